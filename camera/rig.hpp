@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "camera/pinhole.hpp"
+
+namespace twofold {
+
+enum class SensorKind : std::uint8_t { kMono, kStereo, kRgbd };
+
+/// Rectified camera rig: the left (or only) camera and, for stereo and RGB-D, a right camera shifted by `baseline`.
+///
+/// A measurement is z = (u_l, v_l, u_r)  (thesis eq. 3.8). RGB-D depth becomes a virtual u_r = u_l - f b / depth
+/// (6.5.3). Without right-image information u_r is NaN (kNoRight) and the measurement has two components.
+struct Rig {
+  SensorKind kind = SensorKind::kStereo;
+  PinholeCamera camera;        ///< both cameras of a rectified pair
+  double baseline = 0;         ///< [m] > 0 for stereo and RGB-D
+  double depth_unit = 0.001;   ///< RGB-D: metres per unit of the 16-bit depth image
+  double depth_min = 0.3;      ///< RGB-D: nearer readings are holes [m]
+  double depth_max = 8.0;      ///< RGB-D: farther readings are holes [m]
+
+  static constexpr double kNoRight = std::numeric_limits<double>::quiet_NaN();
+
+  /// Stereo measurement of a point in the left camera's frame [m]; x_c.z() must be positive  (eq. 3.8).
+  [[nodiscard]] Vector3 project(const Vector3& x_c) const {
+    const double inv_z = 1.0 / x_c.z();
+    return {camera.fx * x_c.x() * inv_z + camera.cx, camera.fy * x_c.y() * inv_z + camera.cy,
+            camera.fx * (x_c.x() - baseline) * inv_z + camera.cx};
+  }
+  /// d project / d x_c  (B.1).
+  [[nodiscard]] Matrix3 project_jacobian(const Vector3& x_c) const {
+    const double inv_z = 1.0 / x_c.z();
+    const double inv_z2 = inv_z * inv_z;
+    Matrix3 J;
+    J << camera.fx * inv_z, 0, -camera.fx * x_c.x() * inv_z2,  //
+        0, camera.fy * inv_z, -camera.fy * x_c.y() * inv_z2,   //
+        camera.fx * inv_z, 0, -camera.fx * (x_c.x() - baseline) * inv_z2;
+    return J;
+  }
+  /// depth = f b / disparity (eq. 3.9, whose print has the fraction upside down); disparity must be positive.
+  [[nodiscard]] double depth_from_disparity(double disparity) const { return camera.fx * baseline / disparity; }
+  [[nodiscard]] double disparity_from_depth(double depth) const { return camera.fx * baseline / depth; }
+  /// Point in the left camera's frame; z.x() - z.z() must be positive  (eq. 3.9).
+  [[nodiscard]] Vector3 unproject(const Vector3& z) const {
+    return camera.unproject(z.head<2>()) * depth_from_disparity(z.x() - z.z());
+  }
+};
+
+}  // namespace twofold

@@ -1,0 +1,41 @@
+# twofold::options carries what every target is compiled with. Levels and sanitizers come from the presets.
+set(TWOFOLD_ARCH "x86-64-v3" CACHE STRING "Value of -march= ; the program checks it at start")
+set(TWOFOLD_SANITIZE "" CACHE STRING "Comma separated list for -fsanitize=")
+option(TWOFOLD_WERROR "Treat warnings as errors" OFF)
+
+add_library(twofold_options INTERFACE)
+add_library(twofold::options ALIAS twofold_options)
+target_compile_features(twofold_options INTERFACE cxx_std_20)
+target_include_directories(twofold_options INTERFACE ${PROJECT_SOURCE_DIR})
+
+target_compile_options(twofold_options INTERFACE
+  -march=${TWOFOLD_ARCH} -Wall -Wextra -Wno-array-bounds -Wshadow -Wnon-virtual-dtor)
+# Eigen's alignment decides the layout of public types: fixed here, so that it does not follow -march.
+target_compile_definitions(twofold_options INTERFACE EIGEN_MAX_ALIGN_BYTES=32 TWOFOLD_ARCH="${TWOFOLD_ARCH}")
+if(TWOFOLD_WERROR)
+  target_compile_options(twofold_options INTERFACE -Werror)
+endif()
+if(TWOFOLD_SANITIZE)
+  target_compile_options(twofold_options INTERFACE -fsanitize=${TWOFOLD_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(twofold_options INTERFACE -fsanitize=${TWOFOLD_SANITIZE})
+endif()
+
+# twofold_library(name SOURCES ... PUBLIC ... PRIVATE ...): one static library a folder, alias twofold::name.
+function(twofold_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(twofold_${name} STATIC ${ARG_SOURCES})
+  add_library(twofold::${name} ALIAS twofold_${name})
+  target_link_libraries(twofold_${name} PUBLIC twofold::options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+endfunction()
+
+# twofold_test(name SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case.
+function(twofold_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE twofold::options ${ARG_LIBS} GTest::gtest GTest::gtest_main)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+endfunction()
