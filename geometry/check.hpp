@@ -5,7 +5,8 @@
 
 namespace twofold {
 
-[[noreturn]] inline void check_failed(const char* condition, const char* context, const char* file, int line) {
+[[noreturn]] inline void check_failed(const char* condition, const char* context, const char* file,
+                                      int line) {
   std::fprintf(stderr, "%s:%d: check failed: %s (%s)\n", file, line, condition, context);
   std::abort();
 }

@@ -12,7 +12,9 @@ namespace twofold {
 }
 
 /// Inverse of Pi; x.z() must not be zero. Pi is its own inverse as a formula.
-[[nodiscard]] inline Vector3 to_inverse_depth(const Vector3& x) { return Vector3(x.x(), x.y(), 1.0) / x.z(); }
+[[nodiscard]] inline Vector3 to_inverse_depth(const Vector3& x) {
+  return Vector3(x.x(), x.y(), 1.0) / x.z();
+}
 
 /// Derivative of y = R_c_a * Pi(psi) + t_c_a by psi, q = psi.z():
 /// [R e1, R e2, -R Pi(psi)] / q  (thesis B.3).

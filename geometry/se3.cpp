@@ -4,7 +4,8 @@
 
 namespace twofold {
 namespace {
-// Where the closed forms of the coefficients lose digits to cancellation, their Taylor series have full accuracy.
+// Where the closed forms of the coefficients lose digits to cancellation, their Taylor series have full
+// accuracy.
 constexpr double kSmallAngle = 1e-2;
 }  // namespace
 

@@ -15,7 +15,8 @@ namespace twofold {
 
 /// Rotation in three dimensions, stored as a unit quaternion.
 ///
-/// Perturbations act on the left: R <- exp(w) * R, w in radians. All maps are accurate for angles near 0 and near pi.
+/// Perturbations act on the left: R <- exp(w) * R, w in radians. All maps are accurate for angles near 0 and
+/// near pi.
 class SO3 {
  public:
   static constexpr int kDof = 3;

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <span>
+
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+
+namespace twofold {
+
+/// A point known in a reference frame and its measurement in the frame whose pose is sought.
+struct MotionObservation {
+  Vector3 x_ref{0, 0, 1};                ///< point in the reference frame [m]
+  Eigen::Vector3f z{0, 0, 0};            ///< (u_l, v_l, u_r) [px]
+  Eigen::Vector3f information{1, 1, 1};  ///< diagonal [1/px^2]; third entry 0: no right image
+  bool inlier = true;                    ///< set by the solver: chi2 below the threshold at the result
+};
+
+struct MotionOnlyOptions {
+  int max_iterations = 10;
+  double huber_px = 1.5;              ///< on the whitened residual norm
+  double inlier_chi2_mono = 5.991;    ///< 95 % of chi-square with 2 degrees of freedom
+  double inlier_chi2_stereo = 7.815;  ///< 95 % of chi-square with 3 degrees of freedom
+  int rounds = 2;           ///< outliers are put aside after each round and judged again in the next
+  double stop_step = 1e-7;  ///< stop when the step is smaller (norm of the tangent vector)
+};
+
+struct MotionOnlyResult {
+  SE3 T_c_ref;
+  Matrix6 information = Matrix6::Zero();  ///< J^T W J at the result over the inliers (left perturbation);
+                                          ///< invert for the covariance
+  double chi2 = 0;                        ///< robustified, over inliers
+  int inliers = 0;
+  bool converged = false;
+};
+
+/// Motion-only bundle adjustment: pose of one frame from matched points  (thesis eq. 3.34 / 4.15), robust.
+/// No allocation; at most rounds * max_iterations passes over the observations. Fewer than three usable
+/// observations, or a singular system: converged is false and T_c_ref is the start value.
+[[nodiscard]] MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> observations,
+                                               const SE3& T_c_ref_start, const MotionOnlyOptions& options);
+
+}  // namespace twofold

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+
+namespace twofold {
+
+/// Double-window problem, eq. 6.4:
+///   chi2 = sum rho(|z_ik - z(T_i T_a(k)^-1 Pi(psi_k))|^2)  +  sum v_ji^T Lambda_ji v_ji,
+///   v_ji = log(T_ji T_i T_j^-1).
+/// Poses T_i map world points into camera i; points are anchored inverse depth points. Indices are positions
+/// in the vectors below. With no pose-pose constraints this is bundle adjustment; with no points a pose
+/// graph.
+struct WindowProblem {
+  struct Pose {
+    SE3 T_k_w;
+    bool fixed = false;  ///< held during optimisation (fixed-rim experiments, structure-only problems)
+  };
+  /// One measurement of a point; those of one point stand together.
+  struct Observation {
+    int pose = 0;
+    Eigen::Vector3f z{0, 0, 0};  ///< (u_l, v_l, u_r) [px]; u_r is ignored where its information is 0
+    Eigen::Vector3f information{1, 1, 1};  ///< diagonal of Lambda_z [1/px^2]; third entry 0: no right image
+  };
+  struct Point {
+    int anchor = 0;  ///< pose index of a(k)
+    Vector3 psi{0, 0, 1};
+    int first_observation = 0;
+    int observation_count = 0;
+  };
+  struct PoseConstraint {
+    int i = 0;
+    int j = 0;
+    SE3 T_j_i;
+    Matrix6 information = Matrix6::Identity();  ///< of v_ji, tangent order (v, omega)
+  };
+
+  Rig rig;
+  std::vector<Pose> poses;
+  std::vector<Point> points;
+  std::vector<Observation> observations;
+  std::vector<PoseConstraint> constraints;
+};
+
+struct WindowSolverOptions {
+  int max_iterations = 3;           ///< Levenberg-Marquardt steps, accepted or not
+  double initial_damping = 1e-4;    ///< relative to the mean diagonal; also holds the gauge (thesis 6.2.3)
+  double huber_px = 2.0;            ///< kernel on the whitened reprojection error norm; <= 0: none
+  double constraint_huber = 0;      ///< kernel on sqrt(v^T Lambda v); <= 0: none
+  double relative_decrease = 1e-6;  ///< stop when a step lowers the cost by less than this share
+};
+
+struct SolverSummary {
+  enum class Termination { kConverged, kIterationLimit, kNoStepFound, kEmptyProblem };
+  double initial_cost = 0;  ///< robustified chi2
+  double final_cost = 0;
+  int iterations = 0;
+  int accepted_steps = 0;
+  Termination termination = Termination::kEmptyProblem;
+};
+
+/// Whitened squared error of one observation at the problem's present values; infinity behind the camera.
+[[nodiscard]] double observation_chi2(const WindowProblem& problem, const WindowProblem::Point& point,
+                                      const WindowProblem::Observation& observation);
+
+}  // namespace twofold

@@ -1,0 +1,142 @@
+#include "graph/graph_writer.hpp"
+
+#include <algorithm>
+
+#include "geometry/check.hpp"
+
+namespace twofold {
+namespace {
+
+bool by_point(const Observation& a, const Observation& b) {
+  return a.point < b.point;
+}
+
+Edge reversed(KeyframeId id, const Edge& edge) {
+  Edge back = edge;
+  back.other = id;
+  back.T_other_this = edge.T_other_this.inverse();
+  return back;
+}
+
+}  // namespace
+
+GraphSnapshot GraphWriter::publish() {
+  GraphSnapshot sealed = graph_;
+  ++graph_.version_;
+  return sealed;
+}
+
+void GraphWriter::add_keyframe(Keyframe keyframe) {
+  TWOFOLD_CHECK(index(keyframe.id) == graph_.keyframe_count(), "keyframe ids are dense");
+  if (!keyframe.observations) keyframe.observations = std::make_shared<const ObservationList>();
+  if (!keyframe.edges) keyframe.edges = std::make_shared<const EdgeList>();
+  graph_.keyframes_.push_back(std::move(keyframe));
+}
+
+void GraphWriter::add_point(PointId id, MapPoint point) {
+  TWOFOLD_CHECK(index(id) >= graph_.point_count(), "a point is added once, in order of ids");
+  while (graph_.point_count() < index(id)) graph_.points_.push_back({});
+  if (!point.observers) point.observers = std::make_shared<const ObserverList>();
+  graph_.points_.push_back(std::move(point));
+}
+
+void GraphWriter::set_anchor(PointId id, KeyframeId anchor, const Vector3& psi) {
+  MapPoint& point = graph_.points_.mutate(index(id));
+  point.anchor = anchor;
+  point.psi = psi;
+}
+
+void GraphWriter::add_observations(KeyframeId id, std::span<const Observation> observations) {
+  ObservationList added(observations.begin(), observations.end());
+  std::sort(added.begin(), added.end(), by_point);
+  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
+  auto merged = std::make_shared<ObservationList>();
+  merged->reserve(keyframe.observations->size() + added.size());
+  // set_union takes equal elements from its first range: new measurements replace old ones.
+  std::set_union(added.begin(), added.end(), keyframe.observations->begin(), keyframe.observations->end(),
+                 std::back_inserter(*merged), by_point);
+  keyframe.observations = std::move(merged);
+  for (const Observation& observation : added) {
+    MapPoint& point = graph_.points_.mutate(index(observation.point));
+    const ObserverList& old = *point.observers;
+    const auto at = std::lower_bound(old.begin(), old.end(), id);
+    if (at != old.end() && *at == id) continue;
+    auto observers = std::make_shared<ObserverList>();
+    observers->reserve(old.size() + 1);
+    observers->assign(old.begin(), at);
+    observers->push_back(id);
+    observers->insert(observers->end(), at, old.end());
+    point.observers = std::move(observers);
+  }
+}
+
+void GraphWriter::remove_observations(KeyframeId id, std::span<const PointId> points) {
+  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
+  auto kept = std::make_shared<ObservationList>();
+  kept->reserve(keyframe.observations->size());
+  for (const Observation& observation : *keyframe.observations) {
+    if (std::binary_search(points.begin(), points.end(), observation.point)) {
+      remove_observer(observation.point, id);
+    } else {
+      kept->push_back(observation);
+    }
+  }
+  keyframe.observations = std::move(kept);
+}
+
+void GraphWriter::remove_observer(PointId point_id, KeyframeId keyframe) {
+  MapPoint& point = graph_.points_.mutate(index(point_id));
+  auto kept = std::make_shared<ObserverList>(*point.observers);
+  std::erase(*kept, keyframe);
+  point.observers = std::move(kept);
+}
+
+void GraphWriter::put_edge(KeyframeId id, const Edge& edge) {
+  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
+  auto edges = std::make_shared<EdgeList>(*keyframe.edges);
+  const auto at = std::lower_bound(edges->begin(), edges->end(), edge.other,
+                                   [](const Edge& e, KeyframeId other) { return e.other < other; });
+  if (at != edges->end() && at->other == edge.other) {
+    *at = edge;
+  } else {
+    edges->insert(at, edge);
+  }
+  keyframe.edges = std::move(edges);
+}
+
+void GraphWriter::set_edge(KeyframeId id, const Edge& edge) {
+  TWOFOLD_CHECK(edge.other != id, "an edge joins two keyframes");
+  put_edge(id, edge);
+  put_edge(edge.other, reversed(id, edge));
+}
+
+void GraphWriter::remove_edge(KeyframeId id, KeyframeId other) {
+  for (const auto& [from, to] : {std::pair(id, other), std::pair(other, id)}) {
+    Keyframe& keyframe = graph_.keyframes_.mutate(index(from));
+    auto edges = std::make_shared<EdgeList>(*keyframe.edges);
+    std::erase_if(*edges, [&, target = to](const Edge& edge) { return edge.other == target; });
+    keyframe.edges = std::move(edges);
+  }
+}
+
+void GraphWriter::cull_point(PointId id) {
+  const ObserverList observers = *graph_.point(id).observers;
+  for (const KeyframeId keyframe : observers) remove_observations(keyframe, std::span(&id, 1));
+  graph_.points_.mutate(index(id)) = MapPoint{};
+}
+
+void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
+  TWOFOLD_CHECK(!graph_.keyframe(heir).culled() && heir != id, "an heir must stay in the map");
+  const SE3 T_this_heir = graph_.keyframe(id).T_k_w * graph_.keyframe(heir).T_k_w.inverse();
+  std::vector<PointId> points;
+  for (const Observation& observation : *graph_.keyframe(id).observations)
+    points.push_back(observation.point);
+  remove_observations(id, points);
+  const EdgeList edges = *graph_.keyframe(id).edges;
+  for (const Edge& edge : edges) remove_edge(id, edge.other);
+  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
+  keyframe.heir = heir;
+  keyframe.T_this_heir = T_this_heir;
+}
+
+}  // namespace twofold

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <span>
+
+#include "graph/snapshot.hpp"
+
+namespace twofold {
+
+/// The one place where the SLAM graph changes. Owned by the mapper; single-threaded.
+///
+/// Works on a private version. publish() seals it as a snapshot in O(1); later changes copy only the chunks
+/// they touch.
+class GraphWriter {
+ public:
+  /// The private version as it stands, with the version number it will be published under.
+  [[nodiscard]] const GraphSnapshot& graph() const { return graph_; }
+  /// Seals the private version and starts the next one.
+  [[nodiscard]] GraphSnapshot publish();
+
+  /// Appends a keyframe; its id must be graph().keyframe_count(). Lists may be null and are then empty.
+  void add_keyframe(Keyframe keyframe);
+  /// Appends a point without observers; ids skipped by the tracker are filled with culled points.
+  void add_point(PointId id, MapPoint point);
+
+  void set_pose(KeyframeId id, const SE3& T_k_w) { graph_.keyframes_.mutate(index(id)).T_k_w = T_k_w; }
+  void set_median_depth(KeyframeId id, double depth) {
+    graph_.keyframes_.mutate(index(id)).median_depth = depth;
+  }
+  void set_inverse_depth(PointId id, const Vector3& psi) { graph_.points_.mutate(index(id)).psi = psi; }
+  void set_appearance(PointId id, std::shared_ptr<const PointAppearance> appearance) {
+    graph_.points_.mutate(index(id)).appearance = std::move(appearance);
+  }
+  void set_reference(KeyframeId id) { graph_.reference_ = id; }
+  /// Moves a point to another anchor that observes it; psi is in the new anchor's frame.
+  void set_anchor(PointId id, KeyframeId anchor, const Vector3& psi);
+
+  /// Adds measurements to a keyframe, or replaces those of the same points, and registers it as their
+  /// observer.
+  void add_observations(KeyframeId id, std::span<const Observation> observations);
+  /// Removes the measurements of the given points (ascending) from a keyframe.
+  void remove_observations(KeyframeId id, std::span<const PointId> points);
+
+  /// Adds the edge to both keyframes or replaces it; `edge` is as seen from `id`.
+  void set_edge(KeyframeId id, const Edge& edge);
+  void remove_edge(KeyframeId id, KeyframeId other);
+
+  /// Removes all measurements of a point and marks it culled.
+  void cull_point(PointId id);
+  /// Removes a keyframe's measurements and edges; its pose stays known relative to `heir`, which must not be
+  /// culled. No point may be anchored in it any more.
+  void cull_keyframe(KeyframeId id, KeyframeId heir);
+
+ private:
+  void remove_observer(PointId point, KeyframeId keyframe);
+  void put_edge(KeyframeId id, const Edge& edge);
+
+  GraphSnapshot graph_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "geometry/se3.hpp"
+#include "graph/ids.hpp"
+
+namespace twofold {
+
+/// Measurement z_ik of point y_k in keyframe V_i  (thesis 6.2.2).
+struct Observation {
+  PointId point = kNoPoint;
+  Eigen::Vector3f z{0, 0, 0};  ///< (u_l, v_l, u_r) level-0 pixels; u_r is NaN without right-image information
+  std::uint8_t level = 0;      ///< pyramid level it was measured on: standard deviation grows with 2^level
+};
+
+/// Relative edge E_ij of the SLAM graph, kept by both its keyframes  (6.2.2).
+struct Edge {
+  KeyframeId other = kNoKeyframe;
+  int weight = 0;             ///< w_ij: points visible in both keyframes
+  bool marginalised = false;  ///< else the relative pose is that of the two absolute poses
+  SE3 T_other_this;           ///< constraint, of use only when marginalised [m]
+  double parallax =
+      0;  ///< |t_other_this| over the mean scene depth; lambda_trans is proportional to it (eq. 6.2)
+};
+
+using ObservationList = std::vector<Observation>;  ///< ascending by point
+using EdgeList = std::vector<Edge>;                ///< ascending by other keyframe
+
+/// Vertex V_i of the SLAM graph. A value: lists are shared between versions and replaced, never changed in
+/// place.
+struct Keyframe {
+  KeyframeId id = kNoKeyframe;
+  std::int64_t frame_index = 0;
+  std::int64_t t_ns = 0;
+  SE3 T_k_w;                ///< absolute pose; accurate relative to its neighbours, not globally (manifold)
+  double median_depth = 0;  ///< of the points it sees [m]
+  std::shared_ptr<const ObservationList> observations;
+  std::shared_ptr<const EdgeList> edges;
+
+  /// A culled keyframe keeps only its pose relative to a keyframe that stayed: T_k_w = T_this_heir *
+  /// T_heir_w.
+  KeyframeId heir = kNoKeyframe;
+  SE3 T_this_heir;
+
+  [[nodiscard]] bool culled() const { return heir != kNoKeyframe; }
+};
+
+}  // namespace twofold

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "geometry/types.hpp"
+#include "graph/ids.hpp"
+#include "imaging/point_appearance.hpp"
+
+namespace twofold {
+
+using ObserverList = std::vector<KeyframeId>;  ///< ascending
+
+/// Anchored inverse depth point  (thesis 6.2.4): Euclidean position in the anchor's frame is Pi(psi).
+struct MapPoint {
+  KeyframeId anchor = kNoKeyframe;  ///< kNoKeyframe: the point was culled
+  Vector3 psi{0, 0, 1};
+  std::shared_ptr<const PointAppearance> appearance;
+  std::shared_ptr<const ObserverList> observers;
+
+  [[nodiscard]] bool alive() const { return anchor != kNoKeyframe; }
+};
+
+}  // namespace twofold

@@ -1,0 +1,45 @@
+#include "graph/snapshot.hpp"
+
+#include <algorithm>
+
+#include "geometry/inverse_depth.hpp"
+
+namespace twofold {
+
+SE3 GraphSnapshot::T_k_w(KeyframeId id) const {
+  SE3 T_k_heir;
+  const Keyframe* keyframe = &this->keyframe(id);
+  while (keyframe->culled()) {
+    T_k_heir = T_k_heir * keyframe->T_this_heir;
+    keyframe = &this->keyframe(keyframe->heir);
+  }
+  return T_k_heir * keyframe->T_k_w;
+}
+
+Vector3 GraphSnapshot::position(PointId id) const {
+  const MapPoint& point = this->point(id);
+  return T_k_w(point.anchor).inverse() * from_inverse_depth(point.psi);
+}
+
+const Observation* find_observation(const Keyframe& keyframe, PointId point) {
+  if (!keyframe.observations) return nullptr;
+  const ObservationList& list = *keyframe.observations;
+  const auto it = std::lower_bound(list.begin(), list.end(), point,
+                                   [](const Observation& o, PointId p) { return o.point < p; });
+  return it != list.end() && it->point == point ? &*it : nullptr;
+}
+
+const Edge* find_edge(const Keyframe& keyframe, KeyframeId other) {
+  if (!keyframe.edges) return nullptr;
+  const EdgeList& list = *keyframe.edges;
+  const auto it = std::lower_bound(list.begin(), list.end(), other,
+                                   [](const Edge& e, KeyframeId k) { return e.other < k; });
+  return it != list.end() && it->other == other ? &*it : nullptr;
+}
+
+SE3 relative_pose(const GraphSnapshot& graph, KeyframeId from, const Edge& edge) {
+  if (edge.marginalised) return edge.T_other_this;
+  return graph.keyframe(edge.other).T_k_w * graph.keyframe(from).T_k_w.inverse();
+}
+
+}  // namespace twofold

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+
+#include "graph/keyframe.hpp"
+#include "graph/map_point.hpp"
+#include "graph/persistent_vector.hpp"
+
+namespace twofold {
+
+/// One immutable version of the SLAM graph. Copying it is O(1); versions share what did not change.
+class GraphSnapshot {
+ public:
+  GraphSnapshot() = default;
+
+  [[nodiscard]] std::uint64_t version() const { return version_; }
+  [[nodiscard]] std::size_t keyframe_count() const { return keyframes_.size(); }
+  [[nodiscard]] std::size_t point_count() const { return points_.size(); }
+  [[nodiscard]] bool contains(KeyframeId id) const { return index(id) < keyframes_.size(); }
+  [[nodiscard]] bool contains(PointId id) const { return index(id) < points_.size(); }
+  [[nodiscard]] const Keyframe& keyframe(KeyframeId id) const { return keyframes_[index(id)]; }
+  [[nodiscard]] const MapPoint& point(PointId id) const { return points_[index(id)]; }
+  /// V_ref, the current centre of interest  (6.2.2); kNoKeyframe in an empty graph.
+  [[nodiscard]] KeyframeId reference() const { return reference_; }
+
+  /// Pose of any keyframe, also of a culled one through its heirs.
+  [[nodiscard]] SE3 T_k_w(KeyframeId id) const;
+  /// Position of a point that is alive, in the world frame [m].
+  [[nodiscard]] Vector3 position(PointId id) const;
+
+ private:
+  friend class GraphWriter;
+
+  std::uint64_t version_ = 0;
+  KeyframeId reference_ = kNoKeyframe;
+  PersistentVector<Keyframe> keyframes_;
+  PersistentVector<MapPoint> points_;
+};
+
+/// Binary search in keyframe.observations; nullptr if the keyframe does not observe the point.
+[[nodiscard]] const Observation* find_observation(const Keyframe& keyframe, PointId point);
+/// Binary search in keyframe.edges; nullptr if there is no such edge.
+[[nodiscard]] const Edge* find_edge(const Keyframe& keyframe, KeyframeId other);
+
+/// T_to_from along edge (from, to): the stored constraint if it is marginalised, else from the absolute
+/// poses.
+[[nodiscard]] SE3 relative_pose(const GraphSnapshot& graph, KeyframeId from, const Edge& edge);
+
+}  // namespace twofold
