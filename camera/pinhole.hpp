@@ -33,9 +33,11 @@ struct PinholeCamera {
   }
   /// uv at least `border` pixels away from the image's edge.
   [[nodiscard]] bool contains(const Vector2& uv, double border = 0) const {
-    return uv.x() >= border && uv.y() >= border && uv.x() <= width - 1 - border && uv.y() <= height - 1 - border;
+    return uv.x() >= border && uv.y() >= border && uv.x() <= width - 1 - border &&
+           uv.y() <= height - 1 - border;
   }
-  /// Camera of pyramid level `level`: level pixel p covers level-0 pixels (p + 0.5) 2^level - 0.5 around its centre.
+  /// Camera of pyramid level `level`: level pixel p covers level-0 pixels (p + 0.5) 2^level - 0.5 around its
+  /// centre.
   [[nodiscard]] PinholeCamera at_level(int level) const;
 };
 

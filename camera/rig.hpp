@@ -9,17 +9,19 @@ namespace twofold {
 
 enum class SensorKind : std::uint8_t { kMono, kStereo, kRgbd };
 
-/// Rectified camera rig: the left (or only) camera and, for stereo and RGB-D, a right camera shifted by `baseline`.
+/// Rectified camera rig: the left (or only) camera and, for stereo and RGB-D, a right camera shifted by
+/// `baseline`.
 ///
-/// A measurement is z = (u_l, v_l, u_r)  (thesis eq. 3.8). RGB-D depth becomes a virtual u_r = u_l - f b / depth
-/// (6.5.3). Without right-image information u_r is NaN (kNoRight) and the measurement has two components.
+/// A measurement is z = (u_l, v_l, u_r)  (thesis eq. 3.8). RGB-D depth becomes a virtual u_r = u_l - f b /
+/// depth (6.5.3). Without right-image information u_r is NaN (kNoRight) and the measurement has two
+/// components.
 struct Rig {
   SensorKind kind = SensorKind::kStereo;
-  PinholeCamera camera;        ///< both cameras of a rectified pair
-  double baseline = 0;         ///< [m] > 0 for stereo and RGB-D
-  double depth_unit = 0.001;   ///< RGB-D: metres per unit of the 16-bit depth image
-  double depth_min = 0.3;      ///< RGB-D: nearer readings are holes [m]
-  double depth_max = 8.0;      ///< RGB-D: farther readings are holes [m]
+  PinholeCamera camera;       ///< both cameras of a rectified pair
+  double baseline = 0;        ///< [m] > 0 for stereo and RGB-D
+  double depth_unit = 0.001;  ///< RGB-D: metres per unit of the 16-bit depth image
+  double depth_min = 0.3;     ///< RGB-D: nearer readings are holes [m]
+  double depth_max = 8.0;     ///< RGB-D: farther readings are holes [m]
 
   static constexpr double kNoRight = std::numeric_limits<double>::quiet_NaN();
 
@@ -40,7 +42,9 @@ struct Rig {
     return J;
   }
   /// depth = f b / disparity (eq. 3.9, whose print has the fraction upside down); disparity must be positive.
-  [[nodiscard]] double depth_from_disparity(double disparity) const { return camera.fx * baseline / disparity; }
+  [[nodiscard]] double depth_from_disparity(double disparity) const {
+    return camera.fx * baseline / disparity;
+  }
   [[nodiscard]] double disparity_from_depth(double depth) const { return camera.fx * baseline / depth; }
   /// Point in the left camera's frame; z.x() - z.z() must be positive  (eq. 3.9).
   [[nodiscard]] Vector3 unproject(const Vector3& z) const {
