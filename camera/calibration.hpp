@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+
+#include "camera/camera_model.hpp"
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+
+namespace twofold {
+
+/// What a calibration file says about a sensor, before rectification. `Rectifier` turns it into a Rig.
+struct Calibration {
+  SensorKind kind = SensorKind::kStereo;
+  CameraModel left;   ///< left or only camera
+  CameraModel right;  ///< stereo only
+  /// Stereo only: pose of the left camera in the right one [m]. A rectified pair with baseline b has (I, (-b,
+  /// 0, 0)).
+  SE3 T_right_left;
+  /// Images are undistorted and, for stereo, row-aligned already: both cameras must be equal pinholes without
+  /// distortion and T_right_left a pure shift along -x.
+  bool already_rectified = false;
+  double fps = 0;  ///< nominal frame rate [Hz]; 0 = unknown
+
+  double depth_unit = 0.001;       ///< RGB-D: metres per unit of the 16-bit depth image, > 0
+  double depth_min = 0.3;          ///< RGB-D: nearer readings are holes [m]
+  double depth_max = 8.0;          ///< RGB-D: farther readings are holes [m]
+  double virtual_baseline = 0.08;  ///< RGB-D: baseline of the virtual right camera (thesis 6.5.3) [m], > 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+}  // namespace twofold

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "camera/distortion.hpp"
+#include "camera/pinhole.hpp"
+
+namespace twofold {
+
+/// Camera as the maker delivers it: lens distortion on the plane z = 1, then a pinhole camera.
+struct CameraModel {
+  PinholeCamera pinhole;  ///< intrinsics and size of the raw image
+  Distortion distortion;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+
+  /// Raw pixel of a point in the camera frame [m]; x_c.z() must be positive.
+  /// @param J  if not null, d project / d x_c
+  [[nodiscard]] Vector2 project(const Vector3& x_c, Matrix23* J = nullptr) const;
+  /// Point at depth 1 of the ray seen by raw pixel uv; nullopt where the distortion has no inverse.
+  [[nodiscard]] std::optional<Vector3> unproject(const Vector2& uv) const;
+};
+
+}  // namespace twofold
