@@ -12,6 +12,9 @@ namespace twofold {
 /// they touch.
 class GraphWriter {
  public:
+  /// An empty graph; its first published version has number 1.
+  GraphWriter() { graph_.version_ = 1; }
+
   /// The private version as it stands, with the version number it will be published under.
   [[nodiscard]] const GraphSnapshot& graph() const { return graph_; }
   /// Seals the private version and starts the next one.
