@@ -5,27 +5,29 @@
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 #include "imaging/image_pyramid.hpp"
+#include "imaging/patch.hpp"
 #include "imaging/point_appearance.hpp"
 
 namespace twofold {
 
 struct GuidedSearchOptions {
-  double radius_px = 3;  ///< search radius around the prediction, in pixels of the searched level
-  double max_mean_difference =
-      18;  ///< after removing mean brightness: mean absolute grey difference of a match, > 0
-  int refine_iterations = 10;  ///< upper bound of sub-pixel Lucas-Kanade steps
-  double right_search_px = 8;  ///< stereo: half range along the row around the predicted u_r, level pixels
+  double radius_px = 3;        ///< search radius around the prediction, in pixels of the searched level
+  float max_rms = 14;          ///< of a match, gain and offset removed [grey]
+  float max_rms_share = 0.6F;  ///< ... and as a share of the patch's own standard deviation, beyond `noise`
+  float noise = 3;             ///< grey levels two views of the same surface differ by anyway
+  int refine_iterations = 12;  ///< upper bound of sub-pixel Lucas-Kanade steps
+  double right_search_px = 6;  ///< stereo: half range along the row around the predicted u_r, level pixels
 };
 
 struct PointMatch {
-  Vector3 z;     ///< (u_l, v_l, u_r) level-0 pixels; u_r is Rig::kNoRight if it was not found
-  int level;     ///< pyramid level of the match: its standard deviation is about sigma_0 * 2^level
-  double score;  ///< mean absolute grey difference of the match, brightness removed
+  Vector3 z{0, 0, 0};  ///< (u_l, v_l, u_r) level-0 pixels; u_r is Rig::kNoRight if it was not found
+  int level = 0;       ///< pyramid level of the match: its standard deviation is about sigma_0 * 2^level
+  float rms = 0;       ///< remaining difference [grey]
 };
 
-/// Looks for a known point in a new view: warps its patch to the view, compares it within a small radius (at
-/// corners or everywhere), refines to sub-pixel, and finds it in the right image along the row (or reads the
-/// depth image). Thesis 3.4.2 and 6.3. No allocation, bounded work.
+/// Looks for a known point in a new view: warps its patch to the view, compares it at every pixel within a
+/// small radius, refines to sub-pixel, and finds it in the right image along the row (or reads the depth
+/// image). Thesis 3.4.2 and 6.3. No allocation, bounded work.
 ///
 /// @param psi    inverse depth coordinates of the point in its anchor frame
 /// @param T_c_a  pose of the view relative to the anchor: x_c = T_c_a x_a  [m]
@@ -33,5 +35,20 @@ struct PointMatch {
 [[nodiscard]] std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
                                                    const PointAppearance& appearance, const Vector3& psi,
                                                    const SE3& T_c_a, const GuidedSearchOptions& options);
+
+/// Right coordinate that a depth image gives a left pixel: median of the valid readings of the 3x3 pixels
+/// around it, as u_r = u_l - f b / depth  (thesis 6.5.3). NaN at holes and where the readings jump (depth
+/// edges).
+[[nodiscard]] double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v);
+
+/// Right coordinate of a left pixel whose depth is unknown: searches the row over the whole range of
+/// disparities, refuses ambiguous and one-way matches (left-right check), refines to sub-pixel. NaN when
+/// there is none.
+/// @param u, v  whole pixels of `level`
+[[nodiscard]] double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, int level,
+                                    const GuidedSearchOptions& options);
+
+/// Diagonal of Lambda_z of a measurement taken on `level` [1/px^2]; third entry 0 without right coordinate.
+[[nodiscard]] Eigen::Vector3f measurement_information(const Rig& rig, int level, bool has_right);
 
 }  // namespace twofold

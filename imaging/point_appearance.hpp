@@ -11,13 +11,13 @@ namespace twofold {
 struct PointAppearance {
   static constexpr int kSize =
       16;  ///< wide enough to warp an 8x8 patch with a scale of up to 1.4 and any rotation
+  static constexpr int kCentre = 8;  ///< row and column of the corner itself
 
-  /// Row-major; pixels[r][c] is sampled at uv_level + (c - (kSize - 1) / 2, r - (kSize - 1) / 2)  (half-pixel
-  /// centre).
+  /// Row-major, unfiltered: pixels[r][c] is the pixel of `level` at (c - kCentre, r - kCentre) from the
+  /// corner.
   std::array<std::uint8_t, kSize * kSize> pixels{};
-  Eigen::Vector2f uv{
-      0, 0};  ///< level-0 pixel in the anchor keyframe; psi.head<2>() up to the back-end's refinement
-  std::uint8_t level = 0;  ///< pyramid level the pixels come from
+  Eigen::Vector2f uv{0, 0};  ///< corner in level-0 pixels of the anchor keyframe; a whole pixel of `level`
+  std::uint8_t level = 0;    ///< pyramid level the pixels come from
 };
 
 }  // namespace twofold

@@ -1,0 +1,176 @@
+#include "imaging/guided_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace twofold {
+namespace {
+
+// Standard deviation of a sub-pixel match on level 0 [px], as found on rendered views with sensor noise.
+constexpr float kSigmaPx = 0.5F;
+// The same of the virtual right coordinate of a structured light camera, whose error is constant in
+// disparity.
+constexpr float kDepthSigmaPx = 0.7F;
+constexpr int kMargin = Patch::kSize;  // whole patches, and room for the sub-pixel search around them
+
+Eigen::Vector2f to_level(const Vector2& uv, int level) {
+  const double s = std::ldexp(1.0, -level);
+  return ((uv.array() + 0.5) * s - 0.5).matrix().cast<float>();
+}
+
+double from_level(double p, int level) {
+  return (p + 0.5) * std::ldexp(1.0, level) - 0.5;
+}
+
+bool good_match(const Patch& patch, float rms, const GuidedSearchOptions& options) {
+  return rms <= options.max_rms && rms <= options.max_rms_share * patch.deviation + options.noise;
+}
+
+/// Best whole pixel within the radius; nothing when the window leaves the image.
+std::optional<Eigen::Vector2f> search_disc(const Patch& patch, const cv::Mat& image,
+                                           const Eigen::Vector2f& centre, double radius) {
+  const int u0 = static_cast<int>(std::lround(centre.x()));
+  const int v0 = static_cast<int>(std::lround(centre.y()));
+  const int r = static_cast<int>(std::ceil(radius));
+  if (u0 - r < kMargin || v0 - r < kMargin || u0 + r >= image.cols - kMargin ||
+      v0 + r >= image.rows - kMargin) {
+    return std::nullopt;
+  }
+  int best = std::numeric_limits<int>::max();
+  Eigen::Vector2f best_uv = centre;
+  for (int dv = -r; dv <= r; ++dv) {
+    for (int du = -r; du <= r; ++du) {
+      if (du * du + dv * dv > radius * radius + 0.5) continue;
+      const int ssd = zero_mean_ssd(patch, image, u0 + du, v0 + dv);
+      if (ssd < best) {
+        best = ssd;
+        best_uv = {static_cast<float>(u0 + du), static_cast<float>(v0 + dv)};
+      }
+    }
+  }
+  return best_uv;
+}
+
+double search_right(const Patch& patch, const cv::Mat& right, const Eigen::Vector2f& left_uv,
+                    double predicted_u, int level, const GuidedSearchOptions& options) {
+  const int v = static_cast<int>(std::lround(left_uv.y()));
+  const int centre = static_cast<int>(std::lround(predicted_u));
+  const int r = static_cast<int>(options.right_search_px);
+  const int first = std::max(centre - r, kMargin);
+  const int last =
+      std::min({centre + r, static_cast<int>(std::lround(left_uv.x())) + 1, right.cols - 1 - kMargin});
+  if (first > last || v < kMargin || v >= right.rows - kMargin) return Rig::kNoRight;
+  int best = std::numeric_limits<int>::max();
+  int best_u = first;
+  for (int u = first; u <= last; ++u) {
+    const int ssd = zero_mean_ssd(patch, right, u, v);
+    if (ssd < best) {
+      best = ssd;
+      best_u = u;
+    }
+  }
+  const auto aligned =
+      align_patch_in_row(patch, right, {static_cast<float>(best_u), left_uv.y()}, options.refine_iterations);
+  if (!aligned || !good_match(patch, aligned->rms, options)) return Rig::kNoRight;
+  const double u_r = from_level(aligned->uv.x(), level);
+  return u_r < from_level(left_uv.x(), level) ? u_r : Rig::kNoRight;
+}
+
+}  // namespace
+
+std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
+                                     const PointAppearance& appearance, const Vector3& psi, const SE3& T_c_a,
+                                     const GuidedSearchOptions& options) {
+  const auto warp = predict_warp(rig.camera, psi, T_c_a);
+  if (!warp || !rig.camera.contains(warp->uv)) return std::nullopt;
+  const auto level = search_level(warp->A_c_a, appearance.level);
+  if (!level) return std::nullopt;
+  Patch patch;
+  warp_patch(appearance, warp->A_c_a, *level, patch);
+  const cv::Mat& image = images.left.level(*level);
+  const auto found = search_disc(patch, image, to_level(warp->uv, *level), options.radius_px);
+  if (!found) return std::nullopt;
+  const auto aligned = align_patch(patch, image, *found, options.refine_iterations);
+  if (!aligned || !good_match(patch, aligned->rms, options)) return std::nullopt;
+
+  PointMatch match;
+  match.level = *level;
+  match.rms = aligned->rms;
+  match.z = {from_level(aligned->uv.x(), *level), from_level(aligned->uv.y(), *level), Rig::kNoRight};
+  if (rig.kind == SensorKind::kStereo && !images.right.empty()) {
+    const double u_r = match.z.x() - rig.disparity_from_depth(warp->depth);
+    const double predicted = (u_r + 0.5) * std::ldexp(1.0, -*level) - 0.5;
+    match.z.z() = search_right(patch, images.right.level(*level), aligned->uv, predicted, *level, options);
+  } else if (rig.kind == SensorKind::kRgbd && !images.depth.empty()) {
+    match.z.z() = right_from_depth(images.depth, rig, match.z.x(), match.z.y());
+  }
+  return match;
+}
+
+double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v) {
+  const int u0 = static_cast<int>(std::lround(u));
+  const int v0 = static_cast<int>(std::lround(v));
+  if (u0 < 1 || v0 < 1 || u0 >= depth.cols - 1 || v0 >= depth.rows - 1) return Rig::kNoRight;
+  std::array<double, 9> readings;
+  std::size_t count = 0;
+  for (int dv = -1; dv <= 1; ++dv) {
+    for (int du = -1; du <= 1; ++du) {
+      const double metres = depth.at<std::uint16_t>(v0 + dv, u0 + du) * rig.depth_unit;
+      if (metres >= rig.depth_min && metres <= rig.depth_max) readings[count++] = metres;
+    }
+  }
+  if (count < 5) return Rig::kNoRight;
+  std::sort(readings.begin(), readings.begin() + static_cast<std::ptrdiff_t>(count));
+  const double near = rig.disparity_from_depth(readings[0]);
+  const double far = rig.disparity_from_depth(readings[count - 1]);
+  constexpr double kDepthEdge = 2.0;  // [px] more than noise and any slanted surface show over three pixels
+  if (near - far > kDepthEdge) return Rig::kNoRight;
+  return u - rig.disparity_from_depth(readings[count / 2]);
+}
+
+double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, int level,
+                      const GuidedSearchOptions& options) {
+  const cv::Mat& left = images.left.level(level);
+  const cv::Mat& right = images.right.level(level);
+  PointAppearance appearance;
+  if (!cut_appearance(left, u, v, level, appearance)) return Rig::kNoRight;
+  Patch patch;
+  warp_patch(appearance, Eigen::Matrix2d::Identity(), level, patch);
+  // Nearer than about a baseline and a half nothing is in both images of a parallel rig.
+  const double nearest = 1.5 * rig.baseline;
+  const int range = static_cast<int>(rig.disparity_from_depth(nearest) * std::ldexp(1.0, -level));
+  const int first = std::max(u - range, kMargin);
+  const int last = std::min(u, right.cols - 1 - kMargin);
+  if (first > last || v < kMargin || v >= right.rows - kMargin) return Rig::kNoRight;
+  int best = std::numeric_limits<int>::max();
+  int best_u = first;
+  for (int r = first; r <= last; ++r) {
+    const int ssd = zero_mean_ssd(patch, right, r, v);
+    if (ssd < best) {
+      best = ssd;
+      best_u = r;
+    }
+  }
+  // Ambiguous: somewhere else, not beside it, it fits nearly as well (repeated texture).
+  for (int r = first; r <= last; ++r) {
+    if (std::abs(r - best_u) > 3 && zero_mean_ssd(patch, right, r, v) * 4 < best * 5) return Rig::kNoRight;
+  }
+  const auto aligned = align_patch_in_row(patch, right, {static_cast<float>(best_u), static_cast<float>(v)},
+                                          options.refine_iterations);
+  if (!aligned || !good_match(patch, aligned->rms, options) || aligned->uv.x() >= static_cast<float>(u)) {
+    return Rig::kNoRight;
+  }
+  return from_level(aligned->uv.x(), level);
+}
+
+Eigen::Vector3f measurement_information(const Rig& rig, int level, bool has_right) {
+  const float sigma = kSigmaPx * std::ldexp(1.0F, level);
+  const float information = 1 / (sigma * sigma);
+  if (!has_right) return {information, information, 0};
+  if (rig.kind != SensorKind::kRgbd) return {information, information, information};
+  return {information, information, 1 / (kDepthSigmaPx * kDepthSigmaPx)};
+}
+
+}  // namespace twofold

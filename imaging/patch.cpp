@@ -1,0 +1,120 @@
+#include "imaging/patch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/inverse_depth.hpp"
+#include "imaging/image_pyramid.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kBordered = Patch::kSize + 2;
+constexpr int kHighestSearchLevel = 3;  // above it patches cover too much of the image to stay planar
+
+float sample_clamped(const PointAppearance& appearance, double u, double v) {
+  constexpr double kLast = PointAppearance::kSize - 1.001;
+  u = std::clamp(u, 0.0, kLast);
+  v = std::clamp(v, 0.0, kLast);
+  const int u0 = static_cast<int>(u);
+  const int v0 = static_cast<int>(v);
+  const auto a = static_cast<float>(u - u0);
+  const auto b = static_cast<float>(v - v0);
+  const std::uint8_t* p = appearance.pixels.data() + v0 * PointAppearance::kSize + u0;
+  const float top = p[0] + a * (p[1] - p[0]);
+  const float bottom =
+      p[PointAppearance::kSize] + a * (p[PointAppearance::kSize + 1] - p[PointAppearance::kSize]);
+  return top + b * (bottom - top);
+}
+
+void finish_patch(const float (&bordered)[kBordered * kBordered], Patch& patch) {
+  float sum = 0;
+  float sum2 = 0;
+  for (int r = 0; r < Patch::kSize; ++r) {
+    for (int c = 0; c < Patch::kSize; ++c) {
+      const float* p = bordered + (r + 1) * kBordered + c + 1;
+      const int i = r * Patch::kSize + c;
+      patch.value[i] = p[0];
+      patch.gradient_u[i] = 0.5F * (p[1] - p[-1]);
+      patch.gradient_v[i] = 0.5F * (p[kBordered] - p[-kBordered]);
+      patch.rounded[i] = static_cast<std::int16_t>(p[0] + 0.5F);
+      sum += p[0];
+      sum2 += p[0] * p[0];
+    }
+  }
+  const float mean = sum / Patch::kArea;
+  patch.deviation = std::sqrt(std::max(0.0F, sum2 / Patch::kArea - mean * mean));
+}
+
+}  // namespace
+
+std::optional<PatchWarp> predict_warp(const PinholeCamera& camera, const Vector3& psi, const SE3& T_c_a) {
+  const Matrix3 R = T_c_a.rotation();
+  const Vector3 x_c = R * from_inverse_depth(psi) + T_c_a.translation();
+  if (!(x_c.z() > 1e-3) || !(psi.z() > 0)) return std::nullopt;
+  PatchWarp warp;
+  // Moving by one pixel in the anchor moves the point by 1 / (f q) in its plane of constant depth.
+  const Matrix23 J = camera.project_jacobian(x_c);
+  warp.A_c_a.col(0) = J * R.col(0) / (camera.fx * psi.z());
+  warp.A_c_a.col(1) = J * R.col(1) / (camera.fy * psi.z());
+  warp.uv = camera.project(x_c);
+  warp.depth = x_c.z();
+  return warp;
+}
+
+std::optional<int> search_level(const Eigen::Matrix2d& A_c_a, int anchor_level) {
+  const double determinant = A_c_a.determinant();
+  if (!(determinant > 1e-4) || determinant > 1e4) return std::nullopt;
+  const double octaves = 0.5 * std::log2(determinant) + anchor_level;
+  const int level = std::clamp(static_cast<int>(std::lround(octaves)), 0, kHighestSearchLevel);
+  if (std::abs(octaves - level) > 1.0) return std::nullopt;
+  return level;
+}
+
+void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a, int level, Patch& patch) {
+  const Eigen::Matrix2d A_a_c = (A_c_a * std::ldexp(1.0, appearance.level - level)).inverse();
+  float bordered[kBordered * kBordered];
+  for (int r = 0; r < kBordered; ++r) {
+    for (int c = 0; c < kBordered; ++c) {
+      const Vector2 offset = A_a_c * Vector2(c - 1 - Patch::kCentre, r - 1 - Patch::kCentre);
+      bordered[r * kBordered + c] = sample_clamped(appearance, PointAppearance::kCentre + offset.x(),
+                                                   PointAppearance::kCentre + offset.y());
+    }
+  }
+  finish_patch(bordered, patch);
+}
+
+bool cut_appearance(const cv::Mat& level_image, int u, int v, int level, PointAppearance& appearance) {
+  const int u0 = u - PointAppearance::kCentre;
+  const int v0 = v - PointAppearance::kCentre;
+  if (u0 < 0 || v0 < 0 || u0 + PointAppearance::kSize > level_image.cols ||
+      v0 + PointAppearance::kSize > level_image.rows) {
+    return false;
+  }
+  for (int r = 0; r < PointAppearance::kSize; ++r) {
+    const std::uint8_t* row = level_image.ptr<std::uint8_t>(v0 + r) + u0;
+    std::copy_n(row, PointAppearance::kSize, appearance.pixels.data() + r * PointAppearance::kSize);
+  }
+  const double scale = std::ldexp(1.0, level);
+  appearance.uv = {static_cast<float>((u + 0.5) * scale - 0.5), static_cast<float>((v + 0.5) * scale - 0.5)};
+  appearance.level = static_cast<std::uint8_t>(level);
+  return true;
+}
+
+int zero_mean_ssd(const Patch& patch, const cv::Mat& image, int u, int v) {
+  int sum = 0;
+  int sum2 = 0;
+  const auto stride = static_cast<std::ptrdiff_t>(image.step);
+  const std::uint8_t* row = image.data + (v - Patch::kCentre) * stride + (u - Patch::kCentre);
+  const std::int16_t* t = patch.rounded;
+  for (int r = 0; r < Patch::kSize; ++r, row += stride, t += Patch::kSize) {
+    for (int c = 0; c < Patch::kSize; ++c) {
+      const int d = row[c] - t[c];
+      sum += d;
+      sum2 += d * d;
+    }
+  }
+  return sum2 - sum * sum / Patch::kArea;
+}
+
+}  // namespace twofold
