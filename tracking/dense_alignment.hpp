@@ -1,0 +1,78 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+#include "imaging/image_pyramid.hpp"
+
+namespace twofold {
+
+struct DenseAlignmentOptions {
+  int coarsest_level = 4;
+  int finest_level = 1;
+  int max_iterations = 8;  ///< per level
+  float huber_grey = 8;    ///< kernel on the grey difference
+  double settled = 1e-4;   ///< stop a level when the step's norm is below (m at unit depth, rad)
+};
+
+/// Where the earlier image is compared: a pixel whose depth is known.
+struct AlignmentPoint {
+  Eigen::Vector2f uv;  ///< level-0 pixel of the earlier image
+  Vector3 x;           ///< the point in the earlier camera's frame [m]
+};
+
+struct DenseAlignmentResult {
+  SE3 T_cur_prev;
+  float gain = 1;  ///< brightness of the later image = gain * earlier + offset
+  float offset = 0;
+  float rms = 0;      ///< robust, on the finest level [grey]
+  float visible = 0;  ///< share of the points inside the later image
+  bool converged = false;
+};
+
+/// Semi-dense 3D Lucas-Kanade: minimises the robust photometric error of 4x4 patches around points of known
+/// depth over the pose between two frames and a common gain and offset, coarse to fine  (thesis eq. 6.7).
+/// Inverse compositional: Jacobians are of the earlier image and are computed once a level.
+///
+/// Buffers are reserved at construction; at most `capacity` points are used.
+class DenseAlignment {
+ public:
+  DenseAlignment(std::size_t capacity, const DenseAlignmentOptions& options);
+
+  [[nodiscard]] DenseAlignmentResult align(const PinholeCamera& camera, const ImagePyramid& previous,
+                                           const ImagePyramid& current,
+                                           std::span<const AlignmentPoint> points,
+                                           const SE3& T_cur_prev_start);
+
+ private:
+  static constexpr int kSize = 4;
+  static constexpr int kArea = kSize * kSize;
+  using Row = Eigen::Matrix<float, 8, 1>;  ///< (v, omega, gain, offset)
+  struct Sample {
+    alignas(32) float jacobian[kArea][8];
+    alignas(32) float value[kArea];
+  };
+  struct Cost {
+    float rms = 0;
+    float visible = 0;
+    Eigen::Matrix<float, 8, 8> H;
+    Row g;
+  };
+
+  void prepare(const PinholeCamera& level_camera, const cv::Mat& image, int level,
+               std::span<const AlignmentPoint> points);
+  bool prepare_point(const PinholeCamera& level_camera, const cv::Mat& image, int level,
+                     const AlignmentPoint& point, Sample& sample) const;
+  void evaluate(const PinholeCamera& level_camera, const cv::Mat& image,
+                std::span<const AlignmentPoint> points, const DenseAlignmentResult& state, Cost& cost) const;
+  bool align_level(const PinholeCamera& level_camera, const cv::Mat& image,
+                   std::span<const AlignmentPoint> points, DenseAlignmentResult& state) const;
+
+  DenseAlignmentOptions options_;
+  std::vector<Sample> samples_;
+  std::vector<std::uint8_t> usable_;
+};
+
+}  // namespace twofold

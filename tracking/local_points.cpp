@@ -1,0 +1,44 @@
+#include "tracking/local_points.hpp"
+
+#include <algorithm>
+
+namespace twofold {
+
+const PendingKeyframe* LocalPoints::find_pending(KeyframeId id) const {
+  const auto it = std::find_if(pending_.begin(), pending_.end(), [&](const auto& p) { return p.id == id; });
+  return it != pending_.end() ? &*it : nullptr;
+}
+
+bool LocalPoints::add(const LocalPoint& point) {
+  if (points_.size() == points_.capacity()) return false;
+  points_.push_back(point);
+  return true;
+}
+
+void LocalPoints::adopt(const GraphSnapshot& graph) {
+  std::erase_if(pending_, [&](const PendingKeyframe& keyframe) { return graph.contains(keyframe.id); });
+  std::erase_if(points_, [&](const LocalPoint& point) {
+    return point.proposed_in != kNoKeyframe && graph.contains(point.proposed_in);
+  });
+}
+
+void LocalPoints::drop_stale(KeyframeId newest, int max_failures, int max_age) {
+  std::erase_if(points_, [&](const LocalPoint& point) {
+    if (point.proposed_in != kNoKeyframe) return false;
+    const int age = static_cast<int>(index(newest)) - static_cast<int>(index(point.anchor));
+    return point.failures >= max_failures || age > max_age;
+  });
+}
+
+void LocalPoints::retract(KeyframeId id) {
+  std::erase_if(pending_, [&](const PendingKeyframe& keyframe) { return keyframe.id == id; });
+  std::erase_if(points_, [&](const LocalPoint& point) { return point.anchor == id; });
+  for (LocalPoint& point : points_) {
+    if (point.proposed_in == id) {
+      point.proposed_in = kNoKeyframe;
+      point.id = kNoPoint;
+    }
+  }
+}
+
+}  // namespace twofold

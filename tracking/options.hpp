@@ -1,0 +1,40 @@
+#pragma once
+
+#include "estimation/motion_only.hpp"
+#include "imaging/guided_search.hpp"
+#include "tracking/dense_alignment.hpp"
+
+namespace twofold {
+
+struct TrackerOptions {
+  DenseAlignmentOptions alignment;
+  GuidedSearchOptions search;
+  MotionOnlyOptions motion;
+
+  int wanted_matches = 180;      ///< stop searching once so many points were found in a frame
+  int max_searches = 320;        ///< upper bound of points searched in a frame
+  int neighbour_keyframes = 20;  ///< N1 is cut off after the strongest so many
+  double max_view_angle_cos =
+      0.7;               ///< points seen from a direction farther from their first one are not searched
+  int min_inliers = 18;  ///< fewer: lost
+  double min_inlier_share = 0.25;  ///< of the matches found: fewer: lost
+  double lost_radius_px = 8;       ///< search radius while lost
+  double max_alignment_rms = 25;   ///< the dense pose is not trusted above this [grey]
+
+  double keyframe_parallax = 0.09;  ///< |t| over median depth since the reference keyframe
+  double keyframe_share = 0.65;     ///< of the reference's points still tracked: below it a keyframe is due
+  double keyframe_empty =
+      0.5;  ///< share of image cells with corners' room but no tracked point: above it one is due
+  double urgent_share = 0.35;  ///< below it a keyframe is due even while the mapper is behind
+  int max_pending = 2;         ///< proposals not yet in the map that do not hold back the next one
+
+  int corner_threshold = 10;     ///< FAST [grey]
+  int corner_levels = 3;         ///< levels on which new points are started
+  int cell_px = 28;              ///< at most one new point a cell and only where no point is tracked
+  int max_new_points = 220;      ///< started in one keyframe
+  double min_corner_score = 12;  ///< Shi-Tomasi
+  int max_failures = 4;          ///< candidates not found so many frames in a row are given up
+  int max_candidate_age = 3;     ///< keyframes after which an unconfirmed candidate is given up
+};
+
+}  // namespace twofold

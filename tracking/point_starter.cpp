@@ -1,0 +1,85 @@
+#include "tracking/point_starter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kMaxCorners = 4096;
+constexpr int kBorder = 12;                 // of a level: room for the patch and its search
+constexpr double kFarthestDisparity = 0.3;  // [px] below it the depth is as good as infinite
+
+Eigen::Vector2f at_level_zero(const Corner& corner) {
+  const float s = std::ldexp(1.0F, corner.level);
+  return {(static_cast<float>(corner.u) + 0.5F) * s - 0.5F, (static_cast<float>(corner.v) + 0.5F) * s - 0.5F};
+}
+
+}  // namespace
+
+PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options)
+    : rig_(rig), options_(options), quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
+  columns_ = rig.camera.width / options.cell_px + 1;
+  const int rows = rig.camera.height / options.cell_px + 1;
+  occupied_.resize(static_cast<std::size_t>(columns_ * rows));
+  corners_.reserve(kMaxCorners);
+}
+
+void PointStarter::clear() {
+  std::fill(occupied_.begin(), occupied_.end(), 0);
+}
+
+std::size_t PointStarter::cell_of(const Eigen::Vector2f& uv) const {
+  const int u = std::clamp(static_cast<int>(uv.x()), 0, rig_.camera.width - 1) / options_.cell_px;
+  const int v = std::clamp(static_cast<int>(uv.y()), 0, rig_.camera.height - 1) / options_.cell_px;
+  return static_cast<std::size_t>(v * columns_ + u);
+}
+
+void PointStarter::occupy(const Eigen::Vector2f& uv) {
+  occupied_[cell_of(uv)] = 1;
+}
+
+int PointStarter::start(const FrameImages& images, KeyframeId anchor, LocalPoints& local) {
+  corners_.clear();
+  for (int level = 0; level < options_.corner_levels; ++level) {
+    detect_corners(images.left.level(level), level, options_.corner_threshold, kBorder, options_.cell_px,
+                   corners_);
+  }
+  quadtree_.clear();
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    if (corners_[i].score < options_.min_corner_score) continue;
+    const Eigen::Vector2f uv = at_level_zero(corners_[i]);
+    if (occupied_[cell_of(uv)] == 0) quadtree_.insert(uv, static_cast<std::uint32_t>(i));
+  }
+  int started = 0;
+  for (std::int64_t i = quadtree_.next(); i >= 0 && started < options_.max_new_points; i = quadtree_.next()) {
+    const Corner& corner = corners_[static_cast<std::size_t>(i)];
+    const Eigen::Vector2f uv = at_level_zero(corner);
+    if (occupied_[cell_of(uv)] != 0 || !start_one(images, corner, anchor, local)) continue;
+    occupy(uv);
+    ++started;
+  }
+  return started;
+}
+
+bool PointStarter::start_one(const FrameImages& images, const Corner& corner, KeyframeId anchor,
+                             LocalPoints& local) const {
+  LocalPoint point;
+  if (!cut_appearance(images.left.level(corner.level), corner.u, corner.v, corner.level, point.appearance)) {
+    return false;
+  }
+  const Vector2 uv = point.appearance.uv.cast<double>();
+  const double u_r = rig_.kind == SensorKind::kStereo
+                         ? right_from_row(images, rig_, corner.u, corner.v, corner.level, options_.search)
+                         : right_from_depth(images.depth, rig_, uv.x(), uv.y());
+  if (std::isnan(u_r)) return false;
+  const double disparity = std::max(uv.x() - u_r, kFarthestDisparity);
+  const Vector3 ray = rig_.camera.unproject(uv);
+  point.anchor = anchor;
+  point.psi = {ray.x(), ray.y(), 1.0 / rig_.depth_from_disparity(disparity)};
+  point.anchor_observation.z = {point.appearance.uv.x(), point.appearance.uv.y(), static_cast<float>(u_r)};
+  point.anchor_observation.level = corner.level;
+  return local.add(point);
+}
+
+}  // namespace twofold

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "imaging/fast_corners.hpp"
+#include "imaging/image_pyramid.hpp"
+#include "tracking/local_points.hpp"
+#include "tracking/options.hpp"
+#include "tracking/quadtree.hpp"
+
+namespace twofold {
+
+/// Decides where a keyframe needs new points, and starts them with the depth of the stereo pair or depth
+/// image (thesis 3.4.3, 6.3). Buffers are reserved at construction.
+class PointStarter {
+ public:
+  PointStarter(const Rig& rig, const TrackerOptions& options);
+
+  /// Marks the whole image as empty.
+  void clear();
+  /// A point is tracked at this level-0 pixel: none is needed near it.
+  void occupy(const Eigen::Vector2f& uv);
+  /// Starts points anchored in keyframe `anchor` where nothing is tracked, evenly over the image; returns how
+  /// many.
+  int start(const FrameImages& images, KeyframeId anchor, LocalPoints& local);
+
+ private:
+  [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;
+  bool start_one(const FrameImages& images, const Corner& corner, KeyframeId anchor,
+                 LocalPoints& local) const;
+
+  Rig rig_;
+  TrackerOptions options_;
+  int columns_ = 0;
+  std::vector<std::uint8_t> occupied_;
+  std::vector<Corner> corners_;
+  Quadtree quadtree_;
+};
+
+}  // namespace twofold

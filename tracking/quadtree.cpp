@@ -1,0 +1,127 @@
+#include "tracking/quadtree.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace twofold {
+namespace {
+
+/// Spreads the low 8 bits to the even positions.
+std::uint32_t spread(std::uint32_t x) {
+  x = (x | (x << 4)) & 0x0f0fU;
+  x = (x | (x << 2)) & 0x3333U;
+  return (x | (x << 1)) & 0x5555U;
+}
+
+}  // namespace
+
+Quadtree::Quadtree(int width, int height, std::size_t capacity)
+    : cells_per_px_((1 << kDepth) / static_cast<double>(std::max(width, height))),
+      width_(width),
+      height_(height) {
+  leaves_.reserve(capacity);
+  level_.reserve(capacity + 4);
+  next_level_.reserve(capacity + 4);
+  stack_.reserve(4 * kDepth + 4);
+}
+
+void Quadtree::clear() {
+  leaves_.clear();
+  level_.clear();
+  next_level_.clear();
+  random_.seed(1);
+  built_ = false;
+}
+
+bool Quadtree::insert(const Eigen::Vector2f& uv, std::uint32_t number) {
+  if (leaves_.size() == leaves_.capacity()) return false;
+  if (!(uv.x() >= 0 && uv.y() >= 0 && uv.x() < static_cast<float>(width_) &&
+        uv.y() < static_cast<float>(height_))) {
+    return false;
+  }
+  const auto x = static_cast<std::uint32_t>(uv.x() * cells_per_px_);
+  const auto y = static_cast<std::uint32_t>(uv.y() * cells_per_px_);
+  leaves_.push_back({spread(x) | (spread(y) << 1), number, false});
+  return true;
+}
+
+void Quadtree::build() {
+  std::sort(leaves_.begin(), leaves_.end(), [](const Leaf& a, const Leaf& b) {
+    return a.morton != b.morton ? a.morton < b.morton : a.number < b.number;
+  });
+  if (!leaves_.empty()) level_.push_back({0, static_cast<std::uint32_t>(leaves_.size()), 0});
+  built_ = true;
+}
+
+int Quadtree::children(const Node& node, Node (&result)[4]) {
+  const int shift = 2 * (kDepth - 1 - node.depth);
+  int count = 0;
+  std::uint32_t begin = node.begin;
+  while (begin < node.end) {
+    const std::uint32_t quadrant = leaves_[begin].morton >> shift;
+    std::uint32_t end = begin + 1;
+    while (end < node.end && leaves_[end].morton >> shift == quadrant) ++end;
+    result[count++] = {begin, end, node.depth + 1};
+    begin = end;
+  }
+  for (int i = count - 1; i > 0; --i) {
+    std::swap(result[i], result[static_cast<int>(random_() % static_cast<unsigned>(i + 1))]);
+  }
+  return count;
+}
+
+std::int64_t Quadtree::take(const Node& leaf) {
+  // Points closer together than the smallest region share a leaf; each is a leaf of its own in turn.
+  for (std::uint32_t i = leaf.begin; i < leaf.end; ++i) {
+    if (!leaves_[i].visited) {
+      leaves_[i].visited = true;
+      return leaves_[i].number;
+    }
+  }
+  return -1;
+}
+
+std::int64_t Quadtree::take_leaf_below(const Node& node) {
+  stack_.clear();
+  stack_.push_back(node);
+  while (!stack_.empty()) {
+    const Node top = stack_.back();
+    stack_.pop_back();
+    if (is_leaf(top)) {
+      const std::int64_t number = take(top);
+      if (number >= 0) return number;
+      continue;
+    }
+    Node below[4];
+    const int count = children(top, below);
+    stack_.insert(stack_.end(), below, below + count);
+  }
+  return -1;
+}
+
+std::int64_t Quadtree::next() {
+  if (!built_) build();
+  for (;;) {
+    if (level_.empty()) {
+      if (next_level_.empty()) return -1;
+      std::swap(level_, next_level_);
+    }
+    const std::size_t chosen = random_() % level_.size();
+    std::swap(level_[chosen], level_.back());
+    const Node node = level_.back();
+    if (is_leaf(node)) {
+      const std::int64_t number = take(node);
+      if (number >= 0) return number;
+      level_.pop_back();
+      continue;
+    }
+    level_.pop_back();
+    Node below[4];
+    const int count = children(node, below);
+    next_level_.insert(next_level_.end(), below, below + count);
+    const std::int64_t number = take_leaf_below(node);
+    if (number >= 0) return number;
+  }
+}
+
+}  // namespace twofold

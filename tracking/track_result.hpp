@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "geometry/se3.hpp"
+#include "graph/ids.hpp"
+
+namespace twofold {
+
+enum class TrackStatus : std::uint8_t { kInitialising, kTracking, kLost };
+
+enum class LostCause : std::uint8_t {
+  kNone,
+  kNoTexture,            ///< too few corners with depth to start a map
+  kTooFewCandidates,     ///< hardly any map point projects into the image
+  kTooFewMatches,        ///< points should be visible but were not found (blur, occlusion, exposure, wrong
+                         ///< prediction)
+  kInconsistentMatches,  ///< found points do not agree on a pose
+  kNoKeyframeBuffer      ///< the map could not be started: no free proposal
+};
+[[nodiscard]] const char* describe(LostCause cause);
+
+enum class TrackStage : std::uint8_t {
+  kPyramid,
+  kAlignment,
+  kCandidates,
+  kSearch,
+  kMotion,
+  kKeyframe,
+  kCount
+};
+inline constexpr std::size_t kTrackStages = static_cast<std::size_t>(TrackStage::kCount);
+[[nodiscard]] const char* describe(TrackStage stage);
+
+struct TrackResult {
+  TrackStatus status = TrackStatus::kInitialising;
+  LostCause cause = LostCause::kNone;
+  KeyframeId reference = kNoKeyframe;
+  SE3 T_c_ref;  ///< pose relative to the reference keyframe; meaningful while kTracking
+  Matrix6 information = Matrix6::Zero();  ///< of T_c_ref, left perturbation (v, omega)
+  int candidates = 0;                     ///< points that should be visible
+  int searched = 0;
+  int matches = 0;
+  int inliers = 0;
+  float alignment_rms = 0;  ///< [grey]
+  bool proposed = false;    ///< the free proposal was filled
+  std::array<std::int64_t, kTrackStages> stage_ns{};
+
+  [[nodiscard]] double tracked_share() const {
+    return searched > 0 ? static_cast<double>(inliers) / searched : 0;
+  }
+};
+
+}  // namespace twofold

@@ -1,0 +1,262 @@
+#include "tracking/tracker.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "geometry/inverse_depth.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kMaxCandidates = 3000;
+constexpr std::size_t kMaxLocalPoints = 1200;
+constexpr std::size_t kMaxPending = 12;
+constexpr std::size_t kMaxAlignmentPoints = 240;
+constexpr int kMinStartPoints = 40;
+
+/// Attributes the time since the last lap to a stage.
+class StageClock {
+ public:
+  explicit StageClock(TrackResult& result) : result_(result) {}
+  void lap(TrackStage stage) {
+    const auto now = std::chrono::steady_clock::now();
+    result_.stage_ns[static_cast<std::size_t>(stage)] += (now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  TrackResult& result_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
+    : rig_(rig),
+      options_(options),
+      alignment_(kMaxAlignmentPoints, options.alignment),
+      candidates_(kMaxCandidates),
+      quadtree_(rig.camera.width, rig.camera.height, kMaxCandidates),
+      local_(kMaxLocalPoints, kMaxPending),
+      starter_(rig, options) {
+  const auto searches = static_cast<std::size_t>(options.max_searches);
+  matches_.reserve(searches);
+  motion_.reserve(searches);
+  inlier_ids_.reserve(searches);
+  depths_.reserve(std::max(searches, kMaxLocalPoints));
+  previous_points_.reserve(kMaxAlignmentPoints);
+}
+
+TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal) {
+  TrackResult result;
+  StageClock clock(result);
+  ++frames_;
+  load_images(frame);
+  clock.lap(TrackStage::kPyramid);
+  if (reference_ == kNoKeyframe) {
+    if (start_map(frame, free_proposal, result)) remember_frame(SE3());
+    clock.lap(TrackStage::kKeyframe);
+    return result;
+  }
+  adopt(graph);
+  if (candidates_stale_) candidates_.rebuild(graph, reference_, local_, options_.neighbour_keyframes);
+  candidates_stale_ = false;
+  clock.lap(TrackStage::kCandidates);
+
+  const SE3 T_c_ref_aligned = align_to_previous(result);
+  clock.lap(TrackStage::kAlignment);
+  select_candidates(T_c_ref_aligned, result);
+  clock.lap(TrackStage::kCandidates);
+  search_points(T_c_ref_aligned, result);
+  clock.lap(TrackStage::kSearch);
+  const bool tracked = estimate_pose(T_c_ref_aligned, result);
+  clock.lap(TrackStage::kMotion);
+  if (!tracked) return result;
+
+  if (free_proposal != nullptr && keyframe_due(result, result.T_c_ref)) {
+    propose_keyframe(frame, graph, *free_proposal, result);
+  }
+  remember_frame(result.T_c_ref);
+  if (!result.proposed) revisit_reference(graph);
+  clock.lap(TrackStage::kKeyframe);
+  return result;
+}
+
+void Tracker::load_images(const Frame& frame) {
+  current_.left.build(frame.left);
+  if (rig_.kind == SensorKind::kStereo) current_.right.build(frame.right);
+  if (rig_.kind == SensorKind::kRgbd) frame.depth.copyTo(current_.depth);
+}
+
+/// A newer map: take over what it confirmed, and move the reference to the newest own keyframe in it.
+void Tracker::adopt(const GraphSnapshot& graph) {
+  if (graph.version() == graph_version_) return;
+  graph_version_ = graph.version();
+  candidates_stale_ = true;
+  const PendingKeyframe* newest = nullptr;
+  for (const PendingKeyframe& pending : local_.pending()) {
+    if (graph.contains(pending.id) && !graph.keyframe(pending.id).culled()) newest = &pending;
+  }
+  if (newest != nullptr && newest->id != reference_) {
+    // As it was tracked, not as the map has it now: both frames were placed by the same points.
+    const SE3 T_ref_new =
+        relative_pose(graph, local_, reference_, newest->reference) * newest->T_k_ref.inverse();
+    T_prev_ref_ = T_prev_ref_ * T_ref_new;
+    reference_ = newest->id;
+  }
+  local_.adopt(graph);
+  if (graph.contains(reference_) && graph.keyframe(reference_).culled()) {
+    const Keyframe& keyframe = graph.keyframe(reference_);
+    T_prev_ref_ = T_prev_ref_ * keyframe.T_this_heir;
+    reference_ = keyframe.heir;
+  }
+}
+
+bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result) {
+  result.status = TrackStatus::kInitialising;
+  result.cause = LostCause::kNoKeyframeBuffer;
+  if (proposal == nullptr || !local_.room_for_keyframe()) return false;
+  const KeyframeId id{next_keyframe_};
+  starter_.clear();
+  if (starter_.start(current_, id, local_) < kMinStartPoints) {
+    local_.retract(id);
+    result.cause = LostCause::kNoTexture;
+    return false;
+  }
+  proposal->clear();
+  proposal->id = id;
+  proposal->frame_index = frame.index;
+  proposal->t_ns = frame.t_ns;
+  matches_.clear();
+  motion_.clear();
+  proposal->median_depth = keyframe_depth_ = median_depth(SE3());
+  proposal->images.copy_from(current_);
+  local_.add_pending({id, kNoKeyframe, SE3()});
+  ++next_keyframe_;
+  points_in_proposal_ = 0;
+  reference_ = id;
+  candidates_stale_ = true;
+  regions_at_keyframe_ = 0;
+  result.status = TrackStatus::kTracking;
+  result.cause = LostCause::kNone;
+  result.reference = id;
+  result.proposed = true;
+  return true;
+}
+
+/// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from constant velocity, then from rest.
+SE3 Tracker::align_to_previous(TrackResult& result) {
+  const SE3 start = lost_frames_ > 0 ? SE3() : T_cur_prev_;
+  DenseAlignmentResult best =
+      alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, start);
+  if (!best.converged || best.rms > 0.5 * options_.max_alignment_rms) {
+    const DenseAlignmentResult rest =
+        alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, SE3());
+    if (rest.converged && (!best.converged || rest.rms < best.rms)) best = rest;
+  }
+  result.alignment_rms = best.rms;
+  const bool trusted = best.converged && best.rms < options_.max_alignment_rms;
+  return (trusted ? best.T_cur_prev : start) * T_prev_ref_;
+}
+
+/// Points that should be visible  (thesis 6.2.5), into the quadtree.
+void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
+  quadtree_.clear();
+  visible_reference_points_ = 0;
+  const Matrix3 R_c_ref = T_c_ref.rotation();
+  const auto points = candidates_.points();
+  const auto [reference_begin, reference_end] = candidates_.reference_range();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3 x_c = R_c_ref * points[i].x_ref + T_c_ref.translation();
+    if (x_c.z() < 1e-3) continue;
+    const Vector2 uv = rig_.camera.project(x_c);
+    if (!rig_.camera.contains(uv, 8)) continue;
+    const SE3& T_ref_a = candidates_.T_ref_a(points[i]);
+    const Vector3 from_anchor = points[i].x_ref - T_ref_a.translation();
+    const Vector3 from_here = R_c_ref.transpose() * x_c;
+    const double cosine = from_anchor.dot(from_here) / (from_anchor.norm() * from_here.norm());
+    if (cosine < options_.max_view_angle_cos) continue;
+    if (i >= reference_begin && i < reference_end) ++visible_reference_points_;
+    quadtree_.insert(uv.cast<float>(), static_cast<std::uint32_t>(i));
+  }
+  result.candidates = static_cast<int>(quadtree_.size());
+}
+
+/// Guided search in equi-distributed order (thesis 3.4.3) until enough points were found.
+void Tracker::search_points(const SE3& T_c_ref, TrackResult& result) {
+  matches_.clear();
+  GuidedSearchOptions search = options_.search;
+  if (lost_frames_ > 0) search.radius_px = options_.lost_radius_px;
+  for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
+    if (static_cast<int>(matches_.size()) >= options_.wanted_matches ||
+        result.searched >= options_.max_searches) {
+      break;
+    }
+    ++result.searched;
+    const TrackedPoint& point = candidates_.points()[static_cast<std::size_t>(i)];
+    const SE3 T_c_a = T_c_ref * candidates_.T_ref_a(point);
+    const auto found = find_point(current_, rig_, *point.appearance, point.psi, T_c_a, search);
+    if (point.local >= 0) {
+      LocalPoint& local = local_.points()[static_cast<std::size_t>(point.local)];
+      local.failures = found ? 0 : static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
+    }
+    if (found) matches_.push_back({static_cast<std::uint32_t>(i), *found});
+  }
+  result.matches = static_cast<int>(matches_.size());
+}
+
+/// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted.
+bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
+  motion_.clear();
+  for (const Match& match : matches_) {
+    const bool has_right = !std::isnan(match.found.z.z());
+    motion_.push_back({candidates_.points()[match.point].x_ref, match.found.z.cast<float>(),
+                       measurement_information(rig_, match.found.level, has_right), true});
+  }
+  const MotionOnlyResult motion = optimise_motion(rig_, motion_, T_c_ref_start, options_.motion);
+  result.inliers = motion.inliers;
+  if (result.candidates < options_.min_inliers) {
+    give_up_frame(LostCause::kTooFewCandidates, result);
+  } else if (result.matches < options_.min_inliers) {
+    give_up_frame(LostCause::kTooFewMatches, result);
+  } else if (!motion.converged || motion.inliers < options_.min_inliers ||
+             motion.inliers < options_.min_inlier_share * result.matches) {
+    give_up_frame(LostCause::kInconsistentMatches, result);
+  } else {
+    result.status = TrackStatus::kTracking;
+    result.reference = reference_;
+    result.T_c_ref = motion.T_c_ref;
+    result.information = motion.information;
+    return true;
+  }
+  return false;
+}
+
+void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
+  result.status = TrackStatus::kLost;
+  result.cause = cause;
+  result.inliers = 0;
+  ++lost_frames_;
+  // previous_ and T_prev_ref_ stay at the last good frame, from where the next one tries again.
+}
+
+void Tracker::remember_frame(const SE3& T_c_ref) {
+  T_cur_prev_ = lost_frames_ > 0 || frames_ < 2 ? SE3() : T_c_ref * T_prev_ref_.inverse();
+  T_prev_ref_ = T_c_ref;
+  lost_frames_ = 0;
+  previous_points_.clear();
+  for (std::size_t m = 0; m < matches_.size() && previous_points_.size() < previous_points_.capacity(); ++m) {
+    if (!motion_[m].inlier) continue;
+    previous_points_.push_back({matches_[m].found.z.head<2>().cast<float>(), T_c_ref * motion_[m].x_ref});
+  }
+  for (const LocalPoint& point : local_.points()) {
+    if (previous_points_.size() == previous_points_.capacity()) break;
+    if (index(point.anchor) + 1 != next_keyframe_ || !candidates_stale_)
+      continue;  // started in this very frame
+    previous_points_.push_back({point.appearance.uv, from_inverse_depth(point.psi)});
+  }
+  std::swap(current_, previous_);
+}
+
+}  // namespace twofold

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "camera/frame.hpp"
+#include "camera/rig.hpp"
+#include "graph/keyframe_proposal.hpp"
+#include "graph/snapshot.hpp"
+#include "tracking/candidate_points.hpp"
+#include "tracking/dense_alignment.hpp"
+#include "tracking/local_points.hpp"
+#include "tracking/options.hpp"
+#include "tracking/point_starter.hpp"
+#include "tracking/quadtree.hpp"
+#include "tracking/track_result.hpp"
+
+namespace twofold {
+
+/// From images to poses: the stereo front-end of thesis 6.3, RGB-D as stereo with a virtual right image
+/// (6.5.3).
+///
+/// Single-threaded and deterministic. After construction and the first few frames nothing is allocated, and
+/// no reference count of a snapshot is touched. Work per frame is bounded by the options.
+///
+/// The tracker numbers keyframes when it proposes them and points when they are found a second time. Its own
+/// pose is relative to a reference keyframe, so that it moves along when a newer snapshot moves that
+/// keyframe.
+class Tracker {
+ public:
+  Tracker(const Rig& rig, const TrackerOptions& options);
+
+  /// Tracks one frame against `graph`, which must stay alive while later calls get the same version.
+  /// @param free_proposal  buffer for a keyframe proposal, or null: no keyframe can be made in this frame.
+  ///                       Filled if and only if the result says `proposed`.
+  TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal);
+
+  /// The proposal of the last step could not be sent: its numbers are taken back.
+  void proposal_rejected();
+
+ private:
+  struct Match {
+    std::uint32_t point;  ///< position in candidates_.points()
+    PointMatch found;
+  };
+
+  void load_images(const Frame& frame);
+  void adopt(const GraphSnapshot& graph);
+  bool start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
+  SE3 align_to_previous(TrackResult& result);
+  void select_candidates(const SE3& T_c_ref, TrackResult& result);
+  void search_points(const SE3& T_c_ref, TrackResult& result);
+  bool estimate_pose(const SE3& T_c_ref_start, TrackResult& result);
+  void give_up_frame(LostCause cause, TrackResult& result);
+  void remember_frame(const SE3& T_c_ref);
+
+  [[nodiscard]] bool keyframe_due(const TrackResult& result, const SE3& T_c_ref) const;
+  void propose_keyframe(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal& proposal,
+                        TrackResult& result);
+  void collect_observations(KeyframeProposal& proposal);
+  void confirm(LocalPoint& point, KeyframeProposal& proposal);
+  void start_points(KeyframeId anchor);
+  void revisit_reference(const GraphSnapshot& graph);
+  [[nodiscard]] int occupied_regions() const;
+  [[nodiscard]] double median_depth(const SE3& T_c_ref);
+
+  Rig rig_;
+  TrackerOptions options_;
+  FrameImages current_, previous_;
+  DenseAlignment alignment_;
+  CandidatePoints candidates_;
+  Quadtree quadtree_;
+  LocalPoints local_;
+  PointStarter starter_;
+
+  KeyframeId reference_ = kNoKeyframe;
+  SE3 T_prev_ref_;  ///< last good pose
+  SE3 T_cur_prev_;  ///< last good motion, the prediction of the next
+  std::uint64_t graph_version_ = 0;
+  bool candidates_stale_ = true;
+  int lost_frames_ = 0;
+  std::uint32_t frames_ = 0;
+
+  std::uint32_t next_keyframe_ = 0;
+  std::uint32_t next_point_ = 0;
+  std::uint32_t points_in_proposal_ = 0;
+  int regions_at_keyframe_ = 0;
+  double keyframe_depth_ = 0;  ///< median depth at the last keyframe [m]
+
+  std::vector<Match> matches_;
+  std::vector<MotionObservation> motion_;
+  std::vector<AlignmentPoint> previous_points_;
+  std::vector<PointId> inlier_ids_;
+  std::vector<double> depths_;
+  int visible_reference_points_ = 0;
+};
+
+}  // namespace twofold
