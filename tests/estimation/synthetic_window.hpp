@@ -94,7 +94,6 @@ inline SyntheticWindow make_synthetic_window(const SyntheticWindowOptions& optio
   for (const SE3& T : ride) problem.poses.push_back({T, false});
 
   // Landmarks around the part of the circle that was ridden.
-  std::vector<std::vector<int>> shared(count, std::vector<int>(count, 0));
   for (int n = 0; n < options.points_per_keyframe * count; ++n) {
     const double angle = 2 * std::numbers::pi * (std::min(1.0, options.laps) * uniform(rng)) + 0.3;
     const double distance = radius + 1.5 + 6 * uniform(rng);
@@ -112,9 +111,6 @@ inline SyntheticWindow make_synthetic_window(const SyntheticWindowOptions& optio
     std::sort(seen_by.begin(), seen_by.end());
     const auto inner_count =
         std::count_if(seen_by.begin(), seen_by.end(), [&](int i) { return is_inner[i]; });
-    for (const int i : seen_by) {
-      for (const int j : seen_by) ++shared[i][j];
-    }
     if (inner_count < 2 || seen_by.size() < 3) continue;
     WindowProblem::Point point;
     point.anchor = seen_by.front();
@@ -126,7 +122,10 @@ inline SyntheticWindow make_synthetic_window(const SyntheticWindowOptions& optio
       o.pose = i;
       Vector3 z = problem.rig.project(ride[i] * p_w);
       for (int c = 0; c < 3; ++c) z[c] += options.pixel_noise * normal(rng);
-      if (uniform(rng) < options.outliers) z += Vector3::Constant(40) + 40 * Vector3::Random();
+      if (uniform(rng) < options.outliers) {  // a wrong match: off in both images alike
+        const double du = 60 * uniform(rng) - 30, dv = 60 * uniform(rng) - 30;
+        z += Vector3(du, dv, du);
+      }
       o.z = z.cast<float>();
       if (options.kind == SensorKind::kMono || uniform(rng) < options.missing_right) {
         o.information.z() = 0;
@@ -139,8 +138,8 @@ inline SyntheticWindow make_synthetic_window(const SyntheticWindowOptions& optio
   }
   for (int i = 0; i < count; ++i) {
     for (int j = i + 1; j < count; ++j) {
-      const bool covisible = j == i + 1 || (shared[i][j] > 10 && (j - i < 4 || j - i > count / 8));
-      if (!covisible || (is_inner[i] && is_inner[j] && !options.constrain_all)) continue;
+      const bool near = j == i + 1 || (centre(i) - centre(j)).norm() < 3.5 * options.spacing;
+      if (!near || (is_inner[i] && is_inner[j] && !options.constrain_all)) continue;
       WindowProblem::PoseConstraint c;
       c.i = i, c.j = j;
       c.T_j_i = SE3::exp(noise6(rng, options.constraint_noise)) * ride[j] * ride[i].inverse();

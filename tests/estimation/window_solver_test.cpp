@@ -38,6 +38,7 @@ double ceres_cost(const WindowProblem& problem, const WindowSolverOptions& optio
   ceres::Solver::Options ceres_options;
   ceres_options.linear_solver_type = ceres::SPARSE_SCHUR;
   ceres_options.max_num_iterations = 300;
+  ceres_options.max_trust_region_radius = 1e9;  // its damping holds the gauge
   ceres_options.function_tolerance = 1e-15;
   ceres_options.gradient_tolerance = 1e-14;
   ceres_options.parameter_tolerance = 1e-14;
@@ -145,7 +146,7 @@ std::vector<CeresCase> ceres_cases() {
           {"PoseGraph", graph, 0, 0, false}, {"PoseGraphRobustFixed", graph, 0, 1, true}};
 }
 INSTANTIATE_TEST_SUITE_P(Window, EqualToCeres, testing::ValuesIn(ceres_cases()),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& test) { return test.param.name; });
 
 TEST(WindowSolver, CostNeverRisesAndSummaryIsTrue) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
@@ -271,7 +272,9 @@ TEST(WindowSolver, EmptyAndFullyHeldProblems) {
   for (std::size_t i = 0; i < held.poses.size(); ++i) held.poses[i] = {window.truth.poses[i].T_k_w, true};
   const auto summary = solver.solve(held, to_convergence());
   EXPECT_LT(summary.final_cost, 1e-6);
-  EXPECT_EQ(relative_pose_error(held, window.truth), 0);
+  for (std::size_t i = 0; i < held.poses.size(); ++i) {
+    EXPECT_EQ(held.poses[i].T_k_w.matrix(), window.truth.poses[i].T_k_w.matrix());
+  }
 }
 
 TEST(WindowProblemDeathTest, InvalidProblemsAreNamed) {
