@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "camera/rig.hpp"
@@ -46,7 +47,8 @@ struct WindowProblem {
 
 struct WindowSolverOptions {
   int max_iterations = 3;           ///< Levenberg-Marquardt steps, accepted or not
-  double initial_damping = 1e-4;    ///< relative to the mean diagonal; also holds the gauge (thesis 6.2.3)
+  double initial_damping = 1e-4;    ///< relative to each parameter's diagonal entry of the normal equations;
+                                    ///< also holds the gauge (thesis 6.2.3)
   double huber_px = 2.0;            ///< kernel on the whitened reprojection error norm; <= 0: none
   double constraint_huber = 0;      ///< kernel on sqrt(v^T Lambda v); <= 0: none
   double relative_decrease = 1e-6;  ///< stop when a step lowers the cost by less than this share
@@ -64,5 +66,12 @@ struct SolverSummary {
 /// Whitened squared error of one observation at the problem's present values; infinity behind the camera.
 [[nodiscard]] double observation_chi2(const WindowProblem& problem, const WindowProblem::Point& point,
                                       const WindowProblem::Observation& observation);
+
+/// Robustified chi2 of the whole problem (eq. 6.4); observations behind their camera are left out, as the
+/// solvers leave them out.
+[[nodiscard]] double window_cost(const WindowProblem& problem, const WindowSolverOptions& options);
+
+/// Empty when indices are in range and numbers finite; otherwise names the first entry that is wrong.
+[[nodiscard]] std::string invalid_reason(const WindowProblem& problem);
 
 }  // namespace twofold

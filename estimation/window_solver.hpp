@@ -7,8 +7,13 @@
 namespace twofold {
 
 /// Levenberg-Marquardt on a WindowProblem. Points are eliminated point track by point track (thesis 3.3.5),
-/// the block sparse reduced camera system is factorised by CHOLMOD, whose symbolic analysis is kept while the
-/// structure stays. Buffers are kept between calls. One instance a thread. Deterministic.
+/// anchor by anchor (see WindowLayout); the block sparse reduced camera system is factorised by
+/// BlockCholesky, which keeps order and pattern while the structure stays. Buffers are kept between calls.
+/// One instance a thread; starts no threads. Deterministic.
+///
+/// Observations behind their camera at the start are left out of the whole solve; a step that brings another
+/// one behind its camera is refused. Poses that no observation or constraint ties to anything stay as they
+/// are.
 class WindowSolver {
  public:
   WindowSolver();
@@ -17,7 +22,7 @@ class WindowSolver {
   WindowSolver& operator=(WindowSolver&&) noexcept;
 
   /// Changes problem.poses and problem.points; the cost never rises. If no step lowers it they stay as they
-  /// were.
+  /// were. The problem must be valid (see invalid_reason).
   SolverSummary solve(WindowProblem& problem, const WindowSolverOptions& options);
 
  private:

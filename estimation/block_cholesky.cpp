@@ -1,0 +1,167 @@
+#include "estimation/block_cholesky.hpp"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+
+#include "estimation/block_kernels.hpp"
+#include "geometry/check.hpp"
+
+namespace twofold {
+namespace {
+
+/// Lower Cholesky factor of A in place and its inverse; false when a pivot is not positive.
+bool factorise_diagonal(Matrix6& A, Matrix6& inverse) {
+  for (int j = 0; j < 6; ++j) {
+    double pivot = A(j, j);
+    for (int k = 0; k < j; ++k) pivot -= A(j, k) * A(j, k);
+    if (!(pivot > 1e-15 * std::abs(A(j, j))) || !std::isfinite(pivot)) return false;
+    const double root = std::sqrt(pivot);
+    const double inv_root = 1 / root;
+    A(j, j) = root;
+    for (int i = j + 1; i < 6; ++i) {
+      double value = A(i, j);
+      for (int k = 0; k < j; ++k) value -= A(i, k) * A(j, k);
+      A(i, j) = value * inv_root;
+      A(j, i) = 0;
+    }
+    inverse(j, j) = inv_root;
+  }
+  for (int j = 0; j < 6; ++j) {
+    for (int i = 0; i < j; ++i) inverse(i, j) = 0;
+    for (int i = j + 1; i < 6; ++i) {
+      double value = 0;
+      for (int k = j; k < i; ++k) value -= A(i, k) * inverse(k, j);
+      inverse(i, j) = value * inverse(i, i);
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+void BlockCholesky::set_pattern(std::vector<std::vector<int>> neighbours) {
+  if (neighbours == neighbours_ && !column_begin_.empty()) return;
+  neighbours_ = std::move(neighbours);
+  choose_order();
+  find_fill();
+}
+
+void BlockCholesky::choose_order() {
+  const int n = static_cast<int>(neighbours_.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < n; ++i) {
+    entries.emplace_back(i, i, 1.0);
+    for (const int j : neighbours_[i]) {
+      entries.emplace_back(i, j, 1.0);
+      entries.emplace_back(j, i, 1.0);
+    }
+  }
+  Eigen::SparseMatrix<double> pattern(n, n);
+  pattern.setFromTriplets(entries.begin(), entries.end());
+  order_.resize(n);
+  if (n > 0) {
+    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation(n);
+    Eigen::AMDOrdering<int>()(pattern, permutation);
+    for (int k = 0; k < n; ++k) order_[k] = permutation.indices()[k];
+  }
+  position_.resize(n);
+  for (int k = 0; k < n; ++k) position_[order_[k]] = k;
+}
+
+/// Column j of the factor has the rows of the matrix's column and those of the columns whose first row below
+/// the diagonal is j (its children in the elimination tree).
+void BlockCholesky::find_fill() {
+  const int n = size();
+  std::vector<std::vector<int>> rows(n);
+  for (int i = 0; i < n; ++i) {
+    for (const int j : neighbours_[i]) {
+      rows[std::min(position_[i], position_[j])].push_back(std::max(position_[i], position_[j]));
+    }
+  }
+  std::vector<int> row_count(n, 0);
+  column_begin_.assign(n + 1, 0);
+  row_.clear();
+  for (int j = 0; j < n; ++j) {
+    std::sort(rows[j].begin(), rows[j].end());
+    rows[j].erase(std::unique(rows[j].begin(), rows[j].end()), rows[j].end());
+    if (!rows[j].empty()) {
+      std::vector<int>& parent = rows[rows[j].front()];
+      parent.insert(parent.end(), rows[j].begin() + 1, rows[j].end());
+    }
+    row_.push_back(j);
+    row_.insert(row_.end(), rows[j].begin(), rows[j].end());
+    column_begin_[j + 1] = static_cast<int>(row_.size());
+    for (const int i : rows[j]) ++row_count[i];
+  }
+  row_begin_.assign(n + 1, 0);
+  for (int k = 0; k < n; ++k) row_begin_[k + 1] = row_begin_[k] + row_count[k];
+  row_entries_.resize(row_begin_[n]);
+  std::vector<int> next(row_begin_.begin(), row_begin_.end() - 1);
+  for (int j = 0; j < n; ++j) {
+    for (int b = column_begin_[j] + 1; b < column_begin_[j + 1]; ++b) row_entries_[next[row_[b]]++] = {j, b};
+  }
+  blocks_.resize(row_.size());
+  inverse_diagonal_.resize(n);
+  place_.resize(n);
+}
+
+int BlockCholesky::block_index(int row, int column) const {
+  const auto begin = row_.begin() + column_begin_[column];
+  const auto end = row_.begin() + column_begin_[column + 1];
+  const auto found = std::lower_bound(begin, end, row);
+  TWOFOLD_CHECK(found != end && *found == row, "block outside of the pattern");
+  return static_cast<int>(found - row_.begin());
+}
+
+void BlockCholesky::set_zero() {
+  for (Matrix6& block : blocks_) block.setZero();
+}
+
+/// Left-looking: column k takes what all finished columns with a block in row k owe to it.
+bool BlockCholesky::factorise() {
+  const int n = size();
+  for (int k = 0; k < n; ++k) {
+    const int begin = column_begin_[k];
+    const int end = column_begin_[k + 1];
+    for (int b = begin; b < end; ++b) place_[row_[b]] = b;
+    for (int e = row_begin_[k]; e < row_begin_[k + 1]; ++e) {
+      const auto [j, first] = row_entries_[e];
+      const double* L_kj = blocks_[first].data();
+      for (int b = first; b < column_begin_[j + 1]; ++b) {
+        add_outer_product<-1, 6>(blocks_[place_[row_[b]]].data(), blocks_[b].data(), L_kj);
+      }
+    }
+    if (!factorise_diagonal(blocks_[begin], inverse_diagonal_[k])) return false;
+    for (int b = begin + 1; b < end; ++b) {
+      Matrix6 L_ik = Matrix6::Zero();
+      add_outer_product<1, 6>(L_ik.data(), blocks_[b].data(), inverse_diagonal_[k].data());
+      blocks_[b] = L_ik;
+    }
+  }
+  return true;
+}
+
+void BlockCholesky::solve(std::span<Vector6> rhs) const {
+  for (int j = 0; j < size(); ++j) {
+    const Vector6 x = inverse_diagonal_[j] * rhs[j];
+    rhs[j] = x;
+    for (int b = column_begin_[j] + 1; b < column_begin_[j + 1]; ++b) {
+      rhs[row_[b]].noalias() -= blocks_[b] * x;
+    }
+  }
+  solve_upper(rhs);
+}
+
+void BlockCholesky::solve_upper(std::span<Vector6> rhs) const {
+  for (int j = size() - 1; j >= 0; --j) {
+    Vector6 x = rhs[j];
+    for (int b = column_begin_[j] + 1; b < column_begin_[j + 1]; ++b) {
+      x.noalias() -= blocks_[b].transpose() * rhs[row_[b]];
+    }
+    rhs[j].noalias() = inverse_diagonal_[j].transpose() * x;
+  }
+}
+
+}  // namespace twofold

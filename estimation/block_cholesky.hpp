@@ -1,0 +1,64 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "geometry/types.hpp"
+
+namespace twofold {
+
+/// Cholesky factorisation of a symmetric positive definite matrix of 6x6 blocks, in a fill-reducing order.
+///
+/// For the reduced camera systems of windows: tens to hundreds of poses, an almost dense inner part and a
+/// sparse rim. Every block product is one fixed-size kernel, so nothing is lost on gathering dense panels,
+/// and no BLAS (with threads of its own) is involved. The order and the pattern of the factor are kept while
+/// the pattern of the matrix stays.
+///
+/// Use: set_pattern, set_zero, add into block(...), factorise, solve. Rows and columns are named by their
+/// position in the elimination order, see position().
+class BlockCholesky {
+ public:
+  /// Which unknowns are coupled: `neighbours[i]` lists, in increasing order, the unknowns coupled with i
+  /// (either both directions or only one of them; without i itself).
+  void set_pattern(std::vector<std::vector<int>> neighbours);
+
+  [[nodiscard]] int size() const { return static_cast<int>(order_.size()); }
+  /// Place of unknown i in the elimination order, for all i.
+  [[nodiscard]] const std::vector<int>& position() const { return position_; }
+  /// Index of the block at (row, column), row >= column, both positions; the pair must be in the pattern.
+  [[nodiscard]] int block_index(int row, int column) const;
+  [[nodiscard]] int diagonal_index(int column) const { return column_begin_[column]; }
+
+  void set_zero();
+  /// Before factorise: block of the matrix, after it: of the factor.
+  [[nodiscard]] Matrix6& block(int index) { return blocks_[index]; }
+
+  /// False when the matrix is not positive definite (to rounding); its blocks are lost either way.
+  [[nodiscard]] bool factorise();
+  /// Right-hand side in, solution out, six numbers an unknown, in elimination order.
+  void solve(std::span<Vector6> rhs) const;
+  /// Solution of the transposed triangular system only: with L L^T = A, turns x into L^-T x.
+  void solve_upper(std::span<Vector6> rhs) const;
+
+ private:
+  void choose_order();
+  void find_fill();
+
+  std::vector<std::vector<int>> neighbours_;
+  std::vector<int> order_;     // unknown at a position
+  std::vector<int> position_;  // position of an unknown
+  // Column j of the factor: blocks [column_begin_[j], column_begin_[j+1]), rows rising, the diagonal first.
+  std::vector<int> column_begin_;
+  std::vector<int> row_;
+  // Row k of the factor left of the diagonal: which blocks, and the columns they stand in.
+  struct RowEntry {
+    int column, block;
+  };
+  std::vector<int> row_begin_;
+  std::vector<RowEntry> row_entries_;
+  std::vector<Matrix6> blocks_;
+  std::vector<Matrix6> inverse_diagonal_;  // L_jj^-1, lower triangular
+  std::vector<int> place_;                 // scratch: block index of a row in the present column
+};
+
+}  // namespace twofold

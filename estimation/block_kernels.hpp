@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstring>
+
+namespace twofold {
+
+/// Four doubles that the compiler maps to one AVX register, or to two SSE2 ones.
+using Packet4 = double __attribute__((vector_size(32)));
+
+[[nodiscard]] inline Packet4 load4(const double* p) {
+  Packet4 value;
+  std::memcpy(&value, p, sizeof value);
+  return value;
+}
+inline void store4(double* p, const Packet4& value) {
+  std::memcpy(p, &value, sizeof value);
+}
+
+/// A += sign * B C^T with A 6x6, B and C 6xK, all column-major and dense.
+///
+/// Six rows do not fill registers of four. But two columns of six are three registers without a gap: rows 0-3
+/// of the even column, its rows 4-5 with rows 0-1 of the odd column, rows 2-5 of the odd column. Nine
+/// registers hold all of A while the K outer products are added; Eigen's product of this size works in halves
+/// of a register.
+template <int kSign, int K>
+inline void add_outer_product(double* __restrict a, const double* __restrict b, const double* __restrict c) {
+  Packet4 acc[9];
+  for (int n = 0; n < 9; ++n) acc[n] = load4(a + 4 * n);
+#pragma GCC unroll 6
+  for (int k = 0; k < K; ++k) {
+    const double* bk = b + 6 * k;
+    const double* ck = c + 6 * k;
+    const Packet4 b0123 = load4(bk);
+    const Packet4 b2345 = load4(bk + 2);
+    const Packet4 b4501 = __builtin_shufflevector(b2345, b0123, 2, 3, 4, 5);
+#pragma GCC unroll 3
+    for (int pair = 0; pair < 3; ++pair) {
+      const double even = kSign * ck[2 * pair];
+      const double odd = kSign * ck[2 * pair + 1];
+      const Packet4 c_even = {even, even, even, even};
+      const Packet4 c_odd = {odd, odd, odd, odd};
+      const Packet4 c_both = {even, even, odd, odd};
+      acc[3 * pair] += b0123 * c_even;
+      acc[3 * pair + 1] += b4501 * c_both;
+      acc[3 * pair + 2] += b2345 * c_odd;
+    }
+  }
+  for (int n = 0; n < 9; ++n) store4(a + 4 * n, acc[n]);
+}
+
+}  // namespace twofold

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <vector>
+
+#include "estimation/block_cholesky.hpp"
+#include "estimation/window_problem.hpp"
+
+namespace twofold {
+
+/// A WindowProblem sorted for the solver: points by anchor, and each anchor's points against the poses
+/// relative to that anchor.
+///
+/// An observation of pose i depends on T_i and T_a only through T_ia = T_i T_a^-1, and to first order on
+/// xi = delta_i - Ad(T_ia) delta_a alone. So all points of one anchor are eliminated in the coordinates xi of
+/// its observers ("slots"), with one 6-dof pose an observation, and only the sum goes on to the absolute
+/// poses.
+///
+/// Observations behind their camera at the start are left out for good: they have no useful derivative, and
+/// leaving them in would forbid every step.
+class WindowLayout {
+ public:
+  /// Motion of one observing pose against the anchor.
+  struct Slot {
+    int pose = 0;
+    int position = -1;           ///< in the elimination order; -1: held
+    bool coupled = false;        ///< xi is not always zero: neither the anchor itself nor both poses held
+    int anchor_block = -1;       ///< block of (slot, anchor) in the reduced system, if both are free
+    bool anchor_is_row = false;  ///< that block has the anchor as row
+  };
+  /// Two slots that see a common point; row == column for each coupled slot.
+  struct Pair {
+    int row, column;  ///< in the group, row >= column
+    int block;        ///< in the reduced system; -1 unless both are free
+  };
+  struct Observation {
+    Eigen::Vector3f z;
+    Eigen::Vector3f information;
+    int slot;   ///< in the group
+    int entry;  ///< coupling of the point with that slot; -1 for slots that are not coupled
+  };
+  struct Track {
+    int point;  ///< in the problem
+    int first_observation, observation_count;
+    int first_entry, entry_count;
+  };
+  struct Group {
+    int anchor;           ///< pose
+    int anchor_position;  ///< in the elimination order; -1: held
+    int first_slot, slot_count;
+    int coupled_count;  ///< coupled slots come first, free ones in elimination order
+    int first_track, track_count;
+    int first_pair, pair_count;
+  };
+
+  /// Sorts the problem, and gives `system` the pattern of its reduced system.
+  void build(const WindowProblem& problem, BlockCholesky& system);
+
+  [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
+  [[nodiscard]] const std::vector<Slot>& slots() const { return slots_; }
+  [[nodiscard]] const std::vector<Track>& tracks() const { return tracks_; }
+  [[nodiscard]] const std::vector<Observation>& observations() const { return observations_; }
+  [[nodiscard]] const std::vector<Pair>& pairs() const { return pairs_; }
+  /// Slot, in the group, of each entry.
+  [[nodiscard]] const std::vector<int>& entry_slots() const { return entry_slots_; }
+  /// Place of a pose in the elimination order; -1 when it is held or nothing depends on it.
+  [[nodiscard]] int position(int pose) const { return position_[pose]; }
+
+ private:
+  void sort_points(const WindowProblem& problem);
+  void collect_group(const WindowProblem& problem, int anchor, const std::vector<int>& points);
+  void find_pairs(Group& group);
+  void set_pattern(const WindowProblem& problem, BlockCholesky& system);
+  void sort_slots(Group& group, const BlockCholesky& system);
+
+  std::vector<Group> groups_;
+  std::vector<Slot> slots_;
+  std::vector<Track> tracks_;
+  std::vector<Observation> observations_;
+  std::vector<Pair> pairs_;
+  std::vector<int> entry_slots_;
+  std::vector<int> position_;
+  std::vector<int> slot_of_pose_;  // scratch
+  std::vector<char> seen_together_;
+};
+
+}  // namespace twofold
