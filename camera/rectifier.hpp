@@ -66,9 +66,12 @@ class Rectifier {
     cv::Mat fraction;
   };
 
+  struct ImageSize {
+    int width = 0, height = 0;
+  };
+
   Rig rig_;
-  int raw_width_ = 0;
-  int raw_height_ = 0;
+  ImageSize raw_left_size_, raw_right_size_;
   SO3 R_rectified_left_;
   SO3 R_rectified_right_;
   RectificationMap left_, right_;

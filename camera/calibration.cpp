@@ -1,0 +1,62 @@
+#include "camera/calibration.hpp"
+
+#include <cmath>
+
+namespace twofold {
+namespace {
+
+std::string invalid_stereo(const Calibration& c) {
+  if (const auto reason = c.right.invalid_reason(); !reason.empty()) return "right camera: " + reason;
+  if (!c.T_right_left.translation().allFinite() || !c.T_right_left.so3().quaternion().coeffs().allFinite()) {
+    return "T_right_left is not finite";
+  }
+  const Vector3 right_in_left = c.T_right_left.inverse().translation();
+  if (!(right_in_left.norm() > 1e-4)) return "T_right_left: the baseline must be longer than 0.1 mm";
+  if (right_in_left.x() < 0.5 * right_in_left.norm()) {
+    return "T_right_left: the right camera must lie mainly along +x of the left one; its position there is "
+           "(" +
+           std::to_string(right_in_left.x()) + ", " + std::to_string(right_in_left.y()) + ", " +
+           std::to_string(right_in_left.z()) + ") m";
+  }
+  return {};
+}
+
+std::string invalid_rectified(const Calibration& c) {
+  if (!c.left.distortion.is_identity()) return "already_rectified: the left camera has distortion";
+  if (c.kind != SensorKind::kStereo) return {};
+  if (!c.right.distortion.is_identity()) return "already_rectified: the right camera has distortion";
+  const PinholeCamera& l = c.left.pinhole;
+  const PinholeCamera& r = c.right.pinhole;
+  constexpr double kSame = 1e-6;  // [px]
+  if (std::abs(l.fx - r.fx) > kSame || std::abs(l.fy - r.fy) > kSame || std::abs(l.cx - r.cx) > kSame ||
+      std::abs(l.cy - r.cy) > kSame || l.width != r.width || l.height != r.height) {
+    return "already_rectified: the cameras' intrinsics differ";
+  }
+  const Vector3& t = c.T_right_left.translation();
+  if (c.T_right_left.so3().log().norm() > 1e-9 || t.tail<2>().norm() > 1e-9 || t.x() >= 0) {
+    return "already_rectified: T_right_left must be a pure shift along -x";
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string Calibration::invalid_reason() const {
+  if (const auto reason = left.invalid_reason(); !reason.empty()) return "left camera: " + reason;
+  if (kind == SensorKind::kStereo) {
+    if (const auto reason = invalid_stereo(*this); !reason.empty()) return reason;
+  }
+  if (already_rectified) {
+    if (const auto reason = invalid_rectified(*this); !reason.empty()) return reason;
+  }
+  if (!(fps >= 0) || !std::isfinite(fps)) return "fps must not be negative, is " + std::to_string(fps);
+  if (kind == SensorKind::kRgbd) {
+    if (!(depth_unit > 0)) return "depth_unit must be positive, is " + std::to_string(depth_unit);
+    if (!(depth_min >= 0 && depth_max > depth_min)) return "depth_min, depth_max must satisfy 0 <= min < max";
+    if (!(virtual_baseline > 0))
+      return "virtual_baseline must be positive, is " + std::to_string(virtual_baseline);
+  }
+  return {};
+}
+
+}  // namespace twofold

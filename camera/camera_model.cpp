@@ -1,0 +1,38 @@
+#include "camera/camera_model.hpp"
+
+#include <cmath>
+
+namespace twofold {
+
+std::string CameraModel::invalid_reason() const {
+  const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
+  if (!positive(pinhole.fx)) return "fx must be positive, is " + std::to_string(pinhole.fx);
+  if (!positive(pinhole.fy)) return "fy must be positive, is " + std::to_string(pinhole.fy);
+  if (!std::isfinite(pinhole.cx) || !std::isfinite(pinhole.cy)) return "cx, cy must be finite";
+  if (pinhole.width <= 0 || pinhole.height <= 0) {
+    return "image size must be positive, is " + std::to_string(pinhole.width) + " x " +
+           std::to_string(pinhole.height);
+  }
+  return distortion.invalid_reason();
+}
+
+Vector2 CameraModel::project(const Vector3& x_c, Matrix23* J) const {
+  const double inv_z = 1 / x_c.z();
+  const Vector2 xy = x_c.head<2>() * inv_z;
+  Eigen::Matrix2d J_distort;
+  const Vector2 xy_d = distortion.distort(xy, J ? &J_distort : nullptr);
+  if (J) {
+    Matrix23 J_xy;  // B.2
+    J_xy << inv_z, 0, -xy.x() * inv_z, 0, inv_z, -xy.y() * inv_z;
+    *J = Vector2(pinhole.fx, pinhole.fy).asDiagonal() * J_distort * J_xy;
+  }
+  return {pinhole.fx * xy_d.x() + pinhole.cx, pinhole.fy * xy_d.y() + pinhole.cy};
+}
+
+std::optional<Vector3> CameraModel::unproject(const Vector2& uv) const {
+  const auto xy = distortion.undistort(pinhole.unproject(uv).head<2>());
+  if (!xy) return std::nullopt;
+  return Vector3(xy->x(), xy->y(), 1.0);
+}
+
+}  // namespace twofold

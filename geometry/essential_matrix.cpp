@@ -1,0 +1,217 @@
+#include "geometry/essential_matrix.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+
+#include "geometry/five_point_polynomials.hpp"
+#include "geometry/triangulation.hpp"
+
+namespace twofold {
+
+Matrix3 essential_matrix(const SE3& T_b_a) {
+  return hat(T_b_a.translation().normalized()) * T_b_a.rotation();
+}
+
+namespace {
+
+using Constraints = Eigen::Matrix<double, 10, 20>;
+
+/// E = x N0 + y N1 + z N2 + N3 must have det E = 0 and 2 E E^T E - tr(E E^T) E = 0: ten cubics in (x, y, z).
+Constraints essential_constraints(const std::array<Matrix3, 4>& N) {
+  using namespace five_point;
+  Linear E[3][3];
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) E[r][c] << N[0](r, c), N[1](r, c), N[2](r, c), N[3](r, c);
+  }
+  Quadratic EEt[3][3];
+  for (int r = 0; r < 3; ++r) {
+    for (int c = r; c < 3; ++c) {
+      EEt[r][c] = product(E[r][0], E[c][0]) + product(E[r][1], E[c][1]) + product(E[r][2], E[c][2]);
+      EEt[c][r] = EEt[r][c];
+    }
+  }
+  const Quadratic half_trace = 0.5 * (EEt[0][0] + EEt[1][1] + EEt[2][2]);
+  for (int i = 0; i < 3; ++i) EEt[i][i] -= half_trace;
+
+  Constraints rows;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      rows.row(3 * r + c) =
+          product(EEt[r][0], E[0][c]) + product(EEt[r][1], E[1][c]) + product(EEt[r][2], E[2][c]);
+    }
+  }
+  const auto minor = [&E](int c1, int c2) -> Quadratic {
+    return product(E[0][c1], E[1][c2]) - product(E[0][c2], E[1][c1]);
+  };
+  rows.row(9) = product(minor(1, 2), E[2][0]) + product(minor(2, 0), E[2][1]) + product(minor(0, 1), E[2][2]);
+  return rows;
+}
+
+}  // namespace
+
+void solve_five_point(std::span<const Vector3, 5> bearings_a, std::span<const Vector3, 5> bearings_b,
+                      std::vector<Matrix3>& solutions) {
+  Eigen::Matrix<double, 9, 5> At;  // columns: b a^T, row-major
+  for (int i = 0; i < 5; ++i) {
+    const Vector3 a = bearings_a[i].normalized();
+    const Vector3 b = bearings_b[i].normalized();
+    At.col(i) << b.x() * a, b.y() * a, b.z() * a;
+  }
+  // The last four columns of Q span the null space of A.
+  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 5>> qr(At);
+  if (qr.rank() < 5) return;
+  const Eigen::Matrix<double, 9, 9> Q = qr.householderQ();
+  std::array<Matrix3, 4> N;
+  for (int k = 0; k < 4; ++k) {
+    N[k] = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(Q.col(5 + k).data());
+  }
+
+  const Constraints C = essential_constraints(N);
+  const Eigen::FullPivLU<Eigen::Matrix<double, 10, 10>> lu(C.leftCols<10>());
+  if (!lu.isInvertible()) return;
+  const Eigen::Matrix<double, 10, 10> reduced = lu.solve(C.rightCols<10>());  // cubics = -reduced * basis
+
+  // Multiplication by x of the basis (x^2, xy, xz, y^2, yz, z^2, x, y, z, 1): the first six become cubics.
+  Eigen::Matrix<double, 10, 10> M = Eigen::Matrix<double, 10, 10>::Zero();
+  M.topRows<6>() = -reduced.topRows<6>();
+  M(6, 0) = M(7, 1) = M(8, 2) = M(9, 6) = 1;
+  const Eigen::EigenSolver<Eigen::Matrix<double, 10, 10>> eigen(M);
+  if (eigen.info() != Eigen::Success) return;
+  for (int i = 0; i < 10; ++i) {
+    if (eigen.eigenvalues()[i].imag() != 0) continue;  // conjugate pairs are exact in a real Schur form
+    const Eigen::Matrix<double, 10, 1> v = eigen.eigenvectors().col(i).real();
+    if (v[9] == 0) continue;
+    const Matrix3 E = (v[6] * N[0] + v[7] * N[1] + v[8] * N[2]) / v[9] + N[3];
+    const double norm = E.norm();
+    if (std::isfinite(norm) && norm > 0) solutions.push_back(E * (std::sqrt(2.0) / norm));
+  }
+}
+
+double squared_sampson_distance(const Matrix3& E_b_a, const Vector3& bearing_a, const Vector3& bearing_b) {
+  const Vector3 a = bearing_a / bearing_a.z();
+  const Vector3 b = bearing_b / bearing_b.z();
+  const Vector3 line_b = E_b_a * a;
+  const Vector3 line_a = E_b_a.transpose() * b;
+  const double e = b.dot(line_b);
+  return e * e / (line_a.head<2>().squaredNorm() + line_b.head<2>().squaredNorm());
+}
+
+std::optional<SE3> decompose_essential(const Matrix3& E_b_a, std::span<const Vector3> bearings_a,
+                                       std::span<const Vector3> bearings_b, std::span<const int> indices) {
+  const Eigen::JacobiSVD<Matrix3> svd(E_b_a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Matrix3 U = svd.matrixU();
+  Matrix3 V = svd.matrixV();
+  if (U.determinant() < 0) U = -U;
+  if (V.determinant() < 0) V = -V;
+  Matrix3 W;
+  W << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  std::optional<SE3> best;
+  int most = 0;
+  for (const Matrix3& R : {Matrix3(U * W * V.transpose()), Matrix3(U * W.transpose() * V.transpose())}) {
+    for (const double sign : {1.0, -1.0}) {
+      const SE3 T_b_a(R, sign * U.col(2));
+      const SE3 T_a_b = T_b_a.inverse();
+      int in_front = 0;
+      for (const int i : indices) {
+        if (triangulate_midpoint(bearings_a[i].normalized(), bearings_b[i].normalized(), T_a_b, 0.0))
+          ++in_front;
+      }
+      if (in_front > most) {
+        most = in_front;
+        best = T_b_a;
+      }
+    }
+  }
+  return best;
+}
+
+namespace {
+
+struct FivePointEstimator {
+  using Model = Matrix3;
+  static constexpr int kSampleSize = 5;
+  std::span<const Vector3> a, b;
+
+  [[nodiscard]] int size() const { return static_cast<int>(std::min(a.size(), b.size())); }
+  void fit(std::span<const int, 5> sample, std::vector<Matrix3>& models) const {
+    std::array<Vector3, 5> sample_a, sample_b;
+    for (int k = 0; k < 5; ++k) {
+      sample_a[k] = a[sample[k]];
+      sample_b[k] = b[sample[k]];
+    }
+    solve_five_point(sample_a, sample_b, models);
+  }
+  [[nodiscard]] double squared_residual(const Matrix3& E, int i) const {
+    return squared_sampson_distance(E, a[i], b[i]);
+  }
+};
+
+double sampson_cost(const SE3& T_b_a, const FivePointEstimator& data, std::span<const int> indices) {
+  const Matrix3 E = essential_matrix(T_b_a);
+  double cost = 0;
+  for (const int i : indices) cost += data.squared_residual(E, i);
+  return cost;
+}
+
+/// One Gauss-Newton step with the Sampson denominators held: rotation R <- exp(w) R, direction t <- t + B y.
+SE3 sampson_step(const SE3& T_b_a, const FivePointEstimator& data, std::span<const int> indices) {
+  using Matrix5 = Eigen::Matrix<double, 5, 5>;
+  using Vector5 = Eigen::Matrix<double, 5, 1>;
+  const Vector3 t = T_b_a.translation().normalized();
+  Eigen::Matrix<double, 3, 2> B;  // basis of the plane perpendicular to t
+  B.col(0) = t.unitOrthogonal();
+  B.col(1) = t.cross(B.col(0));
+  const Matrix3 R = T_b_a.rotation();
+  const Matrix3 E = hat(t) * R;
+  Matrix5 H = Matrix5::Zero();
+  Vector5 g = Vector5::Zero();
+  for (const int i : indices) {
+    const Vector3 a = data.a[i] / data.a[i].z();
+    const Vector3 b = data.b[i] / data.b[i].z();
+    const Vector3 Ra = R * a;
+    const double e = b.dot(E * a);
+    const double d = (E * a).head<2>().squaredNorm() + (E.transpose() * b).head<2>().squaredNorm();
+    Vector5 J;  // of b . (t x exp(w) R a)
+    J << Ra.cross(b.cross(t)), B.transpose() * Ra.cross(b);
+    H += J * J.transpose() / d;
+    g -= J * (e / d);
+  }
+  const Vector5 step = H.ldlt().solve(g);
+  return {SO3::exp(step.head<3>()) * T_b_a.so3(), (t + B * step.tail<2>()).normalized()};
+}
+
+}  // namespace
+
+std::optional<RelativePose> estimate_relative_pose(std::span<const Vector3> bearings_a,
+                                                   std::span<const Vector3> bearings_b,
+                                                   const RansacOptions& options) {
+  const FivePointEstimator data{bearings_a, bearings_b};
+  const auto found = ransac(data, options);
+  if (!found) return std::nullopt;
+  const auto start = decompose_essential(found->model, bearings_a, bearings_b, found->inliers);
+  if (!start) return std::nullopt;
+
+  constexpr int kMaxSteps = 10;
+  RelativePose result{*start, found->inliers};
+  double cost = sampson_cost(result.T_b_a, data, result.inliers);
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const SE3 T_new = sampson_step(result.T_b_a, data, result.inliers);
+    const double cost_new = sampson_cost(T_new, data, result.inliers);
+    if (!(cost_new < cost)) break;
+    const bool converged = cost_new > (1 - 1e-9) * cost;
+    result.T_b_a = T_new;
+    cost = cost_new;
+    if (converged) break;
+  }
+  const Matrix3 E = essential_matrix(result.T_b_a);
+  result.inliers.clear();
+  for (int i = 0; i < data.size(); ++i) {
+    if (data.squared_residual(E, i) <= options.threshold * options.threshold) result.inliers.push_back(i);
+  }
+  return result;
+}
+
+}  // namespace twofold

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+namespace twofold::five_point {
+
+/// Polynomials in (x, y, z) as coefficient rows. Monomials, highest degree first:
+///   cubic      x3 x2y x2z xy2 xyz xz2 y3 y2z yz2 z3, then those of
+///   quadratic  x2 xy xz y2 yz z2, then those of
+///   linear     x y z 1
+using Linear = Eigen::Matrix<double, 1, 4>;
+using Quadratic = Eigen::Matrix<double, 1, 10>;
+using Cubic = Eigen::Matrix<double, 1, 20>;
+
+struct Exponents {
+  int x, y, z;
+  constexpr bool operator==(const Exponents&) const = default;
+};
+
+inline constexpr std::array<Exponents, 20> kMonomials{
+    {{3, 0, 0}, {2, 1, 0}, {2, 0, 1}, {1, 2, 0}, {1, 1, 1}, {1, 0, 2}, {0, 3, 0},
+     {0, 2, 1}, {0, 1, 2}, {0, 0, 3}, {2, 0, 0}, {1, 1, 0}, {1, 0, 1}, {0, 2, 0},
+     {0, 1, 1}, {0, 0, 2}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
+
+/// kProduct[i][j]: position of monomial i times monomial j among the twenty; -1 above degree three.
+inline constexpr auto kProduct = [] {
+  std::array<std::array<int, 20>, 20> table{};
+  for (int i = 0; i < 20; ++i) {
+    for (int j = 0; j < 20; ++j) {
+      table[i][j] = -1;
+      const Exponents sum{kMonomials[i].x + kMonomials[j].x, kMonomials[i].y + kMonomials[j].y,
+                          kMonomials[i].z + kMonomials[j].z};
+      for (int k = 0; k < 20; ++k) {
+        if (kMonomials[k] == sum) table[i][j] = k;
+      }
+    }
+  }
+  return table;
+}();
+
+/// Products of polynomials.
+[[nodiscard]] inline Quadratic product(const Linear& p, const Linear& q) {
+  Quadratic r = Quadratic::Zero();
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) r[kProduct[16 + i][16 + j] - 10] += p[i] * q[j];
+  }
+  return r;
+}
+
+[[nodiscard]] inline Cubic product(const Quadratic& p, const Linear& q) {
+  Cubic r = Cubic::Zero();
+  for (int i = 0; i < 10; ++i) {
+    for (int j = 0; j < 4; ++j) r[kProduct[10 + i][16 + j]] += p[i] * q[j];
+  }
+  return r;
+}
+
+}  // namespace twofold::five_point

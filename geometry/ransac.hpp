@@ -1,0 +1,109 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace twofold {
+
+/// SplitMix64 (Steele et al., OOPSLA 2014): the same numbers on every platform, unlike <random>'s
+/// distributions.
+class SplitMix64 {
+ public:
+  explicit SplitMix64(std::uint64_t seed) : state_(seed) {}
+  [[nodiscard]] std::uint64_t next() {
+    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+    return z ^ (z >> 31);
+  }
+  /// In [0, n), n in [1, 2^31); the bias is below 2^-32.
+  [[nodiscard]] int below(int n) {
+    return static_cast<int>(((next() >> 32) * static_cast<std::uint64_t>(n)) >> 32);
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+struct RansacOptions {
+  double threshold =
+      0;  ///< largest residual of an inlier, in the unit of Estimator::squared_residual's root, > 0
+  double confidence = 0.999;  ///< probability of having drawn one sample without outliers, in (0, 1)
+  int max_iterations = 1000;  ///< samples, >= 1
+  std::uint64_t seed = 1;
+};
+
+template <class Model>
+struct RansacResult {
+  Model model;
+  std::vector<int> inliers;  ///< ascending indices of data with residual <= threshold under model
+  int iterations = 0;        ///< samples drawn
+};
+
+/// Adaptive RANSAC (Fischler & Bolles, CACM 1981) with the truncated quadratic score of MSAC (Torr &
+/// Zisserman, 2000), which prefers, among models with the same inliers, the one that fits them better.
+///
+/// Estimator:
+///   using Model;  static constexpr int kSampleSize;
+///   int size() const;                                                     number of data
+///   void fit(std::span<const int, kSampleSize>, std::vector<Model>&) const;   appends none, one or several
+///   models double squared_residual(const Model&, int i) const;                   may be infinite
+///
+/// @return  the best model seen, not refined; nullopt when size() < kSampleSize or no model has kSampleSize
+/// inliers. Deterministic: depends on the estimator and the options only.
+template <class Estimator>
+[[nodiscard]] std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator,
+                                                                            const RansacOptions& options) {
+  using Model = typename Estimator::Model;
+  constexpr int kSample = Estimator::kSampleSize;
+  const int n = estimator.size();
+  if (n < kSample) return std::nullopt;
+  const double threshold2 = options.threshold * options.threshold;
+  SplitMix64 random(options.seed);
+  std::optional<Model> best;
+  double best_score = std::numeric_limits<double>::infinity();
+  int needed = options.max_iterations;
+  int iteration = 0;
+  std::vector<Model> models;
+  for (; iteration < needed; ++iteration) {
+    std::array<int, kSample> sample;
+    for (int k = 0; k < kSample; ++k) {
+      do {
+        sample[k] = random.below(n);
+      } while (std::find(sample.begin(), sample.begin() + k, sample[k]) != sample.begin() + k);
+    }
+    models.clear();
+    estimator.fit(std::span<const int, kSample>(sample), models);
+    for (const Model& model : models) {
+      double score = 0;
+      int inliers = 0;
+      for (int i = 0; i < n && score < best_score; ++i) {
+        const double r2 = estimator.squared_residual(model, i);
+        if (r2 <= threshold2) ++inliers;
+        score += r2 <= threshold2 ? r2 : threshold2;
+      }
+      if (score >= best_score || inliers < kSample) continue;
+      best_score = score;
+      best = model;
+      // 1 - (1 - w^k)^N >= confidence, w the inlier share
+      const double p_good = std::pow(static_cast<double>(inliers) / n, kSample);
+      const double draws = p_good >= 1 ? 1 : std::log(1 - options.confidence) / std::log1p(-p_good);
+      needed = draws < options.max_iterations ? std::max(1, static_cast<int>(std::ceil(draws)))
+                                              : options.max_iterations;
+    }
+  }
+  if (!best) return std::nullopt;
+  RansacResult<Model> result{*best, {}, iteration};
+  for (int i = 0; i < n; ++i) {
+    if (estimator.squared_residual(*best, i) <= threshold2) result.inliers.push_back(i);
+  }
+  return result;
+}
+
+}  // namespace twofold

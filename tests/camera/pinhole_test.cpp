@@ -1,0 +1,41 @@
+#include "camera/pinhole.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "camera/rig.hpp"
+#include "tests/numeric_derivative.hpp"
+
+namespace twofold {
+namespace {
+
+const PinholeCamera kCamera{450, 455, 320, 240, 640, 480};
+
+TEST(Pinhole, JacobiansMatchCentralDifferences) {
+  const Rig rig{SensorKind::kStereo, kCamera, 0.12};
+  std::mt19937 rng(7);
+  std::uniform_real_distribution<double> xy(-2, 2), depth(0.5, 20);
+  for (int i = 0; i < 200; ++i) {
+    const Vector3 x_c(xy(rng), xy(rng), depth(rng));
+    const auto J = kCamera.project_jacobian(x_c);
+    const auto J_num = central_difference([&](const Vector3& x) { return kCamera.project(x); }, x_c);
+    EXPECT_LT((J - J_num).norm(), 1e-6 * J.norm()) << x_c.transpose();
+    const auto J_rig = rig.project_jacobian(x_c);
+    const auto J_rig_num = central_difference([&](const Vector3& x) { return rig.project(x); }, x_c);
+    EXPECT_LT((J_rig - J_rig_num).norm(), 1e-6 * J_rig.norm()) << x_c.transpose();
+    EXPECT_LT((rig.unproject(rig.project(x_c)) - x_c).norm(), 1e-9 * x_c.squaredNorm());
+  }
+}
+
+TEST(Pinhole, PyramidLevelKeepsTheAreaOfPixels) {
+  const PinholeCamera half = kCamera.at_level(1);
+  EXPECT_EQ(half.width, 320);
+  EXPECT_EQ(half.height, 240);
+  // Level-1 pixel (10, 20) covers level-0 pixels (20..21, 40..41), centred at (20.5, 40.5).
+  const Vector3 ray = kCamera.unproject({20.5, 40.5});
+  EXPECT_LT((half.project(ray) - Vector2(10, 20)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace twofold

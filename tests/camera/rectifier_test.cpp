@@ -1,0 +1,287 @@
+#include "camera/rectifier.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+namespace twofold {
+namespace {
+
+/// The stereo head of the EuRoC sequences; T_right_left from its T_BS matrices.
+Calibration euroc() {
+  Calibration c;
+  c.kind = SensorKind::kStereo;
+  c.left = {{458.654, 457.296, 367.215, 248.375, 752, 480},
+            {DistortionModel::kRadTan, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}}};
+  c.right = {{457.587, 456.134, 379.999, 255.238, 752, 480},
+             {DistortionModel::kRadTan, {-0.28368365, 0.07451284, -0.00010473, -3.55590700e-05, 0}}};
+  Matrix3 R_b_l, R_b_r;
+  R_b_l << 0.0148655429818, -0.999880929698, 0.00414029679422, 0.999557249008, 0.0149672133247,
+      0.025715529948, -0.0257744366974, 0.00375618835797, 0.999660727178;
+  R_b_r << 0.0125552670891, -0.999755099723, 0.0182237714554, 0.999598781151, 0.0130119051815,
+      0.0251588363115, -0.0253898008918, 0.0179005838253, 0.999517347078;
+  const SE3 T_b_l(R_b_l, Vector3(-0.0216401454975, -0.064676986768, 0.00981073058949));
+  const SE3 T_b_r(R_b_r, Vector3(-0.0198435579556, 0.0453689425024, 0.00786212447038));
+  c.T_right_left = T_b_r.inverse() * T_b_l;
+  return c;
+}
+
+/// A fisheye pair that squints, with different focal lengths and sizes.
+Calibration fisheye() {
+  Calibration c;
+  c.left = {{300, 301, 330, 250, 660, 500},
+            {DistortionModel::kEquidistant, {-0.009, 0.012, -0.012, 0.004, 0}}};
+  c.right = {{310, 309, 310, 235, 640, 480},
+             {DistortionModel::kEquidistant, {-0.007, 0.010, -0.010, 0.003, 0}}};
+  c.T_right_left = SE3(SO3::exp({0.03, -0.05, 0.02}), {-0.2, 0.01, 0.015});
+  return c;
+}
+
+Calibration double_sphere() {
+  Calibration c = fisheye();
+  c.left.distortion = {DistortionModel::kDoubleSphere, {-0.2, 0.55}};
+  c.right.distortion = {DistortionModel::kDoubleSphere, {-0.18, 0.56}};
+  return c;
+}
+
+float sample(const cv::Mat& map, double u, double v) {
+  cv::Mat value;
+  cv::getRectSubPix(map, {1, 1}, cv::Point2f(static_cast<float>(u), static_cast<float>(v)), value);
+  return value.at<float>(0, 0);
+}
+
+class StereoRectifier : public ::testing::TestWithParam<Calibration> {};
+INSTANTIATE_TEST_SUITE_P(Rigs, StereoRectifier, ::testing::Values(euroc(), fisheye(), double_sphere()));
+
+/// Project points through the raw cameras and look up, in the maps, the rectified pixels that show these raw
+/// pixels.
+TEST_P(StereoRectifier, MapsSendRectifiedProjectionsToRawProjections) {
+  const Calibration& c = GetParam();
+  const Rectifier rectifier(c);
+  const Rig& rig = rectifier.rig();
+  std::mt19937 rng(1);
+  std::uniform_real_distribution<double> u(2, rig.camera.width - 3), v(2, rig.camera.height - 3),
+      depth(0.4, 30);
+  int seen = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3 x_rectified = depth(rng) * rig.camera.unproject({u(rng), v(rng)});
+    const Vector3 z = rig.project(x_rectified);
+    const Vector3 x_l = rectifier.R_rectified_left().inverse() * x_rectified;
+    const Vector2 raw_l = c.left.project(x_l);
+    EXPECT_NEAR(sample(rectifier.left_map().x, z.x(), z.y()), raw_l.x(), 0.02);
+    EXPECT_NEAR(sample(rectifier.left_map().y, z.x(), z.y()), raw_l.y(), 0.02);
+    if (z.z() < 2) continue;
+    ++seen;
+    const Vector2 raw_r = c.right.project(c.T_right_left * x_l);
+    EXPECT_NEAR(sample(rectifier.right_map().x, z.z(), z.y()), raw_r.x(), 0.02);
+    EXPECT_NEAR(sample(rectifier.right_map().y, z.z(), z.y()), raw_r.y(), 0.02);
+  }
+  EXPECT_GT(seen, 1000);
+}
+
+/// The other way round, without the rig: undistorting and rotating raw projections must give equal rows.
+TEST_P(StereoRectifier, CorrespondingPointsShareTheirRow) {
+  const Calibration& c = GetParam();
+  const Rectifier rectifier(c);
+  const PinholeCamera& camera = rectifier.rig().camera;
+  std::mt19937 rng(2);
+  std::uniform_real_distribution<double> u(0, c.left.pinhole.width - 1), v(0, c.left.pinhole.height - 1),
+      depth(0.4, 30);
+  int both = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const auto ray = c.left.unproject({u(rng), v(rng)});
+    if (!ray) continue;
+    const Vector3 x_l = depth(rng) * *ray;
+    const Vector3 x_r = c.T_right_left * x_l;
+    if (x_r.z() < 0.1) continue;
+    const auto ray_l = c.left.unproject(c.left.project(x_l));
+    const auto ray_r = c.right.unproject(c.right.project(x_r));
+    if (!ray_l || !ray_r) continue;
+    ++both;
+    const Vector2 uv_l = camera.project(rectifier.R_rectified_left() * *ray_l);
+    const Vector2 uv_r = camera.project(rectifier.R_rectified_right() * *ray_r);
+    EXPECT_NEAR(uv_l.y(), uv_r.y(), 1e-6);
+    const double z = (rectifier.R_rectified_left() * x_l).z();
+    EXPECT_NEAR(uv_l.x() - uv_r.x(), rectifier.rig().disparity_from_depth(z), 1e-6);
+  }
+  EXPECT_GT(both, 1500);
+}
+
+TEST_P(StereoRectifier, EveryPixelHasASourceAndMostOfTheImageStays) {
+  const Calibration& c = GetParam();
+  const Rectifier rectifier(c);
+  const auto check = [](const RectificationMap& map, const PinholeCamera& raw) {
+    double low, high;
+    cv::minMaxLoc(map.x, &low, &high);
+    EXPECT_GE(low, -0.5);
+    EXPECT_LE(high, raw.width - 0.5);
+    cv::minMaxLoc(map.y, &low, &high);
+    EXPECT_GE(low, -0.5);
+    EXPECT_LE(high, raw.height - 0.5);
+  };
+  check(rectifier.left_map(), c.left.pinhole);
+  check(rectifier.right_map(), c.right.pinhole);
+
+  int kept = 0, all = 0;
+  for (int v = 0; v < c.left.pinhole.height; v += 5) {
+    for (int u = 0; u < c.left.pinhole.width; u += 5) {
+      ++all;
+      const auto ray = c.left.unproject(Vector2(u, v));
+      if (!ray) continue;
+      const Vector3 x = rectifier.R_rectified_left() * *ray;
+      if (x.z() > 0 && rectifier.rig().camera.contains(rectifier.rig().camera.project(x))) ++kept;
+    }
+  }
+  // EuRoC: 79 % (as with the common focal length of 435 px). The squinting fisheyes lose more.
+  EXPECT_GT(kept, (c.left.distortion.model == DistortionModel::kRadTan ? 0.75 : 0.6) * all)
+      << kept << " of " << all;
+}
+
+TEST_P(StereoRectifier, FullFieldKeepsEveryRawPixelWithinTheLimit) {
+  const Calibration& c = GetParam();
+  const Rectifier rectifier(c, {.field = 1, .max_half_field_deg = 75});
+  const double limit = std::tan(75 * M_PI / 180);
+  for (int v = 0; v < c.left.pinhole.height; v += 7) {
+    for (int u = 0; u < c.left.pinhole.width; u += 7) {
+      const auto ray = c.left.unproject(Vector2(u, v));
+      if (!ray) continue;
+      const Vector3 x = rectifier.R_rectified_left() * *ray;
+      if (x.z() <= 0 || (x.head<2>() / x.z()).lpNorm<Eigen::Infinity>() > limit) continue;
+      EXPECT_TRUE(rectifier.rig().camera.contains(rectifier.rig().camera.project(x), -1.0)) << u << ", " << v;
+    }
+  }
+}
+
+TEST(Rectifier, EurocBaselineAndFocalLength) {
+  const Rectifier rectifier(euroc());
+  EXPECT_NEAR(rectifier.rig().baseline, 0.110074, 1e-5);
+  EXPECT_NEAR(rectifier.rig().camera.fx, 435, 15);  // about what this head is commonly rectified to
+  EXPECT_EQ(rectifier.rig().camera.fx, rectifier.rig().camera.fy);
+  EXPECT_LT(rectifier.R_rectified_left().log().norm(), 0.05);
+}
+
+/// A smooth pattern on a plane, imaged by a raw camera.
+cv::Mat image_of_plane(const CameraModel& camera, const SE3& T_c_w, double phase_per_metre) {
+  cv::Mat image(camera.pinhole.height, camera.pinhole.width, CV_8UC1);
+  const SE3 T_w_c = T_c_w.inverse();
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
+      const Vector3 ray = T_w_c.so3() * *camera.unproject(Vector2(u, v));
+      const double depth = (4 - T_w_c.translation().z()) / ray.z();  // plane z = 4 of the world
+      const Vector3 x_w = T_w_c.translation() + depth * ray;
+      const double s = std::sin(phase_per_metre * x_w.x()) * std::cos(0.8 * phase_per_metre * x_w.y());
+      image.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(128 + 100 * s);
+    }
+  }
+  return image;
+}
+
+TEST(Rectifier, RectifiedImagesShowTheSamePointAtTheDisparityOfItsDepth) {
+  const Calibration c = euroc();
+  const Rectifier rectifier(c);
+  Frame raw{3, 77, image_of_plane(c.left, SE3(), 4), image_of_plane(c.right, c.T_right_left, 4), {}};
+  ASSERT_EQ(rectifier.mismatch_reason(raw), "");
+  Frame out;
+  rectifier.rectify(raw, out);
+  EXPECT_EQ(out.index, 3);
+  EXPECT_EQ(out.t_ns, 77);
+  const Rig& rig = rectifier.rig();
+  const Vector3 normal = rectifier.R_rectified_left() * Vector3::UnitZ();
+  double sum = 0;
+  int count = 0;
+  for (int v = 10; v < rig.camera.height - 10; v += 9) {
+    for (int u = 80; u < rig.camera.width - 10; u += 9) {
+      const Vector3 ray = rig.camera.unproject(Vector2(u, v));
+      const Vector3 z = rig.project(ray * (4 / normal.dot(ray)));
+      cv::Mat value;
+      cv::getRectSubPix(out.right, {1, 1}, cv::Point2f(z.z(), z.y()), value);
+      sum += std::abs(value.at<std::uint8_t>(0, 0) - out.left.at<std::uint8_t>(v, u));
+      ++count;
+    }
+  }
+  EXPECT_LT(sum / count, 0.8);  // grey levels; rounding alone gives about 0.5
+}
+
+TEST(Rectifier, PassesRectifiedImagesThrough) {
+  Calibration c;
+  c.left = c.right = {{700, 700, 600, 180, 1241, 376}, {}};
+  c.T_right_left = SE3(SO3(), {-0.54, 0, 0});
+  c.already_rectified = true;
+  const Rectifier rectifier(c);
+  EXPECT_TRUE(rectifier.passes_through());
+  EXPECT_EQ(rectifier.rig().baseline, 0.54);
+  const Frame raw{0, 0, cv::Mat(376, 1241, CV_8UC1), cv::Mat(376, 1241, CV_8UC1), {}};
+  Frame out;
+  rectifier.rectify(raw, out);
+  EXPECT_EQ(out.left.data, raw.left.data);
+  EXPECT_EQ(out.right.data, raw.right.data);
+}
+
+TEST(Rectifier, UndistortsDepthWithoutMixingSurfaces) {
+  Calibration c;
+  c.kind = SensorKind::kRgbd;
+  c.left = euroc().left;
+  const Rectifier rectifier(c);
+  EXPECT_FALSE(rectifier.passes_through());
+  EXPECT_EQ(rectifier.rig().baseline, c.virtual_baseline);
+  Frame raw{
+      0, 0, cv::Mat(480, 752, CV_8UC1, cv::Scalar(9)), {}, cv::Mat(480, 752, CV_16UC1, cv::Scalar(1000))};
+  raw.depth.colRange(300, 752).setTo(5000);
+  ASSERT_EQ(rectifier.mismatch_reason(raw), "");
+  Frame out;
+  rectifier.rectify(raw, out);
+  const int near = cv::countNonZero(out.depth == 1000);
+  const int far = cv::countNonZero(out.depth == 5000);
+  EXPECT_EQ(near + far, 480 * 752);
+  EXPECT_GT(near, 100000);
+}
+
+TEST(Rectifier, MonoWithoutDistortionKeepsItsIntrinsics) {
+  Calibration c;
+  c.kind = SensorKind::kMono;
+  c.left = {{500, 510, 320, 240, 640, 480}, {}};
+  const Rectifier rectifier(c);
+  EXPECT_TRUE(rectifier.passes_through());
+  EXPECT_EQ(rectifier.rig().camera.fy, 510);
+}
+
+std::string error_of(const Calibration& c, const RectifierOptions& options = {}) {
+  try {
+    const Rectifier rectifier(c, options);
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Rectifier, RejectsWhatItCannotRectify) {
+  Calibration c = euroc();
+  c.right.pinhole.fx = 0;
+  EXPECT_NE(error_of(c).find("right camera: fx"), std::string::npos);
+  c = euroc();
+  c.T_right_left = c.T_right_left.inverse();  // cameras swapped
+  EXPECT_NE(error_of(c).find("T_right_left"), std::string::npos);
+  c = euroc();
+  c.T_right_left = SE3(SO3::exp({0, 2.5, 0}), {-0.1, 0, 0.05});  // looking away from each other
+  EXPECT_NE(error_of(c), "");
+  c = euroc();
+  c.already_rectified = true;
+  EXPECT_NE(error_of(c).find("already_rectified"), std::string::npos);
+  EXPECT_NE(error_of(euroc(), {.field = 2}).find("field"), std::string::npos);
+  EXPECT_NE(error_of(euroc(), {.width = 640}).find("width"), std::string::npos);
+}
+
+TEST(Rectifier, SaysHowAFrameDiffersFromTheCalibration) {
+  const Rectifier rectifier(euroc());
+  Frame raw{0, 0, cv::Mat(480, 752, CV_8UC1), {}, {}};
+  EXPECT_EQ(rectifier.mismatch_reason(raw), "the right image is missing");
+  raw.right = cv::Mat(480, 640, CV_8UC1);
+  EXPECT_EQ(rectifier.mismatch_reason(raw),
+            "the right image has 640 x 480 pixels, the calibration says 752 x 480");
+  raw.right = cv::Mat(480, 752, CV_8UC3);
+  EXPECT_EQ(rectifier.mismatch_reason(raw), "the right image is not 8-bit grey");
+}
+
+}  // namespace
+}  // namespace twofold
