@@ -23,9 +23,10 @@ struct PoolSlot {
 
 }  // namespace internal
 
-/// Use of one object of a FramePool; gives it back when destroyed. Moves, through rings too; empty by default and
-/// after being moved from. A handle is used by one thread at a time, two handles of one object by two threads.
-/// The holder of the only handle may write the object; once share() was called all holders only read.
+/// Use of one object of a FramePool; gives it back when destroyed. Moves, through rings too; empty by default
+/// and after being moved from. A handle is used by one thread at a time, two handles of one object by two
+/// threads. The holder of the only handle may write the object; once share() was called all holders only
+/// read.
 template <class T, class Atomics = StdAtomics>
 class PoolHandle {
  public:
@@ -42,8 +43,8 @@ class PoolHandle {
 
   /// Another handle of the same object, for another thread; on an empty handle an empty one.
   [[nodiscard]] PoolHandle share() const {
-    // Relaxed: the object reaches the other thread through a ring, whose release publishes it; the count cannot
-    // fall to zero meanwhile because this handle holds one.
+    // Relaxed: the object reaches the other thread through a ring, whose release publishes it; the count
+    // cannot fall to zero meanwhile because this handle holds one.
     if (slot_ != nullptr) slot_->users.fetch_add(1, std::memory_order_relaxed);
     return PoolHandle(slot_);
   }
@@ -63,19 +64,19 @@ class PoolHandle {
   Slot* slot_ = nullptr;
 };
 
-/// Fixed number of objects made at start and used over and over, so that the steady state allocates nothing: frames,
-/// pyramids, message bodies. An object keeps its contents, buffers included, between two uses.
+/// Fixed number of objects made at start and used over and over, so that the steady state allocates nothing:
+/// frames, pyramids, message bodies. An object keeps its contents, buffers included, between two uses.
 ///
-/// Roles: one thread calls try_acquire; handles are dropped on any thread. All handles must be gone, or never be
-/// used again, when the pool is destroyed.
-/// Progress: both wait-free. Dropping a handle is one decrement; acquiring looks at each object's use count at most
-/// once, starting behind the last one given out, which in steady state is the first look. A ring of free objects for
-/// each dropping thread would do as well and need one ring more for every thread: the counts are there anyway.
-/// Full policy: an empty handle, and the caller drops or waits a frame.
+/// Roles: one thread calls try_acquire; handles are dropped on any thread. All handles must be gone, or never
+/// be used again, when the pool is destroyed. Progress: both wait-free. Dropping a handle is one decrement;
+/// acquiring looks at each object's use count at most once, starting behind the last one given out, which in
+/// steady state is the first look. A ring of free objects for each dropping thread would do as well and need
+/// one ring more for every thread: the counts are there anyway. Full policy: an empty handle, and the caller
+/// drops or waits a frame.
 ///
-/// Ordering. (A) users release (every drop) -> acquire (try_acquire): the drops of one object form a release sequence
-/// of read-modify-writes, so that reading 0 synchronises with each of them: all uses are over before the next begins.
-/// Only the acquiring thread takes a count from 0, hence no compare-and-swap.
+/// Ordering. (A) users release (every drop) -> acquire (try_acquire): the drops of one object form a release
+/// sequence of read-modify-writes, so that reading 0 synchronises with each of them: all uses are over before
+/// the next begins. Only the acquiring thread takes a count from 0, hence no compare-and-swap.
 template <class T, class Atomics = StdAtomics>
 class FramePool {
  public:

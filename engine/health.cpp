@@ -34,16 +34,21 @@ ProcessUsage process_usage() {
   return usage;
 }
 
-double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID).value_or(0); }
-
-std::optional<double> thread_cpu_seconds(pid_t thread) {
-  // The kernel's numbering of per-thread CPU clocks. pthread_getcpuclockid gives the same, but for a thread that has
-  // ended and is not joined yet its answer is the caller's own clock.
-  constexpr clockid_t kPerThread = 4;
-  constexpr clockid_t kScheduled = 2;
-  return clock_seconds(static_cast<clockid_t>(static_cast<unsigned>(~thread) << 3U) | kPerThread | kScheduled);
+double thread_cpu_seconds() {
+  return clock_seconds(CLOCK_THREAD_CPUTIME_ID).value_or(0);
 }
 
-pid_t this_thread_id() { return static_cast<pid_t>(syscall(SYS_gettid)); }
+std::optional<double> thread_cpu_seconds(pid_t thread) {
+  // The kernel's numbering of per-thread CPU clocks. pthread_getcpuclockid gives the same, but for a thread
+  // that has ended and is not joined yet its answer is the caller's own clock.
+  constexpr clockid_t kPerThread = 4;
+  constexpr clockid_t kScheduled = 2;
+  return clock_seconds(static_cast<clockid_t>(static_cast<unsigned>(~thread) << 3U) | kPerThread |
+                       kScheduled);
+}
+
+pid_t this_thread_id() {
+  return static_cast<pid_t>(syscall(SYS_gettid));
+}
 
 }  // namespace twofold

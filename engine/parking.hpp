@@ -9,35 +9,41 @@
 
 namespace twofold {
 
-/// The two futex calls. wait returns when woken, when `word` is not `expected`, after the timeout, or for no reason.
+/// The two futex calls. wait returns when woken, when `word` is not `expected`, after the timeout, or for no
+/// reason.
 struct Futex {
   static void wait(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
                    std::optional<std::chrono::nanoseconds> timeout) noexcept;
   static void wake(const std::atomic<std::uint32_t>& word) noexcept;
 };
 
-/// Where ONE consumer thread sleeps until a condition that others bring about holds, such as "a ring has a value".
+/// Where ONE consumer thread sleeps until a condition that others bring about holds, such as "a ring has a
+/// value".
 ///
 /// Roles: any thread calls wake after it made the condition true; the one consumer calls the wait functions.
 /// Progress: wake is wait-free; it makes a system call only when the consumer sleeps or is about to.
 ///
-/// state_ holds a count of wakes (upper 31 bits) and whether the consumer is about to sleep (bit 0). Both sides change
-/// it by read-modify-write, which are totally ordered, so of a wake and the consumer's announcement one comes first:
-///  - wake first: the announcement reads from its release sequence (acquire), so the re-check of the condition sees
+/// state_ holds a count of wakes (upper 31 bits) and whether the consumer is about to sleep (bit 0). Both
+/// sides change it by read-modify-write, which are totally ordered, so of a wake and the consumer's
+/// announcement one comes first:
+///  - wake first: the announcement reads from its release sequence (acquire), so the re-check of the
+///  condition sees
 ///    what the waker wrote before wake, and the consumer does not sleep;
-///  - announcement first: the waker finds bit 0 set and calls the futex, while the changed count keeps the consumer
+///  - announcement first: the waker finds bit 0 set and calls the futex, while the changed count keeps the
+///  consumer
 ///    from going to sleep if it was not yet asleep.
-/// Therefore release in wake and acquire in the announcement suffice; no seq_cst fence is needed. The count would have
-/// to wrap, 2^31 wakes between announcement and futex call, to be mistaken for no wake. std::atomic::wait of
-/// libstdc++ 12 gives no timeout, spins and yields before it sleeps, and shares its sleeper counts between addresses.
+/// Therefore release in wake and acquire in the announcement suffice; no seq_cst fence is needed. The count
+/// would have to wrap, 2^31 wakes between announcement and futex call, to be mistaken for no wake.
+/// std::atomic::wait of libstdc++ 12 gives no timeout, spins and yields before it sleeps, and shares its
+/// sleeper counts between addresses.
 class Parking {
  public:
   void wake() noexcept {
     if (state_.fetch_add(kOneWake, std::memory_order_release) & kSleeping) Futex::wake(state_);
   }
 
-  /// Sleeps until ready() is true or a stop is requested; returns what ready() said last. ready is called on this
-  /// thread, at least once, and may be woken for nothing.
+  /// Sleeps until ready() is true or a stop is requested; returns what ready() said last. ready is called on
+  /// this thread, at least once, and may be woken for nothing.
   template <class Ready>
   [[nodiscard]] bool wait(const std::stop_token& stop, Ready&& ready) {
     return wait_impl(stop, std::nullopt, ready);
@@ -72,7 +78,8 @@ class Parking {
           return done;
         }
       }
-      // Relaxed: taking back the announcement tells nobody anything; a waker that still sees it wakes for nothing.
+      // Relaxed: taking back the announcement tells nobody anything; a waker that still sees it wakes for
+      // nothing.
       state_.fetch_and(~kSleeping, std::memory_order_relaxed);
       return done;
     }

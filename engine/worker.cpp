@@ -45,7 +45,8 @@ tl::expected<void, std::string> lock_memory() {
                              "); it needs CAP_IPC_LOCK or a limit raised by `ulimit -l`");
 }
 
-Worker::Worker(WorkerOptions options, std::function<void(std::stop_token)> body) : options_(std::move(options)) {
+Worker::Worker(WorkerOptions options, std::function<void(std::stop_token)> body)
+    : options_(std::move(options)) {
   thread_ = std::jthread([this, body = std::move(body)](const std::stop_token& stop) { run(stop, body); });
   started_.wait(false, std::memory_order_acquire);
 }
@@ -81,7 +82,7 @@ double Worker::cpu_seconds() const {
   if (!finished()) {
     if (const auto seconds = thread_cpu_seconds(thread_id_)) return *seconds;
   }
-  // Either finished, or it ended between the two looks: then the figure follows within microseconds.
+  // The kernel no longer knows the thread, so it has passed its last statement, which raised finished_.
   return finished() ? final_cpu_seconds_ : 0.0;
 }
 
