@@ -1,0 +1,122 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "engine/atomics.hpp"
+#include "geometry/check.hpp"
+
+namespace twofold {
+
+template <class T, class Atomics>
+class FramePool;
+
+namespace internal {
+
+template <class T, class Atomics>
+struct PoolSlot {
+  T value;
+  alignas(kCacheLine) typename Atomics::template Atomic<std::uint32_t> users{0};
+};
+
+}  // namespace internal
+
+/// Use of one object of a FramePool; gives it back when destroyed. Moves, through rings too; empty by default
+/// and after being moved from. A handle is used by one thread at a time, two handles of one object by two
+/// threads. The holder of the only handle may write the object; once share() was called all holders only
+/// read.
+template <class T, class Atomics = StdAtomics>
+class PoolHandle {
+ public:
+  PoolHandle() = default;
+  PoolHandle(PoolHandle&& other) noexcept : slot_(std::exchange(other.slot_, nullptr)) {}
+  PoolHandle& operator=(PoolHandle&& other) noexcept {
+    if (this != &other) {
+      reset();
+      slot_ = std::exchange(other.slot_, nullptr);
+    }
+    return *this;
+  }
+  ~PoolHandle() { reset(); }
+
+  /// Another handle of the same object, for another thread; on an empty handle an empty one.
+  [[nodiscard]] PoolHandle share() const {
+    // Relaxed: the object reaches the other thread through a ring, whose release publishes it; the count
+    // cannot fall to zero meanwhile because this handle holds one.
+    if (slot_ != nullptr) slot_->users.fetch_add(1, std::memory_order_relaxed);
+    return PoolHandle(slot_);
+  }
+  void reset() noexcept {
+    if (slot_ == nullptr) return;
+    slot_->users.fetch_sub(1, std::memory_order_release);  // (A)
+    slot_ = nullptr;
+  }
+  [[nodiscard]] explicit operator bool() const { return slot_ != nullptr; }
+  [[nodiscard]] T& operator*() const { return slot_->value; }
+  [[nodiscard]] T* operator->() const { return &slot_->value; }
+
+ private:
+  friend class FramePool<T, Atomics>;
+  using Slot = internal::PoolSlot<T, Atomics>;
+  explicit PoolHandle(Slot* slot) : slot_(slot) {}
+  Slot* slot_ = nullptr;
+};
+
+/// Fixed number of objects made at start and used over and over, so that the steady state allocates nothing:
+/// frames, pyramids, message bodies. An object keeps its contents, buffers included, between two uses.
+///
+/// Roles: one thread calls try_acquire; handles are dropped on any thread. All handles must be gone, or never
+/// be used again, when the pool is destroyed. Progress: both wait-free. Dropping a handle is one decrement;
+/// acquiring looks at each object's use count at most once, starting behind the last one given out, which in
+/// steady state is the first look. A ring of free objects for each dropping thread would do as well and need
+/// one ring more for every thread: the counts are there anyway. Full policy: an empty handle, and the caller
+/// drops or waits a frame.
+///
+/// Ordering. (A) users release (every drop) -> acquire (try_acquire): the drops of one object form a release
+/// sequence of read-modify-writes, so that reading 0 synchronises with each of them: all uses are over before
+/// the next begins. Only the acquiring thread takes a count from 0, hence no compare-and-swap.
+template <class T, class Atomics = StdAtomics>
+class FramePool {
+ public:
+  using Handle = PoolHandle<T, Atomics>;
+
+  /// Calls prepare(object) once for each object, to size its buffers.
+  template <class Prepare>
+  FramePool(std::size_t capacity, Prepare&& prepare)
+      : capacity_(capacity), slots_(std::make_unique<Slot[]>(capacity)) {
+    TWOFOLD_CHECK(capacity > 0, "pool capacity");
+    for (std::size_t i = 0; i < capacity; ++i) prepare(slots_[i].value);
+  }
+  explicit FramePool(std::size_t capacity) : FramePool(capacity, [](T&) {}) {}
+  FramePool(const FramePool&) = delete;
+  FramePool& operator=(const FramePool&) = delete;
+
+  /// Acquiring thread. Empty handle when all objects are in use.
+  [[nodiscard]] Handle try_acquire() {
+    for (std::size_t looked = 0; looked < capacity_; ++looked) {
+      Slot& slot = slots_[next_];
+      next_ = next_ + 1 == capacity_ ? 0 : next_ + 1;
+      if (slot.users.load(std::memory_order_acquire) != 0) continue;  // (A)
+      slot.users.store(1, std::memory_order_relaxed);                 // nobody else looks at a count of 0
+      return Handle(&slot);
+    }
+    return {};
+  }
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }
+  /// Objects in use, for counters; anyone. Relaxed: publishes nothing, and is out of date when it returns.
+  [[nodiscard]] std::size_t in_use_approx() const {
+    std::size_t used = 0;
+    for (std::size_t i = 0; i < capacity_; ++i) used += slots_[i].users.load(std::memory_order_relaxed) != 0;
+    return used;
+  }
+
+ private:
+  using Slot = internal::PoolSlot<T, Atomics>;
+  const std::size_t capacity_;
+  const std::unique_ptr<Slot[]> slots_;
+  std::size_t next_ = 0;  // acquiring thread's
+};
+
+}  // namespace twofold

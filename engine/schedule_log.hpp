@@ -1,0 +1,87 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <iosfwd>
+#include <span>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+namespace twofold {
+
+/// What one frame met in the tracker. Together with the input images it determines the tracker's step.
+struct TrackerStep {
+  enum class Fate : std::uint8_t { kTracked, kDropped };
+  std::int64_t frame = 0;     ///< Frame::index, grows from record to record
+  std::uint64_t version = 0;  ///< snapshot it was tracked against; 0 when dropped
+  Fate fate = Fate::kTracked;
+  std::uint8_t degrade_level = 0;  ///< rung of the load ladder, 0 = nothing left out, <= 15
+  std::uint32_t messages = 0;      ///< relocalisation answers consumed before it
+  std::uint32_t refused = 0;       ///< its messages that found a ring full
+  bool operator==(const TrackerStep&) const = default;
+};
+
+/// What one mapper round consumed.
+struct MapperStep {
+  std::uint64_t version = 0;        ///< version it published, grows; 0 when it published none
+  std::uint32_t proposals = 0;      ///< keyframe proposals consumed
+  std::uint32_t loop_messages = 0;  ///< loop constraints consumed
+  std::uint32_t iterations = 0;     ///< solver iterations it was given or had time for
+  std::uint32_t refused = 0;        ///< its messages that found a ring full
+  bool operator==(const MapperStep&) const = default;
+};
+
+/// What one step of the loop closer consumed.
+struct LoopStep {
+  std::uint64_t version = 0;   ///< snapshot it used
+  std::int64_t keyframe = -1;  ///< keyframe consumed, -1 = none
+  std::uint32_t requests = 0;  ///< relocalisation requests consumed
+  std::uint32_t refused = 0;   ///< its messages that found a ring full
+  bool operator==(const LoopStep&) const = default;
+};
+
+/// Who saw what when, of a whole run. Steps are pure functions of their inputs, so that this and the
+/// recording reproduce a threaded run one thread at a time.
+struct Schedule {
+  std::vector<TrackerStep> tracker;
+  std::vector<MapperStep> mapper;
+  std::vector<LoopStep> loop_closer;
+  bool operator==(const Schedule&) const = default;
+};
+
+/// Bytes of one thread's records, each about three to five: differences to the record before as
+/// variable-length integers. Used by that thread only, without locks, and read after it was joined. Room for
+/// `reserve_bytes` is made at start, so that appending allocates nothing until that is used up (1 MiB: hours
+/// at 30 frames a second).
+template <class Step>
+class ScheduleStream {
+ public:
+  explicit ScheduleStream(std::size_t reserve_bytes = 1U << 20) { bytes_.reserve(reserve_bytes); }
+  void append(const Step& step);
+
+  [[nodiscard]] std::uint64_t records() const { return records_; }
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+  std::uint64_t records_ = 0;
+  Step last_;
+};
+
+/// Writes the file. All integers little-endian or LEB128 ("varint", low seven bits first):
+///   "TWFSCHED", format version (1 byte), number of sections (1 byte)
+///   a section each for tracker (1), mapper (2), loop closer (3): id (1 byte), records (varint), bytes
+///   (varint), the bytes, CRC-32 of all of the section before it (4 bytes)
+/// False when the stream failed.
+[[nodiscard]] bool write_schedule(std::ostream& out, const ScheduleStream<TrackerStep>& tracker,
+                                  const ScheduleStream<MapperStep>& mapper,
+                                  const ScheduleStream<LoopStep>& loop_closer);
+
+/// Parses a file's bytes, which may be anything. Error: which section is wrong, at which byte, and how.
+[[nodiscard]] tl::expected<Schedule, std::string> parse_schedule(std::span<const std::uint8_t> file);
+/// Reads the stream to its end and parses it; a file of more than 256 MiB is refused.
+[[nodiscard]] tl::expected<Schedule, std::string> read_schedule(std::istream& in);
+
+}  // namespace twofold

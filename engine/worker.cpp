@@ -1,0 +1,89 @@
+#include "engine/worker.hpp"
+
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <cstring>
+#include <exception>
+#include <utility>
+
+#include "engine/health.hpp"
+
+namespace twofold {
+
+std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
+  std::vector<std::string> notes;
+  const auto refuse = [&](const std::string& what, int error, const char* advice) {
+    notes.push_back(options.name + ": " + what + " was refused (" + std::strerror(error) + "); " + advice);
+  };
+  pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
+  if (options.cpu) {
+    const std::string what = "running on CPU " + std::to_string(*options.cpu) + " only";
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    if (*options.cpu >= 0 && *options.cpu < CPU_SETSIZE) CPU_SET(*options.cpu, &set);
+    if (const int error = pthread_setaffinity_np(pthread_self(), sizeof set, &set)) {
+      refuse(what, error, "name a CPU that `taskset -p 1` lists");
+    }
+  }
+  if (options.fifo_priority) {
+    const std::string what = "SCHED_FIFO priority " + std::to_string(*options.fifo_priority);
+    sched_param parameters{};
+    parameters.sched_priority = *options.fifo_priority;
+    if (const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters)) {
+      refuse(what, error, "priorities are 1 to 99 and need CAP_SYS_NICE or a limit raised by `ulimit -r`");
+    }
+  }
+  return notes;
+}
+
+tl::expected<void, std::string> lock_memory() {
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};
+  return tl::make_unexpected(std::string("locking memory was refused (") + std::strerror(errno) +
+                             "); it needs CAP_IPC_LOCK or a limit raised by `ulimit -l`");
+}
+
+Worker::Worker(WorkerOptions options, std::function<void(std::stop_token)> body)
+    : options_(std::move(options)) {
+  thread_ = std::jthread([this, body = std::move(body)](const std::stop_token& stop) { run(stop, body); });
+  started_.wait(false, std::memory_order_acquire);
+}
+
+Worker::~Worker() {
+  thread_.request_stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Worker::run(const std::stop_token& stop, const std::function<void(std::stop_token)>& body) {
+  thread_id_ = this_thread_id();
+  notes_ = configure_this_thread(options_);
+  started_.store(true, std::memory_order_release);
+  started_.notify_one();
+  try {
+    body(stop);
+  } catch (const std::exception& error) {
+    error_ = options_.name + ": " + error.what();
+  } catch (...) {
+    error_ = options_.name + ": ended by an exception of unknown type";
+  }
+  final_cpu_seconds_ = thread_cpu_seconds();
+  finished_.store(true, std::memory_order_release);
+}
+
+tl::expected<void, std::string> Worker::join() {
+  if (thread_.joinable()) thread_.join();
+  if (error_) return tl::make_unexpected(*error_);
+  return {};
+}
+
+double Worker::cpu_seconds() const {
+  if (!finished()) {
+    if (const auto seconds = thread_cpu_seconds(thread_id_)) return *seconds;
+  }
+  // The kernel no longer knows the thread, so it has passed its last statement, which raised finished_.
+  return finished() ? final_cpu_seconds_ : 0.0;
+}
+
+}  // namespace twofold

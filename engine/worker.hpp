@@ -1,0 +1,64 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <tl/expected.hpp>
+#include <vector>
+
+namespace twofold {
+
+struct WorkerOptions {
+  std::string name = "worker";       ///< shown by top and debuggers, where cut to 15 characters
+  std::optional<int> cpu;            ///< run on this CPU only, >= 0
+  std::optional<int> fifo_priority;  ///< run under SCHED_FIFO with this priority, 1..99
+};
+
+/// Applies the options to the calling thread. Returns one line for each wish that was not granted, saying why
+/// and what to do; the thread runs on without it.
+[[nodiscard]] std::vector<std::string> configure_this_thread(const WorkerOptions& options);
+/// Keeps all memory of the process, present and future, from being paged out. Error: why not, and what to do.
+[[nodiscard]] tl::expected<void, std::string> lock_memory();
+
+/// A thread that runs one function, and what became of it. No exception leaves the thread: it ends the
+/// function and is reported by join.
+class Worker {
+ public:
+  /// Starts the thread and returns when its options are applied. Throws std::system_error when no thread can
+  /// be made.
+  Worker(WorkerOptions options, std::function<void(std::stop_token)> body);
+  /// Requests a stop and joins.
+  ~Worker();
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  /// Asks the body to return; anyone, any number of times. Sleepers in Parking::wait with the body's token
+  /// wake.
+  void request_stop() { thread_.request_stop(); }
+  /// Waits for the body to return. Error: "NAME: " and what the exception that ended it said.
+  [[nodiscard]] tl::expected<void, std::string> join();
+  /// Whether the body has returned or failed; anyone.
+  [[nodiscard]] bool finished() const { return finished_.load(std::memory_order_acquire); }
+  /// CPU time the thread has used [s]; anyone, also after it ended.
+  [[nodiscard]] double cpu_seconds() const;
+  /// Wishes in the options that were not granted.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  [[nodiscard]] const std::string& name() const { return options_.name; }
+
+ private:
+  void run(const std::stop_token& stop, const std::function<void(std::stop_token)>& body);
+
+  WorkerOptions options_;
+  std::vector<std::string> notes_;     // written before started_ is raised
+  std::optional<std::string> error_;   // written before finished_
+  std::atomic<bool> started_{false};   // release -> acquire publishes notes_ and thread_id_
+  std::atomic<bool> finished_{false};  // release -> acquire publishes error_ and final_cpu_seconds_
+  int thread_id_ = 0;
+  double final_cpu_seconds_ = 0;
+  std::jthread thread_;  // last member: starts after, and joins before, everything it uses
+};
+
+}  // namespace twofold
