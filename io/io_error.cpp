@@ -16,6 +16,8 @@ std::string one_line(std::string text) {
 
 }  // namespace
 
+IoError::IoError(const std::string& message) : std::runtime_error(one_line(message)) {}
+
 IoError::IoError(const std::filesystem::path& subject, const std::string& problem)
     : std::runtime_error(one_line(fmt::format("{}: {}", subject.string(), problem))) {}
 

@@ -12,6 +12,8 @@ namespace twofold {
 /// put into the message has its control characters replaced, so that it stays one line.
 class IoError : public std::runtime_error {
  public:
+  /// A message that names its subject already.
+  explicit IoError(const std::string& message);
   /// subject: a file, a folder or the text of a source the user gave.
   IoError(const std::filesystem::path& subject, const std::string& problem);
   IoError(const std::filesystem::path& file, int line, const std::string& problem);
