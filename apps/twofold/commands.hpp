@@ -1,0 +1,16 @@
+#pragma once
+
+#include <CLI/App.hpp>
+
+namespace twofold {
+
+/// What the program ends with.
+enum ExitCode : int { kOk = 0, kFailedRun = 1, kBadInput = 2 };
+
+/// One a file: adds its subcommand to the program. The subcommand runs while the command line is parsed,
+/// writes what the program is to end with into exit_code, and throws IoError for input it cannot use.
+void add_eval_command(CLI::App& app, int& exit_code);
+void add_render_command(CLI::App& app, int& exit_code);
+void add_run_command(CLI::App& app, int& exit_code);
+
+}  // namespace twofold

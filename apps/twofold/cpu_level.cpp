@@ -1,0 +1,19 @@
+// Compiled for the oldest x86-64, whatever the rest is compiled for, so that this check itself cannot trap.
+
+#include <unistd.h>
+
+#include <cstring>
+
+namespace {
+
+/// Runs before every other initialiser of the program: those are compiled for TWOFOLD_ARCH already.
+__attribute__((constructor(101))) void check_cpu_level() {
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports(TWOFOLD_ARCH)) return;
+  static const char kMessage[] = "twofold: this processor lacks instructions of " TWOFOLD_ARCH
+                                 ", which the program was built for; build the preset release-v2 instead\n";
+  (void)!write(STDERR_FILENO, kMessage, std::strlen(kMessage));
+  _exit(2);
+}
+
+}  // namespace

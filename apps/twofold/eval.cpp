@@ -1,0 +1,175 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "io/evaluation.hpp"
+#include "io/io_error.hpp"
+#include "io/open_source.hpp"
+#include "io/output_file.hpp"
+#include "io/plot.hpp"
+#include "io/trajectory_file.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EvalArguments {
+  std::string estimate, truth;
+  Alignment alignment = Alignment::kSe3;
+  double max_difference_s = 0.01;
+  std::string json, plot;
+};
+
+const std::map<std::string, Alignment> kAlignments{
+    {"none", Alignment::kNone}, {"se3", Alignment::kSe3}, {"sim3", Alignment::kSim3}};
+
+std::string name_of(Alignment alignment) {
+  for (const auto& [name, value] : kAlignments) {
+    if (value == alignment) return name;
+  }
+  return "";
+}
+
+Trajectory read_truth(const std::string& text) {
+  if (fs::is_regular_file(text)) return read_trajectory(text);
+  Trajectory truth = open_source(text)->ground_truth();
+  if (truth.empty()) throw IoError(text, "the recording has no ground truth");
+  return truth;
+}
+
+bool is_kitti(const std::string& file) {
+  return fs::is_regular_file(file) && trajectory_form(file) == TrajectoryForm::kKitti;
+}
+
+/// By time, or by line when neither file has times.
+std::vector<PosePair> pair_poses(const EvalArguments& arguments) {
+  if (!fs::is_regular_file(arguments.estimate)) throw IoError(arguments.estimate, "no such trajectory file");
+  const bool estimate_by_line = is_kitti(arguments.estimate);
+  if (estimate_by_line != is_kitti(arguments.truth)) {
+    throw IoError(
+        estimate_by_line ? arguments.estimate : arguments.truth,
+        "has no time stamps (KITTI form), the other trajectory has: they cannot be brought together");
+  }
+  const Trajectory estimate = read_trajectory(arguments.estimate);
+  const Trajectory truth = read_truth(arguments.truth);
+  if (!estimate_by_line) return associate(estimate, truth, std::llround(arguments.max_difference_s * 1e9));
+  if (estimate.size() != truth.size()) {
+    throw IoError(arguments.estimate, fmt::format("has {} poses without time stamps, {} has {}",
+                                                  estimate.size(), arguments.truth, truth.size()));
+  }
+  return associate(estimate, truth, 0);
+}
+
+void print_row(const char* name, const char* unit, const ErrorStatistics& s) {
+  fmt::print("{:<22} {:>4} {:>6} {:>11.6f} {:>11.6f} {:>11.6f} {:>11.6f} {:>11.6f}\n", name, unit, s.count,
+             s.rmse, s.mean, s.median, s.stddev, s.max);
+}
+
+void print_table(const EvalArguments& arguments, const Evaluation& e, bool has_times) {
+  fmt::print("{} against {}\n{} poses, path {:.3f} m, align {}, scale {:.6f}, ATE {:.4f} % of the path\n\n",
+             arguments.estimate, arguments.truth, e.pairs.size(), e.path_length, name_of(arguments.alignment),
+             e.S_w_e.scale(), e.path_length > 0 ? 100 * e.absolute.rmse / e.path_length : 0.0);
+  fmt::print("{:<22} {:>4} {:>6} {:>11} {:>11} {:>11} {:>11} {:>11}\n", "", "unit", "count", "rmse", "mean",
+             "median", "std", "max");
+  print_row("ATE", "m", e.absolute);
+  print_row("ATE rotation", "deg", e.absolute_rotation_deg);
+  if (has_times) {
+    print_row("RPE over 1 s", "m", e.per_second.translation);
+    print_row("RPE over 1 s", "deg", e.per_second.rotation_deg);
+    print_row("RPE over 1 s / path", "%", e.per_second.translation_percent);
+  }
+  print_row("RPE over 1 m", "m", e.per_metre.translation);
+  print_row("RPE over 1 m", "deg", e.per_metre.rotation_deg);
+  print_row("RPE over 1 m / path", "%", e.per_metre.translation_percent);
+}
+
+nlohmann::ordered_json to_json(const ErrorStatistics& s) {
+  return {{"count", s.count}, {"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median},
+          {"std", s.stddev},  {"min", s.min},   {"max", s.max}};
+}
+
+nlohmann::ordered_json to_json(const RelativeError& e) {
+  return {{"translation_m", to_json(e.translation)},
+          {"rotation_deg", to_json(e.rotation_deg)},
+          {"translation_percent", to_json(e.translation_percent)}};
+}
+
+std::string json_text(const EvalArguments& arguments, const Evaluation& e, bool has_times) {
+  const Eigen::Quaterniond& q = e.S_w_e.so3().quaternion();
+  const Vector3& t = e.S_w_e.translation();
+  nlohmann::ordered_json json{{"estimate", arguments.estimate},
+                              {"ground_truth", arguments.truth},
+                              {"align", name_of(arguments.alignment)},
+                              {"poses", e.pairs.size()},
+                              {"path_length_m", e.path_length},
+                              {"alignment",
+                               {{"scale", e.S_w_e.scale()},
+                                {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
+                                {"translation_m", {t.x(), t.y(), t.z()}}}},
+                              {"ate_m", to_json(e.absolute)},
+                              {"ate_rotation_deg", to_json(e.absolute_rotation_deg)}};
+  if (has_times) json["rpe_1s"] = to_json(e.per_second);
+  json["rpe_1m"] = to_json(e.per_metre);
+  return json.dump(2) + "\n";
+}
+
+cv::Mat draw(const EvalArguments& arguments, const Evaluation& e) {
+  Trajectory truth, estimate;
+  for (const PosePair& pair : e.pairs) {
+    truth.push_back({pair.t_ns, pair.T_w_c});
+    estimate.push_back({pair.t_ns, pair.T_e_c});
+  }
+  PlotOptions options;
+  options.title = fs::path(arguments.estimate).filename().string();
+  options.subtitle =
+      fmt::format("{} poses, {:.1f} m, ATE {:.4f} m rmse, {:.4f} m max, align {}", e.pairs.size(),
+                  e.path_length, e.absolute.rmse, e.absolute.max, name_of(arguments.alignment));
+  options.up_axis = up_axis_of(truth);
+  return draw_top_down(
+      {{"ground truth", positions(truth), plot_colours::kTruth, 4, {}},
+       {"estimate, coloured by error", positions(estimate), plot_colours::kFinal, 2, e.position_errors}},
+      options);
+}
+
+void run_eval(const EvalArguments& arguments) {
+  EvaluationOptions options;
+  options.alignment = arguments.alignment;
+  const auto evaluation = evaluate(pair_poses(arguments), options);
+  if (!evaluation) throw IoError(arguments.estimate, evaluation.error());
+  const bool has_times = !is_kitti(arguments.estimate);
+  print_table(arguments, *evaluation, has_times);
+  if (!arguments.json.empty()) write_file(arguments.json, json_text(arguments, *evaluation, has_times));
+  if (!arguments.plot.empty()) write_png(arguments.plot, draw(arguments, *evaluation));
+}
+
+}  // namespace
+
+void add_eval_command(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<EvalArguments>();
+  CLI::App* command = app.add_subcommand("eval", "Compare a trajectory with the ground truth");
+  command->add_option("ESTIMATE", arguments->estimate, "trajectory, TUM or KITTI form")->required();
+  command->add_option("GROUNDTRUTH", arguments->truth, "trajectory, TUM, KITTI or EuRoC form, or a recording")
+      ->required();
+  command->add_option("--align", arguments->alignment, "none, se3 or sim3")
+      ->transform(CLI::CheckedTransformer(kAlignments))
+      ->default_str("se3");
+  command
+      ->add_option("--max-difference", arguments->max_difference_s, "largest difference of time stamps [s]")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--json", arguments->json, "write all figures to this file");
+  command->add_option("--plot", arguments->plot,
+                      "draw both paths from above, coloured by error, to this PNG file");
+  command->callback([arguments, &exit_code] {
+    run_eval(*arguments);
+    exit_code = kOk;
+  });
+}
+
+}  // namespace twofold

@@ -1,0 +1,43 @@
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <opencv2/core/utils/logger.hpp>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "io/io_error.hpp"
+
+namespace {
+
+/// Errors are reported once, by us: the image and video decoders stay quiet.
+void silence_decoders() {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // AV_LOG_QUIET
+}
+
+/// One line, whatever the library put into its message.
+int report(const std::string& what, int exit_code) {
+  fmt::print(stderr, "twofold: {}\n", what.substr(0, what.find('\n')));
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  silence_decoders();
+  CLI::App app{"Twofold: real-time visual SLAM", "twofold"};
+  app.require_subcommand(1);
+  int exit_code = twofold::kOk;
+  twofold::add_eval_command(app, exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);  // --help
+    return report(e.what(), twofold::kBadInput);
+  } catch (const twofold::IoError& e) {
+    return report(e.what(), twofold::kBadInput);
+  } catch (const std::exception& e) {
+    return report(e.what(), twofold::kFailedRun);
+  }
+  return exit_code;
+}

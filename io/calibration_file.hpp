@@ -1,0 +1,41 @@
+#pragma once
+
+#include <filesystem>
+
+#include "camera/calibration.hpp"
+
+namespace twofold {
+
+/// Reads a calibration; the form is recognised by what the file holds  (docs/calibration.md):
+///
+///   own YAML          top-level key `cameras`
+///   Kalibr camchain   top-level keys cam0, cam1
+///   EuRoC sensor.yaml top-level key camera_model or T_BS: one camera
+///   KITTI calib.txt   lines "P0: twelve numbers"; has no image size: width and height stay 0
+///
+/// The result is not yet checked as a whole (see expect_valid), because a size may have to come from the
+/// images. Throws IoError naming file, key and what is wrong; keys the own form does not know are errors.
+[[nodiscard]] Calibration read_calibration(const std::filesystem::path& file);
+
+/// EuRoC keeps a file a camera. Poses of the cameras in the body come from T_BS.
+[[nodiscard]] Calibration read_euroc_calibration(const std::filesystem::path& cam0,
+                                                 const std::filesystem::path& cam1);
+
+/// One camera of an EuRoC rig and its pose in the body frame.
+struct EurocCamera {
+  CameraModel model;
+  SE3 T_b_c;
+  double rate_hz = 0;
+};
+/// T_BS alone, of a sensor that need not be a camera.
+[[nodiscard]] SE3 read_euroc_sensor_pose(const std::filesystem::path& file);
+[[nodiscard]] EurocCamera read_euroc_camera(const std::filesystem::path& file);
+
+/// Fills in a size that the calibration file did not state.
+void set_missing_size(int width, int height, Calibration* calibration);
+
+/// Throws IoError with the file's name when the calibration cannot be used (negative focal length, size
+/// missing, ...).
+void expect_valid(const std::filesystem::path& file, const Calibration& calibration);
+
+}  // namespace twofold

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+namespace twofold {
+
+/// Largest image accepted from a file [pixels]; sizes in files are not trusted before anything is allocated.
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
+
+/// An image file as CV_8UC1; colour becomes luminance, 16 bits become 8.
+///
+/// Throws IoError when the file is missing, of no known kind, cut short, damaged (PNG: chunk check sums;
+/// JPEG: end marker) or too large. The decoders alone would fill the missing part of a cut-off JPEG with grey
+/// and go on.
+[[nodiscard]] cv::Mat read_grey_image(const std::filesystem::path& file);
+
+/// A depth image as CV_16UC1; throws as above and when the file holds anything but one channel of 16 bits.
+[[nodiscard]] cv::Mat read_depth_image(const std::filesystem::path& file);
+
+/// Files in `folder` with an image's extension (png, jpg, jpeg, pgm, tif, tiff, bmp), sorted by name. Throws
+/// IoError when the folder is missing or holds none.
+[[nodiscard]] std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
+
+}  // namespace twofold

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "geometry/types.hpp"
+
+namespace twofold {
+
+struct PlyPoint {
+  Vector3 x_w;  ///< [m]
+  std::array<std::uint8_t, 3> rgb = {255, 255, 255};
+  float stddev = 0;  ///< of the position, along its worst axis [m]; 0 = unknown
+};
+
+/// Writes a binary little-endian PLY with vertex properties x y z (double), red green blue, stddev (float).
+/// Throws IoError when the file cannot be written in full.
+void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> points);
+
+}  // namespace twofold

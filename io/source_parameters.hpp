@@ -1,0 +1,43 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace twofold {
+
+/// A source as the user writes it: PATH[?key=value&...] or scheme:ARGUMENT[?key=value&...].
+struct SourceSpec {
+  std::string text;      ///< as given, for messages
+  std::string scheme;    ///< empty for a bare path
+  std::string argument;  ///< path, scene or device
+  std::map<std::string, std::string> parameters;
+};
+
+/// Splits a source text. An existing path is never split. Throws IoError on a parameter without '=', an empty
+/// or repeated key, or an empty argument.
+[[nodiscard]] SourceSpec parse_source_spec(const std::string& text);
+
+/// Typed access to the parameters of a source that remembers what was asked for, so that a misspelt key is an
+/// error.
+class SourceParameters {
+ public:
+  /// subject names the source in messages.
+  SourceParameters(std::string subject, std::map<std::string, std::string> values)
+      : subject_(std::move(subject)), values_(std::move(values)) {}
+
+  /// Value of the key, if given; throws IoError when it is not a finite number.
+  [[nodiscard]] std::optional<double> take_number(const std::string& key);
+  [[nodiscard]] std::optional<std::string> take_text(const std::string& key);
+  /// Throws IoError when a key was given that nobody took.
+  void expect_all_taken() const;
+
+  [[nodiscard]] const std::string& subject() const { return subject_; }
+
+ private:
+  std::string subject_;
+  std::map<std::string, std::string> values_;
+};
+
+}  // namespace twofold

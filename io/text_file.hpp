@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace twofold {
+
+struct TextLine {
+  int number = 0;  ///< counts from 1
+  std::string text;
+};
+
+/// Lines of a text file that are neither blank nor comments ('#' first), without line ends. Throws IoError
+/// when the file cannot be read.
+[[nodiscard]] std::vector<TextLine> read_text_lines(const std::filesystem::path& file);
+
+/// Non-empty pieces of `text` between any of the separators; views into it.
+[[nodiscard]] std::vector<std::string_view> split_fields(std::string_view text,
+                                                         std::string_view separators = " \t");
+
+/// The whole text as a finite decimal number, independent of the locale.
+[[nodiscard]] std::optional<double> to_number(std::string_view text);
+[[nodiscard]] std::optional<std::int64_t> to_integer(std::string_view text);
+
+/// Seconds as decimal text to nanoseconds: exact for plain decimals (no detour over double, which is off by
+/// up to 120 ns for today's Unix times); digits below 1 ns are dropped. Also reads 1.036e-01. Nothing when
+/// negative.
+[[nodiscard]] std::optional<std::int64_t> seconds_to_ns(std::string_view text);
+
+/// The inverse, with nine decimals.
+[[nodiscard]] std::string ns_to_seconds(std::int64_t t_ns);
+
+/// As above for a field of a file's line; throw IoError naming file, line and field.
+[[nodiscard]] double number_field(const std::filesystem::path& file, int line, std::string_view field);
+[[nodiscard]] std::int64_t seconds_field(const std::filesystem::path& file, int line, std::string_view field);
+[[nodiscard]] std::int64_t nanoseconds_field(const std::filesystem::path& file, int line,
+                                             std::string_view field);
+
+/// Throws IoError unless t_ns is after previous_t_ns; previous_t_ns is then t_ns. Start it with -1.
+void expect_increasing(const std::filesystem::path& file, int line, std::int64_t t_ns,
+                       std::int64_t* previous_t_ns);
+
+}  // namespace twofold
