@@ -88,7 +88,8 @@ Course run_ceres(const char* name, ceres::LinearSolverType type, const WindowPro
     std::vector<double> ms, cost;
     for (const auto& iteration : summary.iterations) {
       ms.push_back(1e3 * iteration.cumulative_time_in_seconds);
-      cost.push_back(2 * iteration.cost);
+      const double own = 2 * iteration.cost;  // of a refused step: what it would have cost
+      cost.push_back(cost.empty() ? own : std::min(cost.back(), own));
     }
     if (r == 0) course.cost = cost, course.ms = ms, course.set_up_ms = set_up_ms;
     course.set_up_ms = std::min(course.set_up_ms, set_up_ms);
