@@ -33,18 +33,19 @@ std::vector<std::uint8_t> bytes_of(const Schedule& schedule) {
 /// A run as it might have been: versions grow every few frames, some frames are dropped or degraded.
 Schedule plausible(int frames, unsigned seed) {
   std::mt19937 rng(seed);
-  const auto one_in = [&](unsigned n) { return rng() % n == 0; };
+  const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(rng()) % n; };
+  const auto one_in = [&](std::uint32_t n) { return below(n) == 0; };
   Schedule s;
   std::uint64_t version = 1;
   for (int i = 0; i < frames; ++i) {
     if (one_in(6)) {
       ++version;
-      s.mapper.push_back({version, 1 + rng() % 2, one_in(50) ? 1U : 0U, rng() % 10, 0});
+      s.mapper.push_back({version, 1 + below(2), one_in(50) ? 1U : 0U, below(10), 0});
       s.loop_closer.push_back(
-          {version - rng() % 2, static_cast<std::int64_t>(version), one_in(30) ? 1U : 0U, 0});
+          {version - below(2), static_cast<std::int64_t>(version), one_in(30) ? 1U : 0U, 0});
     }
     TrackerStep step{i, version, TrackerStep::Fate::kTracked, 0, one_in(40) ? 1U : 0U, one_in(60) ? 2U : 0U};
-    if (one_in(20)) step.degrade_level = static_cast<std::uint8_t>(rng() % 16);
+    if (one_in(20)) step.degrade_level = static_cast<std::uint8_t>(below(16));
     if (one_in(25)) step = {i, 0, TrackerStep::Fate::kDropped, 0, 0, 0};
     s.tracker.push_back(step);
   }
@@ -161,7 +162,8 @@ TEST(ScheduleLog, StreamsInAndOut) {
   EXPECT_EQ(*parsed, schedule);
   std::ostringstream broken;
   broken.setstate(std::ios::badbit);
-  EXPECT_FALSE(write_schedule(broken, {}, {}, {}));
+  const Streams none;
+  EXPECT_FALSE(write_schedule(broken, none.tracker, none.mapper, none.loop_closer));
 }
 
 }  // namespace
