@@ -56,5 +56,5 @@ struct MailboxModel : rl::test_suite<MailboxModel, kReaders + 1> {
 
 int main(int argc, char** argv) {
   if (!twofold::parse_fault(argc, argv)) return 2;
-  return twofold::check_model<twofold::MailboxModel>(500'000);
+  return twofold::check_model<twofold::MailboxModel>(200'000);
 }

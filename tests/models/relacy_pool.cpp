@@ -57,5 +57,5 @@ struct PoolModel : rl::test_suite<PoolModel, 3> {
 
 int main(int argc, char** argv) {
   if (!twofold::parse_fault(argc, argv)) return 2;
-  return twofold::check_model<twofold::PoolModel>(500'000);
+  return twofold::check_model<twofold::PoolModel>(200'000);
 }

@@ -59,5 +59,5 @@ struct RingModel : rl::test_suite<RingModel, 2> {
 
 int main(int argc, char** argv) {
   if (!twofold::parse_fault(argc, argv)) return 2;
-  return twofold::check_model<twofold::RingModel>(500'000);
+  return twofold::check_model<twofold::RingModel>(200'000);
 }
