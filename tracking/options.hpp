@@ -9,7 +9,8 @@ namespace twofold {
 struct TrackerOptions {
   DenseAlignmentOptions alignment;
   GuidedSearchOptions search;
-  MotionOnlyOptions motion;
+  /// A step of 1e-5 moves no projection by a hundredth of a pixel.
+  MotionOnlyOptions motion{.max_iterations = 15, .stop_step = 1e-5};
 
   int wanted_matches = 180;      ///< stop searching once so many points were found in a frame
   int max_searches = 320;        ///< upper bound of points searched in a frame
