@@ -26,6 +26,7 @@ struct Arguments {
   std::string trajectory;
   int map_delay = 2;  ///< frames between a proposal and the snapshot that has it
   bool verbose = false;
+  bool residuals = false;
   TrackerOptions tracker;
 };
 
@@ -62,7 +63,45 @@ void print_frame(const Frame& frame, const TrackResult& r, double cpu_ms) {
       r.alignment_rms, cpu_ms, r.proposed ? "keyframe" : "", describe(r.cause));
 }
 
-std::vector<TrackedFrame> track(FrameSource& source, const Arguments& arguments, PlainMap& map) {
+/// Residuals (predicted minus measured) in pixels of the level they were measured on.
+struct ResidualStatistics {
+  std::array<std::array<std::vector<double>, 3>, 4> by_level;
+  std::array<std::array<int, 2>, 4> inliers{};
+
+  void add(const Rig& rig, const SE3& T_c_ref, std::span<const MotionObservation> observations) {
+    const double finest = measurement_information(rig, 0, false).x();
+    for (const MotionObservation& o : observations) {
+      const auto level = static_cast<std::size_t>(std::lround(0.5 * std::log2(finest / o.information.x())));
+      if (level >= by_level.size()) continue;
+      const Vector3 error =
+          (rig.project(T_c_ref * o.x_ref) - o.z.cast<double>()) * std::ldexp(1.0, -static_cast<int>(level));
+      ++inliers[level][o.inlier ? 1 : 0];
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (k < 2) by_level[level][k].push_back(std::abs(error[static_cast<int>(k)]));
+        // Of the disparity: the right coordinate alone repeats u.
+        else if (o.information.z() != 0)
+          by_level[level][k].push_back(std::abs(error.x() - error.z()));
+      }
+    }
+  }
+  void print() const;
+};
+
+void ResidualStatistics::print() const {
+  for (std::size_t level = 0; level < by_level.size(); ++level) {
+    const auto& e = by_level[level];
+    fmt::print("  level {}: {} in, {} out;", level, inliers[level][1], inliers[level][0]);
+    const char* names[] = {"u", "v", "disparity"};
+    for (std::size_t k = 0; k < 3; ++k) {
+      fmt::print("  |{}| median {:.3f} 68 % {:.3f} 90 % {:.2f}", names[k], percentile(e[k], 0.5),
+                 percentile(e[k], 0.68), percentile(e[k], 0.9));
+    }
+    fmt::print("\n");
+  }
+}
+
+std::vector<TrackedFrame> track(FrameSource& source, const Arguments& arguments, PlainMap& map,
+                                ResidualStatistics& residuals) {
   Tracker tracker(source.rig(), arguments.tracker);
   GraphSnapshot snapshot = map.publish();
   std::deque<std::pair<std::int64_t, KeyframeProposal>> queue;
@@ -82,6 +121,8 @@ std::vector<TrackedFrame> track(FrameSource& source, const Arguments& arguments,
     const double cpu_ms = 1e-6 * static_cast<double>(thread_cpu_ns() - start);
     if (result.proposed) queue.emplace_back(frame.index + arguments.map_delay, proposal);
     frames.push_back({frame.t_ns, result, cpu_ms});
+    if (result.status == TrackStatus::kTracking)
+      residuals.add(source.rig(), result.T_c_ref, tracker.last_observations());
     if (arguments.verbose) print_frame(frame, result, cpu_ms);
   }
   for (const auto& [when, late] : queue) map.insert(late);
@@ -133,10 +174,12 @@ void print_drift(const Trajectory& trajectory, const Trajectory& truth) {
   const auto report = [&](const char* name, const EvaluationOptions& options) {
     const auto evaluation = evaluate(associate(trajectory, truth, 20'000'000), options);
     if (!evaluation) return fmt::print("{}: {}\n", name, evaluation.error());
-    fmt::print("{}: ATE {:.4f} m ({:.4f} deg) over {:.2f} m; RPE/s {:.4f} m {:.3f} deg; RPE/m {:.2f} %\n",
-               name, evaluation->absolute.rmse, evaluation->absolute_rotation_deg.rmse,
-               evaluation->path_length, evaluation->per_second.translation.rmse,
-               evaluation->per_second.rotation_deg.rmse, evaluation->per_metre.translation_percent.mean);
+    fmt::print(
+        "{}: scale {:.4f} ATE {:.4f} m ({:.4f} deg) over {:.2f} m; RPE/s {:.4f} m {:.3f} deg; RPE/m {:.2f} "
+        "%\n",
+        name, evaluation->S_w_e.scale(), evaluation->absolute.rmse, evaluation->absolute_rotation_deg.rmse,
+        evaluation->path_length, evaluation->per_second.translation.rmse,
+        evaluation->per_second.rotation_deg.rmse, evaluation->per_metre.translation_percent.mean);
   };
   report("SE(3)", {});
   EvaluationOptions sim;
@@ -149,9 +192,11 @@ void run(const Arguments& arguments) {
   source_options.preload = true;
   const auto source = open_source(arguments.source, source_options);
   PlainMap map;
-  const std::vector<TrackedFrame> frames = track(*source, arguments, map);
+  ResidualStatistics residuals;
+  const std::vector<TrackedFrame> frames = track(*source, arguments, map, residuals);
   const Trajectory trajectory = compose(frames, map.publish());
   print_counts(frames);
+  if (arguments.residuals) residuals.print();
   print_times(frames);
   if (!source->ground_truth().empty()) print_drift(trajectory, source->ground_truth());
   if (!arguments.trajectory.empty()) write_tum_trajectory(arguments.trajectory, trajectory);
@@ -167,6 +212,7 @@ int main(int argc, char** argv) {
   app.add_option("--trajectory", arguments.trajectory, "write the trajectory here (TUM)");
   app.add_option("--map-delay", arguments.map_delay, "frames until a proposal is in the map");
   app.add_flag("-v,--verbose", arguments.verbose, "a line for every frame");
+  app.add_flag("--residuals", arguments.residuals, "statistics of the reprojection errors");
   CLI11_PARSE(app, argc, argv);
   try {
     twofold::run(arguments);
