@@ -13,6 +13,7 @@ constexpr float kSigmaPx = 0.5F;
 // The same of the virtual right coordinate of a structured light camera, whose error is constant in
 // disparity.
 constexpr float kDepthSigmaPx = 0.7F;
+constexpr double kNearestBaselines = 2.5;
 constexpr int kMargin = Patch::kSize;  // whole patches, and room for the sub-pixel search around them
 
 Eigen::Vector2f to_level(const Vector2& uv, int level) {
@@ -130,38 +131,72 @@ double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v
   return u - rig.disparity_from_depth(readings[count / 2]);
 }
 
+namespace {
+
+constexpr int kMaxRange = 1024;  // pixels of a row searched at most
+
+/// Cost of the patch at every pixel [first, first + count) of a row, and where it is least.
+struct RowCosts {
+  int first = 0;
+  int count = 0;
+  int best_u = 0;
+  int best = std::numeric_limits<int>::max();
+  int cost[kMaxRange];
+
+  RowCosts(const Patch& patch, const cv::Mat& image, int v, int from, int to)
+      : first(from), count(std::min(to - from + 1, kMaxRange)) {
+    for (int i = 0; i < count; ++i) {
+      cost[i] = zero_mean_ssd(patch, image, first + i, v);
+      if (cost[i] < best) {
+        best = cost[i];
+        best_u = first + i;
+      }
+    }
+  }
+  /// Somewhere else, not beside the best, it fits nearly as well (repeated texture).
+  [[nodiscard]] bool ambiguous() const {
+    for (int i = 0; i < count; ++i) {
+      if (std::abs(first + i - best_u) > 3 && cost[i] * 4 < best * 5) return true;
+    }
+    return false;
+  }
+};
+
+/// Patch as it stands at a whole pixel.
+bool plain_patch(const cv::Mat& image, int u, int v, int level, Patch& patch) {
+  PointAppearance appearance;
+  if (!cut_appearance(image, u, v, level, appearance)) return false;
+  warp_patch(appearance, Eigen::Matrix2d::Identity(), level, patch);
+  return true;
+}
+
+}  // namespace
+
 double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, int level,
                       const GuidedSearchOptions& options) {
   const cv::Mat& left = images.left.level(level);
   const cv::Mat& right = images.right.level(level);
-  PointAppearance appearance;
-  if (!cut_appearance(left, u, v, level, appearance)) return Rig::kNoRight;
   Patch patch;
-  warp_patch(appearance, Eigen::Matrix2d::Identity(), level, patch);
-  // Nearer than about a baseline and a half nothing is in both images of a parallel rig.
-  const double nearest = 1.5 * rig.baseline;
+  if (!plain_patch(left, u, v, level, patch)) return Rig::kNoRight;
+  // Nearer than a few baselines hardly anything is in both images of a parallel rig.
+  const double nearest = kNearestBaselines * rig.baseline;
   const int range = static_cast<int>(rig.disparity_from_depth(nearest) * std::ldexp(1.0, -level));
   const int first = std::max(u - range, kMargin);
   const int last = std::min(u, right.cols - 1 - kMargin);
   if (first > last || v < kMargin || v >= right.rows - kMargin) return Rig::kNoRight;
-  int best = std::numeric_limits<int>::max();
-  int best_u = first;
-  for (int r = first; r <= last; ++r) {
-    const int ssd = zero_mean_ssd(patch, right, r, v);
-    if (ssd < best) {
-      best = ssd;
-      best_u = r;
-    }
-  }
-  // Ambiguous: somewhere else, not beside it, it fits nearly as well (repeated texture).
-  for (int r = first; r <= last; ++r) {
-    if (std::abs(r - best_u) > 3 && zero_mean_ssd(patch, right, r, v) * 4 < best * 5) return Rig::kNoRight;
-  }
-  const auto aligned = align_patch_in_row(patch, right, {static_cast<float>(best_u), static_cast<float>(v)},
-                                          options.refine_iterations);
+  const RowCosts costs(patch, right, v, first, last);
+  if (costs.ambiguous()) return Rig::kNoRight;
+  const auto aligned = align_patch_in_row(
+      patch, right, {static_cast<float>(costs.best_u), static_cast<float>(v)}, options.refine_iterations);
   if (!aligned || !good_match(patch, aligned->rms, options) || aligned->uv.x() >= static_cast<float>(u)) {
     return Rig::kNoRight;
   }
+  // The match looked for in the left image must lead back.
+  Patch back;
+  if (!plain_patch(right, costs.best_u, v, level, back)) return Rig::kNoRight;
+  const RowCosts back_costs(back, left, v, std::max(costs.best_u, kMargin),
+                            std::min(costs.best_u + range, left.cols - 1 - kMargin));
+  if (std::abs(back_costs.best_u - u) > 1) return Rig::kNoRight;
   return from_level(aligned->uv.x(), level);
 }
 

@@ -1,5 +1,9 @@
 #include "imaging/patch.hpp"
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 #include <algorithm>
 #include <cmath>
 
@@ -102,11 +106,30 @@ bool cut_appearance(const cv::Mat& level_image, int u, int v, int level, PointAp
 }
 
 int zero_mean_ssd(const Patch& patch, const cv::Mat& image, int u, int v) {
-  int sum = 0;
-  int sum2 = 0;
   const auto stride = static_cast<std::ptrdiff_t>(image.step);
   const std::uint8_t* row = image.data + (v - Patch::kCentre) * stride + (u - Patch::kCentre);
   const std::int16_t* t = patch.rounded;
+#ifdef __AVX2__
+  static_assert(Patch::kSize == 8);
+  __m256i sums = _mm256_setzero_si256();     // 16 sums of 4 differences
+  __m256i squares = _mm256_setzero_si256();  // 8 sums of 8 squares
+  for (int r = 0; r < Patch::kSize; r += 2, row += 2 * stride, t += 2 * Patch::kSize) {
+    const __m128i upper = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(row));
+    const __m128i lower = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(row + stride));
+    const __m256i pixels = _mm256_cvtepu8_epi16(_mm_unpacklo_epi64(upper, lower));
+    const __m256i d = _mm256_sub_epi16(pixels, _mm256_load_si256(reinterpret_cast<const __m256i*>(t)));
+    sums = _mm256_add_epi16(sums, d);
+    squares = _mm256_add_epi32(squares, _mm256_madd_epi16(d, d));
+  }
+  const __m256i wide_sums = _mm256_madd_epi16(sums, _mm256_set1_epi16(1));
+  __m256i both = _mm256_hadd_epi32(wide_sums, squares);
+  both = _mm256_hadd_epi32(both, both);
+  const __m128i halves = _mm_add_epi32(_mm256_castsi256_si128(both), _mm256_extracti128_si256(both, 1));
+  const int sum = _mm_cvtsi128_si32(halves);
+  const int sum2 = _mm_extract_epi32(halves, 1);
+#else
+  int sum = 0;
+  int sum2 = 0;
   for (int r = 0; r < Patch::kSize; ++r, row += stride, t += Patch::kSize) {
     for (int c = 0; c < Patch::kSize; ++c) {
       const int d = row[c] - t[c];
@@ -114,6 +137,7 @@ int zero_mean_ssd(const Patch& patch, const cv::Mat& image, int u, int v) {
       sum2 += d * d;
     }
   }
+#endif
   return sum2 - sum * sum / Patch::kArea;
 }
 

@@ -29,13 +29,13 @@ struct TrackerOptions {
   double urgent_share = 0.35;  ///< below it a keyframe is due even while the mapper is behind
   int max_pending = 2;         ///< proposals not yet in the map that do not hold back the next one
 
-  int corner_threshold = 10;     ///< FAST [grey]
-  int corner_levels = 3;         ///< levels on which new points are started
-  int cell_px = 28;              ///< at most one new point a cell and only where no point is tracked
-  int max_new_points = 220;      ///< started in one keyframe
-  double min_corner_score = 12;  ///< Shi-Tomasi
-  int max_failures = 4;          ///< candidates not found so many frames in a row are given up
-  int max_candidate_age = 3;     ///< keyframes after which an unconfirmed candidate is given up
+  int corner_threshold = 10;    ///< FAST [grey]
+  int corner_levels = 3;        ///< levels on which new points are started
+  int cell_px = 28;             ///< at most one new point a cell and only where no point is tracked
+  int max_new_points = 220;     ///< started in one keyframe
+  float min_corner_score = 12;  ///< Shi-Tomasi
+  int max_failures = 4;         ///< candidates not found so many frames in a row are given up
+  int max_candidate_age = 3;    ///< keyframes after which an unconfirmed candidate is given up
 };
 
 }  // namespace twofold

@@ -20,8 +20,8 @@ Eigen::Vector2f at_level_zero(const Corner& corner) {
 PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options)
     : rig_(rig), options_(options), quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
   columns_ = rig.camera.width / options.cell_px + 1;
-  const int rows = rig.camera.height / options.cell_px + 1;
-  occupied_.resize(static_cast<std::size_t>(columns_ * rows));
+  rows_ = rig.camera.height / options.cell_px + 1;
+  occupied_.resize(static_cast<std::size_t>(columns_ * rows_));
   corners_.reserve(kMaxCorners);
 }
 
@@ -41,15 +41,14 @@ void PointStarter::occupy(const Eigen::Vector2f& uv) {
 
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, LocalPoints& local) {
   corners_.clear();
+  const CellGrid grid{options_.cell_px, columns_, rows_, occupied_};
   for (int level = 0; level < options_.corner_levels; ++level) {
-    detect_corners(images.left.level(level), level, options_.corner_threshold, kBorder, options_.cell_px,
-                   corners_);
+    detect_corners(images.left.level(level), level, options_.corner_threshold, options_.min_corner_score,
+                   kBorder, grid, corners_);
   }
   quadtree_.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
-    if (corners_[i].score < options_.min_corner_score) continue;
-    const Eigen::Vector2f uv = at_level_zero(corners_[i]);
-    if (occupied_[cell_of(uv)] == 0) quadtree_.insert(uv, static_cast<std::uint32_t>(i));
+    quadtree_.insert(at_level_zero(corners_[i]), static_cast<std::uint32_t>(i));
   }
   int started = 0;
   for (std::int64_t i = quadtree_.next(); i >= 0 && started < options_.max_new_points; i = quadtree_.next()) {

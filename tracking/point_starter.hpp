@@ -34,6 +34,7 @@ class PointStarter {
   Rig rig_;
   TrackerOptions options_;
   int columns_ = 0;
+  int rows_ = 0;
   std::vector<std::uint8_t> occupied_;
   std::vector<Corner> corners_;
   Quadtree quadtree_;

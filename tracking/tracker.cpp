@@ -220,7 +220,7 @@ bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
     give_up_frame(LostCause::kTooFewCandidates, result);
   } else if (result.matches < options_.min_inliers) {
     give_up_frame(LostCause::kTooFewMatches, result);
-  } else if (!motion.converged || motion.inliers < options_.min_inliers ||
+  } else if (motion.inliers < options_.min_inliers ||
              motion.inliers < options_.min_inlier_share * result.matches) {
     give_up_frame(LostCause::kInconsistentMatches, result);
   } else {
