@@ -24,9 +24,6 @@ struct MotionError {
   return input.T_cur_prev * T_prev_w;
 }
 
-/// Inverse of the left Jacobian of SE(3): d log(exp(y) exp(xi)) / d y at y = 0. Needs |omega| < 2 pi.
-[[nodiscard]] Matrix6 se3_left_jacobian_inverse(const Vector6& xi);
-
 [[nodiscard]] MotionError motion_error(const MotionInput& input, const SE3& T_prev_w, const SE3& T_cur_w);
 
 /// Motion input from velocities held constant over dt.

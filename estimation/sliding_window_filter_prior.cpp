@@ -2,7 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "estimation/process_model.hpp"
+#include "geometry/cbh.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {
@@ -20,7 +20,7 @@ VectorX WindowPrior::difference(const std::vector<Vector3>& landmarks, const SE3
 
 void WindowPrior::relinearise(const std::vector<Vector3>& landmarks, const SE3& T_c_w) {
   const VectorX d = difference(landmarks, T_c_w);
-  const Matrix6 J = se3_left_jacobian_inverse(d.tail<6>());
+  const Matrix6 J = cbh_jacobian<SE3>(d.tail<6>(), CbhOrder::kExact);
   vector.noalias() -= information * d;
   // Change of chart: derivative of d by the left perturbation at the new point is diag(I, J).
   vector.tail<6>() = (J.transpose() * vector.tail<6>()).eval();

@@ -5,6 +5,7 @@
 
 #include "estimation/robust_kernel.hpp"
 #include "estimation/sliding_window_filter.hpp"
+#include "geometry/cbh.hpp"
 
 namespace twofold {
 namespace {
@@ -90,7 +91,7 @@ void SlidingWindowFilter::build_equations() {
     const VectorX d = prior_.difference(points_, poses_.front().T_c_w);
     VectorX g = prior_.vector - prior_.information * d;
     if (!first_estimates()) {
-      const Matrix6 J = se3_left_jacobian_inverse(d.tail<6>());
+      const Matrix6 J = cbh_jacobian<SE3>(d.tail<6>(), CbhOrder::kExact);
       g.tail<6>() = (J.transpose() * g.tail<6>()).eval();
       eq.prior.rightCols<6>() = (eq.prior.rightCols<6>() * J).eval();
       eq.prior.bottomRows<6>() = (J.transpose() * eq.prior.bottomRows<6>()).eval();

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <map>
 
+#include "geometry/cbh.hpp"
 #include "swf_scene.hpp"
 
 namespace twofold::test {
@@ -44,7 +45,7 @@ class IteratedEkf {
     VectorX xi = VectorX::Zero(P_.rows());
     MatrixX K, H;
     for (int iteration = 0; iteration < 40; ++iteration) {
-      const Matrix6 J_l = se3_left_jacobian_inverse(xi.head<6>()).inverse();
+      const Matrix6 J_l = cbh_jacobian<SE3>(xi.head<6>(), CbhOrder::kExact).inverse();
       H = MatrixX::Zero(rows, P_.rows());
       VectorX innovation(rows);
       MatrixX R = MatrixX::Zero(rows, rows);
@@ -70,7 +71,7 @@ class IteratedEkf {
     P_ = ((MatrixX::Identity(P_.rows(), P_.rows()) - K * H) * P_).eval();
     // The estimate moved: covariance in the tangent space at the new pose.
     MatrixX G = MatrixX::Identity(P_.rows(), P_.rows());
-    G.topLeftCorner<6, 6>() = se3_left_jacobian_inverse(xi.head<6>()).inverse();
+    G.topLeftCorner<6, 6>() = cbh_jacobian<SE3>(xi.head<6>(), CbhOrder::kExact).inverse();
     P_ = (G * P_ * G.transpose()).eval();
   }
 
