@@ -8,8 +8,9 @@
 
 namespace twofold::synthetic {
 
-/// Rectangle origin + s * s_axis + q * q_axis, s in [0, width], q in [0, height] [m], seen from the side of
-/// s_axis x q_axis. Unit axes. A texture runs along s in u and along q in v; a wall's q_axis points down.
+/// Rectangle origin + s * s_axis + q * q_axis, s in [0, width], q in [0, height] [m], seen from the side
+/// from which s_axis points right and q_axis down (s_axis x q_axis points away). Unit axes. A texture runs
+/// along s in u and along q in v; a wall's q_axis points down.
 struct Quad {
   Vector3 origin;
   Vector3 s_axis;

@@ -84,7 +84,7 @@ void ViewGeometry::add_quad(const Scene& scene, const Quad& quad) {
   const Vector3 q_c = R_c_w * quad.q_axis;
   const Vector3 n_c = s_c.cross(q_c);
   const double distance = n_c.dot(origin_c);  // n . x = distance on the plane
-  if (distance >= -1e-6) return;              // seen from behind or edge-on
+  if (distance <= 1e-6) return;               // seen from behind or edge-on
   const std::int32_t id = make_id(kQuad, quads_.size());
   const auto before = visible_.size();
   const Vector3 s = quad.width * s_c;
