@@ -29,7 +29,7 @@ void paint_wall(Canvas& canvas, Random& random) {
     }
     x += w + random.uniform(0.2, 0.7);
   }
-  scatter_specks(canvas, random, 35, 0.01, 0.06, 40);
+  scatter_specks(canvas, random, 19, 0.01, 0.06, 40);
 }
 
 void add_shell(Scene& scene, Random& random) {

@@ -13,7 +13,7 @@ constexpr double kHalfX = 9.5;  ///< inner half width of the court [m]
 constexpr double kHalfY = 7.5;
 constexpr double kWallHeight = 6.5;
 constexpr double kTexel = 0.005;
-constexpr double kSpeed = 1.45;
+constexpr double kRound = 30;  ///< once around [s]
 
 void paint_facade(Canvas& canvas, Random& random, int style) {
   const auto grey = static_cast<float>(random.uniform(115, 165));
@@ -88,7 +88,7 @@ void add_ground(Scene& scene, Random& random) {
                    random.uniform(0.1, 0.4), random.uniform(0.05, 0.25), random.uniform(0, 180),
                    static_cast<float>(random.uniform(50, 200)));
   canvas.add_noise(random.word(), 8, 0.4, 0.02, 0.9f);
-  scatter_specks(canvas, random, 40, 0.01, 0.05, 45);
+  scatter_specks(canvas, random, 22, 0.01, 0.05, 45);
   const int texture = scene.add(canvas.finish());
   scene.quads.push_back(
       {{-kHalfX, kHalfY, 0}, Vector3::UnitX(), -Vector3::UnitY(), 2 * kHalfX, 2 * kHalfY, texture, 0.95});
@@ -197,9 +197,9 @@ Staging make_courtyard(std::uint64_t seed) {
   }
   const ClosedCurve curve(ring);
   WalkStyle style;
-  style.speed = kSpeed;
+  style.speed = curve.length() / kRound;
   staging.path = walk(curve, style);
-  staging.round_seconds = curve.length() / kSpeed;
+  staging.round_seconds = kRound;
 
   // Somebody walks the same way some metres ahead, at a changing distance.
   staging.object_size = {0.5, 0.35, 1.75};
@@ -208,7 +208,7 @@ Staging make_courtyard(std::uint64_t seed) {
     draw_poster(c, random, 0.05, 0.1, 0.25, 0.2);
   });
   staging.T_w_object = [curve](double t) {
-    const double s = kSpeed * t + 4.5 + 1.5 * std::sin(0.35 * t);
+    const double s = curve.length() / kRound * t + 4.5 + 1.5 * std::sin(0.35 * t);
     const Vector2 p = curve.position(s);
     return standing(p.x(), p.y(), 0.875, curve.heading(s) + 0.15 * std::sin(6 * t));
   };

@@ -76,7 +76,7 @@ Staging make_descent(std::uint64_t seed) {
   staging.scene.height_fields.push_back(std::move(ground));
 
   constexpr double kSeconds = (kTopHeight - kLastHeight) / kSpeed;
-  staging.round_seconds = kSeconds;
+  staging.round_seconds = kSeconds + 0.1;  // 61 frames: the first and the last height included
   staging.path = [](double t) {
     const double phase = std::fmod(t, 2 * kSeconds);  // down, then up again
     const double z = kTopHeight - kSpeed * (phase <= kSeconds ? phase : 2 * kSeconds - phase);

@@ -100,7 +100,7 @@ void add_things(Scene& scene, Random& random) {
 SE3 browse(double t) {
   const double phase = 2 * std::numbers::pi * t / kRound;
   const double x = -0.75 * std::cos(phase);
-  const Vector3 eye(x, -0.95 + 0.12 * std::sin(2.1 * phase), 1.22 + 0.07 * std::sin(1.7 * phase + 0.6));
+  const Vector3 eye(x, -0.84 + 0.1 * std::sin(2.1 * phase), 1.17 + 0.06 * std::sin(1.7 * phase + 0.6));
   const double yaw = 0.5 * std::numbers::pi + 0.16 * std::sin(1.3 * phase) - 0.12 * std::cos(phase) +
                      0.02 * std::sin(2 * std::numbers::pi * 0.9 * t);
   const double pitch =

@@ -32,7 +32,7 @@ void scatter_specks(Canvas& canvas, Random& random, double per_square_metre, dou
     const int u = std::clamp(static_cast<int>(x / canvas.texel()), 0, image.cols - 1);
     const int v = std::clamp(static_cast<int>(y / canvas.texel()), 0, image.rows - 1);
     const float sign = random.chance(0.6) ? -1.0f : 1.0f;
-    const float grey = image.at<float>(v, u) + sign * contrast * static_cast<float>(random.uniform(0.5, 1.2));
+    const float grey = image.at<float>(v, u) + sign * contrast * static_cast<float>(random.uniform(0.2, 1.0));
     canvas.ellipse(x, y, r, r * random.uniform(0.4, 1.0), random.uniform(0, 180),
                    std::clamp(grey, 8.0f, 250.0f));
   }
@@ -52,7 +52,7 @@ void paint_bricks(Canvas& canvas, Random& random, double brick_width, double bri
     }
   }
   canvas.add_noise(random.word(), 14, 2.0, 0.02, 0.8f);
-  scatter_specks(canvas, random, 30, 0.01, 0.05, 40);
+  scatter_specks(canvas, random, 16, 0.01, 0.05, 40);
 }
 
 void paint_ashlar(Canvas& canvas, Random& random, double stone, float grey) {
@@ -73,7 +73,7 @@ void paint_ashlar(Canvas& canvas, Random& random, double stone, float grey) {
     y += h;
   }
   canvas.add_noise(random.word(), 16, 1.2, 0.012, 0.85f);
-  scatter_specks(canvas, random, 35, 0.008, 0.05, 38);
+  scatter_specks(canvas, random, 19, 0.008, 0.05, 38);
 }
 
 void paint_plaster(Canvas& canvas, Random& random, float grey) {
@@ -106,7 +106,7 @@ void paint_plaster(Canvas& canvas, Random& random, float grey) {
       y = ny;
     }
   }
-  scatter_specks(canvas, random, 45, 0.008, 0.07, 42);
+  scatter_specks(canvas, random, 25, 0.008, 0.07, 42);
 }
 
 void paint_planks(Canvas& canvas, Random& random, double plank_width, float grey) {
@@ -152,7 +152,7 @@ void paint_paving(Canvas& canvas, Random& random, double slab, float grey) {
     }
   }
   canvas.add_noise(random.word(), 15, 3.0, 0.015, 0.85f);
-  scatter_specks(canvas, random, 40, 0.012, 0.07, 48);
+  scatter_specks(canvas, random, 22, 0.012, 0.07, 48);
 }
 
 void paint_foliage(Canvas& canvas, Random& random, double leaf, float grey) {
@@ -178,7 +178,7 @@ void paint_bark(Canvas& canvas, Random& random, float grey) {
                 random.uniform(0.008, 0.03), vary(random, grey, 50));
   }
   canvas.add_noise(random.word(), 14, 0.4, 0.012, 0.85f);
-  scatter_specks(canvas, random, 60, 0.01, 0.04, 45);
+  scatter_specks(canvas, random, 33, 0.01, 0.04, 45);
 }
 
 void paint_metal(Canvas& canvas, Random& random, float grey) {

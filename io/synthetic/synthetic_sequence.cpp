@@ -1,5 +1,6 @@
 #include "io/synthetic/synthetic_sequence.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -34,7 +35,7 @@ SyntheticSequence::SyntheticSequence(const SyntheticOptions& options)
   rig_.baseline = options.sensor == SensorKind::kMono ? 0 : options.baseline;
   const std::int64_t frames = options.frames > 0
                                   ? options.frames
-                                  : std::lround(options.rounds * staging_.round_seconds * options.fps) + 1;
+                                  : std::max(1L, std::lround(options.rounds * staging_.round_seconds * options.fps));
   for (std::int64_t i = 0; i < frames; ++i) {
     const std::uint64_t word = counter_hash(options.seed, kDropStream, static_cast<std::uint64_t>(i));
     if (i == 0 || unit_interval(word) >= options.drop) indices_.push_back(i);
