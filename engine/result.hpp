@@ -1,10 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "engine/latency_histogram.hpp"
+#include "engine/schedule_log.hpp"
+#include "engine/stage_timer.hpp"
+#include "engine/trace.hpp"
 #include "graph/snapshot.hpp"
 
 namespace twofold {
@@ -21,45 +24,50 @@ struct FrameRecord {
   std::int64_t t_ns = 0;
   FrameState state = FrameState::kLost;
   KeyframeId reference = kNoKeyframe;
-  SE3 T_c_ref;           ///< pose relative to the reference keyframe: survives map changes
-  SE3 T_c_w_causal;      ///< pose in the map as it was known at the frame's own time
-  double tracked_share = 0;           ///< matched points over points searched, in [0, 1]
-  int inliers = 0;                    ///< measurements the pose rests on
-  std::uint64_t snapshot_version = 0; ///< version of the map it was tracked against
-  bool keyframe = false;              ///< it was proposed as a keyframe and accepted
-  const char* cause = "";             ///< why it was lost; empty when tracked
-  std::int64_t tracking_ns = 0;       ///< time spent on it by the tracker
-  std::int64_t latency_ns = 0;        ///< from the moment it was due to the moment its pose was known
+  SE3 T_c_ref;                         ///< pose relative to the reference keyframe: survives map changes
+  SE3 T_c_w_causal;                    ///< pose in the map as it was known at the frame's own time
+  double tracked_share = 0;            ///< matched points over points searched, in [0, 1]
+  int inliers = 0;                     ///< measurements the pose rests on
+  std::uint64_t snapshot_version = 0;  ///< version of the map it was tracked against
+  bool keyframe = false;               ///< it was proposed as a keyframe and accepted
+  const char* cause = "";              ///< why it was lost; empty when tracked
+  std::int64_t tracking_ns = 0;        ///< time spent on it by the tracker
+  std::int64_t latency_ns = 0;         ///< from the moment it was due to the moment its pose was known
 };
 
 /// One keyframe proposal turned into a map version by the mapper.
 struct MapperRound {
-  std::uint64_t version = 0;   ///< published afterwards
-  int proposals = 0;           ///< consumed
+  std::uint64_t version = 0;  ///< published afterwards
+  int proposals = 0;          ///< consumed
   int inner_window = 0;
   int outer_window = 0;
   int points = 0;
   int observations = 0;
-  int metric_loops = 0;        ///< edges added by metric loop closure
+  int metric_loops = 0;  ///< edges added by metric loop closure
   std::int64_t duration_ns = 0;
 };
 
-struct StageTimes {
-  std::string name;
-  LatencyHistogram histogram;
+/// Who saw what when, in the form it is written to a file.
+struct ScheduleStreams {
+  ScheduleStream<TrackerStep> tracker;
+  ScheduleStream<MapperStep> mapper;
+  ScheduleStream<LoopStep> loop_closer;
 };
 
 /// All a run leaves behind.
 struct RunResult {
-  std::vector<FrameRecord> frames;   ///< in the order of the source, dropped ones included
+  std::vector<FrameRecord> frames;  ///< in the order of the source, dropped ones included
   std::vector<MapperRound> rounds;
   GraphSnapshot graph;               ///< after the last round and the final relaxation
-  std::vector<StageTimes> stages;    ///< per thread and stage
-  std::uint64_t proposals_refused = 0;  ///< a keyframe was due, but queue or pool were full
+  std::vector<StageRecorder> times;  ///< one a thread
+  ScheduleStreams schedule;
+  std::unique_ptr<Trace> trace;               ///< null unless asked for
+  std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted
+  std::uint64_t proposals_refused = 0;        ///< a keyframe was due, but queue or pool were full
   std::uint64_t keyframes_not_described = 0;  ///< the loop closer's queue was full
   bool interrupted = false;
-  std::string error;                 ///< empty, or why the run ended early (a thread failed, the input broke)
-  double cpu_seconds = 0;            ///< all threads, from start to end of the run
+  std::string error;       ///< empty, or why the run ended early (a thread failed, the input broke)
+  double cpu_seconds = 0;  ///< all threads, from start to end of the run
   double wall_seconds = 0;
   double peak_rss_mb = 0;
 };

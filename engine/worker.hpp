@@ -12,9 +12,9 @@
 namespace twofold {
 
 struct WorkerOptions {
-  std::string name = "worker";       ///< shown by top and debuggers, where cut to 15 characters
-  std::optional<int> cpu;            ///< run on this CPU only, >= 0
-  std::optional<int> fifo_priority;  ///< run under SCHED_FIFO with this priority, 1..99
+  std::string name = "worker";            ///< shown by top and debuggers, where cut to 15 characters
+  std::optional<int> cpu = std::nullopt;  ///< run on this CPU only, >= 0
+  std::optional<int> fifo_priority = std::nullopt;  ///< run under SCHED_FIFO with this priority, 1..99
 };
 
 /// Applies the options to the calling thread. Returns one line for each wish that was not granted, saying why

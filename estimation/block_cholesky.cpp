@@ -116,7 +116,7 @@ int BlockCholesky::block_index(int row, int column) const {
 }
 
 void BlockCholesky::set_zero() {
-  for (Matrix6& block : blocks_) block.setZero();
+  set_all_zero(blocks_.data(), blocks_.size());
 }
 
 /// Left-looking: column k takes what all finished columns with a block in row k owe to it.

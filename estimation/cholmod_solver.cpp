@@ -1,6 +1,7 @@
 #include "estimation/cholmod_solver.hpp"
 
 #include <cholmod.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <limits>
@@ -8,12 +9,29 @@
 
 #include "geometry/check.hpp"
 
+// Present when the BLAS is OpenBLAS.
+extern "C" [[gnu::weak]] void openblas_set_num_threads(int);
+
 namespace twofold {
 namespace {
+
+/// Keeps OpenMP to the calling thread. CHOLMOD's supernodal code asks for four threads at every small copy loop, whatever
+/// omp_set_num_threads says; they spin on the cores other threads need. The setting belongs to the calling thread.
+class OneThread {
+ public:
+  OneThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  ~OneThread() { omp_set_max_active_levels(levels_); }
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  int levels_;
+};
 
 /// Silent CHOLMOD workspace.
 struct Common {
   Common() {
+    if (openblas_set_num_threads != nullptr) openblas_set_num_threads(1);
     cholmod_start(&c);
     c.print = 0;
     c.error_handler = nullptr;
@@ -158,6 +176,7 @@ void CholmodSolver::set_zero() {
 
 bool CholmodSolver::factorise(double damping) {
   if (dimension() == 0) return true;
+  const OneThread one_thread;
   double* values = values_.data();
   if (damping > 0) {
     cholmod_->damped = values_;
@@ -179,6 +198,7 @@ Eigen::MatrixXd CholmodSolver::solve(const Eigen::MatrixXd& b) {
     ordered.middleRows(position_[i] * n, n) = b.middleRows(static_cast<Eigen::Index>(i) * n, n);
   }
   if (b.size() == 0) return ordered;
+  const OneThread one_thread;
   cholmod_dense B{};
   B.nrow = B.d = ordered.rows();
   B.ncol = ordered.cols();

@@ -225,6 +225,16 @@ RoundResult run_round(const MotionCost& cost, bool inliers_only, const MotionOnl
   return {accepted_any, false};
 }
 
+/// Do the observations determine all six directions? Pivots of the information scaled to a unit diagonal.
+bool determines_pose(const Matrix6& information) {
+  const Vector6 d = information.diagonal();
+  if (!(d.minCoeff() > 0)) return false;
+  const Vector6 scale = d.cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<Matrix6> llt(scale.asDiagonal() * information * scale.asDiagonal());
+  constexpr double kSmallestPivot = 1e-5;  // of the root: 1e-10 of the matrix, rounding leaves 1e-16
+  return llt.info() == Eigen::Success && llt.matrixL().toDenseMatrix().diagonal().minCoeff() > kSmallestPivot;
+}
+
 }  // namespace
 
 MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> observations,
@@ -240,8 +250,9 @@ MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> ob
     if (result.inliers < kMinObservations) round = {};
     if (!round.usable) break;
   }
+  if (round.usable) round.usable = determines_pose(cost.evaluate(result.T_c_ref, true).hessian());
   if (!round.usable) result.T_c_ref = T_c_ref_start;
-  result.converged = round.converged;
+  result.converged = round.usable && round.converged;
   result.inliers = cost.classify(result.T_c_ref, options);
   const NormalEquations final_equations = cost.evaluate(result.T_c_ref, true);
   result.information = final_equations.hessian();

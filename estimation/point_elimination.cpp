@@ -48,9 +48,11 @@ void PointElimination::eliminate(const WindowLayout& layout, const ObservationMo
   couplings_.resize(layout.entry_slots().size());
   for (const auto& group : layout.groups()) {
     hessian_.resize(std::max<std::size_t>(hessian_.size(), triangle_index(group.coupled_count, 0)));
-    std::fill_n(hessian_.begin(), triangle_index(group.coupled_count, 0), Matrix6::Zero());
-    information_.assign(group.coupled_count, Matrix6::Zero());
-    slot_gradient_.assign(group.coupled_count, Vector6::Zero());
+    information_.resize(group.coupled_count);
+    slot_gradient_.resize(group.coupled_count);
+    set_all_zero(hessian_.data(), triangle_index(group.coupled_count, 0));
+    set_all_zero(information_.data(), information_.size());
+    set_all_zero(slot_gradient_.data(), slot_gradient_.size());
     const RelativePose* group_relative = relative.data() + group.first_slot;
     for (int k = group.first_track; k < group.first_track + group.track_count; ++k) {
       const auto& track = layout.tracks()[k];
@@ -89,7 +91,7 @@ void PointElimination::eliminate_track(const WindowLayout::Track& track,
                                        const RelativePose* relative, const Vector3& psi, double lambda,
                                        EliminatedPoint& point) {
   Matrix63* Y = couplings_.data() + track.first_entry;
-  for (int n = 0; n < track.entry_count; ++n) Y[n].setZero();
+  set_all_zero(Y, track.entry_count);
   const double inv_q = 1 / psi.z();
   const Vector3 y(psi.x() * inv_q, psi.y() * inv_q, inv_q);
   Matrix3 V = Matrix3::Zero();
@@ -157,7 +159,8 @@ void PointElimination::add_group(const WindowLayout& layout, const WindowLayout:
   const WindowLayout::Slot* slots = layout.slots().data() + group.first_slot;
   const bool anchor_free = group.anchor_position >= 0;
   adjoint_transposed_.resize(group.coupled_count);
-  times_adjoint_.assign(group.coupled_count, Matrix6::Zero());
+  times_adjoint_.resize(group.coupled_count);
+  set_all_zero(times_adjoint_.data(), times_adjoint_.size());
   for (int s = 0; s < group.coupled_count; ++s) {
     Matrix6& I = information_[s];
     I.triangularView<Eigen::StrictlyUpper>() = I.transpose();

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
+#include <limits>
+#include <optional>
 
 #include "estimation/cholmod_solver.hpp"
 #include "estimation/pose_graph_error.hpp"
@@ -63,8 +64,8 @@ struct PoseGraphSolver<Group>::Workspace {
   std::vector<int> order;
   std::vector<CholmodSolver::Slot> slots;
   CholmodSolver system;
-  Eigen::MatrixXd gradient;
-  std::vector<Group> trial;
+  Eigen::MatrixXd gradient, delta;  ///< H delta = gradient; the step is -delta
+  std::vector<Group> before;
 
   void analyse(const PoseGraph<Group>& graph) {
     std::vector<std::pair<int, int>> now;
@@ -111,12 +112,11 @@ struct PoseGraphSolver<Group>::Workspace {
     if (graph.origin >= 0) system.add_diagonal<kDof>(graph.origin, Block::Identity());  // its step is zero
   }
 
-  /// Moves along the step of the last factor; keeps the old poses in `trial`.
-  void step(PoseGraph<Group>& graph) {
-    const Eigen::MatrixXd delta = system.solve(gradient);
-    trial = graph.poses;
+  /// poses <- exp(-scale delta) start.
+  void move(const std::vector<Group>& start, double scale, std::vector<Group>& moved) const {
+    moved.resize(start.size());
     for (int i = 0; i < poses; ++i) {
-      graph.poses[i] = Group::exp(-delta.template block<kDof, 1>(kDof * i, 0)) * trial[i];
+      moved[i] = Group::exp(-scale * delta.template block<kDof, 1>(kDof * i, 0)) * start[i];
     }
   }
 };
@@ -132,82 +132,139 @@ PoseGraphSolver<Group>& PoseGraphSolver<Group>::operator=(PoseGraphSolver&&) noe
 
 namespace {
 
-/// Takes the chordal start where its cost is lower; returns the cost.
+/// What only graphs of rigid motions have: positions that are linear given the rotations.
 template <class Group>
-double take_better_start(PoseGraph<Group>& graph, const PoseGraphOptions& options,
-                         std::span<const int> order) {
-  const double cost = pose_graph_cost(graph, options.error, options.huber);
-  if constexpr (!std::is_same_v<Group, Sim3>) {
-    if (!options.chordal_start) return cost;
-    std::vector<Group> given = graph.poses;
-    graph.poses = chordal_initialisation(graph, order);
-    const double chordal_cost = pose_graph_cost(graph, options.error, options.huber);
-    if (chordal_cost < cost || !std::isfinite(cost)) return chordal_cost;
-    graph.poses = std::move(given);
+struct Positions {
+  Positions(const PoseGraph<Group>& graph, const PoseGraphOptions& options, std::span<const int> order)
+      : order(order), useful(options.resolve_positions) {
+    if (options.resolve_positions || options.chordal_start) solver.emplace(graph, order);
   }
-  return cost;
-}
+
+  /// Takes new poses where they cost less than `cost`; returns the lower cost.
+  double take_better(PoseGraph<Group>& graph, std::vector<Group> poses, double cost,
+                     const PoseGraphOptions& options) {
+    std::swap(graph.poses, poses);
+    const double new_cost = pose_graph_cost(graph, options.error, options.huber);
+    if (new_cost < cost) return new_cost;
+    std::swap(graph.poses, poses);
+    return cost;
+  }
+  double chordal(PoseGraph<Group>& graph, double cost, const PoseGraphOptions& options) {
+    if (!options.chordal_start) return cost;
+    return take_better(graph, chordal_initialisation(graph, order, *solver), cost, options);
+  }
+  double resolve(PoseGraph<Group>& graph, double cost, const PoseGraphOptions& options) {
+    if (!useful) return cost;
+    std::vector<Group> poses = graph.poses;
+    if (!solver->update(graph, poses)) return cost;
+    const double new_cost = take_better(graph, std::move(poses), cost, options);
+    useful = new_cost < (1 - kWorthwhile) * cost;
+    return new_cost;
+  }
+
+  static constexpr double kWorthwhile = 1e-3;  // it stops paying once the steps are short
+  std::span<const int> order;
+  std::optional<PoseGraphPositions<Group>> solver;
+  bool useful;
+};
+
+template <>
+struct Positions<Sim3> {
+  Positions(const PoseGraph<Sim3>&, const PoseGraphOptions&, std::span<const int>) {}
+  static double chordal(PoseGraph<Sim3>&, double cost, const PoseGraphOptions&) { return cost; }
+  static double resolve(PoseGraph<Sim3>&, double cost, const PoseGraphOptions&) { return cost; }
+};
+
+/// Levenberg-Marquardt damping relative to the diagonal; `least` is 0 for Gauss-Newton.
+class Damping {
+ public:
+  explicit Damping(double least) : least_(least), value_(least) {}
+  [[nodiscard]] double value() const { return value_; }
+  [[nodiscard]] bool least() const { return value_ == least_; }
+  /// gain: true decrease over the one the linear model promised.
+  void accepted(double gain) {
+    if (gain < 0.25) value_ *= 4;
+    if (gain > 0.75) value_ *= 0.1;
+    if (value_ < kNone) value_ = least_;
+  }
+  /// False when there is nothing left to try.
+  [[nodiscard]] bool rejected() {
+    value_ = std::max(10 * value_, kFirst);
+    return value_ < kMost;
+  }
+
+ private:
+  static constexpr double kNone = 1e-9, kFirst = 1e-5, kMost = 1e8;
+  double least_, value_;
+};
 
 }  // namespace
 
 template <class Group>
 SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseGraphOptions& options) {
-  constexpr double kMinDamping = 1e-9, kFirstDamping = 1e-5, kMaxDamping = 1e8;
+  using Termination = SolverSummary::Termination;
   SolverSummary summary;
   if (graph.constraints.empty()) return summary;
   TWOFOLD_CHECK(options.invalid_reason().empty(), "options are valid");
   Workspace& w = *workspace_;
   w.analyse(graph);
+  Positions<Group> positions(graph, options, w.order);
   summary.initial_cost = pose_graph_cost(graph, options.error, options.huber);
-  double cost = take_better_start(graph, options, w.order);
+  double cost = positions.chordal(graph, summary.initial_cost, options);
   if (options.on_cost) options.on_cost(0, cost);
 
-  const double least_damping =
-      graph.origin < 0 ? std::max(options.initial_damping, kMinDamping) : options.initial_damping;
-  double damping = least_damping;
+  constexpr double kGaugeDamping = 1e-9;
+  Damping damping(graph.origin < 0 ? std::max(options.initial_damping, kGaugeDamping)
+                                   : options.initial_damping);
   bool keep_factor = false;
-  double last_decrease = 1;  // relative
   bool linearised = false;
-  summary.termination = SolverSummary::Termination::kIterationLimit;
+  double last_decrease = 1;  // relative to the cost
+  summary.termination = Termination::kIterationLimit;
   while (summary.iterations < options.max_iterations) {
     if (!linearised) w.linearise(graph, options);
     linearised = true;
     ++summary.iterations;
     const bool own_factor = !keep_factor;
+    keep_factor = false;
+    w.before = graph.poses;
     double new_cost = std::numeric_limits<double>::infinity();
-    if (!own_factor || w.system.factorise(damping)) {
-      w.step(graph);
-      new_cost = pose_graph_cost(graph, options.error, options.huber);
-      if (!(new_cost < cost)) std::swap(graph.poses, w.trial);
-    }
-    const double decrease = (cost - new_cost) / cost;
-    if (!(new_cost < cost)) {
-      if (!own_factor) {  // the old factor has served its time: one more try with the right one
-        keep_factor = false;
-      } else if (last_decrease < 1e-3 && decrease > -1e-9) {  // rounding decides here
-        summary.termination = SolverSummary::Termination::kConverged;
-        break;
-      } else {
-        damping = std::max(10 * damping, kFirstDamping);
-        if (damping > kMaxDamping) {
-          summary.termination = SolverSummary::Termination::kNoStepFound;
-          break;
-        }
+    double promised = 0;
+    if (!own_factor || w.system.factorise(damping.value())) {
+      w.delta = w.system.solve(w.gradient);
+      promised = w.gradient.cwiseProduct(w.delta).sum();
+      // An old factor may overshoot where the curvature has grown: halve. A fresh one is left to the damping.
+      const double shortest = own_factor ? 1.0 : 0.25;
+      for (double scale = 1; scale >= shortest && !(new_cost < cost); scale *= 0.5) {
+        w.move(w.before, scale, graph.poses);
+        new_cost = pose_graph_cost(graph, options.error, options.huber);
       }
-      continue;
     }
+    if (!(new_cost < cost)) {
+      graph.poses = w.before;
+      if (!own_factor) continue;  // once more with its own factor
+      if (promised >= 0 && promised < options.relative_decrease * cost) {
+        summary.termination = Termination::kConverged;
+        break;
+      }
+      if (damping.rejected()) continue;
+      summary.termination = Termination::kNoStepFound;
+      break;
+    }
+    const double gain = (cost - new_cost) / promised;
+    new_cost = positions.resolve(graph, new_cost, options);
+    const double decrease = (cost - new_cost) / cost;
     ++summary.accepted_steps;
     linearised = false;
     cost = new_cost;
     if (options.on_cost) options.on_cost(summary.iterations, cost);
     if (decrease < options.relative_decrease) {
-      summary.termination = SolverSummary::Termination::kConverged;
+      summary.termination = Termination::kConverged;
       break;
     }
-    if (own_factor)
-      damping = damping <= kFirstDamping ? least_damping : std::max(least_damping, 0.1 * damping);
-    const bool fast = own_factor ? decrease < options.keep_factor_below : decrease < last_decrease / 3;
-    keep_factor = fast && damping == least_damping;
+    const bool was_least = damping.least();
+    if (own_factor) damping.accepted(gain);
+    keep_factor =
+        was_least && (own_factor ? decrease < options.keep_factor_below : decrease < last_decrease / 3);
     last_decrease = decrease;
   }
   summary.final_cost = cost;

@@ -39,15 +39,19 @@ enum class PoseGraphError : std::uint8_t {
 struct PoseGraphOptions {
   PoseGraphError error = PoseGraphError::kLog;
   CbhOrder jacobian = CbhOrder::kExact;  ///< for kLog; the Jacobian of kComponents is exact
-  bool chordal_start = false;  ///< start from chordal_initialisation where its cost is lower; not for Sim3
-  int max_iterations = 100;    ///< steps tried, accepted or not, >= 0
-  double initial_damping = 0;  ///< relative to the diagonal, >= 0; 0: Gauss-Newton until a step fails.
-                               ///< Without an origin at least 1e-9 is used
+  /// Start from chordal_initialisation where its cost is lower. Not for Sim3.
+  bool chordal_start = false;
+  /// After a step, solve for the positions with the rotations held, a small linear problem, where that lowers
+  /// the cost: it repairs what a long Gauss-Newton step bends. Not for Sim3.
+  bool resolve_positions = true;
+  int max_iterations = 100;         ///< steps tried, accepted or not, >= 0
+  double initial_damping = 0;       ///< relative to the diagonal, >= 0; 0: Gauss-Newton until a step fails.
+                                    ///< Without an origin at least 1e-9 is used
   double huber = 0;                 ///< kernel on sqrt(e^T Lambda e); <= 0: none
   double relative_decrease = 1e-6;  ///< stop when a step lowers the cost by less than this share
   /// Once a step has lowered the cost by less than this share, its factor also serves the following steps, as
   /// long as each of them gains at most a third of the one before. 0: every step has its own factor.
-  double keep_factor_below = 0.2;
+  double keep_factor_below = 0.1;
   std::function<void(int iteration, double cost)>
       on_cost;  ///< called for the start and after each accepted step
 

@@ -42,104 +42,116 @@ Square<D> nearest_rotation(const Square<D>& M) {
   return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
 }
 
-template <class Group, int D>
-class Chordal {
- public:
-  Chordal(const PoseGraph<Group>& graph, std::span<const int> order)
-      : graph_(graph), order_(order), origin_(std::max(graph.origin, 0)) {
-    for (const auto& c : graph.constraints) edges_.emplace_back(c.i, c.j);
-  }
+std::vector<std::pair<int, int>> edges_of(const auto& graph) {
+  std::vector<std::pair<int, int>> edges;
+  for (const auto& c : graph.constraints) edges.emplace_back(c.i, c.j);
+  return edges;
+}
 
-  std::vector<Group> run() {
-    if (!solve_rotations() || !solve_positions()) return graph_.poses;
-    std::vector<Group> poses;
-    for (std::size_t i = 0; i < rotations_.size(); ++i) {
-      const Eigen::Matrix<double, D, 1> t =
-          -rotations_[i] * positions_.row(static_cast<Eigen::Index>(i)).transpose();
-      poses.push_back(from_rotation(rotations_[i], t));
+/// Row j of the normal equations: k R_j - k R_ji R_i; the known origin moves to the right-hand side.
+template <int D, class Group>
+std::vector<Square<D>> relaxed_rotations(const PoseGraph<Group>& graph, std::span<const int> order) {
+  const int origin = std::max(graph.origin, 0);
+  CholmodSolver system;
+  const auto slots = system.set_pattern(D, order, edges_of(graph));
+  Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(system.dimension(), D);
+  const Square<D> R_origin = rotation_of(graph.poses[origin]);
+  for (std::size_t e = 0; e < slots.size(); ++e) {
+    const auto& c = graph.constraints[e];
+    const double k = c.information.diagonal().template tail<Group::kDof - D>().mean();
+    const Square<D> k_R_ji = k * rotation_of(c.T_j_i);
+    if (c.i != origin) system.add_diagonal<D>(c.i, k * Square<D>::Identity());
+    if (c.j != origin) system.add_diagonal<D>(c.j, k * Square<D>::Identity());
+    if (c.i == origin) {
+      rhs.middleRows<D>(D * c.j) += k_R_ji * R_origin;
+    } else if (c.j == origin) {
+      rhs.middleRows<D>(D * c.i) += k_R_ji.transpose() * R_origin;
+    } else {
+      system.add_off_diagonal<D>(slots[e], -k_R_ji.transpose());
     }
-    poses[origin_] = graph_.poses[origin_];
-    return poses;
   }
-
- private:
-  /// Row j of the normal equations: k R_j - k R_ji R_i; the known origin moves to the right-hand side.
-  bool solve_rotations() {
-    CholmodSolver system;
-    const auto slots = system.set_pattern(D, order_, edges_);
-    Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(system.dimension(), D);
-    const Square<D> R_origin = rotation_of(graph_.poses[origin_]);
-    for (std::size_t e = 0; e < slots.size(); ++e) {
-      const auto& c = graph_.constraints[e];
-      const double k = c.information.diagonal().template tail<Group::kDof - D>().mean();
-      const Square<D> R_ji = rotation_of(c.T_j_i);
-      if (c.i != origin_) system.add_diagonal<D>(c.i, k * Square<D>::Identity());
-      if (c.j != origin_) system.add_diagonal<D>(c.j, k * Square<D>::Identity());
-      if (c.i == origin_) {
-        rhs.middleRows<D>(D * c.j) += k * R_ji * R_origin;
-      } else if (c.j == origin_) {
-        rhs.middleRows<D>(D * c.i) += k * R_ji.transpose() * R_origin;
-      } else {
-        system.add_off_diagonal<D>(slots[e], -k * R_ji.transpose());
-      }
-    }
-    system.add_diagonal<D>(origin_, Square<D>::Identity());
-    rhs.middleRows<D>(D * origin_) = R_origin;
-    if (!system.factorise(0)) return false;
-    const Eigen::MatrixXd relaxed = system.solve(rhs);
-    for (std::size_t i = 0; i < order_.size(); ++i) {
-      rotations_.push_back(nearest_rotation<D>(relaxed.middleRows<D>(D * static_cast<Eigen::Index>(i))));
-    }
-    return relaxed.allFinite();
+  system.add_diagonal<D>(origin, Square<D>::Identity());
+  rhs.middleRows<D>(D * origin) = R_origin;
+  std::vector<Square<D>> rotations;
+  if (!system.factorise(0)) return rotations;
+  const Eigen::MatrixXd relaxed = system.solve(rhs);
+  if (!relaxed.allFinite()) return rotations;
+  for (int i = 0; i < static_cast<int>(order.size()); ++i) {
+    rotations.push_back(nearest_rotation<D>(relaxed.middleRows<D>(D * i)));
   }
+  return rotations;
+}
 
-  /// A graph Laplacian for each coordinate of the positions in the world.
-  bool solve_positions() {
-    using Scalar = Eigen::Matrix<double, 1, 1>;
-    CholmodSolver system;
-    const auto slots = system.set_pattern(1, order_, edges_);
-    Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(system.dimension(), D);
-    const Eigen::Matrix<double, 1, D> c_origin = graph_.poses[origin_].inverse().translation().transpose();
-    for (std::size_t e = 0; e < slots.size(); ++e) {
-      const auto& c = graph_.constraints[e];
-      const double t = c.information.diagonal().template head<D>().mean();
-      const Eigen::Matrix<double, 1, D> shift =
-          (rotations_[c.i].transpose() * c.T_j_i.inverse().translation()).transpose();  // c_j - c_i
-      if (c.i != origin_) {
-        system.add_diagonal<1>(c.i, Scalar(t));
-        rhs.row(c.i) -= t * shift;
-        if (c.j == origin_) rhs.row(c.i) += t * c_origin;
-      }
-      if (c.j != origin_) {
-        system.add_diagonal<1>(c.j, Scalar(t));
-        rhs.row(c.j) += t * shift;
-        if (c.i == origin_) rhs.row(c.j) += t * c_origin;
-      }
-      if (c.i != origin_ && c.j != origin_) system.add_off_diagonal<1>(slots[e], Scalar(-t));
-    }
-    system.add_diagonal<1>(origin_, Scalar(1.0));
-    rhs.row(origin_) = c_origin;
-    if (!system.factorise(0)) return false;
-    positions_ = system.solve(rhs);
-    return positions_.allFinite();
+template <int D, class Group>
+std::vector<Group> chordal(const PoseGraph<Group>& graph, std::span<const int> order,
+                           PoseGraphPositions<Group>& positions) {
+  const auto rotations = relaxed_rotations<D>(graph, order);
+  std::vector<Group> poses = graph.poses;
+  if (rotations.empty()) return poses;
+  const int origin = std::max(graph.origin, 0);
+  for (int i = 0; i < static_cast<int>(poses.size()); ++i) {
+    if (i != origin) poses[i] = from_rotation(rotations[i], Eigen::Matrix<double, D, 1>::Zero());
   }
+  return positions.update(graph, poses) ? poses : graph.poses;
+}
 
-  const PoseGraph<Group>& graph_;
-  std::span<const int> order_;
-  int origin_;
-  std::vector<std::pair<int, int>> edges_;
-  std::vector<Square<D>> rotations_;
-  Eigen::MatrixXd positions_;
-};
+template <class Group>
+double translation_weight(const typename PoseGraph<Group>::Constraint& c) {
+  return c.information.diagonal().template head<PoseGraphPositions<Group>::kDim>().mean();
+}
 
 }  // namespace
 
-std::vector<SE2> chordal_initialisation(const PoseGraph<SE2>& graph, std::span<const int> order) {
-  return Chordal<SE2, 2>(graph, order).run();
+template <class Group>
+PoseGraphPositions<Group>::PoseGraphPositions(const PoseGraph<Group>& graph, std::span<const int> order) {
+  using Scalar = Eigen::Matrix<double, 1, 1>;
+  const int origin = std::max(graph.origin, 0);
+  const auto slots = laplacian_.set_pattern(1, order, edges_of(graph));
+  for (std::size_t e = 0; e < slots.size(); ++e) {
+    const auto& c = graph.constraints[e];
+    const double t = translation_weight<Group>(c);
+    if (c.i != origin) laplacian_.add_diagonal<1>(c.i, Scalar(t));
+    if (c.j != origin) laplacian_.add_diagonal<1>(c.j, Scalar(t));
+    if (c.i != origin && c.j != origin) laplacian_.add_off_diagonal<1>(slots[e], Scalar(-t));
+  }
+  laplacian_.add_diagonal<1>(origin, Scalar(1.0));
+  factorised_ = laplacian_.factorise(0);
 }
 
-std::vector<SE3> chordal_initialisation(const PoseGraph<SE3>& graph, std::span<const int> order) {
-  return Chordal<SE3, 3>(graph, order).run();
+template <class Group>
+bool PoseGraphPositions<Group>::update(const PoseGraph<Group>& graph, std::vector<Group>& poses) {
+  if (!factorised_) return false;
+  using Row = Eigen::Matrix<double, 1, kDim>;
+  const int origin = std::max(graph.origin, 0);
+  const Row c_origin = poses[origin].inverse().translation().transpose();
+  Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(laplacian_.dimension(), kDim);
+  for (const auto& c : graph.constraints) {
+    const double t = translation_weight<Group>(c);
+    const Row shift =
+        (rotation_of(poses[c.i]).transpose() * c.T_j_i.inverse().translation()).transpose();  // c_j - c_i
+    if (c.i != origin) rhs.row(c.i) += t * ((c.j == origin ? c_origin : Row::Zero().eval()) - shift);
+    if (c.j != origin) rhs.row(c.j) += t * ((c.i == origin ? c_origin : Row::Zero().eval()) + shift);
+  }
+  rhs.row(origin) = c_origin;
+  const Eigen::MatrixXd centres = laplacian_.solve(rhs);
+  if (!centres.allFinite()) return false;
+  for (int i = 0; i < static_cast<int>(poses.size()); ++i) {
+    if (i != origin) poses[i].translation() = -(rotation_of(poses[i]) * centres.row(i).transpose());
+  }
+  return true;
 }
+
+std::vector<SE2> chordal_initialisation(const PoseGraph<SE2>& graph, std::span<const int> order,
+                                        PoseGraphPositions<SE2>& positions) {
+  return chordal<2>(graph, order, positions);
+}
+
+std::vector<SE3> chordal_initialisation(const PoseGraph<SE3>& graph, std::span<const int> order,
+                                        PoseGraphPositions<SE3>& positions) {
+  return chordal<3>(graph, order, positions);
+}
+
+template class PoseGraphPositions<SE2>;
+template class PoseGraphPositions<SE3>;
 
 }  // namespace twofold

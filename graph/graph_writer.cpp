@@ -58,6 +58,7 @@ void GraphWriter::add_observations(KeyframeId id, std::span<const Observation> o
   keyframe.observations = std::move(merged);
   for (const Observation& observation : added) {
     MapPoint& point = graph_.points_.mutate(index(observation.point));
+    TWOFOLD_CHECK(point.alive(), "a culled point cannot be observed");
     const ObserverList& old = *point.observers;
     const auto at = std::lower_bound(old.begin(), old.end(), id);
     if (at != old.end() && *at == id) continue;
@@ -106,6 +107,8 @@ void GraphWriter::put_edge(KeyframeId id, const Edge& edge) {
 
 void GraphWriter::set_edge(KeyframeId id, const Edge& edge) {
   TWOFOLD_CHECK(edge.other != id, "an edge joins two keyframes");
+  TWOFOLD_CHECK(!graph_.keyframe(id).culled() && !graph_.keyframe(edge.other).culled(),
+                "culled keyframes have no edges");
   put_edge(id, edge);
   put_edge(edge.other, reversed(id, edge));
 }
@@ -120,6 +123,7 @@ void GraphWriter::remove_edge(KeyframeId id, KeyframeId other) {
 }
 
 void GraphWriter::cull_point(PointId id) {
+  if (!graph_.point(id).alive()) return;
   const ObserverList observers = *graph_.point(id).observers;
   for (const KeyframeId keyframe : observers) remove_observations(keyframe, std::span(&id, 1));
   graph_.points_.mutate(index(id)) = MapPoint{};
@@ -127,6 +131,8 @@ void GraphWriter::cull_point(PointId id) {
 
 void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
   TWOFOLD_CHECK(!graph_.keyframe(heir).culled() && heir != id, "an heir must stay in the map");
+  TWOFOLD_CHECK(!graph_.keyframe(id).culled() && id != graph_.reference(),
+                "a keyframe is culled once, and never the reference");
   const SE3 T_this_heir = graph_.keyframe(id).T_k_w * graph_.keyframe(heir).T_k_w.inverse();
   std::vector<PointId> points;
   for (const Observation& observation : *graph_.keyframe(id).observations)

@@ -47,10 +47,11 @@ class GraphWriter {
   void set_edge(KeyframeId id, const Edge& edge);
   void remove_edge(KeyframeId id, KeyframeId other);
 
-  /// Removes all measurements of a point and marks it culled.
+  /// Removes all measurements of a point and marks it culled; nothing happens to a point culled before.
   void cull_point(PointId id);
   /// Removes a keyframe's measurements and edges; its pose stays known relative to `heir`, which must not be
-  /// culled. No point may be anchored in it any more.
+  /// culled. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes along with the
+  /// heir (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
   void cull_keyframe(KeyframeId id, KeyframeId heir);
 
  private:

@@ -13,7 +13,9 @@ using ObserverList = std::vector<KeyframeId>;  ///< ascending
 
 /// Anchored inverse depth point  (thesis 6.2.4): Euclidean position in the anchor's frame is Pi(psi).
 struct MapPoint {
-  KeyframeId anchor = kNoKeyframe;  ///< kNoKeyframe: the point was culled
+  /// kNoKeyframe: the point was culled. The anchor itself may be a culled keyframe: its frame is then known
+  /// through its heir, so ask GraphSnapshot::T_k_w for its pose.
+  KeyframeId anchor = kNoKeyframe;
   Vector3 psi{0, 0, 1};
   std::shared_ptr<const PointAppearance> appearance;
   std::shared_ptr<const ObserverList> observers;

@@ -78,7 +78,7 @@ std::vector<PosePair> associate(const Trajectory& estimate, const Trajectory& tr
   std::size_t j = 0;
   for (const TimedPose& pose : estimate) {
     const auto difference = [&](std::size_t k) { return std::abs(truth[k].t_ns - pose.t_ns); };
-    while (j + 1 < truth.size() && difference(j + 1) <= difference(j)) ++j;
+    while (j + 1 < truth.size() && difference(j + 1) < difference(j)) ++j;
     if (j < truth.size() && difference(j) <= max_difference_ns) {
       pairs.push_back({pose.t_ns, pose.T_w_c, truth[j].T_w_c});
     }

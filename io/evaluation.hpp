@@ -51,9 +51,9 @@ struct RelativeError {
 
 struct EvaluationOptions {
   Alignment alignment = Alignment::kSe3;
-  double delta_s = 1.0;           ///< step of the error per time
-  double delta_m = 1.0;           ///< step of the error per distance
-  double time_tolerance_s = 0.1;  ///< pairs whose times differ from delta_s by more are left out
+  double delta_s = 1.0;            ///< step of the error per time
+  double delta_m = 1.0;            ///< step of the error per distance
+  double time_tolerance_s = 0.05;  ///< pairs whose times differ from delta_s by more are left out
 };
 
 struct Evaluation {

@@ -13,7 +13,8 @@ namespace twofold {
 namespace {
 
 constexpr int kSuper = 2;  // drawn twice as large and averaged down: thin lines and letters come out smooth
-constexpr int kLeftMargin = 90, kRightMargin = 40, kTopMargin = 90, kBottomMargin = 78, kBarMargin = 110;  // [px]
+constexpr int kLeftMargin = 90, kRightMargin = 40, kTopMargin = 90, kBottomMargin = 78,
+              kBarMargin = 110;  // [px]
 const cv::Scalar kInk(60, 60, 60), kGrid(232, 232, 232), kWhite(255, 255, 255);
 
 /// Maps the plane of the paper (a to the right, b up, metres) to pixels of the large canvas.
@@ -209,7 +210,8 @@ cv::Mat draw_top_down(const std::vector<PlotTrack>& tracks, const PlotOptions& o
   draw_legend(canvas, axes, tracks);
   if (has_bar) draw_colour_bar(canvas, axes, largest(coloured->values), options.value_label);
   put_text(canvas, options.title, {kSuper * kLeftMargin, kSuper * 32}, 0.7, Anchor::kLeft, {20, 20, 20}, 1);
-  put_text(canvas, options.subtitle, {kSuper * kLeftMargin, kSuper * 54}, 0.45, Anchor::kLeft, {110, 110, 110});
+  put_text(canvas, options.subtitle, {kSuper * kLeftMargin, kSuper * 54}, 0.45, Anchor::kLeft,
+           {110, 110, 110});
   cv::Mat image;
   cv::resize(canvas, image, {width / kSuper, height / kSuper}, 0, 0, cv::INTER_AREA);
   return image;

@@ -8,8 +8,9 @@ namespace {
 constexpr std::size_t kMaxAnchors = 512;
 constexpr std::size_t kMaxEdges = 512;
 
-/// Walks down the chain of pending proposals to a keyframe of the graph, or to the start of the map.
-SE3 T_k_world(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k) {
+}  // namespace
+
+SE3 pose_in_world(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k) {
   SE3 T_k_here;
   for (const PendingKeyframe* pending = nullptr; !graph.contains(k); k = pending->reference) {
     pending = local.find_pending(k);
@@ -20,11 +21,9 @@ SE3 T_k_world(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k
   return T_k_here * graph.T_k_w(k);
 }
 
-}  // namespace
-
 SE3 relative_pose(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k, KeyframeId ref) {
   if (k == ref) return {};
-  return T_k_world(graph, local, k) * T_k_world(graph, local, ref).inverse();
+  return pose_in_world(graph, local, k) * pose_in_world(graph, local, ref).inverse();
 }
 
 CandidatePoints::CandidatePoints(std::size_t capacity) : met_(kTable, 0) {

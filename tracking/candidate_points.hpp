@@ -62,6 +62,8 @@ class CandidatePoints {
   std::pair<std::size_t, std::size_t> reference_range_{0, 0};
 };
 
+/// T_k_w of a keyframe in the graph, or of a pending one through the keyframes it was proposed relative to.
+[[nodiscard]] SE3 pose_in_world(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k);
 /// T_k_ref of two keyframes, each in the graph or pending.
 [[nodiscard]] SE3 relative_pose(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k,
                                 KeyframeId ref);

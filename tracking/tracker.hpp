@@ -36,6 +36,11 @@ class Tracker {
   ///                       Filled if and only if the result says `proposed`.
   TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal);
 
+  /// Pose of the last tracked frame in the map as `graph`, that of the last step, has it.
+  [[nodiscard]] SE3 T_c_w(const GraphSnapshot& graph) const {
+    return T_prev_ref_ * pose_in_world(graph, local_, reference_);
+  }
+
   /// The proposal of the last step could not be sent: its numbers are taken back.
   void proposal_rejected();
 

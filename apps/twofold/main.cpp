@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Twofold: real-time visual SLAM", "twofold"};
   app.require_subcommand(1);
   int exit_code = twofold::kOk;
+  twofold::add_run_command(app, exit_code);
   twofold::add_eval_command(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -1,6 +1,7 @@
 // pose_graph FILE.g2o[.gz]: solves a pose graph with this project's solver and with Ceres, and compares.
 
 #include <fmt/format.h>
+#include <omp.h>
 #include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
@@ -165,6 +166,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "pose_graph: {}\n", reason);
     return 2;
   }
+  omp_set_max_active_levels(0);  // one thread for Ceres' CHOLMOD too; see estimation/cholmod_solver.cpp
   try {
     const AnyPoseGraph graph = read_g2o(arguments.file);
     std::visit([&](const auto& g) { compare(g, arguments); }, graph);

@@ -9,13 +9,13 @@
 namespace twofold {
 namespace {
 
-/// 25 inner and 175 outer keyframes, or 30 and 170.
+/// 25 inner and 175 outer keyframes.
 SyntheticWindow typical_window(bool outer_observations) {
   SyntheticWindowOptions options;
   options.inner = 25;
   options.outer = 175;
   options.laps = 1.6;
-  options.points_per_keyframe = outer_observations ? 250 : 600;
+  options.points_per_keyframe = outer_observations ? 70 : 80;
   options.outer_observations = outer_observations;
   options.pixel_noise = 0.7;
   options.outliers = 0.03;

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "estimation/robust_kernel.hpp"
 #include "estimation/window_problem.hpp"
 #include "geometry/inverse_depth.hpp"
 

@@ -1,0 +1,217 @@
+#include "apps/twofold/run_output.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "geometry/inverse_depth.hpp"
+#include "io/evaluation.hpp"
+#include "io/io_error.hpp"
+#include "io/output_file.hpp"
+#include "io/plot.hpp"
+#include "io/ply.hpp"
+#include "io/trajectory_file.hpp"
+
+namespace twofold {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// A frame counts as late in the report when its pose was known later than this after it was due.
+constexpr std::int64_t kLateNs = 33'000'000;
+
+Trajectory final_trajectory(const RunResult& result) {
+  Trajectory trajectory;
+  for (const FrameRecord& record : result.frames) {
+    // A keyframe the mapper never got to (the run was cut short) leaves its frames without a place in the
+    // map.
+    if (record.state != FrameState::kTracked || !result.graph.contains(record.reference)) continue;
+    trajectory.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
+  }
+  return trajectory;
+}
+
+Trajectory causal_trajectory(const RunResult& result) {
+  Trajectory trajectory;
+  for (const FrameRecord& record : result.frames) {
+    if (record.state == FrameState::kTracked)
+      trajectory.push_back({record.t_ns, record.T_c_w_causal.inverse()});
+  }
+  return trajectory;
+}
+
+Trajectory keyframe_trajectory(const GraphSnapshot& graph) {
+  Trajectory trajectory;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (!keyframe.culled()) trajectory.push_back({keyframe.t_ns, keyframe.T_k_w.inverse()});
+  }
+  return trajectory;
+}
+
+std::vector<PlyPoint> map_points(const GraphSnapshot& graph) {
+  std::vector<PlyPoint> points;
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+    const MapPoint& point = graph.point(PointId{p});
+    if (!point.alive()) continue;
+    const std::uint8_t grey =
+        point.appearance->pixels[PointAppearance::kCentre * (PointAppearance::kSize + 1)];
+    points.push_back({graph.position(PointId{p}), {grey, grey, grey}});
+  }
+  return points;
+}
+
+Json late_and_lost(const RunResult& result) {
+  Json lost = Json::array();
+  Json late = Json::array();
+  std::int64_t previous_t_ns = 0;
+  for (const FrameRecord& record : result.frames) {
+    const double gap_ms = previous_t_ns == 0 ? 0 : static_cast<double>(record.t_ns - previous_t_ns) * 1e-6;
+    previous_t_ns = record.t_ns;
+    if (record.state == FrameState::kLost) {
+      lost.push_back({{"frame", record.frame_index}, {"cause", record.cause}, {"ms_since_previous", gap_ms}});
+    } else if (record.state == FrameState::kDropped) {
+      late.push_back({{"frame", record.frame_index}, {"cause", "dropped: its successor was due already"}});
+    } else if (record.latency_ns > kLateNs) {
+      const bool own = record.tracking_ns > kLateNs / 2;
+      late.push_back(
+          {{"frame", record.frame_index},
+           {"latency_ms", static_cast<double>(record.latency_ns) * 1e-6},
+           {"tracking_ms", static_cast<double>(record.tracking_ns) * 1e-6},
+           {"cause", own ? "tracking it took long" : "it waited: earlier frames, decoding, or no CPU"}});
+    }
+  }
+  return {{"why_lost", lost}, {"why_late", late}};
+}
+
+Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result) {
+  const auto count = [&](FrameState state) {
+    return std::count_if(result.frames.begin(), result.frames.end(),
+                         [&](const auto& r) { return r.state == state; });
+  };
+  std::int64_t metric_loops = 0;
+  for (const MapperRound& round : result.rounds) metric_loops += round.metric_loops;
+  std::size_t keyframes = 0;
+  std::size_t points = 0;
+  for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k)
+    keyframes += !result.graph.keyframe(KeyframeId{k}).culled();
+  for (std::uint32_t p = 0; p < result.graph.point_count(); ++p)
+    points += result.graph.point(PointId{p}).alive();
+  const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
+  Json json{{"source", source_text},
+            {"interrupted", result.interrupted},
+            {"error", result.error},
+            {"frames", result.frames.size()},
+            {"tracked", count(FrameState::kTracked)},
+            {"lost", count(FrameState::kLost)},
+            {"dropped", count(FrameState::kDropped)},
+            {"keyframes", keyframes},
+            {"points", points},
+            {"mapper_rounds", result.rounds.size()},
+            {"metric_loop_edges", metric_loops},
+            {"proposals_refused", result.proposals_refused},
+            {"wall_seconds", result.wall_seconds},
+            {"cpu_seconds", result.cpu_seconds},
+            {"cpu_ms_per_frame", 1e3 * result.cpu_seconds / frames},
+            {"peak_rss_mb", result.peak_rss_mb},
+            {"options",
+             {{"deterministic", options.deterministic},
+              {"speed", options.pacing.speed},
+              {"inner_window", options.mapper.inner_window},
+              {"outer_window", options.mapper.outer_window},
+              {"theta", options.mapper.theta},
+              {"wanted_matches", options.tracker.wanted_matches}}},
+            {"notes", result.notes}};
+  json.update(late_and_lost(result));
+  return json;
+}
+
+Json timing_json(const RunResult& result) {
+  Json json;
+  for (const StageRecorder& recorder : result.times) json[recorder.thread_name()] = recorder.to_json();
+  return json;
+}
+
+/// The run and the truth from above; without truth, the run alone.
+cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
+                 const Trajectory& causal_poses, const Trajectory& truth) {
+  PlotOptions plot;
+  plot.title = source_text;
+  plot.subtitle = fmt::format("{} poses", final_poses.size());
+  Trajectory shown = final_poses;
+  Trajectory shown_causal = causal_poses;
+  const auto pairs = associate(final_poses, truth, 10'000'000);
+  if (const auto evaluation = evaluate(pairs)) {
+    for (auto& pose : shown) pose.T_w_c = aligned_pose(evaluation->S_w_e, pose.T_w_c);
+    for (auto& pose : shown_causal) pose.T_w_c = aligned_pose(evaluation->S_w_e, pose.T_w_c);
+    plot.subtitle = fmt::format("{} poses, {:.1f} m, final ATE {:.4f} m ({:.3f} %)", final_poses.size(),
+                                evaluation->path_length, evaluation->absolute.rmse,
+                                100 * evaluation->absolute.rmse / std::max(evaluation->path_length, 1e-9));
+  }
+  plot.up_axis = truth.empty() ? 1 : up_axis_of(truth);
+  return draw_top_down({{"ground truth", positions(truth), plot_colours::kTruth, 4, {}},
+                        {"causal", positions(shown_causal), plot_colours::kCausal, 1, {}},
+                        {"final", positions(shown), plot_colours::kFinal, 2, {}}},
+                       plot);
+}
+
+}  // namespace
+
+void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
+                      const FrameSource& source, const EngineOptions& options, const RunResult& result) {
+  const Trajectory final_poses = final_trajectory(result);
+  const Trajectory causal_poses = causal_trajectory(result);
+  write_tum_trajectory(folder / "trajectory.txt", final_poses);
+  write_tum_trajectory(folder / "trajectory_causal.txt", causal_poses);
+  write_tum_trajectory(folder / "keyframes.txt", keyframe_trajectory(result.graph));
+  if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
+  write_ply(folder / "map.ply", map_points(result.graph));
+  write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
+  write_file(folder / "summary.json", summary_json(source_text, options, result).dump(2) + "\n");
+  std::ostringstream schedule;
+  if (!write_schedule(schedule, result.schedule.tracker, result.schedule.mapper,
+                      result.schedule.loop_closer)) {
+    throw IoError((folder / "schedule.log").string(), "cannot be written");
+  }
+  write_file(folder / "schedule.log", schedule.str());
+  if (!final_poses.empty()) {
+    write_png(folder / "trajectory.png",
+              draw_run(source_text, final_poses, causal_poses, source.ground_truth()));
+  }
+}
+
+void write_trace(const std::filesystem::path& file, const RunResult& result) {
+  std::ofstream out(file);
+  if (!result.trace || !result.trace->write(out)) throw IoError(file.string(), "the trace cannot be written");
+}
+
+void print_summary(const std::filesystem::path& folder, const RunResult& result) {
+  const auto count = [&](FrameState state) {
+    return std::count_if(result.frames.begin(), result.frames.end(),
+                         [&](const auto& r) { return r.state == state; });
+  };
+  std::int64_t metric_loops = 0;
+  for (const MapperRound& round : result.rounds) metric_loops += round.metric_loops;
+  fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", result.frames.size(),
+             count(FrameState::kTracked), count(FrameState::kLost), count(FrameState::kDropped),
+             result.interrupted ? ", interrupted" : "");
+  fmt::print("map         {} keyframes, {} rounds, {} metric loop edges\n", result.graph.keyframe_count(),
+             result.rounds.size(), metric_loops);
+  for (const StageRecorder& recorder : result.times) {
+    if (recorder.thread_name() == "loop closer") continue;
+    const LatencyHistogram& h = recorder.histogram(0);
+    fmt::print("{:<11} mean {:.2f} ms, p50 {:.2f}, p99 {:.2f}, max {:.2f}\n", recorder.thread_name(),
+               h.mean_ns() * 1e-6, static_cast<double>(h.quantile_ns(0.5)) * 1e-6,
+               static_cast<double>(h.quantile_ns(0.99)) * 1e-6, static_cast<double>(h.max_ns()) * 1e-6);
+  }
+  const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
+  fmt::print("cost        {:.1f} s wall, {:.1f} s CPU ({:.1f} CPU-ms a frame), {:.0f} MB at most\n",
+             result.wall_seconds, result.cpu_seconds, 1e3 * result.cpu_seconds / frames, result.peak_rss_mb);
+  for (const std::string& note : result.notes) fmt::print("note        {}\n", note);
+  fmt::print("written to  {}\n", folder.string());
+}
+
+}  // namespace twofold

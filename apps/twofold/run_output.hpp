@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "engine/options.hpp"
+#include "engine/result.hpp"
+#include "io/frame_source.hpp"
+
+namespace twofold {
+
+/// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, groundtruth.txt if
+/// known (all TUM form), map.ply, timing.json, summary.json, schedule.log, trajectory.png. Throws IoError
+/// when it cannot.
+void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
+                      const FrameSource& source, const EngineOptions& options, const RunResult& result);
+
+/// Chrome/Perfetto trace; the run must have kept one.
+void write_trace(const std::filesystem::path& file, const RunResult& result);
+
+/// What a person wants to know, on standard output.
+void print_summary(const std::filesystem::path& folder, const RunResult& result);
+
+}  // namespace twofold

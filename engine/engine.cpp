@@ -1,0 +1,64 @@
+#include "engine/engine.hpp"
+
+#include <stdexcept>
+
+#include "engine/health.hpp"
+#include "engine/lockstep_run.hpp"
+#include "engine/threaded_run.hpp"
+
+namespace twofold {
+namespace {
+
+/// What the run itself cost, beside what the process had used before.
+class CostMeter {
+ public:
+  void finish(RunResult& result) const {
+    const ProcessUsage usage = process_usage();
+    result.cpu_seconds = usage.cpu_seconds - start_.cpu_seconds;
+    result.peak_rss_mb = static_cast<double>(usage.peak_rss_bytes) / (1024.0 * 1024.0);
+    result.wall_seconds = static_cast<double>(steady_now_ns() - start_ns_) * 1e-9;
+  }
+
+ private:
+  ProcessUsage start_ = process_usage();
+  std::int64_t start_ns_ = steady_now_ns();
+};
+
+}  // namespace
+
+Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
+  if (const std::string reason = options_.pacing.invalid_reason(); !reason.empty())
+    throw std::runtime_error(reason);
+  if (rig.kind == SensorKind::kMono) {
+    throw std::runtime_error("this source has a single camera without depth; stereo or RGB-D is needed");
+  }
+}
+
+RunResult Engine::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
+                      const ProgressSink& progress) {
+  const CostMeter cost;
+  RunResult result;
+  if (options_.deterministic) {
+    LockstepRun run(rig_, options_);
+    run.run(feed, interrupted, progress);
+    result = run.finish();
+  } else {
+    ThreadedRun run(rig_, options_);
+    run.run(feed, interrupted, progress);
+    result = run.finish();
+  }
+  cost.finish(result);
+  return result;
+}
+
+RunResult Engine::replay(const FrameFeed& feed, const Schedule& schedule,
+                         const std::atomic<bool>& interrupted, const ProgressSink& progress) {
+  const CostMeter cost;
+  LockstepRun run(rig_, options_);
+  run.replay(feed, schedule, interrupted, progress);
+  RunResult result = run.finish();
+  cost.finish(result);
+  return result;
+}
+
+}  // namespace twofold

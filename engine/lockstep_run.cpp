@@ -1,0 +1,127 @@
+#include "engine/lockstep_run.hpp"
+
+namespace twofold {
+namespace {
+
+// A replay queues what the threaded run had under way; its own limit must never be the tighter one.
+constexpr std::size_t kReplayRoom = 64;
+
+}  // namespace
+
+LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
+    : trace_(options.trace ? std::make_unique<Trace>() : nullptr),
+      pool_(options.proposal_slots + kReplayRoom),
+      tracking_(rig, options.tracker, trace_.get()),
+      mapping_(rig, options.mapper, trace_.get()),
+      snapshot_(mapping_.publish()) {}
+
+void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
+                      const ProgressSink& progress) {
+  Frame frame;
+  FeedStatus status = FeedStatus::kEnd;
+  // Relaxed: the flag carries no other data; seeing it a frame later is as good.
+  while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
+    track(frame, true, false);
+    if (!queue_.empty()) map(queue_.size());
+    report(progress);
+  }
+  result_.interrupted = interrupted.load(std::memory_order_relaxed);
+  if (status == FeedStatus::kError) fail("the input ended with an error");
+}
+
+void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
+                         const std::atomic<bool>& interrupted, const ProgressSink& progress) {
+  Frame frame;
+  auto round = schedule.mapper.begin();
+  for (const TrackerStep& step : schedule.tracker) {
+    if (interrupted.load(std::memory_order_relaxed)) {
+      result_.interrupted = true;
+      return;
+    }
+    if (feed(frame) != FeedStatus::kFrame) {
+      fail("the schedule has more frames than the input");
+      return;
+    }
+    if (frame.index != step.frame) {
+      fail("the schedule belongs to another recording: frame numbers differ");
+      return;
+    }
+    if (step.fate == TrackerStep::Fate::kDropped) {
+      drop(frame);
+      continue;
+    }
+    for (; snapshot_.version() < step.version; ++round) {
+      if (round == schedule.mapper.end() || round->proposals > queue_.size()) {
+        fail("the schedule does not fit the input: the mapper would need keyframes that were not proposed");
+        return;
+      }
+      map(round->proposals);
+    }
+    track(frame, step.degrade_level == 0, step.refused > 0);
+    report(progress);
+  }
+  for (; round != schedule.mapper.end() && round->proposals <= queue_.size(); ++round) map(round->proposals);
+}
+
+void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse) {
+  const std::int64_t due_ns = steady_now_ns();
+  FrameRecord record;
+  ProposalHandle proposal;
+  if (may_propose) proposal = pool_.try_acquire();
+  if (tracking_.step(frame, snapshot_, proposal, record)) {
+    if (refuse) {
+      tracking_.proposal_rejected(record);
+      ++result_.proposals_refused;
+    } else {
+      queue_.push_back(std::move(proposal));
+    }
+  }
+  tracking_.finish(due_ns, record);
+  result_.schedule.tracker.append({record.frame_index, record.snapshot_version, TrackerStep::Fate::kTracked,
+                                   static_cast<std::uint8_t>(may_propose ? 0 : 1), 0, refuse ? 1U : 0U});
+  result_.frames.push_back(record);
+}
+
+void LockstepRun::drop(const Frame& frame) {
+  FrameRecord record;
+  record.frame_index = frame.index;
+  record.t_ns = frame.t_ns;
+  record.state = FrameState::kDropped;
+  result_.schedule.tracker.append({frame.index, 0, TrackerStep::Fate::kDropped});
+  result_.frames.push_back(record);
+}
+
+void LockstepRun::map(std::size_t proposals) {
+  consumed_.clear();
+  for (std::size_t i = 0; i < proposals; ++i) {
+    consumed_.push_back(std::move(queue_.front()));
+    queue_.pop_front();
+  }
+  const MapperRound round = mapping_.step(consumed_);
+  consumed_.clear();
+  snapshot_ = mapping_.publish();
+  result_.schedule.mapper.append({round.version, static_cast<std::uint32_t>(proposals)});
+  result_.rounds.push_back(round);
+}
+
+void LockstepRun::report(const ProgressSink& progress) {
+  const FrameRecord& record = result_.frames.back();
+  ++progress_.frames;
+  progress_.lost += record.state == FrameState::kLost;
+  progress_.keyframes += record.keyframe;
+  progress_.tracked_share = record.tracked_share;
+  progress_.map_version = snapshot_.version();
+  progress_.queued = queue_.size();
+  if (progress) progress(progress_);
+}
+
+RunResult LockstepRun::finish() {
+  mapping_.mapper().relax_all();
+  result_.graph = mapping_.publish();
+  result_.times.push_back(std::move(tracking_.times()));
+  result_.times.push_back(std::move(mapping_.times()));
+  result_.trace = std::move(trace_);
+  return std::move(result_);
+}
+
+}  // namespace twofold

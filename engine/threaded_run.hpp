@@ -1,0 +1,89 @@
+#pragma once
+
+#include <atomic>
+
+#include "engine/engine.hpp"
+#include "engine/pacing.hpp"
+#include "engine/parking.hpp"
+#include "engine/snapshot_mailbox.hpp"
+#include "engine/spsc_ring.hpp"
+#include "engine/stages.hpp"
+#include "engine/worker.hpp"
+
+namespace twofold {
+
+/// The live engine: three threads that share snapshots and rings, fed by the calling thread.
+///
+///   reader --frames--> tracker --proposals--> mapper --keyframes--> loop closer
+///     ^------done-------+   ^---- snapshots ----+---- snapshots ------^
+///
+/// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
+/// withheld first (no free buffer, or a full ring), and tracking goes on with the points it has.
+class ThreadedRun {
+ public:
+  ThreadedRun(const Rig& rig, const EngineOptions& options);
+
+  void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
+  /// Final relaxation; moves the result out.
+  [[nodiscard]] RunResult finish();
+
+ private:
+  struct FrameSlot {
+    Frame frame;
+    std::optional<std::int64_t> next_t_ns;  ///< time stamp of the frame after it, if known
+    FrameRecord record;
+  };
+  using SlotPool = FramePool<FrameSlot>;
+  using SlotHandle = SlotPool::Handle;
+
+  // On the calling thread.
+  void read_frames(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
+  SlotHandle free_slot(const ProgressSink& progress);
+  void send(SlotHandle slot);
+  void collect_records(const ProgressSink& progress);
+  [[nodiscard]] bool must_hold_back() const;
+  [[nodiscard]] bool any_thread_failed() const;
+  void join_threads();
+
+  // One each on its own thread.
+  void tracker_thread(const std::stop_token& stop);
+  void mapper_thread(const std::stop_token& stop);
+  void loop_closer_thread(const std::stop_token& stop);
+
+  void track(FrameSlot& slot, const GraphSnapshot& graph);
+  void send_proposal(FrameRecord& record, TrackerStep& step);
+  std::size_t take_proposals();
+
+  EngineOptions options_;
+  std::unique_ptr<Trace> trace_;
+  RunResult result_;
+  Progress progress_;
+
+  TrackingStage tracking_;
+  MappingStage mapping_;
+  StageRecorder loop_times_;
+  ScheduleStreams schedule_;
+
+  SlotPool slots_;
+  ProposalPool proposals_pool_;
+  SpscRing<SlotHandle> frames_;         // reader -> tracker
+  SpscRing<SlotHandle> done_;           // tracker -> reader; as long as the pool, so that it cannot be full
+  SpscRing<ProposalHandle> proposals_;  // tracker -> mapper
+  SpscRing<ProposalHandle> keyframes_;  // mapper -> loop closer
+  SnapshotPublisher<GraphSnapshot> snapshots_;
+  Pacer pacer_;
+
+  ProposalHandle spare_;                  // tracker's: the buffer the next keyframe goes to
+  std::vector<ProposalHandle> consumed_;  // mapper's
+
+  Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_;
+  // Each is raised by the thread before in the chain, with release, after its last push: who sees it
+  // (acquire) and then finds the ring empty has seen everything.
+  std::atomic<bool> frames_ended_{false}, proposals_ended_{false}, keyframes_ended_{false};
+  // Counters for the progress line; relaxed, because they publish nothing.
+  std::atomic<std::uint64_t> map_version_{0}, not_described_{0};
+
+  std::optional<Worker> loop_closer_, mapper_, tracker_;  // last: join before what they use is destroyed
+};
+
+}  // namespace twofold

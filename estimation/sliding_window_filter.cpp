@@ -1,0 +1,178 @@
+#include "estimation/sliding_window_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "geometry/check.hpp"
+
+namespace twofold {
+
+std::string SlidingWindowOptions::invalid_reason() const {
+  if (window < 0) return "window must be >= 0, is " + std::to_string(window);
+  if (!(huber_sigmas > 0)) return "huber_sigmas must be > 0, is " + std::to_string(huber_sigmas);
+  if (max_iterations < 0) return "max_iterations must be >= 0, is " + std::to_string(max_iterations);
+  if (!(initial_damping >= 0)) return "initial_damping must be >= 0, is " + std::to_string(initial_damping);
+  if (!(min_disparity_px > 0)) return "min_disparity_px must be > 0, is " + std::to_string(min_disparity_px);
+  return {};
+}
+
+SlidingWindowFilter::SlidingWindowFilter(const Rig& rig, const SlidingWindowOptions& options)
+    : rig_(rig), options_(options) {
+  const std::string reason = options.invalid_reason();
+  if (!reason.empty()) throw std::runtime_error("sliding window filter: " + reason);
+}
+
+void SlidingWindowFilter::set_first_pose(const SE3& T_c_w, const std::optional<Matrix6>& information) {
+  TWOFOLD_CHECK(next_frame_ == 0, "set_first_pose before the first step");
+  first_T_c_w_ = T_c_w;
+  prior_.T_lin = T_c_w;
+  oldest_fixed_ = !information.has_value();
+  if (information) prior_.information = *information;
+}
+
+WindowSummary SlidingWindowFilter::step(const WindowFrame& frame) {
+  add(frame);
+  return optimise();
+}
+
+void SlidingWindowFilter::add(const WindowFrame& frame) {
+  Pose pose;
+  pose.frame = next_frame_++;
+  if (poses_.empty()) {
+    pose.T_c_w = first_T_c_w_;
+  } else if (frame.motion) {
+    pose.T_c_w = compound(*frame.motion, poses_.back().T_c_w);
+    pose.motion = frame.motion;
+  } else {
+    pose.T_c_w = frame.T_c_w_start.value_or(poses_.back().T_c_w);
+  }
+  const bool first = poses_.empty();
+  poses_.push_back(std::move(pose));
+  summary_.landmarks_marginalised = 0;
+  // Removal comes first: the process model must be linearised at its own prediction.
+  if (options_.window > 0 && pose_count() > options_.window) remove_oldest(frame);
+  if (options_.motion_only_start && !first) fit_newest_pose(frame);
+  add_observations(frame);
+}
+
+void SlidingWindowFilter::add_observations(const WindowFrame& frame) {
+  Pose& pose = poses_.back();
+  const SE3 T_w_c = pose.T_c_w.inverse();
+  for (const LandmarkObservation& observation : frame.observations) {
+    auto found = index_.find(observation.landmark);
+    if (found == index_.end()) {
+      const double disparity = observation.z.x() - observation.z.z();
+      if (!(disparity >= options_.min_disparity_px)) continue;  // also when u_r is NaN
+      found = index_.emplace(observation.landmark, landmark_count()).first;
+      landmarks_.push_back({});
+      ids_.push_back(observation.landmark);
+      points_.push_back(T_w_c * rig_.unproject(observation.z));
+    }
+    pose.observations.push_back({found->second, observation.z, observation.information});
+    ++landmarks_[static_cast<std::size_t>(found->second)].observations;
+  }
+}
+
+std::optional<Vector3> SlidingWindowFilter::find_landmark(std::int64_t id) const {
+  const auto found = index_.find(id);
+  if (found == index_.end()) return std::nullopt;
+  return points_[static_cast<std::size_t>(found->second)];
+}
+
+bool SlidingWindowFilter::set_landmark(std::int64_t id, const Vector3& x_w) {
+  const auto found = index_.find(id);
+  if (found == index_.end()) return false;
+  points_[static_cast<std::size_t>(found->second)] = x_w;
+  return true;
+}
+
+WindowSummary SlidingWindowFilter::optimise() {
+  summary_.iterations = summary_.factorisations = 0;
+  summary_.converged = false;
+  huber_ = 0;
+  update_threshold();
+  build_equations();
+  double damping = options_.initial_damping;
+  double current = cost();
+  double last_decrement = 0;
+  bool factor_is_good = false;
+  while (summary_.iterations < options_.max_iterations) {
+    ++summary_.iterations;
+    const bool reused = factor_is_good;
+    if (!factor_is_good) {
+      ++summary_.factorisations;
+      if (!factor_.factorise(equations_, damping)) {
+        damping = std::max(10 * damping, 1e-6);
+        continue;
+      }
+    }
+    factor_.solve(equations_.g_poses, equations_.g_landmarks, step_);
+    double decrement = 0;  // g^T delta
+    for (std::size_t j = 0; j < step_.poses.size(); ++j)
+      decrement += equations_.g_poses[j].dot(step_.poses[j]);
+    for (std::size_t l = 0; l < step_.landmarks.size(); ++l) {
+      decrement += equations_.g_landmarks[l].dot(step_.landmarks[l]);
+    }
+    std::vector<SE3> old_poses;
+    for (const Pose& pose : poses_) old_poses.push_back(pose.T_c_w);
+    const std::vector<Vector3> old_points = points_;
+    apply(step_);
+    const double next = cost();
+    // First-estimate derivatives lead to a point that is not exactly the minimum of the cost, so that close
+    // to it the cost may rise a little; a rise by one is within the noise of a single residual.
+    const double slack = 1e-9 * (1 + std::abs(current)) + (first_estimates() ? 1.0 + decrement : 0.0);
+    if (!(next <= current + slack) && decrement > options_.stop_decrement) {
+      for (std::size_t j = 0; j < old_poses.size(); ++j) poses_[j].T_c_w = old_poses[j];
+      points_ = old_points;
+      factor_is_good = false;
+      if (!reused) damping = std::max(10 * damping, 1e-3);
+      continue;
+    }
+    if (decrement <= options_.stop_decrement) {
+      summary_.converged = true;
+      break;
+    }
+    damping *= 0.1;
+    if (summary_.iterations <= 5) update_threshold();
+    build_equations();
+    current = cost();
+    const bool contracts = summary_.iterations == 1 || decrement < 0.05 * last_decrement;
+    factor_is_good = options_.reuse_factor && contracts;
+    last_decrement = decrement;
+  }
+  summary_.cost = cost();
+  summary_.poses = pose_count();
+  summary_.landmarks = landmark_count();
+  return summary_;
+}
+
+void SlidingWindowFilter::apply(const WindowStep& step) {
+  for (std::size_t j = 0; j < poses_.size(); ++j) {
+    if (j == 0 && oldest_fixed_) continue;
+    poses_[j].T_c_w = SE3::exp(step.poses[j]) * poses_[j].T_c_w;
+  }
+  // A badly started or mismatched landmark can overshoot through infinity to behind the cameras, from where
+  // no measurement brings it back: its step is cut so that its depth falls to no less than half in any view.
+  std::vector<double> share(points_.size(), 1.0);
+  for (const Pose& pose : poses_) {
+    const Vector3 axis_w = pose.T_c_w.rotation().row(2).transpose();
+    for (const Observation& o : pose.observations) {
+      const auto l = static_cast<std::size_t>(o.landmark);
+      const double depth = axis_w.dot(points_[l]) + pose.T_c_w.translation().z();
+      const double change = axis_w.dot(step.landmarks[l]);
+      if (depth > 0 && change < -0.5 * depth) share[l] = std::min(share[l], -0.5 * depth / change);
+    }
+  }
+  for (std::size_t l = 0; l < points_.size(); ++l) points_[l] += share[l] * step.landmarks[l];
+}
+
+std::optional<WindowCovariances> SlidingWindowFilter::covariances() {
+  build_equations();
+  if (!factor_.factorise(equations_, 0.0)) return std::nullopt;
+  WindowCovariances result = factor_.covariances();
+  if (oldest_fixed_ && !result.poses.empty()) result.poses.front().setZero();
+  return result;
+}
+
+}  // namespace twofold

@@ -1,0 +1,75 @@
+#include "estimation/sliding_window_filter_prior.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include "geometry/cbh.hpp"
+#include "geometry/check.hpp"
+
+namespace twofold {
+
+VectorX WindowPrior::difference(const std::vector<Vector3>& landmarks, const SE3& T_c_w) const {
+  const int n = landmark_count();
+  VectorX d(3 * n + 6);
+  for (int l = 0; l < n; ++l) {
+    const auto i = static_cast<std::size_t>(l);
+    d.segment<3>(3 * l) = landmarks[i] - landmarks_lin[i];
+  }
+  d.tail<6>() = (T_c_w * T_lin.inverse()).log();
+  return d;
+}
+
+void WindowPrior::relinearise(const std::vector<Vector3>& landmarks, const SE3& T_c_w) {
+  const VectorX d = difference(landmarks, T_c_w);
+  const Matrix6 J = cbh_jacobian<SE3>(d.tail<6>(), CbhOrder::kExact);
+  vector.noalias() -= information * d;
+  // Change of chart: derivative of d by the left perturbation at the new point is diag(I, J).
+  vector.tail<6>() = (J.transpose() * vector.tail<6>()).eval();
+  const MatrixX right = information.rightCols<6>() * J;
+  information.rightCols<6>() = right;
+  const MatrixX bottom = J.transpose() * information.bottomRows<6>();
+  information.bottomRows<6>() = bottom;
+  for (std::size_t l = 0; l < landmarks_lin.size(); ++l) landmarks_lin[l] = landmarks[l];
+  T_lin = T_c_w;
+}
+
+void schur_marginalise(MatrixX& Lambda, VectorX& g, int eliminated, FillIn fill_in,
+                       const std::vector<int>& block_sizes) {
+  const int kept = static_cast<int>(Lambda.rows()) - eliminated;
+  const MatrixX A = Lambda.topLeftCorner(eliminated, eliminated);
+  const MatrixX B = Lambda.topRightCorner(eliminated, kept);
+  MatrixX C = Lambda.bottomRightCorner(kept, kept);
+  VectorX g_kept = g.tail(kept);
+  // Y^T Y is the fill-in, with Y = L^-1 B: symmetric and positive semi-definite by construction.
+  MatrixX Y = B;
+  VectorX y = g.head(eliminated);
+  const Eigen::LLT<MatrixX> llt(A);
+  if (llt.info() == Eigen::Success && llt.rcond() > 1e-14) {
+    llt.matrixL().solveInPlace(Y);
+    llt.matrixL().solveInPlace(y);
+  } else {
+    const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(A);
+    const double floor = 1e-12 * std::max(1.0, eigen.eigenvalues().cwiseAbs().maxCoeff());
+    const VectorX scale =
+        eigen.eigenvalues().unaryExpr([floor](double v) { return v > floor ? 1.0 / std::sqrt(v) : 0.0; });
+    const MatrixX half = scale.asDiagonal() * eigen.eigenvectors().transpose();
+    Y = half * B;
+    y = half * y.eval();
+  }
+  g_kept.noalias() -= Y.transpose() * y;
+  if (fill_in == FillIn::kFull) {
+    C.selfadjointView<Eigen::Lower>().rankUpdate(Y.transpose(), -1.0);
+    C = MatrixX(C.selfadjointView<Eigen::Lower>());
+  } else {
+    int at = 0;
+    for (const int size : block_sizes) {
+      const auto block = Y.middleCols(at, size);
+      C.block(at, at, size, size).noalias() -= block.transpose() * block;
+      at += size;
+    }
+    TWOFOLD_CHECK(at == kept, "block sizes cover the remaining unknowns");
+  }
+  Lambda = std::move(C);
+  g = std::move(g_kept);
+}
+
+}  // namespace twofold

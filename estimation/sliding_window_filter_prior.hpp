@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "estimation/sliding_window_filter_equations.hpp"
+#include "geometry/se3.hpp"
+
+namespace twofold {
+
+/// Prior information of the filter, x_Pi ~ N(x, Pi^-1) in canonical form  (SWF eq. 1): the quadratic
+///   d^T Pi d / 2 - eta^T d,   d = state (-) linearisation point,
+/// over the first landmarks of the state and the oldest pose, order [landmarks | pose], where
+/// d = l - l_lin for a landmark and log(T T_lin^-1) for the pose.
+struct WindowPrior {
+  MatrixX information = MatrixX::Zero(6, 6);  ///< Pi, symmetric, size 3 n + 6
+  VectorX vector = VectorX::Zero(6);          ///< eta
+  std::vector<Vector3> landmarks_lin;         ///< linearisation points [m]
+  SE3 T_lin;
+
+  [[nodiscard]] int landmark_count() const { return static_cast<int>(landmarks_lin.size()); }
+  /// d at the given state; landmarks has at least landmark_count() entries.
+  [[nodiscard]] VectorX difference(const std::vector<Vector3>& landmarks, const SE3& T_c_w) const;
+  /// Moves the linearisation point to the given state; the quadratic keeps value and slope there.
+  void relinearise(const std::vector<Vector3>& landmarks, const SE3& T_c_w);
+};
+
+/// What is done with the fill-in Lambda_b^T Lambda_a^-1 Lambda_b of an elimination.
+enum class FillIn {
+  kFull,          ///< Schur complement: exact marginalisation  (SWF eq. 9, 10)
+  kBlockDiagonal  ///< only its diagonal blocks: the sparse VSDF  (SWF eq. 12)
+};
+
+/// Eliminates the first `eliminated` unknowns of Lambda x = g:
+///   Lambda_c - Lambda_b^T Lambda_a^-1 Lambda_b,  g_b - Lambda_b^T Lambda_a^-1 g_a   (SWF eq. 9).
+///
+/// @param block_sizes  sizes of the diagonal blocks of the remaining unknowns, used by kBlockDiagonal. Blocks
+///        rather than single diagonal entries, as eq. 12 has it printed: Lambda_c minus the bare diagonal
+///        need not be positive semi-definite, minus diagonal blocks it is.
+/// Directions of Lambda_a without information are left out (pseudo-inverse), not an error.
+void schur_marginalise(MatrixX& Lambda, VectorX& g, int eliminated, FillIn fill_in,
+                       const std::vector<int>& block_sizes = {});
+
+}  // namespace twofold

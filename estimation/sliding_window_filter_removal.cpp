@@ -1,0 +1,171 @@
+// Removal of parameters from the sliding window filter  (SWF 3.1.2, 3.2, 4.2.4, 4.2.7).
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "estimation/sliding_window_filter.hpp"
+
+namespace twofold {
+
+void SlidingWindowFilter::remove_oldest(const WindowFrame& frame) {
+  const auto n = static_cast<std::size_t>(landmark_count());
+  for (const Observation& o : poses_.front().observations)
+    --landmarks_[static_cast<std::size_t>(o.landmark)].observations;
+  std::vector<bool> drop(n);
+  const bool keep = options_.keep_unseen_landmarks && options_.removal != PoseRemoval::kDelete;
+  for (std::size_t l = 0; l < n; ++l) drop[l] = !keep && landmarks_[l].observations == 0;
+  for (const LandmarkObservation& o : frame.observations) {
+    const auto found = index_.find(o.landmark);
+    if (found != index_.end()) drop[static_cast<std::size_t>(found->second)] = false;
+  }
+  summary_.landmarks_marginalised = static_cast<int>(std::count(drop.begin(), drop.end(), true));
+  if (options_.removal == PoseRemoval::kDelete) {
+    delete_oldest(drop);
+  } else {
+    marginalise_oldest(drop);
+  }
+}
+
+void SlidingWindowFilter::delete_oldest(const std::vector<bool>& drop) {
+  prior_ = WindowPrior{};
+  poses_.pop_front();
+  poses_.front().motion.reset();
+  prior_.T_lin = poses_.front().T_c_w;
+  oldest_fixed_ = true;
+  std::vector<int> order;
+  for (int l = 0; l < landmark_count(); ++l) {
+    if (!drop[static_cast<std::size_t>(l)]) order.push_back(l);
+  }
+  compact_landmarks(order);
+}
+
+void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
+  const int n_prior = prior_.landmark_count();
+  if (!first_estimates()) prior_.relinearise(points_, poses_.front().T_c_w);
+
+  // Everything the oldest pose or the prior touches: its Markov blanket.
+  std::vector<bool> touched(static_cast<std::size_t>(landmark_count()));
+  std::fill_n(touched.begin(), n_prior, true);
+  for (const Observation& o : poses_.front().observations)
+    touched[static_cast<std::size_t>(o.landmark)] = true;
+  std::vector<int> dropped, kept, rest;
+  for (int l = 0; l < landmark_count(); ++l) {
+    const auto i = static_cast<std::size_t>(l);
+    (drop[i] ? dropped : touched[i] ? kept : rest).push_back(l);
+  }
+
+  // Unknowns: [oldest pose | dropped landmarks | kept landmarks | next pose], as offsets from the
+  // linearisation point.
+  const int eliminated = 6 + 3 * static_cast<int>(dropped.size());
+  const int next_pose = eliminated + 3 * static_cast<int>(kept.size());
+  std::vector<int> at(touched.size(), -1);
+  for (std::size_t i = 0; i < dropped.size(); ++i)
+    at[static_cast<std::size_t>(dropped[i])] = 6 + 3 * static_cast<int>(i);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    at[static_cast<std::size_t>(kept[i])] = eliminated + 3 * static_cast<int>(i);
+  }
+  MatrixX Lambda = MatrixX::Zero(next_pose + 6, next_pose + 6);
+  VectorX g = VectorX::Zero(next_pose + 6);
+  VectorX d = VectorX::Zero(next_pose + 6);  // current state minus linearisation point
+
+  // Prior: rows and columns move to their new places.
+  const auto place = [&](int block) { return block == n_prior ? 0 : at[static_cast<std::size_t>(block)]; };
+  const auto size = [&](int block) { return block == n_prior ? 6 : 3; };
+  for (int a = 0; a <= n_prior; ++a) {
+    for (int b = 0; b <= n_prior; ++b) {
+      Lambda.block(place(a), place(b), size(a), size(b)) =
+          prior_.information.block(3 * a, 3 * b, size(a), size(b));
+    }
+    g.segment(place(a), size(a)) = prior_.vector.segment(3 * a, size(a));
+  }
+  if (first_estimates()) {
+    const VectorX d_prior = prior_.difference(points_, poses_.front().T_c_w);
+    for (int a = 0; a < n_prior; ++a) d.segment<3>(place(a)) = d_prior.segment<3>(3 * a);
+    if (pose_is_linearised_at_prior(0)) d.head<6>() = d_prior.tail<6>();
+  }
+  // Measurements of the oldest pose.
+  for (const Observation& o : poses_.front().observations) {
+    const ObservationTerm term = linearise(0, o);
+    if (!term.valid) continue;
+    const int l = at[static_cast<std::size_t>(o.landmark)];
+    const Vector3 r = term.r + term.J_pose * d.head<6>() + term.J_landmark * d.segment<3>(l);
+    const Matrix63 W = term.J_pose.transpose() * term.information * term.J_landmark;
+    Lambda.topLeftCorner<6, 6>() += term.J_pose.transpose() * term.information * term.J_pose;
+    Lambda.block<3, 3>(l, l) += term.J_landmark.transpose() * term.information * term.J_landmark;
+    Lambda.block<6, 3>(0, l) += W;
+    Lambda.block<3, 6>(l, 0) += W.transpose();
+    g.head<6>() += term.J_pose.transpose() * term.information * r;
+    g.segment<3>(l) += term.J_landmark.transpose() * term.information * r;
+  }
+  // Process model to the next pose.
+  if (pose_count() > 1 && poses_[1].motion) {
+    const MotionError error = linearise_motion(1);
+    Eigen::Matrix<double, 6, 12> J;
+    J << error.J_prev, error.J_cur;
+    const Matrix6 Q_inv = poses_[1].motion->covariance.inverse();
+    const Eigen::Matrix<double, 12, 12> H = J.transpose() * Q_inv * J;
+    const Eigen::Matrix<double, 12, 1> h = -J.transpose() * (Q_inv * (error.e - error.J_prev * d.head<6>()));
+    Lambda.topLeftCorner<6, 6>() += H.topLeftCorner<6, 6>();
+    Lambda.topRightCorner<6, 6>() += H.topRightCorner<6, 6>();
+    Lambda.bottomLeftCorner<6, 6>() += H.bottomLeftCorner<6, 6>();
+    Lambda.bottomRightCorner<6, 6>() += H.bottomRightCorner<6, 6>();
+    g.head<6>() += h.head<6>();
+    g.tail<6>() += h.tail<6>();
+  }
+  if (oldest_fixed_) {  // known: conditioning on it is dropping it
+    Lambda.topRows<6>().setZero();
+    Lambda.leftCols<6>().setZero();
+    Lambda.topLeftCorner<6, 6>().setIdentity();
+    g.head<6>().setZero();
+  }
+  std::vector<int> block_sizes(kept.size(), 3);
+  block_sizes.push_back(6);
+  schur_marginalise(
+      Lambda, g, eliminated,
+      options_.removal == PoseRemoval::kMarginaliseDiagonal ? FillIn::kBlockDiagonal : FillIn::kFull,
+      block_sizes);
+
+  // The new prior; what was in the old one keeps its first estimate.
+  WindowPrior next;
+  next.information = std::move(Lambda);
+  next.vector = std::move(g);
+  next.T_lin = poses_[1].T_c_w;
+  for (const int l : kept) {
+    const auto i = static_cast<std::size_t>(l);
+    next.landmarks_lin.push_back(first_estimates() && l < n_prior ? prior_.landmarks_lin[i] : points_[i]);
+  }
+  prior_ = std::move(next);
+  oldest_fixed_ = false;
+  poses_.pop_front();
+  poses_.front().motion.reset();
+  kept.insert(kept.end(), rest.begin(), rest.end());
+  compact_landmarks(kept);
+}
+
+void SlidingWindowFilter::compact_landmarks(const std::vector<int>& order) {
+  std::vector<int> moved(landmarks_.size(), -1);
+  std::vector<LandmarkRecord> records;
+  std::vector<Vector3> points;
+  std::vector<std::int64_t> ids;
+  for (const int old : order) {
+    const auto i = static_cast<std::size_t>(old);
+    moved[i] = static_cast<int>(points.size());
+    records.push_back(landmarks_[i]);
+    points.push_back(points_[i]);
+    ids.push_back(ids_[i]);
+  }
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    if (moved[i] < 0) {
+      index_.erase(ids_[i]);
+    } else {
+      index_[ids_[i]] = moved[i];
+    }
+  }
+  for (Pose& pose : poses_) {
+    for (Observation& o : pose.observations) o.landmark = moved[static_cast<std::size_t>(o.landmark)];
+  }
+  landmarks_ = std::move(records);
+  points_ = std::move(points);
+  ids_ = std::move(ids);
+}
+
+}  // namespace twofold

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+namespace twofold::synthetic {
+
+/// How texel coordinates (u, v) change over the pixels (x, y) of the image being rendered [texel/px].
+struct TexelFootprint {
+  float u_x = 0, u_y = 0;
+  float v_x = 0, v_y = 0;
+};
+
+/// Grey-level texture with its pyramid of 2x2 means, read through an elliptical footprint.
+///
+/// A surface must look the same from any distance and angle, or sub-pixel trackers measure the renderer instead of
+/// the scene. So a pixel's footprint, an ellipse in the texture, is covered by up to kMaxProbes trilinear probes
+/// along its major axis, each about as wide as the minor one  (the scheme of McCormack et al., "Feline", 1999).
+class Texture {
+ public:
+  static constexpr int kMaxProbes = 8;
+
+  /// canvas: CV_32FC1 in grey levels, at least 2x2; clamped to [0, 255] and stored with eight bits.
+  explicit Texture(const cv::Mat& canvas);
+
+  /// Mean grey level under the footprint around (u, v); texel (0, 0) has its centre at (0, 0). Clamps at the rim.
+  [[nodiscard]] float sample(float u, float v, const TexelFootprint& footprint) const;
+
+  [[nodiscard]] int width() const { return levels_.front().width; }
+  [[nodiscard]] int height() const { return levels_.front().height; }
+
+ private:
+  struct Level {
+    int width = 0;
+    int height = 0;
+    std::vector<std::uint8_t> texels;
+
+    [[nodiscard]] float bilinear(float u, float v) const;
+  };
+  [[nodiscard]] float trilinear(float u, float v, int level, float blend) const;
+
+  std::vector<Level> levels_;
+};
+
+}  // namespace twofold::synthetic

@@ -1,0 +1,95 @@
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "io/trajectory_file.hpp"
+#include "tests/io/scratch_folder.hpp"
+
+namespace twofold {
+namespace {
+
+struct Outcome {
+  int exit_code = -1;
+  std::string out, err;
+};
+
+std::string content(const std::string& file) {
+  std::stringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+Outcome run(const ScratchFolder& folder, const std::string& arguments) {
+  const std::string command = std::string(TWOFOLD_BINARY) + " " + arguments + " >'" + (folder / "out") +
+                              "' 2>'" + (folder / "err") + "'";
+  const int status = std::system(command.c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder / "out"), content(folder / "err")};
+}
+
+void expect_bad_input(const Outcome& outcome, const std::string& part) {
+  EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+}
+
+std::string write_circle(const ScratchFolder& folder, const std::string& name, double scale) {
+  Trajectory trajectory;
+  for (int i = 0; i < 60; ++i) {
+    trajectory.push_back(
+        {i * 100'000'000LL, SE3(SO3::exp(Vector3(0, 0, 0.1 * i)),
+                                scale * Vector3(std::cos(0.1 * i), std::sin(0.1 * i), 0.01 * i))});
+  }
+  write_tum_trajectory(folder.path() / name, trajectory);
+  return folder / name;
+}
+
+TEST(EvalCommand, WritesTableJsonAndPlot) {
+  const ScratchFolder folder;
+  const auto truth = write_circle(folder, "truth.txt", 1);
+  const auto estimate = write_circle(folder, "estimate.txt", 0.5);
+  const auto outcome = run(folder, "eval " + estimate + " " + truth + " --align sim3 --json " +
+                                       (folder / "e.json") + " --plot " + (folder / "e.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_NE(outcome.out.find("RPE over 1 s"), std::string::npos);
+  const auto json = nlohmann::json::parse(content(folder / "e.json"));
+  EXPECT_NEAR(json["alignment"]["scale"].get<double>(), 2.0, 1e-6);
+  EXPECT_LT(json["ate_m"]["rmse"].get<double>(), 1e-6);
+  EXPECT_EQ(json["poses"], 60);
+  EXPECT_EQ(cv::imread(folder / "e.png").empty(), false);
+}
+
+TEST(EvalCommand, BadInputIsOneLineAndExitCodeTwo) {
+  const ScratchFolder folder;
+  const auto truth = write_circle(folder, "truth.txt", 1);
+  const auto nan = folder.write("nan.txt", "1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n").string();
+  const auto kitti = folder.write("kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n").string();
+  const auto late = folder.write("late.txt", "1000 0 0 0 0 0 0 1\n").string();
+  const auto strange = folder.write("a\nb.txt", "1 x\n").string();
+  expect_bad_input(run(folder, "eval " + nan + " " + truth), "nan.txt:2: 'nan' is not a finite number");
+  expect_bad_input(run(folder, "eval " + truth + " " + nan), "nan.txt:2");
+  expect_bad_input(run(folder, "eval " + truth + " " + kitti), "has no time stamps");
+  expect_bad_input(run(folder, "eval " + late + " " + truth), "close in time");
+  expect_bad_input(run(folder, "eval '" + strange + "' " + truth), "a?b.txt");
+  expect_bad_input(run(folder, "eval " + (folder / "none.txt") + " " + truth),
+                   "none.txt: no such trajectory file");
+  expect_bad_input(run(folder, "eval " + truth + " " + (folder / "none")), "none: no such file or folder");
+  expect_bad_input(run(folder, "eval " + truth + " " + truth + " --align fancy"), "align");
+  expect_bad_input(run(folder, "eval " + truth + " " + truth + " --plot /nonexistent/p.png"),
+                   "cannot be written");
+  expect_bad_input(run(folder, "eval " + truth), "GROUNDTRUTH");
+  expect_bad_input(run(folder, "eval --what"), "");
+  expect_bad_input(run(folder, ""), "subcommand");
+}
+
+TEST(EvalCommand, HelpIsNoError) {
+  const ScratchFolder folder;
+  EXPECT_EQ(run(folder, "--help").exit_code, 0);
+  EXPECT_EQ(run(folder, "eval --help").exit_code, 0);
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,170 @@
+#include "engine/schedule_log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+#include <sstream>
+
+namespace twofold {
+namespace {
+
+struct Streams {
+  ScheduleStream<TrackerStep> tracker;
+  ScheduleStream<MapperStep> mapper;
+  ScheduleStream<LoopStep> loop_closer;
+};
+
+void append_all(const Schedule& schedule, Streams& streams) {
+  for (const auto& step : schedule.tracker) streams.tracker.append(step);
+  for (const auto& step : schedule.mapper) streams.mapper.append(step);
+  for (const auto& step : schedule.loop_closer) streams.loop_closer.append(step);
+}
+
+std::vector<std::uint8_t> bytes_of(const Schedule& schedule) {
+  Streams streams;
+  append_all(schedule, streams);
+  std::ostringstream out;
+  EXPECT_TRUE(write_schedule(out, streams.tracker, streams.mapper, streams.loop_closer));
+  const std::string text = out.str();
+  return {text.begin(), text.end()};
+}
+
+/// A run as it might have been: versions grow every few frames, some frames are dropped or degraded.
+Schedule plausible(int frames, unsigned seed) {
+  std::mt19937 rng(seed);
+  const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(rng()) % n; };
+  const auto one_in = [&](std::uint32_t n) { return below(n) == 0; };
+  Schedule s;
+  std::uint64_t version = 1;
+  for (int i = 0; i < frames; ++i) {
+    if (one_in(6)) {
+      ++version;
+      s.mapper.push_back({version, 1 + below(2), one_in(50) ? 1U : 0U, below(10), 0});
+      s.loop_closer.push_back(
+          {version - below(2), static_cast<std::int64_t>(version), one_in(30) ? 1U : 0U, 0});
+    }
+    TrackerStep step{i, version, TrackerStep::Fate::kTracked, 0, one_in(40) ? 1U : 0U, one_in(60) ? 2U : 0U};
+    if (one_in(20)) step.degrade_level = static_cast<std::uint8_t>(below(16));
+    if (one_in(25)) step = {i, 0, TrackerStep::Fate::kDropped, 0, 0, 0};
+    s.tracker.push_back(step);
+  }
+  return s;
+}
+
+TEST(ScheduleLog, ReadsBackWhatWasWritten) {
+  for (const int frames : {0, 1, 2000}) {
+    const Schedule schedule = plausible(frames, 11);
+    const auto parsed = parse_schedule(bytes_of(schedule));
+    ASSERT_TRUE(parsed) << parsed.error();
+    EXPECT_EQ(*parsed, schedule);
+  }
+}
+
+TEST(ScheduleLog, ReadsBackExtremes) {
+  constexpr auto kMost32 = std::numeric_limits<std::uint32_t>::max();
+  constexpr auto kMost64 = std::numeric_limits<std::uint64_t>::max();
+  constexpr auto kMostFrame = std::numeric_limits<std::int64_t>::max();
+  Schedule s;
+  s.tracker = {{0, kMost64, TrackerStep::Fate::kTracked, 15, kMost32, kMost32},
+               {kMostFrame, 0, TrackerStep::Fate::kDropped, 0, 0, 1}};
+  s.mapper = {{kMost64, kMost32, kMost32, kMost32, kMost32}, {0, 0, 0, 0, 0}};
+  s.loop_closer = {{kMost64, kMostFrame, kMost32, kMost32}, {0, -1, 0, 0}};
+  const auto parsed = parse_schedule(bytes_of(s));
+  ASSERT_TRUE(parsed) << parsed.error();
+  EXPECT_EQ(*parsed, s);
+}
+
+TEST(ScheduleLog, TakesAFewBytesAFrame) {
+  Streams streams;
+  append_all(plausible(10'000, 2), streams);
+  EXPECT_LT(static_cast<double>(streams.tracker.bytes().size()) / 10'000, 3.5);
+}
+
+TEST(ScheduleLog, EveryTruncationAndEveryChangedByteIsRefused) {
+  const auto good = bytes_of(plausible(40, 5));
+  for (std::size_t length = 0; length < good.size(); ++length) {
+    EXPECT_FALSE(parse_schedule(std::span(good).first(length))) << "first " << length << " bytes";
+  }
+  for (std::size_t at = 0; at < good.size(); ++at) {
+    for (int bit = 0; bit < 8; ++bit) {
+      auto bad = good;
+      bad[at] ^= static_cast<std::uint8_t>(1 << bit);
+      EXPECT_FALSE(parse_schedule(bad)) << "bit " << bit << " of byte " << at;
+    }
+  }
+  auto longer = good;
+  longer.push_back(0);
+  EXPECT_FALSE(parse_schedule(longer));
+}
+
+TEST(ScheduleLog, ErrorsNameTheSection) {
+  const Schedule schedule = plausible(40, 5);
+  const auto good = bytes_of(schedule);
+  const auto error = [](std::vector<std::uint8_t> bytes) {
+    const auto parsed = parse_schedule(bytes);
+    return parsed ? std::string("accepted") : parsed.error();
+  };
+  EXPECT_NE(error({'h', 'e', 'l', 'l', 'o'}).find("no schedule log"), std::string::npos);
+  auto other = good;
+  other[8] = 9;
+  EXPECT_NE(error(other).find("format version 9"), std::string::npos) << error(other);
+  auto damaged = good;
+  damaged[20] ^= 1;
+  EXPECT_NE(error(damaged).find("section 'tracker'"), std::string::npos) << error(damaged);
+  damaged = good;
+  damaged[good.size() - 1] ^= 1;
+  EXPECT_NE(error(damaged).find("section 'loop closer' is damaged"), std::string::npos) << error(damaged);
+  damaged.assign(good.begin(), good.end() - 2);
+  EXPECT_NE(error(damaged).find("section 'loop closer'"), std::string::npos) << error(damaged);
+}
+
+TEST(ScheduleLog, OversizedCountsAreRefusedBeforeMemoryIsTaken) {
+  std::vector<std::uint8_t> file = {'T', 'W', 'F', 'S', 'C', 'H', 'E', 'D', 1, 3, 1};
+  for (int i = 0; i < 2; ++i) {  // 2^63 - 1 records in as many bytes
+    for (int k = 0; k < 8; ++k) file.push_back(0xFF);
+    file.push_back(0x7F);
+  }
+  const auto parsed = parse_schedule(file);
+  ASSERT_FALSE(parsed);
+  EXPECT_NE(parsed.error().find("section 'tracker' is longer than the file"), std::string::npos)
+      << parsed.error();
+}
+
+TEST(ScheduleLog, FramesOutOfOrderAreRefused) {
+  Schedule schedule = plausible(10, 1);
+  std::swap(schedule.tracker[3], schedule.tracker[7]);
+  const auto parsed = parse_schedule(bytes_of(schedule));
+  ASSERT_FALSE(parsed);
+  EXPECT_NE(parsed.error().find("frames out of order"), std::string::npos) << parsed.error();
+}
+
+TEST(ScheduleLog, RandomBytesNeverCrashTheReader) {
+  std::mt19937 rng(17);
+  const auto good = bytes_of(plausible(30, 3));
+  for (int i = 0; i < 20'000; ++i) {
+    auto bytes = good;
+    bytes.resize(rng() % (good.size() + 40), 0);
+    const std::size_t keep = rng() % 12;  // often the magic survives
+    for (std::size_t at = keep; at < bytes.size(); ++at) {
+      if (rng() % 4 == 0) bytes[at] = static_cast<std::uint8_t>(rng());
+    }
+    (void)parse_schedule(bytes);
+  }
+}
+
+TEST(ScheduleLog, StreamsInAndOut) {
+  const Schedule schedule = plausible(100, 4);
+  const auto bytes = bytes_of(schedule);
+  std::istringstream in(std::string(bytes.begin(), bytes.end()));
+  const auto parsed = read_schedule(in);
+  ASSERT_TRUE(parsed) << parsed.error();
+  EXPECT_EQ(*parsed, schedule);
+  std::ostringstream broken;
+  broken.setstate(std::ios::badbit);
+  const Streams none;
+  EXPECT_FALSE(write_schedule(broken, none.tracker, none.mapper, none.loop_closer));
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,126 @@
+#include "engine/worker.hpp"
+
+#include <gtest/gtest.h>
+#include <pthread.h>
+#include <sched.h>
+
+#include <array>
+#include <atomic>
+#include <stdexcept>
+#include <vector>
+
+#include "engine/clock.hpp"
+#include "engine/health.hpp"
+#include "engine/parking.hpp"
+
+namespace twofold {
+namespace {
+
+void burn_cpu(double seconds) {
+  volatile double sink = 0;
+  const double end = thread_cpu_seconds() + seconds;
+  while (thread_cpu_seconds() < end) sink = sink + 1;
+}
+
+TEST(Worker, RunsStopsAndJoins) {
+  Parking parking;
+  Worker worker({.name = "test"},
+                [&](const std::stop_token& stop) { (void)parking.wait(stop, [] { return false; }); });
+  EXPECT_FALSE(worker.finished());
+  worker.request_stop();
+  EXPECT_TRUE(worker.join());
+  EXPECT_TRUE(worker.finished());
+  EXPECT_TRUE(worker.notes().empty());
+}
+
+TEST(Worker, DestructionStopsASleepingBody) {
+  Parking parking;
+  std::atomic<bool> ended{false};
+  {
+    const Worker worker({.name = "test"}, [&](const std::stop_token& stop) {
+      (void)parking.wait(stop, [] { return false; });
+      ended = true;
+    });
+  }
+  EXPECT_TRUE(ended);
+}
+
+TEST(Worker, AnExceptionBecomesAResult) {
+  Worker worker({.name = "mapper"},
+                [](const std::stop_token&) { throw std::runtime_error("no such window"); });
+  const auto result = worker.join();
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error(), "mapper: no such window");
+  Worker odd({.name = "odd"}, [](const std::stop_token&) { throw 7; });
+  EXPECT_NE(odd.join().error().find("odd: "), std::string::npos);
+  EXPECT_FALSE(odd.join());  // the same again
+}
+
+TEST(Worker, NamesItsThread) {
+  std::array<char, 32> name{};
+  Worker worker({.name = "a name longer than fifteen"}, [&](const std::stop_token&) {
+    pthread_getname_np(pthread_self(), name.data(), name.size());
+  });
+  EXPECT_TRUE(worker.join());
+  EXPECT_STREQ(name.data(), "a name longer t");
+}
+
+TEST(Worker, RefusedWishesAreToldAndTheThreadRunsOn) {
+  std::atomic<bool> ran{false};
+  Worker worker({.name = "tracker", .cpu = CPU_SETSIZE - 1, .fifo_priority = 1000},
+                [&](const std::stop_token&) { ran = true; });
+  ASSERT_EQ(worker.notes().size(), 2u);
+  EXPECT_NE(worker.notes()[0].find("tracker: running on CPU"), std::string::npos) << worker.notes()[0];
+  EXPECT_NE(worker.notes()[1].find("SCHED_FIFO priority 1000"), std::string::npos) << worker.notes()[1];
+  EXPECT_TRUE(worker.join());
+  EXPECT_TRUE(ran);
+}
+
+TEST(Worker, PinsToACpuItMayUse) {
+  cpu_set_t allowed;
+  ASSERT_EQ(sched_getaffinity(0, sizeof allowed, &allowed), 0);
+  int cpu = 0;
+  while (!CPU_ISSET(cpu, &allowed)) ++cpu;
+  int used = -1;
+  Worker worker({.name = "pinned", .cpu = cpu}, [&](const std::stop_token&) { used = sched_getcpu(); });
+  EXPECT_TRUE(worker.join());
+  EXPECT_TRUE(worker.notes().empty());
+  EXPECT_EQ(used, cpu);
+}
+
+TEST(Worker, CountsItsCpuTimeWhileAndAfterItRuns) {
+  std::atomic<bool> burnt{false};
+  Parking parking;
+  Worker worker({.name = "busy"}, [&](const std::stop_token& stop) {
+    burn_cpu(0.02);
+    burnt = true;
+    (void)parking.wait(stop, [] { return false; });
+  });
+  while (!burnt) std::this_thread::yield();
+  EXPECT_GE(worker.cpu_seconds(), 0.02);
+  worker.request_stop();
+  EXPECT_TRUE(worker.join());
+  EXPECT_GE(worker.cpu_seconds(), 0.02);
+  EXPECT_LT(worker.cpu_seconds(), 5.0);
+}
+
+TEST(Health, CpuTimeAndMemoryGrowWithUse) {
+  const ProcessUsage before = process_usage();
+  EXPECT_GT(before.rss_bytes, 0);
+  EXPECT_GE(before.peak_rss_bytes, before.rss_bytes);
+  burn_cpu(0.02);
+  constexpr std::size_t kBytes = std::size_t{64} << 20;
+  std::vector<char> block(kBytes, 1);
+  const ProcessUsage after = process_usage();
+  EXPECT_GE(after.cpu_seconds - before.cpu_seconds, 0.02);
+  EXPECT_GT(after.rss_bytes, before.rss_bytes + static_cast<std::int64_t>(kBytes) / 2);
+  EXPECT_EQ(block[kBytes / 2], 1);
+}
+
+TEST(Health, ThreadsAreKnownByIdWhileTheyLive) {
+  EXPECT_NEAR(thread_cpu_seconds(this_thread_id()).value_or(-1), thread_cpu_seconds(), 0.01);
+  EXPECT_FALSE(thread_cpu_seconds(pid_t{0x3FFFFFF}));  // above the kernel's largest id
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,114 @@
+#include "io/calibration_file.hpp"
+
+#include "tests/io/scratch_folder.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr const char* kStereo = R"(sensor: stereo
+fps: 20
+cameras:
+  - size: [640, 480]
+    intrinsics: [500, 501, 320, 240]
+    distortion: {model: radtan, coefficients: [-0.2, 0.05, 0.001, 0.002]}
+  - {size: [640, 480], intrinsics: [502, 503, 321, 241]}
+T_right_left: [1, 0, 0, -0.11,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]
+)";
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  EXPECT_NE(at, std::string::npos);
+  return text.replace(at, from.size(), to);
+}
+
+TEST(CalibrationFile, OwnForm) {
+  const ScratchFolder folder;
+  const auto c = read_calibration(folder.write("c.yaml", kStereo));
+  EXPECT_EQ(c.kind, SensorKind::kStereo);
+  EXPECT_EQ(c.left.pinhole.fy, 501);
+  EXPECT_EQ(c.left.distortion.model, DistortionModel::kRadTan);
+  EXPECT_EQ(c.left.distortion.coefficients[3], 0.002);
+  EXPECT_EQ(c.right.pinhole.cx, 321);
+  EXPECT_NEAR(c.T_right_left.translation().x(), -0.11, 1e-15);
+  EXPECT_EQ(c.fps, 20);
+  EXPECT_EQ(c.invalid_reason(), "");
+
+  const auto rgbd = read_calibration(
+      folder.write("d.yaml",
+                   "sensor: rgbd\ncameras: [{size: [640, 480], intrinsics: [525, 525, 319.5, 239.5]}]\n"
+                   "depth: {unit: 0.0002, max: 5, virtual_baseline: 0.075}\n"));
+  EXPECT_EQ(rgbd.depth_unit, 0.0002);
+  EXPECT_EQ(rgbd.depth_max, 5);
+  EXPECT_EQ(rgbd.virtual_baseline, 0.075);
+}
+
+TEST(CalibrationFile, NamesTheKeyThatIsWrong) {
+  const ScratchFolder folder;
+  const auto error = [&](const std::string& text) {
+    const auto file = folder.write("c.yaml", text);
+    return io_error_of([&] { expect_valid(file, read_calibration(file)); });
+  };
+  const std::pair<std::string, const char*> cases[] = {
+      {with(kStereo, "    intrinsics: [500, 501, 320, 240]\n", ""), "key 'cameras[0].intrinsics' is missing"},
+      {with(kStereo, "[500,", "[-500,"), "left camera: "},
+      {with(kStereo, "[500,", "[.nan,"), "not a finite number"},
+      {with(kStereo, "500, 501,", "500,"), "has 3 numbers, 4 are needed"},
+      {with(kStereo, "fps: 20", "fsp: 20"), "unknown key 'fsp'"},
+      {with(kStereo, "radtan", "fancy"), "'fancy'"},
+      {with(kStereo, "T_right_left: [1,", "T_right_left: [2,"), "not a rotation and a translation"},
+      {with(kStereo, "stereo", "sonar"), "'sonar'"},
+      {with(kStereo, "size: [640, 480]", "size: [0, 480]"), "left camera: "},
+      {"a: [", "c.yaml:"},
+      {"just text", "not a YAML file of keys"},
+      {"other: 1\n", "not a calibration"}};
+  for (const auto& [text, part] : cases) {
+    const auto message = error(text);
+    EXPECT_NE(message.find(part), std::string::npos) << message << "\nfor\n" << text;
+    EXPECT_NE(message.find("c.yaml"), std::string::npos) << message;
+  }
+}
+
+TEST(CalibrationFile, KalibrChain) {
+  const ScratchFolder folder;
+  const auto c = read_calibration(folder.write("camchain.yaml", R"(cam0:
+  camera_model: pinhole
+  distortion_model: equidistant
+  distortion_coeffs: [0.01, 0.02, 0.03, 0.04]
+  intrinsics: [400, 401, 320, 240]
+  resolution: [640, 480]
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.2]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  distortion_model: equidistant
+  distortion_coeffs: [0.01, 0.02, 0.03, 0.04]
+  intrinsics: [400, 401, 320, 240]
+  resolution: [640, 480]
+)"));
+  EXPECT_EQ(c.kind, SensorKind::kStereo);
+  EXPECT_EQ(c.left.distortion.model, DistortionModel::kEquidistant);
+  EXPECT_EQ(c.left.distortion.coefficients[3], 0.04);
+  EXPECT_NEAR(c.T_right_left.translation().x(), -0.2, 1e-15);
+}
+
+TEST(CalibrationFile, KittiBaseline) {
+  const ScratchFolder folder;
+  const auto c = read_calibration(folder.write(
+      "calib.txt", "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP1: 700 0 600 -350 0 700 180 0 0 0 1 0\n"));
+  EXPECT_NEAR(c.T_right_left.translation().x(), -0.5, 1e-15);
+  EXPECT_TRUE(c.already_rectified);
+  EXPECT_IO_ERROR(read_calibration(folder.write("calib.txt", "P0: 700 0 600 0 0 700\n")),
+                  "calib.txt:1: key P0: has 6");
+  EXPECT_IO_ERROR(read_calibration(folder.write("calib.txt", "P1: 700 0 600 0 0 700 180 0 0 0 1 0\n")),
+                  "key 'P0' is missing");
+  EXPECT_IO_ERROR(
+      read_calibration(folder.write(
+          "calib.txt", "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP1: 700 0 600 350 0 700 180 0 0 0 1 0\n")),
+      "baseline");
+}
+
+}  // namespace
+}  // namespace twofold

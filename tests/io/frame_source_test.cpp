@@ -1,0 +1,231 @@
+#include <opencv2/videoio.hpp>
+
+#include <fmt/format.h>
+
+#include "io/open_source.hpp"
+#include "tests/io/scratch_folder.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kWidth = 64, kHeight = 48, kCount = 5;
+
+void write_kitti(const ScratchFolder& folder) {
+  std::string times, poses;
+  for (int i = 0; i < kCount; ++i) {
+    folder.write_image(fmt::format("image_0/{:06d}.png", i), numbered_image(kWidth, kHeight, i));
+    folder.write_image(fmt::format("image_1/{:06d}.png", i), numbered_image(kWidth, kHeight, 100 + i));
+    times += fmt::format("{:e}\n", 0.1 * i);
+    poses += fmt::format("1 0 0 0 0 1 0 0 0 0 1 {}\n", i);
+  }
+  folder.write("times.txt", times);
+  folder.write("poses.txt", poses);
+  folder.write("calib.txt", "P0: 50 0 32 0 0 50 24 0 0 0 1 0\nP1: 50 0 32 -10 0 50 24 0 0 0 1 0\n");
+}
+
+void write_tum(const ScratchFolder& folder) {
+  std::string rgb, depth;
+  for (int i = 0; i < kCount; ++i) {
+    folder.write_image(fmt::format("rgb/{}.png", i), numbered_image(kWidth, kHeight, i, CV_8UC3));
+    folder.write_image(fmt::format("depth/{}.png", i),
+                       cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(1000 + i)));
+    rgb += fmt::format("{:.3f} rgb/{}.png\n", 10 + 0.1 * i, i);
+    // The third depth image is too late for its colour image.
+    depth += fmt::format("{:.3f} depth/{}.png\n", 10 + 0.1 * i + (i == 2 ? 0.03 : 0.01), i);
+  }
+  folder.write("rgb.txt", "# time file\n" + rgb);
+  folder.write("depth.txt", depth);
+  folder.write("groundtruth.txt", "10.0 0 0 0 0 0 0 1\n10.1 1 0 0 0 0 0 1\n");
+}
+
+/// What a source ends with: its error, or how many frames it gave.
+std::string drain(FrameSource& source) {
+  Frame frame;
+  int count = 0;
+  while (true) {
+    switch (source.next(frame)) {
+      case FrameStatus::kFrame:
+        ++count;
+        break;
+      case FrameStatus::kEnd:
+        return std::to_string(count);
+      case FrameStatus::kError:
+        return source.error();
+    }
+  }
+}
+
+TEST(FrameSource, KittiStereo) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  const auto source = open_source(folder.path().string());
+  EXPECT_EQ(source->rig().kind, SensorKind::kStereo);
+  EXPECT_NEAR(source->rig().baseline, 0.2, 1e-12);
+  EXPECT_EQ(source->rig().camera.width, kWidth);
+  EXPECT_EQ(source->frame_count(), kCount);
+  ASSERT_EQ(source->ground_truth().size(), std::size_t{kCount});
+  EXPECT_EQ(source->ground_truth()[3].t_ns, 300'000'000);
+  EXPECT_EQ(source->ground_truth()[3].T_w_c.translation().z(), 3);
+  Frame frame;
+  for (int i = 0; i < kCount; ++i) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.index, i);
+    EXPECT_EQ(frame.t_ns, i * 100'000'000LL);
+    EXPECT_EQ(frame.left.at<unsigned char>(0, 5), i);
+    EXPECT_EQ(frame.right.at<unsigned char>(0, 5), 100 + i);
+  }
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+}
+
+TEST(FrameSource, EarlierFramesSurviveLaterOnes) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  const auto source = open_source(folder.path().string());
+  Frame frame;
+  ASSERT_EQ(source->next(frame), FrameStatus::kFrame);
+  const cv::Mat held = frame.left;
+  ASSERT_EQ(source->next(frame), FrameStatus::kFrame);
+  EXPECT_EQ(held.at<unsigned char>(0, 5), 0);
+}
+
+TEST(FrameSource, PreloadGivesTheSameFrames) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  const auto direct = open_source(folder.path().string());
+  const auto preloaded = open_source(folder.path().string(), {.calibration = {}, .preload = true});
+  EXPECT_EQ(preloaded->frame_count(), kCount);
+  EXPECT_EQ(preloaded->ground_truth().size(), direct->ground_truth().size());
+  Frame a, b;
+  while (direct->next(a) == FrameStatus::kFrame) {
+    ASSERT_EQ(preloaded->next(b), FrameStatus::kFrame);
+    EXPECT_EQ(a.t_ns, b.t_ns);
+    EXPECT_EQ(a.index, b.index);
+    EXPECT_EQ(cv::norm(a.left, b.left, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(a.right, b.right, cv::NORM_INF), 0);
+  }
+  EXPECT_EQ(preloaded->next(b), FrameStatus::kEnd);
+}
+
+TEST(FrameSource, KittiBrokenInput) {
+  const ScratchFolder folder;
+  const auto error_after = [&](auto&& damage) {
+    write_kitti(folder);
+    damage();
+    try {
+      return drain(*open_source(folder.path().string()));
+    } catch (const IoError& e) {
+      return std::string(e.what());
+    }
+  };
+  const auto expect = [](const std::string& message, const std::string& part) {
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  };
+  expect(error_after([] {}), "5");
+  expect(error_after([&] { folder.write("image_0/000003.png", "broken"); }),
+         "000003.png: the image cannot be decoded");
+  expect(error_after([&] { folder.write_image("image_1/000002.png", numbered_image(60, 48, 1)); }),
+         "000002.png: the image is 60x48");
+  expect(error_after([&] { folder.write("times.txt", "0\n1\n1\n2\n3\n"); }), "times.txt:3: time stamp");
+  expect(error_after([&] { folder.write("times.txt", "0\n1\n2\n3\n2.5\n"); }), "times.txt:5: time stamp");
+  expect(error_after([&] { folder.write("times.txt", "0\n1\n"); }), "has 2 time stamps for 5 images");
+  expect(error_after([&] { folder.write("poses.txt", "1 0 0 0 0 1 0 nan 0 0 1 0\n"); }),
+         "poses.txt:1: 'nan'");
+  expect(error_after([&] { folder.write("calib.txt", "P0: 50 0 32 0 0 50 24 0 0 0 1 0\n"); }),
+         "key 'P1' is missing");
+  expect(error_after([&] {
+           folder.write("calib.txt", "P0: -50 0 32 0 0 50 24 0 0 0 1 0\nP1: -50 0 32 10 0 50 24 0 0 0 1 0\n");
+         }),
+         "calib.txt: left camera");
+  expect(error_after([&] { fs::remove(folder.path() / "times.txt"); }), "times.txt: no such file");
+  expect(error_after([&] { fs::remove(folder.path() / "image_1/000004.png"); }),
+         "image_0 has 5 images, image_1 has 4");
+  expect(error_after([&] { fs::remove(folder.path() / "calib.txt"); }),
+         "calib.txt: no such calibration file");
+}
+
+TEST(FrameSource, TumAssociatesAndScales) {
+  const ScratchFolder folder;
+  write_tum(folder);
+  const std::string intrinsics = "?fx=50&fy=50&cx=32&cy=24";
+  EXPECT_IO_ERROR(open_source(folder.path().string()), "no calibration");
+  EXPECT_IO_ERROR(open_source("tum:" + folder.path().string() + intrinsics + "&fz=1"),
+                  "unknown parameter 'fz'");
+  EXPECT_IO_ERROR(open_source("tum:" + folder.path().string() + intrinsics + "&depth_scale=0"),
+                  "must be positive");
+  EXPECT_IO_ERROR(open_source("tum:" + folder.path().string() + "?fx=-50&fy=50&cx=32&cy=24"), "left camera");
+  const auto source = open_source("tum:" + folder.path().string() + intrinsics + "&depth_scale=1000");
+  EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
+  EXPECT_EQ(source->rig().depth_unit, 0.001);
+  EXPECT_GT(source->rig().baseline, 0);
+  EXPECT_EQ(source->frame_count(), kCount - 1);
+  EXPECT_EQ(source->ground_truth().size(), 2u);
+  Frame frame;
+  for (const int i : {0, 1, 3, 4}) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.depth.at<std::uint16_t>(7, 7), 1000 + i);
+    EXPECT_EQ(frame.left.at<unsigned char>(0, 5), i);
+  }
+}
+
+TEST(FrameSource, ImageFolderAndItsTimes) {
+  const ScratchFolder folder;
+  for (int i = 0; i < 3; ++i)
+    folder.write_image(fmt::format("{}.png", i), numbered_image(kWidth, kHeight, i));
+  const std::string spec = "images:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24";
+  EXPECT_IO_ERROR(open_source(spec), "times.txt");
+  const auto source = open_source(spec + "&fps=10");
+  EXPECT_EQ(source->rig().kind, SensorKind::kMono);
+  EXPECT_EQ(drain(*source), "3");
+}
+
+TEST(FrameSource, VideoSideBySide) {
+  const ScratchFolder folder;
+  const std::string file = folder / "pair.avi";
+  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25,
+                         {2 * kWidth, kHeight});
+  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here cannot write MJPEG";
+  for (int i = 0; i < 4; ++i) {
+    cv::Mat image(kHeight, 2 * kWidth, CV_8UC3, cv::Scalar::all(40));
+    image.colRange(kWidth, 2 * kWidth).setTo(cv::Scalar::all(200));
+    writer.write(image);
+  }
+  writer.release();
+  const auto source =
+      open_source("video:" + file + "?layout=side-by-side&fx=50&fy=50&cx=32&cy=24&baseline=0.1");
+  EXPECT_EQ(source->rig().kind, SensorKind::kStereo);
+  EXPECT_EQ(source->rig().camera.width, kWidth);
+  Frame frame;
+  ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+  EXPECT_NEAR(cv::mean(frame.left)[0], 40, 3);
+  EXPECT_NEAR(cv::mean(frame.right)[0], 200, 3);
+  ASSERT_EQ(source->next(frame), FrameStatus::kFrame);
+  EXPECT_EQ(frame.t_ns, 40'000'000);
+  EXPECT_EQ(drain(*source), "2");
+}
+
+TEST(FrameSource, EurocRefusesUnequalCounts) {
+  const ScratchFolder folder;
+  const char* sensor =
+      "T_BS:\n  data: [1,0,0,{}, 0,1,0,0, 0,0,1,0, 0,0,0,1]\nresolution: [64, 48]\n"
+      "camera_model: pinhole\nintrinsics: [50, 50, 32, 24]\n";
+  for (int c = 0; c < 2; ++c) {
+    std::string list = "#time,file\n";
+    for (int i = 0; i < 3 - c; ++i) {
+      folder.write_image(fmt::format("mav0/cam{}/data/{}.png", c, i), numbered_image(kWidth, kHeight, i));
+      list += fmt::format("{},{}.png\r\n", 1000 + i, i);
+    }
+    folder.write(fmt::format("mav0/cam{}/data.csv", c), list);
+    folder.write(fmt::format("mav0/cam{}/sensor.yaml", c),
+                 fmt::format(fmt::runtime(sensor), c == 0 ? "0" : "0.1"));
+  }
+  EXPECT_IO_ERROR(open_source(folder.path().string()), "cam0 lists 3 images, cam1 2");
+  const auto source = open_source("euroc:" + folder.path().string() + "?unpaired=drop");
+  EXPECT_NEAR(source->rig().baseline, 0.1, 1e-12);
+  EXPECT_EQ(drain(*source), "2");
+}
+
+}  // namespace
+}  // namespace twofold

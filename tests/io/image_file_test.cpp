@@ -1,0 +1,65 @@
+#include "io/image_file.hpp"
+
+#include <fstream>
+#include <random>
+
+#include "tests/io/scratch_folder.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+cv::Mat noise_image() {
+  cv::Mat image(40, 60, CV_8UC1);
+  std::mt19937 rng(3);
+  for (int i = 0; i < 40 * 60; ++i) image.data[i] = static_cast<unsigned char>(rng() & 0xff);
+  return image;
+}
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(ImageFile, ReadsGreyColourAndDepth) {
+  const ScratchFolder folder;
+  const cv::Mat image = noise_image();
+  EXPECT_EQ(cv::norm(read_grey_image(folder.write_image("a.png", image)), image, cv::NORM_INF), 0);
+  EXPECT_EQ(read_grey_image(folder.write_image("c.png", cv::Mat(4, 5, CV_8UC3, cv::Scalar(9, 9, 9)))).type(),
+            CV_8UC1);
+  const cv::Mat depth(4, 5, CV_16UC1, cv::Scalar(40000));
+  EXPECT_EQ(cv::norm(read_depth_image(folder.write_image("d.png", depth)), depth, cv::NORM_INF), 0);
+  EXPECT_IO_ERROR(read_depth_image(folder.path() / "a.png"), "this one has 1 of 8");
+}
+
+/// However short an image file is cut, it is refused: no decoder gets to fill in the rest.
+TEST(ImageFile, RefusesEveryTruncation) {
+  const ScratchFolder folder;
+  for (const char* name : {"a.png", "a.jpg"}) {
+    const std::string whole = bytes_of(folder.write_image(name, noise_image()));
+    for (std::size_t length = 0; length < whole.size(); length += 7) {
+      const auto cut = folder.write(std::string("cut_") + name, whole.substr(0, length));
+      EXPECT_THROW((void)read_grey_image(cut), IoError) << name << " cut to " << length;
+    }
+  }
+}
+
+TEST(ImageFile, RefusesDamagedAndHugeImages) {
+  const ScratchFolder folder;
+  std::string png = bytes_of(folder.write_image("a.png", noise_image()));
+  std::string damaged = png;
+  damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] ^ 0x10);
+  EXPECT_IO_ERROR(read_grey_image(folder.write("damaged.png", damaged)), "check sum");
+
+  std::string jpeg = bytes_of(folder.write_image("a.jpg", noise_image()));
+  const auto header = jpeg.find("\xff\xc0");
+  ASSERT_NE(header, std::string::npos);
+  jpeg.replace(header + 5, 4, "\xff\xff\xff\xff");
+  EXPECT_IO_ERROR(read_grey_image(folder.write("huge.jpg", jpeg)), "impossible image size of 65535x65535");
+  EXPECT_IO_ERROR(read_grey_image(folder.write("text.png", "no image")), "cannot be decoded");
+  EXPECT_IO_ERROR(read_grey_image(folder.path() / "none.png"), "no such image file");
+}
+
+}  // namespace
+}  // namespace twofold

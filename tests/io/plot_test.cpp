@@ -1,0 +1,49 @@
+#include "io/plot.hpp"
+
+#include <cstring>
+#include <fstream>
+
+#include "io/ply.hpp"
+#include "tests/io/scratch_folder.hpp"
+
+namespace twofold {
+namespace {
+
+TEST(Plot, LooksAlongTheCamerasVertical) {
+  const SE3 camera_world;                                                // y down
+  const SE3 room(SO3::exp(Vector3(-1.5707963, 0, 0)), Vector3::Zero());  // camera level in a room with z up
+  EXPECT_EQ(up_axis_of({{0, camera_world}}), 1);
+  EXPECT_EQ(up_axis_of({{0, room}}), 2);
+}
+
+TEST(Plot, DrawsEveryTrackAndCopesWithDegenerateOnes) {
+  const cv::Scalar magenta(255, 0, 255);
+  const auto count = [&](const std::vector<Vector3>& x) {
+    const cv::Mat image = draw_top_down({{"a", x, magenta, 3, {}}, {"none", {}, magenta, 3, {}}}, {});
+    cv::Mat mask;
+    cv::inRange(image, cv::Scalar(200, 0, 200), cv::Scalar(255, 80, 255), mask);
+    return cv::countNonZero(mask);
+  };
+  EXPECT_GT(count({{0, 0, 0}, {5, 5, 0}, {9, 0, 0}}), 1500);
+  EXPECT_GT(count({{1, 1, 0}}), 50);
+  EXPECT_GT(count({{0, 0, 0}, {0, 0, 0}}), 50);
+}
+
+TEST(Ply, WritesHeaderAndPoints) {
+  const ScratchFolder folder;
+  const PlyPoint points[] = {{Vector3(1, 2, 3), {10, 20, 30}, 0.5f}, {Vector3(-4, 0, 0), {}, 0}};
+  write_ply(folder.path() / "m.ply", points);
+  std::ifstream stream(folder.path() / "m.ply", std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  EXPECT_NE(bytes.find("element vertex 2\n"), std::string::npos);
+  const auto body = bytes.find("end_header\n") + 11;
+  ASSERT_EQ(bytes.size() - body, 2 * (24 + 3 + 4u));
+  double xyz[3];
+  std::memcpy(xyz, &bytes[body], sizeof(xyz));
+  EXPECT_EQ(xyz[2], 3.0);
+  EXPECT_EQ(bytes[body + 25], 20);
+  EXPECT_IO_ERROR(write_ply("/nonexistent/m.ply", points), "cannot be written");
+}
+
+}  // namespace
+}  // namespace twofold

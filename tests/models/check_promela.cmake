@@ -1,0 +1,33 @@
+# Verifies one Promela model: cmake -DSPIN= -DCC= -DMODEL= -DWORK= [-DFAULT=] -P check_promela.cmake
+# Fails when spin reports an error or has not searched everything.
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK})
+if(FAULT)
+  set(define -D${FAULT})
+endif()
+execute_process(COMMAND ${SPIN} ${define} -a ${MODEL} WORKING_DIRECTORY ${WORK} RESULT_VARIABLE failed
+                OUTPUT_VARIABLE text ERROR_VARIABLE text)
+if(failed OR NOT EXISTS ${WORK}/pan.c)
+  message(FATAL_ERROR "model checker could not be generated: ${text}")
+endif()
+execute_process(COMMAND ${CC} -O2 -w -DSAFETY -DCOLLAPSE -o pan pan.c WORKING_DIRECTORY ${WORK}
+                COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ./pan -m100000 WORKING_DIRECTORY ${WORK} OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)
+message(STATUS "${text}")
+if(NOT text MATCHES "errors: ([0-9]+)")
+  message(FATAL_ERROR "no verdict")
+endif()
+set(errors ${CMAKE_MATCH_1})
+if(text MATCHES "Search not completed|max search depth too small|out of memory")
+  set(complete FALSE)
+else()
+  set(complete TRUE)
+endif()
+if(FAULT)
+  # The seeded fault has to be found; anything else is a weak model.
+  if(errors EQUAL 0)
+    message(FATAL_ERROR "seeded fault ${FAULT} was not found")
+  endif()
+elseif(errors GREATER 0 OR NOT complete)
+  message(FATAL_ERROR "errors: ${errors}, search complete: ${complete}")
+endif()

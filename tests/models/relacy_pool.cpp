@@ -1,0 +1,61 @@
+// FramePool under the model checker: thread 0 fills objects and sends each to two threads, which read and
+// drop it; an object comes back to be filled only after both have dropped it.
+#include "relacy_atomics.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kFrames = 4;
+
+struct Object {
+  rl::var<int> value{0};
+};
+using Handle = PoolHandle<Object, ModelAtomics>;
+
+struct PoolModel : rl::test_suite<PoolModel, 3> {
+  FramePool<Object, ModelAtomics> pool{2};
+  using Ring = SpscRing<Handle, ModelAtomics>;
+  // On the heap: the model checker's own allocation of this object does not heed alignas.
+  std::unique_ptr<Ring> to_mapper = std::make_unique<Ring>(4);
+  std::unique_ptr<Ring> to_loop_closer = std::make_unique<Ring>(4);
+
+  void thread(unsigned index) {
+    if (index == 0) {
+      send();
+    } else {
+      receive(index == 1 ? *to_mapper : *to_loop_closer);
+    }
+  }
+  void send() {
+    for (int i = 0; i < kFrames;) {
+      Handle handle = pool.try_acquire();
+      if (!handle) {
+        rl::yield(1, $);
+        continue;
+      }
+      handle->value($) = i++;
+      // Room for all frames in flight, two, is in each ring.
+      RL_ASSERT(to_mapper->try_push(handle.share()));
+      RL_ASSERT(to_loop_closer->try_push(std::move(handle)));
+    }
+  }
+  void receive(SpscRing<Handle, ModelAtomics>& ring) {
+    for (int i = 0; i < kFrames;) {
+      Handle handle;
+      if (!ring.try_pop(handle)) {
+        rl::yield(1, $);
+        continue;
+      }
+      RL_ASSERT(static_cast<int>(handle->value($)) == i);
+      ++i;
+    }
+  }
+};
+
+}  // namespace
+}  // namespace twofold
+
+int main(int argc, char** argv) {
+  if (!twofold::parse_fault(argc, argv)) return 2;
+  return twofold::check_model<twofold::PoolModel>(200'000);
+}
