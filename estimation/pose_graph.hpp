@@ -54,8 +54,8 @@ struct PoseGraphOptions {
   /// Once a step has lowered the cost by less than this share, its factor also serves the following steps, as
   /// long as each of them gains at most a third of the one before. 0: every step has its own factor.
   double keep_factor_below = 0.1;
-  std::function<void(int iteration, double cost)>
-      on_cost{};  ///< called for the start and after each accepted step
+  /// Called for the start and after each accepted step.
+  std::function<void(int iteration, double cost)> on_cost = {};
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -147,15 +147,13 @@ TYPED_TEST(PoseGraphOf, DampingTakesTheGaugeWithoutAnOrigin) {
 
 TYPED_TEST(PoseGraphOf, HuberKernelHoldsAWrongConstraintOff) {
   using Tangent = typename TypeParam::Tangent;
-  Loop<TypeParam> loop(1e-3);
+  // The wrong constraint pulls with a force of at most the threshold, some times the noise.
+  Loop<TypeParam> loop(1e-4);
   loop.graph.constraints.push_back({3, 40, TypeParam::exp(Tangent::Constant(0.6))});
   Loop<TypeParam> robust = loop;
   PoseGraphSolver<TypeParam> solver;
   solver.solve(loop.graph, {});
-  const auto sum = solver.solve(robust.graph, {.huber = 1e-3});
-  Loop<TypeParam> clean(1e-3);
-  solver.solve(clean.graph, {});
-  std::printf("clean %g robust %g plain %g; cost %g -> %g its %d term %d\n", clean.distance_from_truth(), robust.distance_from_truth(), loop.distance_from_truth(), sum.initial_cost, sum.final_cost, sum.iterations, (int)sum.termination);
+  solver.solve(robust.graph, {.huber = 1e-3});
   EXPECT_LT(robust.distance_from_truth(), 0.2 * loop.distance_from_truth());
 }
 
