@@ -149,7 +149,8 @@ TYPED_TEST(PoseGraphOf, HuberKernelHoldsAWrongConstraintOff) {
   using Tangent = typename TypeParam::Tangent;
   // The wrong constraint pulls with a force of at most the threshold, some times the noise.
   Loop<TypeParam> loop(1e-4);
-  loop.graph.constraints.push_back({3, 40, TypeParam::exp(Tangent::Constant(0.6))});
+  loop.graph.constraints.push_back(
+      {3, 40, TypeParam::exp(Tangent::Constant(0.6)) * loop.truth[40] * loop.truth[3].inverse()});
   Loop<TypeParam> robust = loop;
   PoseGraphSolver<TypeParam> solver;
   solver.solve(loop.graph, {});
