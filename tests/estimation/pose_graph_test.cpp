@@ -145,17 +145,24 @@ TYPED_TEST(PoseGraphOf, DampingTakesTheGaugeWithoutAnOrigin) {
   EXPECT_NEAR(free_cost / fixed_cost, 1, 1e-6);
 }
 
-TYPED_TEST(PoseGraphOf, HuberKernelHoldsAWrongConstraintOff) {
+/// Beyond the threshold a constraint pulls with a constant force: the loop gives way in proportion to the
+/// threshold, hardly in proportion to the error.
+TYPED_TEST(PoseGraphOf, HuberKernelBoundsThePullOfAWrongConstraint) {
   using Tangent = typename TypeParam::Tangent;
-  // The wrong constraint pulls with a force of at most the threshold, some times the noise.
-  Loop<TypeParam> loop(1e-4);
-  loop.graph.constraints.push_back(
-      {3, 40, TypeParam::exp(Tangent::Constant(0.6)) * loop.truth[40] * loop.truth[3].inverse()});
-  Loop<TypeParam> robust = loop;
-  PoseGraphSolver<TypeParam> solver;
-  solver.solve(loop.graph, {});
-  solver.solve(robust.graph, {.huber = 1e-3});
-  EXPECT_LT(robust.distance_from_truth(), 0.2 * loop.distance_from_truth());
+  using Information = typename PoseGraph<TypeParam>::Information;
+  const auto displacement = [](double error, double huber) {
+    Loop<TypeParam> loop(0);
+    const TypeParam wrong =
+        TypeParam::exp(Tangent::Constant(error)) * loop.truth[40] * loop.truth[3].inverse();
+    loop.graph.constraints.push_back({3, 40, wrong, 0.01 * Information::Identity()});
+    PoseGraphSolver<TypeParam> solver;
+    solver.solve(loop.graph, {.huber = huber, .relative_decrease = 1e-9});
+    return loop.distance_from_truth();
+  };
+  EXPECT_NEAR(displacement(0.4, 1e-3) / displacement(0.4, 5e-4), 2, 0.2);
+  EXPECT_NEAR(displacement(0.4, 1e-3) / displacement(0.2, 1e-3), 1, 0.35);
+  EXPECT_NEAR(displacement(0.4, 0) / displacement(0.2, 0), 2, 0.5);
+  EXPECT_LT(displacement(0.4, 1e-3), 0.2 * displacement(0.4, 0));
 }
 
 TYPED_TEST(PoseGraphOf, ReusedSolverRepeatsItsResultBitForBit) {
