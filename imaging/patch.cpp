@@ -32,23 +32,24 @@ float sample(const std::uint8_t* pixels, float u, float v) {
   return top + b * (bottom - top);
 }
 
-void finish_patch(const float (&bordered)[kBordered * kBordered], Patch& patch) {
-  float sum = 0;
-  float sum2 = 0;
+/// Fills the patch from its pixels and a border of one around them, rows `stride` apart.
+template <class Pixel>
+void fill_patch(const Pixel* bordered, std::ptrdiff_t stride, Patch& patch) {
   for (int r = 0; r < Patch::kSize; ++r) {
+    const Pixel* p = bordered + (r + 1) * stride + 1;
+    float* value = patch.value + r * Patch::kSize;
     for (int c = 0; c < Patch::kSize; ++c) {
-      const float* p = bordered + (r + 1) * kBordered + c + 1;
-      const int i = r * Patch::kSize + c;
-      patch.value[i] = p[0];
-      patch.gradient_u[i] = 0.5F * (p[1] - p[-1]);
-      patch.gradient_v[i] = 0.5F * (p[kBordered] - p[-kBordered]);
-      patch.rounded[i] = static_cast<std::int16_t>(p[0] + 0.5F);
-      sum += p[0];
-      sum2 += p[0] * p[0];
+      value[c] = static_cast<float>(p[c]);
+      patch.gradient_u[r * Patch::kSize + c] =
+          0.5F * (static_cast<float>(p[c + 1]) - static_cast<float>(p[c - 1]));
+      patch.gradient_v[r * Patch::kSize + c] =
+          0.5F * (static_cast<float>(p[c + stride]) - static_cast<float>(p[c - stride]));
+      patch.rounded[r * Patch::kSize + c] = static_cast<std::int16_t>(value[c] + 0.5F);
     }
   }
-  const float mean = sum / Patch::kArea;
-  patch.deviation = std::sqrt(std::max(0.0F, sum2 / Patch::kArea - mean * mean));
+  const Eigen::Map<const Eigen::Array<float, Patch::kArea, 1>, Eigen::Aligned32> value(patch.value);
+  const float mean = value.sum() / Patch::kArea;
+  patch.deviation = std::sqrt((value - mean).square().sum() / Patch::kArea);
 }
 
 }  // namespace
@@ -92,7 +93,17 @@ void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a,
           sample(appearance.pixels.data(), std::clamp(u, 0.0F, kLast), std::clamp(v, 0.0F, kLast));
     }
   }
-  finish_patch(bordered, patch);
+  fill_patch(bordered, kBordered, patch);
+}
+
+bool cut_patch(const cv::Mat& level_image, int u, int v, Patch& patch) {
+  const int u0 = u - Patch::kCentre - 1;
+  const int v0 = v - Patch::kCentre - 1;
+  if (u0 < 0 || v0 < 0 || u0 + kBordered > level_image.cols || v0 + kBordered > level_image.rows)
+    return false;
+  const auto stride = static_cast<std::ptrdiff_t>(level_image.step);
+  fill_patch(level_image.ptr<std::uint8_t>(v0) + u0, stride, patch);
+  return true;
 }
 
 bool cut_appearance(const cv::Mat& level_image, int u, int v, int level, PointAppearance& appearance) {
