@@ -63,13 +63,14 @@ class LineReader {
     Number value{};
     const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
     if (error != std::errc() || end != field.data() + field.size()) {
-      fail("'" + std::string(field) + "' is not a number");
+      fail(std::string("'").append(field).append("' is not a number"));
     }
     return value;
   }
   int count() {
     const int value = number<int>();
-    if (value < 0 || value > kMaxCount) fail("count " + std::to_string(value) + " is out of range");
+    if (value < 0 || value > kMaxCount)
+      fail(std::string("count ").append(std::to_string(value)).append(" is out of range"));
     return value;
   }
   SE3 pose() {
@@ -118,7 +119,7 @@ Rig read_rig(LineReader& reader) {
   for (int n = 0; n < 3; ++n) {
     if (kind == kKindNames[n]) rig.kind = static_cast<SensorKind>(n), known = true;
   }
-  if (!known) reader.fail("unknown sensor '" + std::string(kind) + "'");
+  if (!known) reader.fail(std::string("unknown sensor '").append(kind).append("'"));
   auto& camera = rig.camera;
   for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value = reader.number<double>();
   camera.width = reader.count();

@@ -282,10 +282,10 @@ TEST(WindowProblemDeathTest, InvalidProblemsAreNamed) {
   EXPECT_EQ(invalid_reason(window.start), "");
   WindowProblem bad = window.start;
   bad.points[3].anchor = 99;
-  EXPECT_EQ(invalid_reason(bad), "point 3: no pose 99 for its anchor");
+  EXPECT_EQ(invalid_reason(bad), "point 3: anchor is no pose");
   bad = window.start;
   bad.observations[7].pose = -1;
-  EXPECT_EQ(invalid_reason(bad), "observation 7: no pose -1");
+  EXPECT_EQ(invalid_reason(bad), "observation 7: no such pose");
   bad = window.start;
   bad.points[2].observation_count = 1 << 30;
   EXPECT_EQ(invalid_reason(bad), "point 2: observations out of range");
