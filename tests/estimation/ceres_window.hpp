@@ -52,6 +52,9 @@ class CeresWindow {
   }
 
   [[nodiscard]] ceres::Problem& problem() { return *problem_; }
+  /// Parameter blocks.
+  [[nodiscard]] const double* pose(int i) const { return pose_values_[i].data(); }
+  [[nodiscard]] const double* point(int k) const { return point_values_[k].data(); }
   /// The window with the present values.
   [[nodiscard]] WindowProblem values() const {
     WindowProblem result = window_;
