@@ -12,9 +12,32 @@ struct WindowSolver::Workspace {
   ReducedSystem system;
   WindowState state, candidate;
 
+  enum class Outcome { kRefused, kAccepted, kAtMinimum };
+  struct Trial {
+    Outcome outcome = Outcome::kRefused;
+    double cost = 0;
+    double gain = 0;  ///< decrease over the decrease the quadratic model promised
+  };
+  Trial try_step(const WindowProblem& problem, const WindowSolverOptions& options, double lambda,
+                 double cost);
   SolverSummary minimise(const WindowProblem& problem, const WindowSolverOptions& options);
   void write_back(WindowProblem& problem) const;
 };
+
+/// One step from state to candidate.
+WindowSolver::Workspace::Trial WindowSolver::Workspace::try_step(const WindowProblem& problem,
+                                                                 const WindowSolverOptions& options,
+                                                                 double lambda, double cost) {
+  system.build(problem, options, state, lambda);
+  if (!system.factorise()) return {};
+  const auto predicted = system.step(state, lambda, candidate);
+  if (!predicted) return {};
+  // Of such a step rounding decides whether it goes up or down.
+  if (*predicted <= 1e-15 * cost) return {Outcome::kAtMinimum, cost, 1};
+  const double new_cost = window_state_cost(problem, system.layout(), options, state.psi, candidate);
+  if (!(new_cost < cost)) return {};
+  return {Outcome::kAccepted, new_cost, (cost - new_cost) / *predicted};
+}
 
 SolverSummary WindowSolver::Workspace::minimise(const WindowProblem& problem,
                                                 const WindowSolverOptions& options) {
@@ -24,33 +47,27 @@ SolverSummary WindowSolver::Workspace::minimise(const WindowProblem& problem,
   summary.initial_cost = cost;
   summary.termination = Termination::kIterationLimit;
   LevenbergMarquardtDamping damping(options.initial_damping);
-  while (summary.iterations < options.max_iterations && !damping.exhausted()) {
+  bool go_on = true;
+  while (go_on && summary.iterations < options.max_iterations && !damping.exhausted()) {
     ++summary.iterations;
-    system.build(problem, options, state, damping.lambda());
-    const auto predicted =
-        system.factorise() ? system.step(state, damping.lambda(), candidate) : std::nullopt;
-    if (!predicted) {
-      damping.reject();
-      continue;
-    }
-    if (*predicted <= 1e-15 * cost) {  // rounding decides whether such a step goes up or down
+    const auto [outcome, new_cost, gain] = try_step(problem, options, damping.lambda(), cost);
+    if (outcome == Outcome::kAtMinimum) {
       summary.termination = Termination::kConverged;
-      break;
-    }
-    const double new_cost = window_state_cost(problem, system.layout(), options, state.psi, candidate);
-    if (!(new_cost < cost)) {
+      go_on = false;
+    } else if (outcome == Outcome::kRefused) {
       damping.reject();
-      continue;
+    } else {
+      std::swap(state, candidate);
+      const double decrease = cost - new_cost;
+      cost = new_cost;
+      ++summary.accepted_steps;
+      damping.accept(gain);
+      if (decrease < options.relative_decrease * cost) {
+        summary.termination = Termination::kConverged;
+        go_on = false;
+      }
     }
-    const double decrease = cost - new_cost;
-    std::swap(state, candidate);
-    cost = new_cost;
-    ++summary.accepted_steps;
-    damping.accept(decrease / *predicted);
-    if (decrease < options.relative_decrease * cost) {
-      summary.termination = Termination::kConverged;
-      break;
-    }
+    if (options.keep_going && !options.keep_going(summary.iterations, cost)) go_on = false;
   }
   if (summary.accepted_steps == 0 && summary.termination != Termination::kConverged) {
     summary.termination = Termination::kNoStepFound;
