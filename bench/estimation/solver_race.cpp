@@ -173,7 +173,12 @@ void print_race(const std::vector<SolverCourse>& courses, double share) {
                 course.cost[third], course.cost.back(), course.ms[third], course.cost.size() - 1);
     if (const auto n = course.reached((1 + share) * best)) {
       std::printf(" %6zu %10.2f", *n, course.ms[*n]);
-      if (own_reached) std::printf(" %7.2fx", course.ms[*n] / own.ms[*own_reached]);
+      // A start that is good enough needs no solver: then there is nothing to compare.
+      if (own_reached && own.ms[*own_reached] > 0) {
+        std::printf(" %7.2fx", course.ms[*n] / own.ms[*own_reached]);
+      } else {
+        std::printf(" %8s", "-");
+      }
     } else {
       std::printf(" %6s %10s %8s", "-", "never", "-");
     }
