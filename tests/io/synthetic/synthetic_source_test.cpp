@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <opencv2/core.hpp>
+
 #include "io/open_source.hpp"
 #include "tests/io/scratch_folder.hpp"
 
