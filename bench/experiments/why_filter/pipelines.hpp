@@ -9,7 +9,7 @@ struct PipelineResult {
   bool ok = false;           ///< finished with finite numbers
   SE3 T_last_first;          ///< estimated motion from frame 0 to frame M (unit of length free for monocular)
   double joint_seconds = 0;  ///< processor time in joint BA updates or joint filter updates
-  double total_seconds = 0;  ///< of the whole pipeline, initialisation included
+  double total_seconds = 0;  ///< of the whole pipeline after the monocular bootstrap
 };
 
 /// Algorithm 3: motion-only, structure-only, full bundle adjustment for every frame; the library's own
