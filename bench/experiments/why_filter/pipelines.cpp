@@ -68,8 +68,15 @@ class BaPipeline {
     problem_.observations.clear();
     for (std::size_t j = 0; j < tracks_.size(); ++j) {
       problem_.points[j].first_observation = static_cast<int>(problem_.observations.size());
-      problem_.points[j].observation_count = static_cast<int>(tracks_[j].size());
-      problem_.observations.insert(problem_.observations.end(), tracks_[j].begin(), tracks_[j].end());
+      const auto& point = problem_.points[j];
+      const Vector3 x_w = problem_.poses[static_cast<std::size_t>(point.anchor)].T_k_w.inverse() *
+                          from_inverse_depth(point.psi);
+      for (const auto& o : tracks_[j]) {  // behind a camera: no linearisation there
+        if ((problem_.poses[static_cast<std::size_t>(o.pose)].T_k_w * x_w).z() > 0.05)
+          problem_.observations.push_back(o);
+      }
+      problem_.points[j].observation_count =
+          static_cast<int>(problem_.observations.size()) - problem_.points[j].first_observation;
     }
     optimise_structure(problem_, options_);
     const double start = thread_seconds();
