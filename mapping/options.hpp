@@ -8,10 +8,9 @@ namespace twofold {
 
 /// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
 struct EdgeInformationOptions {
-  double sigma_px = 0.5;       ///< standard deviation of a measurement on level 0 [px]
-  double trans_share = 0.3;    ///< share of the ideal translational precision that is left, in (0, 1]
-  double rot_share = 0.3;      ///< share of the ideal rotational precision that is left, in (0, 1]
-  double min_parallax = 0.02;  ///< smaller ones count as this much, so that no edge leaves translation free
+  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
+  double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
+  double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
 };
 
 /// 6.4.1.
