@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+
+#include "geometry/check.hpp"
 
 namespace twofold {
 namespace {
@@ -35,75 +38,105 @@ Circle circle_offsets(std::ptrdiff_t stride) {
   return offsets;
 }
 
-/// Nine ones in a row among the sixteen bits, taken as a ring.
-bool has_arc_of_nine(std::uint32_t ring) {
-  ring |= ring << 16;
-  std::uint32_t run = ring & (ring >> 1);  // two in a row
-  run &= run >> 2;                         // four
-  run &= run >> 4;                         // eight
-  return (run & (ring >> 8)) != 0;
-}
-
-bool is_corner(const std::uint8_t* p, const Circle& circle, int threshold) {
-  const int high = *p + threshold;
-  const int low = *p - threshold;
-  std::uint32_t bright_ring = 0;
-  std::uint32_t dark_ring = 0;
-  for (std::size_t i = 0; i < 16; ++i) {
-    const int value = p[circle[i]];
-    bright_ring |= static_cast<std::uint32_t>(value > high) << i;
-    dark_ring |= static_cast<std::uint32_t>(value < low) << i;
-  }
-  return has_arc_of_nine(bright_ring) || has_arc_of_nine(dark_ring);
-}
-
-constexpr int kStrong = 3;  // thresholds that a strong corner stands out by
 constexpr int kRun = 32;    // pixels looked at together
+constexpr int kStrong = 3;  // thresholds that a strong corner stands out by
 
-/// Bytes that are non-zero where the pixel may be a corner: an arc of nine covers at least two neighbouring
-/// compass points, so most pixels end here. Written for the vectoriser: bytes only, no branches.
-void may_be_corners(const std::uint8_t* p, std::ptrdiff_t stride, int threshold,
-                    std::uint8_t (&flags)[kRun]) {
-  const std::uint8_t* north = p - 3 * stride;
-  const std::uint8_t* south = p + 3 * stride;
-  const auto t = static_cast<std::uint8_t>(threshold);
-  const auto room = static_cast<std::uint8_t>(255 - threshold);
-  for (int i = 0; i < kRun; ++i) {
-    const std::uint8_t c = p[i];
-    const auto high = static_cast<std::uint8_t>(c > room ? 255 : c + t);
-    const auto low = static_cast<std::uint8_t>(c < t ? 0 : c - t);
-    // Nearest of opposite points must be outside on the same side: (n or s) and (e or w).
-    const std::uint8_t ns_max = std::max(north[i], south[i]);
-    const std::uint8_t ew_max = std::max(p[i + 3], p[i - 3]);
-    const std::uint8_t ns_min = std::min(north[i], south[i]);
-    const std::uint8_t ew_min = std::min(p[i + 3], p[i - 3]);
-    const std::uint8_t bright = std::min(ns_max, ew_max) > high ? 1 : 0;
-    const std::uint8_t dark = std::max(ns_min, ew_min) < low ? 1 : 0;
-    flags[i] = bright | dark;
-  }
+/// One byte a pixel; comparisons give 255 or 0.
+using Bytes = std::uint8_t __attribute__((vector_size(kRun)));
+
+Bytes load(const std::uint8_t* p) {
+  Bytes bytes;
+  std::memcpy(&bytes, p, sizeof bytes);
+  return bytes;
+}
+Bytes larger(Bytes a, Bytes b) {
+  return a > b ? a : b;
+}
+Bytes smaller(Bytes a, Bytes b) {
+  return a < b ? a : b;
+}
+bool any(Bytes bytes) {
+  std::uint64_t words[kRun / 8];
+  std::memcpy(words, &bytes, sizeof words);
+  return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
-/// Best corner of the pixels [u0, u1) x [v0, v1).
-Corner best_corner(const cv::Mat& image, const Circle& circle, int threshold, int u0, int u1, int v0,
-                   int v1) {
-  const auto stride = static_cast<std::ptrdiff_t>(image.step);
-  Corner best;
-  alignas(32) std::uint8_t flags[kRun];
-  for (int v = v0; v < v1; ++v) {
-    const std::uint8_t* row = image.data + v * stride;
+/// 255 for every pixel of the run that is a corner, else 0.
+Bytes find_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
+  const Bytes centre = load(p);
+  const Bytes t = Bytes{} + static_cast<std::uint8_t>(threshold);
+  const Bytes high = larger(centre, centre + t) == centre + t ? centre + t : Bytes{} + std::uint8_t{255};
+  const Bytes low = larger(centre, t) - t;
+  // An arc of nine covers two neighbouring compass points at least: most runs end here.
+  const Bytes n = load(p + circle[0]), e = load(p + circle[4]);
+  const Bytes s = load(p + circle[8]), w = load(p + circle[12]);
+  const Bytes bright = smaller(larger(n, s), larger(e, w)) > high;
+  const Bytes dark = larger(smaller(n, s), smaller(e, w)) < low;
+  if (!any(bright | dark)) return Bytes{};
+
+  // Lengths of the arcs that end at point k; once around and eight more for those across the start.
+  Bytes bright_arc{}, dark_arc{}, longest{};
+  const Bytes one = Bytes{} + std::uint8_t{1};
+  for (std::size_t k = 0; k < 16 + 8; ++k) {
+    const Bytes q = load(p + circle[k % 16]);
+    bright_arc = (bright_arc + one) & static_cast<Bytes>(q > high);
+    dark_arc = (dark_arc + one) & static_cast<Bytes>(q < low);
+    longest = larger(longest, larger(bright_arc, dark_arc));
+  }
+  return longest > Bytes{} + std::uint8_t{8};
+}
+
+constexpr int kMaxColumns = 256;
+
+/// One row of cells on one pyramid level, and the best corner found in each so far.
+struct Strip {
+  const cv::Mat& image;
+  const Circle circle;
+  int cell;    // side in pixels of the level
+  int u0, u1;  // columns and rows of pixels looked at
+  int v0, v1;
+  std::array<bool, kMaxColumns> wanted{};
+  std::array<Corner, kMaxColumns> best{};
+
+  /// Any cell wanted that has pixels in [first, end)?
+  [[nodiscard]] bool wants(int first, int end) const {
+    for (int column = first / cell; column <= (end - 1) / cell; ++column) {
+      if (wanted[static_cast<std::size_t>(column)]) return true;
+    }
+    return false;
+  }
+
+  void judge(int u, int v) {
+    const auto column = static_cast<std::size_t>(u / cell);
+    if (!wanted[column]) return;
+    const float score = shi_tomasi_score(image, u, v);
+    if (score > best[column].score) {
+      best[column] = {static_cast<std::int16_t>(u), static_cast<std::int16_t>(v), 0, score};
+    }
+  }
+
+  void scan(int threshold) {
     for (int first = u0; first < u1; first += kRun) {
-      // The run may reach past the cell, but not past the row's end.
+      const int end = std::min(first + kRun, u1);
+      if (!wants(first, end)) continue;
+      // The last run starts earlier, so that it does not reach past the row's end.
       const int begin = std::min(first, image.cols - 3 - kRun);
-      may_be_corners(row + begin, stride, threshold, flags);
-      for (int u = first; u < std::min(first + kRun, u1); ++u) {
-        if (flags[u - begin] == 0 || !is_corner(row + u, circle, threshold)) continue;
-        const float score = shi_tomasi_score(image, u, v);
-        if (score > best.score) best = {static_cast<std::int16_t>(u), static_cast<std::int16_t>(v), 0, score};
+      for (int v = v0; v < v1; ++v) {
+        const Bytes found = find_in_run(image.ptr<std::uint8_t>(v) + begin, circle, threshold);
+        std::uint64_t words[kRun / 8];
+        std::memcpy(words, &found, sizeof words);
+        for (int word = 0; word < kRun / 8; ++word) {
+          for (std::uint64_t left = words[word]; left != 0;) {
+            const int byte = __builtin_ctzll(left) / 8;
+            left &= ~(std::uint64_t{0xff} << (8 * byte));
+            const int u = begin + 8 * word + byte;
+            if (u >= first && u < end) judge(u, v);
+          }
+        }
       }
     }
   }
-  return best;
-}
+};
 
 }  // namespace
 
@@ -153,22 +186,30 @@ float shi_tomasi_score(const cv::Mat& image, int u, int v) {
 
 void detect_corners(const cv::Mat& image, int level, int threshold, float min_score, int border,
                     const CellGrid& grid, std::vector<Corner>& corners) {
-  if (image.cols < kRun + 6) return;
-  const Circle circle = circle_offsets(static_cast<std::ptrdiff_t>(image.step));
+  TWOFOLD_CHECK(grid.columns <= kMaxColumns, "image too wide for cells of this size");
+  if (image.cols < kRun + 2 * border) return;
   const int cell = grid.cell_px >> level;
+  const Circle circle = circle_offsets(static_cast<std::ptrdiff_t>(image.step));
   for (int row = 0; row < grid.rows; ++row) {
-    const int v0 = std::max(row * cell, border);
-    const int v1 = std::min((row + 1) * cell, image.rows - border);
-    for (int column = 0; column < grid.columns && v0 < v1; ++column) {
-      if (grid.occupied[static_cast<std::size_t>(row * grid.columns + column)] != 0) continue;
-      const int u0 = std::max(column * cell, border);
-      const int u1 = std::min((column + 1) * cell, image.cols - border);
-      if (u0 >= u1) continue;
-      // Strong corners first: in rich texture there are enough of them, and far fewer to score.
-      Corner best = best_corner(image, circle, kStrong * threshold, u0, u1, v0, v1);
-      if (best.score < min_score) best = best_corner(image, circle, threshold, u0, u1, v0, v1);
-      best.level = static_cast<std::uint8_t>(level);
-      if (best.score >= min_score && corners.size() < corners.capacity()) corners.push_back(best);
+    Strip strip{image,
+                circle,
+                cell,
+                border,
+                std::min(grid.columns * cell, image.cols - border),
+                std::max(row * cell, border),
+                std::min((row + 1) * cell, image.rows - border)};
+    const std::uint8_t* occupied = grid.occupied.data() + row * grid.columns;
+    for (int c = 0; c < grid.columns; ++c) strip.wanted[static_cast<std::size_t>(c)] = occupied[c] == 0;
+    // Strong corners first: in rich texture there are enough of them, and far fewer to score.
+    strip.scan(kStrong * threshold);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
+      strip.wanted[c] = strip.wanted[c] && strip.best[c].score < min_score;
+    }
+    strip.scan(threshold);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
+      Corner corner = strip.best[c];
+      corner.level = static_cast<std::uint8_t>(level);
+      if (corner.score >= min_score && corners.size() < corners.capacity()) corners.push_back(corner);
     }
   }
 }

@@ -153,21 +153,23 @@ struct RowCosts {
       }
     }
   }
-  /// Somewhere else, not beside the best, it fits nearly as well (repeated texture).
-  [[nodiscard]] bool ambiguous() const {
+  /// Least cost elsewhere, not beside the best: near to `best` where texture repeats.
+  [[nodiscard]] int second_best() const {
+    int second = std::numeric_limits<int>::max();
     for (int i = 0; i < count; ++i) {
-      if (std::abs(first + i - best_u) > 3 && cost[i] * 4 < best * 5) return true;
+      if (std::abs(first + i - best_u) > 3) second = std::min(second, cost[i]);
     }
-    return false;
+    return second;
   }
 };
 
-/// Patch as it stands at a whole pixel.
-bool plain_patch(const cv::Mat& image, int u, int v, int level, Patch& patch) {
-  PointAppearance appearance;
-  if (!cut_appearance(image, u, v, level, appearance)) return false;
-  warp_patch(appearance, Eigen::Matrix2d::Identity(), level, patch);
-  return true;
+/// The pixel found in the right image, looked for in the left one, is found where it came from.
+bool leads_back(const cv::Mat& left, const cv::Mat& right, int u_right, int u_left, int v, int range) {
+  Patch patch;
+  if (!cut_patch(right, u_right, v, patch)) return false;
+  const RowCosts costs(patch, left, v, std::max(u_right, kMargin),
+                       std::min(u_right + range, left.cols - 1 - kMargin));
+  return std::abs(costs.best_u - u_left) <= 1;
 }
 
 }  // namespace
@@ -177,7 +179,7 @@ double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, i
   const cv::Mat& left = images.left.level(level);
   const cv::Mat& right = images.right.level(level);
   Patch patch;
-  if (!plain_patch(left, u, v, level, patch)) return Rig::kNoRight;
+  if (!cut_patch(left, u, v, patch)) return Rig::kNoRight;
   // Nearer than a few baselines hardly anything is in both images of a parallel rig.
   const double nearest = kNearestBaselines * rig.baseline;
   const int range = static_cast<int>(rig.disparity_from_depth(nearest) * std::ldexp(1.0, -level));
@@ -185,18 +187,17 @@ double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, i
   const int last = std::min(u, right.cols - 1 - kMargin);
   if (first > last || v < kMargin || v >= right.rows - kMargin) return Rig::kNoRight;
   const RowCosts costs(patch, right, v, first, last);
-  if (costs.ambiguous()) return Rig::kNoRight;
+  const std::int64_t second = costs.second_best();
+  if (second * 4 < std::int64_t{costs.best} * 5) return Rig::kNoRight;
   const auto aligned = align_patch_in_row(
       patch, right, {static_cast<float>(costs.best_u), static_cast<float>(v)}, options.refine_iterations);
   if (!aligned || !good_match(patch, aligned->rms, options) || aligned->uv.x() >= static_cast<float>(u)) {
     return Rig::kNoRight;
   }
-  // The match looked for in the left image must lead back.
-  Patch back;
-  if (!plain_patch(right, costs.best_u, v, level, back)) return Rig::kNoRight;
-  const RowCosts back_costs(back, left, v, std::max(costs.best_u, kMargin),
-                            std::min(costs.best_u + range, left.cols - 1 - kMargin));
-  if (std::abs(back_costs.best_u - u) > 1) return Rig::kNoRight;
+  // Not quite alone: the match looked for in the left image must lead back.
+  if (second < std::int64_t{costs.best} * 3 && !leads_back(left, right, costs.best_u, u, v, range)) {
+    return Rig::kNoRight;
+  }
   return from_level(aligned->uv.x(), level);
 }
 

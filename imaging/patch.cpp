@@ -16,38 +16,40 @@ namespace {
 constexpr int kBordered = Patch::kSize + 2;
 constexpr int kHighestSearchLevel = 3;  // above it patches cover too much of the image to stay planar
 
-float sample_clamped(const PointAppearance& appearance, double u, double v) {
-  constexpr double kLast = PointAppearance::kSize - 1.001;
-  u = std::clamp(u, 0.0, kLast);
-  v = std::clamp(v, 0.0, kLast);
+constexpr int kAppearance = PointAppearance::kSize;
+constexpr float kLast = kAppearance - 1.001F;  // last position with a pixel after it
+
+float sample(const std::uint8_t* pixels, float u, float v) {
   const int u0 = static_cast<int>(u);
   const int v0 = static_cast<int>(v);
-  const auto a = static_cast<float>(u - u0);
-  const auto b = static_cast<float>(v - v0);
-  const std::uint8_t* p = appearance.pixels.data() + v0 * PointAppearance::kSize + u0;
-  const float top = p[0] + a * (p[1] - p[0]);
-  const float bottom =
-      p[PointAppearance::kSize] + a * (p[PointAppearance::kSize + 1] - p[PointAppearance::kSize]);
+  const float a = u - static_cast<float>(u0);
+  const float b = v - static_cast<float>(v0);
+  const std::uint8_t* p = pixels + v0 * kAppearance + u0;
+  const auto p00 = static_cast<float>(p[0]);
+  const auto p10 = static_cast<float>(p[kAppearance]);
+  const float top = p00 + a * (static_cast<float>(p[1]) - p00);
+  const float bottom = p10 + a * (static_cast<float>(p[kAppearance + 1]) - p10);
   return top + b * (bottom - top);
 }
 
-void finish_patch(const float (&bordered)[kBordered * kBordered], Patch& patch) {
-  float sum = 0;
-  float sum2 = 0;
+/// Fills the patch from its pixels and a border of one around them, rows `stride` apart.
+template <class Pixel>
+void fill_patch(const Pixel* bordered, std::ptrdiff_t stride, Patch& patch) {
   for (int r = 0; r < Patch::kSize; ++r) {
+    const Pixel* p = bordered + (r + 1) * stride + 1;
+    float* value = patch.value + r * Patch::kSize;
     for (int c = 0; c < Patch::kSize; ++c) {
-      const float* p = bordered + (r + 1) * kBordered + c + 1;
-      const int i = r * Patch::kSize + c;
-      patch.value[i] = p[0];
-      patch.gradient_u[i] = 0.5F * (p[1] - p[-1]);
-      patch.gradient_v[i] = 0.5F * (p[kBordered] - p[-kBordered]);
-      patch.rounded[i] = static_cast<std::int16_t>(p[0] + 0.5F);
-      sum += p[0];
-      sum2 += p[0] * p[0];
+      value[c] = static_cast<float>(p[c]);
+      patch.gradient_u[r * Patch::kSize + c] =
+          0.5F * (static_cast<float>(p[c + 1]) - static_cast<float>(p[c - 1]));
+      patch.gradient_v[r * Patch::kSize + c] =
+          0.5F * (static_cast<float>(p[c + stride]) - static_cast<float>(p[c - stride]));
+      patch.rounded[r * Patch::kSize + c] = static_cast<std::int16_t>(value[c] + 0.5F);
     }
   }
-  const float mean = sum / Patch::kArea;
-  patch.deviation = std::sqrt(std::max(0.0F, sum2 / Patch::kArea - mean * mean));
+  const Eigen::Map<const Eigen::Array<float, Patch::kArea, 1>, Eigen::Aligned32> value(patch.value);
+  const float mean = value.sum() / Patch::kArea;
+  patch.deviation = std::sqrt((value - mean).square().sum() / Patch::kArea);
 }
 
 }  // namespace
@@ -76,16 +78,32 @@ std::optional<int> search_level(const Eigen::Matrix2d& A_c_a, int anchor_level) 
 }
 
 void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a, int level, Patch& patch) {
-  const Eigen::Matrix2d A_a_c = (A_c_a * std::ldexp(1.0, appearance.level - level)).inverse();
+  const Eigen::Matrix2f A_a_c = (A_c_a * std::ldexp(1.0, appearance.level - level)).inverse().cast<float>();
+  constexpr float kBefore = Patch::kCentre + 1;
+  const Eigen::Vector2f first =
+      Eigen::Vector2f::Constant(PointAppearance::kCentre) - kBefore * (A_a_c.col(0) + A_a_c.col(1));
   float bordered[kBordered * kBordered];
   for (int r = 0; r < kBordered; ++r) {
+    const Eigen::Vector2f row = first + static_cast<float>(r) * A_a_c.col(1);
     for (int c = 0; c < kBordered; ++c) {
-      const Vector2 offset = A_a_c * Vector2(c - 1 - Patch::kCentre, r - 1 - Patch::kCentre);
-      bordered[r * kBordered + c] = sample_clamped(appearance, PointAppearance::kCentre + offset.x(),
-                                                   PointAppearance::kCentre + offset.y());
+      const float u = row.x() + static_cast<float>(c) * A_a_c(0, 0);
+      const float v = row.y() + static_cast<float>(c) * A_a_c(1, 0);
+      // A strong warp reaches past what was kept: its rim is repeated.
+      bordered[r * kBordered + c] =
+          sample(appearance.pixels.data(), std::clamp(u, 0.0F, kLast), std::clamp(v, 0.0F, kLast));
     }
   }
-  finish_patch(bordered, patch);
+  fill_patch(bordered, kBordered, patch);
+}
+
+bool cut_patch(const cv::Mat& level_image, int u, int v, Patch& patch) {
+  const int u0 = u - Patch::kCentre - 1;
+  const int v0 = v - Patch::kCentre - 1;
+  if (u0 < 0 || v0 < 0 || u0 + kBordered > level_image.cols || v0 + kBordered > level_image.rows)
+    return false;
+  const auto stride = static_cast<std::ptrdiff_t>(level_image.step);
+  fill_patch(level_image.ptr<std::uint8_t>(v0) + u0, stride, patch);
+  return true;
 }
 
 bool cut_appearance(const cv::Mat& level_image, int u, int v, int level, PointAppearance& appearance) {

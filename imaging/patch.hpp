@@ -44,6 +44,9 @@ struct PatchWarp {
 /// Samples the appearance as it should look at `level` of the view.
 void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a, int level, Patch& patch);
 
+/// Patch around a whole pixel as it stands; false when too near to the border.
+[[nodiscard]] bool cut_patch(const cv::Mat& level_image, int u, int v, Patch& patch);
+
 /// Copies an appearance out of a pyramid level around a whole pixel; false when too near to the border.
 [[nodiscard]] bool cut_appearance(const cv::Mat& level_image, int u, int v, int level,
                                   PointAppearance& appearance);

@@ -1,4 +1,4 @@
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <cmath>
 
 #include "imaging/patch.hpp"
@@ -35,66 +35,59 @@ bool sample_window(const cv::Mat& image, const Eigen::Vector2f& uv, float* sampl
   return true;
 }
 
-/// Rows of the Jacobian of gain * T(u + du, v + dv) + offset: gradients, template (mean removed), one.
+using Pixels = Eigen::Array<float, Patch::kArea, 1>;
+using PixelsView = Eigen::Map<const Pixels, Eigen::Aligned32>;
+
+/// Least squares for the residual I - (gain T + offset), T with its mean removed. A row of the Jacobian is
+/// the gradients of the template, T and 1.
 template <int kMotions>
 struct Normal {
   static constexpr int kSize = kMotions + 2;
   using Matrix = Eigen::Matrix<float, kSize, kSize>;
   using Vector = Eigen::Matrix<float, kSize, 1>;
 
-  explicit Normal(const Patch& patch) {
-    float sum = 0;
-    for (const float value : patch.value) sum += value;
-    mean = sum / Patch::kArea;
-    Matrix H = Matrix::Zero();
-    for (int i = 0; i < Patch::kArea; ++i) {
-      const Vector j = row(patch, i);
-      H.noalias() += j * j.transpose();
+  explicit Normal(const Patch& patch) : gu(patch.gradient_u), gv(patch.gradient_v) {
+    const PixelsView value(patch.value);
+    mean = value.sum() / Patch::kArea;
+    t = value - mean;
+    Matrix H;
+    // Upper triangle; T and 1 are orthogonal because T has no mean.
+    H(0, 0) = (gu * gu).sum();
+    if constexpr (kMotions == 2) {
+      H(0, 1) = H(1, 0) = (gu * gv).sum();
+      H(1, 1) = (gv * gv).sum();
+      H(1, 2) = H(2, 1) = (gv * t).sum();
+      H(1, 3) = H(3, 1) = gv.sum();
     }
+    constexpr int kT = kMotions;
+    H(0, kT) = H(kT, 0) = (gu * t).sum();
+    H(0, kT + 1) = H(kT + 1, 0) = gu.sum();
+    H(kT, kT) = t.square().sum() + 1.0F;
+    H(kT, kT + 1) = H(kT + 1, kT) = 0;
+    H(kT + 1, kT + 1) = Patch::kArea;
     // A patch without gradient along a direction cannot be placed along it; the damping keeps H invertible,
     // and the step small there.
     for (int m = 0; m < kMotions; ++m) H(m, m) += 1e-3F * H(m, m) + 1.0F;
-    H(kMotions, kMotions) += 1.0F;
     inverse = H.inverse();
   }
-  Vector row(const Patch& patch, int i) const {
-    Vector j;
-    j(0) = patch.gradient_u[i];
-    if constexpr (kMotions == 2) j(1) = patch.gradient_v[i];
-    j(kMotions) = patch.value[i] - mean;
-    j(kMotions + 1) = 1;
-    return j;
+
+  /// Step of (u, v, gain, offset), and the sum of squares it starts from.
+  Vector step(const PixelsView& window, float gain, float offset, float& squares) const {
+    const Pixels r = window - gain * t - offset;
+    squares = r.square().sum();
+    Vector g;
+    g(0) = (gu * r).sum();
+    if constexpr (kMotions == 2) g(1) = (gv * r).sum();
+    g(kMotions) = (t * r).sum();
+    g(kMotions + 1) = r.sum();
+    return inverse * g;
   }
 
+  PixelsView gu, gv;
+  Pixels t;
   float mean = 0;
   Matrix inverse;
 };
-
-/// J^T r and r^T r of the residual I - (gain T + offset), T with its mean removed.
-template <int kMotions>
-typename Normal<kMotions>::Vector gradient(const Patch& patch, const float* window, float mean, float gain,
-                                           float offset, float& squares) {
-  float gu = 0;
-  float gv = 0;
-  float gt = 0;
-  float g1 = 0;
-  float r2 = 0;
-  for (int i = 0; i < Patch::kArea; ++i) {
-    const float t = patch.value[i] - mean;
-    const float r = window[i] - gain * t - offset;
-    gu += patch.gradient_u[i] * r;
-    if constexpr (kMotions == 2) gv += patch.gradient_v[i] * r;
-    gt += t * r;
-    g1 += r;
-    r2 += r * r;
-  }
-  squares = r2;
-  if constexpr (kMotions == 2) {
-    return {gu, gv, gt, g1};
-  } else {
-    return {gu, gt, g1};
-  }
-}
 
 template <int kMotions>
 std::optional<AlignmentResult> align(const Patch& patch, const cv::Mat& image, const Eigen::Vector2f& start,
@@ -108,8 +101,7 @@ std::optional<AlignmentResult> align(const Patch& patch, const cv::Mat& image, c
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!sample_window(image, result.uv, window)) return std::nullopt;
     float squares = 0;
-    const auto step =
-        (normal.inverse * gradient<kMotions>(patch, window, normal.mean, gain, offset, squares)).eval();
+    const auto step = normal.step(PixelsView(window), gain, offset, squares);
     // Inverse composition: the template's motion is undone in the image, scaled by the gain it was found
     // with.
     Eigen::Vector2f move(step(0) / gain, 0);

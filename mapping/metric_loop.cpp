@@ -6,6 +6,7 @@
 
 #include "geometry/inverse_depth.hpp"
 #include "mapping/edges.hpp"
+#include "mapping/loop_consensus.hpp"
 
 namespace twofold {
 namespace {
@@ -127,7 +128,10 @@ void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const Frame
 
 /// T_loop: the pose of the reference keyframe that explains the found points best.
 std::optional<SE3> MetricLoopCloser::estimate_pose(const SE3& T_ref_w) {
-  const MotionOnlyResult result = optimise_motion(rig_, motion_, T_ref_w, {});
+  // Within a wide search radius most matches may be wrong, too many for a robust kernel to find the way from
+  // T_ref.
+  const auto start = consensus_pose(rig_, motion_, theta_);
+  const MotionOnlyResult result = optimise_motion(rig_, motion_, start.value_or(T_ref_w), {});
   if (result.inliers < theta_) return std::nullopt;
   return result.T_c_ref;
 }

@@ -3,10 +3,14 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace twofold {
 namespace {
 
+constexpr float kMidGrey = 128;  // subtracted everywhere, so that gain and offset are hardly correlated
+
+/// Weights of the four pixels around a sub-pixel position, the same for a whole window.
 struct Bilinear {
   const std::uint8_t* p;  // top-left pixel of the window
   std::ptrdiff_t stride;
@@ -27,10 +31,29 @@ bool window_at(const cv::Mat& image, float u, float v, int before, int size, Bil
   return true;
 }
 
-float sample(const Bilinear& w, int r, int c) {
-  const std::uint8_t* p = w.p + r * w.stride + c;
-  return w.w00 * static_cast<float>(p[0]) + w.w01 * static_cast<float>(p[1]) +
-         w.w10 * static_cast<float>(p[w.stride]) + w.w11 * static_cast<float>(p[w.stride + 1]);
+using Bytes8 = std::uint8_t __attribute__((vector_size(8)));
+using Floats8 = float __attribute__((vector_size(32)));
+
+/// Four pixels of a row and four of the next one.
+Floats8 load_4x2(const std::uint8_t* p, std::ptrdiff_t stride) {
+  std::uint8_t bytes[8];
+  std::memcpy(bytes, p, 4);
+  std::memcpy(bytes + 4, p + stride, 4);
+  Bytes8 packed;
+  std::memcpy(&packed, bytes, 8);
+  return __builtin_convertvector(packed, Floats8);
+}
+
+/// The 4x4 samples of a window, row by row.
+template <class Pixels>
+void sample_4x4(const Bilinear& w, Pixels& samples) {
+  for (int r = 0; r < 4; r += 2) {
+    const std::uint8_t* p = w.p + r * w.stride;
+    const Floats8 rows = w.w00 * load_4x2(p, w.stride) + w.w01 * load_4x2(p + 1, w.stride) +
+                         w.w10 * load_4x2(p + w.stride, w.stride) +
+                         w.w11 * load_4x2(p + w.stride + 1, w.stride) - kMidGrey;
+    std::memcpy(samples.data() + 4 * r, &rows, sizeof rows);
+  }
 }
 
 }  // namespace
@@ -45,35 +68,38 @@ bool DenseAlignment::prepare_point(const PinholeCamera& level_camera, const cv::
   const float v = (point.uv.y() + 0.5F) * s - 0.5F;
   Bilinear window{};
   if (point.x.z() < 1e-3 || !window_at(image, u, v, kSize / 2 + 1, kSize + 2, window)) return false;
+  const auto shifted = [&](int du, int dv, Pixels& pixels) {
+    Bilinear w = window;
+    w.p += (1 + dv) * w.stride + 1 + du;
+    sample_4x4(w, pixels);
+  };
+  Pixels left, right, up, down;
+  shifted(0, 0, out.value);
+  shifted(-1, 0, left);
+  shifted(1, 0, right);
+  shifted(0, -1, up);
+  shifted(0, 1, down);
+  out.gradient_u = 0.5F * (right - left);
+  out.gradient_v = 0.5F * (down - up);
   // d pixel / d (v, omega) for x -> exp(delta) x
   const Eigen::Matrix<float, 2, 3> J_x = level_camera.project_jacobian(point.x).cast<float>();
-  Eigen::Matrix<float, 2, 6> J;
-  J.leftCols<3>() = J_x;
-  J.rightCols<3>() = -J_x * hat(point.x).cast<float>();
-  float values[(kSize + 2) * (kSize + 2)];
-  for (int r = 0; r < kSize + 2; ++r) {
-    for (int c = 0; c < kSize + 2; ++c) values[r * (kSize + 2) + c] = sample(window, r, c);
-  }
-  for (int r = 0; r < kSize; ++r) {
-    for (int c = 0; c < kSize; ++c) {
-      const float* p = values + (r + 1) * (kSize + 2) + c + 1;
-      const float gu = 0.5F * (p[1] - p[-1]);
-      const float gv = 0.5F * (p[kSize + 2] - p[-(kSize + 2)]);
-      const int i = r * kSize + c;
-      for (int k = 0; k < 6; ++k) out.jacobian[i][k] = gu * J(0, k) + gv * J(1, k);
-      out.jacobian[i][6] = p[0];
-      out.jacobian[i][7] = 1;
-      out.value[i] = p[0];
-    }
-  }
+  const Eigen::Matrix<float, 2, 3> J_omega = -J_x * hat(point.x).cast<float>();
+  out.du << J_x.row(0).transpose(), J_omega.row(0).transpose(), 0, 0;
+  out.dv << J_x.row(1).transpose(), J_omega.row(1).transpose(), 0, 0;
   return true;
 }
 
 void DenseAlignment::prepare(const PinholeCamera& level_camera, const cv::Mat& image, int level,
                              std::span<const AlignmentPoint> points) {
+  double inverse_depths = 0;
+  int usable = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     usable_[i] = prepare_point(level_camera, image, level, points[i], samples_[i]) ? 1 : 0;
+    if (usable_[i] == 0) continue;
+    inverse_depths += 1 / points[i].x.z();
+    ++usable;
   }
+  mean_inverse_depth_ = inverse_depths / std::max(1, usable);
 }
 
 void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& image,
@@ -81,14 +107,15 @@ void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& 
                               Cost& cost) const {
   const Matrix3 R = state.T_cur_prev.rotation();
   const Vector3& t = state.T_cur_prev.translation();
-  alignas(32) float H[8][8] = {};
-  alignas(32) float g[8] = {};
+  cost.H.setZero();
+  cost.g.setZero();
   float squares = 0;
   float weights = 0;
   int visible = 0;
   int usable = 0;
+  Pixels now;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!usable_[i]) continue;
+    if (usable_[i] == 0) continue;
     ++usable;
     const Vector3 x = R * points[i].x + t;
     if (x.z() < 1e-3) continue;
@@ -99,28 +126,32 @@ void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& 
       continue;
     }
     ++visible;
+    sample_4x4(window, now);
     const Sample& s = samples_[i];
-    for (int p = 0; p < kArea; ++p) {
-      const float residual = sample(window, p / kSize, p % kSize) - state.gain * s.value[p] - state.offset;
-      const float magnitude = std::abs(residual);
-      const float w = magnitude <= options_.huber_grey ? 1.0F : options_.huber_grey / magnitude;
-      squares += w * residual * residual;
-      weights += w;
-      const float* J = s.jacobian[p];
-      const float wr = w * residual;
-      for (int a = 0; a < 8; ++a) {
-        const float wJ = w * J[a];
-        for (int b = 0; b < 8; ++b) H[a][b] += wJ * J[b];
-        g[a] += wr * J[a];
-      }
-    }
+    const Pixels residual = now - state.gain * s.value - state.offset;
+    const Pixels w = options_.huber_grey / residual.abs().max(options_.huber_grey);
+    const Pixels wr = w * residual, wu = w * s.gradient_u, wv = w * s.gradient_v, wt = w * s.value;
+    squares += (wr * residual).sum();
+    weights += w.sum();
+    // sum over the pixels of w J J^T with J = gu du + gv dv, then value, then 1: all but du, dv are sums.
+    const float uv_sum = (wu * s.gradient_v).sum();
+    const Row along_u = (wu * s.gradient_u).sum() * s.du + uv_sum * s.dv;
+    const Row along_v = uv_sum * s.du + (wv * s.gradient_v).sum() * s.dv;
+    cost.H.noalias() += along_u * s.du.transpose();
+    cost.H.noalias() += along_v * s.dv.transpose();
+    cost.H.col(6) += (wu * s.value).sum() * s.du + (wv * s.value).sum() * s.dv;
+    cost.H.col(7) += wu.sum() * s.du + wv.sum() * s.dv;
+    cost.H(6, 6) += (wt * s.value).sum();
+    cost.H(6, 7) += wt.sum();
+    cost.H(7, 7) += w.sum();
+    cost.g += (wu * residual).sum() * s.du + (wv * residual).sum() * s.dv;
+    cost.g(6) += (wt * residual).sum();
+    cost.g(7) += wr.sum();
   }
+  cost.H.bottomLeftCorner<2, 6>() = cost.H.topRightCorner<6, 2>().transpose();
+  cost.H(7, 6) = cost.H(6, 7);
   cost.rms = weights > 0 ? std::sqrt(squares / weights) : 1e9F;
   cost.visible = usable > 0 ? static_cast<float>(visible) / static_cast<float>(usable) : 0.0F;
-  for (int a = 0; a < 8; ++a) {
-    for (int b = 0; b < 8; ++b) cost.H(a, b) = H[a][b];
-    cost.g(a) = g[a];
-  }
 }
 
 bool DenseAlignment::align_level(const PinholeCamera& level_camera, const cv::Mat& image,
@@ -142,7 +173,14 @@ bool DenseAlignment::align_level(const PinholeCamera& level_camera, const cv::Ma
     state.T_cur_prev = state.T_cur_prev * SE3::exp(-step.head<6>());
     state.gain += static_cast<float>(step(6));
     state.offset += static_cast<float>(step(7));
-    if (step.head<6>().norm() < options_.settled) break;
+    const double moved_px =
+        level_camera.fx * (step.head<3>().norm() * mean_inverse_depth_ + step.segment<3>(3).norm());
+    if (moved_px < options_.settled_px) {
+      best.T_cur_prev = state.T_cur_prev;  // too small to be worth another look
+      best.gain = state.gain;
+      best.offset = state.offset;
+      break;
+    }
   }
   const bool moved = best.rms < 1e9F;
   state = best;
@@ -165,6 +203,7 @@ DenseAlignmentResult DenseAlignment::align(const PinholeCamera& camera, const Im
       state.converged = true;
     }
   }
+  state.offset += kMidGrey * (1 - state.gain);
   return state;
 }
 

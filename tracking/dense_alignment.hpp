@@ -12,9 +12,9 @@ namespace twofold {
 struct DenseAlignmentOptions {
   int coarsest_level = 4;
   int finest_level = 1;
-  int max_iterations = 8;  ///< per level
-  float huber_grey = 8;    ///< kernel on the grey difference
-  double settled = 1e-4;   ///< stop a level when the step's norm is below (m at unit depth, rad)
+  int max_iterations = 8;    ///< per level
+  float huber_grey = 8;      ///< kernel on the grey difference
+  double settled_px = 0.05;  ///< stop a level when the step moves the points by less, in its pixels
 };
 
 /// Where the earlier image is compared: a pixel whose depth is known.
@@ -49,10 +49,13 @@ class DenseAlignment {
  private:
   static constexpr int kSize = 4;
   static constexpr int kArea = kSize * kSize;
+  using Pixels = Eigen::Array<float, kArea, 1>;
   using Row = Eigen::Matrix<float, 8, 1>;  ///< (v, omega, gain, offset)
+  /// Patch of the earlier image at one level, mid-grey subtracted. The Jacobian of a pixel with respect to
+  /// the pose is gradient_u * du + gradient_v * dv, with du and dv the same over the patch.
   struct Sample {
-    alignas(32) float jacobian[kArea][8];
-    alignas(32) float value[kArea];
+    Pixels value, gradient_u, gradient_v;
+    Row du, dv;  ///< last two entries 0
   };
   struct Cost {
     float rms = 0;
@@ -65,6 +68,7 @@ class DenseAlignment {
                std::span<const AlignmentPoint> points);
   bool prepare_point(const PinholeCamera& level_camera, const cv::Mat& image, int level,
                      const AlignmentPoint& point, Sample& sample) const;
+  /// Normal equations of the pose of the earlier frame, the gain and the offset.
   void evaluate(const PinholeCamera& level_camera, const cv::Mat& image,
                 std::span<const AlignmentPoint> points, const DenseAlignmentResult& state, Cost& cost) const;
   bool align_level(const PinholeCamera& level_camera, const cv::Mat& image,
@@ -73,6 +77,7 @@ class DenseAlignment {
   DenseAlignmentOptions options_;
   std::vector<Sample> samples_;
   std::vector<std::uint8_t> usable_;
+  double mean_inverse_depth_ = 0;  ///< of the usable points [1/m]
 };
 
 }  // namespace twofold

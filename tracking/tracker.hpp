@@ -44,8 +44,8 @@ class Tracker {
   /// The proposal of the last step could not be sent: its numbers are taken back.
   void proposal_rejected();
 
-  /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing and
-  /// diagnosis. Valid until the next step.
+  /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
+  /// and diagnosis. Valid until the next step.
   [[nodiscard]] std::span<const MotionObservation> last_observations() const { return motion_; }
 
  private:

@@ -6,6 +6,7 @@
 #include <deque>
 #include <exception>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include <fmt/core.h>
@@ -13,10 +14,12 @@
 #include "io/evaluation.hpp"
 #include "io/open_source.hpp"
 #include "io/trajectory_file.hpp"
+#include "mapping/mapper.hpp"
 #include "plain_map.hpp"
 #include "tracking/tracker.hpp"
 
-// The tracker alone, on a map that is never optimised: time a frame by stage, drift against ground truth.
+// The tracker in lockstep with a map, by default one that is never optimised: time a frame by stage, drift
+// against ground truth.
 
 namespace twofold {
 namespace {
@@ -27,6 +30,7 @@ struct Arguments {
   int map_delay = 2;  ///< frames between a proposal and the snapshot that has it
   bool verbose = false;
   bool residuals = false;
+  bool mapper = false;  ///< the real back-end instead of the plain map
   TrackerOptions tracker;
 };
 
@@ -100,7 +104,25 @@ void ResidualStatistics::print() const {
   }
 }
 
-std::vector<TrackedFrame> track(FrameSource& source, const Arguments& arguments, PlainMap& map,
+/// Either map behind one face.
+class Map {
+ public:
+  Map(const Rig& rig, bool optimised) {
+    if (optimised) mapper_.emplace(rig, MapperOptions{});
+  }
+  void insert(KeyframeProposal& proposal) {
+    if (!mapper_) return plain_.insert(proposal);
+    KeyframeProposal* one = &proposal;
+    mapper_->step(std::span(&one, 1));
+  }
+  [[nodiscard]] GraphSnapshot publish() { return mapper_ ? mapper_->publish() : plain_.publish(); }
+
+ private:
+  PlainMap plain_;
+  std::optional<Mapper> mapper_;
+};
+
+std::vector<TrackedFrame> track(FrameSource& source, const Arguments& arguments, Map& map,
                                 ResidualStatistics& residuals) {
   Tracker tracker(source.rig(), arguments.tracker);
   GraphSnapshot snapshot = map.publish();
@@ -125,7 +147,7 @@ std::vector<TrackedFrame> track(FrameSource& source, const Arguments& arguments,
       residuals.add(source.rig(), result.T_c_ref, tracker.last_observations());
     if (arguments.verbose) print_frame(frame, result, cpu_ms);
   }
-  for (const auto& [when, late] : queue) map.insert(late);
+  for (auto& [when, late] : queue) map.insert(late);
   if (!source.error().empty()) throw std::runtime_error(source.error());
   return frames;
 }
@@ -191,7 +213,7 @@ void run(const Arguments& arguments) {
   SourceOptions source_options;
   source_options.preload = true;
   const auto source = open_source(arguments.source, source_options);
-  PlainMap map;
+  Map map(source->rig(), arguments.mapper);
   ResidualStatistics residuals;
   const std::vector<TrackedFrame> frames = track(*source, arguments, map, residuals);
   const Trajectory trajectory = compose(frames, map.publish());
@@ -213,6 +235,7 @@ int main(int argc, char** argv) {
   app.add_option("--map-delay", arguments.map_delay, "frames until a proposal is in the map");
   app.add_flag("-v,--verbose", arguments.verbose, "a line for every frame");
   app.add_flag("--residuals", arguments.residuals, "statistics of the reprojection errors");
+  app.add_flag("--mapper", arguments.mapper, "optimise the map (double window)");
   CLI11_PARSE(app, argc, argv);
   try {
     twofold::run(arguments);
