@@ -22,7 +22,11 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
   // Relaxed: the flag carries no other data; seeing it a frame later is as good.
   while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
     track(frame, true, false);
-    if (!queue_.empty()) map(queue_.size());
+    if (!queue_.empty()) {
+      const auto keyframe = static_cast<std::int64_t>(index(queue_.back()->id));
+      map(queue_.size());
+      result_.schedule.loop_closer.append({snapshot_.version(), keyframe});
+    }
     report(progress);
   }
   result_.interrupted = interrupted.load(std::memory_order_relaxed);
@@ -61,6 +65,8 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     report(progress);
   }
   for (; round != schedule.mapper.end() && round->proposals <= queue_.size(); ++round) map(round->proposals);
+  // The loop closer's steps change nothing that the others see.
+  for (const LoopStep& step : schedule.loop_closer) result_.schedule.loop_closer.append(step);
 }
 
 void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse) {

@@ -46,11 +46,8 @@ class SnapshotMailbox {
   /// Reader. The newest version; valid until this reader's next call of latest. A first version is there from
   /// construction of the publisher on.
   [[nodiscard]] const T& latest() {
-    // Most calls find nothing new. A relaxed look spares the cache line from being written then; missing a
-    // version put at this very moment is as good as having called a moment earlier.
-    if (slot_.load(std::memory_order_relaxed) == nullptr) return *current_;
-    // Only the reader empties the slot, so it is still full.
     const T* next = slot_.exchange(nullptr, std::memory_order_acquire);  // (A)
+    if (next == nullptr) return *current_;
     current_ = next;
     held_.store(next->version(), std::memory_order_release);  // (B)
     return *current_;

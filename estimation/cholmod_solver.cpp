@@ -4,6 +4,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <set>
 
@@ -15,8 +16,9 @@ extern "C" [[gnu::weak]] void openblas_set_num_threads(int);
 namespace twofold {
 namespace {
 
-/// Keeps OpenMP to the calling thread. CHOLMOD's supernodal code asks for four threads at every small copy loop, whatever
-/// omp_set_num_threads says; they spin on the cores other threads need. The setting belongs to the calling thread.
+/// Keeps OpenMP to the calling thread. CHOLMOD's supernodal code asks for four threads at every small copy
+/// loop, whatever omp_set_num_threads says; they spin on the cores other threads need. The setting belongs to
+/// the calling thread.
 class OneThread {
  public:
   OneThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
@@ -74,7 +76,10 @@ std::vector<std::vector<int>> lower_neighbours(int nodes, std::span<const std::p
 
 }  // namespace
 
-std::vector<int> elimination_order(int nodes, std::span<const std::pair<int, int>> edges) {
+std::vector<int> elimination_order(int nodes, std::span<const std::pair<int, int>> edges, int block_size) {
+  // Flops from which nested dissection may earn back its own time, which is several times that of minimum
+  // degree.
+  constexpr double kWorthDissecting = 2e7;
   std::vector<int> begin{0}, row;
   const auto below = lower_neighbours(nodes, edges);
   for (int j = 0; j < nodes; ++j) {
@@ -86,7 +91,9 @@ std::vector<int> elimination_order(int nodes, std::span<const std::pair<int, int
   std::vector<int> best(nodes);
   for (int i = 0; i < nodes; ++i) best[i] = i;
   double fewest_flops = std::numeric_limits<double>::infinity();
+  const double block_flops = std::pow(block_size, 3);
   for (const int ordering : {CHOLMOD_AMD, CHOLMOD_METIS}) {
+    if (ordering == CHOLMOD_METIS && fewest_flops * block_flops < kWorthDissecting) break;
     Common common;
     common.c.nmethods = 1;
     common.c.method[0].ordering = ordering;

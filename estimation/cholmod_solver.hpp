@@ -13,8 +13,10 @@ namespace twofold {
 /// better of minimum degree (AMD) and nested dissection (METIS) by the flops they lead to, postordered.
 ///
 /// @param edges  pairs of different nodes in [0, nodes); repetitions are allowed
+/// @param block_size  unknowns a node stands for
 /// @return       order[k] = node eliminated k-th
-[[nodiscard]] std::vector<int> elimination_order(int nodes, std::span<const std::pair<int, int>> edges);
+[[nodiscard]] std::vector<int> elimination_order(int nodes, std::span<const std::pair<int, int>> edges,
+                                                 int block_size);
 
 /// Symmetric positive definite block system A x = b with square blocks of one size, factorised by CHOLMOD's
 /// supernodal Cholesky. The symbolic analysis happens once in set_pattern. Blocks are stored in elimination

@@ -74,7 +74,7 @@ struct PoseGraphSolver<Group>::Workspace {
     if (poses == static_cast<int>(graph.poses.size()) && now == edges) return;
     edges = std::move(now);
     poses = static_cast<int>(graph.poses.size());
-    order = elimination_order(poses, edges);
+    order = elimination_order(poses, edges, kDof);
     slots = system.set_pattern(kDof, order, edges);
   }
 
@@ -135,8 +135,8 @@ namespace {
 /// What only graphs of rigid motions have: positions that are linear given the rotations.
 template <class Group>
 struct Positions {
-  Positions(const PoseGraph<Group>& graph, const PoseGraphOptions& options, std::span<const int> order)
-      : order(order), useful(options.resolve_positions) {
+  Positions(const PoseGraph<Group>& graph, const PoseGraphOptions& options, std::span<const int> elimination)
+      : order(elimination), useful(options.resolve_positions) {
     if (options.resolve_positions || options.chordal_start) solver.emplace(graph, order);
   }
 
@@ -150,7 +150,8 @@ struct Positions {
     return cost;
   }
   double chordal(PoseGraph<Group>& graph, double cost, const PoseGraphOptions& options) {
-    if (!options.chordal_start) return cost;
+    constexpr double kGoodStart = 4;
+    if (!options.chordal_start || cost < kGoodStart * Group::kDof * graph.constraints.size()) return cost;
     return take_better(graph, chordal_initialisation(graph, order, *solver), cost, options);
   }
   double resolve(PoseGraph<Group>& graph, double cost, const PoseGraphOptions& options) {
@@ -228,7 +229,7 @@ SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseG
     keep_factor = false;
     w.before = graph.poses;
     double new_cost = std::numeric_limits<double>::infinity();
-    double promised = 0;
+    double promised = std::numeric_limits<double>::infinity();  // decrease of the cost by the linear model
     if (!own_factor || w.system.factorise(damping.value())) {
       w.delta = w.system.solve(w.gradient);
       promised = w.gradient.cwiseProduct(w.delta).sum();

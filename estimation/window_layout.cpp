@@ -38,6 +38,16 @@ class BitMatrix {
   std::vector<std::uint64_t> bits_;
 };
 
+/// By insertion: tracks are short and almost in order.
+void sort_by_slot(WindowLayout::Observation* first, int count) {
+  for (int n = 1; n < count; ++n) {
+    const WindowLayout::Observation moved = first[n];
+    int m = n;
+    for (; m > 0 && first[m - 1].slot > moved.slot; --m) first[m] = first[m - 1];
+    first[m] = moved;
+  }
+}
+
 int triangle_index(int row, int column) {
   return row * (row + 1) / 2 + column;
 }
@@ -201,8 +211,7 @@ void WindowLayout::sort_slots(Group& group, const BlockCholesky& system) {
     Track& track = tracks_[k];
     Observation* observations = &observations_[track.first_observation];
     for (int n = 0; n < track.observation_count; ++n) observations[n].slot = renamed[observations[n].slot];
-    std::stable_sort(observations, observations + track.observation_count,
-                     [](const Observation& a, const Observation& b) { return a.slot < b.slot; });
+    sort_by_slot(observations, track.observation_count);
     track.first_entry = static_cast<int>(entry_slots_.size());
     for (int n = 0; n < track.observation_count; ++n) {
       Observation& o = observations[n];

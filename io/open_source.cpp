@@ -11,10 +11,7 @@
 #include "io/source_parameters.hpp"
 #include "io/video.hpp"
 
-#if __has_include("io/synthetic/synthetic_source.hpp")
 #include "io/synthetic/synthetic_source.hpp"
-#define TWOFOLD_HAS_SYNTHETIC
-#endif
 
 namespace twofold {
 namespace {
@@ -58,10 +55,8 @@ const std::map<std::string, Opener>& openers() {
       {"tum", recording_opener(read_tum_recording)},
       {"images", recording_opener(read_image_folder)},
       {"video", open_video},
-#ifdef TWOFOLD_HAS_SYNTHETIC
       {"synthetic", [](const SourceSpec& spec,
                        const SourceOptions&) { return open_synthetic(spec.argument, spec.parameters); }},
-#endif
   };
   return kOpeners;
 }

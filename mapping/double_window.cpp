@@ -2,58 +2,112 @@
 
 #include <algorithm>
 
-namespace twofold {
+#include "mapping/edges.hpp"
 
-int DoubleWindow::position(KeyframeId id) const {
-  return index(id) < positions_.size() ? positions_[index(id)] : -1;
+namespace twofold {
+namespace {
+
+/// Position in W1 of the keyframe with the strongest edge to `id`; -1 if there is none.
+int strongest_inner_neighbour(const GraphSnapshot& graph, const DoubleWindow& window, KeyframeId id) {
+  int best = -1, best_weight = -1;
+  for (const Edge& edge : *graph.keyframe(id).edges) {
+    const int at = window.position.find(edge.other);
+    if (!window.is_inner(at) || edge.weight <= best_weight) continue;
+    best = at;
+    best_weight = edge.weight;
+  }
+  return best;
 }
 
-void DoubleWindow::select(const GraphSnapshot& graph, const MapperOptions& options) {
-  previous_.clear();
-  for (const TreeNode& node : members_) {
-    previous_.push_back(node.id);
-    positions_[index(node.id)] = -1;
-  }
-  std::sort(previous_.begin(), previous_.end());
+/// Covisibility as it is now. A loop found by appearance has more matches than shared points: it keeps them.
+int present_weight(const Keyframe& from, const Keyframe& to) {
+  const Edge& edge = *find_edge(from, to.id);
+  const int shared = shared_points(from, to);
+  return edge.marginalised ? std::max(shared, edge.weight) : std::max(shared, 1);
+}
 
+void add_anchors(const GraphSnapshot& graph, std::size_t max_anchors, IdMap& met, DoubleWindow& window) {
+  met.clear();
+  std::size_t added = 0;
+  for (std::size_t n = 0; n < window.inner && added < max_anchors; ++n) {
+    for (const Observation& observation : *graph.keyframe(window.nodes[n].id).observations) {
+      const KeyframeId anchor = graph.point(observation.point).anchor;
+      if (met.contains(anchor) || window.contains(anchor)) continue;
+      met.set(anchor, 0);
+      if (graph.keyframe(anchor).culled()) continue;
+      const int parent = strongest_inner_neighbour(graph, window, anchor);
+      if (parent < 0) continue;
+      window.position.set(anchor, static_cast<int>(window.nodes.size()));
+      window.nodes.push_back({anchor, parent});
+      if (++added == max_anchors) return;
+    }
+  }
+}
+
+}  // namespace
+
+void select_double_window(const GraphSnapshot& graph, const MapperOptions& options, SelectionScratch& scratch,
+                          DoubleWindow& window) {
+  const auto inner = static_cast<std::size_t>(options.inner_window);
   const std::size_t count = options.global_outer_window
                                 ? graph.keyframe_count()
-                                : static_cast<std::size_t>(options.inner_window + options.outer_window);
-  weighted_breadth_first(graph, graph.reference(), count, visited_, members_);
-  inner_count_ = std::min(members_.size(), static_cast<std::size_t>(options.inner_window));
-  if (positions_.size() < graph.keyframe_count()) positions_.resize(graph.keyframe_count(), -1);
-  poses_.resize(members_.size());
-  placed_anew_.resize(members_.size());
-  for (std::size_t n = 0; n < members_.size(); ++n) {
-    positions_[index(members_[n].id)] = static_cast<int>(n);
-    place(graph, n);
+                                : inner + static_cast<std::size_t>(options.outer_window);
+  weighted_breadth_first(graph, graph.reference(), count, scratch.visited, window.nodes);
+  window.inner = std::min(inner, window.nodes.size());
+  window.position.clear();
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    window.position.set(window.nodes[n].id, static_cast<int>(n));
   }
+  add_anchors(graph, static_cast<std::size_t>(options.max_anchors), scratch.met_anchors, window);
 }
 
-void DoubleWindow::place(const GraphSnapshot& graph, std::size_t n) {
-  const TreeNode& node = members_[n];
-  const Keyframe& keyframe = graph.keyframe(node.id);
-  const bool is_new = !std::binary_search(previous_.begin(), previous_.end(), node.id);
-  const bool parent_moved = node.parent >= 0 && placed_anew_[static_cast<std::size_t>(node.parent)] != 0;
-  placed_anew_[n] = node.parent >= 0 && (is_new || parent_moved) ? 1 : 0;
-  if (placed_anew_[n] == 0) {
-    poses_[n] = keyframe.T_k_w;
-    return;
+int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now) {
+  struct Left {
+    KeyframeId from, to;
+  };
+  std::vector<Left> left;
+  const GraphSnapshot& graph = writer.graph();
+  for (std::size_t n = 0; n < before.inner; ++n) {
+    const KeyframeId i = before.nodes[n].id;
+    if (graph.keyframe(i).culled()) continue;
+    for (const Edge& edge : *graph.keyframe(i).edges) {
+      const KeyframeId j = edge.other;
+      const bool was_inner = before.is_inner(j);
+      if (was_inner && j < i) continue;  // met from the other end
+      const bool stays_inner = now.is_inner(i) && now.is_inner(j);
+      const bool stays_tied = now.contains(i) && now.contains(j) && (now.is_inner(i) || now.is_inner(j));
+      if (was_inner ? !stays_inner : (!edge.marginalised && !stays_tied)) left.push_back({i, j});
+    }
   }
-  const auto parent = static_cast<std::size_t>(node.parent);
-  const KeyframeId parent_id = members_[parent].id;
-  poses_[n] =
-      relative_pose(graph, parent_id, *find_edge(graph.keyframe(parent_id), node.id)) * poses_[parent];
+  for (const auto& [i, j] : left) {
+    const Keyframe& from = graph.keyframe(i);
+    const Keyframe& to = graph.keyframe(j);
+    link_marginalised(writer, i, j, present_weight(from, to), to.T_k_w * from.T_k_w.inverse());
+  }
+  return static_cast<int>(left.size());
 }
 
-int DoubleWindow::add_anchor(const GraphSnapshot& graph, KeyframeId id, int parent) {
-  const std::size_t n = members_.size();
-  members_.push_back({id, parent});
-  poses_.emplace_back();
-  placed_anew_.push_back(0);
-  positions_[index(id)] = static_cast<int>(n);
-  place(graph, n);
-  return static_cast<int>(n);
+int enter_window(GraphWriter& writer, const IdMap& consistent, const DoubleWindow& window) {
+  const GraphSnapshot& graph = writer.graph();
+  const auto& nodes = window.nodes;
+  std::vector<bool> reset(nodes.size(), false);
+  std::vector<SE3> T_child_parent(nodes.size());
+  int count = 0;
+  // All relative poses are read before the first absolute one changes: unmarginalised edges are made of them.
+  for (std::size_t n = 1; n < nodes.size(); ++n) {
+    const auto parent = static_cast<std::size_t>(nodes[n].parent);
+    reset[n] = reset[parent] || !consistent.contains(nodes[n].id);
+    if (!reset[n]) continue;
+    const Edge* edge = find_edge(graph.keyframe(nodes[parent].id), nodes[n].id);
+    T_child_parent[n] = relative_pose(graph, nodes[parent].id, *edge);
+    ++count;
+  }
+  for (std::size_t n = 1; n < nodes.size(); ++n) {  // eq. 6.3
+    if (!reset[n]) continue;
+    const KeyframeId parent = nodes[static_cast<std::size_t>(nodes[n].parent)].id;
+    writer.set_pose(nodes[n].id, T_child_parent[n] * graph.keyframe(parent).T_k_w);
+  }
+  return count;
 }
 
 }  // namespace twofold

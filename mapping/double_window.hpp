@@ -1,47 +1,49 @@
 #pragma once
 
-#include <span>
 #include <vector>
 
+#include "graph/graph_writer.hpp"
 #include "graph/neighbourhood.hpp"
+#include "mapping/id_map.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {
 
-/// Members of the double window around the reference keyframe, and their start poses  (thesis 6.2.3).
+/// W1 and W2 around a reference keyframe  (thesis 6.2.3).
 ///
-/// Keeps the members of the round before: who was not among them is placed anew along relative edges.
-class DoubleWindow {
- public:
-  /// Weighted breadth-first search from the graph's reference: the first M1 keyframes are W1, the next M2 are
-  /// W2. Then eq. 6.3: poses that were not in the old window, and all their children in the spanning tree,
-  /// are set along the tree's relative edges, so that a loop that does not close breaks at the rim.
-  void select(const GraphSnapshot& graph, const MapperOptions& options);
-  /// Adds a keyframe to W2: an anchor of points seen from W1 that has an edge to `parent` in W1  (6.2.4).
-  /// Returns its position.
-  int add_anchor(const GraphSnapshot& graph, KeyframeId id, int parent);
+/// `nodes` is a spanning tree rooted at the reference, parents before children: first the inner window, then
+/// the outer one, then anchors of inner points that joined the outer window  (6.2.4).
+struct DoubleWindow {
+  std::vector<TreeNode> nodes;
+  std::size_t inner = 0;  ///< nodes[0, inner) are W1, the rest W2
+  IdMap position;         ///< of a keyframe in nodes
 
-  [[nodiscard]] std::span<const TreeNode> members() const { return members_; }
-  [[nodiscard]] std::size_t inner_count() const { return inner_count_; }
-  /// Start pose T_k_w of a member, by position.
-  [[nodiscard]] const SE3& start_pose(std::size_t position) const { return poses_[position]; }
-  /// Position of a keyframe among the members, -1 for others.
-  [[nodiscard]] int position(KeyframeId id) const;
-  [[nodiscard]] bool in_inner(KeyframeId id) const {
-    const int p = position(id);
-    return p >= 0 && static_cast<std::size_t>(p) < inner_count_;
-  }
-
- private:
-  void place(const GraphSnapshot& graph, std::size_t position);
-
-  std::vector<TreeNode> members_;
-  std::vector<SE3> poses_;
-  std::vector<std::uint8_t> placed_anew_;
-  std::size_t inner_count_ = 0;
-  std::vector<int> positions_;        // by keyframe id; -1
-  std::vector<KeyframeId> previous_;  // members of the round before, ascending
-  VisitedSet visited_;
+  [[nodiscard]] bool contains(KeyframeId id) const { return position.contains(id); }
+  [[nodiscard]] bool is_inner(int at) const { return at >= 0 && static_cast<std::size_t>(at) < inner; }
+  [[nodiscard]] bool is_inner(KeyframeId id) const { return is_inner(position.find(id)); }
 };
+
+/// Scratch kept between rounds.
+struct SelectionScratch {
+  VisitedSet visited;
+  IdMap met_anchors;
+};
+
+/// Weighted breadth-first selection of both windows, and of the anchors that may join: those with a direct
+/// edge to a frame of W1, so that they are still accurately defined. Costs O(window).
+void select_double_window(const GraphSnapshot& graph, const MapperOptions& options, SelectionScratch& scratch,
+                          DoubleWindow& window);
+
+/// Marginalisation when W1 moves on: an edge within the old inner window that is not within the new one gets
+/// the present relative pose as its constraint; so does any edge that would otherwise hang on absolute poses
+/// that are no longer optimised together. Returns the number of edges.
+///
+/// Afterwards an edge without a constraint of its own has an end in W1 and both ends in the double window.
+int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now);
+
+/// Window entry, eq. 6.3: keyframes outside of `consistent`, and all their children in the spanning tree, are
+/// set along the relative poses of the tree's edges, so that a loop that does not add up breaks at the rim
+/// and not near the reference. Returns the number of poses set.
+int enter_window(GraphWriter& writer, const IdMap& consistent, const DoubleWindow& window);
 
 }  // namespace twofold

@@ -1,71 +1,162 @@
 #include "mapping/mapper.hpp"
 
+#include <chrono>
 #include <stdexcept>
 
-#include "mapping/keyframe_insertion.hpp"
-#include "mapping/relaxation.hpp"
+#include "mapping/edges.hpp"
 
 namespace twofold {
+namespace {
 
-std::string MapperOptions::invalid_reason() const {
-  if (inner_window < 2) return "inner_window must be at least 2, is " + std::to_string(inner_window);
-  if (outer_window < 0) return "outer_window must not be negative, is " + std::to_string(outer_window);
-  if (theta < 1) return "theta must be at least 1, is " + std::to_string(theta);
-  if (!(constraint_share > 0)) return "constraint_share must be positive";
-  return {};
+/// Adds the time of a scope to a counter.
+class StageTime {
+ public:
+  explicit StageTime(double& ms) : ms_(ms), start_(Clock::now()) {}
+  ~StageTime() { ms_ += std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
+  StageTime(const StageTime&) = delete;
+  StageTime& operator=(const StageTime&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double& ms_;
+  Clock::time_point start_;
+};
+
+MapperOptions validated(const MapperOptions& options) {
+  if (const std::string reason = options.invalid_reason(); !reason.empty()) {
+    throw std::runtime_error("mapper options: " + reason);
+  }
+  return options;
 }
 
-Mapper::Mapper(const Rig& rig, const MapperOptions& options) : rig_(rig), options_(options), builder_(rig) {
-  if (const std::string reason = options.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
-}
+}  // namespace
 
-MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals) {
+Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
+    : rig_(rig),
+      options_(validated(options)),
+      builder_(rig, options),
+      loop_closer_(rig, options, std::move(search)),
+      point_culler_(rig, options.culling) {}
+
+Mapper::Mapper(const Rig& rig, const MapperOptions& options)
+    : Mapper(rig, options, guided_point_search(rig, options.loop.search_radius_px)) {}
+
+MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals, std::span<const LoopConstraint> loops,
+                          KeyframeId tracker_reference) {
   MapperReport report;
-  for (const KeyframeProposal* proposal : proposals) insert_keyframe(writer_, *proposal, options_.theta);
-  report.inserted = static_cast<int>(proposals.size());
-  if (proposals.empty()) return report;
-  optimise_window(report);
+  inserted_.clear();
+  for (const KeyframeProposal* proposal : proposals) insert(*proposal, report);
+  for (const LoopConstraint& loop : loops) add_loop(loop, report);
+  if (proposals.empty()) revisit(tracker_reference);
+  if (graph().reference() == kNoKeyframe) return report;
+  form_windows(report);
+  optimise(report);
+  remove_outliers(report);
+  if (!proposals.empty()) close_metric_loops(proposals.back()->images, report);
+  cull(report);
   return report;
 }
 
-/// Thesis 6.2.3: choose the windows, place who enters, points alone, all together, marginalise who leaves.
-void Mapper::optimise_window(MapperReport& report) {
-  window_.select(writer_.graph(), options_);
-  marginalise_edges();
-  WindowProblem& problem = builder_.build(writer_.graph(), window_, options_);
-  WindowSolverOptions structure = options_.solver;
-  structure.max_iterations = options_.structure_iterations;
-  optimise_structure(problem, structure);
-  report.solver = solver_.solve(problem, options_.solver);
-  report.removed_observations = builder_.write_back(writer_, window_, options_);
-
-  report.inner_window = static_cast<int>(window_.inner_count());
-  report.outer_window = static_cast<int>(window_.members().size() - window_.inner_count());
-  report.points = static_cast<int>(problem.points.size());
-  report.observations = static_cast<int>(problem.observations.size());
-  report.constraints = static_cast<int>(problem.constraints.size());
+void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
+  const StageTime time(report.ms.insert);
+  const InsertionReport insertion = insert_keyframe(writer_, proposal, options_.theta, consistent_, counts_);
+  inserted_.push_back(proposal.id);
+  ++report.inserted;
+  report.new_points += insertion.new_points;
+  report.dropped_observations += insertion.dropped_observations;
 }
 
-/// Keyframes in W1 are defined by their absolute poses, all others by relative edges: an edge that has just
-/// lost an end to W2 or beyond keeps the relative pose of the last joint solve, with the information of
-/// eq. 6.2; an edge within W1 is free again. Works on the poses of the graph, which are those of the last
-/// solve.
-void Mapper::marginalise_edges() {
-  const auto update = [this](KeyframeId id) {
-    const EdgeList edges = *writer_.graph().keyframe(id).edges;
-    for (const Edge& edge : edges) {
-      const bool both_inner = window_.in_inner(id) && window_.in_inner(edge.other);
-      if (edge.marginalised || both_inner) continue;
-      Edge sealed = make_edge(writer_.graph(), id, edge.other, edge.weight);
-      sealed.marginalised = true;
-      writer_.set_edge(id, sealed);
+void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
+  if (!graph().contains(loop.from) || !graph().contains(loop.to)) return;
+  // A constraint of a keyframe that was culled in the meantime passes to its heir.
+  KeyframeId from = loop.from, to = loop.to;
+  SE3 T_to_from = loop.T_to_from;
+  for (; graph().keyframe(from).culled(); from = graph().keyframe(from).heir) {
+    T_to_from = T_to_from * graph().keyframe(from).T_this_heir;
+  }
+  for (; graph().keyframe(to).culled(); to = graph().keyframe(to).heir) {
+    T_to_from = graph().keyframe(to).T_this_heir.inverse() * T_to_from;
+  }
+  if (from == to) return;
+  link_marginalised(writer_, from, to, std::max(1, loop.inliers), T_to_from);
+  ++report.loops;
+}
+
+void Mapper::revisit(KeyframeId tracker_reference) {
+  if (tracker_reference == kNoKeyframe || !graph().contains(tracker_reference)) return;
+  KeyframeId id = tracker_reference;
+  while (graph().keyframe(id).culled()) id = graph().keyframe(id).heir;
+  writer_.set_reference(id);
+  if (consistent_.contains(id)) return;
+  consistent_.clear();
+  consistent_.set(id, 0);
+}
+
+/// Both windows around the reference; edges that W1 leaves behind; poses and edges of what entered  (6.2.3).
+void Mapper::form_windows(MapperReport& report) {
+  const StageTime time(report.ms.window);
+  select_double_window(graph(), options_, selection_, next_window_);
+  report.edges_marginalised = marginalise_left_edges(writer_, window_, next_window_);
+  report.poses_set = enter_window(writer_, consistent_, next_window_);
+  std::swap(window_, next_window_);
+  for (const KeyframeId id : inserted_) {
+    register_in_window(writer_, id, window_, options_.theta, counts_);
+  }
+  consistent_.clear();
+  for (const TreeNode& node : window_.nodes) consistent_.set(node.id, 0);
+  report.inner_window = static_cast<int>(window_.inner);
+  report.outer_window = static_cast<int>(window_.nodes.size() - window_.inner);
+}
+
+/// Structure-only after poses were set, then eq. 6.4 over everything in the windows.
+void Mapper::optimise(MapperReport& report) {
+  {
+    const StageTime time(report.ms.build);
+    builder_.build(graph(), window_);
+    report.points = static_cast<int>(builder_.problem().points.size());
+    report.observations = static_cast<int>(builder_.problem().observations.size());
+    report.constraints = static_cast<int>(builder_.problem().constraints.size());
+  }
+  {
+    const StageTime time(report.ms.solve);
+    if (report.poses_set > 0 && options_.structure_iterations > 0) {
+      WindowSolverOptions structure = options_.solver;
+      structure.max_iterations = options_.structure_iterations;
+      optimise_structure(builder_.problem(), structure);
     }
-  };
-  for (const TreeNode& node : window_.members()) update(node.id);
+    report.solver = solver_.solve(builder_.problem(), options_.solver);
+  }
+  const StageTime time(report.ms.write);
+  builder_.write_back(writer_, window_);
 }
 
-void Mapper::relax_all() {
-  relax_graph(writer_, rig_, options_);
+void Mapper::remove_outliers(MapperReport& report) {
+  const StageTime time(report.ms.cull);
+  builder_.find_outliers(window_, outliers_);
+  report.outliers = static_cast<int>(outliers_.size());
+  report.culled_points += remove_measurements(writer_, outliers_);
+}
+
+void Mapper::close_metric_loops(const FrameImages& images, MapperReport& report) {
+  if (!options_.loop.enabled) return;
+  const StageTime time(report.ms.loop);
+  report.loop_search = loop_closer_.close(writer_, window_, images);
+  report.metric_loops = report.loop_search.edges;
+}
+
+void Mapper::cull(MapperReport& report) {
+  const StageTime time(report.ms.cull);
+  if (options_.culling.points && !inserted_.empty()) {
+    report.culled_points += point_culler_.step(writer_, inserted_.back(), builder_.point_ids());
+  }
+  if (options_.culling.keyframes) {
+    report.culled_keyframes =
+        cull_redundant_keyframes(writer_, window_, options_.culling, report.culled_points);
+  }
+}
+
+RelaxationReport Mapper::relax_all() {
+  return relax_all_poses(writer_, rig_, options_);
 }
 
 }  // namespace twofold

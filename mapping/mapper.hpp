@@ -1,59 +1,107 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "estimation/window_solver.hpp"
 #include "graph/graph_writer.hpp"
 #include "graph/keyframe_proposal.hpp"
+#include "graph/loop_constraint.hpp"
+#include "mapping/culling.hpp"
 #include "mapping/double_window.hpp"
+#include "mapping/insertion.hpp"
+#include "mapping/metric_loop.hpp"
 #include "mapping/options.hpp"
+#include "mapping/relaxation.hpp"
 #include "mapping/window_builder.hpp"
 
 namespace twofold {
 
-/// What one round did.
+/// What one round of the mapper did.
 struct MapperReport {
-  int inserted = 0;      ///< keyframes
-  int inner_window = 0;  ///< keyframes in W1
-  int outer_window = 0;  ///< keyframes in W2
-  int points = 0;        ///< in the joint solve
+  int inserted = 0;  ///< keyframes
+  int new_points = 0;
+  int dropped_observations = 0;  ///< of points culled or unknown
+  int loops = 0;                 ///< loop constraints accepted
+
+  int inner_window = 0;  ///< |W1|
+  int outer_window = 0;  ///< |W2|, anchors included
+  int points = 0;
   int observations = 0;
-  int constraints = 0;  ///< pose-pose
-  int removed_observations = 0;
-  int metric_loops = 0;  ///< edges added by metric loop closure
-  int culled_keyframes = 0;
-  int culled_points = 0;
+  int constraints = 0;
+  int poses_set = 0;           ///< on window entry
+  int edges_marginalised = 0;  ///< frames that left W1
   SolverSummary solver;
+
+  int outliers = 0;      ///< measurements removed
+  int metric_loops = 0;  ///< edges added by metric loop closure
+  MetricLoopReport loop_search;
+  int culled_points = 0;
+  std::vector<KeyframeId> culled_keyframes;
+
+  /// Wall time of the stages, for statistics only [ms].
+  struct Times {
+    double insert = 0, window = 0, build = 0, solve = 0, write = 0, loop = 0, cull = 0;
+    [[nodiscard]] double total() const { return insert + window + build + solve + write + loop + cull; }
+  } ms;
 };
 
-/// The only writer of the SLAM graph: double-window optimisation  (thesis 6.2). Single-threaded,
-/// deterministic.
+/// Double-window optimisation: keeps the SLAM graph  (thesis 6.2, 6.4.1).
+///
+/// The only one who changes the graph. Single-threaded; starts no threads; the same calls give the same graph
+/// bit for bit. A round costs the same whatever the size of the map, unless a window is unbounded.
 class Mapper {
  public:
-  /// Throws std::runtime_error for invalid options.
+  /// Options must be valid (see MapperOptions::invalid_reason).
+  /// @param search  looks for points in images to close metric loops
+  Mapper(const Rig& rig, const MapperOptions& options, PointSearch search);
   Mapper(const Rig& rig, const MapperOptions& options);
 
-  /// One round: inserts the proposals, oldest first, and optimises the double window around the newest.
-  MapperReport step(std::span<KeyframeProposal* const> proposals);
+  /// One round: inserts the proposals (in the order of their ids, which continue the graph's), adds loop
+  /// constraints, optimises the double window, closes metric loops, culls.
+  /// @param tracker_reference  where the tracker is now, if there are no proposals: the windows form around
+  ///                           it when an old place is revisited; kNoKeyframe leaves the reference
+  MapperReport step(std::span<KeyframeProposal* const> proposals, std::span<const LoopConstraint> loops = {},
+                    KeyframeId tracker_reference = kNoKeyframe);
 
-  /// The graph as it stands; publish() seals it as a snapshot.
+  /// The private version; it becomes the next published one.
   [[nodiscard]] const GraphSnapshot& graph() const { return writer_.graph(); }
+  /// O(1) whatever the size of the map.
   [[nodiscard]] GraphSnapshot publish() { return writer_.publish(); }
 
-  /// Makes the whole map consistent: relaxes all keyframe poses over all relative edges, those of the inner
-  /// window as they are now. Cost grows with the map; meant for the end of a run and for saving.
-  void relax_all();
+  /// Makes all poses agree globally, e.g. at the end of a run. Cost grows with the map.
+  RelaxationReport relax_all();
+
+  [[nodiscard]] const DoubleWindow& window() const { return window_; }
+  [[nodiscard]] const MapperOptions& options() const { return options_; }
+  /// The problem as it was solved last: for experiments.
+  [[nodiscard]] const WindowProblem& last_problem() const { return builder_.problem(); }
 
  private:
-  void optimise_window(MapperReport& report);
-  void marginalise_edges();
+  void insert(const KeyframeProposal& proposal, MapperReport& report);
+  void add_loop(const LoopConstraint& loop, MapperReport& report);
+  void revisit(KeyframeId tracker_reference);
+  void form_windows(MapperReport& report);
+  void optimise(MapperReport& report);
+  void remove_outliers(MapperReport& report);
+  void close_metric_loops(const FrameImages& images, MapperReport& report);
+  void cull(MapperReport& report);
 
   Rig rig_;
   MapperOptions options_;
   GraphWriter writer_;
-  DoubleWindow window_;
   WindowBuilder builder_;
   WindowSolver solver_;
+  MetricLoopCloser loop_closer_;
+  PointCuller point_culler_;
+
+  DoubleWindow window_;       ///< of the last round
+  DoubleWindow next_window_;  ///< being formed
+  IdMap consistent_;          ///< keyframes whose absolute poses agree: the last window and what joined since
+  std::vector<KeyframeId> inserted_;  ///< in this round
+  SelectionScratch selection_;
+  IdMap counts_;
+  std::vector<WindowBuilder::Outlier> outliers_;
 };
 
 }  // namespace twofold

@@ -6,23 +6,50 @@
 
 namespace twofold {
 
+/// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
+struct EdgeInformationOptions {
+  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
+  double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
+  double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
+};
+
+/// 6.4.1.
+struct MetricLoopOptions {
+  bool enabled = true;
+  int neighbourhood = 100;  ///< |N2|: nearest members of the double window whose points are tried
+  int max_searches = 240;   ///< points searched in one round, spread over the image
+  double search_radius_px = 10;
+  double max_error_px = 1;      ///< of points that agree with T_loop, on their pyramid level
+  double border_px = 10;        ///< predictions closer to the image's edge are not searched
+  double max_view_angle = 0.9;  ///< between the anchor's and the reference's ray to a point [rad]
+};
+
+struct CullingOptions {
+  bool keyframes = true;
+  bool points = true;
+  double redundant_share = 0.9;  ///< of a keyframe's points that others see as well
+  int redundant_observers = 3;   ///< other keyframes that must see such a point, as finely
+  int keep_recent = 8;           ///< newest keyframes are never culled
+  int max_keyframes = 2;         ///< culled in one round
+  int max_misses = 8;            ///< keyframes in a row a weak point should have been seen from and was not
+};
+
 struct MapperOptions {
-  int inner_window = 25;             ///< M1: keyframes optimised over points, >= 2  (thesis 6.2.3)
-  int outer_window = 175;            ///< M2: keyframes held by relative poses
+  int inner_window = 25;             ///< M1 >= 1: keyframes joined by point-pose constraints  (6.2.3)
+  int outer_window = 175;            ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO)
   bool global_outer_window = false;  ///< gDWO: the outer window is all the rest of the map
-  int theta = 15;                    ///< points two keyframes must share to be joined by an edge  (6.2.6)
-
-  int structure_iterations = 3;  ///< points alone, before the joint solve
-  WindowSolverOptions solver{.max_iterations = 4, .huber_px = 2.0};
-  double outlier_chi2_mono =
-      9.0;  ///< measurements above it are removed after the solve (2 degrees of freedom)
-  double outlier_chi2_stereo = 11.0;  ///< the same with right coordinate (3 degrees of freedom)
-
-  /// eq. 6.2: information of a relative pose by which w shared points hold two keyframes,
-  /// w diag(lambda_trans^2 I, lambda_rot^2 I), in units of what one point of one pixel noise gives:
-  /// lambda_rot = share f, lambda_trans = share f / depth. The share is well below one because the points
-  /// themselves are uncertain.
-  double constraint_share = 0.3;
+  bool fixed_outer_window = false;   ///< holds W2's poses: the hard rim the thesis argues against
+  int max_anchors = 25;              ///< anchors that may join W2 for their points  (6.2.4)
+  int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
+  int theta = 15;                    ///< Theta: covisible points that make an edge, 15 to 30
+  EdgeInformationOptions edge;
+  WindowSolverOptions solver{.max_iterations = 3, .huber_px = 2.0};  ///< joint optimisation of eq. 6.4
+  int structure_iterations = 2;        ///< structure-only, after poses were set along edges
+  double sigma_scale = 1;              ///< multiplies the standard deviation that imaging gives a measurement
+  double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom
+  double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom
+  MetricLoopOptions loop;
+  CullingOptions culling;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -1,35 +1,70 @@
 #include "mapping/relaxation.hpp"
 
 #include "estimation/pose_graph.hpp"
-#include "mapping/double_window.hpp"
-#include "mapping/window_builder.hpp"
+#include "graph/neighbourhood.hpp"
+#include "mapping/edges.hpp"
+#include "mapping/id_map.hpp"
 
 namespace twofold {
+namespace {
 
-SolverSummary relax_graph(GraphWriter& writer, const Rig& rig, const MapperOptions& options) {
-  if (writer.graph().keyframe_count() < 2) return {};
-  MapperOptions all = options;
-  all.global_outer_window = true;
-  DoubleWindow window;
-  window.select(writer.graph(), all);
-
-  PoseGraph<SE3> poses;
-  poses.origin = 0;  // the search starts at the reference
-  for (std::size_t n = 0; n < window.members().size(); ++n) {
-    poses.poses.push_back(window.start_pose(n));
-    const Keyframe& keyframe = writer.graph().keyframe(window.members()[n].id);
-    for (const Edge& edge : *keyframe.edges) {
-      if (edge.other < keyframe.id) continue;  // met from the other end
-      poses.constraints.push_back(
-          {static_cast<int>(n), window.position(edge.other), relative_pose(writer.graph(), keyframe.id, edge),
-           edge_information(rig, edge, keyframe.median_depth, options.constraint_share)});
+/// Pose graph of one part: pose n is tree[n], set along the tree from the root  (eq. 6.3).
+PoseGraph<SE3> pose_graph(const GraphSnapshot& graph, const std::vector<TreeNode>& tree, const Rig& rig,
+                          const MapperOptions& options) {
+  PoseGraph<SE3> problem;
+  problem.origin = 0;
+  IdMap position;
+  for (std::size_t n = 0; n < tree.size(); ++n) {
+    position.set(tree[n].id, static_cast<int>(n));
+    const Keyframe& keyframe = graph.keyframe(tree[n].id);
+    if (n == 0) {
+      problem.poses.push_back(keyframe.T_k_w);
+      continue;
+    }
+    const auto parent = static_cast<std::size_t>(tree[n].parent);
+    const Edge& edge = *find_edge(graph.keyframe(tree[parent].id), tree[n].id);
+    problem.poses.push_back(relative_pose(graph, tree[parent].id, edge) * problem.poses[parent]);
+  }
+  for (std::size_t n = 0; n < tree.size(); ++n) {
+    const Keyframe& from = graph.keyframe(tree[n].id);
+    for (const Edge& edge : *from.edges) {
+      const int other = position.find(edge.other);
+      if (other <= static_cast<int>(n)) continue;
+      problem.constraints.push_back(
+          {static_cast<int>(n), other, relative_pose(graph, from.id, edge),
+           edge_information(from, graph.keyframe(edge.other), edge, rig.camera.fx, options.edge)});
     }
   }
+  return problem;
+}
+
+}  // namespace
+
+RelaxationReport relax_all_poses(GraphWriter& writer, const Rig& rig, const MapperOptions& options) {
+  RelaxationReport report;
+  const GraphSnapshot& graph = writer.graph();
+  std::vector<KeyframeId> roots{graph.reference()};
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) roots.push_back(KeyframeId{k});
   PoseGraphSolver<SE3> solver;
-  const SolverSummary summary = solver.solve(poses, {});
-  for (std::size_t n = 0; n < window.members().size(); ++n)
-    writer.set_pose(window.members()[n].id, poses.poses[n]);
-  return summary;
+  IdMap done;
+  VisitedSet visited;
+  std::vector<TreeNode> tree;
+  for (const KeyframeId root : roots) {
+    if (!graph.contains(root) || done.contains(root) || graph.keyframe(root).culled()) continue;
+    weighted_breadth_first(graph, root, graph.keyframe_count(), visited, tree);
+    PoseGraph<SE3> problem = pose_graph(graph, tree, rig, options);
+    const SolverSummary summary = solver.solve(problem, {});
+    for (std::size_t n = 0; n < tree.size(); ++n) {
+      writer.set_pose(tree[n].id, problem.poses[n]);
+      done.set(tree[n].id, 0);
+    }
+    ++report.parts;
+    report.keyframes += static_cast<int>(tree.size());
+    report.constraints += static_cast<int>(problem.constraints.size());
+    report.initial_cost += summary.initial_cost;
+    report.final_cost += summary.final_cost;
+  }
+  return report;
 }
 
 }  // namespace twofold

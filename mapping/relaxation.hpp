@@ -1,14 +1,23 @@
 #pragma once
 
-#include "estimation/window_problem.hpp"
+#include "camera/rig.hpp"
 #include "graph/graph_writer.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {
 
-/// Pose-graph relaxation of the whole map over its relative edges (thesis 5.3.2 with the weights of eq. 6.2),
-/// started from the spanning tree of the reference keyframe. The reference keyframe stays where it is.
-/// Keyframes that no path of edges joins to it are not touched. O(keyframes).
-SolverSummary relax_graph(GraphWriter& writer, const Rig& rig, const MapperOptions& options);
+struct RelaxationReport {
+  int parts = 0;  ///< connected components of the graph
+  int keyframes = 0;
+  int constraints = 0;
+  double initial_cost = 0;
+  double final_cost = 0;
+};
+
+/// Relaxes all keyframe poses over all edges (eq. 6.4 without points, outer window = everything), part by
+/// part. Outside of the double window poses are only defined relative to their neighbours; this makes them
+/// agree globally, e.g. before a trajectory is written. The reference keyframe, or the oldest one of a part
+/// without it, stays where it is. Cost grows with the map.
+RelaxationReport relax_all_poses(GraphWriter& writer, const Rig& rig, const MapperOptions& options);
 
 }  // namespace twofold

@@ -3,146 +3,205 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/inverse_depth.hpp"
 #include "imaging/guided_search.hpp"
+#include "mapping/edges.hpp"
 
 namespace twofold {
+namespace {
 
-Matrix6 edge_information(const Rig& rig, const Edge& edge, double depth, double share) {
-  const double lambda_rot = share * rig.camera.fx;
-  const double lambda_trans = lambda_rot / std::max(depth, 1e-3);
-  Vector6 diagonal;
-  diagonal << Vector3::Constant(lambda_trans * lambda_trans), Vector3::Constant(lambda_rot * lambda_rot);
-  return (edge.weight * diagonal).asDiagonal();
+constexpr double kMinInverseDepth = 1e-5;  // farther points say nothing about translation
+constexpr double kMaxInverseDepth = 1e3;
+
+bool plausible(const Vector3& psi) {
+  return psi.allFinite() && psi.z() > kMinInverseDepth && psi.z() < kMaxInverseDepth;
 }
 
-WindowProblem& WindowBuilder::build(const GraphSnapshot& graph, DoubleWindow& window,
-                                    const MapperOptions& options) {
-  problem_.poses.clear();
-  problem_.points.clear();
-  problem_.observations.clear();
-  problem_.constraints.clear();
+/// Keyframe whose pose a (perhaps culled) keyframe hangs on.
+KeyframeId living_heir(const GraphSnapshot& graph, KeyframeId id) {
+  while (graph.keyframe(id).culled()) id = graph.keyframe(id).heir;
+  return id;
+}
+
+}  // namespace
+
+WindowBuilder::WindowBuilder(const Rig& rig, const MapperOptions& options) : options_(options) {
+  problem_.rig = rig;
+}
+
+void WindowBuilder::build(const GraphSnapshot& graph, const DoubleWindow& window) {
+  problem_.poses.resize(window.nodes.size());
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    problem_.poses[n].T_k_w = graph.keyframe(window.nodes[n].id).T_k_w;
+    problem_.poses[n].fixed = options_.fixed_outer_window && n >= window.inner;
+  }
   collect_points(graph, window);
-  for (std::size_t n = 0; n < window.members().size(); ++n)
-    problem_.poses.push_back({window.start_pose(n), false});
   collect_observations(graph, window);
-  collect_constraints(graph, window, options);
-  return problem_;
+  collect_constraints(graph, window);
 }
 
-/// Position of a point's anchor; joins it to W2 when it only has an edge into W1. -1: the point must be left
-/// out.
-int WindowBuilder::anchor_position(const GraphSnapshot& graph, DoubleWindow& window,
-                                   KeyframeId anchor) const {
-  if (window.in_inner(anchor)) return window.position(anchor);
-  int parent = -1;
-  int weight = 0;
-  for (const Edge& edge : *graph.keyframe(anchor).edges) {
-    if (window.in_inner(edge.other) && edge.weight > weight) {
-      parent = window.position(edge.other);
-      weight = edge.weight;
+/// Chooses the frame a point is anchored in within the problem; false if the point has to stay out.
+bool WindowBuilder::anchor_point(const GraphSnapshot& graph, const DoubleWindow& window, PointId id,
+                                 int seen_from, WindowProblem::Point& point) const {
+  const MapPoint& map_point = graph.point(id);
+  const int anchor = window.position.find(map_point.anchor);
+  if (anchor >= 0) {
+    // Select_double_window let anchors join W2 for their points. An older member of W2 serves as well only
+    // with a direct edge to W1.
+    point.anchor = anchor;
+    point.psi = map_point.psi;
+    if (window.is_inner(anchor)) return true;
+    for (const Edge& edge : *graph.keyframe(map_point.anchor).edges) {
+      if (window.is_inner(edge.other)) return true;
+    }
+    return false;
+  }
+  // An anchor that was culled moves with its heir. In the problem such a point hangs on a frame that sees it.
+  if (!graph.keyframe(map_point.anchor).culled()) return false;
+  if (!window.contains(living_heir(graph, map_point.anchor))) return false;
+  point.anchor = seen_from;
+  const KeyframeId seen_from_id = window.nodes[static_cast<std::size_t>(seen_from)].id;
+  const SE3 T_k_a = graph.keyframe(seen_from_id).T_k_w * graph.T_k_w(map_point.anchor).inverse();
+  point.psi = to_inverse_depth(T_k_a * from_inverse_depth(map_point.psi));
+  return plausible(point.psi);
+}
+
+void WindowBuilder::collect_points(const GraphSnapshot& graph, const DoubleWindow& window) {
+  problem_.points.clear();
+  point_ids_.clear();
+  point_position_.clear();
+  constexpr int kLeftOut = 0;  // position of the point in the problem + 1 otherwise
+  for (std::size_t n = 0; n < window.inner; ++n) {
+    for (const Observation& observation : *graph.keyframe(window.nodes[n].id).observations) {
+      const PointId id = observation.point;
+      if (point_position_.find(id) >= 0) continue;
+      point_position_.set(id, kLeftOut);
+      WindowProblem::Point point;
+      if (!anchor_point(graph, window, id, static_cast<int>(n), point)) continue;
+      problem_.points.push_back(point);
+      point_ids_.push_back(id);
+      point_position_.set(id, static_cast<int>(problem_.points.size()));
     }
   }
-  if (parent < 0) return -1;
-  const int position = window.position(anchor);
-  return position >= 0 ? position : window.add_anchor(graph, anchor, parent);
+  for (const TreeNode& node : window.nodes) {
+    for (const Observation& observation : *graph.keyframe(node.id).observations) {
+      const int at = point_position_.find(observation.point);
+      if (at > 0) ++problem_.points[static_cast<std::size_t>(at) - 1].observation_count;
+    }
+  }
+  keep_best_points();
 }
 
-void WindowBuilder::collect_points(const GraphSnapshot& graph, DoubleWindow& window) {
-  for (const PointId id : points_) point_positions_[index(id)] = -1;
-  points_.clear();
-  if (point_positions_.size() < graph.point_count()) point_positions_.resize(graph.point_count(), -1);
-  std::vector<KeyframeId> inner;
-  for (std::size_t n = 0; n < window.inner_count(); ++n) inner.push_back(window.members()[n].id);
-  std::vector<PointId> visible;
-  visible_points(graph, inner, visited_, visible);
-  for (const PointId id : visible) {
-    const MapPoint& point = graph.point(id);
-    if (point.observers->size() < 2) continue;
-    const int anchor = anchor_position(graph, window, point.anchor);
-    if (anchor < 0) continue;
-    point_positions_[index(id)] = static_cast<int>(points_.size());
-    points_.push_back(id);
-    problem_.points.push_back({anchor, point.psi, 0, 0});
+/// Points the window measures once are left out, and beyond the budget those it measures least.
+void WindowBuilder::keep_best_points() {
+  std::vector<std::size_t> with_count;
+  for (const auto& point : problem_.points) {
+    const auto count = static_cast<std::size_t>(point.observation_count);
+    if (count >= with_count.size()) with_count.resize(count + 1);
+    ++with_count[count];
   }
+  const auto max_points = static_cast<std::size_t>(options_.max_points);
+  std::size_t threshold = with_count.size(), kept = 0;  // points with more measurements are kept
+  while (threshold > 2 && kept + with_count[threshold - 1] <= max_points) {
+    kept += with_count[--threshold];
+  }
+  std::size_t room = max_points - std::min(kept, max_points);
+  if (threshold <= 2) room = 0;
+  std::size_t to = 0;
+  int first = 0;
+  for (std::size_t from = 0; from < problem_.points.size(); ++from) {
+    const auto count = static_cast<std::size_t>(problem_.points[from].observation_count);
+    const bool at_threshold = count + 1 == threshold && room > 0;
+    if (count < threshold && !at_threshold) {
+      point_position_.set(point_ids_[from], 0);
+      continue;
+    }
+    if (count < threshold) --room;
+    problem_.points[to] = problem_.points[from];
+    problem_.points[to].first_observation = first;
+    first += problem_.points[to].observation_count;
+    point_ids_[to] = point_ids_[from];
+    ++to;
+    point_position_.set(point_ids_[from], static_cast<int>(to));
+  }
+  problem_.points.resize(to);
+  point_ids_.resize(to);
+  problem_.observations.resize(static_cast<std::size_t>(first));
 }
 
 void WindowBuilder::collect_observations(const GraphSnapshot& graph, const DoubleWindow& window) {
-  // Twice over the keyframes' lists: first how many measurements each point has, then each into its place.
-  const auto for_each = [&](auto&& use) {
-    for (std::size_t n = 0; n < window.members().size(); ++n) {
-      for (const Observation& observation : *graph.keyframe(window.members()[n].id).observations) {
-        const int p = point_positions_[index(observation.point)];
-        if (p >= 0) use(static_cast<int>(n), problem_.points[static_cast<std::size_t>(p)], observation);
-      }
+  filled_.assign(problem_.points.size(), 0);
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    for (const Observation& observation : *graph.keyframe(window.nodes[n].id).observations) {
+      add_observation(observation, static_cast<int>(n));
     }
-  };
-  for_each([](int, WindowProblem::Point& point, const Observation&) { ++point.observation_count; });
-  int total = 0;
-  for (WindowProblem::Point& point : problem_.points) {
-    point.first_observation = total;
-    total += point.observation_count;
-    point.observation_count = 0;
   }
-  problem_.observations.resize(static_cast<std::size_t>(total));
-  for_each([&](int pose, WindowProblem::Point& point, const Observation& observation) {
-    const bool has_right = !std::isnan(observation.z.z());
-    const auto at = static_cast<std::size_t>(point.first_observation + point.observation_count++);
-    problem_.observations[at] = {pose, observation.z,
-                                 measurement_information(problem_.rig, observation.level, has_right)};
-  });
 }
 
-void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window,
-                                        const MapperOptions& options) {
-  for (std::size_t n = window.inner_count(); n < window.members().size(); ++n) {
-    const Keyframe& keyframe = graph.keyframe(window.members()[n].id);
-    for (const Edge& edge : *keyframe.edges) {
-      const int other = window.position(edge.other);
-      if (other < 0) continue;
-      const bool outer = static_cast<std::size_t>(other) >= window.inner_count();
-      if (outer && edge.other < keyframe.id) continue;  // met from the other end
+void WindowBuilder::add_observation(const Observation& observation, int pose) {
+  const int at = point_position_.find(observation.point);
+  if (at <= 0) return;
+  const auto p = static_cast<std::size_t>(at) - 1;
+  auto& entry = problem_.observations[static_cast<std::size_t>(problem_.points[p].first_observation) +
+                                      static_cast<std::size_t>(filled_[p]++)];
+  const bool has_right = problem_.rig.kind != SensorKind::kMono && std::isfinite(observation.z.z());
+  const auto scale = static_cast<float>(options_.sigma_scale);
+  entry.pose = pose;
+  entry.z = observation.z;
+  if (!has_right) entry.z.z() = 0;
+  entry.information = measurement_information(problem_.rig, observation.level, has_right) / (scale * scale);
+}
+
+void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window) {
+  problem_.constraints.clear();
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    const Keyframe& from = graph.keyframe(window.nodes[n].id);
+    for (const Edge& edge : *from.edges) {
+      const int other = window.position.find(edge.other);
+      if (other <= static_cast<int>(n)) continue;  // outside, or met from the other end
+      const Keyframe& to = graph.keyframe(edge.other);
+      // Within W1 the points speak, except across a loop that has been recognised but not yet matched.
+      if (window.is_inner(other) && (!edge.marginalised || shared_points(from, to) >= options_.theta)) {
+        continue;
+      }
       problem_.constraints.push_back(
-          {static_cast<int>(n), other, relative_pose(graph, keyframe.id, edge),
-           edge_information(problem_.rig, edge, keyframe.median_depth, options.constraint_share)});
+          {static_cast<int>(n), other, relative_pose(graph, from.id, edge),
+           edge_information(from, to, edge, problem_.rig.camera.fx, options_.edge)});
     }
   }
 }
 
-int WindowBuilder::write_back(GraphWriter& writer, const DoubleWindow& window,
-                              const MapperOptions& options) const {
-  for (std::size_t n = 0; n < window.members().size(); ++n) {
-    writer.set_pose(window.members()[n].id, problem_.poses[n].T_k_w);
+void WindowBuilder::write_back(GraphWriter& writer, const DoubleWindow& window) const {
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    writer.set_pose(window.nodes[n].id, problem_.poses[n].T_k_w);
   }
-  std::vector<std::vector<PointId>> outliers(window.members().size());
-  int removed = 0;
-  for (std::size_t p = 0; p < points_.size(); ++p) {
-    const WindowProblem::Point& point = problem_.points[p];
-    int kept = 0;
-    for (int o = 0; o < point.observation_count; ++o) {
-      const auto& observation = problem_.observations[static_cast<std::size_t>(point.first_observation + o)];
-      const double limit =
-          observation.information.z() > 0 ? options.outlier_chi2_stereo : options.outlier_chi2_mono;
-      if (observation_chi2(problem_, point, observation) <= limit) {
-        ++kept;
-      } else {
-        outliers[static_cast<std::size_t>(observation.pose)].push_back(points_[p]);
-        ++removed;
-      }
+  const GraphSnapshot& graph = writer.graph();
+  for (std::size_t p = 0; p < point_ids_.size(); ++p) {
+    const auto& solved = problem_.points[p];
+    const auto used = static_cast<std::size_t>(solved.anchor);
+    const KeyframeId anchor = graph.point(point_ids_[p]).anchor;
+    Vector3 psi = solved.psi;
+    if (anchor != window.nodes[used].id) {
+      const SE3 T_a_used = graph.T_k_w(anchor) * problem_.poses[used].T_k_w.inverse();
+      psi = to_inverse_depth(T_a_used * from_inverse_depth(psi));
     }
-    const auto outside =
-        static_cast<int>(writer.graph().point(points_[p]).observers->size()) - point.observation_count;
-    if (kept + outside < 2 || !(point.psi.z() > 0)) {
-      writer.cull_point(points_[p]);
-    } else {
-      writer.set_inverse_depth(points_[p], point.psi);
+    if (plausible(psi)) writer.set_inverse_depth(point_ids_[p], psi);
+  }
+}
+
+void WindowBuilder::find_outliers(const DoubleWindow& window, std::vector<Outlier>& outliers) const {
+  outliers.clear();
+  for (std::size_t p = 0; p < point_ids_.size(); ++p) {
+    const auto& point = problem_.points[p];
+    for (int n = 0; n < point.observation_count; ++n) {
+      const auto& observation = problem_.observations[static_cast<std::size_t>(point.first_observation + n)];
+      const bool stereo = observation.information.z() > 0;
+      const double limit = stereo ? options_.outlier_chi2_stereo : options_.outlier_chi2_mono;
+      if (observation_chi2(problem_, point, observation) <= limit) continue;
+      outliers.push_back({window.nodes[static_cast<std::size_t>(observation.pose)].id, point_ids_[p]});
     }
   }
-  for (std::size_t n = 0; n < outliers.size(); ++n) {
-    if (outliers[n].empty()) continue;
-    std::sort(outliers[n].begin(), outliers[n].end());
-    writer.remove_observations(window.members()[n].id, outliers[n]);
-  }
-  return removed;
+  std::sort(outliers.begin(), outliers.end());
 }
 
 }  // namespace twofold

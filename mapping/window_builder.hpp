@@ -5,41 +5,50 @@
 #include "estimation/window_problem.hpp"
 #include "graph/graph_writer.hpp"
 #include "mapping/double_window.hpp"
+#include "mapping/id_map.hpp"
+#include "mapping/options.hpp"
 
 namespace twofold {
 
-/// The double window as a least-squares problem (eq. 6.4), and back into the graph. Buffers are kept between
-/// rounds.
+/// Translates between the graph and the optimisation problem of eq. 6.4. Buffers are kept between rounds.
+///
+/// Pose n of the problem is window.nodes[n]. Points are those seen from W1 whose anchor is at hand (6.2.4)
+/// and which the window measures at least twice; measurements of them from the outer window are included.
+/// Pose-pose constraints are the edges with an end in W2 and both ends in the double window.
 class WindowBuilder {
  public:
-  explicit WindowBuilder(const Rig& rig) { problem_.rig = rig; }
+  WindowBuilder(const Rig& rig, const MapperOptions& options);
 
-  /// Fills the problem from the window: its poses, all points seen from W1 whose anchor is in the window or
-  /// next to W1 (6.2.4; such anchors join W2), their measurements from W1 and W2, and a pose-pose constraint
-  /// for every edge with an end in W2.
-  WindowProblem& build(const GraphSnapshot& graph, DoubleWindow& window, const MapperOptions& options);
-
-  /// Writes poses and points back, and removes measurements that the solution contradicts and points that are
-  /// left with fewer than two. Returns how many measurements were removed.
-  int write_back(GraphWriter& writer, const DoubleWindow& window, const MapperOptions& options) const;
-
+  void build(const GraphSnapshot& graph, const DoubleWindow& window);
+  [[nodiscard]] WindowProblem& problem() { return problem_; }
   [[nodiscard]] const WindowProblem& problem() const { return problem_; }
+  [[nodiscard]] const std::vector<PointId>& point_ids() const { return point_ids_; }
+
+  /// Poses and points of the solved problem go back into the graph.
+  void write_back(GraphWriter& writer, const DoubleWindow& window) const;
+
+  struct Outlier {
+    KeyframeId keyframe = kNoKeyframe;
+    PointId point = kNoPoint;
+    auto operator<=>(const Outlier&) const = default;
+  };
+  /// Measurements the solved problem disagrees with, by keyframe, then point.
+  void find_outliers(const DoubleWindow& window, std::vector<Outlier>& outliers) const;
 
  private:
-  void collect_points(const GraphSnapshot& graph, DoubleWindow& window);
-  [[nodiscard]] int anchor_position(const GraphSnapshot& graph, DoubleWindow& window,
-                                    KeyframeId anchor) const;
+  void collect_points(const GraphSnapshot& graph, const DoubleWindow& window);
+  void keep_best_points();
   void collect_observations(const GraphSnapshot& graph, const DoubleWindow& window);
-  void collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window,
-                           const MapperOptions& options);
+  void add_observation(const Observation& observation, int pose);
+  void collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window);
+  [[nodiscard]] bool anchor_point(const GraphSnapshot& graph, const DoubleWindow& window, PointId id,
+                                  int seen_from, WindowProblem::Point& point) const;
 
+  MapperOptions options_;
   WindowProblem problem_;
-  std::vector<PointId> points_;       // of the problem, by position
-  std::vector<int> point_positions_;  // by point id; -1
-  VisitedSet visited_;
+  std::vector<PointId> point_ids_;
+  IdMap point_position_;
+  std::vector<int> filled_;
 };
-
-/// Lambda of eq. 6.2 for an edge; see MapperOptions::constraint_share.
-[[nodiscard]] Matrix6 edge_information(const Rig& rig, const Edge& edge, double depth, double share);
 
 }  // namespace twofold

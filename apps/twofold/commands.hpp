@@ -12,5 +12,6 @@ enum ExitCode : int { kOk = 0, kFailedRun = 1, kBadInput = 2 };
 void add_eval_command(CLI::App& app, int& exit_code);
 void add_render_command(CLI::App& app, int& exit_code);
 void add_run_command(CLI::App& app, int& exit_code);
+void add_vocabulary_command(CLI::App& app, int& exit_code);
 
 }  // namespace twofold

@@ -30,6 +30,8 @@ int main(int argc, char** argv) {
   int exit_code = twofold::kOk;
   twofold::add_run_command(app, exit_code);
   twofold::add_eval_command(app, exit_code);
+  twofold::add_render_command(app, exit_code);
+  twofold::add_vocabulary_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

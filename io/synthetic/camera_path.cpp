@@ -41,7 +41,8 @@ Vector2 ClosedCurve::at(double parameter) const {
   const double t = parameter - static_cast<double>(span);
   const double u = 1 - t;
   return (u * u * u * points_[span % n] + (3 * t * t * t - 6 * t * t + 4) * points_[(span + 1) % n] +
-          (3 * u * u * u - 6 * u * u + 4) * points_[(span + 2) % n] + t * t * t * points_[(span + 3) % n]) / 6;
+          (3 * u * u * u - 6 * u * u + 4) * points_[(span + 2) % n] + t * t * t * points_[(span + 3) % n]) /
+         6;
 }
 
 Vector2 ClosedCurve::tangent(double parameter) const {
@@ -61,7 +62,9 @@ double ClosedCurve::parameter(double s) const {
   return (k + (s - a) / (*upper - a)) / kStepsPerSpan;
 }
 
-Vector2 ClosedCurve::position(double s) const { return at(parameter(s)); }
+Vector2 ClosedCurve::position(double s) const {
+  return at(parameter(s));
+}
 
 double ClosedCurve::heading(double s) const {
   const Vector2 d = tangent(parameter(s));
@@ -81,9 +84,10 @@ CameraPath walk(const ClosedCurve& curve, const WalkStyle& style) {
 
     // Glances are tied to places (multiples of a lap), so that the next round sees most of them again.
     const double glance = 0.6 * std::sin(4 * lap) + 0.3 * std::sin(7 * lap + 0.8) + 0.1 * std::sin(2.3 * lap);
-    const double yaw = heading + kDegree * (style.look_aside_deg * glance - style.outward_deg +
-                                            0.7 * std::sin(step + 0.4));
-    const double pitch = kDegree * (style.pitch_deg + 2.5 * std::sin(3 * lap + 0.5) + 0.5 * std::sin(2 * step + 1));
+    const double yaw =
+        heading + kDegree * (style.look_aside_deg * glance - style.outward_deg + 0.7 * std::sin(step + 0.4));
+    const double pitch =
+        kDegree * (style.pitch_deg + 2.5 * std::sin(3 * lap + 0.5) + 0.5 * std::sin(2 * step + 1));
     const double roll = kDegree * (0.8 * std::sin(step + 1.2) + 0.6 * std::sin(5 * lap));
     return looking({xy.x(), xy.y(), z}, yaw, pitch, roll);
   };

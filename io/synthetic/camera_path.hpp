@@ -10,11 +10,12 @@ namespace twofold::synthetic {
 /// T_w_c [m] at time t [s], smooth in t and defined for all t >= 0.
 using CameraPath = std::function<SE3(double t)>;
 
-/// Pose of a camera at `position` that looks along the horizontal heading `yaw` (0: +x, pi/2: +y), turned up by
-/// `pitch` and clockwise about its optical axis by `roll` [rad]. World z is up.
+/// Pose of a camera at `position` that looks along the horizontal heading `yaw` (0: +x, pi/2: +y), turned up
+/// by `pitch` and clockwise about its optical axis by `roll` [rad]. World z is up.
 [[nodiscard]] SE3 looking(const Vector3& position, double yaw, double pitch, double roll);
 
-/// Closed smooth curve in the plane: a uniform cubic B-spline over a ring of control points, walked by arc length.
+/// Closed smooth curve in the plane: a uniform cubic B-spline over a ring of control points, walked by arc
+/// length.
 class ClosedCurve {
  public:
   explicit ClosedCurve(std::vector<Vector2> control_points);
@@ -35,15 +36,15 @@ class ClosedCurve {
 };
 
 struct WalkStyle {
-  double speed = 1.4;           ///< [m/s]
-  double eye_height = 1.6;      ///< [m]
-  double look_aside_deg = 22;   ///< amplitude of the glances to either side
-  double outward_deg = 0;       ///< mean turn to the right of the direction of motion
+  double speed = 1.4;          ///< [m/s]
+  double eye_height = 1.6;     ///< [m]
+  double look_aside_deg = 22;  ///< amplitude of the glances to either side
+  double outward_deg = 0;      ///< mean turn to the right of the direction of motion
   double pitch_deg = -2;
 };
 
-/// Walking along the curve: the head bobs at step frequency, sways, nods and glances aside; the line walked differs
-/// from round to round by up to 0.2 m.
+/// Walking along the curve: the head bobs at step frequency, sways, nods and glances aside; the line walked
+/// differs from round to round by up to 0.2 m.
 [[nodiscard]] CameraPath walk(const ClosedCurve& curve, const WalkStyle& style);
 
 }  // namespace twofold::synthetic

@@ -47,7 +47,9 @@ void add_octave(cv::Mat& image, std::uint64_t seed, float amplitude, double wave
 }  // namespace
 
 Canvas::Canvas(double width, double height, double texel, float grey)
-    : width_(width), height_(height), texel_(texel),
+    : width_(width),
+      height_(height),
+      texel_(texel),
       image_(std::max(2, static_cast<int>(std::lround(height / texel))),
              std::max(2, static_cast<int>(std::lround(width / texel))), CV_32FC1, cv::Scalar(grey)) {}
 
@@ -62,18 +64,20 @@ void Canvas::rectangle(double x, double y, double w, double h, float grey) {
   const auto top = static_cast<int>(std::lround(y / texel_));
   const auto right = static_cast<int>(std::lround((x + w) / texel_));
   const auto bottom = static_cast<int>(std::lround((y + h) / texel_));
-  const cv::Rect r = cv::Rect(left, top, right - left, bottom - top) & cv::Rect(0, 0, image_.cols, image_.rows);
+  const cv::Rect r =
+      cv::Rect(left, top, right - left, bottom - top) & cv::Rect(0, 0, image_.cols, image_.rows);
   if (r.area() > 0) image_(r).setTo(grey);
 }
 
 void Canvas::disc(double x, double y, double radius, float grey) {
-  cv::circle(image_, pixel(x, y), static_cast<int>(std::lround(radius / texel_ * (1 << kShift))), grey, cv::FILLED,
-             cv::LINE_8, kShift);
+  cv::circle(image_, pixel(x, y), static_cast<int>(std::lround(radius / texel_ * (1 << kShift))), grey,
+             cv::FILLED, cv::LINE_8, kShift);
 }
 
 void Canvas::ellipse(double x, double y, double a, double b, double angle_deg, float grey) {
   const auto length = [&](double v) { return static_cast<int>(std::lround(v / texel_ * (1 << kShift))); };
-  cv::ellipse(image_, pixel(x, y), {length(a), length(b)}, angle_deg, 0, 360, grey, cv::FILLED, cv::LINE_8, kShift);
+  cv::ellipse(image_, pixel(x, y), {length(a), length(b)}, angle_deg, 0, 360, grey, cv::FILLED, cv::LINE_8,
+              kShift);
 }
 
 void Canvas::polygon(const std::vector<cv::Point2d>& corners, float grey) {
@@ -94,7 +98,8 @@ void Canvas::text(const std::string& letters, double x, double y, double letter_
   cv::putText(image_, letters, at, cv::FONT_HERSHEY_SIMPLEX, scale, grey, thickness);
 }
 
-void Canvas::add_noise(std::uint64_t seed, float amplitude, double coarsest, double finest, float persistence) {
+void Canvas::add_noise(std::uint64_t seed, float amplitude, double coarsest, double finest,
+                       float persistence) {
   std::uint64_t octave = 0;
   for (double wavelength = coarsest; wavelength >= finest && wavelength > 1.5 * texel_; wavelength *= 0.5) {
     add_octave(image_, mix64(seed + octave++), amplitude, wavelength / texel_);

@@ -28,7 +28,8 @@ class Canvas {
   void text(const std::string& letters, double x, double y, double letter_height, float grey);
 
   /// Adds value noise: octaves from wavelength `coarsest` down to `finest` [m], each weaker by `persistence`.
-  void add_noise(std::uint64_t seed, float amplitude, double coarsest, double finest, float persistence = 0.7f);
+  void add_noise(std::uint64_t seed, float amplitude, double coarsest, double finest,
+                 float persistence = 0.7f);
   /// Multiplies rows from y0 to y1 by a factor that goes linearly from f0 to f1 (dirt, shade).
   void shade_rows(double y0, double y1, float f0, float f1);
 

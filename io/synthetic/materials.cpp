@@ -13,7 +13,8 @@ float vary(Random& random, float grey, double spread) {
 
 std::string random_letters(Random& random, int count) {
   std::string letters;
-  for (int i = 0; i < count; ++i) letters += static_cast<char>(random.chance(0.15) ? ' ' : 'A' + random.below(26));
+  for (int i = 0; i < count; ++i)
+    letters += static_cast<char>(random.chance(0.15) ? ' ' : 'A' + random.below(26));
   return letters;
 }
 
@@ -31,8 +32,9 @@ void scatter_specks(Canvas& canvas, Random& random, double per_square_metre, dou
     const int u = std::clamp(static_cast<int>(x / canvas.texel()), 0, image.cols - 1);
     const int v = std::clamp(static_cast<int>(y / canvas.texel()), 0, image.rows - 1);
     const float sign = random.chance(0.6) ? -1.0f : 1.0f;
-    const float grey = image.at<float>(v, u) + sign * contrast * static_cast<float>(random.uniform(0.5, 1.2));
-    canvas.ellipse(x, y, r, r * random.uniform(0.4, 1.0), random.uniform(0, 180), std::clamp(grey, 8.0f, 250.0f));
+    const float grey = image.at<float>(v, u) + sign * contrast * static_cast<float>(random.uniform(0.2, 1.0));
+    canvas.ellipse(x, y, r, r * random.uniform(0.4, 1.0), random.uniform(0, 180),
+                   std::clamp(grey, 8.0f, 250.0f));
   }
 }
 
@@ -44,12 +46,13 @@ void paint_bricks(Canvas& canvas, Random& random, double brick_width, double bri
     double x = -brick_width * (row % 2 == 0 ? 0.1 : 0.6);
     while (x < canvas.width()) {
       const double w = brick_width * random.uniform(0.9, 1.1);
-      canvas.rectangle(x, y, w - joint, brick_height - joint, vary(random, grey, random.chance(0.12) ? 65 : 28));
+      canvas.rectangle(x, y, w - joint, brick_height - joint,
+                       vary(random, grey, random.chance(0.12) ? 65 : 28));
       x += w;
     }
   }
   canvas.add_noise(random.word(), 14, 2.0, 0.02, 0.8f);
-  scatter_specks(canvas, random, 30, 0.01, 0.05, 40);
+  scatter_specks(canvas, random, 16, 0.01, 0.05, 40);
 }
 
 void paint_ashlar(Canvas& canvas, Random& random, double stone, float grey) {
@@ -60,15 +63,17 @@ void paint_ashlar(Canvas& canvas, Random& random, double stone, float grey) {
       const double w = stone * random.uniform(0.8, 2.4);
       const double gap = 0.018;
       const auto jitter = [&] { return random.uniform(0, 0.03); };
-      canvas.polygon({{x + jitter(), y + jitter()}, {x + w - gap - jitter(), y + jitter()},
-                      {x + w - gap - jitter(), y + h - gap - jitter()}, {x + jitter(), y + h - gap - jitter()}},
+      canvas.polygon({{x + jitter(), y + jitter()},
+                      {x + w - gap - jitter(), y + jitter()},
+                      {x + w - gap - jitter(), y + h - gap - jitter()},
+                      {x + jitter(), y + h - gap - jitter()}},
                      vary(random, grey, 38));
       x += w;
     }
     y += h;
   }
   canvas.add_noise(random.word(), 16, 1.2, 0.012, 0.85f);
-  scatter_specks(canvas, random, 35, 0.008, 0.05, 38);
+  scatter_specks(canvas, random, 19, 0.008, 0.05, 38);
 }
 
 void paint_plaster(Canvas& canvas, Random& random, float grey) {
@@ -79,8 +84,11 @@ void paint_plaster(Canvas& canvas, Random& random, float grey) {
     const double h = random.uniform(0.15, 0.7);
     const double x = random.uniform(-0.2, canvas.width());
     const double y = random.uniform(-0.2, canvas.height());
-    canvas.polygon({{x, y + random.uniform(0, 0.1)}, {x + w, y}, {x + w + random.uniform(-0.1, 0.1), y + h},
-                    {x + 0.4 * w, y + h + random.uniform(-0.1, 0.1)}, {x + random.uniform(0, 0.1), y + h}},
+    canvas.polygon({{x, y + random.uniform(0, 0.1)},
+                    {x + w, y},
+                    {x + w + random.uniform(-0.1, 0.1), y + h},
+                    {x + 0.4 * w, y + h + random.uniform(-0.1, 0.1)},
+                    {x + random.uniform(0, 0.1), y + h}},
                    vary(random, grey, 32));
   }
   canvas.add_noise(random.word(), 16, 2.4, 0.012, 0.82f);
@@ -98,7 +106,7 @@ void paint_plaster(Canvas& canvas, Random& random, float grey) {
       y = ny;
     }
   }
-  scatter_specks(canvas, random, 45, 0.008, 0.07, 42);
+  scatter_specks(canvas, random, 25, 0.008, 0.07, 42);
 }
 
 void paint_planks(Canvas& canvas, Random& random, double plank_width, float grey) {
@@ -119,7 +127,8 @@ void paint_planks(Canvas& canvas, Random& random, double plank_width, float grey
                 vary(random, grey - 25, 25));
   }
   canvas.add_noise(random.word(), 10, 0.6, 0.006, 0.8f);
-  scatter_specks(canvas, random, 3.0 / (plank_width * plank_width), 0.05 * plank_width, 0.25 * plank_width, 45);
+  scatter_specks(canvas, random, 3.0 / (plank_width * plank_width), 0.05 * plank_width, 0.25 * plank_width,
+                 45);
 }
 
 void paint_paving(Canvas& canvas, Random& random, double slab, float grey) {
@@ -130,8 +139,11 @@ void paint_paving(Canvas& canvas, Random& random, double slab, float grey) {
       const double w = slab * (random.chance(0.4) ? random.uniform(1.2, 2.0) : random.uniform(0.6, 1.1));
       const auto j = [&] { return random.uniform(0.0, 0.025); };
       const float tone = vary(random, grey, 36);
-      canvas.polygon({{x + j(), y + j()}, {x + w - 0.02 - j(), y + j()}, {x + w - 0.02 - j(), y + slab - 0.02 - j()},
-                      {x + j(), y + slab - 0.02 - j()}}, tone);
+      canvas.polygon({{x + j(), y + j()},
+                      {x + w - 0.02 - j(), y + j()},
+                      {x + w - 0.02 - j(), y + slab - 0.02 - j()},
+                      {x + j(), y + slab - 0.02 - j()}},
+                     tone);
       if (random.chance(0.3)) {
         const double at = x + w * random.uniform(0.2, 0.8);
         canvas.line(at, y, at + random.uniform(-0.2, 0.2), y + slab, 0.015, tone - 55);
@@ -140,7 +152,7 @@ void paint_paving(Canvas& canvas, Random& random, double slab, float grey) {
     }
   }
   canvas.add_noise(random.word(), 15, 3.0, 0.015, 0.85f);
-  scatter_specks(canvas, random, 40, 0.012, 0.07, 48);
+  scatter_specks(canvas, random, 22, 0.012, 0.07, 48);
 }
 
 void paint_foliage(Canvas& canvas, Random& random, double leaf, float grey) {
@@ -162,11 +174,11 @@ void paint_bark(Canvas& canvas, Random& random, float grey) {
   for (int i = 0; i < ridges; ++i) {
     const double x = random.uniform(0, canvas.width());
     const double y = random.uniform(0, canvas.height());
-    canvas.line(x, y, x + random.uniform(-0.03, 0.03), y + random.uniform(0.05, 0.3), random.uniform(0.008, 0.03),
-                vary(random, grey, 50));
+    canvas.line(x, y, x + random.uniform(-0.03, 0.03), y + random.uniform(0.05, 0.3),
+                random.uniform(0.008, 0.03), vary(random, grey, 50));
   }
   canvas.add_noise(random.word(), 14, 0.4, 0.012, 0.85f);
-  scatter_specks(canvas, random, 60, 0.01, 0.04, 45);
+  scatter_specks(canvas, random, 33, 0.01, 0.04, 45);
 }
 
 void paint_metal(Canvas& canvas, Random& random, float grey) {
@@ -216,7 +228,8 @@ void draw_door(Canvas& canvas, Random& random, double x, double y, double w, dou
       const double px = x + w * (c + 0.12) / columns;
       const double py = y + h * (r + 0.1) / rows;
       canvas.rectangle(px, py, 0.76 * w / columns, 0.8 * h / rows, leaf - 35);
-      canvas.rectangle(px + 0.02, py + 0.02, 0.76 * w / columns - 0.04, 0.8 * h / rows - 0.04, vary(random, leaf + 12, 14));
+      canvas.rectangle(px + 0.02, py + 0.02, 0.76 * w / columns - 0.04, 0.8 * h / rows - 0.04,
+                       vary(random, leaf + 12, 14));
     }
   }
   canvas.disc(x + (random.chance(0.5) ? 0.1 : 0.9) * w, y + 0.53 * h, 0.035, 230);
@@ -234,9 +247,14 @@ void draw_poster(Canvas& canvas, Random& random, double x, double y, double w, d
     const double s = w * random.uniform(0.05, 0.14);
     const float tone = vary(random, 128, 110);
     switch (random.below(3)) {
-      case 0: canvas.disc(cx, cy, s, tone); break;
-      case 1: canvas.rectangle(cx - s, cy - 0.6 * s, 2 * s, 1.2 * s, tone); break;
-      default: canvas.polygon({{cx - s, cy + s}, {cx + s, cy + s * random.uniform(0, 1)}, {cx, cy - s}}, tone);
+      case 0:
+        canvas.disc(cx, cy, s, tone);
+        break;
+      case 1:
+        canvas.rectangle(cx - s, cy - 0.6 * s, 2 * s, 1.2 * s, tone);
+        break;
+      default:
+        canvas.polygon({{cx - s, cy + s}, {cx + s, cy + s * random.uniform(0, 1)}, {cx, cy - s}}, tone);
     }
   }
   const double letter = w * random.uniform(0.06, 0.1);

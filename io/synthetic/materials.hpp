@@ -4,12 +4,13 @@
 
 namespace twofold::synthetic {
 
-/// Painters of surfaces and of things on them. Each draws differently for each state of `random`, so that no two
-/// places of a scene look alike. Sizes in metres.
+/// Painters of surfaces and of things on them. Each draws differently for each state of `random`, so that no
+/// two places of a scene look alike. Sizes in metres.
 
 void paint_bricks(Canvas& canvas, Random& random, double brick_width, double brick_height, float grey);
-void paint_ashlar(Canvas& canvas, Random& random, double stone, float grey);  ///< rows of stones of random sizes
-void paint_plaster(Canvas& canvas, Random& random, float grey);               ///< blotches, cracks, stains, repairs
+void paint_ashlar(Canvas& canvas, Random& random, double stone,
+                  float grey);                                   ///< rows of stones of random sizes
+void paint_plaster(Canvas& canvas, Random& random, float grey);  ///< blotches, cracks, stains, repairs
 void paint_planks(Canvas& canvas, Random& random, double plank_width, float grey);
 void paint_paving(Canvas& canvas, Random& random, double slab, float grey);
 void paint_foliage(Canvas& canvas, Random& random, double leaf, float grey);

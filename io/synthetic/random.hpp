@@ -14,7 +14,8 @@ namespace twofold::synthetic {
 }
 
 /// One random word for each (seed, stream, counter): no state, so the order of evaluation does not matter.
-[[nodiscard]] inline std::uint64_t counter_hash(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter) {
+[[nodiscard]] inline std::uint64_t counter_hash(std::uint64_t seed, std::uint64_t stream,
+                                                std::uint64_t counter) {
   return mix64(mix64(mix64(seed) ^ stream) ^ counter);
 }
 

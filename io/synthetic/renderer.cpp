@@ -12,18 +12,26 @@ namespace {
 constexpr int kTile = 16;  ///< [px]; a multiple of RayPacket::kSize
 
 /// Eight rooks: sub-pixel offsets with distinct rows and columns.
-constexpr std::array<float, 8> kSubX{-0.4375f, -0.3125f, -0.1875f, -0.0625f, 0.0625f, 0.1875f, 0.3125f, 0.4375f};
-constexpr std::array<float, 8> kSubY{-0.0625f, 0.3125f, -0.3125f, 0.1875f, -0.4375f, 0.4375f, -0.1875f, 0.0625f};
+constexpr std::array<float, 8> kSubX{-0.4375f, -0.3125f, -0.1875f, -0.0625f,
+                                     0.0625f,  0.1875f,  0.3125f,  0.4375f};
+constexpr std::array<float, 8> kSubY{-0.0625f, 0.3125f, -0.3125f, 0.1875f,
+                                     -0.4375f, 0.4375f, -0.1875f, 0.0625f};
 constexpr float kSubFootprint = 0.5f;  ///< [px] of one of eight
 
 class ImageCaster {
  public:
   ImageCaster(const PinholeCamera& camera, const ViewGeometry& geometry)
-      : geometry_(geometry), width_(camera.width), height_(camera.height),
-        columns_((camera.width + kTile - 1) / kTile), rows_((camera.height + kTile - 1) / kTile),
-        cx_(static_cast<float>(camera.cx)), cy_(static_cast<float>(camera.cy)),
-        inv_fx_(static_cast<float>(1 / camera.fx)), inv_fy_(static_cast<float>(1 / camera.fy)),
-        tiles_(static_cast<std::size_t>(columns_) * rows_), ids_(height_, width_, CV_32SC1) {
+      : geometry_(geometry),
+        width_(camera.width),
+        height_(camera.height),
+        columns_((camera.width + kTile - 1) / kTile),
+        rows_((camera.height + kTile - 1) / kTile),
+        cx_(static_cast<float>(camera.cx)),
+        cy_(static_cast<float>(camera.cy)),
+        inv_fx_(static_cast<float>(1 / camera.fx)),
+        inv_fy_(static_cast<float>(1 / camera.fy)),
+        tiles_(static_cast<std::size_t>(columns_) * rows_),
+        ids_(height_, width_, CV_32SC1) {
     for (const auto& [id, b] : geometry.visible()) {
       for (int r = b.top / kTile; r <= b.bottom / kTile; ++r)
         for (int c = b.left / kTile; c <= b.right / kTile; ++c) tiles_[r * columns_ + c].push_back(id);
@@ -95,8 +103,8 @@ class ImageCaster {
     auto* out = view.intensity.ptr<float>(y);
     for (int x = 0; x < width_; ++x) {
       out[x] = at_rim(x, y) ? supersample(x, y)
-                            : geometry_.shade(ids[x], ray_x(static_cast<float>(x)), ray_y(static_cast<float>(y)),
-                                              inverse_depth[x], 1.0f);
+                            : geometry_.shade(ids[x], ray_x(static_cast<float>(x)),
+                                              ray_y(static_cast<float>(y)), inverse_depth[x], 1.0f);
     }
   }
 

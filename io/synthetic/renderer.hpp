@@ -17,16 +17,18 @@ struct View {
 
 /// Ray caster with exact depth and filtered textures.
 ///
-/// Each pixel's ray is intersected with the primitives whose outline touches its tile; the hit is shaded through the
-/// texture footprint of the pixel (from the surface's tangent plane). Pixels at the rim of a primitive are replaced
-/// by the mean of eight sub-pixel rays. Rows of tiles run in parallel (TBB); the result does not depend on that.
+/// Each pixel's ray is intersected with the primitives whose outline touches its tile; the hit is shaded
+/// through the texture footprint of the pixel (from the surface's tangent plane). Pixels at the rim of a
+/// primitive are replaced by the mean of eight sub-pixel rays. Rows of tiles run in parallel (TBB); the
+/// result does not depend on that.
 class Renderer {
  public:
   /// scene must outlive the renderer.
   explicit Renderer(const Scene& scene) : scene_(&scene) {}
 
   /// extra: primitives of this instant only (moving objects); their textures belong to the scene.
-  [[nodiscard]] View render(const PinholeCamera& camera, const SE3& T_w_c, const std::vector<Quad>& extra = {}) const;
+  [[nodiscard]] View render(const PinholeCamera& camera, const SE3& T_w_c,
+                            const std::vector<Quad>& extra = {}) const;
 
  private:
   const Scene* scene_;

@@ -33,9 +33,12 @@ std::vector<Quad> box_quads(const SE3& T_w_o, const Vector3& size, int first_tex
   };
   const int t = first_texture;
   // Light falls from above and a little from one side: faces of one box differ, as in daylight.
-  return {{corner(-1, -1, 1), x, -z, size.x(), size.z(), t, 0.92},     {corner(1, -1, 1), y, -z, size.y(), size.z(), t + 1, 0.82},
-          {corner(1, 1, 1), -x, -z, size.x(), size.z(), t + 2, 0.74},  {corner(-1, 1, 1), -y, -z, size.y(), size.z(), t + 3, 0.86},
-          {corner(-1, 1, 1), x, -y, size.x(), size.y(), t + 4, 1.0},   {corner(-1, -1, -1), x, y, size.x(), size.y(), t + 5, 0.6}};
+  return {{corner(-1, -1, 1), x, -z, size.x(), size.z(), t, 0.92},
+          {corner(1, -1, 1), y, -z, size.y(), size.z(), t + 1, 0.82},
+          {corner(1, 1, 1), -x, -z, size.x(), size.z(), t + 2, 0.74},
+          {corner(-1, 1, 1), -y, -z, size.y(), size.z(), t + 3, 0.86},
+          {corner(-1, 1, 1), x, -y, size.x(), size.y(), t + 4, 1.0},
+          {corner(-1, -1, -1), x, y, size.x(), size.y(), t + 5, 0.6}};
 }
 
 }  // namespace twofold::synthetic

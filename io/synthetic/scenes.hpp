@@ -19,9 +19,10 @@ struct Staging {
 };
 
 /// seed changes every texture and small things in the layout; the walls, the path and its length stay.
-[[nodiscard]] Staging make_courtyard(std::uint64_t seed);  ///< 44 m loop between walls, columns and trees
+[[nodiscard]] Staging make_courtyard(std::uint64_t seed);  ///< 40 m loop between walls, columns and trees
 [[nodiscard]] Staging make_desk(std::uint64_t seed);       ///< things on a desk, looked along from 0.7 m
-[[nodiscard]] Staging make_corridor(std::uint64_t seed);   ///< up and down a corridor of 22 m
-[[nodiscard]] Staging make_descent(std::uint64_t seed);    ///< straight down onto a cratered surface, 10 m to 1 m
+[[nodiscard]] Staging make_corridor(std::uint64_t seed);   ///< up and down a corridor of 24 m
+[[nodiscard]] Staging make_descent(
+    std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
 
 }  // namespace twofold::synthetic

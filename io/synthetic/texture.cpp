@@ -9,8 +9,8 @@
 namespace twofold::synthetic {
 namespace {
 
-/// log2 of a positive normal number, exact at powers of two and linear between them (error < 0.09): enough to blend
-/// two pyramid levels, and the same on every machine.
+/// log2 of a positive normal number, exact at powers of two and linear between them (error < 0.09): enough to
+/// blend two pyramid levels, and the same on every machine.
 float coarse_log2(float x) {
   const auto bits = std::bit_cast<std::uint32_t>(x);
   const auto exponent = static_cast<int>(bits >> 23) - 127;
@@ -19,8 +19,8 @@ float coarse_log2(float x) {
 }
 
 struct Ellipse {
-  float major = 0, minor = 0;        ///< lengths of the axes [texel/px]
-  float major_u = 0, major_v = 0;    ///< the major axis itself [texel/px]
+  float major = 0, minor = 0;      ///< lengths of the axes [texel/px]
+  float major_u = 0, major_v = 0;  ///< the major axis itself [texel/px]
 };
 
 /// Image of the unit circle of a pixel: singular values and first left singular vector of the 2x2 footprint.

@@ -14,9 +14,10 @@ struct TexelFootprint {
 
 /// Grey-level texture with its pyramid of 2x2 means, read through an elliptical footprint.
 ///
-/// A surface must look the same from any distance and angle, or sub-pixel trackers measure the renderer instead of
-/// the scene. So a pixel's footprint, an ellipse in the texture, is covered by up to kMaxProbes trilinear probes
-/// along its major axis, each about as wide as the minor one  (the scheme of McCormack et al., "Feline", 1999).
+/// A surface must look the same from any distance and angle, or sub-pixel trackers measure the renderer
+/// instead of the scene. So a pixel's footprint, an ellipse in the texture, is covered by up to kMaxProbes
+/// trilinear probes along its major axis, each about as wide as the minor one  (the scheme of McCormack et
+/// al., "Feline", 1999).
 class Texture {
  public:
   static constexpr int kMaxProbes = 8;
@@ -24,7 +25,8 @@ class Texture {
   /// canvas: CV_32FC1 in grey levels, at least 2x2; clamped to [0, 255] and stored with eight bits.
   explicit Texture(const cv::Mat& canvas);
 
-  /// Mean grey level under the footprint around (u, v); texel (0, 0) has its centre at (0, 0). Clamps at the rim.
+  /// Mean grey level under the footprint around (u, v); texel (0, 0) has its centre at (0, 0). Clamps at the
+  /// rim.
   [[nodiscard]] float sample(float u, float v, const TexelFootprint& footprint) const;
 
   [[nodiscard]] int width() const { return levels_.front().width; }

@@ -11,7 +11,7 @@ namespace {
 enum Kind : std::int32_t { kQuad, kCylinder, kSphere, kHeightField };
 constexpr int kKindShift = 24;
 constexpr std::int32_t kIndexMask = (1 << kKindShift) - 1;
-constexpr double kNear = 0.02;          ///< [m]
+constexpr double kNear = 0.02;  ///< [m]
 constexpr int kHeightIterations = 24;
 constexpr float kHeightTolerance = 1e-5f;  ///< [m]
 
@@ -39,9 +39,14 @@ std::vector<Vector3> clip_near(const std::vector<Vector3>& polygon) {
 
 ViewGeometry::ViewGeometry(const Scene& scene, const std::vector<Quad>& extra, const PinholeCamera& camera,
                            const SE3& T_w_c)
-    : camera_(camera), T_w_c_(T_w_c), T_c_w_(T_w_c.inverse()), R_w_c_(T_w_c.rotation().cast<float>()),
-      eye_(T_w_c.translation().cast<float>()), sky_zenith_(static_cast<float>(scene.sky_zenith)),
-      sky_horizon_(static_cast<float>(scene.sky_horizon)), height_fields_(&scene.height_fields),
+    : camera_(camera),
+      T_w_c_(T_w_c),
+      T_c_w_(T_w_c.inverse()),
+      R_w_c_(T_w_c.rotation().cast<float>()),
+      eye_(T_w_c.translation().cast<float>()),
+      sky_zenith_(static_cast<float>(scene.sky_zenith)),
+      sky_horizon_(static_cast<float>(scene.sky_horizon)),
+      height_fields_(&scene.height_fields),
       textures_(&scene.textures) {
   const Matrix3 R = T_w_c.rotation();
   dx_ = form_of(R.row(0));
@@ -67,8 +72,9 @@ void ViewGeometry::add_visible(std::int32_t id, const std::vector<Vector3>& outl
   }
   if (right < -1 || bottom < -1 || left > camera_.width || top > camera_.height) return;
   const auto clamp = [](double v, int high) { return static_cast<int>(std::clamp(v, 0.0, high - 1.0)); };
-  visible_.push_back({id, {clamp(left - 1, camera_.width), clamp(top - 1, camera_.height),
-                           clamp(right + 2, camera_.width), clamp(bottom + 2, camera_.height)}});
+  visible_.push_back({id,
+                      {clamp(left - 1, camera_.width), clamp(top - 1, camera_.height),
+                       clamp(right + 2, camera_.width), clamp(bottom + 2, camera_.height)}});
 }
 
 void ViewGeometry::add_quad(const Scene& scene, const Quad& quad) {
@@ -78,17 +84,17 @@ void ViewGeometry::add_quad(const Scene& scene, const Quad& quad) {
   const Vector3 q_c = R_c_w * quad.q_axis;
   const Vector3 n_c = s_c.cross(q_c);
   const double distance = n_c.dot(origin_c);  // n . x = distance on the plane
-  if (distance >= -1e-6) return;              // seen from behind or edge-on
+  if (distance <= 1e-6) return;               // seen from behind or edge-on
   const std::int32_t id = make_id(kQuad, quads_.size());
   const auto before = visible_.size();
   const Vector3 s = quad.width * s_c;
   const Vector3 q = quad.height * q_c;
   add_visible(id, clip_near({origin_c, origin_c + s, origin_c + s + q, origin_c + q}));
   if (visible_.size() == before) return;
-  quads_.push_back({form_of(n_c / distance), form_of(s_c), form_of(q_c), static_cast<float>(s_c.dot(origin_c)),
-                    static_cast<float>(q_c.dot(origin_c)), static_cast<float>(quad.width),
-                    static_cast<float>(quad.height), &scene.textures[quad.texture],
-                    static_cast<float>(quad.brightness)});
+  quads_.push_back({form_of(n_c / distance), form_of(s_c), form_of(q_c),
+                    static_cast<float>(s_c.dot(origin_c)), static_cast<float>(q_c.dot(origin_c)),
+                    static_cast<float>(quad.width), static_cast<float>(quad.height),
+                    &scene.textures[quad.texture], static_cast<float>(quad.brightness)});
 }
 
 void ViewGeometry::add_cylinder(const Scene& scene, const Cylinder& cylinder) {
@@ -139,10 +145,14 @@ void ViewGeometry::add_sphere(const Scene& scene, const Sphere& sphere) {
 void ViewGeometry::intersect(std::int32_t id, RayPacket& rays) const {
   const std::int32_t index = id & kIndexMask;
   switch (id >> kKindShift) {
-    case kQuad: return intersect_quad(quads_[index], id, rays);
-    case kCylinder: return intersect_cylinder(cylinders_[index], id, rays);
-    case kSphere: return intersect_sphere(spheres_[index], id, rays);
-    default: return intersect_height_field((*height_fields_)[index], id, rays);
+    case kQuad:
+      return intersect_quad(quads_[index], id, rays);
+    case kCylinder:
+      return intersect_cylinder(cylinders_[index], id, rays);
+    case kSphere:
+      return intersect_sphere(spheres_[index], id, rays);
+    default:
+      return intersect_height_field((*height_fields_)[index], id, rays);
   }
 }
 
@@ -209,7 +219,8 @@ void ViewGeometry::intersect_height_field(const HeightField& f, std::int32_t id,
     const float dy = dy_(rays.x[k], rays.y[k]);
     const float dz = dz_(rays.x[k], rays.y[k]);
     if (dz >= -1e-3f) continue;
-    // Contracts by |slope| tan(angle to the vertical) each time; the neighbouring ray's height is a good start.
+    // Contracts by |slope| tan(angle to the vertical) each time; the neighbouring ray's height is a good
+    // start.
     float height = start;
     float t = 0;
     for (int i = 0; i < kHeightIterations; ++i) {
@@ -241,7 +252,8 @@ ViewGeometry::SurfacePoint ViewGeometry::on_quad(const QuadForm& f, float x, flo
 }
 
 TexelFootprint ViewGeometry::project_footprint(const Eigen::Vector3f& normal, const Eigen::Vector3f& grad_u,
-                                               const Eigen::Vector3f& grad_v, float x, float y, float t) const {
+                                               const Eigen::Vector3f& grad_v, float x, float y,
+                                               float t) const {
   const Eigen::Vector3f d = R_w_c_ * Eigen::Vector3f(x, y, 1);
   const float facing = std::min(normal.dot(d), -1e-3f * normal.norm());  // bounded at the silhouette
   const Eigen::Vector3f along_x = t * (R_w_c_.col(0) - normal.dot(R_w_c_.col(0)) / facing * d);
@@ -284,7 +296,8 @@ ViewGeometry::SurfacePoint ViewGeometry::on_sphere(const SphereForm& f, float x,
           project_footprint(p, grad_u, grad_v, x, y, t), f.brightness};
 }
 
-ViewGeometry::SurfacePoint ViewGeometry::on_height_field(const HeightField& f, float x, float y, float t) const {
+ViewGeometry::SurfacePoint ViewGeometry::on_height_field(const HeightField& f, float x, float y,
+                                                         float t) const {
   const float px = eye_.x() + t * dx_(x, y);
   const float py = eye_.y() + t * dy_(x, y);
   const auto h = static_cast<float>(f.spacing);
@@ -303,10 +316,14 @@ float ViewGeometry::shade(std::int32_t id, float x, float y, float inverse_depth
   const float t = 1 / inverse_depth;
   const SurfacePoint point = [&] {
     switch (id >> kKindShift) {
-      case kQuad: return on_quad(quads_[index], x, y, t);
-      case kCylinder: return on_cylinder(cylinders_[index], x, y, t);
-      case kSphere: return on_sphere(spheres_[index], x, y, t);
-      default: return on_height_field((*height_fields_)[index], x, y, t);
+      case kQuad:
+        return on_quad(quads_[index], x, y, t);
+      case kCylinder:
+        return on_cylinder(cylinders_[index], x, y, t);
+      case kSphere:
+        return on_sphere(spheres_[index], x, y, t);
+      default:
+        return on_height_field((*height_fields_)[index], x, y, t);
     }
   }();
   const float sx = footprint / static_cast<float>(camera_.fx);

@@ -10,8 +10,8 @@
 
 namespace twofold::synthetic {
 
-/// Eight rays (x, y, 1) of the camera, and the nearest surface each has met so far. Loops over it have no branches,
-/// so that a compiler turns them into vector instructions.
+/// Eight rays (x, y, 1) of the camera, and the nearest surface each has met so far. Loops over it have no
+/// branches, so that a compiler turns them into vector instructions.
 struct RayPacket {
   static constexpr int kSize = 8;
   static constexpr std::int32_t kSky = -1;
@@ -32,11 +32,12 @@ struct PixelBounds {
   int left = 0, top = 0, right = -1, bottom = -1;
 };
 
-/// A scene seen by one camera: every primitive as the coefficients its intersection with a ray (x, y, 1) needs.
-/// Positions are taken relative to the camera in double before they are rounded to float.
+/// A scene seen by one camera: every primitive as the coefficients its intersection with a ray (x, y, 1)
+/// needs. Positions are taken relative to the camera in double before they are rounded to float.
 class ViewGeometry {
  public:
-  ViewGeometry(const Scene& scene, const std::vector<Quad>& extra, const PinholeCamera& camera, const SE3& T_w_c);
+  ViewGeometry(const Scene& scene, const std::vector<Quad>& extra, const PinholeCamera& camera,
+               const SE3& T_w_c);
 
   /// Primitives that may be visible, and where.
   struct Visible {
@@ -94,14 +95,15 @@ class ViewGeometry {
   [[nodiscard]] SurfacePoint on_height_field(const HeightField& f, float x, float y, float t) const;
   /// Footprint from the gradients of u and v along the surface, through its tangent plane.
   [[nodiscard]] TexelFootprint project_footprint(const Eigen::Vector3f& normal, const Eigen::Vector3f& grad_u,
-                                                 const Eigen::Vector3f& grad_v, float x, float y, float t) const;
+                                                 const Eigen::Vector3f& grad_v, float x, float y,
+                                                 float t) const;
   [[nodiscard]] float sky(float x, float y) const;
 
   PinholeCamera camera_;
   SE3 T_w_c_, T_c_w_;
   RayForm dx_, dy_, dz_;  ///< ray in world axes
   Eigen::Matrix3f R_w_c_;
-  Eigen::Vector3f eye_;   ///< camera centre, world
+  Eigen::Vector3f eye_;  ///< camera centre, world
   float sky_zenith_, sky_horizon_;
   std::vector<QuadForm> quads_;
   std::vector<CylinderForm> cylinders_;

@@ -115,12 +115,14 @@ TEST(ScheduleLog, ErrorsNameTheSection) {
   damaged = good;
   damaged[good.size() - 1] ^= 1;
   EXPECT_NE(error(damaged).find("section 'loop closer' is damaged"), std::string::npos) << error(damaged);
-  damaged.assign(good.begin(), good.end() - 2);
-  EXPECT_NE(error(damaged).find("section 'loop closer'"), std::string::npos) << error(damaged);
+  const std::vector<std::uint8_t> cut(good.begin(), good.end() - 2);
+  EXPECT_NE(error(cut).find("section 'loop closer'"), std::string::npos) << error(cut);
 }
 
 TEST(ScheduleLog, OversizedCountsAreRefusedBeforeMemoryIsTaken) {
-  std::vector<std::uint8_t> file = {'T', 'W', 'F', 'S', 'C', 'H', 'E', 'D', 1, 3, 1};
+  const std::string header("TWFSCHED\1\3\1");
+  std::vector<std::uint8_t> file(header.begin(), header.end());
+  file.reserve(64);
   for (int i = 0; i < 2; ++i) {  // 2^63 - 1 records in as many bytes
     for (int k = 0; k < 8; ++k) file.push_back(0xFF);
     file.push_back(0x7F);

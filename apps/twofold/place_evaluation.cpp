@@ -1,0 +1,315 @@
+#include "apps/twofold/place_evaluation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "io/image_file.hpp"
+#include "io/io_error.hpp"
+#include "io/open_source.hpp"
+#include "io/plot.hpp"
+#include "loopclosure/geometric_verification.hpp"
+#include "loopclosure/place_recogniser.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Truth : std::uint8_t { kSame, kOther, kUndecided };
+
+struct Place {
+  PlaceView view;
+  std::optional<SE3> T_w_c;
+};
+
+struct PlaceSet {
+  Rig rig;
+  std::vector<Place> places;
+};
+
+/// The best answer to one query.
+struct Answer {
+  int query = 0;
+  int place = -1;
+  double score = 0;      ///< relative to the score with the image before
+  bool verified = false;
+  SE3 T_query_place;     ///< when verified
+};
+
+PlaceSet load_images(const fs::path& folder, int every, const Vocabulary& vocabulary) {
+  PlaceSet set;
+  set.rig.kind = SensorKind::kMono;
+  PlaceDescriber describer(set.rig, {});
+  const std::vector<fs::path> files = list_images(folder);
+  FrameImages images;
+  for (std::size_t i = 0; i < files.size(); i += static_cast<std::size_t>(every)) {
+    images.left.build(read_grey_image(files[i]));
+    set.places.push_back({describer.describe(images, vocabulary), std::nullopt});
+  }
+  return set;
+}
+
+std::optional<SE3> pose_at(const Trajectory& truth, std::int64_t t_ns) {
+  const auto after = std::lower_bound(truth.begin(), truth.end(), t_ns,
+                                      [](const TimedPose& pose, std::int64_t t) { return pose.t_ns < t; });
+  std::optional<SE3> best;
+  std::int64_t best_ns = 20'000'000;
+  for (auto it = after == truth.begin() ? after : after - 1; it != truth.end() && it <= after; ++it) {
+    const std::int64_t distance = std::abs(it->t_ns - t_ns);
+    if (distance > best_ns) continue;
+    best_ns = distance;
+    best = it->T_w_c;
+  }
+  return best;
+}
+
+PlaceSet load_source(const std::string& text, int every, const Vocabulary& vocabulary) {
+  const auto source = open_source(text);
+  PlaceSet set;
+  set.rig = source->rig();
+  PlaceDescriber describer(set.rig, {});
+  Frame frame;
+  FrameImages images;
+  FrameStatus status;
+  while ((status = source->next(frame)) == FrameStatus::kFrame) {
+    if (frame.index % every != 0) continue;
+    images.left.build(frame.left);
+    if (set.rig.kind == SensorKind::kStereo) images.right.build(frame.right);
+    images.depth = frame.depth;
+    set.places.push_back(
+        {describer.describe(images, vocabulary), pose_at(source->ground_truth(), frame.t_ns)});
+  }
+  if (status == FrameStatus::kError) throw IoError(source->error());
+  return set;
+}
+
+PlaceSet load_set(const PlaceEvaluationArguments& arguments, const Vocabulary& vocabulary) {
+  const fs::path folder = arguments.set;
+  if (fs::is_directory(folder / "images")) return load_images(folder / "images", arguments.every, vocabulary);
+  return load_source(arguments.set, arguments.every, vocabulary);
+}
+
+/// Which images show the same place.
+class TruePairs {
+ public:
+  TruePairs(const PlaceEvaluationArguments& arguments, const PlaceSet& set) : arguments_(arguments), set_(set) {
+    if (arguments.pairs.empty()) {
+      for (const Place& place : set.places) {
+        if (!place.T_w_c) throw IoError(arguments.set, "has no true poses: give the true pairs with --pairs");
+      }
+      return;
+    }
+    std::string text = arguments.pairs;
+    if (fs::is_regular_file(text)) {
+      std::ifstream in(text);
+      text.assign(std::istreambuf_iterator<char>(in), {});
+    }
+    parse(text);
+  }
+
+  [[nodiscard]] Truth of(int a, int b) const {
+    if (arguments_.pairs.empty()) return from_poses(a, b);
+    for (int i = a - arguments_.tolerance; i <= a + arguments_.tolerance; ++i) {
+      for (int j = b - arguments_.tolerance; j <= b + arguments_.tolerance; ++j) {
+        if (pairs_.contains({i, j}) || pairs_.contains({j, i})) return Truth::kSame;
+      }
+    }
+    return Truth::kOther;
+  }
+
+ private:
+  void parse(const std::string& text) {
+    std::string plain;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) plain += line.substr(0, line.find('#')) + "\n";
+    for (char& c : plain) {
+      if (c == ',' || c == '-') c = c == ',' ? '\n' : ' ';
+    }
+    std::istringstream in(plain);
+    for (std::string line; std::getline(in, line);) {
+      std::istringstream fields(line);
+      int i = 0, j = 0;
+      if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+      if (!(fields >> i >> j) || i < 1 || j < 1) throw IoError("--pairs", fmt::format("'{}' is no pair", line));
+      pairs_.insert({i - 1, j - 1});
+    }
+    if (pairs_.empty()) throw IoError("--pairs", "no pairs");
+  }
+
+  /// Between the bounds and twice the bounds both answers are right: part of the view is shared.
+  [[nodiscard]] Truth from_poses(int a, int b) const {
+    const SE3 T_a_b = set_.places[static_cast<std::size_t>(a)].T_w_c->inverse() *
+                      *set_.places[static_cast<std::size_t>(b)].T_w_c;
+    const double distance = T_a_b.translation().norm();
+    const double angle =
+        std::acos(std::clamp(T_a_b.rotation()(2, 2), -1.0, 1.0)) * 180 / std::numbers::pi;
+    if (distance <= arguments_.max_distance && angle <= arguments_.max_angle_deg) return Truth::kSame;
+    if (distance > 2.5 * arguments_.max_distance || angle > 2.5 * arguments_.max_angle_deg) return Truth::kOther;
+    return Truth::kUndecided;
+  }
+
+  const PlaceEvaluationArguments& arguments_;
+  const PlaceSet& set_;
+  std::set<std::pair<int, int>> pairs_;
+};
+
+std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSet& set,
+                        const Vocabulary& vocabulary) {
+  PlaceIndex index(vocabulary.word_count());
+  VisitedSet excluded;
+  std::vector<Answer> answers;
+  const RecogniserOptions recogniser;
+  const bool has_depth = set.rig.kind != SensorKind::kMono;
+  for (int i = 0; i < static_cast<int>(set.places.size()); ++i) {
+    const PlaceView& view = set.places[static_cast<std::size_t>(i)].view;
+    if (i > arguments.gap) {
+      const int added = i - arguments.gap - 1;
+      index.add(KeyframeId{static_cast<std::uint32_t>(added)}, set.places[static_cast<std::size_t>(added)].view.bag);
+    }
+    excluded.reset(0);
+    const auto candidates =
+        index.query(view.bag, excluded, static_cast<std::size_t>(recogniser.max_candidates));
+    if (candidates.empty()) continue;
+    const double reference = bag_score(view.bag, set.places[static_cast<std::size_t>(std::max(i - 1, 0))].view.bag);
+    Answer answer;
+    answer.query = i;
+    answer.place = static_cast<int>(twofold::index(candidates[0].keyframe));
+    answer.score = candidates[0].score / std::max(reference, 1e-6);
+    for (const PlaceCandidate& candidate : candidates) {
+      if (!has_depth) break;
+      const auto place = static_cast<int>(twofold::index(candidate.keyframe));
+      const auto verified = verify_place(set.rig, set.places[static_cast<std::size_t>(place)].view, view, {});
+      if (!verified) continue;
+      answer.verified = true;
+      answer.place = place;
+      answer.T_query_place = verified->T_b_a;
+      break;
+    }
+    answers.push_back(answer);
+    if (answer.verified) continue;
+  }
+  return answers;
+}
+
+struct Counts {
+  int right = 0, wrong = 0;
+  [[nodiscard]] double precision() const { return right + wrong > 0 ? 1.0 * right / (right + wrong) : 1.0; }
+};
+
+/// Queries that have a true place among the images they were compared with.
+int answerable(const PlaceEvaluationArguments& arguments, const PlaceSet& set, const TruePairs& truth) {
+  int count = 0;
+  for (int i = 0; i < static_cast<int>(set.places.size()); ++i) {
+    bool any = false;
+    for (int j = 0; j < i - arguments.gap && !any; ++j) any = truth.of(i, j) == Truth::kSame;
+    count += any ? 1 : 0;
+  }
+  return count;
+}
+
+void count(const TruePairs& truth, const Answer& answer, Counts& counts) {
+  const Truth t = truth.of(answer.query, answer.place);
+  counts.right += t == Truth::kSame ? 1 : 0;
+  counts.wrong += t == Truth::kOther ? 1 : 0;
+}
+
+void print_recognition(std::vector<Answer> answers, const TruePairs& truth, int possible,
+                       std::vector<std::pair<double, double>>& curve) {
+  std::stable_sort(answers.begin(), answers.end(), [](const Answer& a, const Answer& b) { return a.score > b.score; });
+  Counts counts;
+  double recall_at_full_precision = 0, full_precision_threshold = 0;
+  Counts at_threshold;
+  for (const Answer& answer : answers) {
+    count(truth, answer, counts);
+    const double recall = std::min(1.0, 1.0 * counts.right / std::max(1, possible));
+    curve.emplace_back(recall, counts.precision());
+    if (counts.wrong == 0) {
+      recall_at_full_precision = recall;
+      full_precision_threshold = answer.score;
+    }
+    if (answer.score >= RecogniserOptions().min_score) at_threshold = counts;
+  }
+  fmt::print("recognition alone      at {:.2f}: precision {:.3f}, recall {:.3f} ({} right, {} wrong)\n",
+             RecogniserOptions().min_score, at_threshold.precision(),
+             std::min(1.0, 1.0 * at_threshold.right / std::max(1, possible)), at_threshold.right, at_threshold.wrong);
+  fmt::print("                       recall at 100 % precision {:.3f} (threshold {:.3f})\n",
+             recall_at_full_precision, full_precision_threshold);
+}
+
+void print_verified(const std::vector<Answer>& answers, const PlaceSet& set, const TruePairs& truth,
+                    int possible) {
+  Counts counts;
+  std::vector<double> errors_m, errors_deg;
+  int undecided = 0;
+  for (const Answer& answer : answers) {
+    if (!answer.verified) continue;
+    count(truth, answer, counts);
+    undecided += truth.of(answer.query, answer.place) == Truth::kUndecided ? 1 : 0;
+    const auto& T_w_q = set.places[static_cast<std::size_t>(answer.query)].T_w_c;
+    const auto& T_w_p = set.places[static_cast<std::size_t>(answer.place)].T_w_c;
+    if (!T_w_q || !T_w_p) continue;
+    const SE3 error = answer.T_query_place * T_w_p->inverse() * *T_w_q;
+    errors_m.push_back(error.translation().norm());
+    errors_deg.push_back(error.log().tail<3>().norm() * 180 / std::numbers::pi);
+  }
+  fmt::print("after verification     precision {:.3f}, recall {:.3f} ({} right, {} wrong, {} share part of the view)\n",
+             counts.precision(), std::min(1.0, 1.0 * counts.right / std::max(1, possible)), counts.right,
+             counts.wrong, undecided);
+  if (errors_m.empty()) return;
+  std::sort(errors_m.begin(), errors_m.end());
+  std::sort(errors_deg.begin(), errors_deg.end());
+  fmt::print("pose of the closures   error median {:.3f} m, {:.2f} deg; worst {:.3f} m, {:.2f} deg\n",
+             errors_m[errors_m.size() / 2], errors_deg[errors_deg.size() / 2], errors_m.back(),
+             errors_deg.back());
+}
+
+/// Precision over recall in [0, 1]^2.
+cv::Mat draw(const std::string& title, const std::vector<std::pair<double, double>>& curve) {
+  constexpr int kSide = 400, kMargin = 50;
+  cv::Mat image(kSide + 2 * kMargin, kSide + 2 * kMargin, CV_8UC3, cv::Scalar::all(255));
+  const auto at = [&](double recall, double precision) {
+    return cv::Point(kMargin + static_cast<int>(recall * kSide), kMargin + static_cast<int>((1 - precision) * kSide));
+  };
+  for (int tick = 0; tick <= 5; ++tick) {
+    const double x = 0.2 * tick;
+    cv::line(image, at(x, 0), at(x, 1), cv::Scalar::all(220));
+    cv::line(image, at(0, x), at(1, x), cv::Scalar::all(220));
+    cv::putText(image, fmt::format("{:.1f}", x), at(x, 0) + cv::Point(-10, 18), cv::FONT_HERSHEY_SIMPLEX, 0.4, {});
+    cv::putText(image, fmt::format("{:.1f}", x), at(0, x) + cv::Point(-30, 4), cv::FONT_HERSHEY_SIMPLEX, 0.4, {});
+  }
+  for (std::size_t i = 1; i < curve.size(); ++i) {
+    cv::line(image, at(curve[i - 1].first, curve[i - 1].second), at(curve[i].first, curve[i].second),
+             plot_colours::kFinal, 2, cv::LINE_AA);
+  }
+  cv::putText(image, "recall", at(0.45, 0) + cv::Point(0, 38), cv::FONT_HERSHEY_SIMPLEX, 0.5, {});
+  cv::putText(image, "precision: " + title, cv::Point(10, 30), cv::FONT_HERSHEY_SIMPLEX, 0.45, {});
+  return image;
+}
+
+}  // namespace
+
+void evaluate_places(const PlaceEvaluationArguments& arguments, const Vocabulary& vocabulary) {
+  const PlaceSet set = load_set(arguments, vocabulary);
+  const TruePairs truth(arguments, set);
+  const std::vector<Answer> answers = ask(arguments, set, vocabulary);
+  const int possible = answerable(arguments, set, truth);
+  fmt::print("{}\n{} images, {} of them show a place seen before\n", arguments.set, set.places.size(), possible);
+  std::vector<std::pair<double, double>> curve;
+  print_recognition(answers, truth, possible, curve);
+  if (set.rig.kind != SensorKind::kMono) print_verified(answers, set, truth, possible);
+  if (!arguments.plot.empty()) {
+    const fs::path folder = fs::path(arguments.set).lexically_normal();
+    write_png(arguments.plot, draw(folder.filename().string(), curve));
+  }
+}
+
+}  // namespace twofold

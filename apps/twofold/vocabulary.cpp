@@ -1,0 +1,215 @@
+#include "loopclosure/vocabulary.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "apps/twofold/place_evaluation.hpp"
+#include "engine/clock.hpp"
+#include "io/image_file.hpp"
+#include "io/io_error.hpp"
+#include "io/open_source.hpp"
+#include "io/plot.hpp"
+#include "loopclosure/corner_selection.hpp"
+#include "loopclosure/default_vocabulary.hpp"
+#include "loopclosure/vocabulary_trainer.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Thesis 6.4.2: training images give 500 to 2000 corners each.
+constexpr int kTrainingCorners = 1000;
+constexpr int kTrainingSide = 1024;  // longer side of a training image [px]
+
+struct TrainArguments {
+  std::vector<std::string> inputs;
+  std::string out;
+  int every = 1;
+  VocabularyTrainerOptions options;
+};
+
+Vocabulary vocabulary_or_default(const std::string& file) {
+  if (file.empty()) return load_default_vocabulary();
+  try {
+    return Vocabulary::load(file);
+  } catch (const std::runtime_error& error) {
+    throw IoError(error.what());
+  }
+}
+
+cv::Mat reduced(const cv::Mat& image) {
+  const double scale = static_cast<double>(kTrainingSide) / std::max(image.cols, image.rows);
+  if (scale >= 1) return image;
+  cv::Mat small;
+  cv::resize(image, small, cv::Size(), scale, scale, cv::INTER_AREA);
+  return small;
+}
+
+class ImageDescriber {
+ public:
+  explicit ImageDescriber(int wanted) : selector_({.wanted = wanted}) {}
+
+  std::vector<DescribedCorner> describe(const cv::Mat& image) {
+    pyramid_.build(image);
+    std::vector<DescribedCorner> corners;
+    selector_.select(pyramid_, corners);
+    describer_.describe(pyramid_, corners);
+    return corners;
+  }
+
+ private:
+  CornerSelector selector_;
+  CornerDescriber describer_;
+  ImagePyramid pyramid_;
+};
+
+/// A photograph as a whole, and its quarters at twice the scale if it has the pixels: one image would show a
+/// few things only, and only as they look from afar.
+template <class Use>
+void use_photograph(const cv::Mat& image, const Use& use) {
+  use(reduced(image));
+  if (std::max(image.cols, image.rows) < 2 * kTrainingSide) return;
+  const cv::Size half(image.cols / 2, image.rows / 2);
+  for (const cv::Point corner : {cv::Point(0, 0), cv::Point(half.width, 0), cv::Point(0, half.height),
+                                 cv::Point(half.width, half.height)}) {
+    use(reduced(image(cv::Rect(corner, half))));
+  }
+}
+
+/// Calls `use` with each image of an input: an image file, a folder of images, or a source of frames.
+template <class Use>
+void for_each_image(const std::string& input, int every, const Use& use) {
+  if (fs::is_regular_file(input)) return use_photograph(read_grey_image(input), use);
+  if (fs::is_directory(input)) {
+    const std::vector<fs::path> files = list_images(input);
+    for (std::size_t i = 0; i < files.size(); i += static_cast<std::size_t>(every)) {
+      use_photograph(read_grey_image(files[i]), use);
+    }
+    return;
+  }
+  const auto source = open_source(input);
+  Frame frame;
+  FrameStatus status;
+  while ((status = source->next(frame)) == FrameStatus::kFrame) {
+    if (frame.index % every == 0) use(frame.left);
+  }
+  if (status == FrameStatus::kError) throw IoError(source->error());
+}
+
+void train(const TrainArguments& arguments) {
+  ImageDescriber describer(kTrainingCorners);
+  std::vector<std::vector<BinaryDescriptor>> images;
+  std::size_t corners = 0;
+  for (const std::string& input : arguments.inputs) {
+    for_each_image(input, arguments.every, [&](const cv::Mat& image) {
+      images.emplace_back();
+      for (const DescribedCorner& corner : describer.describe(image)) {
+        images.back().push_back(corner.descriptor);
+      }
+      corners += images.back().size();
+    });
+  }
+  const Vocabulary vocabulary = train_vocabulary(images, arguments.options);
+  vocabulary.save(arguments.out);
+  fmt::print("{} images, {} corners: {} words, depth {}, {} bytes, written to {}\n", images.size(), corners,
+             vocabulary.word_count(), vocabulary.depth(), fs::file_size(arguments.out), arguments.out);
+}
+
+void print_info(const std::string& file) {
+  const std::int64_t begin_ns = steady_now_ns();
+  const Vocabulary vocabulary = vocabulary_or_default(file);
+  const double ms = static_cast<double>(steady_now_ns() - begin_ns) * 1e-6;
+  double least = 1e9, most = 0, sum = 0;
+  for (const Vocabulary::Node& node : vocabulary.nodes()) {
+    if (node.child_count > 0) continue;
+    least = std::min<double>(least, node.idf);
+    most = std::max<double>(most, node.idf);
+    sum += node.idf;
+  }
+  fmt::print("words   {}\nnodes   {}\ndepth   {}\nidf     {:.3f} to {:.3f}, mean {:.3f}\nloaded  in {:.2f} ms\n",
+             vocabulary.word_count(), vocabulary.nodes().size(), vocabulary.depth(), least, most,
+             sum / static_cast<double>(vocabulary.word_count()), ms);
+}
+
+void print_score(const std::string& file, const std::string& a, const std::string& b) {
+  const Vocabulary vocabulary = vocabulary_or_default(file);
+  ImageDescriber describer(CornerSelectionOptions().wanted);
+  const auto corners_a = describer.describe(reduced(read_grey_image(a)));
+  const auto corners_b = describer.describe(reduced(read_grey_image(b)));
+  fmt::print("{:.6f}\n", bag_score(vocabulary.bag(corners_a), vocabulary.bag(corners_b)));
+}
+
+void add_train(CLI::App& parent, int& exit_code) {
+  auto arguments = std::make_shared<TrainArguments>();
+  CLI::App* command = parent.add_subcommand("train", "Learn words from images");
+  command->add_option("IMAGES", arguments->inputs, "Image files, folders of them, or sources of frames")
+      ->required();
+  command->add_option("-o,--out", arguments->out, "File to write")->required();
+  command->add_option("--every", arguments->every, "Take each Nth image of folders and sources")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--branching", arguments->options.branching)->check(CLI::Range(2, 64))->capture_default_str();
+  command->add_option("--levels", arguments->options.levels)->check(CLI::Range(1, 6))->capture_default_str();
+  command->add_option("--seed", arguments->options.seed)->capture_default_str();
+  command->callback([arguments, &exit_code] {
+    train(*arguments);
+    exit_code = kOk;
+  });
+}
+
+void add_evaluate(CLI::App& parent, const std::shared_ptr<std::string>& file, int& exit_code) {
+  auto arguments = std::make_shared<PlaceEvaluationArguments>();
+  CLI::App* command = parent.add_subcommand(
+      "evaluate", "Precision and recall on a set of places: recognition alone, and after verification");
+  command->add_option("SET", arguments->set, "Folder of images in order of time, or a source with true poses")
+      ->required();
+  command->add_option("--pairs", arguments->pairs,
+                      "True pairs of a set without poses: a file of 'i j' lines (1-based), or 1-10,2-3");
+  command->add_option("--tolerance", arguments->tolerance, "Images that far from a true pair's are true too")
+      ->capture_default_str();
+  command->add_option("--gap", arguments->gap, "Images that near in time are never candidates")
+      ->capture_default_str();
+  command->add_option("--max-distance", arguments->max_distance, "Between cameras at the same place [m]")
+      ->capture_default_str();
+  command->add_option("--max-angle", arguments->max_angle_deg, "Between their optical axes [deg]")
+      ->capture_default_str();
+  command->add_option("--every", arguments->every, "Take each Nth frame")->check(CLI::PositiveNumber);
+  command->add_option("--plot", arguments->plot, "Draw precision over recall to this PNG file");
+  command->callback([arguments, file, &exit_code] {
+    evaluate_places(*arguments, vocabulary_or_default(*file));
+    exit_code = kOk;
+  });
+}
+
+}  // namespace
+
+void add_vocabulary_command(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("vocabulary", "Visual words: train, inspect, try");
+  command->require_subcommand(1);
+  auto file = std::make_shared<std::string>();
+  command->add_option("--vocabulary", *file, "Vocabulary file instead of the built-in one");
+  add_train(*command, exit_code);
+  CLI::App* info = command->add_subcommand("info", "Size and weights");
+  info->callback([file, &exit_code] {
+    print_info(*file);
+    exit_code = kOk;
+  });
+  CLI::App* score = command->add_subcommand("score", "Likeness of two images, 0 to 1");
+  auto images = std::make_shared<std::pair<std::string, std::string>>();
+  score->add_option("A", images->first, "image file")->required();
+  score->add_option("B", images->second, "image file")->required();
+  score->callback([file, images, &exit_code] {
+    print_score(*file, images->first, images->second);
+    exit_code = kOk;
+  });
+  add_evaluate(*command, file, exit_code);
+}
+
+}  // namespace twofold

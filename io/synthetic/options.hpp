@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "camera/rig.hpp"
+
+namespace twofold::synthetic {
+
+/// What to render and how the camera spoils it.
+struct SyntheticOptions {
+  std::string scene = "courtyard";  ///< one of scene_names()
+  SensorKind sensor = SensorKind::kStereo;
+  int width = 640;         ///< [px] 32 .. 4096
+  int height = 480;        ///< [px] 32 .. 4096
+  double f = 420;          ///< focal length [px] > 0
+  double baseline = 0.11;  ///< [m] > 0; RGB-D: of the virtual right camera
+  double fps = 30;         ///< (0, 1000]
+  double rounds = 2;       ///< times around, or back and forth > 0
+  int frames = 0;          ///< 0: as many as the rounds take; else the walk is cut or goes on
+  std::uint64_t seed = 1;  ///< of textures and noise
+  double noise = 2;        ///< standard deviation [grey levels] 0 .. 50
+  double depth_noise = 1;  ///< RGB-D: factor on the sensor's depth noise, 0 .. 10
+  double blur = 0;         ///< exposure time as a share of the frame interval, 0 .. 1
+  double exposure = 0;     ///< amplitude of the changes of gain, 0 .. 0.9
+  bool object = false;     ///< something moves through the scene
+  double drop = 0;         ///< share of frames lost, 0 .. 0.9; the first is always there
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+[[nodiscard]] const std::vector<std::string>& scene_names();
+
+/// The usual camera of a scene; throws std::invalid_argument for an unknown scene.
+[[nodiscard]] SyntheticOptions default_options(const std::string& scene);
+
+}  // namespace twofold::synthetic

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "camera/frame.hpp"
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+#include "io/synthetic/options.hpp"
+#include "io/synthetic/renderer.hpp"
+#include "io/synthetic/scenes.hpp"
+
+namespace twofold::synthetic {
+
+/// A rendered recording with exact ground truth. Frames are numbered 0 .. frame_count() - 1 here; lost frames
+/// are not counted but leave a gap in Frame::index. Rendering is const and may be called from several
+/// threads; the same options give the same bytes.
+class SyntheticSequence {
+ public:
+  /// Throws std::invalid_argument with options.invalid_reason().
+  explicit SyntheticSequence(const SyntheticOptions& options);
+
+  [[nodiscard]] int frame_count() const { return static_cast<int>(indices_.size()); }
+  [[nodiscard]] const Rig& rig() const { return rig_; }
+  [[nodiscard]] std::int64_t index(int i) const { return indices_[i]; }
+  [[nodiscard]] std::int64_t t_ns(int i) const;
+  /// Pose of the left camera in the middle of the exposure.
+  [[nodiscard]] SE3 T_w_c(int i) const;
+
+  /// The images as the sensor delivers them.
+  [[nodiscard]] Frame render(int i) const;
+  /// The left view without noise, gain or blur, with exact depth.
+  [[nodiscard]] View exact_view(int i) const;
+
+ private:
+  [[nodiscard]] double seconds(int i) const;
+  /// View at time t of a camera shifted by right_m along the rig's x axis.
+  [[nodiscard]] View view_at(double t, double right_m) const;
+  [[nodiscard]] cv::Mat blurred(int i, double right_m) const;
+  [[nodiscard]] double gain(int i) const;
+
+  SyntheticOptions options_;
+  Rig rig_;
+  Staging staging_;
+  std::vector<std::int64_t> indices_;
+};
+
+}  // namespace twofold::synthetic

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "io/frame_source.hpp"
+
+namespace twofold {
+
+/// synthetic:SCENE?key=value&...  Scenes: corridor, courtyard, descent, desk. Keys, with their ranges and
+/// defaults in io/synthetic/options.hpp: sensor (stereo, rgbd, mono), width, height, f, baseline, fps,
+/// rounds, frames, seed, noise, depth_noise, blur, exposure, object, drop. f follows width when only width is
+/// given.
+///
+/// Throws IoError naming the scene or key and what is wrong with it.
+[[nodiscard]] std::unique_ptr<FrameSource> open_synthetic(
+    const std::string& scene, const std::map<std::string, std::string>& parameters);
+
+}  // namespace twofold

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "imaging/fast_corners.hpp"
+#include "loopclosure/binary_descriptor.hpp"
+
+namespace twofold {
+
+struct CornerSelectionOptions {
+  int wanted = 500;      ///< corners of a keyframe at most, over all levels (thesis 6.4.2: 500 to 2000)
+  int levels = 3;        ///< pyramid levels searched, in [1, 3]
+  int threshold = 8;     ///< FAST [grey]
+  float min_score = 6;   ///< Shi-Tomasi, see Corner
+};
+
+/// Picks the corners of an image that describe its place: each level is parted into cells, each cell gives
+/// its best corner, so that a busy corner of the image does not speak for the rest; the strongest are kept.
+/// A level gets cells in proportion to its share of the corners wanted, half as many as the level below.
+///
+/// Keeps buffers between calls; one instance a thread.
+class CornerSelector {
+ public:
+  explicit CornerSelector(const CornerSelectionOptions& options);
+
+  /// Corners without angle and descriptor, strongest first within a level, levels ascending. All of them are
+  /// far enough from the border of their level to be described.
+  void select(const ImagePyramid& pyramid, std::vector<DescribedCorner>& corners);
+
+ private:
+  CornerSelectionOptions options_;
+  std::vector<Corner> found_;
+  std::vector<std::uint8_t> free_cells_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,25 @@
+#include "loopclosure/default_vocabulary.hpp"
+
+// The file's bytes, put between two labels by the assembler.
+__asm__(
+    ".section .rodata\n"
+    ".balign 16\n"
+    "twofold_vocabulary_begin:\n"
+    ".incbin \"" TWOFOLD_VOCABULARY_FILE
+    "\"\n"
+    "twofold_vocabulary_end:\n"
+    ".byte 0\n"
+    ".text\n");
+
+extern "C" {
+extern const std::uint8_t twofold_vocabulary_begin[];
+extern const std::uint8_t twofold_vocabulary_end[];
+}
+
+namespace twofold {
+
+Vocabulary load_default_vocabulary() {
+  return Vocabulary::parse({twofold_vocabulary_begin, twofold_vocabulary_end}, "built-in vocabulary");
+}
+
+}  // namespace twofold

@@ -1,0 +1,106 @@
+#include "loopclosure/loop_closer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kCheckedForCulling = 64;  // views a step
+
+LoopCloserOptions validated(const LoopCloserOptions& options) {
+  if (const std::string reason = options.invalid_reason(); !reason.empty()) {
+    throw std::runtime_error("loop closer options: " + reason);
+  }
+  return options;
+}
+
+}  // namespace
+
+std::string LoopCloserOptions::invalid_reason() const {
+  if (corners.levels < 1 || corners.levels > 3) {
+    return fmt::format("corners.levels must be 1, 2 or 3, is {}", corners.levels);
+  }
+  if (corners.wanted < 1) return fmt::format("corners.wanted must be >= 1, is {}", corners.wanted);
+  if (recogniser.max_candidates < 1) {
+    return fmt::format("recogniser.max_candidates must be >= 1, is {}", recogniser.max_candidates);
+  }
+  return verification.invalid_reason();
+}
+
+LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary,
+                       const LoopCloserOptions& options)
+    : rig_(rig),
+      vocabulary_(std::move(vocabulary)),
+      options_(validated(options)),
+      describer_(rig, options.corners),
+      recogniser_(vocabulary_->word_count(), options.recogniser) {}
+
+std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
+  report_ = {};
+  forget_culled(graph);
+  if (!graph.contains(keyframe.id) || graph.keyframe(keyframe.id).culled()) return std::nullopt;
+  PlaceView view = describer_.describe(keyframe.images, *vocabulary_);
+  report_.corners = static_cast<int>(view.corners.size());
+  report_.with_depth = static_cast<int>(
+      std::count_if(view.z.begin(), view.z.end(), [](const auto& z) { return std::isfinite(z.z()); }));
+
+  const double likeness = likeness_with_previous(keyframe.id, view.bag);
+  const auto candidates = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
+  report_.candidates = static_cast<int>(candidates.size());
+  std::optional<LoopConstraint> loop;
+  for (const PlaceCandidate& candidate : candidates) {
+    ++report_.tried;
+    const PlaceView& before = *views_[index(candidate.keyframe)];
+    const auto verified = verify_place(rig_, before, view, options_.verification);
+    if (!verified) continue;
+    loop = LoopConstraint{graph.version(), candidate.keyframe, keyframe.id, verified->T_b_a,
+                          verified->inliers};
+    break;
+  }
+  remember(keyframe.id, std::move(view));
+  return loop;
+}
+
+std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, const GraphSnapshot& graph) {
+  const PlaceView view = describer_.describe(images, *vocabulary_);
+  const auto candidates =
+      recogniser_.query_anywhere(view.bag, static_cast<std::size_t>(options_.relocalisation_candidates));
+  for (const PlaceCandidate& candidate : candidates) {
+    if (!graph.contains(candidate.keyframe) || graph.keyframe(candidate.keyframe).culled()) continue;
+    const auto verified =
+        verify_place(rig_, *views_[index(candidate.keyframe)], view, options_.verification);
+    if (verified) return Relocalisation{candidate.keyframe, verified->T_b_a, verified->inliers};
+  }
+  return std::nullopt;
+}
+
+/// How much this scene's neighbouring views look alike; 0 at the start of a map.
+double LoopCloser::likeness_with_previous(KeyframeId id, const BagOfWords& bag) const {
+  if (previous_ == kNoKeyframe || previous_ >= id || !views_[index(previous_)]) return 0;
+  return bag_score(bag, views_[index(previous_)]->bag);
+}
+
+void LoopCloser::remember(KeyframeId id, PlaceView view) {
+  recogniser_.add(id, view.bag);
+  if (views_.size() <= index(id)) views_.resize(index(id) + 1);
+  views_[index(id)] = std::make_unique<const PlaceView>(std::move(view));
+  previous_ = id;
+}
+
+/// A bounded number of views is looked at each step, so that memory follows the map and no step is long.
+void LoopCloser::forget_culled(const GraphSnapshot& graph) {
+  for (std::size_t n = 0; n < std::min(kCheckedForCulling, views_.size()); ++n) {
+    next_checked_ = next_checked_ + 1 < views_.size() ? next_checked_ + 1 : 0;
+    const KeyframeId id{static_cast<std::uint32_t>(next_checked_)};
+    auto& view = views_[next_checked_];
+    if (!view || id == previous_ || !graph.contains(id) || !graph.keyframe(id).culled()) continue;
+    recogniser_.remove(id, view->bag);
+    view.reset();
+  }
+}
+
+}  // namespace twofold

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "graph/keyframe_proposal.hpp"
+#include "graph/loop_constraint.hpp"
+#include "loopclosure/geometric_verification.hpp"
+#include "loopclosure/place_recogniser.hpp"
+
+namespace twofold {
+
+struct LoopCloserOptions {
+  CornerSelectionOptions corners;
+  RecogniserOptions recogniser;
+  VerificationOptions verification;
+  int relocalisation_candidates = 8;  ///< places tried for a lost camera
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Where a lost camera is: p_c = T_c_k * p_k.
+struct Relocalisation {
+  KeyframeId keyframe = kNoKeyframe;
+  SE3 T_c_k;
+  int inliers = 0;
+};
+
+/// What one step did, for statistics.
+struct LoopCloserReport {
+  int corners = 0;     ///< described
+  int with_depth = 0;  ///< of them
+  int candidates = 0;  ///< places that appearance, topology and the keyframes before agreed about
+  int tried = 0;       ///< of them, until one was verified
+};
+
+/// Large-scale loop closure  (thesis 6.4.2), and relocalisation.
+///
+/// Remembers how the place of every keyframe looks. Reads snapshots, changes nothing: a loop goes to the
+/// mapper as a message. Single-threaded; the same calls give the same answers. A step's cost grows with the
+/// inverted file's lists only.
+class LoopCloser {
+ public:
+  LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
+
+  /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be
+  /// called in the order of keyframe ids; ids may be left out.
+  [[nodiscard]] std::optional<LoopConstraint> step(const KeyframeProposal& keyframe,
+                                                   const GraphSnapshot& graph);
+
+  /// Place of a view of a lost camera, from its images alone.
+  [[nodiscard]] std::optional<Relocalisation> relocalise(const FrameImages& images,
+                                                         const GraphSnapshot& graph);
+
+  [[nodiscard]] const LoopCloserReport& last_report() const { return report_; }
+
+ private:
+  [[nodiscard]] double likeness_with_previous(KeyframeId id, const BagOfWords& bag) const;
+  void forget_culled(const GraphSnapshot& graph);
+  void remember(KeyframeId id, PlaceView view);
+
+  Rig rig_;
+  std::shared_ptr<const Vocabulary> vocabulary_;
+  LoopCloserOptions options_;
+  PlaceDescriber describer_;
+  PlaceRecogniser recogniser_;
+  std::vector<std::unique_ptr<const PlaceView>> views_;  // by keyframe; null: never described, or culled
+  KeyframeId previous_ = kNoKeyframe;
+  std::size_t next_checked_ = 0;  // for culling: views are looked through in turn
+  LoopCloserReport report_;
+};
+
+}  // namespace twofold

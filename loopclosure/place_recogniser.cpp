@@ -1,0 +1,48 @@
+#include "loopclosure/place_recogniser.hpp"
+
+#include <algorithm>
+
+namespace twofold {
+
+PlaceRecogniser::PlaceRecogniser(std::size_t word_count, const RecogniserOptions& options)
+    : options_(options), index_(word_count) {}
+
+std::vector<PlaceCandidate> PlaceRecogniser::recognise(KeyframeId id, const BagOfWords& bag,
+                                                       double reference_score, const GraphSnapshot& graph) {
+  std::vector<PlaceCandidate> confirmed;
+  std::vector<Hypothesis> hypotheses;
+  if (reference_score >= options_.min_reference) {
+    exclude_near(id, graph);
+    for (const PlaceCandidate& candidate :
+         index_.query(bag, excluded_, static_cast<std::size_t>(options_.max_candidates))) {
+      if (candidate.score < options_.min_score * reference_score) break;  // best first
+      int length = 1;
+      for (const Hypothesis& before : hypotheses_) {
+        if (same_place(before.keyframe, candidate.keyframe, graph)) length = std::max(length, before.length + 1);
+      }
+      hypotheses.push_back({candidate.keyframe, length});
+      if (length >= options_.consistency) confirmed.push_back(candidate);
+    }
+  }
+  hypotheses_ = std::move(hypotheses);
+  return confirmed;
+}
+
+std::vector<PlaceCandidate> PlaceRecogniser::query_anywhere(const BagOfWords& bag, std::size_t max_count) {
+  excluded_.reset(0);
+  return index_.query(bag, excluded_, max_count);
+}
+
+/// Keyframes newer than the snapshot are near too: they were made just now.
+void PlaceRecogniser::exclude_near(KeyframeId id, const GraphSnapshot& graph) {
+  weighted_breadth_first(graph, id, static_cast<std::size_t>(options_.near_keyframes), excluded_, near_);
+  if (near_.empty()) excluded_.reset(graph.keyframe_count());
+}
+
+bool PlaceRecogniser::same_place(KeyframeId a, KeyframeId b, const GraphSnapshot& graph) const {
+  const auto distance = static_cast<std::int64_t>(index(a)) - static_cast<std::int64_t>(index(b));
+  if (std::abs(distance) <= options_.same_place) return true;
+  return graph.contains(a) && graph.contains(b) && find_edge(graph.keyframe(a), b) != nullptr;
+}
+
+}  // namespace twofold

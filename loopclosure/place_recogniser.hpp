@@ -1,0 +1,61 @@
+#pragma once
+
+#include <vector>
+
+#include "graph/snapshot.hpp"
+#include "loopclosure/place_index.hpp"
+
+namespace twofold {
+
+struct RecogniserOptions {
+  int near_keyframes = 60;     ///< this many around the query by breadth-first search are never candidates
+  int max_candidates = 5;      ///< of a query
+  double min_score = 0.4;      ///< of a candidate, relative to the score with the keyframe before
+  double min_reference = 0.05; ///< score with the keyframe before below which the query says nothing
+  int consistency = 2;         ///< successive keyframes that must agree about the place, >= 1
+  int same_place = 6;          ///< keyframes this many edges-or-numbers apart show the same place
+};
+
+/// Hypotheses of places seen before, by appearance and topology  (thesis 6.4.2).
+///
+/// A candidate must be topologically distant (near places are the metric loop closure's work), look as much
+/// like the query as `min_score` of what two neighbouring keyframes look alike, which takes the scene's own
+/// texture out of the threshold, and be confirmed by the keyframes before, which must have had a candidate at
+/// the same place.
+class PlaceRecogniser {
+ public:
+  PlaceRecogniser(std::size_t word_count, const RecogniserOptions& options);
+
+  /// Adds a keyframe to the index.
+  void add(KeyframeId id, const BagOfWords& bag) { index_.add(id, bag); }
+  void remove(KeyframeId id, const BagOfWords& bag) { index_.remove(id, bag); }
+
+  /// Candidates for the keyframe `id` (not added yet, or added), best first. To be called for keyframes in
+  /// the order they were made: the calls before are what a candidate must be consistent with.
+  /// @param reference_score  bag_score with the keyframe before; scores are relative to it
+  [[nodiscard]] std::vector<PlaceCandidate> recognise(KeyframeId id, const BagOfWords& bag,
+                                                      double reference_score, const GraphSnapshot& graph);
+
+  /// Candidates anywhere in the map, best first, without the tests that need a history: for a lost camera.
+  [[nodiscard]] std::vector<PlaceCandidate> query_anywhere(const BagOfWords& bag, std::size_t max_count);
+
+  [[nodiscard]] const PlaceIndex& index() const { return index_; }
+
+ private:
+  /// A place that the last queries agreed about.
+  struct Hypothesis {
+    KeyframeId keyframe;
+    int length;  ///< successive queries that had it
+  };
+
+  void exclude_near(KeyframeId id, const GraphSnapshot& graph);
+  [[nodiscard]] bool same_place(KeyframeId a, KeyframeId b, const GraphSnapshot& graph) const;
+
+  RecogniserOptions options_;
+  PlaceIndex index_;
+  VisitedSet excluded_;
+  std::vector<TreeNode> near_;
+  std::vector<Hypothesis> hypotheses_;
+};
+
+}  // namespace twofold

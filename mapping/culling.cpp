@@ -1,0 +1,153 @@
+#include "mapping/culling.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/inverse_depth.hpp"
+#include "mapping/edges.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kMinObservers = 2;
+constexpr double kViewBorderPx = 30;
+constexpr double kMinViewCosine = 0.9;
+constexpr double kMaxScaleChange = 1.5;
+
+bool has_lost_its_anchor(const GraphSnapshot& graph, PointId id) {
+  const Keyframe& anchor = graph.keyframe(graph.point(id).anchor);
+  return !anchor.culled() && !find_observation(anchor, id);
+}
+
+/// n and the heir still meet without the culled keyframe: directly, or in a common neighbour.
+bool in_touch(const Keyframe& n, const Keyframe& heir, KeyframeId culled) {
+  if (find_edge(n, heir.id)) return true;
+  for (const Edge& edge : *n.edges) {
+    if (edge.other != culled && find_edge(heir, edge.other)) return true;
+  }
+  return false;
+}
+
+const Edge& strongest_edge(const Keyframe& keyframe) {
+  return *std::max_element(keyframe.edges->begin(), keyframe.edges->end(), [](const Edge& a, const Edge& b) {
+    return a.weight != b.weight ? a.weight < b.weight : b.other < a.other;
+  });
+}
+
+/// Edges from the heir to neighbours of `id` that reach it through `id` alone.
+void keep_connected(GraphWriter& writer, KeyframeId id, KeyframeId heir) {
+  const GraphSnapshot& graph = writer.graph();
+  const std::shared_ptr<const EdgeList> edges = graph.keyframe(id).edges;
+  const Edge& to_heir = *find_edge(graph.keyframe(id), heir);
+  const SE3 T_id_heir = relative_pose(graph, id, to_heir).inverse();
+  for (const Edge& edge : *edges) {
+    if (edge.other == heir || in_touch(graph.keyframe(edge.other), graph.keyframe(heir), id)) continue;
+    const SE3 T_other_heir = relative_pose(graph, id, edge) * T_id_heir;
+    link_marginalised(writer, heir, edge.other, std::max(1, std::min(edge.weight, to_heir.weight)),
+                      T_other_heir);
+  }
+}
+
+}  // namespace
+
+int remove_measurements(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers) {
+  std::vector<PointId> points, suspects;
+  for (std::size_t n = 0; n < outliers.size(); ++n) {
+    points.push_back(outliers[n].point);
+    suspects.push_back(outliers[n].point);
+    if (n + 1 < outliers.size() && outliers[n + 1].keyframe == outliers[n].keyframe) continue;
+    writer.remove_observations(outliers[n].keyframe, points);
+    points.clear();
+  }
+  int culled = 0;
+  for (const PointId id : suspects) {
+    const MapPoint& point = writer.graph().point(id);
+    if (!point.alive()) continue;
+    if (point.observers->size() >= kMinObservers && !has_lost_its_anchor(writer.graph(), id)) continue;
+    writer.cull_point(id);
+    ++culled;
+  }
+  return culled;
+}
+
+bool is_redundant(const GraphSnapshot& graph, KeyframeId id, const CullingOptions& options) {
+  const auto& observations = *graph.keyframe(id).observations;
+  const auto total = static_cast<double>(observations.size());
+  const int allowed = static_cast<int>(std::floor((1 - options.redundant_share) * total + 1e-9));
+  int own = 0;  // points that others do not see well enough
+  for (const Observation& observation : observations) {
+    int others = 0;
+    for (const KeyframeId observer : *graph.point(observation.point).observers) {
+      if (observer == id) continue;
+      if (find_observation(graph.keyframe(observer), observation.point)->level > observation.level) continue;
+      if (++others == options.redundant_observers) break;
+    }
+    if (others < options.redundant_observers && ++own > allowed) return false;
+  }
+  return true;
+}
+
+int remove_keyframe(GraphWriter& writer, KeyframeId id) {
+  TWOFOLD_CHECK(!writer.graph().keyframe(id).edges->empty(), "a keyframe without neighbours has no heir");
+  const KeyframeId heir = strongest_edge(writer.graph().keyframe(id)).other;
+  keep_connected(writer, id, heir);
+  const std::shared_ptr<const ObservationList> observations = writer.graph().keyframe(id).observations;
+  writer.cull_keyframe(id, heir);
+  int culled = 0;
+  for (const Observation& observation : *observations) {
+    if (writer.graph().point(observation.point).observers->size() >= kMinObservers) continue;
+    writer.cull_point(observation.point);
+    ++culled;
+  }
+  return culled;
+}
+
+std::vector<KeyframeId> cull_redundant_keyframes(GraphWriter& writer, const DoubleWindow& window,
+                                                 const CullingOptions& options, int& culled_points) {
+  std::vector<KeyframeId> candidates, culled;
+  const GraphSnapshot& graph = writer.graph();
+  for (std::size_t n = 0; n < window.inner; ++n) candidates.push_back(window.nodes[n].id);
+  std::sort(candidates.rbegin(), candidates.rend());
+  for (const KeyframeId id : candidates) {
+    if (static_cast<int>(culled.size()) == options.max_keyframes) break;
+    if (index(id) + static_cast<std::size_t>(options.keep_recent) >= graph.keyframe_count()) continue;
+    if (id == graph.reference() || graph.keyframe(id).culled() || graph.keyframe(id).edges->empty()) continue;
+    if (!is_redundant(graph, id, options)) continue;
+    culled_points += remove_keyframe(writer, id);
+    culled.push_back(id);
+  }
+  return culled;
+}
+
+bool PointCuller::in_view(const GraphSnapshot& graph, const MapPoint& point, PointId id,
+                          KeyframeId newest) const {
+  const SE3& T_k_w = graph.keyframe(newest).T_k_w;
+  const SE3 T_w_a = graph.T_k_w(point.anchor).inverse();
+  const Vector3 x_w = graph.position(id);
+  const Vector3 x_k = T_k_w * x_w;
+  if (!(x_k.z() > 1e-3) || !rig_.camera.contains(rig_.camera.project(x_k), kViewBorderPx)) return false;
+  const Vector3 from_anchor = x_w - T_w_a.translation();
+  const Vector3 from_here = x_w - T_k_w.inverse().translation();
+  const double ratio = from_anchor.norm() / from_here.norm();
+  return ratio < kMaxScaleChange && ratio * kMaxScaleChange > 1 &&
+         from_anchor.dot(from_here) > kMinViewCosine * from_anchor.norm() * from_here.norm();
+}
+
+int PointCuller::step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) {
+  if (misses_.size() < writer.graph().point_count()) misses_.resize(writer.graph().point_count(), 0);
+  int culled = 0;
+  for (const PointId id : points) {
+    const MapPoint& point = writer.graph().point(id);
+    if (!point.alive() || point.observers->size() > kMinObservers) continue;
+    std::uint8_t& misses = misses_[index(id)];
+    if (std::binary_search(point.observers->begin(), point.observers->end(), newest)) {
+      misses = 0;
+    } else if (in_view(writer.graph(), point, id, newest) && ++misses >= options_.max_misses) {
+      writer.cull_point(id);
+      ++culled;
+    }
+  }
+  return culled;
+}
+
+}  // namespace twofold

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "graph/graph_writer.hpp"
+#include "mapping/double_window.hpp"
+#include "mapping/options.hpp"
+#include "mapping/window_builder.hpp"
+
+namespace twofold {
+
+/// Removes measurements (sorted by keyframe, then point), and points that are left with fewer than two
+/// observers or lost the measurement of their anchor. Returns the number of points culled.
+int remove_measurements(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers);
+
+/// A keyframe is redundant when `redundant_share` of its points are seen by at least `redundant_observers`
+/// other keyframes on the same or a finer pyramid level.
+[[nodiscard]] bool is_redundant(const GraphSnapshot& graph, KeyframeId id, const CullingOptions& options);
+
+/// Takes a keyframe out of the graph. Its strongest neighbour becomes its heir. Neighbours that would lose
+/// touch with the heir get an edge to it, composed along the culled keyframe, so that the graph stays
+/// connected; points left with fewer than two observers are culled. Returns the number of points culled.
+int remove_keyframe(GraphWriter& writer, KeyframeId id);
+
+/// Culls redundant keyframes of the inner window, newest first, so that what is already mapped stays and
+/// moving in a mapped place does not grow the map. Returns the keyframes culled.
+std::vector<KeyframeId> cull_redundant_keyframes(GraphWriter& writer, const DoubleWindow& window,
+                                                 const CullingOptions& options, int& culled_points);
+
+/// Finds points that add nothing: seen from two keyframes only, and not seen again from keyframe after
+/// keyframe that had them well in view.
+class PointCuller {
+ public:
+  PointCuller(const Rig& rig, const CullingOptions& options) : rig_(rig), options_(options) {}
+
+  /// Judges the given points by the keyframe that was inserted last. Returns the number of points culled.
+  int step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points);
+
+ private:
+  [[nodiscard]] bool in_view(const GraphSnapshot& graph, const MapPoint& point, PointId id,
+                             KeyframeId newest) const;
+
+  Rig rig_;
+  CullingOptions options_;
+  std::vector<std::uint8_t> misses_;  ///< by point, since it was last seen
+};
+
+}  // namespace twofold

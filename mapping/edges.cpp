@@ -1,0 +1,86 @@
+#include "mapping/edges.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace twofold {
+namespace {
+
+double mean_depth(const Keyframe& a, const Keyframe& b) {
+  return std::max(0.5 * (a.median_depth + b.median_depth), 1e-6);
+}
+
+}  // namespace
+
+void covisible_keyframes(const GraphSnapshot& graph, KeyframeId id, IdMap& counts,
+                         std::vector<Covisible>& result) {
+  counts.clear();
+  result.clear();
+  for (const Observation& observation : *graph.keyframe(id).observations) {
+    for (const KeyframeId observer : *graph.point(observation.point).observers) {
+      if (observer == id) continue;
+      int at = counts.find(observer);
+      if (at < 0) {
+        at = static_cast<int>(result.size());
+        counts.set(observer, at);
+        result.push_back({observer, 0});
+      }
+      ++result[static_cast<std::size_t>(at)].points;
+    }
+  }
+  std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+}
+
+int shared_points(const Keyframe& a, const Keyframe& b) {
+  int shared = 0;
+  auto i = a.observations->begin(), j = b.observations->begin();
+  while (i != a.observations->end() && j != b.observations->end()) {
+    if (i->point < j->point) {
+      ++i;
+    } else if (j->point < i->point) {
+      ++j;
+    } else {
+      ++shared, ++i, ++j;
+    }
+  }
+  return shared;
+}
+
+double parallax(const Keyframe& a, const Keyframe& b, const SE3& T_b_a) {
+  return T_b_a.translation().norm() / mean_depth(a, b);
+}
+
+void link(GraphWriter& writer, KeyframeId from, KeyframeId to, int weight) {
+  const Keyframe& a = writer.graph().keyframe(from);
+  const Keyframe& b = writer.graph().keyframe(to);
+  Edge edge;
+  edge.other = to;
+  edge.weight = weight;
+  edge.parallax = parallax(a, b, b.T_k_w * a.T_k_w.inverse());
+  writer.set_edge(from, edge);
+}
+
+void link_marginalised(GraphWriter& writer, KeyframeId from, KeyframeId to, int weight,
+                       const SE3& T_to_from) {
+  Edge edge;
+  edge.other = to;
+  edge.weight = weight;
+  edge.marginalised = true;
+  edge.T_other_this = T_to_from;
+  edge.parallax = parallax(writer.graph().keyframe(from), writer.graph().keyframe(to), T_to_from);
+  writer.set_edge(from, edge);
+}
+
+Matrix6 edge_information(const Keyframe& from, const Keyframe& to, const Edge& edge, double focal_px,
+                         const EdgeInformationOptions& options) {
+  const double ideal = focal_px / (std::numbers::sqrt2 * options.sigma_px);
+  const double lambda_rot = options.rot_share * ideal;
+  const double lambda_trans = options.trans_share * ideal / mean_depth(from, to);
+  Vector6 diagonal;
+  diagonal.head<3>().setConstant(lambda_trans * lambda_trans);
+  diagonal.tail<3>().setConstant(lambda_rot * lambda_rot);
+  return std::max(1, edge.weight) * diagonal.asDiagonal();
+}
+
+}  // namespace twofold

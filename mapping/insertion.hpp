@@ -1,0 +1,35 @@
+#pragma once
+
+#include "graph/graph_writer.hpp"
+#include "graph/keyframe_proposal.hpp"
+#include "mapping/double_window.hpp"
+#include "mapping/edges.hpp"
+#include "mapping/id_map.hpp"
+#include "mapping/options.hpp"
+
+namespace twofold {
+
+struct InsertionReport {
+  int observations = 0;          ///< accepted
+  int dropped_observations = 0;  ///< of points that are unknown or culled
+  int new_points = 0;
+  int edges = 0;
+};
+
+/// Adding a keyframe and registering it locally  (thesis 6.2.6). The new keyframe becomes the reference.
+///
+/// Its pose hangs on the present pose of the proposal's reference (through its heir, if that was culled in
+/// the meantime). Edges go to the keyframes of `consistent` that share at least theta points with it, at
+/// least one to its strongest neighbour there or to the proposal's reference, so that the graph stays
+/// connected. `consistent` are the keyframes whose absolute poses agree with one another; the new one joins.
+/// If the reference is none of them, the set starts anew around the reference.
+InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, int theta,
+                                IdMap& consistent, IdMap& counts);
+
+/// Second half of local registration, once all poses of the window agree: edges to keyframes of the double
+/// window that share at least theta points with `id` but were not at hand when it was inserted. Returns the
+/// number of edges added.
+int register_in_window(GraphWriter& writer, KeyframeId id, const DoubleWindow& window, int theta,
+                       IdMap& counts);
+
+}  // namespace twofold

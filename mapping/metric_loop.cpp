@@ -1,0 +1,193 @@
+#include "mapping/metric_loop.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "geometry/inverse_depth.hpp"
+#include "mapping/edges.hpp"
+#include "mapping/loop_consensus.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kColumns = 8;
+constexpr int kRows = 6;
+
+}  // namespace
+
+PointSearch guided_point_search(const Rig& rig, double radius_px) {
+  GuidedSearchOptions options;
+  options.radius_px = radius_px;
+  return [rig, options](const FrameImages& images, PointId, const MapPoint& point, const SE3& T_k_a) {
+    return point.appearance ? find_point(images, rig, *point.appearance, point.psi, T_k_a, options)
+                            : std::nullopt;
+  };
+}
+
+MetricLoopCloser::MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search)
+    : rig_(rig),
+      theta_(options.theta),
+      options_(options.loop),
+      sigma_scale_(options.sigma_scale),
+      search_(std::move(search)) {}
+
+MetricLoopReport MetricLoopCloser::close(GraphWriter& writer, const DoubleWindow& window,
+                                         const FrameImages& images) {
+  MetricLoopReport report;
+  split_neighbourhoods(writer.graph(), window);
+  if (far_.empty()) return report;
+  collect_candidates(writer.graph());
+  report.searched = static_cast<int>(candidates_.size());
+  if (report.searched < theta_) return report;
+  search_candidates(writer.graph(), images);
+  report.found = static_cast<int>(found_.size());
+  if (report.found < theta_) return report;
+  const auto T_loop_w = estimate_pose(writer.graph().keyframe(reference_).T_k_w);
+  if (!T_loop_w) return report;
+  prune(*T_loop_w);
+  report.agreed = static_cast<int>(found_.size());
+  if (report.agreed < theta_) return report;
+  connect(writer, *T_loop_w, report);
+  return report;
+}
+
+void MetricLoopCloser::split_neighbourhoods(const GraphSnapshot& graph, const DoubleWindow& window) {
+  reference_ = graph.reference();
+  near_.clear();
+  far_.clear();
+  direct_neighbours(graph, reference_, graph.keyframe(reference_).edges->size() + 1, near_);  // eq. 6.5
+  const std::size_t count = std::min(static_cast<std::size_t>(options_.neighbourhood), window.nodes.size());
+  for (std::size_t n = 0; n < count; ++n) {
+    const KeyframeId id = window.nodes[n].id;
+    if (id != reference_ && !find_edge(graph.keyframe(reference_), id)) far_.push_back(id);
+  }
+}
+
+/// A: points seen from N2 but not from N1 that should be visible in the reference keyframe, spread evenly
+/// over its image.
+void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
+  near_points_.clear();
+  candidates_.clear();
+  visible_points(graph, near_, visited_, near_points_);
+  std::array<int, kColumns * kRows> taken{};
+  const int per_cell = (options_.max_searches + kColumns * kRows - 1) / (kColumns * kRows);
+  for (const KeyframeId id : far_) {
+    for (const Observation& observation : *graph.keyframe(id).observations) {
+      if (!visited_.insert(index(observation.point))) continue;
+      const MapPoint& point = graph.point(observation.point);
+      const Vector3 x_w = graph.position(observation.point);
+      Vector2 uv;
+      if (!well_visible(graph, point, x_w, uv)) continue;
+      const int column = static_cast<int>(uv.x() * kColumns / rig_.camera.width);
+      const int row = static_cast<int>(uv.y() * kRows / rig_.camera.height);
+      int& in_cell = taken[static_cast<std::size_t>(row * kColumns + column)];
+      if (in_cell == per_cell) continue;
+      ++in_cell;
+      candidates_.push_back({observation.point, x_w});
+    }
+  }
+}
+
+bool MetricLoopCloser::well_visible(const GraphSnapshot& graph, const MapPoint& point, const Vector3& x_w,
+                                    Vector2& uv) const {
+  const SE3& T_ref_w = graph.keyframe(reference_).T_k_w;
+  const Vector3 x_ref = T_ref_w * x_w;
+  if (!(x_ref.z() > 1e-3)) return false;
+  uv = rig_.camera.project(x_ref);
+  if (!rig_.camera.contains(uv, options_.border_px)) return false;
+  const Vector3 from_anchor = x_w - graph.T_k_w(point.anchor).inverse().translation();
+  const Vector3 from_here = x_w - T_ref_w.inverse().translation();
+  return from_anchor.dot(from_here) >
+         std::cos(options_.max_view_angle) * from_anchor.norm() * from_here.norm();
+}
+
+void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const FrameImages& images) {
+  const SE3& T_ref_w = graph.keyframe(reference_).T_k_w;
+  found_.clear();
+  motion_.clear();
+  for (const Candidate& candidate : candidates_) {
+    const MapPoint& point = graph.point(candidate.id);
+    const auto match = search_(images, candidate.id, point, T_ref_w * graph.T_k_w(point.anchor).inverse());
+    if (!match) continue;
+    Observation observation;
+    observation.point = candidate.id;
+    observation.z = match->z.cast<float>();
+    observation.level = static_cast<std::uint8_t>(match->level);
+    const bool has_right = rig_.kind != SensorKind::kMono && std::isfinite(match->z.z());
+    const auto scale = static_cast<float>(sigma_scale_);
+    MotionObservation motion;
+    motion.x_ref = candidate.x_w;
+    motion.z = observation.z;
+    motion.information = measurement_information(rig_, match->level, has_right) / (scale * scale);
+    if (!has_right) motion.z.z() = 0;
+    found_.push_back(observation);
+    motion_.push_back(motion);
+  }
+}
+
+/// T_loop: the pose of the reference keyframe that explains the found points best.
+std::optional<SE3> MetricLoopCloser::estimate_pose(const SE3& T_ref_w) {
+  // Within a wide search radius most matches may be wrong, too many for a robust kernel to find the way from
+  // T_ref.
+  const auto start = consensus_pose(rig_, motion_, theta_);
+  const MotionOnlyResult result = optimise_motion(rig_, motion_, start.value_or(T_ref_w), {});
+  if (result.inliers < theta_) return std::nullopt;
+  return result.T_c_ref;
+}
+
+/// Only points that mutually agree, hence are explained by the common pose, stay.
+void MetricLoopCloser::prune(const SE3& T_loop_w) {
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < found_.size(); ++n) {
+    const Vector3 x = T_loop_w * motion_[n].x_ref;
+    if (!(x.z() > 1e-3)) continue;
+    Vector3 error = (rig_.project(x) - motion_[n].z.cast<double>()) / std::ldexp(1.0, found_[n].level);
+    if (motion_[n].information.z() == 0) error.z() = 0;
+    if (error.cwiseAbs().maxCoeff() > options_.max_error_px) continue;
+    found_[kept] = found_[n];
+    motion_[kept] = motion_[n];
+    ++kept;
+  }
+  found_.resize(kept);
+  motion_.resize(kept);
+}
+
+/// At least Theta / 2 matches in the upper, lower, left and right half of the reference image: constraints
+/// held by a corner of the image alone are weak.
+bool MetricLoopCloser::well_spread(const std::vector<std::size_t>& matches) const {
+  int left = 0, upper = 0;
+  for (const std::size_t n : matches) {
+    left += found_[n].z.x() < 0.5F * static_cast<float>(rig_.camera.width) ? 1 : 0;
+    upper += found_[n].z.y() < 0.5F * static_cast<float>(rig_.camera.height) ? 1 : 0;
+  }
+  const int count = static_cast<int>(matches.size());
+  return 2 * std::min({left, count - left, upper, count - upper}) >= theta_;
+}
+
+void MetricLoopCloser::connect(GraphWriter& writer, const SE3& T_loop_w, MetricLoopReport& report) {
+  found_position_.clear();
+  for (std::size_t n = 0; n < found_.size(); ++n) found_position_.set(found_[n].point, static_cast<int>(n));
+  std::vector<bool> accepted(found_.size(), false);
+  std::vector<std::size_t> shared;
+  for (const KeyframeId id : far_) {
+    shared.clear();
+    for (const Observation& observation : *writer.graph().keyframe(id).observations) {
+      const int at = found_position_.find(observation.point);
+      if (at >= 0) shared.push_back(static_cast<std::size_t>(at));
+    }
+    if (static_cast<int>(shared.size()) < theta_ || !well_spread(shared)) continue;
+    const SE3 T_i_ref = writer.graph().keyframe(id).T_k_w * T_loop_w.inverse();  // eq. 6.8
+    link_marginalised(writer, reference_, id, static_cast<int>(shared.size()), T_i_ref);
+    for (const std::size_t n : shared) accepted[n] = true;
+    ++report.edges;
+  }
+  std::vector<Observation> added;
+  for (std::size_t n = 0; n < found_.size(); ++n) {
+    if (accepted[n]) added.push_back(found_[n]);
+  }
+  report.observations = static_cast<int>(added.size());
+  if (!added.empty()) writer.add_observations(reference_, added);
+}
+
+}  // namespace twofold

@@ -1,0 +1,216 @@
+#include "engine/engine.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <sstream>
+
+#include "tests/imaging/rendered_scene.hpp"
+
+namespace twofold {
+namespace {
+
+Rig small_rig() {
+  Rig rig;
+  rig.camera = {220, 220, 159.5, 119.5, 320, 240};
+  rig.baseline = 0.12;
+  return rig;
+}
+
+/// A camera that sways through a textured room; rendered once for all tests.
+class EngineTest : public ::testing::Test {
+ protected:
+  static constexpr int kFrames = 45;
+
+  static SE3 T_c_w(int i) {
+    const double s = 0.03 * i;
+    return SE3(SO3::exp(Vector3(0.04 * std::sin(3 * s), 0.25 * std::sin(2 * s), 0.03 * std::sin(s))),
+               Vector3(0.5 * std::sin(2 * s), 0.1 * std::sin(3 * s), -0.6 * s));
+  }
+
+  static void SetUpTestSuite() {
+    twofold::testing::RenderedScene scene(small_rig(), Vector3(2.5, 2.0, 3.5), 5);
+    frames_ = new std::vector<Frame>;
+    for (int i = 0; i < kFrames; ++i) {
+      const SE3 T_r_c(SO3(), Vector3(-small_rig().baseline, 0, 0));
+      Frame frame;
+      frame.index = i;
+      frame.t_ns = 1'000'000'000 + i * 33'333'333LL;
+      frame.left = scene.render_one(T_c_w(i), 1.5);
+      frame.right = scene.render_one(T_r_c * T_c_w(i), 1.5);
+      frames_->push_back(frame);
+    }
+  }
+  static void TearDownTestSuite() {
+    delete frames_;
+    frames_ = nullptr;
+  }
+
+  static FrameFeed feed(int count = kFrames, FeedStatus last = FeedStatus::kEnd) {
+    return [count, last, next = 0](Frame& frame) mutable {
+      if (next == count) return last;
+      frame = (*frames_)[static_cast<std::size_t>(next++)];
+      return FeedStatus::kFrame;
+    };
+  }
+
+  static RunResult run(const EngineOptions& options, const FrameFeed& frames = feed()) {
+    std::atomic<bool> interrupted{false};
+    return Engine(small_rig(), options).run(frames, interrupted);
+  }
+
+  static Schedule schedule_of(const RunResult& result) {
+    std::stringstream file;
+    EXPECT_TRUE(
+        write_schedule(file, result.schedule.tracker, result.schedule.mapper, result.schedule.loop_closer));
+    const auto schedule = read_schedule(file);
+    EXPECT_TRUE(schedule) << schedule.error();
+    return *schedule;
+  }
+
+  static void expect_same(const RunResult& a, const RunResult& b) {
+    ASSERT_EQ(a.frames.size(), b.frames.size());
+    for (std::size_t i = 0; i < a.frames.size(); ++i) {
+      EXPECT_EQ(a.frames[i].state, b.frames[i].state) << i;
+      EXPECT_EQ(a.frames[i].reference, b.frames[i].reference) << i;
+      EXPECT_EQ(a.frames[i].snapshot_version, b.frames[i].snapshot_version) << i;
+      EXPECT_EQ(a.frames[i].T_c_ref.matrix(), b.frames[i].T_c_ref.matrix()) << i;
+      EXPECT_EQ(a.frames[i].T_c_w_causal.matrix(), b.frames[i].T_c_w_causal.matrix()) << i;
+    }
+    ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
+    ASSERT_EQ(a.graph.point_count(), b.graph.point_count());
+    for (std::uint32_t k = 0; k < a.graph.keyframe_count(); ++k) {
+      EXPECT_EQ(a.graph.T_k_w(KeyframeId{k}).matrix(), b.graph.T_k_w(KeyframeId{k}).matrix()) << k;
+    }
+    for (std::uint32_t p = 0; p < a.graph.point_count(); ++p) {
+      EXPECT_EQ(a.graph.point(PointId{p}).psi, b.graph.point(PointId{p}).psi) << p;
+    }
+  }
+
+  /// Largest distance between tracked and true camera positions, in the first camera's frame.
+  static double worst_position_error(const RunResult& result) {
+    double worst = 0;
+    for (const FrameRecord& record : result.frames) {
+      const SE3 T_c_first = final_T_c_w(record, result.graph) * result.graph.T_k_w(KeyframeId{0}).inverse();
+      const SE3 T_c_first_true = T_c_w(static_cast<int>(record.frame_index)) * T_c_w(0).inverse();
+      worst = std::max(worst,
+                       (T_c_first.inverse().translation() - T_c_first_true.inverse().translation()).norm());
+    }
+    return worst;
+  }
+
+  static std::vector<Frame>* frames_;
+};
+
+std::vector<Frame>* EngineTest::frames_ = nullptr;
+
+TEST_F(EngineTest, FollowsTheTrueCameraInEveryKindOfRun) {
+  EngineOptions options;
+  for (const bool deterministic : {true, false}) {
+    options.deterministic = deterministic;
+    const RunResult result = run(options);
+    EXPECT_EQ(result.error, "");
+    ASSERT_EQ(result.frames.size(), static_cast<std::size_t>(kFrames));
+    for (const FrameRecord& record : result.frames) {
+      EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << ": " << record.cause;
+    }
+    EXPECT_GE(result.graph.keyframe_count(), 3U);
+    EXPECT_LT(worst_position_error(result), 0.01);  // of a path of about 1.5 m
+  }
+}
+
+TEST_F(EngineTest, DeterministicRunsAreEqual) {
+  EngineOptions options;
+  options.deterministic = true;
+  const RunResult first = run(options);
+  expect_same(first, run(options));
+}
+
+TEST_F(EngineTest, ScheduleReplaysAThreadedRun) {
+  for (const double speed : {0.0, 3.0}) {
+    EngineOptions options;
+    options.pacing.speed = speed;
+    const RunResult live = run(options);
+    ASSERT_EQ(live.error, "");
+    std::atomic<bool> interrupted{false};
+    const Schedule schedule = schedule_of(live);
+    const RunResult replayed = Engine(small_rig(), options).replay(feed(), schedule, interrupted);
+    EXPECT_EQ(replayed.error, "");
+    expect_same(live, replayed);
+    EXPECT_EQ(schedule_of(replayed), schedule);
+  }
+}
+
+TEST_F(EngineTest, LateFramesAreDroppedOnRequestAndReplayed) {
+  EngineOptions options;
+  options.pacing.speed = 60;  // far faster than any machine can follow
+  options.pacing.late = LatePolicy::kDrop;
+  const RunResult live = run(options);
+  EXPECT_EQ(live.frames.size(), static_cast<std::size_t>(kFrames));
+  const auto dropped = std::count_if(live.frames.begin(), live.frames.end(),
+                                     [](const auto& record) { return record.state == FrameState::kDropped; });
+  EXPECT_GT(dropped, 0);
+  std::atomic<bool> interrupted{false};
+  const RunResult replayed = Engine(small_rig(), options).replay(feed(), schedule_of(live), interrupted);
+  EXPECT_EQ(replayed.error, "");
+  expect_same(live, replayed);
+}
+
+TEST_F(EngineTest, ReplayRefusesAnotherRecording) {
+  EngineOptions options;
+  const RunResult live = run(options);
+  std::atomic<bool> interrupted{false};
+  const RunResult replayed =
+      Engine(small_rig(), options).replay(feed(kFrames / 2), schedule_of(live), interrupted);
+  EXPECT_NE(replayed.error.find("more frames than the input"), std::string::npos);
+}
+
+TEST_F(EngineTest, KeepsWhatItHasWhenInterruptedOrTheInputBreaks) {
+  for (const bool deterministic : {true, false}) {
+    EngineOptions options;
+    options.deterministic = deterministic;
+    std::atomic<bool> interrupted{false};
+    int seen = 0;
+    const ProgressSink stop_after_ten = [&](const Progress&) { interrupted = ++seen >= 10; };
+    const RunResult stopped = Engine(small_rig(), options).run(feed(), interrupted, stop_after_ten);
+    EXPECT_TRUE(stopped.interrupted);
+    EXPECT_GE(stopped.frames.size(), 10U);
+    EXPECT_LT(stopped.frames.size(), static_cast<std::size_t>(kFrames));
+    EXPECT_GE(stopped.graph.keyframe_count(), 1U);
+
+    const RunResult broken = run(options, feed(20, FeedStatus::kError));
+    EXPECT_EQ(broken.error, "the input ended with an error");
+    EXPECT_EQ(broken.frames.size(), 20U);
+  }
+}
+
+TEST_F(EngineTest, ReportsLostFramesAndRecovers) {
+  EngineOptions options;
+  options.deterministic = true;
+  const FrameFeed covered = [next = 0](Frame& frame) mutable {
+    if (next == kFrames) return FeedStatus::kEnd;
+    frame = (*frames_)[static_cast<std::size_t>(next)];
+    if (next >= 20 && next < 23) {  // a hand over the lens
+      frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(12));
+      frame.right = frame.left;
+    }
+    ++next;
+    return FeedStatus::kFrame;
+  };
+  const RunResult result = run(options, covered);
+  for (const FrameRecord& record : result.frames) {
+    const bool hidden = record.frame_index >= 20 && record.frame_index < 23;
+    EXPECT_EQ(record.state, hidden ? FrameState::kLost : FrameState::kTracked) << record.frame_index;
+    EXPECT_EQ(std::string(record.cause).empty(), !hidden) << record.frame_index;
+  }
+}
+
+TEST_F(EngineTest, RefusesAMonocularRig) {
+  Rig rig = small_rig();
+  rig.kind = SensorKind::kMono;
+  EXPECT_THROW(Engine(rig, {}), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace twofold
