@@ -227,6 +227,12 @@ class MapBuilder {
         observers_[index(observation.point)].push_back(keyframe.id);
       }
     }
+    for (std::size_t p = 0; p < points_.size(); ++p) {
+      if (!points_[p].alive() || keyframes_[index(points_[p].anchor)].culled()) continue;
+      if (!std::binary_search(observers_[p].begin(), observers_[p].end(), points_[p].anchor)) {
+        throw FormatError{"points: an anchor does not observe its point"};
+      }
+    }
   }
 
   /// Both keyframes of an edge keep it; the file has it once.
