@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "engine/pacing.hpp"
+#include "loopclosure/loop_closer.hpp"
 #include "mapping/mapper.hpp"
 #include "tracking/options.hpp"
 
@@ -13,6 +15,9 @@ namespace twofold {
 struct EngineOptions {
   TrackerOptions tracker;
   MapperOptions mapper;
+  LoopCloserOptions loop_closer;
+  /// Words that places are recognised by; null: no loop is closed by appearance, no lost camera finds itself.
+  std::shared_ptr<const Vocabulary> vocabulary;
 
   /// One thread, one order: each frame is tracked against the map with every earlier keyframe optimised.
   bool deterministic = false;

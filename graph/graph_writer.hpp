@@ -36,6 +36,8 @@ class GraphWriter {
     graph_.points_.mutate(index(id)).appearance = std::move(appearance);
   }
   void set_reference(KeyframeId id) { graph_.reference_ = id; }
+  /// Says that poses jump with the version being made.
+  void announce_jump(MapChange::Kind kind) { graph_.last_jump_ = {graph_.version_, kind}; }
   /// Moves a point to another anchor that observes it; psi is in the new anchor's frame.
   void set_anchor(PointId id, KeyframeId anchor, const Vector3& psi);
 

@@ -72,6 +72,12 @@ class Mapper {
   /// O(1) whatever the size of the map.
   [[nodiscard]] GraphSnapshot publish() { return writer_.publish(); }
 
+  /// Takes over poses that were relaxed beside the mapper, outside of the double window: that one is more
+  /// accurate, and the tracker stands in it. They are moved as a whole so that the reference keyframe, or the
+  /// one of the window nearest to it that the relaxation has, stays where it is. To be followed by a step.
+  /// @return keyframes moved
+  int take_relaxation(const PoseRelaxation& relaxation);
+
   /// Makes all poses agree globally, e.g. at the end of a run. Cost grows with the map.
   RelaxationReport relax_all();
 
