@@ -144,6 +144,11 @@ bool BlockCholesky::factorise() {
 }
 
 void BlockCholesky::solve(std::span<Vector6> rhs) const {
+  solve_lower(rhs);
+  solve_upper(rhs);
+}
+
+void BlockCholesky::solve_lower(std::span<Vector6> rhs) const {
   for (int j = 0; j < size(); ++j) {
     const Vector6 x = inverse_diagonal_[j] * rhs[j];
     rhs[j] = x;
@@ -151,7 +156,6 @@ void BlockCholesky::solve(std::span<Vector6> rhs) const {
       rhs[row_[b]].noalias() -= blocks_[b] * x;
     }
   }
-  solve_upper(rhs);
 }
 
 void BlockCholesky::solve_upper(std::span<Vector6> rhs) const {

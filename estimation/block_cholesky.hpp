@@ -32,12 +32,14 @@ class BlockCholesky {
   void set_zero();
   /// Before factorise: block of the matrix, after it: of the factor.
   [[nodiscard]] Matrix6& block(int index) { return blocks_[index]; }
+  [[nodiscard]] const Matrix6& block(int index) const { return blocks_[index]; }
 
   /// False when the matrix is not positive definite (to rounding); its blocks are lost either way.
   [[nodiscard]] bool factorise();
   /// Right-hand side in, solution out, six numbers an unknown, in elimination order.
   void solve(std::span<Vector6> rhs) const;
-  /// Solution of the transposed triangular system only: with L L^T = A, turns x into L^-T x.
+  /// The two halves of solve, with L L^T = A: x becomes L^-1 x, or L^-T x.
+  void solve_lower(std::span<Vector6> rhs) const;
   void solve_upper(std::span<Vector6> rhs) const;
 
  private:

@@ -55,7 +55,7 @@ inline void add_outer_product(double* __restrict a, const double* __restrict b, 
 /// compiler does far worse.
 template <class Matrix>
 inline void set_all_zero(Matrix* first, std::size_t n) {
-  std::memset(static_cast<void*>(first), 0, n * sizeof(Matrix));
+  if (n > 0) std::memset(static_cast<void*>(first), 0, n * sizeof(Matrix));
 }
 
 }  // namespace twofold

@@ -22,6 +22,14 @@ struct RelativePose {
 /// and Y_i c from their gradient; the point's own step is -L^-T (c + sum Y_i^T xi_i).
 class PointElimination {
  public:
+  using Matrix63 = Eigen::Matrix<double, 6, 3>;
+  /// What back substitution needs of a track; its Y_i stand in couplings().
+  struct EliminatedPoint {
+    Matrix3 L;
+    Vector3 c;
+    Vector3 damping;
+  };
+
   /// Adds what remains of all points after their elimination to the reduced system.
   /// @param relative   T_ia of every slot
   /// @param psi        of every track
@@ -37,15 +45,12 @@ class PointElimination {
                        std::span<const Vector6> pose_steps, double lambda, std::vector<Vector3>& psi_steps,
                        double& predicted);
 
- private:
-  using Matrix63 = Eigen::Matrix<double, 6, 3>;
-  /// What back substitution needs of a track; its Y_i stand in couplings_.
-  struct EliminatedPoint {
-    Matrix3 L;
-    Vector3 c;
-    Vector3 damping;
-  };
+  /// By track.
+  [[nodiscard]] const std::vector<EliminatedPoint>& points() const { return points_; }
+  /// Y_i, by entry of the layout.
+  [[nodiscard]] const std::vector<Matrix63>& couplings() const { return couplings_; }
 
+ private:
   void eliminate_track(const WindowLayout::Track& track, const WindowLayout::Observation* observations,
                        const int* entry_slots, const ObservationModel& model, const HuberKernel& kernel,
                        const RelativePose* relative, const Vector3& psi, double lambda,
@@ -54,8 +59,8 @@ class PointElimination {
   void add_group(const WindowLayout& layout, const WindowLayout::Group& group, const RelativePose* relative,
                  BlockCholesky& system, std::span<Vector6> gradient, std::span<Vector6> diagonal);
 
-  std::vector<EliminatedPoint> points_;  // by track
-  std::vector<Matrix63> couplings_;      // Y_i, by entry
+  std::vector<EliminatedPoint> points_;
+  std::vector<Matrix63> couplings_;
   // Of the group at hand, in slot coordinates:
   std::vector<Matrix6> hessian_;      // lower triangle, row by row, of - sum Y_i Y_j^T
   std::vector<Matrix6> information_;  // sum A_i^T W A_i of each slot

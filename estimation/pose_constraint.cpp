@@ -5,14 +5,6 @@
 namespace twofold {
 namespace {
 
-/// Matrix of y -> [v, y], the Lie bracket of se(3)  (thesis A.2.1).
-Matrix6 lie_bracket_matrix(const Vector6& v) {
-  const Matrix3 W = hat(v.tail<3>());
-  Matrix6 ad;
-  ad << W, hat(v.head<3>()), Matrix3::Zero(), W;
-  return ad;
-}
-
 struct EvenCoefficients {
   double c2, c4;
 };
@@ -40,12 +32,19 @@ EvenCoefficients even_coefficients(double theta2) {
 
 }  // namespace
 
+/// The Lie bracket's matrix is ad = [W U; 0 W] with W = [w]x, U = [u]x for v = (u, w)  (thesis A.2.1), so all
+/// its powers have that form, and those of W are W^3 = -theta^2 W and W^4 = -theta^2 W^2.
 Matrix6 se3_left_jacobian_inverse(const Vector6& v) {
-  const Matrix6 ad = lie_bracket_matrix(v);
-  const Matrix6 ad2 = ad * ad;
-  const auto [c2, c4] = even_coefficients(v.tail<3>().squaredNorm());
-  Matrix6 J = Matrix6::Identity() - 0.5 * ad + c2 * ad2;
-  J.noalias() += c4 * ad2 * ad2;
+  const Matrix3 U = hat(v.head<3>()), W = hat(v.tail<3>());
+  const double theta2 = v.tail<3>().squaredNorm();
+  const auto [c2, c4] = even_coefficients(theta2);
+  const Matrix3 W2 = W * W;
+  const Matrix3 X = W * U + U * W;  // ad^2 = [W^2 X; 0 W^2], ad^4 = [W^4 W^2 X + X W^2; 0 W^4]
+  Matrix6 J;
+  J.topLeftCorner<3, 3>() = Matrix3::Identity() - 0.5 * W + (c2 - c4 * theta2) * W2;
+  J.topRightCorner<3, 3>() = -0.5 * U + c2 * X + c4 * (W2 * X + X * W2);
+  J.bottomLeftCorner<3, 3>().setZero();
+  J.bottomRightCorner<3, 3>() = J.topLeftCorner<3, 3>();
   return J;
 }
 
@@ -57,8 +56,14 @@ PoseConstraintTerms linearise_pose_constraint(const SE3& T_j_i, const SE3& T_i_w
   PoseConstraintTerms terms;
   terms.v = pose_constraint_error(T_j_i, T_i_w, T_j_w);
   // T_ji exp(x) T_i T_j^-1 = exp(Ad x) E  and  E exp(-x) = (exp(x) E^-1)^-1
-  terms.J_i = se3_left_jacobian_inverse(terms.v) * T_j_i.adjoint();
-  terms.J_j = -se3_left_jacobian_inverse(-terms.v);
+  const Matrix6 J = se3_left_jacobian_inverse(terms.v);
+  terms.J_i.noalias() = J * T_j_i.adjoint();
+  // The Jacobian at -v differs from J in the sign of its only odd term, -ad(v) / 2.
+  const Matrix3 U = hat(terms.v.head<3>()), W = hat(terms.v.tail<3>());
+  terms.J_j = -J;
+  terms.J_j.topLeftCorner<3, 3>() -= W;
+  terms.J_j.topRightCorner<3, 3>() -= U;
+  terms.J_j.bottomRightCorner<3, 3>() -= W;
   return terms;
 }
 

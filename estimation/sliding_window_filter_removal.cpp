@@ -69,14 +69,17 @@ void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
 
   // Prior: rows and columns move to their new places.
   const auto place = [&](int block) { return block == n_prior ? 0 : at[static_cast<std::size_t>(block)]; };
-  const auto size = [&](int block) { return block == n_prior ? 6 : 3; };
-  for (int a = 0; a <= n_prior; ++a) {
-    for (int b = 0; b <= n_prior; ++b) {
-      Lambda.block(place(a), place(b), size(a), size(b)) =
-          prior_.information.block(3 * a, 3 * b, size(a), size(b));
+  const int pose_column = 3 * n_prior;
+  for (int b = 0; b < n_prior; ++b) {
+    for (int a = 0; a < n_prior; ++a) {
+      Lambda.block<3, 3>(place(a), place(b)) = prior_.information.block<3, 3>(3 * a, 3 * b);
     }
-    g.segment(place(a), size(a)) = prior_.vector.segment(3 * a, size(a));
+    Lambda.block<6, 3>(0, place(b)) = prior_.information.block<6, 3>(pose_column, 3 * b);
+    Lambda.block<3, 6>(place(b), 0) = prior_.information.block<3, 6>(3 * b, pose_column);
+    g.segment<3>(place(b)) = prior_.vector.segment<3>(3 * b);
   }
+  Lambda.topLeftCorner<6, 6>() = prior_.information.bottomRightCorner<6, 6>();
+  g.head<6>() = prior_.vector.tail<6>();
   if (first_estimates()) {
     const VectorX d_prior = prior_.difference(points_, poses_.front().T_c_w);
     for (int a = 0; a < n_prior; ++a) d.segment<3>(place(a)) = d_prior.segment<3>(3 * a);

@@ -10,8 +10,9 @@
 namespace twofold {
 namespace {
 
-constexpr double kMinDepth = 1e-3;         // [m]; nearer or behind: the measurement says nothing
-constexpr double kMinInlierSigma = 0.3;    // keeps the Huber threshold off zero on noise-free data
+constexpr double kMinDepth = 1e-3;       // [m]; nearer or behind: the measurement says nothing
+constexpr double kMinInlierSigma = 0.3;  // keeps the Huber threshold off zero on noise-free data
+constexpr int kMinDof = 30;
 constexpr double kUnknownLandmark = 1e-6;  // [1/m^2]
 constexpr double kMedianChi2 = 2.366;      // of three degrees of freedom
 
@@ -181,9 +182,17 @@ void SlidingWindowFilter::update_threshold() {
     ++inliers;
   }
   summary_.outliers = static_cast<int>(chi2s.size()) - inliers;
-  summary_.inlier_sigma = std::sqrt(sum / (3.0 * std::max(1, inliers)));
+  // Free landmarks and poses without process model take up as many residuals as they have unknowns.
+  int unknowns = 3 * (landmark_count() - prior_.landmark_count());
+  for (int j = oldest_fixed_ ? 1 : 0; j < pose_count(); ++j) {
+    if (!poses_[static_cast<std::size_t>(j)].motion) unknowns += 6;
+  }
+  const int dof = 3 * inliers - unknowns;
+  summary_.inlier_sigma = std::sqrt(sum / std::max(1, dof));
   if (options_.robust) {
-    huber_ = options_.huber_sigmas * std::sqrt(3.0) * std::max(summary_.inlier_sigma, kMinInlierSigma);
+    // Too few surplus residuals to estimate a spread from: the stated variances stand.
+    const double sigma = dof >= kMinDof ? std::max(summary_.inlier_sigma, kMinInlierSigma) : 1.0;
+    huber_ = options_.huber_sigmas * std::sqrt(3.0) * sigma;
   }
 }
 

@@ -38,6 +38,16 @@ class BitMatrix {
   std::vector<std::uint64_t> bits_;
 };
 
+/// By insertion: tracks are short and almost in order.
+void sort_by_slot(WindowLayout::Observation* first, int count) {
+  for (int n = 1; n < count; ++n) {
+    const WindowLayout::Observation moved = first[n];
+    int m = n;
+    for (; m > 0 && first[m - 1].slot > moved.slot; --m) first[m] = first[m - 1];
+    first[m] = moved;
+  }
+}
+
 int triangle_index(int row, int column) {
   return row * (row + 1) / 2 + column;
 }
@@ -90,13 +100,15 @@ void WindowLayout::collect_group(const WindowProblem& problem, int anchor, const
       int& slot = slot_of_pose_[o.pose];
       if (slot < 0) {
         slot = group.slot_count++;
-        const bool both_held = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
-        slots_.push_back({o.pose, -1, o.pose != anchor && !both_held, -1, false});
+        slots_.push_back({o.pose, -1, false, -1, false});
         const SE3 T_i_a = o.pose == anchor ? SE3() : problem.poses[o.pose].T_k_w * T_w_a;
         depth_row.push_back(T_i_a.rotation().row(2));
         depth_shift.push_back(T_i_a.translation().z());
       }
       if (!(depth_row[slot].dot(y) + depth_shift[slot] > 2 * kMinDepth)) continue;
+      // Only a measurement that counts couples: a pose all of whose points are behind it has no place in the system.
+      const bool both_held = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
+      slots_[group.first_slot + slot].coupled = o.pose != anchor && !both_held;
       observations_.push_back({o.z, o.information, slot, -1});
       ++track.observation_count;
     }
@@ -201,8 +213,7 @@ void WindowLayout::sort_slots(Group& group, const BlockCholesky& system) {
     Track& track = tracks_[k];
     Observation* observations = &observations_[track.first_observation];
     for (int n = 0; n < track.observation_count; ++n) observations[n].slot = renamed[observations[n].slot];
-    std::stable_sort(observations, observations + track.observation_count,
-                     [](const Observation& a, const Observation& b) { return a.slot < b.slot; });
+    sort_by_slot(observations, track.observation_count);
     track.first_entry = static_cast<int>(entry_slots_.size());
     for (int n = 0; n < track.observation_count; ++n) {
       Observation& o = observations[n];

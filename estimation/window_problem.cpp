@@ -36,37 +36,53 @@ double window_cost(const WindowProblem& problem, const WindowSolverOptions& opti
   return cost;
 }
 
-std::string invalid_reason(const WindowProblem& problem) {
-  const int poses = static_cast<int>(problem.poses.size());
+namespace {
+
+/// What is wrong with one entry; nullptr when nothing is. (Text is put together only for the entry named.)
+const char* fault(const WindowProblem& problem, const WindowProblem::Point& point) {
   const int observations = static_cast<int>(problem.observations.size());
-  const auto is_pose = [poses](int i) { return i >= 0 && i < poses; };
-  for (std::size_t k = 0; k < problem.points.size(); ++k) {
-    const auto& point = problem.points[k];
-    const std::string name = "point " + std::to_string(k) + ": ";
-    if (!is_pose(point.anchor)) return name + "no pose " + std::to_string(point.anchor) + " for its anchor";
-    if (point.observation_count < 0 || point.first_observation < 0 ||
-        point.first_observation > observations - point.observation_count) {
-      return name + "observations out of range";
-    }
-    if (!point.psi.allFinite()) return name + "psi is not finite";
+  if (point.anchor < 0 || point.anchor >= static_cast<int>(problem.poses.size())) return "anchor is no pose";
+  if (point.observation_count < 0 || point.first_observation < 0 ||
+      point.first_observation > observations - point.observation_count) {
+    return "observations out of range";
   }
-  for (std::size_t n = 0; n < problem.observations.size(); ++n) {
-    const auto& o = problem.observations[n];
-    const std::string name = "observation " + std::to_string(n) + ": ";
-    if (!is_pose(o.pose)) return name + "no pose " + std::to_string(o.pose);
-    if (!o.information.allFinite() || o.information.minCoeff() < 0) return name + "information is negative";
-    if (!o.z.head<2>().allFinite() || (o.information.z() > 0 && !std::isfinite(o.z.z()))) {
-      return name + "measurement is not finite";
-    }
+  return point.psi.allFinite() ? nullptr : "psi is not finite";
+}
+
+const char* fault(const WindowProblem& problem, const WindowProblem::Observation& o) {
+  if (o.pose < 0 || o.pose >= static_cast<int>(problem.poses.size())) return "no such pose";
+  for (int c = 0; c < 3; ++c) {
+    if (!(o.information[c] >= 0) || !std::isfinite(o.information[c]))
+      return "information is negative or not finite";
+    if ((c < 2 || o.information[c] > 0) && !std::isfinite(o.z[c])) return "measurement is not finite";
   }
-  for (std::size_t n = 0; n < problem.constraints.size(); ++n) {
-    const auto& c = problem.constraints[n];
-    const std::string name = "constraint " + std::to_string(n) + ": ";
-    if (!is_pose(c.i) || !is_pose(c.j)) return name + "no such pose";
-    if (c.i == c.j) return name + "joins a pose with itself";
-    if (!c.information.allFinite()) return name + "information is not finite";
+  return nullptr;
+}
+
+const char* fault(const WindowProblem& problem, const WindowProblem::PoseConstraint& c) {
+  const int poses = static_cast<int>(problem.poses.size());
+  if (c.i < 0 || c.j < 0 || c.i >= poses || c.j >= poses) return "no such pose";
+  if (c.i == c.j) return "joins a pose with itself";
+  return c.information.allFinite() ? nullptr : "information is not finite";
+}
+
+template <class Entry>
+std::string first_fault(const WindowProblem& problem, const char* kind, const std::vector<Entry>& entries) {
+  for (std::size_t n = 0; n < entries.size(); ++n) {
+    if (const char* what = fault(problem, entries[n])) {
+      return std::string(kind).append(" ").append(std::to_string(n)).append(": ").append(what);
+    }
   }
   return {};
+}
+
+}  // namespace
+
+std::string invalid_reason(const WindowProblem& problem) {
+  std::string reason = first_fault(problem, "point", problem.points);
+  if (reason.empty()) reason = first_fault(problem, "observation", problem.observations);
+  if (reason.empty()) reason = first_fault(problem, "constraint", problem.constraints);
+  return reason;
 }
 
 }  // namespace twofold

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,9 @@ struct WindowSolverOptions {
   double huber_px = 2.0;            ///< kernel on the whitened reprojection error norm; <= 0: none
   double constraint_huber = 0;      ///< kernel on sqrt(v^T Lambda v); <= 0: none
   double relative_decrease = 1e-6;  ///< stop when a step lowers the cost by less than this share
+  /// WindowSolver asks after each iteration, if set: iterations so far and present cost; false stops. For
+  /// time budgets and measurements.
+  std::function<bool(int iterations, double cost)> keep_going;
 };
 
 struct SolverSummary {

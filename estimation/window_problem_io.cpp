@@ -6,13 +6,13 @@
 #include <ostream>
 #include <stdexcept>
 #include <string_view>
-#include <vector>
+
+#include "estimation/field_reader.hpp"
 
 namespace twofold {
 namespace {
 
 constexpr const char* kKindNames[] = {"mono", "stereo", "rgbd"};
-constexpr int kMaxCount = 100'000'000;  // a count above this is a broken file, not a problem
 
 class LineWriter {
  public:
@@ -38,78 +38,24 @@ class LineWriter {
   bool first_ = true;
 };
 
-/// Lines of fields; knows where it is.
-class LineReader {
- public:
-  LineReader(std::istream& in, std::string name) : in_(in), name_(std::move(name)) {}
+SE3 read_pose(FieldReader& reader) {
+  Eigen::Quaterniond q;
+  Vector3 t;
+  for (double& value : q.coeffs()) value = reader.number<double>();
+  for (double& value : t) value = reader.number<double>();
+  if (!(std::abs(q.norm() - 1) < 1e-6)) reader.fail("quaternion is not of unit length");
+  if (!t.allFinite()) reader.fail("translation is not finite");
+  return {SO3(q), t};
+}
 
-  /// The next line that has fields, which must be `count` of them.
-  void next(std::size_t count, const char* what) {
-    do {
-      if (!std::getline(in_, text_)) fail(std::string("file ends where ") + what + " should stand");
-      ++line_;
-      split();
-    } while (fields_.empty());
-    at_ = 0;
-    if (fields_.size() != count) {
-      fail(std::string(what) + " needs " + std::to_string(count) + " fields, found " +
-           std::to_string(fields_.size()));
-    }
-  }
-  std::string_view word() { return fields_[at_++]; }
-  template <class Number>
-  Number number() {
-    const std::string_view field = fields_[at_++];
-    Number value{};
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    if (error != std::errc() || end != field.data() + field.size()) {
-      fail("'" + std::string(field) + "' is not a number");
-    }
-    return value;
-  }
-  int count() {
-    const int value = number<int>();
-    if (value < 0 || value > kMaxCount) fail("count " + std::to_string(value) + " is out of range");
-    return value;
-  }
-  SE3 pose() {
-    Eigen::Quaterniond q;
-    Vector3 t;
-    for (double& value : q.coeffs()) value = number<double>();
-    for (double& value : t) value = number<double>();
-    if (!(std::abs(q.norm() - 1) < 1e-6)) fail("quaternion is not of unit length");
-    if (!t.allFinite()) fail("translation is not finite");
-    return {SO3(q), t};
-  }
-  /// "keyword N"
-  int section(const char* keyword) {
-    next(2, keyword);
-    if (word() != keyword) fail(std::string("expected '") + keyword + "'");
-    return count();
-  }
-  [[noreturn]] void fail(const std::string& what) const {
-    throw std::runtime_error(name_ + ":" + std::to_string(line_) + ": " + what);
-  }
+/// "keyword N"
+int read_section(FieldReader& reader, const char* keyword) {
+  reader.next(2, keyword);
+  if (reader.word() != keyword) reader.fail(std::string("expected '") + keyword + "'");
+  return reader.count();
+}
 
- private:
-  void split() {
-    fields_.clear();
-    const std::string_view all = std::string_view(text_).substr(0, text_.find('#'));
-    for (std::size_t begin = 0; (begin = all.find_first_not_of(" \t\r", begin)) != all.npos;) {
-      const std::size_t end = std::min(all.find_first_of(" \t\r", begin), all.size());
-      fields_.push_back(all.substr(begin, end - begin));
-      begin = end;
-    }
-  }
-
-  std::istream& in_;
-  std::string name_, text_;
-  std::vector<std::string_view> fields_;
-  std::size_t at_ = 0;
-  int line_ = 0;
-};
-
-Rig read_rig(LineReader& reader) {
+Rig read_rig(FieldReader& reader) {
   reader.next(9, "rig");
   if (reader.word() != "rig") reader.fail("expected 'rig'");
   Rig rig;
@@ -118,7 +64,7 @@ Rig read_rig(LineReader& reader) {
   for (int n = 0; n < 3; ++n) {
     if (kind == kKindNames[n]) rig.kind = static_cast<SensorKind>(n), known = true;
   }
-  if (!known) reader.fail("unknown sensor '" + std::string(kind) + "'");
+  if (!known) reader.fail(std::string("unknown sensor '").append(kind).append("'"));
   auto& camera = rig.camera;
   for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value = reader.number<double>();
   camera.width = reader.count();
@@ -129,8 +75,8 @@ Rig read_rig(LineReader& reader) {
   return rig;
 }
 
-void read_points(LineReader& reader, WindowProblem& problem) {
-  const int count = reader.section("points");
+void read_points(FieldReader& reader, WindowProblem& problem) {
+  const int count = read_section(reader, "points");
   for (int k = 0; k < count; ++k) {
     reader.next(5, "point");
     WindowProblem::Point point;
@@ -150,14 +96,14 @@ void read_points(LineReader& reader, WindowProblem& problem) {
   }
 }
 
-void read_constraints(LineReader& reader, WindowProblem& problem) {
-  const int count = reader.section("constraints");
+void read_constraints(FieldReader& reader, WindowProblem& problem) {
+  const int count = read_section(reader, "constraints");
   for (int n = 0; n < count; ++n) {
     reader.next(30, "constraint");
     WindowProblem::PoseConstraint c;
     c.i = reader.number<int>();
     c.j = reader.number<int>();
-    c.T_j_i = reader.pose();
+    c.T_j_i = read_pose(reader);
     for (int row = 0; row < 6; ++row) {
       for (int col = row; col < 6; ++col) {
         c.information(row, col) = c.information(col, row) = reader.number<double>();
@@ -197,18 +143,18 @@ void write_window_problem(std::ostream& out, const WindowProblem& problem) {
 }
 
 WindowProblem read_window_problem(std::istream& in, const std::string& name) {
-  LineReader reader(in, name);
+  FieldReader reader(in, name);
   reader.next(2, "twofold_window");
   if (reader.word() != "twofold_window") reader.fail("not a window problem");
   if (reader.number<int>() != 1) reader.fail("unknown version");
   WindowProblem problem;
   problem.rig = read_rig(reader);
-  const int poses = reader.section("poses");
+  const int poses = read_section(reader, "poses");
   for (int i = 0; i < poses; ++i) {
     reader.next(8, "pose");
     const int fixed = reader.number<int>();
     if (fixed != 0 && fixed != 1) reader.fail("fixed must be 0 or 1");
-    problem.poses.push_back({reader.pose(), fixed == 1});
+    problem.poses.push_back({read_pose(reader), fixed == 1});
   }
   read_points(reader, problem);
   read_constraints(reader, problem);

@@ -127,6 +127,8 @@ void GraphWriter::cull_point(PointId id) {
   const ObserverList observers = *graph_.point(id).observers;
   for (const KeyframeId keyframe : observers) remove_observations(keyframe, std::span(&id, 1));
   graph_.points_.mutate(index(id)) = MapPoint{};
+  // Points come and go for hours: where all of a chunk are gone, so is the chunk.
+  graph_.points_.forget_chunk_if(index(id), [](const MapPoint& point) { return !point.alive(); });
 }
 
 void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {

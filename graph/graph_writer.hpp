@@ -14,6 +14,8 @@ class GraphWriter {
  public:
   /// An empty graph; its first published version has number 1.
   GraphWriter() { graph_.version_ = 1; }
+  /// Continues from an existing graph, e.g. a loaded map, with the next version number.
+  explicit GraphWriter(const GraphSnapshot& graph) : graph_(graph) { ++graph_.version_; }
 
   /// The private version as it stands, with the version number it will be published under.
   [[nodiscard]] const GraphSnapshot& graph() const { return graph_; }

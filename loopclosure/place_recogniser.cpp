@@ -40,7 +40,7 @@ void PlaceRecogniser::exclude_near(KeyframeId id, const GraphSnapshot& graph) {
 }
 
 bool PlaceRecogniser::same_place(KeyframeId a, KeyframeId b, const GraphSnapshot& graph) const {
-  const auto distance = static_cast<std::int64_t>(index(a)) - static_cast<std::int64_t>(index(b));
+  const auto distance = static_cast<std::int64_t>(twofold::index(a)) - static_cast<std::int64_t>(twofold::index(b));
   if (std::abs(distance) <= options_.same_place) return true;
   return graph.contains(a) && graph.contains(b) && find_edge(graph.keyframe(a), b) != nullptr;
 }

@@ -42,6 +42,15 @@ Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
 Mapper::Mapper(const Rig& rig, const MapperOptions& options)
     : Mapper(rig, options, guided_point_search(rig, options.loop.search_radius_px)) {}
 
+void Mapper::adopt(const GraphSnapshot& graph) {
+  writer_ = GraphWriter(graph);
+  // Nothing is known about which absolute poses agree: the first window is set along edges from its
+  // reference.
+  window_ = next_window_ = DoubleWindow();
+  consistent_.clear();
+  if (graph.reference() != kNoKeyframe) consistent_.set(graph.reference(), 0);
+}
+
 MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals, std::span<const LoopConstraint> loops,
                           KeyframeId tracker_reference) {
   MapperReport report;

@@ -8,10 +8,9 @@ namespace twofold {
 
 /// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
 struct EdgeInformationOptions {
-  double sigma_px = 0.5;       ///< standard deviation of a measurement on level 0 [px]
-  double trans_share = 0.3;    ///< share of the ideal translational precision that is left, in (0, 1]
-  double rot_share = 0.3;      ///< share of the ideal rotational precision that is left, in (0, 1]
-  double min_parallax = 0.02;  ///< smaller ones count as this much, so that no edge leaves translation free
+  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
+  double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
+  double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
 };
 
 /// 6.4.1.
@@ -44,7 +43,7 @@ struct MapperOptions {
   int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
   int theta = 15;                    ///< Theta: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;
-  WindowSolverOptions solver{.max_iterations = 3, .huber_px = 2.0};  ///< joint optimisation of eq. 6.4
+  WindowSolverOptions solver{.max_iterations = 3, .huber_px = 2.0, .keep_going = {}};  ///< joint optimisation of eq. 6.4
   int structure_iterations = 2;        ///< structure-only, after poses were set along edges
   double sigma_scale = 1;              ///< multiplies the standard deviation that imaging gives a measurement
   double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom

@@ -9,8 +9,8 @@ namespace twofold::bench {
 
 /// One curve of a plot. Points with a NaN, or not positive on a logarithmic axis, break the line.
 struct Series {
-  std::string name;  ///< legend text; empty: not in the legend
-  std::vector<double> x, y;
+  std::string name = {};  ///< legend text; empty: not in the legend
+  std::vector<double> x = {}, y = {};
   bool line = true;
   bool markers = false;
   bool dashed = false;
@@ -19,7 +19,7 @@ struct Series {
 };
 
 struct PlotOptions {
-  std::string title, x_label, y_label;
+  std::string title = {}, x_label = {}, y_label = {};
   bool log_x = false, log_y = false;
   bool equal_aspect = false;  ///< same scale on both axes (trajectories); linear axes only
   int width = 900, height = 600;

@@ -9,10 +9,11 @@ namespace twofold::synthetic {
 namespace {
 
 constexpr double kHalfLength = 12;
-constexpr double kHalfWidth = 1.5;
+constexpr double kHalfWidth = 1.7;
+constexpr double kLane = 0.85;  ///< of the walk from the middle, and radius of its turns [m]
 constexpr double kCeiling = 2.8;
 constexpr double kTexel = 0.004;
-constexpr double kSpeed = 1.1;
+constexpr double kSpeed = 1.0;
 
 void paint_wall(Canvas& canvas, Random& random) {
   paint_plaster(canvas, random, static_cast<float>(random.uniform(150, 190)));
@@ -85,10 +86,16 @@ Staging make_corridor(std::uint64_t seed) {
 
   // Up on one side, around, and down on the other: the ring is a narrow stadium.
   std::vector<Vector2> ring;
-  for (double x = -9; x <= 9; x += 1.5) ring.emplace_back(x, -0.45);
-  ring.insert(ring.end(), {{10.1, -0.4}, {10.4, 0.0}, {10.1, 0.4}});
-  for (double x = 9; x >= -9; x -= 1.5) ring.emplace_back(x, 0.45);
-  ring.insert(ring.end(), {{-10.1, 0.4}, {-10.4, 0.0}, {-10.1, -0.4}});
+  const auto turn = [&](double centre, double first_angle) {
+    for (int i = 1; i < 6; ++i) {
+      const double angle = first_angle + std::numbers::pi * i / 6;
+      ring.emplace_back(centre + kLane * std::cos(angle), kLane * std::sin(angle));
+    }
+  };
+  for (double x = -9; x <= 9; x += 0.5) ring.emplace_back(x, -kLane);
+  turn(9, -0.5 * std::numbers::pi);
+  for (double x = 9; x >= -9; x -= 0.5) ring.emplace_back(x, kLane);
+  turn(-9, 0.5 * std::numbers::pi);
   const ClosedCurve curve(ring);
   WalkStyle style;
   style.speed = kSpeed;

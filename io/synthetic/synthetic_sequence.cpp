@@ -33,9 +33,9 @@ SyntheticSequence::SyntheticSequence(const SyntheticOptions& options)
   rig_.camera = {options.f,     options.f,     0.5 * (options.width - 1), 0.5 * (options.height - 1),
                  options.width, options.height};
   rig_.baseline = options.sensor == SensorKind::kMono ? 0 : options.baseline;
-  const std::int64_t frames = options.frames > 0
-                                  ? options.frames
-                                  : std::max(1L, std::lround(options.rounds * staging_.round_seconds * options.fps));
+  const std::int64_t frames =
+      options.frames > 0 ? options.frames
+                         : std::max(1L, std::lround(options.rounds * staging_.round_seconds * options.fps));
   for (std::int64_t i = 0; i < frames; ++i) {
     const std::uint64_t word = counter_hash(options.seed, kDropStream, static_cast<std::uint64_t>(i));
     if (i == 0 || unit_interval(word) >= options.drop) indices_.push_back(i);

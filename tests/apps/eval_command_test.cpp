@@ -1,39 +1,11 @@
-#include <sys/wait.h>
-
-#include <algorithm>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
-#include <sstream>
+#include <opencv2/imgcodecs.hpp>
 
 #include "io/trajectory_file.hpp"
-#include "tests/io/scratch_folder.hpp"
+#include "tests/apps/command.hpp"
 
 namespace twofold {
 namespace {
-
-struct Outcome {
-  int exit_code = -1;
-  std::string out, err;
-};
-
-std::string content(const std::string& file) {
-  std::stringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
-
-Outcome run(const ScratchFolder& folder, const std::string& arguments) {
-  const std::string command = std::string(TWOFOLD_BINARY) + " " + arguments + " >'" + (folder / "out") +
-                              "' 2>'" + (folder / "err") + "'";
-  const int status = std::system(command.c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder / "out"), content(folder / "err")};
-}
-
-void expect_bad_input(const Outcome& outcome, const std::string& part) {
-  EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
-  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-  EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
-}
 
 std::string write_circle(const ScratchFolder& folder, const std::string& name, double scale) {
   Trajectory trajectory;

@@ -20,51 +20,6 @@ namespace twofold {
 /// Jacobian picks those six. That spares Ceres the chain rule through the quaternion.
 class CeresWindow {
  public:
-  CeresWindow(const WindowProblem& problem, const WindowSolverOptions& options) : window_(problem) {
-    for (const auto& pose : problem.poses) pose_values_.push_back(to_array(pose.T_k_w));
-    for (const auto& point : problem.points)
-      point_values_.push_back({point.psi.x(), point.psi.y(), point.psi.z()});
-    ceres::Problem::Options owner;
-    owner.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    owner.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    problem_ = std::make_unique<ceres::Problem>(owner);
-    if (options.huber_px > 0) loss_ = std::make_unique<ceres::HuberLoss>(options.huber_px);
-    if (options.constraint_huber > 0) {
-      constraint_loss_ = std::make_unique<ceres::HuberLoss>(options.constraint_huber);
-    }
-    add_points();
-    add_constraints();
-    ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
-    for (auto& psi : point_values_) {
-      if (problem_->HasParameterBlock(psi.data())) ordering_->AddElementToGroup(psi.data(), 0);
-    }
-    for (auto& pose : pose_values_) {
-      if (problem_->HasParameterBlock(pose.data())) ordering_->AddElementToGroup(pose.data(), 1);
-    }
-  }
-
-  ceres::Solver::Summary solve(ceres::Solver::Options options) {
-    options.linear_solver_ordering = ordering_;
-    options.num_threads = 1;
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, problem_.get(), &summary);
-    return summary;
-  }
-
-  [[nodiscard]] ceres::Problem& problem() { return *problem_; }
-  /// The window with the present values.
-  [[nodiscard]] WindowProblem values() const {
-    WindowProblem result = window_;
-    for (std::size_t i = 0; i < pose_values_.size(); ++i) {
-      result.poses[i].T_k_w = from_array(pose_values_[i].data());
-    }
-    for (std::size_t k = 0; k < point_values_.size(); ++k) {
-      result.points[k].psi = Eigen::Map<const Vector3>(point_values_[k].data());
-    }
-    return result;
-  }
-
- private:
   using PoseArray = std::array<double, 7>;
   static PoseArray to_array(const SE3& T) {
     const auto& q = T.so3().quaternion();
@@ -118,6 +73,54 @@ class CeresWindow {
     }
   };
 
+  CeresWindow(const WindowProblem& problem, const WindowSolverOptions& options) : window_(problem) {
+    for (const auto& pose : problem.poses) pose_values_.push_back(to_array(pose.T_k_w));
+    for (const auto& point : problem.points)
+      point_values_.push_back({point.psi.x(), point.psi.y(), point.psi.z()});
+    ceres::Problem::Options owner;
+    owner.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    owner.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    problem_ = std::make_unique<ceres::Problem>(owner);
+    if (options.huber_px > 0) loss_ = std::make_unique<ceres::HuberLoss>(options.huber_px);
+    if (options.constraint_huber > 0) {
+      constraint_loss_ = std::make_unique<ceres::HuberLoss>(options.constraint_huber);
+    }
+    add_points();
+    add_constraints();
+    ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (auto& psi : point_values_) {
+      if (problem_->HasParameterBlock(psi.data())) ordering_->AddElementToGroup(psi.data(), 0);
+    }
+    for (auto& pose : pose_values_) {
+      if (problem_->HasParameterBlock(pose.data())) ordering_->AddElementToGroup(pose.data(), 1);
+    }
+  }
+
+  ceres::Solver::Summary solve(ceres::Solver::Options options) {
+    options.linear_solver_ordering = ordering_;
+    options.num_threads = 1;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, problem_.get(), &summary);
+    return summary;
+  }
+
+  [[nodiscard]] ceres::Problem& problem() { return *problem_; }
+  /// Parameter blocks.
+  [[nodiscard]] const double* pose(int i) const { return pose_values_[i].data(); }
+  [[nodiscard]] const double* point(int k) const { return point_values_[k].data(); }
+  /// The window with the present values.
+  [[nodiscard]] WindowProblem values() const {
+    WindowProblem result = window_;
+    for (std::size_t i = 0; i < pose_values_.size(); ++i) {
+      result.poses[i].T_k_w = from_array(pose_values_[i].data());
+    }
+    for (std::size_t k = 0; k < point_values_.size(); ++k) {
+      result.points[k].psi = Eigen::Map<const Vector3>(point_values_[k].data());
+    }
+    return result;
+  }
+
+ private:
   class AnchorObservation final : public ceres::SizedCostFunction<3, 3> {
    public:
     AnchorObservation(const Rig& rig, const WindowProblem::Observation& o) : rig_(rig), o_(o) {}

@@ -68,7 +68,7 @@ TEST(WindowProblemIo, NamesTheLineThatIsWrong) {
   expect_error(head + "poses 1\n0 0 0 0 1 1 2 3\npoints 1\n0 0 0 1 1\n",
                "w.txt:6: file ends where observation should stand");
   expect_error(head + "poses 1\n0 0 0 0 1 1 2 3\npoints 1\n5 0 0 1 0\nconstraints 0\n",
-               "w.txt: point 0: no pose 5 for its anchor");
+               "w.txt: point 0: anchor is no pose");
 }
 
 TEST(WindowProblemIo, NamesTheFileThatIsMissing) {

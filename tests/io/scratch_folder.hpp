@@ -17,8 +17,9 @@ class ScratchFolder {
  public:
   ScratchFolder() {
     const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() / (std::string("twofold_") + test->test_suite_name() +
-                                                      "_" + test->name() + "_" + std::to_string(getpid()));
+    // Outside of a test: set-up of a whole suite.
+    const std::string name = test ? std::string(test->test_suite_name()) + "_" + test->name() : "suite";
+    path_ = std::filesystem::temp_directory_path() / ("twofold_" + name + "_" + std::to_string(getpid()));
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

@@ -9,6 +9,7 @@ namespace twofold::bench {
 struct SlidingWindowExperimentOptions {
   int trials = 40;
   int nees_trials = 200;
+  int starry_first = 122;  ///< first step used: see starry_night_experiment
   int starry_steps = 1900;
   std::string data;  ///< folder of tracks_starrynight_stereo_imu; empty: left out
 };

@@ -28,6 +28,8 @@ int main(int argc, char** argv) {
   app.add_option("--data", options.data,
                  "folder tracks_starrynight_stereo_imu; without it that part is left out")
       ->check(CLI::ExistingDirectory);
+  app.add_option("--first-step", options.starry_first, "first step of the recording to use")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--steps", options.starry_steps, "first steps of the recording to use")
       ->check(CLI::PositiveNumber);
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");

@@ -78,14 +78,18 @@ void sideways_experiment(const SlidingWindowExperimentOptions& options, Report& 
                                .x_label = "frame",
                                .y_label = "RMS position error of the newest pose [m]"}));
   const auto ratio = [&](std::size_t v) { return std::sqrt(total[v] / total[0]); };
-  report.state("SWF fig. 15",
-               "sideways, the 2-frame window suffers (RMS error 10 % above batch) where 10 does not",
-               text("RMS over all frames relative to batch: 10: %.3f, 5: %.3f, 2: %.3f; derivatives at "
-                    "current estimates: 10: "
-                    "%.3f, 2: %.3f, 1 (EKF): %.3f; batch %.3f m",
-                    ratio(1), ratio(2), ratio(3), ratio(4), ratio(5), ratio(6),
-                    std::sqrt(total[0] / static_cast<double>(frames))),
-               std::min(ratio(3), ratio(5)) > 1.1 && ratio(1) < 1.1);
+  // The paper's filter takes all derivatives at current estimates; first estimates cure most of what it
+  // shows.
+  report.state(
+      "SWF fig. 15",
+      "sideways, the 2-frame window suffers (RMS error 10 % above batch) where 10 does not; derivatives at "
+      "current estimates as in the paper",
+      text("RMS over all frames relative to batch: 10: %.3f, 2: %.3f, 1 (EKF): %.3f; batch %.3f m", ratio(4),
+           ratio(5), ratio(6), std::sqrt(total[0] / static_cast<double>(frames))),
+      ratio(5) > 1.1 && ratio(4) < 1.1);
+  report.state(
+      "SWF fig. 15", "with first-estimate derivatives even 2 frames stay within 10 % of batch (ours)",
+      text("10: %.3f, 5: %.3f, 2: %.3f", ratio(1), ratio(2), ratio(3)), ratio(3) < 1.1 && ratio(1) < 1.1);
 }
 
 void track_length_experiment(const SlidingWindowExperimentOptions& options, Report& report) {

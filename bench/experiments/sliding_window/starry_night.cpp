@@ -157,7 +157,7 @@ void plot_envelopes(const StarryNight& data, const Track& track, const std::stri
 }  // namespace
 
 void starry_night_experiment(const SlidingWindowExperimentOptions& options, Report& report) {
-  const StarryNight data = load_starry_night(options.data, options.starry_steps);
+  const StarryNight data = load_starry_night(options.data, options.starry_first, options.starry_steps);
   struct Case {
     std::string name;
     Track track;

@@ -62,7 +62,7 @@ Vector3 vector3(const std::vector<double>& row, std::size_t at) {
 
 }  // namespace
 
-StarryNight load_starry_night(const std::string& folder, int steps) {
+StarryNight load_starry_night(const std::string& folder, int first, int steps) {
   StarryNight data;
   auto keys = read_keys(folder + "/camera.txt");
   data.rig.camera = {keys["fu"][0], keys["fv"][0], keys["cu"][0], keys["cv"][0], 640, 480};
@@ -74,6 +74,10 @@ StarryNight load_starry_night(const std::string& folder, int steps) {
   variance << vector3(keys["v_var"], 0), vector3(keys["w_var"], 0);
 
   auto rows = read_rows(folder + "/states.txt", 14);
+  if (first < 0 || first >= static_cast<int>(rows.size())) {
+    throw std::runtime_error(folder + "/states.txt has no step " + std::to_string(first));
+  }
+  rows.erase(rows.begin(), rows.begin() + first);
   if (static_cast<int>(rows.size()) > steps) rows.resize(static_cast<std::size_t>(steps));
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto& row = rows[k];
@@ -91,14 +95,13 @@ StarryNight load_starry_night(const std::string& folder, int steps) {
   for (const auto& row : read_rows(folder + "/landmarks.txt", 4)) data.landmarks.push_back(vector3(row, 1));
 
   const auto& y = keys["y_var"];
-  const double w_l = 1 / y[1], w_r = 1 / y[3];
-  const Vector3 information(1 / y[0], w_l + w_r, 1 / y[2]);
+  const Vector3 information(1 / y[0], 2 / (y[1] + y[3]), 1 / y[2]);
   for (const auto& row : read_rows(folder + "/observations.txt", 6)) {
-    const auto k = static_cast<std::size_t>(row[0]);
-    if (k >= data.frames.size()) continue;
+    if (row[0] < first || row[0] >= first + static_cast<double>(data.frames.size())) continue;
+    const auto k = static_cast<std::size_t>(row[0]) - static_cast<std::size_t>(first);
     LandmarkObservation o;
     o.landmark = static_cast<std::int64_t>(row[1]);
-    o.z = Vector3(row[2], (w_l * row[3] + w_r * row[5]) / (w_l + w_r), row[4]);
+    o.z = Vector3(row[2], 0.5 * (row[3] + row[5]), row[4]);
     o.information = information.asDiagonal();
     data.frames[k].observations.push_back(o);
   }

@@ -1,0 +1,52 @@
+// Experiments of "Visual SLAM: Why Filter?" (Strasdat 2012, chapter 4).
+#include <tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+
+#include "experiments/why_filter/experiments.hpp"
+
+int main(int argc, char** argv) {
+  using namespace twofold::bench;
+  WhyFilterOptions options;
+  std::string out = "why_filter_results";
+  std::vector<std::string> only;
+  int threads = 2;
+  bool full = false;
+  CLI::App app{"Why filter? BA-SLAM against filter-SLAM: figures 4.3, 4.6 - 4.13"};
+  app.add_option("--trials", options.trials, "Monte Carlo trials of a cell")->check(CLI::Range(2, 100000));
+  app.add_option("--min-trials", options.min_trials, "least trials of dear cells")
+      ->check(CLI::Range(2, 100000));
+  app.add_option("--cell-seconds", options.cell_seconds,
+                 "processor time after which a cell's trials are cut to --min-trials");
+  app.add_flag("--full", full, "500 trials in every cell, as in the thesis");
+  app.add_flag("!--no-480", options.large_n, "leave out N = 480");
+  app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
+  app.add_option("--only", only, "run these parts only: preliminary motion cost monte_carlo");
+  app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);
+  CLI11_PARSE(app, argc, argv);
+  if (full) options.trials = options.min_trials = 500;
+  const std::vector<std::pair<std::string, std::function<void(const WhyFilterOptions&, Report&)>>> all = {
+      {"preliminary", preliminary_experiment},
+      {"motion", motion_experiment},
+      {"cost", cost_experiment},
+      {"monte_carlo", monte_carlo_experiment}};
+  try {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(threads));
+    Report report(out);
+    for (const auto& [name, experiment] : all) {
+      if (!only.empty() && std::find(only.begin(), only.end(), name) == only.end()) continue;
+      experiment(options, report);
+      std::printf("done: %s\n", name.c_str());
+      std::fflush(stdout);
+    }
+    std::fputs(report.finish().c_str(), stdout);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

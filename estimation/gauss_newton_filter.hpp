@@ -1,0 +1,118 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimation/inverse_depth_filter.hpp"
+#include "estimation/sliding_window_filter_equations.hpp"
+
+namespace twofold {
+
+/// How the pose of a new frame is found before the joint update.
+enum class MotionEstimate : std::uint8_t {
+  kMotionOnly,    ///< map taken as exact  (thesis eq. 4.15), linear in the points
+  kMapPrior,      ///< Gaussian map, algorithm 6, cubic in the points
+  kMapPriorOnce,  ///< algorithm 6 with the innovation covariance computed once (step 7 skipped)
+};
+
+struct GaussNewtonFilterOptions {
+  double sigma_px = 0.5;  ///< of every measurement component, > 0
+  int iterations = 3;     ///< Levenberg-Marquardt steps of the joint update, >= 0; 0: the motion estimate stands
+  int motion_iterations = 10;
+  MotionEstimate motion = MotionEstimate::kMotionOnly;
+
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Measurement of one point; z.z() is ignored by monocular rigs.
+struct PointObservation {
+  std::int64_t point = 0;
+  Vector3 z = Vector3::Zero();  ///< (u_l, v_l, u_r) [px]
+};
+
+/// Gauss-Newton filter for visual SLAM: an iterated information filter without motion prior over a joint
+/// Gaussian of anchored inverse depth points and their anchor poses  (thesis 2.3.4, 4.5.2, 4.5.3; algorithms
+/// 4, 5, 6).
+///
+/// Order of the state: [anchor poses | points | current pose]; the origin T_0 is known and not part of it.
+/// Poses T_i map the origin frame into camera i, perturbed on the left. Every joint update costs O((3N +
+/// 6A)^3).
+class GaussNewtonFilter {
+ public:
+  GaussNewtonFilter(const Rig& rig, const GaussNewtonFilterOptions& options);
+
+  /// First frame of a stereo rig: the points and their information  (eq. 4.23, 4.24).
+  void initialise(std::span<const PointObservation> first);
+  /// Monocular start from three consecutive frames  (4.5.3): the first is the origin, the translation to the
+  /// second defines the unit of length by a 5-DoF constraint, the third is a standard update. Points not seen
+  /// in all three are left out. False when the motion could not be estimated.
+  [[nodiscard]] bool bootstrap(std::span<const PointObservation> b0, std::span<const PointObservation> b1,
+                               std::span<const PointObservation> first);
+
+  /// One time step of algorithm 5. `lost`: points no longer seen, marginalised out. `fresh`: points to add,
+  /// measured in the previous frame, whose pose becomes their anchor. `current`: measurements of this frame,
+  /// of old and new points. False when the joint update found no finite step; the state is then that of the
+  /// motion estimate.
+  bool step(std::span<const std::int64_t> lost, std::span<const PointObservation> fresh,
+            std::span<const PointObservation> current);
+
+  /// From the next step on; throws as the constructor does.
+  void set_options(const GaussNewtonFilterOptions& options);
+
+  [[nodiscard]] const SE3& T_c_w() const { return T_c_w_; }
+  [[nodiscard]] int point_count() const { return static_cast<int>(points_.size()); }
+  [[nodiscard]] int anchor_count() const { return static_cast<int>(anchors_.size()) - 1; }
+  [[nodiscard]] Vector3 point_in_world(int point) const;
+  [[nodiscard]] std::int64_t point_id(int point) const { return points_[static_cast<std::size_t>(point)].id; }
+  [[nodiscard]] const Vector3& psi(int point) const { return points_[static_cast<std::size_t>(point)].psi; }
+  /// Information of [anchors | points | current pose].
+  [[nodiscard]] const MatrixX& information() const { return Lambda_; }
+  /// 6 x 6 marginal covariance of the current pose.
+  [[nodiscard]] Matrix6 pose_covariance() const;
+  /// Time spent in the last joint update [s, of the calling thread's processor].
+  [[nodiscard]] double joint_seconds() const { return joint_seconds_; }
+
+ private:
+  struct Point {
+    std::int64_t id;
+    int anchor;  ///< index into anchors_
+    Vector3 psi;
+  };
+  struct Seen {
+    int point;  ///< index into points_
+    Vector3 z;
+  };
+
+  [[nodiscard]] int rows() const { return rig_.kind == SensorKind::kMono ? 2 : 3; }
+  [[nodiscard]] int anchor_at(int anchor) const { return 6 * (anchor - 1); }
+  [[nodiscard]] int point_at(int point) const { return 6 * anchor_count() + 3 * point; }
+  [[nodiscard]] int pose_at() const { return 6 * anchor_count() + 3 * point_count(); }
+  [[nodiscard]] InverseDepthFilter first_estimate(const Vector3& z) const;
+  [[nodiscard]] std::vector<Seen> match(std::span<const PointObservation> observations) const;
+  [[nodiscard]] SE3 T_c_anchor(int anchor) const {
+    return T_c_w_ * anchors_[static_cast<std::size_t>(anchor)].inverse();
+  }
+  void add_point(const PointObservation& observation, int anchor);
+  void marginalise_pose();
+  void pose_becomes_anchor();
+  void marginalise_points(std::span<const std::int64_t> lost);
+  void append_pose();
+  double add_measurements(const std::vector<Seen>& seen, MatrixX* Lambda, VectorX* g) const;
+  bool joint_update(const std::vector<Seen>& seen, int iterations, bool fixed_gauge);
+  void estimate_motion(const std::vector<Seen>& seen);
+  [[nodiscard]] bool innovation(const std::vector<Seen>& seen, const MatrixX* Sigma, MatrixX& S, MatrixX& J_T,
+                                VectorX& d) const;
+  void eliminate(const std::vector<int>& indices);
+
+  Rig rig_;
+  GaussNewtonFilterOptions options_;
+  std::vector<SE3> anchors_;  ///< [0] is the origin
+  std::vector<Point> points_;
+  SE3 T_c_w_;
+  MatrixX Lambda_;
+  double joint_seconds_ = 0;
+};
+
+}  // namespace twofold

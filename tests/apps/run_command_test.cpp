@@ -1,0 +1,186 @@
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include <fmt/format.h>
+
+#include "io/trajectory_file.hpp"
+#include "tests/apps/command.hpp"
+#include "tests/imaging/rendered_scene.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+Rig small_rig() {
+  Rig rig;
+  rig.camera = {220, 220, 159.5, 119.5, 320, 240};
+  rig.baseline = 0.12;
+  return rig;
+}
+
+SE3 T_c_w(int i) {
+  return {SO3::exp(Vector3(0, 0.004 * i, 0)), Vector3(0.004 * i, 0, -0.01 * i)};
+}
+
+/// A stereo recording in KITTI's layout, made once and copied by tests that damage it.
+class RunCommand : public ::testing::Test {
+ protected:
+  static constexpr int kFrames = 24;
+
+  static void SetUpTestSuite() {
+    master_ = new ScratchFolder;
+    fs::create_directories(master_->path() / "image_0");
+    fs::create_directories(master_->path() / "image_1");
+    twofold::testing::RenderedScene scene(small_rig(), Vector3(2.5, 2.0, 3.5), 5);
+    const SE3 T_r_c(SO3(), Vector3(-small_rig().baseline, 0, 0));
+    std::string times, poses;
+    for (int i = 0; i < kFrames; ++i) {
+      const std::string name = fmt::format("{:06}.png", i);
+      cv::imwrite(*master_ / ("image_0/" + name), scene.render_one(T_c_w(i), 1));
+      cv::imwrite(*master_ / ("image_1/" + name), scene.render_one(T_r_c * T_c_w(i), 1));
+      times += fmt::format("{:.6f}\n", 0.05 * i);
+      const Matrix4 m = T_c_w(i).inverse().matrix();
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 4; ++c) poses += fmt::format("{:.9f}{}", m(r, c), r == 2 && c == 3 ? '\n' : ' ');
+      }
+    }
+    master_->write("times.txt", times);
+    master_->write("poses.txt", poses);
+    master_->write("calib.txt",
+                   "P0: 220 0 159.5 0 0 220 119.5 0 0 0 1 0\nP1: 220 0 159.5 -26.4 0 220 119.5 0 0 0 1 0\n");
+  }
+  static void TearDownTestSuite() {
+    delete master_;
+    master_ = nullptr;
+  }
+
+  void SetUp() override {
+    recording_ = folder_.path() / "recording";
+    fs::copy(master_->path(), recording_, fs::copy_options::recursive);
+  }
+  Outcome run_recording(const std::string& options = "", const std::string& wrapper = "") {
+    return run(folder_,
+               "run 'kitti:" + recording_.string() + "' --out '" + (folder_ / "result") + "' " + options,
+               wrapper);
+  }
+  [[nodiscard]] std::string result(const std::string& name) const {
+    return content(folder_ / ("result/" + name));
+  }
+  void replace_in(const std::string& name, const std::string& from, const std::string& to) const {
+    std::string text = content((recording_ / name).string());
+    ASSERT_NE(text.find(from), std::string::npos);
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(recording_ / name) << text;
+  }
+
+  static ScratchFolder* master_;
+  ScratchFolder folder_;
+  fs::path recording_;
+};
+ScratchFolder* RunCommand::master_ = nullptr;
+
+TEST_F(RunCommand, WritesEveryOutputAndFollowsTheTruth) {
+  const Outcome outcome = run_recording("--deterministic --trace '" + (folder_ / "trace.json") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");  // no progress line where there is no terminal
+  const Trajectory estimate = read_trajectory(folder_ / "result/trajectory.txt");
+  ASSERT_EQ(estimate.size(), static_cast<std::size_t>(kFrames));
+  for (int i = 0; i < kFrames; ++i) {
+    const Vector3 truth = (T_c_w(0) * T_c_w(i).inverse()).translation();
+    EXPECT_LT((estimate[static_cast<std::size_t>(i)].T_w_c.translation() - truth).norm(), 0.005) << i;
+  }
+  EXPECT_EQ(read_trajectory(folder_ / "result/trajectory_causal.txt").size(),
+            static_cast<std::size_t>(kFrames));
+  EXPECT_FALSE(cv::imread(folder_ / "result/trajectory.png").empty());
+  EXPECT_FALSE(result("map.ply").empty());
+  const auto summary = nlohmann::json::parse(result("summary.json"));
+  EXPECT_EQ(summary["tracked"], kFrames);
+  EXPECT_EQ(summary["why_lost"].size(), 0U);
+  const auto timing = nlohmann::json::parse(result("timing.json"));
+  EXPECT_EQ(timing["tracker"]["frame"]["count"], kFrames);
+  EXPECT_TRUE(nlohmann::json::parse(content(folder_ / "trace.json")).contains("traceEvents"));
+}
+
+TEST_F(RunCommand, LiveRunIsReplayedByteForByte) {
+  const std::vector<std::string> files{"trajectory.txt", "trajectory_causal.txt", "keyframes.txt", "map.ply",
+                                       "schedule.log"};
+  ASSERT_EQ(run_recording("--speed 2 --preload").exit_code, 0);
+  std::vector<std::string> live;
+  for (const std::string& file : files) live.push_back(result(file));
+  fs::rename(folder_.path() / "result", folder_.path() / "live");
+  const Outcome replay = run_recording("--replay-schedule '" + (folder_ / "live/schedule.log") + "'");
+  ASSERT_EQ(replay.exit_code, 0) << replay.err;
+  for (std::size_t i = 0; i < files.size(); ++i) EXPECT_EQ(result(files[i]), live[i]) << files[i];
+}
+
+TEST_F(RunCommand, InterruptedRunKeepsItsResults) {
+  const Outcome outcome = run_recording("--speed 0.3 --preload", "timeout --preserve-status -s INT 2");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto summary = nlohmann::json::parse(result("summary.json"));
+  EXPECT_EQ(summary["interrupted"], true);
+  EXPECT_GT(summary["tracked"], 2);
+  EXPECT_LT(summary["tracked"], kFrames);
+  EXPECT_FALSE(read_trajectory(folder_ / "result/trajectory.txt").empty());
+  EXPECT_FALSE(result("map.ply").empty());
+}
+
+TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
+  expect_bad_input(run(folder_, "run"), "SOURCE");
+  expect_bad_input(run_recording("--speed fast"), "--speed");
+  expect_bad_input(run_recording("--speed -1"), "--speed");
+  expect_bad_input(run_recording("--windows 25"), "--windows");
+  expect_bad_input(run_recording("--windows 0,10"), "--windows");
+  expect_bad_input(run_recording("--late never"), "late");
+  expect_bad_input(run_recording("--replay-schedule /nonexistent"), "/nonexistent");
+  expect_bad_input(run_recording("--calib /nonexistent.yaml"), "/nonexistent.yaml");
+  folder_.write("noise.log", "this is no schedule");
+  expect_bad_input(run_recording("--replay-schedule '" + (folder_ / "noise.log") + "'"), "noise.log");
+  expect_bad_input(run(folder_, "run nosuch:thing"), "nosuch");
+  expect_bad_input(run(folder_, "run kitti:/nonexistent"), "/nonexistent");
+  expect_bad_input(run(folder_, "run kitti:" + recording_.string() + " --out /proc/nothing/here"),
+                   "/proc/nothing");
+}
+
+TEST_F(RunCommand, BrokenRecordingsAreOneLineAndExitCodeTwo) {
+  const auto damaged = [&](const std::string& what, const std::string& message, const auto& damage) {
+    SCOPED_TRACE(what);
+    fs::remove_all(recording_);
+    fs::copy(master_->path(), recording_, fs::copy_options::recursive);
+    damage();
+    expect_bad_input(run_recording("--deterministic"), message);
+  };
+  damaged("empty folder", "", [&] {
+    fs::remove_all(recording_);
+    fs::create_directory(recording_);
+  });
+  damaged("undecodable image", "000005.png",
+          [&] { std::ofstream(recording_ / "image_0/000005.png") << "not an image"; });
+  damaged("image of another size", "000007.png", [&] {
+    cv::imwrite((recording_ / "image_1/000007.png").string(), cv::Mat(100, 100, CV_8UC1, cv::Scalar(9)));
+  });
+  damaged("calibration without a key", "calib.txt", [&] { replace_in("calib.txt", "P1:", "Q1:"); });
+  damaged("negative focal length", "calib.txt", [&] { replace_in("calib.txt", "P0: 220", "P0: -220"); });
+  damaged("NaN in ground truth", "poses.txt", [&] { replace_in("poses.txt", "1.000000000", "nan"); });
+  damaged("repeated time stamp", "times.txt", [&] { replace_in("times.txt", "0.100000", "0.050000"); });
+  damaged("time stamps out of order", "times.txt", [&] { replace_in("times.txt", "0.100000", "0.010000"); });
+  damaged("left and right counts differ", "", [&] { fs::remove(recording_ / "image_1/000023.png"); });
+}
+
+TEST_F(RunCommand, RecordingWithoutTextureIsAFailedRun) {
+  for (int i = 0; i < kFrames; ++i) {
+    for (const char* side : {"image_0", "image_1"}) {
+      cv::imwrite((recording_ / side / fmt::format("{:06}.png", i)).string(),
+                  cv::Mat(240, 320, CV_8UC1, cv::Scalar(120)));
+    }
+  }
+  const Outcome outcome = run_recording("--deterministic");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("no frame could be tracked"), std::string::npos) << outcome.err;
+  const auto summary = nlohmann::json::parse(result("summary.json"));
+  EXPECT_EQ(summary["why_lost"].size(), static_cast<std::size_t>(kFrames));
+}
+
+}  // namespace
+}  // namespace twofold

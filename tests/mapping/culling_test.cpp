@@ -1,0 +1,142 @@
+#include "mapping/culling.hpp"
+
+#include <gtest/gtest.h>
+
+#include "mapping/mapper.hpp"
+#include "tests/graph/graph_invariants.hpp"
+#include "tests/mapping/simulation.hpp"
+#include "tests/mapping/small_graphs.hpp"
+
+namespace twofold {
+namespace {
+
+KeyframeId k(std::uint32_t id) {
+  return KeyframeId{id};
+}
+
+TEST(IsRedundant, NeedsEnoughPointsSeenByEnoughOthersAsFinely) {
+  const Rig rig = simulation::thesis_rig();
+  GraphWriter writer = chain(5);
+  CullingOptions options;
+  for (int n = 0; n < 18; ++n) add_point(writer, rig, {0.2, 0.01 * n, 1}, {k(0), k(1), k(2), k(3)});
+  for (int n = 0; n < 2; ++n) add_point(writer, rig, {0.2, 0.01 * n, 1.1}, {k(1), k(2)});
+  EXPECT_TRUE(is_redundant(writer.graph(), k(1), options));  // 18 of 20
+  EXPECT_TRUE(is_redundant(writer.graph(), k(3), options));  // 18 of 18
+  add_point(writer, rig, {0.2, 0, 1.2}, {k(1), k(2), k(3)});
+  EXPECT_FALSE(is_redundant(writer.graph(), k(1), options));  // 18 of 21
+  Observation coarser = writer.graph().keyframe(k(0)).observations->front();
+  coarser.level = 2;
+  for (std::uint32_t p = 0; p < 18; ++p) {
+    coarser.point = PointId{p};
+    writer.add_observations(k(0), std::span(&coarser, 1));
+  }
+  EXPECT_FALSE(is_redundant(writer.graph(), k(3), options)) << "one of the others sees them less finely";
+  EXPECT_TRUE(is_redundant(writer.graph(), k(0), options));
+}
+
+TEST(RemoveKeyframe, KeepsTheGraphConnectedAndRelativePosesKnown) {
+  std::mt19937 rng(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    GraphWriter writer = chain(30);
+    for (int e = 0; e < 15; ++e) {
+      const std::uint32_t a = rng() % 30, b = rng() % 30;
+      if (a != b) link(writer, k(a), k(b), static_cast<int>(rng() % 40));
+    }
+    std::vector<Matrix4> before;
+    for (std::uint32_t i = 0; i < 30; ++i) before.push_back(writer.graph().T_k_w(k(i)).matrix());
+    for (int n = 0; n < 20; ++n) {
+      const KeyframeId id = k(rng() % 29);  // 29 is the reference
+      if (writer.graph().keyframe(id).culled()) continue;
+      remove_keyframe(writer, id);
+      ASSERT_EQ(broken_invariant(writer.graph()), "");
+      ASSERT_EQ(component_count(writer.graph()), 1);
+    }
+    for (std::uint32_t i = 0; i < 30; ++i) {
+      ASSERT_LT((writer.graph().T_k_w(k(i)).matrix() - before[i]).norm(), 1e-9);
+    }
+    for (std::uint32_t i = 0; i < 30; ++i) {
+      for (const Edge& edge : *writer.graph().keyframe(k(i)).edges) {
+        const SE3 T = writer.graph().T_k_w(edge.other) * writer.graph().T_k_w(k(i)).inverse();
+        ASSERT_LT((relative_pose(writer.graph(), k(i), edge) * T.inverse()).log().norm(), 1e-9);
+      }
+    }
+  }
+}
+
+TEST(PointCuller, CullsWeakPointsThatAreInViewAndNeverSeenAgain) {
+  const Rig rig = simulation::thesis_rig();
+  CullingOptions options;
+  options.max_misses = 3;
+  PointCuller culler(rig, options);
+  GraphWriter writer = chain(8, 0.02);
+  const PointId forgotten = add_point(writer, rig, {0.05, 0, 1}, {k(0), k(1)});
+  const PointId strong = add_point(writer, rig, {0.05, 0.1, 1}, {k(0), k(1), k(2)});
+  const PointId outside = add_point(writer, rig, {-3, 0, 1}, {k(0), k(1)});
+  const PointId again = add_point(writer, rig, {0.05, 0.2, 1}, {k(0), k(3)});
+  const std::vector<PointId> points{forgotten, strong, outside, again};
+  int culled = 0;
+  for (const std::uint32_t newest : {2U, 3U, 4U, 5U}) culled += culler.step(writer, k(newest), points);
+  EXPECT_EQ(culled, 1);
+  EXPECT_FALSE(writer.graph().point(forgotten).alive());
+  for (const PointId id : {strong, outside, again}) EXPECT_TRUE(writer.graph().point(id).alive());
+  culler.step(writer, k(6), points);
+  EXPECT_FALSE(writer.graph().point(again).alive()) << "three misses since it was last seen";
+}
+
+struct Size {
+  std::size_t keyframes = 0, points = 0, observations = 0, edges = 0;
+};
+
+Size living(const GraphSnapshot& graph) {
+  Size size;
+  for (std::uint32_t i = 0; i < graph.keyframe_count(); ++i) {
+    const Keyframe& keyframe = graph.keyframe(k(i));
+    size.keyframes += keyframe.culled() ? 0 : 1;
+    size.observations += keyframe.observations->size();
+    size.edges += keyframe.edges->size();
+  }
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+    size.points += graph.point(PointId{p}).alive() ? 1 : 0;
+  }
+  return size;
+}
+
+/// Browsing a mapped place: laps of the same circle, a tracker that starts new points where it has forgotten
+/// old ones, metric loop closure. After the first laps the living map stays as large as it is.
+TEST(Culling, BrowsingAMappedPlaceDoesNotGrowTheMap) {
+  simulation::Options options;
+  options.rig = simulation::thesis_rig();
+  options.global_association = false;
+  options.max_observations = 100;
+  const int lap = 40, laps = 10;
+  const std::vector<SE3> path = simulation::circle_path(lap * laps, laps, 0.8, 1.2);
+  simulation::Simulation simulation(options, simulation::scattered_points(path, 2, 25, 1), path);
+  MapperOptions mapping;
+  mapping.sigma_scale = 2;
+  mapping.edge.sigma_px = 1;
+  mapping.inner_window = 15;
+  mapping.outer_window = 40;
+  Mapper mapper(options.rig, mapping, simulation.search(10));
+  std::vector<Size> after_lap;
+  for (int n = 1; !simulation.done(); ++n) {
+    KeyframeProposal* proposal = &simulation.propose(mapper.graph());
+    mapper.step(std::span(&proposal, 1));
+    ASSERT_EQ(broken_invariant(mapper.graph(), 2), "") << "keyframe " << n;
+    ASSERT_EQ(component_count(mapper.graph()), 1);
+    if (n % lap == 0) after_lap.push_back(living(mapper.graph()));
+  }
+  const Size& second = after_lap[2];
+  const Size& last = after_lap.back();
+  EXPECT_LE(last.keyframes, second.keyframes * 11 / 10);
+  EXPECT_LE(last.points, second.points * 11 / 10);
+  EXPECT_LE(last.observations, second.observations * 11 / 10);
+  EXPECT_LE(last.edges, second.edges * 12 / 10);
+  EXPECT_LT(last.keyframes, static_cast<std::size_t>(lap) * 2);
+  for (const Size& s : after_lap) {
+    RecordProperty("lap", std::to_string(s.keyframes) + " " + std::to_string(s.points) + " " +
+                              std::to_string(s.observations) + " " + std::to_string(s.edges));
+  }
+}
+
+}  // namespace
+}  // namespace twofold
