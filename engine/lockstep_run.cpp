@@ -15,7 +15,7 @@ constexpr std::size_t kDeterministicRoom = 6;
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
     : trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       pool_(options.deterministic ? kDeterministicRoom : options.proposal_slots + kReplayRoom),
-      tracking_(rig, options.tracker, trace_.get()),
+      tracking_(rig, options, trace_.get()),
       mapping_(rig, options.mapper, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
       snapshot_(mapping_.publish()) {}
@@ -26,10 +26,11 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
   FeedStatus status = FeedStatus::kEnd;
   // Relaxed: the flag carries no other data; seeing it a frame later is as good.
   while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
-    track(frame, true, false);
+    track(frame, true, false, answer_ ? 1 : 0);
+    if (request_) answer_request(snapshot_);
     if (!queue_.empty()) {
       map(queue_.size(), 0);
-      close_loops(*mapped_.front(), 0);
+      close_loops(*mapped_.front(), snapshot_, 0);
       mapped_.clear();
       if (!loop_messages_.empty()) map(0, loop_messages_.size());
     }
@@ -43,6 +44,7 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
                          const std::atomic<bool>& interrupted, const ProgressSink& progress) {
   Frame frame;
   auto round = schedule.mapper.begin();
+  history_.push_back(snapshot_);
   for (const TrackerStep& step : schedule.tracker) {
     if (interrupted.load(std::memory_order_relaxed)) {
       result_.interrupted = true;
@@ -66,13 +68,20 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
         return;
       }
       map(round->proposals, round->loop_messages);
+      history_.push_back(snapshot_);
       replay_loop_steps(schedule);
     }
-    track(frame, step.degrade_level == 0, step.refused > 0);
+    if (step.messages > 0 && !answer_) {
+      fail("the schedule does not fit the input: the tracker would need an answer it did not ask for");
+      return;
+    }
+    track(frame, step.degrade_level == 0, step.refused > 0, step.messages);
+    replay_loop_steps(schedule);
     report(progress);
   }
   for (; round != schedule.mapper.end() && can_map(*round); ++round) {
     map(round->proposals, round->loop_messages);
+    history_.push_back(snapshot_);
     replay_loop_steps(schedule);
   }
 }
@@ -81,11 +90,15 @@ bool LockstepRun::can_map(const MapperStep& round) const {
   return round.proposals <= queue_.size() && round.loop_messages <= loop_messages_.size();
 }
 
-/// All steps that used the version just published: whatever they send, the mapper took later.
 void LockstepRun::replay_loop_steps(const Schedule& schedule) {
   for (; next_loop_step_ < schedule.loop_closer.size(); ++next_loop_step_) {
     const LoopStep& step = schedule.loop_closer[next_loop_step_];
-    if (step.version != snapshot_.version()) return;
+    if (step.version > snapshot_.version() || (step.requests > 0 && !request_)) return;
+    while (history_.front().version() < step.version) history_.pop_front();
+    if (step.requests > 0) {
+      answer_request(history_.front());
+      continue;
+    }
     const auto is_older = [&](const ProposalHandle& p) {
       return static_cast<std::int64_t>(index(p->id)) < step.keyframe;
     };
@@ -94,21 +107,32 @@ void LockstepRun::replay_loop_steps(const Schedule& schedule) {
       fail("the schedule does not fit the input: the loop closer would need another keyframe");
       return;
     }
-    close_loops(*mapped_.front(), step.refused);
+    close_loops(*mapped_.front(), history_.front(), step.refused);
     mapped_.pop_front();
   }
 }
 
-void LockstepRun::close_loops(const KeyframeProposal& keyframe, std::size_t refused) {
-  const std::span<LoopMessage> messages = loop_closing_.step(keyframe, snapshot_);
+void LockstepRun::answer_request(const GraphSnapshot& graph) {
+  answer_ = loop_closing_.relocalise(*request_, graph);
+  request_.reset();
+  result_.schedule.loop_closer.append({graph.version(), -1, 1});
+}
+
+void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph,
+                              std::size_t refused) {
+  const std::span<LoopMessage> messages = loop_closing_.step(keyframe, graph);
   const std::size_t sent = messages.size() - std::min(refused, messages.size());
   for (LoopMessage& message : messages.first(sent)) loop_messages_.push_back(std::move(message));
-  result_.schedule.loop_closer.append({snapshot_.version(), static_cast<std::int64_t>(index(keyframe.id)), 0,
+  result_.schedule.loop_closer.append({graph.version(), static_cast<std::int64_t>(index(keyframe.id)), 0,
                                        static_cast<std::uint32_t>(messages.size() - sent)});
 }
 
-void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse) {
+void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse, std::uint32_t answers) {
   const std::int64_t due_ns = steady_now_ns();
+  if (answers > 0) {
+    tracking_.take_answer(*answer_, snapshot_);
+    answer_.reset();
+  }
   FrameRecord record;
   ProposalHandle proposal;
   if (may_propose) proposal = pool_.try_acquire();
@@ -122,7 +146,9 @@ void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse) {
   }
   tracking_.finish(due_ns, record);
   result_.schedule.tracker.append({record.frame_index, record.snapshot_version, TrackerStep::Fate::kTracked,
-                                   static_cast<std::uint8_t>(may_propose ? 0 : 1), 0, refuse ? 1U : 0U});
+                                   static_cast<std::uint8_t>(may_propose ? 0 : 1), answers,
+                                   refuse ? 1U : 0U});
+  if (tracking_.wants_relocalisation()) (void)tracking_.request_relocalisation(request_.emplace());
   result_.frames.push_back(record);
 }
 
@@ -150,8 +176,8 @@ void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
   for (ProposalHandle& keyframe : consumed_) mapped_.push_back(std::move(keyframe));
   consumed_.clear();
   snapshot_ = mapping_.publish();
-  result_.schedule.mapper.append({round.version, static_cast<std::uint32_t>(proposals),
-                                  static_cast<std::uint32_t>(loop_messages)});
+  result_.schedule.mapper.append(
+      {round.version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
   result_.rounds.push_back(round);
 }
 

@@ -20,10 +20,13 @@ class LockstepRun {
   [[nodiscard]] RunResult finish();
 
  private:
-  void track(const Frame& frame, bool may_propose, bool refuse);
+  void track(const Frame& frame, bool may_propose, bool refuse, std::uint32_t answers);
+  void answer_request(const GraphSnapshot& graph);
   void map(std::size_t proposals, std::size_t loop_messages);
   /// One step of the loop closer for a keyframe; the last `refused` of its messages found the ring full.
-  void close_loops(const KeyframeProposal& keyframe, std::size_t refused);
+  void close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph, std::size_t refused);
+  /// Takes all steps of the loop closer whose inputs are there. It does not matter when within the replay a
+  /// step is taken: what it sends waits until the schedule says that it arrived.
   void replay_loop_steps(const Schedule& schedule);
   /// Were all messages of this round sent?
   [[nodiscard]] bool can_map(const MapperStep& round) const;
@@ -42,6 +45,9 @@ class LockstepRun {
   std::deque<LoopMessage> loop_messages_;    // on their way to the mapper
   std::vector<LoopMessage> taken_messages_;  // of this round
   std::size_t next_loop_step_ = 0;           // of a replay
+  std::deque<GraphSnapshot> history_;        // of a replay: versions that loop closer steps may still need
+  std::optional<RelocalisationRequest> request_;
+  std::optional<RelocalisationAnswer> answer_;
   GraphSnapshot snapshot_;  // what the tracker sees; replaced between its steps only
   RunResult result_;
   Progress progress_;

@@ -22,9 +22,9 @@ enum class FrameState : std::uint8_t {
 /// Why poses in the world changed for a reason other than motion.
 enum class CorrectionReason : std::uint8_t {
   kNone,
-  kOptimisation,   ///< the double window, metric closures included
-  kLoopClosure,    ///< a place was recognised
-  kRelaxation,     ///< the whole pose graph was relaxed
+  kOptimisation,  ///< the double window, metric closures included
+  kLoopClosure,   ///< a place was recognised
+  kRelaxation,    ///< the whole pose graph was relaxed
 };
 [[nodiscard]] constexpr const char* describe(CorrectionReason reason) {
   switch (reason) {
@@ -83,8 +83,8 @@ struct MapperRound {
 /// A loop that was closed by appearance.
 struct ClosedLoop {
   LoopConstraint constraint;
-  SE3 T_to_from_before;  ///< as the map had it: the difference is the drift
-  std::int64_t t_ns = 0; ///< of the frame that came back
+  SE3 T_to_from_before;   ///< as the map had it: the difference is the drift
+  std::int64_t t_ns = 0;  ///< of the frame that came back
 };
 
 /// Who saw what when, in the form it is written to a file.

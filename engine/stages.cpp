@@ -6,11 +6,15 @@ namespace {
 // Smaller changes of the last frame's pose are not announced: each round of the mapper makes some.
 constexpr double kCorrection = 0.01;         // [m]
 constexpr double kCorrectionAngle = 0.0035;  // [rad]
+// A frame or two are lost now and then; the tracker finds on by itself.
+constexpr int kLostBeforeAsking = 2;
 
 }  // namespace
 
-TrackingStage::TrackingStage(const Rig& rig, const TrackerOptions& options, Trace* trace)
-    : tracker_(rig, options), times_("tracker", trace) {
+TrackingStage::TrackingStage(const Rig& rig, const EngineOptions& options, Trace* trace)
+    : tracker_(rig, options.tracker),
+      times_("tracker", trace),
+      can_relocalise_(options.vocabulary != nullptr) {
   frame_stage_ = times_.add_stage("frame");
   latency_stage_ = times_.add_stage("latency from due time");
   for (std::size_t s = 0; s < kTrackStages; ++s) {
@@ -71,6 +75,22 @@ void TrackingStage::proposal_rejected(FrameRecord& record) {
   record.keyframe = false;
 }
 
+bool TrackingStage::wants_relocalisation() const {
+  return can_relocalise_ && !answer_awaited_ && tracker_.lost_frames() >= kLostBeforeAsking;
+}
+
+bool TrackingStage::request_relocalisation(RelocalisationRequest& request) {
+  if (!wants_relocalisation()) return false;
+  request.images.copy_from(tracker_.lost_images());
+  answer_awaited_ = true;
+  return true;
+}
+
+void TrackingStage::take_answer(const RelocalisationAnswer& answer, const GraphSnapshot& graph) {
+  answer_awaited_ = false;
+  if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k, graph);
+}
+
 void TrackingStage::finish(std::int64_t scheduled_ns, FrameRecord& record) {
   record.latency_ns = steady_now_ns() - scheduled_ns;
   times_.record(latency_stage_, scheduled_ns, record.latency_ns);
@@ -113,6 +133,7 @@ LoopClosingStage::LoopClosingStage(const Rig& rig, const EngineOptions& options,
     : rig_(rig), mapper_options_(options.mapper), times_("loop closer", trace) {
   place_stage_ = times_.add_stage("place");
   relax_stage_ = times_.add_stage("relaxation");
+  relocalise_stage_ = times_.add_stage("relocalisation");
   if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
 }
 
@@ -127,6 +148,12 @@ std::span<LoopMessage> LoopClosingStage::step(const KeyframeProposal& keyframe, 
     unrelaxed_ = loop;
   }
   return messages_;
+}
+
+RelocalisationAnswer LoopClosingStage::relocalise(const RelocalisationRequest& request,
+                                                  const GraphSnapshot& graph) {
+  const ScopedStage timed(times_, relocalise_stage_);
+  return closer_ ? closer_->relocalise(request.images, graph) : std::nullopt;
 }
 
 /// One relaxation for a run of loops: when the newest of them is in the map.

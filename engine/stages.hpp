@@ -23,16 +23,30 @@ using ProposalHandle = ProposalPool::Handle;
 /// From the loop closer to the mapper.
 using LoopMessage = std::variant<LoopConstraint, PoseRelaxation>;
 
+/// Of the tracker to the loop closer: where was this frame taken?
+struct RelocalisationRequest {
+  FrameImages images;
+};
+using RequestPool = FramePool<RelocalisationRequest>;
+using RequestHandle = RequestPool::Handle;
+/// The answer, which always comes; nothing when no place was recognised.
+using RelocalisationAnswer = std::optional<Relocalisation>;
+
 /// The tracker's step as every kind of run takes it: track, record, time.
 class TrackingStage {
  public:
-  TrackingStage(const Rig& rig, const TrackerOptions& options, Trace* trace);
+  TrackingStage(const Rig& rig, const EngineOptions& options, Trace* trace);
 
   /// @param proposal  free buffer or empty; stays with the caller
   /// @return whether `proposal` was filled and should be sent
   bool step(const Frame& frame, const GraphSnapshot& graph, ProposalHandle& proposal, FrameRecord& record);
   /// The filled proposal could not be sent.
   void proposal_rejected(FrameRecord& record);
+  /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
+  bool request_relocalisation(RelocalisationRequest& request);
+  /// Before the next step, with its graph.
+  void take_answer(const RelocalisationAnswer& answer, const GraphSnapshot& graph);
+  [[nodiscard]] bool wants_relocalisation() const;
   /// Completes the record once the pose is known: how long after its due time that was.
   void finish(std::int64_t scheduled_ns, FrameRecord& record);
 
@@ -49,6 +63,8 @@ class TrackingStage {
   std::vector<StageId> stages_;
   TraceName version_counter_;
   FrameRecord last_;  // the last frame that was tracked
+  bool answer_awaited_ = false;
+  const bool can_relocalise_;
 };
 
 /// The mapper's step as every kind of run takes it.
@@ -80,6 +96,9 @@ class LoopClosingStage {
   /// @return what the mapper should know, in order; valid until the next step
   std::span<LoopMessage> step(const KeyframeProposal& keyframe, const GraphSnapshot& graph);
 
+  [[nodiscard]] RelocalisationAnswer relocalise(const RelocalisationRequest& request,
+                                                const GraphSnapshot& graph);
+
   [[nodiscard]] std::vector<ClosedLoop>& loops() { return loops_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
@@ -90,7 +109,7 @@ class LoopClosingStage {
   MapperOptions mapper_options_;
   std::optional<LoopCloser> closer_;
   StageRecorder times_;
-  StageId place_stage_, relax_stage_;
+  StageId place_stage_, relax_stage_, relocalise_stage_;
   std::vector<LoopMessage> messages_;
   std::vector<ClosedLoop> loops_;
   std::optional<LoopConstraint> unrelaxed_;  // newest loop that no relaxation has seen

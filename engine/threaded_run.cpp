@@ -7,6 +7,8 @@ namespace {
 
 constexpr std::size_t kTrackerReader = 0;
 constexpr std::size_t kLoopReader = 1;
+// One request is under way at most; its buffer may be in the loop closer's hands when the next is made.
+constexpr std::size_t kRequests = 2;
 // A worker that failed does not wake the reader: it looks this often.
 constexpr auto kFailureCheck = std::chrono::milliseconds(50);
 
@@ -19,7 +21,7 @@ std::size_t ring_size(std::size_t wanted) {
 ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options)
     : options_(options),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
-      tracking_(rig, options.tracker, trace_.get()),
+      tracking_(rig, options, trace_.get()),
       mapping_(rig, options.mapper, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
       slots_(options.frame_slots),
@@ -30,6 +32,9 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options)
       proposals_(ring_size(options.proposal_slots)),
       keyframes_(ring_size(options.proposal_slots)),
       loops_(ring_size(options.proposal_slots)),
+      request_pool_(kRequests),
+      requests_(kRequests),
+      answers_(kRequests),
       snapshots_(2, mapping_.publish()),
       pacer_(options.pacing) {
   consumed_.reserve(ring_size(options.proposal_slots));
@@ -190,9 +195,28 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
 void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
   if (!spare_) spare_ = proposals_pool_.try_acquire();
   TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
+  take_answers(graph, step);
   step.degrade_level = spare_ ? 0 : 1;  // first rung of the ladder: keyframes are withheld
   if (tracking_.step(slot.frame, graph, spare_, slot.record)) send_proposal(slot.record, step);
   schedule_.tracker.append(step);
+  ask_where_we_are();
+}
+
+void ThreadedRun::take_answers(const GraphSnapshot& graph, TrackerStep& step) {
+  RelocalisationAnswer answer;
+  while (answers_.try_pop(answer)) {
+    tracking_.take_answer(answer, graph);
+    ++step.messages;
+  }
+}
+
+void ThreadedRun::ask_where_we_are() {
+  if (!tracking_.wants_relocalisation()) return;
+  RequestHandle request = request_pool_.try_acquire();
+  TWOFOLD_CHECK(request, "the answer to the request before has come");
+  (void)tracking_.request_relocalisation(*request);
+  TWOFOLD_CHECK(requests_.try_push(std::move(request)), "one request is under way at most");
+  loop_parking_.wake();
 }
 
 void ThreadedRun::send_proposal(FrameRecord& record, TrackerStep& step) {
@@ -253,9 +277,11 @@ void ThreadedRun::mapper_thread(const std::stop_token& stop) {
 void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
   ProposalHandle keyframe;
   const auto ready = [&] {
-    return keyframes_.try_pop(keyframe) || keyframes_ended_.load(std::memory_order_acquire);
+    return keyframe || requests_.size_approx() > 0 || keyframes_.try_pop(keyframe) ||
+           keyframes_ended_.load(std::memory_order_acquire);
   };
   while (loop_parking_.wait(stop, ready)) {
+    if (answer_request()) continue;  // a lost camera comes first
     if (!keyframe && !keyframes_.try_pop(keyframe)) break;
     const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
     LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
@@ -263,6 +289,17 @@ void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
     schedule_.loop_closer.append(step);
     keyframe.reset();
   }
+}
+
+bool ThreadedRun::answer_request() {
+  RequestHandle request;
+  if (!requests_.try_pop(request)) return false;
+  const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
+  RelocalisationAnswer answer = loop_closing_.relocalise(*request, graph);
+  request.reset();  // before the answer: the next request finds its buffer free
+  TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
+  schedule_.loop_closer.append({graph.version(), -1, 1});
+  return true;
 }
 
 /// A ring that is full takes nothing more of this step; a loop that is lost is found again.

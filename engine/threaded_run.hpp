@@ -16,7 +16,8 @@ namespace twofold {
 ///
 ///   reader --frames--> tracker --proposals--> mapper --keyframes--> loop closer
 ///     ^------done-------+   ^---- snapshots ----+---- snapshots ------^
-///                                               ^------- loops -------+
+///                           ^                   ^------- loops -------+
+///                           +--- requests: where am I? ---> answers --+
 ///
 /// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
 /// withheld first (no free buffer, or a full ring), and tracking goes on with the points it has.
@@ -54,6 +55,10 @@ class ThreadedRun {
   void track(FrameSlot& slot, const GraphSnapshot& graph);
   void send_proposal(FrameRecord& record, TrackerStep& step);
   void take_messages();
+  void take_answers(const GraphSnapshot& graph, TrackerStep& step);
+  void ask_where_we_are();
+  /// False when there was no request.
+  bool answer_request();
   void send_loops(std::span<LoopMessage> messages, LoopStep& step);
   void map_late_loops();
 
@@ -74,11 +79,14 @@ class ThreadedRun {
   SpscRing<ProposalHandle> proposals_;  // tracker -> mapper
   SpscRing<ProposalHandle> keyframes_;  // mapper -> loop closer
   SpscRing<LoopMessage> loops_;         // loop closer -> mapper
+  RequestPool request_pool_;
+  SpscRing<RequestHandle> requests_;        // tracker -> loop closer; one at most is under way
+  SpscRing<RelocalisationAnswer> answers_;  // loop closer -> tracker
   SnapshotPublisher<GraphSnapshot> snapshots_;
   Pacer pacer_;
 
-  ProposalHandle spare_;                  // tracker's: the buffer the next keyframe goes to
-  std::vector<ProposalHandle> consumed_;  // mapper's
+  ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
+  std::vector<ProposalHandle> consumed_;    // mapper's
   std::vector<LoopMessage> loop_messages_;  // mapper's, of this round
 
   Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_;

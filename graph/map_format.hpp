@@ -60,7 +60,9 @@ class ByteWriter {
   void put_vector(const Vector& v) {
     for (int i = 0; i < v.size(); ++i) put(v[i]);
   }
-  void put_bytes(std::span<const std::uint8_t> bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
+  void put_bytes(std::span<const std::uint8_t> bytes) {
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  }
   void clear() { bytes_.clear(); }
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
 

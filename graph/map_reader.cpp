@@ -43,16 +43,18 @@ class SectionReader {
     std::uint64_t length = 0;
     std::memcpy(&section.id, head.data(), 4);
     std::memcpy(&length, head.data() + 4, 8);
-    if (left_ < 4 || length > left_ - 4) throw FormatError{"reaches beyond the end of the file: it is cut short"};
+    if (left_ < 4 || length > left_ - 4)
+      throw FormatError{"reaches beyond the end of the file: it is cut short"};
     section.bytes.resize(length);
     read(section.bytes);
     std::array<std::uint8_t, 4> tail;
     read(tail);
     uLong crc = crc32(0, head.data(), static_cast<uInt>(head.size()));
-    crc = crc32_z(crc, section.bytes.data(), section.bytes.size());
+    if (!section.bytes.empty()) crc = crc32_z(crc, section.bytes.data(), section.bytes.size());
     std::uint32_t written = 0;
     std::memcpy(&written, tail.data(), 4);
-    if (written != static_cast<std::uint32_t>(crc)) throw FormatError{"checksum is wrong, the file is damaged"};
+    if (written != static_cast<std::uint32_t>(crc))
+      throw FormatError{"checksum is wrong, the file is damaged"};
   }
 
   [[nodiscard]] std::uint64_t left() const { return left_; }
@@ -78,7 +80,8 @@ class MapBuilder {
     for (double* value : {&c.fx, &c.fy, &c.cx, &c.cy}) *value = in.take_finite();
     c.width = in.take<std::int32_t>();
     c.height = in.take<std::int32_t>();
-    if (c.width < 1 || c.height < 1 || !(c.fx > 0) || !(c.fy > 0)) throw FormatError{"holds an impossible camera"};
+    if (c.width < 1 || c.height < 1 || !(c.fx > 0) || !(c.fy > 0))
+      throw FormatError{"holds an impossible camera"};
     for (double* value : {&rig.baseline, &rig.depth_unit, &rig.depth_min, &rig.depth_max}) {
       *value = in.take_finite();
     }
@@ -87,7 +90,8 @@ class MapBuilder {
     keyframe_count_ = in.take<std::uint32_t>();
     point_count_ = in.take<std::uint32_t>();
     in.expect_end();
-    if (keyframe_count_ > kMaxCount || point_count_ > kMaxCount) throw FormatError{"announces too large a map"};
+    if (keyframe_count_ > kMaxCount || point_count_ > kMaxCount)
+      throw FormatError{"announces too large a map"};
   }
 
   void take_keyframes(ByteReader in) {
@@ -142,7 +146,8 @@ class MapBuilder {
           std::isinf(observation.z.z())) {
         throw FormatError{"holds a measurement that is not finite"};
       }
-      if (n > 0 && !((*list)[n - 1].point < observation.point)) throw FormatError{"observations out of order"};
+      if (n > 0 && !((*list)[n - 1].point < observation.point))
+        throw FormatError{"observations out of order"};
     }
     return list;
   }
@@ -195,7 +200,8 @@ class MapBuilder {
         state[at] = kOnTheWay;
         chain.push_back(at);
         if (!keyframes_[at].culled()) break;
-        if (index(keyframes_[at].heir) >= keyframes_.size()) throw FormatError{"keyframes: an heir is not there"};
+        if (index(keyframes_[at].heir) >= keyframes_.size())
+          throw FormatError{"keyframes: an heir is not there"};
         at = index(keyframes_[at].heir);
       }
       for (const std::size_t at : chain) state[at] = kGood;
@@ -242,7 +248,8 @@ class MapBuilder {
       const std::size_t own = edges_[k].size();
       for (std::size_t n = 0; n < own && edges_[k][n].other < id; ++n) {
         const Edge edge = edges_[k][n];
-        if (keyframes_[index(edge.other)].culled()) throw FormatError{"keyframes: an edge to a culled keyframe"};
+        if (keyframes_[index(edge.other)].culled())
+          throw FormatError{"keyframes: an edge to a culled keyframe"};
         Edge back = edge;
         back.other = id;
         back.T_other_this = edge.T_other_this.inverse();

@@ -65,7 +65,7 @@ void write_section(ReplacedFile& file, Section section, std::span<const std::uin
   head.put(section);
   head.put(std::uint64_t{bytes.size()});
   uLong crc = crc32(0, head.bytes().data(), static_cast<uInt>(head.bytes().size()));
-  crc = crc32_z(crc, bytes.data(), bytes.size());
+  if (!bytes.empty()) crc = crc32_z(crc, bytes.data(), bytes.size());  // a null pointer would start it anew
   file.write(head.bytes());
   file.write(bytes);
   ByteWriter tail;

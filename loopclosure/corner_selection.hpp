@@ -8,10 +8,10 @@
 namespace twofold {
 
 struct CornerSelectionOptions {
-  int wanted = 500;      ///< corners of a keyframe at most, over all levels (thesis 6.4.2: 500 to 2000)
-  int levels = 3;        ///< pyramid levels searched, in [1, 3]
-  int threshold = 8;     ///< FAST [grey]
-  float min_score = 6;   ///< Shi-Tomasi, see Corner
+  int wanted = 500;     ///< corners of a keyframe at most, over all levels (thesis 6.4.2: 500 to 2000)
+  int levels = 3;       ///< pyramid levels searched, in [1, 3]
+  int threshold = 8;    ///< FAST [grey]
+  float min_score = 6;  ///< Shi-Tomasi, see Corner
 };
 
 /// Picks the corners of an image that describe its place: each level is parted into cells, each cell gives

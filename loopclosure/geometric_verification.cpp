@@ -121,7 +121,8 @@ class RigidEstimator {
   std::vector<Vector3> x_a_, x_b_;
 };
 
-/// Best partner in b, near to where T_b_a says, of each corner of a that has depth; a corner of b serves once.
+/// Best partner in b, near to where T_b_a says, of each corner of a that has depth; a corner of b serves
+/// once.
 /// @param expected  counts the corners of a that should be visible in b
 std::vector<Match> match_guided(const Rig& rig, const PlaceView& a, const PlaceView& b, const SE3& T_b_a,
                                 const VerificationOptions& options, int& expected) {
@@ -138,8 +139,7 @@ std::vector<Match> match_guided(const Rig& rig, const PlaceView& a, const PlaceV
     for (std::size_t j = 0; j < b.corners.size(); ++j) {
       const double radius = std::ldexp(options.guided_radius_px, b.corners[j].level);
       if ((b.corners[j].uv.cast<double>() - uv).cwiseAbs().maxCoeff() > radius) continue;
-      nearest.offer(static_cast<int>(j),
-                    hamming_distance(a.corners[i].descriptor, b.corners[j].descriptor));
+      nearest.offer(static_cast<int>(j), hamming_distance(a.corners[i].descriptor, b.corners[j].descriptor));
     }
     if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
     of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(i), nearest.distance);

@@ -9,15 +9,16 @@
 namespace twofold {
 
 struct VerificationOptions {
-  int max_distance = 70;         ///< of a match's descriptors [bits]
-  double max_ratio = 0.85;       ///< of the best to the second best distance, in (0, 1]
-  int min_inliers = 30;          ///< Theta
-  double min_inlier_share = 0.3; ///< of the corners that should be visible in the other view and were matched
-  double max_error_px = 3;       ///< reprojection error of an inlier, pixels of the corner's level
-  double guided_radius_px = 6;   ///< guided matching around the prediction, pixels of the corner's level
-  int guided_distance = 80;      ///< descriptors in guided matching [bits]
-  int max_iterations = 300;      ///< RANSAC
-  double min_disparity_px = 1;   ///< corners farther than this tell nothing about translation
+  int max_distance = 70;    ///< of a match's descriptors [bits]
+  double max_ratio = 0.85;  ///< of the best to the second best distance, in (0, 1]
+  int min_inliers = 30;     ///< Theta
+  double min_inlier_share =
+      0.3;                      ///< of the corners that should be visible in the other view and were matched
+  double max_error_px = 3;      ///< reprojection error of an inlier, pixels of the corner's level
+  double guided_radius_px = 6;  ///< guided matching around the prediction, pixels of the corner's level
+  int guided_distance = 80;     ///< descriptors in guided matching [bits]
+  int max_iterations = 300;     ///< RANSAC
+  double min_disparity_px = 1;  ///< corners farther than this tell nothing about translation
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -30,9 +31,9 @@ struct VerifiedPlace {
 
 /// What became of a pair of views; for statistics and tests.
 struct VerificationReport {
-  int matches = 0;        ///< of descriptors, mutual and unambiguous, both with depth
+  int matches = 0;  ///< of descriptors, mutual and unambiguous, both with depth
   int ransac_inliers = 0;
-  int guided = 0;         ///< matched by guided search at the end
+  int guided = 0;  ///< matched by guided search at the end
   int inliers = 0;
   bool well_spread = false;
 };

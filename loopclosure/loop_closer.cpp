@@ -57,8 +57,8 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
     ++report_.tried;
     const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
     if (!verified) continue;
-    loop = LoopConstraint{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k,
-                          verified->inliers};
+    loop =
+        LoopConstraint{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k, verified->inliers};
     break;
   }
   remember(keyframe.id, std::move(view));

@@ -4,18 +4,18 @@
 #include <vector>
 
 #include "estimation/motion_only.hpp"
+#include "graph/neighbourhood.hpp"
 #include "graph/snapshot.hpp"
 #include "imaging/image_pyramid.hpp"
-#include "graph/neighbourhood.hpp"
 
 namespace twofold {
 
 struct RefinementOptions {
-  int neighbours = 8;            ///< keyframes of N1 whose points are looked for, the place itself included
-  int max_points = 400;          ///< searched
-  double radius_px = 8;          ///< of the first search; the second one takes a third of it
-  int min_inliers = 20;          ///< Theta
-  double min_inlier_share = 0.6; ///< of the points found
+  int neighbours = 8;             ///< keyframes of N1 whose points are looked for, the place itself included
+  int max_points = 400;           ///< searched
+  double radius_px = 8;           ///< of the first search; the second one takes a third of it
+  int min_inliers = 20;           ///< Theta
+  double min_inlier_share = 0.6;  ///< of the points found
 };
 
 /// A view placed by the map's points.
@@ -31,8 +31,8 @@ enum class RefinementOutcome : std::uint8_t {
 };
 
 /// Looks for the map's points around a keyframe in a view whose place was recognised: their patches and their
-/// depths, from many frames, tell the pose far more exactly than corners described one by one, and bear witness
-/// that the descriptors had no part in.
+/// depths, from many frames, tell the pose far more exactly than corners described one by one, and bear
+/// witness that the descriptors had no part in.
 class MapRefinement {
  public:
   MapRefinement(const Rig& rig, const RefinementOptions& options) : rig_(rig), options_(options) {}

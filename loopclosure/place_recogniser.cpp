@@ -18,7 +18,8 @@ std::vector<PlaceCandidate> PlaceRecogniser::recognise(KeyframeId id, const BagO
       if (candidate.score < options_.min_score * reference_score) break;  // best first
       int length = 1;
       for (const Hypothesis& before : hypotheses_) {
-        if (same_place(before.keyframe, candidate.keyframe, graph)) length = std::max(length, before.length + 1);
+        if (same_place(before.keyframe, candidate.keyframe, graph))
+          length = std::max(length, before.length + 1);
       }
       hypotheses.push_back({candidate.keyframe, length});
       if (length >= options_.consistency) confirmed.push_back(candidate);
@@ -40,7 +41,8 @@ void PlaceRecogniser::exclude_near(KeyframeId id, const GraphSnapshot& graph) {
 }
 
 bool PlaceRecogniser::same_place(KeyframeId a, KeyframeId b, const GraphSnapshot& graph) const {
-  const auto distance = static_cast<std::int64_t>(twofold::index(a)) - static_cast<std::int64_t>(twofold::index(b));
+  const auto distance =
+      static_cast<std::int64_t>(twofold::index(a)) - static_cast<std::int64_t>(twofold::index(b));
   if (std::abs(distance) <= options_.same_place) return true;
   return graph.contains(a) && graph.contains(b) && find_edge(graph.keyframe(a), b) != nullptr;
 }

@@ -8,12 +8,12 @@
 namespace twofold {
 
 struct RecogniserOptions {
-  int near_keyframes = 60;     ///< this many around the query by breadth-first search are never candidates
-  int max_candidates = 5;      ///< of a query
-  double min_score = 0.4;      ///< of a candidate, relative to the score with the keyframe before
-  double min_reference = 0.05; ///< score with the keyframe before below which the query says nothing
-  int consistency = 2;         ///< successive keyframes that must agree about the place, >= 1
-  int same_place = 6;          ///< keyframes this many edges-or-numbers apart show the same place
+  int near_keyframes = 60;      ///< this many around the query by breadth-first search are never candidates
+  int max_candidates = 5;       ///< of a query
+  double min_score = 0.4;       ///< of a candidate, relative to the score with the keyframe before
+  double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing
+  int consistency = 2;          ///< successive keyframes that must agree about the place, >= 1
+  int same_place = 6;           ///< keyframes this many edges-or-numbers apart show the same place
 };
 
 /// Hypotheses of places seen before, by appearance and topology  (thesis 6.4.2).

@@ -176,8 +176,7 @@ int Mapper::take_relaxation(const PoseRelaxation& relaxation) {
     return position.contains(node.id) && !graph().keyframe(node.id).culled();
   });
   if (held == window_.nodes.end()) return 0;
-  const SE3& T_held_relaxed =
-      relaxation.poses[static_cast<std::size_t>(position.find(held->id))].T_k_w;
+  const SE3& T_held_relaxed = relaxation.poses[static_cast<std::size_t>(position.find(held->id))].T_k_w;
   const SE3 T_relaxed_w = T_held_relaxed.inverse() * graph().keyframe(held->id).T_k_w;
   int moved = 0;
   for (const KeyframePose& pose : relaxation.poses) {

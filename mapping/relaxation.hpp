@@ -15,15 +15,15 @@ struct RelaxationReport {
   double final_cost = 0;
 };
 
-/// Relaxes the part of the map that is connected with `root` over all its edges (eq. 6.4 without points, outer
-/// window = everything); `root` is held. Changes nothing: for use beside the mapper, which takes the result as
-/// a message (Mapper::take_relaxation). Cost grows with the part.
+/// Relaxes the part of the map that is connected with `root` over all its edges (eq. 6.4 without points,
+/// outer window = everything); `root` is held. Changes nothing: for use beside the mapper, which takes the
+/// result as a message (Mapper::take_relaxation). Cost grows with the part.
 PoseRelaxation relax_part(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
                           const MapperOptions& options, RelaxationReport& report);
 
-/// Relaxes all keyframe poses, part by part. Outside of the double window poses are only defined relative to their neighbours; this makes them
-/// agree globally, e.g. before a trajectory is written. The reference keyframe, or the oldest one of a part
-/// without it, stays where it is. Cost grows with the map.
+/// Relaxes all keyframe poses, part by part. Outside of the double window poses are only defined relative to
+/// their neighbours; this makes them agree globally, e.g. before a trajectory is written. The reference
+/// keyframe, or the oldest one of a part without it, stays where it is. Cost grows with the map.
 RelaxationReport relax_all_poses(GraphWriter& writer, const Rig& rig, const MapperOptions& options);
 
 }  // namespace twofold

@@ -268,6 +268,18 @@ void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
   // previous_ and T_prev_ref_ stay at the last good frame, from where the next one tries again.
 }
 
+void Tracker::relocalise(KeyframeId keyframe, const SE3& T_c_k, const GraphSnapshot& graph) {
+  if (lost_frames_ == 0 || reference_ == kNoKeyframe || !graph.contains(keyframe)) return;
+  SE3 T_c_ref = T_c_k;
+  for (; graph.keyframe(keyframe).culled(); keyframe = graph.keyframe(keyframe).heir) {
+    T_c_ref = T_c_ref * graph.keyframe(keyframe).T_this_heir;
+  }
+  reference_ = keyframe;
+  T_prev_ref_ = T_c_ref;
+  previous_points_.clear();  // there is no image at that pose to align with: guided search starts from it
+  candidates_stale_ = true;
+}
+
 void Tracker::remember_frame(const SE3& T_c_ref) {
   T_cur_prev_ = lost_frames_ > 0 || frames_ < 2 ? SE3() : T_c_ref * T_prev_ref_.inverse();
   T_prev_ref_ = T_c_ref;

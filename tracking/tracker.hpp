@@ -41,6 +41,15 @@ class Tracker {
     return T_prev_ref_ * pose_in_world(graph, local_, reference_);
   }
 
+  /// A place recogniser says where the last frames, which were lost, were taken: the next step looks for the
+  /// map's points from there, and accepts or refuses the pose as it does every other. Nothing happens while
+  /// tracking, or when `graph`, that of the next step, does not have the keyframe.
+  void relocalise(KeyframeId keyframe, const SE3& T_c_k, const GraphSnapshot& graph);
+  /// Images of the last step's frame, if that was lost.
+  [[nodiscard]] const FrameImages& lost_images() const { return current_; }
+  /// Frames since the last one with a pose.
+  [[nodiscard]] int lost_frames() const { return lost_frames_; }
+
   /// The proposal of the last step could not be sent: its numbers are taken back.
   void proposal_rejected();
 

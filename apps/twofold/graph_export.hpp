@@ -15,8 +15,8 @@ namespace twofold {
 /// Points that are alive, in the grey of their corner.
 [[nodiscard]] std::vector<PlyPoint> map_points(const GraphSnapshot& graph);
 
-/// The pose graph in g2o's text form: VERTEX_SE3:QUAT with T_w_k, EDGE_SE3:QUAT with T_i_j of each edge and an
-/// information that is the edge's weight times the identity. The oldest keyframe is fixed.
+/// The pose graph in g2o's text form: VERTEX_SE3:QUAT with T_w_k, EDGE_SE3:QUAT with T_i_j of each edge and
+/// an information that is the edge's weight times the identity. The oldest keyframe is fixed.
 [[nodiscard]] std::string g2o_text(const GraphSnapshot& graph);
 
 }  // namespace twofold

@@ -79,7 +79,8 @@ void add_map_command(CLI::App& app, int& exit_code) {
     print_info(arguments->file);
     exit_code = kOk;
   });
-  CLI::App* check = command->add_subcommand("check", "Read all of it; exit code 2 and the section when damaged");
+  CLI::App* check =
+      command->add_subcommand("check", "Read all of it; exit code 2 and the section when damaged");
   check->add_option("FILE", arguments->file, "map file")->required();
   check->callback([arguments, &exit_code] {
     (void)open_map(arguments->file);

@@ -40,9 +40,9 @@ struct PlaceSet {
 struct Answer {
   int query = 0;
   int place = -1;
-  double score = 0;      ///< relative to the score with the image before
+  double score = 0;  ///< relative to the score with the image before
   bool verified = false;
-  SE3 T_query_place;     ///< when verified
+  SE3 T_query_place;  ///< when verified
 };
 
 PlaceSet load_images(const fs::path& folder, int every, const Vocabulary& vocabulary) {
@@ -101,7 +101,8 @@ PlaceSet load_set(const PlaceEvaluationArguments& arguments, const Vocabulary& v
 /// Which images show the same place.
 class TruePairs {
  public:
-  TruePairs(const PlaceEvaluationArguments& arguments, const PlaceSet& set) : arguments_(arguments), set_(set) {
+  TruePairs(const PlaceEvaluationArguments& arguments, const PlaceSet& set)
+      : arguments_(arguments), set_(set) {
     if (arguments.pairs.empty()) {
       for (const Place& place : set.places) {
         if (!place.T_w_c) throw IoError(arguments.set, "has no true poses: give the true pairs with --pairs");
@@ -139,7 +140,8 @@ class TruePairs {
       std::istringstream fields(line);
       int i = 0, j = 0;
       if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-      if (!(fields >> i >> j) || i < 1 || j < 1) throw IoError("--pairs", fmt::format("'{}' is no pair", line));
+      if (!(fields >> i >> j) || i < 1 || j < 1)
+        throw IoError("--pairs", fmt::format("'{}' is no pair", line));
       pairs_.insert({i - 1, j - 1});
     }
     if (pairs_.empty()) throw IoError("--pairs", "no pairs");
@@ -150,10 +152,10 @@ class TruePairs {
     const SE3 T_a_b = set_.places[static_cast<std::size_t>(a)].T_w_c->inverse() *
                       *set_.places[static_cast<std::size_t>(b)].T_w_c;
     const double distance = T_a_b.translation().norm();
-    const double angle =
-        std::acos(std::clamp(T_a_b.rotation()(2, 2), -1.0, 1.0)) * 180 / std::numbers::pi;
+    const double angle = std::acos(std::clamp(T_a_b.rotation()(2, 2), -1.0, 1.0)) * 180 / std::numbers::pi;
     if (distance <= arguments_.max_distance && angle <= arguments_.max_angle_deg) return Truth::kSame;
-    if (distance > 2.5 * arguments_.max_distance || angle > 2.5 * arguments_.max_angle_deg) return Truth::kOther;
+    if (distance > 2.5 * arguments_.max_distance || angle > 2.5 * arguments_.max_angle_deg)
+      return Truth::kOther;
     return Truth::kUndecided;
   }
 
@@ -173,13 +175,15 @@ std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSe
     const PlaceView& view = set.places[static_cast<std::size_t>(i)].view;
     if (i > arguments.gap) {
       const int added = i - arguments.gap - 1;
-      index.add(KeyframeId{static_cast<std::uint32_t>(added)}, set.places[static_cast<std::size_t>(added)].view.bag);
+      index.add(KeyframeId{static_cast<std::uint32_t>(added)},
+                set.places[static_cast<std::size_t>(added)].view.bag);
     }
     excluded.reset(0);
     const auto candidates =
         index.query(view.bag, excluded, static_cast<std::size_t>(recogniser.max_candidates));
     if (candidates.empty()) continue;
-    const double reference = bag_score(view.bag, set.places[static_cast<std::size_t>(std::max(i - 1, 0))].view.bag);
+    const double reference =
+        bag_score(view.bag, set.places[static_cast<std::size_t>(std::max(i - 1, 0))].view.bag);
     Answer answer;
     answer.query = i;
     answer.place = static_cast<int>(twofold::index(candidates[0].keyframe));
@@ -224,7 +228,8 @@ void count(const TruePairs& truth, const Answer& answer, Counts& counts) {
 
 void print_recognition(std::vector<Answer> answers, const TruePairs& truth, int possible,
                        std::vector<std::pair<double, double>>& curve) {
-  std::stable_sort(answers.begin(), answers.end(), [](const Answer& a, const Answer& b) { return a.score > b.score; });
+  std::stable_sort(answers.begin(), answers.end(),
+                   [](const Answer& a, const Answer& b) { return a.score > b.score; });
   Counts counts;
   double recall_at_full_precision = 0, full_precision_threshold = 0;
   Counts at_threshold;
@@ -240,7 +245,8 @@ void print_recognition(std::vector<Answer> answers, const TruePairs& truth, int 
   }
   fmt::print("recognition alone      at {:.2f}: precision {:.3f}, recall {:.3f} ({} right, {} wrong)\n",
              RecogniserOptions().min_score, at_threshold.precision(),
-             std::min(1.0, 1.0 * at_threshold.right / std::max(1, possible)), at_threshold.right, at_threshold.wrong);
+             std::min(1.0, 1.0 * at_threshold.right / std::max(1, possible)), at_threshold.right,
+             at_threshold.wrong);
   fmt::print("                       recall at 100 % precision {:.3f} (threshold {:.3f})\n",
              recall_at_full_precision, full_precision_threshold);
 }
@@ -261,9 +267,11 @@ void print_verified(const std::vector<Answer>& answers, const PlaceSet& set, con
     errors_m.push_back(error.translation().norm());
     errors_deg.push_back(error.log().tail<3>().norm() * 180 / std::numbers::pi);
   }
-  fmt::print("after verification     precision {:.3f}, recall {:.3f} ({} right, {} wrong, {} share part of the view)\n",
-             counts.precision(), std::min(1.0, 1.0 * counts.right / std::max(1, possible)), counts.right,
-             counts.wrong, undecided);
+  fmt::print(
+      "after verification     precision {:.3f}, recall {:.3f} ({} right, {} wrong, {} share part of the "
+      "view)\n",
+      counts.precision(), std::min(1.0, 1.0 * counts.right / std::max(1, possible)), counts.right,
+      counts.wrong, undecided);
   if (errors_m.empty()) return;
   std::sort(errors_m.begin(), errors_m.end());
   std::sort(errors_deg.begin(), errors_deg.end());
@@ -277,14 +285,17 @@ cv::Mat draw(const std::string& title, const std::vector<std::pair<double, doubl
   constexpr int kSide = 400, kMargin = 50;
   cv::Mat image(kSide + 2 * kMargin, kSide + 2 * kMargin, CV_8UC3, cv::Scalar::all(255));
   const auto at = [&](double recall, double precision) {
-    return cv::Point(kMargin + static_cast<int>(recall * kSide), kMargin + static_cast<int>((1 - precision) * kSide));
+    return cv::Point(kMargin + static_cast<int>(recall * kSide),
+                     kMargin + static_cast<int>((1 - precision) * kSide));
   };
   for (int tick = 0; tick <= 5; ++tick) {
     const double x = 0.2 * tick;
     cv::line(image, at(x, 0), at(x, 1), cv::Scalar::all(220));
     cv::line(image, at(0, x), at(1, x), cv::Scalar::all(220));
-    cv::putText(image, fmt::format("{:.1f}", x), at(x, 0) + cv::Point(-10, 18), cv::FONT_HERSHEY_SIMPLEX, 0.4, {});
-    cv::putText(image, fmt::format("{:.1f}", x), at(0, x) + cv::Point(-30, 4), cv::FONT_HERSHEY_SIMPLEX, 0.4, {});
+    cv::putText(image, fmt::format("{:.1f}", x), at(x, 0) + cv::Point(-10, 18), cv::FONT_HERSHEY_SIMPLEX, 0.4,
+                {});
+    cv::putText(image, fmt::format("{:.1f}", x), at(0, x) + cv::Point(-30, 4), cv::FONT_HERSHEY_SIMPLEX, 0.4,
+                {});
   }
   for (std::size_t i = 1; i < curve.size(); ++i) {
     cv::line(image, at(curve[i - 1].first, curve[i - 1].second), at(curve[i].first, curve[i].second),
@@ -302,7 +313,8 @@ void evaluate_places(const PlaceEvaluationArguments& arguments, const Vocabulary
   const TruePairs truth(arguments, set);
   const std::vector<Answer> answers = ask(arguments, set, vocabulary);
   const int possible = answerable(arguments, set, truth);
-  fmt::print("{}\n{} images, {} of them show a place seen before\n", arguments.set, set.places.size(), possible);
+  fmt::print("{}\n{} images, {} of them show a place seen before\n", arguments.set, set.places.size(),
+             possible);
   std::vector<std::pair<double, double>> curve;
   print_recognition(answers, truth, possible, curve);
   if (set.rig.kind != SensorKind::kMono) print_verified(answers, set, truth, possible);

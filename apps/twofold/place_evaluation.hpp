@@ -7,11 +7,11 @@
 namespace twofold {
 
 struct PlaceEvaluationArguments {
-  std::string set;             ///< folder of images, or a source
-  std::string pairs;           ///< file or list of true pairs; empty: from the source's poses
-  int tolerance = 0;           ///< images
-  int gap = 20;                ///< images
-  double max_distance = 1.0;   ///< [m]
+  std::string set;            ///< folder of images, or a source
+  std::string pairs;          ///< file or list of true pairs; empty: from the source's poses
+  int tolerance = 0;          ///< images
+  int gap = 20;               ///< images
+  double max_distance = 1.0;  ///< [m]
   double max_angle_deg = 30;
   int every = 1;
   std::string plot;

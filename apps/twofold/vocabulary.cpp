@@ -133,9 +133,10 @@ void print_info(const std::string& file) {
     most = std::max<double>(most, node.idf);
     sum += node.idf;
   }
-  fmt::print("words   {}\nnodes   {}\ndepth   {}\nidf     {:.3f} to {:.3f}, mean {:.3f}\nloaded  in {:.2f} ms\n",
-             vocabulary.word_count(), vocabulary.nodes().size(), vocabulary.depth(), least, most,
-             sum / static_cast<double>(vocabulary.word_count()), ms);
+  fmt::print(
+      "words   {}\nnodes   {}\ndepth   {}\nidf     {:.3f} to {:.3f}, mean {:.3f}\nloaded  in {:.2f} ms\n",
+      vocabulary.word_count(), vocabulary.nodes().size(), vocabulary.depth(), least, most,
+      sum / static_cast<double>(vocabulary.word_count()), ms);
 }
 
 void print_score(const std::string& file, const std::string& a, const std::string& b) {
@@ -155,7 +156,9 @@ void add_train(CLI::App& parent, int& exit_code) {
   command->add_option("--every", arguments->every, "Take each Nth image of folders and sources")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--branching", arguments->options.branching)->check(CLI::Range(2, 64))->capture_default_str();
+  command->add_option("--branching", arguments->options.branching)
+      ->check(CLI::Range(2, 64))
+      ->capture_default_str();
   command->add_option("--levels", arguments->options.levels)->check(CLI::Range(1, 6))->capture_default_str();
   command->add_option("--seed", arguments->options.seed)->capture_default_str();
   command->callback([arguments, &exit_code] {

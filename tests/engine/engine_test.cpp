@@ -144,7 +144,7 @@ TEST_F(EngineTest, ScheduleReplaysAThreadedRun) {
 
 TEST_F(EngineTest, LateFramesAreDroppedOnRequestAndReplayed) {
   EngineOptions options;
-  options.pacing.speed = 60;  // far faster than any machine can follow
+  options.pacing.speed = 2000;  // far faster than any machine can follow
   options.pacing.late = LatePolicy::kDrop;
   const RunResult live = run(options);
   EXPECT_EQ(live.frames.size(), static_cast<std::size_t>(kFrames));

@@ -16,8 +16,8 @@ void repair_checksums(std::string& bytes) {
     std::memcpy(&length, bytes.data() + at + 4, 8);
     if (length > bytes.size() - at - 16) return;
     const auto end = at + 12 + static_cast<std::size_t>(length);
-    const auto crc = static_cast<std::uint32_t>(
-        crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data() + at), end - at));
+    const auto crc =
+        static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data() + at), end - at));
     std::memcpy(bytes.data() + end, &crc, 4);
     at = end + 4;
   }

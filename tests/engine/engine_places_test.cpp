@@ -1,0 +1,165 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <sstream>
+
+#include "engine/engine.hpp"
+#include "loopclosure/default_vocabulary.hpp"
+#include "tests/imaging/rendered_scene.hpp"
+
+namespace twofold {
+namespace {
+
+Rig small_rig() {
+  Rig rig;
+  rig.camera = {220, 220, 159.5, 119.5, 320, 240};
+  rig.baseline = 0.12;
+  return rig;
+}
+
+/// A camera that turns by 90 degrees in a textured room; rendered once for all tests.
+class EnginePlacesTest : public ::testing::Test {
+ protected:
+  static constexpr int kFrames = 45;
+  static constexpr int kCovered = 5;
+  static constexpr int kCarriedTo = 6;  // frame whose place the camera is carried to
+  static constexpr int kAfter = 12;     // frames from there on
+
+  static SE3 T_c_w(int i) {
+    const double s = 0.035 * i;
+    return SE3(SO3::exp(Vector3(0.03 * std::sin(3 * s), s, 0)),
+               Vector3(0.4 * std::sin(2 * s), 0.05 * std::sin(3 * s), -0.2 * s));
+  }
+
+  static Frame render(int i, std::uint32_t room) {
+    twofold::testing::RenderedScene scene(small_rig(), Vector3(2.5, 2.0, 3.5), room);
+    const SE3 T_r_c(SO3(), Vector3(-small_rig().baseline, 0, 0));
+    Frame frame;
+    frame.left = scene.render_one(T_c_w(i), 1.5);
+    frame.right = scene.render_one(T_r_c * T_c_w(i), 1.5);
+    return frame;
+  }
+
+  static void SetUpTestSuite() {
+    mapped_ = new std::vector<Frame>;
+    elsewhere_ = new std::vector<Frame>;
+    for (int i = 0; i < kFrames; ++i) mapped_->push_back(render(i, 5));
+    for (int i = 0; i < kAfter; ++i) elsewhere_->push_back(render(kCarriedTo + i, 77));
+  }
+  static void TearDownTestSuite() {
+    delete mapped_;
+    delete elsewhere_;
+  }
+
+  /// Number of the frame of the walk shown as frame i; -1 while the lens is covered.
+  static int shown(int i) {
+    if (i < kFrames) return i;
+    return i < kFrames + kCovered ? -1 : i - kFrames - kCovered + kCarriedTo;
+  }
+  static bool after_kidnapping(const FrameRecord& record) { return record.frame_index >= kFrames + kCovered; }
+
+  /// The walk, a hand over the lens, and then, without having seen the way, a place of the walk, or of
+  /// another room.
+  static FrameFeed kidnapped(bool to_another_room) {
+    return [to_another_room, next = 0](Frame& frame) mutable {
+      if (next == kFrames + kCovered + kAfter) return FeedStatus::kEnd;
+      const int i = shown(next);
+      if (i < 0) {
+        frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(12));
+        frame.right = frame.left;
+      } else if (next >= kFrames && to_another_room) {
+        frame = (*elsewhere_)[static_cast<std::size_t>(i - kCarriedTo)];
+      } else {
+        frame = (*mapped_)[static_cast<std::size_t>(i)];
+      }
+      frame.index = next;
+      frame.t_ns = 1'000'000'000 + next * 33'333'333LL;
+      ++next;
+      return FeedStatus::kFrame;
+    };
+  }
+
+  static EngineOptions options(bool recognise = true) {
+    EngineOptions options;
+    options.deterministic = true;
+    if (recognise) options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+    return options;
+  }
+  static RunResult run(const EngineOptions& options, const FrameFeed& frames) {
+    std::atomic<bool> interrupted{false};
+    return Engine(small_rig(), options).run(frames, interrupted);
+  }
+
+  static std::vector<Frame>*mapped_, *elsewhere_;
+};
+
+std::vector<Frame>* EnginePlacesTest::mapped_ = nullptr;
+std::vector<Frame>* EnginePlacesTest::elsewhere_ = nullptr;
+
+TEST_F(EnginePlacesTest, ACameraCarriedElsewhereFindsItselfInTheMap) {
+  const RunResult result = run(options(), kidnapped(false));
+  EXPECT_EQ(result.error, "");
+  int lost = 0, tracked = 0;
+  for (const FrameRecord& record : result.frames) {
+    if (!after_kidnapping(record)) continue;
+    if (record.state != FrameState::kTracked) {
+      EXPECT_EQ(tracked, 0) << "lost again at " << record.frame_index;
+      ++lost;
+      continue;
+    }
+    ++tracked;
+    const SE3 T_c_first = final_T_c_w(record, result.graph) * result.graph.T_k_w(KeyframeId{0}).inverse();
+    const SE3 T_c_first_true = T_c_w(shown(static_cast<int>(record.frame_index))) * T_c_w(0).inverse();
+    EXPECT_LT((T_c_first.inverse().translation() - T_c_first_true.inverse().translation()).norm(), 0.03);
+  }
+  EXPECT_LE(lost, 3);
+  EXPECT_GE(tracked, kAfter - 3);
+}
+
+TEST_F(EnginePlacesTest, WithoutRecognitionItStaysLost) {
+  const RunResult result = run(options(false), kidnapped(false));
+  for (const FrameRecord& record : result.frames) {
+    if (after_kidnapping(record)) EXPECT_EQ(record.state, FrameState::kLost) << record.frame_index;
+  }
+}
+
+TEST_F(EnginePlacesTest, InAnUnknownPlaceItSaysThatItIsLost) {
+  const RunResult result = run(options(), kidnapped(true));
+  for (const FrameRecord& record : result.frames) {
+    if (after_kidnapping(record)) EXPECT_EQ(record.state, FrameState::kLost) << record.frame_index;
+  }
+}
+
+TEST_F(EnginePlacesTest, AThreadedRunWithRequestsAndAnswersReplays) {
+  EngineOptions threaded = options();
+  threaded.deterministic = false;
+  threaded.pacing.speed = 1;
+  const RunResult live = run(threaded, kidnapped(false));
+  ASSERT_EQ(live.error, "");
+  EXPECT_EQ(live.frames.back().state, FrameState::kTracked);
+  std::stringstream file;
+  ASSERT_TRUE(write_schedule(file, live.schedule.tracker, live.schedule.mapper, live.schedule.loop_closer));
+  const auto schedule = read_schedule(file);
+  ASSERT_TRUE(schedule) << schedule.error();
+  const auto asked = [](const Schedule& s) {
+    return std::count_if(s.loop_closer.begin(), s.loop_closer.end(),
+                         [](const LoopStep& step) { return step.requests > 0; });
+  };
+  EXPECT_GT(asked(*schedule), 0);
+  std::atomic<bool> interrupted{false};
+  const RunResult replayed = Engine(small_rig(), threaded).replay(kidnapped(false), *schedule, interrupted);
+  EXPECT_EQ(replayed.error, "");
+  ASSERT_EQ(replayed.frames.size(), live.frames.size());
+  for (std::size_t i = 0; i < live.frames.size(); ++i) {
+    EXPECT_EQ(live.frames[i].state, replayed.frames[i].state) << i;
+    EXPECT_EQ(live.frames[i].T_c_ref.matrix(), replayed.frames[i].T_c_ref.matrix()) << i;
+    EXPECT_EQ(live.frames[i].snapshot_version, replayed.frames[i].snapshot_version) << i;
+  }
+  for (std::uint32_t k = 0; k < live.graph.keyframe_count(); ++k) {
+    EXPECT_EQ(live.graph.T_k_w(KeyframeId{k}).matrix(), replayed.graph.T_k_w(KeyframeId{k}).matrix()) << k;
+  }
+}
+
+}  // namespace
+}  // namespace twofold
