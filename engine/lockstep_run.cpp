@@ -1,18 +1,23 @@
 #include "engine/lockstep_run.hpp"
 
+#include <algorithm>
+
 namespace twofold {
 namespace {
 
 // A replay queues what the threaded run had under way; its own limit must never be the tighter one.
 constexpr std::size_t kReplayRoom = 64;
+// A deterministic run maps and describes each proposal before the next frame.
+constexpr std::size_t kDeterministicRoom = 6;
 
 }  // namespace
 
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
     : trace_(options.trace ? std::make_unique<Trace>() : nullptr),
-      pool_(options.proposal_slots + kReplayRoom),
+      pool_(options.deterministic ? kDeterministicRoom : options.proposal_slots + kReplayRoom),
       tracking_(rig, options.tracker, trace_.get()),
       mapping_(rig, options.mapper, trace_.get()),
+      loop_closing_(rig, options, trace_.get()),
       snapshot_(mapping_.publish()) {}
 
 void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
@@ -23,9 +28,10 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
   while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
     track(frame, true, false);
     if (!queue_.empty()) {
-      const auto keyframe = static_cast<std::int64_t>(index(queue_.back()->id));
-      map(queue_.size());
-      result_.schedule.loop_closer.append({snapshot_.version(), keyframe});
+      map(queue_.size(), 0);
+      close_loops(*mapped_.front(), 0);
+      mapped_.clear();
+      if (!loop_messages_.empty()) map(0, loop_messages_.size());
     }
     report(progress);
   }
@@ -55,18 +61,50 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
       continue;
     }
     for (; snapshot_.version() < step.version; ++round) {
-      if (round == schedule.mapper.end() || round->proposals > queue_.size()) {
-        fail("the schedule does not fit the input: the mapper would need keyframes that were not proposed");
+      if (round == schedule.mapper.end() || !can_map(*round)) {
+        fail("the schedule does not fit the input: the mapper would need messages that were not sent");
         return;
       }
-      map(round->proposals);
+      map(round->proposals, round->loop_messages);
+      replay_loop_steps(schedule);
     }
     track(frame, step.degrade_level == 0, step.refused > 0);
     report(progress);
   }
-  for (; round != schedule.mapper.end() && round->proposals <= queue_.size(); ++round) map(round->proposals);
-  // The loop closer's steps change nothing that the others see.
-  for (const LoopStep& step : schedule.loop_closer) result_.schedule.loop_closer.append(step);
+  for (; round != schedule.mapper.end() && can_map(*round); ++round) {
+    map(round->proposals, round->loop_messages);
+    replay_loop_steps(schedule);
+  }
+}
+
+bool LockstepRun::can_map(const MapperStep& round) const {
+  return round.proposals <= queue_.size() && round.loop_messages <= loop_messages_.size();
+}
+
+/// All steps that used the version just published: whatever they send, the mapper took later.
+void LockstepRun::replay_loop_steps(const Schedule& schedule) {
+  for (; next_loop_step_ < schedule.loop_closer.size(); ++next_loop_step_) {
+    const LoopStep& step = schedule.loop_closer[next_loop_step_];
+    if (step.version != snapshot_.version()) return;
+    const auto is_older = [&](const ProposalHandle& p) {
+      return static_cast<std::int64_t>(index(p->id)) < step.keyframe;
+    };
+    while (!mapped_.empty() && is_older(mapped_.front())) mapped_.pop_front();  // found the ring full
+    if (mapped_.empty() || static_cast<std::int64_t>(index(mapped_.front()->id)) != step.keyframe) {
+      fail("the schedule does not fit the input: the loop closer would need another keyframe");
+      return;
+    }
+    close_loops(*mapped_.front(), step.refused);
+    mapped_.pop_front();
+  }
+}
+
+void LockstepRun::close_loops(const KeyframeProposal& keyframe, std::size_t refused) {
+  const std::span<LoopMessage> messages = loop_closing_.step(keyframe, snapshot_);
+  const std::size_t sent = messages.size() - std::min(refused, messages.size());
+  for (LoopMessage& message : messages.first(sent)) loop_messages_.push_back(std::move(message));
+  result_.schedule.loop_closer.append({snapshot_.version(), static_cast<std::int64_t>(index(keyframe.id)), 0,
+                                       static_cast<std::uint32_t>(messages.size() - sent)});
 }
 
 void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse) {
@@ -97,16 +135,23 @@ void LockstepRun::drop(const Frame& frame) {
   result_.frames.push_back(record);
 }
 
-void LockstepRun::map(std::size_t proposals) {
+void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
   consumed_.clear();
   for (std::size_t i = 0; i < proposals; ++i) {
     consumed_.push_back(std::move(queue_.front()));
     queue_.pop_front();
   }
-  const MapperRound round = mapping_.step(consumed_);
+  taken_messages_.clear();
+  for (std::size_t i = 0; i < loop_messages; ++i) {
+    taken_messages_.push_back(std::move(loop_messages_.front()));
+    loop_messages_.pop_front();
+  }
+  const MapperRound round = mapping_.step(consumed_, taken_messages_);
+  for (ProposalHandle& keyframe : consumed_) mapped_.push_back(std::move(keyframe));
   consumed_.clear();
   snapshot_ = mapping_.publish();
-  result_.schedule.mapper.append({round.version, static_cast<std::uint32_t>(proposals)});
+  result_.schedule.mapper.append({round.version, static_cast<std::uint32_t>(proposals),
+                                  static_cast<std::uint32_t>(loop_messages)});
   result_.rounds.push_back(round);
 }
 
@@ -126,6 +171,8 @@ RunResult LockstepRun::finish() {
   result_.graph = mapping_.publish();
   result_.times.push_back(std::move(tracking_.times()));
   result_.times.push_back(std::move(mapping_.times()));
+  result_.times.push_back(std::move(loop_closing_.times()));
+  result_.loops = std::move(loop_closing_.loops());
   result_.trace = std::move(trace_);
   return std::move(result_);
 }

@@ -21,7 +21,12 @@ class LockstepRun {
 
  private:
   void track(const Frame& frame, bool may_propose, bool refuse);
-  void map(std::size_t proposals);
+  void map(std::size_t proposals, std::size_t loop_messages);
+  /// One step of the loop closer for a keyframe; the last `refused` of its messages found the ring full.
+  void close_loops(const KeyframeProposal& keyframe, std::size_t refused);
+  void replay_loop_steps(const Schedule& schedule);
+  /// Were all messages of this round sent?
+  [[nodiscard]] bool can_map(const MapperStep& round) const;
   void drop(const Frame& frame);
   void report(const ProgressSink& progress);
   void fail(const std::string& why) { result_.error = why; }
@@ -30,8 +35,13 @@ class LockstepRun {
   ProposalPool pool_;
   TrackingStage tracking_;
   MappingStage mapping_;
+  LoopClosingStage loop_closing_;
   std::deque<ProposalHandle> queue_;
   std::vector<ProposalHandle> consumed_;
+  std::deque<ProposalHandle> mapped_;        // keyframes the loop closer has not seen
+  std::deque<LoopMessage> loop_messages_;    // on their way to the mapper
+  std::vector<LoopMessage> taken_messages_;  // of this round
+  std::size_t next_loop_step_ = 0;           // of a replay
   GraphSnapshot snapshot_;  // what the tracker sees; replaced between its steps only
   RunResult result_;
   Progress progress_;

@@ -8,6 +8,7 @@
 #include "engine/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
+#include "graph/loop_constraint.hpp"
 #include "graph/snapshot.hpp"
 
 namespace twofold {
@@ -16,6 +17,35 @@ enum class FrameState : std::uint8_t {
   kTracked,  ///< pose known
   kLost,     ///< looked at, no trustworthy pose
   kDropped   ///< never looked at: it came while a newer frame was already due (--late drop)
+};
+
+/// Why poses in the world changed for a reason other than motion.
+enum class CorrectionReason : std::uint8_t {
+  kNone,
+  kOptimisation,   ///< the double window, metric closures included
+  kLoopClosure,    ///< a place was recognised
+  kRelaxation,     ///< the whole pose graph was relaxed
+};
+[[nodiscard]] constexpr const char* describe(CorrectionReason reason) {
+  switch (reason) {
+    case CorrectionReason::kNone:
+      return "";
+    case CorrectionReason::kOptimisation:
+      return "optimisation";
+    case CorrectionReason::kLoopClosure:
+      return "loop closure";
+    case CorrectionReason::kRelaxation:
+      return "relaxation";
+  }
+  return "";
+}
+
+/// Announced with the first frame that is tracked against the corrected map: the frame before it, in the map
+/// it was tracked against and in the new one.
+struct PoseCorrection {
+  CorrectionReason reason = CorrectionReason::kNone;
+  SE3 T_c_w_before;
+  SE3 T_c_w_after;
 };
 
 /// What is remembered of every frame.
@@ -31,6 +61,7 @@ struct FrameRecord {
   std::uint64_t snapshot_version = 0;  ///< version of the map it was tracked against
   bool keyframe = false;               ///< it was proposed as a keyframe and accepted
   const char* cause = "";              ///< why it was lost; empty when tracked
+  PoseCorrection correction;           ///< of the map, seen first by this frame
   std::int64_t tracking_ns = 0;        ///< time spent on it by the tracker
   std::int64_t latency_ns = 0;         ///< from the moment it was due to the moment its pose was known
 };
@@ -44,7 +75,16 @@ struct MapperRound {
   int points = 0;
   int observations = 0;
   int metric_loops = 0;  ///< edges added by metric loop closure
+  int loops = 0;         ///< edges added by large-scale loop closure
+  int relaxed = 0;       ///< keyframes outside of the windows that took a relaxed pose
   std::int64_t duration_ns = 0;
+};
+
+/// A loop that was closed by appearance.
+struct ClosedLoop {
+  LoopConstraint constraint;
+  SE3 T_to_from_before;  ///< as the map had it: the difference is the drift
+  std::int64_t t_ns = 0; ///< of the frame that came back
 };
 
 /// Who saw what when, in the form it is written to a file.
@@ -58,6 +98,7 @@ struct ScheduleStreams {
 struct RunResult {
   std::vector<FrameRecord> frames;  ///< in the order of the source, dropped ones included
   std::vector<MapperRound> rounds;
+  std::vector<ClosedLoop> loops;     ///< by appearance, in the order they were found
   GraphSnapshot graph;               ///< after the last round and the final relaxation
   std::vector<StageRecorder> times;  ///< one a thread
   ScheduleStreams schedule;

@@ -1,6 +1,13 @@
 #include "engine/stages.hpp"
 
 namespace twofold {
+namespace {
+
+// Smaller changes of the last frame's pose are not announced: each round of the mapper makes some.
+constexpr double kCorrection = 0.01;         // [m]
+constexpr double kCorrectionAngle = 0.0035;  // [rad]
+
+}  // namespace
 
 TrackingStage::TrackingStage(const Rig& rig, const TrackerOptions& options, Trace* trace)
     : tracker_(rig, options), times_("tracker", trace) {
@@ -20,12 +27,14 @@ bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, Proposa
   record.t_ns = frame.t_ns;
   record.state = result.status == TrackStatus::kTracking ? FrameState::kTracked : FrameState::kLost;
   record.cause = describe(result.cause);
+  record.snapshot_version = graph.version();
   record.reference = result.reference;
   record.T_c_ref = result.T_c_ref;
   record.T_c_w_causal = record.state == FrameState::kTracked ? tracker_.T_c_w(graph) : SE3();
+  announce_correction(graph, record);
+  if (record.state == FrameState::kTracked) last_ = record;
   record.tracked_share = result.tracked_share();
   record.inliers = result.inliers;
-  record.snapshot_version = graph.version();
   record.keyframe = result.proposed;
   record.tracking_ns = steady_now_ns() - begin_ns;
   times_.record(frame_stage_, begin_ns, record.tracking_ns);
@@ -36,6 +45,25 @@ bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, Proposa
   }
   times_.counter(version_counter_, static_cast<std::int64_t>(graph.version()));
   return result.proposed;
+}
+
+/// Where the last tracked frame is in the map of this one, if that is elsewhere than it was said to be.
+void TrackingStage::announce_correction(const GraphSnapshot& graph, FrameRecord& record) const {
+  if (last_.state != FrameState::kTracked || last_.snapshot_version == graph.version() ||
+      !graph.contains(last_.reference)) {
+    return;
+  }
+  const SE3 T_c_w = final_T_c_w(last_, graph);
+  const SE3 change = T_c_w.inverse() * last_.T_c_w_causal;
+  if (change.translation().norm() < kCorrection && change.so3().log().norm() < kCorrectionAngle) return;
+  const MapChange& jump = graph.last_jump();
+  record.correction.reason = CorrectionReason::kOptimisation;
+  if (jump.version > last_.snapshot_version) {
+    record.correction.reason = jump.kind == MapChange::Kind::kLoopClosure ? CorrectionReason::kLoopClosure
+                                                                          : CorrectionReason::kRelaxation;
+  }
+  record.correction.T_c_w_before = last_.T_c_w_causal;
+  record.correction.T_c_w_after = T_c_w;
 }
 
 void TrackingStage::proposal_rejected(FrameRecord& record) {
@@ -53,12 +81,21 @@ MappingStage::MappingStage(const Rig& rig, const MapperOptions& options, Trace* 
   round_stage_ = times_.add_stage("round");
 }
 
-MapperRound MappingStage::step(std::span<const ProposalHandle> proposals) {
+MapperRound MappingStage::step(std::span<const ProposalHandle> proposals,
+                               std::span<const LoopMessage> messages) {
   const std::int64_t begin_ns = steady_now_ns();
   proposals_.clear();
   for (const ProposalHandle& proposal : proposals) proposals_.push_back(&*proposal);
-  const MapperReport report = mapper_.step(proposals_);
   MapperRound round;
+  loops_.clear();
+  for (const LoopMessage& message : messages) {
+    if (const auto* loop = std::get_if<LoopConstraint>(&message)) {
+      loops_.push_back(*loop);
+    } else {
+      round.relaxed += mapper_.take_relaxation(std::get<PoseRelaxation>(message));
+    }
+  }
+  const MapperReport report = mapper_.step(proposals_, loops_);
   round.version = mapper_.graph().version();
   round.proposals = static_cast<int>(proposals.size());
   round.inner_window = report.inner_window;
@@ -66,9 +103,45 @@ MapperRound MappingStage::step(std::span<const ProposalHandle> proposals) {
   round.points = report.points;
   round.observations = report.observations;
   round.metric_loops = report.metric_loops;
+  round.loops = report.loops;
   round.duration_ns = steady_now_ns() - begin_ns;
   times_.record(round_stage_, begin_ns, round.duration_ns);
   return round;
+}
+
+LoopClosingStage::LoopClosingStage(const Rig& rig, const EngineOptions& options, Trace* trace)
+    : rig_(rig), mapper_options_(options.mapper), times_("loop closer", trace) {
+  place_stage_ = times_.add_stage("place");
+  relax_stage_ = times_.add_stage("relaxation");
+  if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
+}
+
+std::span<LoopMessage> LoopClosingStage::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
+  messages_.clear();
+  if (!closer_) return messages_;
+  relax_if_due(graph);
+  const ScopedStage timed(times_, place_stage_);
+  if (const auto loop = closer_->step(keyframe, graph)) {
+    messages_.emplace_back(*loop);
+    loops_.push_back({*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns});
+    unrelaxed_ = loop;
+  }
+  return messages_;
+}
+
+/// One relaxation for a run of loops: when the newest of them is in the map.
+void LoopClosingStage::relax_if_due(const GraphSnapshot& graph) {
+  if (!unrelaxed_ || graph.version() == unrelaxed_->snapshot_version) return;
+  const Keyframe& from = graph.keyframe(unrelaxed_->from);
+  if (from.culled() || graph.keyframe(unrelaxed_->to).culled()) {
+    unrelaxed_.reset();
+    return;
+  }
+  if (find_edge(from, unrelaxed_->to) == nullptr) return;  // not taken yet
+  const ScopedStage timed(times_, relax_stage_);
+  RelaxationReport report;
+  messages_.emplace_back(relax_part(graph, graph.reference(), rig_, mapper_options_, report));
+  unrelaxed_.reset();
 }
 
 }  // namespace twofold

@@ -21,7 +21,7 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options)
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       tracking_(rig, options.tracker, trace_.get()),
       mapping_(rig, options.mapper, trace_.get()),
-      loop_times_("loop closer", trace_.get()),
+      loop_closing_(rig, options, trace_.get()),
       slots_(options.frame_slots),
       // In the rings, in the two threads' hands, and the tracker's spare one.
       proposals_pool_(2 * ring_size(options.proposal_slots) + 4),
@@ -29,9 +29,11 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options)
       done_(ring_size(options.frame_slots)),
       proposals_(ring_size(options.proposal_slots)),
       keyframes_(ring_size(options.proposal_slots)),
+      loops_(ring_size(options.proposal_slots)),
       snapshots_(2, mapping_.publish()),
       pacer_(options.pacing) {
   consumed_.reserve(ring_size(options.proposal_slots));
+  loop_messages_.reserve(ring_size(options.proposal_slots));
 }
 
 void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
@@ -136,12 +138,24 @@ void ThreadedRun::join_threads() {
   join(*loop_closer_, nobody, nullptr);
 }
 
+/// The loop closer ends after the mapper: what it sent last is taken here, all threads being gone.
+void ThreadedRun::map_late_loops() {
+  take_messages();
+  if (loop_messages_.empty()) return;
+  const MapperRound round = mapping_.step({}, loop_messages_);
+  (void)mapping_.publish();
+  schedule_.mapper.append({round.version, 0, static_cast<std::uint32_t>(loop_messages_.size())});
+  result_.rounds.push_back(round);
+}
+
 RunResult ThreadedRun::finish() {
+  map_late_loops();
   mapping_.mapper().relax_all();
   result_.graph = mapping_.publish();
   result_.times.push_back(std::move(tracking_.times()));
   result_.times.push_back(std::move(mapping_.times()));
-  result_.times.push_back(std::move(loop_times_));
+  result_.times.push_back(std::move(loop_closing_.times()));
+  result_.loops = std::move(loop_closing_.loops());
   result_.schedule = std::move(schedule_);
   result_.trace = std::move(trace_);
   result_.keyframes_not_described = not_described_.load(std::memory_order_relaxed);
@@ -194,25 +208,32 @@ void ThreadedRun::send_proposal(FrameRecord& record, TrackerStep& step) {
 // ------------------------------------------------------------------------------------------------------
 // mapper
 
-std::size_t ThreadedRun::take_proposals() {
+void ThreadedRun::take_messages() {
   consumed_.clear();
   ProposalHandle proposal;
   while (consumed_.size() < consumed_.capacity() && proposals_.try_pop(proposal)) {
     consumed_.push_back(std::move(proposal));
   }
-  return consumed_.size();
+  loop_messages_.clear();
+  LoopMessage message;
+  while (loop_messages_.size() < loop_messages_.capacity() && loops_.try_pop(message)) {
+    loop_messages_.push_back(std::move(message));
+  }
 }
 
 void ThreadedRun::mapper_thread(const std::stop_token& stop) {
   const auto ready = [this] {
-    return proposals_.size_approx() > 0 || proposals_ended_.load(std::memory_order_acquire);
+    return proposals_.size_approx() > 0 || loops_.size_approx() > 0 ||
+           proposals_ended_.load(std::memory_order_acquire);
   };
   while (mapper_parking_.wait(stop, ready)) {
-    if (take_proposals() == 0) break;  // ended
-    MapperRound round = mapping_.step(consumed_);
+    take_messages();
+    if (consumed_.empty() && loop_messages_.empty()) break;  // ended
+    MapperRound round = mapping_.step(consumed_, loop_messages_);
     snapshots_.publish(mapping_.publish());
     map_version_.store(round.version, std::memory_order_relaxed);
-    MapperStep step{round.version, static_cast<std::uint32_t>(round.proposals)};
+    MapperStep step{round.version, static_cast<std::uint32_t>(round.proposals),
+                    static_cast<std::uint32_t>(loop_messages_.size())};
     for (ProposalHandle& proposal : consumed_) {
       if (keyframes_.try_push(std::move(proposal))) continue;
       ++step.refused;
@@ -237,9 +258,19 @@ void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
   while (loop_parking_.wait(stop, ready)) {
     if (!keyframe && !keyframes_.try_pop(keyframe)) break;
     const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
-    schedule_.loop_closer.append({graph.version(), static_cast<std::int64_t>(index(keyframe->id))});
+    LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
+    send_loops(loop_closing_.step(*keyframe, graph), step);
+    schedule_.loop_closer.append(step);
     keyframe.reset();
   }
+}
+
+/// A ring that is full takes nothing more of this step; a loop that is lost is found again.
+void ThreadedRun::send_loops(std::span<LoopMessage> messages, LoopStep& step) {
+  std::size_t sent = 0;
+  while (sent < messages.size() && loops_.try_push(std::move(messages[sent]))) ++sent;
+  step.refused = static_cast<std::uint32_t>(messages.size() - sent);
+  if (sent > 0) mapper_parking_.wake();
 }
 
 }  // namespace twofold

@@ -16,6 +16,7 @@ namespace twofold {
 ///
 ///   reader --frames--> tracker --proposals--> mapper --keyframes--> loop closer
 ///     ^------done-------+   ^---- snapshots ----+---- snapshots ------^
+///                                               ^------- loops -------+
 ///
 /// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
 /// withheld first (no free buffer, or a full ring), and tracking goes on with the points it has.
@@ -52,7 +53,9 @@ class ThreadedRun {
 
   void track(FrameSlot& slot, const GraphSnapshot& graph);
   void send_proposal(FrameRecord& record, TrackerStep& step);
-  std::size_t take_proposals();
+  void take_messages();
+  void send_loops(std::span<LoopMessage> messages, LoopStep& step);
+  void map_late_loops();
 
   EngineOptions options_;
   std::unique_ptr<Trace> trace_;
@@ -61,7 +64,7 @@ class ThreadedRun {
 
   TrackingStage tracking_;
   MappingStage mapping_;
-  StageRecorder loop_times_;
+  LoopClosingStage loop_closing_;
   ScheduleStreams schedule_;
 
   SlotPool slots_;
@@ -70,11 +73,13 @@ class ThreadedRun {
   SpscRing<SlotHandle> done_;           // tracker -> reader; as long as the pool, so that it cannot be full
   SpscRing<ProposalHandle> proposals_;  // tracker -> mapper
   SpscRing<ProposalHandle> keyframes_;  // mapper -> loop closer
+  SpscRing<LoopMessage> loops_;         // loop closer -> mapper
   SnapshotPublisher<GraphSnapshot> snapshots_;
   Pacer pacer_;
 
   ProposalHandle spare_;                  // tracker's: the buffer the next keyframe goes to
   std::vector<ProposalHandle> consumed_;  // mapper's
+  std::vector<LoopMessage> loop_messages_;  // mapper's, of this round
 
   Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_;
   // Each is raised by the thread before in the chain, with release, after its last push: who sees it

@@ -100,13 +100,15 @@ void WindowLayout::collect_group(const WindowProblem& problem, int anchor, const
       int& slot = slot_of_pose_[o.pose];
       if (slot < 0) {
         slot = group.slot_count++;
-        const bool both_held = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
-        slots_.push_back({o.pose, -1, o.pose != anchor && !both_held, -1, false});
+        slots_.push_back({o.pose, -1, false, -1, false});
         const SE3 T_i_a = o.pose == anchor ? SE3() : problem.poses[o.pose].T_k_w * T_w_a;
         depth_row.push_back(T_i_a.rotation().row(2));
         depth_shift.push_back(T_i_a.translation().z());
       }
       if (!(depth_row[slot].dot(y) + depth_shift[slot] > 2 * kMinDepth)) continue;
+      // Only a measurement that counts couples: a pose all of whose points are behind it has no place in the system.
+      const bool both_held = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
+      slots_[group.first_slot + slot].coupled = o.pose != anchor && !both_held;
       observations_.push_back({o.z, o.information, slot, -1});
       ++track.observation_count;
     }

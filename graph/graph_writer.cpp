@@ -127,6 +127,8 @@ void GraphWriter::cull_point(PointId id) {
   const ObserverList observers = *graph_.point(id).observers;
   for (const KeyframeId keyframe : observers) remove_observations(keyframe, std::span(&id, 1));
   graph_.points_.mutate(index(id)) = MapPoint{};
+  // Points come and go for hours: where all of a chunk are gone, so is the chunk.
+  graph_.points_.forget_chunk_if(index(id), [](const MapPoint& point) { return !point.alive(); });
 }
 
 void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
@@ -140,6 +142,22 @@ void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
   remove_observations(id, points);
   const EdgeList edges = *graph_.keyframe(id).edges;
   for (const Edge& edge : edges) remove_edge(id, edge.other);
+  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
+  keyframe.heir = heir;
+  keyframe.T_this_heir = T_this_heir;
+  // Lists emptied one by one keep their buffers.
+  keyframe.observations = std::make_shared<const ObservationList>();
+  keyframe.edges = std::make_shared<const EdgeList>();
+}
+
+void GraphWriter::shorten_heirs(KeyframeId id) {
+  KeyframeId heir = graph_.keyframe(id).heir;
+  if (heir == kNoKeyframe || !graph_.keyframe(heir).culled()) return;
+  SE3 T_this_heir = graph_.keyframe(id).T_this_heir;
+  while (graph_.keyframe(heir).culled()) {
+    T_this_heir = T_this_heir * graph_.keyframe(heir).T_this_heir;
+    heir = graph_.keyframe(heir).heir;
+  }
   Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
   keyframe.heir = heir;
   keyframe.T_this_heir = T_this_heir;

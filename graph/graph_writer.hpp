@@ -14,6 +14,8 @@ class GraphWriter {
  public:
   /// An empty graph; its first published version has number 1.
   GraphWriter() { graph_.version_ = 1; }
+  /// Continues from an existing graph, e.g. a loaded map, with the next version number.
+  explicit GraphWriter(const GraphSnapshot& graph) : graph_(graph) { ++graph_.version_; }
 
   /// The private version as it stands, with the version number it will be published under.
   [[nodiscard]] const GraphSnapshot& graph() const { return graph_; }
@@ -34,6 +36,8 @@ class GraphWriter {
     graph_.points_.mutate(index(id)).appearance = std::move(appearance);
   }
   void set_reference(KeyframeId id) { graph_.reference_ = id; }
+  /// Says that poses jump with the version being made.
+  void announce_jump(MapChange::Kind kind) { graph_.last_jump_ = {graph_.version_, kind}; }
   /// Moves a point to another anchor that observes it; psi is in the new anchor's frame.
   void set_anchor(PointId id, KeyframeId anchor, const Vector3& psi);
 
@@ -53,6 +57,9 @@ class GraphWriter {
   /// culled. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes along with the
   /// heir (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
   void cull_keyframe(KeyframeId id, KeyframeId heir);
+  /// Lets a culled keyframe hang directly on the one that stayed. Its pose is the same; asking for it no
+  /// longer walks along all that were culled in between.
+  void shorten_heirs(KeyframeId id);
 
  private:
   void remove_observer(PointId point, KeyframeId keyframe);

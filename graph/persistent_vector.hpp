@@ -48,6 +48,7 @@ class PersistentVector {
     for (int shift = shift_; shift > 0; shift -= kBits) {
       node = static_cast<const Inner*>(node)->children[(i >> shift) & kMask].get();
     }
+    if (!node) return forgotten();
     return static_cast<const Leaf*>(node)->values[i & kMask];
   }
 
@@ -57,6 +58,24 @@ class PersistentVector {
     return leaf_for_writing(i).values[i & kMask];
   }
 
+  /// Frees the chunk of entry i < size() if `forgettable` holds for all its entries: they then read as T{}
+  /// until they are written again. Returns whether it did. Other versions keep theirs.
+  template <class Predicate>
+  bool forget_chunk_if(std::size_t i, Predicate&& forgettable) {
+    TWOFOLD_CHECK(i < size_, "index beyond the vector's end");
+    if (shift_ == 0) return false;
+    const std::size_t begin = i & ~kMask;
+    for (std::size_t n = begin; n < begin + kWidth && n < size_; ++n) {
+      if (!forgettable((*this)[n])) return false;
+    }
+    std::shared_ptr<Node>* slot = &root_;
+    for (int shift = shift_; shift > 0; shift -= kBits) {
+      slot = &own<Inner>(*slot).children[(i >> shift) & kMask];
+    }
+    slot->reset();
+    return true;
+  }
+
   void push_back(T value) {
     if (size_ == capacity()) grow();
     leaf_for_writing(size_).values[size_ & kMask] = std::move(value);
@@ -64,6 +83,10 @@ class PersistentVector {
   }
 
  private:
+  static const T& forgotten() {
+    static const T value{};
+    return value;
+  }
   [[nodiscard]] std::size_t capacity() const { return root_ ? kWidth << shift_ : 0; }
 
   void grow() {

@@ -8,6 +8,13 @@
 
 namespace twofold {
 
+/// A change of many poses at once, as the mapper announces it to those who use poses.
+struct MapChange {
+  enum class Kind : std::uint8_t { kLoopClosure, kRelaxation };
+  std::uint64_t version = 0;  ///< first version that has it; 0: there was none yet
+  Kind kind = Kind::kLoopClosure;
+};
+
 /// One immutable version of the SLAM graph. Copying it is O(1); versions share what did not change.
 class GraphSnapshot {
  public:
@@ -23,6 +30,8 @@ class GraphSnapshot {
   /// V_ref, the current centre of interest  (6.2.2); kNoKeyframe in an empty graph.
   [[nodiscard]] KeyframeId reference() const { return reference_; }
 
+  [[nodiscard]] const MapChange& last_jump() const { return last_jump_; }
+
   /// Pose of any keyframe, also of a culled one through its heirs.
   [[nodiscard]] SE3 T_k_w(KeyframeId id) const;
   /// Position of a point that is alive, in the world frame [m].
@@ -33,6 +42,7 @@ class GraphSnapshot {
 
   std::uint64_t version_ = 0;
   KeyframeId reference_ = kNoKeyframe;
+  MapChange last_jump_;
   PersistentVector<Keyframe> keyframes_;
   PersistentVector<MapPoint> points_;
 };

@@ -203,13 +203,14 @@ void detect_corners(const cv::Mat& image, int level, int threshold, float min_sc
     // Strong corners first: in rich texture there are enough of them, and far fewer to score.
     strip.scan(kStrong * threshold);
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
-      strip.wanted[c] = strip.wanted[c] && strip.best[c].score < min_score;
+      strip.wanted[c] = strip.wanted[c] && !(strip.best[c].score > 0 && strip.best[c].score >= min_score);
     }
     strip.scan(threshold);
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
       Corner corner = strip.best[c];
       corner.level = static_cast<std::uint8_t>(level);
-      if (corner.score >= min_score && corners.size() < corners.capacity()) corners.push_back(corner);
+      if (corner.score > 0 && corner.score >= min_score && corners.size() < corners.capacity())
+        corners.push_back(corner);
     }
   }
 }

@@ -133,7 +133,8 @@ double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v
 
 namespace {
 
-constexpr int kMaxRange = 1024;  // pixels of a row searched at most
+constexpr int kNoiseSsd = 4 * 64 * 4;  // four times what noise of two grey levels adds to a patch
+constexpr int kMaxRange = 1024;        // pixels of a row searched at most
 
 /// Cost of the patch at every pixel [first, first + count) of a row, and where it is least.
 struct RowCosts {
@@ -188,7 +189,7 @@ double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, i
   if (first > last || v < kMargin || v >= right.rows - kMargin) return Rig::kNoRight;
   const RowCosts costs(patch, right, v, first, last);
   const std::int64_t second = costs.second_best();
-  if (second * 4 < std::int64_t{costs.best} * 5) return Rig::kNoRight;
+  if (second * 4 <= std::int64_t{costs.best} * 5 + kNoiseSsd) return Rig::kNoRight;
   const auto aligned = align_patch_in_row(
       patch, right, {static_cast<float>(costs.best_u), static_cast<float>(v)}, options.refine_iterations);
   if (!aligned || !good_match(patch, aligned->rms, options) || aligned->uv.x() >= static_cast<float>(u)) {

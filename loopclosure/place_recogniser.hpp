@@ -39,8 +39,6 @@ class PlaceRecogniser {
   /// Candidates anywhere in the map, best first, without the tests that need a history: for a lost camera.
   [[nodiscard]] std::vector<PlaceCandidate> query_anywhere(const BagOfWords& bag, std::size_t max_count);
 
-  [[nodiscard]] const PlaceIndex& index() const { return index_; }
-
  private:
   /// A place that the last queries agreed about.
   struct Hypothesis {

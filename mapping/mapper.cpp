@@ -1,5 +1,6 @@
 #include "mapping/mapper.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
@@ -41,6 +42,15 @@ Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
 Mapper::Mapper(const Rig& rig, const MapperOptions& options)
     : Mapper(rig, options, guided_point_search(rig, options.loop.search_radius_px)) {}
 
+void Mapper::adopt(const GraphSnapshot& graph) {
+  writer_ = GraphWriter(graph);
+  // Nothing is known about which absolute poses agree: the first window is set along edges from its
+  // reference.
+  window_ = next_window_ = DoubleWindow();
+  consistent_.clear();
+  if (graph.reference() != kNoKeyframe) consistent_.set(graph.reference(), 0);
+}
+
 MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals, std::span<const LoopConstraint> loops,
                           KeyframeId tracker_reference) {
   MapperReport report;
@@ -79,6 +89,7 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   }
   if (from == to) return;
   link_marginalised(writer_, from, to, std::max(1, loop.inliers), T_to_from);
+  writer_.announce_jump(MapChange::Kind::kLoopClosure);
   ++report.loops;
 }
 
@@ -153,6 +164,29 @@ void Mapper::cull(MapperReport& report) {
     report.culled_keyframes =
         cull_redundant_keyframes(writer_, window_, options_.culling, report.culled_points);
   }
+}
+
+int Mapper::take_relaxation(const PoseRelaxation& relaxation) {
+  IdMap position;
+  for (std::size_t n = 0; n < relaxation.poses.size(); ++n) {
+    position.set(relaxation.poses[n].id, static_cast<int>(n));
+  }
+  // Window nodes are in breadth-first order around the reference.
+  const auto held = std::find_if(window_.nodes.begin(), window_.nodes.end(), [&](const TreeNode& node) {
+    return position.contains(node.id) && !graph().keyframe(node.id).culled();
+  });
+  if (held == window_.nodes.end()) return 0;
+  const SE3& T_held_relaxed =
+      relaxation.poses[static_cast<std::size_t>(position.find(held->id))].T_k_w;
+  const SE3 T_relaxed_w = T_held_relaxed.inverse() * graph().keyframe(held->id).T_k_w;
+  int moved = 0;
+  for (const KeyframePose& pose : relaxation.poses) {
+    if (window_.contains(pose.id) || graph().keyframe(pose.id).culled()) continue;
+    writer_.set_pose(pose.id, pose.T_k_w * T_relaxed_w);
+    ++moved;
+  }
+  if (moved > 0) writer_.announce_jump(MapChange::Kind::kRelaxation);
+  return moved;
 }
 
 RelaxationReport Mapper::relax_all() {

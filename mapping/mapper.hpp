@@ -57,6 +57,9 @@ class Mapper {
   Mapper(const Rig& rig, const MapperOptions& options, PointSearch search);
   Mapper(const Rig& rig, const MapperOptions& options);
 
+  /// Goes on with an existing graph, e.g. a loaded map, instead of the present one.
+  void adopt(const GraphSnapshot& graph);
+
   /// One round: inserts the proposals (in the order of their ids, which continue the graph's), adds loop
   /// constraints, optimises the double window, closes metric loops, culls.
   /// @param tracker_reference  where the tracker is now, if there are no proposals: the windows form around
@@ -68,6 +71,12 @@ class Mapper {
   [[nodiscard]] const GraphSnapshot& graph() const { return writer_.graph(); }
   /// O(1) whatever the size of the map.
   [[nodiscard]] GraphSnapshot publish() { return writer_.publish(); }
+
+  /// Takes over poses that were relaxed beside the mapper, outside of the double window: that one is more
+  /// accurate, and the tracker stands in it. They are moved as a whole so that the reference keyframe, or the
+  /// one of the window nearest to it that the relaxation has, stays where it is. To be followed by a step.
+  /// @return keyframes moved
+  int take_relaxation(const PoseRelaxation& relaxation);
 
   /// Makes all poses agree globally, e.g. at the end of a run. Cost grows with the map.
   RelaxationReport relax_all();

@@ -40,29 +40,38 @@ PoseGraph<SE3> pose_graph(const GraphSnapshot& graph, const std::vector<TreeNode
 
 }  // namespace
 
+PoseRelaxation relax_part(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
+                          const MapperOptions& options, RelaxationReport& report) {
+  VisitedSet visited;
+  std::vector<TreeNode> tree;
+  weighted_breadth_first(graph, root, graph.keyframe_count(), visited, tree);
+  PoseGraph<SE3> problem = pose_graph(graph, tree, rig, options);
+  PoseGraphSolver<SE3> solver;
+  const SolverSummary summary = solver.solve(problem, {});
+  PoseRelaxation relaxation;
+  relaxation.snapshot_version = graph.version();
+  relaxation.poses.reserve(tree.size());
+  for (std::size_t n = 0; n < tree.size(); ++n) relaxation.poses.push_back({tree[n].id, problem.poses[n]});
+  ++report.parts;
+  report.keyframes += static_cast<int>(tree.size());
+  report.constraints += static_cast<int>(problem.constraints.size());
+  report.initial_cost += summary.initial_cost;
+  report.final_cost += summary.final_cost;
+  return relaxation;
+}
+
 RelaxationReport relax_all_poses(GraphWriter& writer, const Rig& rig, const MapperOptions& options) {
   RelaxationReport report;
   const GraphSnapshot& graph = writer.graph();
   std::vector<KeyframeId> roots{graph.reference()};
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) roots.push_back(KeyframeId{k});
-  PoseGraphSolver<SE3> solver;
   IdMap done;
-  VisitedSet visited;
-  std::vector<TreeNode> tree;
   for (const KeyframeId root : roots) {
     if (!graph.contains(root) || done.contains(root) || graph.keyframe(root).culled()) continue;
-    weighted_breadth_first(graph, root, graph.keyframe_count(), visited, tree);
-    PoseGraph<SE3> problem = pose_graph(graph, tree, rig, options);
-    const SolverSummary summary = solver.solve(problem, {});
-    for (std::size_t n = 0; n < tree.size(); ++n) {
-      writer.set_pose(tree[n].id, problem.poses[n]);
-      done.set(tree[n].id, 0);
+    for (const KeyframePose& pose : relax_part(graph, root, rig, options, report).poses) {
+      writer.set_pose(pose.id, pose.T_k_w);
+      done.set(pose.id, 0);
     }
-    ++report.parts;
-    report.keyframes += static_cast<int>(tree.size());
-    report.constraints += static_cast<int>(problem.constraints.size());
-    report.initial_cost += summary.initial_cost;
-    report.final_cost += summary.final_cost;
   }
   return report;
 }

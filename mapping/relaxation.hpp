@@ -2,6 +2,7 @@
 
 #include "camera/rig.hpp"
 #include "graph/graph_writer.hpp"
+#include "graph/pose_relaxation.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {
@@ -14,8 +15,13 @@ struct RelaxationReport {
   double final_cost = 0;
 };
 
-/// Relaxes all keyframe poses over all edges (eq. 6.4 without points, outer window = everything), part by
-/// part. Outside of the double window poses are only defined relative to their neighbours; this makes them
+/// Relaxes the part of the map that is connected with `root` over all its edges (eq. 6.4 without points, outer
+/// window = everything); `root` is held. Changes nothing: for use beside the mapper, which takes the result as
+/// a message (Mapper::take_relaxation). Cost grows with the part.
+PoseRelaxation relax_part(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
+                          const MapperOptions& options, RelaxationReport& report);
+
+/// Relaxes all keyframe poses, part by part. Outside of the double window poses are only defined relative to their neighbours; this makes them
 /// agree globally, e.g. before a trajectory is written. The reference keyframe, or the oldest one of a part
 /// without it, stays where it is. Cost grows with the map.
 RelaxationReport relax_all_poses(GraphWriter& writer, const Rig& rig, const MapperOptions& options);

@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
   twofold::add_run_command(app, exit_code);
   twofold::add_eval_command(app, exit_code);
   twofold::add_render_command(app, exit_code);
+  twofold::add_map_command(app, exit_code);
   twofold::add_vocabulary_command(app, exit_code);
   try {
     app.parse(argc, argv);

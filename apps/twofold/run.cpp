@@ -11,9 +11,11 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "engine/engine.hpp"
+#include "graph/map_file.hpp"
 #include "io/io_error.hpp"
 #include "io/open_source.hpp"
 #include "io/output_file.hpp"
+#include "loopclosure/default_vocabulary.hpp"
 
 namespace twofold {
 namespace {
@@ -28,6 +30,10 @@ struct RunArguments {
   std::string replay_schedule;
   std::string trace;
   std::string pin;
+  std::string vocabulary;
+  std::string save_map;
+  bool no_metric_loops = false;
+  bool no_places = false;
   bool deterministic = false;
   bool preload = false;
   bool real_time = false;
@@ -86,6 +92,11 @@ EngineOptions engine_options(const RunArguments& arguments) {
     options.loop_closer_cpu = cpus[2];
   }
   if (arguments.real_time) options.fifo_priority = 50;
+  options.mapper.loop.enabled = !arguments.no_metric_loops;
+  if (!arguments.no_places) {
+    options.vocabulary = std::make_shared<const Vocabulary>(
+        arguments.vocabulary.empty() ? load_default_vocabulary() : Vocabulary::load(arguments.vocabulary));
+  }
   return options;
 }
 
@@ -158,6 +169,7 @@ int run(const RunArguments& arguments) {
   const RunResult result = schedule ? engine.replay(feed, *schedule, interrupted, progress)
                                     : engine.run(feed, interrupted, progress);
   line.end();
+  if (!arguments.save_map.empty()) save_map(arguments.save_map, {source->rig(), result.graph, {}});
   write_run_output(arguments.out, arguments.source, *source, options, result);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, result);
@@ -189,6 +201,11 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--windows", arguments->windows, "Keyframes in the inner and outer window")
       ->capture_default_str();
+  command->add_option("--vocabulary", arguments->vocabulary, "Vocabulary file instead of the built-in one");
+  command->add_option("--save-map", arguments->save_map, "Write the map to this file (.tfm) at the end");
+  command->add_flag("--no-places", arguments->no_places, "Recognise no places: no large loops are closed");
+  command->add_flag("--no-metric-loops", arguments->no_metric_loops,
+                    "Close no small loops: for experiments with drift");
   command->add_flag("--deterministic", arguments->deterministic,
                     "One thread, one order: same input, same bytes");
   command->add_option("--replay-schedule", arguments->replay_schedule,

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "geometry/inverse_depth.hpp"
+#include "apps/twofold/graph_export.hpp"
 #include "io/evaluation.hpp"
 #include "io/io_error.hpp"
 #include "io/output_file.hpp"
@@ -43,27 +43,6 @@ Trajectory causal_trajectory(const RunResult& result) {
   return trajectory;
 }
 
-Trajectory keyframe_trajectory(const GraphSnapshot& graph) {
-  Trajectory trajectory;
-  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-    if (!keyframe.culled()) trajectory.push_back({keyframe.t_ns, keyframe.T_k_w.inverse()});
-  }
-  return trajectory;
-}
-
-std::vector<PlyPoint> map_points(const GraphSnapshot& graph) {
-  std::vector<PlyPoint> points;
-  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
-    const MapPoint& point = graph.point(PointId{p});
-    if (!point.alive()) continue;
-    const std::uint8_t grey =
-        point.appearance->pixels[PointAppearance::kCentre * (PointAppearance::kSize + 1)];
-    points.push_back({graph.position(PointId{p}), {grey, grey, grey}});
-  }
-  return points;
-}
-
 Json late_and_lost(const RunResult& result) {
   Json lost = Json::array();
   Json late = Json::array();
@@ -85,6 +64,36 @@ Json late_and_lost(const RunResult& result) {
     }
   }
   return {{"why_lost", lost}, {"why_late", late}};
+}
+
+Json loops_json(const RunResult& result) {
+  Json loops = Json::array();
+  for (const ClosedLoop& loop : result.loops) {
+    const Vector6 drift = (loop.constraint.T_to_from * loop.T_to_from_before.inverse()).log();
+    loops.push_back({{"t_ns", loop.t_ns},
+                     {"from", index(loop.constraint.from)},
+                     {"to", index(loop.constraint.to)},
+                     {"inliers", loop.constraint.inliers},
+                     {"drift_m", drift.head<3>().norm()},
+                     {"drift_rad", drift.tail<3>().norm()}});
+  }
+  return loops;
+}
+
+/// How far the camera jumped in the map, when, and why.
+Json corrections_json(const RunResult& result) {
+  Json corrections = Json::array();
+  for (const FrameRecord& record : result.frames) {
+    const PoseCorrection& c = record.correction;
+    if (c.reason == CorrectionReason::kNone) continue;
+    const SE3 T_before_after = c.T_c_w_before * c.T_c_w_after.inverse();
+    corrections.push_back({{"frame", record.frame_index},
+                           {"t_ns", record.t_ns},
+                           {"reason", describe(c.reason)},
+                           {"moved_m", T_before_after.translation().norm()},
+                           {"turned_rad", T_before_after.so3().log().norm()}});
+  }
+  return corrections;
 }
 
 Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result) {
@@ -112,6 +121,8 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"points", points},
             {"mapper_rounds", result.rounds.size()},
             {"metric_loop_edges", metric_loops},
+            {"closed_loops", loops_json(result)},
+            {"pose_corrections", corrections_json(result)},
             {"proposals_refused", result.proposals_refused},
             {"wall_seconds", result.wall_seconds},
             {"cpu_seconds", result.cpu_seconds},
@@ -198,8 +209,8 @@ void print_summary(const std::filesystem::path& folder, const RunResult& result)
   fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", result.frames.size(),
              count(FrameState::kTracked), count(FrameState::kLost), count(FrameState::kDropped),
              result.interrupted ? ", interrupted" : "");
-  fmt::print("map         {} keyframes, {} rounds, {} metric loop edges\n", result.graph.keyframe_count(),
-             result.rounds.size(), metric_loops);
+  fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
+             result.graph.keyframe_count(), result.rounds.size(), metric_loops, result.loops.size());
   for (const StageRecorder& recorder : result.times) {
     if (recorder.thread_name() == "loop closer") continue;
     const LatencyHistogram& h = recorder.histogram(0);

@@ -16,7 +16,7 @@ Report::Report(const std::filesystem::path& folder) : folder_(folder) {
 void Report::csv(const std::string& name, const std::vector<std::string>& columns,
                  const std::vector<std::vector<double>>& rows) const {
   std::ofstream out(folder_ / name);
-  for (std::size_t c = 0; c < columns.size(); ++c) out << (c ? "," : "") << columns[c];
+  for (std::size_t c = 0; c < columns.size(); ++c) out << (c ? "," : "") << '"' << columns[c] << '"';
   out << '\n';
   out.precision(9);
   for (const auto& row : rows) {

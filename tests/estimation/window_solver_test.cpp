@@ -252,6 +252,19 @@ TEST(WindowSolver, LeavesOutObservationsBehindTheCamera) {
   EXPECT_EQ(lonely.matrix(), problem.poses.back().T_k_w.matrix()) << "nothing ties this pose to anything";
 }
 
+TEST(WindowSolver, LeavesOutAPoseThatHasAllItsPointsBehindIt) {
+  auto window = make_synthetic_window(small_window());
+  WindowProblem& problem = window.start;
+  // Turned half around about its vertical axis: it is still tied to a neighbour by a pose-pose constraint alone.
+  SE3& T_k_w = problem.poses[2].T_k_w;
+  T_k_w = SE3(SO3::exp(Vector3(0, 3.14159, 0)), Vector3::Zero()) * T_k_w;
+  problem.constraints.push_back({2, 3, problem.poses[3].T_k_w * T_k_w.inverse()});
+  WindowSolver solver;
+  const auto summary = solver.solve(problem, to_convergence());
+  EXPECT_LT(summary.final_cost, summary.initial_cost);
+  EXPECT_TRUE(problem.poses[2].T_k_w.matrix().allFinite());
+}
+
 TEST(WindowSolver, HoldsPointsAtInfinity) {
   auto window = make_synthetic_window(small_window());
   WindowProblem problem = window.truth;

@@ -109,6 +109,29 @@ TEST(PersistentVector, AppendingLeavesOlderVersionsAtTheirSize) {
   for (std::size_t i = 0; i < 80; ++i) EXPECT_EQ(v[i], static_cast<int>(i));
 }
 
+TEST(PersistentVector, ForgottenChunksReadAsDefaultsUntilWritten) {
+  PersistentVector<int, 2> v;
+  for (int i = 0; i < 70; ++i) v.push_back(i + 1);
+  const PersistentVector<int, 2> version = v;
+  const auto none = [](int) { return false; };
+  const auto all = [](int) { return true; };
+  EXPECT_FALSE(v.forget_chunk_if(9, none));
+  EXPECT_TRUE(v.forget_chunk_if(9, all));
+  EXPECT_TRUE(v.forget_chunk_if(69, all));  // the last one is not full
+  for (std::size_t i = 0; i < 70; ++i) {
+    const bool gone = (i >= 8 && i < 12) || i >= 68;
+    EXPECT_EQ(v[i], gone ? 0 : static_cast<int>(i) + 1);
+    EXPECT_EQ(version[i], static_cast<int>(i) + 1);
+  }
+  v.mutate(10) = -1;
+  v.push_back(-2);
+  EXPECT_EQ(v[10], -1);
+  EXPECT_EQ(v[9], 0);
+  EXPECT_EQ(v[69], 0);
+  EXPECT_EQ(v[70], -2);
+  EXPECT_FALSE(v.forget_chunk_if(9, [](int value) { return value == 0; }));
+}
+
 TEST(PersistentVector, WritingBeyondTheEndIsABug) {
   PersistentVector<int> v;
   v.push_back(1);

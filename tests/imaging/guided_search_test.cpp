@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 #include <vector>
 
+#include "geometry/inverse_depth.hpp"
 #include "imaging/fast_corners.hpp"
 #include "rendered_scene.hpp"
 
@@ -23,20 +26,24 @@ struct Start {
 };
 
 /// Corners of one view with their true depth.
-std::vector<Start> corners_of(const RenderedScene& scene, const Rig& rig, const FrameImages& images, const SE3& T_c_w,
-                              int levels) {
+std::vector<Start> corners_of(const RenderedScene& scene, const Rig& rig, const FrameImages& images,
+                              const SE3& T_c_w) {
   std::vector<Corner> corners;
   corners.reserve(4000);
   CellGrid grid{32, rig.camera.width / 32, rig.camera.height / 32, {}};
-  const std::vector<std::uint8_t> free_cells(static_cast<std::size_t>(grid.columns * grid.rows), 0);
-  grid.occupied = free_cells;
-  for (int level = 0; level < levels; ++level)
+  const std::vector<std::uint8_t> none(static_cast<std::size_t>(grid.columns * grid.rows), 0);
+  grid.occupied = none;
+  for (int level = 0; level < 3; ++level) {
     detect_corners(images.left.level(level), level, 10, 15, 12, grid, corners);
+  }
   std::vector<Start> starts;
   for (const Corner& corner : corners) {
     Start start;
     start.corner = corner;
-    if (!cut_appearance(images.left.level(corner.level), corner.u, corner.v, corner.level, start.appearance)) continue;
+    if (!cut_appearance(images.left.level(corner.level), corner.u, corner.v, corner.level,
+                        start.appearance)) {
+      continue;
+    }
     const Vector2 uv = start.appearance.uv.cast<double>();
     const Vector3 ray = rig.camera.unproject(uv);
     start.psi = {ray.x(), ray.y(), 1 / scene.depth(T_c_w, uv)};
@@ -45,95 +52,207 @@ std::vector<Start> corners_of(const RenderedScene& scene, const Rig& rig, const 
   return starts;
 }
 
+/// Errors in pixels of the level a point was found on.
 struct Errors {
-  std::vector<double> u, v, r;  // in pixels of the level
-  int tried = 0;
-  int with_right = 0;
+  double u2 = 0, v2 = 0, disparity2 = 0, disparity = 0;
+  int tried = 0, found = 0, with_right = 0;
+
+  [[nodiscard]] double rms_u() const { return std::sqrt(u2 / found); }
+  [[nodiscard]] double rms_v() const { return std::sqrt(v2 / found); }
+  [[nodiscard]] double rms_disparity() const { return std::sqrt(disparity2 / with_right); }
 };
 
-double rms(const std::vector<double>& e) {
-  double sum = 0;
-  for (double x : e) sum += x * x;
-  return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, e.size())));
-}
-double mean(const std::vector<double>& e) {
-  double sum = 0;
-  for (double x : e) sum += x;
-  return sum / static_cast<double>(std::max<std::size_t>(1, e.size()));
-}
-double median_abs(std::vector<double> e) {
-  if (e.empty()) return 0;
-  for (double& x : e) x = std::abs(x);
-  std::nth_element(e.begin(), e.begin() + static_cast<std::ptrdiff_t>(e.size() / 2), e.end());
-  return e[e.size() / 2];
-}
+struct Motion {
+  const char* name;
+  Vector6 xi;
+  double found_share;
+};
 
-void report(const char* name, const Errors& e) {
-  std::printf("%-28s tried %d found %zu right %d | u rms %.3f med %.3f mean %+.3f | v rms %.3f med %.3f mean %+.3f | disparity rms %.3f med %.3f mean %+.3f\n", name, e.tried, e.u.size(),
-              e.with_right, rms(e.u), median_abs(e.u), mean(e.u), rms(e.v), median_abs(e.v), mean(e.v), rms(e.r), median_abs(e.r), mean(e.r));
-}
-
-class GuidedSearch : public ::testing::Test {
+class GuidedSearch : public ::testing::TestWithParam<Motion> {
  protected:
+  Errors search(const SE3& T_c_a, const SE3& T_c_a_predicted) {
+    const SE3 T_a_w;
+    FrameImages first, second;
+    scene_.render(T_a_w, kNoise, first);
+    scene_.render(T_c_a * T_a_w, kNoise, second);
+    Errors errors;
+    for (const Start& start : corners_of(scene_, rig_, first, T_a_w)) {
+      const Vector3 x_c = T_c_a * from_inverse_depth(start.psi);
+      if (x_c.z() < 0.5) continue;
+      const Vector3 truth = rig_.project(x_c);
+      const int border = 16 << start.corner.level;
+      if (!rig_.camera.contains(truth.head<2>(), border) || truth.z() < border) continue;
+      ++errors.tried;
+      const auto match = find_point(second, rig_, start.appearance, start.psi, T_c_a_predicted, {});
+      if (!match) continue;
+      add(errors, match->z, truth, match->level);
+    }
+    return errors;
+  }
+  static void add(Errors& errors, const Vector3& z, const Vector3& truth, int level) {
+    const double s = std::ldexp(1.0, -level);
+    const Vector3 e = (z - truth) * s;
+    ++errors.found;
+    errors.u2 += e.x() * e.x();
+    errors.v2 += e.y() * e.y();
+    if (std::isnan(e.z())) return;
+    ++errors.with_right;
+    errors.disparity += e.x() - e.z();
+    errors.disparity2 += (e.x() - e.z()) * (e.x() - e.z());
+  }
+
   Rig rig_ = test_rig(SensorKind::kStereo);
   RenderedScene scene_{rig_, {4, 2.5, 5}, 7};
-  FrameImages first_, second_;
 };
 
-TEST_F(GuidedSearch, Explore) {
-  const SE3 T_a_w;
-  scene_.render(T_a_w, kNoise, first_);
-  const std::vector<Start> starts = corners_of(scene_, rig_, first_, T_a_w, 3);
-  struct Motion {
-    const char* name;
-    Vector6 xi;
+TEST_P(GuidedSearch, FindsPointsToAFewHundredthsOfAPixel) {
+  const Motion& motion = GetParam();
+  const SE3 T_c_a = SE3::exp(motion.xi);
+  const Errors errors = search(T_c_a, T_c_a);
+  std::printf("%s: %d of %d found, rms u %.3f v %.3f disparity %.3f (mean %+.3f) px\n", motion.name,
+              errors.found, errors.tried, errors.rms_u(), errors.rms_v(), errors.rms_disparity(),
+              errors.disparity / errors.with_right);
+  ASSERT_GT(errors.tried, 200);
+  EXPECT_GT(errors.found, motion.found_share * errors.tried);
+  EXPECT_GT(errors.with_right, 0.95 * errors.found);
+  EXPECT_LT(errors.rms_u(), 0.06);
+  EXPECT_LT(errors.rms_v(), 0.06);
+  EXPECT_LT(errors.rms_disparity(), 0.06);
+  EXPECT_LT(std::abs(errors.disparity / errors.with_right), 0.03);
+}
+
+TEST_P(GuidedSearch, ForgivesAPredictionTwoPixelsOff) {
+  const Motion& motion = GetParam();
+  const SE3 T_c_a = SE3::exp(motion.xi);
+  const SE3 off(SO3::exp(Vector3(2 / rig_.camera.fx, -1.5 / rig_.camera.fx, 0)), Vector3::Zero());
+  const Errors errors = search(T_c_a, off * T_c_a);
+  // A pixel of texture may look alike two pixels away: the few that do are for the robust kernel.
+  EXPECT_GT(errors.found, (motion.found_share - 0.05) * errors.tried);
+  EXPECT_LT(errors.rms_u(), 0.25);
+  EXPECT_LT(errors.rms_v(), 0.25);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Motions, GuidedSearch,
+    ::testing::Values(Motion{"rest", Vector6::Zero(), 0.98},
+                      Motion{"sideways", (Vector6() << 0.1, 0.02, 0, 0, 0, 0).finished(), 0.9},
+                      Motion{"forward", (Vector6() << 0.01, 0.02, -0.5, 0, 0, 0).finished(), 0.85},
+                      Motion{"far forward", (Vector6() << 0.01, 0.02, -1.2, 0, 0, 0).finished(), 0.85},
+                      Motion{"roll", (Vector6() << 0.1, 0.02, 0, 0, 0, 0.35).finished(), 0.85},
+                      Motion{"yaw", (Vector6() << 0.1, 0.02, 0, 0, 0.26, 0).finished(), 0.9}),
+    [](const auto& motion) {
+      std::string name = motion.param.name;
+      std::replace(name.begin(), name.end(), ' ', '_');
+      return name;
+    });
+
+TEST_F(GuidedSearch, SurvivesAChangeOfExposure) {
+  FrameImages first, second;
+  scene_.render(SE3(), kNoise, first);
+  const SE3 T_c_a = SE3::exp((Vector6() << 0.05, 0, 0, 0, 0.02, 0).finished());
+  const auto darken = [](const cv::Mat& image) {
+    cv::Mat dark;
+    image.convertTo(dark, CV_8UC1, 0.7, 12);
+    return dark;
   };
-  std::vector<Motion> motions(6);
-  motions[0] = {"none", Vector6::Zero()};
-  motions[1] = {"sideways 0.1", (Vector6() << 0.1, 0.02, 0, 0, 0, 0).finished()};
-  motions[2] = {"forward 0.5", (Vector6() << 0.01, 0.02, -0.5, 0, 0, 0).finished()};
-  motions[3] = {"forward 1.2", (Vector6() << 0.01, 0.02, -1.2, 0, 0, 0).finished()};
-  motions[4] = {"roll 20 deg", (Vector6() << 0.1, 0.02, 0, 0, 0, 0.35).finished()};
-  motions[5] = {"yaw 15 deg", (Vector6() << 0.1, 0.02, 0, 0, 0.26, 0).finished()};
-  for (const Motion& motion : motions) {
-    const SE3 T_c_a = SE3::exp(motion.xi);
-    scene_.render(T_c_a * T_a_w, kNoise, second_);
-    for (int level = 0; level < 3; ++level) {
-      Errors errors;
-      for (const Start& start : starts) {
-        if (start.corner.level != level) continue;
-        const Vector3 x_a(start.psi.x() / start.psi.z(), start.psi.y() / start.psi.z(), 1 / start.psi.z());
-        const Vector3 x_c = T_c_a * x_a;
-        if (x_c.z() < 0.3) continue;
-        const Vector3 truth = rig_.project(x_c);
-        if (!rig_.camera.contains(truth.head<2>(), 20)) continue;
-        ++errors.tried;
-        const auto found = find_point(second_, rig_, start.appearance, start.psi, T_c_a, {});
-        if (!found) continue;
-        const double s = std::ldexp(1.0, -found->level);
-        errors.u.push_back((found->z.x() - truth.x()) * s);
-        errors.v.push_back((found->z.y() - truth.y()) * s);
-        if (std::isnan(found->z.z())) continue;
-        ++errors.with_right;
-        errors.r.push_back(((found->z.x() - found->z.z()) - (truth.x() - truth.z())) * s);
-      }
-      report((std::string(motion.name) + " level " + std::to_string(level)).c_str(), errors);
-    }
-  }
+  scene_.render(T_c_a, kNoise, second);
+  second.left.build(darken(second.left.level(0)));
+  second.right.build(darken(second.right.level(0)));
   Errors errors;
-  for (int level = 0; level < 3; ++level) {
-    Errors row;
-    for (const Start& start : starts) {
-      if (start.corner.level != level) continue;
-      ++row.tried;
-      const double u_r = right_from_row(first_, rig_, start.corner.u, start.corner.v, level, {});
-      if (std::isnan(u_r)) continue;
-      ++row.with_right;
-      const double disparity = rig_.disparity_from_depth(1 / start.psi.z());
-      row.r.push_back((start.appearance.uv.x() - u_r - disparity) * std::ldexp(1.0, -level));
+  for (const Start& start : corners_of(scene_, rig_, first, SE3())) {
+    const Vector3 truth = rig_.project(T_c_a * from_inverse_depth(start.psi));
+    if (!rig_.camera.contains(truth.head<2>(), 60) || truth.z() < 60) continue;
+    ++errors.tried;
+    if (const auto match = find_point(second, rig_, start.appearance, start.psi, T_c_a, {})) {
+      add(errors, match->z, truth, match->level);
     }
-    report("right_from_row", row);
   }
+  EXPECT_GT(errors.found, 0.9 * errors.tried);
+  EXPECT_LT(errors.rms_u(), 0.06);
+  EXPECT_LT(errors.rms_v(), 0.06);
+}
+
+TEST_F(GuidedSearch, FindsNothingWhereThereIsNothing) {
+  FrameImages first, second;
+  scene_.render(SE3(), kNoise, first);
+  RenderedScene other(rig_, {4, 2.5, 5}, 99);
+  other.render(SE3(), kNoise, second);
+  int tried = 0;
+  int found = 0;
+  for (const Start& start : corners_of(scene_, rig_, first, SE3())) {
+    ++tried;
+    found += find_point(second, rig_, start.appearance, start.psi, SE3(), {}).has_value();
+  }
+  EXPECT_LT(found, 0.05 * tried);
+}
+
+TEST_F(GuidedSearch, RefusesPointsBehindOutsideAndAtTheWrongScale) {
+  FrameImages images;
+  scene_.render(SE3(), 0, images);
+  const Start start = corners_of(scene_, rig_, images, SE3()).front();
+  const double depth = 1 / start.psi.z();
+  const auto moved = [&](const Vector3& t) {
+    return find_point(images, rig_, start.appearance, start.psi, SE3(SO3(), t), {});
+  };
+  EXPECT_TRUE(moved(Vector3::Zero()));
+  EXPECT_FALSE(moved({0, 0, -depth - 1}));  // behind
+  EXPECT_FALSE(moved({100, 0, 0}));         // beside
+  EXPECT_FALSE(moved({0, 0, 30 * depth}));  // too small to be recognised
+}
+
+TEST_F(GuidedSearch, StartsDepthFromTheRow) {
+  FrameImages images;
+  scene_.render(SE3(), kNoise, images);
+  for (int level = 0; level < 3; ++level) {
+    Errors errors;
+    for (const Start& start : corners_of(scene_, rig_, images, SE3())) {
+      if (start.corner.level != level) continue;
+      const Vector3 truth = rig_.project(from_inverse_depth(start.psi));
+      if (truth.z() < (16 << level)) continue;
+      ++errors.tried;
+      const double u_r = right_from_row(images, rig_, start.corner.u, start.corner.v, level, {});
+      if (!std::isnan(u_r)) add(errors, {truth.x(), truth.y(), u_r}, truth, level);
+    }
+    std::printf("level %d: %d of %d found, rms disparity %.3f (mean %+.3f) px\n", level, errors.found,
+                errors.tried, errors.rms_disparity(), errors.disparity / errors.found);
+    EXPECT_GT(errors.found, 0.9 * errors.tried);
+    EXPECT_LT(errors.rms_disparity(), 0.06);
+  }
+}
+
+TEST_F(GuidedSearch, RepeatedTextureGivesNoDepth) {
+  cv::Mat image(rig_.camera.height, rig_.camera.width, CV_8UC1);
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
+      image.at<std::uint8_t>(v, u) = (u / 10 + v / 10) % 2 == 0 ? 60 : 190;
+    }
+  }
+  FrameImages images;
+  images.left.build(image);
+  images.right.build(image);
+  EXPECT_TRUE(std::isnan(right_from_row(images, rig_, 400, 240, 0, {})));
+}
+
+TEST(RightFromDepth, IsTheVirtualDisparityAndRefusesHolesAndEdges) {
+  const Rig rig = test_rig(SensorKind::kRgbd);
+  cv::Mat depth(rig.camera.height, rig.camera.width, CV_16UC1, cv::Scalar(2000));
+  EXPECT_NEAR(right_from_depth(depth, rig, 100.25, 50.5), 100.25 - rig.disparity_from_depth(2.0), 1e-9);
+  depth(cv::Rect(200, 0, 100, 100)) = 0;
+  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 250, 50)));  // hole
+  depth(cv::Rect(300, 0, 100, 100)) = 1000;
+  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 400, 50)));  // edge between 1 m and 2 m
+  depth(cv::Rect(0, 200, 50, 50)) = 65000;
+  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 20, 220)));  // beyond the sensor's range
+  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 0, 220)));   // rim
+}
+
+TEST(MeasurementInformation, FallsByFourALevel) {
+  const Rig rig = test_rig(SensorKind::kStereo);
+  const Eigen::Vector3f fine = measurement_information(rig, 0, true);
+  const Eigen::Vector3f coarse = measurement_information(rig, 1, true);
+  EXPECT_FLOAT_EQ(fine.x(), 4 * coarse.x());
+  EXPECT_FLOAT_EQ(fine.z(), 4 * coarse.z());
+  EXPECT_EQ(measurement_information(rig, 0, false).z(), 0);
 }
 
 }  // namespace

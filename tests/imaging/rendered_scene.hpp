@@ -45,7 +45,8 @@ class NoiseTexture {
     const auto smooth = [](double t) { return t * t * (3 - 2 * t); };
     const double a = smooth(x - fx);
     const double b = smooth(y - fy);
-    return (1 - b) * ((1 - a) * at(i, j) + a * at(i + 1, j)) + b * ((1 - a) * at(i, j + 1) + a * at(i + 1, j + 1));
+    return (1 - b) * ((1 - a) * at(i, j) + a * at(i + 1, j)) +
+           b * ((1 - a) * at(i, j + 1) + a * at(i + 1, j + 1));
   }
 
   std::array<float, static_cast<std::size_t>(kSide) * kSide> lattice_{};
@@ -122,7 +123,8 @@ class RenderedScene {
       if (std::abs(ray[axis]) < 1e-12) continue;
       const double wall = ray[axis] > 0 ? half_size_[axis] : -half_size_[axis];
       const double distance = (wall - origin[axis]) / ray[axis];
-      if (distance < nearest.distance) nearest = {distance, 2 * axis + (ray[axis] > 0), origin + distance * ray};
+      if (distance < nearest.distance)
+        nearest = {distance, 2 * axis + (ray[axis] > 0), origin + distance * ray};
     }
     return nearest;
   }

@@ -217,6 +217,23 @@ TEST(Mapper, TheWindowFormsAroundARevisitedKeyframe) {
   EXPECT_LT(inner_error(mapper, simulation), 0.03);
 }
 
+TEST(Mapper, GoesOnWithAnAdoptedGraph) {
+  Simulation simulation = spiral(40, 12);
+  Mapper first(simulation::thesis_rig(), small_windows());
+  for (int k = 0; k < 25; ++k) map_next(simulation, first);
+  const GraphSnapshot saved = first.publish();
+  Mapper second(simulation::thesis_rig(), small_windows());
+  second.adopt(saved);
+  EXPECT_EQ(second.graph().version(), saved.version() + 1);
+  while (!simulation.done()) map_next(simulation, second);
+  EXPECT_EQ(second.graph().keyframe_count(), 40U);
+  EXPECT_EQ(saved.keyframe_count(), 25U);
+  EXPECT_EQ(broken_invariant(saved, 2), "");
+  EXPECT_EQ(broken_invariant(second.graph(), 2), "");
+  EXPECT_EQ(component_count(second.graph()), 1);
+  EXPECT_LT(inner_error(second, simulation), 0.03);
+}
+
 TEST(Mapper, RelaxingTheWholeMapKeepsTheReferenceAndTheAccuracy) {
   Simulation simulation = spiral(110, 11);
   MapperOptions options = small_windows();

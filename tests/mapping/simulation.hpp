@@ -30,6 +30,7 @@ class Simulation {
  public:
   Simulation(const Options& options, std::vector<Vector3> points, std::vector<SE3> T_k_w);
 
+  [[nodiscard]] const Rig& rig() const { return options_.rig; }
   [[nodiscard]] bool done() const { return next_ == T_k_w_.size(); }
   /// Proposal of the next keyframe; valid until the next call.
   KeyframeProposal& propose(const GraphSnapshot& graph);

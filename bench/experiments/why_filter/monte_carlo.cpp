@@ -177,6 +177,7 @@ Doubling compare_doublings(const Case& c, int method) {
     d.by_points += p;
     d.by_frames += f;
   }
+  if (d.cells == 0) d.least = 0;
   d.by_points /= std::max(1, d.cells);
   d.by_frames /= std::max(1, d.cells);
   return d;

@@ -1,0 +1,67 @@
+#include "apps/twofold/graph_export.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include <fmt/format.h>
+
+namespace twofold {
+namespace {
+
+std::string pose_text(const SE3& T) {
+  const Eigen::Quaterniond& q = T.so3().quaternion();
+  const Vector3& t = T.translation();
+  return fmt::format("{:.12g} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g}", t.x(), t.y(), t.z(), q.x(),
+                     q.y(), q.z(), q.w());
+}
+
+/// Upper triangle of weight * identity.
+std::string information_text(int weight) {
+  std::string text;
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column) text += fmt::format(" {}", row == column ? weight : 0);
+  }
+  return text;
+}
+
+}  // namespace
+
+Trajectory keyframe_trajectory(const GraphSnapshot& graph) {
+  Trajectory trajectory;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (!keyframe.culled()) trajectory.push_back({keyframe.t_ns, keyframe.T_k_w.inverse()});
+  }
+  return trajectory;
+}
+
+std::vector<PlyPoint> map_points(const GraphSnapshot& graph) {
+  std::vector<PlyPoint> points;
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+    const MapPoint& point = graph.point(PointId{p});
+    if (!point.alive()) continue;
+    const std::uint8_t grey =
+        point.appearance->pixels[PointAppearance::kCentre * (PointAppearance::kSize + 1)];
+    points.push_back({graph.position(PointId{p}), {grey, grey, grey}});
+  }
+  return points;
+}
+
+std::string g2o_text(const GraphSnapshot& graph) {
+  std::string vertices, edges, fixed;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (keyframe.culled()) continue;
+    if (fixed.empty()) fixed = fmt::format("FIX {}\n", k);
+    vertices += fmt::format("VERTEX_SE3:QUAT {} {}\n", k, pose_text(keyframe.T_k_w.inverse()));
+    for (const Edge& edge : *keyframe.edges) {
+      if (edge.other < keyframe.id) continue;
+      const SE3 T_this_other = relative_pose(graph, keyframe.id, edge).inverse();
+      edges += fmt::format("EDGE_SE3:QUAT {} {} {}{}\n", k, index(edge.other), pose_text(T_this_other),
+                           information_text(std::max(1, edge.weight)));
+    }
+  }
+  return vertices + fixed + edges;
+}
+
+}  // namespace twofold

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "graph/snapshot.hpp"
+#include "io/ply.hpp"
+#include "io/trajectory.hpp"
+
+namespace twofold {
+
+/// Poses of the keyframes that were not culled.
+[[nodiscard]] Trajectory keyframe_trajectory(const GraphSnapshot& graph);
+
+/// Points that are alive, in the grey of their corner.
+[[nodiscard]] std::vector<PlyPoint> map_points(const GraphSnapshot& graph);
+
+/// The pose graph in g2o's text form: VERTEX_SE3:QUAT with T_w_k, EDGE_SE3:QUAT with T_i_j of each edge and an
+/// information that is the edge's weight times the identity. The oldest keyframe is fixed.
+[[nodiscard]] std::string g2o_text(const GraphSnapshot& graph);
+
+}  // namespace twofold

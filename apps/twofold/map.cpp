@@ -1,0 +1,100 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "apps/twofold/graph_export.hpp"
+#include "graph/map_file.hpp"
+#include "io/io_error.hpp"
+#include "io/output_file.hpp"
+#include "io/ply.hpp"
+#include "io/trajectory_file.hpp"
+
+namespace twofold {
+namespace {
+
+SavedMap open_map(const std::string& file) {
+  try {
+    return load_map(file);
+  } catch (const MapFileError& error) {
+    throw IoError(error.what());
+  }
+}
+
+const char* name_of(SensorKind kind) {
+  return kind == SensorKind::kStereo ? "stereo" : kind == SensorKind::kRgbd ? "rgbd" : "mono";
+}
+
+void print_info(const std::string& file) {
+  const SavedMap map = open_map(file);
+  const GraphSnapshot& graph = map.graph;
+  std::size_t keyframes = 0, points = 0, observations = 0, edges = 0, marginalised = 0;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    keyframes += keyframe.culled() ? 0 : 1;
+    observations += keyframe.observations->size();
+    for (const Edge& edge : *keyframe.edges) {
+      if (edge.other > keyframe.id) continue;
+      ++edges;
+      marginalised += edge.marginalised ? 1 : 0;
+    }
+  }
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) points += graph.point(PointId{p}).alive() ? 1 : 0;
+  const PinholeCamera& camera = map.rig.camera;
+  fmt::print("sensor        {} {}x{}, f {:.2f} {:.2f}, c {:.2f} {:.2f}, baseline {:.4f} m\n",
+             name_of(map.rig.kind), camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
+             map.rig.baseline);
+  fmt::print("keyframes     {} ({} culled)\npoints        {} ({} culled)\nobservations  {}\n", keyframes,
+             graph.keyframe_count() - keyframes, points, graph.point_count() - points, observations);
+  fmt::print("edges         {} ({} marginalised)\nplaces        {} bytes\nfile          {} bytes\n", edges,
+             marginalised, map.places.size(), std::filesystem::file_size(file));
+}
+
+struct ExportArguments {
+  std::string file, ply, g2o, tum;
+};
+
+void export_map(const ExportArguments& arguments) {
+  if (arguments.ply.empty() && arguments.g2o.empty() && arguments.tum.empty()) {
+    throw IoError("map export", "name at least one of --ply, --g2o, --tum");
+  }
+  const SavedMap map = open_map(arguments.file);
+  if (!arguments.ply.empty()) write_ply(arguments.ply, map_points(map.graph));
+  if (!arguments.tum.empty()) write_tum_trajectory(arguments.tum, keyframe_trajectory(map.graph));
+  if (!arguments.g2o.empty()) write_file(arguments.g2o, g2o_text(map.graph));
+}
+
+}  // namespace
+
+void add_map_command(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("map", "Map files (.tfm): look into, check, export");
+  command->require_subcommand(1);
+  auto arguments = std::make_shared<ExportArguments>();
+  CLI::App* info = command->add_subcommand("info", "What the map holds");
+  info->add_option("FILE", arguments->file, "map file")->required();
+  info->callback([arguments, &exit_code] {
+    print_info(arguments->file);
+    exit_code = kOk;
+  });
+  CLI::App* check = command->add_subcommand("check", "Read all of it; exit code 2 and the section when damaged");
+  check->add_option("FILE", arguments->file, "map file")->required();
+  check->callback([arguments, &exit_code] {
+    (void)open_map(arguments->file);
+    fmt::print("{}: intact\n", arguments->file);
+    exit_code = kOk;
+  });
+  CLI::App* out = command->add_subcommand("export", "Write parts of it in common forms");
+  out->add_option("FILE", arguments->file, "map file")->required();
+  out->add_option("--ply", arguments->ply, "points");
+  out->add_option("--g2o", arguments->g2o, "keyframe poses and edges (VERTEX_SE3:QUAT)");
+  out->add_option("--tum", arguments->tum, "keyframe poses");
+  out->callback([arguments, &exit_code] {
+    export_map(*arguments);
+    exit_code = kOk;
+  });
+}
+
+}  // namespace twofold

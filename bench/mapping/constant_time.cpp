@@ -1,0 +1,233 @@
+// What the mapper costs at 300, 3,000 and 20,000 keyframes, and what browsing a mapped place does to memory.
+// Simulated stereo camera, known truth; the maps are made by the mapper itself, with small windows where only
+// the size of the map matters.
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "graph/neighbourhood.hpp"
+#include "mapping/mapper.hpp"
+#include "tests/mapping/simulation.hpp"
+
+namespace twofold {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using simulation::Simulation;
+
+double us_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
+
+struct Samples {
+  std::vector<double> values;
+
+  void add(double value) { values.push_back(value); }
+  [[nodiscard]] double quantile(double q) const {
+    std::vector<double> sorted = values;
+    std::sort(sorted.begin(), sorted.end());
+    return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1))];
+  }
+  [[nodiscard]] double median() const { return quantile(0.5); }
+};
+
+MapperOptions mapper_options(int inner, int outer) {
+  MapperOptions options;
+  options.inner_window = inner;
+  options.outer_window = outer;
+  options.sigma_scale = 2;  // one pixel of noise
+  options.edge.sigma_px = 1;
+  return options;
+}
+
+/// A straight flight over endless ground: no place is seen twice.
+Simulation exploration(int keyframes) {
+  std::vector<SE3> path;
+  for (int k = 0; k < keyframes; ++k) {
+    path.push_back(
+        simulation::looking_down(0.12 * k, 0.5 * std::sin(0.05 * k), 1.2, 0.1 * std::sin(0.1 * k)));
+  }
+  simulation::Options options;
+  options.rig = simulation::thesis_rig();
+  options.max_observations = 180;
+  return {options, simulation::scattered_points(path, 2, 40, 1), path};
+}
+
+MapperReport map_next(Simulation& simulation, Mapper& mapper) {
+  KeyframeProposal* proposal = &simulation.propose(mapper.graph());
+  return mapper.step(std::span(&proposal, 1));
+}
+
+struct Measurement {
+  std::size_t keyframes = 0;
+  Samples round_ms, publish_us, destroy_us, search_us;
+  MapperReport::Times stages;  ///< sum over the rounds
+  MapperReport last;
+};
+
+/// Rounds with the default windows, each followed by a publication that outlives the next round.
+Measurement measure_rounds(Simulation& simulation, Mapper& mapper, int rounds) {
+  Measurement result;
+  auto published = std::make_unique<GraphSnapshot>(mapper.publish());
+  VisitedSet visited;
+  std::vector<TreeNode> tree;
+  for (int n = 0; n < rounds; ++n) {
+    result.last = map_next(simulation, mapper);
+    const auto& ms = result.last.ms;
+    result.round_ms.add(ms.total());
+    for (const auto stage :
+         {&MapperReport::Times::insert, &MapperReport::Times::window, &MapperReport::Times::build,
+          &MapperReport::Times::solve, &MapperReport::Times::write, &MapperReport::Times::loop,
+          &MapperReport::Times::cull}) {
+      result.stages.*stage += ms.*stage / rounds;
+    }
+    auto start = Clock::now();
+    auto next = std::make_unique<GraphSnapshot>(mapper.publish());
+    result.publish_us.add(us_since(start));
+    start = Clock::now();
+    published.reset();
+    result.destroy_us.add(us_since(start));
+    published = std::move(next);
+    start = Clock::now();
+    weighted_breadth_first(*published, published->reference(), 200, visited, tree);
+    result.search_us.add(us_since(start));
+  }
+  result.keyframes = mapper.graph().keyframe_count();
+  return result;
+}
+
+/// Keyframes are not culled while exploring, so that maps of all sizes have the same windows.
+MapperOptions exploring(int inner, int outer) {
+  MapperOptions options = mapper_options(inner, outer);
+  options.culling.keyframes = false;
+  return options;
+}
+
+nlohmann::json explore(const std::vector<int>& sizes, int rounds) {
+  nlohmann::json out = nlohmann::json::array();
+  fmt::print(
+      "{:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}   stages [ms]: insert window build solve write "
+      "loop cull\n",
+      "keyframes", "round ms", "p99 ms", "publ. us", "p99 us", "destr. us", "search us", "KiB/keyfr.");
+  for (const int size : sizes) {
+    Simulation simulation = exploration(size + rounds);
+    auto filler = std::make_unique<Mapper>(simulation.rig(), exploring(3, 6), simulation.search(10));
+    const auto fill = [&](Mapper& mapper, std::size_t until) {
+      while (mapper.graph().keyframe_count() < until) map_next(simulation, mapper);
+    };
+    fill(*filler, static_cast<std::size_t>(size) - 60);
+    auto mapper = std::make_unique<Mapper>(simulation.rig(), exploring(25, 175), simulation.search(10));
+    mapper->adopt(filler->publish());
+    filler.reset();
+    fill(*mapper, static_cast<std::size_t>(size));
+    const Measurement m = measure_rounds(simulation, *mapper, rounds);
+    // What the mapper and its graph hold is what comes back when they go.
+    const std::size_t with = mallinfo2().uordblks;
+    mapper.reset();
+    const double kib =
+        static_cast<double>(with - mallinfo2().uordblks) / 1024 / static_cast<double>(m.keyframes);
+    fmt::print(
+        "{:9} {:9.2f} {:9.2f} {:9.2f} {:9.2f} {:9.1f} {:9.1f} {:11.1f}   {:.2f} {:.2f} {:.2f} {:.2f} "
+        "{:.2f} {:.2f} {:.2f}\n",
+        m.keyframes, m.round_ms.median(), m.round_ms.quantile(0.99), m.publish_us.median(),
+        m.publish_us.quantile(0.99), m.destroy_us.median(), m.search_us.median(), kib, m.stages.insert,
+        m.stages.window, m.stages.build, m.stages.solve, m.stages.write, m.stages.loop, m.stages.cull);
+    fmt::print("          windows {} + {}, {} points, {} measurements, {} pose-pose constraints\n",
+               m.last.inner_window, m.last.outer_window, m.last.points, m.last.observations,
+               m.last.constraints);
+    std::fflush(stdout);
+    out.push_back({{"keyframes", m.keyframes},
+                   {"round_ms_median", m.round_ms.median()},
+                   {"round_ms_p99", m.round_ms.quantile(0.99)},
+                   {"publish_us_median", m.publish_us.median()},
+                   {"publish_us_p99", m.publish_us.quantile(0.99)},
+                   {"destroy_us_median", m.destroy_us.median()},
+                   {"search_us_median", m.search_us.median()},
+                   {"kib_per_keyframe", kib},
+                   {"solve_ms", m.stages.solve},
+                   {"points", m.last.points},
+                   {"measurements", m.last.observations},
+                   {"constraints", m.last.constraints}});
+  }
+  return out;
+}
+
+/// Laps of the same circle by a tracker that forgets points out of sight.
+nlohmann::json browse(int laps) {
+  constexpr int kLap = 120;
+  const std::vector<SE3> path = simulation::circle_path(kLap * laps, laps, 2.2, 1.2);
+  simulation::Options options;
+  options.rig = simulation::thesis_rig();
+  options.global_association = false;
+  options.max_observations = 180;
+  Simulation simulation(options, simulation::scattered_points(path, 2, 40, 1), path);
+  auto mapper = std::make_unique<Mapper>(options.rig, mapper_options(25, 175), simulation.search(10));
+  nlohmann::json out = nlohmann::json::array();
+  double heap = 0;  // of the mapper and its graph, without the simulation [bytes]
+  fmt::print("\nbrowsing: laps of {} keyframes\n{:>5} {:>9} {:>9} {:>12} {:>9} {:>9} {:>9} {:>9}\n", kLap,
+             "lap", "keyframes", "points", "measurements", "edges", "heap MiB", "round ms", "point ids");
+  for (int lap = 1; lap <= laps; ++lap) {
+    Samples round_ms;
+    for (int n = 0; n < kLap; ++n) {
+      KeyframeProposal* proposal = &simulation.propose(mapper->graph());
+      const std::size_t before = mallinfo2().uordblks;
+      round_ms.add(mapper->step(std::span(&proposal, 1)).ms.total());
+      heap += static_cast<double>(mallinfo2().uordblks) - static_cast<double>(before);
+    }
+    const GraphSnapshot& graph = mapper->graph();
+    std::size_t keyframes = 0, points = 0, measurements = 0, edges = 0;
+    for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+      const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+      keyframes += keyframe.culled() ? 0 : 1;
+      measurements += keyframe.observations->size();
+      edges += keyframe.edges->size() / 2;
+    }
+    for (std::uint32_t p = 0; p < graph.point_count(); ++p) points += graph.point(PointId{p}).alive() ? 1 : 0;
+    if (lap <= 5 || lap % 5 == 0) {
+      fmt::print("{:5} {:9} {:9} {:12} {:9} {:9.2f} {:9.2f} {:9}\n", lap, keyframes, points, measurements,
+                 edges, heap / (1024 * 1024), round_ms.median(), graph.point_count());
+      std::fflush(stdout);
+    }
+    out.push_back({{"lap", lap},
+                   {"keyframes", keyframes},
+                   {"points", points},
+                   {"measurements", measurements},
+                   {"edges", edges},
+                   {"heap_mib", heap / (1024 * 1024)},
+                   {"round_ms_median", round_ms.median()}});
+  }
+  return out;
+}
+
+}  // namespace
+}  // namespace twofold
+
+int main(int argc, char** argv) {
+  CLI::App app("Cost of the mapper against the size of the map");
+  std::vector<int> sizes{300, 3000, 20000};
+  int rounds = 100, laps = 20;
+  std::string json_file;
+  app.add_option("--keyframes", sizes, "Sizes of the explored map")->check(CLI::Range(100, 1000000));
+  app.add_option("--rounds", rounds, "Rounds measured at each size")->check(CLI::Range(2, 100000));
+  app.add_option("--laps", laps, "Laps of browsing, 0 for none")->check(CLI::Range(0, 10000));
+  app.add_option("--json", json_file, "Also write the figures to this file");
+  CLI11_PARSE(app, argc, argv);
+  nlohmann::json result;
+  result["exploration"] = twofold::explore(sizes, rounds);
+  if (laps > 0) result["browsing"] = twofold::browse(laps);
+  if (!json_file.empty()) {
+    std::ofstream out(json_file);
+    out << result.dump(2) << "\n";
+    if (!out) {
+      fmt::print(stderr, "{}: cannot be written\n", json_file);
+      return 1;
+    }
+  }
+  return 0;
+}

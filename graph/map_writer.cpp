@@ -1,0 +1,166 @@
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "graph/map_file.hpp"
+#include "graph/map_format.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace map_format;
+namespace fs = std::filesystem;
+
+/// A file that appears under its name only when it is complete.
+class ReplacedFile {
+ public:
+  explicit ReplacedFile(fs::path file) : file_(std::move(file)), temporary_(file_.string() + ".tmp") {
+    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (fd_ < 0) fail("cannot be opened for writing");
+  }
+  ReplacedFile(const ReplacedFile&) = delete;
+  ReplacedFile& operator=(const ReplacedFile&) = delete;
+  ~ReplacedFile() {
+    if (fd_ >= 0) ::close(fd_);
+    if (!done_) ::unlink(temporary_.c_str());
+  }
+
+  void write(std::span<const std::uint8_t> bytes) {
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(fd_, bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) fail("cannot be written");
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    }
+  }
+
+  /// The data must be on the disk before the name points to it, and the name before we say so.
+  void commit() {
+    if (::fsync(fd_) != 0) fail("cannot be written");
+    if (::close(std::exchange(fd_, -1)) != 0) fail("cannot be written");
+    if (::rename(temporary_.c_str(), file_.c_str()) != 0) fail("cannot be renamed");
+    done_ = true;
+    const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
+    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) return;  // the map is there; not every file system lets its folders be opened
+    (void)::fsync(fd);
+    ::close(fd);
+  }
+
+ private:
+  [[noreturn]] void fail(const char* what) const {
+    throw MapFileError(temporary_.string() + ": " + what + ": " + std::strerror(errno));
+  }
+
+  fs::path file_, temporary_;
+  int fd_ = -1;
+  bool done_ = false;
+};
+
+void write_section(ReplacedFile& file, Section section, std::span<const std::uint8_t> bytes) {
+  ByteWriter head;
+  head.put(section);
+  head.put(std::uint64_t{bytes.size()});
+  uLong crc = crc32(0, head.bytes().data(), static_cast<uInt>(head.bytes().size()));
+  crc = crc32_z(crc, bytes.data(), bytes.size());
+  file.write(head.bytes());
+  file.write(bytes);
+  ByteWriter tail;
+  tail.put(static_cast<std::uint32_t>(crc));
+  file.write(tail.bytes());
+}
+
+void put_head(ByteWriter& out, const SavedMap& map) {
+  const Rig& rig = map.rig;
+  out.put(rig.kind);
+  const PinholeCamera& c = rig.camera;
+  for (const double value : {c.fx, c.fy, c.cx, c.cy}) out.put(value);
+  out.put(std::int32_t{c.width});
+  out.put(std::int32_t{c.height});
+  for (const double value : {rig.baseline, rig.depth_unit, rig.depth_min, rig.depth_max}) out.put(value);
+  out.put(map.graph.version());
+  out.put(map.graph.reference());
+  out.put(static_cast<std::uint32_t>(map.graph.keyframe_count()));
+  out.put(static_cast<std::uint32_t>(map.graph.point_count()));
+}
+
+/// Edges are written by their newer keyframe.
+void put_edges(ByteWriter& out, const Keyframe& keyframe) {
+  std::uint32_t count = 0;
+  for (const Edge& edge : *keyframe.edges) count += edge.other < keyframe.id ? 1 : 0;
+  out.put(count);
+  for (const Edge& edge : *keyframe.edges) {
+    if (edge.other > keyframe.id) continue;
+    out.put(edge.other);
+    out.put(std::int32_t{edge.weight});
+    out.put(static_cast<std::uint8_t>(edge.marginalised));
+    out.put(edge.T_other_this);
+    out.put(edge.parallax);
+  }
+}
+
+void put_keyframe(ByteWriter& out, const Keyframe& keyframe) {
+  out.put(keyframe.frame_index);
+  out.put(keyframe.t_ns);
+  out.put(keyframe.T_k_w);
+  out.put(keyframe.median_depth);
+  out.put(keyframe.heir);
+  out.put(keyframe.T_this_heir);
+  out.put(static_cast<std::uint32_t>(keyframe.observations->size()));
+  for (const Observation& observation : *keyframe.observations) {
+    out.put(observation.point);
+    out.put_vector(observation.z);
+    out.put(observation.level);
+  }
+  put_edges(out, keyframe);
+}
+
+/// Observers follow from the keyframes' observations.
+void put_point(ByteWriter& out, const MapPoint& point) {
+  out.put(point.anchor);
+  if (!point.alive()) return;
+  out.put_vector(point.psi);
+  out.put(static_cast<std::uint8_t>(point.appearance != nullptr));
+  if (point.appearance == nullptr) return;
+  out.put_vector(point.appearance->uv);
+  out.put(point.appearance->level);
+  out.put_bytes(point.appearance->pixels);
+}
+
+}  // namespace
+
+void save_map(const fs::path& file, const SavedMap& map) {
+  ReplacedFile out(file);
+  ByteWriter bytes;
+  for (const char c : kMagic) bytes.put(c);
+  bytes.put(kMapFormatVersion);
+  bytes.put(std::uint8_t{0});
+  out.write(bytes.bytes());
+  bytes.clear();
+  put_head(bytes, map);
+  write_section(out, Section::kHead, bytes.bytes());
+  const auto keyframes = static_cast<std::uint32_t>(map.graph.keyframe_count());
+  for (std::uint32_t first = 0; first < keyframes; first += kKeyframesPerSection) {
+    bytes.clear();
+    for (std::uint32_t k = first; k < std::min(keyframes, first + kKeyframesPerSection); ++k) {
+      put_keyframe(bytes, map.graph.keyframe(KeyframeId{k}));
+    }
+    write_section(out, Section::kKeyframes, bytes.bytes());
+  }
+  const auto points = static_cast<std::uint32_t>(map.graph.point_count());
+  for (std::uint32_t first = 0; first < points; first += kPointsPerSection) {
+    bytes.clear();
+    for (std::uint32_t p = first; p < std::min(points, first + kPointsPerSection); ++p) {
+      put_point(bytes, map.graph.point(PointId{p}));
+    }
+    write_section(out, Section::kPoints, bytes.bytes());
+  }
+  if (!map.places.empty()) write_section(out, Section::kPlaces, map.places);
+  write_section(out, Section::kEnd, {});
+  out.commit();
+}
+
+}  // namespace twofold

@@ -1,0 +1,208 @@
+#include "graph/map_file.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <sstream>
+
+#include "tests/graph/graph_invariants.hpp"
+#include "tests/graph/sample_map.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::sample_map;
+
+class MapFileTest : public ::testing::Test {
+ protected:
+  MapFileTest() {
+    folder_ = fs::temp_directory_path() / ("twofold_map_test_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    file_ = folder_ / "map.tfm";
+  }
+  ~MapFileTest() override { fs::remove_all(folder_); }
+
+  static std::string bytes_of(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  static SavedMap parse(const std::string& bytes) {
+    std::istringstream in(bytes);
+    return read_map(in, bytes.size(), "test");
+  }
+  /// Message of the error, or empty when the bytes were taken for a map.
+  static std::string error_of(const std::string& bytes) {
+    try {
+      (void)parse(bytes);
+    } catch (const MapFileError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_, file_;
+};
+
+void expect_same(const SavedMap& a, const SavedMap& b) {
+  EXPECT_EQ(a.rig.kind, b.rig.kind);
+  EXPECT_EQ(a.rig.camera.fy, b.rig.camera.fy);
+  EXPECT_EQ(a.rig.baseline, b.rig.baseline);
+  EXPECT_EQ(a.places, b.places);
+  EXPECT_EQ(a.graph.reference(), b.graph.reference());
+  ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
+  ASSERT_EQ(a.graph.point_count(), b.graph.point_count());
+  for (std::uint32_t i = 0; i < a.graph.keyframe_count(); ++i) {
+    const Keyframe& k = a.graph.keyframe(KeyframeId{i});
+    const Keyframe& l = b.graph.keyframe(KeyframeId{i});
+    EXPECT_EQ(k.id, l.id);
+    EXPECT_EQ(k.t_ns, l.t_ns);
+    EXPECT_EQ(k.frame_index, l.frame_index);
+    EXPECT_EQ(k.heir, l.heir);
+    EXPECT_LT((k.T_k_w.matrix() - l.T_k_w.matrix()).norm(), 1e-13);
+    EXPECT_LT((k.T_this_heir.matrix() - l.T_this_heir.matrix()).norm(), 1e-13);
+    ASSERT_EQ(k.observations->size(), l.observations->size());
+    for (std::size_t n = 0; n < k.observations->size(); ++n) {
+      const Observation& o = (*k.observations)[n];
+      const Observation& q = (*l.observations)[n];
+      EXPECT_EQ(o.point, q.point);
+      EXPECT_EQ(o.z.head<2>(), q.z.head<2>());
+      EXPECT_TRUE(o.z.z() == q.z.z() || (std::isnan(o.z.z()) && std::isnan(q.z.z())));
+      EXPECT_EQ(o.level, q.level);
+    }
+    ASSERT_EQ(k.edges->size(), l.edges->size());
+    for (std::size_t n = 0; n < k.edges->size(); ++n) {
+      EXPECT_EQ((*k.edges)[n].other, (*l.edges)[n].other);
+      EXPECT_EQ((*k.edges)[n].weight, (*l.edges)[n].weight);
+      EXPECT_EQ((*k.edges)[n].marginalised, (*l.edges)[n].marginalised);
+      EXPECT_LT(((*k.edges)[n].T_other_this.matrix() - (*l.edges)[n].T_other_this.matrix()).norm(), 1e-12);
+    }
+  }
+  for (std::uint32_t i = 0; i < a.graph.point_count(); ++i) {
+    const MapPoint& p = a.graph.point(PointId{i});
+    const MapPoint& q = b.graph.point(PointId{i});
+    ASSERT_EQ(p.anchor, q.anchor);
+    if (!p.alive()) continue;
+    EXPECT_EQ(p.psi, q.psi);
+    EXPECT_EQ(p.appearance->pixels, q.appearance->pixels);
+    EXPECT_EQ(p.appearance->uv, q.appearance->uv);
+    EXPECT_EQ(*p.observers, *q.observers);
+  }
+}
+
+TEST_F(MapFileTest, WhatIsSavedIsLoaded) {
+  const SavedMap map = sample_map(60, 900, 1);
+  ASSERT_EQ(broken_invariant(map.graph), "");
+  save_map(file_, map);
+  const SavedMap loaded = load_map(file_);
+  EXPECT_EQ(broken_invariant(loaded.graph), "");
+  expect_same(map, loaded);
+  EXPECT_FALSE(fs::exists(file_.string() + ".tmp"));
+}
+
+TEST_F(MapFileTest, AnEmptyMapAndOneOfSeveralSlices) {
+  SavedMap empty;
+  empty.rig.camera = {500, 500, 320, 240, 640, 480};
+  save_map(file_, empty);
+  EXPECT_EQ(load_map(file_).graph.keyframe_count(), 0U);
+  const SavedMap large = sample_map(2100, 40000, 2);
+  save_map(file_, large);
+  expect_same(large, load_map(file_));
+}
+
+TEST_F(MapFileTest, EveryTruncationIsRefused) {
+  save_map(file_, sample_map(8, 20, 3));
+  const std::string bytes = bytes_of(file_);
+  for (std::size_t length = 0; length < bytes.size(); ++length) {
+    const std::string error = error_of(bytes.substr(0, length));
+    ASSERT_FALSE(error.empty()) << length;
+    if (length >= 8 + 12) EXPECT_NE(error.find("section"), std::string::npos) << error;
+  }
+}
+
+TEST_F(MapFileTest, EveryFlippedByteIsRefusedAndTheSectionNamed) {
+  save_map(file_, sample_map(8, 20, 4));
+  const std::string bytes = bytes_of(file_);
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    std::string damaged = bytes;
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 << (at % 8)));
+    // The header's last byte is not used.
+    if (at == 7) continue;
+    const std::string error = error_of(damaged);
+    ASSERT_FALSE(error.empty()) << at;
+    if (at >= 8) EXPECT_NE(error.find("section"), std::string::npos) << error;
+  }
+}
+
+TEST_F(MapFileTest, BytesThatFollowAreRefused) {
+  save_map(file_, sample_map(8, 20, 5));
+  EXPECT_NE(error_of(bytes_of(file_) + "x").find("bytes follow"), std::string::npos);
+}
+
+TEST_F(MapFileTest, OtherVersionsAreNamed) {
+  save_map(file_, sample_map(4, 10, 6));
+  std::string bytes = bytes_of(file_);
+  bytes[5] = 9;
+  EXPECT_NE(error_of(bytes).find("format version 9"), std::string::npos);
+}
+
+TEST_F(MapFileTest, HugeLengthsAllocateNothing) {
+  save_map(file_, sample_map(4, 10, 7));
+  std::string bytes = bytes_of(file_);
+  for (std::size_t at = 8 + 4; at < 8 + 12; ++at) bytes[at] = static_cast<char>(0x7f);
+  EXPECT_NE(error_of(bytes).find("beyond the end"), std::string::npos);
+}
+
+TEST_F(MapFileTest, AFullDiskLeavesTheOldMap) {
+  const SavedMap old = sample_map(10, 40, 8);
+  save_map(file_, old);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{20'000, 20'000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    try {
+      save_map(file_, sample_map(200, 3000, 9));
+    } catch (const MapFileError&) {
+      _exit(7);
+    }
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 7);
+  expect_same(old, load_map(file_));
+  EXPECT_FALSE(fs::exists(file_.string() + ".tmp"));
+}
+
+TEST_F(MapFileTest, KilledWhileSavingItIsTheOldMapOrTheNewOne) {
+  const SavedMap maps[] = {sample_map(30, 300, 10), sample_map(120, 4000, 11)};
+  save_map(file_, maps[0]);
+  std::mt19937 rng(12);
+  int seen[2] = {0, 0};
+  for (int trial = 0; trial < 100; ++trial) {
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      for (int n = 0;; ++n) save_map(file_, maps[n % 2]);
+    }
+    usleep(rng() % 15'000);
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    const SavedMap loaded = load_map(file_);
+    const std::size_t which = loaded.graph.keyframe_count() == 30 ? 0 : 1;
+    ASSERT_EQ(loaded.graph.keyframe_count(), maps[which].graph.keyframe_count());
+    ASSERT_EQ(loaded.graph.point_count(), maps[which].graph.point_count());
+    ++seen[which];
+  }
+  EXPECT_EQ(seen[0] + seen[1], 100);
+}
+
+}  // namespace
+}  // namespace twofold

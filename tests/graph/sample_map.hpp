@@ -1,0 +1,69 @@
+#pragma once
+
+#include <algorithm>
+#include <random>
+
+#include "graph/graph_writer.hpp"
+#include "graph/map_file.hpp"
+
+namespace twofold::testing {
+
+/// A map with everything a file must hold: culled keyframes and points, both kinds of edges, missing right
+/// coordinates.
+inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> number(-1, 1);
+  const auto vector = [&] { return Vector3(number(rng), number(rng), number(rng)); };
+  const auto random_pose = [&] { return SE3(SO3::exp(vector()), 10 * vector()); };
+  GraphWriter writer;
+  for (int k = 0; k < keyframes; ++k) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{static_cast<std::uint32_t>(k)};
+    keyframe.frame_index = 7 * k;
+    keyframe.t_ns = 1'700'000'000'000'000'000 + 33'333'333LL * k;
+    keyframe.T_k_w = random_pose();
+    keyframe.median_depth = 2 + number(rng);
+    writer.add_keyframe(keyframe);
+    for (int back = 1; back <= std::min(k, 3); ++back) {
+      Edge edge;
+      edge.other = KeyframeId{static_cast<std::uint32_t>(k - back)};
+      edge.weight = 40 / back;
+      edge.marginalised = back == 2;
+      if (edge.marginalised) edge.T_other_this = random_pose();
+      edge.parallax = 0.1 * back;
+      writer.set_edge(keyframe.id, edge);
+    }
+  }
+  writer.set_reference(KeyframeId{static_cast<std::uint32_t>(keyframes - 1)});
+  for (int p = 0; p < points; ++p) {
+    const PointId id{static_cast<std::uint32_t>(p)};
+    const auto anchor = static_cast<std::uint32_t>(p * keyframes / points);
+    MapPoint point;
+    point.anchor = KeyframeId{anchor};
+    point.psi = Vector3(number(rng), number(rng), 0.6 + 0.4 * number(rng));
+    auto appearance = std::make_shared<PointAppearance>();
+    appearance->uv = {static_cast<float>(rng() % 640), static_cast<float>(rng() % 480)};
+    appearance->level = static_cast<std::uint8_t>(rng() % 3);
+    for (std::uint8_t& pixel : appearance->pixels) pixel = static_cast<std::uint8_t>(rng());
+    point.appearance = appearance;
+    writer.add_point(id, point);
+    for (std::uint32_t k = anchor; k < std::min<std::uint32_t>(anchor + 3, keyframes); ++k) {
+      const float u = static_cast<float>(rng() % 6400) / 10;
+      const float right = p % 5 == 0 ? std::numeric_limits<float>::quiet_NaN() : u - 12;
+      writer.add_observations(KeyframeId{k}, std::vector<Observation>{{id, {u, 100, right}, 1}});
+    }
+  }
+  for (int p = 3; p < points; p += 11) writer.cull_point(PointId{static_cast<std::uint32_t>(p)});
+  for (int k = 4; k + 2 < keyframes; k += 9) {
+    writer.cull_keyframe(KeyframeId{static_cast<std::uint32_t>(k)},
+                         KeyframeId{static_cast<std::uint32_t>(k + 1)});
+  }
+  SavedMap map;
+  map.rig.camera = {500, 501, 320, 240, 640, 480};
+  map.rig.baseline = 0.11;
+  map.graph = writer.publish();
+  map.places = {1, 2, 3, 4, 5};
+  return map;
+}
+
+}  // namespace twofold::testing
