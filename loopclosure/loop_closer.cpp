@@ -37,7 +37,8 @@ LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabul
       vocabulary_(std::move(vocabulary)),
       options_(validated(options)),
       describer_(rig, options.corners),
-      recogniser_(vocabulary_->word_count(), options.recogniser) {}
+      recogniser_(vocabulary_->word_count(), options.recogniser),
+      refinement_(rig, options.refinement) {}
 
 std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
   report_ = {};
@@ -54,10 +55,9 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   std::optional<LoopConstraint> loop;
   for (const PlaceCandidate& candidate : candidates) {
     ++report_.tried;
-    const PlaceView& before = *views_[index(candidate.keyframe)];
-    const auto verified = verify_place(rig_, before, view, options_.verification);
+    const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
     if (!verified) continue;
-    loop = LoopConstraint{graph.version(), candidate.keyframe, keyframe.id, verified->T_b_a,
+    loop = LoopConstraint{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k,
                           verified->inliers};
     break;
   }
@@ -70,10 +70,24 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
   const auto candidates =
       recogniser_.query_anywhere(view.bag, static_cast<std::size_t>(options_.relocalisation_candidates));
   for (const PlaceCandidate& candidate : candidates) {
-    if (!graph.contains(candidate.keyframe) || graph.keyframe(candidate.keyframe).culled()) continue;
-    const auto verified =
-        verify_place(rig_, *views_[index(candidate.keyframe)], view, options_.verification);
-    if (verified) return Relocalisation{candidate.keyframe, verified->T_b_a, verified->inliers};
+    if (auto verified = verify(candidate.keyframe, view, images, graph)) return verified;
+  }
+  return std::nullopt;
+}
+
+std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& view,
+                                                 const FrameImages& images, const GraphSnapshot& graph) {
+  if (!graph.contains(k) || graph.keyframe(k).culled()) return std::nullopt;
+  const auto place = verify_place(rig_, *views_[index(k)], view, options_.verification);
+  if (!place) return std::nullopt;
+  RefinedPlace refined;
+  switch (refinement_.refine(graph, k, images, place->T_b_a, refined)) {
+    case RefinementOutcome::kRefined:
+      return Relocalisation{k, refined.T_c_k, refined.inliers};
+    case RefinementOutcome::kTooFewPoints:
+      return Relocalisation{k, place->T_b_a, place->inliers};
+    case RefinementOutcome::kContradicted:
+      break;
   }
   return std::nullopt;
 }

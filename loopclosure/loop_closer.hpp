@@ -7,6 +7,7 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
 #include "loopclosure/geometric_verification.hpp"
+#include "loopclosure/map_refinement.hpp"
 #include "loopclosure/place_recogniser.hpp"
 
 namespace twofold {
@@ -15,6 +16,7 @@ struct LoopCloserOptions {
   CornerSelectionOptions corners;
   RecogniserOptions recogniser;
   VerificationOptions verification;
+  RefinementOptions refinement;
   int relocalisation_candidates = 8;  ///< places tried for a lost camera
 
   /// Empty when valid; otherwise names the field, the rule and the value.
@@ -58,6 +60,9 @@ class LoopCloser {
 
  private:
   [[nodiscard]] double likeness_with_previous(KeyframeId id, const BagOfWords& bag) const;
+  /// Does the view show the place of keyframe k? First by corners, then by the map's points.
+  [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
+                                                     const FrameImages& images, const GraphSnapshot& graph);
   void forget_culled(const GraphSnapshot& graph);
   void remember(KeyframeId id, PlaceView view);
 
@@ -66,6 +71,7 @@ class LoopCloser {
   LoopCloserOptions options_;
   PlaceDescriber describer_;
   PlaceRecogniser recogniser_;
+  MapRefinement refinement_;
   std::vector<std::unique_ptr<const PlaceView>> views_;  // by keyframe; null: never described, or culled
   KeyframeId previous_ = kNoKeyframe;
   std::size_t next_checked_ = 0;  // for culling: views are looked through in turn
