@@ -174,6 +174,9 @@ int run(const RunArguments& arguments) {
   write_run_output(arguments.out, arguments.source, *source, options, result);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, result);
+  const SourceReport captured = source->report();
+  for (const std::string& line : captured.summary) fmt::print("{}\n", line);
+  for (const std::string& line : captured.faults) fmt::print("  {}\n", line);
   if (!source->error().empty()) throw IoError("", source->error());
   if (!result.error.empty()) throw std::runtime_error(result.error);
   const bool any_tracked =
