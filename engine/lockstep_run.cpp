@@ -7,12 +7,14 @@ namespace {
 
 // A replay queues what the threaded run had under way; its own limit must never be the tighter one.
 constexpr std::size_t kReplayRoom = 64;
+// A deterministic run maps and describes each proposal before the next frame.
+constexpr std::size_t kDeterministicRoom = 6;
 
 }  // namespace
 
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
     : trace_(options.trace ? std::make_unique<Trace>() : nullptr),
-      pool_(options.proposal_slots + kReplayRoom),
+      pool_(options.deterministic ? kDeterministicRoom : options.proposal_slots + kReplayRoom),
       tracking_(rig, options, trace_.get()),
       mapping_(rig, options.mapper, trace_.get()),
       loop_closing_(rig, options, trace_.get()),

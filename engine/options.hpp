@@ -24,7 +24,7 @@ struct EngineOptions {
   PacingOptions pacing{.speed = 0};  ///< of threaded runs
 
   std::size_t frame_slots = 8;     ///< frames decoded ahead, or waiting, at most
-  std::size_t proposal_slots = 8;  ///< keyframe proposals under way between the threads, a power of two
+  std::size_t proposal_slots = 4;  ///< keyframe proposals under way between the threads, a power of two
 
   std::optional<int> tracker_cpu;  ///< pin the threads
   std::optional<int> mapper_cpu;

@@ -145,6 +145,22 @@ void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
   Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
   keyframe.heir = heir;
   keyframe.T_this_heir = T_this_heir;
+  // Lists emptied one by one keep their buffers.
+  keyframe.observations = std::make_shared<const ObservationList>();
+  keyframe.edges = std::make_shared<const EdgeList>();
+}
+
+void GraphWriter::shorten_heirs(KeyframeId id) {
+  KeyframeId heir = graph_.keyframe(id).heir;
+  if (heir == kNoKeyframe || !graph_.keyframe(heir).culled()) return;
+  SE3 T_this_heir = graph_.keyframe(id).T_this_heir;
+  while (graph_.keyframe(heir).culled()) {
+    T_this_heir = T_this_heir * graph_.keyframe(heir).T_this_heir;
+    heir = graph_.keyframe(heir).heir;
+  }
+  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
+  keyframe.heir = heir;
+  keyframe.T_this_heir = T_this_heir;
 }
 
 }  // namespace twofold

@@ -57,6 +57,9 @@ class GraphWriter {
   /// culled. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes along with the
   /// heir (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
   void cull_keyframe(KeyframeId id, KeyframeId heir);
+  /// Lets a culled keyframe hang directly on the one that stayed. Its pose is the same; asking for it no
+  /// longer walks along all that were culled in between.
+  void shorten_heirs(KeyframeId id);
 
  private:
   void remove_observer(PointId point, KeyframeId keyframe);

@@ -43,7 +43,7 @@ struct MapperOptions {
   int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
   int theta = 15;                    ///< Theta: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;
-  WindowSolverOptions solver{.max_iterations = 3, .huber_px = 2.0, .keep_going = {}};  ///< joint optimisation of eq. 6.4
+  WindowSolverOptions solver;          ///< joint optimisation of eq. 6.4
   int structure_iterations = 2;        ///< structure-only, after poses were set along edges
   double sigma_scale = 1;              ///< multiplies the standard deviation that imaging gives a measurement
   double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kMinInverseDepth = 1e-5;  // farther points say nothing about translation
 constexpr double kMaxInverseDepth = 1e3;
+constexpr double kMinDepth = 1e-3;  // [m]
 
 bool plausible(const Vector3& psi) {
   return psi.allFinite() && psi.z() > kMinInverseDepth && psi.z() < kMaxInverseDepth;
@@ -83,10 +84,15 @@ void WindowBuilder::collect_points(const GraphSnapshot& graph, const DoubleWindo
       point_position_.set(id, static_cast<int>(problem_.points.size()));
     }
   }
-  for (const TreeNode& node : window.nodes) {
-    for (const Observation& observation : *graph.keyframe(node.id).observations) {
-      const int at = point_position_.find(observation.point);
-      if (at > 0) ++problem_.points[static_cast<std::size_t>(at) - 1].observation_count;
+  positions_w_.clear();
+  for (const auto& point : problem_.points) {
+    const SE3& T_a_w = problem_.poses[static_cast<std::size_t>(point.anchor)].T_k_w;
+    positions_w_.push_back(T_a_w.inverse() * from_inverse_depth(point.psi));
+  }
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    for (const Observation& observation : *graph.keyframe(window.nodes[n].id).observations) {
+      const int p = usable_point(observation.point, static_cast<int>(n));
+      if (p >= 0) ++problem_.points[static_cast<std::size_t>(p)].observation_count;
     }
   }
   keep_best_points();
@@ -118,6 +124,7 @@ void WindowBuilder::keep_best_points() {
     }
     if (count < threshold) --room;
     problem_.points[to] = problem_.points[from];
+    positions_w_[to] = positions_w_[from];
     problem_.points[to].first_observation = first;
     first += problem_.points[to].observation_count;
     point_ids_[to] = point_ids_[from];
@@ -138,10 +145,17 @@ void WindowBuilder::collect_observations(const GraphSnapshot& graph, const Doubl
   }
 }
 
+int WindowBuilder::usable_point(PointId id, int pose) const {
+  const int p = point_position_.find(id) - 1;
+  if (p < 0) return -1;
+  const SE3& T_k_w = problem_.poses[static_cast<std::size_t>(pose)].T_k_w;
+  return (T_k_w * positions_w_[static_cast<std::size_t>(p)]).z() > kMinDepth ? p : -1;
+}
+
 void WindowBuilder::add_observation(const Observation& observation, int pose) {
-  const int at = point_position_.find(observation.point);
-  if (at <= 0) return;
-  const auto p = static_cast<std::size_t>(at) - 1;
+  const int at = usable_point(observation.point, pose);
+  if (at < 0) return;
+  const auto p = static_cast<std::size_t>(at);
   auto& entry = problem_.observations[static_cast<std::size_t>(problem_.points[p].first_observation) +
                                       static_cast<std::size_t>(filled_[p]++)];
   const bool has_right = problem_.rig.kind != SensorKind::kMono && std::isfinite(observation.z.z());
@@ -182,6 +196,7 @@ void WindowBuilder::write_back(GraphWriter& writer, const DoubleWindow& window) 
     const KeyframeId anchor = graph.point(point_ids_[p]).anchor;
     Vector3 psi = solved.psi;
     if (anchor != window.nodes[used].id) {
+      writer.shorten_heirs(anchor);
       const SE3 T_a_used = graph.T_k_w(anchor) * problem_.poses[used].T_k_w.inverse();
       psi = to_inverse_depth(T_a_used * from_inverse_depth(psi));
     }

@@ -14,6 +14,7 @@ namespace twofold {
 ///
 /// Pose n of the problem is window.nodes[n]. Points are those seen from W1 whose anchor is at hand (6.2.4)
 /// and which the window measures at least twice; measurements of them from the outer window are included.
+/// Measurements that start behind their camera have no gradient to follow and stay out of the round.
 /// Pose-pose constraints are the edges with an end in W2 and both ends in the double window.
 class WindowBuilder {
  public:
@@ -39,6 +40,8 @@ class WindowBuilder {
   void collect_points(const GraphSnapshot& graph, const DoubleWindow& window);
   void keep_best_points();
   void collect_observations(const GraphSnapshot& graph, const DoubleWindow& window);
+  /// Position in the problem of a point that is in front of the pose; -1 for others.
+  [[nodiscard]] int usable_point(PointId id, int pose) const;
   void add_observation(const Observation& observation, int pose);
   void collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window);
   [[nodiscard]] bool anchor_point(const GraphSnapshot& graph, const DoubleWindow& window, PointId id,
@@ -48,6 +51,7 @@ class WindowBuilder {
   WindowProblem problem_;
   std::vector<PointId> point_ids_;
   IdMap point_position_;
+  std::vector<Vector3> positions_w_;  ///< of the points at the start
   std::vector<int> filled_;
 };
 

@@ -9,8 +9,11 @@ namespace twofold {
 struct TrackerOptions {
   DenseAlignmentOptions alignment;
   GuidedSearchOptions search;
-  /// A step of 1e-5 moves no projection by a hundredth of a pixel.
-  MotionOnlyOptions motion{.max_iterations = 15, .stop_step = 1e-5};
+  /// A step of 1e-5 moves no projection by a hundredth of a pixel. Outliers: beyond 99 % of chi-square,
+  /// because real errors (rolling shutter, calibration, depth of a point seen from one place only) have long
+  /// tails.
+  MotionOnlyOptions motion{
+      .max_iterations = 15, .inlier_chi2_mono = 9.210, .inlier_chi2_stereo = 11.345, .stop_step = 1e-5};
 
   int wanted_matches = 180;      ///< stop searching once so many points were found in a frame
   int max_searches = 320;        ///< upper bound of points searched in a frame

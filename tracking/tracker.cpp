@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "geometry/inverse_depth.hpp"
 
@@ -60,11 +61,14 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
     return result;
   }
   adopt(graph);
+  const KeyframeId reference_before = reference_;
+  const SE3 T_prev_ref_before = T_prev_ref_;
+  const bool hinted = take_hint(graph);
   if (candidates_stale_) candidates_.rebuild(graph, reference_, local_, options_.neighbour_keyframes);
   candidates_stale_ = false;
   clock.lap(TrackStage::kCandidates);
 
-  const SE3 T_c_ref_aligned = align_to_previous(result);
+  const SE3 T_c_ref_aligned = hinted ? T_prev_ref_ : align_to_previous(result);
   clock.lap(TrackStage::kAlignment);
   select_candidates(T_c_ref_aligned, result);
   clock.lap(TrackStage::kCandidates);
@@ -72,7 +76,14 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   clock.lap(TrackStage::kSearch);
   const bool tracked = estimate_pose(T_c_ref_aligned, result);
   clock.lap(TrackStage::kMotion);
-  if (!tracked) return result;
+  if (!tracked) {
+    if (hinted) {  // the images to try from are still those of the last good frame
+      reference_ = reference_before;
+      T_prev_ref_ = T_prev_ref_before;
+      candidates_stale_ = true;
+    }
+    return result;
+  }
 
   if (free_proposal != nullptr && keyframe_due(result, result.T_c_ref)) {
     propose_keyframe(frame, graph, *free_proposal, result);
@@ -111,6 +122,22 @@ void Tracker::adopt(const GraphSnapshot& graph) {
     T_prev_ref_ = T_prev_ref_ * keyframe.T_this_heir;
     reference_ = keyframe.heir;
   }
+}
+
+void Tracker::relocalise(KeyframeId id, const SE3& T_c_k) {
+  hint_keyframe_ = id;
+  hint_T_c_k_ = T_c_k;
+}
+
+/// Moves to where the loop closer recognised the camera, if it is lost.
+bool Tracker::take_hint(const GraphSnapshot& graph) {
+  const KeyframeId id = std::exchange(hint_keyframe_, kNoKeyframe);
+  if (id == kNoKeyframe || lost_frames_ == 0 || !graph.contains(id) || graph.keyframe(id).culled())
+    return false;
+  reference_ = id;
+  T_prev_ref_ = hint_T_c_k_;
+  candidates_stale_ = true;
+  return true;
 }
 
 bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result) {

@@ -53,6 +53,10 @@ class Tracker {
   /// The proposal of the last step could not be sent: its numbers are taken back.
   void proposal_rejected();
 
+  /// Hint of the loop closer: the camera was recognised at T_c_k relative to keyframe `id`. The next step, if
+  /// its graph has the keyframe, looks for points around there, and forgets the hint. Ignored while tracking.
+  void relocalise(KeyframeId id, const SE3& T_c_k);
+
   /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
   /// and diagnosis. Valid until the next step.
   [[nodiscard]] std::span<const MotionObservation> last_observations() const { return motion_; }
@@ -66,6 +70,7 @@ class Tracker {
   void load_images(const Frame& frame);
   void adopt(const GraphSnapshot& graph);
   bool start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
+  bool take_hint(const GraphSnapshot& graph);
   SE3 align_to_previous(TrackResult& result);
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, TrackResult& result);
@@ -98,6 +103,8 @@ class Tracker {
   std::uint64_t graph_version_ = 0;
   bool candidates_stale_ = true;
   int lost_frames_ = 0;
+  KeyframeId hint_keyframe_ = kNoKeyframe;  ///< of relocalise
+  SE3 hint_T_c_k_;
   std::uint32_t frames_ = 0;
 
   std::uint32_t next_keyframe_ = 0;

@@ -59,14 +59,6 @@ Simulation exploration(int keyframes) {
   return {options, simulation::scattered_points(path, 2, 40, 1), path};
 }
 
-std::size_t living_keyframes(const GraphSnapshot& graph) {
-  std::size_t living = 0;
-  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-    living += graph.keyframe(KeyframeId{k}).culled() ? 0 : 1;
-  }
-  return living;
-}
-
 MapperReport map_next(Simulation& simulation, Mapper& mapper) {
   KeyframeProposal* proposal = &simulation.propose(mapper.graph());
   return mapper.step(std::span(&proposal, 1));
@@ -106,8 +98,15 @@ Measurement measure_rounds(Simulation& simulation, Mapper& mapper, int rounds) {
     weighted_breadth_first(*published, published->reference(), 200, visited, tree);
     result.search_us.add(us_since(start));
   }
-  result.keyframes = living_keyframes(mapper.graph());
+  result.keyframes = mapper.graph().keyframe_count();
   return result;
+}
+
+/// Keyframes are not culled while exploring, so that maps of all sizes have the same windows.
+MapperOptions exploring(int inner, int outer) {
+  MapperOptions options = mapper_options(inner, outer);
+  options.culling.keyframes = false;
+  return options;
 }
 
 nlohmann::json explore(const std::vector<int>& sizes, int rounds) {
@@ -117,15 +116,13 @@ nlohmann::json explore(const std::vector<int>& sizes, int rounds) {
       "loop cull\n",
       "keyframes", "round ms", "p99 ms", "publ. us", "p99 us", "destr. us", "search us", "KiB/keyfr.");
   for (const int size : sizes) {
-    // Redundant keyframes are culled on the way: about every second one.
-    Simulation simulation = exploration(3 * size + rounds);
-    auto filler = std::make_unique<Mapper>(simulation.rig(), mapper_options(3, 6), simulation.search(10));
-    std::size_t living = 0;
+    Simulation simulation = exploration(size + rounds);
+    auto filler = std::make_unique<Mapper>(simulation.rig(), exploring(3, 6), simulation.search(10));
     const auto fill = [&](Mapper& mapper, std::size_t until) {
-      while (living < until) living = living + 1 - map_next(simulation, mapper).culled_keyframes.size();
+      while (mapper.graph().keyframe_count() < until) map_next(simulation, mapper);
     };
     fill(*filler, static_cast<std::size_t>(size) - 60);
-    auto mapper = std::make_unique<Mapper>(simulation.rig(), mapper_options(25, 175), simulation.search(10));
+    auto mapper = std::make_unique<Mapper>(simulation.rig(), exploring(25, 175), simulation.search(10));
     mapper->adopt(filler->publish());
     filler.reset();
     fill(*mapper, static_cast<std::size_t>(size));
@@ -173,8 +170,8 @@ nlohmann::json browse(int laps) {
   auto mapper = std::make_unique<Mapper>(options.rig, mapper_options(25, 175), simulation.search(10));
   nlohmann::json out = nlohmann::json::array();
   double heap = 0;  // of the mapper and its graph, without the simulation [bytes]
-  fmt::print("\nbrowsing: laps of {} keyframes\n{:>5} {:>9} {:>9} {:>12} {:>9} {:>9} {:>9}\n", kLap, "lap",
-             "keyframes", "points", "measurements", "edges", "heap MiB", "round ms");
+  fmt::print("\nbrowsing: laps of {} keyframes\n{:>5} {:>9} {:>9} {:>12} {:>9} {:>9} {:>9} {:>9}\n", kLap,
+             "lap", "keyframes", "points", "measurements", "edges", "heap MiB", "round ms", "point ids");
   for (int lap = 1; lap <= laps; ++lap) {
     Samples round_ms;
     for (int n = 0; n < kLap; ++n) {
@@ -193,8 +190,8 @@ nlohmann::json browse(int laps) {
     }
     for (std::uint32_t p = 0; p < graph.point_count(); ++p) points += graph.point(PointId{p}).alive() ? 1 : 0;
     if (lap <= 5 || lap % 5 == 0) {
-      fmt::print("{:5} {:9} {:9} {:12} {:9} {:9.2f} {:9.2f}\n", lap, keyframes, points, measurements, edges,
-                 heap / (1024 * 1024), round_ms.median());
+      fmt::print("{:5} {:9} {:9} {:12} {:9} {:9.2f} {:9.2f} {:9}\n", lap, keyframes, points, measurements,
+                 edges, heap / (1024 * 1024), round_ms.median(), graph.point_count());
       std::fflush(stdout);
     }
     out.push_back({{"lap", lap},

@@ -28,6 +28,12 @@ void PlainMap::insert(const KeyframeProposal& proposal) {
   link(writer_.graph().keyframe(proposal.id));
 }
 
+void PlainMap::transform(const SE3& T_v_w) {
+  for (std::uint32_t k = 0; k < writer_.graph().keyframe_count(); ++k) {
+    writer_.set_pose(KeyframeId{k}, writer_.graph().keyframe(KeyframeId{k}).T_k_w * T_v_w.inverse());
+  }
+}
+
 void PlainMap::link(const Keyframe& keyframe) {
   const GraphSnapshot& graph = writer_.graph();
   shared_.assign(graph.keyframe_count(), 0);

@@ -15,6 +15,8 @@ class PlainMap {
   explicit PlainMap(int min_shared = 15) : min_shared_(min_shared) {}
 
   void insert(const KeyframeProposal& proposal);
+  /// Moves everything from world w to world v.
+  void transform(const SE3& T_v_w);
   [[nodiscard]] GraphSnapshot publish() { return writer_.publish(); }
 
  private:

@@ -138,6 +138,12 @@ TEST(GraphWriter, CulledKeyframesAndTheirPointsFollowTheirHeirs) {
   EXPECT_EQ(broken_invariant(writer.graph()), "");
   EXPECT_LT((writer.graph().position(PointId{0}) - position).norm(), 1e-12);
 
+  writer.shorten_heirs(k[0]);
+  EXPECT_EQ(writer.graph().keyframe(k[0]).heir, k[3]);
+  writer.shorten_heirs(k[3]);  // nothing to do for one that stayed
+  EXPECT_FALSE(writer.graph().keyframe(k[3]).culled());
+  EXPECT_EQ(broken_invariant(writer.graph()), "");
+
   const SE3 T_3_w = random_pose(rng);
   writer.set_pose(k[3], T_3_w);
   EXPECT_LT((writer.graph().T_k_w(k[0]) * (T_0_3 * T_3_w).inverse()).log().norm(), 1e-10);

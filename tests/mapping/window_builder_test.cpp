@@ -136,6 +136,17 @@ TEST_F(WindowBuilderTest, PointsWhoseAnchorWasCulledAreOptimisedAndGoBackIntoThe
   EXPECT_LT((writer_.graph().position(id) - (x_w - Vector3(3, 2, 1))).norm(), 1e-9);
 }
 
+TEST_F(WindowBuilderTest, MeasurementsBehindTheirCameraStayOutOfTheRound) {
+  const PointId id = point({k(7), k(8), k(9)});
+  writer_.set_pose(k(9), SE3(SO3::exp({0, 3.1, 0}), {0, 0, 0}));  // looks the other way
+  WindowBuilder builder = build();
+  ASSERT_EQ(builder.point_ids(), std::vector{id});
+  EXPECT_EQ(builder.problem().points[0].observation_count, 2);
+  WindowSolver solver;
+  const SolverSummary summary = solver.solve(builder.problem(), {});
+  EXPECT_LE(summary.final_cost, summary.initial_cost);
+}
+
 TEST_F(WindowBuilderTest, WrongMeasurementsAreFoundAndBadPointsCulled) {
   const PointId good = point({k(7), k(8), k(9)});
   const PointId pair = point({k(8), k(9)});
