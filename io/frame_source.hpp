@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
@@ -14,6 +15,13 @@ enum class FrameStatus : std::uint8_t {
   kFrame,  ///< the frame was filled
   kEnd,    ///< no more frames
   kError   ///< the input is broken; FrameSource::error says how
+};
+
+/// What became of the frames that were not delivered. Recordings lose none.
+struct SourceReport {
+  std::uint64_t lost = 0;            ///< frames that the source knows to be missing
+  std::vector<std::string> summary;  ///< a line a camera, for people
+  std::vector<std::string> faults;   ///< a line a fault, in order of time; the first ones only
 };
 
 /// Where frames come from: a recording, a video, a rendered scene, a camera.
@@ -35,6 +43,12 @@ class FrameSource {
 
   /// Frames next will deliver in all; nothing when that is not known beforehand.
   [[nodiscard]] virtual std::optional<std::int64_t> frame_count() const { return std::nullopt; }
+
+  /// Frames come when they are taken, not when they are asked for.
+  [[nodiscard]] virtual bool is_live() const { return false; }
+  /// Images are unrectified, because SourceOptions::raw asked for it; rig() states kind and size only.
+  [[nodiscard]] virtual bool is_raw() const { return false; }
+  [[nodiscard]] virtual SourceReport report() const { return {}; }
 
   /// Fetches the next frame. Its images replace those in `frame` and are never written to again by the
   /// source; they may share memory with it, so treat them as read-only. What is delivered is checked here for

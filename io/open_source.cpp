@@ -9,6 +9,7 @@
 #include "io/preloaded_source.hpp"
 #include "io/recording.hpp"
 #include "io/source_parameters.hpp"
+#include "io/v4l2_source.hpp"
 #include "io/video.hpp"
 
 #include "io/synthetic/synthetic_source.hpp"
@@ -55,6 +56,10 @@ const std::map<std::string, Opener>& openers() {
       {"tum", recording_opener(read_tum_recording)},
       {"images", recording_opener(read_image_folder)},
       {"video", open_video},
+      {"v4l2",
+       [](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
+         return std::make_unique<V4l2Source>(spec, options);
+       }},
       {"synthetic", [](const SourceSpec& spec,
                        const SourceOptions&) { return open_synthetic(spec.argument, spec.parameters); }},
   };
@@ -93,6 +98,7 @@ std::unique_ptr<FrameSource> open_source(const std::string& text, const SourceOp
     throw IoError(text, fmt::format("unknown kind of source '{}' (known: {})", scheme, known_schemes()));
   }
   auto source = opener->second(spec, options);
+  if (options.preload && source->is_live()) throw IoError(text, "a camera cannot be preloaded");
   if (options.preload) source = std::make_unique<PreloadedSource>(std::move(source));
   return source;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -11,7 +12,11 @@ namespace twofold {
 
 struct SourceOptions {
   std::optional<std::filesystem::path>
-      calibration;       ///< overrides the one in the recording (docs/calibration.md)
+      calibration;  ///< overrides the one in the recording (docs/calibration.md)
+  /// Cameras only: images as they are captured, without calibration or rectification.
+  bool raw = false;
+  /// Cameras only: when it becomes true, the source ends. Outlives the source.
+  const std::atomic<bool>* stop = nullptr;
   bool preload = false;  ///< decode everything into memory before returning
 };
 
@@ -28,6 +33,9 @@ struct SourceOptions {
 ///   fps=;
 ///                  fx fy cx cy baseline depth_scale ...
 ///   video:FILE     fps=, layout=mono|side-by-side; fx fy cx cy baseline
+///   v4l2:DEVICE    a camera: size=640x480 fps= format= layout=mono|side-by-side, right=DEVICE or
+///                  depth=DEVICE for a second camera paired by time (pairing_ms=), exposure_us= gain= focus=,
+///                  buffers= stall_ms= reconnect_ms=; fx fy cx cy baseline instead of a calibration file
 ///   synthetic:SCENE  rendered (io/synthetic)
 ///
 /// Throws IoError naming the file and what is wrong with it.

@@ -29,7 +29,6 @@ V4l2Expected<std::unique_ptr<V4l2Camera>> V4l2Camera::open(V4l2Calls& calls, Cam
   std::unique_ptr<V4l2Camera> camera(new V4l2Camera(calls, std::move(options)));
   if (auto started = camera->start(); !started) return tl::unexpected(started.error());
   camera->identity_ = camera->device_->identity();
-  camera->last_frame_arrival_ns_ = calls.now_ns();
   return camera;
 }
 
@@ -77,7 +76,7 @@ void V4l2Camera::note(const std::string& event) {
 }
 
 bool V4l2Camera::give_up(const std::string& why) {
-  const std::int64_t silent_ns = calls_.now_ns() - last_frame_arrival_ns_;
+  const std::int64_t silent_ns = calls_.now_ns() - waiting_since_ns_;
   if (silent_ns < std::int64_t{options_.reconnect_ms + options_.stall_timeout_ms} * kMsNs) return false;
   close();
   problem_ = fmt::format("no frame for {:.1f} s: {}", static_cast<double>(silent_ns) * 1e-9, why);
@@ -104,6 +103,13 @@ CameraStatus V4l2Camera::reopen(const std::atomic<bool>& stop) {
 }
 
 CameraStatus V4l2Camera::next(const std::atomic<bool>& stop, CameraFrame* frame) {
+  // Counts from here: that the caller took its time is no fault of the camera. Frames that could not be
+  // decoded are as good as none, and do not start the count anew.
+  if (std::exchange(undecodable_, false)) {
+    if (give_up(last_fault_)) return CameraStatus::kLost;
+  } else {
+    waiting_since_ns_ = calls_.now_ns();
+  }
   while (!stop.load(std::memory_order_relaxed)) {
     if (!problem_.empty()) return CameraStatus::kLost;
     if (!stream_) {
@@ -162,13 +168,13 @@ bool V4l2Camera::accept(const StreamFrame& answer, CameraFrame* frame) {
   }
   count_missed(answer.t_ns);
   last_t_ns_ = answer.t_ns;
-  last_frame_arrival_ns_ = calls_.now_ns();
   *frame = {answer.image, answer.t_ns, report_.frames + report_.lost()};
   ++report_.frames;
   return true;
 }
 
 void V4l2Camera::report_damaged(const std::string& problem) {
+  undecodable_ = true;
   --report_.frames;
   note(problem);
   ++report_.damaged;

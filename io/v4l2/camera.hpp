@@ -91,9 +91,10 @@ class V4l2Camera {
   std::string problem_;
   std::string last_fault_;
   std::optional<std::int64_t> last_t_ns_;
-  std::int64_t last_frame_arrival_ns_ = 0;  // of a delivered one; or when the camera was opened
-  std::int64_t last_sign_ns_ = 0;           // when the present stream last gave anything at all
-  bool restarted_ = false;                  // since the last delivered frame
+  std::int64_t waiting_since_ns_ = 0;  // for a frame that can be used
+  bool undecodable_ = false;           // the last delivered frame was
+  std::int64_t last_sign_ns_ = 0;      // when the present stream last gave anything at all
+  bool restarted_ = false;             // since the last delivered frame
 };
 
 }  // namespace twofold
