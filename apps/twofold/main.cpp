@@ -30,6 +30,8 @@ int main(int argc, char** argv) {
   int exit_code = twofold::kOk;
   twofold::add_run_command(app, exit_code);
   twofold::add_eval_command(app, exit_code);
+  twofold::add_record_command(app, exit_code);
+  twofold::add_devices_command(app, exit_code);
   twofold::add_render_command(app, exit_code);
   twofold::add_map_command(app, exit_code);
   twofold::add_vocabulary_command(app, exit_code);

@@ -144,6 +144,7 @@ int run(const RunArguments& arguments) {
   prepare_output_folder(arguments.out);
   SourceOptions source_options;
   source_options.preload = arguments.preload;
+  source_options.stop = &interrupted;
   if (!arguments.calibration.empty()) source_options.calibration = arguments.calibration;
   const std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options);
   if (source->rig().kind == SensorKind::kMono) {

@@ -1,0 +1,112 @@
+#include <csignal>
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "engine/clock.hpp"
+#include "io/calibration_file.hpp"
+#include "io/io_error.hpp"
+#include "io/open_source.hpp"
+#include "io/recorder.hpp"
+
+namespace twofold {
+namespace {
+
+struct RecordArguments {
+  std::string source;
+  std::string out;
+  std::string calibration;
+  std::int64_t frames = 0;
+  std::size_t queue = 64;
+  bool quiet = false;
+};
+
+// A signal handler may touch a lock-free atomic; relaxed, because it carries no other data.
+std::atomic<bool> interrupted{false};
+void on_interrupt(int) {
+  interrupted.store(true, std::memory_order_relaxed);
+}
+
+void show(const Recorder& recorder, const SourceReport& source, bool last) {
+  const Recorder::Counts counts = recorder.counts();
+  fmt::print(stderr,
+             "\r{} frames written  {} waiting  {} lost by the camera  {} lost by writing  {:.1f} MB  {}",
+             counts.written, counts.queued, source.lost, counts.refused,
+             static_cast<double>(counts.bytes) * 1e-6, last ? "\n" : "");
+  std::fflush(stderr);
+}
+
+std::optional<Calibration> calibration_for(const FrameSource& source, const RecordArguments& arguments) {
+  if (!source.is_raw()) return calibration_of(source.rig());
+  if (arguments.calibration.empty()) return std::nullopt;
+  Calibration calibration = read_calibration(arguments.calibration);
+  expect_valid(arguments.calibration, calibration);
+  return calibration;
+}
+
+int record(const RecordArguments& arguments) {
+  SourceOptions options;
+  options.raw = true;
+  options.stop = &interrupted;
+  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  const std::unique_ptr<FrameSource> source = open_source(arguments.source, options);
+  RecorderOptions recorder_options;
+  recorder_options.queue_frames = arguments.queue;
+  Recorder recorder(arguments.out, source->rig().kind, calibration_for(*source, arguments), recorder_options);
+
+  const bool visible = !arguments.quiet && isatty(STDERR_FILENO) == 1;
+  std::int64_t shown_ns = 0;
+  FrameStatus status = FrameStatus::kEnd;
+  for (std::int64_t n = 0; arguments.frames == 0 || n < arguments.frames; ++n) {
+    Frame frame;  // a new one each time: the queue keeps the images
+    if (interrupted.load(std::memory_order_relaxed)) break;
+    if ((status = source->next(frame)) != FrameStatus::kFrame) break;
+    // A camera does not wait; a recording does.
+    if (!recorder.offer(frame, !source->is_live()) && recorder.failed()) break;
+    if (visible && steady_now_ns() - shown_ns > 200'000'000) {
+      shown_ns = steady_now_ns();
+      show(recorder, source->report(), false);
+    }
+  }
+  const std::string problem = recorder.finish();
+  const SourceReport report = source->report();
+  if (visible) show(recorder, report, true);
+  const Recorder::Counts counts = recorder.counts();
+  fmt::print("{}: {} frames, {:.1f} MB; lost: {} by the camera, {} because writing was too slow or failed\n",
+             arguments.out, counts.written, static_cast<double>(counts.bytes) * 1e-6, report.lost,
+             counts.refused);
+  for (const std::string& line : report.summary) fmt::print("{}\n", line);
+  for (const std::string& line : report.faults) fmt::print("  {}\n", line);
+  if (!problem.empty()) throw std::runtime_error(problem);
+  if (status == FrameStatus::kError) throw IoError(source->error());
+  return counts.refused == 0 ? kOk : kFailedRun;
+}
+
+}  // namespace
+
+void add_record_command(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<RecordArguments>();
+  CLI::App* command = app.add_subcommand("record", "Write a camera's frames into a folder of EuRoC layout");
+  command
+      ->add_option("SOURCE", arguments->source, "v4l2:/dev/video0?size=640x480&fps=30, or any other source")
+      ->required();
+  command->add_option("OUT", arguments->out, "Folder of the recording; must not hold one yet")->required();
+  command->add_option("--calib", arguments->calibration, "Calibration to store with a camera's recording");
+  command->add_option("--frames", arguments->frames, "Stop after so many (0: at Ctrl-C or the end)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_option("--queue", arguments->queue, "Frames that may wait to be written")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_flag("--quiet", arguments->quiet, "No counter");
+  command->callback([arguments, &exit_code] { exit_code = record(*arguments); });
+}
+
+}  // namespace twofold
