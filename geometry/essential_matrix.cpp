@@ -61,24 +61,25 @@ void solve_five_point(std::span<const Vector3, 5> bearings_a, std::span<const Ve
     At.col(i) << b.x() * a, b.y() * a, b.z() * a;
   }
   // The last four columns of Q span the null space of A.
-  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 5>> qr(At);
+  // Dynamic sizes from here on: Eigen would unroll the fixed ones into minutes of compilation.
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(At);
   if (qr.rank() < 5) return;
-  const Eigen::Matrix<double, 9, 9> Q = qr.householderQ();
+  const Eigen::MatrixXd Q = qr.householderQ();
   std::array<Matrix3, 4> N;
   for (int k = 0; k < 4; ++k) {
     N[k] = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(Q.col(5 + k).data());
   }
 
   const Constraints C = essential_constraints(N);
-  const Eigen::FullPivLU<Eigen::Matrix<double, 10, 10>> lu(C.leftCols<10>());
+  const Eigen::FullPivLU<Eigen::MatrixXd> lu(C.leftCols<10>());
   if (!lu.isInvertible()) return;
-  const Eigen::Matrix<double, 10, 10> reduced = lu.solve(C.rightCols<10>());  // cubics = -reduced * basis
+  const Eigen::MatrixXd reduced = lu.solve(C.rightCols<10>());  // cubics = -reduced * basis
 
   // Multiplication by x of the basis (x^2, xy, xz, y^2, yz, z^2, x, y, z, 1): the first six become cubics.
-  Eigen::Matrix<double, 10, 10> M = Eigen::Matrix<double, 10, 10>::Zero();
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(10, 10);
   M.topRows<6>() = -reduced.topRows<6>();
   M(6, 0) = M(7, 1) = M(8, 2) = M(9, 6) = 1;
-  const Eigen::EigenSolver<Eigen::Matrix<double, 10, 10>> eigen(M);
+  const Eigen::EigenSolver<Eigen::MatrixXd> eigen(M);
   if (eigen.info() != Eigen::Success) return;
   for (int i = 0; i < 10; ++i) {
     if (eigen.eigenvalues()[i].imag() != 0) continue;  // conjugate pairs are exact in a real Schur form

@@ -187,7 +187,7 @@ std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSe
     Answer answer;
     answer.query = i;
     answer.place = static_cast<int>(twofold::index(candidates[0].keyframe));
-    answer.score = candidates[0].score / std::max(reference, 1e-6);
+    answer.score = candidates[0].score / std::max(reference, recogniser.min_reference);
     for (const PlaceCandidate& candidate : candidates) {
       if (!has_depth) break;
       const auto place = static_cast<int>(twofold::index(candidate.keyframe));
@@ -199,7 +199,6 @@ std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSe
       break;
     }
     answers.push_back(answer);
-    if (answer.verified) continue;
   }
   return answers;
 }
