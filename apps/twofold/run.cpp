@@ -175,8 +175,8 @@ int run(const RunArguments& arguments) {
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, result);
   const SourceReport captured = source->report();
-  for (const std::string& line : captured.summary) fmt::print("{}\n", line);
-  for (const std::string& line : captured.faults) fmt::print("  {}\n", line);
+  for (const std::string& text : captured.summary) fmt::print("{}\n", text);
+  for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
   if (!source->error().empty()) throw IoError("", source->error());
   if (!result.error.empty()) throw std::runtime_error(result.error);
   const bool any_tracked =
