@@ -61,29 +61,43 @@ bool any(Bytes bytes) {
   return (words[0] | words[1] | words[2] | words[3]) != 0;
 }
 
+/// How far the weakest of the nine pixels of an arc stands out, for the arc of which it is most: `d` are the
+/// differences around the circle. Arcs k and k + 1 share eight pixels.
+Bytes strongest_arc(const std::array<Bytes, 16>& d) {
+  std::array<Bytes, 8> two, four;
+  for (std::size_t i = 0; i < 8; ++i) two[i] = smaller(d[2 * i + 1], d[(2 * i + 2) % 16]);
+  for (std::size_t i = 0; i < 8; ++i) four[i] = smaller(two[i], two[(i + 1) % 8]);
+  Bytes strongest{};
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Bytes shared = smaller(four[i], four[(i + 2) % 8]);
+    strongest = larger(strongest, smaller(shared, larger(d[2 * i], d[(2 * i + 9) % 16])));
+  }
+  return strongest;
+}
+
 /// 255 for every pixel of the run that is a corner, else 0.
 Bytes find_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
   const Bytes centre = load(p);
   const Bytes t = Bytes{} + static_cast<std::uint8_t>(threshold);
-  const Bytes high = larger(centre, centre + t) == centre + t ? centre + t : Bytes{} + std::uint8_t{255};
-  const Bytes low = larger(centre, t) - t;
+  const auto brighter = [&](Bytes q) { return larger(q, centre) - centre; };
+  const auto darker = [&](Bytes q) { return centre - smaller(q, centre); };
   // An arc of nine covers two neighbouring compass points at least: most runs end here.
   const Bytes n = load(p + circle[0]), e = load(p + circle[4]);
   const Bytes s = load(p + circle[8]), w = load(p + circle[12]);
-  const Bytes bright = smaller(larger(n, s), larger(e, w)) > high;
-  const Bytes dark = larger(smaller(n, s), smaller(e, w)) < low;
-  if (!any(bright | dark)) return Bytes{};
+  const Bytes may_be_bright = brighter(smaller(larger(n, s), larger(e, w))) > t;
+  const Bytes may_be_dark = darker(larger(smaller(n, s), smaller(e, w))) > t;
 
-  // Lengths of the arcs that end at point k; once around and eight more for those across the start.
-  Bytes bright_arc{}, dark_arc{}, longest{};
-  const Bytes one = Bytes{} + std::uint8_t{1};
-  for (std::size_t k = 0; k < 16 + 8; ++k) {
-    const Bytes q = load(p + circle[k % 16]);
-    bright_arc = (bright_arc + one) & static_cast<Bytes>(q > high);
-    dark_arc = (dark_arc + one) & static_cast<Bytes>(q < low);
-    longest = larger(longest, larger(bright_arc, dark_arc));
+  Bytes strength{};
+  std::array<Bytes, 16> d;
+  if (any(may_be_bright)) {
+    for (std::size_t k = 0; k < 16; ++k) d[k] = brighter(load(p + circle[k]));
+    strength = strongest_arc(d);
   }
-  return longest > Bytes{} + std::uint8_t{8};
+  if (any(may_be_dark)) {
+    for (std::size_t k = 0; k < 16; ++k) d[k] = darker(load(p + circle[k]));
+    strength = larger(strength, strongest_arc(d));
+  }
+  return strength > t;
 }
 
 constexpr int kMaxColumns = 256;

@@ -134,7 +134,6 @@ double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v
 namespace {
 
 constexpr int kNoiseSsd = 4 * 64 * 4;  // four times what noise of two grey levels adds to a patch
-constexpr int kMaxRange = 1024;        // pixels of a row searched at most
 
 /// Cost of the patch at every pixel [first, first + count) of a row, and where it is least.
 struct RowCosts {
@@ -142,23 +141,20 @@ struct RowCosts {
   int count = 0;
   int best_u = 0;
   int best = std::numeric_limits<int>::max();
-  int cost[kMaxRange];
+  std::array<int, kMaxRowCosts> cost;
 
   RowCosts(const Patch& patch, const cv::Mat& image, int v, int from, int to)
-      : first(from), count(std::min(to - from + 1, kMaxRange)) {
-    for (int i = 0; i < count; ++i) {
-      cost[i] = zero_mean_ssd(patch, image, first + i, v);
-      if (cost[i] < best) {
-        best = cost[i];
-        best_u = first + i;
-      }
-    }
+      : first(from), count(std::min(to - from + 1, kMaxRowCosts)) {
+    zero_mean_ssd_row(patch, image, first, v, std::span(cost).first(static_cast<std::size_t>(count)));
+    const auto least = std::min_element(cost.begin(), cost.begin() + count);
+    best = *least;
+    best_u = first + static_cast<int>(least - cost.begin());
   }
   /// Least cost elsewhere, not beside the best: near to `best` where texture repeats.
   [[nodiscard]] int second_best() const {
     int second = std::numeric_limits<int>::max();
     for (int i = 0; i < count; ++i) {
-      if (std::abs(first + i - best_u) > 3) second = std::min(second, cost[i]);
+      if (std::abs(first + i - best_u) > 3) second = std::min(second, cost[static_cast<std::size_t>(i)]);
     }
     return second;
   }

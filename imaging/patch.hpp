@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <span>
 
 #include "camera/pinhole.hpp"
 #include "geometry/se3.hpp"
@@ -54,6 +55,11 @@ void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a,
 /// Sum of squared differences between the patch (corner at whole pixel (u, v)) and the image, means removed.
 /// The patch must lie inside the image.
 [[nodiscard]] int zero_mean_ssd(const Patch& patch, const cv::Mat& image, int u, int v);
+
+/// The same for a stretch of a row: cost[i] is that at (u + i, v), at a fraction of the time. At most
+/// kMaxRowCosts of them; up to a pixel right of the last patch is read.
+inline constexpr int kMaxRowCosts = 1024;
+void zero_mean_ssd_row(const Patch& patch, const cv::Mat& image, int u, int v, std::span<int> cost);
 
 struct AlignmentResult {
   Eigen::Vector2f uv;  ///< corner in pixels of the image's level

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "imaging/image_pyramid.hpp"
 
@@ -87,6 +88,22 @@ TEST(Patch, ZeroMeanSsdIsThatOfTheDefinition) {
       sum2 += d * d;
     }
     EXPECT_NEAR(zero_mean_ssd(patch, image, u, v), sum2 - sum * sum / 64, 1.0);
+  }
+}
+
+TEST(Patch, RowOfSsdsIsThatOfSingleOnes) {
+  std::mt19937 random(6);
+  cv::Mat image(24, 90, CV_8UC1);
+  for (int i = 0; i < image.rows * image.cols; ++i) image.data[i] = static_cast<std::uint8_t>(random());
+  Patch patch;
+  ASSERT_TRUE(cut_patch(image, 40, 12, patch));
+  for (const int count : {1, 7, 8, 9, 16, 61, 74}) {
+    std::vector<int> cost(static_cast<std::size_t>(count));
+    zero_mean_ssd_row(patch, image, 8, 11, cost);
+    for (int i = 0; i < count; ++i) {
+      EXPECT_EQ(cost[static_cast<std::size_t>(i)], zero_mean_ssd(patch, image, 8 + i, 11))
+          << count << ' ' << i;
+    }
   }
 }
 
