@@ -120,14 +120,18 @@ TEST_F(EnginePlacesTest, ACameraCarriedElsewhereFindsItselfInTheMap) {
 TEST_F(EnginePlacesTest, WithoutRecognitionItStaysLost) {
   const RunResult result = run(options(false), kidnapped(false));
   for (const FrameRecord& record : result.frames) {
-    if (after_kidnapping(record)) EXPECT_EQ(record.state, FrameState::kLost) << record.frame_index;
+    if (after_kidnapping(record)) {
+      EXPECT_EQ(record.state, FrameState::kLost) << record.frame_index;
+    }
   }
 }
 
 TEST_F(EnginePlacesTest, InAnUnknownPlaceItSaysThatItIsLost) {
   const RunResult result = run(options(), kidnapped(true));
   for (const FrameRecord& record : result.frames) {
-    if (after_kidnapping(record)) EXPECT_EQ(record.state, FrameState::kLost) << record.frame_index;
+    if (after_kidnapping(record)) {
+      EXPECT_EQ(record.state, FrameState::kLost) << record.frame_index;
+    }
   }
 }
 

@@ -107,10 +107,10 @@ TEST(ScheduleLog, ErrorsNameTheSection) {
   };
   EXPECT_NE(error({'h', 'e', 'l', 'l', 'o'}).find("no schedule log"), std::string::npos);
   auto other = good;
-  other[8] = 9;
+  other.at(8) = 9;
   EXPECT_NE(error(other).find("format version 9"), std::string::npos) << error(other);
   auto damaged = good;
-  damaged[20] ^= 1;
+  damaged.at(20) ^= 1;
   EXPECT_NE(error(damaged).find("section 'tracker'"), std::string::npos) << error(damaged);
   damaged = good;
   damaged[good.size() - 1] ^= 1;

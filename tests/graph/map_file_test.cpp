@@ -121,7 +121,9 @@ TEST_F(MapFileTest, EveryTruncationIsRefused) {
   for (std::size_t length = 0; length < bytes.size(); ++length) {
     const std::string error = error_of(bytes.substr(0, length));
     ASSERT_FALSE(error.empty()) << length;
-    if (length >= 8 + 12) EXPECT_NE(error.find("section"), std::string::npos) << error;
+    if (length >= 8 + 12) {
+      EXPECT_NE(error.find("section"), std::string::npos) << error;
+    }
   }
 }
 
@@ -135,7 +137,9 @@ TEST_F(MapFileTest, EveryFlippedByteIsRefusedAndTheSectionNamed) {
     if (at == 7) continue;
     const std::string error = error_of(damaged);
     ASSERT_FALSE(error.empty()) << at;
-    if (at >= 8) EXPECT_NE(error.find("section"), std::string::npos) << error;
+    if (at >= 8) {
+      EXPECT_NE(error.find("section"), std::string::npos) << error;
+    }
   }
 }
 

@@ -205,7 +205,9 @@ TEST_F(LoopCloserTest, CulledKeyframesAreForgotten) {
   add_to_map(6);
   (void)closer.step(keyframe(6), graph_);
   const auto found = closer.relocalise(old.images, graph_);
-  if (found) EXPECT_GE(index(found->keyframe), 5U);
+  if (found) {
+    EXPECT_GE(index(found->keyframe), 5U);
+  }
 }
 
 TEST(LoopCloserOptions, NameWhatIsWrong) {

@@ -9,7 +9,7 @@
 
 #include "../../bench/tracking/plain_map.hpp"
 #include "../imaging/rendered_scene.hpp"
-#include "allocation_counter.hpp"
+#include "tests/allocation_counter.hpp"
 
 namespace twofold {
 namespace {

@@ -1,4 +1,4 @@
-#include "allocation_counter.hpp"
+#include "tests/allocation_counter.hpp"
 
 #include <cerrno>
 #include <cstddef>
