@@ -53,6 +53,14 @@ class ViewGeometry {
   [[nodiscard]] float shade(std::int32_t id, float x, float y, float inverse_depth, float footprint) const;
 
  private:
+  /// Kind in the upper bits of an id, index below.
+  enum Kind : std::int32_t { kQuad, kCylinder, kSphere, kHeightField };
+  static constexpr int kKindShift = 24;
+  static constexpr std::int32_t kIndexMask = (1 << kKindShift) - 1;
+  static std::int32_t make_id(Kind kind, std::size_t index) {
+    return (static_cast<std::int32_t>(kind) << kKindShift) | static_cast<std::int32_t>(index);
+  }
+
   /// Inverse depth w . ray; position on the quad s = (s_axis . ray) / w - s0, q alike [m].
   struct QuadForm {
     RayForm w, s, q;
