@@ -24,7 +24,10 @@ std::string SyntheticOptions::invalid_reason() const {
                                  outside("depth_noise", depth_noise, 0, 10),
                                  outside("blur", blur, 0, 1),
                                  outside("exposure", exposure, 0, 0.9),
-                                 outside("drop", drop, 0, 0.9)};
+                                 outside("drop", drop, 0, 0.9),
+                                 outside("cover_at", cover_at, 0, 1e6),
+                                 outside("cover", cover, 0, 1e6),
+                                 outside("carried_to", carried_to, 0, 1e6)};
   for (const std::string& reason : reasons)
     if (!reason.empty()) return reason;
   return {};

@@ -28,6 +28,12 @@ struct SyntheticOptions {
   bool object = false;     ///< something moves through the scene
   double drop = 0;         ///< share of frames lost, 0 .. 0.9; the first is always there
 
+  /// A hand covers the lens at this time [s], and nothing but noise is seen for `cover` seconds; 0: never.
+  double cover_at = 0;
+  double cover = 2;             ///< [s] >= 0
+  double carried_to = 0;        ///< the walk goes on from where it is at this time [s] >= 0
+  std::uint64_t elsewhere = 0;  ///< seed of the place it goes on in, which then looks different; 0: the same
+
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
 };

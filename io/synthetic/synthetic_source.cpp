@@ -18,7 +18,7 @@ class SyntheticSource : public FrameSource {
   explicit SyntheticSource(const SyntheticOptions& options) : sequence_(options) {
     rig_ = sequence_.rig();
     for (int i = 0; i < sequence_.frame_count(); ++i)
-      ground_truth_.push_back({sequence_.t_ns(i), sequence_.T_w_c(i)});
+      if (sequence_.in_first_place(i)) ground_truth_.push_back({sequence_.t_ns(i), sequence_.T_w_c(i)});
   }
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override { return sequence_.frame_count(); }
 
@@ -75,10 +75,15 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
                                    {"depth_noise", &options.depth_noise},
                                    {"blur", &options.blur},
                                    {"exposure", &options.exposure},
-                                   {"drop", &options.drop}})
+                                   {"drop", &options.drop},
+                                   {"cover_at", &options.cover_at},
+                                   {"cover", &options.cover},
+                                   {"carried_to", &options.carried_to}})
     take(parameters, key, value);
   take_int(parameters, "frames", &options.frames);
   if (const auto seed = take_integer(parameters, "seed")) options.seed = static_cast<std::uint64_t>(*seed);
+  if (const auto seed = take_integer(parameters, "elsewhere"))
+    options.elsewhere = static_cast<std::uint64_t>(*seed);
   int object = 0;
   take_int(parameters, "object", &object);
   if (object > 1) throw IoError(parameters.subject(), "parameter object must be 0 or 1");

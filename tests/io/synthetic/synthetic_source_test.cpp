@@ -48,6 +48,46 @@ TEST(SyntheticSource, DefaultsAreThoseOfTheScenes) {
   EXPECT_NEAR(truth[1].T_w_c.translation().z(), 9.85, 1e-9);
 }
 
+TEST(SyntheticSource, ACameraIsCoveredAndCarriedElsewhere) {
+  const Parameters small{{"width", "64"}, {"height", "48"}, {"fps", "10"}, {"noise", "0"}};
+  const auto with = [&](Parameters more) {
+    more.insert(small.begin(), small.end());
+    return open_synthetic("desk", more);
+  };
+  const Parameters hand{{"frames", "10"}, {"cover_at", "0.3"}, {"cover", "0.4"}, {"carried_to", "1.5"}};
+  Parameters away = hand;
+  away["elsewhere"] = "9";
+  const auto walk = with({{"frames", "20"}});
+  const auto carried = with(hand);
+  const auto elsewhere = with(away);
+  std::vector<Frame> walked(20);
+  for (Frame& frame : walked) ASSERT_EQ(walk->next(frame), FrameStatus::kFrame);
+
+  const auto differs = [](const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) > 0; };
+  for (int i = 0; i < 10; ++i) {
+    Frame here, there;
+    ASSERT_EQ(carried->next(here), FrameStatus::kFrame);
+    ASSERT_EQ(elsewhere->next(there), FrameStatus::kFrame);
+    EXPECT_EQ(here.t_ns, walked[static_cast<std::size_t>(i)].t_ns);
+    if (i >= 3 && i < 7) {  // nothing but the hand
+      double low = 0, high = 0;
+      cv::minMaxLoc(here.left, &low, &high);
+      EXPECT_EQ(low, high);
+      EXPECT_FALSE(differs(here.left, here.right));
+      continue;
+    }
+    const Frame& same = walked[static_cast<std::size_t>(i < 3 ? i : i - 7 + 15)];
+    EXPECT_FALSE(differs(here.left, same.left)) << i;
+    EXPECT_FALSE(differs(here.right, same.right)) << i;
+    EXPECT_EQ(differs(there.left, same.left), i >= 7) << i;
+  }
+  // No truth behind the hand, nor in another place.
+  ASSERT_EQ(carried->ground_truth().size(), 6U);
+  EXPECT_EQ(carried->ground_truth()[3].t_ns, walked[7].t_ns);
+  EXPECT_EQ(carried->ground_truth()[3].T_w_c.matrix(), walk->ground_truth()[15].T_w_c.matrix());
+  EXPECT_EQ(elsewhere->ground_truth().size(), 3U);
+}
+
 TEST(SyntheticSource, DroppedFramesLeaveGaps) {
   const auto source =
       open_synthetic("desk", {{"width", "64"}, {"height", "48"}, {"frames", "200"}, {"drop", "0.25"}});
