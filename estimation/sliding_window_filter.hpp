@@ -17,7 +17,9 @@ namespace twofold {
 /// What happens to a pose that leaves the window.
 enum class PoseRemoval : std::uint8_t {
   kMarginalise,          ///< Schur complement into the prior  (SWF eq. 10)
-  kMarginaliseDiagonal,  ///< VSDF: diagonal blocks of the Schur complement only  (eq. 12)
+  kMarginaliseDiagonal,  ///< VSDF: only the blocks of the Schur complement on the diagonal  (eq. 12)
+  kMarginaliseEntries,   ///< eq. 12 as printed, single entries of the diagonal: what is left need not be
+                         ///< positive definite, and is not once depth is much less certain than direction
   kDelete  ///< visual odometry: its information is dropped, the oldest pose left is held fixed (4.2.4)
 };
 
@@ -154,6 +156,8 @@ class SlidingWindowFilter {
   void remove_oldest(const WindowFrame& frame);
   void delete_oldest(const std::vector<bool>& drop);
   void marginalise_oldest(const std::vector<bool>& drop);
+  /// Sizes of the diagonal blocks of the fill-in that the sparse filters keep: kept landmarks, next pose.
+  [[nodiscard]] std::vector<int> fill_in_blocks(std::size_t landmarks) const;
   void compact_landmarks(const std::vector<int>& order);
   void add_observations(const WindowFrame& frame);
   void fit_newest_pose(const WindowFrame& frame);

@@ -27,15 +27,15 @@ struct WindowPrior {
 /// What is done with the fill-in Lambda_b^T Lambda_a^-1 Lambda_b of an elimination.
 enum class FillIn {
   kFull,          ///< Schur complement: exact marginalisation  (SWF eq. 9, 10)
-  kBlockDiagonal  ///< only its diagonal blocks: the sparse VSDF  (SWF eq. 12)
+  kBlockDiagonal  ///< only its blocks on the diagonal: the sparse VSDF  (SWF eq. 12)
 };
 
 /// Eliminates the first `eliminated` unknowns of Lambda x = g:
 ///   Lambda_c - Lambda_b^T Lambda_a^-1 Lambda_b,  g_b - Lambda_b^T Lambda_a^-1 g_a   (SWF eq. 9).
 ///
-/// @param block_sizes  sizes of the diagonal blocks of the remaining unknowns, used by kBlockDiagonal. Blocks
-///        rather than single diagonal entries, as eq. 12 has it printed: Lambda_c minus the bare diagonal
-///        need not be positive semi-definite, minus diagonal blocks it is.
+/// @param block_sizes  sizes of the diagonal blocks of the remaining unknowns, used by kBlockDiagonal; sizes
+///        of one are eq. 12 as printed. Lambda_c minus bare diagonal entries need not be positive
+///        semi-definite; minus whole blocks it is, when Lambda_c has no information between the blocks.
 /// Directions of Lambda_a without information are left out (pseudo-inverse), not an error.
 void schur_marginalise(MatrixX& Lambda, VectorX& g, int eliminated, FillIn fill_in,
                        const std::vector<int>& block_sizes = {});

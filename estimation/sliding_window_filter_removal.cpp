@@ -38,6 +38,13 @@ void SlidingWindowFilter::delete_oldest(const std::vector<bool>& drop) {
   compact_landmarks(order);
 }
 
+std::vector<int> SlidingWindowFilter::fill_in_blocks(std::size_t landmarks) const {
+  if (options_.removal == PoseRemoval::kMarginaliseEntries) return std::vector<int>(3 * landmarks + 6, 1);
+  std::vector<int> sizes(landmarks, 3);
+  sizes.push_back(6);
+  return sizes;
+}
+
 void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
   const int n_prior = prior_.landmark_count();
   if (!first_estimates()) prior_.relinearise(points_, poses_.front().T_c_w);
@@ -120,12 +127,13 @@ void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
     Lambda.topLeftCorner<6, 6>().setIdentity();
     g.head<6>().setZero();
   }
-  std::vector<int> block_sizes(kept.size(), 3);
-  block_sizes.push_back(6);
-  schur_marginalise(
-      Lambda, g, eliminated,
-      options_.removal == PoseRemoval::kMarginaliseDiagonal ? FillIn::kBlockDiagonal : FillIn::kFull,
-      block_sizes);
+  // Eliminated at the current estimate, where the slope of what is left does not depend on which part of the
+  // fill-in is kept: removing a pose never moves the estimate, in the sparse filters either (eq. 12).
+  g.noalias() -= Lambda * d;
+  schur_marginalise(Lambda, g, eliminated,
+                    options_.removal == PoseRemoval::kMarginalise ? FillIn::kFull : FillIn::kBlockDiagonal,
+                    fill_in_blocks(kept.size()));
+  g.noalias() += Lambda * d.tail(g.size());
 
   // The new prior; what was in the old one keeps its first estimate.
   WindowPrior next;

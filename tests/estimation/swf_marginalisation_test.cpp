@@ -117,5 +117,30 @@ TEST(SwfMarginalisation, FilterCovariancesSurviveRemoval) {
   }
 }
 
+/// Removal leaves the slope of the cost at the estimate as it is, whatever part of the fill-in is kept and
+/// wherever derivatives are taken: without new measurements nothing moves.
+TEST(SwfMarginalisation, RemovalNeverMovesTheEstimate) {
+  const SwfScene scene = make_swf_scene({.frames = 7, .points = 40, .seed = 9, .noise_px = 1.0});
+  for (const auto linearisation : {Linearisation::kCurrent, Linearisation::kFirstEstimate}) {
+    for (const auto removal : {PoseRemoval::kMarginalise, PoseRemoval::kMarginaliseDiagonal}) {
+      SlidingWindowOptions options = exact_options(3);
+      options.linearisation = linearisation;
+      options.removal = removal;
+      SlidingWindowFilter filter(scene.rig, options);
+      filter.set_first_pose(SE3(), swf_first_information());
+      for (const WindowFrame& frame : scene.frames) filter.step(frame);
+      const SE3 T_before = filter.newest_T_c_w();
+      std::map<std::int64_t, Vector3> before;
+      for (int l = 0; l < filter.landmark_count(); ++l) before[filter.landmark_id(l)] = filter.landmark(l);
+
+      WindowFrame blind;
+      blind.motion = MotionInput{};
+      filter.step(blind);
+      EXPECT_LT((filter.T_c_w(1) * T_before.inverse()).log().norm(), 1e-8);
+      for (const auto& [id, x_w] : before) EXPECT_LT((*filter.find_landmark(id) - x_w).norm(), 1e-7) << id;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace twofold::test

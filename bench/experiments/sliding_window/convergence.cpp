@@ -1,4 +1,4 @@
-// Landmark convergence, static and moving; visual odometry by deletion; sparse marginalisation.
+// Landmark convergence, static and moving; visual odometry by deletion.
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -24,9 +24,8 @@ const std::vector<Variant> kVariants = {{"batch", 0},
                                         {"window 2", 2},
                                         {"window 1 (EKF)", 1},
                                         {"VO, 1 frame", 1, PoseRemoval::kDelete},
-                                        {"VO, 2 frames", 2, PoseRemoval::kDelete},
-                                        {"VSDF, window 3", 3, PoseRemoval::kMarginaliseDiagonal}};
-enum : std::size_t { kBatch, kW10, kW5, kW4, kW3, kW2, kW1, kVo1, kVo2, kVsdf };
+                                        {"VO, 2 frames", 2, PoseRemoval::kDelete}};
+enum : std::size_t { kBatch, kW10, kW5, kW4, kW3, kW2, kW1, kVo1, kVo2 };
 
 struct Curves {
   std::vector<std::vector<double>> structure, absolute, sigma;  ///< [variant][frame]: m^2, m^2, m
@@ -162,15 +161,6 @@ void convergence_experiment(const SlidingWindowExperimentOptions& options, Repor
              error_ratio, error_first, sigma_ratio),
         error_ratio >= 3.0 && error_ratio <= 4.0);
   }
-
-  RunOptions longer;
-  longer.frames = 20;
-  longer.landmarks = 60;
-  const Curves sparse = run_curves(longer, options.trials);
-  write_curves(sparse, "fig17_vsdf", "SWF fig. 17: sparse (VSDF) against full marginalisation", report);
-  const double ratio = sparse.structure[kVsdf].back() / sparse.structure[kW3].back();
-  report.state("SWF fig. 17", "VSDF clearly worse than full marginalisation (squared error above 1.5 times)",
-               text("window 3 after 20 frames: %.2f times", ratio), ratio > 1.5);
 }
 
 }  // namespace twofold::bench

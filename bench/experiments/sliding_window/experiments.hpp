@@ -15,7 +15,9 @@ struct SlidingWindowExperimentOptions {
 };
 
 void convergence_experiment(const SlidingWindowExperimentOptions& options,
-                            Report& report);  // fig. 12, 13, 17; 4.2.4
+                            Report& report);  // fig. 12, 13; 4.2.4
+void sparse_marginalisation_experiment(const SlidingWindowExperimentOptions& options,
+                                       Report& report);                                       // fig. 17
 void sideways_experiment(const SlidingWindowExperimentOptions& options, Report& report);      // fig. 15
 void track_length_experiment(const SlidingWindowExperimentOptions& options, Report& report);  // fig. 16
 void run_time_experiment(const SlidingWindowExperimentOptions& options, Report& report);      // fig. 14
