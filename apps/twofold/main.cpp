@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "graph/map_file.hpp"
 #include "io/io_error.hpp"
 
 namespace {
@@ -41,6 +42,8 @@ int main(int argc, char** argv) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help
     return report(e.what(), twofold::kBadInput);
   } catch (const twofold::IoError& e) {
+    return report(e.what(), twofold::kBadInput);
+  } catch (const twofold::MapFileError& e) {
     return report(e.what(), twofold::kBadInput);
   } catch (const std::exception& e) {
     return report(e.what(), twofold::kFailedRun);

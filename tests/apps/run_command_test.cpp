@@ -143,6 +143,15 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
                    "/proc/nothing");
 }
 
+TEST_F(RunCommand, FullDiskIsOneLineAndExitCodeTwo) {
+  // No file may grow beyond 8 KiB: writing fails as it does on a full disk.
+  const std::string full_disk = "trap '' XFSZ; ulimit -f 16;";
+  expect_bad_input(run_recording("--deterministic", full_disk), "cannot be written");
+  expect_bad_input(run_recording("--deterministic --save-map '" + (folder_ / "map.tfm") + "'", full_disk),
+                   "cannot be written");
+  EXPECT_FALSE(fs::exists(folder_.path() / "map.tfm"));
+}
+
 TEST_F(RunCommand, BrokenRecordingsAreOneLineAndExitCodeTwo) {
   const auto damaged = [&](const std::string& what, const std::string& message, const auto& damage) {
     SCOPED_TRACE(what);
