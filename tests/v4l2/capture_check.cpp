@@ -1,5 +1,5 @@
-// Captures from a kernel device and judges what came. Runs inside the virtual machine of run_vm, so it needs
-// nothing but the C++ library, and is built for any x86-64 processor.
+// Captures from a kernel device and judges what came. Runs inside a virtual machine (virtual_machine.sh), so it
+// needs nothing but the C++ library, and is built for any x86-64 processor.
 //
 //   capture_check DEVICE formats FRAMES        every supported format the device lists
 //   capture_check DEVICE fault FRAMES WHAT     one format; WHAT must have been counted and survived:
