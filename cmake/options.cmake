@@ -40,7 +40,8 @@ function(twofold_test name)
   if(TWOFOLD_SANITIZE)
     math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
     # ThreadSanitizer does not see how libgomp waits for its threads: the CHOLMOD inside Ceres stays on one.
-    set_tests_properties(${name} PROPERTIES ENVIRONMENT OMP_THREAD_LIMIT=1)
+    set_tests_properties(${name} PROPERTIES
+      ENVIRONMENT "OMP_THREAD_LIMIT=1;TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/tsan.supp")
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
 endfunction()

@@ -7,6 +7,7 @@
 #include "engine/engine.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "tests/imaging/rendered_scene.hpp"
+#include "tests/sanitized.hpp"
 
 namespace twofold {
 namespace {
@@ -138,7 +139,7 @@ TEST_F(EnginePlacesTest, InAnUnknownPlaceItSaysThatItIsLost) {
 TEST_F(EnginePlacesTest, AThreadedRunWithRequestsAndAnswersReplays) {
   EngineOptions threaded = options();
   threaded.deterministic = false;
-  threaded.pacing.speed = 1;
+  threaded.pacing.speed = testing::kSanitized ? 0.1 : 1;  // the answer must come while it is lost
   const RunResult live = run(threaded, kidnapped(false));
   ASSERT_EQ(live.error, "");
   EXPECT_EQ(live.frames.back().state, FrameState::kTracked);
