@@ -15,6 +15,7 @@
 #include "io/io_error.hpp"
 #include "io/open_source.hpp"
 #include "io/output_file.hpp"
+#include "io/recorded_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 
 namespace twofold {
@@ -32,6 +33,7 @@ struct RunArguments {
   std::string pin;
   std::string vocabulary;
   std::string save_map;
+  std::string record;
   bool no_metric_loops = false;
   bool no_places = false;
   bool deterministic = false;
@@ -146,9 +148,12 @@ int run(const RunArguments& arguments) {
   source_options.preload = arguments.preload;
   source_options.stop = &interrupted;
   if (!arguments.calibration.empty()) source_options.calibration = arguments.calibration;
-  const std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options);
+  std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options);
   if (source->rig().kind == SensorKind::kMono) {
     throw IoError(arguments.source, "has a single camera without depth; stereo or RGB-D is needed");
+  }
+  if (!arguments.record.empty()) {
+    source = std::make_unique<RecordedSource>(std::move(source), arguments.record);
   }
 
   ProgressLine line(source->frame_count(), arguments.quiet);
@@ -207,6 +212,8 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--vocabulary", arguments->vocabulary, "Vocabulary file instead of the built-in one");
   command->add_option("--save-map", arguments->save_map, "Write the map to this file (.tfm) at the end");
+  command->add_option("--record", arguments->record,
+                      "Record the frames into this folder: the run can be repeated from it and schedule.log");
   command->add_flag("--no-places", arguments->no_places, "Recognise no places: no large loops are closed");
   command->add_flag("--no-metric-loops", arguments->no_metric_loops,
                     "Close no small loops: for experiments with drift");
