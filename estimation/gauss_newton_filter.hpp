@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "estimation/inverse_depth_filter.hpp"
+#include "estimation/linearisation.hpp"
 #include "estimation/sliding_window_filter_equations.hpp"
 
 namespace twofold {
@@ -19,9 +21,12 @@ enum class MotionEstimate : std::uint8_t {
 
 struct GaussNewtonFilterOptions {
   double sigma_px = 0.5;  ///< of every measurement component, > 0
-  int iterations = 3;     ///< Levenberg-Marquardt steps of the joint update, >= 0; 0: the motion estimate stands
+  int iterations = 3;  ///< Levenberg-Marquardt steps of the joint update, >= 0; 0: the motion estimate stands
   int motion_iterations = 10;
   MotionEstimate motion = MotionEstimate::kMotionOnly;
+  /// Stereo: first estimates bring the filter to bundle adjustment's accuracy. Monocular: kCurrent is better,
+  /// the first depths, of little parallax, are too far off to take derivatives at.
+  Linearisation linearisation = Linearisation::kFirstEstimate;
 
   [[nodiscard]] std::string invalid_reason() const;
 };
@@ -79,6 +84,12 @@ class GaussNewtonFilter {
     std::int64_t id;
     int anchor;  ///< index into anchors_
     Vector3 psi;
+    std::optional<Vector3> psi_lin = {};  ///< where derivatives are taken, once a second frame measured it
+  };
+  struct Mean {
+    SE3 T_c_w;
+    std::vector<SE3> anchors;
+    std::vector<Point> points;
   };
   struct Seen {
     int point;  ///< index into points_
@@ -101,6 +112,10 @@ class GaussNewtonFilter {
   void append_pose();
   double add_measurements(const std::vector<Seen>& seen, MatrixX* Lambda, VectorX* g) const;
   bool joint_update(const std::vector<Seen>& seen, int iterations, bool fixed_gauge);
+  [[nodiscard]] Mean mean() const { return {T_c_w_, anchors_, points_}; }
+  void set_mean(const Mean& mean);
+  void move(const VectorX& delta);
+  [[nodiscard]] VectorX offset(const Mean& from) const;
   void estimate_motion(const std::vector<Seen>& seen);
   [[nodiscard]] bool innovation(const std::vector<Seen>& seen, const MatrixX* Sigma, MatrixX& S, MatrixX& J_T,
                                 VectorX& d) const;
@@ -108,7 +123,8 @@ class GaussNewtonFilter {
 
   Rig rig_;
   GaussNewtonFilterOptions options_;
-  std::vector<SE3> anchors_;  ///< [0] is the origin
+  std::vector<SE3> anchors_;      ///< [0] is the origin
+  std::vector<SE3> anchors_lin_;  ///< where their derivatives are taken: what they were as current poses
   std::vector<Point> points_;
   SE3 T_c_w_;
   MatrixX Lambda_;

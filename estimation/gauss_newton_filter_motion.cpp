@@ -102,6 +102,7 @@ void GaussNewtonFilter::estimate_motion(const std::vector<Seen>& all) {
 bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::span<const PointObservation> b1,
                                   std::span<const PointObservation> first) {
   anchors_.assign(1, SE3());
+  anchors_lin_.assign(1, SE3());
   points_.clear();
   T_c_w_ = SE3();
   Lambda_ = MatrixX::Zero(6, 6);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "camera/rig.hpp"
+#include "estimation/linearisation.hpp"
 #include "estimation/process_model.hpp"
 #include "estimation/sliding_window_filter_equations.hpp"
 #include "estimation/sliding_window_filter_prior.hpp"
@@ -23,21 +24,11 @@ enum class PoseRemoval : std::uint8_t {
   kDelete  ///< visual odometry: its information is dropped, the oldest pose left is held fixed (4.2.4)
 };
 
-/// Where derivatives of variables that carry prior information are taken.
-///
-/// Information once marginalised is tied to the point it was linearised at. If later measurements of the same
-/// variables are linearised elsewhere, the sum claims to know directions that no measurement sees (position
-/// and heading of the whole), and the filter grows over-confident. kFirstEstimate takes all derivatives of
-/// such a variable at the estimate it had when it entered the prior, residuals always at the current one.
-enum class Linearisation : std::uint8_t {
-  kCurrent,       ///< always at the current estimate; with window 1 this is the iterated EKF
-  kFirstEstimate  ///< fixed once a variable is in the prior; as kCurrent for window 1, where a pose enters
-                  ///< the prior as a mere prediction, before it is measured
-};
-
 struct SlidingWindowOptions {
   int window = 10;  ///< k, poses kept; 0: all (batch / full SLAM). 1: iterated extended Kalman filter
   PoseRemoval removal = PoseRemoval::kMarginalise;
+  /// kFirstEstimate works as kCurrent for window 1 (the iterated EKF), where a pose enters the prior as a
+  /// mere prediction, before it is measured.
   Linearisation linearisation = Linearisation::kFirstEstimate;
   /// A landmark is marginalised when no pose of the window, the new frame included, sees it. true: it stays
   /// (its information is in the prior), so that it can be seen again; the state then grows with the map.

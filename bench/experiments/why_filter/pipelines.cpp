@@ -179,7 +179,9 @@ PipelineResult run_bundle_adjustment(const Block& block, int iterations) {
 
 PipelineResult run_filter(const Block& block, int iterations, MotionEstimate motion) {
   PipelineResult result;
-  GaussNewtonFilter filter(block.rig, filter_options(iterations, motion));
+  GaussNewtonFilterOptions options = filter_options(iterations, motion);
+  if (block.rig.kind == SensorKind::kMono) options.linearisation = Linearisation::kCurrent;
+  GaussNewtonFilter filter(block.rig, options);
   if (block.rig.kind == SensorKind::kMono) {
     if (!filter.bootstrap(block.bootstrap[0], block.bootstrap[1], block.first)) return result;
   } else {
