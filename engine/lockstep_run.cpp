@@ -13,11 +13,13 @@ constexpr std::size_t kDeterministicRoom = 6;
 }  // namespace
 
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
-    : trace_(options.trace ? std::make_unique<Trace>() : nullptr),
+    : localise_only_(options.localise_only),
+      trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       pool_(options.deterministic ? kDeterministicRoom : options.proposal_slots + kReplayRoom),
       tracking_(rig, options, trace_.get()),
-      mapping_(rig, options.mapper, trace_.get()),
+      mapping_(rig, options, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
+      checkpoints_(rig, options.checkpoint),
       snapshot_(mapping_.publish()) {}
 
 void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
@@ -34,6 +36,7 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
       mapped_.clear();
       if (!loop_messages_.empty()) map(0, loop_messages_.size());
     }
+    checkpoint_if_due(frame.t_ns);
     report(progress);
   }
   result_.interrupted = interrupted.load(std::memory_order_relaxed);
@@ -77,6 +80,7 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     }
     track(frame, step.degrade_level == 0, step.refused > 0, step.messages);
     replay_loop_steps(schedule);
+    checkpoint_if_due(frame.t_ns);
     report(progress);
   }
   for (; round != schedule.mapper.end() && can_map(*round); ++round) {
@@ -133,6 +137,7 @@ void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse, std::
     tracking_.take_answer(*answer_, snapshot_);
     answer_.reset();
   }
+  may_propose = may_propose && !localise_only_;
   FrameRecord record;
   ProposalHandle proposal;
   if (may_propose) proposal = pool_.try_acquire();
@@ -181,6 +186,14 @@ void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
   result_.rounds.push_back(round);
 }
 
+void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
+  if (!checkpoints_.enabled()) return;
+  const bool first = checkpoint_due_ns_ == std::numeric_limits<std::int64_t>::min();
+  if (!first && t_ns < checkpoint_due_ns_) return;
+  checkpoint_due_ns_ = t_ns + checkpoints_.period_ns();
+  if (!first) checkpoints_.save(snapshot_, loop_closing_.places());
+}
+
 void LockstepRun::report(const ProgressSink& progress) {
   const FrameRecord& record = result_.frames.back();
   ++progress_.frames;
@@ -193,8 +206,9 @@ void LockstepRun::report(const ProgressSink& progress) {
 }
 
 RunResult LockstepRun::finish() {
-  mapping_.mapper().relax_all();
-  result_.graph = mapping_.publish();
+  result_.graph = mapping_.finish();
+  result_.places = loop_closing_.places();
+  result_.checkpoints = checkpoints_.report();
   result_.times.push_back(std::move(tracking_.times()));
   result_.times.push_back(std::move(mapping_.times()));
   result_.times.push_back(std::move(loop_closing_.times()));

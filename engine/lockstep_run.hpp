@@ -1,7 +1,9 @@
 #pragma once
 
 #include <deque>
+#include <limits>
 
+#include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
 #include "engine/stages.hpp"
 
@@ -31,9 +33,12 @@ class LockstepRun {
   /// Were all messages of this round sent?
   [[nodiscard]] bool can_map(const MapperStep& round) const;
   void drop(const Frame& frame);
+  /// By the time of the recording: the same in every run.
+  void checkpoint_if_due(std::int64_t t_ns);
   void report(const ProgressSink& progress);
   void fail(const std::string& why) { result_.error = why; }
 
+  const bool localise_only_;
   std::unique_ptr<Trace> trace_;
   ProposalPool pool_;
   TrackingStage tracking_;
@@ -48,6 +53,8 @@ class LockstepRun {
   std::deque<GraphSnapshot> history_;        // of a replay: versions that loop closer steps may still need
   std::optional<RelocalisationRequest> request_;
   std::optional<RelocalisationAnswer> answer_;
+  CheckpointWriter checkpoints_;
+  std::int64_t checkpoint_due_ns_ = std::numeric_limits<std::int64_t>::min();
   GraphSnapshot snapshot_;  // what the tracker sees; replaced between its steps only
   RunResult result_;
   Progress progress_;

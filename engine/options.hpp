@@ -1,16 +1,24 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "engine/pacing.hpp"
+#include "graph/map_file.hpp"
 #include "loopclosure/loop_closer.hpp"
 #include "mapping/mapper.hpp"
 #include "tracking/options.hpp"
 
 namespace twofold {
+
+/// The map as it stands, saved again and again during a run.
+struct CheckpointOptions {
+  std::filesystem::path file;
+  double period = 0;  ///< [s] >= 0; 0: none. By the clock; in runs on one thread by the frames' time stamps
+};
 
 struct EngineOptions {
   TrackerOptions tracker;
@@ -18,6 +26,12 @@ struct EngineOptions {
   LoopCloserOptions loop_closer;
   /// Words that places are recognised by; null: no loop is closed by appearance, no lost camera finds itself.
   std::shared_ptr<const Vocabulary> vocabulary;
+
+  /// Map to go on with, in which the camera must first be recognised; null: the run starts one. Not destroyed
+  /// before the run has ended.
+  std::shared_ptr<const SavedMap> map;
+  bool localise_only = false;  ///< no keyframe is made: `map`, which must be there, does not change
+  CheckpointOptions checkpoint;
 
   /// One thread, one order: each frame is tracked against the map with every earlier keyframe optimised.
   bool deterministic = false;

@@ -9,6 +9,7 @@
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
 #include "graph/loop_constraint.hpp"
+#include "graph/place_book.hpp"
 #include "graph/snapshot.hpp"
 
 namespace twofold {
@@ -87,6 +88,14 @@ struct ClosedLoop {
   std::int64_t t_ns = 0;  ///< of the frame that came back
 };
 
+/// What became of EngineOptions::checkpoint.
+struct CheckpointReport {
+  int saved = 0;
+  std::uint64_t version = 0;    ///< of the map, saved last
+  std::int64_t longest_ns = 0;  ///< a save took
+  std::string error;            ///< of the newest save that failed; the file is then the one before
+};
+
 /// Who saw what when, in the form it is written to a file.
 struct ScheduleStreams {
   ScheduleStream<TrackerStep> tracker;
@@ -98,8 +107,10 @@ struct ScheduleStreams {
 struct RunResult {
   std::vector<FrameRecord> frames;  ///< in the order of the source, dropped ones included
   std::vector<MapperRound> rounds;
-  std::vector<ClosedLoop> loops;     ///< by appearance, in the order they were found
-  GraphSnapshot graph;               ///< after the last round and the final relaxation
+  std::vector<ClosedLoop> loops;  ///< by appearance, in the order they were found
+  GraphSnapshot graph;            ///< after the last round and the final relaxation
+  PlaceBook places;               ///< how the places of its keyframes look
+  CheckpointReport checkpoints;
   std::vector<StageRecorder> times;  ///< one a thread
   ScheduleStreams schedule;
   std::unique_ptr<Trace> trace;               ///< null unless asked for

@@ -21,6 +21,7 @@ TrackingStage::TrackingStage(const Rig& rig, const EngineOptions& options, Trace
     stages_.push_back(times_.add_stage(describe(static_cast<TrackStage>(s))));
   }
   version_counter_ = times_.add_counter("snapshot version");
+  if (options.map) tracker_.continue_in(options.map->graph);
 }
 
 bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, ProposalHandle& proposal,
@@ -76,7 +77,8 @@ void TrackingStage::proposal_rejected(FrameRecord& record) {
 }
 
 bool TrackingStage::wants_relocalisation() const {
-  return can_relocalise_ && !answer_awaited_ && tracker_.lost_frames() >= kLostBeforeAsking;
+  const bool lost = tracker_.unplaced() || tracker_.lost_frames() >= kLostBeforeAsking;
+  return can_relocalise_ && !answer_awaited_ && lost;
 }
 
 bool TrackingStage::request_relocalisation(RelocalisationRequest& request) {
@@ -96,9 +98,10 @@ void TrackingStage::finish(std::int64_t scheduled_ns, FrameRecord& record) {
   times_.record(latency_stage_, scheduled_ns, record.latency_ns);
 }
 
-MappingStage::MappingStage(const Rig& rig, const MapperOptions& options, Trace* trace)
-    : mapper_(rig, options), times_("mapper", trace) {
+MappingStage::MappingStage(const Rig& rig, const EngineOptions& options, Trace* trace)
+    : mapper_(rig, options.mapper), may_change_(!options.localise_only), times_("mapper", trace) {
   round_stage_ = times_.add_stage("round");
+  if (options.map) mapper_.adopt(options.map->graph);
 }
 
 MapperRound MappingStage::step(std::span<const ProposalHandle> proposals,
@@ -129,12 +132,18 @@ MapperRound MappingStage::step(std::span<const ProposalHandle> proposals,
   return round;
 }
 
+GraphSnapshot MappingStage::finish() {
+  if (may_change_) mapper_.relax_all();
+  return mapper_.publish();
+}
+
 LoopClosingStage::LoopClosingStage(const Rig& rig, const EngineOptions& options, Trace* trace)
     : rig_(rig), mapper_options_(options.mapper), times_("loop closer", trace) {
   place_stage_ = times_.add_stage("place");
   relax_stage_ = times_.add_stage("relaxation");
   relocalise_stage_ = times_.add_stage("relocalisation");
   if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
+  if (closer_ && options.map) closer_->adopt(options.map->places);
 }
 
 std::span<LoopMessage> LoopClosingStage::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {

@@ -70,17 +70,19 @@ class TrackingStage {
 /// The mapper's step as every kind of run takes it.
 class MappingStage {
  public:
-  MappingStage(const Rig& rig, const MapperOptions& options, Trace* trace);
+  MappingStage(const Rig& rig, const EngineOptions& options, Trace* trace);
 
   /// One round over the given proposals, oldest first. The new version is then ready to be published.
   MapperRound step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
   [[nodiscard]] GraphSnapshot publish() { return mapper_.publish(); }
-  [[nodiscard]] Mapper& mapper() { return mapper_; }
+  /// The last version: all poses agree globally, unless the map was not to change.
+  [[nodiscard]] GraphSnapshot finish();
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
  private:
   Mapper mapper_;
+  const bool may_change_;
   StageRecorder times_;
   StageId round_stage_;
   std::vector<KeyframeProposal*> proposals_;
@@ -99,6 +101,9 @@ class LoopClosingStage {
   [[nodiscard]] RelocalisationAnswer relocalise(const RelocalisationRequest& request,
                                                 const GraphSnapshot& graph);
 
+  /// How the places it knows look; empty without a vocabulary.
+  [[nodiscard]] const PlaceBook& places() const { return closer_ ? closer_->places() : no_places_; }
+
   [[nodiscard]] std::vector<ClosedLoop>& loops() { return loops_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
@@ -108,6 +113,7 @@ class LoopClosingStage {
   Rig rig_;
   MapperOptions mapper_options_;
   std::optional<LoopCloser> closer_;
+  const PlaceBook no_places_;
   StageRecorder times_;
   StageId place_stage_, relax_stage_, relocalise_stage_;
   std::vector<LoopMessage> messages_;

@@ -7,6 +7,7 @@ namespace {
 
 constexpr std::size_t kTrackerReader = 0;
 constexpr std::size_t kLoopReader = 1;
+constexpr std::size_t kCheckpointReader = 2;
 // One request is under way at most; its buffer may be in the loop closer's hands when the next is made.
 constexpr std::size_t kRequests = 2;
 // A worker that failed does not wake the reader: it looks this often.
@@ -22,7 +23,7 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options)
     : options_(options),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       tracking_(rig, options, trace_.get()),
-      mapping_(rig, options.mapper, trace_.get()),
+      mapping_(rig, options, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
       slots_(options.frame_slots),
       // In the rings, in the two threads' hands, and the tracker's spare one.
@@ -35,7 +36,9 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options)
       request_pool_(kRequests),
       requests_(kRequests),
       answers_(kRequests),
-      snapshots_(2, mapping_.publish()),
+      snapshots_(options.checkpoint.period > 0 ? 3 : 2, mapping_.publish()),
+      places_(1, loop_closing_.places()),
+      checkpoints_(rig, options.checkpoint),
       pacer_(options.pacing) {
   consumed_.reserve(ring_size(options.proposal_slots));
   loop_messages_.reserve(ring_size(options.proposal_slots));
@@ -51,6 +54,10 @@ void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
   tracker_.emplace(
       WorkerOptions{.name = "tracker", .cpu = options_.tracker_cpu, .fifo_priority = options_.fifo_priority},
       [this](std::stop_token stop) { tracker_thread(stop); });
+  if (checkpoints_.enabled()) {
+    checkpointer_.emplace(WorkerOptions{.name = "checkpoints", .cpu = {}, .fifo_priority = {}},
+                          [this](std::stop_token stop) { checkpoint_thread(stop); });
+  }
   read_frames(feed, interrupted, progress);
   join_threads();
   collect_records(progress);
@@ -141,6 +148,10 @@ void ThreadedRun::join_threads() {
   join(*tracker_, proposals_ended_, &mapper_parking_);
   join(*mapper_, keyframes_ended_, &loop_parking_);
   join(*loop_closer_, nobody, nullptr);
+  if (checkpointer_) {
+    checkpointer_->request_stop();
+    join(*checkpointer_, nobody, nullptr);
+  }
 }
 
 /// The loop closer ends after the mapper: what it sent last is taken here, all threads being gone.
@@ -155,8 +166,9 @@ void ThreadedRun::map_late_loops() {
 
 RunResult ThreadedRun::finish() {
   map_late_loops();
-  mapping_.mapper().relax_all();
-  result_.graph = mapping_.publish();
+  result_.graph = mapping_.finish();
+  result_.places = loop_closing_.places();
+  result_.checkpoints = checkpoints_.report();
   result_.times.push_back(std::move(tracking_.times()));
   result_.times.push_back(std::move(mapping_.times()));
   result_.times.push_back(std::move(loop_closing_.times()));
@@ -193,7 +205,7 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
 }
 
 void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
-  if (!spare_) spare_ = proposals_pool_.try_acquire();
+  if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
   TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
   take_answers(graph, step);
   step.degrade_level = spare_ ? 0 : 1;  // first rung of the ladder: keyframes are withheld
@@ -286,6 +298,7 @@ void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
     const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
     LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
     send_loops(loop_closing_.step(*keyframe, graph), step);
+    publish_places();
     schedule_.loop_closer.append(step);
     keyframe.reset();
   }
@@ -302,12 +315,32 @@ bool ThreadedRun::answer_request() {
   return true;
 }
 
+void ThreadedRun::publish_places() {
+  const PlaceBook& places = loop_closing_.places();
+  if (checkpoints_.enabled() && places.version() > places_.newest()) places_.publish(places);
+}
+
 /// A ring that is full takes nothing more of this step; a loop that is lost is found again.
 void ThreadedRun::send_loops(std::span<LoopMessage> messages, LoopStep& step) {
   std::size_t sent = 0;
   while (sent < messages.size() && loops_.try_push(std::move(messages[sent]))) ++sent;
   step.refused = static_cast<std::uint32_t>(messages.size() - sent);
   if (sent > 0) mapper_parking_.wake();
+}
+
+// ------------------------------------------------------------------------------------------------
+// checkpoints
+
+/// Reads the newest versions where they are, for as long as it takes: publishing goes on meanwhile, and the
+/// versions read are destroyed by their writers when this thread asks for newer ones.
+void ThreadedRun::checkpoint_thread(const std::stop_token& stop) {
+  yield_to_other_threads();
+  while (!stop.stop_requested()) {
+    const auto due = std::chrono::steady_clock::now() + std::chrono::nanoseconds(checkpoints_.period_ns());
+    (void)checkpoint_parking_.wait_until(stop, due, [] { return false; });
+    if (stop.stop_requested()) return;  // the caller saves the final map
+    checkpoints_.save(snapshots_.mailbox(kCheckpointReader).latest(), places_.mailbox(0).latest());
+  }
 }
 
 }  // namespace twofold

@@ -2,6 +2,7 @@
 
 #include <atomic>
 
+#include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
 #include "engine/pacing.hpp"
 #include "engine/parking.hpp"
@@ -18,6 +19,8 @@ namespace twofold {
 ///     ^------done-------+   ^---- snapshots ----+---- snapshots ------^
 ///                           ^                   ^------- loops -------+
 ///                           +--- requests: where am I? ---> answers --+
+///
+/// A fourth thread, if checkpoints are wanted, saves what mapper and loop closer published: it only reads.
 ///
 /// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
 /// withheld first (no free buffer, or a full ring), and tracking goes on with the points it has.
@@ -51,6 +54,7 @@ class ThreadedRun {
   void tracker_thread(const std::stop_token& stop);
   void mapper_thread(const std::stop_token& stop);
   void loop_closer_thread(const std::stop_token& stop);
+  void checkpoint_thread(const std::stop_token& stop);
 
   void track(FrameSlot& slot, const GraphSnapshot& graph);
   void send_proposal(FrameRecord& record, TrackerStep& step);
@@ -61,6 +65,7 @@ class ThreadedRun {
   bool answer_request();
   void send_loops(std::span<LoopMessage> messages, LoopStep& step);
   void map_late_loops();
+  void publish_places();
 
   EngineOptions options_;
   std::unique_ptr<Trace> trace_;
@@ -83,20 +88,23 @@ class ThreadedRun {
   SpscRing<RequestHandle> requests_;        // tracker -> loop closer; one at most is under way
   SpscRing<RelocalisationAnswer> answers_;  // loop closer -> tracker
   SnapshotPublisher<GraphSnapshot> snapshots_;
+  SnapshotPublisher<PlaceBook> places_;  // loop closer -> checkpoints
+  CheckpointWriter checkpoints_;
   Pacer pacer_;
 
   ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
   std::vector<ProposalHandle> consumed_;    // mapper's
   std::vector<LoopMessage> loop_messages_;  // mapper's, of this round
 
-  Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_;
+  Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_, checkpoint_parking_;
   // Each is raised by the thread before in the chain, with release, after its last push: who sees it
   // (acquire) and then finds the ring empty has seen everything.
   std::atomic<bool> frames_ended_{false}, proposals_ended_{false}, keyframes_ended_{false};
   // Counters for the progress line; relaxed, because they publish nothing.
   std::atomic<std::uint64_t> map_version_{0}, not_described_{0};
 
-  std::optional<Worker> loop_closer_, mapper_, tracker_;  // last: join before what they use is destroyed
+  std::optional<Worker> checkpointer_, loop_closer_, mapper_,
+      tracker_;  // last: join before what they use is destroyed
 };
 
 }  // namespace twofold

@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 #include <cerrno>
 #include <cstring>
@@ -37,6 +38,11 @@ std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
     }
   }
   return notes;
+}
+
+void yield_to_other_threads() {
+  constexpr int kLeastUrgent = 19;
+  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(this_thread_id()), kLeastUrgent);  // never refused
 }
 
 tl::expected<void, std::string> lock_memory() {

@@ -20,6 +20,8 @@ struct WorkerOptions {
 /// Applies the options to the calling thread. Returns one line for each wish that was not granted, saying why
 /// and what to do; the thread runs on without it.
 [[nodiscard]] std::vector<std::string> configure_this_thread(const WorkerOptions& options);
+/// Lets the calling thread run when the others leave time.
+void yield_to_other_threads();
 /// Keeps all memory of the process, present and future, from being paged out. Error: why not, and what to do.
 [[nodiscard]] tl::expected<void, std::string> lock_memory();
 

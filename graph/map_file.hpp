@@ -5,9 +5,9 @@
 #include <iosfwd>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "camera/rig.hpp"
+#include "graph/place_book.hpp"
 #include "graph/snapshot.hpp"
 
 namespace twofold {
@@ -22,14 +22,13 @@ class MapFileError : public std::runtime_error {
 struct SavedMap {
   Rig rig;
   GraphSnapshot graph;
-  /// How places look, as LoopCloser::save_places made it; empty when places were not described.
-  std::vector<std::uint8_t> places;
+  PlaceBook places;  ///< of keyframes that are in the graph and were not culled; empty: none were described
 };
 
-/// Format, little-endian throughout (docs/formats.md):
+/// Format, little-endian throughout (docs/places.md):
 ///   "TFMAP", format version (2 bytes), 0; then sections: id (4 bytes), length (8), the bytes, CRC-32 of all
-///   of the section before it (4). First `head`, then `keyframes` and `points` in slices, `places` if there
-///   are any, and `end`, after which nothing follows.
+///   of the section before it (4). First `head`, then `keyframes`, `points` and `places` in slices, and
+///   `end`, after which nothing follows.
 /// A section with an unknown id is skipped if its id's highest bit is set, and refused otherwise: that is how
 /// a newer program says whether an older one may read on.
 inline constexpr std::uint16_t kMapFormatVersion = 1;
@@ -37,12 +36,24 @@ inline constexpr std::uint16_t kMapFormatVersion = 1;
 /// Writes to FILE.tmp in the same folder, syncs it, renames it over `file`, syncs the folder: whenever the
 /// program is killed or the disk is full, `file` is the old map or the new one. Memory: one slice. Throws
 /// MapFileError; the temporary file is then removed.
-void save_map(const std::filesystem::path& file, const SavedMap& map);
+///
+/// Looks at graph and places through these references only and copies neither, so that any reader they were
+/// published to may save them, while their writers go on. Places of keyframes that `graph` does not have, or
+/// has culled, are left out.
+void save_map(const std::filesystem::path& file, const Rig& rig, const GraphSnapshot& graph,
+              const PlaceBook& places);
+inline void save_map(const std::filesystem::path& file, const SavedMap& map) {
+  save_map(file, map.rig, map.graph, map.places);
+}
 
 /// Reads a map; trusts nothing in it: sizes are checked against the file's before anything is allocated,
 /// numbers against each other, and the graph's invariants hold afterwards. Throws MapFileError.
 [[nodiscard]] SavedMap load_map(const std::filesystem::path& file);
 /// The same from a stream of `size` bytes; `name` stands in messages.
 [[nodiscard]] SavedMap read_map(std::istream& in, std::uint64_t size, const std::string& name);
+
+/// Empty when measurements of one rig can be used in a map of the other; else what differs, as "baseline
+/// is 0.12, the map's is 0.11". Depth unit and range are the source's own affair: the map is in metres.
+[[nodiscard]] std::string rig_difference(const Rig& rig, const Rig& map_rig);
 
 }  // namespace twofold

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -40,7 +41,9 @@ enum class Section : std::uint32_t { kEnd = 0, kHead = 1, kKeyframes = 2, kPoint
 // Slices of the map a section holds at most: what reader and writer keep in memory beside the map.
 inline constexpr std::uint32_t kKeyframesPerSection = 1024;
 inline constexpr std::uint32_t kPointsPerSection = 16384;
+inline constexpr std::uint32_t kPlacesPerSection = 256;
 inline constexpr std::uint32_t kMaxCount = 1U << 28;  // keyframes or points of a map
+inline constexpr std::uint8_t kLevels = 16;           // of a pyramid: a file's numbers are below this
 
 /// Collects the bytes of a section.
 class ByteWriter {
@@ -48,8 +51,7 @@ class ByteWriter {
   template <class T>
   void put(const T& value) {
     static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T>);
-    const auto* p = reinterpret_cast<const std::uint8_t*>(&value);
-    bytes_.insert(bytes_.end(), p, p + sizeof(T));
+    put_bytes({reinterpret_cast<const std::uint8_t*>(&value), sizeof(T)});
   }
   void put(const SE3& T) {
     const Eigen::Quaterniond& q = T.so3().quaternion();
@@ -60,9 +62,7 @@ class ByteWriter {
   void put_vector(const Vector& v) {
     for (int i = 0; i < v.size(); ++i) put(v[i]);
   }
-  void put_bytes(std::span<const std::uint8_t> bytes) {
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-  }
+  void put_bytes(std::span<const std::uint8_t> bytes);
   void clear() { bytes_.clear(); }
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
 

@@ -1,14 +1,21 @@
 #include <fcntl.h>
 #include <unistd.h>
 #include <zlib.h>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "graph/map_file.hpp"
 #include "graph/map_format.hpp"
 
 namespace twofold {
+
+void map_format::ByteWriter::put_bytes(std::span<const std::uint8_t> bytes) {
+  bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+}
+
 namespace {
 
 using namespace map_format;
@@ -73,18 +80,17 @@ void write_section(ReplacedFile& file, Section section, std::span<const std::uin
   file.write(tail.bytes());
 }
 
-void put_head(ByteWriter& out, const SavedMap& map) {
-  const Rig& rig = map.rig;
+void put_head(ByteWriter& out, const Rig& rig, const GraphSnapshot& graph) {
   out.put(rig.kind);
   const PinholeCamera& c = rig.camera;
   for (const double value : {c.fx, c.fy, c.cx, c.cy}) out.put(value);
   out.put(std::int32_t{c.width});
   out.put(std::int32_t{c.height});
   for (const double value : {rig.baseline, rig.depth_unit, rig.depth_min, rig.depth_max}) out.put(value);
-  out.put(map.graph.version());
-  out.put(map.graph.reference());
-  out.put(static_cast<std::uint32_t>(map.graph.keyframe_count()));
-  out.put(static_cast<std::uint32_t>(map.graph.point_count()));
+  out.put(graph.version());
+  out.put(graph.reference());
+  out.put(static_cast<std::uint32_t>(graph.keyframe_count()));
+  out.put(static_cast<std::uint32_t>(graph.point_count()));
 }
 
 /// Edges are written by their newer keyframe.
@@ -130,9 +136,38 @@ void put_point(ByteWriter& out, const MapPoint& point) {
   out.put_bytes(point.appearance->pixels);
 }
 
+void put_place(ByteWriter& out, KeyframeId id, const PlaceAppearance& place) {
+  out.put(id);
+  out.put(static_cast<std::uint32_t>(place.corners.size()));
+  for (std::size_t n = 0; n < place.corners.size(); ++n) {
+    const DescribedCorner& corner = place.corners[n];
+    out.put_vector(corner.uv);
+    out.put(n < place.z.size() ? place.z[n].z() : std::numeric_limits<float>::quiet_NaN());
+    out.put(corner.level);
+    out.put(corner.angle);
+    for (const std::uint64_t bits : corner.descriptor.bits) out.put(bits);
+  }
+}
+
+/// Writes entries [0, count) in sections of up to `per_section`.
+/// @param put  puts entry i into a ByteWriter; false: there is nothing to put
+template <class Put>
+void write_slices(ReplacedFile& file, Section section, std::uint32_t count, std::uint32_t per_section,
+                  Put&& put) {
+  ByteWriter bytes;
+  std::uint32_t entries = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    entries += put(bytes, i) ? 1 : 0;
+    if (entries == 0 || (entries < per_section && i + 1 < count)) continue;
+    write_section(file, section, bytes.bytes());
+    bytes.clear();
+    entries = 0;
+  }
+}
+
 }  // namespace
 
-void save_map(const fs::path& file, const SavedMap& map) {
+void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph, const PlaceBook& places) {
   ReplacedFile out(file);
   ByteWriter bytes;
   for (const char c : kMagic) bytes.put(c);
@@ -140,25 +175,26 @@ void save_map(const fs::path& file, const SavedMap& map) {
   bytes.put(std::uint8_t{0});
   out.write(bytes.bytes());
   bytes.clear();
-  put_head(bytes, map);
+  put_head(bytes, rig, graph);
   write_section(out, Section::kHead, bytes.bytes());
-  const auto keyframes = static_cast<std::uint32_t>(map.graph.keyframe_count());
-  for (std::uint32_t first = 0; first < keyframes; first += kKeyframesPerSection) {
-    bytes.clear();
-    for (std::uint32_t k = first; k < std::min(keyframes, first + kKeyframesPerSection); ++k) {
-      put_keyframe(bytes, map.graph.keyframe(KeyframeId{k}));
-    }
-    write_section(out, Section::kKeyframes, bytes.bytes());
-  }
-  const auto points = static_cast<std::uint32_t>(map.graph.point_count());
-  for (std::uint32_t first = 0; first < points; first += kPointsPerSection) {
-    bytes.clear();
-    for (std::uint32_t p = first; p < std::min(points, first + kPointsPerSection); ++p) {
-      put_point(bytes, map.graph.point(PointId{p}));
-    }
-    write_section(out, Section::kPoints, bytes.bytes());
-  }
-  if (!map.places.empty()) write_section(out, Section::kPlaces, map.places);
+  write_slices(out, Section::kKeyframes, static_cast<std::uint32_t>(graph.keyframe_count()),
+               kKeyframesPerSection, [&](ByteWriter& to, std::uint32_t k) {
+                 put_keyframe(to, graph.keyframe(KeyframeId{k}));
+                 return true;
+               });
+  write_slices(out, Section::kPoints, static_cast<std::uint32_t>(graph.point_count()), kPointsPerSection,
+               [&](ByteWriter& to, std::uint32_t p) {
+                 put_point(to, graph.point(PointId{p}));
+                 return true;
+               });
+  const std::size_t described = std::min(places.size(), graph.keyframe_count());
+  write_slices(out, Section::kPlaces, static_cast<std::uint32_t>(described), kPlacesPerSection,
+               [&](ByteWriter& to, std::uint32_t k) {
+                 const PlaceAppearance* place = places.find(KeyframeId{k});
+                 if (place == nullptr || graph.keyframe(KeyframeId{k}).culled()) return false;
+                 put_place(to, KeyframeId{k}, *place);
+                 return true;
+               });
   write_section(out, Section::kEnd, {});
   out.commit();
 }

@@ -6,17 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "geometry/types.hpp"
+#include "graph/place_appearance.hpp"
 #include "imaging/image_pyramid.hpp"
 
 namespace twofold {
-
-/// 256 brightness comparisons around a corner.
-struct BinaryDescriptor {
-  std::array<std::uint64_t, 4> bits{};
-
-  friend bool operator==(const BinaryDescriptor&, const BinaryDescriptor&) = default;
-};
 
 /// Number of bits that differ, in [0, 256].
 [[nodiscard]] inline int hamming_distance(const BinaryDescriptor& a, const BinaryDescriptor& b) {
@@ -24,14 +17,6 @@ struct BinaryDescriptor {
   for (std::size_t i = 0; i < a.bits.size(); ++i) distance += std::popcount(a.bits[i] ^ b.bits[i]);
   return distance;
 }
-
-/// A corner as a place is recognised by.
-struct DescribedCorner {
-  Eigen::Vector2f uv{0, 0};  ///< level-0 pixel
-  std::uint8_t level = 0;    ///< pyramid level it was found and described on
-  float angle = 0;           ///< direction of the intensity centroid, [0, 2 pi) clockwise from the u axis
-  BinaryDescriptor descriptor;
-};
 
 /// Pixels a corner must stay away from the border of its level to be described.
 inline constexpr int kDescriptorBorder = 20;

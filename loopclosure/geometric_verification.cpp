@@ -10,6 +10,7 @@
 #include "geometry/absolute_orientation.hpp"
 #include "geometry/ransac.hpp"
 #include "imaging/guided_search.hpp"
+#include "loopclosure/binary_descriptor.hpp"
 
 namespace twofold {
 namespace {
@@ -39,7 +40,7 @@ struct Nearest {
   }
 };
 
-std::vector<Match> match_descriptors(const PlaceView& a, const PlaceView& b,
+std::vector<Match> match_descriptors(const PlaceAppearance& a, const PlaceAppearance& b,
                                      const VerificationOptions& options) {
   std::vector<Nearest> of_a(a.corners.size()), of_b(b.corners.size());
   for (std::size_t i = 0; i < a.corners.size(); ++i) {
@@ -75,7 +76,8 @@ class RigidEstimator {
   using Model = SE3;
   static constexpr int kSampleSize = 3;
 
-  RigidEstimator(const Rig& rig, const PlaceView& a, const PlaceView& b, const std::vector<Match>& matches)
+  RigidEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
+                 const std::vector<Match>& matches)
       : rig_(rig), a_(a), b_(b), matches_(matches) {
     for (const Match& match : matches) {
       x_a_.push_back(rig.unproject(z_a(match).cast<double>()));
@@ -110,13 +112,13 @@ class RigidEstimator {
   [[nodiscard]] const Eigen::Vector3f& z_b(const Match& m) const {
     return b_.z[static_cast<std::size_t>(m.b)];
   }
-  static int level(const PlaceView& view, int corner) {
+  static int level(const PlaceAppearance& view, int corner) {
     return view.corners[static_cast<std::size_t>(corner)].level;
   }
 
   const Rig& rig_;
-  const PlaceView& a_;
-  const PlaceView& b_;
+  const PlaceAppearance& a_;
+  const PlaceAppearance& b_;
   const std::vector<Match>& matches_;
   std::vector<Vector3> x_a_, x_b_;
 };
@@ -124,8 +126,8 @@ class RigidEstimator {
 /// Best partner in b, near to where T_b_a says, of each corner of a that has depth; a corner of b serves
 /// once.
 /// @param expected  counts the corners of a that should be visible in b
-std::vector<Match> match_guided(const Rig& rig, const PlaceView& a, const PlaceView& b, const SE3& T_b_a,
-                                const VerificationOptions& options, int& expected) {
+std::vector<Match> match_guided(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
+                                const SE3& T_b_a, const VerificationOptions& options, int& expected) {
   std::vector<Nearest> of_b(b.corners.size());
   expected = 0;
   for (std::size_t i = 0; i < a.corners.size(); ++i) {
@@ -151,8 +153,8 @@ std::vector<Match> match_guided(const Rig& rig, const PlaceView& a, const PlaceV
   return matches;
 }
 
-SE3 refine(const Rig& rig, const PlaceView& a, const PlaceView& b, const std::vector<Match>& matches,
-           const SE3& T_b_a) {
+SE3 refine(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
+           const std::vector<Match>& matches, const SE3& T_b_a) {
   std::vector<MotionObservation> observations;
   observations.reserve(matches.size());
   for (const Match& match : matches) {
@@ -170,7 +172,7 @@ SE3 refine(const Rig& rig, const PlaceView& a, const PlaceView& b, const std::ve
   return result.converged ? result.T_c_ref : T_b_a;
 }
 
-std::vector<Match> keep_inliers(const Rig& rig, const PlaceView& a, const PlaceView& b,
+std::vector<Match> keep_inliers(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                                 const std::vector<Match>& matches, const SE3& T_b_a,
                                 const VerificationOptions& options) {
   std::vector<Match> kept;
@@ -188,8 +190,8 @@ std::vector<Match> keep_inliers(const Rig& rig, const PlaceView& a, const PlaceV
 }
 
 /// At least Theta / 2 inliers in the upper, lower, left and right half of both images (6.4.1).
-bool spread_over(const Rig& rig, const PlaceView& view, const std::vector<Match>& matches, int Match::*side,
-                 int theta) {
+bool spread_over(const Rig& rig, const PlaceAppearance& view, const std::vector<Match>& matches,
+                 int Match::*side, int theta) {
   int left = 0, upper = 0;
   for (const Match& match : matches) {
     const Eigen::Vector2f& uv = view.corners[static_cast<std::size_t>(match.*side)].uv;
@@ -210,7 +212,7 @@ std::string VerificationOptions::invalid_reason() const {
   return "";
 }
 
-std::optional<VerifiedPlace> verify_place(const Rig& rig, const PlaceView& a, const PlaceView& b,
+std::optional<VerifiedPlace> verify_place(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                                           const VerificationOptions& options, VerificationReport* report) {
   VerificationReport unwanted;
   VerificationReport& r = report != nullptr ? *report : unwanted;

@@ -3,8 +3,9 @@
 #include <optional>
 #include <string>
 
+#include "camera/rig.hpp"
 #include "geometry/se3.hpp"
-#include "loopclosure/place_view.hpp"
+#include "graph/place_appearance.hpp"
 
 namespace twofold {
 
@@ -44,8 +45,8 @@ struct VerificationReport {
 /// measured where they arise, in pixels; guided matching with the pose found; robust refinement; at least
 /// Theta inliers, spread over both halves of the image in each direction, as metric closures must be (6.4.1).
 /// Deterministic.
-[[nodiscard]] std::optional<VerifiedPlace> verify_place(const Rig& rig, const PlaceView& a,
-                                                        const PlaceView& b,
+[[nodiscard]] std::optional<VerifiedPlace> verify_place(const Rig& rig, const PlaceAppearance& a,
+                                                        const PlaceAppearance& b,
                                                         const VerificationOptions& options,
                                                         VerificationReport* report = nullptr);
 

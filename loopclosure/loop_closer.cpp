@@ -9,7 +9,7 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kCheckedForCulling = 64;  // views a step
+constexpr std::size_t kCheckedForCulling = 64;  // places a step
 
 LoopCloserOptions validated(const LoopCloserOptions& options) {
   if (const std::string reason = options.invalid_reason(); !reason.empty()) {
@@ -39,6 +39,17 @@ LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabul
       describer_(rig, options.corners),
       recogniser_(vocabulary_->word_count(), options.recogniser),
       refinement_(rig, options.refinement) {}
+
+void LoopCloser::adopt(const PlaceBook& places) {
+  places_ = places;
+  bags_.assign(places.size(), {});
+  for (std::uint32_t k = 0; k < places.size(); ++k) {
+    const PlaceAppearance* place = places.find(KeyframeId{k});
+    if (place == nullptr) continue;
+    bags_[k] = vocabulary_->bag(place->corners);
+    recogniser_.add(KeyframeId{k}, bags_[k]);
+  }
+}
 
 std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
   report_ = {};
@@ -78,7 +89,7 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
 std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& view,
                                                  const FrameImages& images, const GraphSnapshot& graph) {
   if (!graph.contains(k) || graph.keyframe(k).culled()) return std::nullopt;
-  const auto place = verify_place(rig_, *views_[index(k)], view, options_.verification);
+  const auto place = verify_place(rig_, *places_.find(k), view, options_.verification);
   if (!place) return std::nullopt;
   RefinedPlace refined;
   switch (refinement_.refine(graph, k, images, place->T_b_a, refined)) {
@@ -94,26 +105,28 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
 
 /// How much this scene's neighbouring views look alike; 0 at the start of a map.
 double LoopCloser::likeness_with_previous(KeyframeId id, const BagOfWords& bag) const {
-  if (previous_ == kNoKeyframe || previous_ >= id || !views_[index(previous_)]) return 0;
-  return bag_score(bag, views_[index(previous_)]->bag);
+  if (previous_ == kNoKeyframe || previous_ >= id || places_.find(previous_) == nullptr) return 0;
+  return bag_score(bag, bags_[index(previous_)]);
 }
 
 void LoopCloser::remember(KeyframeId id, PlaceView view) {
   recogniser_.add(id, view.bag);
-  if (views_.size() <= index(id)) views_.resize(index(id) + 1);
-  views_[index(id)] = std::make_unique<const PlaceView>(std::move(view));
+  if (bags_.size() <= index(id)) bags_.resize(index(id) + 1);
+  bags_[index(id)] = std::move(view.bag);
+  places_.set(id, std::move(view));
   previous_ = id;
 }
 
-/// A bounded number of views is looked at each step, so that memory follows the map and no step is long.
+/// A bounded number of places is looked at each step, so that memory follows the map and no step is long.
 void LoopCloser::forget_culled(const GraphSnapshot& graph) {
-  for (std::size_t n = 0; n < std::min(kCheckedForCulling, views_.size()); ++n) {
-    next_checked_ = next_checked_ + 1 < views_.size() ? next_checked_ + 1 : 0;
+  for (std::size_t n = 0; n < std::min(kCheckedForCulling, places_.size()); ++n) {
+    next_checked_ = next_checked_ + 1 < places_.size() ? next_checked_ + 1 : 0;
     const KeyframeId id{static_cast<std::uint32_t>(next_checked_)};
-    auto& view = views_[next_checked_];
-    if (!view || id == previous_ || !graph.contains(id) || !graph.keyframe(id).culled()) continue;
-    recogniser_.remove(id, view->bag);
-    view.reset();
+    if (places_.find(id) == nullptr || id == previous_) continue;
+    if (!graph.contains(id) || !graph.keyframe(id).culled()) continue;
+    recogniser_.remove(id, bags_[next_checked_]);
+    bags_[next_checked_] = {};
+    places_.forget(id);
   }
 }
 

@@ -6,9 +6,11 @@
 
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
+#include "graph/place_book.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/map_refinement.hpp"
 #include "loopclosure/place_recogniser.hpp"
+#include "loopclosure/place_view.hpp"
 
 namespace twofold {
 
@@ -47,6 +49,10 @@ class LoopCloser {
  public:
   LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
 
+  /// Knows the places of a loaded map from now on. Their words are found anew, so that a map does not depend
+  /// on the vocabulary it was made with. To be called before the first step.
+  void adopt(const PlaceBook& places);
+
   /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be
   /// called in the order of keyframe ids; ids may be left out.
   [[nodiscard]] std::optional<LoopConstraint> step(const KeyframeProposal& keyframe,
@@ -55,6 +61,9 @@ class LoopCloser {
   /// Place of a view of a lost camera, from its images alone.
   [[nodiscard]] std::optional<Relocalisation> relocalise(const FrameImages& images,
                                                          const GraphSnapshot& graph);
+
+  /// What is remembered, to be saved with the map or published.
+  [[nodiscard]] const PlaceBook& places() const { return places_; }
 
   [[nodiscard]] const LoopCloserReport& last_report() const { return report_; }
 
@@ -72,9 +81,10 @@ class LoopCloser {
   PlaceDescriber describer_;
   PlaceRecogniser recogniser_;
   MapRefinement refinement_;
-  std::vector<std::unique_ptr<const PlaceView>> views_;  // by keyframe; null: never described, or culled
+  PlaceBook places_;
+  std::vector<BagOfWords> bags_;  // by keyframe; of those that have a place
   KeyframeId previous_ = kNoKeyframe;
-  std::size_t next_checked_ = 0;  // for culling: views are looked through in turn
+  std::size_t next_checked_ = 0;  // for culling: places are looked through in turn
   LoopCloserReport report_;
 };
 

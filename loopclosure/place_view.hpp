@@ -1,18 +1,14 @@
 #pragma once
 
-#include <vector>
-
 #include "camera/rig.hpp"
+#include "graph/place_appearance.hpp"
 #include "loopclosure/corner_selection.hpp"
 #include "loopclosure/vocabulary.hpp"
 
 namespace twofold {
 
-/// What the loop closer keeps of a keyframe: how its place looks, and where its corners are.
-struct PlaceView {
-  std::vector<DescribedCorner> corners;
-  /// In step with corners: (u_l, v_l, u_r) level-0 pixels; u_r is Rig::kNoRight where no depth is known.
-  std::vector<Eigen::Vector3f> z;
+/// A described image: how the place looks, and its words.
+struct PlaceView : PlaceAppearance {
   BagOfWords bag;
 };
 

@@ -16,6 +16,8 @@ const char* describe(LostCause cause) {
       return "found points do not agree on a pose";
     case LostCause::kNoKeyframeBuffer:
       return "no free buffer to start the map with";
+    case LostCause::kUnplaced:
+      return "no place of the loaded map was recognised yet";
   }
   return "";
 }

@@ -17,7 +17,8 @@ enum class LostCause : std::uint8_t {
   kTooFewMatches,        ///< points should be visible but were not found (blur, occlusion, exposure, wrong
                          ///< prediction)
   kInconsistentMatches,  ///< found points do not agree on a pose
-  kNoKeyframeBuffer      ///< the map could not be started: no free proposal
+  kNoKeyframeBuffer,     ///< the map could not be started: no free proposal
+  kUnplaced              ///< in a loaded map, of which no place was recognised yet
 };
 [[nodiscard]] const char* describe(LostCause cause);
 

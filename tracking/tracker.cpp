@@ -55,6 +55,10 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   ++frames_;
   load_images(frame);
   clock.lap(TrackStage::kPyramid);
+  if (unplaced_ && reference_ == kNoKeyframe) {
+    give_up_frame(LostCause::kUnplaced, result);
+    return result;
+  }
   if (reference_ == kNoKeyframe) {
     if (start_map(frame, free_proposal, result)) remember_frame(SE3());
     clock.lap(TrackStage::kKeyframe);
@@ -82,8 +86,10 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
       T_prev_ref_ = T_prev_ref_before;
       candidates_stale_ = true;
     }
+    if (unplaced_) reference_ = kNoKeyframe;  // it was not that place; nothing is known again
     return result;
   }
+  unplaced_ = false;
 
   if (free_proposal != nullptr && keyframe_due(result, result.T_c_ref)) {
     propose_keyframe(frame, graph, *free_proposal, result);
@@ -92,6 +98,13 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   if (!result.proposed) revisit_reference(graph);
   clock.lap(TrackStage::kKeyframe);
   return result;
+}
+
+void Tracker::continue_in(const GraphSnapshot& graph) {
+  if (graph.keyframe_count() == 0) return;
+  next_keyframe_ = static_cast<std::uint32_t>(graph.keyframe_count());
+  next_point_ = static_cast<std::uint32_t>(graph.point_count());
+  unplaced_ = true;
 }
 
 void Tracker::load_images(const Frame& frame) {
@@ -175,6 +188,7 @@ bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackRes
 /// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from constant velocity, then from rest.
 SE3 Tracker::align_to_previous(TrackResult& result) {
   const SE3 start = lost_frames_ > 0 ? SE3() : T_cur_prev_;
+  if (previous_points_.empty()) return start * T_prev_ref_;
   DenseAlignmentResult best =
       alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, start);
   if (!best.converged || best.rms > 0.5 * options_.max_alignment_rms) {
@@ -269,13 +283,14 @@ void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
 }
 
 void Tracker::relocalise(KeyframeId keyframe, const SE3& T_c_k, const GraphSnapshot& graph) {
-  if (lost_frames_ == 0 || reference_ == kNoKeyframe || !graph.contains(keyframe)) return;
+  if (lost_frames_ == 0 || !graph.contains(keyframe) || (reference_ == kNoKeyframe && !unplaced_)) return;
   SE3 T_c_ref = T_c_k;
   for (; graph.keyframe(keyframe).culled(); keyframe = graph.keyframe(keyframe).heir) {
     T_c_ref = T_c_ref * graph.keyframe(keyframe).T_this_heir;
   }
   reference_ = keyframe;
   T_prev_ref_ = T_c_ref;
+  if (unplaced_) keyframe_depth_ = graph.keyframe(keyframe).median_depth;
   previous_points_.clear();  // there is no image at that pose to align with: guided search starts from it
   candidates_stale_ = true;
 }

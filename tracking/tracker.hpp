@@ -36,6 +36,12 @@ class Tracker {
   ///                       Filled if and only if the result says `proposed`.
   TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal);
 
+  /// Goes on with a map made before: the numbers of keyframes and points continue its own, and the camera is
+  /// lost until `relocalise` says where in it the camera is. To be called before the first step.
+  void continue_in(const GraphSnapshot& graph);
+  /// The camera was never placed in the map it was to continue in.
+  [[nodiscard]] bool unplaced() const { return unplaced_; }
+
   /// Pose of the last tracked frame in the map as `graph`, that of the last step, has it.
   [[nodiscard]] SE3 T_c_w(const GraphSnapshot& graph) const {
     return T_prev_ref_ * pose_in_world(graph, local_, reference_);
@@ -98,6 +104,7 @@ class Tracker {
   PointStarter starter_;
 
   KeyframeId reference_ = kNoKeyframe;
+  bool unplaced_ = false;
   SE3 T_prev_ref_;  ///< last good pose
   SE3 T_cur_prev_;  ///< last good motion, the prediction of the next
   std::uint64_t graph_version_ = 0;

@@ -7,7 +7,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/graph_export.hpp"
-#include "graph/map_file.hpp"
+#include "apps/twofold/map_options.hpp"
 #include "io/io_error.hpp"
 #include "io/output_file.hpp"
 #include "io/ply.hpp"
@@ -15,14 +15,6 @@
 
 namespace twofold {
 namespace {
-
-SavedMap open_map(const std::string& file) {
-  try {
-    return load_map(file);
-  } catch (const MapFileError& error) {
-    throw IoError(error.what());
-  }
-}
 
 const char* name_of(SensorKind kind) {
   return kind == SensorKind::kStereo ? "stereo" : kind == SensorKind::kRgbd ? "rgbd" : "mono";
@@ -43,14 +35,20 @@ void print_info(const std::string& file) {
     }
   }
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) points += graph.point(PointId{p}).alive() ? 1 : 0;
+  std::size_t places = 0, corners = 0;
+  for (std::uint32_t k = 0; k < map.places.size(); ++k) {
+    const PlaceAppearance* place = map.places.find(KeyframeId{k});
+    places += place != nullptr ? 1 : 0;
+    corners += place != nullptr ? place->corners.size() : 0;
+  }
   const PinholeCamera& camera = map.rig.camera;
   fmt::print("sensor        {} {}x{}, f {:.2f} {:.2f}, c {:.2f} {:.2f}, baseline {:.4f} m\n",
              name_of(map.rig.kind), camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
              map.rig.baseline);
   fmt::print("keyframes     {} ({} culled)\npoints        {} ({} culled)\nobservations  {}\n", keyframes,
              graph.keyframe_count() - keyframes, points, graph.point_count() - points, observations);
-  fmt::print("edges         {} ({} marginalised)\nplaces        {} bytes\nfile          {} bytes\n", edges,
-             marginalised, map.places.size(), std::filesystem::file_size(file));
+  fmt::print("edges         {} ({} marginalised)\nplaces        {} ({} corners)\nfile          {} bytes\n",
+             edges, marginalised, places, corners, std::filesystem::file_size(file));
 }
 
 struct ExportArguments {

@@ -18,6 +18,7 @@
 #include "io/plot.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/place_recogniser.hpp"
+#include "loopclosure/place_view.hpp"
 
 namespace twofold {
 namespace {

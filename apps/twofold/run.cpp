@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/map_options.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "engine/engine.hpp"
-#include "graph/map_file.hpp"
 #include "io/io_error.hpp"
 #include "io/open_source.hpp"
 #include "io/output_file.hpp"
@@ -32,8 +32,8 @@ struct RunArguments {
   std::string trace;
   std::string pin;
   std::string vocabulary;
-  std::string save_map;
   std::string record;
+  MapArguments map;
   bool no_metric_loops = false;
   bool no_places = false;
   bool deterministic = false;
@@ -140,7 +140,8 @@ Schedule load_schedule(const std::string& file) {
 }
 
 int run(const RunArguments& arguments) {
-  const EngineOptions options = engine_options(arguments);
+  EngineOptions options = engine_options(arguments);
+  apply_map_options(arguments.map, options);
   std::optional<Schedule> schedule;
   if (!arguments.replay_schedule.empty()) schedule = load_schedule(arguments.replay_schedule);
   prepare_output_folder(arguments.out);
@@ -152,6 +153,7 @@ int run(const RunArguments& arguments) {
   if (source->rig().kind == SensorKind::kMono) {
     throw IoError(arguments.source, "has a single camera without depth; stereo or RGB-D is needed");
   }
+  expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
   if (!arguments.record.empty()) {
     source = std::make_unique<RecordedSource>(std::move(source), arguments.record);
   }
@@ -175,10 +177,10 @@ int run(const RunArguments& arguments) {
   const RunResult result = schedule ? engine.replay(feed, *schedule, interrupted, progress)
                                     : engine.run(feed, interrupted, progress);
   line.end();
-  if (!arguments.save_map.empty()) save_map(arguments.save_map, {source->rig(), result.graph, {}});
+  if (!arguments.map.save.empty()) save_map(arguments.map.save, source->rig(), result.graph, result.places);
   write_run_output(arguments.out, arguments.source, *source, options, result);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
-  print_summary(arguments.out, result);
+  print_summary(arguments.out, options, result);
   const SourceReport captured = source->report();
   for (const std::string& text : captured.summary) fmt::print("{}\n", text);
   for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
@@ -187,6 +189,8 @@ int run(const RunArguments& arguments) {
   const bool any_tracked =
       std::any_of(result.frames.begin(), result.frames.end(),
                   [](const FrameRecord& record) { return record.state == FrameState::kTracked; });
+  if (!any_tracked && options.map)
+    throw std::runtime_error(arguments.source + ": no place of the loaded map was recognised");
   if (!any_tracked) throw std::runtime_error(arguments.source + ": no frame could be tracked");
   return kOk;
 }
@@ -211,9 +215,9 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command->add_option("--windows", arguments->windows, "Keyframes in the inner and outer window")
       ->capture_default_str();
   command->add_option("--vocabulary", arguments->vocabulary, "Vocabulary file instead of the built-in one");
-  command->add_option("--save-map", arguments->save_map, "Write the map to this file (.tfm) at the end");
   command->add_option("--record", arguments->record,
                       "Record the frames into this folder: the run can be repeated from it and schedule.log");
+  add_map_options(*command, arguments->map);
   command->add_flag("--no-places", arguments->no_places, "Recognise no places: no large loops are closed");
   command->add_flag("--no-metric-loops", arguments->no_metric_loops,
                     "Close no small loops: for experiments with drift");

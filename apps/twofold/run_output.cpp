@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/graph_export.hpp"
+#include "apps/twofold/map_options.hpp"
 #include "io/evaluation.hpp"
 #include "io/io_error.hpp"
 #include "io/output_file.hpp"
@@ -96,6 +97,25 @@ Json corrections_json(const RunResult& result) {
   return corrections;
 }
 
+/// What became of the map the run started with.
+Json loaded_map_json(const EngineOptions& options, const RunResult& result) {
+  if (!options.map) return nullptr;
+  Json json{{"keyframes", options.map->graph.keyframe_count()},
+            {"localise_only", options.localise_only},
+            {"recognised", false}};
+  if (const auto frame = recognised_at(options, result)) {
+    json["recognised"] = true;
+    json["recognised_at_frame"] = *frame;
+  }
+  return json;
+}
+
+Json checkpoints_json(const CheckpointReport& report) {
+  return {{"saved", report.saved},
+          {"longest_ms", static_cast<double>(report.longest_ns) * 1e-6},
+          {"error", report.error}};
+}
+
 Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result) {
   const auto count = [&](FrameState state) {
     return std::count_if(result.frames.begin(), result.frames.end(),
@@ -119,6 +139,8 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"dropped", count(FrameState::kDropped)},
             {"keyframes", keyframes},
             {"points", points},
+            {"loaded_map", loaded_map_json(options, result)},
+            {"checkpoints", checkpoints_json(result.checkpoints)},
             {"mapper_rounds", result.rounds.size()},
             {"metric_loop_edges", metric_loops},
             {"closed_loops", loops_json(result)},
@@ -199,7 +221,8 @@ void write_trace(const std::filesystem::path& file, const RunResult& result) {
   if (!result.trace || !result.trace->write(out)) throw IoError(file.string(), "the trace cannot be written");
 }
 
-void print_summary(const std::filesystem::path& folder, const RunResult& result) {
+void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
+                   const RunResult& result) {
   const auto count = [&](FrameState state) {
     return std::count_if(result.frames.begin(), result.frames.end(),
                          [&](const auto& r) { return r.state == state; });
@@ -211,6 +234,16 @@ void print_summary(const std::filesystem::path& folder, const RunResult& result)
              result.interrupted ? ", interrupted" : "");
   fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
              result.graph.keyframe_count(), result.rounds.size(), metric_loops, result.loops.size());
+  if (options.map) {
+    const auto frame = recognised_at(options, result);
+    fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),
+               frame ? fmt::format("recognised at frame {}", *frame)
+                     : std::string("no place of it was recognised: poses are not in its frame"));
+  }
+  if (const CheckpointReport& c = result.checkpoints; options.checkpoint.period > 0) {
+    fmt::print("checkpoints {} saved, the slowest in {:.0f} ms{}{}\n", c.saved,
+               static_cast<double>(c.longest_ns) * 1e-6, c.error.empty() ? "" : "; one failed: ", c.error);
+  }
   for (const StageRecorder& recorder : result.times) {
     if (recorder.thread_name() == "loop closer") continue;
     const LatencyHistogram& h = recorder.histogram(0);

@@ -19,6 +19,7 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
 void write_trace(const std::filesystem::path& file, const RunResult& result);
 
 /// What a person wants to know, on standard output.
-void print_summary(const std::filesystem::path& folder, const RunResult& result);
+void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
+                   const RunResult& result);
 
 }  // namespace twofold

@@ -62,7 +62,22 @@ inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
   map.rig.camera = {500, 501, 320, 240, 640, 480};
   map.rig.baseline = 0.11;
   map.graph = writer.publish();
-  map.places = {1, 2, 3, 4, 5};
+  for (int k = 0; k < keyframes; k += 2) {  // some were never described
+    const KeyframeId id{static_cast<std::uint32_t>(k)};
+    if (map.graph.keyframe(id).culled()) continue;
+    PlaceAppearance place;
+    for (int n = 0; n < 1 + k % 7; ++n) {
+      DescribedCorner corner;
+      corner.uv = {static_cast<float>(rng() % 640), static_cast<float>(rng() % 480)};
+      corner.level = static_cast<std::uint8_t>(rng() % 3);
+      corner.angle = 0.1F * static_cast<float>(rng() % 60);
+      for (std::uint64_t& bits : corner.descriptor.bits) bits = std::uint64_t{rng()} << 32 | rng();
+      place.corners.push_back(corner);
+      const float u_r = n % 3 == 0 ? std::numeric_limits<float>::quiet_NaN() : corner.uv.x() - 20;
+      place.z.emplace_back(corner.uv.x(), corner.uv.y(), u_r);
+    }
+    map.places.set(id, std::move(place));
+  }
   return map;
 }
 

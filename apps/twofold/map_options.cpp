@@ -1,0 +1,75 @@
+#include "apps/twofold/map_options.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "io/io_error.hpp"
+
+namespace twofold {
+namespace {
+
+void expect_sensible(const MapArguments& arguments, const EngineOptions& options) {
+  if (arguments.localise_only && arguments.load.empty()) throw IoError("--localise-only", "needs --load-map");
+  if (arguments.localise_only && !arguments.save.empty())
+    throw IoError("--localise-only", "changes no map: there is nothing for --save-map to write");
+  if (!(arguments.checkpoint >= 0))
+    throw IoError("--checkpoint", fmt::format("must be a number of seconds, is {}", arguments.checkpoint));
+  if (arguments.checkpoint > 0 && arguments.save.empty())
+    throw IoError("--checkpoint", "needs --save-map, the file to write to");
+  if (!arguments.load.empty() && !options.vocabulary)
+    throw IoError("--load-map", "needs places, by which the camera finds itself in the map");
+  const std::filesystem::path folder = std::filesystem::path(arguments.save).parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder))  // known now, not after an hour of mapping
+    throw IoError(arguments.save, "the folder is not there");
+}
+
+}  // namespace
+
+SavedMap open_map(const std::string& file) {
+  try {
+    return load_map(file);
+  } catch (const MapFileError& error) {
+    throw IoError(error.what());
+  }
+}
+
+void add_map_options(CLI::App& command, MapArguments& arguments) {
+  command.add_option("--save-map", arguments.save, "Write the map to this file (.tfm) at the end");
+  command.add_option("--checkpoint", arguments.checkpoint,
+                     "Seconds after which the map is written to it during the run, again and again");
+  command.add_option("--load-map", arguments.load,
+                     "Go on with the map in this file, once a place of it is recognised");
+  command.add_flag("--localise-only", arguments.localise_only,
+                   "Poses in the loaded map, which does not change");
+}
+
+void apply_map_options(const MapArguments& arguments, EngineOptions& options) {
+  expect_sensible(arguments, options);
+  options.localise_only = arguments.localise_only;
+  options.checkpoint = {arguments.save, arguments.checkpoint};
+  if (arguments.load.empty()) return;
+  auto map = std::make_shared<const SavedMap>(open_map(arguments.load));
+  if (map->places.size() == 0) {
+    throw IoError(arguments.load, "knows no places, so that no camera can find itself in it");
+  }
+  options.map = std::move(map);
+}
+
+void expect_rig_of_map(const MapArguments& arguments, const std::string& source, const Rig& rig,
+                       const EngineOptions& options) {
+  if (!options.map) return;
+  const std::string difference = rig_difference(rig, options.map->rig);
+  if (difference.empty()) return;
+  throw IoError(arguments.load, "made with another camera than that of " + source + ": " + difference);
+}
+
+std::optional<std::int64_t> recognised_at(const EngineOptions& options, const RunResult& result) {
+  const std::size_t loaded = options.map ? options.map->graph.keyframe_count() : 0;
+  for (const FrameRecord& record : result.frames) {
+    if (record.state == FrameState::kTracked && index(record.reference) < loaded) return record.frame_index;
+  }
+  return std::nullopt;
+}
+
+}  // namespace twofold

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <optional>
+#include <string>
+
+#include "engine/options.hpp"
+#include "engine/result.hpp"
+#include "graph/map_file.hpp"
+
+namespace twofold {
+
+/// Reads a map file; IoError names the section that is wrong.
+[[nodiscard]] SavedMap open_map(const std::string& file);
+
+/// What `twofold run` is told about map files.
+struct MapArguments {
+  std::string load;
+  std::string save;
+  double checkpoint = 0;  ///< [s], 0: none
+  bool localise_only = false;
+};
+
+void add_map_options(CLI::App& command, MapArguments& arguments);
+
+/// Loads the map and sets what the engine must know. Throws IoError for options that make no sense together,
+/// files that are no maps, and maps in which no camera can find itself.
+void apply_map_options(const MapArguments& arguments, EngineOptions& options);
+
+/// Throws IoError when `rig`, that of `source`, cannot be used in the loaded map.
+void expect_rig_of_map(const MapArguments& arguments, const std::string& source, const Rig& rig,
+                       const EngineOptions& options);
+
+/// Index of the first frame that was tracked in the loaded map.
+[[nodiscard]] std::optional<std::int64_t> recognised_at(const EngineOptions& options,
+                                                        const RunResult& result);
+
+}  // namespace twofold

@@ -1,0 +1,33 @@
+#pragma once
+
+#include "camera/rig.hpp"
+#include "engine/options.hpp"
+#include "engine/result.hpp"
+#include "graph/place_book.hpp"
+#include "graph/snapshot.hpp"
+
+namespace twofold {
+
+/// Saves published versions of a map to one file, whole each time (save_map). Used by one thread; the report
+/// is read after that was joined. A save that fails is reported, and the next one tries again: a full disk
+/// must not end a run.
+class CheckpointWriter {
+ public:
+  CheckpointWriter(const Rig& rig, CheckpointOptions options) : rig_(rig), options_(std::move(options)) {}
+
+  [[nodiscard]] bool enabled() const { return options_.period > 0; }
+  [[nodiscard]] std::int64_t period_ns() const { return static_cast<std::int64_t>(options_.period * 1e9); }
+
+  /// Reads both through these references only. Nothing is written when this version of the graph was saved
+  /// before.
+  void save(const GraphSnapshot& graph, const PlaceBook& places);
+
+  [[nodiscard]] const CheckpointReport& report() const { return report_; }
+
+ private:
+  Rig rig_;
+  CheckpointOptions options_;
+  CheckpointReport report_;
+};
+
+}  // namespace twofold

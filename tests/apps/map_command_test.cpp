@@ -1,0 +1,148 @@
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/apps/command.hpp"
+
+namespace twofold {
+namespace {
+
+const std::string kDesk = "'synthetic:desk?frames=60&width=320&height=240'";
+
+/// One mapped desk, saved once.
+class MapCommand : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new ScratchFolder;
+    made_ = new Outcome(run(*shared_, "run " + kDesk + " --deterministic --quiet --out '" +
+                                          (*shared_ / "made") + "' --save-map '" + map() + "'"));
+  }
+  static void TearDownTestSuite() {
+    delete shared_;
+    delete made_;
+  }
+  void SetUp() override { ASSERT_EQ(made_->exit_code, 0) << made_->err; }
+
+  static std::string map() { return *shared_ / "desk.tfm"; }
+  Outcome run_in_map(const std::string& options, const std::string& source = kDesk) const {
+    return run(folder_, "run " + source + " --quiet --out '" + (folder_ / "result") + "' --load-map '" +
+                            map() + "' " + options);
+  }
+  [[nodiscard]] nlohmann::json summary() const {
+    return nlohmann::json::parse(content(folder_ / "result/summary.json"));
+  }
+  Outcome check(const std::string& bytes) const {
+    const auto file = folder_.write("other.tfm", bytes);
+    return run(folder_, "map check '" + file.string() + "'");
+  }
+
+  static ScratchFolder* shared_;
+  static Outcome* made_;
+  ScratchFolder folder_;
+};
+ScratchFolder* MapCommand::shared_ = nullptr;
+Outcome* MapCommand::made_ = nullptr;
+
+TEST_F(MapCommand, InfoCheckAndExport) {
+  const Outcome info = run(folder_, "map info '" + map() + "'");
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_NE(info.out.find("stereo 320x240"), std::string::npos) << info.out;
+  EXPECT_NE(info.out.find("corners)"), std::string::npos) << info.out;
+  EXPECT_EQ(run(folder_, "map check '" + map() + "'").exit_code, 0);
+  const Outcome out = run(folder_, "map export '" + map() + "' --ply '" + (folder_ / "a.ply") + "' --tum '" +
+                                       (folder_ / "a.txt") + "' --g2o '" + (folder_ / "a.g2o") + "'");
+  ASSERT_EQ(out.exit_code, 0) << out.err;
+  for (const char* name : {"a.ply", "a.txt", "a.g2o"}) EXPECT_FALSE(content(folder_ / name).empty()) << name;
+}
+
+TEST_F(MapCommand, LocalisingLeavesTheMapAndSaysWhereItBegan) {
+  const std::string before = content(map());
+  const Outcome outcome = run_in_map("--deterministic --localise-only");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(content(map()), before);
+  EXPECT_NE(outcome.out.find("recognised at frame 1"), std::string::npos) << outcome.out;
+  const auto json = summary();
+  EXPECT_EQ(json["loaded_map"]["recognised_at_frame"], 1);
+  EXPECT_EQ(json["tracked"], 59);
+  EXPECT_EQ(json["mapper_rounds"], 0);
+}
+
+TEST_F(MapCommand, GoingOnTwiceGivesTheSameBytes) {
+  std::string maps[2];
+  for (int i = 0; i < 2; ++i) {
+    const std::string file = folder_ / ("next" + std::to_string(i) + ".tfm");
+    const Outcome outcome = run_in_map("--deterministic --checkpoint 0.7 --save-map '" + file + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(run(folder_, "map check '" + file + "'").exit_code, 0);
+    EXPECT_GT(summary()["checkpoints"]["saved"], 0);
+    maps[i] = content(file);
+  }
+  EXPECT_FALSE(maps[0].empty());
+  EXPECT_EQ(maps[0], maps[1]);
+}
+
+TEST_F(MapCommand, ElsewhereItSaysThatNothingWasRecognised) {
+  const Outcome outcome =
+      run_in_map("--deterministic --localise-only", "'synthetic:corridor?frames=6&width=320&height=240'");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("no place of the loaded map was recognised"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.out.find("no place of it was recognised"), std::string::npos) << outcome.out;
+  EXPECT_EQ(summary()["loaded_map"]["recognised"], false);
+}
+
+TEST_F(MapCommand, WrongUseIsOneLineAndExitCodeTwo) {
+  const std::string folder = folder_.path().string();
+  expect_bad_input(run_in_map("", "'synthetic:desk?frames=6'"), "images are 640x480, the map's are 320x240");
+  expect_bad_input(run_in_map("--no-places"), "--load-map: needs places");
+  expect_bad_input(run_in_map("--localise-only --save-map '" + folder + "/a.tfm'"), "--localise-only");
+  expect_bad_input(run_in_map("--checkpoint 5"), "--checkpoint: needs --save-map");
+  expect_bad_input(run_in_map("--checkpoint -1 --save-map '" + folder + "/a.tfm'"), "--checkpoint");
+  expect_bad_input(run_in_map("--save-map '" + folder + "/none/a.tfm'"), "the folder is not there");
+  expect_bad_input(run(folder_, "run " + kDesk + " --localise-only"), "needs --load-map");
+  expect_bad_input(run(folder_, "run " + kDesk + " --load-map '" + folder + "/no.tfm'"), "cannot be opened");
+}
+
+TEST_F(MapCommand, DamagedMapsNameTheirSection) {
+  const std::string good = content(map());
+  expect_bad_input(check(good.substr(0, good.size() / 2)), "section");
+  expect_bad_input(check(good.substr(0, good.size() - 3)), "section");
+  expect_bad_input(check(good + "more"), "bytes follow after the end section");
+  expect_bad_input(check(""), "too short to be a map");
+  std::string flipped = good;
+  flipped[good.size() - 300] ^= 0x10;  // in the last section but the end
+  expect_bad_input(check(flipped), "(places): checksum is wrong");
+  std::string oversized = good;
+  oversized[8 + 4 + 7] = 0x40;  // the head's length
+  expect_bad_input(check(oversized), "section 1 (head): reaches beyond the end of the file");
+  expect_bad_input(run(folder_, "run " + kDesk + " --load-map '" + (folder_ / "other.tfm") + "'"),
+                   "section 1 (head)");
+}
+
+TEST_F(MapCommand, KilledDuringCheckpointsAWholeMapIsLeft) {
+  const std::string file = folder_ / "killed.tfm";
+  const std::string command = std::string("exec ") + TWOFOLD_BINARY + " run " + kDesk +
+                              " --speed 1 --quiet --checkpoint 0.01 --save-map '" + file + "' --out '" +
+                              (folder_ / "killed") + "' >/dev/null 2>&1";
+  for (int trial = 0; trial < 5; ++trial) {
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+      _exit(127);
+    }
+    for (int waited = 0; trial == 0 && !std::filesystem::exists(file) && waited < 6000; ++waited)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::this_thread::sleep_for(std::chrono::milliseconds(137 * trial));
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    const Outcome outcome = run(folder_, "map check '" + file + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+}
+
+}  // namespace
+}  // namespace twofold
