@@ -42,8 +42,7 @@ struct BoxSums {
 /// patch's first entry at the first of them.
 #ifdef __AVX2__
 struct Correlator {
-  std::array<__m256i, kSize / 2>
-      pairs;  // picks the pixels (c, c+1), (c+1, c+2), ... of a row as 16-bit values
+  __m256i pairs[kSize / 2];  // pick the pixels (c, c+1), (c+1, c+2), ... of a row as 16-bit values
   std::array<std::int32_t, Patch::kArea / 2> weights;  // two neighbouring entries of the patch each
 
   explicit Correlator(const Patch& patch) {
@@ -53,7 +52,7 @@ struct Correlator {
         mask[2 * i] = static_cast<std::int8_t>(c + i / 2 + i % 2);
         mask[2 * i + 1] = -1;
       }
-      pairs[static_cast<std::size_t>(c / 2)] = _mm256_load_si256(reinterpret_cast<const __m256i*>(mask));
+      pairs[c / 2] = _mm256_load_si256(reinterpret_cast<const __m256i*>(mask));
     }
     std::memcpy(weights.data(), patch.rounded, sizeof weights);
   }
@@ -63,10 +62,10 @@ struct Correlator {
     for (std::size_t r = 0; r < kSize; ++r, first += stride) {
       const __m256i row =
           _mm256_broadcastsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(first)));
-      for (std::size_t c = 0; c < pairs.size(); ++c) {
+      for (std::size_t c = 0; c < kSize / 2; ++c) {
         const __m256i pixels = _mm256_shuffle_epi8(row, pairs[c]);
         total = _mm256_add_epi32(total,
-                                 _mm256_madd_epi16(pixels, _mm256_set1_epi32(weights[r * pairs.size() + c])));
+                                 _mm256_madd_epi16(pixels, _mm256_set1_epi32(weights[r * (kSize / 2) + c])));
       }
     }
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(correlation), total);
