@@ -11,11 +11,6 @@
 #include "graph/map_format.hpp"
 
 namespace twofold {
-
-void map_format::ByteWriter::put_bytes(std::span<const std::uint8_t> bytes) {
-  bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-}
-
 namespace {
 
 using namespace map_format;
