@@ -26,6 +26,7 @@ enum class CorrectionReason : std::uint8_t {
   kOptimisation,  ///< the double window, metric closures included
   kLoopClosure,   ///< a place was recognised
   kRelaxation,    ///< the whole pose graph was relaxed
+  kPartsJoined,   ///< the map part of the camera joined another one
 };
 [[nodiscard]] constexpr const char* describe(CorrectionReason reason) {
   switch (reason) {
@@ -37,6 +38,8 @@ enum class CorrectionReason : std::uint8_t {
       return "loop closure";
     case CorrectionReason::kRelaxation:
       return "relaxation";
+    case CorrectionReason::kPartsJoined:
+      return "map parts joined";
   }
   return "";
 }
@@ -55,16 +58,17 @@ struct FrameRecord {
   std::int64_t t_ns = 0;
   FrameState state = FrameState::kLost;
   KeyframeId reference = kNoKeyframe;
-  SE3 T_c_ref;                         ///< pose relative to the reference keyframe: survives map changes
-  SE3 T_c_w_causal;                    ///< pose in the map as it was known at the frame's own time
-  double tracked_share = 0;            ///< matched points over points searched, in [0, 1]
-  int inliers = 0;                     ///< measurements the pose rests on
-  std::uint64_t snapshot_version = 0;  ///< version of the map it was tracked against
-  bool keyframe = false;               ///< it was proposed as a keyframe and accepted
-  const char* cause = "";              ///< why it was lost; empty when tracked
-  PoseCorrection correction;           ///< of the map, seen first by this frame
-  std::int64_t tracking_ns = 0;        ///< time spent on it by the tracker
-  std::int64_t latency_ns = 0;         ///< from the moment it was due to the moment its pose was known
+  SE3 T_c_ref;                           ///< pose relative to the reference keyframe: survives map changes
+  SE3 T_c_w_causal;                      ///< pose in the map as it was known at the frame's own time
+  KeyframeId part_causal = kNoKeyframe;  ///< map part whose world frame that was, under its name of then
+  double tracked_share = 0;              ///< matched points over points searched, in [0, 1]
+  int inliers = 0;                       ///< measurements the pose rests on
+  std::uint64_t snapshot_version = 0;    ///< version of the map it was tracked against
+  bool keyframe = false;                 ///< it was proposed as a keyframe and accepted
+  const char* cause = "";                ///< why it was lost; empty when tracked
+  PoseCorrection correction;             ///< of the map, seen first by this frame
+  std::int64_t tracking_ns = 0;          ///< time spent on it by the tracker
+  std::int64_t latency_ns = 0;           ///< from the moment it was due to the moment its pose was known
 };
 
 /// One keyframe proposal turned into a map version by the mapper.
@@ -84,8 +88,9 @@ struct MapperRound {
 /// A loop that was closed by appearance.
 struct ClosedLoop {
   LoopConstraint constraint;
-  SE3 T_to_from_before;   ///< as the map had it: the difference is the drift
-  std::int64_t t_ns = 0;  ///< of the frame that came back
+  SE3 T_to_from_before;      ///< as the map had it: the difference is the drift
+  std::int64_t t_ns = 0;     ///< of the frame that came back
+  bool joins_parts = false;  ///< there is no drift then: the keyframes had different worlds
 };
 
 /// What became of EngineOptions::checkpoint.

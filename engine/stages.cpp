@@ -9,6 +9,18 @@ constexpr double kCorrectionAngle = 0.0035;  // [rad]
 // A frame or two are lost now and then; the tracker finds on by itself.
 constexpr int kLostBeforeAsking = 2;
 
+CorrectionReason reason_of(MapChange::Kind kind) {
+  switch (kind) {
+    case MapChange::Kind::kLoopClosure:
+      return CorrectionReason::kLoopClosure;
+    case MapChange::Kind::kRelaxation:
+      return CorrectionReason::kRelaxation;
+    case MapChange::Kind::kPartsJoined:
+      break;
+  }
+  return CorrectionReason::kPartsJoined;
+}
+
 }  // namespace
 
 TrackingStage::TrackingStage(const Rig& rig, const EngineOptions& options, Trace* trace)
@@ -35,7 +47,10 @@ bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, Proposa
   record.snapshot_version = graph.version();
   record.reference = result.reference;
   record.T_c_ref = result.T_c_ref;
-  record.T_c_w_causal = record.state == FrameState::kTracked ? tracker_.T_c_w(graph) : SE3();
+  if (record.state == FrameState::kTracked) {
+    record.T_c_w_causal = tracker_.T_c_w(graph);
+    record.part_causal = tracker_.part(graph);
+  }
   announce_correction(graph, record);
   if (record.state == FrameState::kTracked) last_ = record;
   record.tracked_share = result.tracked_share();
@@ -64,16 +79,18 @@ void TrackingStage::announce_correction(const GraphSnapshot& graph, FrameRecord&
   const MapChange& jump = graph.last_jump();
   record.correction.reason = CorrectionReason::kOptimisation;
   if (jump.version > last_.snapshot_version) {
-    record.correction.reason = jump.kind == MapChange::Kind::kLoopClosure ? CorrectionReason::kLoopClosure
-                                                                          : CorrectionReason::kRelaxation;
+    record.correction.reason = reason_of(jump.kind);
   }
   record.correction.T_c_w_before = last_.T_c_w_causal;
   record.correction.T_c_w_after = T_c_w;
 }
 
 void TrackingStage::proposal_rejected(FrameRecord& record) {
-  tracker_.proposal_rejected();
   record.keyframe = false;
+  if (tracker_.proposal_rejected()) return;
+  record.state = FrameState::kLost;
+  record.cause = describe(LostCause::kNoKeyframeBuffer);
+  last_ = record;
 }
 
 bool TrackingStage::wants_relocalisation() const {
@@ -153,7 +170,9 @@ std::span<LoopMessage> LoopClosingStage::step(const KeyframeProposal& keyframe, 
   const ScopedStage timed(times_, place_stage_);
   if (const auto loop = closer_->step(keyframe, graph)) {
     messages_.emplace_back(*loop);
-    loops_.push_back({*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns});
+    const bool joins = graph.keyframe(loop->from).part != graph.keyframe(loop->to).part;
+    loops_.push_back(
+        {*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins});
     unrelaxed_ = loop;
   }
   return messages_;

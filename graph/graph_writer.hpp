@@ -28,6 +28,8 @@ class GraphWriter {
   void add_point(PointId id, MapPoint point);
 
   void set_pose(KeyframeId id, const SE3& T_k_w) { graph_.keyframes_.mutate(index(id)).T_k_w = T_k_w; }
+  /// Moves the keyframe to another part, whose world frame T_k_w is then of.
+  void set_part(KeyframeId id, KeyframeId part) { graph_.keyframes_.mutate(index(id)).part = part; }
   void set_median_depth(KeyframeId id, double depth) {
     graph_.keyframes_.mutate(index(id)).median_depth = depth;
   }

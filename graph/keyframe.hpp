@@ -45,6 +45,10 @@ struct Keyframe {
   KeyframeId heir = kNoKeyframe;
   SE3 T_this_heir;
 
+  /// First keyframe of the map part whose world frame T_k_w is of; those of different parts have nothing to
+  /// do with each other.
+  KeyframeId part{0};
+
   [[nodiscard]] bool culled() const { return heir != kNoKeyframe; }
 };
 

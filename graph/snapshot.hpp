@@ -10,7 +10,7 @@ namespace twofold {
 
 /// A change of many poses at once, as the mapper announces it to those who use poses.
 struct MapChange {
-  enum class Kind : std::uint8_t { kLoopClosure, kRelaxation };
+  enum class Kind : std::uint8_t { kLoopClosure, kRelaxation, kPartsJoined };
   std::uint64_t version = 0;  ///< first version that has it; 0: there was none yet
   Kind kind = Kind::kLoopClosure;
 };

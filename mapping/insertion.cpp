@@ -28,13 +28,14 @@ std::pair<KeyframeId, SE3> present_reference(const GraphSnapshot& graph, const K
   return {id, T_k_ref};
 }
 
-void add_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, const SE3& T_k_w) {
+void add_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, const SE3& T_k_w, KeyframeId part) {
   Keyframe keyframe;
   keyframe.id = proposal.id;
   keyframe.frame_index = proposal.frame_index;
   keyframe.t_ns = proposal.t_ns;
   keyframe.T_k_w = T_k_w;
   keyframe.median_depth = proposal.median_depth;
+  keyframe.part = part;
   writer.add_keyframe(std::move(keyframe));
 }
 
@@ -121,7 +122,8 @@ InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& pro
     std::tie(reference, T_k_ref) = present_reference(writer.graph(), proposal);
     T_k_w = T_k_ref * writer.graph().keyframe(reference).T_k_w;
   }
-  add_keyframe(writer, proposal, T_k_w);
+  const KeyframeId part = first_of_part ? proposal.id : writer.graph().keyframe(reference).part;
+  add_keyframe(writer, proposal, T_k_w, part);
   report.new_points = add_new_points(writer, proposal);
   add_measurements(writer, proposal, report);
   if (first_of_part || !consistent.contains(reference)) {

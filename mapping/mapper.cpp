@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "mapping/edges.hpp"
+#include "mapping/map_parts.hpp"
 
 namespace twofold {
 namespace {
@@ -88,8 +89,9 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
     T_to_from = graph().keyframe(to).T_this_heir.inverse() * T_to_from;
   }
   if (from == to) return;
+  report.joined += join_parts(writer_, from, to, T_to_from);
   link_marginalised(writer_, from, to, std::max(1, loop.inliers), T_to_from);
-  writer_.announce_jump(MapChange::Kind::kLoopClosure);
+  writer_.announce_jump(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
   ++report.loops;
 }
 

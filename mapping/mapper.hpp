@@ -23,6 +23,7 @@ struct MapperReport {
   int new_points = 0;
   int dropped_observations = 0;  ///< of points culled or unknown
   int loops = 0;                 ///< loop constraints accepted
+  int joined = 0;                ///< keyframes of parts that were moved to join others
 
   int inner_window = 0;  ///< |W1|
   int outer_window = 0;  ///< |W2|, anchors included

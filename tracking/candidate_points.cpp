@@ -21,6 +21,16 @@ SE3 pose_in_world(const GraphSnapshot& graph, const LocalPoints& local, Keyframe
   return T_k_here * graph.T_k_w(k);
 }
 
+KeyframeId part_of(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k) {
+  while (!graph.contains(k)) {
+    const PendingKeyframe* pending = local.find_pending(k);
+    TWOFOLD_CHECK(pending != nullptr, "keyframe neither in the map nor pending");
+    if (pending->reference == kNoKeyframe) return k;
+    k = pending->reference;
+  }
+  return graph.keyframe(k).part;
+}
+
 SE3 relative_pose(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k, KeyframeId ref) {
   if (k == ref) return {};
   return pose_in_world(graph, local, k) * pose_in_world(graph, local, ref).inverse();

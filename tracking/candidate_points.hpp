@@ -64,7 +64,9 @@ class CandidatePoints {
 
 /// T_k_w of a keyframe in the graph, or of a pending one through the keyframes it was proposed relative to.
 [[nodiscard]] SE3 pose_in_world(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k);
-/// T_k_ref of two keyframes, each in the graph or pending.
+/// Map part of a keyframe in the graph or pending.
+[[nodiscard]] KeyframeId part_of(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k);
+/// T_k_ref of two keyframes of one part, each in the graph or pending.
 [[nodiscard]] SE3 relative_pose(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k,
                                 KeyframeId ref);
 

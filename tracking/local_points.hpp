@@ -44,6 +44,8 @@ class LocalPoints {
   void add_pending(const PendingKeyframe& keyframe) { pending_.push_back(keyframe); }
   /// False when full.
   bool add(const LocalPoint& point);
+  /// Forgets all points.
+  void clear_points() { points_.clear(); }
   /// Forgets what the map has taken over or refused.
   void adopt(const GraphSnapshot& graph);
   /// Forgets candidates that failed too often or that `newest - anchor` keyframes did not confirm.

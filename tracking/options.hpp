@@ -23,6 +23,8 @@ struct TrackerOptions {
   int min_inliers = 18;  ///< fewer: lost
   double min_inlier_share = 0.25;  ///< of the matches found: fewer: lost
   double lost_radius_px = 8;       ///< search radius while lost
+  double new_part_after = 1;       ///< lost for so long while corners are seen: a new map part is started [s]
+  int min_corners_seen = 40;       ///< fewer: the lens is covered, or there is nothing to see
   double max_alignment_rms = 25;   ///< the dense pose is not trusted above this [grey]
 
   double keyframe_parallax = 0.09;  ///< |t| over median depth since the reference keyframe

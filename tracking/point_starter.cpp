@@ -61,6 +61,15 @@ int PointStarter::start(const FrameImages& images, KeyframeId anchor, LocalPoint
   return started;
 }
 
+bool PointStarter::sees_corners(const FrameImages& images, int wanted) {
+  clear();
+  corners_.clear();
+  constexpr int level = 1;
+  detect_corners(images.left.level(level), level, options_.corner_threshold, options_.min_corner_score,
+                 kBorder, {options_.cell_px, columns_, rows_, occupied_}, corners_);
+  return static_cast<int>(corners_.size()) >= wanted;
+}
+
 bool PointStarter::start_one(const FrameImages& images, const Corner& corner, KeyframeId anchor,
                              LocalPoints& local) const {
   LocalPoint point;

@@ -25,6 +25,8 @@ class PointStarter {
   /// Starts points anchored in keyframe `anchor` where nothing is tracked, evenly over the image; returns how
   /// many.
   int start(const FrameImages& images, KeyframeId anchor, LocalPoints& local);
+  /// Whether corners are seen in so many cells: a quick look at level 1, where noise makes none.
+  [[nodiscard]] bool sees_corners(const FrameImages& images, int wanted);
 
  private:
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;

@@ -57,6 +57,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   clock.lap(TrackStage::kPyramid);
   if (unplaced_ && reference_ == kNoKeyframe) {
     give_up_frame(LostCause::kUnplaced, result);
+    if (new_part_due(frame.t_ns) && start_part(frame, free_proposal, result)) remember_frame(SE3());
     return result;
   }
   if (reference_ == kNoKeyframe) {
@@ -87,6 +88,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
       candidates_stale_ = true;
     }
     if (unplaced_) reference_ = kNoKeyframe;  // it was not that place; nothing is known again
+    if (new_part_due(frame.t_ns) && start_part(frame, free_proposal, result)) remember_frame(SE3());
     return result;
   }
   unplaced_ = false;
@@ -173,7 +175,7 @@ bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackRes
   proposal->median_depth = keyframe_depth_ = median_depth(SE3());
   proposal->images.copy_from(current_);
   local_.add_pending({id, kNoKeyframe, SE3()});
-  ++next_keyframe_;
+  first_of_part_ = next_keyframe_++;
   points_in_proposal_ = 0;
   reference_ = id;
   candidates_stale_ = true;
@@ -182,6 +184,30 @@ bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackRes
   result.cause = LostCause::kNone;
   result.reference = id;
   result.proposed = true;
+  return true;
+}
+
+/// Lost for some time, though there is something to see.
+bool Tracker::new_part_due(std::int64_t t_ns) {
+  if (!starter_.sees_corners(current_, options_.min_corners_seen)) {
+    seeing_since_ns_ = 0;
+    return false;
+  }
+  if (seeing_since_ns_ == 0) seeing_since_ns_ = t_ns;
+  return static_cast<double>(t_ns - seeing_since_ns_) >= options_.new_part_after * 1e9;
+}
+
+/// The camera does not know where it is: it goes on in a map part of its own, from identity, until a place
+/// of both parts is recognised. Not before the map has all that was proposed of the old part, so that nothing
+/// here refers to that any more.
+bool Tracker::start_part(const Frame& frame, KeyframeProposal* proposal, TrackResult& result) {
+  if (proposal == nullptr || !local_.pending().empty()) return false;
+  local_.clear_points();
+  TrackResult started = result;
+  if (!start_map(frame, proposal, started)) return false;
+  unplaced_ = false;
+  result = started;
+  result.T_c_ref = SE3();
   return true;
 }
 
@@ -299,6 +325,7 @@ void Tracker::remember_frame(const SE3& T_c_ref) {
   T_cur_prev_ = lost_frames_ > 0 || frames_ < 2 ? SE3() : T_c_ref * T_prev_ref_.inverse();
   T_prev_ref_ = T_c_ref;
   lost_frames_ = 0;
+  seeing_since_ns_ = 0;
   previous_points_.clear();
   for (std::size_t m = 0; m < matches_.size() && previous_points_.size() < previous_points_.capacity(); ++m) {
     if (!motion_[m].inlier) continue;

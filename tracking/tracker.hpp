@@ -37,9 +37,10 @@ class Tracker {
   TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal);
 
   /// Goes on with a map made before: the numbers of keyframes and points continue its own, and the camera is
-  /// lost until `relocalise` says where in it the camera is. To be called before the first step.
+  /// lost until `relocalise` says where in it the camera is, or until a new part is started. To be called
+  /// before the first step.
   void continue_in(const GraphSnapshot& graph);
-  /// The camera was never placed in the map it was to continue in.
+  /// The camera was not placed yet in the map it was to continue in, nor in a new part.
   [[nodiscard]] bool unplaced() const { return unplaced_; }
 
   /// Pose of the last tracked frame in the map as `graph`, that of the last step, has it.
@@ -55,9 +56,14 @@ class Tracker {
   [[nodiscard]] const FrameImages& lost_images() const { return current_; }
   /// Frames since the last one with a pose.
   [[nodiscard]] int lost_frames() const { return lost_frames_; }
+  /// Map part of the last tracked frame, as `graph`, that of the last step, has it.
+  [[nodiscard]] KeyframeId part(const GraphSnapshot& graph) const {
+    return part_of(graph, local_, reference_);
+  }
 
   /// The proposal of the last step could not be sent: its numbers are taken back.
-  void proposal_rejected();
+  /// @return  false when it was to start a map or map part: the last frame has no pose then
+  bool proposal_rejected();
 
   /// Hint of the loop closer: the camera was recognised at T_c_k relative to keyframe `id`. The next step, if
   /// its graph has the keyframe, looks for points around there, and forgets the hint. Ignored while tracking.
@@ -77,6 +83,8 @@ class Tracker {
   void adopt(const GraphSnapshot& graph);
   bool start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
   bool take_hint(const GraphSnapshot& graph);
+  bool start_part(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
+  [[nodiscard]] bool new_part_due(std::int64_t t_ns);
   SE3 align_to_previous(TrackResult& result);
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, TrackResult& result);
@@ -113,8 +121,10 @@ class Tracker {
   KeyframeId hint_keyframe_ = kNoKeyframe;  ///< of relocalise
   SE3 hint_T_c_k_;
   std::uint32_t frames_ = 0;
+  std::int64_t seeing_since_ns_ = 0;  ///< lost, but with corners in view, since then; 0: not
 
   std::uint32_t next_keyframe_ = 0;
+  std::uint32_t first_of_part_ = 0;  ///< the newest part's
   std::uint32_t next_point_ = 0;
   std::uint32_t points_in_proposal_ = 0;
   int regions_at_keyframe_ = 0;

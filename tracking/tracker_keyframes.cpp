@@ -13,12 +13,14 @@ constexpr std::uint32_t kRevisitInterval = 3;  // frames between looks for a bet
 
 }  // namespace
 
-void Tracker::proposal_rejected() {
+bool Tracker::proposal_rejected() {
   --next_keyframe_;
   next_point_ -= points_in_proposal_;
   local_.retract(KeyframeId{next_keyframe_});
   candidates_stale_ = true;
-  if (reference_ == KeyframeId{next_keyframe_}) reference_ = kNoKeyframe;
+  if (reference_ != KeyframeId{next_keyframe_}) return true;
+  reference_ = kNoKeyframe;
+  return false;
 }
 
 /// Number of parts of the image, of 8 x 6, in which a point is tracked.
@@ -60,7 +62,8 @@ bool Tracker::keyframe_due(const TrackResult& result, const SE3& T_c_ref) const 
   const double parallax = T_c_ref.translation().norm() / std::max(keyframe_depth_, 1e-3);
   const bool emptied = occupied_regions() < (1 - options_.keyframe_empty) * regions_at_keyframe_;
   // The second keyframe confirms the first one's points: until then there is no map.
-  const bool map_is_young = next_keyframe_ < 2 && parallax > 0.2 * options_.keyframe_parallax;
+  const bool map_is_young =
+      next_keyframe_ == first_of_part_ + 1 && parallax > 0.2 * options_.keyframe_parallax;
   return parallax > options_.keyframe_parallax || share < options_.keyframe_share || emptied || map_is_young;
 }
 

@@ -26,20 +26,21 @@ std::string information_text(int weight) {
 
 }  // namespace
 
-Trajectory keyframe_trajectory(const GraphSnapshot& graph) {
+Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part) {
   Trajectory trajectory;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-    if (!keyframe.culled()) trajectory.push_back({keyframe.t_ns, keyframe.T_k_w.inverse()});
+    if (keyframe.part == part && !keyframe.culled())
+      trajectory.push_back({keyframe.t_ns, keyframe.T_k_w.inverse()});
   }
   return trajectory;
 }
 
-std::vector<PlyPoint> map_points(const GraphSnapshot& graph) {
+std::vector<PlyPoint> map_points(const GraphSnapshot& graph, KeyframeId part) {
   std::vector<PlyPoint> points;
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
     const MapPoint& point = graph.point(PointId{p});
-    if (!point.alive()) continue;
+    if (!point.alive() || graph.keyframe(point.anchor).part != part) continue;
     const std::uint8_t grey =
         point.appearance->pixels[PointAppearance::kCentre * (PointAppearance::kSize + 1)];
     points.push_back({graph.position(PointId{p}), {grey, grey, grey}});

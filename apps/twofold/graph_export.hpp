@@ -9,11 +9,11 @@
 
 namespace twofold {
 
-/// Poses of the keyframes that were not culled.
-[[nodiscard]] Trajectory keyframe_trajectory(const GraphSnapshot& graph);
+/// Poses of the keyframes that were not culled, of one part of the map.
+[[nodiscard]] Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
 
-/// Points that are alive, in the grey of their corner.
-[[nodiscard]] std::vector<PlyPoint> map_points(const GraphSnapshot& graph);
+/// Points that are alive, in the grey of their corner, of one part of the map.
+[[nodiscard]] std::vector<PlyPoint> map_points(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
 
 /// The pose graph in g2o's text form: VERTEX_SE3:QUAT with T_w_k, EDGE_SE3:QUAT with T_i_j of each edge and
 /// an information that is the edge's weight times the identity. The oldest keyframe is fixed.

@@ -65,9 +65,12 @@ void expect_rig_of_map(const MapArguments& arguments, const std::string& source,
 }
 
 std::optional<std::int64_t> recognised_at(const EngineOptions& options, const RunResult& result) {
-  const std::size_t loaded = options.map ? options.map->graph.keyframe_count() : 0;
+  if (!options.map) return std::nullopt;
+  const GraphSnapshot& graph = result.graph;
   for (const FrameRecord& record : result.frames) {
-    if (record.state == FrameState::kTracked && index(record.reference) < loaded) return record.frame_index;
+    if (record.state != FrameState::kTracked || !graph.contains(record.reference)) continue;
+    if (graph.keyframe(record.reference).part == graph.keyframe(KeyframeId{0}).part)
+      return record.frame_index;
   }
   return std::nullopt;
 }

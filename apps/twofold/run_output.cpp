@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -9,6 +10,7 @@
 
 #include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/map_options.hpp"
+#include "apps/twofold/map_parts.hpp"
 #include "io/evaluation.hpp"
 #include "io/io_error.hpp"
 #include "io/output_file.hpp"
@@ -24,24 +26,40 @@ using Json = nlohmann::ordered_json;
 // A frame counts as late in the report when its pose was known later than this after it was due.
 constexpr std::int64_t kLateNs = 33'000'000;
 
-Trajectory final_trajectory(const RunResult& result) {
-  Trajectory trajectory;
-  for (const FrameRecord& record : result.frames) {
-    // A keyframe the mapper never got to (the run was cut short) leaves its frames without a place in the
-    // map.
-    if (record.state != FrameState::kTracked || !result.graph.contains(record.reference)) continue;
-    trajectory.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
-  }
-  return trajectory;
-}
-
+/// Causal poses of the map part that most frames were tracked in: other parts had other worlds, as far as was
+/// known then.
 Trajectory causal_trajectory(const RunResult& result) {
-  Trajectory trajectory;
+  std::map<KeyframeId, Trajectory> parts;
   for (const FrameRecord& record : result.frames) {
     if (record.state == FrameState::kTracked)
-      trajectory.push_back({record.t_ns, record.T_c_w_causal.inverse()});
+      parts[record.part_causal].push_back({record.t_ns, record.T_c_w_causal.inverse()});
   }
-  return trajectory;
+  const auto most = std::max_element(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+    return a.second.size() < b.second.size();
+  });
+  return most == parts.end() ? Trajectory() : std::move(most->second);
+}
+
+/// Of an earlier run into the same folder, which had more parts.
+void remove_part_files(const std::filesystem::path& folder, std::size_t parts) {
+  const auto remove = [&](const char* stem, std::size_t n, const char* extension) {
+    std::error_code error;
+    return std::filesystem::remove(folder / part_file(stem, n, extension), error);
+  };
+  for (std::size_t n = parts; remove("trajectory", n, ".txt"); ++n) {
+    remove("keyframes", n, ".txt");
+    remove("map", n, ".ply");
+  }
+}
+
+Json parts_json(const std::vector<MapPart>& parts) {
+  Json json = Json::array();
+  for (const MapPart& part : parts) {
+    json.push_back({{"first_keyframe", index(part.id)},
+                    {"keyframes", part.keyframes},
+                    {"frames", part.trajectory.size()}});
+  }
+  return json;
 }
 
 Json late_and_lost(const RunResult& result) {
@@ -75,8 +93,9 @@ Json loops_json(const RunResult& result) {
                      {"from", index(loop.constraint.from)},
                      {"to", index(loop.constraint.to)},
                      {"inliers", loop.constraint.inliers},
-                     {"drift_m", drift.head<3>().norm()},
-                     {"drift_rad", drift.tail<3>().norm()}});
+                     {"joins_parts", loop.joins_parts},
+                     {"drift_m", loop.joins_parts ? Json() : Json(drift.head<3>().norm())},
+                     {"drift_rad", loop.joins_parts ? Json() : Json(drift.tail<3>().norm())}});
   }
   return loops;
 }
@@ -116,7 +135,8 @@ Json checkpoints_json(const CheckpointReport& report) {
           {"error", report.error}};
 }
 
-Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result) {
+Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result,
+                  const std::vector<MapPart>& parts) {
   const auto count = [&](FrameState state) {
     return std::count_if(result.frames.begin(), result.frames.end(),
                          [&](const auto& r) { return r.state == state; });
@@ -141,6 +161,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"points", points},
             {"loaded_map", loaded_map_json(options, result)},
             {"checkpoints", checkpoints_json(result.checkpoints)},
+            {"map_parts", parts_json(parts)},
             {"mapper_rounds", result.rounds.size()},
             {"metric_loop_edges", metric_loops},
             {"closed_loops", loops_json(result)},
@@ -195,15 +216,21 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
 
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
                       const FrameSource& source, const EngineOptions& options, const RunResult& result) {
-  const Trajectory final_poses = final_trajectory(result);
+  const std::vector<MapPart> parts = map_parts(result, options);
+  const Trajectory& final_poses = parts.front().trajectory;
   const Trajectory causal_poses = causal_trajectory(result);
   write_tum_trajectory(folder / "trajectory.txt", final_poses);
   write_tum_trajectory(folder / "trajectory_causal.txt", causal_poses);
-  write_tum_trajectory(folder / "keyframes.txt", keyframe_trajectory(result.graph));
+  remove_part_files(folder, parts.size());
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    if (n > 0) write_tum_trajectory(folder / part_file("trajectory", n, ".txt"), parts[n].trajectory);
+    write_tum_trajectory(folder / part_file("keyframes", n, ".txt"),
+                         keyframe_trajectory(result.graph, parts[n].id));
+    write_ply(folder / part_file("map", n, ".ply"), map_points(result.graph, parts[n].id));
+  }
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
-  write_ply(folder / "map.ply", map_points(result.graph));
   write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
-  write_file(folder / "summary.json", summary_json(source_text, options, result).dump(2) + "\n");
+  write_file(folder / "summary.json", summary_json(source_text, options, result, parts).dump(2) + "\n");
   std::ostringstream schedule;
   if (!write_schedule(schedule, result.schedule.tracker, result.schedule.mapper,
                       result.schedule.loop_closer)) {
@@ -243,6 +270,11 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
   if (const CheckpointReport& c = result.checkpoints; options.checkpoint.period > 0) {
     fmt::print("checkpoints {} saved, the slowest in {:.0f} ms{}{}\n", c.saved,
                static_cast<double>(c.longest_ns) * 1e-6, c.error.empty() ? "" : "; one failed: ", c.error);
+  }
+  for (const std::vector<MapPart> parts = map_parts(result, options); const MapPart& part : parts) {
+    if (parts.size() == 1) break;
+    fmt::print("map part    {} keyframes, {} frames, first keyframe {}\n", part.keyframes,
+               part.trajectory.size(), index(part.id));
   }
   for (const StageRecorder& recorder : result.times) {
     if (recorder.thread_name() == "loop closer") continue;

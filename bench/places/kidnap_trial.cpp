@@ -22,6 +22,10 @@ SE3 error_of(const FrameRecord& record, const GraphSnapshot& graph, const SE3& T
   return T_c_first.inverse() * T_c_first_true;
 }
 
+bool in_old_map(const FrameRecord& record, const GraphSnapshot& graph) {
+  return graph.keyframe(record.reference).part == graph.keyframe(KeyframeId{0}).part;
+}
+
 }  // namespace
 
 Kidnapping draw_kidnapping(std::uint64_t trial, double round_seconds, bool to_unmapped_place) {
@@ -90,7 +94,7 @@ KidnapOutcome KidnapTrials::run(const Kidnapping& kidnapping) {
     const bool after = seconds(i) > kidnapping.cover_at;
     if (after && first_seen < 0) first_seen = i;
     outcome.frames_watched += after ? 1 : 0;
-    if (record.state != FrameState::kTracked) continue;
+    if (record.state != FrameState::kTracked || !in_old_map(record, result.graph)) continue;
     const SE3 error = error_of(record, result.graph, sequence.T_w_c(i).inverse() * sequence.T_w_c(0));
     const double metres = error.translation().norm();
     if (!after) {

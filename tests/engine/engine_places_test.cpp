@@ -136,6 +136,130 @@ TEST_F(EnginePlacesTest, InAnUnknownPlaceItSaysThatItIsLost) {
   }
 }
 
+/// Feeds frames one after the other; no image stands for a hand over the lens.
+FrameFeed shown_in_turn(std::vector<Frame> frames) {
+  return [frames = std::move(frames), next = 0](Frame& frame) mutable {
+    if (next == static_cast<int>(frames.size())) return FeedStatus::kEnd;
+    frame = frames[static_cast<std::size_t>(next)];
+    if (frame.left.empty()) {
+      frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(12));
+      frame.right = frame.left;
+    }
+    frame.index = next;
+    frame.t_ns = 1'000'000'000 + next * 33'333'333LL;
+    ++next;
+    return FeedStatus::kFrame;
+  };
+}
+
+/// The first half of the room; a hand; then from its other end back into the first half.
+class MapPartsTest : public EnginePlacesTest {
+ protected:
+  static constexpr int kFirst = 24;
+  static constexpr int kLast = 4;
+  static FrameFeed frames() {
+    std::vector<Frame> shown(mapped_->begin(), mapped_->begin() + kFirst);
+    shown.resize(kFirst + kCovered);
+    for (int i = kFrames - 1; i >= kLast; --i) shown.push_back((*mapped_)[static_cast<std::size_t>(i)]);
+    return shown_in_turn(std::move(shown));
+  }
+  /// Frame of the walk that is shown as frame i, or -1.
+  static int walked(std::int64_t i) {
+    if (i < kFirst) return static_cast<int>(i);
+    return i < kFirst + kCovered ? -1 : static_cast<int>(kFrames - 1 - (i - kFirst - kCovered));
+  }
+  static EngineOptions impatient() {
+    EngineOptions engine = options();
+    engine.tracker.new_part_after = 0.1;
+    return engine;
+  }
+  static void expect_equal(const RunResult& a, const RunResult& b) {
+    ASSERT_EQ(a.frames.size(), b.frames.size());
+    for (std::size_t i = 0; i < a.frames.size(); ++i) {
+      EXPECT_EQ(a.frames[i].state, b.frames[i].state) << i;
+      EXPECT_EQ(a.frames[i].T_c_ref.matrix(), b.frames[i].T_c_ref.matrix()) << i;
+      EXPECT_EQ(a.frames[i].T_c_w_causal.matrix(), b.frames[i].T_c_w_causal.matrix()) << i;
+      EXPECT_EQ(a.frames[i].part_causal, b.frames[i].part_causal) << i;
+    }
+    ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
+    for (std::uint32_t k = 0; k < a.graph.keyframe_count(); ++k) {
+      EXPECT_EQ(a.graph.T_k_w(KeyframeId{k}).matrix(), b.graph.T_k_w(KeyframeId{k}).matrix()) << k;
+      EXPECT_EQ(a.graph.keyframe(KeyframeId{k}).part, b.graph.keyframe(KeyframeId{k}).part) << k;
+    }
+  }
+};
+
+TEST_F(MapPartsTest, ALostCameraStartsAPartThatJoinsWhenAPlaceOfBothIsRecognised) {
+  const RunResult result = run(impatient(), frames());
+  EXPECT_EQ(result.error, "");
+  std::vector<KeyframeId> parts;
+  bool announced = false;
+  int lost = 0;
+  for (const FrameRecord& record : result.frames) {
+    announced |= record.correction.reason == CorrectionReason::kPartsJoined;
+    if (walked(record.frame_index) < 0) continue;
+    lost += record.state != FrameState::kTracked ? 1 : 0;
+    if (record.state != FrameState::kTracked) continue;
+    if (parts.empty() || parts.back() != record.part_causal) parts.push_back(record.part_causal);
+    const SE3 T_c_first = final_T_c_w(record, result.graph) * result.graph.T_k_w(KeyframeId{0}).inverse();
+    const SE3 T_c_first_true = T_c_w(walked(record.frame_index)) * T_c_w(0).inverse();
+    EXPECT_LT((T_c_first.inverse().translation() - T_c_first_true.inverse().translation()).norm(), 0.03)
+        << record.frame_index;
+  }
+  EXPECT_GE(parts.size(), 2U);  // as known at the time: old part, new part, one of them for both
+  EXPECT_TRUE(announced);
+  EXPECT_LE(lost, 5);
+  EXPECT_TRUE(std::any_of(result.loops.begin(), result.loops.end(),
+                          [](const ClosedLoop& loop) { return loop.joins_parts; }));
+  for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k) {
+    EXPECT_EQ(result.graph.keyframe(KeyframeId{k}).part, result.graph.keyframe(KeyframeId{0}).part);
+  }
+}
+
+TEST_F(MapPartsTest, TwoRunsGiveTheSameBytes) {
+  expect_equal(run(impatient(), frames()), run(impatient(), frames()));
+}
+
+TEST_F(MapPartsTest, AThreadedRunReplays) {
+  EngineOptions threaded = impatient();
+  threaded.deterministic = false;
+  threaded.pacing.speed = 1;
+  const RunResult live = run(threaded, frames());
+  ASSERT_EQ(live.error, "");
+  std::stringstream file;
+  ASSERT_TRUE(write_schedule(file, live.schedule.tracker, live.schedule.mapper, live.schedule.loop_closer));
+  const auto schedule = read_schedule(file);
+  ASSERT_TRUE(schedule) << schedule.error();
+  std::atomic<bool> interrupted{false};
+  const RunResult replayed = Engine(small_rig(), threaded).replay(frames(), *schedule, interrupted);
+  EXPECT_EQ(replayed.error, "");
+  expect_equal(live, replayed);
+}
+
+TEST_F(MapPartsTest, InAnUnknownPlaceThePartStaysApart) {
+  const RunResult result = run(impatient(), kidnapped(true));
+  EXPECT_EQ(result.error, "");
+  int tracked = 0;
+  KeyframeId part = kNoKeyframe;
+  SE3 T_start_w;
+  for (const FrameRecord& record : result.frames) {
+    if (!after_kidnapping(record) || record.state != FrameState::kTracked) continue;
+    const SE3 T_c_w_true = T_c_w(shown(static_cast<int>(record.frame_index)));
+    if (tracked++ == 0) {
+      part = record.part_causal;
+      T_start_w = T_c_w_true;
+      EXPECT_EQ(record.T_c_w_causal.matrix(), SE3().matrix());
+    }
+    EXPECT_EQ(record.part_causal, part);
+    EXPECT_NE(record.part_causal, KeyframeId{0});
+    EXPECT_EQ(result.graph.keyframe(record.reference).part, part);
+    // Its world is where it started, with nothing of the old part in it.
+    EXPECT_LT((record.T_c_w_causal * (T_c_w_true * T_start_w.inverse()).inverse()).translation().norm(),
+              0.03);
+  }
+  EXPECT_GE(tracked, kAfter - 5);
+}
+
 TEST_F(EnginePlacesTest, AThreadedRunWithRequestsAndAnswersReplays) {
   EngineOptions threaded = options();
   threaded.deterministic = false;
