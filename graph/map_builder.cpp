@@ -4,6 +4,7 @@
 
 #include "graph/graph_writer.hpp"
 #include "graph/map_entries.hpp"
+#include "graph/part_extraction.hpp"
 
 namespace twofold::map_format {
 
@@ -154,6 +155,7 @@ SavedMap MapBuilder::assemble() {
     writer.add_point(PointId{static_cast<std::uint32_t>(p)}, std::move(points_[p]));
   }
   writer.set_reference(reference_);
+  name_parts(writer);
   map_.graph = writer.publish();
   return std::move(map_);
 }

@@ -8,6 +8,7 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/map_options.hpp"
+#include "graph/part_extraction.hpp"
 #include "io/io_error.hpp"
 #include "io/output_file.hpp"
 #include "io/ply.hpp"
@@ -47,6 +48,8 @@ void print_info(const std::string& file) {
              map.rig.baseline);
   fmt::print("keyframes     {} ({} culled)\npoints        {} ({} culled)\nobservations  {}\n", keyframes,
              graph.keyframe_count() - keyframes, points, graph.point_count() - points, observations);
+  if (const auto parts = parts_of(graph); parts.size() > 1)
+    fmt::print("parts         {}, not connected\n", parts.size());
   fmt::print("edges         {} ({} marginalised)\nplaces        {} ({} corners)\nfile          {} bytes\n",
              edges, marginalised, places, corners, std::filesystem::file_size(file));
 }

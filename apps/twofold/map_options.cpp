@@ -35,7 +35,9 @@ SavedMap open_map(const std::string& file) {
 }
 
 void add_map_options(CLI::App& command, MapArguments& arguments) {
-  command.add_option("--save-map", arguments.save, "Write the map to this file (.tfm) at the end");
+  command.add_option("--save-map", arguments.save,
+                     "Write the map to this file (.tfm) at the end; parts that never joined it to "
+                     "FILE-2.tfm, ...");
   command.add_option("--checkpoint", arguments.checkpoint,
                      "Seconds after which the map is written to it during the run, again and again");
   command.add_option("--load-map", arguments.load,

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "graph/part_extraction.hpp"
+
 namespace twofold {
 
 std::vector<MapPart> map_parts(const RunResult& result, const EngineOptions& options) {
@@ -33,6 +35,23 @@ std::vector<MapPart> map_parts(const RunResult& result, const EngineOptions& opt
     return a.trajectory.size() > b.trajectory.size();
   });
   return parts;
+}
+
+std::vector<std::string> save_parts(const std::filesystem::path& file, const Rig& rig,
+                                    const RunResult& result, const std::vector<MapPart>& parts) {
+  std::vector<std::string> written;
+  for (const MapPart& part : parts) {
+    if (!written.empty() && part.keyframes < 2) continue;
+    const std::filesystem::path to =
+        file.parent_path() / part_file(file.stem().string(), written.size(), file.extension().string());
+    if (parts.size() == 1) {
+      save_map(to, rig, result.graph, result.places);
+    } else {
+      save_map(to, extract_part(rig, result.graph, result.places, part.id));
+    }
+    written.push_back(to.string());
+  }
+  return written;
 }
 
 std::string part_file(const std::string& stem, std::size_t n, const std::string& extension) {

@@ -10,6 +10,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/map_options.hpp"
+#include "apps/twofold/map_parts.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "engine/engine.hpp"
 #include "io/io_error.hpp"
@@ -177,10 +178,14 @@ int run(const RunArguments& arguments) {
   const RunResult result = schedule ? engine.replay(feed, *schedule, interrupted, progress)
                                     : engine.run(feed, interrupted, progress);
   line.end();
-  if (!arguments.map.save.empty()) save_map(arguments.map.save, source->rig(), result.graph, result.places);
+  std::vector<std::string> maps;
+  if (!arguments.map.save.empty()) {
+    maps = save_parts(arguments.map.save, source->rig(), result, map_parts(result, options));
+  }
   write_run_output(arguments.out, arguments.source, *source, options, result);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, options, result);
+  for (const std::string& map : maps) fmt::print("map in      {}\n", map);
   const SourceReport captured = source->report();
   for (const std::string& text : captured.summary) fmt::print("{}\n", text);
   for (const std::string& text : captured.faults) fmt::print("  {}\n", text);

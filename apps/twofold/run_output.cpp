@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/graph_export.hpp"
+#include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "apps/twofold/map_parts.hpp"
 #include "io/evaluation.hpp"
@@ -186,6 +187,9 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
 Json timing_json(const RunResult& result) {
   Json json;
   for (const StageRecorder& recorder : result.times) json[recorder.thread_name()] = recorder.to_json();
+  const LoopLatency latency = loop_latency(result);
+  json["latency round loops"] = {{"within 5 s", latency.near.to_json()},
+                                 {"elsewhere", latency.rest.to_json()}};
   return json;
 }
 
@@ -237,6 +241,7 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
     throw IoError((folder / "schedule.log").string(), "cannot be written");
   }
   write_file(folder / "schedule.log", schedule.str());
+  write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",
               draw_run(source_text, final_poses, causal_poses, source.ground_truth()));

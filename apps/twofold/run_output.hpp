@@ -10,8 +10,9 @@
 namespace twofold {
 
 /// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, groundtruth.txt if
-/// known (all TUM form), map.ply, timing.json, summary.json, schedule.log, trajectory.png. Throws IoError
-/// when it cannot.
+/// known (all TUM form), map.ply, timing.json, loop_latency.txt, summary.json, schedule.log,
+/// trajectory.png; trajectory, keyframes and map of parts that never joined the first (map_parts) as
+/// trajectory-2.txt and so on. Throws IoError when it cannot.
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
                       const FrameSource& source, const EngineOptions& options, const RunResult& result);
 

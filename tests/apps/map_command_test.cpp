@@ -85,6 +85,34 @@ TEST_F(MapCommand, GoingOnTwiceGivesTheSameBytes) {
   EXPECT_EQ(maps[0], maps[1]);
 }
 
+TEST_F(MapCommand, PartsThatNeverJoinedAreMapsOfTheirOwn) {
+  const std::string file = folder_ / "parts.tfm", second = folder_ / "parts-2.tfm";
+  const Outcome outcome =
+      run(folder_,
+          "run 'synthetic:desk?frames=75&fps=15&width=320&height=240&cover_at=2&cover=0.3&elsewhere=9' "
+          "--deterministic --quiet --out '" +
+              (folder_ / "result") + "' --save-map '" + file + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto parts = summary()["map_parts"];
+  ASSERT_EQ(parts.size(), 2U);
+  EXPECT_GE(parts[0]["frames"], parts[1]["frames"]);
+  EXPECT_GT(parts[1]["frames"], 10);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "parts-3.tfm"));
+  for (const std::string& map : {file, second}) {
+    EXPECT_NE(outcome.out.find(map), std::string::npos) << outcome.out;
+    const Outcome info = run(folder_, "map info '" + map + "'");
+    ASSERT_EQ(info.exit_code, 0) << info.err;
+    EXPECT_EQ(info.out.find("not connected"), std::string::npos) << info.out;
+  }
+  // Poses of one part are not mixed with those of the other.
+  const auto lines = [&](const char* name) {
+    const std::string text = content(folder_ / (std::string("result/") + name));
+    return static_cast<int>(std::count(text.begin(), text.end(), '\n')) - 1;  // a line says what stands where
+  };
+  EXPECT_EQ(lines("trajectory.txt"), parts[0]["frames"]);
+  EXPECT_EQ(lines("trajectory-2.txt"), parts[1]["frames"]);
+}
+
 TEST_F(MapCommand, ElsewhereItSaysThatNothingWasRecognised) {
   const Outcome outcome =
       run_in_map("--deterministic --localise-only", "'synthetic:corridor?frames=6&width=320&height=240'");

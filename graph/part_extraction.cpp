@@ -1,0 +1,122 @@
+#include "graph/part_extraction.hpp"
+
+#include <algorithm>
+
+namespace twofold {
+namespace {
+
+/// New numbers of the keyframes and points that are kept.
+class Renumbering {
+ public:
+  Renumbering(const GraphSnapshot& graph, KeyframeId part)
+      : keyframes_(graph.keyframe_count(), kNoKeyframe), points_(graph.point_count(), kNoPoint) {
+    std::uint32_t keyframes = 0, points = 0;
+    for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+      if (graph.keyframe(KeyframeId{k}).part == part) keyframes_[k] = KeyframeId{keyframes++};
+    }
+    for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+      const MapPoint& point = graph.point(PointId{p});
+      if (point.alive() && (*this)(point.anchor) != kNoKeyframe) points_[p] = PointId{points++};
+    }
+  }
+  [[nodiscard]] KeyframeId operator()(KeyframeId id) const { return keyframes_[index(id)]; }
+  [[nodiscard]] PointId operator()(PointId id) const { return points_[index(id)]; }
+
+ private:
+  std::vector<KeyframeId> keyframes_;
+  std::vector<PointId> points_;
+};
+
+Keyframe renumbered(const Keyframe& keyframe, const Renumbering& number) {
+  Keyframe copy = keyframe;
+  copy.id = number(keyframe.id);
+  copy.part = KeyframeId{0};
+  if (keyframe.culled()) copy.heir = number(keyframe.heir);
+  // Both lists stay in order, because new numbers are in the order of the old ones.
+  auto observations = std::make_shared<ObservationList>();
+  for (Observation observation : *keyframe.observations) {
+    observation.point = number(observation.point);
+    if (observation.point != kNoPoint) observations->push_back(observation);
+  }
+  auto edges = std::make_shared<EdgeList>(*keyframe.edges);
+  for (Edge& edge : *edges) edge.other = number(edge.other);
+  copy.observations = std::move(observations);
+  copy.edges = std::move(edges);
+  return copy;
+}
+
+MapPoint renumbered(const MapPoint& point, const Renumbering& number) {
+  MapPoint copy = point;
+  copy.anchor = number(point.anchor);
+  auto observers = std::make_shared<ObserverList>(*point.observers);
+  for (KeyframeId& observer : *observers) observer = number(observer);
+  copy.observers = std::move(observers);
+  return copy;
+}
+
+}  // namespace
+
+void name_parts(GraphWriter& writer) {
+  const GraphSnapshot& graph = writer.graph();
+  std::vector<KeyframeId> name(graph.keyframe_count(), kNoKeyframe);
+  std::vector<KeyframeId> open;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    if (name[k] != kNoKeyframe || graph.keyframe(KeyframeId{k}).culled()) continue;
+    name[k] = KeyframeId{k};
+    open.push_back(KeyframeId{k});
+    while (!open.empty()) {
+      const KeyframeId at = open.back();
+      open.pop_back();
+      for (const Edge& edge : *graph.keyframe(at).edges) {
+        if (name[index(edge.other)] != kNoKeyframe) continue;
+        name[index(edge.other)] = KeyframeId{k};
+        open.push_back(edge.other);
+      }
+    }
+  }
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    KeyframeId heir{k};
+    while (graph.keyframe(heir).culled()) heir = graph.keyframe(heir).heir;
+    if (graph.keyframe(KeyframeId{k}).part != name[index(heir)])
+      writer.set_part(KeyframeId{k}, name[index(heir)]);
+  }
+}
+
+std::vector<KeyframeId> parts_of(const GraphSnapshot& graph) {
+  std::vector<KeyframeId> parts;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (!keyframe.culled()) parts.push_back(keyframe.part);
+  }
+  std::sort(parts.begin(), parts.end());
+  parts.erase(std::unique(parts.begin(), parts.end()), parts.end());
+  return parts;
+}
+
+SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBook& places, KeyframeId part) {
+  const Renumbering number(graph, part);
+  GraphWriter writer;
+  SavedMap map;
+  map.rig = rig;
+  KeyframeId newest = kNoKeyframe;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (keyframe.part != part) continue;
+    const KeyframeId id = number(keyframe.id);
+    writer.add_keyframe(renumbered(keyframe, number));
+    if (keyframe.culled()) continue;
+    newest = id;
+    if (const PlaceAppearance* place = places.find(keyframe.id)) map.places.set(id, *place);
+  }
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+    if (number(PointId{p}) != kNoPoint)
+      writer.add_point(number(PointId{p}), renumbered(graph.point(PointId{p}), number));
+  }
+  const bool has_reference =
+      graph.reference() != kNoKeyframe && graph.keyframe(graph.reference()).part == part;
+  writer.set_reference(has_reference ? number(graph.reference()) : newest);
+  map.graph = writer.publish();
+  return map;
+}
+
+}  // namespace twofold

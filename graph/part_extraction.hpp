@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "graph/graph_writer.hpp"
+#include "graph/map_file.hpp"
+
+namespace twofold {
+
+/// Names each keyframe's part (Keyframe::part) after the oldest keyframe it is connected with: for a graph
+/// that comes without names. Cost grows with the map.
+void name_parts(GraphWriter& writer);
+
+/// Names of the parts that have keyframes which were not culled, ascending.
+[[nodiscard]] std::vector<KeyframeId> parts_of(const GraphSnapshot& graph);
+
+/// A map of one part alone: its keyframes and points, numbered anew from 0 in the same order, and their
+/// places. The reference is kept, or, when it is of another part, its newest keyframe becomes it.
+[[nodiscard]] SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBook& places,
+                                    KeyframeId part);
+
+}  // namespace twofold

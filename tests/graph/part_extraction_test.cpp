@@ -1,0 +1,100 @@
+#include "graph/part_extraction.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/graph/graph_invariants.hpp"
+#include "tests/graph/sample_map.hpp"
+
+namespace twofold {
+namespace {
+
+/// Two maps in one graph, the second one's numbers behind the first one's.
+SavedMap two_parts(const SavedMap& first, const SavedMap& second) {
+  GraphWriter writer(first.graph);
+  SavedMap both = first;
+  const auto keyframes = static_cast<std::uint32_t>(first.graph.keyframe_count());
+  const auto points = static_cast<std::uint32_t>(first.graph.point_count());
+  const auto shifted = [&](KeyframeId id) { return KeyframeId{index(id) + keyframes}; };
+  for (std::uint32_t k = 0; k < second.graph.keyframe_count(); ++k) {
+    Keyframe keyframe = second.graph.keyframe(KeyframeId{k});
+    keyframe.id = shifted(keyframe.id);
+    if (keyframe.culled()) keyframe.heir = shifted(keyframe.heir);
+    ObservationList observations = *keyframe.observations;
+    for (Observation& o : observations) o.point = PointId{index(o.point) + points};
+    keyframe.observations = std::make_shared<const ObservationList>(std::move(observations));
+    EdgeList edges = *keyframe.edges;
+    for (Edge& edge : edges) edge.other = shifted(edge.other);
+    keyframe.edges = std::make_shared<const EdgeList>(std::move(edges));
+    writer.add_keyframe(keyframe);
+    if (const PlaceAppearance* place = second.places.find(KeyframeId{k}))
+      both.places.set(keyframe.id, *place);
+  }
+  for (std::uint32_t p = 0; p < second.graph.point_count(); ++p) {
+    MapPoint point = second.graph.point(PointId{p});
+    if (!point.alive()) continue;
+    point.anchor = shifted(point.anchor);
+    ObserverList observers = *point.observers;
+    for (KeyframeId& observer : observers) observer = shifted(observer);
+    point.observers = std::make_shared<const ObserverList>(std::move(observers));
+    writer.add_point(PointId{p + points}, point);
+  }
+  writer.set_reference(shifted(second.graph.reference()));
+  name_parts(writer);
+  both.graph = writer.publish();
+  return both;
+}
+
+/// Same keyframes, and the same living points in the same order.
+void expect_same(const SavedMap& a, const SavedMap& b) {
+  ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
+  EXPECT_EQ(a.graph.reference(), b.graph.reference());
+  for (std::uint32_t i = 0; i < a.graph.keyframe_count(); ++i) {
+    const KeyframeId k{i};
+    EXPECT_EQ(a.graph.T_k_w(k).matrix(), b.graph.T_k_w(k).matrix());
+    EXPECT_EQ(a.graph.keyframe(k).heir, b.graph.keyframe(k).heir);
+    EXPECT_EQ(a.graph.keyframe(k).edges->size(), b.graph.keyframe(k).edges->size());
+    EXPECT_EQ(a.graph.keyframe(k).observations->size(), b.graph.keyframe(k).observations->size());
+    ASSERT_EQ(a.places.find(k) == nullptr, b.places.find(k) == nullptr);
+    if (a.places.find(k)) EXPECT_EQ(a.places.find(k)->corners.size(), b.places.find(k)->corners.size());
+  }
+  const auto psi = [](const GraphSnapshot& graph) {
+    std::vector<double> values;
+    for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+      const MapPoint& point = graph.point(PointId{p});
+      if (point.alive()) values.push_back(point.psi.z() + index(point.anchor));
+    }
+    return values;
+  };
+  EXPECT_EQ(psi(a.graph), psi(b.graph));
+}
+
+TEST(PartExtraction, PartsComeOutAsTheyWentIn) {
+  const SavedMap first = testing::sample_map(20, 120, 1), second = testing::sample_map(11, 60, 2);
+  const SavedMap both = two_parts(first, second);
+  ASSERT_EQ(broken_invariant(both.graph), "");
+  EXPECT_EQ(parts_of(both.graph), (std::vector<KeyframeId>{KeyframeId{0}, KeyframeId{20}}));
+  const SavedMap a = extract_part(both.rig, both.graph, both.places, KeyframeId{0});
+  const SavedMap b = extract_part(both.rig, both.graph, both.places, KeyframeId{20});
+  for (const SavedMap* map : {&a, &b}) {
+    EXPECT_EQ(broken_invariant(map->graph), "");
+    EXPECT_EQ(parts_of(map->graph), std::vector<KeyframeId>{KeyframeId{0}});
+  }
+  expect_same(b, second);
+  // Its reference was left behind: the newest keyframe that is there
+  expect_same(a, first);
+}
+
+TEST(PartExtraction, NamesFollowEdgesAndHeirs) {
+  GraphWriter writer(testing::sample_map(30, 90, 3).graph);
+  name_parts(writer);
+  EXPECT_EQ(parts_of(writer.graph()).size(), static_cast<std::size_t>(component_count(writer.graph())));
+  for (std::uint32_t k = 0; k < writer.graph().keyframe_count(); ++k) {
+    const Keyframe& keyframe = writer.graph().keyframe(KeyframeId{k});
+    for (const Edge& edge : *keyframe.edges)
+      EXPECT_EQ(writer.graph().keyframe(edge.other).part, keyframe.part);
+    if (keyframe.culled()) EXPECT_EQ(writer.graph().keyframe(keyframe.heir).part, keyframe.part);
+  }
+}
+
+}  // namespace
+}  // namespace twofold
