@@ -55,7 +55,9 @@ void expect_same(const SavedMap& a, const SavedMap& b) {
     EXPECT_EQ(a.graph.keyframe(k).edges->size(), b.graph.keyframe(k).edges->size());
     EXPECT_EQ(a.graph.keyframe(k).observations->size(), b.graph.keyframe(k).observations->size());
     ASSERT_EQ(a.places.find(k) == nullptr, b.places.find(k) == nullptr);
-    if (a.places.find(k)) EXPECT_EQ(a.places.find(k)->corners.size(), b.places.find(k)->corners.size());
+    if (a.places.find(k) != nullptr) {
+      EXPECT_EQ(a.places.find(k)->corners.size(), b.places.find(k)->corners.size());
+    }
   }
   const auto psi = [](const GraphSnapshot& graph) {
     std::vector<double> values;
@@ -92,7 +94,9 @@ TEST(PartExtraction, NamesFollowEdgesAndHeirs) {
     const Keyframe& keyframe = writer.graph().keyframe(KeyframeId{k});
     for (const Edge& edge : *keyframe.edges)
       EXPECT_EQ(writer.graph().keyframe(edge.other).part, keyframe.part);
-    if (keyframe.culled()) EXPECT_EQ(writer.graph().keyframe(keyframe.heir).part, keyframe.part);
+    if (keyframe.culled()) {
+      EXPECT_EQ(writer.graph().keyframe(keyframe.heir).part, keyframe.part);
+    }
   }
 }
 
