@@ -5,22 +5,11 @@
 
 #include "geometry/se3.hpp"
 #include "graph/ids.hpp"
+#include "tracking/lost_cause.hpp"
 
 namespace twofold {
 
 enum class TrackStatus : std::uint8_t { kInitialising, kTracking, kLost };
-
-enum class LostCause : std::uint8_t {
-  kNone,
-  kNoTexture,            ///< too few corners with depth to start a map
-  kTooFewCandidates,     ///< hardly any map point projects into the image
-  kTooFewMatches,        ///< points should be visible but were not found (blur, occlusion, exposure, wrong
-                         ///< prediction)
-  kInconsistentMatches,  ///< found points do not agree on a pose
-  kNoKeyframeBuffer,     ///< the map could not be started: no free proposal
-  kUnplaced              ///< in a loaded map, of which no place was recognised yet
-};
-[[nodiscard]] const char* describe(LostCause cause);
 
 enum class TrackStage : std::uint8_t {
   kPyramid,

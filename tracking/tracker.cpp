@@ -53,6 +53,8 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   TrackResult result;
   StageClock clock(result);
   ++frames_;
+  const LostCause gap = intervals_.next(frame.index, frame.t_ns);
+  if (lost_frames_ == 0) gap_before_loss_ = gap;
   load_images(frame);
   clock.lap(TrackStage::kPyramid);
   if (unplaced_ && reference_ == kNoKeyframe) {
@@ -302,7 +304,7 @@ bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
 
 void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
   result.status = TrackStatus::kLost;
-  result.cause = cause;
+  result.cause = explain_loss(cause, current_.left, previous_.left, gap_before_loss_);
   result.inliers = 0;
   ++lost_frames_;
   // previous_ and T_prev_ref_ stay at the last good frame, from where the next one tries again.

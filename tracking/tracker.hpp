@@ -118,7 +118,9 @@ class Tracker {
   std::uint64_t graph_version_ = 0;
   bool candidates_stale_ = true;
   int lost_frames_ = 0;
-  KeyframeId hint_keyframe_ = kNoKeyframe;  ///< of relocalise
+  FrameIntervals intervals_;
+  LostCause gap_before_loss_ = LostCause::kNone;  ///< between the last good frame and the next
+  KeyframeId hint_keyframe_ = kNoKeyframe;        ///< of relocalise
   SE3 hint_T_c_k_;
   std::uint32_t frames_ = 0;
   std::int64_t seeing_since_ns_ = 0;  ///< lost, but with corners in view, since then; 0: not

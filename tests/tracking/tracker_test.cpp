@@ -231,7 +231,7 @@ TEST(Tracker, SaysThatItIsLostAndWhyAndComesBack) {
   for (std::size_t i = 15; i < 18; ++i) {
     const TrackResult lost = odometry.step(covered(sequence[i]));
     EXPECT_EQ(lost.status, TrackStatus::kLost);
-    EXPECT_EQ(lost.cause, LostCause::kTooFewMatches);
+    EXPECT_EQ(lost.cause, LostCause::kCovered);
     EXPECT_EQ(lost.inliers, 0);
     EXPECT_FALSE(lost.proposed);
   }
@@ -253,6 +253,31 @@ TEST(Tracker, DoesNotInventAPoseInAnotherPlace) {
     frame.right = images.right.level(0).clone();
     EXPECT_EQ(odometry.step(frame).status, TrackStatus::kLost) << i;
   }
+}
+
+TEST(Tracker, SaysThatItIsLostForWhatWasMissedBefore) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  const auto cause_after = [&](std::int64_t missing, std::int64_t gap_ns) {
+    Odometry odometry(SensorKind::kStereo);
+    for (std::size_t i = 0; i < 15; ++i) odometry.step(sequence[i]);
+    // Turned far away meanwhile.
+    RenderedScene scene(test_rig(SensorKind::kStereo, 320, 240), {3, 2, 5}, 21);
+    FrameImages images;
+    scene.render(SE3(SO3::exp(Vector3(0, 1.2, 0)), Vector3::Zero()) * true_T_c_w(14), 2, images);
+    Frame frame = sequence[15];
+    frame.index += missing;
+    frame.t_ns += gap_ns;
+    frame.left = images.left.level(0).clone();
+    frame.right = images.right.level(0).clone();
+    const TrackResult result = odometry.step(frame);
+    EXPECT_EQ(result.status, TrackStatus::kLost);
+    return result.cause;
+  };
+  EXPECT_EQ(cause_after(20, 700'000'000), LostCause::kFramesMissing);
+  EXPECT_EQ(cause_after(0, 700'000'000), LostCause::kGapInTime);
+  const LostCause neither = cause_after(0, 0);
+  EXPECT_TRUE(neither == LostCause::kTooFewMatches || neither == LostCause::kTooFewCandidates)
+      << describe(neither);
 }
 
 TEST(Tracker, GoesWhereItIsRelocalised) {

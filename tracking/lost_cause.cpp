@@ -1,0 +1,110 @@
+#include "tracking/lost_cause.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace twofold {
+namespace {
+
+constexpr int kFineLevel = 1;
+constexpr int kCoarseLevel = 4;
+// Shares of what the last good frame had. Two neighbouring frames of a steady camera differ by a few per
+// cent.
+constexpr double kCoveredContrast = 0.35;
+constexpr double kBlurredDetail = 0.7;
+constexpr double kGap = 2.5;  // usual intervals
+
+/// Mean absolute difference of horizontal neighbours [grey].
+double detail(const cv::Mat& image) {
+  std::int64_t sum = 0;
+  for (int v = 0; v < image.rows; ++v) {
+    const auto* row = image.ptr<std::uint8_t>(v);
+    int in_row = 0;
+    for (int u = 1; u < image.cols; ++u) in_row += std::abs(int{row[u]} - int{row[u - 1]});
+    sum += in_row;
+  }
+  return static_cast<double>(sum) / std::max<double>(1, static_cast<double>(image.total()));
+}
+
+/// Standard deviation [grey].
+double contrast(const cv::Mat& image) {
+  double sum = 0, squares = 0;
+  for (int v = 0; v < image.rows; ++v) {
+    const auto* row = image.ptr<std::uint8_t>(v);
+    for (int u = 0; u < image.cols; ++u) {
+      sum += row[u];
+      squares += double{1} * row[u] * row[u];
+    }
+  }
+  const double n = std::max<double>(1, static_cast<double>(image.total()));
+  return std::sqrt(std::max(0.0, squares / n - sum / n * (sum / n)));
+}
+
+/// Detail at a fine level over that at a coarse one: blur takes the first away and leaves the second; a view
+/// of something else changes both.
+double sharpness(const ImagePyramid& images) {
+  return detail(images.level(kFineLevel)) / (1 + detail(images.level(kCoarseLevel)));
+}
+
+}  // namespace
+
+LostCause explain_loss(LostCause found, const ImagePyramid& now, const ImagePyramid& last_good,
+                       LostCause gap) {
+  const bool unexplained = found == LostCause::kTooFewMatches || found == LostCause::kInconsistentMatches ||
+                           found == LostCause::kTooFewCandidates;
+  if (!unexplained) return found;
+  if (!last_good.empty()) {
+    if (contrast(now.level(kCoarseLevel)) < kCoveredContrast * contrast(last_good.level(kCoarseLevel)))
+      return LostCause::kCovered;
+    if (sharpness(now) < kBlurredDetail * sharpness(last_good)) return LostCause::kBlurred;
+  }
+  return gap != LostCause::kNone ? gap : found;
+}
+
+LostCause FrameIntervals::next(std::int64_t index, std::int64_t t_ns) {
+  LostCause gap = LostCause::kNone;
+  if (any_) {
+    const std::int64_t interval = t_ns - t_ns_;
+    if (index > index_ + 1) {
+      gap = LostCause::kFramesMissing;
+    } else if (usual_ns_ > 0 && static_cast<double>(interval) > kGap * static_cast<double>(usual_ns_)) {
+      gap = LostCause::kGapInTime;
+    }
+    if (interval > 0 && (usual_ns_ == 0 || interval < usual_ns_)) usual_ns_ = interval;
+  }
+  any_ = true;
+  index_ = index;
+  t_ns_ = t_ns;
+  return gap;
+}
+
+const char* describe(LostCause cause) {
+  switch (cause) {
+    case LostCause::kNone:
+      return "";
+    case LostCause::kNoTexture:
+      return "too few corners with depth to start a map";
+    case LostCause::kTooFewCandidates:
+      return "hardly any map point should be visible";
+    case LostCause::kTooFewMatches:
+      return "visible map points were not found";
+    case LostCause::kInconsistentMatches:
+      return "found points do not agree on a pose";
+    case LostCause::kNoKeyframeBuffer:
+      return "no free buffer to start the map with";
+    case LostCause::kUnplaced:
+      return "no place of the loaded map was recognised yet";
+    case LostCause::kCovered:
+      return "the lens is covered, or it is dark: no contrast";
+    case LostCause::kBlurred:
+      return "the image is blurred";
+    case LostCause::kFramesMissing:
+      return "frames before it were dropped, and the camera moved on";
+    case LostCause::kGapInTime:
+      return "a gap in the time stamps, and the camera moved on";
+  }
+  return "";
+}
+
+}  // namespace twofold

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+
+#include "imaging/image_pyramid.hpp"
+
+namespace twofold {
+
+enum class LostCause : std::uint8_t {
+  kNone,
+  kNoTexture,            ///< too few corners with depth to start a map
+  kTooFewCandidates,     ///< hardly any map point projects into the image
+  kTooFewMatches,        ///< points should be visible but were not found (occlusion, wrong prediction)
+  kInconsistentMatches,  ///< found points do not agree on a pose
+  kNoKeyframeBuffer,     ///< the map could not be started: no free proposal
+  kUnplaced,             ///< in a loaded map, of which no place was recognised yet
+  kCovered,              ///< the image has hardly any contrast left: a hand, darkness, glare
+  kBlurred,              ///< fine detail is gone, contrast is not
+  kFramesMissing,        ///< frames before it were dropped: the camera moved on unseen
+  kGapInTime             ///< the source's time stamps jump, with no frame missing by number
+};
+[[nodiscard]] const char* describe(LostCause cause);
+
+/// What images and time stamps say about why points were not found, when that is what happened; otherwise
+/// `found` again. Bounded work, no allocation.
+///
+/// @param gap  kFramesMissing or kGapInTime when the first lost frame came after one, else kNone
+/// @param last_good  images of the last frame that had a pose; may be empty
+[[nodiscard]] LostCause explain_loss(LostCause found, const ImagePyramid& now, const ImagePyramid& last_good,
+                                     LostCause gap);
+
+/// Watches numbers and time stamps of frames for gaps. The usual interval is the shortest seen.
+class FrameIntervals {
+ public:
+  /// kNone, kFramesMissing or kGapInTime between the frame before and this one.
+  LostCause next(std::int64_t index, std::int64_t t_ns);
+
+ private:
+  bool any_ = false;
+  std::int64_t index_ = 0;
+  std::int64_t t_ns_ = 0;
+  std::int64_t usual_ns_ = 0;  ///< 0: not known yet
+};
+
+}  // namespace twofold
