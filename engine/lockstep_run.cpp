@@ -134,7 +134,7 @@ void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnaps
 void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse, std::uint32_t answers) {
   const std::int64_t due_ns = steady_now_ns();
   if (answers > 0) {
-    tracking_.take_answer(*answer_, snapshot_);
+    tracking_.take_answer(*answer_);
     answer_.reset();
   }
   may_propose = may_propose && !localise_only_;

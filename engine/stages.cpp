@@ -105,9 +105,9 @@ bool TrackingStage::request_relocalisation(RelocalisationRequest& request) {
   return true;
 }
 
-void TrackingStage::take_answer(const RelocalisationAnswer& answer, const GraphSnapshot& graph) {
+void TrackingStage::take_answer(const RelocalisationAnswer& answer) {
   answer_awaited_ = false;
-  if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k, graph);
+  if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
 }
 
 void TrackingStage::finish(std::int64_t scheduled_ns, FrameRecord& record) {

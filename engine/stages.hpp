@@ -44,8 +44,8 @@ class TrackingStage {
   void proposal_rejected(FrameRecord& record);
   /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
   bool request_relocalisation(RelocalisationRequest& request);
-  /// Before the next step, with its graph.
-  void take_answer(const RelocalisationAnswer& answer, const GraphSnapshot& graph);
+  /// Before the next step.
+  void take_answer(const RelocalisationAnswer& answer);
   [[nodiscard]] bool wants_relocalisation() const;
   /// Completes the record once the pose is known: how long after its due time that was.
   void finish(std::int64_t scheduled_ns, FrameRecord& record);

@@ -207,17 +207,17 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
 void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
   if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
   TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
-  take_answers(graph, step);
+  take_answers(step);
   step.degrade_level = spare_ ? 0 : 1;  // first rung of the ladder: keyframes are withheld
   if (tracking_.step(slot.frame, graph, spare_, slot.record)) send_proposal(slot.record, step);
   schedule_.tracker.append(step);
   ask_where_we_are();
 }
 
-void ThreadedRun::take_answers(const GraphSnapshot& graph, TrackerStep& step) {
+void ThreadedRun::take_answers(TrackerStep& step) {
   RelocalisationAnswer answer;
   while (answers_.try_pop(answer)) {
-    tracking_.take_answer(answer, graph);
+    tracking_.take_answer(answer);
     ++step.messages;
   }
 }

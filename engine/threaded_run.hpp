@@ -59,7 +59,7 @@ class ThreadedRun {
   void track(FrameSlot& slot, const GraphSnapshot& graph);
   void send_proposal(FrameRecord& record, TrackerStep& step);
   void take_messages();
-  void take_answers(const GraphSnapshot& graph, TrackerStep& step);
+  void take_answers(TrackerStep& step);
   void ask_where_we_are();
   /// False when there was no request.
   bool answer_request();

@@ -14,10 +14,11 @@ constexpr std::size_t kMaxCandidates = 3000;
 constexpr std::size_t kMaxLocalPoints = 1200;
 constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxAlignmentPoints = 240;
-constexpr int kMinStartPoints = 40;
+
+}  // namespace
 
 /// Attributes the time since the last lap to a stage.
-class StageClock {
+class Tracker::StageClock {
  public:
   explicit StageClock(TrackResult& result) : result_(result) {}
   void lap(TrackStage stage) {
@@ -30,8 +31,6 @@ class StageClock {
   TrackResult& result_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
-
-}  // namespace
 
 Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
@@ -57,12 +56,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   if (lost_frames_ == 0) gap_before_loss_ = gap;
   load_images(frame);
   clock.lap(TrackStage::kPyramid);
-  if (unplaced_ && reference_ == kNoKeyframe) {
-    give_up_frame(LostCause::kUnplaced, result);
-    if (new_part_due(frame.t_ns) && start_part(frame, free_proposal, result)) remember_frame(SE3());
-    return result;
-  }
-  if (reference_ == kNoKeyframe) {
+  if (reference_ == kNoKeyframe && !unplaced_) {
     if (start_map(frame, free_proposal, result)) remember_frame(SE3());
     clock.lap(TrackStage::kKeyframe);
     return result;
@@ -71,10 +65,32 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   const KeyframeId reference_before = reference_;
   const SE3 T_prev_ref_before = T_prev_ref_;
   const bool hinted = take_hint(graph);
+  if (reference_ == kNoKeyframe) {
+    give_up_frame(LostCause::kUnplaced, result);
+  } else if (track(graph, hinted, clock, result)) {
+    if (free_proposal != nullptr && keyframe_due(result, result.T_c_ref)) {
+      propose_keyframe(frame, graph, *free_proposal, result);
+    }
+    remember_frame(result.T_c_ref);
+    if (!result.proposed) revisit_reference(graph);
+    clock.lap(TrackStage::kKeyframe);
+    return result;
+  } else if (hinted) {  // it was not that place: the images to try from are still those of the last good
+                        // frame
+    reference_ = reference_before;
+    T_prev_ref_ = T_prev_ref_before;
+    candidates_stale_ = true;
+  }
+  if (new_part_due(frame.t_ns) && start_part(frame, free_proposal, result)) remember_frame(SE3());
+  clock.lap(TrackStage::kKeyframe);
+  return result;
+}
+
+/// Pose of the frame relative to the reference keyframe, from the points of the map around it.
+bool Tracker::track(const GraphSnapshot& graph, bool hinted, StageClock& clock, TrackResult& result) {
   if (candidates_stale_) candidates_.rebuild(graph, reference_, local_, options_.neighbour_keyframes);
   candidates_stale_ = false;
   clock.lap(TrackStage::kCandidates);
-
   const SE3 T_c_ref_aligned = hinted ? T_prev_ref_ : align_to_previous(result);
   clock.lap(TrackStage::kAlignment);
   select_candidates(T_c_ref_aligned, result);
@@ -83,32 +99,8 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   clock.lap(TrackStage::kSearch);
   const bool tracked = estimate_pose(T_c_ref_aligned, result);
   clock.lap(TrackStage::kMotion);
-  if (!tracked) {
-    if (hinted) {  // the images to try from are still those of the last good frame
-      reference_ = reference_before;
-      T_prev_ref_ = T_prev_ref_before;
-      candidates_stale_ = true;
-    }
-    if (unplaced_) reference_ = kNoKeyframe;  // it was not that place; nothing is known again
-    if (new_part_due(frame.t_ns) && start_part(frame, free_proposal, result)) remember_frame(SE3());
-    return result;
-  }
-  unplaced_ = false;
-
-  if (free_proposal != nullptr && keyframe_due(result, result.T_c_ref)) {
-    propose_keyframe(frame, graph, *free_proposal, result);
-  }
-  remember_frame(result.T_c_ref);
-  if (!result.proposed) revisit_reference(graph);
-  clock.lap(TrackStage::kKeyframe);
-  return result;
-}
-
-void Tracker::continue_in(const GraphSnapshot& graph) {
-  if (graph.keyframe_count() == 0) return;
-  next_keyframe_ = static_cast<std::uint32_t>(graph.keyframe_count());
-  next_point_ = static_cast<std::uint32_t>(graph.point_count());
-  unplaced_ = true;
+  if (tracked) unplaced_ = false;
+  return tracked;
 }
 
 void Tracker::load_images(const Frame& frame) {
@@ -139,78 +131,6 @@ void Tracker::adopt(const GraphSnapshot& graph) {
     T_prev_ref_ = T_prev_ref_ * keyframe.T_this_heir;
     reference_ = keyframe.heir;
   }
-}
-
-void Tracker::relocalise(KeyframeId id, const SE3& T_c_k) {
-  hint_keyframe_ = id;
-  hint_T_c_k_ = T_c_k;
-}
-
-/// Moves to where the loop closer recognised the camera, if it is lost.
-bool Tracker::take_hint(const GraphSnapshot& graph) {
-  const KeyframeId id = std::exchange(hint_keyframe_, kNoKeyframe);
-  if (id == kNoKeyframe || lost_frames_ == 0 || !graph.contains(id) || graph.keyframe(id).culled())
-    return false;
-  reference_ = id;
-  T_prev_ref_ = hint_T_c_k_;
-  candidates_stale_ = true;
-  return true;
-}
-
-bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result) {
-  result.status = TrackStatus::kInitialising;
-  result.cause = LostCause::kNoKeyframeBuffer;
-  if (proposal == nullptr || !local_.room_for_keyframe()) return false;
-  const KeyframeId id{next_keyframe_};
-  starter_.clear();
-  if (starter_.start(current_, id, local_) < kMinStartPoints) {
-    local_.retract(id);
-    result.cause = LostCause::kNoTexture;
-    return false;
-  }
-  proposal->clear();
-  proposal->id = id;
-  proposal->frame_index = frame.index;
-  proposal->t_ns = frame.t_ns;
-  matches_.clear();
-  motion_.clear();
-  proposal->median_depth = keyframe_depth_ = median_depth(SE3());
-  proposal->images.copy_from(current_);
-  local_.add_pending({id, kNoKeyframe, SE3()});
-  first_of_part_ = next_keyframe_++;
-  points_in_proposal_ = 0;
-  reference_ = id;
-  candidates_stale_ = true;
-  regions_at_keyframe_ = 0;
-  result.status = TrackStatus::kTracking;
-  result.cause = LostCause::kNone;
-  result.reference = id;
-  result.proposed = true;
-  return true;
-}
-
-/// Lost for some time, though there is something to see.
-bool Tracker::new_part_due(std::int64_t t_ns) {
-  if (!starter_.sees_corners(current_, options_.min_corners_seen)) {
-    seeing_since_ns_ = 0;
-    return false;
-  }
-  if (seeing_since_ns_ == 0) seeing_since_ns_ = t_ns;
-  return static_cast<double>(t_ns - seeing_since_ns_) >= options_.new_part_after * 1e9;
-}
-
-/// The camera does not know where it is: it goes on in a map part of its own, from identity, until a place
-/// of both parts is recognised. Not before the map has all that was proposed of the old part, so that nothing
-/// here refers to that any more.
-bool Tracker::start_part(const Frame& frame, KeyframeProposal* proposal, TrackResult& result) {
-  if (proposal == nullptr || !local_.pending().empty()) return false;
-  local_.clear_points();
-  TrackResult started = result;
-  if (!start_map(frame, proposal, started)) return false;
-  unplaced_ = false;
-  result = started;
-  result.T_c_ref = SE3();
-  return true;
 }
 
 /// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from constant velocity, then from rest.
@@ -300,27 +220,6 @@ bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
     return true;
   }
   return false;
-}
-
-void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
-  result.status = TrackStatus::kLost;
-  result.cause = explain_loss(cause, current_.left, previous_.left, gap_before_loss_);
-  result.inliers = 0;
-  ++lost_frames_;
-  // previous_ and T_prev_ref_ stay at the last good frame, from where the next one tries again.
-}
-
-void Tracker::relocalise(KeyframeId keyframe, const SE3& T_c_k, const GraphSnapshot& graph) {
-  if (lost_frames_ == 0 || !graph.contains(keyframe) || (reference_ == kNoKeyframe && !unplaced_)) return;
-  SE3 T_c_ref = T_c_k;
-  for (; graph.keyframe(keyframe).culled(); keyframe = graph.keyframe(keyframe).heir) {
-    T_c_ref = T_c_ref * graph.keyframe(keyframe).T_this_heir;
-  }
-  reference_ = keyframe;
-  T_prev_ref_ = T_c_ref;
-  if (unplaced_) keyframe_depth_ = graph.keyframe(keyframe).median_depth;
-  previous_points_.clear();  // there is no image at that pose to align with: guided search starts from it
-  candidates_stale_ = true;
 }
 
 void Tracker::remember_frame(const SE3& T_c_ref) {

@@ -48,10 +48,6 @@ class Tracker {
     return T_prev_ref_ * pose_in_world(graph, local_, reference_);
   }
 
-  /// A place recogniser says where the last frames, which were lost, were taken: the next step looks for the
-  /// map's points from there, and accepts or refuses the pose as it does every other. Nothing happens while
-  /// tracking, or when `graph`, that of the next step, does not have the keyframe.
-  void relocalise(KeyframeId keyframe, const SE3& T_c_k, const GraphSnapshot& graph);
   /// Images of the last step's frame, if that was lost.
   [[nodiscard]] const FrameImages& lost_images() const { return current_; }
   /// Frames since the last one with a pose.
@@ -74,6 +70,7 @@ class Tracker {
   [[nodiscard]] std::span<const MotionObservation> last_observations() const { return motion_; }
 
  private:
+  class StageClock;
   struct Match {
     std::uint32_t point;  ///< position in candidates_.points()
     PointMatch found;
@@ -83,6 +80,7 @@ class Tracker {
   void adopt(const GraphSnapshot& graph);
   bool start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
   bool take_hint(const GraphSnapshot& graph);
+  bool track(const GraphSnapshot& graph, bool hinted, StageClock& clock, TrackResult& result);
   bool start_part(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
   [[nodiscard]] bool new_part_due(std::int64_t t_ns);
   SE3 align_to_previous(TrackResult& result);
