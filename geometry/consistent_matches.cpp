@@ -1,0 +1,82 @@
+#include "geometry/consistent_matches.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+namespace twofold {
+namespace {
+
+/// Rows of bits: the adjacency matrix of the agreement graph.
+class BitRows {
+ public:
+  explicit BitRows(std::size_t n) : words_((n + 63) / 64), bits_(n * words_) {}
+
+  void set(std::size_t row, std::size_t column) { bits_[row * words_ + column / 64] |= bit(column); }
+  [[nodiscard]] std::span<const std::uint64_t> row(std::size_t i) const {
+    return {bits_.data() + i * words_, words_};
+  }
+  [[nodiscard]] static std::uint64_t bit(std::size_t column) { return std::uint64_t{1} << (column % 64); }
+
+ private:
+  std::size_t words_;
+  std::vector<std::uint64_t> bits_;
+};
+
+int common(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b) {
+  int count = 0;
+  for (std::size_t w = 0; w < a.size(); ++w) count += std::popcount(a[w] & b[w]);
+  return count;
+}
+
+/// Variance of |a - b| by first-order propagation.
+double distance_variance(const Vector3& difference, double distance, const Matrix3& covariance) {
+  if (!(distance > 0)) return covariance.trace();
+  return difference.dot(covariance * difference) / (distance * distance);
+}
+
+bool agree(const PointMatch3d& a, const PointMatch3d& b, const ConsistencyOptions& options) {
+  const Vector3 v_0 = a.x_0 - b.x_0, v_1 = a.x_1 - b.x_1;
+  const double d_0 = v_0.norm(), d_1 = v_1.norm();
+  const double variance = distance_variance(v_0, d_0, a.covariance_0 + b.covariance_0) +
+                          distance_variance(v_1, d_1, a.covariance_1 + b.covariance_1);
+  return std::abs(d_0 - d_1) <= options.threshold + options.sigmas * std::sqrt(variance);
+}
+
+}  // namespace
+
+std::vector<int> consistent_matches(std::span<const PointMatch3d> matches,
+                                    const ConsistencyOptions& options) {
+  const std::size_t n = matches.size();
+  BitRows neighbours(n);
+  for (std::size_t a = 0; a < n; ++a) {
+    for (std::size_t b = a + 1; b < n; ++b) {
+      if (!agree(matches[a], matches[b], options)) continue;
+      neighbours.set(a, b);
+      neighbours.set(b, a);
+    }
+  }
+  std::vector<std::uint64_t> candidates((n + 63) / 64, ~std::uint64_t{0});
+  std::vector<bool> open(n, true);
+  std::vector<int> clique;
+  for (;;) {
+    int best = -1, most = -1;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!open[i]) continue;
+      const int kept = common(candidates, neighbours.row(i));
+      if (kept <= most) continue;
+      best = static_cast<int>(i);
+      most = kept;
+    }
+    if (best < 0) break;
+    clique.push_back(best);
+    const auto row = neighbours.row(static_cast<std::size_t>(best));
+    for (std::size_t w = 0; w < candidates.size(); ++w) candidates[w] &= row[w];
+    for (std::size_t i = 0; i < n; ++i) open[i] = (candidates[i / 64] & BitRows::bit(i)) != 0;
+  }
+  std::sort(clique.begin(), clique.end());
+  return clique;
+}
+
+}  // namespace twofold
