@@ -75,8 +75,8 @@ Bytes strongest_arc(const std::array<Bytes, 16>& d) {
   return strongest;
 }
 
-/// 255 for every pixel of the run that is a corner, else 0.
-Bytes find_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
+/// How far each pixel of the run stands out as a corner; 0 for those that are none.
+Bytes strength_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
   const Bytes centre = load(p);
   const Bytes t = Bytes{} + static_cast<std::uint8_t>(threshold);
   const auto brighter = [&](Bytes q) { return larger(q, centre) - centre; };
@@ -97,7 +97,7 @@ Bytes find_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
     for (std::size_t k = 0; k < 16; ++k) d[k] = darker(load(p + circle[k]));
     strength = larger(strength, strongest_arc(d));
   }
-  return strength > t;
+  return strength & static_cast<Bytes>(strength > t);
 }
 
 constexpr int kMaxColumns = 256;
@@ -129,24 +129,36 @@ struct Strip {
     }
   }
 
+  /// Those of [first, end) that are marked in the run that starts at `begin`.
+  void judge_run(const Bytes& marked, int begin, int first, int end, int v) {
+    std::uint64_t words[kRun / 8];
+    std::memcpy(words, &marked, sizeof words);
+    for (int word = 0; word < kRun / 8; ++word) {
+      for (std::uint64_t left = words[word]; left != 0;) {
+        const int byte = __builtin_ctzll(left) / 8;
+        left &= ~(std::uint64_t{0xff} << (8 * byte));
+        const int u = begin + 8 * word + byte;
+        if (u >= first && u < end) judge(u, v);
+      }
+    }
+  }
+
   void scan(int threshold) {
+    if (v0 >= v1) return;
     for (int first = u0; first < u1; first += kRun) {
       const int end = std::min(first + kRun, u1);
       if (!wants(first, end)) continue;
       // The last run starts earlier, so that it does not reach past the row's end.
       const int begin = std::min(first, image.cols - 3 - kRun);
+      Bytes above{};
+      Bytes here = strength_in_run(image.ptr<std::uint8_t>(v0) + begin, circle, threshold);
       for (int v = v0; v < v1; ++v) {
-        const Bytes found = find_in_run(image.ptr<std::uint8_t>(v) + begin, circle, threshold);
-        std::uint64_t words[kRun / 8];
-        std::memcpy(words, &found, sizeof words);
-        for (int word = 0; word < kRun / 8; ++word) {
-          for (std::uint64_t left = words[word]; left != 0;) {
-            const int byte = __builtin_ctzll(left) / 8;
-            left &= ~(std::uint64_t{0xff} << (8 * byte));
-            const int u = begin + 8 * word + byte;
-            if (u >= first && u < end) judge(u, v);
-          }
-        }
+        Bytes below{};
+        if (v + 1 < v1) below = strength_in_run(image.ptr<std::uint8_t>(v + 1) + begin, circle, threshold);
+        // Corners come in clusters: only those that stand out from their column are worth a score.
+        judge_run(static_cast<Bytes>(here > above) & static_cast<Bytes>(here >= below), begin, first, end, v);
+        above = here;
+        here = below;
       }
     }
   }
