@@ -55,10 +55,17 @@ Bytes larger(Bytes a, Bytes b) {
 Bytes smaller(Bytes a, Bytes b) {
   return a < b ? a : b;
 }
-bool any(Bytes bytes) {
-  std::uint64_t words[kRun / 8];
-  std::memcpy(words, &bytes, sizeof words);
-  return (words[0] | words[1] | words[2] | words[3]) != 0;
+/// Bit k set where byte k is not zero; marks are 255 or 0.
+std::uint32_t mask_of(const Bytes& marks) {
+#ifdef __AVX2__
+  __m256i bytes;
+  std::memcpy(&bytes, &marks, sizeof bytes);
+  return static_cast<std::uint32_t>(_mm256_movemask_epi8(bytes));
+#else
+  std::uint32_t mask = 0;
+  for (int k = 0; k < kRun; ++k) mask |= (marks[k] != 0 ? 1U : 0U) << k;
+  return mask;
+#endif
 }
 
 /// How far the weakest of the nine pixels of an arc stands out, for the arc of which it is most: `d` are the
@@ -89,11 +96,11 @@ Bytes strength_in_run(const std::uint8_t* p, const Circle& circle, int threshold
 
   Bytes strength{};
   std::array<Bytes, 16> d;
-  if (any(may_be_bright)) {
+  if (mask_of(may_be_bright) != 0) {
     for (std::size_t k = 0; k < 16; ++k) d[k] = brighter(load(p + circle[k]));
     strength = strongest_arc(d);
   }
-  if (any(may_be_dark)) {
+  if (mask_of(may_be_dark) != 0) {
     for (std::size_t k = 0; k < 16; ++k) d[k] = darker(load(p + circle[k]));
     strength = larger(strength, strongest_arc(d));
   }
@@ -101,6 +108,7 @@ Bytes strength_in_run(const std::uint8_t* p, const Circle& circle, int threshold
 }
 
 constexpr int kMaxColumns = 256;
+constexpr int kMaxMasks = 1 << 14;  // of one strip: 128 rows of 4096 pixels
 
 /// One row of cells on one pyramid level, and the best corner found in each so far.
 struct Strip {
@@ -109,6 +117,7 @@ struct Strip {
   int cell;    // side in pixels of the level
   int u0, u1;  // columns and rows of pixels looked at
   int v0, v1;
+  std::span<std::uint32_t> weak;  // by run and row: corners that do not stand out far
   std::array<bool, kMaxColumns> wanted{};
   std::array<Corner, kMaxColumns> best{};
 
@@ -119,6 +128,11 @@ struct Strip {
     }
     return false;
   }
+  [[nodiscard]] std::uint32_t& weak_at(int first, int v) {
+    return weak[static_cast<std::size_t>((first - u0) / kRun * (v1 - v0) + v - v0)];
+  }
+  /// The last run starts earlier, so that it does not reach past the row's end.
+  [[nodiscard]] int begin_of(int first) const { return std::min(first, image.cols - 3 - kRun); }
 
   void judge(int u, int v) {
     const auto column = static_cast<std::size_t>(u / cell);
@@ -129,37 +143,43 @@ struct Strip {
     }
   }
 
-  /// Those of [first, end) that are marked in the run that starts at `begin`.
-  void judge_run(const Bytes& marked, int begin, int first, int end, int v) {
-    std::uint64_t words[kRun / 8];
-    std::memcpy(words, &marked, sizeof words);
-    for (int word = 0; word < kRun / 8; ++word) {
-      for (std::uint64_t left = words[word]; left != 0;) {
-        const int byte = __builtin_ctzll(left) / 8;
-        left &= ~(std::uint64_t{0xff} << (8 * byte));
-        const int u = begin + 8 * word + byte;
-        if (u >= first && u < end) judge(u, v);
+  void judge_all(std::uint32_t mask, int first, int v) {
+    const int begin = begin_of(first);
+    for (; mask != 0; mask &= mask - 1) {
+      const int u = begin + __builtin_ctz(mask);
+      if (u >= first && u < std::min(first + kRun, u1)) judge(u, v);
+    }
+  }
+
+  /// Finds all corners; judges those that stand out by more than `strong` and keeps the others for later.
+  void scan(int threshold, int strong) {
+    const Bytes far = Bytes{} + static_cast<std::uint8_t>(std::min(strong, 255));
+    for (int first = u0; first < u1; first += kRun) {
+      if (v0 >= v1 || !wants(first, std::min(first + kRun, u1))) continue;
+      const auto strengths = [&](int v) {
+        return strength_in_run(image.ptr<std::uint8_t>(v) + begin_of(first), circle, threshold);
+      };
+      Bytes above{};
+      Bytes here = strengths(v0);
+      for (int v = v0; v < v1; ++v) {
+        Bytes below{};
+        if (v + 1 < v1) below = strengths(v + 1);
+        // Corners come in clusters: only those that stand out from their column are worth a score.
+        const Bytes kept = static_cast<Bytes>(here > above) & static_cast<Bytes>(here >= below);
+        const std::uint32_t strong_ones = mask_of(kept & static_cast<Bytes>(here > far));
+        weak_at(first, v) = mask_of(kept) & ~strong_ones;
+        judge_all(strong_ones, first, v);
+        above = here;
+        here = below;
       }
     }
   }
 
-  void scan(int threshold) {
-    if (v0 >= v1) return;
+  /// Judges what scan kept for later, of the cells still wanted.
+  void judge_weak() {
     for (int first = u0; first < u1; first += kRun) {
-      const int end = std::min(first + kRun, u1);
-      if (!wants(first, end)) continue;
-      // The last run starts earlier, so that it does not reach past the row's end.
-      const int begin = std::min(first, image.cols - 3 - kRun);
-      Bytes above{};
-      Bytes here = strength_in_run(image.ptr<std::uint8_t>(v0) + begin, circle, threshold);
-      for (int v = v0; v < v1; ++v) {
-        Bytes below{};
-        if (v + 1 < v1) below = strength_in_run(image.ptr<std::uint8_t>(v + 1) + begin, circle, threshold);
-        // Corners come in clusters: only those that stand out from their column are worth a score.
-        judge_run(static_cast<Bytes>(here > above) & static_cast<Bytes>(here >= below), begin, first, end, v);
-        above = here;
-        here = below;
-      }
+      if (!wants(first, std::min(first + kRun, u1))) continue;
+      for (int v = v0; v < v1; ++v) judge_all(weak_at(first, v), first, v);
     }
   }
 };
@@ -216,6 +236,8 @@ void detect_corners(const cv::Mat& image, int level, int threshold, float min_sc
   if (image.cols < kRun + 2 * border) return;
   const int cell = grid.cell_px >> level;
   const Circle circle = circle_offsets(static_cast<std::ptrdiff_t>(image.step));
+  TWOFOLD_CHECK((image.cols / kRun + 1) * cell <= kMaxMasks, "cells too large for an image so wide");
+  std::array<std::uint32_t, kMaxMasks> weak;
   for (int row = 0; row < grid.rows; ++row) {
     Strip strip{image,
                 circle,
@@ -223,15 +245,16 @@ void detect_corners(const cv::Mat& image, int level, int threshold, float min_sc
                 border,
                 std::min(grid.columns * cell, image.cols - border),
                 std::max(row * cell, border),
-                std::min((row + 1) * cell, image.rows - border)};
+                std::min((row + 1) * cell, image.rows - border),
+                weak};
     const std::uint8_t* occupied = grid.occupied.data() + row * grid.columns;
     for (int c = 0; c < grid.columns; ++c) strip.wanted[static_cast<std::size_t>(c)] = occupied[c] == 0;
     // Strong corners first: in rich texture there are enough of them, and far fewer to score.
-    strip.scan(kStrong * threshold);
+    strip.scan(threshold, kStrong * threshold);
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
       strip.wanted[c] = strip.wanted[c] && !(strip.best[c].score > 0 && strip.best[c].score >= min_score);
     }
-    strip.scan(threshold);
+    strip.judge_weak();
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
       Corner corner = strip.best[c];
       corner.level = static_cast<std::uint8_t>(level);
