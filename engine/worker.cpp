@@ -41,8 +41,8 @@ std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
 }
 
 void yield_to_other_threads() {
-  constexpr int kLeastUrgent = 19;
-  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(this_thread_id()), kLeastUrgent);  // never refused
+  constexpr int kNice = 10;  // a tenth of the share of a thread that does not yield
+  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(this_thread_id()), kNice);  // never refused
 }
 
 tl::expected<void, std::string> lock_memory() {

@@ -140,7 +140,8 @@ void put_place(ByteWriter& out, KeyframeId id, const PlaceAppearance& place) {
     out.put(n < place.z.size() ? place.z[n].z() : std::numeric_limits<float>::quiet_NaN());
     out.put(corner.level);
     out.put(corner.angle);
-    for (const std::uint64_t bits : corner.descriptor.bits) out.put(bits);
+    out.put_bytes(
+        {reinterpret_cast<const std::uint8_t*>(corner.descriptor.bits.data()), sizeof(BinaryDescriptor)});
   }
 }
 

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/twofold/place_evaluation.hpp"
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+#include "loopclosure/place_view.hpp"
+
+namespace twofold {
+
+/// An image of a set, described.
+struct DescribedImage {
+  PlaceView view;
+  std::optional<SE3> T_w_c;  ///< true pose, if known
+};
+
+struct PlaceSet {
+  Rig rig;
+  std::vector<DescribedImage> places;
+};
+
+/// Describes every `arguments.every`-th image of a folder that has a folder `images`, which are of one
+/// camera, or of a source. Throws IoError.
+[[nodiscard]] PlaceSet load_place_set(const PlaceEvaluationArguments& arguments,
+                                      const Vocabulary& vocabulary);
+
+enum class Truth : std::uint8_t { kSame, kOther, kUndecided };
+
+/// Which images show the same place: by a list of pairs, or by true poses.
+class TruePairs {
+ public:
+  /// Both must outlive this. Throws IoError when neither pairs nor poses are there.
+  TruePairs(const PlaceEvaluationArguments& arguments, const PlaceSet& set);
+
+  [[nodiscard]] Truth of(int a, int b) const;
+
+ private:
+  void parse(const std::string& text);
+  [[nodiscard]] Truth from_poses(int a, int b) const;
+
+  const PlaceEvaluationArguments& arguments_;
+  const PlaceSet& set_;
+  std::set<std::pair<int, int>> pairs_;
+};
+
+}  // namespace twofold
