@@ -77,12 +77,13 @@ BENCHMARK(fast_corners)->ArgName("level")->DenseRange(0, 2)->Unit(benchmark::kMi
 /// One point, left and right image: warp, whole-pixel search, sub-pixel refinement.
 void patch_search(benchmark::State& state) {
   const GuidedSearchOptions options;
+  const Views& both = views();
   std::size_t n = 0;
   std::size_t found = 0;
   for (auto _ : state) {
-    const Views::Point& point = views().points[n++ % views().points.size()];
+    const Views::Point& point = both.points[n++ % both.points.size()];
     const auto match =
-        find_point(views().second, views().rig, point.appearance, point.psi, views().T_second_first, options);
+        find_point(both.second, both.rig, point.appearance, point.psi, both.T_second_first, options);
     found += match.has_value();
   }
   state.counters["found_share"] = static_cast<double>(found) / static_cast<double>(state.iterations());
@@ -92,11 +93,11 @@ BENCHMARK(patch_search)->Unit(benchmark::kMicrosecond);
 /// Depth of a new point: the whole row is searched.
 void row_search(benchmark::State& state) {
   const GuidedSearchOptions options;
+  const Views& both = views();
   std::size_t n = 0;
   for (auto _ : state) {
-    const Corner& corner = views().corners[n++ % views().corners.size()];
-    benchmark::DoNotOptimize(
-        right_from_row(views().first, views().rig, corner.u, corner.v, corner.level, options));
+    const Corner& corner = both.corners[n++ % both.corners.size()];
+    benchmark::DoNotOptimize(right_from_row(both.first, both.rig, corner.u, corner.v, corner.level, options));
   }
 }
 BENCHMARK(row_search)->Unit(benchmark::kMicrosecond);

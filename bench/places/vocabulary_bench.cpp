@@ -26,28 +26,31 @@ const Keyframe& keyframe() {
 }
 
 void vocabulary_word(benchmark::State& state) {
+  const Keyframe& one = keyframe();
   std::size_t n = 0;
   for (auto _ : state) {
-    const DescribedCorner& corner = keyframe().corners[n++ % keyframe().corners.size()];
-    benchmark::DoNotOptimize(keyframe().vocabulary.word(corner.descriptor));
+    const DescribedCorner& corner = one.corners[n++ % one.corners.size()];
+    benchmark::DoNotOptimize(one.vocabulary.word(corner.descriptor));
   }
 }
 BENCHMARK(vocabulary_word);
 
 void vocabulary_bag(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(keyframe().vocabulary.bag(keyframe().corners));
-  state.counters["corners"] = static_cast<double>(keyframe().corners.size());
+  const Keyframe& one = keyframe();
+  for (auto _ : state) benchmark::DoNotOptimize(one.vocabulary.bag(one.corners));
+  state.counters["corners"] = static_cast<double>(one.corners.size());
 }
 BENCHMARK(vocabulary_bag)->Unit(benchmark::kMicrosecond);
 
 void select_and_describe(benchmark::State& state) {
+  const Keyframe& one = keyframe();
   CornerSelector selector({});
   CornerDescriber describer;
   std::vector<DescribedCorner> corners;
   for (auto _ : state) {
     corners.clear();
-    selector.select(keyframe().images, corners);
-    describer.describe(keyframe().images, corners);
+    selector.select(one.images, corners);
+    describer.describe(one.images, corners);
   }
 }
 BENCHMARK(select_and_describe)->Unit(benchmark::kMillisecond);
