@@ -28,7 +28,7 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
   FeedStatus status = FeedStatus::kEnd;
   // Relaxed: the flag carries no other data; seeing it a frame later is as good.
   while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
-    track(frame, true, false, answer_ ? 1 : 0);
+    track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = localise_only_});
     if (request_) answer_request(snapshot_);
     if (!queue_.empty()) {
       map(queue_.size(), 0);
@@ -61,8 +61,12 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
       fail("the schedule belongs to another recording: frame numbers differ");
       return;
     }
+    if (step.degrade_level >= kLadderRungs) {
+      fail("the schedule has a rung of the load ladder that this program does not know");
+      return;
+    }
     if (step.fate == TrackerStep::Fate::kDropped) {
-      drop(frame);
+      drop(frame, step);
       continue;
     }
     for (; snapshot_.version() < step.version; ++round) {
@@ -78,7 +82,7 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
       fail("the schedule does not fit the input: the tracker would need an answer it did not ask for");
       return;
     }
-    track(frame, step.degrade_level == 0, step.refused > 0, step.messages);
+    track(frame, step);
     replay_loop_steps(schedule);
     checkpoint_if_due(frame.t_ns);
     report(progress);
@@ -131,38 +135,39 @@ void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnaps
                                        static_cast<std::uint32_t>(messages.size() - sent)});
 }
 
-void LockstepRun::track(const Frame& frame, bool may_propose, bool refuse, std::uint32_t answers) {
+void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
   const std::int64_t due_ns = steady_now_ns();
-  if (answers > 0) {
+  if (step.messages > 0) {
     tracking_.take_answer(*answer_);
     answer_.reset();
   }
-  may_propose = may_propose && !localise_only_;
   FrameRecord record;
   ProposalHandle proposal;
-  if (may_propose) proposal = pool_.try_acquire();
-  if (tracking_.step(frame, snapshot_, proposal, record)) {
-    if (refuse) {
+  if (!step.keyframe_withheld) proposal = pool_.try_acquire();
+  if (tracking_.step(frame, snapshot_, static_cast<LadderRung>(step.degrade_level), proposal, record)) {
+    if (step.refused > 0) {
       tracking_.proposal_rejected(record);
       ++result_.proposals_refused;
     } else {
       queue_.push_back(std::move(proposal));
     }
   }
-  tracking_.finish(due_ns, record);
-  result_.schedule.tracker.append({record.frame_index, record.snapshot_version, TrackerStep::Fate::kTracked,
-                                   static_cast<std::uint8_t>(may_propose ? 0 : 1), answers,
-                                   refuse ? 1U : 0U});
+  tracking_.finish(due_ns, steady_now_ns(), record);
+  TrackerStep taken = step;
+  taken.frame = record.frame_index;
+  taken.version = record.snapshot_version;
+  result_.schedule.tracker.append(taken);
   if (tracking_.wants_relocalisation()) (void)tracking_.request_relocalisation(request_.emplace());
   result_.frames.push_back(record);
 }
 
-void LockstepRun::drop(const Frame& frame) {
+void LockstepRun::drop(const Frame& frame, const TrackerStep& step) {
   FrameRecord record;
   record.frame_index = frame.index;
   record.t_ns = frame.t_ns;
   record.state = FrameState::kDropped;
-  result_.schedule.tracker.append({frame.index, 0, TrackerStep::Fate::kDropped});
+  record.rung = static_cast<LadderRung>(step.degrade_level);
+  result_.schedule.tracker.append(step);
   result_.frames.push_back(record);
 }
 

@@ -22,7 +22,8 @@ class LockstepRun {
   [[nodiscard]] RunResult finish();
 
  private:
-  void track(const Frame& frame, bool may_propose, bool refuse, std::uint32_t answers);
+  /// `step` says what the frame meets: rung, answers, whether a keyframe may be made and is refused.
+  void track(const Frame& frame, const TrackerStep& step);
   void answer_request(const GraphSnapshot& graph);
   void map(std::size_t proposals, std::size_t loop_messages);
   /// One step of the loop closer for a keyframe; the last `refused` of its messages found the ring full.
@@ -32,7 +33,7 @@ class LockstepRun {
   void replay_loop_steps(const Schedule& schedule);
   /// Were all messages of this round sent?
   [[nodiscard]] bool can_map(const MapperStep& round) const;
-  void drop(const Frame& frame);
+  void drop(const Frame& frame, const TrackerStep& step);
   /// By the time of the recording: the same in every run.
   void checkpoint_if_due(std::int64_t t_ns);
   void report(const ProgressSink& progress);

@@ -30,21 +30,23 @@ std::int64_t Pacer::due_ns(std::int64_t t_ns) const {
 Arrival Pacer::wait_for(std::int64_t t_ns, std::optional<std::int64_t> next_t_ns,
                         const std::stop_token& stop) {
   std::int64_t now_ns = clock_->now_ns();
-  if (options_.speed == 0) return {now_ns, 0, false};
+  if (options_.speed == 0) return {now_ns, 0, 0, false};
   const bool first = !started_;
   if (first) {
     started_ = true;
     first_t_ns_ = t_ns;
     start_ns_ = now_ns;
   }
-  Arrival arrival{due_ns(t_ns), 0, false};
+  Arrival arrival{due_ns(t_ns), 0, 0, false};
+  if (next_t_ns) period_ns_ = due_ns(*next_t_ns) - arrival.scheduled_ns;
+  arrival.period_ns = period_ns_;
   if (now_ns < arrival.scheduled_ns) {
     clock_->sleep_until(arrival.scheduled_ns, stop);
     now_ns = clock_->now_ns();
   }
   arrival.late_ns = std::max<std::int64_t>(now_ns - arrival.scheduled_ns, 0);
-  arrival.drop = options_.late == LatePolicy::kDrop && !first && next_t_ns && now_ns >= due_ns(*next_t_ns);
-  dropped_ += arrival.drop;
+  arrival.overtaken =
+      options_.late == LatePolicy::kDrop && !first && next_t_ns && now_ns >= due_ns(*next_t_ns);
   return arrival;
 }
 

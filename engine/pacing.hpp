@@ -12,7 +12,7 @@ namespace twofold {
 
 enum class LatePolicy : std::uint8_t {
   kQueue,  ///< every frame is processed; lateness adds up until the engine catches up
-  kDrop,   ///< a frame whose successor is due already is skipped, as a camera with one buffer does
+  kDrop,   ///< frames whose successor is due already may be skipped (LoadLadder says when)
 };
 
 struct PacingOptions {
@@ -39,7 +39,8 @@ class PacingClock {
 struct Arrival {
   std::int64_t scheduled_ns = 0;  ///< when the frame was due on the steady clock; latency counts from here
   std::int64_t late_ns = 0;       ///< how long after that its turn came, >= 0
-  bool drop = false;              ///< to be skipped by the policy
+  std::int64_t period_ns = 0;     ///< from its due time to its successor's; 0: there is no pace
+  bool overtaken = false;         ///< its successor is due already, and the policy allows to skip it
 };
 
 /// Gives out recorded frames at the pace at which they were taken.
@@ -54,11 +55,12 @@ class Pacer {
   explicit Pacer(const PacingOptions& options, PacingClock* clock = nullptr);
 
   /// Waits for the turn of the frame taken at t_ns. next_t_ns: time stamp of its successor, nullopt for the
-  /// last frame, which is never dropped. Nor is the first. A stop request ends the wait early.
+  /// last frame, which is never overtaken. Nor is the first. A stop request ends the wait early.
   [[nodiscard]] Arrival wait_for(std::int64_t t_ns, std::optional<std::int64_t> next_t_ns,
                                  const std::stop_token& stop);
 
-  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+  /// Time on the clock that frames are paced by [ns].
+  [[nodiscard]] std::int64_t now_ns() { return clock_->now_ns(); }
 
  private:
   [[nodiscard]] std::int64_t due_ns(std::int64_t t_ns) const;
@@ -69,7 +71,7 @@ class Pacer {
   bool started_ = false;
   std::int64_t first_t_ns_ = 0;
   std::int64_t start_ns_ = 0;
-  std::uint64_t dropped_ = 0;
+  std::int64_t period_ns_ = 0;  // of the frame before: the last one has no successor
 };
 
 }  // namespace twofold

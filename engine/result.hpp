@@ -11,6 +11,7 @@
 #include "graph/loop_constraint.hpp"
 #include "graph/place_book.hpp"
 #include "graph/snapshot.hpp"
+#include "tracking/effort.hpp"
 
 namespace twofold {
 
@@ -65,10 +66,11 @@ struct FrameRecord {
   int inliers = 0;                       ///< measurements the pose rests on
   std::uint64_t snapshot_version = 0;    ///< version of the map it was tracked against
   bool keyframe = false;                 ///< it was proposed as a keyframe and accepted
-  const char* cause = "";                ///< why it was lost; empty when tracked
-  PoseCorrection correction;             ///< of the map, seen first by this frame
-  std::int64_t tracking_ns = 0;          ///< time spent on it by the tracker
-  std::int64_t latency_ns = 0;           ///< from the moment it was due to the moment its pose was known
+  LadderRung rung = LadderRung::kEverything;  ///< what was left out for want of time
+  const char* cause = "";                     ///< why it was lost; empty when tracked
+  PoseCorrection correction;                  ///< of the map, seen first by this frame
+  std::int64_t tracking_ns = 0;               ///< time spent on it by the tracker
+  std::int64_t latency_ns = 0;                ///< from the moment it was due to the moment its pose was known
 };
 
 /// One keyframe proposal turned into a map version by the mapper.

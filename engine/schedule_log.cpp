@@ -14,7 +14,7 @@ namespace twofold {
 namespace {
 
 constexpr std::string_view kMagic = "TWFSCHED";
-constexpr std::uint8_t kFormatVersion = 1;
+constexpr std::uint8_t kFormatVersion = 2;
 constexpr std::array<const char*, 3> kSectionNames = {"tracker", "mapper", "loop closer"};
 constexpr std::size_t kLargestFile = std::size_t{256} << 20;
 
@@ -87,12 +87,13 @@ class Cursor {
   std::string failure_;
 };
 
-// Tracker record: flags (fate, has messages, has refused, unused, level in the upper half), frame and version
-// as differences, then what the flags announce.
+// Tracker record: flags (fate, has messages, has refused, keyframe withheld, level in the upper half), frame
+// and version as differences, then what the flags announce.
 void encode(std::vector<std::uint8_t>& bytes, const TrackerStep& step, const TrackerStep& last) {
   TWOFOLD_CHECK(step.degrade_level <= 15, "degrade level");
   const unsigned flags = static_cast<unsigned>(step.fate) | (step.messages ? 2U : 0U) |
-                         (step.refused ? 4U : 0U) | static_cast<unsigned>(step.degrade_level) << 4;
+                         (step.refused ? 4U : 0U) | (step.keyframe_withheld ? 8U : 0U) |
+                         static_cast<unsigned>(step.degrade_level) << 4;
   bytes.push_back(static_cast<std::uint8_t>(flags));
   put_varint(bytes, zigzag(static_cast<std::uint64_t>(step.frame), static_cast<std::uint64_t>(last.frame)));
   put_varint(bytes, zigzag(step.version, last.version));
@@ -102,9 +103,9 @@ void encode(std::vector<std::uint8_t>& bytes, const TrackerStep& step, const Tra
 TrackerStep decode(Cursor& in, const TrackerStep& last) {
   TrackerStep step;
   const unsigned flags = in.byte();
-  if (flags & 8U) in.fail("has unknown flags");
   step.fate = static_cast<TrackerStep::Fate>(flags & 1U);
   step.degrade_level = static_cast<std::uint8_t>(flags >> 4);
+  step.keyframe_withheld = (flags & 8U) != 0;
   step.frame = static_cast<std::int64_t>(unzigzag(in.varint(), static_cast<std::uint64_t>(last.frame)));
   step.version = unzigzag(in.varint(), last.version);
   if (flags & 2U) step.messages = in.varint32();

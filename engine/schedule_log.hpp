@@ -17,9 +17,10 @@ struct TrackerStep {
   std::int64_t frame = 0;     ///< Frame::index, grows from record to record
   std::uint64_t version = 0;  ///< snapshot it was tracked against; 0 when dropped
   Fate fate = Fate::kTracked;
-  std::uint8_t degrade_level = 0;  ///< rung of the load ladder, 0 = nothing left out, <= 15
+  std::uint8_t degrade_level = 0;  ///< LadderRung, 0 = nothing left out, <= 15
   std::uint32_t messages = 0;      ///< relocalisation answers consumed before it
   std::uint32_t refused = 0;       ///< its messages that found a ring full
+  bool keyframe_withheld = false;  ///< there was no buffer for a keyframe: the mapper is behind
   bool operator==(const TrackerStep&) const = default;
 };
 

@@ -33,16 +33,18 @@ TrackingStage::TrackingStage(const Rig& rig, const EngineOptions& options, Trace
     stages_.push_back(times_.add_stage(describe(static_cast<TrackStage>(s))));
   }
   version_counter_ = times_.add_counter("snapshot version");
+  rung_counter_ = times_.add_counter("load ladder rung");
   if (options.map) tracker_.continue_in(options.map->graph);
 }
 
-bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, ProposalHandle& proposal,
-                         FrameRecord& record) {
+bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, LadderRung rung,
+                         ProposalHandle& proposal, FrameRecord& record) {
   const std::int64_t begin_ns = steady_now_ns();
-  const TrackResult result = tracker_.step(frame, graph, proposal ? &*proposal : nullptr);
+  const TrackResult result = tracker_.step(frame, graph, proposal ? &*proposal : nullptr, rung);
   record.frame_index = frame.index;
   record.t_ns = frame.t_ns;
   record.state = result.status == TrackStatus::kTracking ? FrameState::kTracked : FrameState::kLost;
+  record.rung = rung;
   record.cause = describe(result.cause);
   record.snapshot_version = graph.version();
   record.reference = result.reference;
@@ -64,6 +66,7 @@ bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, Proposa
     at_ns += result.stage_ns[s];
   }
   times_.counter(version_counter_, static_cast<std::int64_t>(graph.version()));
+  times_.counter(rung_counter_, static_cast<std::int64_t>(rung));
   return result.proposed;
 }
 
@@ -110,8 +113,8 @@ void TrackingStage::take_answer(const RelocalisationAnswer& answer) {
   if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
 }
 
-void TrackingStage::finish(std::int64_t scheduled_ns, FrameRecord& record) {
-  record.latency_ns = steady_now_ns() - scheduled_ns;
+void TrackingStage::finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record) {
+  record.latency_ns = now_ns - scheduled_ns;
   times_.record(latency_stage_, scheduled_ns, record.latency_ns);
 }
 

@@ -37,9 +37,12 @@ class TrackingStage {
  public:
   TrackingStage(const Rig& rig, const EngineOptions& options, Trace* trace);
 
+  /// Makes room in a pooled buffer before the tracker thread starts, so that it allocates nothing.
+  void prepare(KeyframeProposal& proposal) const { tracker_.prepare(proposal); }
   /// @param proposal  free buffer or empty; stays with the caller
   /// @return whether `proposal` was filled and should be sent
-  bool step(const Frame& frame, const GraphSnapshot& graph, ProposalHandle& proposal, FrameRecord& record);
+  bool step(const Frame& frame, const GraphSnapshot& graph, LadderRung rung, ProposalHandle& proposal,
+            FrameRecord& record);
   /// The filled proposal could not be sent.
   void proposal_rejected(FrameRecord& record);
   /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
@@ -47,8 +50,8 @@ class TrackingStage {
   /// Before the next step.
   void take_answer(const RelocalisationAnswer& answer);
   [[nodiscard]] bool wants_relocalisation() const;
-  /// Completes the record once the pose is known: how long after its due time that was.
-  void finish(std::int64_t scheduled_ns, FrameRecord& record);
+  /// Completes the record once the pose is known, at `now_ns` on the clock of the pace.
+  void finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record);
 
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
@@ -61,7 +64,7 @@ class TrackingStage {
   StageId frame_stage_;
   StageId latency_stage_;
   std::vector<StageId> stages_;
-  TraceName version_counter_;
+  TraceName version_counter_, rung_counter_;
   FrameRecord last_;  // the last frame that was tracked
   bool answer_awaited_ = false;
   const bool can_relocalise_;

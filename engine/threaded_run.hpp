@@ -23,16 +23,22 @@ namespace twofold {
 /// A fourth thread, if checkpoints are wanted, saves what mapper and loop closer published: it only reads.
 ///
 /// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
-/// withheld first (no free buffer, or a full ring), and tracking goes on with the points it has.
+/// withheld (no free buffer, or a full ring), and tracking goes on with the points it has. If the tracker
+/// itself is late, it goes down the load ladder.
 class ThreadedRun {
  public:
-  ThreadedRun(const Rig& rig, const EngineOptions& options);
+  /// clock: nullptr for the steady clock; otherwise read and slept on by the tracker thread alone.
+  ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClock* clock = nullptr);
 
   void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
   /// Final relaxation; moves the result out.
   [[nodiscard]] RunResult finish();
 
  private:
+  static constexpr std::size_t kTrackerReader = 0;  // mailboxes of snapshots_
+  static constexpr std::size_t kLoopReader = 1;
+  static constexpr std::size_t kCheckpointReader = 2;
+
   struct FrameSlot {
     Frame frame;
     std::optional<std::int64_t> next_t_ns;  ///< time stamp of the frame after it, if known
@@ -57,6 +63,7 @@ class ThreadedRun {
   void checkpoint_thread(const std::stop_token& stop);
 
   void track(FrameSlot& slot, const GraphSnapshot& graph);
+  void drop(FrameSlot& slot);
   void send_proposal(FrameRecord& record, TrackerStep& step);
   void take_messages();
   void take_answers(TrackerStep& step);
@@ -91,6 +98,7 @@ class ThreadedRun {
   SnapshotPublisher<PlaceBook> places_;  // loop closer -> checkpoints
   CheckpointWriter checkpoints_;
   Pacer pacer_;
+  LoadLadder ladder_;
 
   ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
   std::vector<ProposalHandle> consumed_;    // mapper's

@@ -190,11 +190,11 @@ bool DenseAlignment::align_level(const PinholeCamera& level_camera, const cv::Ma
 DenseAlignmentResult DenseAlignment::align(const PinholeCamera& camera, const ImagePyramid& previous,
                                            const ImagePyramid& current,
                                            std::span<const AlignmentPoint> points,
-                                           const SE3& T_cur_prev_start) {
+                                           const SE3& T_cur_prev_start, int finest_level) {
   points = points.first(std::min(points.size(), samples_.size()));
   DenseAlignmentResult state;
   state.T_cur_prev = T_cur_prev_start;
-  for (int level = options_.coarsest_level; level >= options_.finest_level; --level) {
+  for (int level = options_.coarsest_level; level >= std::max(finest_level, options_.finest_level); --level) {
     const PinholeCamera level_camera = camera.at_level(level);
     prepare(level_camera, previous.level(level), level, points);
     DenseAlignmentResult refined = state;

@@ -41,10 +41,11 @@ class DenseAlignment {
  public:
   DenseAlignment(std::size_t capacity, const DenseAlignmentOptions& options);
 
+  /// @param finest_level  where to stop when there is no time for DenseAlignmentOptions::finest_level
   [[nodiscard]] DenseAlignmentResult align(const PinholeCamera& camera, const ImagePyramid& previous,
                                            const ImagePyramid& current,
                                            std::span<const AlignmentPoint> points,
-                                           const SE3& T_cur_prev_start);
+                                           const SE3& T_cur_prev_start, int finest_level = 0);
 
  private:
   static constexpr int kSize = 4;

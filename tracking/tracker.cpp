@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "geometry/inverse_depth.hpp"
+#include "imaging/image_buffers.hpp"
 
 namespace twofold {
 namespace {
@@ -46,9 +47,13 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   inlier_ids_.reserve(searches);
   depths_.reserve(std::max(searches, kMaxLocalPoints));
   previous_points_.reserve(kMaxAlignmentPoints);
+  allocate_images(rig, current_);
+  allocate_images(rig, previous_);
 }
 
-TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal) {
+TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
+                          LadderRung rung) {
+  effort_ = effort_on(rung, options_);
   TrackResult result;
   StageClock clock(result);
   ++frames_;
@@ -137,11 +142,11 @@ void Tracker::adopt(const GraphSnapshot& graph) {
 SE3 Tracker::align_to_previous(TrackResult& result) {
   const SE3 start = lost_frames_ > 0 ? SE3() : T_cur_prev_;
   if (previous_points_.empty()) return start * T_prev_ref_;
-  DenseAlignmentResult best =
-      alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, start);
-  if (!best.converged || best.rms > 0.5 * options_.max_alignment_rms) {
-    const DenseAlignmentResult rest =
-        alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, SE3());
+  DenseAlignmentResult best = alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_,
+                                               start, effort_.finest_alignment_level);
+  if (effort_.align_from_rest && (!best.converged || best.rms > 0.5 * options_.max_alignment_rms)) {
+    const DenseAlignmentResult rest = alignment_.align(
+        rig_.camera, previous_.left, current_.left, previous_points_, SE3(), effort_.finest_alignment_level);
     if (rest.converged && (!best.converged || rest.rms < best.rms)) best = rest;
   }
   result.alignment_rms = best.rms;
@@ -176,10 +181,11 @@ void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
 void Tracker::search_points(const SE3& T_c_ref, TrackResult& result) {
   matches_.clear();
   GuidedSearchOptions search = options_.search;
+  search.refine_iterations = effort_.refine_iterations;
   if (lost_frames_ > 0) search.radius_px = options_.lost_radius_px;
   for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
-    if (static_cast<int>(matches_.size()) >= options_.wanted_matches ||
-        result.searched >= options_.max_searches) {
+    if (static_cast<int>(matches_.size()) >= effort_.wanted_matches ||
+        result.searched >= effort_.max_searches) {
       break;
     }
     ++result.searched;
@@ -203,7 +209,9 @@ bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
     motion_.push_back({candidates_.points()[match.point].x_ref, match.found.z.cast<float>(),
                        measurement_information(rig_, match.found.level, has_right), true});
   }
-  const MotionOnlyResult motion = optimise_motion(rig_, motion_, T_c_ref_start, options_.motion);
+  MotionOnlyOptions solver = options_.motion;
+  solver.max_iterations = effort_.motion_iterations;
+  const MotionOnlyResult motion = optimise_motion(rig_, motion_, T_c_ref_start, solver);
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) {
     give_up_frame(LostCause::kTooFewCandidates, result);

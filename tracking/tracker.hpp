@@ -10,6 +10,7 @@
 #include "graph/snapshot.hpp"
 #include "tracking/candidate_points.hpp"
 #include "tracking/dense_alignment.hpp"
+#include "tracking/effort.hpp"
 #include "tracking/local_points.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
@@ -21,8 +22,9 @@ namespace twofold {
 /// From images to poses: the stereo front-end of thesis 6.3, RGB-D as stereo with a virtual right image
 /// (6.5.3).
 ///
-/// Single-threaded and deterministic. After construction and the first few frames nothing is allocated, and
-/// no reference count of a snapshot is touched. Work per frame is bounded by the options.
+/// Single-threaded and deterministic. After construction nothing is allocated, keyframes included if their
+/// buffers were prepared, and no reference count of a snapshot is touched. Work per frame is bounded by the
+/// options.
 ///
 /// The tracker numbers keyframes when it proposes them and points when they are found a second time. Its own
 /// pose is relative to a reference keyframe, so that it moves along when a newer snapshot moves that
@@ -31,10 +33,15 @@ class Tracker {
  public:
   Tracker(const Rig& rig, const TrackerOptions& options);
 
+  /// Makes room in a buffer for the largest keyframe proposal that this tracker can fill it with.
+  void prepare(KeyframeProposal& proposal) const;
+
   /// Tracks one frame against `graph`, which must stay alive while later calls get the same version.
   /// @param free_proposal  buffer for a keyframe proposal, or null: no keyframe can be made in this frame.
   ///                       Filled if and only if the result says `proposed`.
-  TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal);
+  /// @param rung           what to leave out
+  TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
+                   LadderRung rung = LadderRung::kEverything);
 
   /// Goes on with a map made before: the numbers of keyframes and points continue its own, and the camera is
   /// lost until `relocalise` says where in it the camera is, or until a new part is started. To be called
@@ -102,6 +109,7 @@ class Tracker {
 
   Rig rig_;
   TrackerOptions options_;
+  TrackEffort effort_;  ///< of this step
   FrameImages current_, previous_;
   DenseAlignment alignment_;
   CandidatePoints candidates_;

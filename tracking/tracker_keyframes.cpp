@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "geometry/inverse_depth.hpp"
+#include "imaging/image_buffers.hpp"
 #include "tracking/tracker.hpp"
 
 namespace twofold {
@@ -12,6 +13,13 @@ constexpr int kRegionRows = 6;
 constexpr std::uint32_t kRevisitInterval = 3;  // frames between looks for a better reference
 
 }  // namespace
+
+void Tracker::prepare(KeyframeProposal& proposal) const {
+  // Every match is an observation, and a new point at most.
+  proposal.observations.reserve(matches_.capacity());
+  proposal.new_points.reserve(matches_.capacity());
+  allocate_images(rig_, proposal.images);
+}
 
 bool Tracker::proposal_rejected() {
   --next_keyframe_;

@@ -1,6 +1,7 @@
 #include "apps/twofold/run_output.hpp"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -73,12 +74,15 @@ Json late_and_lost(const RunResult& result) {
     if (record.state == FrameState::kLost) {
       lost.push_back({{"frame", record.frame_index}, {"cause", record.cause}, {"ms_since_previous", gap_ms}});
     } else if (record.state == FrameState::kDropped) {
-      late.push_back({{"frame", record.frame_index}, {"cause", "dropped: its successor was due already"}});
+      late.push_back({{"frame", record.frame_index},
+                      {"rung", describe(record.rung)},
+                      {"cause", "dropped: its successor was due already"}});
     } else if (record.latency_ns > kLateNs) {
       const bool own = record.tracking_ns > kLateNs / 2;
       late.push_back(
           {{"frame", record.frame_index},
            {"latency_ms", static_cast<double>(record.latency_ns) * 1e-6},
+           {"rung", describe(record.rung)},
            {"tracking_ms", static_cast<double>(record.tracking_ns) * 1e-6},
            {"cause", own ? "tracking it took long" : "it waited: earlier frames, decoding, or no CPU"}});
     }
@@ -184,8 +188,26 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
   return json;
 }
 
+/// Frames on each rung of the load ladder, and where it was changed.
+Json ladder_json(const RunResult& result) {
+  std::array<std::int64_t, kLadderRungs> frames{};
+  Json changes = Json::array();
+  LadderRung rung = LadderRung::kEverything;
+  for (const FrameRecord& record : result.frames) {
+    ++frames[static_cast<std::size_t>(record.rung)];
+    if (record.rung != rung) {
+      changes.push_back({{"frame", record.frame_index}, {"rung", describe(record.rung)}});
+    }
+    rung = record.rung;
+  }
+  Json on = Json::object();
+  for (std::size_t r = 0; r < frames.size(); ++r) on[describe(static_cast<LadderRung>(r))] = frames[r];
+  return {{"frames", on}, {"changes", changes}};
+}
+
 Json timing_json(const RunResult& result) {
   Json json;
+  json["load ladder"] = ladder_json(result);
   for (const StageRecorder& recorder : result.times) json[recorder.thread_name()] = recorder.to_json();
   const LoopLatency latency = loop_latency(result);
   json["latency round loops"] = {{"within 5 s", latency.near.to_json()},

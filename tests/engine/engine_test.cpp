@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <sstream>
+#include <thread>
 
+#include "engine/threaded_run.hpp"
 #include "tests/imaging/rendered_scene.hpp"
 
 namespace twofold {
@@ -155,6 +158,80 @@ TEST_F(EngineTest, LateFramesAreDroppedOnRequestAndReplayed) {
   const RunResult replayed = Engine(small_rig(), options).replay(feed(), schedule_of(live), interrupted);
   EXPECT_EQ(replayed.error, "");
   expect_same(live, replayed);
+}
+
+/// Time passes when it is read, which is two or three times a frame, and for a while more than a frame has.
+class CostlyClock : public PacingClock {
+ public:
+  std::int64_t now_ns() override {
+    ++readings_;
+    return now_ += readings_ > 20 && readings_ <= 32 ? 25'000'000 : 2'000'000;
+  }
+  void sleep_until(std::int64_t t_ns, const std::stop_token&) override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(3));  // the mapper's time is real
+    now_ = std::max(now_, t_ns);
+  }
+
+ private:
+  std::int64_t now_ = 1'000'000'000;
+  int readings_ = 0;
+};
+
+TEST_F(EngineTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
+  for (const LatePolicy late : {LatePolicy::kQueue, LatePolicy::kDrop}) {
+    EngineOptions options;
+    options.trace = true;
+    options.pacing = {.speed = 1, .late = late};
+    options.ladder.patience = 3;
+    CostlyClock clock;
+    std::atomic<bool> interrupted{false};
+    ThreadedRun run(small_rig(), options, &clock);
+    run.run(feed(), interrupted, {});
+    const RunResult live = run.finish();
+    ASSERT_EQ(live.error, "");
+    ASSERT_EQ(live.frames.size(), static_cast<std::size_t>(kFrames));
+    int lowest = 0;
+    int before = 0;
+    bool rose = false;
+    for (const FrameRecord& record : live.frames) {
+      const int rung = static_cast<int>(record.rung);
+      EXPECT_LE(std::abs(rung - before), 1) << record.frame_index;  // step by step
+      rose |= rung < before;
+      lowest = std::max(lowest, rung);
+      before = rung;
+      if (record.state == FrameState::kDropped) continue;
+      EXPECT_EQ(record.state, FrameState::kTracked) << record.cause;
+    }
+    EXPECT_EQ(live.frames.front().rung, LadderRung::kEverything);
+    EXPECT_EQ(lowest, kLadderRungs - 1);
+    EXPECT_TRUE(rose);
+    const auto dropped = std::count_if(live.frames.begin(), live.frames.end(),
+                                       [](const auto& r) { return r.state == FrameState::kDropped; });
+    EXPECT_EQ(dropped > 0, late == LatePolicy::kDrop);
+    if (late == LatePolicy::kDrop) {
+      EXPECT_EQ(live.frames.back().rung, LadderRung::kEverything);
+    }
+    std::ostringstream trace;
+    ASSERT_TRUE(live.trace->write(trace));
+    EXPECT_NE(trace.str().find("load ladder rung"), std::string::npos);
+
+    const Schedule schedule = schedule_of(live);
+    const RunResult replayed = Engine(small_rig(), options).replay(feed(), schedule, interrupted);
+    EXPECT_EQ(replayed.error, "");
+    expect_same(live, replayed);
+    EXPECT_EQ(schedule_of(replayed), schedule);
+    for (std::size_t i = 0; i < live.frames.size(); ++i)
+      EXPECT_EQ(live.frames[i].rung, replayed.frames[i].rung) << i;
+  }
+}
+
+TEST_F(EngineTest, ReplayRefusesARungItDoesNotKnow) {
+  EngineOptions options;
+  Schedule schedule = schedule_of(run(options));
+  schedule.tracker[3].degrade_level = kLadderRungs;
+  std::atomic<bool> interrupted{false};
+  const RunResult replayed = Engine(small_rig(), options).replay(feed(), schedule, interrupted);
+  EXPECT_NE(replayed.error.find("rung of the load ladder"), std::string::npos);
 }
 
 TEST_F(EngineTest, ReplayRefusesAnotherRecording) {

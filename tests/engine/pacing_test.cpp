@@ -28,7 +28,7 @@ TEST(Pacer, FollowsRecordedStampsAtTheAskedSpeed) {
       EXPECT_EQ(arrival.scheduled_ns - start, std::llround(static_cast<double>(t * kMs) / speed));
       EXPECT_EQ(clock.now, arrival.scheduled_ns);
       EXPECT_EQ(arrival.late_ns, 0);
-      EXPECT_FALSE(arrival.drop);
+      EXPECT_FALSE(arrival.overtaken);
     }
   }
 }
@@ -42,42 +42,42 @@ TEST(Pacer, OneSlowFrameShowsInAllItDelays) {
     clock.now += (i == 1 ? 35 : 4) * kMs;  // work on the frame
   }
   EXPECT_EQ(late_ms, (std::vector<std::int64_t>{0, 0, 25, 19, 13, 7}));
-  EXPECT_EQ(pacer.dropped(), 0u);
 }
 
-TEST(Pacer, DropSkipsFramesWhoseSuccessorIsDue) {
+TEST(Pacer, SaysWhichFramesTheirSuccessorsOvertook) {
   FakeClock clock;
   Pacer pacer({1.0, LatePolicy::kDrop}, &clock);
-  std::vector<bool> dropped;
+  std::vector<bool> overtaken;
   for (int i = 0; i < 6; ++i) {
     const auto next = i == 5 ? std::nullopt : std::optional<std::int64_t>((i + 1) * 10 * kMs);
     const Arrival arrival = pacer.wait_for(i * 10 * kMs, next, {});
-    dropped.push_back(arrival.drop);
-    if (!arrival.drop) clock.now += (i == 1 ? 35 : 4) * kMs;
+    overtaken.push_back(arrival.overtaken);
+    EXPECT_EQ(arrival.period_ns, 10 * kMs);
+    if (!arrival.overtaken) clock.now += (i == 1 ? 35 : 4) * kMs;
   }
   // Frame 1 ends at 45 ms: 2 (20..30) and 3 (30..40) are past, 4 is the newest.
-  EXPECT_EQ(dropped, (std::vector<bool>{false, false, true, true, false, false}));
-  EXPECT_EQ(pacer.dropped(), 2u);
+  EXPECT_EQ(overtaken, (std::vector<bool>{false, false, true, true, false, false}));
 }
 
-TEST(Pacer, NeverDropsTheLastFrame) {
+TEST(Pacer, TheLastFrameIsNeverOvertaken) {
   FakeClock clock;
   Pacer pacer({1.0, LatePolicy::kDrop}, &clock);
   (void)pacer.wait_for(0, 10 * kMs, {});
   clock.now += 1000 * kMs;
   const Arrival last = pacer.wait_for(10 * kMs, std::nullopt, {});
-  EXPECT_FALSE(last.drop);
+  EXPECT_FALSE(last.overtaken);
   EXPECT_EQ(last.late_ns, 990 * kMs);
 }
 
-TEST(Pacer, FullSpeedNeitherWaitsNorDrops) {
+TEST(Pacer, FullSpeedHasNoPace) {
   FakeClock clock;
   const std::int64_t start = clock.now;
   Pacer pacer({0.0, LatePolicy::kDrop}, &clock);
   for (int i = 0; i < 5; ++i) {
     const Arrival arrival = pacer.wait_for(i * 1000 * kMs, (i + 1) * 1000 * kMs, {});
     EXPECT_EQ(arrival.late_ns, 0);
-    EXPECT_FALSE(arrival.drop);
+    EXPECT_EQ(arrival.period_ns, 0);
+    EXPECT_FALSE(arrival.overtaken);
   }
   EXPECT_EQ(clock.now, start);
 }

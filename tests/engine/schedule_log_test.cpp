@@ -46,6 +46,7 @@ Schedule plausible(int frames, unsigned seed) {
     }
     TrackerStep step{i, version, TrackerStep::Fate::kTracked, 0, one_in(40) ? 1U : 0U, one_in(60) ? 2U : 0U};
     if (one_in(20)) step.degrade_level = static_cast<std::uint8_t>(below(16));
+    step.keyframe_withheld = one_in(30);
     if (one_in(25)) step = {i, 0, TrackerStep::Fate::kDropped, 0, 0, 0};
     s.tracker.push_back(step);
   }
@@ -66,7 +67,7 @@ TEST(ScheduleLog, ReadsBackExtremes) {
   constexpr auto kMost64 = std::numeric_limits<std::uint64_t>::max();
   constexpr auto kMostFrame = std::numeric_limits<std::int64_t>::max();
   Schedule s;
-  s.tracker = {{0, kMost64, TrackerStep::Fate::kTracked, 15, kMost32, kMost32},
+  s.tracker = {{0, kMost64, TrackerStep::Fate::kTracked, 15, kMost32, kMost32, true},
                {kMostFrame, 0, TrackerStep::Fate::kDropped, 0, 0, 1}};
   s.mapper = {{kMost64, kMost32, kMost32, kMost32, kMost32}, {0, 0, 0, 0, 0}};
   s.loop_closer = {{kMost64, kMostFrame, kMost32, kMost32}, {0, -1, 0, 0}};
@@ -120,7 +121,7 @@ TEST(ScheduleLog, ErrorsNameTheSection) {
 }
 
 TEST(ScheduleLog, OversizedCountsAreRefusedBeforeMemoryIsTaken) {
-  const std::string header("TWFSCHED\1\3\1");
+  const std::string header("TWFSCHED\2\3\1");
   std::vector<std::uint8_t> file(header.begin(), header.end());
   file.reserve(64);
   for (int i = 0; i < 2; ++i) {  // 2^63 - 1 records in as many bytes

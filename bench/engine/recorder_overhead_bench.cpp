@@ -1,0 +1,93 @@
+// What recording costs a frame of the tracker: the calls that TrackingStage and ThreadedRun make for one
+// frame (histograms, trace, schedule log, clock readings), and the share of that in a frame's tracking time.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <vector>
+
+#include "engine/stages.hpp"
+#include "tests/imaging/rendered_scene.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kFrames = 24;
+
+Rig rig() {
+  return testing::test_rig(SensorKind::kStereo);
+}
+
+const std::vector<Frame>& frames() {
+  static const std::vector<Frame> all = [] {
+    testing::RenderedScene scene(rig(), {3, 2, 5}, 21);
+    std::vector<Frame> made;
+    for (int i = 0; i < kFrames; ++i) {
+      FrameImages images;
+      scene.render(SE3(SO3::exp(Vector3(0, 0.01 * i, 0)), Vector3(-0.01 * i, 0, -0.02 * i)), 2, images);
+      made.push_back(
+          {i, i * std::int64_t{33'000'000}, images.left.level(0).clone(), images.right.level(0).clone(), {}});
+    }
+    return made;
+  }();
+  return all;
+}
+
+/// Mean time of a frame in the whole stage, everything recorded [ns].
+double tracking_ns() {
+  EngineOptions options;
+  Trace trace;
+  TrackingStage tracking(rig(), options, &trace);
+  MappingStage mapping(rig(), options, nullptr);
+  ProposalPool pool(4, [&](KeyframeProposal& proposal) { tracking.prepare(proposal); });
+  GraphSnapshot graph = mapping.publish();
+  std::int64_t sum = 0;
+  for (const Frame& frame : frames()) {
+    std::vector<ProposalHandle> proposal;
+    proposal.push_back(pool.try_acquire());
+    FrameRecord record;
+    const bool proposed = tracking.step(frame, graph, LadderRung::kEverything, proposal.front(), record);
+    sum += record.tracking_ns;
+    if (!proposed) continue;
+    (void)mapping.step(proposal);
+    graph = mapping.publish();
+  }
+  return static_cast<double>(sum) / kFrames;
+}
+
+/// The recording of one frame and nothing else: stages, latency, counters, schedule, and the readings of the
+/// clock that only they need.
+void recorders_of_one_frame(benchmark::State& state) {
+  static const double frame_ns = tracking_ns();
+  Trace trace;
+  StageRecorder times("tracker", &trace);
+  std::vector<StageId> stages;
+  for (std::size_t s = 0; s < kTrackStages; ++s)
+    stages.push_back(times.add_stage(describe(static_cast<TrackStage>(s))));
+  const StageId frame_stage = times.add_stage("frame");
+  const StageId latency_stage = times.add_stage("latency");
+  const TraceName version = times.add_counter("version");
+  const TraceName rung = times.add_counter("rung");
+  ScheduleStream<TrackerStep> schedule(std::size_t{64} << 20);
+  TrackerStep step;
+  const std::int64_t begin_ns = steady_now_ns();
+  for (auto _ : state) {
+    // Laps of the stages, two for candidates; begin and end of the frame; the latency.
+    std::int64_t now_ns = 0;
+    for (std::size_t n = 0; n < kTrackStages + 5; ++n) benchmark::DoNotOptimize(now_ns = steady_now_ns());
+    times.record(frame_stage, now_ns, 12'345'678);
+    for (const StageId stage : stages) times.record(stage, now_ns, 2'345'678);
+    times.record(latency_stage, now_ns, 13'345'678);
+    times.counter(version, static_cast<std::int64_t>(step.version));
+    times.counter(rung, 0);
+    ++step.frame;
+    step.version += step.frame % 8 == 0;
+    schedule.append(step);
+  }
+  const double ns = static_cast<double>(steady_now_ns() - begin_ns) / static_cast<double>(state.iterations());
+  state.counters["tracking_ms"] = frame_ns * 1e-6;
+  state.counters["share_percent"] = 100 * ns / frame_ns;
+}
+BENCHMARK(recorders_of_one_frame);
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,98 @@
+// The threads of ThreadedRun behind the tracker: mapper, loop closer, checkpoints.
+#include "engine/threaded_run.hpp"
+
+namespace twofold {
+
+void ThreadedRun::take_messages() {
+  consumed_.clear();
+  ProposalHandle proposal;
+  while (consumed_.size() < consumed_.capacity() && proposals_.try_pop(proposal)) {
+    consumed_.push_back(std::move(proposal));
+  }
+  loop_messages_.clear();
+  while (loop_messages_.size() < loop_messages_.capacity() && loops_.has_value()) {
+    (void)loops_.try_pop(loop_messages_.emplace_back());
+  }
+}
+
+void ThreadedRun::mapper_thread(const std::stop_token& stop) {
+  const auto ready = [this] {
+    return proposals_.size_approx() > 0 || loops_.size_approx() > 0 ||
+           proposals_ended_.load(std::memory_order_acquire);
+  };
+  while (mapper_parking_.wait(stop, ready)) {
+    take_messages();
+    if (consumed_.empty() && loop_messages_.empty()) break;  // ended
+    MapperRound round = mapping_.step(consumed_, loop_messages_);
+    snapshots_.publish(mapping_.publish());
+    map_version_.store(round.version, std::memory_order_relaxed);
+    MapperStep step{round.version, static_cast<std::uint32_t>(round.proposals),
+                    static_cast<std::uint32_t>(loop_messages_.size())};
+    for (ProposalHandle& proposal : consumed_) {
+      if (keyframes_.try_push(std::move(proposal))) continue;
+      ++step.refused;
+      not_described_.fetch_add(1, std::memory_order_relaxed);
+    }
+    consumed_.clear();
+    loop_parking_.wake();
+    reader_parking_.wake();
+    schedule_.mapper.append(step);
+    result_.rounds.push_back(round);  // read by others after the join only
+  }
+}
+
+void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
+  ProposalHandle keyframe;
+  const auto ready = [&] {
+    return keyframe || requests_.size_approx() > 0 || keyframes_.try_pop(keyframe) ||
+           keyframes_ended_.load(std::memory_order_acquire);
+  };
+  while (loop_parking_.wait(stop, ready)) {
+    if (answer_request()) continue;  // a lost camera comes first
+    if (!keyframe && !keyframes_.try_pop(keyframe)) break;
+    const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
+    LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
+    send_loops(loop_closing_.step(*keyframe, graph), step);
+    publish_places();
+    schedule_.loop_closer.append(step);
+    keyframe.reset();
+  }
+}
+
+bool ThreadedRun::answer_request() {
+  RequestHandle request;
+  if (!requests_.try_pop(request)) return false;
+  const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
+  RelocalisationAnswer answer = loop_closing_.relocalise(*request, graph);
+  request.reset();  // before the answer: the next request finds its buffer free
+  TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
+  schedule_.loop_closer.append({graph.version(), -1, 1});
+  return true;
+}
+
+void ThreadedRun::publish_places() {
+  const PlaceBook& places = loop_closing_.places();
+  if (checkpoints_.enabled() && places.version() > places_.newest()) places_.publish(places);
+}
+
+/// A ring that is full takes nothing more of this step; a loop that is lost is found again.
+void ThreadedRun::send_loops(std::span<LoopMessage> messages, LoopStep& step) {
+  std::size_t sent = 0;
+  while (sent < messages.size() && loops_.try_push(std::move(messages[sent]))) ++sent;
+  step.refused = static_cast<std::uint32_t>(messages.size() - sent);
+  if (sent > 0) mapper_parking_.wake();
+}
+
+/// Reads the newest versions where they are, for as long as it takes: publishing goes on meanwhile, and the
+/// versions read are destroyed by their writers when this thread asks for newer ones.
+void ThreadedRun::checkpoint_thread(const std::stop_token& stop) {
+  yield_to_other_threads();
+  while (!stop.stop_requested()) {
+    const auto due = std::chrono::steady_clock::now() + std::chrono::nanoseconds(checkpoints_.period_ns());
+    (void)checkpoint_parking_.wait_until(stop, due, [] { return false; });
+    if (stop.stop_requested()) return;  // the caller saves the final map
+    checkpoints_.save(snapshots_.mailbox(kCheckpointReader).latest(), places_.mailbox(0).latest());
+  }
+}
+
+}  // namespace twofold

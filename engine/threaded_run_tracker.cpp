@@ -1,0 +1,75 @@
+// The tracker's thread of ThreadedRun: no lock, no allocation, no input or output.
+#include "engine/threaded_run.hpp"
+
+namespace twofold {
+
+void ThreadedRun::tracker_thread(const std::stop_token& stop) {
+  SlotHandle slot;
+  const auto ready = [&] { return frames_.try_pop(slot) || frames_ended_.load(std::memory_order_acquire); };
+  while (tracker_parking_.wait(stop, ready)) {
+    if (!slot && !frames_.try_pop(slot)) break;  // ended, and nothing was pushed before that
+    const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, slot->next_t_ns, stop);
+    slot->record = FrameRecord{};
+    if (ladder_.must_drop(arrival)) {
+      drop(*slot);
+    } else {
+      track(*slot, snapshots_.mailbox(kTrackerReader).latest());
+      tracking_.finish(arrival.scheduled_ns, pacer_.now_ns(), slot->record);
+      ladder_.tracked(slot->record.latency_ns, arrival.period_ns);
+    }
+    TWOFOLD_CHECK(done_.try_push(std::move(slot)), "the ring holds every slot of the pool");
+    reader_parking_.wake();
+  }
+  spare_.reset();
+}
+
+void ThreadedRun::drop(FrameSlot& slot) {
+  slot.record.frame_index = slot.frame.index;
+  slot.record.t_ns = slot.frame.t_ns;
+  slot.record.state = FrameState::kDropped;
+  slot.record.rung = ladder_.rung();
+  schedule_.tracker.append(
+      {slot.frame.index, 0, TrackerStep::Fate::kDropped, static_cast<std::uint8_t>(ladder_.rung())});
+  ladder_.dropped();
+}
+
+void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
+  if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
+  TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
+  take_answers(step);
+  step.degrade_level = static_cast<std::uint8_t>(ladder_.rung());
+  step.keyframe_withheld = !spare_;
+  if (tracking_.step(slot.frame, graph, ladder_.rung(), spare_, slot.record))
+    send_proposal(slot.record, step);
+  schedule_.tracker.append(step);
+  ask_where_we_are();
+}
+
+void ThreadedRun::take_answers(TrackerStep& step) {
+  RelocalisationAnswer answer;
+  while (answers_.try_pop(answer)) {
+    tracking_.take_answer(answer);
+    ++step.messages;
+  }
+}
+
+void ThreadedRun::ask_where_we_are() {
+  if (!tracking_.wants_relocalisation()) return;
+  RequestHandle request = request_pool_.try_acquire();
+  TWOFOLD_CHECK(request, "the answer to the request before has come");
+  (void)tracking_.request_relocalisation(*request);
+  TWOFOLD_CHECK(requests_.try_push(std::move(request)), "one request is under way at most");
+  loop_parking_.wake();
+}
+
+void ThreadedRun::send_proposal(FrameRecord& record, TrackerStep& step) {
+  if (proposals_.try_push(std::move(spare_))) {
+    mapper_parking_.wake();
+    return;
+  }
+  // The mapper is behind by a whole ring: this keyframe is given up, its buffer kept.
+  tracking_.proposal_rejected(record);
+  step.refused = 1;
+}
+
+}  // namespace twofold

@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "engine/load_ladder.hpp"
+#include "engine/stages.hpp"
+#include "imaging/image_buffers.hpp"
+#include "loopclosure/default_vocabulary.hpp"
+#include "tests/allocation_counter.hpp"
+#include "tests/imaging/rendered_scene.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::allocations;
+
+/// All that the tracker thread does with a frame, with recorders, trace and schedule log on: tracked frames,
+/// keyframes, lost frames, the question where it is, and its answer.
+TEST(TrackerThread, NeverAllocates) {
+  if (!testing::allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
+  const Rig rig = testing::test_rig(SensorKind::kStereo, 320, 240);
+  testing::RenderedScene scene(rig, {3, 2, 5}, 21);
+  const auto T_c_w = [](int i) {
+    return SE3(SO3::exp(Vector3(0, 0.02 * i, 0)), Vector3(-0.02 * i, 0, -0.02 * i));
+  };
+  const auto frame_at = [&](int i, bool covered) {
+    FrameImages images;
+    scene.render(T_c_w(i), 1.5, images);
+    Frame frame{
+        i, i * std::int64_t{33'000'000}, images.left.level(0).clone(), images.right.level(0).clone(), {}};
+    if (covered) frame.left.setTo(5), frame.right.setTo(5);
+    return frame;
+  };
+
+  EngineOptions options;
+  options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  Trace trace;
+  TrackingStage tracking(rig, options, &trace);
+  MappingStage mapping(rig, options, &trace);
+  LoopClosingStage loop_closing(rig, options, &trace);
+  ProposalPool proposals(4, [&](KeyframeProposal& proposal) { tracking.prepare(proposal); });
+  RequestPool requests(2, [&](RelocalisationRequest& r) { allocate_images(rig, r.images); });
+  ScheduleStream<TrackerStep> schedule;
+  LoadLadder ladder({});
+  GraphSnapshot graph = mapping.publish();
+
+  int keyframes = 0, lost = 0, asked = 0;
+  ProposalHandle proposal = proposals.try_acquire();
+  std::vector<ProposalHandle> sent;
+  std::optional<RelocalisationAnswer> answer;
+  for (int i = 0; i < 36; ++i) {
+    const Frame frame = frame_at(i, i >= 20 && i < 25);
+    const std::uint64_t before = allocations();
+    FrameRecord record;
+    if (answer) tracking.take_answer(*answer);
+    const bool proposed = tracking.step(frame, graph, ladder.rung(), proposal, record);
+    tracking.finish(0, 40'000'000, record);
+    ladder.tracked(i < 4 ? 40'000'000 : 5'000'000, 33'000'000);
+    schedule.append({frame.index, graph.version(), TrackerStep::Fate::kTracked,
+                     static_cast<std::uint8_t>(ladder.rung())});
+    RequestHandle request;
+    if (tracking.wants_relocalisation()) {
+      request = requests.try_acquire();
+      ASSERT_TRUE(request && tracking.request_relocalisation(*request));
+    }
+    EXPECT_EQ(allocations(), before) << "frame " << i << (proposed ? ", a keyframe" : "");
+    // The other threads' work.
+    answer.reset();
+    if (request) answer = loop_closing.relocalise(*request, graph);
+    asked += static_cast<bool>(request);
+    lost += record.state == FrameState::kLost;
+    keyframes += proposed;
+    if (!proposed) continue;
+    sent.push_back(std::move(proposal));
+    (void)mapping.step(sent);
+    graph = mapping.publish();
+    (void)loop_closing.step(*sent.front(), graph);
+    sent.clear();
+    proposal = proposals.try_acquire();
+    ASSERT_TRUE(proposal);
+  }
+  EXPECT_GE(keyframes, 3);
+  EXPECT_GE(lost, 3);
+  EXPECT_GE(asked, 1);
+}
+
+}  // namespace
+}  // namespace twofold
