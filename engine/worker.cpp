@@ -1,9 +1,12 @@
 #include "engine/worker.hpp"
 
+#include <linux/capability.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -45,7 +48,25 @@ void yield_to_other_threads() {
   (void)setpriority(PRIO_PROCESS, static_cast<id_t>(this_thread_id()), kNice);  // never refused
 }
 
+namespace {
+
+bool may_lock_without_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY) return true;
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  __user_cap_data_struct data[_LINUX_CAPABILITY_U32S_3] = {};
+  if (syscall(SYS_capget, &header, data) != 0) return false;
+  return (data[0].effective & (1U << CAP_IPC_LOCK)) != 0;
+}
+
+}  // namespace
+
 tl::expected<void, std::string> lock_memory() {
+  // Under a limit the lock may succeed now and make every allocation beyond it fail later.
+  if (!may_lock_without_limit()) {
+    return tl::make_unexpected(
+        std::string("memory is not locked: it needs CAP_IPC_LOCK or `ulimit -l unlimited`"));
+  }
   if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return {};
   return tl::make_unexpected(std::string("locking memory was refused (") + std::strerror(errno) +
                              "); it needs CAP_IPC_LOCK or a limit raised by `ulimit -l`");

@@ -8,14 +8,15 @@
 #include <fmt/format.h>
 
 #include "io/output_file.hpp"
+#include "io/plot_ink.hpp"
 
 namespace twofold {
 namespace {
 
-constexpr int kSuper = 2;  // drawn twice as large and averaged down: thin lines and letters come out smooth
+using namespace plot_ink;
+
 constexpr int kLeftMargin = 90, kRightMargin = 40, kTopMargin = 90, kBottomMargin = 78,
               kBarMargin = 110;  // [px]
-const cv::Scalar kInk(60, 60, 60), kGrid(232, 232, 232), kWhite(255, 255, 255);
 
 /// Maps the plane of the paper (a to the right, b up, metres) to pixels of the large canvas.
 struct Axes {
@@ -69,18 +70,6 @@ double tick_step(double range) {
     if (factor * power >= raw) return factor * power;
   }
   return 10 * power;
-}
-
-enum class Anchor { kLeft, kCentre, kRight };
-
-void put_text(cv::Mat& canvas, const std::string& text, cv::Point at, double size, Anchor anchor,
-              const cv::Scalar& colour = kInk, int weight = 1) {
-  const double scale = size * kSuper;
-  int baseline = 0;
-  const int width = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, weight * kSuper, &baseline).width;
-  if (anchor == Anchor::kCentre) at.x -= width / 2;
-  if (anchor == Anchor::kRight) at.x -= width;
-  cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, colour, weight * kSuper, cv::LINE_AA);
 }
 
 std::string tick_text(double value, double step) {
@@ -212,9 +201,7 @@ cv::Mat draw_top_down(const std::vector<PlotTrack>& tracks, const PlotOptions& o
   put_text(canvas, options.title, {kSuper * kLeftMargin, kSuper * 32}, 0.7, Anchor::kLeft, {20, 20, 20}, 1);
   put_text(canvas, options.subtitle, {kSuper * kLeftMargin, kSuper * 54}, 0.45, Anchor::kLeft,
            {110, 110, 110});
-  cv::Mat image;
-  cv::resize(canvas, image, {width / kSuper, height / kSuper}, 0, 0, cv::INTER_AREA);
-  return image;
+  return shrink(canvas);
 }
 
 void write_png(const std::filesystem::path& file, const cv::Mat& image) {

@@ -15,6 +15,7 @@ void add_map_command(CLI::App& app, int& exit_code);
 void add_record_command(CLI::App& app, int& exit_code);
 void add_render_command(CLI::App& app, int& exit_code);
 void add_run_command(CLI::App& app, int& exit_code);
+void add_timing_command(CLI::App& app, int& exit_code);
 void add_vocabulary_command(CLI::App& app, int& exit_code);
 
 }  // namespace twofold

@@ -13,6 +13,7 @@
 #include "apps/twofold/map_parts.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "engine/engine.hpp"
+#include "engine/worker.hpp"
 #include "io/io_error.hpp"
 #include "io/open_source.hpp"
 #include "io/output_file.hpp"
@@ -132,6 +133,16 @@ class ProgressLine {
   std::int64_t shown_ns_ = 0;
 };
 
+/// Locks memory where --rt asks for it; what was asked for and is not to be had. Threads report their own.
+std::vector<std::string> real_time_notes(const RunArguments& arguments) {
+  const bool one_thread = arguments.deterministic || !arguments.replay_schedule.empty();
+  if (one_thread && (arguments.real_time || !arguments.pin.empty()))
+    return {"--pin and --rt have no effect: this run has one thread"};
+  if (!arguments.real_time) return {};
+  if (const auto locked = lock_memory(); !locked) return {locked.error()};
+  return {};
+}
+
 Schedule load_schedule(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw IoError(file, "cannot be opened");
@@ -174,10 +185,12 @@ int run(const RunArguments& arguments) {
   const ProgressSink progress = [&](const Progress& p) { line.show(p); };
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
+  const std::vector<std::string> notes = real_time_notes(arguments);
   Engine engine(source->rig(), options);
-  const RunResult result = schedule ? engine.replay(feed, *schedule, interrupted, progress)
-                                    : engine.run(feed, interrupted, progress);
+  RunResult result = schedule ? engine.replay(feed, *schedule, interrupted, progress)
+                              : engine.run(feed, interrupted, progress);
   line.end();
+  result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
   std::vector<std::string> maps;
   if (!arguments.map.save.empty()) {
     maps = save_parts(arguments.map.save, source->rig(), result, map_parts(result, options));
@@ -234,7 +247,7 @@ void add_run_command(CLI::App& app, int& exit_code) {
   command->add_option("--trace", arguments->trace,
                       "Write spans and counters for ui.perfetto.dev to this file");
   command->add_option("--pin", arguments->pin, "CPUs of tracker, mapper, loop closer: 0,1,1");
-  command->add_flag("--rt", arguments->real_time, "Tracker under SCHED_FIFO where permitted");
+  command->add_flag("--rt", arguments->real_time, "Tracker under SCHED_FIFO, memory locked, where permitted");
   command->add_flag("--quiet", arguments->quiet, "No progress line");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

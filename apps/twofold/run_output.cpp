@@ -212,6 +212,10 @@ Json timing_json(const RunResult& result) {
   const LoopLatency latency = loop_latency(result);
   json["latency round loops"] = {{"within 5 s", latency.near.to_json()},
                                  {"elsewhere", latency.rest.to_json()}};
+  json["run"] = {{"frames", result.frames.size()},
+                 {"wall_seconds", result.wall_seconds},
+                 {"cpu_seconds", result.cpu_seconds},
+                 {"peak_rss_mb", result.peak_rss_mb}};
   return json;
 }
 

@@ -100,7 +100,31 @@ TEST_F(RunCommand, WritesEveryOutputAndFollowsTheTruth) {
   EXPECT_EQ(summary["why_lost"].size(), 0U);
   const auto timing = nlohmann::json::parse(result("timing.json"));
   EXPECT_EQ(timing["tracker"]["frame"]["count"], kFrames);
+  EXPECT_EQ(timing["run"]["frames"], kFrames);
+  EXPECT_GT(timing["run"]["cpu_seconds"], 0.0);
+  EXPECT_GT(timing["run"]["peak_rss_mb"], 1.0);
+  const Outcome shown = twofold::run(folder_, "timing '" + (folder_ / "result") + "'");
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_NE(shown.out.find("p99.9"), std::string::npos);
   EXPECT_TRUE(nlohmann::json::parse(content(folder_ / "trace.json")).contains("traceEvents"));
+}
+
+TEST_F(RunCommand, RealTimeWishesAreGrantedOrSaidNotToBe) {
+  // The superuser has capabilities to be taken away before limits mean anything.
+  const std::string unprivileged =
+      geteuid() == 0 ? "setpriv --bounding-set -sys_nice,-ipc_lock --inh-caps -sys_nice,-ipc_lock" : "";
+  const Outcome refused =
+      run_recording("--preload --rt --pin 1023,0,0", "ulimit -r 0; ulimit -l 64; " + unprivileged);
+  EXPECT_EQ(refused.exit_code, 0) << refused.err;
+  for (const char* part :
+       {"tracker: running on CPU 1023 only was refused", "SCHED_FIFO priority 50 was refused", "`ulimit -r`",
+        "memory is not locked", "`ulimit -l"})
+    EXPECT_NE(refused.out.find(part), std::string::npos) << part << "\n" << refused.out;
+  EXPECT_EQ(nlohmann::json::parse(result("summary.json"))["notes"].size(), 3U);
+  const Outcome pinned = run_recording("--preload --pin 0,0,0");
+  EXPECT_EQ(pinned.exit_code, 0) << pinned.err;
+  EXPECT_EQ(pinned.out.find("note"), std::string::npos) << pinned.out;
+  EXPECT_NE(run_recording("--deterministic --rt").out.find("have no effect"), std::string::npos);
 }
 
 TEST_F(RunCommand, LiveRunIsReplayedByteForByte) {
