@@ -87,7 +87,22 @@ bool SlidingWindowFilter::set_landmark(std::int64_t id, const Vector3& x_w) {
   return true;
 }
 
+bool SlidingWindowFilter::set_measurement(int pose, std::int64_t id, const Vector3& z) {
+  const auto found = index_.find(id);
+  if (found == index_.end()) return false;
+  for (Observation& o : poses_[static_cast<std::size_t>(pose)].observations) {
+    if (o.landmark != found->second) continue;
+    o.z = z;
+    return true;
+  }
+  return false;
+}
+
 WindowSummary SlidingWindowFilter::optimise() {
+  return optimise(options_.max_iterations);
+}
+
+WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
   summary_.iterations = summary_.factorisations = 0;
   summary_.converged = false;
   huber_ = 0;
@@ -97,7 +112,7 @@ WindowSummary SlidingWindowFilter::optimise() {
   double current = cost();
   double last_decrement = 0;
   bool factor_is_good = false;
-  while (summary_.iterations < options_.max_iterations) {
+  while (summary_.iterations < max_iterations) {
     ++summary_.iterations;
     const bool reused = factor_is_good;
     if (!factor_is_good) {

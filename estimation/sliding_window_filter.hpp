@@ -100,6 +100,8 @@ class SlidingWindowFilter {
   /// The steps without the update, for callers that optimise once at the end.
   void add(const WindowFrame& frame);
   WindowSummary optimise();
+  /// At most so many Gauss-Newton steps; for callers that measure again in between.
+  WindowSummary optimise(int max_iterations);
 
   [[nodiscard]] int pose_count() const { return static_cast<int>(poses_.size()); }
   [[nodiscard]] int landmark_count() const { return static_cast<int>(landmarks_.size()); }
@@ -120,6 +122,10 @@ class SlidingWindowFilter {
   /// Covariances at the current estimate, in the order of pose(i) and landmark(i); zero for a held pose. None
   /// when the information matrix is singular.
   [[nodiscard]] std::optional<WindowCovariances> covariances();
+
+  /// Replaces a measurement of a frame in the window, number of poses as for T_c_w(); false when that frame
+  /// does not see the landmark.
+  bool set_measurement(int pose, std::int64_t id, const Vector3& z);
 
   /// Moves a start value before the first optimise(); false when the landmark is not in the state.
   bool set_landmark(std::int64_t id, const Vector3& x_w);
