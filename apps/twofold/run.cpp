@@ -162,6 +162,8 @@ int run(const RunArguments& arguments) {
   source_options.stop = &interrupted;
   if (!arguments.calibration.empty()) source_options.calibration = arguments.calibration;
   std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options);
+  // A camera's frames are due when they are taken, whether anybody asks for a pace or not.
+  if (source->is_live() && options.pacing.speed == 0) options.pacing.speed = 1;
   if (source->rig().kind == SensorKind::kMono) {
     throw IoError(arguments.source, "has a single camera without depth; stereo or RGB-D is needed");
   }
