@@ -3,44 +3,11 @@
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <cmath>
 
 #include "estimation/block_kernels.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {
-namespace {
-
-/// Lower Cholesky factor of A in place and its inverse; false when a pivot is not positive.
-bool factorise_diagonal(Matrix6& A, Matrix6& inverse) {
-  for (int j = 0; j < 6; ++j) {
-    double pivot = A(j, j);
-    for (int k = 0; k < j; ++k) pivot -= A(j, k) * A(j, k);
-    if (!(pivot > 1e-15 * std::abs(A(j, j))) || !std::isfinite(pivot)) return false;
-    const double root = std::sqrt(pivot);
-    const double inv_root = 1 / root;
-    A(j, j) = root;
-    for (int i = j + 1; i < 6; ++i) {
-      double value = A(i, j);
-      for (int k = 0; k < j; ++k) value -= A(i, k) * A(j, k);
-      A(i, j) = value * inv_root;
-      A(j, i) = 0;
-    }
-    inverse(j, j) = inv_root;
-  }
-  for (int j = 0; j < 6; ++j) {
-    for (int i = 0; i < j; ++i) inverse(i, j) = 0;
-    for (int i = j + 1; i < 6; ++i) {
-      double value = 0;
-      for (int k = j; k < i; ++k) value -= A(i, k) * inverse(k, j);
-      inverse(i, j) = value * inverse(i, i);
-    }
-  }
-  return true;
-}
-
-}  // namespace
-
 void BlockCholesky::set_pattern(std::vector<std::vector<int>> neighbours) {
   if (neighbours == neighbours_ && !column_begin_.empty()) return;
   neighbours_ = std::move(neighbours);
@@ -133,7 +100,7 @@ bool BlockCholesky::factorise() {
         add_outer_product<-1, 6>(blocks_[place_[row_[b]]].data(), blocks_[b].data(), L_kj);
       }
     }
-    if (!factorise_diagonal(blocks_[begin], inverse_diagonal_[k])) return false;
+    if (!factorise_diagonal<6>(blocks_[begin], inverse_diagonal_[k])) return false;
     for (int b = begin + 1; b < end; ++b) {
       Matrix6 L_ik = Matrix6::Zero();
       add_outer_product<1, 6>(L_ik.data(), blocks_[b].data(), inverse_diagonal_[k].data());

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 
@@ -56,6 +58,36 @@ inline void add_outer_product(double* __restrict a, const double* __restrict b, 
 template <class Matrix>
 inline void set_all_zero(Matrix* first, std::size_t n) {
   if (n > 0) std::memset(static_cast<void*>(first), 0, n * sizeof(Matrix));
+}
+
+/// Lower Cholesky factor of A in place, read below the diagonal, and its inverse; false when a pivot is not
+/// positive (to rounding).
+template <int N>
+inline bool factorise_diagonal(Eigen::Matrix<double, N, N>& A, Eigen::Matrix<double, N, N>& inverse) {
+  for (int j = 0; j < N; ++j) {
+    double pivot = A(j, j);
+    for (int k = 0; k < j; ++k) pivot -= A(j, k) * A(j, k);
+    if (!(pivot > 1e-15 * std::abs(A(j, j))) || !std::isfinite(pivot)) return false;
+    const double root = std::sqrt(pivot);
+    const double inv_root = 1 / root;
+    A(j, j) = root;
+    for (int i = j + 1; i < N; ++i) {
+      double value = A(i, j);
+      for (int k = 0; k < j; ++k) value -= A(i, k) * A(j, k);
+      A(i, j) = value * inv_root;
+      A(j, i) = 0;
+    }
+    inverse(j, j) = inv_root;
+  }
+  for (int j = 0; j < N; ++j) {
+    for (int i = 0; i < j; ++i) inverse(i, j) = 0;
+    for (int i = j + 1; i < N; ++i) {
+      double value = 0;
+      for (int k = j; k < i; ++k) value -= A(i, k) * inverse(k, j);
+      inverse(i, j) = value * inverse(i, i);
+    }
+  }
+  return true;
 }
 
 }  // namespace twofold

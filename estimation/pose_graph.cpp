@@ -5,10 +5,10 @@
 #include <limits>
 #include <optional>
 
-#include "estimation/cholmod_solver.hpp"
 #include "estimation/pose_graph_error.hpp"
 #include "estimation/pose_graph_initialisation.hpp"
 #include "estimation/robust_kernel.hpp"
+#include "estimation/sparse_block_solver.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {
@@ -61,9 +61,8 @@ struct PoseGraphSolver<Group>::Workspace {
 
   std::vector<std::pair<int, int>> edges;  ///< of the analysed structure
   int poses = -1;
-  std::vector<int> order;
-  std::vector<CholmodSolver::Slot> slots;
-  CholmodSolver system;
+  BlockStructure structure;
+  SparseBlockSolver system;
   Eigen::MatrixXd gradient, delta;  ///< H delta = gradient; the step is -delta
   std::vector<Group> before;
 
@@ -74,8 +73,8 @@ struct PoseGraphSolver<Group>::Workspace {
     if (poses == static_cast<int>(graph.poses.size()) && now == edges) return;
     edges = std::move(now);
     poses = static_cast<int>(graph.poses.size());
-    order = elimination_order(poses, edges, kDof);
-    slots = system.set_pattern(kDof, order, edges);
+    structure = analyse_blocks(poses, edges, kDof);
+    system.set_structure(structure, kDof);
   }
 
   /// Normal equations H delta = -gradient of half the cost at graph.poses.
@@ -107,7 +106,7 @@ struct PoseGraphSolver<Group>::Workspace {
         system.add_diagonal<kDof>(c.j, H_jj);
         gradient.template block<kDof, 1>(kDof * c.j, 0) -= ad.transpose() * g_i;
       }
-      if (c.i != graph.origin && c.j != graph.origin) system.add_off_diagonal<kDof>(slots[k], H_ij);
+      if (c.i != graph.origin && c.j != graph.origin) system.add_off_diagonal<kDof>(k, H_ij);
     }
     if (graph.origin >= 0) system.add_diagonal<kDof>(graph.origin, Block::Identity());  // its step is zero
   }
@@ -135,9 +134,9 @@ namespace {
 /// What only graphs of rigid motions have: positions that are linear given the rotations.
 template <class Group>
 struct Positions {
-  Positions(const PoseGraph<Group>& graph, const PoseGraphOptions& options, std::span<const int> elimination)
-      : order(elimination), useful(options.resolve_positions) {
-    if (options.resolve_positions || options.chordal_start) solver.emplace(graph, order);
+  Positions(const PoseGraph<Group>& graph, const PoseGraphOptions& options, const BlockStructure& blocks)
+      : structure(blocks), useful(options.resolve_positions) {
+    if (options.resolve_positions || options.chordal_start) solver.emplace(graph, structure);
   }
 
   /// Takes new poses where they cost less than `cost`; returns the lower cost.
@@ -152,7 +151,7 @@ struct Positions {
   double chordal(PoseGraph<Group>& graph, double cost, const PoseGraphOptions& options) {
     constexpr double kGoodStart = 4;
     if (!options.chordal_start || cost < kGoodStart * Group::kDof * graph.constraints.size()) return cost;
-    return take_better(graph, chordal_initialisation(graph, order, *solver), cost, options);
+    return take_better(graph, chordal_initialisation(graph, structure, *solver), cost, options);
   }
   double resolve(PoseGraph<Group>& graph, double cost, const PoseGraphOptions& options) {
     if (!useful) return cost;
@@ -164,14 +163,14 @@ struct Positions {
   }
 
   static constexpr double kWorthwhile = 1e-3;  // it stops paying once the steps are short
-  std::span<const int> order;
+  const BlockStructure& structure;
   std::optional<PoseGraphPositions<Group>> solver;
   bool useful;
 };
 
 template <>
 struct Positions<Sim3> {
-  Positions(const PoseGraph<Sim3>&, const PoseGraphOptions&, std::span<const int>) {}
+  Positions(const PoseGraph<Sim3>&, const PoseGraphOptions&, const BlockStructure&) {}
   static double chordal(PoseGraph<Sim3>&, double cost, const PoseGraphOptions&) { return cost; }
   static double resolve(PoseGraph<Sim3>&, double cost, const PoseGraphOptions&) { return cost; }
 };
@@ -209,7 +208,7 @@ SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseG
   TWOFOLD_CHECK(options.invalid_reason().empty(), "options are valid");
   Workspace& w = *workspace_;
   w.analyse(graph);
-  Positions<Group> positions(graph, options, w.order);
+  Positions<Group> positions(graph, options, w.structure);
   summary.initial_cost = pose_graph_cost(graph, options.error, options.huber);
   double cost = positions.chordal(graph, summary.initial_cost, options);
   if (options.on_cost) options.on_cost(0, cost);

@@ -42,21 +42,15 @@ Square<D> nearest_rotation(const Square<D>& M) {
   return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
 }
 
-std::vector<std::pair<int, int>> edges_of(const auto& graph) {
-  std::vector<std::pair<int, int>> edges;
-  for (const auto& c : graph.constraints) edges.emplace_back(c.i, c.j);
-  return edges;
-}
-
 /// Row j of the normal equations: k R_j - k R_ji R_i; the known origin moves to the right-hand side.
 template <int D, class Group>
-std::vector<Square<D>> relaxed_rotations(const PoseGraph<Group>& graph, std::span<const int> order) {
+std::vector<Square<D>> relaxed_rotations(const PoseGraph<Group>& graph, const BlockStructure& structure) {
   const int origin = std::max(graph.origin, 0);
-  CholmodSolver system;
-  const auto slots = system.set_pattern(D, order, edges_of(graph));
+  SparseBlockSolver system;
+  system.set_structure(structure, D);
   Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(system.dimension(), D);
   const Square<D> R_origin = rotation_of(graph.poses[origin]);
-  for (std::size_t e = 0; e < slots.size(); ++e) {
+  for (std::size_t e = 0; e < graph.constraints.size(); ++e) {
     const auto& c = graph.constraints[e];
     const double k = c.information.diagonal().template tail<Group::kDof - D>().mean();
     const Square<D> k_R_ji = k * rotation_of(c.T_j_i);
@@ -67,7 +61,7 @@ std::vector<Square<D>> relaxed_rotations(const PoseGraph<Group>& graph, std::spa
     } else if (c.j == origin) {
       rhs.middleRows<D>(D * c.i) += k_R_ji.transpose() * R_origin;
     } else {
-      system.add_off_diagonal<D>(slots[e], -k_R_ji.transpose());
+      system.add_off_diagonal<D>(e, -k_R_ji.transpose());
     }
   }
   system.add_diagonal<D>(origin, Square<D>::Identity());
@@ -76,16 +70,16 @@ std::vector<Square<D>> relaxed_rotations(const PoseGraph<Group>& graph, std::spa
   if (!system.factorise(0)) return rotations;
   const Eigen::MatrixXd relaxed = system.solve(rhs);
   if (!relaxed.allFinite()) return rotations;
-  for (int i = 0; i < static_cast<int>(order.size()); ++i) {
+  for (int i = 0; i < structure.nodes(); ++i) {
     rotations.push_back(nearest_rotation<D>(relaxed.middleRows<D>(D * i)));
   }
   return rotations;
 }
 
 template <int D, class Group>
-std::vector<Group> chordal(const PoseGraph<Group>& graph, std::span<const int> order,
+std::vector<Group> chordal(const PoseGraph<Group>& graph, const BlockStructure& structure,
                            PoseGraphPositions<Group>& positions) {
-  const auto rotations = relaxed_rotations<D>(graph, order);
+  const auto rotations = relaxed_rotations<D>(graph, structure);
   std::vector<Group> poses = graph.poses;
   if (rotations.empty()) return poses;
   const int origin = std::max(graph.origin, 0);
@@ -103,16 +97,17 @@ double translation_weight(const typename PoseGraph<Group>::Constraint& c) {
 }  // namespace
 
 template <class Group>
-PoseGraphPositions<Group>::PoseGraphPositions(const PoseGraph<Group>& graph, std::span<const int> order) {
+PoseGraphPositions<Group>::PoseGraphPositions(const PoseGraph<Group>& graph,
+                                              const BlockStructure& structure) {
   using Scalar = Eigen::Matrix<double, 1, 1>;
   const int origin = std::max(graph.origin, 0);
-  const auto slots = laplacian_.set_pattern(1, order, edges_of(graph));
-  for (std::size_t e = 0; e < slots.size(); ++e) {
+  laplacian_.set_structure(structure, 1);
+  for (std::size_t e = 0; e < graph.constraints.size(); ++e) {
     const auto& c = graph.constraints[e];
     const double t = translation_weight<Group>(c);
     if (c.i != origin) laplacian_.add_diagonal<1>(c.i, Scalar(t));
     if (c.j != origin) laplacian_.add_diagonal<1>(c.j, Scalar(t));
-    if (c.i != origin && c.j != origin) laplacian_.add_off_diagonal<1>(slots[e], Scalar(-t));
+    if (c.i != origin && c.j != origin) laplacian_.add_off_diagonal<1>(e, Scalar(-t));
   }
   laplacian_.add_diagonal<1>(origin, Scalar(1.0));
   factorised_ = laplacian_.factorise(0);
@@ -141,14 +136,14 @@ bool PoseGraphPositions<Group>::update(const PoseGraph<Group>& graph, std::vecto
   return true;
 }
 
-std::vector<SE2> chordal_initialisation(const PoseGraph<SE2>& graph, std::span<const int> order,
+std::vector<SE2> chordal_initialisation(const PoseGraph<SE2>& graph, const BlockStructure& structure,
                                         PoseGraphPositions<SE2>& positions) {
-  return chordal<2>(graph, order, positions);
+  return chordal<2>(graph, structure, positions);
 }
 
-std::vector<SE3> chordal_initialisation(const PoseGraph<SE3>& graph, std::span<const int> order,
+std::vector<SE3> chordal_initialisation(const PoseGraph<SE3>& graph, const BlockStructure& structure,
                                         PoseGraphPositions<SE3>& positions) {
-  return chordal<3>(graph, order, positions);
+  return chordal<3>(graph, structure, positions);
 }
 
 template class PoseGraphPositions<SE2>;

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "estimation/cholmod_solver.hpp"
 #include "estimation/pose_graph.hpp"
+#include "estimation/sparse_block_solver.hpp"
 
 namespace twofold {
 
@@ -13,14 +13,15 @@ class PoseGraphPositions {
  public:
   static constexpr int kDim = Group::kDof == 6 ? 3 : 2;
 
-  PoseGraphPositions(const PoseGraph<Group>& graph, std::span<const int> order);
+  /// @param structure  of the poses, its edges the graph's constraints; must outlive this
+  PoseGraphPositions(const PoseGraph<Group>& graph, const BlockStructure& structure);
   /// Moves all poses but the origin, along with their rotations as they are. False, and nothing moves, when
   /// the Laplacian is singular.
   bool update(const PoseGraph<Group>& graph, std::vector<Group>& poses);
 
  private:
   bool factorised_ = false;
-  CholmodSolver laplacian_;
+  SparseBlockSolver laplacian_;
 };
 
 /// Start values for a pose graph without any of its own: rotations by chordal relaxation (Martinec & Pajdla,
@@ -30,12 +31,14 @@ class PoseGraphPositions {
 /// Rotations: minimise sum k_ji |R_j - R_ji R_i|_F^2 over matrices, with R_origin held, then project each
 /// matrix onto the nearest rotation; k is the mean diagonal entry of the rotation information.
 ///
-/// @param order  elimination order of the poses
+/// @param structure  of the poses, its edges the graph's constraints
 /// @return       poses; the graph's own when a linear system is singular (parts of the graph are not
 /// connected)
-[[nodiscard]] std::vector<SE2> chordal_initialisation(const PoseGraph<SE2>& graph, std::span<const int> order,
+[[nodiscard]] std::vector<SE2> chordal_initialisation(const PoseGraph<SE2>& graph,
+                                                      const BlockStructure& structure,
                                                       PoseGraphPositions<SE2>& positions);
-[[nodiscard]] std::vector<SE3> chordal_initialisation(const PoseGraph<SE3>& graph, std::span<const int> order,
+[[nodiscard]] std::vector<SE3> chordal_initialisation(const PoseGraph<SE3>& graph,
+                                                      const BlockStructure& structure,
                                                       PoseGraphPositions<SE3>& positions);
 
 }  // namespace twofold

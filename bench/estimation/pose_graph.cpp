@@ -166,7 +166,7 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "pose_graph: {}\n", reason);
     return 2;
   }
-  omp_set_max_active_levels(0);  // one thread for Ceres' CHOLMOD too; see estimation/cholmod_solver.cpp
+  omp_set_max_active_levels(0);  // one thread for Ceres' CHOLMOD too; see estimation/cholmod_common.hpp
   try {
     const AnyPoseGraph graph = read_g2o(arguments.file);
     std::visit([&](const auto& g) { compare(g, arguments); }, graph);

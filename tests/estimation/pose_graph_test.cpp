@@ -209,9 +209,9 @@ void expect_chordal_recovers() {
   loop.graph.poses[5] = loop.truth[5];
   std::vector<std::pair<int, int>> edges;
   for (const auto& c : loop.graph.constraints) edges.emplace_back(c.i, c.j);
-  const auto order = elimination_order(loop.kPoses, edges, Group::kDof);
-  PoseGraphPositions<Group> positions(loop.graph, order);
-  loop.graph.poses = chordal_initialisation(loop.graph, order, positions);
+  const BlockStructure structure = analyse_blocks(loop.kPoses, edges, Group::kDof);
+  PoseGraphPositions<Group> positions(loop.graph, structure);
+  loop.graph.poses = chordal_initialisation(loop.graph, structure, positions);
   EXPECT_LT(loop.distance_from_truth(), 1e-8);
 }
 
@@ -227,40 +227,6 @@ TEST(PoseGraph, ChordalStartFindsTheMinimumFromNowhere) {
   const double best = solver.solve(good.graph, {.relative_decrease = 1e-10}).final_cost;
   EXPECT_NEAR(solver.solve(lost.graph, {.chordal_start = true, .relative_decrease = 1e-10}).final_cost / best,
               1, 1e-6);
-}
-
-TEST(CholmodSolver, SolvesABlockSystem) {
-  std::mt19937 rng(6);
-  std::normal_distribution<double> normal;
-  constexpr int kBlocks = 30, kSize = 3;
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(kBlocks * kSize, kBlocks * kSize);
-  std::vector<std::pair<int, int>> edges;
-  for (int i = 0; i < kBlocks; ++i) {
-    for (int j : {(i + 1) % kBlocks, (i * 7 + 3) % kBlocks}) {
-      if (i != j) edges.emplace_back(i, j);
-    }
-  }
-  CholmodSolver solver;
-  const auto slots = solver.set_pattern(kSize, elimination_order(kBlocks, edges, kSize), edges);
-  for (std::size_t e = 0; e < edges.size(); ++e) {  // repeated edges add up
-    const auto [i, j] = edges[e];
-    const Matrix3 block = Matrix3::NullaryExpr([&] { return normal(rng); });
-    solver.add_off_diagonal<3>(slots[e], block);
-    A.block<3, 3>(3 * i, 3 * j) += block;
-    A.block<3, 3>(3 * j, 3 * i) += block.transpose();
-  }
-  for (int i = 0; i < kBlocks; ++i) {
-    solver.add_diagonal<3>(i, Matrix3(30 * Matrix3::Identity()));
-    A.block<3, 3>(3 * i, 3 * i) += 30 * Matrix3::Identity();
-  }
-  const Eigen::MatrixXd b = Eigen::MatrixXd::NullaryExpr(A.rows(), 2, [&] { return normal(rng); });
-  ASSERT_TRUE(solver.factorise(0));
-  EXPECT_LT((A * solver.solve(b) - b).norm(), 1e-11);
-  ASSERT_TRUE(solver.factorise(0.5));
-  A.diagonal() *= 1.5;
-  EXPECT_LT((A * solver.solve(b) - b).norm(), 1e-11);
-  solver.add_diagonal<3>(4, Matrix3(-100 * Matrix3::Identity()));
-  EXPECT_FALSE(solver.factorise(0));
 }
 
 }  // namespace

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+
+#include "estimation/block_structure.hpp"
+
+namespace twofold {
+
+/// Cholesky factor of a block system. Two kinds share this interface because neither is fast everywhere:
+/// block by block for systems with little fill, where a general library spends its time on book-keeping and
+/// calls of its BLAS; supernodal (CHOLMOD) for systems whose fill makes large dense panels.
+///
+/// Not thread-safe. Deterministic with a single-threaded BLAS.
+class BlockFactor {
+ public:
+  virtual ~BlockFactor() = default;
+
+  /// Of A + damping * diag(A). False when that is not positive definite.
+  /// @param blocks  of A as the structure lists them, column-major; diagonal blocks count below the diagonal
+  [[nodiscard]] virtual bool factorise(std::span<const double> blocks, double damping) = 0;
+  /// x becomes A^-1 x with the last factor; rows in elimination order, any number of columns.
+  virtual void solve(Eigen::MatrixXd& x) = 0;
+};
+
+/// Block sizes 1 (scalar), 2, 3, 6, 7. The structure must outlive the factor.
+[[nodiscard]] std::unique_ptr<BlockFactor> make_simplicial_factor(const BlockStructure& structure,
+                                                                  int block_size);
+/// Any block size.
+[[nodiscard]] std::unique_ptr<BlockFactor> make_supernodal_factor(const BlockStructure& structure,
+                                                                  int block_size);
+
+}  // namespace twofold

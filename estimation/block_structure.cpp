@@ -1,0 +1,182 @@
+#include "estimation/block_structure.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "estimation/cholmod_common.hpp"
+#include "geometry/check.hpp"
+
+namespace twofold {
+namespace {
+
+/// Lower triangle of an undirected graph with its diagonal: sorted columns without repetitions.
+struct Pattern {
+  std::vector<int> begin, row;
+};
+
+/// Two passes of counting sort, by row and then by column.
+Pattern lower_triangle(int nodes, std::span<const std::pair<int, int>> edges) {
+  std::vector<int> row_count(nodes + 1, 0);
+  for (const auto& [i, j] : edges) ++row_count[std::max(i, j) + 1];
+  std::partial_sum(row_count.begin(), row_count.end(), row_count.begin());
+  std::vector<int> columns(edges.size());
+  std::vector<int> next(row_count.begin(), row_count.end() - 1);
+  for (const auto& [i, j] : edges) columns[next[std::max(i, j)]++] = std::min(i, j);
+
+  Pattern pattern;
+  pattern.begin.assign(nodes + 1, 0);
+  std::vector<int> last_row(nodes, -1);
+  const auto for_each_entry = [&](auto&& visit) {
+    std::fill(last_row.begin(), last_row.end(), -1);
+    for (int row = 0; row < nodes; ++row) {
+      visit(row, row);
+      for (int e = row_count[row]; e < row_count[row + 1]; ++e) {
+        if (std::exchange(last_row[columns[e]], row) != row) visit(row, columns[e]);
+      }
+    }
+  };
+  for_each_entry([&](int, int column) { ++pattern.begin[column + 1]; });
+  std::partial_sum(pattern.begin.begin(), pattern.begin.end(), pattern.begin.begin());
+  pattern.row.resize(pattern.begin[nodes]);
+  next.assign(pattern.begin.begin(), pattern.begin.end() - 1);
+  for_each_entry([&](int row, int column) { pattern.row[next[column]++] = row; });
+  return pattern;
+}
+
+cholmod_sparse view(Pattern& pattern) {
+  return lower_triangle_view(static_cast<int>(pattern.begin.size()) - 1, pattern.begin, pattern.row, nullptr);
+}
+
+std::vector<int> natural_order(int nodes) {
+  std::vector<int> order(nodes);
+  std::iota(order.begin(), order.end(), 0);
+  return order;
+}
+
+/// The better of minimum degree and nested dissection, postordered.
+std::vector<int> dissected_order(int nodes, cholmod_sparse& A) {
+  std::vector<int> best = natural_order(nodes);
+  double fewest_flops = std::numeric_limits<double>::infinity();
+  for (const int ordering : {CHOLMOD_AMD, CHOLMOD_METIS}) {
+    CholmodCommon common;
+    common.c.nmethods = 1;
+    common.c.method[0].ordering = ordering;
+    common.c.postorder = 1;
+    common.c.supernodal = CHOLMOD_SIMPLICIAL;  // symbolic work on single nodes only
+    cholmod_factor* L = cholmod_analyze(&A, &common.c);
+    if (L != nullptr && common.c.fl < fewest_flops) {
+      fewest_flops = common.c.fl;
+      std::copy_n(static_cast<const int*>(L->Perm), nodes, best.begin());
+    }
+    cholmod_free_factor(&L, &common.c);
+  }
+  return best;
+}
+
+void choose_order(int nodes, std::span<const std::pair<int, int>> edges, int block_size, BlockStructure& s) {
+  // Flops from which nested dissection may earn back its own time, which is several times that of minimum
+  // degree.
+  constexpr double kWorthDissecting = 4e7;
+  s.order = natural_order(nodes);
+  if (nodes == 0) return;
+  Pattern pattern = lower_triangle(nodes, edges);
+  cholmod_sparse A = view(pattern);
+  CholmodCommon common;
+  const bool ordered = cholmod_amd(&A, nullptr, 0, s.order.data(), &common.c) != 0;
+  TWOFOLD_CHECK(ordered, "ordering runs out of memory only");
+  if (common.c.fl * std::pow(block_size, 3) < kWorthDissecting) return;
+  s.order = dissected_order(nodes, A);
+  s.postordered = true;
+}
+
+/// Rows of the factor along the elimination tree: row k has the columns on the paths from those of the
+/// system's row k up to k  (Davis, Direct Methods for Sparse Linear Systems, 4.2).
+void find_fill(BlockStructure& s) {
+  const int n = s.nodes();
+  std::vector<int> count(n, 0), parent(n, -1), met(n, -1);
+  // Rows of the system, from its columns.
+  std::vector<int> begin(n + 1, 0);
+  for (const int row : s.system_row) ++begin[row + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<int> column(s.system_row.size());
+  std::vector<int> next(begin.begin(), begin.end() - 1);
+  for (int j = 0; j < n; ++j) {
+    for (int b = s.system_begin[j]; b < s.system_begin[j + 1]; ++b) column[next[s.system_row[b]]++] = j;
+  }
+  s.row_begin.assign(1, 0);
+  s.row_entries.clear();
+  for (int k = 0; k < n; ++k) {
+    met[k] = k;
+    for (int e = begin[k]; e < begin[k + 1]; ++e) {
+      for (int j = column[e]; met[j] != k; j = parent[j]) {
+        if (parent[j] < 0) parent[j] = k;
+        met[j] = k;
+        ++count[j];
+        s.row_entries.push_back({j, 0});
+      }
+    }
+    s.row_begin.push_back(static_cast<int>(s.row_entries.size()));
+  }
+  s.factor_begin.assign(n + 1, 0);
+  for (int j = 0; j < n; ++j) {
+    s.factor_begin[j + 1] = s.factor_begin[j] + count[j] + 1;
+    s.block_products += 0.5 * count[j] * (count[j] + 1.0);
+  }
+  s.factor_row.resize(s.factor_begin[n]);
+  next.assign(s.factor_begin.begin(), s.factor_begin.end() - 1);
+  for (int k = 0; k < n; ++k) {
+    for (int e = s.row_begin[k]; e < s.row_begin[k + 1]; ++e) {
+      auto& entry = s.row_entries[e];
+      entry.block = next[entry.column]++;
+      s.factor_row[entry.block] = k;
+    }
+    s.factor_row[next[k]++] = k;
+  }
+}
+
+void place_system_in_factor(BlockStructure& s) {
+  s.factor_block.resize(s.system_row.size());
+  for (int j = 0; j < s.nodes(); ++j) {
+    int place = s.factor_begin[j];
+    for (int b = s.system_begin[j]; b < s.system_begin[j + 1]; ++b) {
+      while (s.factor_row[place] != s.system_row[b]) ++place;
+      s.factor_block[b] = place;
+    }
+  }
+}
+
+}  // namespace
+
+double BlockStructure::flops(int block_size) const {
+  return 2 * block_products * std::pow(block_size, 3);
+}
+
+BlockStructure analyse_blocks(int nodes, std::span<const std::pair<int, int>> edges, int block_size) {
+  for (const auto& [i, j] : edges) {
+    TWOFOLD_CHECK(i != j && i >= 0 && j >= 0 && i < nodes && j < nodes, "edge joins two different nodes");
+  }
+  BlockStructure s;
+  choose_order(nodes, edges, block_size, s);
+  s.position.resize(nodes);
+  for (int k = 0; k < nodes; ++k) s.position[s.order[k]] = k;
+  std::vector<std::pair<int, int>> ordered;
+  ordered.reserve(edges.size());
+  for (const auto& [i, j] : edges) ordered.emplace_back(s.position[i], s.position[j]);
+  Pattern pattern = lower_triangle(nodes, ordered);
+  s.system_begin = std::move(pattern.begin);
+  s.system_row = std::move(pattern.row);
+  s.slots.reserve(edges.size());
+  for (const auto& [i, j] : ordered) {
+    const auto [column, row] = std::minmax(i, j);
+    const auto first = s.system_row.begin() + s.system_begin[column];
+    const auto found = std::lower_bound(first, s.system_row.begin() + s.system_begin[column + 1], row);
+    s.slots.push_back({static_cast<int>(found - s.system_row.begin()), i < j});
+  }
+  find_fill(s);
+  place_system_in_factor(s);
+  return s;
+}
+
+}  // namespace twofold
