@@ -42,7 +42,7 @@ TEST(FramePool, ComesBackWithTheLastHandleOnly) {
 
 // One filler, two users; an object filled anew while in use shows as words that change or disagree.
 TEST(FramePoolStress, NoObjectIsFilledWhileInUse) {
-  constexpr std::uint64_t kFrames = 100'000;
+  constexpr std::uint64_t kFrames = 30'000;
   using Object = std::array<std::uint64_t, 8>;
   using Handle = PoolHandle<Object>;
   FramePool<Object> pool(5);

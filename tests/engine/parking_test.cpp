@@ -50,7 +50,7 @@ TEST(Parking, AStopRequestEndsTheSleep) {
 // Two producers, a ring each, one consumer that sleeps whenever both are empty. A lost wake-up hangs (and the
 // test times out); every message is counted.
 TEST(ParkingStress, NoWakeUpIsLost) {
-  constexpr std::uint64_t kMessages = 100'000;
+  constexpr std::uint64_t kMessages = 30'000;
   Parking parking;
   std::array<SpscRing<std::uint64_t>, 2> rings{SpscRing<std::uint64_t>(4), SpscRing<std::uint64_t>(4)};
   const auto produce = [&](std::size_t me) {
