@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <optional>
+#include <vector>
+
+#include "estimation/observation_model.hpp"
+#include "estimation/window_problem.hpp"
+
+namespace twofold {
+
+/// Normal equations of bundle adjustment with the poses eliminated, for problems with few points and many
+/// poses: what remains is a dense system of three unknowns a point.
+///
+/// Points keep their inverse depth form, but about the place their anchor had at the start, which stays put:
+/// then an observation depends on one pose and one point, and poses are independent given the points.
+/// Pose-pose constraints are not covered.
+class PoseElimination {
+ public:
+  struct Values {
+    std::vector<SE3> poses;
+    std::vector<Vector3> psi;
+  };
+
+  /// By an estimate of the multiplications of both ways; never with pose-pose constraints.
+  [[nodiscard]] static bool is_cheaper(const WindowProblem& problem);
+
+  /// Sorts the problem by pose; returns its values. Observations behind their camera are left out.
+  [[nodiscard]] Values start(const WindowProblem& problem);
+  /// Robustified cost; infinity when an observation comes to lie behind its camera.
+  [[nodiscard]] double cost(const WindowSolverOptions& options, const Values& values) const;
+  /// Step of the damped normal equations from `values` to `next`; returns the decrease of the cost the
+  /// quadratic model promises, nullopt when the system is not positive definite.
+  [[nodiscard]] std::optional<double> step(const WindowSolverOptions& options, const Values& values,
+                                           double lambda, Values& next);
+  /// Points go back to the frames of their anchors.
+  void write_back(const Values& values, WindowProblem& problem) const;
+
+ private:
+  using Matrix63 = Eigen::Matrix<double, 6, 3>;
+  struct Observation {
+    int point;
+    Eigen::Vector3f z, information;
+  };
+  struct PoseBlock {
+    Matrix6 H, L;
+    Vector6 gradient, damping, c;  ///< c = L^-1 gradient
+  };
+
+  void linearise_pose(int pose, const HuberKernel& kernel, const Values& values);
+  void eliminate(int pose);
+
+  std::optional<ObservationModel> model_;
+  std::vector<SE3> T_w_frame_;  ///< by point
+  std::vector<char> fixed_;     ///< by pose; also those that see nothing
+  std::vector<int> begin_;      ///< observations of pose i: [begin[i], begin[i + 1])
+  std::vector<Observation> observations_;
+  std::vector<char> seen_;  ///< by point
+  std::vector<PoseBlock> blocks_;
+  std::vector<Matrix63> couplings_;  ///< by observation: A^T W B, then L^-1 of it
+  std::vector<Matrix3> V_;
+  Eigen::VectorXd gradient_;  ///< of the points
+  Eigen::VectorXd reduced_gradient_;
+  Eigen::MatrixXd reduced_;
+};
+
+}  // namespace twofold
