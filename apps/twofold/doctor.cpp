@@ -1,0 +1,90 @@
+#include <CLI/CLI.hpp>
+#include <array>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "io/doctor/camera.hpp"
+#include "io/doctor/disk.hpp"
+#include "io/doctor/machine.hpp"
+#include "io/io_error.hpp"
+#include "io/v4l2_frames.hpp"
+
+namespace twofold {
+namespace {
+
+struct DoctorArguments {
+  std::string source, folder;
+  std::string root = "/";
+};
+
+/// One image stream to look at, and what recording it takes.
+struct Wanted {
+  std::vector<CameraOptions> cameras;
+  double bytes_per_second = 2 * 640 * 480 * 30;  // a small stereo camera, when no source says more
+};
+
+CaptureFormat with_defaults(CaptureFormat format) {
+  if (format.width == 0) format = {format.format, 640, 480, format.fps};
+  if (format.fps <= 0) format.fps = 30;
+  return format;
+}
+
+Wanted wanted_of(const std::string& text) {
+  Wanted wanted;
+  if (text.empty()) return wanted;
+  const SourceSpec spec = parse_source_spec(text);
+  if (spec.scheme != "v4l2") return wanted;  // a recording needs nothing of the machine but its disk
+  SourceParameters parameters(text, spec.parameters);
+  const V4l2FramesOptions options = take_v4l2_options(spec.argument, parameters);
+  wanted.cameras.push_back(options.first);
+  if (options.second) wanted.cameras.push_back(*options.second);
+  wanted.bytes_per_second = 0;
+  for (CameraOptions& camera : wanted.cameras) {
+    camera.format = with_defaults(camera.format);
+    wanted.bytes_per_second += stream_bytes_per_second(PixelFormat::kGrey, camera.format.width,
+                                                       camera.format.height, camera.format.fps);
+  }
+  return wanted;
+}
+
+void print(const Finding& finding) {
+  static constexpr std::array kNames{"ok", "warn", "bad"};
+  fmt::print("{:<4}  {:<15} {}\n", kNames[static_cast<std::size_t>(finding.health)], finding.subject,
+             finding.state);
+  if (!finding.remedy.empty()) fmt::print("      {:<15} -> {}\n", "", finding.remedy);
+}
+
+int examine(const DoctorArguments& arguments) {
+  const Wanted wanted = wanted_of(arguments.source);
+  std::vector<Finding> findings = check_machine(arguments.root);
+  SystemV4l2Calls calls;
+  for (const CameraOptions& camera : wanted.cameras) {
+    for (Finding& finding : check_camera(calls, arguments.root, camera.path, camera.format))
+      findings.push_back(std::move(finding));
+  }
+  if (!arguments.folder.empty()) findings.push_back(check_disk(arguments.folder, wanted.bytes_per_second));
+  int exit_code = kOk;
+  for (const Finding& finding : findings) {
+    print(finding);
+    if (finding.health == Health::kBad) exit_code = kFailedRun;
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+void add_doctor_command(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<DoctorArguments>();
+  CLI::App* command = app.add_subcommand("doctor", "Say what on this machine will hurt real time");
+  command->add_option("SOURCE", arguments->source,
+                      "Camera to run, e.g. v4l2:/dev/video0?size=640x480&fps=30");
+  command->add_option("--record-to", arguments->folder,
+                      "Folder of recordings: measures how fast it can be written");
+  command->add_option("--root", arguments->root, "Where proc and sys are (a tree to examine instead)")
+      ->capture_default_str();
+  command->callback([arguments, &exit_code] { exit_code = examine(*arguments); });
+}
+
+}  // namespace twofold
