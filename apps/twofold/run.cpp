@@ -11,6 +11,7 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "apps/twofold/map_parts.hpp"
+#include "apps/twofold/run_filter.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "engine/engine.hpp"
 #include "engine/worker.hpp"
@@ -35,6 +36,8 @@ struct RunArguments {
   std::string pin;
   std::string vocabulary;
   std::string record;
+  std::string estimator = "engine";
+  int window = 10;
   MapArguments map;
   bool no_metric_loops = false;
   bool no_places = false;
@@ -151,17 +154,31 @@ Schedule load_schedule(const std::string& file) {
   return *std::move(schedule);
 }
 
+SourceOptions source_options_of(const RunArguments& arguments) {
+  SourceOptions options;
+  options.preload = arguments.preload;
+  options.stop = &interrupted;
+  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  return options;
+}
+
+int run_with_filter(const RunArguments& arguments) {
+  prepare_output_folder(arguments.out);
+  const auto source = open_source(arguments.source, source_options_of(arguments));
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  run_filter(*source, arguments.source, arguments.window, arguments.out, interrupted);
+  return kOk;
+}
+
 int run(const RunArguments& arguments) {
+  if (arguments.estimator == "swf") return run_with_filter(arguments);
   EngineOptions options = engine_options(arguments);
   apply_map_options(arguments.map, options);
   std::optional<Schedule> schedule;
   if (!arguments.replay_schedule.empty()) schedule = load_schedule(arguments.replay_schedule);
   prepare_output_folder(arguments.out);
-  SourceOptions source_options;
-  source_options.preload = arguments.preload;
-  source_options.stop = &interrupted;
-  if (!arguments.calibration.empty()) source_options.calibration = arguments.calibration;
-  std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options);
+  std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options_of(arguments));
   // A camera's frames are due when they are taken, whether anybody asks for a pace or not.
   if (source->is_live() && options.pacing.speed == 0) options.pacing.speed = 1;
   if (source->rig().kind == SensorKind::kMono) {
@@ -233,6 +250,14 @@ void add_run_command(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"queue", "drop"}))
       ->capture_default_str();
   command->add_option("--windows", arguments->windows, "Keyframes in the inner and outer window")
+      ->capture_default_str();
+  command
+      ->add_option("--estimator", arguments->estimator,
+                   "engine, or swf: the sliding window filter on stereo, for surface structure")
+      ->check(CLI::IsMember({"engine", "swf"}))
+      ->capture_default_str();
+  command->add_option("--window", arguments->window, "Poses the sliding window filter keeps (0: all)")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("--vocabulary", arguments->vocabulary, "Vocabulary file instead of the built-in one");
   command->add_option("--record", arguments->record,

@@ -1,0 +1,84 @@
+#include "apps/twofold/run_filter.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include <fmt/format.h>
+
+#include "io/io_error.hpp"
+#include "io/output_file.hpp"
+#include "io/ply.hpp"
+#include "io/trajectory_file.hpp"
+#include "structure/structure_filter.hpp"
+
+namespace twofold {
+namespace {
+
+// A point measured less often may be a mismatch that nothing contradicted.
+constexpr int kMinMeasurements = 3;
+
+std::vector<PlyPoint> surface_points(const StructureFilter& filter) {
+  std::vector<PlyPoint> points;
+  for (const auto& [id, point] : filter.points()) {
+    if (point.measurements < kMinMeasurements || point.covariance.isZero(0)) continue;
+    const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(point.covariance, Eigen::EigenvaluesOnly);
+    PlyPoint ply;
+    ply.x_w = point.x_w;
+    ply.rgb = {point.grey, point.grey, point.grey};
+    ply.stddev = static_cast<float>(std::sqrt(std::max(0.0, eigen.eigenvalues()[2])));
+    points.push_back(ply);
+  }
+  return points;
+}
+
+}  // namespace
+
+void run_filter(FrameSource& source, const std::string& source_text, int window,
+                const std::filesystem::path& folder, const std::atomic<bool>& stop) {
+  if (source.rig().kind != SensorKind::kStereo) {
+    throw IoError(source_text, "is not stereo, which --estimator swf needs");
+  }
+  StructureOptions options;
+  options.filter.window = window;
+  StructureFilter filter(source.rig(), options);
+  const auto start = std::chrono::steady_clock::now();
+  double slowest_ms = 0, busy_ms = 0;
+  Frame frame;
+  while (!stop.load(std::memory_order_relaxed) && source.next(frame) == FrameStatus::kFrame) {
+    const auto before = std::chrono::steady_clock::now();
+    filter.process(frame);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - before;
+    busy_ms += took.count();
+    slowest_ms = std::max(slowest_ms, took.count());
+  }
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+
+  Trajectory smoothed, causal;
+  for (const StructureFrame& f : filter.frames()) {
+    if (!f.tracked) continue;
+    smoothed.push_back({f.t_ns, f.T_c_w_smoothed.inverse()});
+    causal.push_back({f.t_ns, f.T_c_w.inverse()});
+  }
+  const std::vector<PlyPoint> points = surface_points(filter);
+  const std::size_t frames = filter.frames().size();
+  write_tum_trajectory(folder / "trajectory.txt", smoothed);
+  write_tum_trajectory(folder / "trajectory_causal.txt", causal);
+  if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
+  write_ply(folder / "structure.ply", points);
+  const double mean_ms = busy_ms / static_cast<double>(std::max<std::size_t>(1, frames));
+  const nlohmann::ordered_json summary{{"source", source_text},      {"estimator", "swf"},
+                                       {"window", window},           {"frames", frames},
+                                       {"tracked", smoothed.size()}, {"restarts", filter.restarts()},
+                                       {"points", points.size()},    {"wall_seconds", wall.count()},
+                                       {"mean_ms", mean_ms},         {"slowest_ms", slowest_ms}};
+  write_file(folder / "summary.json", summary.dump(2) + "\n");
+  fmt::print("{} frames, {} tracked, {} restarts, {} points; {:.1f} ms a frame, slowest {:.1f}; {}\n", frames,
+             smoothed.size(), filter.restarts(), points.size(), mean_ms, slowest_ms, folder.string());
+  if (!source.error().empty()) throw IoError("", source.error());
+  if (smoothed.size() < 2) throw std::runtime_error(source_text + ": no frame could be tracked");
+}
+
+}  // namespace twofold
