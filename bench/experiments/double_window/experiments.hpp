@@ -2,6 +2,7 @@
 
 #include "experiments/double_window/scene.hpp"
 #include "experiments/report.hpp"
+#include "mapping/options.hpp"
 
 namespace twofold::bench {
 
@@ -11,6 +12,8 @@ struct DoubleWindowExperimentOptions {
   int loop_keyframes = 300;  ///< of the double loop: two rounds
   unsigned seed = 1;         ///< of the first trial
   SceneOptions scene;
+  int max_anchors = 25;              ///< that join W2 for their points (6.2.4), beyond its size
+  EdgeInformationOptions edge = {};  ///< shares; sigma_px follows the scene's noise
 };
 
 void spiral_experiment(const DoubleWindowExperimentOptions& options, SensorKind kind,

@@ -41,7 +41,7 @@ KeyframeProposal& Feeder::propose(const GraphSnapshot& graph) {
   proposal_.reference = KeyframeId{static_cast<std::uint32_t>(next_ - 1)};
   associate(graph);
   track(graph);
-  start_points(graph);
+  start_points();
   std::sort(proposal_.observations.begin(), proposal_.observations.end(),
             [](const Observation& a, const Observation& b) { return a.point < b.point; });
   T_step_ = proposal_.T_k_ref;
@@ -120,7 +120,7 @@ bool Feeder::start_value(const Vector3& z_previous, const Vector3& z, const SE3&
 }
 
 /// Points seen in the previous keyframe and in this one, but not in the map.
-void Feeder::start_points(const GraphSnapshot&) {
+void Feeder::start_points() {
   const auto& previous = scene_.seen[static_cast<std::size_t>(next_ - 1)];
   const SE3 T_previous_k = proposal_.T_k_ref.inverse();
   for (const Scene::Sighting& sighting : unknown_) {

@@ -24,21 +24,20 @@ class Feeder {
   /// Proposal of the next keyframe; valid until the next call.
   KeyframeProposal& propose(const GraphSnapshot& graph);
 
-  /// Newest map point of a world point that satisfies `use`; kNoPoint if there is none.
+  /// Oldest map point of a world point that satisfies `use`; kNoPoint if there is none.
   template <class Use>
   [[nodiscard]] PointId map_point(int world, Use&& use) const {
-    const auto& ids = known_[static_cast<std::size_t>(world)];
-    for (std::size_t n = ids.size(); n-- > 0;) {
-      if (use(ids[n])) return ids[n];
+    for (const PointId id : known_[static_cast<std::size_t>(world)]) {
+      if (use(id)) return id;
     }
     return kNoPoint;
   }
+  [[nodiscard]] Observation observe(PointId id, const Vector3& z) const;
 
  private:
-  [[nodiscard]] Observation observe(PointId id, const Vector3& z) const;
   void associate(const GraphSnapshot& graph);
   void track(const GraphSnapshot& graph);
-  void start_points(const GraphSnapshot& graph);
+  void start_points();
   [[nodiscard]] bool start_value(const Vector3& z_previous, const Vector3& z, const SE3& T_previous_k,
                                  Vector3& psi) const;
 
@@ -46,7 +45,7 @@ class Feeder {
   Association association_;
   int next_ = 0;
   PointId free_point_{0};
-  std::vector<std::vector<PointId>> known_;  ///< map points of a world point, newest last
+  std::vector<std::vector<PointId>> known_;  ///< map points of a world point, oldest first
   std::vector<Scene::Sighting> unknown_;     ///< of this keyframe: not in the map
   SE3 T_step_;                               ///< the previous keyframe's pose relative to the one before
   KeyframeProposal proposal_;

@@ -33,12 +33,12 @@ cv::Mat draw(const std::vector<MethodRounds>& methods, const Curve& curve, PlotO
 
 }  // namespace
 
-double MethodRounds::rmse(RelativeError Round::*level, std::size_t first, std::size_t last) const {
-  RelativeError error;
+RelativeError MethodRounds::error(RelativeError Round::*level, std::size_t first, std::size_t last) const {
+  RelativeError sum;
   for (const Rounds& trial : trials) {
-    for (std::size_t k = first; k < last; ++k) error.add(trial[k].*level);
+    for (std::size_t k = first; k < last; ++k) sum.add(trial[k].*level);
   }
-  return error.rmse();
+  return sum;
 }
 
 double MethodRounds::median(double Round::*figure, std::size_t first, std::size_t last) const {
@@ -51,7 +51,7 @@ double MethodRounds::median(double Round::*figure, std::size_t first, std::size_
 
 std::vector<double> MethodRounds::rmse_curve(RelativeError Round::*level) const {
   std::vector<double> curve;
-  for (std::size_t k = 0; k < keyframes(); ++k) curve.push_back(rmse(level, k, k + 1));
+  for (std::size_t k = 0; k < keyframes(); ++k) curve.push_back(error(level, k, k + 1).rmse());
   return curve;
 }
 

@@ -23,8 +23,8 @@ struct MethodRounds {
   std::vector<Rounds> trials;
 
   [[nodiscard]] std::size_t keyframes() const { return trials.front().size(); }
-  /// RMSE of eq. 6.10 over all trials and the keyframes [first, last).
-  [[nodiscard]] double rmse(RelativeError Round::*level, std::size_t first, std::size_t last) const;
+  /// Eq. 6.10 over all trials and the keyframes [first, last).
+  [[nodiscard]] RelativeError error(RelativeError Round::*level, std::size_t first, std::size_t last) const;
   /// Median of a figure over all trials and the keyframes [first, last).
   [[nodiscard]] double median(double Round::*figure, std::size_t first, std::size_t last) const;
   [[nodiscard]] std::vector<double> rmse_curve(RelativeError Round::*level) const;

@@ -103,9 +103,12 @@ Scene spiral_scene(const SceneOptions& options, SensorKind kind, int keyframes, 
 }
 
 Scene double_loop_scene(const SceneOptions& options, int keyframes, unsigned seed) {
-  const double radius = options.step * keyframes / (4 * std::numbers::pi);
-  return make_scene(options, SensorKind::kMono, simulation::circle_path(keyframes, 2, radius, options.height),
-                    seed);
+  // Keyframes of the second round stand between those of the first: the direction between two that coincide
+  // is not defined.
+  const double laps = keyframes / (0.5 * keyframes - 0.5);
+  const double radius = options.step * keyframes / (2 * std::numbers::pi * laps);
+  return make_scene(options, SensorKind::kMono,
+                    simulation::circle_path(keyframes, laps, radius, options.height), seed);
 }
 
 }  // namespace twofold::bench
