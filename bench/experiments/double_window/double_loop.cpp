@@ -3,97 +3,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <memory>
 
-#include "experiments/double_window/drift_mapper.hpp"
 #include "experiments/double_window/experiments.hpp"
-#include "experiments/double_window/feeder.hpp"
+#include "experiments/double_window/place_recognition.hpp"
 #include "experiments/double_window/rounds.hpp"
 #include "experiments/plot.hpp"
-#include "geometry/absolute_orientation.hpp"
 
 namespace twofold::bench {
 namespace {
 
 constexpr int kInner = 30, kOuter = 100;
-constexpr std::size_t kNear = 60;  // keyframes within this topological distance are no large loop
-constexpr int kMinMatches = 40;    // of a place that is recognised
 
 enum Method : std::size_t { kBa, kConstant, kGlobal, kRigid, kMethods };
 constexpr const char* kNames[kMethods] = {"BA", "cDWO", "gDWO", "cDWO, SE(3) loop"};
 
 MapperOptions mapper_options(Method method, const DoubleWindowExperimentOptions& options) {
-  constexpr int kUnbounded = std::numeric_limits<int>::max() / 4;
-  MapperOptions mapper;
+  MapperOptions mapper = simulation_mapper_options(options);
   mapper.inner_window = method == kBa ? kUnbounded : kInner;
   mapper.outer_window = kOuter;
   mapper.global_outer_window = method == kGlobal;
-  mapper.max_anchors = options.max_anchors;
-  mapper.max_points = kUnbounded;
-  mapper.theta = options.scene.theta;
-  mapper.sigma_scale = 2 * options.scene.noise_px;
-  mapper.edge = options.edge;
-  mapper.edge.sigma_px = options.scene.noise_px;
-  mapper.solver.max_iterations = 3;
-  mapper.solver.huber_px = 0;  // perfect association
   return mapper;
 }
-
-/// A place seen again after a large loop: points that the map has twice.
-struct Recognition {
-  SimilarityConstraint loop;
-  std::vector<Observation> matches;  ///< of the old points, measured in the new keyframe
-};
-
-class PlaceRecognition {
- public:
-  PlaceRecognition(const Scene& scene, const Feeder& feeder) : scene_(scene), feeder_(feeder) {}
-
-  /// Known association in place of appearance; topologically near keyframes do not count (6.4.2).
-  Recognition look(const GraphSnapshot& graph) {
-    Recognition best;
-    const KeyframeId k = graph.reference();
-    weighted_breadth_first(graph, k, kNear, visited_, tree_);
-    for (const int earlier : scene_.covisible[index(k)]) {
-      const KeyframeId j{static_cast<std::uint32_t>(earlier)};
-      if (std::any_of(tree_.begin(), tree_.end(), [&](const TreeNode& n) { return n.id == j; })) continue;
-      Recognition found = match(graph, k, j);
-      if (found.loop.inliers > best.loop.inliers) best = std::move(found);
-    }
-    return best;
-  }
-
- private:
-  [[nodiscard]] Recognition match(const GraphSnapshot& graph, KeyframeId from, KeyframeId to) const {
-    Recognition found;
-    std::vector<Vector3> x_from, x_to;
-    const auto seen_by = [&](KeyframeId keyframe) {
-      return [&graph, keyframe](PointId id) {
-        return graph.contains(id) && find_observation(graph.keyframe(keyframe), id) != nullptr;
-      };
-    };
-    for (const Scene::Sighting& sighting : scene_.seen[index(from)]) {
-      const PointId recent = feeder_.map_point(sighting.point, seen_by(from));
-      const PointId old = feeder_.map_point(sighting.point, seen_by(to));
-      if (recent == kNoPoint || old == kNoPoint || recent == old) continue;
-      x_from.push_back(graph.T_k_w(from) * graph.position(recent));
-      x_to.push_back(graph.T_k_w(to) * graph.position(old));
-      found.matches.push_back(feeder_.observe(old, sighting.z));
-    }
-    if (static_cast<int>(x_from.size()) < kMinMatches) return found;
-    const auto S_to_from = align_similarity(x_to, x_from);
-    if (!S_to_from) return found;
-    found.loop = {from, to, *S_to_from, static_cast<int>(x_from.size())};
-    std::sort(found.matches.begin(), found.matches.end(),
-              [](const Observation& a, const Observation& b) { return a.point < b.point; });
-    return found;
-  }
-
-  const Scene& scene_;
-  const Feeder& feeder_;
-  VisitedSet visited_;
-  std::vector<TreeNode> tree_;
-};
 
 struct LoopEvent {
   int keyframe = 0, to = 0;
@@ -102,7 +33,7 @@ struct LoopEvent {
 
 /// The trajectory in the frame of its last keyframe, and truth in the same place at the scale of the last
 /// stretch.
-void plot_path(const GraphSnapshot& graph, const Scene& scene, const std::string& title, cv::Mat& image) {
+cv::Mat plot_path(const GraphSnapshot& graph, const Scene& scene, const std::string& title) {
   const std::size_t last = graph.keyframe_count() - 1;
   const SE3 T_w_now = scene.T_k_w[last].inverse();
   const KeyframeId last_id{static_cast<std::uint32_t>(last)}, before{static_cast<std::uint32_t>(last - 10)};
@@ -122,7 +53,7 @@ void plot_path(const GraphSnapshot& graph, const Scene& scene, const std::string
   }
   PlotOptions plot{
       .title = title, .x_label = "m", .y_label = "m", .equal_aspect = true, .width = 560, .height = 460};
-  image = draw_plot({truth, path}, plot);
+  return draw_plot({truth, path}, plot);
 }
 
 struct TrialResult {
@@ -131,49 +62,66 @@ struct TrialResult {
   std::vector<cv::Mat> plots;
 };
 
+/// One method on one scene.
+struct Contestant {
+  Contestant(const Scene& scene, const MapperOptions& options)
+      : mapper(scene.rig, options), feeder(scene, Association::kLocal), places(scene, feeder) {}
+  Contestant(const Contestant&) = delete;  // places refers to feeder
+  Contestant& operator=(const Contestant&) = delete;
+
+  void map_next(Round& round) {
+    const KeyframeProposal& proposal = feeder.propose(mapper.graph());
+    const double start = thread_cpu_ms();
+    const MapperReport report = mapper.step(proposal);
+    record_cost(report, thread_cpu_ms() - start, round);
+  }
+
+  DriftMapper mapper;
+  Feeder feeder;
+  PlaceRecognition places;
+};
+
+/// Looks for a place seen before, and closes the loop.
+void close_loop(Contestant& contestant, Method method, std::size_t k, const Scene& scene, bool plots,
+                TrialResult& result) {
+  const GraphSnapshot& graph = contestant.mapper.graph();
+  Recognition seen = contestant.places.look(graph);
+  const bool last = k + 1 == result.rounds.size(), first_loop = seen.found() && result.loops.empty();
+  if (plots && (last || first_loop)) {
+    const std::string when = std::string(kNames[method]) + ", keyframe " + std::to_string(k + 1);
+    result.plots.push_back(plot_path(graph, scene, when + (first_loop ? ", before the loop closes" : "")));
+  }
+  if (!seen.found()) return;
+  result.loops.push_back(
+      {static_cast<int>(k), static_cast<int>(index(seen.loop.to)), seen.loop.S_to_from.scale()});
+  if (method == kRigid) seen.loop.S_to_from = Sim3(seen.loop.S_to_from.without_scale());
+  contestant.mapper.close(seen.loop, seen.matches);
+}
+
 std::vector<TrialResult> run_trial(const Scene& scene, const DoubleWindowExperimentOptions& options,
                                    bool plots) {
-  std::vector<DriftMapper> mappers;
-  std::vector<Feeder> feeders;
-  std::vector<PlaceRecognition> places;
-  feeders.reserve(kMethods);  // referred to
-  for (std::size_t m = 0; m < kMethods; ++m) {
-    mappers.emplace_back(scene.rig, mapper_options(static_cast<Method>(m), options));
-    feeders.emplace_back(scene, Association::kLocal);
-    places.emplace_back(scene, feeders.back());
-  }
-  const auto count = static_cast<std::size_t>(scene.keyframes());
+  std::vector<std::unique_ptr<Contestant>> contestants;
   std::vector<TrialResult> results(kMethods);
-  for (auto& result : results) result.rounds.resize(count);
+  const auto count = static_cast<std::size_t>(scene.keyframes());
+  for (std::size_t m = 0; m < kMethods; ++m) {
+    contestants.push_back(
+        std::make_unique<Contestant>(scene, mapper_options(static_cast<Method>(m), options)));
+    results[m].rounds.resize(count);
+  }
   for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t m = 0; m < kMethods; ++m) contestants[m]->map_next(results[m].rounds[k]);
     for (std::size_t m = 0; m < kMethods; ++m) {
-      const KeyframeProposal& proposal = feeders[m].propose(mappers[m].graph());
-      const double start = thread_cpu_ms();
-      const MapperReport report = mappers[m].step(proposal);
-      record_cost(report, thread_cpu_ms() - start, results[m].rounds[k]);
+      record_errors(contestants[m]->mapper.graph(), scene, contestants[kConstant]->mapper.window(),
+                    results[m].rounds[k]);
     }
     for (std::size_t m = 0; m < kMethods; ++m) {
-      record_errors(mappers[m].graph(), scene, mappers[kConstant].window(), results[m].rounds[k]);
-      Recognition seen = places[m].look(mappers[m].graph());
-      const bool closes = seen.loop.inliers >= kMinMatches;
-      const std::string when = std::string(kNames[m]) + ", keyframe " + std::to_string(k + 1);
-      if (plots && (k + 1 == count || (closes && results[m].loops.empty()))) {
-        plot_path(mappers[m].graph(), scene, when + (closes ? ", before the loop closes" : ""),
-                  results[m].plots.emplace_back());
-      }
-      if (!closes) continue;
-      if (m == kRigid) seen.loop.S_to_from = Sim3(seen.loop.S_to_from.without_scale());
-      mappers[m].close(seen.loop, seen.matches);
-      results[m].loops.push_back(
-          {static_cast<int>(k), static_cast<int>(index(seen.loop.to)), seen.loop.S_to_from.scale()});
+      close_loop(*contestants[m], static_cast<Method>(m), k, scene, plots, results[m]);
     }
   }
   return results;
 }
 
-void state_double_loop(const std::vector<MethodRounds>& m, const std::vector<std::vector<LoopEvent>>& loops,
-                       Report& report) {
-  const std::size_t end = m[kBa].keyframes(), half = end / 2;
+void state_loops(const std::vector<std::vector<LoopEvent>>& loops, Report& report) {
   std::size_t once = 0;
   double drift = 0;
   auto list = nlohmann::json::array();
@@ -187,6 +135,10 @@ void state_double_loop(const std::vector<MethodRounds>& m, const std::vector<std
                text("once in %zu of %zu trials; largest scale drift at the closure %.1f %%", once,
                     loops.size(), 100 * (std::exp(drift) - 1)),
                once == loops.size());
+}
+
+void state_accuracy(const std::vector<MethodRounds>& m, Report& report) {
+  const std::size_t end = m[kBa].keyframes(), half = end / 2;
   const std::size_t after = std::min(end - 1, half + 20);
   const double inner =
       m[kConstant].error(&Round::inner, after, end).rmse() / m[kBa].error(&Round::inner, after, end).rmse();
@@ -209,11 +161,15 @@ void state_double_loop(const std::vector<MethodRounds>& m, const std::vector<std
   report.state(
       "thesis 6.2.7",
       "double loop: without a scale at the loop (SE(3)) the windows are worse while it passes through them",
-      text("RMSE in both windows, keyframes %zu to %zu, SE(3) / Sim(3): %.3f; inner window %.3f", half + 1,
+      text("RMSE in both windows, keyframes %zu to %zu, SE(3) / Sim(3): %.4f; inner window %.4f", half + 1,
            closing, both(kRigid, kConstant, half, closing),
            m[kRigid].error(&Round::inner, half, closing).rmse() /
                m[kConstant].error(&Round::inner, half, closing).rmse()),
       both(kRigid, kConstant, half, closing) > 1);
+}
+
+void state_cost(const std::vector<MethodRounds>& m, Report& report) {
+  const std::size_t end = m[kBa].keyframes(), half = end / 2, after = std::min(end - 1, half + 20);
   const double before =
       m[kConstant].median(&Round::cpu_ms, half - std::min<std::size_t>(half - 1, 15), half - 2);
   const double later = m[kConstant].median(&Round::cpu_ms, after, end);
@@ -251,7 +207,9 @@ void double_loop_experiment(const DoubleWindowExperimentOptions& options, Report
   });
   write_rounds("double_loop", "double loop", methods, true, report);
   if (!plots.empty()) write_png(report.file("double_loop_paths.png"), tile(plots, 2));
-  state_double_loop(methods, loops, report);
+  state_loops(loops, report);
+  state_accuracy(methods, report);
+  state_cost(methods, report);
 }
 
 }  // namespace twofold::bench

@@ -4,6 +4,7 @@
 #include <ctime>
 #include <functional>
 
+#include "experiments/double_window/experiments.hpp"
 #include "experiments/plot.hpp"
 
 namespace twofold::bench {
@@ -32,6 +33,22 @@ cv::Mat draw(const std::vector<MethodRounds>& methods, const Curve& curve, PlotO
 }
 
 }  // namespace
+
+MapperOptions simulation_mapper_options(const DoubleWindowExperimentOptions& options) {
+  MapperOptions mapper;
+  mapper.max_anchors = options.max_anchors;
+  mapper.max_points = kUnbounded;
+  mapper.theta = options.scene.theta;
+  mapper.sigma_scale = 2 * options.scene.noise_px;  // imaging gives half a pixel
+  mapper.edge = options.edge;
+  mapper.edge.sigma_px = options.scene.noise_px;
+  mapper.solver.max_iterations = 3;
+  // Perfect association: there are no outliers to look for, no metric loops to find, and nothing to cull.
+  mapper.solver.huber_px = 0;
+  mapper.outlier_chi2_mono = mapper.outlier_chi2_stereo = 1e9;
+  mapper.loop.enabled = mapper.culling.keyframes = mapper.culling.points = false;
+  return mapper;
+}
 
 RelativeError MethodRounds::error(RelativeError Round::*level, std::size_t first, std::size_t last) const {
   RelativeError sum;

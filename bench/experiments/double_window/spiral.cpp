@@ -2,7 +2,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "experiments/double_window/experiments.hpp"
 #include "experiments/double_window/feeder.hpp"
@@ -19,23 +18,11 @@ enum Method : std::size_t { kBa, kConstant, kGlobal, kFixedRim, kMethods };
 constexpr const char* kNames[kMethods] = {"BA", "cDWO", "gDWO", "fixed rim"};
 
 MapperOptions mapper_options(Method method, const DoubleWindowExperimentOptions& options) {
-  constexpr int kUnbounded = std::numeric_limits<int>::max() / 4;
-  MapperOptions mapper;
+  MapperOptions mapper = simulation_mapper_options(options);
   mapper.inner_window = method == kBa ? kUnbounded : kInner;
   mapper.outer_window = kOuter;
   mapper.global_outer_window = method == kGlobal;
   mapper.fixed_outer_window = method == kFixedRim;
-  mapper.max_anchors = options.max_anchors;
-  mapper.max_points = kUnbounded;
-  mapper.theta = options.scene.theta;
-  mapper.sigma_scale = 2 * options.scene.noise_px;
-  mapper.edge = options.edge;
-  mapper.edge.sigma_px = options.scene.noise_px;
-  mapper.solver.max_iterations = 3;
-  // Perfect association: there are no outliers to look for, no loops to find, nothing to cull.
-  mapper.solver.huber_px = 0;
-  mapper.outlier_chi2_mono = mapper.outlier_chi2_stereo = 1e9;
-  mapper.loop.enabled = mapper.culling.keyframes = mapper.culling.points = false;
   return mapper;
 }
 
