@@ -1,0 +1,141 @@
+#include "experiments/double_window/rounds.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <functional>
+
+#include "experiments/double_window/experiments.hpp"
+#include "experiments/plot.hpp"
+
+namespace twofold::bench {
+namespace {
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+using Curve = std::function<std::vector<double>(const MethodRounds&)>;
+
+cv::Mat draw(const std::vector<MethodRounds>& methods, const Curve& curve, PlotOptions plot) {
+  std::vector<Series> series;
+  int colour = 0;
+  for (const MethodRounds& method : methods) {
+    Series s{.name = method.name, .y = curve(method), .colour = colour++};
+    for (std::size_t k = 0; k < s.y.size(); ++k) s.x.push_back(static_cast<double>(k + 1));
+    series.push_back(s);
+  }
+  plot.x_label = "keyframe";
+  plot.width = 760;
+  plot.height = 460;
+  return draw_plot(series, plot);
+}
+
+}  // namespace
+
+MapperOptions simulation_mapper_options(const DoubleWindowExperimentOptions& options) {
+  MapperOptions mapper;
+  mapper.max_anchors = options.max_anchors;
+  mapper.max_points = kUnbounded;
+  mapper.theta = options.scene.theta;
+  mapper.sigma_scale = 2 * options.scene.noise_px;  // imaging gives half a pixel
+  mapper.edge = options.edge;
+  mapper.edge.sigma_px = options.scene.noise_px;
+  mapper.solver.max_iterations = 3;
+  // Perfect association: there are no outliers to look for, no metric loops to find, and nothing to cull.
+  mapper.solver.huber_px = 0;
+  mapper.outlier_chi2_mono = mapper.outlier_chi2_stereo = 1e9;
+  mapper.loop.enabled = mapper.culling.keyframes = mapper.culling.points = false;
+  return mapper;
+}
+
+RelativeError MethodRounds::error(RelativeError Round::*level, std::size_t first, std::size_t last) const {
+  RelativeError sum;
+  for (const Rounds& trial : trials) {
+    for (std::size_t k = first; k < last; ++k) sum.add(trial[k].*level);
+  }
+  return sum;
+}
+
+double MethodRounds::median(double Round::*figure, std::size_t first, std::size_t last) const {
+  std::vector<double> values;
+  for (const Rounds& trial : trials) {
+    for (std::size_t k = first; k < last; ++k) values.push_back(trial[k].*figure);
+  }
+  return median_of(std::move(values));
+}
+
+std::vector<double> MethodRounds::rmse_curve(RelativeError Round::*level) const {
+  std::vector<double> curve;
+  for (std::size_t k = 0; k < keyframes(); ++k) curve.push_back(error(level, k, k + 1).rmse());
+  return curve;
+}
+
+std::vector<double> MethodRounds::median_curve(double Round::*figure) const {
+  std::vector<double> curve;
+  for (std::size_t k = 0; k < keyframes(); ++k) curve.push_back(median(figure, k, k + 1));
+  return curve;
+}
+
+double thread_cpu_ms() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+void record_cost(const MapperReport& report, double cpu_ms, Round& round) {
+  round.cpu_ms = cpu_ms;
+  round.frames = report.inner_window + report.outer_window;
+  round.points = report.points;
+  round.observations = report.observations;
+  round.constraints = report.constraints;
+}
+
+void record_errors(const GraphSnapshot& graph, const Scene& scene, const DoubleWindow& window, Round& round) {
+  round.inner = relative_error(graph, scene, [&](KeyframeId id) { return window.is_inner(id); });
+  round.both = relative_error(graph, scene, [&](KeyframeId id) { return window.contains(id); });
+  round.all = relative_error(graph, scene, [](KeyframeId) { return true; });
+}
+
+void write_rounds(const std::string& name, const std::string& title, const std::vector<MethodRounds>& methods,
+                  bool scale_free, Report& report) {
+  const std::pair<const char*, RelativeError Round::*> levels[] = {
+      {"inner window", &Round::inner}, {"both windows", &Round::both}, {"all edges", &Round::all}};
+  const std::pair<const char*, double Round::*> figures[] = {
+      {"CPU time [ms]", &Round::cpu_ms},
+      {"frames", &Round::frames},
+      {"points", &Round::points},
+      {"point-to-frame constraints", &Round::observations},
+      {"frame-to-frame constraints", &Round::constraints}};
+  std::vector<std::string> columns{"keyframe"};
+  std::vector<std::vector<double>> rows(methods.front().keyframes());
+  for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = {static_cast<double>(k + 1)};
+  const auto add_columns = [&](const char* label, const Curve& curve) {
+    for (const MethodRounds& method : methods) {
+      columns.push_back(method.name + ": " + label);
+      const std::vector<double> values = curve(method);
+      for (std::size_t k = 0; k < rows.size(); ++k) rows[k].push_back(values[k]);
+    }
+  };
+  std::vector<cv::Mat> accuracy, cost;
+  for (const auto& [label, level] : levels) {
+    const Curve curve = [level = level](const MethodRounds& m) { return m.rmse_curve(level); };
+    add_columns(label, curve);
+    PlotOptions plot{.title = title + ": RMSE, " + label, .y_label = scale_free ? "of unit length" : "m"};
+    plot.log_y = level == &Round::all;
+    accuracy.push_back(draw(methods, curve, plot));
+  }
+  for (const auto& [label, figure] : figures) {
+    const Curve curve = [figure = figure](const MethodRounds& m) { return m.median_curve(figure); };
+    add_columns(label, curve);
+    PlotOptions plot{.title = title + ": " + label, .y_label = label};
+    plot.log_y = figure == &Round::cpu_ms;
+    cost.push_back(draw(methods, curve, plot));
+  }
+  report.csv(name + ".csv", columns, rows);
+  write_png(report.file(name + "_accuracy.png"), tile(accuracy, 2));
+  write_png(report.file(name + "_cost.png"), tile(cost, 2));
+}
+
+}  // namespace twofold::bench

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+
+namespace twofold::bench {
+
+/// What of the simulation the thesis leaves open  (6.5.1: only the camera, the noise and the number of
+/// keyframes are printed).
+struct SceneOptions {
+  double noise_px = 1;      ///< standard deviation of each coordinate of a measurement
+  int max_sightings = 120;  ///< of a keyframe
+  double density = 25;      ///< points per square metre of ground
+  double height = 1.2;      ///< of the camera above the ground it looks down on [m]
+  double step = 0.2;        ///< between keyframes [m]
+  double spacing = 0.8;     ///< between the turns of the spiral [m]
+  int theta = 15;           ///< points seen from both keyframes that make an edge of eq. 6.10
+};
+
+/// One trial: true poses and points, and all measurements, drawn once so that every method gets the same.
+struct Scene {
+  struct Sighting {
+    int point = 0;       ///< in `points`
+    Vector3 z{0, 0, 0};  ///< (u_l, v_l, u_r), noise included [px]
+  };
+  Rig rig;
+  std::vector<SE3> T_k_w;                   ///< truth
+  std::vector<Vector3> points;              ///< truth, world frame [m]
+  std::vector<std::vector<Sighting>> seen;  ///< by keyframe, ascending by point
+  std::vector<std::vector<int>> covisible;  ///< by keyframe: earlier ones that share theta points with it
+
+  [[nodiscard]] int keyframes() const { return static_cast<int>(T_k_w.size()); }
+  [[nodiscard]] double median_depth(int keyframe) const;
+};
+
+/// Spiral from the centre outwards: loopy and exploring at the same time  (fig. 6.9).
+[[nodiscard]] Scene spiral_scene(const SceneOptions& options, SensorKind kind, int keyframes, unsigned seed);
+/// Twice around a circle  (fig. 6.11).
+[[nodiscard]] Scene double_loop_scene(const SceneOptions& options, int keyframes, unsigned seed);
+
+}  // namespace twofold::bench
