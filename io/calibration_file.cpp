@@ -129,7 +129,7 @@ void read_own_depth(const YamlNode& node, Calibration* calibration) {
 }
 
 Calibration read_own(const YamlNode& root) {
-  root.expect_keys({"sensor", "fps", "cameras", "baseline", "T_right_left", "depth"});
+  root.expect_keys({"sensor", "fps", "cameras", "baseline", "T_right_left", "depth", "quality"});
   static const std::map<std::string, SensorKind> kKinds{
       {"mono", SensorKind::kMono}, {"stereo", SensorKind::kStereo}, {"rgbd", SensorKind::kRgbd}};
   const YamlNode sensor = root.at("sensor");

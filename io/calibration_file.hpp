@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 
 #include "camera/calibration.hpp"
 
@@ -37,5 +39,18 @@ void set_missing_size(int width, int height, Calibration* calibration);
 /// Throws IoError with the file's name when the calibration cannot be used (negative focal length, size
 /// missing, ...).
 void expect_valid(const std::filesystem::path& file, const Calibration& calibration);
+
+/// How a calibration came about; kept in the file for people and ignored when read.
+struct CalibrationQuality {
+  std::string board;
+  int views = 0;
+  double rms_px = 0;
+  double focal_std_px = 0;             ///< the largest of all fx, fy
+  std::optional<double> baseline_std;  ///< stereo [m]
+};
+
+/// Writes the own form; only mono and stereo. Throws IoError when the file cannot be written.
+void write_calibration(const std::filesystem::path& file, const Calibration& calibration,
+                       const CalibrationQuality& quality);
 
 }  // namespace twofold

@@ -9,6 +9,7 @@ enum ExitCode : int { kOk = 0, kFailedRun = 1, kBadInput = 2 };
 
 /// One a file: adds its subcommand to the program. The subcommand runs while the command line is parsed,
 /// writes what the program is to end with into exit_code, and throws IoError for input it cannot use.
+void add_calibrate_command(CLI::App& app, int& exit_code);
 void add_devices_command(CLI::App& app, int& exit_code);
 void add_doctor_command(CLI::App& app, int& exit_code);
 void add_eval_command(CLI::App& app, int& exit_code);

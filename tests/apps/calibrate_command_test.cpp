@@ -1,0 +1,90 @@
+#include <opencv2/imgcodecs.hpp>
+
+#include <fmt/format.h>
+
+#include "io/calibration_file.hpp"
+#include "tests/apps/command.hpp"
+#include "tests/calibration/rendered_board.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace twofold::testing;
+
+const Board kBoard{BoardKind::kChessboard, 9, 6, 0.025, 0, MarkerFamily::k4x4};
+
+/// Images of both cameras of a pair, 16 views, in left/ and right/.
+void render_pairs(const ScratchFolder& folder, const CameraModel& left, const CameraModel& right,
+                  const SE3& T_r_l) {
+  const BoardCamera left_camera(left), right_camera(right);
+  const cv::Mat print = print_chessboard(kBoard);
+  std::mt19937 random(8);
+  for (int n = 0; n < 16;) {
+    const SE3 T_l_b = random_pose(kBoard, 0.6, random);
+    if (!sees(left, kBoard, T_l_b) || !sees(right, kBoard, T_r_l * T_l_b)) continue;
+    const auto see = [&](const BoardCamera& camera, const SE3& T_c_b) {
+      return camera.see(print, kPrintSquarePx / kBoard.square, {2 * kPrintSquarePx, 2 * kPrintSquarePx},
+                        T_c_b, random);
+    };
+    folder.write_image(fmt::format("set/left/{:02}.png", n), see(left_camera, T_l_b));
+    folder.write_image(fmt::format("set/right/{:02}.png", n), see(right_camera, T_r_l * T_l_b));
+    ++n;
+  }
+}
+
+TEST(CalibrateCommand, FolderOfPairsBecomesACalibrationThatCanBeRead) {
+  const ScratchFolder folder;
+  const CameraModel left = test_camera(460, 324.3, 237.1, -0.28, 0.074, 0.0002, -0.0004);
+  const CameraModel right = test_camera(457, 315.6, 243.8, -0.27, 0.069, -0.0003, 0.0003);
+  render_pairs(folder, left, right, SE3(SO3(), Vector3(-0.06, 0, 0)));
+  const std::string board = " --board chessboard:9x6:0.025 -o ";
+  const Outcome stereo = run(folder, "calibrate " + (folder / "set") + board + (folder / "stereo.yaml"));
+  ASSERT_EQ(stereo.exit_code, 0) << stereo.err;
+  EXPECT_NE(stereo.out.find("baseline 0.0"), std::string::npos) << stereo.out;
+  EXPECT_NE(stereo.err.find("Next: "), std::string::npos);
+  EXPECT_FALSE(cv::imread(folder / "stereo.png").empty());
+  const Calibration calibration = read_calibration(folder / "stereo.yaml");
+  EXPECT_EQ(calibration.kind, SensorKind::kStereo);
+  EXPECT_NEAR(calibration.left.pinhole.fx, 460, 0.92);
+  EXPECT_NEAR(calibration.T_right_left.translation().x(), -0.06, 0.0003);
+  EXPECT_NE(content(folder / "stereo.yaml").find("rms_px: 0."), std::string::npos);
+  const Outcome mono =
+      run(folder, "calibrate " + (folder / "set/left") + board + (folder / "mono.yaml") + " --quiet");
+  ASSERT_EQ(mono.exit_code, 0) << mono.err;
+  EXPECT_EQ(mono.err, "");
+  EXPECT_EQ(read_calibration(folder / "mono.yaml").kind, SensorKind::kMono);
+
+  for (int n = 5; n < 16; ++n) std::filesystem::remove(folder / fmt::format("set/left/{:02}.png", n));
+  const Outcome few =
+      run(folder, "calibrate " + (folder / "set/left") + board + (folder / "few.yaml") + " --quiet");
+  EXPECT_EQ(few.exit_code, 1);
+  EXPECT_NE(few.err.find("no calibration: too few views: 5"), std::string::npos) << few.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "few.yaml"));
+}
+
+TEST(CalibrateCommand, BadInputIsOneLineAndExitCodeTwo) {
+  const ScratchFolder folder;
+  const std::string out = " -o " + (folder / "c.yaml");
+  expect_bad_input(run(folder, "calibrate " + (folder / "none") + out + " --board chessboard:9x6:0.025"),
+                   "none: no such folder");
+  expect_bad_input(
+      run(folder, "calibrate " + folder.path().string() + out + " --board aprilgrid:6x6:0.088:0.3"),
+      "no AprilGrid");
+  expect_bad_input(run(folder, "calibrate " + folder.path().string() + out + " --board chessboard:9x6"),
+                   "the form is");
+  expect_bad_input(run(folder, "calibrate " + folder.path().string() + out), "--board");
+}
+
+TEST(DoctorCommand, ReportsLineByLine) {
+  const ScratchFolder folder;
+  const Outcome here = run(folder, "doctor --record-to " + folder.path().string());
+  for (const char* part : {"cores", "governor", "SCHED_FIFO", "locked memory", "MB/s"})
+    EXPECT_NE(here.out.find(part), std::string::npos) << part << here.out;
+  const Outcome absent = run(folder, "doctor 'v4l2:/dev/video97?size=640x480&fps=30'");
+  EXPECT_EQ(absent.exit_code, 1);
+  EXPECT_NE(absent.out.find("bad   /dev/video97"), std::string::npos) << absent.out;
+  expect_bad_input(run(folder, "doctor 'v4l2:/dev/video97?size=huge'"), "size='huge'");
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,92 @@
+#include "calibration/view_guide.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/calibration/rendered_board.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace twofold::testing;
+
+const Board kBoard{BoardKind::kChessboard, 9, 6, 0.025, 0, MarkerFamily::k4x4};
+const cv::Size kSize(640, 480);
+
+BoardView view_at(const SO3& R, const Vector3& centre_c) {
+  const CameraModel camera = test_camera(520, 320, 240, 0, 0, 0, 0);
+  BoardView view;
+  for (int id = 0; id < kBoard.corner_count(); ++id) {
+    const cv::Point3f p = kBoard.corner(id);
+    const Vector2 uv = camera.project(R.matrix() * Vector3(p.x - 0.1, p.y - 0.0625, 0) + centre_c);
+    view.ids.push_back(id);
+    view.pixels.emplace_back(static_cast<float>(uv.x()), static_cast<float>(uv.y()));
+  }
+  return view;
+}
+
+bool asks_for(const ViewGuide& guide, const std::string& part) {
+  for (const std::string& text : guide.missing()) {
+    if (text.find(part) != std::string::npos) return true;
+  }
+  return false;
+}
+
+TEST(ViewShape, TellsWhichSideIsFartherAway) {
+  const auto yaw = shape_of(view_at(SO3::exp(Vector3(0, -0.4, 0)), {0, 0, 0.4}), kBoard, kSize);
+  ASSERT_TRUE(yaw.has_value());
+  EXPECT_NEAR(yaw->yaw(), 0.4, 0.08);  // a turn about -y takes the right side away
+  EXPECT_NEAR(yaw->pitch(), 0, 0.05);
+  const auto pitch = shape_of(view_at(SO3::exp(Vector3(0.4, 0, 0)), {0, 0, 0.4}), kBoard, kSize);
+  ASSERT_TRUE(pitch.has_value());
+  EXPECT_NEAR(pitch->pitch(), 0.4, 0.08);  // about x: the lower side
+}
+
+TEST(ViewGuide, TakesOnlyNewViews) {
+  ViewGuide guide(kBoard, kSize);
+  EXPECT_TRUE(guide.offer(view_at(SO3(), {0, 0, 0.4})));
+  EXPECT_FALSE(guide.offer(view_at(SO3(), {0.001, 0, 0.4})));
+  EXPECT_TRUE(guide.offer(view_at(SO3(), {0.08, 0, 0.4})));
+  EXPECT_EQ(guide.chosen(), (std::vector<int>{0, 2}));
+}
+
+TEST(ViewGuide, AsksForWhatIsMissingUntilNothingIs) {
+  ViewGuideOptions options;
+  options.wanted_views = 9;
+  ViewGuide guide(kBoard, kSize, options);
+  EXPECT_TRUE(guide.offer(view_at(SO3(), {-0.08, -0.08, 0.4})));
+  for (const char* part :
+       {"upper right", "right side", "left side", "lower side", "upper side", "nearer", "8 more"})
+    EXPECT_TRUE(asks_for(guide, part)) << part;
+  guide.offer(view_at(SO3::exp(Vector3(0, -0.5, 0)), {0, 0, 0.4}));
+  EXPECT_FALSE(asks_for(guide, "right side"));
+  EXPECT_TRUE(asks_for(guide, "left side"));
+  guide.offer(view_at(SO3::exp(Vector3(0, 0.5, 0)), {0, 0, 0.4}));
+  guide.offer(view_at(SO3::exp(Vector3(0.5, 0, 0)), {0, 0, 0.4}));
+  guide.offer(view_at(SO3::exp(Vector3(-0.5, 0, 0)), {0, 0, 0.4}));
+  EXPECT_FALSE(asks_for(guide, "side"));
+  EXPECT_TRUE(guide.offer(view_at(SO3(), {0, 0, 0.8})));
+  EXPECT_FALSE(asks_for(guide, "nearer"));
+  for (const double x : {-0.12, 0.12}) {
+    for (const double y : {-0.11, 0.11}) guide.offer(view_at(SO3(), {x, y, 0.4}));
+  }
+  EXPECT_EQ(guide.missing(), std::vector<std::string>{});
+}
+
+TEST(ViewGuide, ThinsOutALongRecording) {
+  ViewGuideOptions options;
+  options.most_views = 12;
+  options.wanted_views = 10;
+  ViewGuide guide(kBoard, kSize, options);
+  std::mt19937 random(4);
+  for (int i = 0; i < 400; ++i) {
+    const SE3 T_c_b = random_pose(kBoard, 0.5, random);
+    guide.offer(view_at(T_c_b.so3(), T_c_b * Vector3(0.1, 0.0625, 0)));
+    ASSERT_LE(guide.chosen().size(), 12U);
+  }
+  EXPECT_GE(guide.chosen().size(), 5U);
+  EXPECT_GT(guide.chosen().back(), 0);
+  EXPECT_TRUE(std::is_sorted(guide.chosen().begin(), guide.chosen().end()));
+}
+
+}  // namespace
+}  // namespace twofold
