@@ -167,6 +167,7 @@ TimingFile read_timing(const fs::path& given) {
       timing.cost = read_cost({file, thread, stages});
       continue;
     }
+    if (thread == "load ladder") continue;  // no durations
     if (!stages.is_object()) Node{file, thread, stages}.fail("is no table of stages");
     for (const auto& [stage, times] : stages.items())
       timing.threads[thread][stage] = read_stage({file, thread + ", " + stage, times});
