@@ -15,7 +15,7 @@ namespace twofold {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;  // the rungs of the ladder come in their order
 
 std::string read_text(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -106,6 +106,16 @@ RunCost read_cost(const Node& node) {
           node.number("peak_rss_mb")};
 }
 
+std::vector<LadderRung> read_ladder(const Node& node) {
+  if (!node.json.is_object()) node.fail("is no table");
+  const Json& frames = node.at("frames");
+  if (!frames.is_object()) node.fail("'frames' is no table");
+  std::vector<LadderRung> ladder;
+  for (const auto& [rung, count] : frames.items())
+    ladder.push_back({rung, Node{node.file, node.where, frames}.count(rung.c_str())});
+  return ladder;
+}
+
 /// "-12 %", of `value` against `base`; blank when the base is nothing.
 std::string change(double value, double base) {
   if (!(base > 0)) return "";
@@ -133,6 +143,17 @@ std::string stage_rows(const std::vector<TimingFile>& runs, const std::string& t
     rows += line + "\n";
   }
   return rows;
+}
+
+std::string ladder_rows(const std::vector<TimingFile>& runs) {
+  std::string rows;
+  for (std::size_t n = 0; n < runs.size(); ++n) {
+    std::string line;
+    for (const LadderRung& rung : runs[n].ladder)
+      line += fmt::format("{}{} {}", line.empty() ? "" : ", ", rung.name, rung.frames);
+    if (!line.empty()) rows += fmt::format("  {:>3}  {}\n", n + 1, line);
+  }
+  return rows.empty() ? rows : "\nframes on the load ladder\n" + rows;
 }
 
 std::string cost_rows(const std::vector<TimingFile>& runs) {
@@ -167,7 +188,10 @@ TimingFile read_timing(const fs::path& given) {
       timing.cost = read_cost({file, thread, stages});
       continue;
     }
-    if (thread == "load ladder") continue;  // no durations
+    if (thread == "load ladder") {
+      timing.ladder = read_ladder({file, thread, stages});
+      continue;
+    }
     if (!stages.is_object()) Node{file, thread, stages}.fail("is no table of stages");
     for (const auto& [stage, times] : stages.items())
       timing.threads[thread][stage] = read_stage({file, thread + ", " + stage, times});
@@ -190,7 +214,7 @@ std::string timing_table(const std::vector<TimingFile>& runs) {
                         runs.size() > 1 ? "       p50     p99 against run 1" : "");
     for (const std::string& stage : stages) text += stage_rows(runs, thread, stage);
   }
-  return text + "\ncost\n" + cost_rows(runs);
+  return text + ladder_rows(runs) + "\ncost\n" + cost_rows(runs);
 }
 
 }  // namespace twofold

@@ -28,11 +28,18 @@ struct RunCost {
   double wall_seconds = 0, cpu_seconds = 0, peak_rss_mb = 0;
 };
 
+/// Frames tracked on one rung of the load ladder.
+struct LadderRung {
+  std::string name;
+  std::uint64_t frames = 0;
+};
+
 /// One timing.json.
 struct TimingFile {
   std::string name;                                                  ///< as given by the user
   std::map<std::string, std::map<std::string, StageTimes>> threads;  ///< thread -> stage -> times
-  std::optional<RunCost> cost;  ///< missing in files of versions that kept it in summary.json only
+  std::vector<LadderRung> ladder;  ///< top rung first; empty in files of versions without it
+  std::optional<RunCost> cost;     ///< missing in files of versions that kept it in summary.json only
 };
 
 /// Reads a timing.json, or the one in a run's folder. Throws IoError naming file, thread, stage and key, or
@@ -40,7 +47,8 @@ struct TimingFile {
 [[nodiscard]] TimingFile read_timing(const std::filesystem::path& file);
 
 /// Table of all stages, a line a stage and run, the runs of a stage below each other; behind each run after
-/// the first how its p50 and p99 compare with the first one's. Ends with what the runs cost.
+/// the first how its p50 and p99 compare with the first one's. Ends with the load ladder and
+/// what the runs cost.
 [[nodiscard]] std::string timing_table(const std::vector<TimingFile>& runs);
 
 }  // namespace twofold

@@ -16,7 +16,9 @@ nlohmann::json times(double factor) {
 }
 
 nlohmann::json file(double factor) {
-  return {{"tracker", {{"frame", times(factor)}, {"search", times(0.5 * factor)}}},
+  return {{"load ladder",
+           {{"frames", {{"everything", 990}, {"fewer points", 10}}}, {"changes", nlohmann::json::array()}}},
+          {"tracker", {{"frame", times(factor)}, {"search", times(0.5 * factor)}}},
           {"run", {{"frames", 1000}, {"wall_seconds", 20.0}, {"cpu_seconds", 5.0}, {"peak_rss_mb", 80.0}}}};
 }
 
@@ -27,8 +29,8 @@ TEST(TimingCommand, ComparesRunsAndDrawsTheirLatencies) {
   const Outcome outcome =
       run(folder, "timing " + base + " " + (folder / "slow") + " --plot " + (folder / "p.png"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  for (const char* part :
-       {"tracker", "frame", "search", "p99.9", "1000", "+100 %", "5.00 CPU-ms a frame", "80 MB"})
+  for (const char* part : {"tracker", "frame", "search", "p99.9", "1000", "+100 %", "5.00 CPU-ms a frame",
+                           "everything 990, fewer points 10", "80 MB"})
     EXPECT_NE(outcome.out.find(part), std::string::npos) << part << "\n" << outcome.out;
   const cv::Mat picture = cv::imread(folder / "p.png");
   ASSERT_FALSE(picture.empty());
@@ -53,6 +55,7 @@ TEST(TimingCommand, BadFilesAreOneLineAndExitCodeTwo) {
   refuse("{\n\n  what}", "t.json:3: this is not JSON");
   refuse("[1]", "not a timing.json");
   refuse("{}", "not a timing.json");
+  refuse(R"({"load ladder": {"frames": {"everything": -1}}})", "load ladder: 'everything' is no count");
   refuse(R"({"tracker": 3})", "tracker: is no table");
   refuse(R"({"tracker": {"frame": {"count": -1}}})", "'count' is no count");
   nlohmann::json json = file(1);
