@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "experiments/report.hpp"
+#include "experiments/scale_drift/scene.hpp"
 
 namespace twofold::bench {
 
@@ -14,9 +15,9 @@ struct ScaleDriftOptions {
   double circle_radius = 10;  ///< [m]; 72 poses and 500 points a metre of it, as in the thesis
   std::vector<double> noise_px = {0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2};  ///< levels of the circle, >= 0
   int sphere_trials = 5;                                             ///< >= 1; the thesis shows one run
-  double sphere_radius = 10;                                         ///< [m]
-  int sphere_turns = 11;       ///< of the flight, one loop closure from each to the next
+  SphereOptions sphere;        ///< of the flight; one loop closure from each turn to the next
   double sphere_noise_px = 1;  ///< >= 0
+  bool compare = true;         ///< state SE(3) against Sim(3); small scenes hardly drift
   unsigned seed = 1;           ///< of the first trial
 };
 

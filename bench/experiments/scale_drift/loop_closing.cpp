@@ -12,14 +12,20 @@ namespace twofold::bench {
 namespace {
 
 constexpr int kMinViews = 4;  ///< of a point that serves to close a loop: its depth is known well by then
+constexpr int kReach = 10;    ///< frames on either side whose points belong to a frame's surroundings
 
-/// Estimated points of a frame by point of the scene, in the camera's frame.
-std::map<int, Vector3> points_in(const ExplorationResult& map, int frame) {
+/// Points of the map around a frame by point of the scene, in the camera's frame: those of one frame alone,
+/// seen under a narrow angle, would leave the rotation to the noise of their depths.
+std::map<int, Vector3> points_around(const ExplorationResult& map, int frame) {
   std::map<int, Vector3> points;
-  for (const int t : map.seen[static_cast<std::size_t>(frame)]) {
-    const Track& track = map.tracks[static_cast<std::size_t>(t)];
-    if (!track.x_w || track.uv.size() < kMinViews) continue;
-    points[track.point] = map.T_c_w[static_cast<std::size_t>(frame)] * *track.x_w;
+  const int first = std::max(0, frame - kReach);
+  const int last = std::min(static_cast<int>(map.seen.size()) - 1, frame + kReach);
+  for (int k = first; k <= last; ++k) {
+    for (const int t : map.seen[static_cast<std::size_t>(k)]) {
+      const Track& track = map.tracks[static_cast<std::size_t>(t)];
+      if (!track.x_w || track.uv.size() < kMinViews) continue;
+      points[track.point] = map.T_c_w[static_cast<std::size_t>(frame)] * *track.x_w;
+    }
   }
   return points;
 }
@@ -58,12 +64,12 @@ Group constraint(const Sim3& S_j_i) {
 }  // namespace
 
 std::optional<LoopConstraint> close_loop(const ExplorationResult& map, int i_begin, int i_end, int j) {
-  const std::map<int, Vector3> in_j = points_in(map, j);
+  const std::map<int, Vector3> in_j = points_around(map, j);
   std::vector<Vector3> x_i, x_j;
   LoopConstraint loop{.i = -1, .j = j, .S_j_i = {}};
   for (int i = i_begin; i < i_end; ++i) {
     std::vector<Vector3> a, b;
-    for (const auto& [point, x] : points_in(map, i)) {
+    for (const auto& [point, x] : points_around(map, i)) {
       const auto other = in_j.find(point);
       if (other == in_j.end()) continue;
       a.push_back(x);
@@ -75,7 +81,7 @@ std::optional<LoopConstraint> close_loop(const ExplorationResult& map, int i_beg
     x_j = std::move(b);
   }
   const SimilarityEstimator estimator{x_j, x_i};
-  const auto found = ransac(estimator, {.threshold = 0.05});
+  const auto found = ransac(estimator, {.threshold = 0.1});
   if (!found || found->inliers.size() < 10) return std::nullopt;
   std::vector<Vector3> a, b;
   for (const int k : found->inliers) {

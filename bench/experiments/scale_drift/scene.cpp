@@ -48,32 +48,29 @@ Scene circle_scene(double radius, unsigned seed) {
   return scene;
 }
 
-Scene sphere_scene(double radius, int turns, unsigned seed) {
-  constexpr double kHeight = 2.5, kSpacing = 2.77, kStep = 0.35, kDensity = 13;  // m, m, m, points / m^2
+Scene sphere_scene(const SphereOptions& options, unsigned seed) {
   std::mt19937 rng(seed);
   std::normal_distribution<double> normal(0, 1);
-  std::uniform_real_distribution<double> relief(-0.3, 0.3);
+  std::uniform_real_distribution<double> relief(-options.relief, options.relief);
   Scene scene;
   scene.rig = mono_rig();
-  scene.max_depth = 2 * kHeight;
-  const double flight = radius + kHeight;
-  const double arc = turns * kSpacing / flight;  // of latitude
+  scene.max_depth = 2 * options.height;
+  const double flight = options.radius + options.height;
+  const double arc = options.turns * options.spacing / flight;  // of latitude
   if (arc > 0.9 * kPi) throw std::runtime_error("the sphere is too small for so many turns");
-  const auto direction = [](double latitude, double longitude) {
-    return Vector3(std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
-                   std::sin(latitude));
-  };
-  for (double longitude = 0; longitude < 2 * kPi * turns;) {
-    const double latitude = arc * (0.5 - longitude / (2 * kPi * turns));
-    const Vector3 up = direction(latitude, longitude);
-    const Vector3 along(-std::sin(longitude), std::cos(longitude), 0);
-    scene.T_c_w.push_back(look_along(flight * up, -up, along));
-    longitude += kStep / (flight * std::cos(latitude));
+  for (double longitude = 0; longitude < 2 * kPi * options.turns;) {
+    const double latitude = arc * (0.5 - longitude / (2 * kPi * options.turns));
+    const double c = std::cos(latitude), s = std::sin(latitude);
+    const Vector3 up(c * std::cos(longitude), c * std::sin(longitude), s);
+    const Vector3 across(-s * std::cos(longitude), -s * std::sin(longitude), c);
+    scene.T_c_w.push_back(look_along(flight * up, -up, across));
+    longitude += options.step / (flight * c);
   }
-  const int points = static_cast<int>(std::lround(kDensity * 4 * kPi * radius * radius));
+  const double area = 4 * kPi * options.radius * options.radius;
+  const int points = static_cast<int>(std::lround(options.density * area));
   for (int j = 0; j < points; ++j) {
     const Vector3 up = Vector3(normal(rng), normal(rng), normal(rng)).normalized();
-    scene.points.push_back((radius + relief(rng)) * up);
+    scene.points.push_back((options.radius + relief(rng)) * up);
   }
   return scene;
 }

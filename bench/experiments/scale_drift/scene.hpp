@@ -19,10 +19,20 @@ struct Scene {
 /// first and the last of 72 `radius` poses are neighbours. 500 `radius` points, +-0.4 m in radius and height.
 [[nodiscard]] Scene circle_scene(double radius, unsigned seed);
 
-/// Thesis fig. 5.6: an aircraft with a camera looking down, 2.5 m above a sphere with relief of +-0.3 m. The
-/// flight winds from one pole towards the other in `turns` turns, each of which overlaps with its neighbours.
+struct SphereOptions {
+  double radius = 10;    ///< of the ground [m]
+  double relief = 0.3;   ///< ground points lie within radius +- relief [m]
+  double height = 5;     ///< of the flight above the ground [m]
+  int turns = 11;        ///< around the axis, from near one pole to near the other
+  double spacing = 3.5;  ///< between turns [m], so that each overlaps with its neighbours
+  double step = 0.3;     ///< between frames [m]
+  double density = 4;    ///< ground points a square metre
+};
+
+/// Thesis fig. 5.6: an aircraft with a camera looking down winds around a sphere, the long side of the image
+/// across the flight.
 /// @throws std::runtime_error  when that many turns do not fit between the poles
-[[nodiscard]] Scene sphere_scene(double radius, int turns, unsigned seed);
+[[nodiscard]] Scene sphere_scene(const SphereOptions& options, unsigned seed);
 
 /// What one frame sees of a point: its index and its pixel.
 struct Sighting {
