@@ -1,0 +1,154 @@
+#include "experiments/scale_drift/loop_closing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <type_traits>
+
+#include "geometry/absolute_orientation.hpp"
+#include "geometry/ransac.hpp"
+
+namespace twofold::bench {
+namespace {
+
+constexpr int kMinViews = 4;  ///< of a point that serves to close a loop: its depth is known well by then
+constexpr int kReach = 10;    ///< frames on either side whose points belong to a frame's surroundings
+
+/// Points of the map around a frame by point of the scene, in the camera's frame: those of one frame alone,
+/// seen under a narrow angle, would leave the rotation to the noise of their depths.
+std::map<int, Vector3> points_around(const ExplorationResult& map, int frame) {
+  std::map<int, Vector3> points;
+  const int first = std::max(0, frame - kReach);
+  const int last = std::min(static_cast<int>(map.seen.size()) - 1, frame + kReach);
+  for (int k = first; k <= last; ++k) {
+    for (const int t : map.seen[static_cast<std::size_t>(k)]) {
+      const Track& track = map.tracks[static_cast<std::size_t>(t)];
+      if (!track.x_w || track.uv.size() < kMinViews) continue;
+      points[track.point] = map.T_c_w[static_cast<std::size_t>(frame)] * *track.x_w;
+    }
+  }
+  return points;
+}
+
+/// Three-point similarity (thesis 5.3.1); residuals relative to the depth, since the scale is arbitrary.
+struct SimilarityEstimator {
+  using Model = Sim3;
+  static constexpr int kSampleSize = 3;
+  const std::vector<Vector3>& x_j;
+  const std::vector<Vector3>& x_i;
+
+  [[nodiscard]] int size() const { return static_cast<int>(x_j.size()); }
+  void fit(std::span<const int, kSampleSize> sample, std::vector<Sim3>& models) const {
+    std::vector<Vector3> a, b;
+    for (const int k : sample) {
+      a.push_back(x_j[static_cast<std::size_t>(k)]);
+      b.push_back(x_i[static_cast<std::size_t>(k)]);
+    }
+    if (const auto S = align_similarity(a, b)) models.push_back(*S);
+  }
+  [[nodiscard]] double squared_residual(const Sim3& S, int k) const {
+    const Vector3& x = x_j[static_cast<std::size_t>(k)];
+    return (x - S * x_i[static_cast<std::size_t>(k)]).squaredNorm() / x.squaredNorm();
+  }
+};
+
+template <class Group>
+Group constraint(const Sim3& S_j_i) {
+  if constexpr (std::is_same_v<Group, Sim3>) {
+    return S_j_i;
+  } else {
+    return {S_j_i.so3(), S_j_i.translation() / std::sqrt(S_j_i.scale())};
+  }
+}
+
+}  // namespace
+
+std::optional<LoopConstraint> close_loop(const ExplorationResult& map, int i_begin, int i_end, int j) {
+  const std::map<int, Vector3> in_j = points_around(map, j);
+  std::vector<Vector3> x_i, x_j;
+  LoopConstraint loop{.i = -1, .j = j, .S_j_i = {}};
+  for (int i = i_begin; i < i_end; ++i) {
+    std::vector<Vector3> a, b;
+    for (const auto& [point, x] : points_around(map, i)) {
+      const auto other = in_j.find(point);
+      if (other == in_j.end()) continue;
+      a.push_back(x);
+      b.push_back(other->second);
+    }
+    if (a.size() <= x_i.size()) continue;
+    loop.i = i;
+    x_i = std::move(a);
+    x_j = std::move(b);
+  }
+  const SimilarityEstimator estimator{x_j, x_i};
+  const auto found = ransac(estimator, {.threshold = 0.1});
+  if (!found || found->inliers.size() < 10) return std::nullopt;
+  std::vector<Vector3> a, b;
+  for (const int k : found->inliers) {
+    a.push_back(x_j[static_cast<std::size_t>(k)]);
+    b.push_back(x_i[static_cast<std::size_t>(k)]);
+  }
+  const auto S_j_i = align_similarity(a, b);
+  if (!S_j_i) return std::nullopt;
+  loop.S_j_i = *S_j_i;
+  loop.inliers = static_cast<int>(a.size());
+  return loop;
+}
+
+template <class Group>
+PoseGraph<Group> pose_graph(const ExplorationResult& map, const std::vector<LoopConstraint>& loops) {
+  PoseGraph<Group> graph;
+  for (const SE3& T : map.T_c_w) graph.poses.emplace_back(T);
+  for (int j = 1; j < static_cast<int>(map.T_c_w.size()); ++j) {
+    const SE3& T_i = map.T_c_w[static_cast<std::size_t>(j) - 1];
+    const SE3& T_j = map.T_c_w[static_cast<std::size_t>(j)];
+    graph.constraints.push_back({j - 1, j, Group(T_j * T_i.inverse())});
+  }
+  for (const LoopConstraint& loop : loops) {
+    graph.constraints.push_back({loop.i, loop.j, constraint<Group>(loop.S_j_i)});
+  }
+  return graph;
+}
+
+template <class Group>
+std::vector<Vector3> corrected_centres(const ExplorationResult& map,
+                                       const std::vector<LoopConstraint>& loops) {
+  PoseGraph<Group> graph = pose_graph<Group>(map, loops);
+  PoseGraphOptions options;
+  options.jacobian = CbhOrder::kThird;
+  options.relative_decrease = 1e-9;
+  PoseGraphSolver<Group>().solve(graph, options);
+  std::vector<Vector3> centres;
+  for (const Group& pose : graph.poses) centres.push_back(pose.inverse().translation());
+  return centres;
+}
+
+std::vector<Vector3> camera_centres(const std::vector<SE3>& T_c_w) {
+  std::vector<Vector3> centres;
+  for (const SE3& T : T_c_w) centres.push_back(T.inverse().translation());
+  return centres;
+}
+
+double scaled_rmse(const std::vector<Vector3>& truth, const std::vector<Vector3>& corrected) {
+  double cross = 0, square = 0;
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    const Vector3 t = truth[k] - truth[0], c = corrected[k] - truth[0];
+    cross += t.dot(c);
+    square += c.squaredNorm();
+  }
+  const double s = square > 0 ? cross / square : 0;
+  double M = 0;
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    M += ((truth[k] - truth[0]) - s * (corrected[k] - truth[0])).squaredNorm();
+  }
+  return std::sqrt(M / static_cast<double>(truth.size()));
+}
+
+template PoseGraph<SE3> pose_graph<SE3>(const ExplorationResult&, const std::vector<LoopConstraint>&);
+template PoseGraph<Sim3> pose_graph<Sim3>(const ExplorationResult&, const std::vector<LoopConstraint>&);
+template std::vector<Vector3> corrected_centres<SE3>(const ExplorationResult&,
+                                                     const std::vector<LoopConstraint>&);
+template std::vector<Vector3> corrected_centres<Sim3>(const ExplorationResult&,
+                                                      const std::vector<LoopConstraint>&);
+
+}  // namespace twofold::bench

@@ -1,0 +1,156 @@
+// Figure 5.6: an aircraft with a camera looking down flies over a sphere; ten loops are closed at once.
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "experiments/plot.hpp"
+#include "experiments/scale_drift/experiments.hpp"
+#include "experiments/scale_drift/trial.hpp"
+
+namespace twofold::bench {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// Turns flown so far, of every frame.
+std::vector<double> turns_of(const Scene& scene) {
+  std::vector<double> turns;
+  double before = 0, whole = 0;
+  for (const Vector3& c : camera_centres(scene.T_c_w)) {
+    const double turn = std::atan2(c.y(), c.x()) / (2 * kPi);
+    if (turn < before - 0.5) whole += 1;
+    before = turn;
+    turns.push_back(whole + turn);
+  }
+  return turns;
+}
+
+/// One closure for each turn but the first, evenly over the flight, to about one turn earlier.
+std::vector<LoopSearch> sphere_searches(const Scene& scene, int turns) {
+  const std::vector<double> turn = turns_of(scene);
+  const auto frame = [&](double at) {  // last one not after
+    const auto found = std::upper_bound(turn.begin(), turn.end(), at + 1e-9);
+    return static_cast<int>(std::max(found - turn.begin() - 1, std::ptrdiff_t{0}));
+  };
+  std::vector<LoopSearch> searches;
+  for (int k = 0; k + 1 < turns; ++k) {
+    const double at = turns == 2 ? turns : 1 + k * (turns - 1.0) / (turns - 2.0);
+    const int j = frame(at);
+    const double j_at = turn[static_cast<std::size_t>(j)];
+    searches.push_back({frame(j_at - 1.05), frame(j_at - 0.95) + 1, j});
+  }
+  return searches;
+}
+
+/// Seen from the side and a little from above.
+Vector2 view(const Vector3& x) {
+  constexpr double kTilt = 0.35;
+  return {x.y(), x.z() * std::cos(kTilt) - x.x() * std::sin(kTilt)};
+}
+
+cv::Mat draw_flight(const DriftTrial& t, const std::vector<Vector3>& centres, const std::string& title,
+                    bool loops) {
+  const auto series = [](const std::vector<Vector3>& way, int colour) {
+    Series s{.colour = colour, .thickness = 1};
+    for (const Vector3& c : way) {
+      s.x.push_back(view(c).x());
+      s.y.push_back(view(c).y());
+    }
+    return s;
+  };
+  std::vector<Series> all = {series(t.truth, 7), series(centres, 1)};
+  all[0].name = "true";
+  all[1].name = "estimated";
+  for (const LoopConstraint& loop : t.loops) {
+    if (!loops) break;
+    all.push_back(
+        series({centres[static_cast<std::size_t>(loop.i)], centres[static_cast<std::size_t>(loop.j)]}, 2));
+    all.back().thickness = 3;
+  }
+  if (loops) all[2].name = "loop closures";
+  PlotOptions plot{.title = title, .x_label = "[m]", .y_label = "[m]"};
+  plot.equal_aspect = true;
+  plot.width = plot.height = 600;
+  return draw_plot(all, plot);
+}
+
+void write_trials(const std::vector<DriftTrial>& trials, Report& report) {
+  std::vector<std::vector<double>> rows;
+  auto list = nlohmann::json::array();
+  for (const DriftTrial& t : trials) {
+    double least = 1, most = 1;
+    for (const LoopConstraint& loop : t.loops) {
+      least = std::min(least, loop.S_j_i.scale());
+      most = std::max(most, loop.S_j_i.scale());
+    }
+    rows.push_back({static_cast<double>(t.ok), static_cast<double>(t.truth.size()),
+                    static_cast<double>(t.loops.size()), least, most, t.rmse[kExplored], t.rmse[kSe3],
+                    t.rmse[kSim3]});
+    list.push_back({{"ok", t.ok},
+                    {"frames", t.truth.size()},
+                    {"loops", t.loops.size()},
+                    {"loop_scale", {least, most}},
+                    {"rmse_explored", t.rmse[kExplored]},
+                    {"rmse_se3", t.rmse[kSe3]},
+                    {"rmse_sim3", t.rmse[kSim3]}});
+  }
+  report.json()["sphere"] = list;
+  report.csv("fig5_6.csv",
+             {"ok", "frames", "loops", "least loop scale", "most", "rmse_explored", "rmse_se3", "rmse_sim3"},
+             rows);
+}
+
+void state_trials(const std::vector<DriftTrial>& trials, const ScaleDriftOptions& options, Report& report) {
+  int found = 0, better = 0;
+  std::array<double, 3> rmse{};
+  double least = std::numeric_limits<double>::infinity();
+  for (const DriftTrial& t : trials) {
+    if (!t.ok) continue;
+    ++found;
+    for (const Method m : {kExplored, kSe3, kSim3}) rmse[m] += t.rmse[m];
+    least = std::min(least, t.rmse[kSe3] / t.rmse[kSim3]);
+    better += t.rmse[kSim3] < t.rmse[kSe3];
+  }
+  for (double& r : rmse) r /= std::max(1, found);
+  const int count = static_cast<int>(trials.size());
+  report.state("thesis 5.4", text("every flight closes all %d loops", options.sphere.turns - 1),
+               text("%d of %d flights", found, count), found == count);
+  if (options.sphere_noise_px == 0) {
+    report.state("simulation", "without noise the sphere is solved exactly (1 mm)",
+                 text("mean RMSE %.1e m", rmse[kSim3]), found > 0 && rmse[kSim3] < 1e-3);
+  }
+  if (!options.compare) return;
+  report.state("thesis fig. 5.6", "Sim(3) has a lower RMSE than SE(3)",
+               text("in %d of %d flights; explored %.3f m", better, count, rmse[kExplored]), better == count);
+  report.state("thesis fig. 5.6", "the mean RMSE of Sim(3) is at least 5 times below SE(3)'s (thesis: 6.7)",
+               text("%.3f against %.3f m, ratio %.2f; least ratio of a flight %.2f", rmse[kSim3], rmse[kSe3],
+                    rmse[kSe3] / rmse[kSim3], least),
+               found > 0 && rmse[kSe3] >= 5 * rmse[kSim3]);
+}
+
+}  // namespace
+
+void sphere_experiment(const ScaleDriftOptions& options, Report& report) {
+  std::vector<DriftTrial> trials(static_cast<std::size_t>(options.sphere_trials));
+  tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t trial) {
+    const unsigned seed = options.seed + static_cast<unsigned>(trial);
+    const Scene scene = sphere_scene(options.sphere, seed);
+    trials[trial] =
+        run_trial(scene, options.sphere_noise_px, 1000 + seed, sphere_searches(scene, options.sphere.turns));
+  });
+  write_trials(trials, report);
+  state_trials(trials, options, report);
+  const DriftTrial& t = trials.front();
+  if (!t.ok) return;
+  write_png(report.file("fig5_6_sphere.png"),
+            tile({draw_flight(t, t.truth, "(a) true", false),
+                  draw_flight(t, t.centres[kExplored], "(b) explored", true),
+                  draw_flight(t, t.centres[kSe3], text("(c) SE(3), RMSE %.3f m", t.rmse[kSe3]), false),
+                  draw_flight(t, t.centres[kSim3], text("(d) Sim(3), RMSE %.3f m", t.rmse[kSim3]), false)},
+                 2));
+}
+
+}  // namespace twofold::bench

@@ -1,0 +1,27 @@
+#include "experiments/scale_drift/trial.hpp"
+
+namespace twofold::bench {
+
+DriftTrial run_trial(const Scene& scene, double noise_px, unsigned seed,
+                     const std::vector<LoopSearch>& searches) {
+  DriftTrial trial;
+  trial.truth = camera_centres(scene.T_c_w);
+  const ExplorationOptions options;
+  const auto second = static_cast<std::size_t>(options.bootstrap_step);
+  const auto map = explore(scene.rig, measure(scene, noise_px, seed), scene.T_c_w[0],
+                           (trial.truth[second] - trial.truth[0]).norm(), options);
+  if (!map) return trial;
+  for (const LoopSearch& search : searches) {
+    const auto loop = close_loop(*map, search.i_begin, search.i_end, search.j);
+    if (!loop) return trial;
+    trial.loops.push_back(*loop);
+  }
+  trial.centres[kExplored] = camera_centres(map->T_c_w);
+  trial.centres[kSe3] = corrected_centres<SE3>(*map, trial.loops);
+  trial.centres[kSim3] = corrected_centres<Sim3>(*map, trial.loops);
+  for (const Method m : {kExplored, kSe3, kSim3}) trial.rmse[m] = scaled_rmse(trial.truth, trial.centres[m]);
+  trial.ok = true;
+  return trial;
+}
+
+}  // namespace twofold::bench
