@@ -156,21 +156,11 @@ struct Strip {
     const Bytes far = Bytes{} + static_cast<std::uint8_t>(std::min(strong, 255));
     for (int first = u0; first < u1; first += kRun) {
       if (v0 >= v1 || !wants(first, std::min(first + kRun, u1))) continue;
-      const auto strengths = [&](int v) {
-        return strength_in_run(image.ptr<std::uint8_t>(v) + begin_of(first), circle, threshold);
-      };
-      Bytes above{};
-      Bytes here = strengths(v0);
       for (int v = v0; v < v1; ++v) {
-        Bytes below{};
-        if (v + 1 < v1) below = strengths(v + 1);
-        // Corners come in clusters: only those that stand out from their column are worth a score.
-        const Bytes kept = static_cast<Bytes>(here > above) & static_cast<Bytes>(here >= below);
-        const std::uint32_t strong_ones = mask_of(kept & static_cast<Bytes>(here > far));
-        weak_at(first, v) = mask_of(kept) & ~strong_ones;
+        const Bytes found = strength_in_run(image.ptr<std::uint8_t>(v) + begin_of(first), circle, threshold);
+        const std::uint32_t strong_ones = mask_of(static_cast<Bytes>(found > far));
+        weak_at(first, v) = mask_of(static_cast<Bytes>(found > Bytes{})) & ~strong_ones;
         judge_all(strong_ones, first, v);
-        above = here;
-        here = below;
       }
     }
   }
