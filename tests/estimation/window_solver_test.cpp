@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "estimation/pose_elimination.hpp"
 #include "tests/estimation/ceres_window.hpp"
 #include "tests/estimation/synthetic_window.hpp"
 
@@ -148,6 +149,42 @@ std::vector<CeresCase> ceres_cases() {
 INSTANTIATE_TEST_SUITE_P(Window, EqualToCeres, testing::ValuesIn(ceres_cases()),
                          [](const auto& test) { return test.param.name; });
 
+/// Many poses, few points: the poses are eliminated, with the same result.
+TEST(WindowSolver, IsEqualToCeresWithFewPointsToo) {
+  for (const bool fixed : {false, true}) {
+    for (const double huber : {0.0, 1.0}) {
+      auto options = small_window();
+      options.inner = 60;
+      options.spacing = 0.02;
+      options.max_track = 60;
+      options.pixel_noise = 0.7;
+      options.missing_right = 0.3;
+      WindowProblem problem = make_synthetic_window(options).start;
+      ASSERT_FALSE(PoseElimination::is_cheaper(problem));
+      problem.points.resize(30);
+      const auto& last = problem.points.back();
+      problem.observations.resize(static_cast<std::size_t>(last.first_observation + last.observation_count));
+      ASSERT_TRUE(PoseElimination::is_cheaper(problem));
+      if (fixed) problem.poses.front().fixed = problem.poses.back().fixed = true;
+      const Matrix4 front = problem.poses.front().T_k_w.matrix();
+      auto solver_options = to_convergence();
+      solver_options.huber_px = huber;
+      const double reference = ceres_cost(problem, solver_options);
+      auto again = problem;
+      WindowSolver solver;
+      const SolverSummary summary = solver.solve(problem, solver_options);
+      EXPECT_NEAR(summary.final_cost, reference, 1e-6 * reference);
+      // In the problem's own form, points relative to their moved anchors.
+      EXPECT_NEAR(window_cost(problem, solver_options), summary.final_cost, 1e-9 * reference);
+      EXPECT_LT(summary.final_cost, 0.5 * summary.initial_cost);
+      if (fixed) {
+        EXPECT_EQ(front, problem.poses.front().T_k_w.matrix());
+      }
+      EXPECT_EQ(WindowSolver().solve(again, solver_options).final_cost, summary.final_cost);
+    }
+  }
+}
+
 TEST(WindowSolver, CostNeverRisesAndSummaryIsTrue) {
   for (unsigned seed = 1; seed <= 8; ++seed) {
     auto options = small_window();
@@ -255,7 +292,8 @@ TEST(WindowSolver, LeavesOutObservationsBehindTheCamera) {
 TEST(WindowSolver, LeavesOutAPoseThatHasAllItsPointsBehindIt) {
   auto window = make_synthetic_window(small_window());
   WindowProblem& problem = window.start;
-  // Turned half around about its vertical axis: it is still tied to a neighbour by a pose-pose constraint alone.
+  // Turned half around about its vertical axis: it is still tied to a neighbour by a pose-pose constraint
+  // alone.
   SE3& T_k_w = problem.poses[2].T_k_w;
   T_k_w = SE3(SO3::exp(Vector3(0, 3.14159, 0)), Vector3::Zero()) * T_k_w;
   problem.constraints.push_back({2, 3, problem.poses[3].T_k_w * T_k_w.inverse()});
