@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "geometry/check.hpp"
+#include "imaging/structure_tensor.hpp"
 
 namespace twofold {
 namespace {
@@ -68,21 +69,24 @@ std::uint32_t mask_of(const Bytes& marks) {
 #endif
 }
 
-/// How far the weakest of the nine pixels of an arc stands out, for the arc of which it is most: `d` are the
-/// differences around the circle. Arcs k and k + 1 share eight pixels.
-Bytes strongest_arc(const std::array<Bytes, 16>& d) {
+/// Over the sixteen arcs of nine neighbours on the circle: the largest of their smallest pixels. `inner` and
+/// `outer` are smaller and larger; the other way round, the smallest of their largest. Arcs k and k + 1 share
+/// eight pixels.
+template <Bytes (*inner)(Bytes, Bytes), Bytes (*outer)(Bytes, Bytes)>
+Bytes best_arc(const std::array<Bytes, 16>& q) {
   std::array<Bytes, 8> two, four;
-  for (std::size_t i = 0; i < 8; ++i) two[i] = smaller(d[2 * i + 1], d[(2 * i + 2) % 16]);
-  for (std::size_t i = 0; i < 8; ++i) four[i] = smaller(two[i], two[(i + 1) % 8]);
-  Bytes strongest{};
-  for (std::size_t i = 0; i < 8; ++i) {
-    const Bytes shared = smaller(four[i], four[(i + 2) % 8]);
-    strongest = larger(strongest, smaller(shared, larger(d[2 * i], d[(2 * i + 9) % 16])));
+  for (std::size_t i = 0; i < 8; ++i) two[i] = inner(q[2 * i + 1], q[(2 * i + 2) % 16]);
+  for (std::size_t i = 0; i < 8; ++i) four[i] = inner(two[i], two[(i + 1) % 8]);
+  Bytes best = inner(inner(four[0], four[2]), outer(q[0], q[9]));
+  for (std::size_t i = 1; i < 8; ++i) {
+    const Bytes shared = inner(four[i], four[(i + 2) % 8]);
+    best = outer(best, inner(shared, outer(q[2 * i], q[(2 * i + 9) % 16])));
   }
-  return strongest;
+  return best;
 }
 
-/// How far each pixel of the run stands out as a corner; 0 for those that are none.
+/// How far each pixel of the run stands out as a corner, by the weakest pixel of the arc that does most; 0
+/// for those that are none.
 Bytes strength_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
   const Bytes centre = load(p);
   const Bytes t = Bytes{} + static_cast<std::uint8_t>(threshold);
@@ -91,21 +95,19 @@ Bytes strength_in_run(const std::uint8_t* p, const Circle& circle, int threshold
   // An arc of nine covers two neighbouring compass points at least: most runs end here.
   const Bytes n = load(p + circle[0]), e = load(p + circle[4]);
   const Bytes s = load(p + circle[8]), w = load(p + circle[12]);
-  const Bytes may_be_bright = brighter(smaller(larger(n, s), larger(e, w))) > t;
-  const Bytes may_be_dark = darker(larger(smaller(n, s), smaller(e, w))) > t;
+  const bool may_be_bright = mask_of(brighter(smaller(larger(n, s), larger(e, w))) > t) != 0;
+  const bool may_be_dark = mask_of(darker(larger(smaller(n, s), smaller(e, w))) > t) != 0;
 
   Bytes strength{};
-  std::array<Bytes, 16> d;
-  if (mask_of(may_be_bright) != 0) {
-    for (std::size_t k = 0; k < 16; ++k) d[k] = brighter(load(p + circle[k]));
-    strength = strongest_arc(d);
-  }
-  if (mask_of(may_be_dark) != 0) {
-    for (std::size_t k = 0; k < 16; ++k) d[k] = darker(load(p + circle[k]));
-    strength = larger(strength, strongest_arc(d));
-  }
+  if (!may_be_bright && !may_be_dark) return strength;
+  std::array<Bytes, 16> q;
+  for (std::size_t k = 0; k < 16; ++k) q[k] = load(p + circle[k]);
+  if (may_be_bright) strength = brighter(best_arc<smaller, larger>(q));
+  if (may_be_dark) strength = larger(strength, darker(best_arc<larger, smaller>(q)));
   return strength & static_cast<Bytes>(strength > t);
 }
+
+constexpr double kPerPixel = 1.0 / (4 * 64);  // from a StructureTensor's eigenvalue to a score
 
 constexpr int kMaxColumns = 256;
 constexpr int kMaxMasks = 1 << 14;  // of one strip: 128 rows of 4096 pixels
@@ -118,36 +120,49 @@ struct Strip {
   int u0, u1;  // columns and rows of pixels looked at
   int v0, v1;
   std::span<std::uint32_t> weak;  // by run and row: corners that do not stand out far
+  struct Best {
+    int u = 0, v = 0;
+    double eigenvalue = 0;
+  };
   std::array<bool, kMaxColumns> wanted{};
-  std::array<Corner, kMaxColumns> best{};
+  std::array<Best, kMaxColumns> best{};
 
-  /// Any cell wanted that has pixels in [first, end)?
-  [[nodiscard]] bool wants(int first, int end) const {
-    for (int column = first / cell; column <= (end - 1) / cell; ++column) {
-      if (wanted[static_cast<std::size_t>(column)]) return true;
+  /// Pixels [begin, begin + kRun) of the strip's rows: the cell of each, and those in wanted cells that no
+  /// run before has looked at.
+  struct Run {
+    int begin = 0;
+    std::uint32_t wanted = 0;
+    std::array<std::uint8_t, kRun> column{};
+  };
+  [[nodiscard]] Run run_at(int first) const {
+    Run run;
+    // The last run starts earlier, so that it does not reach past the row's end.
+    run.begin = std::min(first, image.cols - 3 - kRun);
+    int column = first / cell;
+    for (int u = first; u < std::min(run.begin + kRun, u1); ++u) {
+      if (u == (column + 1) * cell) ++column;
+      const auto k = static_cast<std::size_t>(u - run.begin);
+      run.column[k] = static_cast<std::uint8_t>(column);
+      if (wanted[run.column[k]]) run.wanted |= 1U << k;
     }
-    return false;
+    return run;
   }
   [[nodiscard]] std::uint32_t& weak_at(int first, int v) {
     return weak[static_cast<std::size_t>((first - u0) / kRun * (v1 - v0) + v - v0)];
   }
-  /// The last run starts earlier, so that it does not reach past the row's end.
-  [[nodiscard]] int begin_of(int first) const { return std::min(first, image.cols - 3 - kRun); }
 
-  void judge(int u, int v) {
-    const auto column = static_cast<std::size_t>(u / cell);
-    if (!wanted[column]) return;
-    const float score = shi_tomasi_score(image, u, v);
-    if (score > best[column].score) {
-      best[column] = {static_cast<std::int16_t>(u), static_cast<std::int16_t>(v), 0, score};
+  void judge(std::uint32_t corners, const Run& run, int v) {
+    // All tensors before the first comparison: a mispredicted one then waits for none of them.
+    std::array<StructureTensor, kRun> tensors;
+    std::size_t count = 0;
+    for (std::uint32_t left = corners; left != 0; left &= left - 1) {
+      tensors[count++] = structure_tensor(image, run.begin + __builtin_ctz(left), v);
     }
-  }
-
-  void judge_all(std::uint32_t mask, int first, int v) {
-    const int begin = begin_of(first);
-    for (; mask != 0; mask &= mask - 1) {
-      const int u = begin + __builtin_ctz(mask);
-      if (u >= first && u < std::min(first + kRun, u1)) judge(u, v);
+    for (std::size_t i = 0; i < count; ++i, corners &= corners - 1) {
+      const int k = __builtin_ctz(corners);
+      Best& so_far = best[run.column[static_cast<std::size_t>(k)]];
+      if (!tensors[i].exceeds(so_far.eigenvalue)) continue;
+      so_far = {run.begin + k, v, tensors[i].smaller_eigenvalue()};
     }
   }
 
@@ -155,12 +170,13 @@ struct Strip {
   void scan(int threshold, int strong) {
     const Bytes far = Bytes{} + static_cast<std::uint8_t>(std::min(strong, 255));
     for (int first = u0; first < u1; first += kRun) {
-      if (v0 >= v1 || !wants(first, std::min(first + kRun, u1))) continue;
+      const Run run = run_at(first);
+      if (run.wanted == 0) continue;
       for (int v = v0; v < v1; ++v) {
-        const Bytes found = strength_in_run(image.ptr<std::uint8_t>(v) + begin_of(first), circle, threshold);
+        const Bytes found = strength_in_run(image.ptr<std::uint8_t>(v) + run.begin, circle, threshold);
         const std::uint32_t strong_ones = mask_of(static_cast<Bytes>(found > far));
         weak_at(first, v) = mask_of(static_cast<Bytes>(found > Bytes{})) & ~strong_ones;
-        judge_all(strong_ones, first, v);
+        judge(strong_ones & run.wanted, run, v);
       }
     }
   }
@@ -168,8 +184,8 @@ struct Strip {
   /// Judges what scan kept for later, of the cells still wanted.
   void judge_weak() {
     for (int first = u0; first < u1; first += kRun) {
-      if (!wants(first, std::min(first + kRun, u1))) continue;
-      for (int v = v0; v < v1; ++v) judge_all(weak_at(first, v), first, v);
+      const Run run = run_at(first);
+      for (int v = v0; v < v1 && run.wanted != 0; ++v) judge(weak_at(first, v) & run.wanted, run, v);
     }
   }
 };
@@ -177,47 +193,7 @@ struct Strip {
 }  // namespace
 
 float shi_tomasi_score(const cv::Mat& image, int u, int v) {
-  const auto stride = static_cast<std::ptrdiff_t>(image.step);
-  const std::uint8_t* p = image.data + (v - 4) * stride + u - 4;
-  int uu = 0;
-  int uv = 0;
-  int vv = 0;
-#ifdef __AVX2__
-  const auto eight = [](const std::uint8_t* at) {
-    return _mm_cvtepu8_epi16(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(at)));
-  };
-  __m128i sums_uu = _mm_setzero_si128();
-  __m128i sums_uv = _mm_setzero_si128();
-  __m128i sums_vv = _mm_setzero_si128();
-  for (int r = 0; r < 8; ++r, p += stride) {
-    const __m128i gu = _mm_sub_epi16(eight(p + 1), eight(p - 1));
-    const __m128i gv = _mm_sub_epi16(eight(p + stride), eight(p - stride));
-    sums_uu = _mm_add_epi32(sums_uu, _mm_madd_epi16(gu, gu));
-    sums_uv = _mm_add_epi32(sums_uv, _mm_madd_epi16(gu, gv));
-    sums_vv = _mm_add_epi32(sums_vv, _mm_madd_epi16(gv, gv));
-  }
-  const __m128i pairs = _mm_hadd_epi32(sums_uu, sums_uv);
-  const __m128i total = _mm_hadd_epi32(pairs, _mm_hadd_epi32(sums_vv, sums_vv));
-  uu = _mm_extract_epi32(total, 0);
-  uv = _mm_extract_epi32(total, 1);
-  vv = _mm_extract_epi32(total, 2);
-#else
-  for (int r = 0; r < 8; ++r, p += stride) {
-    for (int c = 0; c < 8; ++c) {
-      const int gu = p[c + 1] - p[c - 1];
-      const int gv = p[c + stride] - p[c - stride];
-      uu += gu * gu;
-      uv += gu * gv;
-      vv += gv * gv;
-    }
-  }
-#endif
-  // Central differences are twice the gradient: a quarter, over 64 pixels.
-  const double scale = 1.0 / (4 * 64);
-  const double a = uu * scale;
-  const double b = uv * scale;
-  const double c = vv * scale;
-  return static_cast<float>(0.5 * (a + c - std::sqrt((a - c) * (a - c) + 4 * b * b)));
+  return static_cast<float>(structure_tensor(image, u, v).smaller_eigenvalue() * kPerPixel);
 }
 
 void detect_corners(const cv::Mat& image, int level, int threshold, float min_score, int border,
@@ -241,15 +217,16 @@ void detect_corners(const cv::Mat& image, int level, int threshold, float min_sc
     for (int c = 0; c < grid.columns; ++c) strip.wanted[static_cast<std::size_t>(c)] = occupied[c] == 0;
     // Strong corners first: in rich texture there are enough of them, and far fewer to score.
     strip.scan(threshold, kStrong * threshold);
+    const double enough = std::max(min_score / kPerPixel, 1.0);
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
-      strip.wanted[c] = strip.wanted[c] && !(strip.best[c].score > 0 && strip.best[c].score >= min_score);
+      strip.wanted[c] = strip.wanted[c] && strip.best[c].eigenvalue < enough;
     }
     strip.judge_weak();
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
-      Corner corner = strip.best[c];
-      corner.level = static_cast<std::uint8_t>(level);
-      if (corner.score > 0 && corner.score >= min_score && corners.size() < corners.capacity())
-        corners.push_back(corner);
+      const Strip::Best& best = strip.best[c];
+      if (best.eigenvalue < enough || corners.size() == corners.capacity()) continue;
+      corners.push_back({static_cast<std::int16_t>(best.u), static_cast<std::int16_t>(best.v),
+                         static_cast<std::uint8_t>(level), static_cast<float>(best.eigenvalue * kPerPixel)});
     }
   }
 }

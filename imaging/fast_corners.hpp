@@ -23,9 +23,8 @@ struct CellGrid {
 };
 
 /// FAST-9 corners (Rosten and Drummond, ECCV 2006): nine of the sixteen pixels on the circle of radius 3 in a
-/// row are all brighter or all darker than the centre by `threshold`. Corners that stand out less than the
-/// one above or below them in the cell are left out. Each free cell gives its corner of highest score, if
-/// that is at least `min_score`, which spreads them and thins neighbours out.
+/// row are all brighter or all darker than the centre by `threshold`. Each free cell gives its corner of
+/// highest score, if that is at least `min_score`, which spreads them and thins neighbours out.
 ///
 /// `image` is level `level` (0 to 2) of the pyramid the grid is laid over. Appends to `corners`, never beyond
 /// its capacity (no allocation). `border`: pixels of the level left out along the edges, >= 8.

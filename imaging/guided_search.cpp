@@ -146,17 +146,20 @@ struct RowCosts {
   RowCosts(const Patch& patch, const cv::Mat& image, int v, int from, int to)
       : first(from), count(std::min(to - from + 1, kMaxRowCosts)) {
     zero_mean_ssd_row(patch, image, first, v, std::span(cost).first(static_cast<std::size_t>(count)));
-    const auto least = std::min_element(cost.begin(), cost.begin() + count);
-    best = *least;
-    best_u = first + static_cast<int>(least - cost.begin());
+    best = least(0, count);
+    best_u = first + static_cast<int>(std::find(cost.begin(), cost.begin() + count, best) - cost.begin());
   }
   /// Least cost elsewhere, not beside the best: near to `best` where texture repeats.
   [[nodiscard]] int second_best() const {
-    int second = std::numeric_limits<int>::max();
-    for (int i = 0; i < count; ++i) {
-      if (std::abs(first + i - best_u) > 3) second = std::min(second, cost[static_cast<std::size_t>(i)]);
-    }
-    return second;
+    constexpr int kBeside = 3;
+    const int at = best_u - first;
+    return std::min(least(0, at - kBeside), least(at + kBeside + 1, count));
+  }
+  /// Of the entries [from, to). A plain reduction, which compilers vectorise; std::min_element is none.
+  [[nodiscard]] int least(int from, int to) const {
+    int result = std::numeric_limits<int>::max();
+    for (int i = from; i < to; ++i) result = std::min(result, cost[static_cast<std::size_t>(i)]);
+    return result;
   }
 };
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_pyramid.hpp"
@@ -35,17 +36,23 @@ float sample(const std::uint8_t* pixels, float u, float v) {
 /// Fills the patch from its pixels and a border of one around them, rows `stride` apart.
 template <class Pixel>
 void fill_patch(const Pixel* bordered, std::ptrdiff_t stride, Patch& patch) {
+  using Row = float __attribute__((vector_size(Patch::kSize * sizeof(float))));
+  using Rounded = std::int16_t __attribute__((vector_size(Patch::kSize * sizeof(std::int16_t))));
+  const auto row_at = [](const Pixel* first) {
+    Pixel __attribute__((vector_size(Patch::kSize * sizeof(Pixel)))) pixels;
+    std::memcpy(&pixels, first, sizeof pixels);
+    return __builtin_convertvector(pixels, Row);
+  };
   for (int r = 0; r < Patch::kSize; ++r) {
     const Pixel* p = bordered + (r + 1) * stride + 1;
-    float* value = patch.value + r * Patch::kSize;
-    for (int c = 0; c < Patch::kSize; ++c) {
-      value[c] = static_cast<float>(p[c]);
-      patch.gradient_u[r * Patch::kSize + c] =
-          0.5F * (static_cast<float>(p[c + 1]) - static_cast<float>(p[c - 1]));
-      patch.gradient_v[r * Patch::kSize + c] =
-          0.5F * (static_cast<float>(p[c + stride]) - static_cast<float>(p[c - stride]));
-      patch.rounded[r * Patch::kSize + c] = static_cast<std::int16_t>(value[c] + 0.5F);
-    }
+    const Row value = row_at(p);
+    const Row gradient_u = 0.5F * (row_at(p + 1) - row_at(p - 1));
+    const Row gradient_v = 0.5F * (row_at(p + stride) - row_at(p - stride));
+    const Rounded rounded = __builtin_convertvector(value + 0.5F, Rounded);
+    std::memcpy(patch.value + r * Patch::kSize, &value, sizeof value);
+    std::memcpy(patch.gradient_u + r * Patch::kSize, &gradient_u, sizeof gradient_u);
+    std::memcpy(patch.gradient_v + r * Patch::kSize, &gradient_v, sizeof gradient_v);
+    std::memcpy(patch.rounded + r * Patch::kSize, &rounded, sizeof rounded);
   }
   const Eigen::Map<const Eigen::Array<float, Patch::kArea, 1>, Eigen::Aligned32> value(patch.value);
   const float mean = value.sum() / Patch::kArea;

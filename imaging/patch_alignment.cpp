@@ -1,5 +1,6 @@
 #include <Eigen/LU>
 #include <cmath>
+#include <cstring>
 
 #include "imaging/patch.hpp"
 
@@ -10,6 +11,14 @@ constexpr float kMaxMove = 2.5F;      // farther from the start is another corne
 constexpr float kSettled = 0.01F;     // [px] no more steps needed
 constexpr float kGoodEnough = 0.05F;  // [px] last step when iterations ran out
 
+using Row = float __attribute__((vector_size(Patch::kSize * sizeof(float))));
+
+Row load_row(const std::uint8_t* first) {
+  std::uint8_t __attribute__((vector_size(Patch::kSize))) bytes;
+  std::memcpy(&bytes, first, sizeof bytes);
+  return __builtin_convertvector(bytes, Row);
+}
+
 /// Bilinear samples of an 8x8 window whose corner is at uv; false when it leaves the image.
 bool sample_window(const cv::Mat& image, const Eigen::Vector2f& uv, float* samples) {
   const int u0 = static_cast<int>(std::floor(uv.x()));
@@ -19,18 +28,16 @@ bool sample_window(const cv::Mat& image, const Eigen::Vector2f& uv, float* sampl
   if (u0 < kBefore || v0 < kBefore || u0 + kAfter >= image.cols || v0 + kAfter >= image.rows) return false;
   const float a = uv.x() - static_cast<float>(u0);
   const float b = uv.y() - static_cast<float>(v0);
-  const float w00 = (1 - a) * (1 - b);
-  const float w01 = a * (1 - b);
-  const float w10 = (1 - a) * b;
-  const float w11 = a * b;
   const auto stride = static_cast<std::ptrdiff_t>(image.step);
-  const std::uint8_t* row = image.data + (v0 - kBefore) * stride + (u0 - kBefore);
-  for (int r = 0; r < Patch::kSize; ++r, row += stride, samples += Patch::kSize) {
-    const std::uint8_t* below = row + stride;
-    for (int c = 0; c < Patch::kSize; ++c) {
-      samples[c] = w00 * static_cast<float>(row[c]) + w01 * static_cast<float>(row[c + 1]) +
-                   w10 * static_cast<float>(below[c]) + w11 * static_cast<float>(below[c + 1]);
-    }
+  const std::uint8_t* pixels = image.data + (v0 - kBefore) * stride + (u0 - kBefore);
+  const auto between_columns = [&] { return (1 - a) * load_row(pixels) + a * load_row(pixels + 1); };
+  Row above = between_columns();
+  for (int r = 0; r < Patch::kSize; ++r, samples += Patch::kSize) {
+    pixels += stride;
+    const Row below = between_columns();
+    const Row between_rows = (1 - b) * above + b * below;
+    std::memcpy(samples, &between_rows, sizeof between_rows);
+    above = below;
   }
   return true;
 }

@@ -14,19 +14,22 @@ namespace {
 constexpr int kSize = Patch::kSize;
 constexpr int kMaxColumns = kMaxRowCosts + kSize - 1;
 
+constexpr int kTogether = 16;  // columns summed at once
+constexpr int kRoom = (kMaxColumns + kTogether - 1) / kTogether * kTogether;
+
+using Bytes = std::uint8_t __attribute__((vector_size(kTogether)));
+using Words = std::uint16_t __attribute__((vector_size(kTogether * 2)));
+using Ints = std::int32_t __attribute__((vector_size(kTogether * 4)));
+
 /// Sums and sums of squares of the image under the patch at every position: by columns, then over eight of
-/// them.
+/// them. Reads whole stretches of 16 columns, and then a last one that ends with the last column.
 struct BoxSums {
-  std::array<int, kMaxColumns> sum{};
-  std::array<int, kMaxColumns> squares{};
+  alignas(64) std::array<std::int32_t, kRoom> sum;
+  alignas(64) std::array<std::int32_t, kRoom> squares;
 
   BoxSums(const std::uint8_t* first, std::ptrdiff_t stride, int columns) {
-    for (int r = 0; r < kSize; ++r, first += stride) {
-      for (int x = 0; x < columns; ++x) {
-        const int pixel = first[x];
-        sum[static_cast<std::size_t>(x)] += pixel;
-        squares[static_cast<std::size_t>(x)] += pixel * pixel;
-      }
+    for (int next = 0; next < columns; next += kTogether) {
+      sum_columns(first, stride, std::min(next, std::max(columns - kTogether, 0)));
     }
     for (int apart = 1; apart < kSize; apart *= 2) {
       columns -= apart;
@@ -35,6 +38,22 @@ struct BoxSums {
         squares[static_cast<std::size_t>(x)] += squares[static_cast<std::size_t>(x + apart)];
       }
     }
+  }
+
+ private:
+  void sum_columns(const std::uint8_t* first, std::ptrdiff_t stride, int x) {
+    Words total{};
+    Ints total_squares{};
+    for (int r = 0; r < kSize; ++r) {
+      Bytes bytes;
+      std::memcpy(&bytes, first + r * stride + x, sizeof bytes);
+      const Words pixels = __builtin_convertvector(bytes, Words);
+      total += pixels;
+      total_squares += __builtin_convertvector(pixels * pixels, Ints);
+    }
+    const Ints wide = __builtin_convertvector(total, Ints);
+    std::memcpy(&sum[static_cast<std::size_t>(x)], &wide, sizeof wide);
+    std::memcpy(&squares[static_cast<std::size_t>(x)], &total_squares, sizeof total_squares);
   }
 };
 
@@ -92,7 +111,6 @@ struct Correlator {
 
 // Sum (q - t)^2 = sum q^2 - 2 sum q t + sum t^2: the first is shared by neighbours, the last by all.
 void zero_mean_ssd_row(const Patch& patch, const cv::Mat& image, int u, int v, std::span<int> cost) {
-  constexpr int kTogether = 8;
   const auto count = static_cast<int>(cost.size());
   TWOFOLD_CHECK(count <= kMaxRowCosts, "a longer stretch of a row than there is room for");
   if (count < kTogether) {
@@ -109,11 +127,12 @@ void zero_mean_ssd_row(const Patch& patch, const cv::Mat& image, int u, int v, s
   }
   const BoxSums box(first, stride, count + kSize - 1);
   const Correlator correlate(patch);
-  std::array<int, kTogether> correlation;
-  for (int next = 0; next < count; next += kTogether) {
-    const int i = std::min(next, count - kTogether);  // the last ones overlap those before
+  constexpr int kAtOnce = 8;
+  std::array<int, kAtOnce> correlation;
+  for (int next = 0; next < count; next += kAtOnce) {
+    const int i = std::min(next, count - kAtOnce);  // the last ones overlap those before
     correlate(first + i, stride, correlation.data());
-    for (int k = 0; k < kTogether; ++k) {
+    for (int k = 0; k < kAtOnce; ++k) {
       const auto at = static_cast<std::size_t>(i + k);
       const int sum = box.sum[at] - patch_sum;
       cost[at] = box.squares[at] - 2 * correlation[static_cast<std::size_t>(k)] + patch_squares -
