@@ -1,0 +1,41 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "apps/twofold/map_options.hpp"
+#include "engine/options.hpp"
+
+namespace twofold {
+
+/// What `twofold run` is told on its command line.
+struct RunArguments {
+  std::string source;
+  std::string calibration;
+  std::string out = "out/run";
+  std::string speed = "max";
+  std::string late = "queue";
+  std::string windows = "25,175";
+  std::string replay_schedule;
+  std::string trace;
+  std::string pin;
+  std::string vocabulary;
+  std::string record;
+  std::string estimator = "engine";
+  int window = 10;
+  MapArguments map;
+  bool no_metric_loops = false;
+  bool no_places = false;
+  bool deterministic = false;
+  bool preload = false;
+  bool real_time = false;
+  bool quiet = false;
+};
+
+void add_run_options(CLI::App& command, RunArguments& arguments);
+
+/// Checks what the command line's own parser does not; IoError names the option. Maps are added by
+/// apply_map_options.
+[[nodiscard]] EngineOptions engine_options(const RunArguments& arguments);
+
+}  // namespace twofold

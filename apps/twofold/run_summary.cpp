@@ -1,0 +1,184 @@
+#include "apps/twofold/run_summary.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "apps/twofold/loop_latency.hpp"
+#include "apps/twofold/map_options.hpp"
+
+namespace twofold {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// A frame counts as late in the report when its pose was known later than this after it was due.
+constexpr std::int64_t kLateNs = 33'000'000;
+
+Json parts_json(const std::vector<MapPart>& parts) {
+  Json json = Json::array();
+  for (const MapPart& part : parts) {
+    json.push_back({{"first_keyframe", index(part.id)},
+                    {"keyframes", part.keyframes},
+                    {"frames", part.trajectory.size()}});
+  }
+  return json;
+}
+
+Json late_and_lost(const RunResult& result) {
+  Json lost = Json::array();
+  Json late = Json::array();
+  std::int64_t previous_t_ns = 0;
+  for (const FrameRecord& record : result.frames) {
+    const double gap_ms = previous_t_ns == 0 ? 0 : static_cast<double>(record.t_ns - previous_t_ns) * 1e-6;
+    previous_t_ns = record.t_ns;
+    if (record.state == FrameState::kLost) {
+      lost.push_back({{"frame", record.frame_index}, {"cause", record.cause}, {"ms_since_previous", gap_ms}});
+    } else if (record.state == FrameState::kDropped) {
+      late.push_back({{"frame", record.frame_index},
+                      {"rung", describe(record.rung)},
+                      {"cause", "dropped: its successor was due already"}});
+    } else if (record.latency_ns > kLateNs) {
+      const bool own = record.tracking_ns > kLateNs / 2;
+      late.push_back(
+          {{"frame", record.frame_index},
+           {"latency_ms", static_cast<double>(record.latency_ns) * 1e-6},
+           {"rung", describe(record.rung)},
+           {"tracking_ms", static_cast<double>(record.tracking_ns) * 1e-6},
+           {"cause", own ? "tracking it took long" : "it waited: earlier frames, decoding, or no CPU"}});
+    }
+  }
+  return {{"why_lost", lost}, {"why_late", late}};
+}
+
+Json loops_json(const RunResult& result) {
+  Json loops = Json::array();
+  for (const ClosedLoop& loop : result.loops) {
+    const Vector6 drift = (loop.constraint.T_to_from * loop.T_to_from_before.inverse()).log();
+    loops.push_back({{"t_ns", loop.t_ns},
+                     {"from", index(loop.constraint.from)},
+                     {"to", index(loop.constraint.to)},
+                     {"inliers", loop.constraint.inliers},
+                     {"joins_parts", loop.joins_parts},
+                     {"drift_m", loop.joins_parts ? Json() : Json(drift.head<3>().norm())},
+                     {"drift_rad", loop.joins_parts ? Json() : Json(drift.tail<3>().norm())}});
+  }
+  return loops;
+}
+
+/// How far the camera jumped in the map, when, and why.
+Json corrections_json(const RunResult& result) {
+  Json corrections = Json::array();
+  for (const FrameRecord& record : result.frames) {
+    const PoseCorrection& c = record.correction;
+    if (c.reason == CorrectionReason::kNone) continue;
+    const SE3 T_before_after = c.T_c_w_before * c.T_c_w_after.inverse();
+    corrections.push_back({{"frame", record.frame_index},
+                           {"t_ns", record.t_ns},
+                           {"reason", describe(c.reason)},
+                           {"moved_m", T_before_after.translation().norm()},
+                           {"turned_rad", T_before_after.so3().log().norm()}});
+  }
+  return corrections;
+}
+
+/// What became of the map the run started with.
+Json loaded_map_json(const EngineOptions& options, const RunResult& result) {
+  if (!options.map) return nullptr;
+  Json json{{"keyframes", options.map->graph.keyframe_count()},
+            {"localise_only", options.localise_only},
+            {"recognised", false}};
+  if (const auto frame = recognised_at(options, result)) {
+    json["recognised"] = true;
+    json["recognised_at_frame"] = *frame;
+  }
+  return json;
+}
+
+Json checkpoints_json(const CheckpointReport& report) {
+  return {{"saved", report.saved},
+          {"longest_ms", static_cast<double>(report.longest_ns) * 1e-6},
+          {"error", report.error}};
+}
+
+/// Frames on each rung of the load ladder, and where it was changed.
+Json ladder_json(const RunResult& result) {
+  std::array<std::int64_t, kLadderRungs> frames{};
+  Json changes = Json::array();
+  LadderRung rung = LadderRung::kEverything;
+  for (const FrameRecord& record : result.frames) {
+    ++frames[static_cast<std::size_t>(record.rung)];
+    if (record.rung != rung) {
+      changes.push_back({{"frame", record.frame_index}, {"rung", describe(record.rung)}});
+    }
+    rung = record.rung;
+  }
+  Json on = Json::object();
+  for (std::size_t r = 0; r < frames.size(); ++r) on[describe(static_cast<LadderRung>(r))] = frames[r];
+  return {{"frames", on}, {"changes", changes}};
+}
+
+}  // namespace
+
+Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result,
+                  const std::vector<MapPart>& parts) {
+  const auto count = [&](FrameState state) {
+    return std::count_if(result.frames.begin(), result.frames.end(),
+                         [&](const auto& r) { return r.state == state; });
+  };
+  std::int64_t metric_loops = 0;
+  for (const MapperRound& round : result.rounds) metric_loops += round.metric_loops;
+  std::size_t keyframes = 0;
+  std::size_t points = 0;
+  for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k)
+    keyframes += !result.graph.keyframe(KeyframeId{k}).culled();
+  for (std::uint32_t p = 0; p < result.graph.point_count(); ++p)
+    points += result.graph.point(PointId{p}).alive();
+  const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
+  Json json{{"source", source_text},
+            {"interrupted", result.interrupted},
+            {"error", result.error},
+            {"frames", result.frames.size()},
+            {"tracked", count(FrameState::kTracked)},
+            {"lost", count(FrameState::kLost)},
+            {"dropped", count(FrameState::kDropped)},
+            {"keyframes", keyframes},
+            {"points", points},
+            {"loaded_map", loaded_map_json(options, result)},
+            {"checkpoints", checkpoints_json(result.checkpoints)},
+            {"map_parts", parts_json(parts)},
+            {"mapper_rounds", result.rounds.size()},
+            {"metric_loop_edges", metric_loops},
+            {"closed_loops", loops_json(result)},
+            {"pose_corrections", corrections_json(result)},
+            {"proposals_refused", result.proposals_refused},
+            {"wall_seconds", result.wall_seconds},
+            {"cpu_seconds", result.cpu_seconds},
+            {"cpu_ms_per_frame", 1e3 * result.cpu_seconds / frames},
+            {"peak_rss_mb", result.peak_rss_mb},
+            {"options",
+             {{"deterministic", options.deterministic},
+              {"speed", options.pacing.speed},
+              {"inner_window", options.mapper.inner_window},
+              {"outer_window", options.mapper.outer_window},
+              {"theta", options.mapper.theta},
+              {"wanted_matches", options.tracker.wanted_matches}}},
+            {"notes", result.notes}};
+  json.update(late_and_lost(result));
+  return json;
+}
+
+Json timing_json(const RunResult& result) {
+  Json json;
+  json["load ladder"] = ladder_json(result);
+  for (const StageRecorder& recorder : result.times) json[recorder.thread_name()] = recorder.to_json();
+  const LoopLatency latency = loop_latency(result);
+  json["latency round loops"] = {{"within 5 s", latency.near.to_json()},
+                                 {"elsewhere", latency.rest.to_json()}};
+  json["run"] = {{"frames", result.frames.size()},
+                 {"wall_seconds", result.wall_seconds},
+                 {"cpu_seconds", result.cpu_seconds},
+                 {"peak_rss_mb", result.peak_rss_mb}};
+  return json;
+}
+
+}  // namespace twofold
