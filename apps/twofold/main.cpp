@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
   silence_decoders();
   CLI::App app{"Twofold: real-time visual SLAM", "twofold"};
   app.require_subcommand(1);
+  app.set_version_flag("--version", "twofold " TWOFOLD_VERSION);
   int exit_code = twofold::kOk;
   twofold::add_run_command(app, exit_code);
   twofold::add_eval_command(app, exit_code);
@@ -43,6 +44,7 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help
+    if (argc == 1) fmt::print(stderr, "{}\n", app.help());
     return report(e.what(), twofold::kBadInput);
   } catch (const twofold::IoError& e) {
     return report(e.what(), twofold::kBadInput);
