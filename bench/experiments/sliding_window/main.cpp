@@ -16,10 +16,11 @@ int main(int argc, char** argv) {
   int threads = 2;
   const std::vector<
       std::pair<std::string, std::function<void(const SlidingWindowExperimentOptions&, Report&)>>>
-      all = {{"convergence", convergence_experiment}, {"vsdf", sparse_marginalisation_experiment},
-             {"sideways", sideways_experiment},       {"track_length", track_length_experiment},
-             {"run_time", run_time_experiment},       {"expansion", expansion_experiment},
-             {"consistency", consistency_experiment}, {"starry_night", starry_night_experiment}};
+      all = {{"convergence", convergence_experiment},     {"vsdf", sparse_marginalisation_experiment},
+             {"patch_warping", patch_warping_experiment}, {"sideways", sideways_experiment},
+             {"track_length", track_length_experiment},   {"run_time", run_time_experiment},
+             {"expansion", expansion_experiment},         {"consistency", consistency_experiment},
+             {"starry_night", starry_night_experiment}};
 
   CLI::App app{"Sliding window filter: figures 2(b), 12-17, consistency, real data with truth"};
   app.add_option("--trials", options.trials, "Monte Carlo trials of the figures")->check(CLI::PositiveNumber);
@@ -33,9 +34,10 @@ int main(int argc, char** argv) {
   app.add_option("--steps", options.starry_steps, "first steps of the recording to use")
       ->check(CLI::PositiveNumber);
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
-  app.add_option("--only", only,
-                 "run these parts only: convergence vsdf sideways track_length run_time expansion "
-                 "consistency starry_night");
+  app.add_option(
+      "--only", only,
+      "run these parts only: convergence vsdf patch_warping sideways track_length run_time expansion "
+      "consistency starry_night");
   app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   try {
