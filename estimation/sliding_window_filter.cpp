@@ -48,6 +48,7 @@ void SlidingWindowFilter::add(const WindowFrame& frame) {
     pose.T_c_w = frame.T_c_w_start.value_or(poses_.back().T_c_w);
   }
   const bool first = poses_.empty();
+  factor_serves_ = false;
   poses_.push_back(std::move(pose));
   summary_.landmarks_marginalised = 0;
   // Removal comes first: the process model must be linearised at its own prediction.
@@ -111,13 +112,15 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
   double damping = options_.initial_damping;
   double current = cost();
   double last_decrement = 0;
-  bool factor_is_good = false;
+  // Between two calls in a frame the state keeps its structure, so that the factor may serve again.
+  bool factor_is_good = options_.reuse_factor && factor_serves_;
   while (summary_.iterations < max_iterations) {
     ++summary_.iterations;
     const bool reused = factor_is_good;
     if (!factor_is_good) {
       ++summary_.factorisations;
-      if (!factor_.factorise(equations_, damping)) {
+      factor_serves_ = factor_.factorise(equations_, damping);
+      if (!factor_serves_) {
         damping = std::max(10 * damping, 1e-6);
         continue;
       }
@@ -184,7 +187,8 @@ void SlidingWindowFilter::apply(const WindowStep& step) {
 
 std::optional<WindowCovariances> SlidingWindowFilter::covariances() {
   build_equations();
-  if (!factor_.factorise(equations_, 0.0)) return std::nullopt;
+  factor_serves_ = factor_.factorise(equations_, 0.0);
+  if (!factor_serves_) return std::nullopt;
   WindowCovariances result = factor_.covariances();
   if (oldest_fixed_ && !result.poses.empty()) result.poses.front().setZero();
   return result;

@@ -38,9 +38,9 @@ struct SlidingWindowOptions {
   double huber_sigmas = 2.0;  ///< threshold, in standard deviations of the inliers' whitened components, > 0
   int max_iterations = 10;    ///< Gauss-Newton steps an update, >= 0
   double stop_decrement = 1e-4;  ///< stop when g^T delta, the expected fall of the cost, is smaller
-  bool reuse_factor = true;      ///< later steps of an update keep the first factor while they contract fast;
-                                 ///< the fixed point is the same
-  double initial_damping = 0;    ///< Levenberg-Marquardt term to start with, absolute, >= 0
+  bool reuse_factor = true;    ///< later steps of a frame's updates keep the first factor while they contract
+                               ///< fast; the fixed point is the same
+  double initial_damping = 0;  ///< Levenberg-Marquardt term to start with, absolute, >= 0
   bool motion_only_start = true;  ///< a new pose is first fitted to the landmarks already known
   double min_disparity_px = 0.1;  ///< of a measurement that starts a landmark, > 0
 
@@ -188,6 +188,7 @@ class SlidingWindowFilter {
   WindowSummary summary_;
   WindowEquations equations_;
   WindowFactor factor_;
+  bool factor_serves_ = false;  ///< factor_ is of this frame's state, at some estimate of it
   WindowStep step_;
 };
 

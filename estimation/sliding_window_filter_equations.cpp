@@ -1,5 +1,7 @@
 #include "estimation/sliding_window_filter_equations.hpp"
 
+#include <algorithm>
+
 #include "geometry/check.hpp"
 
 namespace twofold {
@@ -22,13 +24,23 @@ void solve_with(const MatrixX& L, VectorX& x) {
   L.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
 }
 
+/// L^-1, block column by block column: above the diagonal nothing is solved for.
+MatrixX inverse_factor(const MatrixX& L) {
+  constexpr Eigen::Index kColumns = 48;
+  const Eigen::Index n = L.rows();
+  MatrixX Y = MatrixX::Identity(n, n);
+  for (Eigen::Index at = 0; at < n; at += kColumns) {
+    auto below = Y.block(at, at, n - at, std::min(kColumns, n - at));
+    L.bottomRightCorner(n - at, n - at).triangularView<Eigen::Lower>().solveInPlace(below);
+  }
+  return Y;
+}
+
 /// Inverse from the Cholesky factor.
 MatrixX inverse_from(const MatrixX& L) {
-  MatrixX inverse = MatrixX::Identity(L.rows(), L.cols());
-  if (L.rows() == 0) return inverse;
-  L.triangularView<Eigen::Lower>().solveInPlace(inverse);
   MatrixX result = MatrixX::Zero(L.rows(), L.cols());
-  result.selfadjointView<Eigen::Lower>().rankUpdate(inverse.transpose());
+  if (L.rows() == 0) return result;
+  result.selfadjointView<Eigen::Lower>().rankUpdate(inverse_factor(L).transpose());
   return result.selfadjointView<Eigen::Lower>();
 }
 
@@ -156,19 +168,25 @@ void WindowFactor::solve_map_onto_path(const std::vector<Vector6>& gp, const std
   }
 }
 
+// Of the inverse L^-T L^-1 only the pose block and the diagonal blocks of the prior landmarks are needed.
 WindowCovariances WindowFactor::covariances_map_onto_path() const {
   const int p0 = 3 * n_prior_;
-  const MatrixX inverse = inverse_from(S_);
+  const MatrixX Y = inverse_factor(S_);
+  const auto Y_poses = Y.bottomRightCorner(6 * m_, 6 * m_);
+  const MatrixX poses = Y_poses.transpose() * Y_poses;
   WindowCovariances result;
-  for (int j = 0; j < m_; ++j) result.poses.push_back(inverse.block<6, 6>(p0 + 6 * j, p0 + 6 * j));
-  for (int l = 0; l < n_prior_; ++l) result.landmarks.push_back(inverse.block<3, 3>(3 * l, 3 * l));
+  for (int j = 0; j < m_; ++j) result.poses.push_back(poses.block<6, 6>(6 * j, 6 * j));
+  for (int l = 0; l < n_prior_; ++l) {
+    const auto Y_l = Y.block(3 * l, 3 * l, p0 + 6 * m_ - 3 * l, 3);
+    result.landmarks.push_back(Y_l.transpose() * Y_l);
+  }
   for (std::size_t l = 0; l < V_inv_.size(); ++l) {
     Matrix3 C = V_inv_[l];
     for (int a = first_[l]; a < first_[l + 1]; ++a) {
       const auto& ca = free_couplings_[static_cast<std::size_t>(a)];
       for (int b = first_[l]; b < first_[l + 1]; ++b) {
         const auto& cb = free_couplings_[static_cast<std::size_t>(b)];
-        C += ca.WV.transpose() * inverse.block<6, 6>(p0 + 6 * ca.pose, p0 + 6 * cb.pose) * cb.WV;
+        C += ca.WV.transpose() * poses.block<6, 6>(6 * ca.pose, 6 * cb.pose) * cb.WV;
       }
     }
     result.landmarks.push_back(C);
