@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
 
 #include "apps/twofold/place_set.hpp"
+#include "io/io_error.hpp"
 #include "io/plot.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/place_recogniser.hpp"
@@ -17,6 +19,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// What became of one candidate of a query.
+struct Tried {
+  int place = -1;
+  double score = 0;
+  bool verified = false;
+  VerificationReport stages;
+};
+
 /// The best answer to one query.
 struct Answer {
   int query = 0;
@@ -24,6 +34,7 @@ struct Answer {
   double score = 0;  ///< relative to the score with the image before
   bool verified = false;
   SE3 T_query_place;  ///< when verified
+  std::vector<Tried> tried;
 };
 
 std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSet& set,
@@ -53,7 +64,12 @@ std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSe
     for (const PlaceCandidate& candidate : candidates) {
       if (!has_depth) break;
       const auto place = static_cast<int>(twofold::index(candidate.keyframe));
-      const auto verified = verify_place(set.rig, set.places[static_cast<std::size_t>(place)].view, view, {});
+      Tried& tried = answer.tried.emplace_back();
+      tried.place = place;
+      tried.score = candidate.score / std::max(reference, recogniser.min_reference);
+      const auto verified =
+          verify_place(set.rig, set.places[static_cast<std::size_t>(place)].view, view, {}, &tried.stages);
+      tried.verified = verified.has_value();
       if (!verified) continue;
       answer.verified = true;
       answer.place = place;
@@ -141,6 +157,21 @@ void print_verified(const std::vector<Answer>& answers, const PlaceSet& set, con
              errors_deg.back());
 }
 
+void write_csv(const std::string& file, const std::vector<Answer>& answers, const TruePairs& truth) {
+  std::ofstream out(file);
+  out << "query,place,same_place,score,matches,ransac_inliers,guided,inliers,well_spread,verified\n";
+  for (const Answer& answer : answers) {
+    for (const Tried& t : answer.tried) {
+      const Truth same = truth.of(answer.query, t.place);
+      out << fmt::format("{},{},{},{:.4f},{},{},{},{},{:d},{:d}\n", answer.query, t.place,
+                         same == Truth::kSame ? "yes" : (same == Truth::kOther ? "no" : "part"), t.score,
+                         t.stages.matches, t.stages.ransac_inliers, t.stages.guided, t.stages.inliers,
+                         t.stages.well_spread, t.verified);
+    }
+  }
+  if (!out.flush()) throw IoError(file, "cannot be written");
+}
+
 /// Precision over recall in [0, 1]^2.
 cv::Mat draw(const std::string& title, const std::vector<std::pair<double, double>>& curve) {
   constexpr int kSide = 400, kMargin = 50;
@@ -179,6 +210,7 @@ void evaluate_places(const PlaceEvaluationArguments& arguments, const Vocabulary
   std::vector<std::pair<double, double>> curve;
   print_recognition(answers, truth, possible, curve);
   if (set.rig.kind != SensorKind::kMono) print_verified(answers, set, truth, possible);
+  if (!arguments.csv.empty()) write_csv(arguments.csv, answers, truth);
   if (!arguments.plot.empty()) {
     const fs::path folder = fs::path(arguments.set).lexically_normal();
     write_png(arguments.plot, draw(folder.filename().string(), curve));

@@ -15,6 +15,7 @@ struct PlaceEvaluationArguments {
   double max_angle_deg = 30;
   int every = 1;
   std::string plot;
+  std::string csv;  ///< where each candidate got to in recognition and verification
 };
 
 /// Asks for each image of the set which earlier one shows the same place, and prints precision and recall of

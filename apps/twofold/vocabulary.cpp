@@ -185,6 +185,7 @@ void add_evaluate(CLI::App& parent, const std::shared_ptr<std::string>& file, in
       ->capture_default_str();
   command->add_option("--every", arguments->every, "Take each Nth frame")->check(CLI::PositiveNumber);
   command->add_option("--plot", arguments->plot, "Draw precision over recall to this PNG file");
+  command->add_option("--csv", arguments->csv, "Write what became of each candidate, stage by stage");
   command->callback([arguments, file, &exit_code] {
     evaluate_places(*arguments, vocabulary_or_default(*file));
     exit_code = kOk;
