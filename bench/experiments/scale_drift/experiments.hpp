@@ -16,7 +16,7 @@ struct ScaleDriftOptions {
   std::vector<double> noise_px = {0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2};  ///< levels of the circle, >= 0
   int sphere_trials = 5;                                             ///< >= 1; the thesis shows one run
   SphereOptions sphere;        ///< of the flight; one loop closure from each turn to the next
-  double sphere_noise_px = 1;  ///< >= 0
+  double sphere_noise_px = 0.75; ///< >= 0
   bool compare = true;         ///< state SE(3) against Sim(3); small scenes hardly drift
   unsigned seed = 1;           ///< of the first trial
 };

@@ -5,12 +5,13 @@
 #include <map>
 
 #include "estimation/motion_only.hpp"
-#include "geometry/essential_matrix.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "geometry/triangulation.hpp"
 
 namespace twofold::bench {
 namespace {
+
+constexpr std::size_t kMinPlacing = 6;  ///< known points that place a frame
 
 class Explorer {
  public:
@@ -39,27 +40,11 @@ class Explorer {
     active_ = std::move(active);
   }
 
-  /// Two-view start between the first frame and the present one; the frames between are placed by their
-  /// points.
-  bool bootstrap(const SE3& T_first, double baseline) {
-    const int last = frame_count() - 1;
-    std::vector<Vector3> rays_first, rays_last;
-    for (const int t : result_.seen.back()) {
-      if (at(t).first_frame > 0) continue;
-      rays_first.push_back(rig_.camera.unproject(at(t).uv.front()));
-      rays_last.push_back(rig_.camera.unproject(at(t).uv.back()));
-    }
-    const auto relative = estimate_relative_pose(rays_first, rays_last, {.threshold = 5 / rig_.camera.fx});
-    if (!relative) return false;
-    result_.T_c_w.assign(static_cast<std::size_t>(last) + 1, T_first);
-    const SE3 T_last_first(relative->T_b_a.so3(), baseline * relative->T_b_a.translation());
-    result_.T_c_w.back() = T_last_first * T_first;
-    for (const int t : result_.seen.back()) triangulate(t, {0, last});
-    for (int k = 1; k < last; ++k) {
-      if (!place(k, pose(k - 1))) return false;
-    }
+  /// The first two frames at their given poses: their points, then the window.
+  void bootstrap(const SE3& T_first, const SE3& T_second) {
+    result_.T_c_w = {T_first, T_second};
+    for (const int t : result_.seen.back()) triangulate(t, {0, 1});
     adjust();
-    return true;
   }
 
   /// One further frame: its pose, its new points, the window.
@@ -67,12 +52,12 @@ class Explorer {
     const int k = frame_count() - 1;
     const SE3 T_predicted = pose(k - 1) * pose(k - 2).inverse() * pose(k - 1);  // start value only
     result_.T_c_w.push_back(T_predicted);
-    if (!place(k, T_predicted)) return false;
+    place(k, T_predicted);
     for (const int t : result_.seen.back()) {
       if (!at(t).x_w) triangulate(t, {at(t).first_frame, k});
     }
     adjust();
-    return true;
+    return pose(k).log().allFinite() && !problem_.observations.empty();
   }
 
   ExplorationResult take() { return std::move(result_); }
@@ -85,8 +70,9 @@ class Explorer {
     return track.uv[static_cast<std::size_t>(frame - track.first_frame)];
   }
 
-  /// Motion-only bundle adjustment of frame k  (eq. 3.34).
-  bool place(int k, const SE3& T_start) {
+  /// Motion-only bundle adjustment of frame k  (eq. 3.34). Where too few points are known it stays where the
+  /// motion goes on: the window's adjustment, which has the points seen twice too, starts from there.
+  void place(int k, const SE3& T_start) {
     std::vector<MotionObservation> observations;
     for (const int t : result_.seen[static_cast<std::size_t>(k)]) {
       if (!at(t).x_w) continue;
@@ -100,9 +86,8 @@ class Explorer {
     options.rounds = 1;
     options.huber_px = 10;  // points seen twice only may be far off
     const MotionOnlyResult placed = optimise_motion(rig_, observations, T_start, options);
-    if (observations.size() < 6 || !placed.T_c_ref.log().allFinite()) return false;
-    pose(k) = placed.T_c_ref;
-    return true;
+    const bool usable = observations.size() >= kMinPlacing && placed.T_c_ref.log().allFinite();
+    pose(k) = usable ? placed.T_c_ref : T_start;
   }
 
   /// A point from the two frames, if they see it under enough parallax.
@@ -116,15 +101,14 @@ class Explorer {
     if (x_a) track.x_w = pose(a).inverse() * *x_a;
   }
 
-  /// Bundle adjustment of the window. While it still grows only the first frame is held and the solver's
-  /// damping takes the scale; afterwards the first two are, whose baseline hands the scale on.
+  /// Bundle adjustment of the window; its first two frames are held, their baseline hands the scale on
+  /// (thesis 3.3.3).
   void adjust() {
     const int end = static_cast<int>(result_.T_c_w.size());
     const int begin = std::max(0, end - options_.window);
     problem_.rig = rig_;
     problem_.poses.clear();
-    for (int k = begin; k < end; ++k) problem_.poses.push_back({pose(k), k == begin});
-    if (begin > 0) problem_.poses[1].fixed = true;
+    for (int k = begin; k < end; ++k) problem_.poses.push_back({pose(k), k < begin + 2});
     problem_.points.clear();
     problem_.observations.clear();
     in_window_.clear();
@@ -180,16 +164,16 @@ class Explorer {
 }  // namespace
 
 std::optional<ExplorationResult> explore(const Rig& rig, const std::vector<std::vector<Sighting>>& frames,
-                                         const SE3& T_first, double first_baseline,
+                                         const SE3& T_first, const SE3& T_second,
                                          const ExplorationOptions& options) {
   Explorer explorer(rig, options);
-  const auto start = static_cast<std::size_t>(options.bootstrap_step);
-  if (frames.size() <= start) return std::nullopt;
-  for (std::size_t k = 0; k < frames.size(); ++k) {
+  if (frames.size() < 2) return std::nullopt;
+  explorer.add_sightings(frames[0]);
+  explorer.add_sightings(frames[1]);
+  explorer.bootstrap(T_first, T_second);
+  for (std::size_t k = 2; k < frames.size(); ++k) {
     explorer.add_sightings(frames[k]);
-    if (k < start) continue;
-    const bool placed = k == start ? explorer.bootstrap(T_first, first_baseline) : explorer.step();
-    if (!placed) return std::nullopt;
+    if (!explorer.step()) return std::nullopt;
   }
   return explorer.take();
 }

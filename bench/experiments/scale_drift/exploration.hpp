@@ -10,7 +10,6 @@ namespace twofold::bench {
 
 struct ExplorationOptions {
   int window = 10;              ///< keyframes adjusted together, >= 3
-  int bootstrap_step = 2;       ///< frames from the first to the second of the two-view start, >= 1
   int iterations = 5;           ///< of bundle adjustment a frame
   double min_parallax = 0.015;  ///< of a new point [rad]
 };
@@ -36,11 +35,11 @@ struct ExplorationResult {
 /// its pose comes from motion-only bundle adjustment, new points from triangulation, then bundle adjustment
 /// of the last `window` frames with the first two of them held (3.3.3).
 ///
-/// @param T_first  pose given to the first frame; the first baseline gets the length `first_baseline`
-/// @return  nullopt when the two-view start fails or a frame cannot be placed
+/// @param T_first, T_second  poses given to the first two frames, which fix the gauge
+/// @return  nullopt when a frame cannot be placed
 [[nodiscard]] std::optional<ExplorationResult> explore(const Rig& rig,
                                                        const std::vector<std::vector<Sighting>>& frames,
-                                                       const SE3& T_first, double first_baseline,
+                                                       const SE3& T_first, const SE3& T_second,
                                                        const ExplorationOptions& options);
 
 }  // namespace twofold::bench

@@ -11,20 +11,42 @@
 namespace twofold::bench {
 namespace {
 
-constexpr int kMinViews = 4;  ///< of a point that serves to close a loop: its depth is known well by then
+constexpr int kMinViews = 3;  ///< of a point that serves to close a loop: its depth is known well by then
 constexpr int kReach = 10;    ///< frames on either side whose points belong to a frame's surroundings
 
-/// Points of the map around a frame by point of the scene, in the camera's frame: those of one frame alone,
-/// seen under a narrow angle, would leave the rotation to the noise of their depths.
-std::map<int, Vector3> points_around(const ExplorationResult& map, int frame) {
-  std::map<int, Vector3> points;
+/// A point in a camera's frame, with the information its sightings give (one pixel, poses held).
+struct LocalPoint {
+  Vector3 x;
+  Matrix3 information;
+};
+
+/// sum of J^T J over the sightings, J = d(pixel) / d(point in the camera's frame).
+Matrix3 point_information(const Rig& rig, const ExplorationResult& map, const Track& track, const SE3& T_c_w) {
+  Matrix3 sum = Matrix3::Zero();
+  for (int k = track.first_frame; k <= track.last_frame(); ++k) {
+    const SE3 T_k_c = map.T_c_w[static_cast<std::size_t>(k)] * T_c_w.inverse();
+    const Vector3 x = T_k_c * (T_c_w * *track.x_w);
+    Eigen::Matrix<double, 2, 3> J;
+    J << rig.camera.fx / x.z(), 0, -rig.camera.fx * x.x() / (x.z() * x.z()),  //
+        0, rig.camera.fy / x.z(), -rig.camera.fy * x.y() / (x.z() * x.z());
+    J = J * T_k_c.rotation();
+    sum += J.transpose() * J;
+  }
+  return sum;
+}
+
+/// Points of the map around a frame by point of the scene: those of one frame alone, seen under a narrow
+/// angle, would leave the rotation to the noise of their depths.
+std::map<int, LocalPoint> points_around(const Rig& rig, const ExplorationResult& map, int frame) {
+  std::map<int, LocalPoint> points;
+  const SE3& T_c_w = map.T_c_w[static_cast<std::size_t>(frame)];
   const int first = std::max(0, frame - kReach);
   const int last = std::min(static_cast<int>(map.seen.size()) - 1, frame + kReach);
   for (int k = first; k <= last; ++k) {
     for (const int t : map.seen[static_cast<std::size_t>(k)]) {
       const Track& track = map.tracks[static_cast<std::size_t>(t)];
       if (!track.x_w || track.uv.size() < kMinViews) continue;
-      points[track.point] = map.T_c_w[static_cast<std::size_t>(frame)] * *track.x_w;
+      points[track.point] = {T_c_w * *track.x_w, point_information(rig, map, track, T_c_w)};
     }
   }
   return points;
@@ -52,6 +74,27 @@ struct SimilarityEstimator {
   }
 };
 
+/// Gauss-Newton on sum (x_j - S x_i)^T C^-1 (x_j - S x_i), C the covariance of the difference: bundle
+/// adjustment of the two places' points over S, their cameras held, to first order  (thesis 5.3.1).
+Sim3 refine(const std::vector<std::pair<LocalPoint, LocalPoint>>& pairs, Sim3 S_j_i) {
+  for (int iteration = 0; iteration < 5; ++iteration) {
+    const Matrix3 sR = S_j_i.scale() * S_j_i.rotation();
+    Matrix7 H = Matrix7::Zero();
+    Vector7 g = Vector7::Zero();
+    for (const auto& [in_i, in_j] : pairs) {
+      const Matrix3 C = in_j.information.inverse() + sR * in_i.information.inverse() * sR.transpose();
+      const Vector3 y = S_j_i * in_i.x;
+      Eigen::Matrix<double, 3, 7> J;  // of exp(delta) y
+      J << Matrix3::Identity(), -hat(y), y;
+      const Eigen::Matrix<double, 7, 3> JW = J.transpose() * C.inverse();
+      H += JW * J;
+      g += JW * (in_j.x - y);
+    }
+    S_j_i = Sim3::exp(H.ldlt().solve(g)) * S_j_i;
+  }
+  return S_j_i;
+}
+
 template <class Group>
 Group constraint(const Sim3& S_j_i) {
   if constexpr (std::is_same_v<Group, Sim3>) {
@@ -63,35 +106,33 @@ Group constraint(const Sim3& S_j_i) {
 
 }  // namespace
 
-std::optional<LoopConstraint> close_loop(const ExplorationResult& map, int i_begin, int i_end, int j) {
-  const std::map<int, Vector3> in_j = points_around(map, j);
-  std::vector<Vector3> x_i, x_j;
+std::optional<LoopConstraint> close_loop(const Rig& rig, const ExplorationResult& map, int i_begin, int i_end,
+                                         int j) {
+  const std::map<int, LocalPoint> in_j = points_around(rig, map, j);
+  std::vector<std::pair<LocalPoint, LocalPoint>> pairs;
   LoopConstraint loop{.i = -1, .j = j, .S_j_i = {}};
   for (int i = i_begin; i < i_end; ++i) {
-    std::vector<Vector3> a, b;
-    for (const auto& [point, x] : points_around(map, i)) {
+    std::vector<std::pair<LocalPoint, LocalPoint>> shared;
+    for (const auto& [point, x] : points_around(rig, map, i)) {
       const auto other = in_j.find(point);
-      if (other == in_j.end()) continue;
-      a.push_back(x);
-      b.push_back(other->second);
+      if (other != in_j.end()) shared.emplace_back(x, other->second);
     }
-    if (a.size() <= x_i.size()) continue;
+    if (shared.size() <= pairs.size()) continue;
     loop.i = i;
-    x_i = std::move(a);
-    x_j = std::move(b);
+    pairs = std::move(shared);
+  }
+  std::vector<Vector3> x_i, x_j;
+  for (const auto& [in_i, in_j_too] : pairs) {
+    x_i.push_back(in_i.x);
+    x_j.push_back(in_j_too.x);
   }
   const SimilarityEstimator estimator{x_j, x_i};
   const auto found = ransac(estimator, {.threshold = 0.1});
   if (!found || found->inliers.size() < 10) return std::nullopt;
-  std::vector<Vector3> a, b;
-  for (const int k : found->inliers) {
-    a.push_back(x_j[static_cast<std::size_t>(k)]);
-    b.push_back(x_i[static_cast<std::size_t>(k)]);
-  }
-  const auto S_j_i = align_similarity(a, b);
-  if (!S_j_i) return std::nullopt;
-  loop.S_j_i = *S_j_i;
-  loop.inliers = static_cast<int>(a.size());
+  std::vector<std::pair<LocalPoint, LocalPoint>> inliers;
+  for (const int k : found->inliers) inliers.push_back(pairs[static_cast<std::size_t>(k)]);
+  loop.S_j_i = refine(inliers, found->model);
+  loop.inliers = static_cast<int>(inliers.size());
   return loop;
 }
 

@@ -19,8 +19,8 @@ struct LoopConstraint {
 /// similarities, refitted to its inliers  (thesis 5.3.1; appearance is not simulated).
 ///
 /// @return  nullopt with fewer than ten inliers
-[[nodiscard]] std::optional<LoopConstraint> close_loop(const ExplorationResult& map, int i_begin, int i_end,
-                                                       int j);
+[[nodiscard]] std::optional<LoopConstraint> close_loop(const Rig& rig, const ExplorationResult& map, int i_begin,
+                                                       int i_end, int j);
 
 /// Pose graph of an explored map: successive frames joined by what was estimated, with scale one, and the
 /// loop constraints  (thesis 5.3.2). SE3: a constraint is the similarity's rotation, and its translation in a

@@ -19,7 +19,6 @@ void shrink(twofold::bench::ScaleDriftOptions& options) {
   options.noise_px = {0, 1};
   options.sphere_trials = 1;
   options.sphere.radius = 5;
-  options.sphere.turns = 4;
   options.sphere_noise_px = 0;
 }
 
@@ -42,7 +41,6 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100));
   app.add_option("--sphere-trials", options.sphere_trials, "flights")->check(CLI::Range(1, 100000));
   app.add_option("--sphere-radius", options.sphere.radius, "[m]")->check(CLI::Range(1, 100));
-  app.add_option("--sphere-turns", options.sphere.turns, "of a flight")->check(CLI::Range(2, 100));
   app.add_option("--sphere-noise", options.sphere_noise_px, "[px]")->check(CLI::NonNegativeNumber);
   app.add_option("--seed", options.seed, "of the first trial");
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
@@ -65,7 +63,6 @@ int main(int argc, char** argv) {
                                 {"noise_px", options.noise_px},
                                 {"sphere_trials", options.sphere_trials},
                                 {"sphere_radius", options.sphere.radius},
-                                {"sphere_turns", options.sphere.turns},
                                 {"sphere_noise_px", options.sphere_noise_px},
                                 {"seed", options.seed}};
     for (const auto& [name, experiment] : all) {

@@ -1,8 +1,8 @@
 #include "experiments/scale_drift/scene.hpp"
 
+#include <array>
 #include <cmath>
 #include <random>
-#include <stdexcept>
 
 namespace twofold::bench {
 namespace {
@@ -12,7 +12,7 @@ constexpr double kPi = 3.14159265358979323846;
 Rig mono_rig() {
   Rig rig;
   rig.kind = SensorKind::kMono;
-  rig.camera = {500, 500, 319.5, 239.5, 640, 480};
+  rig.camera = {195, 195, 162, 125, 320, 240};
   return rig;
 }
 
@@ -26,11 +26,37 @@ SE3 look_along(const Vector3& centre_w, const Vector3& forward_w, const Vector3&
   return SE3(R_w_c, centre_w).inverse();
 }
 
+/// A closed way from longitude 0 on the equator: `turns` around the axis, the latitude atan(climb * longitude)
+/// for the first half of it and back the same way for the second.
+struct Excursion {
+  int turns;
+  double climb;  ///< negative: southwards
+};
+constexpr std::array<Excursion, 4> kExcursions = {{{2, 0.1}, {2, -0.1}, {1, 0.5}, {1, -0.5}}};
+
+/// Poses `step` apart, looking down, the long side of the image along the flight.
+void fly(const Excursion& excursion, double radius, double step, std::vector<SE3>& T_c_w) {
+  const double end = 2 * kPi * excursion.turns;
+  const auto up_at = [&](double longitude) {
+    const double latitude = std::atan(excursion.climb * std::min(longitude, end - longitude));
+    return Vector3(std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
+                   std::sin(latitude));
+  };
+  constexpr double kFine = 1e-4;  // of longitude
+  Vector3 last = up_at(0);
+  for (double longitude = 0; longitude < end; longitude += kFine) {
+    const Vector3 up = up_at(longitude);
+    if (longitude > 0 && radius * (up - last).norm() < step) continue;
+    T_c_w.push_back(look_along(radius * up, -up, up_at(longitude + kFine) - up));
+    last = up;
+  }
+}
+
 }  // namespace
 
 Scene circle_scene(double radius, unsigned seed) {
   std::mt19937 rng(seed);
-  std::uniform_real_distribution<double> angle(-kPi, kPi), relief(-0.4, 0.4);
+  std::uniform_real_distribution<double> angle(-kPi, kPi), height(-1, 1);
   Scene scene;
   scene.rig = mono_rig();
   scene.max_depth = 3;
@@ -42,35 +68,29 @@ Scene circle_scene(double radius, unsigned seed) {
   }
   const int points = static_cast<int>(std::lround(500 * radius));
   for (int j = 0; j < points; ++j) {
-    const double a = angle(rng), r = radius + 1 + relief(rng);
-    scene.points.emplace_back(r * std::cos(a), r * std::sin(a), relief(rng));
+    const double a = angle(rng), r = radius + 1;
+    scene.points.emplace_back(r * std::cos(a), r * std::sin(a), height(rng));
   }
   return scene;
 }
 
 Scene sphere_scene(const SphereOptions& options, unsigned seed) {
   std::mt19937 rng(seed);
-  std::normal_distribution<double> normal(0, 1);
-  std::uniform_real_distribution<double> relief(-options.relief, options.relief);
+  std::uniform_real_distribution<double> unit(0, 1);
   Scene scene;
   scene.rig = mono_rig();
   scene.max_depth = 2 * options.height;
   const double flight = options.radius + options.height;
-  const double arc = options.turns * options.spacing / flight;  // of latitude
-  if (arc > 0.9 * kPi) throw std::runtime_error("the sphere is too small for so many turns");
-  for (double longitude = 0; longitude < 2 * kPi * options.turns;) {
-    const double latitude = arc * (0.5 - longitude / (2 * kPi * options.turns));
-    const double c = std::cos(latitude), s = std::sin(latitude);
-    const Vector3 up(c * std::cos(longitude), c * std::sin(longitude), s);
-    const Vector3 across(-s * std::cos(longitude), -s * std::sin(longitude), c);
-    scene.T_c_w.push_back(look_along(flight * up, -up, across));
-    longitude += options.step / (flight * c);
+  for (const Excursion& excursion : kExcursions) {
+    fly(excursion, flight, options.step, scene.T_c_w);
   }
   const double area = 4 * kPi * options.radius * options.radius;
   const int points = static_cast<int>(std::lround(options.density * area));
   for (int j = 0; j < points; ++j) {
-    const Vector3 up = Vector3(normal(rng), normal(rng), normal(rng)).normalized();
-    scene.points.push_back((options.radius + relief(rng)) * up);
+    const double longitude = 2 * kPi * unit(rng), from_pole = std::sqrt(kPi * unit(rng));
+    const double z = std::cos(from_pole) * (unit(rng) < 0.5 ? 1 : -1);
+    scene.points.emplace_back(options.radius * std::sin(from_pole) * std::cos(longitude),
+                              options.radius * std::sin(from_pole) * std::sin(longitude), options.radius * z);
   }
   return scene;
 }

@@ -16,22 +16,19 @@ struct Scene {
 };
 
 /// Thesis fig. 5.5: a circle, the camera looking outwards onto a ring of points one metre further out. The
-/// first and the last of 72 `radius` poses are neighbours. 500 `radius` points, +-0.4 m in radius and height.
+/// first and the last of 72 `radius` poses are neighbours. 500 `radius` points, +-1 m in height.
 [[nodiscard]] Scene circle_scene(double radius, unsigned seed);
 
 struct SphereOptions {
-  double radius = 10;    ///< of the ground [m]
-  double relief = 0.3;   ///< ground points lie within radius +- relief [m]
-  double height = 5;     ///< of the flight above the ground [m]
-  int turns = 11;        ///< around the axis, from near one pole to near the other
-  double spacing = 3.5;  ///< between turns [m], so that each overlaps with its neighbours
-  double step = 0.3;     ///< between frames [m]
-  double density = 4;    ///< ground points a square metre
+  double radius = 10;   ///< of the ground [m]
+  double height = 1;    ///< of the flight above the ground [m]
+  double step = 0.3;    ///< between frames [m]
+  double density = 12;  ///< ground points a square metre
 };
 
-/// Thesis fig. 5.6: an aircraft with a camera looking down winds around a sphere, the long side of the image
-/// across the flight.
-/// @throws std::runtime_error  when that many turns do not fit between the poles
+/// Thesis fig. 5.6: an aircraft with a camera looking down flies over a sphere, four times from one place on
+/// the equator out and back to it, first north, then south: two turns climbing to a latitude of 32 degrees,
+/// then one turn to 58 degrees.
 [[nodiscard]] Scene sphere_scene(const SphereOptions& options, unsigned seed);
 
 /// What one frame sees of a point: its index and its pixel.

@@ -7,12 +7,10 @@ DriftTrial run_trial(const Scene& scene, double noise_px, unsigned seed,
   DriftTrial trial;
   trial.truth = camera_centres(scene.T_c_w);
   const ExplorationOptions options;
-  const auto second = static_cast<std::size_t>(options.bootstrap_step);
-  const auto map = explore(scene.rig, measure(scene, noise_px, seed), scene.T_c_w[0],
-                           (trial.truth[second] - trial.truth[0]).norm(), options);
+  const auto map = explore(scene.rig, measure(scene, noise_px, seed), scene.T_c_w[0], scene.T_c_w[1], options);
   if (!map) return trial;
   for (const LoopSearch& search : searches) {
-    const auto loop = close_loop(*map, search.i_begin, search.i_end, search.j);
+    const auto loop = close_loop(scene.rig, *map, search.i_begin, search.i_end, search.j);
     if (!loop) return trial;
     trial.loops.push_back(*loop);
   }
