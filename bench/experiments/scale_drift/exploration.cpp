@@ -11,13 +11,13 @@
 namespace twofold::bench {
 namespace {
 
-constexpr std::size_t kMinPlacing = 6;  ///< known points that place a frame
+constexpr std::size_t kMinPlacing = 8;  ///< known points that place a frame
 
 class Explorer {
  public:
   Explorer(const Rig& rig, const ExplorationOptions& options) : rig_(rig), options_(options) {
     solver_options_.max_iterations = options.iterations;
-    solver_options_.huber_px = 0;  // association is known
+    solver_options_.huber_px = options.huber_px;
     solver_options_.relative_decrease = 1e-5;
   }
 

@@ -9,9 +9,10 @@
 namespace twofold::bench {
 
 struct ExplorationOptions {
-  int window = 10;              ///< keyframes adjusted together, >= 3
-  int iterations = 5;           ///< of bundle adjustment a frame
-  double min_parallax = 0.015;  ///< of a new point [rad]
+  int window = 10;             ///< keyframes adjusted together, >= 3
+  int iterations = 10;         ///< of bundle adjustment a frame
+  double min_parallax = 0.05;  ///< of a new point [rad]
+  double huber_px = 3;         ///< kernel of bundle adjustment (thesis 3.5)
 };
 
 /// One point from its first to its last sighting without a gap. A point of the scene that comes into view
@@ -33,7 +34,7 @@ struct ExplorationResult {
 
 /// Monocular exploration with known association  (thesis chapter 3, as in 5.4): every frame is a keyframe;
 /// its pose comes from motion-only bundle adjustment, new points from triangulation, then bundle adjustment
-/// of the last `window` frames with the first two of them held (3.3.3).
+/// of the last `window` frames with the first two of them held (3.3.3). The two-view start is not simulated.
 ///
 /// @param T_first, T_second  poses given to the first two frames, which fix the gauge
 /// @return  nullopt when a frame cannot be placed

@@ -12,7 +12,7 @@ namespace twofold::bench {
 namespace {
 
 constexpr int kMinViews = 3;  ///< of a point that serves to close a loop: its depth is known well by then
-constexpr int kReach = 10;    ///< frames on either side whose points belong to a frame's surroundings
+constexpr int kReach = 4;     ///< frames on either side whose points belong to a frame's surroundings
 
 /// A point in a camera's frame, with the information its sightings give (one pixel, poses held).
 struct LocalPoint {
@@ -21,7 +21,8 @@ struct LocalPoint {
 };
 
 /// sum of J^T J over the sightings, J = d(pixel) / d(point in the camera's frame).
-Matrix3 point_information(const Rig& rig, const ExplorationResult& map, const Track& track, const SE3& T_c_w) {
+Matrix3 point_information(const Rig& rig, const ExplorationResult& map, const Track& track,
+                          const SE3& T_c_w) {
   Matrix3 sum = Matrix3::Zero();
   for (int k = track.first_frame; k <= track.last_frame(); ++k) {
     const SE3 T_k_c = map.T_c_w[static_cast<std::size_t>(k)] * T_c_w.inverse();
@@ -170,17 +171,18 @@ std::vector<Vector3> camera_centres(const std::vector<SE3>& T_c_w) {
   return centres;
 }
 
-double scaled_rmse(const std::vector<Vector3>& truth, const std::vector<Vector3>& corrected) {
+double scaled_rmse(const std::vector<Vector3>& truth, const std::vector<Vector3>& corrected,
+                   const Vector3& origin) {
   double cross = 0, square = 0;
   for (std::size_t k = 0; k < truth.size(); ++k) {
-    const Vector3 t = truth[k] - truth[0], c = corrected[k] - truth[0];
+    const Vector3 t = truth[k] - origin, c = corrected[k] - origin;
     cross += t.dot(c);
     square += c.squaredNorm();
   }
   const double s = square > 0 ? cross / square : 0;
   double M = 0;
   for (std::size_t k = 0; k < truth.size(); ++k) {
-    M += ((truth[k] - truth[0]) - s * (corrected[k] - truth[0])).squaredNorm();
+    M += ((truth[k] - origin) - s * (corrected[k] - origin)).squaredNorm();
   }
   return std::sqrt(M / static_cast<double>(truth.size()));
 }

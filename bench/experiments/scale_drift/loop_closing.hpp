@@ -16,11 +16,12 @@ struct LoopConstraint {
 
 /// Loop closure between a frame and the one among [i_begin, i_end) that shares most points of the scene with
 /// it: the points' two estimates, one in either camera's frame, are aligned by a three-point RANSAC on
-/// similarities, refitted to its inliers  (thesis 5.3.1; appearance is not simulated).
+/// similarities, refined over its inliers with their covariances  (thesis 5.3.1; appearance is not
+/// simulated).
 ///
 /// @return  nullopt with fewer than ten inliers
-[[nodiscard]] std::optional<LoopConstraint> close_loop(const Rig& rig, const ExplorationResult& map, int i_begin,
-                                                       int i_end, int j);
+[[nodiscard]] std::optional<LoopConstraint> close_loop(const Rig& rig, const ExplorationResult& map,
+                                                       int i_begin, int i_end, int j);
 
 /// Pose graph of an explored map: successive frames joined by what was estimated, with scale one, and the
 /// loop constraints  (thesis 5.3.2). SE3: a constraint is the similarity's rotation, and its translation in a
@@ -36,8 +37,9 @@ template <class Group>
 
 [[nodiscard]] std::vector<Vector3> camera_centres(const std::vector<SE3>& T_c_w);
 
-/// sqrt(M / n), M = min over s of sum |t_true - s t_cor|^2, t the camera centres seen from the first one
+/// sqrt(M / n), M = min over s of sum |t_true - s t_cor|^2, t the camera centres seen from `origin`
 /// (thesis 5.4); both have the same first pose.
-[[nodiscard]] double scaled_rmse(const std::vector<Vector3>& truth, const std::vector<Vector3>& corrected);
+[[nodiscard]] double scaled_rmse(const std::vector<Vector3>& truth, const std::vector<Vector3>& corrected,
+                                 const Vector3& origin);
 
 }  // namespace twofold::bench

@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
+/// The camera of the program with which the thesis' author published these two experiments (RobotVision 1.0,
+/// rss2010_demo): a wide, coarse one, as in section 3.5.
 Rig mono_rig() {
   Rig rig;
   rig.kind = SensorKind::kMono;
@@ -26,15 +28,15 @@ SE3 look_along(const Vector3& centre_w, const Vector3& forward_w, const Vector3&
   return SE3(R_w_c, centre_w).inverse();
 }
 
-/// A closed way from longitude 0 on the equator: `turns` around the axis, the latitude atan(climb * longitude)
-/// for the first half of it and back the same way for the second.
+/// A closed way from longitude 0 on the equator: `turns` around the axis, the latitude atan(climb *
+/// longitude) for the first half of it and back the same way for the second.
 struct Excursion {
   int turns;
   double climb;  ///< negative: southwards
 };
 constexpr std::array<Excursion, 4> kExcursions = {{{2, 0.1}, {2, -0.1}, {1, 0.5}, {1, -0.5}}};
 
-/// Poses `step` apart, looking down, the long side of the image along the flight.
+/// Poses `step` apart, looking down, the long side of the image across the flight.
 void fly(const Excursion& excursion, double radius, double step, std::vector<SE3>& T_c_w) {
   const double end = 2 * kPi * excursion.turns;
   const auto up_at = [&](double longitude) {
@@ -43,12 +45,12 @@ void fly(const Excursion& excursion, double radius, double step, std::vector<SE3
                    std::sin(latitude));
   };
   constexpr double kFine = 1e-4;  // of longitude
-  Vector3 last = up_at(0);
+  Vector3 last = T_c_w.empty() ? Vector3::Zero().eval() : T_c_w.back().inverse().translation();
   for (double longitude = 0; longitude < end; longitude += kFine) {
     const Vector3 up = up_at(longitude);
-    if (longitude > 0 && radius * (up - last).norm() < step) continue;
-    T_c_w.push_back(look_along(radius * up, -up, up_at(longitude + kFine) - up));
-    last = up;
+    if ((radius * up - last).norm() < step) continue;
+    T_c_w.push_back(look_along(radius * up, -up, up.cross(up_at(longitude + kFine) - up)));
+    last = radius * up;
   }
 }
 
@@ -79,6 +81,8 @@ Scene sphere_scene(const SphereOptions& options, unsigned seed) {
   std::uniform_real_distribution<double> unit(0, 1);
   Scene scene;
   scene.rig = mono_rig();
+  scene.rig.camera.width = 324;  // that program's image here: twice the principal point
+  scene.rig.camera.height = 250;
   scene.max_depth = 2 * options.height;
   const double flight = options.radius + options.height;
   for (const Excursion& excursion : kExcursions) {

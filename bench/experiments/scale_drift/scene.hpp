@@ -28,7 +28,8 @@ struct SphereOptions {
 
 /// Thesis fig. 5.6: an aircraft with a camera looking down flies over a sphere, four times from one place on
 /// the equator out and back to it, first north, then south: two turns climbing to a latitude of 32 degrees,
-/// then one turn to 58 degrees.
+/// then one turn to 58 degrees. The thesis prints none of this: way, height, steps and points (their angle
+/// from the nearer pole is sqrt(pi u), u uniform) are those of its author's program.
 [[nodiscard]] Scene sphere_scene(const SphereOptions& options, unsigned seed);
 
 /// What one frame sees of a point: its index and its pixel.
