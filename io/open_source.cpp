@@ -70,6 +70,7 @@ const std::map<std::string, Opener>& openers() {
 std::string recognise_layout(const fs::path& path) {
   std::error_code error;
   if (fs::is_regular_file(path, error)) return "video";
+  if (fs::is_character_file(path, error)) return "v4l2";
   if (!fs::exists(path, error)) throw IoError(path, "no such file or folder");
   expect_folder(path);
   if (fs::exists(path / "mav0") || fs::exists(path / "cam0" / "data.csv")) return "euroc";

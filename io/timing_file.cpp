@@ -35,6 +35,8 @@ Json parse(const fs::path& file) {
     const bool ended = e.byte >= text.size();
     throw IoError(file, static_cast<int>(line),
                   ended ? "the file ends in the middle of the JSON text" : "this is not JSON");
+  } catch (const Json::out_of_range&) {
+    throw IoError(file, "holds a number too large for any duration or count");
   }
 }
 

@@ -35,7 +35,9 @@ Wanted wanted_of(const std::string& text) {
   Wanted wanted;
   if (text.empty()) return wanted;
   const SourceSpec spec = parse_source_spec(text);
-  if (spec.scheme != "v4l2") return wanted;  // a recording needs nothing of the machine but its disk
+  const bool device = spec.scheme.empty() && spec.argument.starts_with("/dev/");
+  if (!device && spec.scheme != "v4l2")
+    throw IoError(text, "is no camera: v4l2:/dev/video0?size=640x480&fps=30");
   SourceParameters parameters(text, spec.parameters);
   const V4l2FramesOptions options = take_v4l2_options(spec.argument, parameters);
   wanted.cameras.push_back(options.first);

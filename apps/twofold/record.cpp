@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/record_session.hpp"
 #include "engine/clock.hpp"
 #include "io/calibration_file.hpp"
-#include "io/io_error.hpp"
 #include "io/open_source.hpp"
 #include "io/recorder.hpp"
 
@@ -33,8 +33,7 @@ void on_interrupt(int) {
   interrupted.store(true, std::memory_order_relaxed);
 }
 
-void show(const Recorder& recorder, const SourceReport& source, bool last) {
-  const Recorder::Counts counts = recorder.counts();
+void show(const Recorder::Counts& counts, const SourceReport& source, bool last) {
   fmt::print(stderr,
              "\r{} frames written  {} waiting  {} lost by the camera  {} lost by writing  {:.1f} MB  {}",
              counts.written, counts.queued, source.lost, counts.refused,
@@ -64,30 +63,16 @@ int record(const RecordArguments& arguments) {
 
   const bool visible = !arguments.quiet && isatty(STDERR_FILENO) == 1;
   std::int64_t shown_ns = 0;
-  FrameStatus status = FrameStatus::kEnd;
-  for (std::int64_t n = 0; arguments.frames == 0 || n < arguments.frames; ++n) {
-    Frame frame;  // a new one each time: the queue keeps the images
-    if (interrupted.load(std::memory_order_relaxed)) break;
-    if ((status = source->next(frame)) != FrameStatus::kFrame) break;
-    // A camera does not wait; a recording does.
-    if (!recorder.offer(frame, !source->is_live()) && recorder.failed()) break;
-    if (visible && steady_now_ns() - shown_ns > 200'000'000) {
-      shown_ns = steady_now_ns();
-      show(recorder, source->report(), false);
-    }
-  }
-  const std::string problem = recorder.finish();
-  const SourceReport report = source->report();
-  if (visible) show(recorder, report, true);
-  const Recorder::Counts counts = recorder.counts();
-  fmt::print("{}: {} frames, {:.1f} MB; lost: {} by the camera, {} because writing was too slow or failed\n",
-             arguments.out, counts.written, static_cast<double>(counts.bytes) * 1e-6, report.lost,
-             counts.refused);
-  for (const std::string& line : report.summary) fmt::print("{}\n", line);
-  for (const std::string& line : report.faults) fmt::print("  {}\n", line);
-  if (!problem.empty()) throw std::runtime_error(problem);
-  if (status == FrameStatus::kError) throw IoError(source->error());
-  return counts.refused == 0 ? kOk : kFailedRun;
+  const auto tick = [&] {
+    if (!visible || steady_now_ns() - shown_ns < 200'000'000) return;
+    shown_ns = steady_now_ns();
+    show(recorder.counts(), source->report(), false);
+  };
+  const RecordOutcome outcome = record_from(*source, recorder, arguments.frames, interrupted, tick);
+  if (visible) show(outcome.counts, outcome.report, true);
+  fmt::print("{}: {}", arguments.out, describe(outcome));
+  if (!outcome.problem.empty()) throw std::runtime_error(outcome.problem);
+  return outcome.all_written() ? kOk : kFailedRun;
 }
 
 }  // namespace

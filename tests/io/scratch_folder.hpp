@@ -16,7 +16,7 @@ namespace twofold {
 class ScratchFolder {
  public:
   ScratchFolder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
     // Outside of a test: set-up of a whole suite.
     const std::string name = test ? std::string(test->test_suite_name()) + "_" + test->name() : "suite";
     path_ = std::filesystem::temp_directory_path() / ("twofold_" + name + "_" + std::to_string(getpid()));

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "calibration/board.hpp"
+#include "io/frame_source.hpp"
+
+namespace twofold {
+
+struct CalibrationRequest {
+  Board board;
+  std::string board_text;      ///< as the calibration file is to name it
+  int views = 20;              ///< wanted from a camera, >= 10
+  std::filesystem::path out;   ///< calibration file to write
+  std::filesystem::path plot;  ///< picture of the residuals to write
+};
+
+/// Shows a source's frames to a ViewCollector until nothing is missing (a camera), the source ends or `stop`
+/// is set; calibrates; writes the calibration file and the picture of its residuals.
+///
+/// @param source  of raw images
+/// @param say  hears a line for the person with the board whenever it changes
+/// @return  the result, some lines for people
+///
+/// Throws IoError for a source that breaks, std::runtime_error with the reason when the calibration is
+/// refused; nothing is written then.
+[[nodiscard]] std::string calibrate_from(FrameSource& source, const CalibrationRequest& request,
+                                         const std::atomic<bool>& stop,
+                                         const std::function<void(const std::string&)>& say);
+
+}  // namespace twofold
