@@ -173,7 +173,7 @@ std::span<LoopMessage> LoopClosingStage::step(const KeyframeProposal& keyframe, 
   const ScopedStage timed(times_, place_stage_);
   if (const auto loop = closer_->step(keyframe, graph)) {
     messages_.emplace_back(*loop);
-    const bool joins = graph.keyframe(loop->from).part != graph.keyframe(loop->to).part;
+    const bool joins = graph.part(loop->from) != graph.part(loop->to);
     loops_.push_back(
         {*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins});
     unrelaxed_ = loop;

@@ -28,14 +28,26 @@ GraphSnapshot GraphWriter::publish() {
 
 void GraphWriter::add_keyframe(Keyframe keyframe) {
   TWOFOLD_CHECK(index(keyframe.id) == graph_.keyframe_count(), "keyframe ids are dense");
-  if (!keyframe.observations) keyframe.observations = std::make_shared<const ObservationList>();
-  if (!keyframe.edges) keyframe.edges = std::make_shared<const EdgeList>();
+  if (!keyframe.observations) keyframe.observations = no_observations();
+  if (!keyframe.edges) keyframe.edges = no_edges();
   graph_.keyframes_.push_back(std::move(keyframe));
+}
+
+void GraphWriter::add_culled_keyframe(const Heir& heir) {
+  const KeyframeId id{static_cast<std::uint32_t>(graph_.keyframe_count())};
+  TWOFOLD_CHECK(heir.id != kNoKeyframe && heir.id != id, "a culled keyframe has an heir");
+  graph_.keyframes_.extend(graph_.keyframe_count() + 1);
+  put_heir(id, heir);
+}
+
+void GraphWriter::put_heir(KeyframeId id, const Heir& heir) {
+  graph_.heirs_.extend(std::size_t{index(id)} + 1);
+  graph_.heirs_.mutate(index(id)) = heir;
 }
 
 void GraphWriter::add_point(PointId id, MapPoint point) {
   TWOFOLD_CHECK(index(id) >= graph_.point_count(), "a point is added once, in order of ids");
-  while (graph_.point_count() < index(id)) graph_.points_.push_back({});
+  graph_.points_.extend(index(id));
   if (!point.observers) point.observers = std::make_shared<const ObserverList>();
   graph_.points_.push_back(std::move(point));
 }
@@ -142,25 +154,15 @@ void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
   remove_observations(id, points);
   const EdgeList edges = *graph_.keyframe(id).edges;
   for (const Edge& edge : edges) remove_edge(id, edge.other);
-  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
-  keyframe.heir = heir;
-  keyframe.T_this_heir = T_this_heir;
-  // Lists emptied one by one keep their buffers.
-  keyframe.observations = std::make_shared<const ObservationList>();
-  keyframe.edges = std::make_shared<const EdgeList>();
+  put_heir(id, {heir, PackedPose(T_this_heir)});
+  graph_.keyframes_.mutate(index(id)) = Keyframe{};
+  graph_.keyframes_.forget_chunk_if(index(id), [](const Keyframe& keyframe) { return keyframe.culled(); });
 }
 
 void GraphWriter::shorten_heirs(KeyframeId id) {
-  KeyframeId heir = graph_.keyframe(id).heir;
-  if (heir == kNoKeyframe || !graph_.keyframe(heir).culled()) return;
-  SE3 T_this_heir = graph_.keyframe(id).T_this_heir;
-  while (graph_.keyframe(heir).culled()) {
-    T_this_heir = T_this_heir * graph_.keyframe(heir).T_this_heir;
-    heir = graph_.keyframe(heir).heir;
-  }
-  Keyframe& keyframe = graph_.keyframes_.mutate(index(id));
-  keyframe.heir = heir;
-  keyframe.T_this_heir = T_this_heir;
+  if (!graph_.keyframe(id).culled() || !graph_.keyframe(graph_.heir(id).id).culled()) return;
+  const auto [heir, T_this_heir] = graph_.survivor(id);
+  put_heir(id, {heir, PackedPose(T_this_heir)});
 }
 
 }  // namespace twofold

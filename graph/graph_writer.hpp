@@ -24,16 +24,19 @@ class GraphWriter {
 
   /// Appends a keyframe; its id must be graph().keyframe_count(). Lists may be null and are then empty.
   void add_keyframe(Keyframe keyframe);
+  /// Appends a keyframe that was culled; `heir` may be added later.
+  void add_culled_keyframe(const Heir& heir);
   /// Appends a point without observers; ids skipped by the tracker are filled with culled points.
   void add_point(PointId id, MapPoint point);
 
   void set_pose(KeyframeId id, const SE3& T_k_w) { graph_.keyframes_.mutate(index(id)).T_k_w = T_k_w; }
-  /// Moves the keyframe to another part, whose world frame T_k_w is then of.
+  /// Moves a keyframe that is not culled to another part, whose world frame T_k_w is then of.
   void set_part(KeyframeId id, KeyframeId part) { graph_.keyframes_.mutate(index(id)).part = part; }
   void set_median_depth(KeyframeId id, double depth) {
     graph_.keyframes_.mutate(index(id)).median_depth = depth;
   }
   void set_inverse_depth(PointId id, const Vector3& psi) { graph_.points_.mutate(index(id)).psi = psi; }
+  void set_misses(PointId id, std::uint8_t misses) { graph_.points_.mutate(index(id)).misses = misses; }
   void set_appearance(PointId id, std::shared_ptr<const PointAppearance> appearance) {
     graph_.points_.mutate(index(id)).appearance = std::move(appearance);
   }
@@ -55,8 +58,8 @@ class GraphWriter {
 
   /// Removes all measurements of a point and marks it culled; nothing happens to a point culled before.
   void cull_point(PointId id);
-  /// Removes a keyframe's measurements and edges; its pose stays known relative to `heir`, which must not be
-  /// culled. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes along with the
+  /// Removes a keyframe and all it has; only its pose relative to `heir`, which must not be culled, stays
+  /// known. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes along with the
   /// heir (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
   void cull_keyframe(KeyframeId id, KeyframeId heir);
   /// Lets a culled keyframe hang directly on the one that stayed. Its pose is the same; asking for it no
@@ -66,6 +69,7 @@ class GraphWriter {
  private:
   void remove_observer(PointId point, KeyframeId keyframe);
   void put_edge(KeyframeId id, const Edge& edge);
+  void put_heir(KeyframeId id, const Heir& heir);
 
   GraphSnapshot graph_;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -29,27 +30,57 @@ struct Edge {
 using ObservationList = std::vector<Observation>;  ///< ascending by point
 using EdgeList = std::vector<Edge>;                ///< ascending by other keyframe
 
+/// The lists of keyframes that have nothing: one of each for all.
+[[nodiscard]] inline std::shared_ptr<const ObservationList> no_observations() {
+  static const auto kNone = std::make_shared<const ObservationList>();
+  return kNone;
+}
+[[nodiscard]] inline std::shared_ptr<const EdgeList> no_edges() {
+  static const auto kNone = std::make_shared<const EdgeList>();
+  return kNone;
+}
+
 /// Vertex V_i of the SLAM graph. A value: lists are shared between versions and replaced, never changed in
 /// place.
 struct Keyframe {
   KeyframeId id = kNoKeyframe;
+  /// First keyframe of the map part whose world frame T_k_w is of; those of different parts have nothing to
+  /// do with each other.
+  KeyframeId part{0};
   std::int64_t frame_index = 0;
   std::int64_t t_ns = 0;
   SE3 T_k_w;                ///< absolute pose; accurate relative to its neighbours, not globally (manifold)
   double median_depth = 0;  ///< of the points it sees [m]
-  std::shared_ptr<const ObservationList> observations;
-  std::shared_ptr<const EdgeList> edges;
+  std::shared_ptr<const ObservationList> observations = no_observations();
+  std::shared_ptr<const EdgeList> edges = no_edges();
 
-  /// A culled keyframe keeps only its pose relative to a keyframe that stayed: T_k_w = T_this_heir *
-  /// T_heir_w.
-  KeyframeId heir = kNoKeyframe;
-  SE3 T_this_heir;
+  /// Nothing remains of a culled keyframe but its Heir: all the above reads as in Keyframe{}. Ask
+  /// GraphSnapshot for its pose and its part.
+  [[nodiscard]] bool culled() const { return id == kNoKeyframe; }
+};
 
-  /// First keyframe of the map part whose world frame T_k_w is of; those of different parts have nothing to
-  /// do with each other.
-  KeyframeId part{0};
+/// A pose in 56 bytes; SE3 takes more, for alignment.
+class PackedPose {
+ public:
+  PackedPose() : PackedPose(SE3()) {}
+  explicit PackedPose(const SE3& T) {
+    Eigen::Map<Eigen::Vector4d>(values_.data()) = T.so3().quaternion().coeffs();
+    Eigen::Map<Vector3>(values_.data() + 4) = T.translation();
+  }
+  [[nodiscard]] SE3 unpacked() const {
+    const Eigen::Quaterniond q(Eigen::Map<const Eigen::Vector4d>(values_.data()).eval());
+    return {SO3(q), Eigen::Map<const Vector3>(values_.data() + 4)};
+  }
 
-  [[nodiscard]] bool culled() const { return heir != kNoKeyframe; }
+ private:
+  std::array<double, 7> values_;  ///< quaternion (x, y, z, w), translation
+};
+
+/// What remains of a culled keyframe, for as long as the map lives: its pose relative to one that stayed,
+/// which may be culled itself later.
+struct Heir {
+  KeyframeId id = kNoKeyframe;
+  PackedPose T_this_heir;
 };
 
 }  // namespace twofold

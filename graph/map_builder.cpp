@@ -21,16 +21,18 @@ void MapBuilder::take_head(ByteReader in) {
 void MapBuilder::take_keyframes(ByteReader in) {
   for (std::uint32_t n = 0; n < kKeyframesPerSection && !in.at_end(); ++n) {
     if (keyframes_.size() == keyframe_count_) throw FormatError{"holds more keyframes than announced"};
-    Keyframe keyframe = take_keyframe(in);
-    keyframe.id = KeyframeId{static_cast<std::uint32_t>(keyframes_.size())};
-    if (!keyframe.observations->empty() && index(keyframe.observations->back().point) >= point_count_) {
+    KeyframeEntry entry = take_keyframe(in);
+    const KeyframeId id{static_cast<std::uint32_t>(keyframes_.size())};
+    const ObservationList& observations = *entry.keyframe.observations;
+    if (!observations.empty() && index(observations.back().point) >= point_count_) {
       throw FormatError{"observes a point that is not there"};
     }
-    edges_.push_back(take_edges(in, keyframe.id));
-    if (keyframe.culled() && (!keyframe.observations->empty() || !edges_.back().empty())) {
+    edges_.push_back(take_edges(in, id));
+    if (entry.culled() && (!observations.empty() || !edges_.back().empty())) {
       throw FormatError{"holds a culled keyframe with observations or edges"};
     }
-    keyframes_.push_back(std::move(keyframe));
+    if (!entry.culled()) entry.keyframe.id = id;
+    keyframes_.push_back(std::move(entry));
   }
   in.expect_end();
 }
@@ -86,9 +88,9 @@ void MapBuilder::check_heirs() const {
       state[at] = kOnTheWay;
       chain.push_back(at);
       if (!keyframes_[at].culled()) break;
-      if (index(keyframes_[at].heir) >= keyframes_.size())
+      if (index(keyframes_[at].heir.id) >= keyframes_.size())
         throw FormatError{"keyframes: an heir is not there"};
-      at = index(keyframes_[at].heir);
+      at = index(keyframes_[at].heir.id);
     }
     for (const std::size_t at : chain) state[at] = kGood;
   }
@@ -112,7 +114,7 @@ void MapBuilder::check_places() const {
 
 void MapBuilder::register_observers() {
   observers_.resize(points_.size());
-  for (const Keyframe& keyframe : keyframes_) {
+  for (const auto& [keyframe, heir] : keyframes_) {
     for (const Observation& observation : *keyframe.observations) {
       if (!points_[index(observation.point)].alive())
         throw FormatError{"keyframes: a culled point is observed"};
@@ -147,8 +149,13 @@ void MapBuilder::mirror_edges() {
 SavedMap MapBuilder::assemble() {
   GraphWriter writer;
   for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    keyframes_[k].edges = std::make_shared<const EdgeList>(std::move(edges_[k]));
-    writer.add_keyframe(std::move(keyframes_[k]));
+    auto& [keyframe, heir] = keyframes_[k];
+    if (keyframes_[k].culled()) {
+      writer.add_culled_keyframe(heir);
+      continue;
+    }
+    keyframe.edges = std::make_shared<const EdgeList>(std::move(edges_[k]));
+    writer.add_keyframe(std::move(keyframe));
   }
   for (std::size_t p = 0; p < points_.size(); ++p) {
     points_[p].observers = std::make_shared<const ObserverList>(std::move(observers_[p]));

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "graph/map_entries.hpp"
 #include "graph/map_file.hpp"
 #include "graph/map_format.hpp"
 
@@ -31,7 +32,7 @@ class MapBuilder {
   SavedMap map_;
   KeyframeId reference_ = kNoKeyframe;
   std::uint32_t keyframe_count_ = 0, point_count_ = 0;
-  std::vector<Keyframe> keyframes_;
+  std::vector<KeyframeEntry> keyframes_;
   std::vector<EdgeList> edges_;  // by keyframe
   std::vector<MapPoint> points_;
   std::vector<ObserverList> observers_;  // by point

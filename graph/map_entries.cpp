@@ -40,16 +40,17 @@ Rig take_rig(ByteReader& in) {
   return rig;
 }
 
-Keyframe take_keyframe(ByteReader& in) {
-  Keyframe keyframe;
+KeyframeEntry take_keyframe(ByteReader& in) {
+  KeyframeEntry entry;
+  Keyframe& keyframe = entry.keyframe;
   keyframe.frame_index = in.take<std::int64_t>();
   keyframe.t_ns = in.take<std::int64_t>();
   keyframe.T_k_w = in.take_pose();
   keyframe.median_depth = in.take_finite();
-  keyframe.heir = KeyframeId{in.take<std::uint32_t>()};
-  keyframe.T_this_heir = in.take_pose();
+  entry.heir.id = KeyframeId{in.take<std::uint32_t>()};
+  entry.heir.T_this_heir = PackedPose(in.take_pose());
   keyframe.observations = take_observations(in);
-  return keyframe;
+  return entry;
 }
 
 EdgeList take_edges(ByteReader& in, KeyframeId id) {

@@ -14,8 +14,14 @@ namespace twofold::map_format {
 /// whether they fit each other is MapBuilder's affair. All functions throw FormatError.
 
 [[nodiscard]] Rig take_rig(ByteReader& in);
-/// Keyframe without edges and number.
-[[nodiscard]] Keyframe take_keyframe(ByteReader& in);
+/// Keyframe without edges and number, which a culled one does not get.
+struct KeyframeEntry {
+  Keyframe keyframe;
+  Heir heir;
+
+  [[nodiscard]] bool culled() const { return heir.id != kNoKeyframe; }
+};
+[[nodiscard]] KeyframeEntry take_keyframe(ByteReader& in);
 /// Edges of keyframe `id` to older ones, in order.
 [[nodiscard]] EdgeList take_edges(ByteReader& in, KeyframeId id);
 /// A culled point if it has no anchor.

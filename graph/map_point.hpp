@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -16,6 +17,9 @@ struct MapPoint {
   /// kNoKeyframe: the point was culled. The anchor itself may be a culled keyframe: its frame is then known
   /// through its heir, so ask GraphSnapshot::T_k_w for its pose.
   KeyframeId anchor = kNoKeyframe;
+  /// Keyframes in a row that should have seen it and did not: by this the mapper tells points that add
+  /// nothing. Not saved.
+  std::uint8_t misses = 0;
   Vector3 psi{0, 0, 1};
   std::shared_ptr<const PointAppearance> appearance;
   std::shared_ptr<const ObserverList> observers;

@@ -103,13 +103,13 @@ void put_edges(ByteWriter& out, const Keyframe& keyframe) {
   }
 }
 
-void put_keyframe(ByteWriter& out, const Keyframe& keyframe) {
+void put_keyframe(ByteWriter& out, const Keyframe& keyframe, const Heir& heir) {
   out.put(keyframe.frame_index);
   out.put(keyframe.t_ns);
   out.put(keyframe.T_k_w);
   out.put(keyframe.median_depth);
-  out.put(keyframe.heir);
-  out.put(keyframe.T_this_heir);
+  out.put(heir.id);
+  out.put(heir.T_this_heir.unpacked());
   out.put(static_cast<std::uint32_t>(keyframe.observations->size()));
   for (const Observation& observation : *keyframe.observations) {
     out.put(observation.point);
@@ -175,7 +175,8 @@ void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph, 
   write_section(out, Section::kHead, bytes.bytes());
   write_slices(out, Section::kKeyframes, static_cast<std::uint32_t>(graph.keyframe_count()),
                kKeyframesPerSection, [&](ByteWriter& to, std::uint32_t k) {
-                 put_keyframe(to, graph.keyframe(KeyframeId{k}));
+                 const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+                 put_keyframe(to, keyframe, keyframe.culled() ? graph.heir(KeyframeId{k}) : Heir{});
                  return true;
                });
   write_slices(out, Section::kPoints, static_cast<std::uint32_t>(graph.point_count()), kPointsPerSection,

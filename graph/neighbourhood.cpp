@@ -35,17 +35,14 @@ void collect_edges(const GraphSnapshot& graph, const std::vector<TreeNode>& node
 }  // namespace
 
 void VisitedSet::reset(std::size_t size) {
-  if (marks_.size() < size) marks_.resize(size, 0);
-  if (++round_ == 0) {
-    std::fill(marks_.begin(), marks_.end(), 0);
-    round_ = 1;
-  }
+  met_.clear();
+  size_ = size;
 }
 
 bool VisitedSet::insert(std::uint32_t id) {
-  TWOFOLD_CHECK(id < marks_.size(), "id beyond the size of the round");
-  if (marks_[id] == round_) return false;
-  marks_[id] = round_;
+  TWOFOLD_CHECK(id < size_, "id beyond the size of the round");
+  if (contains(id)) return false;
+  met_.set(id, 0);
   return true;
 }
 

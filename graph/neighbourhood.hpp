@@ -4,24 +4,26 @@
 #include <span>
 #include <vector>
 
+#include "graph/id_map.hpp"
 #include "graph/snapshot.hpp"
 
 namespace twofold {
 
-/// Scratch of searches over the graph: which keyframes or points were already met. Grows to the largest id
-/// seen and is cleared in O(1) by counting rounds.
+/// Scratch of searches over the graph: which keyframes or points were already met. Memory and time follow
+/// what is met, not the ids.
 class VisitedSet {
  public:
   /// Starts a new round for ids below `size`.
   void reset(std::size_t size);
   /// True the first time an id is inserted in this round; ids beyond the size of the round are a bug.
   bool insert(std::uint32_t id);
-  [[nodiscard]] bool contains(std::uint32_t id) const { return id < marks_.size() && marks_[id] == round_; }
-  void reserve(std::size_t size) { marks_.reserve(size); }
+  [[nodiscard]] bool contains(std::uint32_t id) const { return met_.find(id) >= 0; }
+  /// Makes room for `count` ids in a round.
+  void reserve(std::size_t count) { met_.reserve(count); }
 
  private:
-  std::vector<std::uint32_t> marks_;
-  std::uint32_t round_ = 0;
+  IdMap met_;
+  std::size_t size_ = 0;
 };
 
 /// Keyframe met by a search, and the edge it was met along: the searches' spanning tree  (6.2.3).

@@ -12,7 +12,7 @@ class Renumbering {
       : keyframes_(graph.keyframe_count(), kNoKeyframe), points_(graph.point_count(), kNoPoint) {
     std::uint32_t keyframes = 0, points = 0;
     for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-      if (graph.keyframe(KeyframeId{k}).part == part) keyframes_[k] = KeyframeId{keyframes++};
+      if (graph.part(KeyframeId{k}) == part) keyframes_[k] = KeyframeId{keyframes++};
     }
     for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
       const MapPoint& point = graph.point(PointId{p});
@@ -31,7 +31,6 @@ Keyframe renumbered(const Keyframe& keyframe, const Renumbering& number) {
   Keyframe copy = keyframe;
   copy.id = number(keyframe.id);
   copy.part = KeyframeId{0};
-  if (keyframe.culled()) copy.heir = number(keyframe.heir);
   // Both lists stay in order, because new numbers are in the order of the old ones.
   auto observations = std::make_shared<ObservationList>();
   for (Observation observation : *keyframe.observations) {
@@ -75,10 +74,8 @@ void name_parts(GraphWriter& writer) {
     }
   }
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-    KeyframeId heir{k};
-    while (graph.keyframe(heir).culled()) heir = graph.keyframe(heir).heir;
-    if (graph.keyframe(KeyframeId{k}).part != name[index(heir)])
-      writer.set_part(KeyframeId{k}, name[index(heir)]);
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (!keyframe.culled() && keyframe.part != name[k]) writer.set_part(KeyframeId{k}, name[k]);
   }
 }
 
@@ -101,10 +98,14 @@ SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBoo
   KeyframeId newest = kNoKeyframe;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-    if (keyframe.part != part) continue;
-    const KeyframeId id = number(keyframe.id);
+    const KeyframeId id = number(KeyframeId{k});
+    if (id == kNoKeyframe) continue;
+    if (keyframe.culled()) {
+      const Heir& heir = graph.heir(KeyframeId{k});
+      writer.add_culled_keyframe({number(heir.id), heir.T_this_heir});
+      continue;
+    }
     writer.add_keyframe(renumbered(keyframe, number));
-    if (keyframe.culled()) continue;
     newest = id;
     if (const PlaceAppearance* place = places.find(keyframe.id)) map.places.set(id, *place);
   }

@@ -6,14 +6,20 @@
 
 namespace twofold {
 
-SE3 GraphSnapshot::T_k_w(KeyframeId id) const {
-  SE3 T_k_heir;
-  const Keyframe* keyframe = &this->keyframe(id);
-  while (keyframe->culled()) {
-    T_k_heir = T_k_heir * keyframe->T_this_heir;
-    keyframe = &this->keyframe(keyframe->heir);
+GraphSnapshot::Survivor GraphSnapshot::survivor(KeyframeId id) const {
+  Survivor survivor{id, SE3()};
+  while (keyframe(survivor.id).culled()) {
+    const Heir& next = heir(survivor.id);
+    survivor = {next.id, survivor.T_this_survivor * next.T_this_heir.unpacked()};
   }
-  return T_k_heir * keyframe->T_k_w;
+  return survivor;
+}
+
+SE3 GraphSnapshot::T_k_w(KeyframeId id) const {
+  const Keyframe& keyframe = this->keyframe(id);
+  if (!keyframe.culled()) return keyframe.T_k_w;
+  const auto [heir, T_k_heir] = survivor(id);
+  return T_k_heir * this->keyframe(heir).T_k_w;
 }
 
 Vector3 GraphSnapshot::position(PointId id) const {

@@ -133,19 +133,23 @@ bool PointCuller::in_view(const GraphSnapshot& graph, const MapPoint& point, Poi
          from_anchor.dot(from_here) > kMinViewCosine * from_anchor.norm() * from_here.norm();
 }
 
-int PointCuller::step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) {
-  if (misses_.size() < writer.graph().point_count()) misses_.resize(writer.graph().point_count(), 0);
+int PointCuller::step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const {
   int culled = 0;
   for (const PointId id : points) {
     const MapPoint& point = writer.graph().point(id);
     if (!point.alive() || point.observers->size() > kMinObservers) continue;
-    std::uint8_t& misses = misses_[index(id)];
     if (std::binary_search(point.observers->begin(), point.observers->end(), newest)) {
-      misses = 0;
-    } else if (in_view(writer.graph(), point, id, newest) && ++misses >= options_.max_misses) {
-      writer.cull_point(id);
-      ++culled;
+      if (point.misses > 0) writer.set_misses(id, 0);
+      continue;
     }
+    if (!in_view(writer.graph(), point, id, newest)) continue;
+    const int misses = point.misses + 1;
+    if (misses < options_.max_misses) {
+      writer.set_misses(id, static_cast<std::uint8_t>(misses));
+      continue;
+    }
+    writer.cull_point(id);
+    ++culled;
   }
   return culled;
 }

@@ -36,7 +36,7 @@ class PointCuller {
   PointCuller(const Rig& rig, const CullingOptions& options) : rig_(rig), options_(options) {}
 
   /// Judges the given points by the keyframe that was inserted last. Returns the number of points culled.
-  int step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points);
+  int step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const;
 
  private:
   [[nodiscard]] bool in_view(const GraphSnapshot& graph, const MapPoint& point, PointId id,
@@ -44,7 +44,6 @@ class PointCuller {
 
   Rig rig_;
   CullingOptions options_;
-  std::vector<std::uint8_t> misses_;  ///< by point, since it was last seen
 };
 
 }  // namespace twofold

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "graph/graph_writer.hpp"
+#include "graph/id_map.hpp"
 #include "graph/neighbourhood.hpp"
-#include "mapping/id_map.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "graph/graph_writer.hpp"
-#include "mapping/id_map.hpp"
+#include "graph/id_map.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {

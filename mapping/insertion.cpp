@@ -19,13 +19,8 @@ const Observation* observation_of(const KeyframeProposal& proposal, PointId poin
 
 /// The reference, or the keyframe that inherited its place, and the new keyframe's pose relative to it.
 std::pair<KeyframeId, SE3> present_reference(const GraphSnapshot& graph, const KeyframeProposal& proposal) {
-  KeyframeId id = proposal.reference;
-  SE3 T_k_ref = proposal.T_k_ref;
-  while (graph.keyframe(id).culled()) {
-    T_k_ref = T_k_ref * graph.keyframe(id).T_this_heir;
-    id = graph.keyframe(id).heir;
-  }
-  return {id, T_k_ref};
+  const auto [id, T_ref_id] = graph.survivor(proposal.reference);
+  return {id, proposal.T_k_ref * T_ref_id};
 }
 
 void add_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, const SE3& T_k_w, KeyframeId part) {

@@ -1,10 +1,10 @@
 #pragma once
 
 #include "graph/graph_writer.hpp"
+#include "graph/id_map.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "mapping/double_window.hpp"
 #include "mapping/edges.hpp"
-#include "mapping/id_map.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {

@@ -21,7 +21,7 @@ int join_parts(GraphWriter& writer, KeyframeId from, KeyframeId to, const SE3& T
   const GraphSnapshot& graph = writer.graph();
   KeyframeId moved = from, fixed = to;
   SE3 T_fixed_moved = T_to_from;
-  const auto part = [&](KeyframeId id) { return graph.keyframe(id).part; };
+  const auto part = [&](KeyframeId id) { return graph.part(id); };
   if (part(moved) == part(fixed)) return 0;
   const std::size_t moved_size = size_of(graph, part(moved)), fixed_size = size_of(graph, part(fixed));
   if (moved_size > fixed_size || (moved_size == fixed_size && part(moved) < part(fixed))) {
@@ -34,9 +34,8 @@ int join_parts(GraphWriter& writer, KeyframeId from, KeyframeId to, const SE3& T
   int count = 0;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const KeyframeId id{k};
-    if (part(id) != old_part) continue;
+    if (graph.keyframe(id).culled() || part(id) != old_part) continue;  // those go along with their heirs
     writer.set_part(id, new_part);
-    if (graph.keyframe(id).culled()) continue;  // its pose goes along with its heir's
     writer.set_pose(id, graph.keyframe(id).T_k_w * T_before_w);
     ++count;
   }

@@ -80,15 +80,10 @@ void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
 void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   if (!graph().contains(loop.from) || !graph().contains(loop.to)) return;
   // A constraint of a keyframe that was culled in the meantime passes to its heir.
-  KeyframeId from = loop.from, to = loop.to;
-  SE3 T_to_from = loop.T_to_from;
-  for (; graph().keyframe(from).culled(); from = graph().keyframe(from).heir) {
-    T_to_from = T_to_from * graph().keyframe(from).T_this_heir;
-  }
-  for (; graph().keyframe(to).culled(); to = graph().keyframe(to).heir) {
-    T_to_from = graph().keyframe(to).T_this_heir.inverse() * T_to_from;
-  }
+  const auto [from, T_loop_from] = graph().survivor(loop.from);
+  const auto [to, T_loop_to] = graph().survivor(loop.to);
   if (from == to) return;
+  const SE3 T_to_from = T_loop_to.inverse() * loop.T_to_from * T_loop_from;
   report.joined += join_parts(writer_, from, to, T_to_from);
   link_marginalised(writer_, from, to, std::max(1, loop.inliers), T_to_from);
   writer_.announce_jump(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
@@ -97,8 +92,7 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
 
 void Mapper::revisit(KeyframeId tracker_reference) {
   if (tracker_reference == kNoKeyframe || !graph().contains(tracker_reference)) return;
-  KeyframeId id = tracker_reference;
-  while (graph().keyframe(id).culled()) id = graph().keyframe(id).heir;
+  const KeyframeId id = graph().survivor(tracker_reference).id;
   writer_.set_reference(id);
   if (consistent_.contains(id)) return;
   consistent_.clear();

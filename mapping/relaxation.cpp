@@ -1,9 +1,9 @@
 #include "mapping/relaxation.hpp"
 
 #include "estimation/pose_graph.hpp"
+#include "graph/id_map.hpp"
 #include "graph/neighbourhood.hpp"
 #include "mapping/edges.hpp"
-#include "mapping/id_map.hpp"
 
 namespace twofold {
 namespace {

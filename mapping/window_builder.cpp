@@ -18,12 +18,6 @@ bool plausible(const Vector3& psi) {
   return psi.allFinite() && psi.z() > kMinInverseDepth && psi.z() < kMaxInverseDepth;
 }
 
-/// Keyframe whose pose a (perhaps culled) keyframe hangs on.
-KeyframeId living_heir(const GraphSnapshot& graph, KeyframeId id) {
-  while (graph.keyframe(id).culled()) id = graph.keyframe(id).heir;
-  return id;
-}
-
 }  // namespace
 
 WindowBuilder::WindowBuilder(const Rig& rig, const MapperOptions& options) : options_(options) {
@@ -59,7 +53,7 @@ bool WindowBuilder::anchor_point(const GraphSnapshot& graph, const DoubleWindow&
   }
   // An anchor that was culled moves with its heir. In the problem such a point hangs on a frame that sees it.
   if (!graph.keyframe(map_point.anchor).culled()) return false;
-  if (!window.contains(living_heir(graph, map_point.anchor))) return false;
+  if (!window.contains(graph.survivor(map_point.anchor).id)) return false;
   point.anchor = seen_from;
   const KeyframeId seen_from_id = window.nodes[static_cast<std::size_t>(seen_from)].id;
   const SE3 T_k_a = graph.keyframe(seen_from_id).T_k_w * graph.T_k_w(map_point.anchor).inverse();

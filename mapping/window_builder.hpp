@@ -4,8 +4,8 @@
 
 #include "estimation/window_problem.hpp"
 #include "graph/graph_writer.hpp"
+#include "graph/id_map.hpp"
 #include "mapping/double_window.hpp"
-#include "mapping/id_map.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {

@@ -28,7 +28,7 @@ KeyframeId part_of(const GraphSnapshot& graph, const LocalPoints& local, Keyfram
     if (pending->reference == kNoKeyframe) return k;
     k = pending->reference;
   }
-  return graph.keyframe(k).part;
+  return graph.part(k);
 }
 
 SE3 relative_pose(const GraphSnapshot& graph, const LocalPoints& local, KeyframeId k, KeyframeId ref) {

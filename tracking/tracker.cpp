@@ -132,9 +132,9 @@ void Tracker::adopt(const GraphSnapshot& graph) {
   }
   local_.adopt(graph);
   if (graph.contains(reference_) && graph.keyframe(reference_).culled()) {
-    const Keyframe& keyframe = graph.keyframe(reference_);
-    T_prev_ref_ = T_prev_ref_ * keyframe.T_this_heir;
-    reference_ = keyframe.heir;
+    const auto [heir, T_ref_heir] = graph.survivor(reference_);
+    T_prev_ref_ = T_prev_ref_ * T_ref_heir;
+    reference_ = heir;
   }
 }
 

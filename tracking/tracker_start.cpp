@@ -25,13 +25,11 @@ void Tracker::relocalise(KeyframeId id, const SE3& T_c_k) {
 
 /// Moves to where the loop closer recognised the camera, if it is lost.
 bool Tracker::take_hint(const GraphSnapshot& graph) {
-  KeyframeId id = std::exchange(hint_keyframe_, kNoKeyframe);
+  const KeyframeId id = std::exchange(hint_keyframe_, kNoKeyframe);
   if (id == kNoKeyframe || lost_frames_ == 0 || !graph.contains(id)) return false;
-  T_prev_ref_ = hint_T_c_k_;
-  for (; graph.keyframe(id).culled(); id = graph.keyframe(id).heir) {
-    T_prev_ref_ = T_prev_ref_ * graph.keyframe(id).T_this_heir;
-  }
-  reference_ = id;
+  const auto [survivor, T_k_survivor] = graph.survivor(id);
+  T_prev_ref_ = hint_T_c_k_ * T_k_survivor;
+  reference_ = survivor;
   candidates_stale_ = true;
   return true;
 }

@@ -40,7 +40,7 @@ std::vector<PlyPoint> map_points(const GraphSnapshot& graph, KeyframeId part) {
   std::vector<PlyPoint> points;
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
     const MapPoint& point = graph.point(PointId{p});
-    if (!point.alive() || graph.keyframe(point.anchor).part != part) continue;
+    if (!point.alive() || graph.part(point.anchor) != part) continue;
     const std::uint8_t grey =
         point.appearance->pixels[PointAppearance::kCentre * (PointAppearance::kSize + 1)];
     points.push_back({graph.position(PointId{p}), {grey, grey, grey}});

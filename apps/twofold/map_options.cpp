@@ -71,8 +71,7 @@ std::optional<std::int64_t> recognised_at(const EngineOptions& options, const Ru
   const GraphSnapshot& graph = result.graph;
   for (const FrameRecord& record : result.frames) {
     if (record.state != FrameState::kTracked || !graph.contains(record.reference)) continue;
-    if (graph.keyframe(record.reference).part == graph.keyframe(KeyframeId{0}).part)
-      return record.frame_index;
+    if (graph.part(record.reference) == graph.part(KeyframeId{0})) return record.frame_index;
   }
   return std::nullopt;
 }

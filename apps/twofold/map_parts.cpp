@@ -14,22 +14,23 @@ std::vector<MapPart> map_parts(const RunResult& result, const EngineOptions& opt
   std::map<KeyframeId, MapPart> found;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (keyframe.culled()) continue;
     MapPart& part = found[keyframe.part];
     part.id = keyframe.part;
-    part.keyframes += keyframe.culled() ? 0 : 1;
+    ++part.keyframes;
   }
   for (const FrameRecord& record : result.frames) {
     // A keyframe the mapper never got to (the run was cut short) leaves its frames without a place in the
     // map.
     if (record.state != FrameState::kTracked || !graph.contains(record.reference)) continue;
-    found[graph.keyframe(record.reference).part].trajectory.push_back(
+    found[graph.part(record.reference)].trajectory.push_back(
         {record.t_ns, final_T_c_w(record, graph).inverse()});
   }
   std::vector<MapPart> parts;
   for (auto& [id, part] : found) parts.push_back(std::move(part));
   if (parts.empty()) parts.emplace_back();
   const KeyframeId loaded =
-      options.map && graph.keyframe_count() > 0 ? graph.keyframe(KeyframeId{0}).part : kNoKeyframe;
+      options.map && graph.keyframe_count() > 0 ? graph.part(KeyframeId{0}) : kNoKeyframe;
   std::stable_sort(parts.begin(), parts.end(), [&](const MapPart& a, const MapPart& b) {
     if (a.id == loaded || b.id == loaded) return a.id == loaded && b.id != loaded;
     return a.trajectory.size() > b.trajectory.size();

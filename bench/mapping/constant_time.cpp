@@ -2,18 +2,18 @@
 // Simulated stereo camera, known truth; the maps are made by the mapper itself, with small windows where only
 // the size of the map matters.
 #include <fmt/format.h>
-#include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "bench/mapping/live_memory.hpp"
+#include "bench/mapping/simulated_run.hpp"
 #include "graph/neighbourhood.hpp"
-#include "mapping/mapper.hpp"
-#include "tests/mapping/simulation.hpp"
 
 namespace twofold {
 namespace {
@@ -23,27 +23,6 @@ using simulation::Simulation;
 
 double us_since(Clock::time_point start) {
   return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-}
-
-struct Samples {
-  std::vector<double> values;
-
-  void add(double value) { values.push_back(value); }
-  [[nodiscard]] double quantile(double q) const {
-    std::vector<double> sorted = values;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1))];
-  }
-  [[nodiscard]] double median() const { return quantile(0.5); }
-};
-
-MapperOptions mapper_options(int inner, int outer) {
-  MapperOptions options;
-  options.inner_window = inner;
-  options.outer_window = outer;
-  options.sigma_scale = 2;  // one pixel of noise
-  options.edge.sigma_px = 1;
-  return options;
 }
 
 /// A straight flight over endless ground: no place is seen twice.
@@ -57,11 +36,6 @@ Simulation exploration(int keyframes) {
   options.rig = simulation::thesis_rig();
   options.max_observations = 180;
   return {options, simulation::scattered_points(path, 2, 40, 1), path};
-}
-
-MapperReport map_next(Simulation& simulation, Mapper& mapper) {
-  KeyframeProposal* proposal = &simulation.propose(mapper.graph());
-  return mapper.step(std::span(&proposal, 1));
 }
 
 struct Measurement {
@@ -165,10 +139,10 @@ nlohmann::json explore(const std::vector<int>& sizes, int rounds) {
     const Measurement m = measure_rounds(simulation, *mapper, rounds);
     const LoopMeasurement loops = measure_loops(simulation.rig(), *mapper);
     // What the mapper and its graph hold is what comes back when they go.
-    const std::size_t with = mallinfo2().uordblks;
+    const std::size_t with = live_heap_bytes();
     mapper.reset();
     const double kib =
-        static_cast<double>(with - mallinfo2().uordblks) / 1024 / static_cast<double>(m.keyframes);
+        static_cast<double>(with - live_heap_bytes()) / 1024 / static_cast<double>(m.keyframes);
     fmt::print(
         "{:9} {:9.2f} {:9.2f} {:9.2f} {:9.2f} {:9.1f} {:9.1f} {:11.1f}   {:.2f} {:.2f} {:.2f} {:.2f} "
         "{:.2f} {:.2f} {:.2f}\n",
@@ -202,53 +176,6 @@ nlohmann::json explore(const std::vector<int>& sizes, int rounds) {
   return out;
 }
 
-/// Laps of the same circle by a tracker that forgets points out of sight.
-nlohmann::json browse(int laps) {
-  constexpr int kLap = 120;
-  const std::vector<SE3> path = simulation::circle_path(kLap * laps, laps, 2.2, 1.2);
-  simulation::Options options;
-  options.rig = simulation::thesis_rig();
-  options.global_association = false;
-  options.max_observations = 180;
-  Simulation simulation(options, simulation::scattered_points(path, 2, 40, 1), path);
-  auto mapper = std::make_unique<Mapper>(options.rig, mapper_options(25, 175), simulation.search(10));
-  nlohmann::json out = nlohmann::json::array();
-  double heap = 0;  // of the mapper and its graph, without the simulation [bytes]
-  fmt::print("\nbrowsing: laps of {} keyframes\n{:>5} {:>9} {:>9} {:>12} {:>9} {:>9} {:>9} {:>9}\n", kLap,
-             "lap", "keyframes", "points", "measurements", "edges", "heap MiB", "round ms", "point ids");
-  for (int lap = 1; lap <= laps; ++lap) {
-    Samples round_ms;
-    for (int n = 0; n < kLap; ++n) {
-      KeyframeProposal* proposal = &simulation.propose(mapper->graph());
-      const std::size_t before = mallinfo2().uordblks;
-      round_ms.add(mapper->step(std::span(&proposal, 1)).ms.total());
-      heap += static_cast<double>(mallinfo2().uordblks) - static_cast<double>(before);
-    }
-    const GraphSnapshot& graph = mapper->graph();
-    std::size_t keyframes = 0, points = 0, measurements = 0, edges = 0;
-    for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-      const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-      keyframes += keyframe.culled() ? 0 : 1;
-      measurements += keyframe.observations->size();
-      edges += keyframe.edges->size() / 2;
-    }
-    for (std::uint32_t p = 0; p < graph.point_count(); ++p) points += graph.point(PointId{p}).alive() ? 1 : 0;
-    if (lap <= 5 || lap % 5 == 0) {
-      fmt::print("{:5} {:9} {:9} {:12} {:9} {:9.2f} {:9.2f} {:9}\n", lap, keyframes, points, measurements,
-                 edges, heap / (1024 * 1024), round_ms.median(), graph.point_count());
-      std::fflush(stdout);
-    }
-    out.push_back({{"lap", lap},
-                   {"keyframes", keyframes},
-                   {"points", points},
-                   {"measurements", measurements},
-                   {"edges", edges},
-                   {"heap_mib", heap / (1024 * 1024)},
-                   {"round_ms_median", round_ms.median()}});
-  }
-  return out;
-}
-
 }  // namespace
 }  // namespace twofold
 
@@ -256,14 +183,22 @@ int main(int argc, char** argv) {
   CLI::App app("Cost of the mapper against the size of the map");
   std::vector<int> sizes{300, 3000, 20000};
   int rounds = 100, laps = 20;
+  double hours = 0, keyframe_rate = 2;
+  bool only_browse = false;
   std::string json_file;
   app.add_option("--keyframes", sizes, "Sizes of the explored map")->check(CLI::Range(100, 1000000));
   app.add_option("--rounds", rounds, "Rounds measured at each size")->check(CLI::Range(2, 100000));
   app.add_option("--laps", laps, "Laps of browsing, 0 for none")->check(CLI::Range(0, 10000));
+  app.add_option("--hours", hours, "Browse for so long instead, time-compressed")
+      ->check(CLI::Range(0.0, 100.0));
+  app.add_option("--keyframe-rate", keyframe_rate, "Keyframes a second for --hours")
+      ->check(CLI::Range(0.01, 30.0));
+  app.add_flag("--only-browse", only_browse, "No exploration");
   app.add_option("--json", json_file, "Also write the figures to this file");
   CLI11_PARSE(app, argc, argv);
   nlohmann::json result;
-  result["exploration"] = twofold::explore(sizes, rounds);
+  if (!only_browse) result["exploration"] = twofold::explore(sizes, rounds);
+  if (hours > 0) laps = static_cast<int>(std::ceil(3600 * hours * keyframe_rate / twofold::kBrowsedLap));
   if (laps > 0) result["browsing"] = twofold::browse(laps);
   if (!json_file.empty()) {
     std::ofstream out(json_file);

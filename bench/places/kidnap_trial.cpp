@@ -23,7 +23,7 @@ SE3 error_of(const FrameRecord& record, const GraphSnapshot& graph, const SE3& T
 }
 
 bool in_old_map(const FrameRecord& record, const GraphSnapshot& graph) {
-  return graph.keyframe(record.reference).part == graph.keyframe(KeyframeId{0}).part;
+  return graph.part(record.reference) == graph.part(KeyframeId{0});
 }
 
 }  // namespace

@@ -184,7 +184,7 @@ class MapPartsTest : public EnginePlacesTest {
     ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
     for (std::uint32_t k = 0; k < a.graph.keyframe_count(); ++k) {
       EXPECT_EQ(a.graph.T_k_w(KeyframeId{k}).matrix(), b.graph.T_k_w(KeyframeId{k}).matrix()) << k;
-      EXPECT_EQ(a.graph.keyframe(KeyframeId{k}).part, b.graph.keyframe(KeyframeId{k}).part) << k;
+      EXPECT_EQ(a.graph.part(KeyframeId{k}), b.graph.part(KeyframeId{k})) << k;
     }
   }
 };
@@ -212,7 +212,7 @@ TEST_F(MapPartsTest, ALostCameraStartsAPartThatJoinsWhenAPlaceOfBothIsRecognised
   EXPECT_TRUE(std::any_of(result.loops.begin(), result.loops.end(),
                           [](const ClosedLoop& loop) { return loop.joins_parts; }));
   for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k) {
-    EXPECT_EQ(result.graph.keyframe(KeyframeId{k}).part, result.graph.keyframe(KeyframeId{0}).part);
+    EXPECT_EQ(result.graph.part(KeyframeId{k}), result.graph.part(KeyframeId{0}));
   }
 }
 
@@ -252,7 +252,7 @@ TEST_F(MapPartsTest, InAnUnknownPlaceThePartStaysApart) {
     }
     EXPECT_EQ(record.part_causal, part);
     EXPECT_NE(record.part_causal, KeyframeId{0});
-    EXPECT_EQ(result.graph.keyframe(record.reference).part, part);
+    EXPECT_EQ(result.graph.part(record.reference), part);
     // Its world is where it started, with nothing of the old part in it.
     EXPECT_LT((record.T_c_w_causal * (T_c_w_true * T_start_w.inverse()).inverse()).translation().norm(),
               0.03);

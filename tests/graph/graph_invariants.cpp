@@ -49,21 +49,25 @@ std::string broken_edge(const GraphSnapshot& graph, const Keyframe& keyframe) {
   return {};
 }
 
-std::string broken_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe) {
-  if (!keyframe.observations || !keyframe.edges) return name(keyframe.id) + " has no lists";
-  if (!keyframe.T_k_w.log().allFinite()) return name(keyframe.id) + ": pose is not finite";
-  if (keyframe.culled()) {
-    if (!keyframe.observations->empty() || !keyframe.edges->empty()) {
-      return "culled " + name(keyframe.id) + " still has observations or edges";
-    }
-    std::size_t steps = 0;
-    KeyframeId heir = keyframe.id;
-    while (graph.keyframe(heir).culled()) {
-      heir = graph.keyframe(heir).heir;
-      if (++steps > graph.keyframe_count()) return name(keyframe.id) + ": heirs go in circles";
-    }
-    return {};
+/// The chain of heirs must end in a keyframe that was not culled.
+std::string broken_heirs(const GraphSnapshot& graph, KeyframeId id) {
+  std::size_t steps = 0;
+  for (KeyframeId heir = id; graph.keyframe(heir).culled(); heir = graph.heir(heir).id) {
+    if (!graph.contains(graph.heir(heir).id)) return name(heir) + " was culled and has no heir";
+    if (++steps > graph.keyframe_count()) return name(id) + ": heirs go in circles";
   }
+  return {};
+}
+
+std::string broken_keyframe(const GraphSnapshot& graph, KeyframeId id) {
+  const Keyframe& keyframe = graph.keyframe(id);
+  if (!keyframe.observations || !keyframe.edges) return name(id) + " has no lists";
+  if (!graph.T_k_w(id).log().allFinite()) return name(id) + ": pose is not finite";
+  if (keyframe.culled()) {
+    if (keyframe.observations->empty() && keyframe.edges->empty()) return {};
+    return "culled " + name(id) + " still has observations or edges";
+  }
+  if (keyframe.id != id) return name(id) + " has another's id";
   std::string broken = broken_observation(graph, keyframe);
   return broken.empty() ? broken_edge(graph, keyframe) : broken;
 }
@@ -89,9 +93,8 @@ std::string broken_point(const GraphSnapshot& graph, PointId id, std::size_t min
 
 std::string broken_invariant(const GraphSnapshot& graph, std::size_t min_observers) {
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-    if (keyframe.id != KeyframeId{k}) return name(KeyframeId{k}) + " has another's id";
-    if (std::string broken = broken_keyframe(graph, keyframe); !broken.empty()) return broken;
+    if (std::string broken = broken_heirs(graph, KeyframeId{k}); !broken.empty()) return broken;
+    if (std::string broken = broken_keyframe(graph, KeyframeId{k}); !broken.empty()) return broken;
   }
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
     if (std::string broken = broken_point(graph, PointId{p}, min_observers); !broken.empty()) return broken;

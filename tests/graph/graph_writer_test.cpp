@@ -139,10 +139,17 @@ TEST(GraphWriter, CulledKeyframesAndTheirPointsFollowTheirHeirs) {
   EXPECT_LT((writer.graph().position(PointId{0}) - position).norm(), 1e-12);
 
   writer.shorten_heirs(k[0]);
-  EXPECT_EQ(writer.graph().keyframe(k[0]).heir, k[3]);
+  EXPECT_EQ(writer.graph().heir(k[0]).id, k[3]);
   writer.shorten_heirs(k[3]);  // nothing to do for one that stayed
   EXPECT_FALSE(writer.graph().keyframe(k[3]).culled());
   EXPECT_EQ(broken_invariant(writer.graph()), "");
+
+  EXPECT_TRUE(writer.graph().keyframe(k[0]).culled());
+  EXPECT_EQ(writer.graph().survivor(k[1]).id, k[3]);
+  EXPECT_EQ(writer.graph().survivor(k[3]).id, k[3]);
+  EXPECT_EQ(writer.graph().part(k[0]), writer.graph().keyframe(k[3]).part);
+  writer.set_part(k[3], k[3]);
+  EXPECT_EQ(writer.graph().part(k[0]), k[3]);
 
   const SE3 T_3_w = random_pose(rng);
   writer.set_pose(k[3], T_3_w);

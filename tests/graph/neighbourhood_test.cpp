@@ -172,6 +172,24 @@ TEST(VisiblePoints, EachPointOnceAndOnlyPointsAlive) {
   }
 }
 
+TEST(IdMap, HoldsWhatWasSetInThisRoundWhateverTheIds) {
+  std::mt19937 rng(3);
+  IdMap map;
+  for (int round = 0; round < 20; ++round) {
+    std::map<std::uint32_t, int> truth;
+    for (int n = 0; n < 500; ++n) {
+      const std::uint32_t id = rng() % 3 == 0 ? rng() % 200 : rng();
+      EXPECT_EQ(map.find(id), truth.contains(id) ? truth[id] : -1);
+      map.set(id, n);
+      truth[id] = n;
+    }
+    for (const auto& [id, value] : truth) ASSERT_EQ(map.find(id), value);
+    EXPECT_EQ(map.find(0xffffffffU), -1);
+    map.clear();
+    for (const auto& [id, value] : truth) ASSERT_EQ(map.find(id), -1);
+  }
+}
+
 TEST(VisitedSet, RoundsForgetAndIdsBeyondTheRoundAreABug) {
   VisitedSet visited;
   visited.reset(10);

@@ -132,6 +132,40 @@ TEST(PersistentVector, ForgottenChunksReadAsDefaultsUntilWritten) {
   EXPECT_FALSE(v.forget_chunk_if(9, [](int value) { return value == 0; }));
 }
 
+TEST(PersistentVector, RangesThatWereNeverWrittenOrAllForgottenTakeNoMemory) {
+  struct Living {
+    Living() { ++count(); }
+    Living(const Living& other) : value(other.value) { ++count(); }
+    Living& operator=(const Living&) = default;
+    ~Living() { --count(); }
+    static long& count() {
+      static long living = 0;
+      return living;
+    }
+    int value = 0;
+  };
+  PersistentVector<Living, 2, 1> v;
+  v.extend(1000);
+  EXPECT_EQ(v.size(), 1000U);
+  EXPECT_EQ(v[999].value, 0);
+  const long none = Living::count();
+  for (std::size_t i = 0; i < 1000; ++i) v.mutate(i).value = static_cast<int>(i);
+  for (std::size_t i = 0; i < 1000; ++i) ASSERT_EQ(v[i].value, static_cast<int>(i));
+  EXPECT_GE(Living::count(), none + 998);
+  v.extend(7);  // nothing to do
+  EXPECT_EQ(v.size(), 1000U);
+  const auto all = [](const Living&) { return true; };
+  for (std::size_t i = 0; i < 1000; i += 2) EXPECT_TRUE(v.forget_chunk_if(i, all));
+  EXPECT_LE(Living::count(), none);
+  for (std::size_t i = 0; i < 1000; ++i) ASSERT_EQ(v[i].value, 0);
+  EXPECT_TRUE(v.forget_chunk_if(4, all));  // where whole branches are gone
+  v.mutate(500).value = 5;
+  v.push_back({});
+  EXPECT_EQ(v[500].value, 5);
+  EXPECT_EQ(v[501].value, 0);
+  EXPECT_EQ(v.size(), 1001U);
+}
+
 TEST(PersistentVector, WritingBeyondTheEndIsABug) {
   PersistentVector<int> v;
   v.push_back(1);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "mapping/mapper.hpp"
 #include "tests/graph/graph_invariants.hpp"
 #include "tests/mapping/simulation.hpp"
@@ -125,6 +127,16 @@ TEST(Culling, BrowsingAMappedPlaceDoesNotGrowTheMap) {
     ASSERT_EQ(component_count(mapper.graph()), 1);
     if (n % lap == 0) after_lap.push_back(living(mapper.graph()));
   }
+  // Nothing remains of what was culled but heirs, and what shares a chunk of 8 with something that stayed.
+  std::set<const void*> keyframes, points;
+  for (std::uint32_t i = 0; i < mapper.graph().keyframe_count(); ++i)
+    keyframes.insert(&mapper.graph().keyframe(k(i)));
+  for (std::uint32_t p = 0; p < mapper.graph().point_count(); ++p)
+    points.insert(&mapper.graph().point(PointId{p}));
+  EXPECT_LE(keyframes.size(), 8 * (after_lap.back().keyframes + 1));
+  EXPECT_LT(keyframes.size(), mapper.graph().keyframe_count() / 2);
+  EXPECT_LE(points.size(), 8 * (after_lap.back().points + 1));
+  EXPECT_LE(sizeof(Heir), 64U);
   const Size& second = after_lap[2];
   const Size& last = after_lap.back();
   EXPECT_LE(last.keyframes, second.keyframes * 11 / 10);

@@ -61,7 +61,7 @@ TEST(MapParts, CulledKeyframesGoAlong) {
   const GraphSnapshot before = writer.graph();
   writer.cull_keyframe(culled, heir);
   EXPECT_EQ(join_parts(writer, heir, KeyframeId{0}, kConstraint), 3);
-  EXPECT_EQ(writer.graph().keyframe(culled).part, KeyframeId{0});
+  EXPECT_EQ(writer.graph().part(culled), KeyframeId{0});
   const std::uint32_t a = index(culled), b = index(heir);
   EXPECT_LT((relative(writer.graph(), a, b) * relative(before, a, b).inverse()).log().norm(), 1e-12);
 }
