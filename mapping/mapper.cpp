@@ -131,6 +131,7 @@ void Mapper::optimise(MapperReport& report) {
       structure.max_iterations = options_.structure_iterations;
       optimise_structure(builder_.problem(), structure);
     }
+    if (options_.watch_problem) options_.watch_problem(builder_.problem());
     report.solver = solver_.solve(builder_.problem(), options_.solver);
   }
   const StageTime time(report.ms.write);

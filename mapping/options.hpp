@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "estimation/window_problem.hpp"
@@ -50,6 +51,9 @@ struct MapperOptions {
   double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom
   MetricLoopOptions loop;
   CullingOptions culling;
+  /// If set, is shown each problem of eq. 6.4 as it stands before the joint optimisation: to take problems
+  /// out of a running mapper and measure solvers on them.
+  std::function<void(const WindowProblem&)> watch_problem;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -72,11 +72,17 @@ TEST(Mapper, KeepsInvariantsAndLowersTheCostInEveryRound) {
     options.culling = {};
     options.culling.keep_recent = 4;
     options.loop.enabled = true;
+    double watched_cost = -1;
+    options.watch_problem = [&](const WindowProblem& problem) {
+      EXPECT_EQ(invalid_reason(problem), "");
+      watched_cost = window_cost(problem, options.solver);
+    };
     Mapper mapper(simulation::thesis_rig(kind), options, simulation.search(10));
     std::vector<GraphSnapshot> published;
     while (!simulation.done()) {
       const MapperReport report = map_next(simulation, mapper);
       ASSERT_LE(report.solver.final_cost, report.solver.initial_cost);
+      ASSERT_NEAR(watched_cost, report.solver.initial_cost, 1e-9 * watched_cost);
       ASSERT_EQ(broken_invariant(mapper.graph(), 2), "") << "keyframe " << mapper.graph().keyframe_count();
       ASSERT_EQ(component_count(mapper.graph()), 1);
       ASSERT_LE(report.inner_window, options.inner_window);
