@@ -58,12 +58,18 @@ PoseElimination::Values PoseElimination::start(const WindowProblem& problem) {
 
 double PoseElimination::cost(const WindowSolverOptions& options, const Values& values) const {
   const HuberKernel kernel{options.huber_px};
+  std::vector<Vector3> x_w;
+  x_w.reserve(values.psi.size());
+  for (std::size_t k = 0; k < values.psi.size(); ++k) {
+    x_w.push_back(T_w_frame_[k] * from_inverse_depth(values.psi[k]));
+  }
   double sum = 0;
   for (std::size_t i = 0; i < values.poses.size(); ++i) {
+    const Matrix3 R = values.poses[i].rotation();
     for (int n = begin_[i]; n < begin_[i + 1]; ++n) {
       const Observation& o = observations_[n];
-      const Vector3 p_w = T_w_frame_[o.point] * from_inverse_depth(values.psi[o.point]);
-      const double chi2 = model_->chi2(values.poses[i] * p_w, o.z, o.information);
+      const Vector3 x = R * x_w[o.point] + values.poses[i].translation();
+      const double chi2 = model_->chi2(x, o.z, o.information);
       if (!std::isfinite(chi2)) return std::numeric_limits<double>::infinity();
       sum += kernel.rho(chi2);
     }
@@ -71,54 +77,73 @@ double PoseElimination::cost(const WindowSolverOptions& options, const Values& v
   return sum;
 }
 
-/// With A = J_x [I, -[x]x] by the pose and B = J_x dx/dpsi by the point, J_x and W in the terms of the model:
-/// H = sum A^T W A, coupling A^T W B, V = sum B^T W B.
-void PoseElimination::linearise_pose(int i, const HuberKernel& kernel, const Values& values) {
-  PoseBlock& block = blocks_[i];
-  block.H.setZero();
-  block.gradient.setZero();
-  for (int n = begin_[i]; n < begin_[i + 1]; ++n) {
-    const Observation& o = observations_[n];
-    const Vector3& psi = values.psi[o.point];
-    const double inv_q = 1 / psi.z();
-    const SE3 T = values.poses[i] * T_w_frame_[o.point];
-    const Matrix3 R = T.rotation();
-    const Vector3 Ry = R * from_inverse_depth(psi);
-    const Vector3 x = Ry + T.translation();
-    const ObservationTerms terms = model_->linearise(x, o.z, o.information, kernel);
-    Matrix3 J;  // dx / dpsi (B.20)
-    J << R.col(0) * inv_q, R.col(1) * inv_q, -inv_q * Ry;
-    Matrix3 S, SJ;
-    S << terms.s00, 0, terms.s02, 0, terms.s11, terms.s12, terms.s02, terms.s12, terms.s22;
-    SJ.noalias() = S * J;
-    const Matrix3 X = hat(x);
-    const Matrix3 XS = X * S;
-    block.H.topLeftCorner<3, 3>() += S;
-    block.H.bottomLeftCorner<3, 3>() += XS;
-    block.H.topRightCorner<3, 3>() += XS.transpose();
-    block.H.bottomRightCorner<3, 3>() -= XS * X;
-    block.gradient.head<3>() += terms.force;
-    block.gradient.tail<3>() += x.cross(terms.force);
-    couplings_[n] << SJ, X * SJ;
-    V_[o.point].noalias() += J.transpose() * SJ;
-    gradient_.segment<3>(3 * o.point).noalias() += J.transpose() * terms.force;
+void PoseElimination::linearise_points(const Values& values) {
+  points_.resize(values.psi.size());
+  for (std::size_t k = 0; k < values.psi.size(); ++k) {
+    const Matrix3 R = T_w_frame_[k].rotation();
+    const double inv_q = 1 / values.psi[k].z();
+    const Vector3 Ry = R * from_inverse_depth(values.psi[k]);
+    points_[k].x_w = Ry + T_w_frame_[k].translation();
+    points_[k].dx_dpsi << R.col(0) * inv_q, R.col(1) * inv_q, -inv_q * Ry;  // (B.20)
   }
 }
 
-/// Subtracts Y_k^T Y_l and Y_k^T c, Y = L^-1 A^T W B, from the system of the points.
+/// With A = J_x [I, -[x]x] by the pose and B = J_x dx/dpsi by the point, J_x and W in the terms of the model:
+/// H = sum A^T W A, coupling A^T W B, V = sum B^T W B.
+void PoseElimination::linearise_pose(int i, const HuberKernel& kernel, const Values& values) {
+  const Matrix3 R = values.poses[i].rotation();
+  const Vector3& t = values.poses[i].translation();
+  Couplings Yt = couplings(i);
+  Matrix3 H_vv = Matrix3::Zero(), H_wv = Matrix3::Zero(), H_ww = Matrix3::Zero();
+  Vector3 g_v = Vector3::Zero(), g_w = Vector3::Zero();
+  for (int n = begin_[i]; n < begin_[i + 1]; ++n) {
+    const Observation& o = observations_[n];
+    const WorldPoint& point = points_[o.point];
+    const Vector3 x = R * point.x_w + t;
+    const ObservationTerms terms = model_->linearise(x, o.z, o.information, kernel);
+    const Matrix3 J = R * point.dx_dpsi;
+    Matrix3 S;
+    S << terms.s00, 0, terms.s02, 0, terms.s11, terms.s12, terms.s02, terms.s12, terms.s22;
+    const Matrix3 X = hat(x);
+    const Matrix3 XS = X.lazyProduct(S);
+    const Matrix3 JtS = J.transpose().lazyProduct(S);
+    H_vv += S;
+    H_wv += XS;
+    H_ww -= XS.lazyProduct(X);
+    g_v += terms.force;
+    g_w += x.cross(terms.force);
+    Yt.block<3, 3>(3 * (n - begin_[i]), 0) = JtS;
+    Yt.block<3, 3>(3 * (n - begin_[i]), 3) = -JtS.lazyProduct(X);  // X^T = -X
+    V_[o.point] += JtS.lazyProduct(J);
+    gradient_.segment<3>(3 * o.point) += J.transpose().lazyProduct(terms.force);
+  }
+  PoseBlock& block = blocks_[i];
+  block.H << H_vv, H_wv.transpose(), H_wv, H_ww;
+  block.gradient << g_v, g_w;
+}
+
+/// Subtracts Y_k^T Y_l and Y_k^T c, Y = L^-1 A^T W B, from the system of the points (lower triangle).
 void PoseElimination::eliminate(int i) {
   PoseBlock& block = blocks_[i];
-  const auto L = block.L.triangularView<Eigen::Lower>();
-  block.c = L.solve(block.gradient);
-  for (int n = begin_[i]; n < begin_[i + 1]; ++n) {
-    L.solveInPlace(couplings_[n]);
-    const int k = 3 * observations_[n].point;
-    reduced_gradient_.segment<3>(k).noalias() -= couplings_[n].transpose() * block.c;
-    for (int m = begin_[i]; m <= n; ++m) {
-      const int l = 3 * observations_[m].point;  // not above k: observations stand in the order of points
-      const Matrix3 product = couplings_[n].transpose().lazyProduct(couplings_[m]);
+  block.c = block.L.triangularView<Eigen::Lower>().solve(block.gradient);
+  Couplings Yt = couplings(i);
+  for (int r = 0; r < 6; ++r) {
+    for (int q = 0; q < r; ++q) Yt.col(r) -= block.L(r, q) * Yt.col(q);
+    Yt.col(r) *= 1 / block.L(r, r);
+  }
+  const int count = begin_[i + 1] - begin_[i];
+  const Observation* seen = observations_.data() + begin_[i];
+  for (int m = 0; m < count; ++m) {
+    const int below = 3 * (count - m), l = 3 * seen[m].point;
+    const Eigen::Matrix<double, 3, 6> Yt_m = Yt.middleRows<3>(3 * m);
+    reduced_gradient_.segment<3>(l) -= Yt_m.lazyProduct(block.c);
+    products_.resize(3 * count, 3);
+    products_.topRows(below) = Yt.bottomRows(below).lazyProduct(Yt_m.transpose());
+    for (int n = m; n < count; ++n) {
+      const int k = 3 * seen[n].point;  // not below l: observations stand in the order of points
+      const auto product = products_.middleRows<3>(3 * (n - m));
       reduced_.block<3, 3>(k, l) -= product;
-      if (m < n && k == l) reduced_.block<3, 3>(k, l) -= product.transpose();
+      if (n > m && k == l) reduced_.block<3, 3>(k, l) -= product.transpose();
     }
   }
 }
@@ -127,10 +152,11 @@ std::optional<double> PoseElimination::step(const WindowSolverOptions& options, 
                                             double lambda, Values& next) {
   const int poses = static_cast<int>(values.poses.size()), points = static_cast<int>(values.psi.size());
   blocks_.resize(poses);
-  couplings_.resize(observations_.size());
+  couplings_.resize(18 * observations_.size());
   V_.assign(points, Matrix3::Zero());
   gradient_.setZero(3 * points);
   reduced_.setZero(3 * points, 3 * points);
+  linearise_points(values);
   for (int i = 0; i < poses; ++i) linearise_pose(i, HuberKernel{options.huber_px}, values);
   reduced_gradient_ = gradient_;
   for (int i = 0; i < poses; ++i) {
@@ -164,9 +190,10 @@ std::optional<double> PoseElimination::step(const WindowSolverOptions& options, 
   for (int i = 0; i < poses; ++i) {
     if (fixed_[i] != 0) continue;
     const PoseBlock& block = blocks_[i];
+    const Couplings Yt = couplings(i);
     Vector6 v = block.c;
     for (int n = begin_[i]; n < begin_[i + 1]; ++n) {
-      v.noalias() += couplings_[n] * delta.segment<3>(3 * observations_[n].point);
+      v += Yt.middleRows<3>(3 * (n - begin_[i])).transpose() * delta.segment<3>(3 * observations_[n].point);
     }
     const Vector6 d = -block.L.transpose().triangularView<Eigen::Upper>().solve(v);
     predicted += -block.gradient.dot(d) + lambda * d.dot(block.damping.cwiseProduct(d));

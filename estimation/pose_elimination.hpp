@@ -37,7 +37,14 @@ class PoseElimination {
   void write_back(const Values& values, WindowProblem& problem) const;
 
  private:
-  using Matrix63 = Eigen::Matrix<double, 6, 3>;
+  /// Couplings of one pose, transposed: three rows an observation, so that all work on them runs down
+  /// columns.
+  using Couplings = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6>>;
+  /// A point in the world and its derivative by its inverse depth form.
+  struct WorldPoint {
+    Vector3 x_w;
+    Matrix3 dx_dpsi;
+  };
   struct Observation {
     int point;
     Eigen::Vector3f z, information;
@@ -47,6 +54,10 @@ class PoseElimination {
     Vector6 gradient, damping, c;  ///< c = L^-1 gradient
   };
 
+  [[nodiscard]] Couplings couplings(int pose) {
+    return {couplings_.data() + 18 * begin_[pose], 3 * (begin_[pose + 1] - begin_[pose]), 6};
+  }
+  void linearise_points(const Values& values);
   void linearise_pose(int pose, const HuberKernel& kernel, const Values& values);
   void eliminate(int pose);
 
@@ -57,7 +68,9 @@ class PoseElimination {
   std::vector<Observation> observations_;
   std::vector<char> seen_;  ///< by point
   std::vector<PoseBlock> blocks_;
-  std::vector<Matrix63> couplings_;  ///< by observation: A^T W B, then L^-1 of it
+  std::vector<WorldPoint> points_;
+  std::vector<double> couplings_;                      ///< pose by pose: B^T W A, then that times L^-T
+  Eigen::Matrix<double, Eigen::Dynamic, 3> products_;  // scratch
   std::vector<Matrix3> V_;
   Eigen::VectorXd gradient_;  ///< of the points
   Eigen::VectorXd reduced_gradient_;
