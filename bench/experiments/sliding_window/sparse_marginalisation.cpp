@@ -115,16 +115,24 @@ void sparse_marginalisation_experiment(const SlidingWindowExperimentOptions& opt
     const auto ratio = [&](std::size_t v) { return curves.error[v].back() / curves.error[kSwf].back(); };
     const auto trust = [&](std::size_t v) { return curves.error[v].back() / curves.claimed[v].back(); };
     report.state("SWF fig. 17",
-                 text("VSDF (diagonal blocks) clearly worse than full marginalisation: squared error above "
-                      "1.5 times, %s",
+                 text("VSDF, eq. 12 as printed (diagonal entries), clearly worse than full marginalisation: "
+                      "squared error above 1.5 times, %s",
                       motion),
-                 text("after 20 frames %.2f times; squared error over claimed variance: %.2f, full %.2f",
-                      ratio(kBlocks), trust(kBlocks), trust(kSwf)),
-                 ratio(kBlocks) > 1.5);
-    report.state("SWF fig. 17", text("the same with eq. 12 as printed (diagonal entries), %s", motion),
                  text("%.1f times: the prior is not positive definite, the estimate stays where it was",
                       ratio(kEntries)),
                  ratio(kEntries) > 1.5);
+    const std::string measured =
+        text("after 20 frames %.2f times; squared error over claimed variance: %.2f, full %.2f",
+             ratio(kBlocks), trust(kBlocks), trust(kSwf));
+    // Along the axis poses are known far better than the depth of any one landmark: its error is its own, and
+    // there is nothing between the blocks to lose. Sideways the poses' errors are shared by all landmarks.
+    if (std::string(motion) == "descent") {
+      report.state("SWF fig. 17", "VSDF by diagonal blocks (ours): loses nothing in a descent (10 %)",
+                   measured, std::abs(ratio(kBlocks) - 1) < 0.1);
+    } else {
+      report.state("SWF fig. 17", "VSDF by diagonal blocks (ours): clearly worse sideways (1.5 times)",
+                   measured, ratio(kBlocks) > 1.5);
+    }
   }
   write_png(report.file("fig17_vsdf.png"), tile(plots, 2));
 }

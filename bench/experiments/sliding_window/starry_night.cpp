@@ -2,6 +2,7 @@
 #include "experiments/sliding_window/starry_night.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "experiments/plot.hpp"
@@ -57,6 +58,9 @@ SlidingWindowOptions filter_options(int window, PoseRemoval removal) {
   options.window = window;
   options.removal = removal;
   options.keep_unseen_landmarks = true;  // the same 20 lights return again and again
+  // After fifty steps without any light (1464 on) the first one contradicts the dead reckoning by six of its
+  // standard deviations: ten Gauss-Newton steps do not settle that in a short window.
+  options.max_iterations = 50;
   return options;
 }
 
@@ -83,9 +87,7 @@ Track causal(const StarryNight& data, int window, PoseRemoval removal) {
 
 /// One estimate of all poses from all data.
 Track smoothed(const StarryNight& data) {
-  SlidingWindowOptions options = filter_options(0, PoseRemoval::kMarginalise);
-  options.max_iterations = 50;
-  SlidingWindowFilter filter(data.rig, options);
+  SlidingWindowFilter filter(data.rig, filter_options(0, PoseRemoval::kMarginalise));
   filter.set_first_pose(data.T_c_v * data.T_v_i[0], first_information());
   for (const WindowFrame& frame : data.frames) {
     filter.add(frame);
@@ -192,13 +194,14 @@ void starry_night_experiment(const SlidingWindowExperimentOptions& options, Repo
   const auto against_rotation = [&](std::size_t i) {
     return summaries[i].rotation / summaries[1].rotation - 1;
   };
-  report.state("Starry Night", "windows of 10 and 50 within 5 % of batch (RMS position, both causal)",
+  report.state("Starry Night",
+               "windows of 10 and 50 within 5 % of batch (RMS position and rotation, both causal)",
                text("50: %+.2f %% (rotation %+.2f %%), 10: %+.2f %% (%+.2f %%); 5: %+.2f %%, 1: %+.2f %%, "
                     "deletion %+.0f %%; "
                     "smoothed batch %+.2f %%",
                     100 * against(2), 100 * against_rotation(2), 100 * against(3), 100 * against_rotation(3),
                     100 * against(4), 100 * against(5), 100 * against(6), 100 * against(0)),
-               against(2) < 0.05 && against(3) < 0.05);
+               std::max({against(2), against(3), against_rotation(2), against_rotation(3)}) < 0.05);
 }
 
 }  // namespace twofold::bench

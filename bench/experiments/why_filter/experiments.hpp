@@ -1,14 +1,18 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "experiments/report.hpp"
 
 namespace twofold::bench {
 
 struct WhyFilterOptions {
-  int trials = 60;      ///< Monte Carlo trials of a cheap cell
-  int min_trials = 12;  ///< of the dearest ones: N and M large, filter
-  double cell_seconds =
-      4;                ///< trials of a cell are cut to about this processor time, but not below min_trials
+  int trials = 60;           ///< Monte Carlo trials of the filter in a cheap cell
+  int ba_trials = 200;       ///< of bundle adjustment, in every cell; the first ones are the filter's
+  int min_trials = 12;       ///< of the filter in the dearest cells: N and M large
+  double cell_seconds = 12;  ///< the filter's trials of a cell are cut to about this processor time
+  std::vector<std::string> settings = {"i", "ii", "iii", "iv"};
   bool large_n = true;  ///< N = 480 for the smallest M
 };
 

@@ -16,18 +16,23 @@ int main(int argc, char** argv) {
   int threads = 2;
   bool full = false;
   CLI::App app{"Why filter? BA-SLAM against filter-SLAM: figures 4.3, 4.6 - 4.13"};
-  app.add_option("--trials", options.trials, "Monte Carlo trials of a cell")->check(CLI::Range(2, 100000));
+  app.add_option("--trials", options.trials, "Monte Carlo trials of the filter in a cell")
+      ->check(CLI::Range(2, 100000));
   app.add_option("--min-trials", options.min_trials, "least trials of dear cells")
       ->check(CLI::Range(2, 100000));
+  app.add_option("--ba-trials", options.ba_trials, "trials of bundle adjustment")
+      ->check(CLI::Range(2, 100000));
+  app.add_option("--settings", options.settings, "of the Monte Carlo: i ii iii iv")
+      ->check(CLI::IsMember({"i", "ii", "iii", "iv"}));
   app.add_option("--cell-seconds", options.cell_seconds,
-                 "processor time after which a cell's trials are cut to --min-trials");
+                 "processor time to which the filter's trials of a cell are cut, not below --min-trials");
   app.add_flag("--full", full, "500 trials in every cell, as in the thesis");
   app.add_flag("!--no-480", options.large_n, "leave out N = 480");
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
   app.add_option("--only", only, "run these parts only: preliminary motion cost monte_carlo");
   app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
-  if (full) options.trials = options.min_trials = 500;
+  if (full) options.trials = options.ba_trials = options.min_trials = 500;
   const std::vector<std::pair<std::string, std::function<void(const WhyFilterOptions&, Report&)>>> all = {
       {"preliminary", preliminary_experiment},
       {"motion", motion_experiment},

@@ -30,7 +30,8 @@ struct Block {
   std::vector<Step> steps;              ///< [0] is frame 1
 };
 
-/// Points are drawn uniformly over the image of the frame they start in; noise 0.5 px. Same seed, same scene.
+/// Points are drawn uniformly over the image of the frame they start in; noise 0.5 px. Same seed, same scene;
+/// cells <M, N> of one seed share points and noise as far as they have the same points and frames.
 [[nodiscard]] Block simulate_block(Setting setting, SensorKind kind, int frames, int points, unsigned seed);
 
 }  // namespace twofold::bench
