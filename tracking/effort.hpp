@@ -13,7 +13,9 @@ enum class LadderRung : std::uint8_t {
   kEverything,
   kFewerPoints,      ///< half of the points are searched
   kCoarseAlignment,  ///< dense alignment stops two levels above the finest, and starts once only
-  kFewerIterations,  ///< a third of the solver's and the patch search's iterations
+  kFewerIterations,  ///< a third of the solver's and the patch search's iterations; keyframes only when
+                     ///< tracking would soon be lost without: they are the dearest frames, and the mapper
+                     ///< that works on them wants the same processors
   kDropFrames,       ///< as before; frames whose successor is due are dropped, if the policy allows it
   kCount
 };
@@ -45,6 +47,7 @@ struct TrackEffort {
   bool align_from_rest = true;  ///< a second time, when the first start did not fit
   int motion_iterations = 0;
   int refine_iterations = 0;
+  bool urgent_keyframes_only = false;  ///< see TrackerOptions::urgent_share
 };
 
 [[nodiscard]] inline TrackEffort effort_on(LadderRung rung, const TrackerOptions& options) {
@@ -63,6 +66,7 @@ struct TrackEffort {
   if (rung >= LadderRung::kFewerIterations) {
     effort.motion_iterations = std::max(options.motion.max_iterations / 3, 1);
     effort.refine_iterations = std::max(options.search.refine_iterations / 3, 1);
+    effort.urgent_keyframes_only = true;
   }
   return effort;
 }

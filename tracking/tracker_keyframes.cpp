@@ -72,6 +72,7 @@ bool Tracker::keyframe_due(const TrackResult& result, const SE3& T_c_ref) const 
   // The second keyframe confirms the first one's points: until then there is no map.
   const bool map_is_young =
       next_keyframe_ == first_of_part_ + 1 && parallax > 0.2 * options_.keyframe_parallax;
+  if (effort_.urgent_keyframes_only) return map_is_young;
   return parallax > options_.keyframe_parallax || share < options_.keyframe_share || emptied || map_is_young;
 }
 
