@@ -1,10 +1,13 @@
-// Captures from a kernel device and judges what came. Runs inside a virtual machine (virtual_machine.sh), so it
-// needs nothing but the C++ library, and is built for any x86-64 processor.
+// Captures from a kernel device and judges what came. Runs inside a virtual machine (virtual_machine.sh), so
+// it needs nothing but the C++ library, and is built for any x86-64 processor.
 //
-//   capture_check DEVICE formats FRAMES        every supported format the device lists
+//   capture_check DEVICE formats FRAMES NAME...  every supported format the device lists; those named must be
+//                                              among them
 //   capture_check DEVICE fault FRAMES WHAT     one format; WHAT must have been counted and survived:
 //                                              dropped, damaged, restarts
 //   capture_check DEVICE lost                  the device must be given up cleanly
+//   capture_check DEVICE refused               opening it must fail with a reason
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -52,6 +55,13 @@ Capture capture(V4l2Camera& camera, std::uint64_t wanted) {
   return result;
 }
 
+/// Frames counted by number and by the time that went by, two clocks for the same thing, agree.
+bool gaps_exact(const Capture& result, double fps, std::uint64_t restarts) {
+  const double by_time = result.seconds * fps;
+  return fps <= 0 || std::abs(by_time - static_cast<double>(result.index_span)) <
+                         1.5 + 1.5 * static_cast<double>(restarts);
+}
+
 void print_events(const V4l2Camera& camera) {
   for (const std::string& event : camera.report().events) std::printf("    %s\n", event.c_str());
 }
@@ -70,23 +80,21 @@ bool check_format(V4l2Calls& calls, const std::string& path, PixelFormat format,
   const Capture result = capture(**camera, frames);
   const CameraReport& report = (*camera)->report();
   const double fps = (*camera)->format().fps;
-  // Two clocks for the same thing: lost frames by sequence number, and by the time that went by.
-  const double spans = result.seconds * fps;
-  const bool gaps_exact = fps <= 0 || std::abs(spans - static_cast<double>(result.index_span)) < 1.5;
   const bool passed = result.frames == frames && result.ordered && result.sizes && result.converted &&
-                      gaps_exact && report.restarts == 0 && report.damaged == 0;
+                      gaps_exact(result, fps, 0) && report.restarts == 0 && report.damaged == 0;
   std::printf(
       "%s %-4s %dx%d %.2f fps: %llu frames in %.2f s, %llu dropped, span %.2f frames by time, %llu by "
       "number\n",
       passed ? "passed" : "FAILED", name(format), width, height, fps,
       static_cast<unsigned long long>(result.frames), result.seconds,
-      static_cast<unsigned long long>(report.dropped), spans,
+      static_cast<unsigned long long>(report.dropped), result.seconds * fps,
       static_cast<unsigned long long>(result.index_span));
   if (!passed) print_events(**camera);
   return passed;
 }
 
-int check_formats(V4l2Calls& calls, const std::string& path, std::uint64_t frames) {
+int check_formats(V4l2Calls& calls, const std::string& path, std::uint64_t frames,
+                  const std::vector<std::string>& expected) {
   std::vector<PixelFormat> formats;
   {
     const auto device = V4l2Device::open(calls, path);
@@ -103,6 +111,12 @@ int check_formats(V4l2Calls& calls, const std::string& path, std::uint64_t frame
                 enumerate_controls(*device).size());
   }
   bool passed = !formats.empty();
+  for (const std::string& format : expected) {
+    if (std::none_of(formats.begin(), formats.end(), [&](PixelFormat f) { return format == name(f); })) {
+      std::printf("FAILED: %s is not among them\n", format.c_str());
+      passed = false;
+    }
+  }
   for (const PixelFormat format : formats) passed &= check_format(calls, path, format, 640, 480, frames);
   return passed ? 0 : 1;
 }
@@ -122,7 +136,8 @@ int check_fault(V4l2Calls& calls, const std::string& path, std::uint64_t frames,
                                 : what == "damaged"  ? report.damaged
                                 : what == "restarts" ? report.restarts
                                                      : 1;
-  const bool passed = result.frames == frames && result.ordered && counted > 0;
+  const bool passed = result.frames == frames && result.ordered && result.sizes && result.converted &&
+                      counted > 0 && gaps_exact(result, (*camera)->format().fps, report.restarts);
   std::printf("%s %s: %llu frames, %llu dropped, %llu damaged, %llu restarts, %llu missed meanwhile\n",
               passed ? "passed" : "FAILED", what.c_str(), static_cast<unsigned long long>(result.frames),
               static_cast<unsigned long long>(report.dropped),
@@ -131,6 +146,19 @@ int check_fault(V4l2Calls& calls, const std::string& path, std::uint64_t frames,
               static_cast<unsigned long long>(report.missed_in_restarts));
   print_events(**camera);
   return passed ? 0 : 1;
+}
+
+int check_refused(V4l2Calls& calls, const std::string& path) {
+  CameraOptions options;
+  options.path = path;
+  options.format = {PixelFormat::kYuyv, 640, 480, 30};
+  const auto camera = V4l2Camera::open(calls, options);
+  if (camera) {
+    std::printf("FAILED: it was opened\n");
+    return 1;
+  }
+  std::printf("passed refused: %s\n", camera.error().text.c_str());
+  return camera.error().text.empty() ? 1 : 0;
 }
 
 int check_lost(V4l2Calls& calls, const std::string& path) {
@@ -157,10 +185,13 @@ int main(int argc, char** argv) {
   const std::string path = argc > 1 ? argv[1] : "";
   const std::string mode = argc > 2 ? argv[2] : "";
   twofold::SystemV4l2Calls calls;
-  if (mode == "formats" && argc == 4) return check_formats(calls, path, std::strtoull(argv[3], nullptr, 10));
+  if (mode == "formats" && argc >= 4)
+    return check_formats(calls, path, std::strtoull(argv[3], nullptr, 10), {argv + 4, argv + argc});
   if (mode == "fault" && argc == 5)
     return check_fault(calls, path, std::strtoull(argv[3], nullptr, 10), argv[4]);
   if (mode == "lost" && argc == 3) return check_lost(calls, path);
-  std::fprintf(stderr, "usage: capture_check DEVICE formats FRAMES | fault FRAMES WHAT | lost\n");
+  if (mode == "refused" && argc == 3) return check_refused(calls, path);
+  std::fprintf(stderr,
+               "usage: capture_check DEVICE formats FRAMES NAME... | fault FRAMES WHAT | lost | refused\n");
   return 2;
 }

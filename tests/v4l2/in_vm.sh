@@ -13,7 +13,7 @@ after() {  # SECONDS COMMAND: beside the check that follows
   (sleep "$1"; shift; "$@") &
 }
 
-check "every supported format" capture_check /dev/video0 formats "${FRAMES:-100}"
+check "every supported format" capture_check /dev/video0 formats "${FRAMES:-100}" YUYV UYVY NV12 GREY Y16
 after 1 $control percentage_of_dropped_buffers=30
 check "30 % of the buffers dropped" capture_check /dev/video0 fault 60 dropped
 $control percentage_of_dropped_buffers=0
@@ -28,6 +28,15 @@ check "QBUF fails" capture_check /dev/video0 fault 60 restarts
 $control wrap_sequence_number=1
 check "sequence numbers wrap" capture_check /dev/video0 fault 140 none
 $control wrap_sequence_number=0
+$control inject_vidioc_streamon_error=1
+check "STREAMON fails" capture_check /dev/video0 refused
+$control inject_vidioc_reqbufs_error=1
+check "REQBUFS fails" capture_check /dev/video0 refused
+check "opened again after both" capture_check /dev/video0 fault 20 none
+capture_check /dev/video0 fault 120 none > /tmp/first &
+sleep 1.5
+check "a second reader" capture_check /dev/video0 refused
+cat /tmp/first; grep -q ^passed /tmp/first || failed=1
 after 1 sh -c 'echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind; sleep 2; echo vivid.0 >/sys/bus/platform/drivers/vivid/bind'
 check "unplugged for two seconds" capture_check /dev/video0 fault 60 restarts
 after 1 sh -c 'echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind'
