@@ -1,6 +1,8 @@
 #include "calibration/board.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
@@ -43,20 +45,33 @@ cv::Ptr<cv::aruco::CharucoBoard> charuco_of(const Board& board) {
                                          cv::aruco::getPredefinedDictionary(kDictionaries.at(board.family)));
 }
 
+/// Shortest distance between neighbours of one row of the board [px]; 0 when no two are seen.
+double spacing_px(const BoardView& view, const Board& board) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < view.ids.size(); ++i) {
+    const bool neighbours = view.ids[i] == view.ids[i - 1] + 1 && view.ids[i] % board.corners_a_row() != 0;
+    if (neighbours) least = std::min(least, cv::norm(view.pixels[i] - view.pixels[i - 1]));
+  }
+  return std::isfinite(least) ? least : 0;
+}
+
+/// Places the corners by the gradients around each, to where it settles. `reach`: how far around a corner
+/// there is nothing but its four squares [px].
+void settle_corners(const cv::Mat& image, double reach, BoardView* view) {
+  const int half = std::clamp(static_cast<int>(reach), 2, 7);
+  cv::cornerSubPix(image, view->pixels, {half, half}, {-1, -1},
+                   cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 1e-3));
+}
+
 std::optional<BoardView> find_chessboard(const cv::Mat& image, const Board& board) {
   BoardView view;
   if (!cv::findChessboardCornersSB(image, {board.columns, board.rows}, view.pixels,
                                    cv::CALIB_CB_NORMALIZE_IMAGE)) {
     return std::nullopt;
   }
-  // Found by lines, which the lens bends; placed by the gradients around each corner.
-  float spacing = 1e9F;
-  for (std::size_t i = 1; i < view.pixels.size(); ++i)
-    spacing = std::min(spacing, static_cast<float>(cv::norm(view.pixels[i] - view.pixels[i - 1])));
-  const int half = std::clamp(static_cast<int>(0.3F * spacing), 2, 7);
-  cv::cornerSubPix(image, view.pixels, {half, half}, {-1, -1},
-                   cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 1e-3));
   for (int id = 0; id < board.corner_count(); ++id) view.ids.push_back(id);
+  // Found by lines, which the lens bends.
+  settle_corners(image, 0.3 * spacing_px(view, board), &view);
   return view;
 }
 
@@ -70,6 +85,9 @@ std::optional<BoardView> find_charuco(const cv::Mat& image, const Board& board) 
   BoardView view;
   cv::aruco::interpolateCornersCharuco(markers, marker_ids, image, charuco, view.pixels, view.ids);
   if (view.ids.size() < 4 || cv::aruco::testCharucoCornersCollinear(charuco, view.ids)) return std::nullopt;
+  // OpenCV's own refinement stops at steps of 0.1 px. The markers beside a corner must stay outside.
+  const double rim = 0.5 * (board.square - board.marker) / board.square;
+  settle_corners(image, rim * spacing_px(view, board) - 1, &view);
   return view;
 }
 
