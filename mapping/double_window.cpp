@@ -44,6 +44,51 @@ void add_anchors(const GraphSnapshot& graph, std::size_t max_anchors, IdMap& met
   }
 }
 
+/// Puts the nodes that stay next to each other, in their order. A node only stays if its parent does.
+void remove_nodes(const std::vector<char>& stays, DoubleWindow& window) {
+  std::vector<int> moved_to(window.nodes.size(), -1);
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    if (!stays[n]) continue;
+    moved_to[n] = static_cast<int>(kept);
+    TreeNode node = window.nodes[n];
+    if (node.parent >= 0) node.parent = moved_to[static_cast<std::size_t>(node.parent)];
+    window.nodes[kept++] = node;
+  }
+  window.nodes.resize(kept);
+}
+
+/// Back to the size the window had when `met` nodes had been found by breadth-first search: those met last go
+/// first, unless they are anchors or others hang on them; after them the anchors that joined last.
+void make_room(const GraphSnapshot& graph, std::size_t met, DoubleWindow& window) {
+  const std::size_t count = window.nodes.size();
+  std::vector<char> needed(count, 0), stays(count, 1);
+  for (std::size_t n = 0; n < window.inner; ++n) {
+    for (const Observation& observation : *graph.keyframe(window.nodes[n].id).observations) {
+      const int anchor = window.position.find(graph.point(observation.point).anchor);
+      if (anchor >= 0) needed[static_cast<std::size_t>(anchor)] = 1;
+    }
+  }
+  std::size_t surplus = count - met;
+  for (std::size_t n = met; n-- > window.inner && surplus > 0;) {
+    if (needed[n]) {
+      needed[static_cast<std::size_t>(window.nodes[n].parent)] = 1;
+    } else {
+      stays[n] = 0;
+      --surplus;
+    }
+  }
+  for (; surplus > 0; --surplus) stays[count - surplus] = 0;  // no node hangs on one that joined
+  remove_nodes(stays, window);
+}
+
+void number_nodes(DoubleWindow& window) {
+  window.position.clear();
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    window.position.set(window.nodes[n].id, static_cast<int>(n));
+  }
+}
+
 }  // namespace
 
 void select_double_window(const GraphSnapshot& graph, const MapperOptions& options, SelectionScratch& scratch,
@@ -54,11 +99,12 @@ void select_double_window(const GraphSnapshot& graph, const MapperOptions& optio
                                 : inner + static_cast<std::size_t>(options.outer_window);
   weighted_breadth_first(graph, graph.reference(), count, scratch.visited, window.nodes);
   window.inner = std::min(inner, window.nodes.size());
-  window.position.clear();
-  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
-    window.position.set(window.nodes[n].id, static_cast<int>(n));
-  }
+  number_nodes(window);
+  const std::size_t met = window.nodes.size();
   add_anchors(graph, static_cast<std::size_t>(options.max_anchors), scratch.met_anchors, window);
+  if (window.nodes.size() == met) return;
+  make_room(graph, met, window);
+  number_nodes(window);
 }
 
 int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now) {

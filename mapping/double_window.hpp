@@ -12,7 +12,7 @@ namespace twofold {
 /// W1 and W2 around a reference keyframe  (thesis 6.2.3).
 ///
 /// `nodes` is a spanning tree rooted at the reference, parents before children: first the inner window, then
-/// the outer one, then anchors of inner points that joined the outer window  (6.2.4).
+/// the outer one, its last nodes anchors of inner points that were not met on the way  (6.2.4).
 struct DoubleWindow {
   std::vector<TreeNode> nodes;
   std::size_t inner = 0;  ///< nodes[0, inner) are W1, the rest W2
@@ -30,7 +30,8 @@ struct SelectionScratch {
 };
 
 /// Weighted breadth-first selection of both windows, and of the anchors that may join: those with a direct
-/// edge to a frame of W1, so that they are still accurately defined. Costs O(window).
+/// edge to a frame of W1, so that they are still accurately defined. W2 keeps its size: an anchor takes the
+/// place of the member met last that is no anchor itself, and stays out if there is none. Costs O(window).
 void select_double_window(const GraphSnapshot& graph, const MapperOptions& options, SelectionScratch& scratch,
                           DoubleWindow& window);
 

@@ -7,11 +7,15 @@
 
 namespace twofold {
 
-/// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
+/// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I), with length_share softer along the
+/// translation; see edge_information.
 struct EdgeInformationOptions {
   double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
   double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
   double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
+  /// Share of the ideal precision that disparities give |t|, >= 0; never above that of its direction.
+  /// 0: as well known as its direction, eq. 6.2 as printed.
+  double length_share = 0;
 };
 
 /// 6.4.1.
@@ -37,10 +41,11 @@ struct CullingOptions {
 
 struct MapperOptions {
   int inner_window = 25;             ///< M1 >= 1: keyframes joined by point-pose constraints  (6.2.3)
-  int outer_window = 175;            ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO)
+  int outer_window = 175;            ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO), anchors
+                                     ///< included
   bool global_outer_window = false;  ///< gDWO: the outer window is all the rest of the map
   bool fixed_outer_window = false;   ///< holds W2's poses: the hard rim the thesis argues against
-  int max_anchors = 25;              ///< anchors that may join W2 for their points  (6.2.4)
+  int max_anchors = 25;              ///< anchors that may take places of W2 for their points  (6.2.4)
   int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
   int theta = 15;                    ///< Theta: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;

@@ -32,7 +32,7 @@ PoseGraph<SE3> pose_graph(const GraphSnapshot& graph, const std::vector<TreeNode
       if (other <= static_cast<int>(n)) continue;
       problem.constraints.push_back(
           {static_cast<int>(n), other, relative_pose(graph, from.id, edge),
-           edge_information(from, graph.keyframe(edge.other), edge, rig.camera.fx, options.edge)});
+           edge_information(from, graph.keyframe(edge.other), edge, rig, options.edge)});
     }
   }
   return problem;

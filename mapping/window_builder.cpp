@@ -172,9 +172,8 @@ void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const Double
       if (window.is_inner(other) && (!edge.marginalised || shared_points(from, to) >= options_.theta)) {
         continue;
       }
-      problem_.constraints.push_back(
-          {static_cast<int>(n), other, relative_pose(graph, from.id, edge),
-           edge_information(from, to, edge, problem_.rig.camera.fx, options_.edge)});
+      problem_.constraints.push_back({static_cast<int>(n), other, relative_pose(graph, from.id, edge),
+                                      edge_information(from, to, edge, problem_.rig, options_.edge)});
     }
   }
 }

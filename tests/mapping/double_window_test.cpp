@@ -56,15 +56,42 @@ TEST(SelectDoubleWindow, AnchorsJoinOnlyWithAnEdgeToTheInnerWindow) {
   const DoubleWindow before = select(writer.graph(), windows(2, 0));
   EXPECT_EQ(before.nodes.size(), 2U);
   link(writer, KeyframeId{5}, KeyframeId{10}, 1);
-  const DoubleWindow window = select(writer.graph(), windows(2, 1));  // W1 = {11, 10}, W2 = {9}
-  ASSERT_EQ(window.nodes.size(), 4U);
-  EXPECT_EQ(window.nodes[3].id, KeyframeId{5});
-  EXPECT_EQ(window.nodes[static_cast<std::size_t>(window.nodes[3].parent)].id, KeyframeId{10});
+  const DoubleWindow window = select(writer.graph(), windows(2, 1));  // W1 = {11, 10}, 9 leaves W2
+  ASSERT_EQ(window.nodes.size(), 3U);
+  EXPECT_EQ(window.nodes[2].id, KeyframeId{5});
+  EXPECT_EQ(window.nodes[static_cast<std::size_t>(window.nodes[2].parent)].id, KeyframeId{10});
   EXPECT_FALSE(window.is_inner(KeyframeId{5}));
   EXPECT_FALSE(window.contains(KeyframeId{0}));
   MapperOptions none = windows(2, 1);
   none.max_anchors = 0;
-  EXPECT_EQ(select(writer.graph(), none).nodes.size(), 3U);
+  EXPECT_EQ(select(writer.graph(), none).nodes.back().id, KeyframeId{9});
+}
+
+TEST(SelectDoubleWindow, KeepsItsSizeWhateverAnchorsJoin) {
+  const Rig rig = simulation::thesis_rig();
+  GraphWriter writer = chain(20);
+  for (const std::uint32_t anchor : {2U, 3U, 4U, 16U}) {
+    add_point(writer, rig, {-0.8, 0, 1.2}, {KeyframeId{anchor}, KeyframeId{19}});
+    if (anchor < 16) link(writer, KeyframeId{anchor}, KeyframeId{18}, 1);
+  }
+  // By breadth-first search alone W2 is {17, 2, ...}: all three old keyframes are neighbours of 18.
+  MapperOptions options = windows(2, 8);
+  for (int outer = 0; outer <= 8; ++outer) {
+    options.outer_window = outer;
+    const DoubleWindow window = select(writer.graph(), options);
+    EXPECT_EQ(window.nodes.size(), 2U + static_cast<std::size_t>(outer));
+    EXPECT_EQ(window.inner, 2U);
+    for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+      EXPECT_EQ(window.position.find(window.nodes[n].id), static_cast<int>(n));
+      if (n == 0) continue;
+      ASSERT_GE(window.nodes[n].parent, 0);
+      ASSERT_LT(window.nodes[n].parent, static_cast<int>(n));
+      const KeyframeId parent = window.nodes[static_cast<std::size_t>(window.nodes[n].parent)].id;
+      EXPECT_NE(find_edge(writer.graph().keyframe(parent), window.nodes[n].id), nullptr);
+    }
+    if (outer < 3) continue;
+    for (const std::uint32_t anchor : {2U, 3U, 4U}) EXPECT_TRUE(window.contains(KeyframeId{anchor}));
+  }
 }
 
 /// Eq. 6.3 and the caveat after it: a ring whose relative poses do not add up breaks far from the reference.
@@ -165,13 +192,42 @@ TEST(EdgeInformation, FollowsEquation62) {
   options.sigma_px = 0.5;
   options.rot_share = 0.2;
   options.trans_share = 0.1;
-  const Matrix6 information = edge_information(a, b, edge, rig.camera.fx, options);
+  const Matrix6 information = edge_information(a, b, edge, rig, options);
   const double ideal = 300 / (std::numbers::sqrt2 * 0.5);
   EXPECT_NEAR(information(0, 0), 50 * std::pow(0.1 * ideal / 3, 2), 1e-9);
   EXPECT_NEAR(information(5, 5), 50 * std::pow(0.2 * ideal, 2), 1e-9);
   EXPECT_EQ(information(0, 5), 0);
   edge.weight = 100;
-  EXPECT_LT((edge_information(a, b, edge, 300, options) - 2 * information).norm(), 1e-9);
+  EXPECT_LT((edge_information(a, b, edge, rig, options) - 2 * information).norm(), 1e-9);
+}
+
+TEST(EdgeInformation, StereoKnowsALengthByDisparityOnly) {
+  const Rig rig = simulation::thesis_rig();
+  Keyframe a, b;
+  a.median_depth = b.median_depth = 2;
+  Edge edge;
+  edge.weight = 50;
+  edge.marginalised = true;
+  const Vector3 along = Vector3(1, 2, -2) / 3;
+  edge.T_other_this = SE3(SO3(), 0.4 * along);
+  EdgeInformationOptions options;
+  options.trans_share = 0.1;
+  options.length_share = 0.2;
+  const double ideal = 300 / (std::numbers::sqrt2 * options.sigma_px) / 2;
+  const Matrix3 stereo = edge_information(a, b, edge, rig, options).topLeftCorner<3, 3>();
+  // A length of 8 baselines: an eighth of the precision.
+  EXPECT_NEAR(along.dot(stereo * along), 50 * std::pow(0.2 * ideal / 8, 2), 1e-9);
+  const Vector3 across = along.unitOrthogonal();
+  EXPECT_LT((stereo * across - 50 * std::pow(0.1 * ideal, 2) * across).norm(), 1e-9);
+  // Never better than the direction; and with one camera nothing but the edges holds the scale.
+  const Matrix3 even = 50 * std::pow(0.1 * ideal, 2) * Matrix3::Identity();
+  const Rig mono = simulation::thesis_rig(SensorKind::kMono);
+  EXPECT_LT((edge_information(a, b, edge, mono, options).topLeftCorner<3, 3>() - even).norm(), 1e-9);
+  options.length_share = 0;
+  EXPECT_LT((edge_information(a, b, edge, rig, options).topLeftCorner<3, 3>() - even).norm(), 1e-9);
+  options.length_share = 0.2;
+  edge.T_other_this = SE3(SO3(), 0.05 * along);
+  EXPECT_LT((edge_information(a, b, edge, rig, options).topLeftCorner<3, 3>() - even).norm(), 1e-9);
 }
 
 TEST(SharedPoints, CountedFromBothSides) {

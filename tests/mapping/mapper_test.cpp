@@ -86,7 +86,7 @@ TEST(Mapper, KeepsInvariantsAndLowersTheCostInEveryRound) {
       ASSERT_EQ(broken_invariant(mapper.graph(), 2), "") << "keyframe " << mapper.graph().keyframe_count();
       ASSERT_EQ(component_count(mapper.graph()), 1);
       ASSERT_LE(report.inner_window, options.inner_window);
-      ASSERT_LE(report.outer_window, options.outer_window + options.max_anchors);
+      ASSERT_LE(report.outer_window, options.outer_window);
       ASSERT_EQ(invalid_reason(mapper.last_problem()), "");
       if (published.size() < 10) published.push_back(mapper.publish());
     }

@@ -28,9 +28,12 @@ int main(int argc, char** argv) {
   app.add_option("--height", options.scene.height, "of the camera above the ground [m]");
   app.add_option("--step", options.scene.step, "between keyframes [m]");
   app.add_option("--spacing", options.scene.spacing, "between the turns of the spiral [m]");
-  app.add_option("--anchors", options.max_anchors, "that may join the outer window for their points");
+  app.add_option("--anchors", options.max_anchors,
+                 "that may take places of the outer window for their points");
   app.add_option("--trans-share", options.edge.trans_share, "of an edge's ideal translational precision");
   app.add_option("--rot-share", options.edge.rot_share, "of an edge's ideal rotational precision");
+  app.add_option("--length-share", options.edge.length_share,
+                 "of an edge's ideal precision of |t| by disparities");
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
   app.add_option("--only", only, "run these parts only: stereo mono double_loop");
   app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);
@@ -62,7 +65,8 @@ int main(int argc, char** argv) {
                                 {"spacing", options.scene.spacing},
                                 {"max_anchors", options.max_anchors},
                                 {"trans_share", options.edge.trans_share},
-                                {"rot_share", options.edge.rot_share}};
+                                {"rot_share", options.edge.rot_share},
+                                {"length_share", options.edge.length_share}};
     for (const auto& [name, experiment] : all) {
       if (!only.empty() && std::find(only.begin(), only.end(), name) == only.end()) continue;
       experiment(options, report);
