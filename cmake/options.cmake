@@ -28,6 +28,15 @@ function(twofold_library name)
   target_link_libraries(twofold_${name} PUBLIC twofold::options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
 endfunction()
 
+# What a registered test needs around it under a sanitizer; nothing without one.
+function(twofold_sanitizer_environment name)
+  if(TWOFOLD_SANITIZE)
+    # ThreadSanitizer does not see how libgomp waits for its threads: the CHOLMOD inside Ceres stays on one.
+    set_tests_properties(${name} PROPERTIES
+      ENVIRONMENT "OMP_THREAD_LIMIT=1;TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/tsan.supp")
+  endif()
+endfunction()
+
 # twofold_test(name SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case.
 function(twofold_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
@@ -39,9 +48,7 @@ function(twofold_test name)
   add_test(NAME ${name} COMMAND ${name})
   if(TWOFOLD_SANITIZE)
     math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
-    # ThreadSanitizer does not see how libgomp waits for its threads: the CHOLMOD inside Ceres stays on one.
-    set_tests_properties(${name} PROPERTIES
-      ENVIRONMENT "OMP_THREAD_LIMIT=1;TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/tsan.supp")
   endif()
+  twofold_sanitizer_environment(${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
 endfunction()
