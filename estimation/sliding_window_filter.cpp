@@ -138,8 +138,10 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
     apply(step_);
     const double next = cost();
     // First-estimate derivatives lead to a point that is not exactly the minimum of the cost, so that close
-    // to it the cost may rise a little; a rise by one is within the noise of a single residual.
-    const double slack = 1e-9 * (1 + std::abs(current)) + (first_estimates() ? 1.0 + decrement : 0.0);
+    // to it the cost may rise a little; a rise by one is within the noise of a single residual. What an old
+    // factor promises is no measure.
+    const double slack =
+        1e-9 * (1 + std::abs(current)) + (first_estimates() ? 1.0 + (reused ? 0.0 : decrement) : 0.0);
     if (!(next <= current + slack) && decrement > options_.stop_decrement) {
       for (std::size_t j = 0; j < old_poses.size(); ++j) poses_[j].T_c_w = old_poses[j];
       points_ = old_points;

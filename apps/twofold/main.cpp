@@ -44,8 +44,8 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help
-    if (argc == 1) fmt::print(stderr, "{}\n", app.help());
-    return report(e.what(), twofold::kBadInput);
+    const std::string hint = argc == 1 ? "; twofold --help lists them" : "";
+    return report(e.what() + hint, twofold::kBadInput);
   } catch (const twofold::IoError& e) {
     return report(e.what(), twofold::kBadInput);
   } catch (const twofold::MapFileError& e) {
