@@ -157,7 +157,8 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
     if (summary_.iterations <= 5) update_threshold();
     build_equations();
     current = cost();
-    const bool contracts = summary_.iterations == 1 || decrement < 0.05 * last_decrement;
+    // Not after the first step, which is the longest: its factor would serve the second one badly.
+    const bool contracts = summary_.iterations > 1 && decrement < 0.05 * last_decrement;
     factor_is_good = options_.reuse_factor && contracts;
     last_decrement = decrement;
   }

@@ -32,8 +32,6 @@ void WindowPrior::relinearise(const std::vector<Vector3>& landmarks, const SE3& 
   T_lin = T_c_w;
 }
 
-constexpr double kLoading = 1e-13;  // of a diagonal entry: some hundred roundings
-
 void schur_marginalise(MatrixX& Lambda, VectorX& g, int eliminated, FillIn fill_in,
                        const std::vector<int>& block_sizes) {
   const int kept = static_cast<int>(Lambda.rows()) - eliminated;
@@ -61,10 +59,6 @@ void schur_marginalise(MatrixX& Lambda, VectorX& g, int eliminated, FillIn fill_
   if (fill_in == FillIn::kFull) {
     C.selfadjointView<Eigen::Lower>().rankUpdate(Y.transpose(), -1.0);
     C = MatrixX(C.selfadjointView<Eigen::Lower>());
-    // What is known of the whole (where it lies in the world) becomes tiny beside what is known of its parts,
-    // and drowns in the rounding of the subtraction, frame by frame: as much as that is added, so that the
-    // prior stays positive definite.
-    C.diagonal() *= 1 + kLoading;
   } else {
     int at = 0;
     for (const int size : block_sizes) {
