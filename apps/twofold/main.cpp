@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
 #include <fmt/format.h>
@@ -16,6 +17,10 @@ void silence_decoders() {
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // AV_LOG_QUIET
 }
 
+/// Rectification and descriptors call OpenCV from the reader's and the loop closer's threads. Threads of its own beside
+/// them would be scheduled on the tracker's core.
+void forbid_hidden_threads() { cv::setNumThreads(1); }
+
 /// One line, whatever the library put into its message.
 int report(const std::string& what, int exit_code) {
   fmt::print(stderr, "twofold: {}\n", what.substr(0, what.find('\n')));
@@ -26,6 +31,7 @@ int report(const std::string& what, int exit_code) {
 
 int main(int argc, char** argv) {
   silence_decoders();
+  forbid_hidden_threads();
   CLI::App app{"Twofold: real-time visual SLAM", "twofold"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "twofold " TWOFOLD_VERSION);

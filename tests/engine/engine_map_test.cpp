@@ -8,17 +8,14 @@
 
 #include "engine/engine.hpp"
 #include "loopclosure/default_vocabulary.hpp"
-#include "tests/imaging/rendered_scene.hpp"
+#include "tests/engine/small_scene.hpp"
 
 namespace twofold {
 namespace {
 
-Rig small_rig() {
-  Rig rig;
-  rig.camera = {220, 220, 159.5, 119.5, 320, 240};
-  rig.baseline = 0.12;
-  return rig;
-}
+using testing::render_walk;
+using testing::small_rig;
+constexpr auto T_c_w = testing::turning_walk;
 
 /// A camera that turns by 90 degrees in a textured room: the first part is mapped and saved, later runs start
 /// elsewhere.
@@ -27,26 +24,8 @@ class EngineMapTest : public ::testing::Test {
   static constexpr int kFrames = 60;
   static constexpr int kMapped = 45;
 
-  static SE3 T_c_w(int i) {
-    const double s = 0.035 * i;
-    return SE3(SO3::exp(Vector3(0.03 * std::sin(3 * s), s, 0)),
-               Vector3(0.4 * std::sin(2 * s), 0.05 * std::sin(3 * s), -0.2 * s));
-  }
-
-  static std::vector<Frame> render(int begin, int end, std::uint32_t room) {
-    twofold::testing::RenderedScene scene(small_rig(), Vector3(2.5, 2.0, 3.5), room);
-    const SE3 T_r_c(SO3(), Vector3(-small_rig().baseline, 0, 0));
-    std::vector<Frame> frames;
-    for (int i = begin; i < end; ++i) {
-      Frame& frame = frames.emplace_back();
-      frame.left = scene.render_one(T_c_w(i), 1.5);
-      frame.right = scene.render_one(T_r_c * T_c_w(i), 1.5);
-    }
-    return frames;
-  }
-
   static void SetUpTestSuite() {
-    room_ = new std::vector<Frame>(render(0, kFrames, 5));
+    room_ = new std::vector<Frame>(render_walk(T_c_w, 0, kFrames, 5));
     map_ = new std::shared_ptr<const SavedMap>;
     const RunResult result = run(options(), frames(0, kMapped));
     *map_ = std::make_shared<const SavedMap>(SavedMap{small_rig(), result.graph, result.places});
@@ -61,8 +40,7 @@ class EngineMapTest : public ::testing::Test {
     return [begin, end, next = begin](Frame& frame) mutable {
       if (next == end) return FeedStatus::kEnd;
       frame = (*room_)[static_cast<std::size_t>(next)];
-      frame.index = next - begin;
-      frame.t_ns = 1'000'000'000 + frame.index * 33'333'333LL;
+      testing::number_frame(frame, next - begin);
       ++next;
       return FeedStatus::kFrame;
     };
@@ -192,13 +170,12 @@ TEST_F(EngineMapTest, AThreadedRunInALoadedMapReplays) {
 }
 
 TEST_F(EngineMapTest, InAnotherRoomNothingIsRecognised) {
-  const std::vector<Frame> elsewhere = render(10, 22, 77);
+  const std::vector<Frame> elsewhere = render_walk(T_c_w, 10, 22, 77);
   for (const bool localise_only : {false, true}) {
     const FrameFeed feed = [&, next = std::size_t{0}](Frame& frame) mutable {
       if (next == elsewhere.size()) return FeedStatus::kEnd;
       frame = elsewhere[next];
-      frame.index = static_cast<std::int64_t>(next++);
-      frame.t_ns = 1'000'000'000 + frame.index * 33'333'333LL;
+      testing::number_frame(frame, static_cast<int>(next++));
       return FeedStatus::kFrame;
     };
     const RunResult result = run(options_with_map(localise_only), feed);

@@ -9,17 +9,12 @@
 #include <thread>
 
 #include "engine/threaded_run.hpp"
-#include "tests/imaging/rendered_scene.hpp"
+#include "tests/engine/small_scene.hpp"
 
 namespace twofold {
 namespace {
 
-Rig small_rig() {
-  Rig rig;
-  rig.camera = {220, 220, 159.5, 119.5, 320, 240};
-  rig.baseline = 0.12;
-  return rig;
-}
+using testing::small_rig;
 
 /// A camera that sways through a textured room; rendered once for all tests.
 class EngineTest : public ::testing::Test {
@@ -33,17 +28,7 @@ class EngineTest : public ::testing::Test {
   }
 
   static void SetUpTestSuite() {
-    twofold::testing::RenderedScene scene(small_rig(), Vector3(2.5, 2.0, 3.5), 5);
-    frames_ = new std::vector<Frame>;
-    for (int i = 0; i < kFrames; ++i) {
-      const SE3 T_r_c(SO3(), Vector3(-small_rig().baseline, 0, 0));
-      Frame frame;
-      frame.index = i;
-      frame.t_ns = 1'000'000'000 + i * 33'333'333LL;
-      frame.left = scene.render_one(T_c_w(i), 1.5);
-      frame.right = scene.render_one(T_r_c * T_c_w(i), 1.5);
-      frames_->push_back(frame);
-    }
+    frames_ = new std::vector<Frame>(testing::render_walk(T_c_w, 0, kFrames, 5));
   }
   static void TearDownTestSuite() {
     delete frames_;
