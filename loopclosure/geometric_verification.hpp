@@ -18,7 +18,7 @@ struct VerificationOptions {
   double max_error_px = 3;      ///< reprojection error of an inlier, pixels of the corner's level
   double guided_radius_px = 6;  ///< guided matching around the prediction, pixels of the corner's level
   int guided_distance = 80;     ///< descriptors in guided matching [bits]
-  int max_iterations = 300;     ///< RANSAC
+  int max_iterations = 1500;    ///< RANSAC: finds a good sample at inlier shares down to a sixth (0.999)
   double min_disparity_px = 1;  ///< corners farther than this tell nothing about translation
 
   /// Empty when valid; otherwise names the field, the rule and the value.

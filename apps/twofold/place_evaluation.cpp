@@ -128,8 +128,9 @@ void print_recognition(std::vector<Answer> answers, const TruePairs& truth, int 
              recall_at_full_precision, full_precision_threshold);
 }
 
-void print_verified(const std::vector<Answer>& answers, const PlaceSet& set, const TruePairs& truth,
-                    int possible) {
+/// @return  recall and precision after verification
+std::pair<double, double> print_verified(const std::vector<Answer>& answers, const PlaceSet& set,
+                                         const TruePairs& truth, int possible) {
   Counts counts;
   std::vector<double> errors_m, errors_deg;
   int undecided = 0;
@@ -144,17 +145,18 @@ void print_verified(const std::vector<Answer>& answers, const PlaceSet& set, con
     errors_m.push_back(error.translation().norm());
     errors_deg.push_back(error.log().tail<3>().norm() * 180 / std::numbers::pi);
   }
+  const double recall = std::min(1.0, 1.0 * counts.right / std::max(1, possible));
   fmt::print(
       "after verification     precision {:.3f}, recall {:.3f} ({} right, {} wrong, {} share part of the "
       "view)\n",
-      counts.precision(), std::min(1.0, 1.0 * counts.right / std::max(1, possible)), counts.right,
-      counts.wrong, undecided);
-  if (errors_m.empty()) return;
+      counts.precision(), recall, counts.right, counts.wrong, undecided);
+  if (errors_m.empty()) return {recall, counts.precision()};
   std::sort(errors_m.begin(), errors_m.end());
   std::sort(errors_deg.begin(), errors_deg.end());
   fmt::print("pose of the closures   error median {:.3f} m, {:.2f} deg; worst {:.3f} m, {:.2f} deg\n",
              errors_m[errors_m.size() / 2], errors_deg[errors_deg.size() / 2], errors_m.back(),
              errors_deg.back());
+  return {recall, counts.precision()};
 }
 
 void write_csv(const std::string& file, const std::vector<Answer>& answers, const TruePairs& truth) {
@@ -172,8 +174,9 @@ void write_csv(const std::string& file, const std::vector<Answer>& answers, cons
   if (!out.flush()) throw IoError(file, "cannot be written");
 }
 
-/// Precision over recall in [0, 1]^2.
-cv::Mat draw(const std::string& title, const std::vector<std::pair<double, double>>& curve) {
+/// Precision over recall in [0, 1]^2: of recognition alone as a curve, after verification as a dot.
+cv::Mat draw(const std::string& title, const std::vector<std::pair<double, double>>& curve,
+             const std::optional<std::pair<double, double>>& verified) {
   constexpr int kSide = 400, kMargin = 50;
   cv::Mat image(kSide + 2 * kMargin, kSide + 2 * kMargin, CV_8UC3, cv::Scalar::all(255));
   const auto at = [&](double recall, double precision) {
@@ -193,6 +196,12 @@ cv::Mat draw(const std::string& title, const std::vector<std::pair<double, doubl
     cv::line(image, at(curve[i - 1].first, curve[i - 1].second), at(curve[i].first, curve[i].second),
              plot_colours::kFinal, 2, cv::LINE_AA);
   }
+  if (verified) {
+    const cv::Point dot = at(verified->first, verified->second);
+    cv::circle(image, dot, 6, plot_colours::kCausal, cv::FILLED, cv::LINE_AA);
+    cv::putText(image, "verified", dot + cv::Point(verified->first > 0.8 ? -60 : 8, 22),
+                cv::FONT_HERSHEY_SIMPLEX, 0.45, plot_colours::kCausal);
+  }
   cv::putText(image, "recall", at(0.45, 0) + cv::Point(0, 38), cv::FONT_HERSHEY_SIMPLEX, 0.5, {});
   cv::putText(image, "precision: " + title, cv::Point(10, 30), cv::FONT_HERSHEY_SIMPLEX, 0.45, {});
   return image;
@@ -209,11 +218,12 @@ void evaluate_places(const PlaceEvaluationArguments& arguments, const Vocabulary
              possible);
   std::vector<std::pair<double, double>> curve;
   print_recognition(answers, truth, possible, curve);
-  if (set.rig.kind != SensorKind::kMono) print_verified(answers, set, truth, possible);
+  std::optional<std::pair<double, double>> verified;
+  if (set.rig.kind != SensorKind::kMono) verified = print_verified(answers, set, truth, possible);
   if (!arguments.csv.empty()) write_csv(arguments.csv, answers, truth);
   if (!arguments.plot.empty()) {
     const fs::path folder = fs::path(arguments.set).lexically_normal();
-    write_png(arguments.plot, draw(folder.filename().string(), curve));
+    write_png(arguments.plot, draw(folder.filename().string(), curve, verified));
   }
 }
 
