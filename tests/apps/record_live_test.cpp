@@ -9,6 +9,7 @@
 #include "io/v4l2_source.hpp"
 #include "tests/apps/command.hpp"
 #include "tests/io/v4l2/fake_device.hpp"
+#include "tests/sanitized.hpp"
 
 namespace twofold {
 namespace {
@@ -126,7 +127,7 @@ TEST(RecordCommand, ControlCEndsItWell) {
   const ScratchFolder folder;
   const Outcome outcome =
       run(folder, "record 'synthetic:desk?width=160&height=120&frames=1000000' " + (folder / "r"),
-          "timeout --preserve-status -s INT 2");
+          std::string("timeout --preserve-status -s INT ") + (testing::kSanitized ? "20" : "2"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_GT(frames_said(outcome.out), 0U);
   EXPECT_EQ(read_back(folder.path() / "r").size(), frames_said(outcome.out));
