@@ -128,9 +128,10 @@ void print_recognition(std::vector<Answer> answers, const TruePairs& truth, int 
              recall_at_full_precision, full_precision_threshold);
 }
 
-/// @return  recall and precision after verification
-std::pair<double, double> print_verified(const std::vector<Answer>& answers, const PlaceSet& set,
-                                         const TruePairs& truth, int possible) {
+/// @return  recall and precision after verification; none when nothing was verified
+std::optional<std::pair<double, double>> print_verified(const std::vector<Answer>& answers,
+                                                        const PlaceSet& set, const TruePairs& truth,
+                                                        int possible) {
   Counts counts;
   std::vector<double> errors_m, errors_deg;
   int undecided = 0;
@@ -145,18 +146,23 @@ std::pair<double, double> print_verified(const std::vector<Answer>& answers, con
     errors_m.push_back(error.translation().norm());
     errors_deg.push_back(error.log().tail<3>().norm() * 180 / std::numbers::pi);
   }
+  if (counts.right + counts.wrong == 0) {
+    fmt::print("after verification     recall 0.000 (nothing verified, {} share part of the view)\n",
+               undecided);
+    return std::nullopt;
+  }
   const double recall = std::min(1.0, 1.0 * counts.right / std::max(1, possible));
   fmt::print(
       "after verification     precision {:.3f}, recall {:.3f} ({} right, {} wrong, {} share part of the "
       "view)\n",
       counts.precision(), recall, counts.right, counts.wrong, undecided);
-  if (errors_m.empty()) return {recall, counts.precision()};
+  if (errors_m.empty()) return std::pair(recall, counts.precision());
   std::sort(errors_m.begin(), errors_m.end());
   std::sort(errors_deg.begin(), errors_deg.end());
   fmt::print("pose of the closures   error median {:.3f} m, {:.2f} deg; worst {:.3f} m, {:.2f} deg\n",
              errors_m[errors_m.size() / 2], errors_deg[errors_deg.size() / 2], errors_m.back(),
              errors_deg.back());
-  return {recall, counts.precision()};
+  return std::pair(recall, counts.precision());
 }
 
 void write_csv(const std::string& file, const std::vector<Answer>& answers, const TruePairs& truth) {
