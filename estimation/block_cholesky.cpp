@@ -3,37 +3,38 @@
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <utility>
 
 #include "estimation/block_kernels.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {
-void BlockCholesky::set_pattern(std::vector<std::vector<int>> neighbours) {
-  if (neighbours == neighbours_ && !column_begin_.empty()) return;
-  neighbours_ = std::move(neighbours);
+
+void BlockCholesky::set_pattern(CouplingPattern pattern) {
+  if (pattern == pattern_ && !column_begin_.empty()) return;
+  pattern_ = std::move(pattern);
   choose_order();
   find_fill();
 }
 
+/// Minimum degree (AMD).
 void BlockCholesky::choose_order() {
-  const int n = static_cast<int>(neighbours_.size());
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int i = 0; i < n; ++i) {
-    entries.emplace_back(i, i, 1.0);
-    for (const int j : neighbours_[i]) {
-      entries.emplace_back(i, j, 1.0);
-      entries.emplace_back(j, i, 1.0);
-    }
-  }
-  Eigen::SparseMatrix<double> pattern(n, n);
-  pattern.setFromTriplets(entries.begin(), entries.end());
+  const int n = pattern_.size();
   order_.resize(n);
-  if (n > 0) {
-    Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation(n);
-    Eigen::AMDOrdering<int>()(pattern, permutation);
-    for (int k = 0; k < n; ++k) order_[k] = permutation.indices()[k];
-  }
   position_.resize(n);
+  if (n == 0) return;
+  std::vector<int> begin{0}, row;
+  for (int i = 0; i < n; ++i) {
+    row.push_back(i);
+    pattern_.for_each_after(i, [&](int j) { row.push_back(j); });
+    begin.push_back(static_cast<int>(row.size()));
+  }
+  const std::vector<double> values(row.size(), 1.0);
+  const Eigen::Map<const Eigen::SparseMatrix<double>> lower(n, n, begin.back(), begin.data(), row.data(),
+                                                            values.data());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation(n);
+  Eigen::AMDOrdering<int>()(lower.selfadjointView<Eigen::Lower>(), permutation);
+  for (int k = 0; k < n; ++k) order_[k] = permutation.indices()[k];
   for (int k = 0; k < n; ++k) position_[order_[k]] = k;
 }
 
@@ -41,26 +42,22 @@ void BlockCholesky::choose_order() {
 /// the diagonal is j (its children in the elimination tree).
 void BlockCholesky::find_fill() {
   const int n = size();
-  std::vector<std::vector<int>> rows(n);
+  CouplingPattern fill(n);
   for (int i = 0; i < n; ++i) {
-    for (const int j : neighbours_[i]) {
-      rows[std::min(position_[i], position_[j])].push_back(std::max(position_[i], position_[j]));
-    }
+    pattern_.for_each_after(i, [&](int j) { fill.couple(position_[i], position_[j]); });
   }
   std::vector<int> row_count(n, 0);
-  column_begin_.assign(n + 1, 0);
+  column_begin_.assign(1, 0);
   row_.clear();
   for (int j = 0; j < n; ++j) {
-    std::sort(rows[j].begin(), rows[j].end());
-    rows[j].erase(std::unique(rows[j].begin(), rows[j].end()), rows[j].end());
-    if (!rows[j].empty()) {
-      std::vector<int>& parent = rows[rows[j].front()];
-      parent.insert(parent.end(), rows[j].begin() + 1, rows[j].end());
-    }
     row_.push_back(j);
-    row_.insert(row_.end(), rows[j].begin(), rows[j].end());
-    column_begin_[j + 1] = static_cast<int>(row_.size());
-    for (const int i : rows[j]) ++row_count[i];
+    fill.for_each_after(j, [&](int i) {
+      row_.push_back(i);
+      ++row_count[i];
+    });
+    const int first = column_begin_[j] + 1, end = static_cast<int>(row_.size());
+    if (first < end) fill.inherit(row_[first], j);
+    column_begin_.push_back(end);
   }
   row_begin_.assign(n + 1, 0);
   for (int k = 0; k < n; ++k) row_begin_[k + 1] = row_begin_[k] + row_count[k];
@@ -71,7 +68,7 @@ void BlockCholesky::find_fill() {
   }
   blocks_.resize(row_.size());
   inverse_diagonal_.resize(n);
-  place_.resize(n);
+  place_.assign(n, -1);
 }
 
 int BlockCholesky::block_index(int row, int column) const {
@@ -80,6 +77,15 @@ int BlockCholesky::block_index(int row, int column) const {
   const auto found = std::lower_bound(begin, end, row);
   TWOFOLD_CHECK(found != end && *found == row, "block outside of the pattern");
   return static_cast<int>(found - row_.begin());
+}
+
+void BlockCholesky::block_indices(int column, std::span<const int> rows, std::span<int> blocks) {
+  const int begin = column_begin_[column], end = column_begin_[column + 1];
+  for (int b = begin; b < end; ++b) place_[row_[b]] = b;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const int b = place_[rows[k]];  // that of a column looked at before does not count
+    blocks[k] = b >= begin && b < end ? b : -1;
+  }
 }
 
 void BlockCholesky::set_zero() {

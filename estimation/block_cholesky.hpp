@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "estimation/coupling_pattern.hpp"
 #include "geometry/types.hpp"
 
 namespace twofold {
@@ -18,9 +19,7 @@ namespace twofold {
 /// position in the elimination order, see position().
 class BlockCholesky {
  public:
-  /// Which unknowns are coupled: `neighbours[i]` lists, in increasing order, the unknowns coupled with i
-  /// (either both directions or only one of them; without i itself).
-  void set_pattern(std::vector<std::vector<int>> neighbours);
+  void set_pattern(CouplingPattern pattern);
 
   [[nodiscard]] int size() const { return static_cast<int>(order_.size()); }
   /// Place of unknown i in the elimination order, for all i.
@@ -28,6 +27,8 @@ class BlockCholesky {
   /// Index of the block at (row, column), row >= column, both positions; the pair must be in the pattern.
   [[nodiscard]] int block_index(int row, int column) const;
   [[nodiscard]] int diagonal_index(int column) const { return column_begin_[column]; }
+  /// The same for many rows of one column: blocks[k] is that of rows[k], -1 where there is none.
+  void block_indices(int column, std::span<const int> rows, std::span<int> blocks);
 
   void set_zero();
   /// Before factorise: block of the matrix, after it: of the factor.
@@ -43,24 +44,25 @@ class BlockCholesky {
   void solve_upper(std::span<Vector6> rhs) const;
 
  private:
+  struct RowEntry {
+    int column, block;
+  };
+
   void choose_order();
   void find_fill();
 
-  std::vector<std::vector<int>> neighbours_;
+  CouplingPattern pattern_;
   std::vector<int> order_;     // unknown at a position
   std::vector<int> position_;  // position of an unknown
   // Column j of the factor: blocks [column_begin_[j], column_begin_[j+1]), rows rising, the diagonal first.
   std::vector<int> column_begin_;
   std::vector<int> row_;
   // Row k of the factor left of the diagonal: which blocks, and the columns they stand in.
-  struct RowEntry {
-    int column, block;
-  };
   std::vector<int> row_begin_;
   std::vector<RowEntry> row_entries_;
   std::vector<Matrix6> blocks_;
   std::vector<Matrix6> inverse_diagonal_;  // L_jj^-1, lower triangular
-  std::vector<int> place_;                 // scratch: block index of a row in the present column
+  std::vector<int> place_;                 // scratch: block of a row in the column looked at last
 };
 
 }  // namespace twofold

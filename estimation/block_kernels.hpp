@@ -15,6 +15,15 @@ using Packet4 = double __attribute__((vector_size(32)));
   std::memcpy(&value, p, sizeof value);
   return value;
 }
+/// *p in all four places. The compiler must not see through it: out of two such vectors it would make a third
+/// by shuffles of the numbers, and shuffles have fewer units than loads and blends.
+[[nodiscard]] inline Packet4 broadcast4(const double* p) {
+  Packet4 value = {*p, *p, *p, *p};
+#ifdef __AVX__
+  asm("" : "+x"(value));
+#endif
+  return value;
+}
 inline void store4(double* p, const Packet4& value) {
   std::memcpy(p, &value, sizeof value);
 }
@@ -25,8 +34,12 @@ inline void store4(double* p, const Packet4& value) {
 /// of the even column, its rows 4-5 with rows 0-1 of the odd column, rows 2-5 of the odd column. Nine
 /// registers hold all of A while the K outer products are added; Eigen's product of this size works in halves
 /// of a register.
+///
+/// No __restrict, as C is all read before A is written: with it, a loop over B and A has the numbers of C
+/// broadcast ahead of it, to the stack, and waits for loads.
 template <int kSign, int K>
-inline void add_outer_product(double* __restrict a, const double* __restrict b, const double* __restrict c) {
+inline void add_outer_product(double* a, const double* b, const double* c) {
+  static_assert(kSign == 1 || kSign == -1);
   Packet4 acc[9];
 #pragma GCC unroll 9
   for (int n = 0; n < 9; ++n) acc[n] = load4(a + 4 * n);
@@ -39,14 +52,18 @@ inline void add_outer_product(double* __restrict a, const double* __restrict b, 
     const Packet4 b4501 = __builtin_shufflevector(b2345, b0123, 2, 3, 4, 5);
 #pragma GCC unroll 3
     for (int pair = 0; pair < 3; ++pair) {
-      const double even = kSign * ck[2 * pair];
-      const double odd = kSign * ck[2 * pair + 1];
-      const Packet4 c_even = {even, even, even, even};
-      const Packet4 c_odd = {odd, odd, odd, odd};
+      const Packet4 c_even = broadcast4(ck + 2 * pair);
+      const Packet4 c_odd = broadcast4(ck + 2 * pair + 1);
       const Packet4 c_both = __builtin_shufflevector(c_even, c_odd, 0, 1, 6, 7);
-      acc[3 * pair] += b0123 * c_even;
-      acc[3 * pair + 1] += b4501 * c_both;
-      acc[3 * pair + 2] += b2345 * c_odd;
+      if constexpr (kSign > 0) {
+        acc[3 * pair] += b0123 * c_even;
+        acc[3 * pair + 1] += b4501 * c_both;
+        acc[3 * pair + 2] += b2345 * c_odd;
+      } else {
+        acc[3 * pair] -= b0123 * c_even;
+        acc[3 * pair + 1] -= b4501 * c_both;
+        acc[3 * pair + 2] -= b2345 * c_odd;
+      }
     }
   }
 #pragma GCC unroll 9

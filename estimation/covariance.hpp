@@ -32,7 +32,7 @@ class WindowCovariance {
   WindowCovariance() = default;
 
   ReducedSystem system_;
-  std::vector<RelativePose> relative_;
+  std::vector<RigidMotion> relative_;
   std::vector<char> fixed_;  // by pose
   std::vector<int> group_of_track_;
   std::vector<int> track_of_point_;  // -1: not used

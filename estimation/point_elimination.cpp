@@ -9,10 +9,6 @@
 namespace twofold {
 namespace {
 
-int triangle_index(int row, int column) {
-  return row * (row + 1) / 2 + column;
-}
-
 /// Lower Cholesky factor; false when V is not positive definite.
 bool cholesky3(const Matrix3& V, Matrix3& L) {
   L.setZero();
@@ -31,99 +27,131 @@ bool cholesky3(const Matrix3& V, Matrix3& L) {
 }
 
 /// Ad(T) x for T = (R, t).
-Vector6 apply_adjoint(const RelativePose& T, const Vector6& x) {
+Vector6 apply_adjoint(const RigidMotion& T, const Vector6& x) {
   const Vector3 Rw = T.R * x.tail<3>();
   Vector6 result;
   result << T.R * x.head<3>() + T.t.cross(Rw), Rw;
   return result;
 }
 
+/// First three columns of the matrix with these rows.
+struct Columns {
+  Packet4 column[3];
+  Columns(const Packet4& r0, const Packet4& r1, const Packet4& r2, const Packet4& r3) {
+    const Packet4 even_01 = __builtin_shufflevector(r0, r1, 0, 4, 2, 6);
+    const Packet4 even_23 = __builtin_shufflevector(r2, r3, 0, 4, 2, 6);
+    const Packet4 odd_01 = __builtin_shufflevector(r0, r1, 1, 5, 3, 7);
+    const Packet4 odd_23 = __builtin_shufflevector(r2, r3, 1, 5, 3, 7);
+    column[0] = __builtin_shufflevector(even_01, even_23, 0, 1, 4, 5);
+    column[1] = __builtin_shufflevector(odd_01, odd_23, 0, 1, 4, 5);
+    column[2] = __builtin_shufflevector(even_01, even_23, 2, 3, 6, 7);
+  }
+};
+
+/// Y = U L^-T, by rows 0-3 and 2-5 of its columns.
+void solve_coupling(const CouplingRows& U, const Matrix3& L, const Vector3& inverse_diagonal,
+                    PointElimination::Matrix63& Y) {
+  const auto solve = [&](Columns& u) {
+    u.column[0] *= inverse_diagonal[0];
+    u.column[1] = (u.column[1] - L(1, 0) * u.column[0]) * inverse_diagonal[1];
+    u.column[2] = (u.column[2] - L(2, 0) * u.column[0] - L(2, 1) * u.column[1]) * inverse_diagonal[2];
+  };
+  const auto &t = U.translation.row, &r = U.rotation.row;
+  Columns low(t[0], t[1], t[2], r[0]), high(t[2], r[0], r[1], r[2]);
+  solve(low);
+  solve(high);
+  for (int c = 0; c < 3; ++c) {
+    store4(Y.data() + 6 * c + 2, high.column[c]);
+    store4(Y.data() + 6 * c, low.column[c]);
+  }
+}
+
+void forget_depth(CouplingRows& U) {
+  for (int r = 0; r < 3; ++r) U.translation.row[r][2] = U.rotation.row[r][2] = 0;
+}
+
 }  // namespace
 
 void PointElimination::eliminate(const WindowLayout& layout, const ObservationModel& model,
-                                 const HuberKernel& kernel, const std::vector<RelativePose>& relative,
+                                 const HuberKernel& kernel, const std::vector<RigidMotion>& relative,
                                  const std::vector<Vector3>& psi, double lambda, BlockCholesky& system,
                                  std::span<Vector6> gradient, std::span<Vector6> diagonal) {
   points_.resize(layout.tracks().size());
   couplings_.resize(layout.entry_slots().size());
-  for (const auto& group : layout.groups()) {
-    hessian_.resize(std::max<std::size_t>(hessian_.size(), triangle_index(group.coupled_count, 0)));
-    information_.resize(group.coupled_count);
-    slot_gradient_.resize(group.coupled_count);
-    set_all_zero(hessian_.data(), triangle_index(group.coupled_count, 0));
-    set_all_zero(information_.data(), information_.size());
-    set_all_zero(slot_gradient_.data(), slot_gradient_.size());
-    const RelativePose* group_relative = relative.data() + group.first_slot;
+  for (const Group& group : layout.groups()) {
+    sums_.assign(group.coupled_count, {});
+    eliminated_gradient_.assign(group.coupled_count, Vector6::Zero());
+    anchor_couplings_.resize(group.coupled_count);
+    set_all_zero(anchor_couplings_.data(), anchor_couplings_.size());
+    anchor_hessian_.setZero();
+    const RigidMotion* group_relative = relative.data() + group.first_slot;
     for (int k = group.first_track; k < group.first_track + group.track_count; ++k) {
       const auto& track = layout.tracks()[k];
-      eliminate_track(track, layout.observations().data() + track.first_observation,
-                      layout.entry_slots().data() + track.first_entry, model, kernel, group_relative, psi[k],
-                      lambda, points_[k]);
+      PointEquations equations = linearise(layout, track, model, kernel, group_relative, psi[k]);
+      eliminate_track(layout, group, track, equations, lambda, system, points_[k]);
     }
     add_group(layout, group, group_relative, system, gradient, diagonal);
   }
 }
 
-/// A^T W A and A^T W e of one observation: with A = J_x [I, -[x]x] and S = J_x^T W J_x they are
-/// [S, -S X; X S, -X S X] and (f, x x f), X = [x]x. Only the lower triangle is summed.
-void PointElimination::add_to_slot(int slot, const ObservationTerms& s, const Vector3& x) {
-  Matrix6& H = information_[slot];
-  H(0, 0) += s.s00, H(2, 0) += s.s02, H(1, 1) += s.s11, H(2, 1) += s.s12, H(2, 2) += s.s22;
-  Matrix3 XS;
-  XS.col(0) = x.cross(Vector3(s.s00, 0, s.s02));
-  XS.col(1) = x.cross(Vector3(0, s.s11, s.s12));
-  XS.col(2) = x.cross(Vector3(s.s02, s.s12, s.s22));
-  H.bottomLeftCorner<3, 3>() += XS;
-  // -X S X: rows of X S crossed by x.
-  H(3, 3) += x.y() * XS(0, 2) - x.z() * XS(0, 1);
-  H(4, 3) += x.y() * XS(1, 2) - x.z() * XS(1, 1);
-  H(5, 3) += x.y() * XS(2, 2) - x.z() * XS(2, 1);
-  H(4, 4) += x.z() * XS(1, 0) - x.x() * XS(1, 2);
-  H(5, 4) += x.z() * XS(2, 0) - x.x() * XS(2, 2);
-  H(5, 5) += x.x() * XS(2, 1) - x.y() * XS(2, 0);
-  slot_gradient_[slot].head<3>() += s.force;
-  slot_gradient_[slot].tail<3>() += x.cross(s.force);
-}
-
-void PointElimination::eliminate_track(const WindowLayout::Track& track,
-                                       const WindowLayout::Observation* observations, const int* entry_slots,
-                                       const ObservationModel& model, const HuberKernel& kernel,
-                                       const RelativePose* relative, const Vector3& psi, double lambda,
-                                       EliminatedPoint& point) {
-  Matrix63* Y = couplings_.data() + track.first_entry;
-  set_all_zero(Y, track.entry_count);
+PointElimination::PointEquations PointElimination::linearise(
+    const WindowLayout& layout, const WindowLayout::Track& track, const ObservationModel& model,
+    const HuberKernel& kernel, const RigidMotion* relative, const Vector3& psi) {
+  coupling_rows_.assign(track.entry_count, {});
   const double inv_q = 1 / psi.z();
   const Vector3 y(psi.x() * inv_q, psi.y() * inv_q, inv_q);
-  Matrix3 V = Matrix3::Zero();
-  Vector3 g = Vector3::Zero();
-  for (int n = 0; n < track.observation_count; ++n) {
-    const auto& o = observations[n];
-    const RelativePose& T = relative[o.slot];
+  Rows3 F, F_coupled;  // sum R_i^T S_i dx_i/dpsi
+  Packet4 g = {};
+  const WindowLayout::Observation* first = &layout.observations()[track.first_observation];
+  for (const auto* o = first; o != first + track.observation_count; ++o) {
+    const RigidMotion& T = relative[o->slot];
     const Vector3 Ry = T.R * y;
     const Vector3 x = Ry + T.t;
-    const ObservationTerms terms = model.linearise(x, o.z, o.information, kernel);
-    Matrix3 J;  // d x / d psi  (B.20)
-    J.col(0) = T.R.col(0) * inv_q;
-    J.col(1) = T.R.col(1) * inv_q;
-    J.col(2) = Ry * -inv_q;
-    Matrix3 SJ;
-    for (int c = 0; c < 3; ++c) SJ.col(c) = terms.apply(J.col(c));
-    V.noalias() += J.transpose() * SJ;
-    g.noalias() += J.transpose() * terms.force;
-    if (o.entry < 0) continue;
-    for (int c = 0; c < 3; ++c) {  // A^T W B
-      Y[o.entry].col(c).head<3>() += SJ.col(c);
-      Y[o.entry].col(c).tail<3>() += x.cross(SJ.col(c));
+    const ObservationTerms terms = model.linearise(x, o->z, o->information, kernel);
+    Rows3 J;  // d x / d psi  (B.20)
+    for (int r = 0; r < 3; ++r) {
+      J.row[r] = Packet4{T.R(r, 0), T.R(r, 1), -Ry[r], 0} * inv_q;
+      g += terms.force[r] * J.row[r];
     }
-    add_to_slot(o.slot, terms, x);
+    const Rows3 SJ = apply(terms, J);
+    const Rows3 RSJ = transposed_times(T.R, SJ);
+    F += RSJ;
+    if (o->entry < 0) continue;
+    F_coupled += RSJ;
+    coupling_rows_[o->entry] += {SJ, cross(x, SJ)};
+    sums_[o->slot].add(terms, x);
+  }
+  // dy/dpsi = [e1, e2, -y] / q
+  const Packet4 V2 = -(y.x() * F.row[0] + y.y() * F.row[1] + y.z() * F.row[2]);
+  PointEquations equations;
+  for (int c = 0; c < 3; ++c) {
+    equations.V.col(c) = inv_q * Vector3(F.row[0][c], F.row[1][c], V2[c]);
+    equations.g[c] = g[c];
+  }
+  const Rows3 torque = cross(y, F_coupled);
+  for (int r = 0; r < 3; ++r) {
+    equations.anchor.translation.row[r] = -F_coupled.row[r];
+    equations.anchor.rotation.row[r] = -torque.row[r];
   }
   // A point at the bound that would like to go beyond infinity keeps its depth for this step.
-  if (psi.z() <= kMinInverseDepth && g.z() > 0) {
-    V.row(2).setZero(), V.col(2).setZero();
-    V(2, 2) = V(0, 0) + V(1, 1);
-    g.z() = 0;
-    for (int n = 0; n < track.entry_count; ++n) Y[n].col(2).setZero();
-  }
+  if (psi.z() <= kMinInverseDepth && equations.g.z() > 0) hold_depth(equations);
+  return equations;
+}
+
+void PointElimination::hold_depth(PointEquations& equations) {
+  auto& [V, g, anchor] = equations;
+  V.row(2).setZero(), V.col(2).setZero();
+  V(2, 2) = V(0, 0) + V(1, 1);
+  g.z() = 0;
+  forget_depth(anchor);
+  for (CouplingRows& U : coupling_rows_) forget_depth(U);
+}
+
+void PointElimination::eliminate_track(const WindowLayout& layout, const Group& group,
+                                       const WindowLayout::Track& track, PointEquations& equations,
+                                       double lambda, BlockCholesky& system, EliminatedPoint& point) {
+  auto& [V, g, anchor] = equations;
+  Matrix63* Y = couplings_.data() + track.first_entry;
   point.damping = damping_diagonal(V);
   V.diagonal() += lambda * point.damping;
   if (!cholesky3(V, point.L)) {  // nothing pulls at this point: it stays, and has no say
@@ -133,79 +161,63 @@ void PointElimination::eliminate_track(const WindowLayout::Track& track,
     return;
   }
   const Matrix3& L = point.L;
-  const double i0 = 1 / L(0, 0), i1 = 1 / L(1, 1), i2 = 1 / L(2, 2);
+  const Vector3 inverse_diagonal = L.diagonal().cwiseInverse();
   Vector3& c = point.c;
-  c[0] = g[0] * i0;
-  c[1] = (g[1] - L(1, 0) * c[0]) * i1;
-  c[2] = (g[2] - L(2, 0) * c[0] - L(2, 1) * c[1]) * i2;
+  c[0] = g[0] * inverse_diagonal[0];
+  c[1] = (g[1] - L(1, 0) * c[0]) * inverse_diagonal[1];
+  c[2] = (g[2] - L(2, 0) * c[0] - L(2, 1) * c[1]) * inverse_diagonal[2];
+  for (int n = 0; n < track.entry_count; ++n) solve_coupling(coupling_rows_[n], L, inverse_diagonal, Y[n]);
+  Matrix63 Y_anchor;
+  solve_coupling(anchor, L, inverse_diagonal, Y_anchor);
+
+  const int* slots = layout.entry_slots().data() + track.first_entry;
+  const bool anchor_free = group.anchor_position >= 0;
   for (int n = 0; n < track.entry_count; ++n) {
-    Matrix63& Yn = Y[n];
-    Yn.col(0) *= i0;
-    Yn.col(1) = (Yn.col(1) - L(1, 0) * Yn.col(0)) * i1;
-    Yn.col(2) = (Yn.col(2) - L(2, 0) * Yn.col(0) - L(2, 1) * Yn.col(1)) * i2;
-    slot_gradient_[entry_slots[n]].noalias() -= Yn * c;
-    Matrix6* row = hessian_.data() + triangle_index(entry_slots[n], 0);
+    const int s = slots[n];
+    eliminated_gradient_[s].noalias() += Y[n] * c;
+    const int* blocks = layout.blocks().data() + group.first_block + s * (s + 1) / 2;
     for (int m = 0; m <= n; ++m) {
-      add_outer_product<-1, 3>(row[entry_slots[m]].data(), Yn.data(), Y[m].data());
+      const int block = blocks[slots[m]];
+      if (block >= 0) add_outer_product<-1, 3>(system.block(block).data(), Y[n].data(), Y[m].data());
     }
+    if (anchor_free) add_outer_product<-1, 3>(anchor_couplings_[s].data(), Y[n].data(), Y_anchor.data());
   }
+  if (anchor_free) add_outer_product<-1, 3>(anchor_hessian_.data(), Y_anchor.data(), Y_anchor.data());
 }
 
-/// From slot to absolute coordinates, xi_i = delta_i - Ad_i delta_a: a block B of slots (i, j) goes to the
-/// poses (i, j) as it is, to (i, a) as -B Ad_j and to (a, a) as Ad_i^T B Ad_j.
-void PointElimination::add_group(const WindowLayout& layout, const WindowLayout::Group& group,
-                                 const RelativePose* relative, BlockCholesky& system,
-                                 std::span<Vector6> gradient, std::span<Vector6> diagonal) {
+/// What the observations say of the slots themselves, and the anchor's share: a block B of slot i goes to the
+/// poses (i, a) as -B Ad_i and to (a, a) as Ad_i^T B Ad_i.
+void PointElimination::add_group(const WindowLayout& layout, const Group& group, const RigidMotion* relative,
+                                 BlockCholesky& system, std::span<Vector6> gradient,
+                                 std::span<Vector6> diagonal) {
   const WindowLayout::Slot* slots = layout.slots().data() + group.first_slot;
-  const bool anchor_free = group.anchor_position >= 0;
-  adjoint_transposed_.resize(group.coupled_count);
-  times_adjoint_.resize(group.coupled_count);
-  set_all_zero(times_adjoint_.data(), times_adjoint_.size());
+  const int a = group.anchor_position;
   for (int s = 0; s < group.coupled_count; ++s) {
-    Matrix6& I = information_[s];
-    I.triangularView<Eigen::StrictlyUpper>() = I.transpose();
-    if (slots[s].position >= 0) {
-      diagonal[slots[s].position] += I.diagonal();
-      gradient[slots[s].position] += slot_gradient_[s];
+    const Matrix6 B = sums_[s].hessian();
+    const Vector6 g = sums_[s].gradient() - eliminated_gradient_[s];
+    if (const int p = slots[s].position; p >= 0) {
+      system.block(system.diagonal_index(p)) += B;
+      diagonal[p] += B.diagonal();
+      gradient[p] += g;
     }
-    if (anchor_free) {
-      const RelativePose& T = relative[s];
-      Matrix6& adjoint_transposed = adjoint_transposed_[s];
-      adjoint_transposed << T.R.transpose(), Matrix3::Zero(), (hat(T.t) * T.R).transpose(), T.R.transpose();
-      const Matrix6 AI = adjoint_transposed * I;
-      diagonal[group.anchor_position] += AI.cwiseProduct(adjoint_transposed).rowwise().sum();
-      gradient[group.anchor_position].noalias() -= adjoint_transposed * slot_gradient_[s];
-    }
-    hessian_[triangle_index(s, s)] += I;
-  }
-  for (int p = group.first_pair; p < group.first_pair + group.pair_count; ++p) {
-    const auto& pair = layout.pairs()[p];
-    const Matrix6& B = hessian_[triangle_index(pair.row, pair.column)];
-    if (pair.block >= 0) system.block(pair.block) += B;
-    if (!anchor_free) continue;
-    add_outer_product<1, 6>(times_adjoint_[pair.row].data(), B.data(),
-                            adjoint_transposed_[pair.column].data());
-    if (pair.row != pair.column) {
-      const Matrix6 Bt = B.transpose();
-      add_outer_product<1, 6>(times_adjoint_[pair.column].data(), Bt.data(),
-                              adjoint_transposed_[pair.row].data());
-    }
-  }
-  if (!anchor_free) return;
-  Matrix6& H_aa = system.block(system.diagonal_index(group.anchor_position));
-  for (int s = 0; s < group.coupled_count; ++s) {
-    const Matrix6 transposed = times_adjoint_[s].transpose();
-    add_outer_product<1, 6>(H_aa.data(), transposed.data(), adjoint_transposed_[s].data());
+    if (a < 0) continue;
+    const Matrix6 A = adjoint_transposed(relative[s]);
+    Matrix6 AB = Matrix6::Zero();  // Ad^T B
+    add_outer_product<1, 6>(AB.data(), A.data(), B.data());
+    add_outer_product<1, 6>(anchor_hessian_.data(), AB.data(), A.data());
+    diagonal[a] += AB.cwiseProduct(A).rowwise().sum();
+    gradient[a].noalias() -= A * g;
     if (slots[s].anchor_block < 0) continue;
     if (slots[s].anchor_is_row) {
-      system.block(slots[s].anchor_block) -= transposed;
+      system.block(slots[s].anchor_block) += anchor_couplings_[s].transpose() - AB;
     } else {
-      system.block(slots[s].anchor_block) -= times_adjoint_[s];
+      system.block(slots[s].anchor_block) += anchor_couplings_[s] - AB.transpose();
     }
   }
+  if (a >= 0) system.block(system.diagonal_index(a)) += anchor_hessian_;
 }
 
-void PointElimination::back_substitute(const WindowLayout& layout, const std::vector<RelativePose>& relative,
+void PointElimination::back_substitute(const WindowLayout& layout, const std::vector<RigidMotion>& relative,
                                        std::span<const Vector6> pose_steps, double lambda,
                                        std::vector<Vector3>& psi_steps, double& predicted) {
   psi_steps.resize(layout.tracks().size());
@@ -232,45 +244,6 @@ void PointElimination::back_substitute(const WindowLayout& layout, const std::ve
       predicted += point.c.squaredNorm() + lambda * step.dot(point.damping.cwiseProduct(step));
     }
   }
-}
-
-void relative_poses(const WindowLayout& layout, const std::vector<SE3>& poses,
-                    std::vector<RelativePose>& relative) {
-  relative.resize(layout.slots().size());
-  for (const auto& group : layout.groups()) {
-    const SE3 T_w_a = poses[group.anchor].inverse();
-    for (int s = group.first_slot; s < group.first_slot + group.slot_count; ++s) {
-      const int pose = layout.slots()[s].pose;
-      const SE3 T_i_a = pose == group.anchor ? SE3() : poses[pose] * T_w_a;
-      relative[s] = {T_i_a.rotation(), T_i_a.translation()};
-    }
-  }
-}
-
-double points_cost(const WindowLayout& layout, const ObservationModel& model, const HuberKernel& kernel,
-                   const std::vector<RelativePose>& relative, const std::vector<Vector3>& psi_before,
-                   std::vector<Vector3>& psi) {
-  double cost = 0;
-  for (const auto& group : layout.groups()) {
-    for (int k = group.first_track; k < group.first_track + group.track_count; ++k) {
-      const auto& track = layout.tracks()[k];
-      const auto track_cost = [&](const Vector3& at) {
-        const Vector3 y = from_inverse_depth(at);
-        double sum = 0;
-        for (int n = track.first_observation; n < track.first_observation + track.observation_count; ++n) {
-          const auto& o = layout.observations()[n];
-          const RelativePose& T = relative[group.first_slot + o.slot];
-          sum += kernel.rho(model.chi2(T.R * y + T.t, o.z, o.information));
-        }
-        return sum;
-      };
-      double sum = track_cost(psi[k]);
-      if (!std::isfinite(sum)) sum = track_cost(psi[k] = psi_before[k]);
-      if (!std::isfinite(sum)) return std::numeric_limits<double>::infinity();
-      cost += sum;
-    }
-  }
-  return cost;
 }
 
 }  // namespace twofold

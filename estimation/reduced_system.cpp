@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimation/block_kernels.hpp"
 #include "estimation/pose_constraint.hpp"
 
 namespace twofold {
@@ -11,9 +12,11 @@ namespace twofold {
 WindowState ReducedSystem::start(const WindowProblem& problem) {
   layout_.build(problem, cholesky_);
   WindowState state;
+  state.poses.reserve(problem.poses.size());
+  state.psi.reserve(layout_.tracks().size());
   for (const auto& pose : problem.poses) state.poses.push_back(pose.T_k_w);
   for (const auto& track : layout_.tracks()) state.psi.push_back(problem.points[track.point].psi);
-  relative_poses(layout_, state.poses, state.relative);
+  state.relate(problem, layout_);
   return state;
 }
 
@@ -25,7 +28,11 @@ void ReducedSystem::build(const WindowProblem& problem, const WindowSolverOption
   elimination_.eliminate(layout_, ObservationModel(problem.rig), HuberKernel{options.huber_px},
                          state.relative, state.psi, lambda, cholesky_, gradient_, diagonal_);
   const HuberKernel kernel{options.constraint_huber};
-  for (const auto& constraint : problem.constraints) add_constraint(constraint, kernel, state.poses);
+  for (std::size_t n = 0; n < problem.constraints.size(); ++n) {
+    const auto& c = problem.constraints[n];
+    add_constraint(c, layout_.constraints()[n], kernel,
+                   relative_motion(state.matrices[c.j], state.matrices[c.i]), state.constraint_errors[n]);
+  }
 
   // A direction in which nothing pulls at a pose is held by a share of what pulls at the average pose.
   Vector6 mean = Vector6::Zero();
@@ -36,32 +43,41 @@ void ReducedSystem::build(const WindowProblem& problem, const WindowSolverOption
   }
 }
 
-void ReducedSystem::add_constraint(const WindowProblem::PoseConstraint& c, const HuberKernel& kernel,
-                                   const std::vector<SE3>& poses) {
-  const int i = layout_.position(c.i), j = layout_.position(c.j);
+/// With B = -dv/d delta_j, K = B^T Lambda B and Ad that of T_j T_i^-1: dv/d delta_i = B Ad, so that the
+/// blocks are K, Ad^T K Ad and -Ad^T K.
+void ReducedSystem::add_constraint(const WindowProblem::PoseConstraint& c,
+                                   const WindowLayout::ConstraintPlace& place, const HuberKernel& kernel,
+                                   const RigidMotion& T_j_i, const Vector6& v) {
+  const auto [i, j, block] = place;
   if (i < 0 && j < 0) return;
-  const auto terms = linearise_pose_constraint(c.T_j_i, poses[c.i], poses[c.j]);
-  const Vector6 information_v = c.information * terms.v;
-  const double weight = kernel.weight(terms.v.dot(information_v));
-  Matrix6 WJ_i, WJ_j, H;
-  WJ_i.noalias() = c.information * terms.J_i;
-  WJ_j.noalias() = c.information * terms.J_j;
-  const auto add_diagonal = [&](int position, const Matrix6& J, const Matrix6& WJ) {
-    if (position < 0) return;
-    H.noalias() = J.transpose() * WJ;
-    cholesky_.block(cholesky_.diagonal_index(position)) += weight * H;
-    diagonal_[position] += weight * H.diagonal();
-    gradient_[position].noalias() += weight * (J.transpose() * information_v);
-  };
-  add_diagonal(i, terms.J_i, WJ_i);
-  add_diagonal(j, terms.J_j, WJ_j);
-  if (i < 0 || j < 0) return;
-  if (i > j) {
-    H.noalias() = terms.J_i.transpose() * WJ_j;
-  } else {
-    H.noalias() = terms.J_j.transpose() * WJ_i;
+  const double weight = kernel.weight(v.dot(c.information * v));
+  // With the inverse left Jacobian [P Q; 0 P] at v, B is that at -v, and P(-v) = P(v)^T, Q(-v) = Q(v)^T.
+  Matrix6 B_transposed = se3_left_jacobian_inverse(v);
+  B_transposed.bottomLeftCorner<3, 3>() = B_transposed.topRightCorner<3, 3>();
+  B_transposed.topRightCorner<3, 3>().setZero();
+  Matrix6 BL = Matrix6::Zero(), K = Matrix6::Zero();  // B^T Lambda, B^T Lambda B
+  add_outer_product<1, 6>(BL.data(), B_transposed.data(), c.information.data());
+  BL *= weight;
+  add_outer_product<1, 6>(K.data(), BL.data(), B_transposed.data());
+  const Vector6 force = BL * v;
+  if (j >= 0) {
+    cholesky_.block(cholesky_.diagonal_index(j)) += K;
+    diagonal_[j] += K.diagonal();
+    gradient_[j] -= force;
   }
-  cholesky_.block(cholesky_.block_index(std::max(i, j), std::min(i, j))) += weight * H;
+  if (i < 0) return;
+  const Matrix6 A = adjoint_transposed(T_j_i);
+  Matrix6 AK = Matrix6::Zero();
+  add_outer_product<1, 6>(AK.data(), A.data(), K.data());
+  add_outer_product<1, 6>(cholesky_.block(cholesky_.diagonal_index(i)).data(), AK.data(), A.data());
+  diagonal_[i] += AK.cwiseProduct(A).rowwise().sum();
+  gradient_[i].noalias() += A * force;
+  if (block < 0) return;
+  if (i > j) {
+    cholesky_.block(block) -= AK;
+  } else {
+    cholesky_.block(block) -= AK.transpose();
+  }
 }
 
 double ReducedSystem::smallest_pivot_ratio() const {
@@ -73,7 +89,8 @@ double ReducedSystem::smallest_pivot_ratio() const {
   return smallest;
 }
 
-std::optional<double> ReducedSystem::step(const WindowState& state, double lambda, WindowState& next) {
+std::optional<double> ReducedSystem::step(const WindowProblem& problem, const WindowState& state,
+                                          double lambda, WindowState& next) {
   pose_steps_.resize(gradient_.size());
   for (std::size_t p = 0; p < gradient_.size(); ++p) pose_steps_[p] = -gradient_[p];
   cholesky_.solve(pose_steps_);
@@ -97,21 +114,8 @@ std::optional<double> ReducedSystem::step(const WindowState& state, double lambd
     next.psi[k] = state.psi[k] + psi_steps_[k];
     next.psi[k].z() = std::max(next.psi[k].z(), kMinInverseDepth);
   }
-  relative_poses(layout_, next.poses, next.relative);
+  next.relate(problem, layout_);
   return predicted;
-}
-
-double window_state_cost(const WindowProblem& problem, const WindowLayout& layout,
-                         const WindowSolverOptions& options, const std::vector<Vector3>& psi_before,
-                         WindowState& values) {
-  double sum = points_cost(layout, ObservationModel(problem.rig), HuberKernel{options.huber_px},
-                           values.relative, psi_before, values.psi);
-  const HuberKernel kernel{options.constraint_huber};
-  for (const auto& c : problem.constraints) {
-    const Vector6 v = pose_constraint_error(c.T_j_i, values.poses[c.i], values.poses[c.j]);
-    sum += kernel.rho(v.dot(c.information * v));
-  }
-  return sum;
 }
 
 }  // namespace twofold

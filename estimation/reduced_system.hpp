@@ -7,15 +7,9 @@
 #include "estimation/point_elimination.hpp"
 #include "estimation/window_layout.hpp"
 #include "estimation/window_problem.hpp"
+#include "estimation/window_state.hpp"
 
 namespace twofold {
-
-/// Values of all unknowns of a window, and what follows from them.
-struct WindowState {
-  std::vector<SE3> poses;
-  std::vector<Vector3> psi;            ///< by track
-  std::vector<RelativePose> relative;  ///< by slot
-};
 
 /// Normal equations of a window with the points eliminated: J^T W J + lambda D over the poses, in the
 /// elimination order of the layout. D is the diagonal of J^T W J.
@@ -33,15 +27,17 @@ class ReducedSystem {
   [[nodiscard]] double smallest_pivot_ratio() const;
   /// Step of all unknowns from `state`, where the system was built, to `next`; returns the decrease of the
   /// cost the quadratic model promises, nullopt when it is not a number.
-  [[nodiscard]] std::optional<double> step(const WindowState& state, double lambda, WindowState& next);
+  [[nodiscard]] std::optional<double> step(const WindowProblem& problem, const WindowState& state,
+                                           double lambda, WindowState& next);
 
   [[nodiscard]] const WindowLayout& layout() const { return layout_; }
   [[nodiscard]] const PointElimination& elimination() const { return elimination_; }
   [[nodiscard]] const BlockCholesky& factor() const { return cholesky_; }
 
  private:
-  void add_constraint(const WindowProblem::PoseConstraint& constraint, const HuberKernel& kernel,
-                      const std::vector<SE3>& poses);
+  void add_constraint(const WindowProblem::PoseConstraint& constraint,
+                      const WindowLayout::ConstraintPlace& place, const HuberKernel& kernel,
+                      const RigidMotion& T_j_i, const Vector6& v);
 
   WindowLayout layout_;
   BlockCholesky cholesky_;
@@ -49,11 +45,5 @@ class ReducedSystem {
   std::vector<Vector6> gradient_, diagonal_, pose_steps_;  // by position
   std::vector<Vector3> psi_steps_;                         // by track
 };
-
-/// Robustified cost of eq. 6.4 at `values`; infinity when a used observation lies behind its camera. Points
-/// for which only their own step is to blame for that are put back to `psi_before`.
-[[nodiscard]] double window_state_cost(const WindowProblem& problem, const WindowLayout& layout,
-                                       const WindowSolverOptions& options,
-                                       const std::vector<Vector3>& psi_before, WindowState& values);
 
 }  // namespace twofold

@@ -1,8 +1,8 @@
 #include "estimation/window_layout.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
+#include <numeric>
+#include <tuple>
 
 #include "estimation/observation_model.hpp"
 #include "geometry/inverse_depth.hpp"
@@ -10,37 +10,10 @@
 namespace twofold {
 namespace {
 
-/// Symmetric relation between n unknowns, a bit a pair.
-class BitMatrix {
- public:
-  explicit BitMatrix(int n) : n_(n), words_((n + 63) / 64), bits_(static_cast<std::size_t>(n) * words_, 0) {}
-  void set(int i, int j) {
-    if (i > j) std::swap(i, j);
-    bits_[static_cast<std::size_t>(i) * words_ + j / 64] |= std::uint64_t{1} << (j % 64);
-  }
-  /// For each i the j > i related to it, rising.
-  [[nodiscard]] std::vector<std::vector<int>> lists() const {
-    std::vector<std::vector<int>> result(n_);
-    for (int i = 0; i < n_; ++i) {
-      for (int w = 0; w < words_; ++w) {
-        auto word = bits_[static_cast<std::size_t>(i) * words_ + w];
-        for (; word != 0; word &= word - 1) {
-          const int j = 64 * w + __builtin_ctzll(word);
-          if (j != i) result[i].push_back(j);
-        }
-      }
-    }
-    return result;
-  }
-
- private:
-  int n_, words_;
-  std::vector<std::uint64_t> bits_;
-};
-
 /// By insertion: tracks are short and almost in order.
 void sort_by_slot(WindowLayout::Observation* first, int count) {
   for (int n = 1; n < count; ++n) {
+    if (first[n - 1].slot <= first[n].slot) continue;
     const WindowLayout::Observation moved = first[n];
     int m = n;
     for (; m > 0 && first[m - 1].slot > moved.slot; --m) first[m] = first[m - 1];
@@ -48,42 +21,64 @@ void sort_by_slot(WindowLayout::Observation* first, int count) {
   }
 }
 
-int triangle_index(int row, int column) {
-  return row * (row + 1) / 2 + column;
+std::size_t triangle_size(int rows) {
+  return static_cast<std::size_t>(rows) * (rows + 1) / 2;
 }
 
 }  // namespace
 
 void WindowLayout::build(const WindowProblem& problem, BlockCholesky& system) {
+  sort_points(problem);
+  set_pattern(problem, system);
+  entry_slots_.clear();
+  entry_slots_.reserve(observations_.size());
+  std::size_t blocks = 0;
+  for (Group& group : groups_) {
+    sort_slots(group);
+    sort_observations(group);
+    group.first_block = blocks;
+    blocks += triangle_size(group.coupled_count);
+  }
+  blocks_.resize(blocks);
+  for (Group& group : groups_) find_blocks(group, system);
+  place_constraints(problem, system);
+}
+
+/// Groups, by a counting sort of the points by anchor.
+void WindowLayout::sort_points(const WindowProblem& problem) {
+  const std::size_t poses = problem.poses.size();
   groups_.clear();
   slots_.clear();
   tracks_.clear();
   observations_.clear();
-  pairs_.clear();
-  entry_slots_.clear();
-  slot_of_pose_.assign(problem.poses.size(), -1);
-  sort_points(problem);
-  for (Group& group : groups_) find_pairs(group);
-  set_pattern(problem, system);
-  for (Group& group : groups_) sort_slots(group, system);
-}
-
-void WindowLayout::sort_points(const WindowProblem& problem) {
-  std::vector<std::vector<int>> by_anchor(problem.poses.size());
-  for (std::size_t k = 0; k < problem.points.size(); ++k) {
-    if (problem.points[k].psi.z() > 0) by_anchor[problem.points[k].anchor].push_back(static_cast<int>(k));
-  }
   observations_.reserve(problem.observations.size());
   tracks_.reserve(problem.points.size());
-  for (std::size_t a = 0; a < by_anchor.size(); ++a) {
-    if (!by_anchor[a].empty()) collect_group(problem, static_cast<int>(a), by_anchor[a]);
+  slot_of_pose_.assign(poses, -1);
+  coupled_ = CouplingPattern(static_cast<int>(poses));
+  involved_.assign(poses, 0);
+  rotations_.clear();
+  for (const auto& pose : problem.poses) rotations_.push_back(pose.T_k_w.rotation());
+
+  const auto usable = [](const WindowProblem::Point& point) { return point.psi.z() > 0; };
+  std::vector<int> begin(poses + 1, 0);
+  for (const auto& point : problem.points) begin[point.anchor + 1] += usable(point);
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<int> by_anchor(begin.back());
+  std::vector<int> next(begin.begin(), begin.end() - 1);
+  for (std::size_t k = 0; k < problem.points.size(); ++k) {
+    if (usable(problem.points[k])) by_anchor[next[problem.points[k].anchor]++] = static_cast<int>(k);
+  }
+  for (std::size_t a = 0; a < poses; ++a) {
+    if (begin[a] == begin[a + 1]) continue;
+    const int count = begin[a + 1] - begin[a];
+    collect_group(problem, static_cast<int>(a), std::span(by_anchor).subspan(begin[a], count));
   }
 }
 
 /// Slots and usable observations of the points anchored in one pose.
-void WindowLayout::collect_group(const WindowProblem& problem, int anchor, const std::vector<int>& points) {
-  const ObservationModel model(problem.rig);
-  const SE3 T_w_a = problem.poses[anchor].T_k_w.inverse();
+void WindowLayout::collect_group(const WindowProblem& problem, int anchor, std::span<const int> points) {
+  const Matrix3& R_a_w = rotations_[anchor];
+  const Vector3& t_a_w = problem.poses[anchor].T_k_w.translation();
   Group group{};
   group.anchor = anchor;
   group.first_slot = static_cast<int>(slots_.size());
@@ -101,129 +96,151 @@ void WindowLayout::collect_group(const WindowProblem& problem, int anchor, const
       if (slot < 0) {
         slot = group.slot_count++;
         slots_.push_back({o.pose, -1, false, -1, false});
-        const SE3 T_i_a = o.pose == anchor ? SE3() : problem.poses[o.pose].T_k_w * T_w_a;
-        depth_row.push_back(T_i_a.rotation().row(2));
-        depth_shift.push_back(T_i_a.translation().z());
+        const Vector3 row =
+            o.pose == anchor ? Vector3::UnitZ() : Vector3(R_a_w * rotations_[o.pose].row(2).transpose());
+        depth_row.push_back(row);
+        depth_shift.push_back(
+            o.pose == anchor ? 0 : problem.poses[o.pose].T_k_w.translation().z() - row.dot(t_a_w));
       }
       if (!(depth_row[slot].dot(y) + depth_shift[slot] > 2 * kMinDepth)) continue;
-      // Only a measurement that counts couples: a pose all of whose points are behind it has no place in the system.
+      // Only a measurement that counts couples: a pose all of whose points are behind it has no place in the
+      // system.
       const bool both_held = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
       slots_[group.first_slot + slot].coupled = o.pose != anchor && !both_held;
       observations_.push_back({o.z, o.information, slot, -1});
       ++track.observation_count;
     }
-    if (track.observation_count > 0) tracks_.push_back(track);
+    if (track.observation_count == 0) continue;
+    tracks_.push_back(track);
+    mark_coupled(group, track);
   }
   for (int s = 0; s < group.slot_count; ++s) slot_of_pose_[slots_[group.first_slot + s].pose] = -1;
   group.track_count = static_cast<int>(tracks_.size()) - group.first_track;
   groups_.push_back(group);
 }
 
-/// Which slots have a point in common.
-void WindowLayout::find_pairs(Group& group) {
+/// Eliminating a point couples all poses that its measurements depend on.
+void WindowLayout::mark_coupled(const Group& group, const Track& track) {
   const Slot* slots = &slots_[group.first_slot];
-  seen_together_.assign(triangle_index(group.slot_count, 0), 0);
-  for (int k = group.first_track; k < group.first_track + group.track_count; ++k) {
-    const Observation* track = &observations_[tracks_[k].first_observation];
-    for (int m = 0; m < tracks_[k].observation_count; ++m) {
-      const int s = track[m].slot;
-      if (!slots[s].coupled) continue;
-      for (int n = 0; n <= m; ++n) {
-        const int r = track[n].slot;
-        if (slots[r].coupled) seen_together_[triangle_index(std::max(r, s), std::min(r, s))] = 1;
-      }
+  const Observation* observations = &observations_[track.first_observation];
+  for (int m = 0; m < track.observation_count; ++m) {
+    const Slot& slot = slots[observations[m].slot];
+    if (!slot.coupled) continue;
+    involved_[slot.pose] = involved_[group.anchor] = 1;
+    coupled_.couple(slot.pose, group.anchor);
+    for (int n = 0; n < m; ++n) {
+      const Slot& other = slots[observations[n].slot];
+      if (other.coupled && other.pose != slot.pose) coupled_.couple(slot.pose, other.pose);
     }
   }
-  group.first_pair = static_cast<int>(pairs_.size());
-  for (int row = 0; row < group.slot_count; ++row) {
-    for (int column = 0; column <= row; ++column) {
-      if (seen_together_[triangle_index(row, column)] != 0) pairs_.push_back({row, column, -1});
-    }
-  }
-  group.pair_count = static_cast<int>(pairs_.size()) - group.first_pair;
 }
 
 void WindowLayout::set_pattern(const WindowProblem& problem, BlockCholesky& system) {
-  std::vector<char> involved(problem.poses.size(), 0);
-  for (const Group& group : groups_) {
-    for (int p = group.first_pair; p < group.first_pair + group.pair_count; ++p) {
-      involved[slots_[group.first_slot + pairs_[p].row].pose] = 1;
-      involved[group.anchor] = 1;
-    }
+  for (const auto& c : problem.constraints) {
+    involved_[c.i] = involved_[c.j] = 1;
+    coupled_.couple(c.i, c.j);
   }
-  for (const auto& c : problem.constraints) involved[c.i] = involved[c.j] = 1;
-
-  std::vector<int> unknown(problem.poses.size(), -1);
+  const int poses = static_cast<int>(problem.poses.size());
+  std::vector<int> unknown(poses, -1);
   int count = 0;
-  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
-    if (involved[i] != 0 && !problem.poses[i].fixed) unknown[i] = count++;
+  for (int i = 0; i < poses; ++i) {
+    if (involved_[i] != 0 && !problem.poses[i].fixed) unknown[i] = count++;
   }
-  BitMatrix coupled(count);
-  const auto couple = [&](int pose_1, int pose_2) {
-    if (unknown[pose_1] >= 0 && unknown[pose_2] >= 0) coupled.set(unknown[pose_1], unknown[pose_2]);
-  };
-  for (const Group& group : groups_) {
-    for (int p = group.first_pair; p < group.first_pair + group.pair_count; ++p) {
-      const int row_pose = slots_[group.first_slot + pairs_[p].row].pose;
-      couple(row_pose, slots_[group.first_slot + pairs_[p].column].pose);
-      couple(row_pose, group.anchor);
-    }
+  CouplingPattern pattern(count);
+  for (int i = 0; i < poses; ++i) {
+    if (unknown[i] < 0) continue;
+    coupled_.for_each_after(i, [&](int j) {
+      if (unknown[j] >= 0) pattern.couple(unknown[i], unknown[j]);
+    });
   }
-  for (const auto& c : problem.constraints) couple(c.i, c.j);
-  system.set_pattern(coupled.lists());
-
-  position_.assign(problem.poses.size(), -1);
-  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+  system.set_pattern(std::move(pattern));
+  position_.assign(poses, -1);
+  for (int i = 0; i < poses; ++i) {
     if (unknown[i] >= 0) position_[i] = system.position()[unknown[i]];
   }
 }
 
-/// Renumbers the slots of a group, coupled ones first and in elimination order, so that blocks of the group
-/// go to the lower triangle of the reduced system as they are.
-void WindowLayout::sort_slots(Group& group, const BlockCholesky& system) {
+/// Renumbers the slots of a group, coupled ones first and in elimination order, so that products of its
+/// points go to the lower triangle of the reduced system as they are.
+void WindowLayout::sort_slots(Group& group) {
   Slot* slots = &slots_[group.first_slot];
   group.anchor_position = position_[group.anchor];
-  for (int s = 0; s < group.slot_count; ++s) slots[s].position = position_[slots[s].pose];
-  std::vector<int> order(group.slot_count);
-  for (int s = 0; s < group.slot_count; ++s) order[s] = s;
-  const auto rank = [slots](int s) { return std::make_pair(slots[s].coupled ? 0 : 1, slots[s].position); };
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return rank(a) < rank(b); });
-  std::vector<int> renamed(group.slot_count);
-  std::vector<Slot> sorted(group.slot_count);
+  unsorted_.assign(slots, slots + group.slot_count);
+  for (Slot& slot : unsorted_) slot.position = position_[slot.pose];
+  std::vector<int>& order = rows_;
+  order.resize(group.slot_count);
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [this](int a, int b) {
+    const auto rank = [this](int s) {
+      return std::make_tuple(unsorted_[s].coupled ? 0 : 1, unsorted_[s].position, s);
+    };
+    return rank(a) < rank(b);
+  });
+  renamed_.resize(group.slot_count);
   for (int s = 0; s < group.slot_count; ++s) {
-    renamed[order[s]] = s;
-    sorted[s] = slots[order[s]];
-    group.coupled_count += sorted[s].coupled;
-    if (sorted[s].coupled && sorted[s].position >= 0 && group.anchor_position >= 0) {
-      sorted[s].anchor_is_row = group.anchor_position > sorted[s].position;
-      sorted[s].anchor_block = system.block_index(std::max(group.anchor_position, sorted[s].position),
-                                                  std::min(group.anchor_position, sorted[s].position));
-    }
+    renamed_[order[s]] = s;
+    slots[s] = unsorted_[order[s]];
+    group.coupled_count += slots[s].coupled;
   }
-  std::copy(sorted.begin(), sorted.end(), slots);
+}
 
-  for (int p = group.first_pair; p < group.first_pair + group.pair_count; ++p) {
-    const int a = renamed[pairs_[p].row], b = renamed[pairs_[p].column];
-    Pair& pair = pairs_[p] = {std::max(a, b), std::min(a, b), -1};
-    if (slots[pair.row].position >= 0 && slots[pair.column].position >= 0) {
-      pair.block = system.block_index(slots[pair.row].position, slots[pair.column].position);
-    }
-  }
+/// Brings the observations of each track into the order of the slots, and counts its couplings.
+void WindowLayout::sort_observations(const Group& group) {
   for (int k = group.first_track; k < group.first_track + group.track_count; ++k) {
     Track& track = tracks_[k];
     Observation* observations = &observations_[track.first_observation];
-    for (int n = 0; n < track.observation_count; ++n) observations[n].slot = renamed[observations[n].slot];
+    for (int n = 0; n < track.observation_count; ++n) observations[n].slot = renamed_[observations[n].slot];
     sort_by_slot(observations, track.observation_count);
     track.first_entry = static_cast<int>(entry_slots_.size());
     for (int n = 0; n < track.observation_count; ++n) {
       Observation& o = observations[n];
-      if (!slots[o.slot].coupled) continue;
+      if (o.slot >= group.coupled_count) break;
       if (n == 0 || observations[n - 1].slot != o.slot) {
         entry_slots_.push_back(o.slot);
         ++track.entry_count;
       }
       o.entry = track.entry_count - 1;
     }
+  }
+}
+
+/// Where the blocks of a group's slots stand in the reduced system.
+void WindowLayout::find_blocks(Group& group, BlockCholesky& system) {
+  Slot* slots = &slots_[group.first_slot];
+  int* blocks = blocks_.data() + group.first_block;
+  int held = 0;  // they come first
+  while (held < group.coupled_count && slots[held].position < 0) ++held;
+  std::fill_n(blocks, triangle_size(held), -1);
+  rows_.resize(group.coupled_count);
+  for (int s = 0; s < group.coupled_count; ++s) rows_[s] = slots[s].position;
+  column_blocks_.resize(group.coupled_count);
+  for (int column = 0; column < group.coupled_count; ++column) {
+    const std::size_t below = group.coupled_count - column;
+    const std::span<int> found = std::span(column_blocks_).first(below);
+    if (column < held) {
+      std::fill(found.begin(), found.end(), -1);
+    } else {
+      system.block_indices(rows_[column], std::span(rows_).last(below), found);
+    }
+    for (int row = column; row < group.coupled_count; ++row) {
+      blocks[triangle_size(row) + column] = found[row - column];
+    }
+  }
+  if (group.anchor_position < 0) return;
+  for (Slot* slot = slots + held; slot != slots + group.coupled_count; ++slot) {
+    slot->anchor_is_row = group.anchor_position > slot->position;
+    slot->anchor_block = system.block_index(std::max(group.anchor_position, slot->position),
+                                            std::min(group.anchor_position, slot->position));
+  }
+}
+
+void WindowLayout::place_constraints(const WindowProblem& problem, const BlockCholesky& system) {
+  constraints_.clear();
+  constraints_.reserve(problem.constraints.size());
+  for (const auto& c : problem.constraints) {
+    const int i = position_[c.i], j = position_[c.j];
+    const bool both_free = i >= 0 && j >= 0;
+    constraints_.push_back({i, j, both_free ? system.block_index(std::max(i, j), std::min(i, j)) : -1});
   }
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "estimation/block_cholesky.hpp"
@@ -27,11 +29,6 @@ class WindowLayout {
     int anchor_block = -1;       ///< block of (slot, anchor) in the reduced system, if both are free
     bool anchor_is_row = false;  ///< that block has the anchor as row
   };
-  /// Two slots that see a common point; row == column for each coupled slot.
-  struct Pair {
-    int row, column;  ///< in the group, row >= column
-    int block;        ///< in the reduced system; -1 unless both are free
-  };
   struct Observation {
     Eigen::Vector3f z;
     Eigen::Vector3f information;
@@ -49,7 +46,12 @@ class WindowLayout {
     int first_slot, slot_count;
     int coupled_count;  ///< coupled slots come first, free ones in elimination order
     int first_track, track_count;
-    int first_pair, pair_count;
+    std::size_t first_block;  ///< of its part of blocks()
+  };
+  /// Where a pose-pose constraint goes in the reduced system.
+  struct ConstraintPlace {
+    int i, j;   ///< positions; -1: held
+    int block;  ///< of (i, j), or (j, i) if that is the lower one; -1 unless both are free
   };
 
   /// Sorts the problem, and gives `system` the pattern of its reduced system.
@@ -59,28 +61,40 @@ class WindowLayout {
   [[nodiscard]] const std::vector<Slot>& slots() const { return slots_; }
   [[nodiscard]] const std::vector<Track>& tracks() const { return tracks_; }
   [[nodiscard]] const std::vector<Observation>& observations() const { return observations_; }
-  [[nodiscard]] const std::vector<Pair>& pairs() const { return pairs_; }
+  /// Blocks of the reduced system for pairs of coupled slots, of each group the lower triangle row by row; -1
+  /// unless both slots are free and a point may be seen from both.
+  [[nodiscard]] const std::vector<int>& blocks() const { return blocks_; }
   /// Slot, in the group, of each entry.
   [[nodiscard]] const std::vector<int>& entry_slots() const { return entry_slots_; }
+  [[nodiscard]] const std::vector<ConstraintPlace>& constraints() const { return constraints_; }
   /// Place of a pose in the elimination order; -1 when it is held or nothing depends on it.
   [[nodiscard]] int position(int pose) const { return position_[pose]; }
 
  private:
   void sort_points(const WindowProblem& problem);
-  void collect_group(const WindowProblem& problem, int anchor, const std::vector<int>& points);
-  void find_pairs(Group& group);
+  void collect_group(const WindowProblem& problem, int anchor, std::span<const int> points);
+  void mark_coupled(const Group& group, const Track& track);
   void set_pattern(const WindowProblem& problem, BlockCholesky& system);
-  void sort_slots(Group& group, const BlockCholesky& system);
+  void sort_slots(Group& group);
+  void sort_observations(const Group& group);
+  void find_blocks(Group& group, BlockCholesky& system);
+  void place_constraints(const WindowProblem& problem, const BlockCholesky& system);
 
   std::vector<Group> groups_;
   std::vector<Slot> slots_;
   std::vector<Track> tracks_;
   std::vector<Observation> observations_;
-  std::vector<Pair> pairs_;
+  std::vector<int> blocks_;
+  std::vector<ConstraintPlace> constraints_;
   std::vector<int> entry_slots_;
   std::vector<int> position_;
-  std::vector<int> slot_of_pose_;  // scratch
-  std::vector<char> seen_together_;
+  // Scratch:
+  std::vector<Matrix3> rotations_;  // of the poses
+  std::vector<int> slot_of_pose_;
+  CouplingPattern coupled_;     // of poses by points
+  std::vector<char> involved_;  // poses that something depends on
+  std::vector<int> renamed_, rows_, column_blocks_;
+  std::vector<Slot> unsorted_;
 };
 
 }  // namespace twofold

@@ -86,7 +86,7 @@ SolverSummary WindowSolver::Workspace::points_first(WindowProblem& problem,
   const auto try_step = [&](double lambda, double cost) -> Trial {
     system.build(problem, options, state, lambda);
     if (!system.factorise()) return {};
-    return judge(system.step(state, lambda, candidate), cost,
+    return judge(system.step(problem, state, lambda, candidate), cost,
                  [&] { return window_state_cost(problem, system.layout(), options, state.psi, candidate); });
   };
   const double cost = window_state_cost(problem, system.layout(), options, state.psi, state);

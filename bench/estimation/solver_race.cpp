@@ -1,5 +1,6 @@
 #include "bench/estimation/solver_race.hpp"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -106,6 +107,10 @@ SolverCourse in_own_process(const std::string& name, const std::function<SolverC
   if (child < 0) throw std::runtime_error("no process");
   if (child == 0) {
     close(pipe_ends[0]);
+    // What a run gives back stays with the process: pages new from the kernel are no matter of solvers, and
+    // whether a run gets some would hang on the sizes of its pieces.
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);
+    mallopt(M_TRIM_THRESHOLD, 1 << 30);
     const std::string text = to_text(run());
     const bool written = write(pipe_ends[1], text.data(), text.size()) == static_cast<ssize_t>(text.size());
     _exit(written ? 0 : 1);

@@ -4,6 +4,7 @@
 #include "estimation/motion_only.hpp"
 #include "estimation/point_elimination.hpp"
 #include "estimation/window_solver.hpp"
+#include "estimation/window_state.hpp"
 #include "tests/estimation/synthetic_window.hpp"
 
 namespace twofold {
@@ -55,23 +56,21 @@ struct Stages {
   WindowLayout layout;
   BlockCholesky system;
   PointElimination elimination;
-  std::vector<SE3> poses;
-  std::vector<Vector3> psi;
-  std::vector<RelativePose> relative;
+  WindowState values;
   std::vector<Vector6> gradient, diagonal;
 
   explicit Stages(bool outer_observations) : window(typical_window(outer_observations)) {
     layout.build(window.start, system);
-    for (const auto& pose : window.start.poses) poses.push_back(pose.T_k_w);
-    for (const auto& track : layout.tracks()) psi.push_back(window.start.points[track.point].psi);
-    relative_poses(layout, poses, relative);
+    for (const auto& pose : window.start.poses) values.poses.push_back(pose.T_k_w);
+    for (const auto& track : layout.tracks()) values.psi.push_back(window.start.points[track.point].psi);
+    values.relate(window.start, layout);
     gradient.resize(system.size());
     diagonal.resize(system.size());
   }
   void eliminate() {
     system.set_zero();
-    elimination.eliminate(layout, ObservationModel(window.start.rig), HuberKernel{2}, relative, psi, 1e-4,
-                          system, gradient, diagonal);
+    elimination.eliminate(layout, ObservationModel(window.start.rig), HuberKernel{2}, values.relative,
+                          values.psi, 1e-4, system, gradient, diagonal);
     for (int p = 0; p < system.size(); ++p) system.block(system.diagonal_index(p)).diagonal().array() += 1e3;
   }
 };
@@ -117,10 +116,10 @@ BENCHMARK(BM_StageEliminateAndFactorise)
 
 void BM_StageCost(benchmark::State& state) {
   Stages stages(state.range(0) != 0);
-  const auto before = stages.psi;
+  const auto before = stages.values.psi;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(points_cost(stages.layout, ObservationModel(stages.window.start.rig),
-                                         HuberKernel{2}, stages.relative, before, stages.psi));
+    benchmark::DoNotOptimize(
+        window_state_cost(stages.window.start, stages.layout, {}, before, stages.values));
   }
 }
 BENCHMARK(BM_StageCost)->ArgName("outer_observations")->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);

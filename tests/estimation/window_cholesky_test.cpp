@@ -31,6 +31,29 @@ TEST(BlockKernels, AddOuterProduct) {
   }
 }
 
+std::vector<int> after(const CouplingPattern& pattern, int i) {
+  std::vector<int> result;
+  pattern.for_each_after(i, [&](int j) { result.push_back(j); });
+  return result;
+}
+
+TEST(CouplingPattern, ListsWhatComesAfterInOrderAcrossWords) {
+  CouplingPattern pattern(200);
+  for (const int j : {199, 3, 64, 63, 128, 64}) pattern.couple(j, 5);  // 3 comes before 5
+  EXPECT_EQ(after(pattern, 5), (std::vector{63, 64, 128, 199}));
+  EXPECT_EQ(after(pattern, 3), (std::vector{5}));
+  EXPECT_TRUE(after(pattern, 199).empty());
+}
+
+TEST(CouplingPattern, InheritsOnlyWhatComesAfterTheHeir) {
+  CouplingPattern pattern(200);
+  for (const int j : {20, 63, 64, 65, 130}) pattern.couple(5, j);
+  pattern.couple(64, 199);
+  pattern.inherit(64, 5);
+  EXPECT_EQ(after(pattern, 64), (std::vector{65, 130, 199}));
+  EXPECT_EQ(after(pattern, 5), (std::vector{20, 63, 64, 65, 130}));
+}
+
 struct Pattern {
   const char* name;
   int size;
@@ -46,12 +69,15 @@ class BlockCholeskyTest : public testing::TestWithParam<Pattern> {
     const auto [name, n, density, chain] = GetParam();
     std::uniform_real_distribution<double> uniform;
     std::vector<std::vector<int>> neighbours(n);
+    CouplingPattern pattern(n);
     for (int i = 0; i < n; ++i) {
       for (int j = i + 1; j < n; ++j) {
-        if ((chain && j == i + 1) || uniform(rng) < density) neighbours[i].push_back(j);
+        if (!((chain && j == i + 1) || uniform(rng) < density)) continue;
+        neighbours[i].push_back(j);
+        pattern.couple(i, j);
       }
     }
-    cholesky.set_pattern(neighbours);
+    cholesky.set_pattern(pattern);
     cholesky.set_zero();
     Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(6 * n, 6 * n);
     for (int i = 0; i < n; ++i) {
@@ -95,6 +121,29 @@ TEST_P(BlockCholeskyTest, SolvesAsTheDenseFactorisationDoes) {
     const Eigen::VectorXd expected = dense.llt().solve(b);
     for (int i = 0; i < n; ++i) {
       EXPECT_LT((x[cholesky.position()[i]] - expected.segment<6>(6 * i)).norm(), 1e-12);
+    }
+  }
+}
+
+TEST_P(BlockCholeskyTest, FindsTheBlocksOfAColumn) {
+  std::mt19937 rng(5);
+  BlockCholesky cholesky;
+  fill(cholesky, rng);
+  const int n = GetParam().size;
+  for (int round = 0; round < 2; ++round) {  // places left by other columns do not count
+    for (int column = 0; column < n; ++column) {
+      std::vector<int> rows, blocks(n - column);
+      for (int row = column; row < n; ++row) rows.push_back(row);
+      cholesky.block_indices(column, rows, blocks);
+      int expected = cholesky.diagonal_index(column);
+      for (int row = column; row < n; ++row) {
+        if (blocks[row - column] < 0) continue;
+        EXPECT_EQ(blocks[row - column], expected++);
+        EXPECT_EQ(blocks[row - column], cholesky.block_index(row, column));
+      }
+      if (column + 1 < n) {
+        EXPECT_EQ(expected, cholesky.diagonal_index(column + 1));
+      }
     }
   }
 }
