@@ -39,13 +39,15 @@ void GaussNewtonFilter::initialise(std::span<const PointObservation> first) {
   points_.clear();
   T_c_w_ = SE3();
   Lambda_ = MatrixX::Zero(6, 6);
+  reference_ = 0;
   // The current pose is the origin itself: known, so its block holds no information to marginalise.
   for (const PointObservation& o : first) add_point(o, 0);
 }
 
 bool GaussNewtonFilter::step(std::span<const std::int64_t> lost, std::span<const PointObservation> fresh,
                              std::span<const PointObservation> current) {
-  if (fresh.empty()) {
+  const bool keep_pose = reference_ == kCurrentPose;
+  if (fresh.empty() && !keep_pose) {
     marginalise_pose();
     if (!lost.empty()) marginalise_points(lost);
   } else {
@@ -55,6 +57,7 @@ bool GaussNewtonFilter::step(std::span<const std::int64_t> lost, std::span<const
       marginalise_pose();
     } else {
       pose_becomes_anchor();
+      if (keep_pose) reference_ = anchor_count();
     }
     marginalise_points(lost);
     append_pose();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -24,8 +25,7 @@ struct GaussNewtonFilterOptions {
   int iterations = 3;  ///< Levenberg-Marquardt steps of the joint update, >= 0; 0: the motion estimate stands
   int motion_iterations = 10;
   MotionEstimate motion = MotionEstimate::kMotionOnly;
-  /// Stereo: first estimates bring the filter to bundle adjustment's accuracy. Monocular: kCurrent is better,
-  /// the first depths, of little parallax, are too far off to take derivatives at.
+  /// First estimates bring the filter to bundle adjustment's accuracy.
   Linearisation linearisation = Linearisation::kFirstEstimate;
 
   [[nodiscard]] std::string invalid_reason() const;
@@ -51,8 +51,9 @@ class GaussNewtonFilter {
   /// First frame of a stereo rig: the points and their information  (eq. 4.23, 4.24).
   void initialise(std::span<const PointObservation> first);
   /// Monocular start from three consecutive frames  (4.5.3): the first is the origin, the translation to the
-  /// second defines the unit of length by a 5-DoF constraint, the third is a standard update. Points not seen
-  /// in all three are left out. False when the motion could not be estimated.
+  /// second defines the unit of length by a 5-DoF constraint, the third is a standard update. Then (ours) all
+  /// three are linearised anew at their common minimum. Points not seen in all three are left out. False when
+  /// the motion could not be estimated.
   [[nodiscard]] bool bootstrap(std::span<const PointObservation> b0, std::span<const PointObservation> b1,
                                std::span<const PointObservation> first);
 
@@ -67,6 +68,12 @@ class GaussNewtonFilter {
   void set_options(const GaussNewtonFilterOptions& options);
 
   [[nodiscard]] const SE3& T_c_w() const { return T_c_w_; }
+  /// Frame from which motion counts: the first one of a stereo rig, the third of a monocular start. That one
+  /// is not the origin and known from two short baselines only: it stays in the state, an anchor even
+  /// without points, and gains from every later measurement.
+  [[nodiscard]] const SE3& T_reference_w() const {
+    return reference_ == kCurrentPose ? T_c_w_ : anchors_[static_cast<std::size_t>(reference_)];
+  }
   [[nodiscard]] int point_count() const { return static_cast<int>(points_.size()); }
   [[nodiscard]] int anchor_count() const { return static_cast<int>(anchors_.size()) - 1; }
   [[nodiscard]] Vector3 point_in_world(int point) const;
@@ -96,6 +103,11 @@ class GaussNewtonFilter {
     Vector3 z;
   };
 
+  struct TwoViews {  ///< second and third frame of the monocular start
+    std::array<std::vector<Seen>, 2> seen;
+    std::array<SE3, 2> T_c_w;
+  };
+
   [[nodiscard]] int rows() const { return rig_.kind == SensorKind::kMono ? 2 : 3; }
   [[nodiscard]] int anchor_at(int anchor) const { return 6 * (anchor - 1); }
   [[nodiscard]] int point_at(int point) const { return 6 * anchor_count() + 3 * point; }
@@ -119,6 +131,9 @@ class GaussNewtonFilter {
   void estimate_motion(const std::vector<Seen>& seen);
   [[nodiscard]] bool innovation(const std::vector<Seen>& seen, const MatrixX* Sigma, MatrixX& S, MatrixX& J_T,
                                 VectorX& d) const;
+  double add_views(const TwoViews& views, MatrixX& H, VectorX& g);
+  [[nodiscard]] bool relinearise_bootstrap(const MatrixX& own, const std::vector<Point>& start,
+                                           TwoViews views);
   void eliminate(const std::vector<int>& indices);
 
   Rig rig_;
@@ -128,6 +143,8 @@ class GaussNewtonFilter {
   std::vector<Point> points_;
   SE3 T_c_w_;
   MatrixX Lambda_;
+  static constexpr int kCurrentPose = -1;
+  int reference_ = 0;  ///< anchor of the reference frame, or kCurrentPose
   double joint_seconds_ = 0;
 };
 

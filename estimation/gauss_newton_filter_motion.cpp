@@ -1,9 +1,8 @@
-// Pose of a new frame given the filter's map (algorithm 6) and the monocular start (4.5.3).
+// Pose of a new frame given the filter's map  (algorithm 6).
 #include <Eigen/Dense>
 #include <cmath>
 
 #include "estimation/gauss_newton_filter.hpp"
-#include "estimation/sliding_window_filter_prior.hpp"
 
 namespace twofold {
 
@@ -97,57 +96,6 @@ void GaussNewtonFilter::estimate_motion(const std::vector<Seen>& all) {
     damping *= 0.1;
     if (done) break;
   }
-}
-
-bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::span<const PointObservation> b1,
-                                  std::span<const PointObservation> first) {
-  anchors_.assign(1, SE3());
-  anchors_lin_.assign(1, SE3());
-  points_.clear();
-  T_c_w_ = SE3();
-  Lambda_ = MatrixX::Zero(6, 6);
-  const auto has = [](std::span<const PointObservation> list, std::int64_t id) {
-    for (const PointObservation& o : list) {
-      if (o.point == id) return true;
-    }
-    return false;
-  };
-  for (const PointObservation& o : b0) {
-    if (has(b1, o.point) && has(first, o.point)) add_point(o, 0);
-  }
-  // Six unknowns of the motion and three a point, one of them, scale, free: held by the damping.
-  const std::vector<Seen> seen = match(b1);
-  if (seen.size() < 6 || !joint_update(seen, 60, false)) return false;
-  const double length = T_c_w_.translation().norm();
-  if (!(length > 1e-9)) return false;
-  T_c_w_.translation() /= length;
-  for (Point& point : points_) point.psi.z() *= length;
-
-  // Uncertainty with a 5-DoF motion, |t| = 1: d|t|^2 / 2 = t^T v for a left perturbation (v, omega).
-  const int pose = pose_at();
-  MatrixX full = Lambda_;
-  // Depth information of the first view is zero and the image part does not depend on scale: the prior is
-  // unchanged.
-  VectorX unused = VectorX::Zero(full.rows());
-  if (!std::isfinite(add_measurements(seen, &full, &unused))) return false;
-  const Eigen::JacobiSVD<Eigen::Matrix<double, 1, 3>, Eigen::FullPivHouseholderQRPreconditioner> svd(
-      T_c_w_.translation().transpose(), Eigen::ComputeFullV);
-  Eigen::Matrix<double, 6, 5> B = Eigen::Matrix<double, 6, 5>::Zero();
-  B.topLeftCorner<3, 2>() = svd.matrixV().rightCols<2>();
-  B.bottomRightCorner<3, 3>().setIdentity();
-  MatrixX reduced(pose + 5, pose + 5);
-  reduced.topLeftCorner<5, 5>() = B.transpose() * full.bottomRightCorner<6, 6>() * B;
-  reduced.topRightCorner(5, pose) = B.transpose() * full.bottomLeftCorner(6, pose);
-  reduced.bottomLeftCorner(pose, 5) = reduced.topRightCorner(5, pose).transpose();
-  reduced.bottomRightCorner(pose, pose) = full.topLeftCorner(pose, pose);
-  VectorX g = VectorX::Zero(pose + 5);
-  schur_marginalise(reduced, g, 5, FillIn::kFull);
-  Lambda_ = std::move(reduced);
-
-  const std::vector<Seen> third = match(first);
-  estimate_motion(third);
-  append_pose();
-  return joint_update(third, 20, true);
 }
 
 }  // namespace twofold

@@ -79,7 +79,8 @@ void GaussNewtonFilter::append_pose() {  // eq. 4.20: uniform prior on the new p
   Lambda_.rightCols(6).setZero();
 }
 
-/// Also marginalises anchors that no point uses any more. Expects the state without current pose.
+/// Also marginalises anchors that no point uses any more, except the reference. Expects the state without
+/// current pose.
 void GaussNewtonFilter::marginalise_points(std::span<const std::int64_t> lost) {
   std::vector<int> indices;
   std::vector<Point> kept;
@@ -97,7 +98,7 @@ void GaussNewtonFilter::marginalise_points(std::span<const std::int64_t> lost) {
   std::vector<SE3> anchors = {anchors_[0]}, anchors_lin = anchors;
   const auto newest = static_cast<int>(anchors_.size()) - 1;  // about to get points
   for (int a = 1; a <= newest; ++a) {
-    if (users[static_cast<std::size_t>(a)] == 0 && a != newest) {
+    if (users[static_cast<std::size_t>(a)] == 0 && a != newest && a != reference_) {
       for (int i = 0; i < 6; ++i) indices.push_back(anchor_at(a) + i);
       continue;
     }
@@ -106,6 +107,7 @@ void GaussNewtonFilter::marginalise_points(std::span<const std::int64_t> lost) {
     anchors_lin.push_back(anchors_lin_[static_cast<std::size_t>(a)]);
   }
   eliminate(indices);
+  if (reference_ > 0) reference_ = renumber[static_cast<std::size_t>(reference_)];
   for (Point& point : kept) point.anchor = renumber[static_cast<std::size_t>(point.anchor)];
   points_ = std::move(kept);
   anchors_ = std::move(anchors);

@@ -40,12 +40,12 @@ void SlidingWindowFilter::add(const WindowFrame& frame) {
   Pose pose;
   pose.frame = next_frame_++;
   if (poses_.empty()) {
-    pose.T_c_w = first_T_c_w_;
+    pose.T_c_l = first_T_c_w_;
   } else if (frame.motion) {
-    pose.T_c_w = compound(*frame.motion, poses_.back().T_c_w);
+    pose.T_c_l = compound(*frame.motion, poses_.back().T_c_l);
     pose.motion = frame.motion;
   } else {
-    pose.T_c_w = frame.T_c_w_start.value_or(poses_.back().T_c_w);
+    pose.T_c_l = frame.T_c_w_start ? *frame.T_c_w_start * T_w_l_ : poses_.back().T_c_l;
   }
   const bool first = poses_.empty();
   factor_serves_ = false;
@@ -59,7 +59,7 @@ void SlidingWindowFilter::add(const WindowFrame& frame) {
 
 void SlidingWindowFilter::add_observations(const WindowFrame& frame) {
   Pose& pose = poses_.back();
-  const SE3 T_w_c = pose.T_c_w.inverse();
+  const SE3 T_l_c = pose.T_c_l.inverse();
   for (const LandmarkObservation& observation : frame.observations) {
     auto found = index_.find(observation.landmark);
     if (found == index_.end()) {
@@ -68,7 +68,7 @@ void SlidingWindowFilter::add_observations(const WindowFrame& frame) {
       found = index_.emplace(observation.landmark, landmark_count()).first;
       landmarks_.push_back({});
       ids_.push_back(observation.landmark);
-      points_.push_back(T_w_c * rig_.unproject(observation.z));
+      points_.push_back(T_l_c * rig_.unproject(observation.z));
     }
     pose.observations.push_back({found->second, observation.z, observation.information});
     ++landmarks_[static_cast<std::size_t>(found->second)].observations;
@@ -78,13 +78,13 @@ void SlidingWindowFilter::add_observations(const WindowFrame& frame) {
 std::optional<Vector3> SlidingWindowFilter::find_landmark(std::int64_t id) const {
   const auto found = index_.find(id);
   if (found == index_.end()) return std::nullopt;
-  return points_[static_cast<std::size_t>(found->second)];
+  return landmark(found->second);
 }
 
 bool SlidingWindowFilter::set_landmark(std::int64_t id, const Vector3& x_w) {
   const auto found = index_.find(id);
   if (found == index_.end()) return false;
-  points_[static_cast<std::size_t>(found->second)] = x_w;
+  points_[static_cast<std::size_t>(found->second)] = T_w_l_.inverse() * x_w;
   return true;
 }
 
@@ -133,8 +133,9 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
       decrement += equations_.g_landmarks[l].dot(step_.landmarks[l]);
     }
     std::vector<SE3> old_poses;
-    for (const Pose& pose : poses_) old_poses.push_back(pose.T_c_w);
+    for (const Pose& pose : poses_) old_poses.push_back(pose.T_c_l);
     const std::vector<Vector3> old_points = points_;
+    const Vector6 old_shift = shift_;
     apply(step_);
     const double next = cost();
     // First-estimate derivatives lead to a point that is not exactly the minimum of the cost, so that close
@@ -143,8 +144,9 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
     const double slack =
         1e-9 * (1 + std::abs(current)) + (first_estimates() ? 1.0 + (reused ? 0.0 : decrement) : 0.0);
     if (!(next <= current + slack) && decrement > options_.stop_decrement) {
-      for (std::size_t j = 0; j < old_poses.size(); ++j) poses_[j].T_c_w = old_poses[j];
+      for (std::size_t j = 0; j < old_poses.size(); ++j) poses_[j].T_c_l = old_poses[j];
       points_ = old_points;
+      shift_ = old_shift;
       factor_is_good = false;
       if (!reused) damping = std::max(10 * damping, 1e-3);
       continue;
@@ -163,29 +165,48 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
     last_decrement = decrement;
   }
   summary_.cost = cost();
+  move_frame();
   summary_.poses = pose_count();
   summary_.landmarks = landmark_count();
   return summary_;
 }
 
 void SlidingWindowFilter::apply(const WindowStep& step) {
-  for (std::size_t j = 0; j < poses_.size(); ++j) {
-    if (j == 0 && oldest_fixed_) continue;
-    poses_[j].T_c_w = SE3::exp(step.poses[j]) * poses_[j].T_c_w;
+  // What the prior's parameters move together is a motion of frame l; the rest happens in l.
+  const Vector6 xi = first_estimates() && !oldest_fixed_ ? prior_.frame_twist(step) : Vector6::Zero();
+  shift_ += xi;
+  const SE3 T_lin_inverse = prior_.T_lin.inverse();
+  for (int j = oldest_fixed_ ? 1 : 0; j < pose_count(); ++j) {
+    const auto p = static_cast<std::size_t>(j);
+    const Vector6 own = step.poses[p] + (pose_lin(j) * T_lin_inverse).adjoint() * xi;
+    poses_[p].T_c_l = SE3::exp(own) * poses_[p].T_c_l;
+  }
+  const Matrix3 R_l_c = T_lin_inverse.rotation();
+  std::vector<Vector3> change_l;
+  for (int l = 0; l < landmark_count(); ++l) {
+    const Vector3 x_c = prior_.T_lin * landmark_lin(l);
+    change_l.push_back(step.landmarks[static_cast<std::size_t>(l)] -
+                       R_l_c * (xi.head<3>() + xi.tail<3>().cross(x_c)));
   }
   // A badly started or mismatched landmark can overshoot through infinity to behind the cameras, from where
   // no measurement brings it back: its step is cut so that its depth falls to no less than half in any view.
   std::vector<double> share(points_.size(), 1.0);
   for (const Pose& pose : poses_) {
-    const Vector3 axis_w = pose.T_c_w.rotation().row(2).transpose();
+    const Vector3 axis_l = pose.T_c_l.rotation().row(2).transpose();
     for (const Observation& o : pose.observations) {
       const auto l = static_cast<std::size_t>(o.landmark);
-      const double depth = axis_w.dot(points_[l]) + pose.T_c_w.translation().z();
-      const double change = axis_w.dot(step.landmarks[l]);
+      const double depth = axis_l.dot(points_[l]) + pose.T_c_l.translation().z();
+      const double change = axis_l.dot(change_l[l]);
       if (depth > 0 && change < -0.5 * depth) share[l] = std::min(share[l], -0.5 * depth / change);
     }
   }
-  for (std::size_t l = 0; l < points_.size(); ++l) points_[l] += share[l] * step.landmarks[l];
+  for (std::size_t l = 0; l < points_.size(); ++l) points_[l] += share[l] * change_l[l];
+}
+
+void SlidingWindowFilter::move_frame() {
+  if (shift_.isZero(0)) return;
+  T_w_l_ = T_w_l_ * prior_.move_frame(shift_);
+  shift_.setZero();
 }
 
 std::optional<WindowCovariances> SlidingWindowFilter::covariances() {
@@ -193,6 +214,8 @@ std::optional<WindowCovariances> SlidingWindowFilter::covariances() {
   factor_serves_ = factor_.factorise(equations_, 0.0);
   if (!factor_serves_) return std::nullopt;
   WindowCovariances result = factor_.covariances();
+  const Matrix3 R_w_l = T_w_l_.rotation();
+  for (Matrix3& C : result.landmarks) C = R_w_l * C * R_w_l.transpose();
   if (oldest_fixed_ && !result.poses.empty()) result.poses.front().setZero();
   return result;
 }

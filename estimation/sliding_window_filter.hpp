@@ -85,6 +85,12 @@ struct WindowSummary {
 /// own small block and the fill-in is subtracted as Y^T Y, O(n^2) a frame, where re-triangularising a
 /// square-root prior is O(n^3); tests compare both on an ill-conditioned problem
 /// (tests/estimation/swf_marginalisation_test.cpp).
+///
+/// Frame l of the window. Measurements say nothing about where the whole window stands in the world: the
+/// prior alone knows, and ever less the longer the path. With first estimates the state is kept in a frame l
+/// that follows the landmarks of the prior as a rigid body: what a step moves them together moves l against
+/// the world, and everything else with it, without an error of second order. Steps within l stay as short as
+/// the local geometry makes them, and first estimates keep their place in front of the cameras.
 class SlidingWindowFilter {
  public:
   /// Throws std::runtime_error when the options are invalid.
@@ -106,17 +112,20 @@ class SlidingWindowFilter {
   [[nodiscard]] int pose_count() const { return static_cast<int>(poses_.size()); }
   [[nodiscard]] int landmark_count() const { return static_cast<int>(landmarks_.size()); }
   /// 0 is the oldest pose in the window.
-  [[nodiscard]] const SE3& T_c_w(int pose) const { return poses_[static_cast<std::size_t>(pose)].T_c_w; }
-  [[nodiscard]] const SE3& newest_T_c_w() const { return poses_.back().T_c_w; }
+  [[nodiscard]] SE3 T_c_w(int pose) const {
+    return poses_[static_cast<std::size_t>(pose)].T_c_l * T_w_l_.inverse();
+  }
+  [[nodiscard]] SE3 newest_T_c_w() const { return T_c_w(pose_count() - 1); }
   /// Frame number (counted from 0 over all steps) of a pose in the window.
   [[nodiscard]] std::int64_t frame_of(int pose) const { return poses_[static_cast<std::size_t>(pose)].frame; }
   [[nodiscard]] std::int64_t landmark_id(int landmark) const {
     return ids_[static_cast<std::size_t>(landmark)];
   }
-  [[nodiscard]] const Vector3& landmark(int landmark) const {
-    return points_[static_cast<std::size_t>(landmark)];
+  [[nodiscard]] Vector3 landmark(int landmark) const {
+    return T_w_l_ * points_[static_cast<std::size_t>(landmark)];
   }
   [[nodiscard]] std::optional<Vector3> find_landmark(std::int64_t id) const;
+  /// In the frame l of the window.
   [[nodiscard]] const WindowPrior& prior() const { return prior_; }
 
   /// Covariances at the current estimate, in the order of pose(i) and landmark(i); zero for a held pose. None
@@ -138,7 +147,7 @@ class SlidingWindowFilter {
   };
   struct Pose {
     std::int64_t frame = 0;
-    SE3 T_c_w;
+    SE3 T_c_l;
     std::optional<MotionInput> motion;  ///< from the previous pose in the window
     std::vector<Observation> observations;
   };
@@ -164,8 +173,12 @@ class SlidingWindowFilter {
   void build_equations();
   [[nodiscard]] double cost() const;
   void update_threshold();
-  void apply(const WindowStep& step);
+  /// Where derivatives are taken: the prior's point for what the prior knows, if first_estimates().
   [[nodiscard]] bool pose_is_linearised_at_prior(int pose) const;
+  [[nodiscard]] const SE3& pose_lin(int pose) const;
+  [[nodiscard]] const Vector3& landmark_lin(int landmark) const;
+  void apply(const WindowStep& step);
+  void move_frame();
   [[nodiscard]] bool first_estimates() const {
     return options_.linearisation == Linearisation::kFirstEstimate && options_.window != 1;
   }
@@ -177,10 +190,12 @@ class SlidingWindowFilter {
     int observations = 0;  ///< in the window
   };
   std::vector<LandmarkRecord> landmarks_;  ///< parallel to points_ and ids_; prior landmarks first
-  std::vector<Vector3> points_;
+  std::vector<Vector3> points_;            ///< in l
   std::vector<std::int64_t> ids_;
   std::unordered_map<std::int64_t, int> index_;  ///< id to position; never iterated
   WindowPrior prior_;
+  SE3 T_w_l_;                        ///< identity unless first_estimates()
+  Vector6 shift_ = Vector6::Zero();  ///< of frame l against the world since optimise() began
   bool oldest_fixed_ = false;
   std::int64_t next_frame_ = 0;
   SE3 first_T_c_w_;

@@ -7,7 +7,8 @@
 
 namespace twofold {
 
-VectorX WindowPrior::difference(const std::vector<Vector3>& landmarks, const SE3& T_c_w) const {
+VectorX WindowPrior::difference(const std::vector<Vector3>& landmarks, const SE3& T_c_w,
+                                const Vector6& shift) const {
   const int n = landmark_count();
   VectorX d(3 * n + 6);
   for (int l = 0; l < n; ++l) {
@@ -15,7 +16,50 @@ VectorX WindowPrior::difference(const std::vector<Vector3>& landmarks, const SE3
     d.segment<3>(3 * l) = landmarks[i] - landmarks_lin[i];
   }
   d.tail<6>() = (T_c_w * T_lin.inverse()).log();
+  if (!shift.isZero(0)) d.noalias() += rigid_motion() * shift;
   return d;
+}
+
+MatrixX WindowPrior::rigid_motion() const {
+  const int n = landmark_count();
+  const Matrix3 R_l_c = T_lin.rotation().transpose();
+  MatrixX N(3 * n + 6, 6);
+  for (int l = 0; l < n; ++l) {
+    const Vector3 x_c = T_lin * landmarks_lin[static_cast<std::size_t>(l)];
+    N.middleRows<3>(3 * l) << R_l_c, -R_l_c * hat(x_c);
+  }
+  N.bottomRows<6>() = -Matrix6::Identity();
+  return N;
+}
+
+void WindowPrior::fit_frame() {
+  const int n = landmark_count();
+  const MatrixX N = rigid_motion();
+  follow.resize(6, 3 * n + 6);  // (N^T W N)^-1 N^T W
+  for (int l = 0; l < n; ++l) {
+    follow.middleCols<3>(3 * l) = N.middleRows<3>(3 * l).transpose() * information.block<3, 3>(3 * l, 3 * l);
+  }
+  follow.rightCols<6>() = N.bottomRows<6>().transpose() * information.bottomRightCorner<6, 6>();
+  const Eigen::LLT<Matrix6> llt(Matrix6(follow * N));
+  if (llt.info() == Eigen::Success && llt.rcond() > 1e-14) {
+    llt.solveInPlace(follow);
+  } else {
+    follow.resize(6, 0);  // too few parameters to carry a frame
+  }
+}
+
+Vector6 WindowPrior::frame_twist(const WindowStep& step) const {
+  Vector6 xi = Vector6::Zero();
+  if (follow.cols() == 0) return xi;
+  for (int l = 0; l < landmark_count(); ++l) {
+    xi += follow.middleCols<3>(3 * l) * step.landmarks[static_cast<std::size_t>(l)];
+  }
+  return xi + follow.rightCols<6>() * step.poses.front();
+}
+
+SE3 WindowPrior::move_frame(const Vector6& shift) {
+  vector.noalias() -= information * (rigid_motion() * shift);
+  return T_lin.inverse() * SE3::exp(shift) * T_lin;
 }
 
 void WindowPrior::relinearise(const std::vector<Vector3>& landmarks, const SE3& T_c_w) {

@@ -16,12 +16,29 @@ struct WindowPrior {
   VectorX vector = VectorX::Zero(6);          ///< eta
   std::vector<Vector3> landmarks_lin;         ///< linearisation points [m]
   SE3 T_lin;
+  /// 6 x (3 n + 6): twist of the rigid motion nearest to a step of the prior's parameters, in the camera
+  /// frame of T_lin, where it is well conditioned however far away the origin is. Empty: none is taken out.
+  MatrixX follow;
 
   [[nodiscard]] int landmark_count() const { return static_cast<int>(landmarks_lin.size()); }
-  /// d at the given state; landmarks has at least landmark_count() entries.
-  [[nodiscard]] VectorX difference(const std::vector<Vector3>& landmarks, const SE3& T_c_w) const;
+  /// d at the given state; landmarks has at least landmark_count() entries. `shift`: twist, in the
+  /// camera frame of T_lin, by which the frame of both has moved since the prior was made; enters to first
+  /// order, so that a rigid motion of everything is linear in it.
+  [[nodiscard]] VectorX difference(const std::vector<Vector3>& landmarks, const SE3& T_c_w,
+                                   const Vector6& shift = Vector6::Zero()) const;
   /// Moves the linearisation point to the given state; the quadratic keeps value and slope there.
   void relinearise(const std::vector<Vector3>& landmarks, const SE3& T_c_w);
+
+  /// Sets `follow`: least squares over landmarks and pose, each weighted with its own block of Pi.
+  void fit_frame();
+  /// Twist of the frame, in the camera frame of T_lin, that takes what all have in common out of a step.
+  [[nodiscard]] Vector6 frame_twist(const WindowStep& step) const;
+  /// From here on difference() counts from the frame moved by shift. Returns that motion in the frame itself.
+  SE3 move_frame(const Vector6& shift);
+
+ private:
+  /// d by the twist of a motion of everything, (3 n + 6) x 6.
+  [[nodiscard]] MatrixX rigid_motion() const;
 };
 
 /// What is done with the fill-in Lambda_b^T Lambda_a^-1 Lambda_b of an elimination.

@@ -29,7 +29,7 @@ void SlidingWindowFilter::delete_oldest(const std::vector<bool>& drop) {
   prior_ = WindowPrior{};
   poses_.pop_front();
   poses_.front().motion.reset();
-  prior_.T_lin = poses_.front().T_c_w;
+  prior_.T_lin = poses_.front().T_c_l;
   oldest_fixed_ = true;
   std::vector<int> order;
   for (int l = 0; l < landmark_count(); ++l) {
@@ -47,7 +47,7 @@ std::vector<int> SlidingWindowFilter::fill_in_blocks(std::size_t landmarks) cons
 
 void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
   const int n_prior = prior_.landmark_count();
-  if (!first_estimates()) prior_.relinearise(points_, poses_.front().T_c_w);
+  if (!first_estimates()) prior_.relinearise(points_, poses_.front().T_c_l);
 
   // Everything the oldest pose or the prior touches: its Markov blanket.
   std::vector<bool> touched(static_cast<std::size_t>(landmark_count()));
@@ -88,7 +88,7 @@ void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
   Lambda.topLeftCorner<6, 6>() = prior_.information.bottomRightCorner<6, 6>();
   g.head<6>() = prior_.vector.tail<6>();
   if (first_estimates()) {
-    const VectorX d_prior = prior_.difference(points_, poses_.front().T_c_w);
+    const VectorX d_prior = prior_.difference(points_, poses_.front().T_c_l, shift_);
     for (int a = 0; a < n_prior; ++a) d.segment<3>(place(a)) = d_prior.segment<3>(3 * a);
     if (pose_is_linearised_at_prior(0)) d.head<6>() = d_prior.tail<6>();
   }
@@ -139,11 +139,12 @@ void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
   WindowPrior next;
   next.information = std::move(Lambda);
   next.vector = std::move(g);
-  next.T_lin = poses_[1].T_c_w;
+  next.T_lin = poses_[1].T_c_l;
   for (const int l : kept) {
     const auto i = static_cast<std::size_t>(l);
     next.landmarks_lin.push_back(first_estimates() && l < n_prior ? prior_.landmarks_lin[i] : points_[i]);
   }
+  if (first_estimates()) next.fit_frame();
   prior_ = std::move(next);
   oldest_fixed_ = false;
   poses_.pop_front();

@@ -27,9 +27,18 @@ bool SlidingWindowFilter::pose_is_linearised_at_prior(int pose) const {
          !prior_.information.bottomRightCorner<6, 6>().isZero(0);
 }
 
+const SE3& SlidingWindowFilter::pose_lin(int pose) const {
+  return pose_is_linearised_at_prior(pose) ? prior_.T_lin : poses_[static_cast<std::size_t>(pose)].T_c_l;
+}
+
+const Vector3& SlidingWindowFilter::landmark_lin(int landmark) const {
+  const auto l = static_cast<std::size_t>(landmark);
+  return first_estimates() && landmark < prior_.landmark_count() ? prior_.landmarks_lin[l] : points_[l];
+}
+
 double SlidingWindowFilter::whitened_chi2(int pose, const Observation& observation) const {
   const Vector3 x_c =
-      poses_[static_cast<std::size_t>(pose)].T_c_w * points_[static_cast<std::size_t>(observation.landmark)];
+      poses_[static_cast<std::size_t>(pose)].T_c_l * points_[static_cast<std::size_t>(observation.landmark)];
   if (x_c.z() < kMinDepth) return -1;
   Vector3 r = observation.z - rig_.project(x_c);
   if (std::isnan(r.z())) return r.head<2>().dot(observation.information.topLeftCorner<2, 2>() * r.head<2>());
@@ -39,14 +48,10 @@ double SlidingWindowFilter::whitened_chi2(int pose, const Observation& observati
 SlidingWindowFilter::ObservationTerm SlidingWindowFilter::linearise(int pose,
                                                                     const Observation& observation) const {
   ObservationTerm term;
-  const auto l = static_cast<std::size_t>(observation.landmark);
-  const SE3& T_c_w = poses_[static_cast<std::size_t>(pose)].T_c_w;
-  const Vector3 x_c = T_c_w * points_[l];
-  const SE3& T_lin = pose_is_linearised_at_prior(pose) ? prior_.T_lin : T_c_w;
-  const Vector3& x_w_lin = first_estimates() && observation.landmark < prior_.landmark_count()
-                               ? prior_.landmarks_lin[l]
-                               : points_[l];
-  const Vector3 x_lin = T_lin * x_w_lin;
+  const Vector3 x_c =
+      poses_[static_cast<std::size_t>(pose)].T_c_l * points_[static_cast<std::size_t>(observation.landmark)];
+  const SE3& T_lin = pose_lin(pose);
+  const Vector3 x_lin = T_lin * landmark_lin(observation.landmark);
   if (x_c.z() < kMinDepth || x_lin.z() < kMinDepth) return term;
 
   term.valid = true;
@@ -73,9 +78,9 @@ SlidingWindowFilter::ObservationTerm SlidingWindowFilter::linearise(int pose,
 MotionError SlidingWindowFilter::linearise_motion(int pose) const {
   const Pose& cur = poses_[static_cast<std::size_t>(pose)];
   const Pose& prev = poses_[static_cast<std::size_t>(pose) - 1];
-  MotionError error = motion_error(*cur.motion, prev.T_c_w, cur.T_c_w);
+  MotionError error = motion_error(*cur.motion, prev.T_c_l, cur.T_c_l);
   if (pose_is_linearised_at_prior(pose - 1)) {
-    const MotionError at_first = motion_error(*cur.motion, prior_.T_lin, cur.T_c_w);
+    const MotionError at_first = motion_error(*cur.motion, pose_lin(0), cur.T_c_l);
     error.J_prev = at_first.J_prev;
     error.J_cur = at_first.J_cur;
   }
@@ -89,7 +94,7 @@ void SlidingWindowFilter::build_equations() {
   eq.prior_landmarks = prior_.landmark_count();
   eq.prior = prior_.information;
   if (!poses_.empty()) {  // L^T Pi L and its right-hand side
-    const VectorX d = prior_.difference(points_, poses_.front().T_c_w);
+    const VectorX d = prior_.difference(points_, poses_.front().T_c_l, shift_);
     VectorX g = prior_.vector - prior_.information * d;
     if (!first_estimates()) {
       const Matrix6 J = cbh_jacobian<SE3>(d.tail<6>(), CbhOrder::kExact);
@@ -139,7 +144,7 @@ void SlidingWindowFilter::build_equations() {
 double SlidingWindowFilter::cost() const {
   double sum = 0;
   if (!poses_.empty()) {
-    const VectorX d = prior_.difference(points_, poses_.front().T_c_w);
+    const VectorX d = prior_.difference(points_, poses_.front().T_c_l, shift_);
     const VectorX half = 0.5 * (prior_.information * d) - prior_.vector;
     sum += d.dot(half);
   }
@@ -151,7 +156,7 @@ double SlidingWindowFilter::cost() const {
       if (chi2 >= 0) sum += robust_cost(kernel, chi2);
     }
     if (j == 0 || !pose.motion) continue;
-    const Vector6 e = motion_error(*pose.motion, poses_[static_cast<std::size_t>(j) - 1].T_c_w, pose.T_c_w).e;
+    const Vector6 e = motion_error(*pose.motion, poses_[static_cast<std::size_t>(j) - 1].T_c_l, pose.T_c_l).e;
     sum += 0.5 * e.dot(pose.motion->covariance.ldlt().solve(e));
   }
   return sum;
@@ -211,7 +216,7 @@ void SlidingWindowFilter::fit_newest_pose(const WindowFrame& frame) {
   Pose& pose = poses_.back();
   if (known.size() < 3 && !frame.motion) return;
   const HuberKernel kernel{options_.robust ? options_.huber_sigmas * std::sqrt(3.0) : 0.0};
-  const SE3 T_predicted = pose.T_c_w;
+  const SE3 T_predicted = pose.T_c_l;
   const Matrix6 prior = frame.motion ? Matrix6(frame.motion->covariance.inverse()) : Matrix6::Zero();
 
   const auto evaluate = [&](const SE3& T, Matrix6* H, Vector6* g) {
@@ -239,18 +244,18 @@ void SlidingWindowFilter::fit_newest_pose(const WindowFrame& frame) {
   double damping = 1e-6;
   Matrix6 H;
   Vector6 g;
-  double current = evaluate(pose.T_c_w, &H, &g);
+  double current = evaluate(pose.T_c_l, &H, &g);
   for (int i = 0; i < 10; ++i) {
     Matrix6 damped = H;
     damped.diagonal() *= 1 + damping;
     const Vector6 delta = damped.ldlt().solve(g);
-    const SE3 T = SE3::exp(delta) * pose.T_c_w;
+    const SE3 T = SE3::exp(delta) * pose.T_c_l;
     const double next = evaluate(T, nullptr, nullptr);
     if (!std::isfinite(next) || next > current) {
       damping = std::max(10 * damping, 1e-3);
       continue;
     }
-    pose.T_c_w = T;
+    pose.T_c_l = T;
     damping *= 0.1;
     if (g.dot(delta) < 1e-4) break;
     current = evaluate(T, &H, &g);

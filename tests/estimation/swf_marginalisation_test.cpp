@@ -142,5 +142,42 @@ TEST(SwfMarginalisation, RemovalNeverMovesTheEstimate) {
   }
 }
 
+/// What moves everything is a motion of the frame: found whole in a step, and linear in the prior however far
+/// it goes, while the frame's content stays where it is.
+TEST(SwfMarginalisation, RigidMotionsBelongToTheFrame) {
+  std::mt19937 rng(21);
+  std::normal_distribution<double> normal(0, 1);
+  WindowPrior prior;
+  prior.T_lin = SE3::exp(random_vector6(rng, 500, 1));  // far from the origin
+  const SE3 T_l_c = prior.T_lin.inverse();
+  for (int l = 0; l < 8; ++l) {
+    prior.landmarks_lin.push_back(T_l_c * Vector3(normal(rng), normal(rng), 5 + normal(rng)));
+  }
+  const int size = 3 * prior.landmark_count() + 6;
+  const MatrixX A = MatrixX::NullaryExpr(size + 4, size, [&] { return normal(rng); });
+  prior.information = A.transpose() * A;
+  prior.vector = VectorX::NullaryExpr(size, [&] { return normal(rng); });
+  prior.fit_frame();
+
+  const Vector6 twist = random_vector6(rng, 0.3, 0.1);
+  WindowStep step;
+  for (const Vector3& x : prior.landmarks_lin) {
+    step.landmarks.emplace_back(T_l_c.rotation() *
+                                (twist.head<3>() + twist.tail<3>().cross(prior.T_lin * x)));
+  }
+  step.poses.emplace_back(-twist);
+  EXPECT_LT((prior.frame_twist(step) - twist).norm(), 1e-9);
+
+  const VectorX moved = prior.difference(prior.landmarks_lin, prior.T_lin, twist);
+  for (int l = 0; l < prior.landmark_count(); ++l) {
+    EXPECT_LT((moved.segment<3>(3 * l) - step.landmarks[static_cast<std::size_t>(l)]).norm(), 1e-9);
+  }
+  const VectorX slope = prior.vector - prior.information * moved;
+  const SE3 motion = prior.move_frame(twist);
+  EXPECT_LT((prior.vector - slope).norm(), 1e-9 * slope.norm());  // d counts from there: zero now
+  EXPECT_LT(prior.difference(prior.landmarks_lin, prior.T_lin).norm(), 1e-9);
+  EXPECT_LT((prior.T_lin * motion * T_l_c * SE3::exp(-twist)).log().norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace twofold::test

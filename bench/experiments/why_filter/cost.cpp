@@ -34,12 +34,11 @@ void motion_experiment(const WhyFilterOptions& options, Report& report) {
         GaussNewtonFilter start(block.rig, {.iterations = 10});
         if (!start.bootstrap(block.bootstrap[0], block.bootstrap[1], block.first)) return;
         GaussNewtonFilter filter = start;
-        const SE3 T_first = filter.T_c_w();
         filter.set_options(filter_options);
         const double begin = thread_seconds();
         result.ok = filter.step(block.steps[0].lost, block.steps[0].fresh, block.steps[0].current);
         seconds[t] = thread_seconds() - begin;
-        result.T_last_first = filter.T_c_w() * T_first.inverse();
+        result.T_last_first = filter.T_c_w() * filter.T_reference_w().inverse();
         squared[t] = end_error(block, result).squaredNorm();
       });
       double sum = 0, time = 0;

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <functional>
 
 #include "experiments/why_filter/experiments.hpp"
@@ -48,6 +49,9 @@ int main(int argc, char** argv) {
       std::printf("done: %s\n", name.c_str());
       std::fflush(stdout);
     }
+    const double minutes = static_cast<double>(std::clock()) / CLOCKS_PER_SEC / 60;
+    report.state("run time", "the default run takes at most ten minutes on two cores: 20 of processor time",
+                 text("%.1f minutes of processor time", minutes), minutes <= 20);
     std::fputs(report.finish().c_str(), stdout);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -234,7 +234,8 @@ void monte_carlo_experiment(const WhyFilterOptions& options, Report& report) {
         for (const int points : {15, 30, 60, 120, 240})
           run_cell(setting, kind, frames, points, options, c.grids);
       }
-      if (options.large_n) run_cell(setting, kind, frame_counts(setting).front(), 480, options, c.grids);
+      if (options.large_n && setting == Setting::kSideways)
+        run_cell(setting, kind, frame_counts(setting).front(), 480, options, c.grids);
       c.base = c.grids[kBa].begin()->first;
       for (const auto& [at, cell] : c.grids[kBa]) {
         if (at.second != 15 || !c.robust(at)) continue;

@@ -179,22 +179,19 @@ PipelineResult run_bundle_adjustment(const Block& block, int iterations) {
 
 PipelineResult run_filter(const Block& block, int iterations, MotionEstimate motion) {
   PipelineResult result;
-  GaussNewtonFilterOptions options = filter_options(iterations, motion);
-  if (block.rig.kind == SensorKind::kMono) options.linearisation = Linearisation::kCurrent;
-  GaussNewtonFilter filter(block.rig, options);
+  GaussNewtonFilter filter(block.rig, filter_options(iterations, motion));
   if (block.rig.kind == SensorKind::kMono) {
     if (!filter.bootstrap(block.bootstrap[0], block.bootstrap[1], block.first)) return result;
   } else {
     filter.initialise(block.first);
   }
   const double start = thread_seconds();
-  const SE3 T_first = filter.T_c_w();
   result.ok = true;
   for (const Block::Step& step : block.steps) {
     result.ok = filter.step(step.lost, step.fresh, step.current) && result.ok;
     result.joint_seconds += filter.joint_seconds();
   }
-  result.T_last_first = filter.T_c_w() * T_first.inverse();
+  result.T_last_first = filter.T_c_w() * filter.T_reference_w().inverse();
   result.total_seconds = thread_seconds() - start;
   result.ok = result.ok && result.T_last_first.log().allFinite();
   return result;

@@ -15,7 +15,7 @@ struct PipelineResult {
 /// Algorithm 3: motion-only, structure-only, full bundle adjustment for every frame; the library's own
 /// solver.
 [[nodiscard]] PipelineResult run_bundle_adjustment(const Block& block, int iterations);
-/// Algorithm 5; derivatives at first estimates for stereo, at current ones for a single camera.
+/// Algorithm 5, derivatives at first estimates.
 [[nodiscard]] PipelineResult run_filter(const Block& block, int iterations, MotionEstimate motion);
 
 /// Error of the end position in the frame of camera 0 [m]: 3 components for stereo; 2 for monocular, after
