@@ -11,11 +11,6 @@ double mean_depth(const Keyframe& a, const Keyframe& b) {
   return std::max(0.5 * (a.median_depth + b.median_depth), 1e-6);
 }
 
-Vector3 edge_translation(const Keyframe& from, const Keyframe& to, const Edge& edge) {
-  if (edge.marginalised) return edge.T_other_this.translation();
-  return (to.T_k_w * from.T_k_w.inverse()).translation();
-}
-
 }  // namespace
 
 void covisible_keyframes(const GraphSnapshot& graph, KeyframeId id, IdMap& counts,
@@ -85,17 +80,7 @@ Matrix6 edge_information(const Keyframe& from, const Keyframe& to, const Edge& e
   Vector6 diagonal;
   diagonal.head<3>().setConstant(lambda_trans * lambda_trans);
   diagonal.tail<3>().setConstant(lambda_rot * lambda_rot);
-  Matrix6 information = diagonal.asDiagonal();
-  const Vector3 t = edge_translation(from, to, edge);
-  const double length = t.norm();
-  if (options.length_share > 0 && rig.kind != SensorKind::kMono && length > 0) {
-    const double lambda_length = options.length_share * ideal / mean_depth(from, to) * rig.baseline / length;
-    if (lambda_length < lambda_trans) {
-      const double excess = lambda_trans * lambda_trans - lambda_length * lambda_length;
-      information.topLeftCorner<3, 3>() -= excess * (t / length) * (t / length).transpose();
-    }
-  }
-  return std::max(1, edge.weight) * information;
+  return Matrix6((std::max(1, edge.weight) * diagonal).asDiagonal());
 }
 
 }  // namespace twofold

@@ -40,11 +40,6 @@ void link_marginalised(GraphWriter& writer, KeyframeId from, KeyframeId to, int 
 /// point counts again in every pair of frames that see it, and what it says about rotation and translation
 /// is correlated. On the spiral of 6.5.1 shares of 0.05 to 0.15 bring the double window within a few percent
 /// of bundle adjustment; shares of 0.3 cost a sixth of the local accuracy, and with softer ones W2 drifts.
-///
-/// The length of t is a matter of its own where a second camera sets the scale: a disparity is f b / d, so
-/// that w points know ln |t| to f b / (sqrt(2) sigma d) each and |t| to lambda_rot / d * b / |t| each, b /
-/// |t| of what they know of its direction. An edge that claims more holds the scale of the few keyframes it
-/// was made from against all that come later. With one camera scale is free, and edges have to hold it.
 [[nodiscard]] Matrix6 edge_information(const Keyframe& from, const Keyframe& to, const Edge& edge,
                                        const Rig& rig, const EdgeInformationOptions& options);
 

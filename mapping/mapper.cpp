@@ -48,6 +48,7 @@ void Mapper::adopt(const GraphSnapshot& graph) {
   // Nothing is known about which absolute poses agree: the first window is set along edges from its
   // reference.
   window_ = next_window_ = DoubleWindow();
+  unit_ = MapUnit();
   consistent_.clear();
   if (graph.reference() != kNoKeyframe) consistent_.set(graph.reference(), 0);
 }
@@ -132,10 +133,28 @@ void Mapper::optimise(MapperReport& report) {
       optimise_structure(builder_.problem(), structure);
     }
     if (options_.watch_problem) options_.watch_problem(builder_.problem());
-    report.solver = solver_.solve(builder_.problem(), options_.solver);
+    if (options_.own_unit && rig_.kind != SensorKind::kMono) {
+      solve_in_own_unit(report);
+    } else {
+      report.solver = solver_.solve(builder_.problem(), options_.solver);
+    }
   }
   const StageTime time(report.ms.write);
   builder_.write_back(writer_, window_);
+}
+
+/// Solves for shape in a unit that nothing but the edges holds: the window's disparities tell its points'
+/// depths from each other, but with the baseline that suits them best they do not pull at the scale of W2.
+void Mapper::solve_in_own_unit(MapperReport& report) {
+  WindowProblem& problem = builder_.problem();
+  unit_.read(problem, window_);
+  problem.rig.baseline = unit_.window_baseline(rig_);
+  report.solver = solver_.solve(problem, options_.solver);
+  unit_.read(problem, window_);
+}
+
+double Mapper::metres_per_unit() const {
+  return rig_.baseline > 0 ? rig_.baseline / unit_.map_baseline(rig_) : 1;
 }
 
 void Mapper::remove_outliers(MapperReport& report) {

@@ -10,6 +10,7 @@
 #include "mapping/culling.hpp"
 #include "mapping/double_window.hpp"
 #include "mapping/insertion.hpp"
+#include "mapping/map_unit.hpp"
 #include "mapping/metric_loop.hpp"
 #include "mapping/options.hpp"
 #include "mapping/relaxation.hpp"
@@ -84,6 +85,8 @@ class Mapper {
 
   [[nodiscard]] const DoubleWindow& window() const { return window_; }
   [[nodiscard]] const MapperOptions& options() const { return options_; }
+  /// Lengths of the graph times this are metres: 1 unless options().own_unit.
+  [[nodiscard]] double metres_per_unit() const;
   /// The problem as it was solved last: for experiments.
   [[nodiscard]] const WindowProblem& last_problem() const { return builder_.problem(); }
 
@@ -93,6 +96,8 @@ class Mapper {
   void revisit(KeyframeId tracker_reference);
   void form_windows(MapperReport& report);
   void optimise(MapperReport& report);
+  void solve_in_own_unit(MapperReport& report);
+
   void remove_outliers(MapperReport& report);
   void close_metric_loops(const FrameImages& images, MapperReport& report);
   void cull(MapperReport& report);
@@ -102,6 +107,7 @@ class Mapper {
   GraphWriter writer_;
   WindowBuilder builder_;
   WindowSolver solver_;
+  MapUnit unit_;
   MetricLoopCloser loop_closer_;
   PointCuller point_culler_;
 

@@ -7,15 +7,11 @@
 
 namespace twofold {
 
-/// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I), with length_share softer along the
-/// translation; see edge_information.
+/// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
 struct EdgeInformationOptions {
   double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
   double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
   double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
-  /// Share of the ideal precision that disparities give |t|, >= 0; never above that of its direction.
-  /// 0: as well known as its direction, eq. 6.2 as printed.
-  double length_share = 0;
 };
 
 /// 6.4.1.
@@ -54,6 +50,9 @@ struct MapperOptions {
   double sigma_scale = 1;              ///< multiplies the standard deviation that imaging gives a measurement
   double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom
   double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom
+  /// Lengths of the map in a unit of its own, see MapUnit and Mapper::metres_per_unit. For maps that are read
+  /// with it: the tracker takes the graph's lengths for metres.
+  bool own_unit = false;
   MetricLoopOptions loop;
   CullingOptions culling;
   /// If set, is shown each problem of eq. 6.4 as it stands before the joint optimisation: to take problems

@@ -201,35 +201,6 @@ TEST(EdgeInformation, FollowsEquation62) {
   EXPECT_LT((edge_information(a, b, edge, rig, options) - 2 * information).norm(), 1e-9);
 }
 
-TEST(EdgeInformation, StereoKnowsALengthByDisparityOnly) {
-  const Rig rig = simulation::thesis_rig();
-  Keyframe a, b;
-  a.median_depth = b.median_depth = 2;
-  Edge edge;
-  edge.weight = 50;
-  edge.marginalised = true;
-  const Vector3 along = Vector3(1, 2, -2) / 3;
-  edge.T_other_this = SE3(SO3(), 0.4 * along);
-  EdgeInformationOptions options;
-  options.trans_share = 0.1;
-  options.length_share = 0.2;
-  const double ideal = 300 / (std::numbers::sqrt2 * options.sigma_px) / 2;
-  const Matrix3 stereo = edge_information(a, b, edge, rig, options).topLeftCorner<3, 3>();
-  // A length of 8 baselines: an eighth of the precision.
-  EXPECT_NEAR(along.dot(stereo * along), 50 * std::pow(0.2 * ideal / 8, 2), 1e-9);
-  const Vector3 across = along.unitOrthogonal();
-  EXPECT_LT((stereo * across - 50 * std::pow(0.1 * ideal, 2) * across).norm(), 1e-9);
-  // Never better than the direction; and with one camera nothing but the edges holds the scale.
-  const Matrix3 even = 50 * std::pow(0.1 * ideal, 2) * Matrix3::Identity();
-  const Rig mono = simulation::thesis_rig(SensorKind::kMono);
-  EXPECT_LT((edge_information(a, b, edge, mono, options).topLeftCorner<3, 3>() - even).norm(), 1e-9);
-  options.length_share = 0;
-  EXPECT_LT((edge_information(a, b, edge, rig, options).topLeftCorner<3, 3>() - even).norm(), 1e-9);
-  options.length_share = 0.2;
-  edge.T_other_this = SE3(SO3(), 0.05 * along);
-  EXPECT_LT((edge_information(a, b, edge, rig, options).topLeftCorner<3, 3>() - even).norm(), 1e-9);
-}
-
 TEST(SharedPoints, CountedFromBothSides) {
   const Rig rig = simulation::thesis_rig();
   GraphWriter writer = chain(4);

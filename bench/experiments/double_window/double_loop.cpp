@@ -111,7 +111,7 @@ std::vector<TrialResult> run_trial(const Scene& scene, const DoubleWindowExperim
   for (std::size_t k = 0; k < count; ++k) {
     for (std::size_t m = 0; m < kMethods; ++m) contestants[m]->map_next(results[m].rounds[k]);
     for (std::size_t m = 0; m < kMethods; ++m) {
-      record_errors(contestants[m]->mapper.graph(), scene, contestants[kConstant]->mapper.window(),
+      record_errors(contestants[m]->mapper.graph(), 1, scene, contestants[kConstant]->mapper.window(),
                     results[m].rounds[k]);
     }
     for (std::size_t m = 0; m < kMethods; ++m) {

@@ -14,9 +14,9 @@ struct DoubleWindowExperimentOptions {
   int loop_keyframes = 300;  ///< of the double loop: two rounds
   unsigned seed = 1;         ///< of the first trial
   SceneOptions scene;
-  int max_anchors = 25;  ///< that take places of W2 for their points (6.2.4)
-  /// Shares; sigma_px follows the scene's noise. Readings of depth are poor here: 11 % each.
-  EdgeInformationOptions edge{.length_share = 0.5};
+  int max_anchors = 25;         ///< that take places of W2 for their points (6.2.4)
+  bool metres = false;          ///< lengths in metres throughout, not in a unit of the map's own (MapUnit)
+  EdgeInformationOptions edge;  ///< shares; sigma_px follows the scene's noise
 };
 
 constexpr int kUnbounded = std::numeric_limits<int>::max() / 4;  // window size of BA over everything

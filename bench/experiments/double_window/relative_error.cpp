@@ -19,7 +19,7 @@ double RelativeError::scaled_rmse() const {
   return edges > 0 ? std::sqrt(scaled / edges) : 0;
 }
 
-RelativeError relative_error(const GraphSnapshot& graph, const Scene& scene,
+RelativeError relative_error(const GraphSnapshot& graph, double metres_per_unit, const Scene& scene,
                              const std::function<bool(KeyframeId)>& use) {
   RelativeError error;
   double product = 0, estimated_squared = 0, truth_squared = 0;
@@ -30,7 +30,7 @@ RelativeError relative_error(const GraphSnapshot& graph, const Scene& scene,
     for (const int earlier : scene.covisible[k]) {
       const KeyframeId j{static_cast<std::uint32_t>(earlier)};
       if (!use(j)) continue;
-      Vector3 estimated = (graph.T_k_w(i) * graph.T_k_w(j).inverse()).translation();
+      Vector3 estimated = metres_per_unit * (graph.T_k_w(i) * graph.T_k_w(j).inverse()).translation();
       Vector3 truth = (scene.T_k_w[k] * scene.T_k_w[index(j)].inverse()).translation();
       if (mono) {
         estimated.normalize();

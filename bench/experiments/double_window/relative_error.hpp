@@ -19,9 +19,9 @@ struct RelativeError {
 };
 
 /// Eq. 6.10 over the edges of the scene (not of one method's graph: all are measured by the same) between
-/// keyframes of the graph that `use` accepts. For one camera translations are normalised to length one, as
-/// in the thesis.
-[[nodiscard]] RelativeError relative_error(const GraphSnapshot& graph, const Scene& scene,
-                                           const std::function<bool(KeyframeId)>& use);
+/// keyframes of the graph that `use` accepts, lengths of the graph times `metres_per_unit`. For one camera
+/// translations are normalised to length one, as in the thesis.
+[[nodiscard]] RelativeError relative_error(const GraphSnapshot& graph, double metres_per_unit,
+                                           const Scene& scene, const std::function<bool(KeyframeId)>& use);
 
 }  // namespace twofold::bench

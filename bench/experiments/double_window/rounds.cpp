@@ -92,10 +92,12 @@ void record_cost(const MapperReport& report, double cpu_ms, Round& round) {
   round.constraints = report.constraints;
 }
 
-void record_errors(const GraphSnapshot& graph, const Scene& scene, const DoubleWindow& window, Round& round) {
-  round.inner = relative_error(graph, scene, [&](KeyframeId id) { return window.is_inner(id); });
-  round.both = relative_error(graph, scene, [&](KeyframeId id) { return window.contains(id); });
-  round.all = relative_error(graph, scene, [](KeyframeId) { return true; });
+void record_errors(const GraphSnapshot& graph, double metres_per_unit, const Scene& scene,
+                   const DoubleWindow& window, Round& round) {
+  const auto error = [&](const auto& use) { return relative_error(graph, metres_per_unit, scene, use); };
+  round.inner = error([&](KeyframeId id) { return window.is_inner(id); });
+  round.both = error([&](KeyframeId id) { return window.contains(id); });
+  round.all = error([](KeyframeId) { return true; });
 }
 
 void write_rounds(const std::string& name, const std::string& title, const std::vector<MethodRounds>& methods,

@@ -38,7 +38,8 @@ struct MethodRounds {
 void record_cost(const MapperReport& report, double cpu_ms, Round& round);
 /// Errors by the same edges for all methods: those between members of the given window, which is one
 /// method's.
-void record_errors(const GraphSnapshot& graph, const Scene& scene, const DoubleWindow& window, Round& round);
+void record_errors(const GraphSnapshot& graph, double metres_per_unit, const Scene& scene,
+                   const DoubleWindow& window, Round& round);
 
 /// NAME.csv with all curves, NAME_accuracy.png (three levels), NAME_cost.png (cost and problem sizes).
 void write_rounds(const std::string& name, const std::string& title, const std::vector<MethodRounds>& methods,

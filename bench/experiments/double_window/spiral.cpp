@@ -23,6 +23,7 @@ MapperOptions mapper_options(Method method, const DoubleWindowExperimentOptions&
   mapper.outer_window = kOuter;
   mapper.global_outer_window = method == kGlobal;
   mapper.fixed_outer_window = method == kFixedRim;
+  mapper.own_unit = method != kBa && !options.metres;
   return mapper;
 }
 
@@ -43,7 +44,8 @@ std::vector<Rounds> run_trial(const Scene& scene, const DoubleWindowExperimentOp
       record_cost(report, thread_cpu_ms() - start, rounds[m][k]);
     }
     for (std::size_t m = 0; m < kMethods; ++m) {
-      record_errors(mappers[m].graph(), scene, mappers[kConstant].window(), rounds[m][k]);
+      record_errors(mappers[m].graph(), mappers[m].metres_per_unit(), scene, mappers[kConstant].window(),
+                    rounds[m][k]);
     }
   }
   return rounds;
