@@ -15,6 +15,7 @@ constexpr std::size_t kMaxCandidates = 3000;
 constexpr std::size_t kMaxLocalPoints = 1200;
 constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxAlignmentPoints = 240;
+constexpr int kHintRounds = 3;
 
 }  // namespace
 
@@ -96,14 +97,20 @@ bool Tracker::track(const GraphSnapshot& graph, bool hinted, StageClock& clock, 
   if (candidates_stale_) candidates_.rebuild(graph, reference_, local_, options_.neighbour_keyframes);
   candidates_stale_ = false;
   clock.lap(TrackStage::kCandidates);
-  const SE3 T_c_ref_aligned = hinted ? T_prev_ref_ : align_to_previous(result);
+  SE3 T_c_ref_start = hinted ? T_prev_ref_ : align_to_previous(result);
   clock.lap(TrackStage::kAlignment);
-  select_candidates(T_c_ref_aligned, result);
-  clock.lap(TrackStage::kCandidates);
-  search_points(T_c_ref_aligned, result);
-  clock.lap(TrackStage::kSearch);
-  const bool tracked = estimate_pose(T_c_ref_aligned, result);
-  clock.lap(TrackStage::kMotion);
+  // A hint is the place of an earlier frame: far points are found from there, and lead to where near ones
+  // are.
+  bool tracked = true;
+  for (int round = 0; tracked && round < (hinted ? kHintRounds : 1); ++round) {
+    select_candidates(T_c_ref_start, result);
+    clock.lap(TrackStage::kCandidates);
+    search_points(T_c_ref_start, result);
+    clock.lap(TrackStage::kSearch);
+    tracked = estimate_pose(T_c_ref_start, result);
+    T_c_ref_start = result.T_c_ref;
+    clock.lap(TrackStage::kMotion);
+  }
   if (tracked) unplaced_ = false;
   return tracked;
 }
@@ -180,6 +187,7 @@ void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
 /// Guided search in equi-distributed order (thesis 3.4.3) until enough points were found.
 void Tracker::search_points(const SE3& T_c_ref, TrackResult& result) {
   matches_.clear();
+  result.searched = 0;
   GuidedSearchOptions search = options_.search;
   search.refine_iterations = effort_.refine_iterations;
   if (lost_frames_ > 0) search.radius_px = options_.lost_radius_px;
