@@ -33,7 +33,7 @@ function(twofold_sanitizer_environment name)
   if(TWOFOLD_SANITIZE)
     # ThreadSanitizer does not see how the libraries of the system wait for the threads of their own: they stay on one.
     set_tests_properties(${name} PROPERTIES
-      ENVIRONMENT "OMP_THREAD_LIMIT=1;OPENBLAS_NUM_THREADS=1;OPENCV_FOR_THREADS_NUM=1;TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/tsan.supp")
+      ENVIRONMENT "OMP_THREAD_LIMIT=1;OPENBLAS_NUM_THREADS=1;TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/tsan.supp")
   endif()
 endfunction()
 
