@@ -100,6 +100,7 @@ class Tracker {
   [[nodiscard]] bool keyframe_due(const TrackResult& result, const SE3& T_c_ref) const;
   void propose_keyframe(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal& proposal,
                         TrackResult& result);
+  void hand_over_images(KeyframeProposal& proposal);
   void collect_observations(KeyframeProposal& proposal);
   void confirm(LocalPoint& point, KeyframeProposal& proposal);
   void start_points(KeyframeId anchor);

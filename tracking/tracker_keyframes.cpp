@@ -87,13 +87,20 @@ void Tracker::propose_keyframe(const Frame& frame, const GraphSnapshot& graph, K
   proposal.T_k_ref = result.T_c_ref;
   proposal.median_depth = keyframe_depth_ = median_depth(result.T_c_ref);
   collect_observations(proposal);
-  proposal.images.copy_from(current_);
   local_.add_pending({proposal.id, reference_, result.T_c_ref});
   ++next_keyframe_;
   start_points(proposal.id);
+  hand_over_images(proposal);
   local_.drop_stale(proposal.id, options_.max_failures, options_.max_candidate_age);
   candidates_stale_ = true;
   result.proposed = true;
+}
+
+/// To be done with the frame: the next one is aligned to its left image, and needs nothing else of it.
+void Tracker::hand_over_images(KeyframeProposal& proposal) {
+  proposal.images.left.copy_from(current_.left);
+  std::swap(proposal.images.right, current_.right);
+  cv::swap(proposal.images.depth, current_.depth);
 }
 
 void Tracker::collect_observations(KeyframeProposal& proposal) {

@@ -52,7 +52,7 @@ bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackRes
   matches_.clear();
   motion_.clear();
   proposal->median_depth = keyframe_depth_ = median_depth(SE3());
-  proposal->images.copy_from(current_);
+  hand_over_images(*proposal);
   local_.add_pending({id, kNoKeyframe, SE3()});
   first_of_part_ = next_keyframe_++;
   points_in_proposal_ = 0;
