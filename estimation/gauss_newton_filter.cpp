@@ -41,7 +41,7 @@ void GaussNewtonFilter::initialise(std::span<const PointObservation> first) {
   Lambda_ = MatrixX::Zero(6, 6);
   reference_ = 0;
   // The current pose is the origin itself: known, so its block holds no information to marginalise.
-  for (const PointObservation& o : first) add_point(o, 0);
+  add_points(first, 0);
 }
 
 bool GaussNewtonFilter::step(std::span<const std::int64_t> lost, std::span<const PointObservation> fresh,
@@ -62,13 +62,13 @@ bool GaussNewtonFilter::step(std::span<const std::int64_t> lost, std::span<const
     marginalise_points(lost);
     append_pose();
     const int anchor = at_origin ? 0 : anchor_count();
-    for (const PointObservation& o : fresh) add_point(o, anchor);
+    add_points(fresh, anchor);
     Lambda_.conservativeResize(pose_at(), pose_at());
   }
   const std::vector<Seen> seen = match(current);
   estimate_motion(seen);
   append_pose();
-  return joint_update(seen, options_.iterations, true);
+  return joint_update(seen, options_.iterations);
 }
 
 std::vector<GaussNewtonFilter::Seen> GaussNewtonFilter::match(

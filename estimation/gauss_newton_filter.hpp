@@ -1,12 +1,12 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "estimation/anchored_views.hpp"
 #include "estimation/inverse_depth_filter.hpp"
 #include "estimation/linearisation.hpp"
 #include "estimation/sliding_window_filter_equations.hpp"
@@ -98,15 +98,7 @@ class GaussNewtonFilter {
     std::vector<SE3> anchors;
     std::vector<Point> points;
   };
-  struct Seen {
-    int point;  ///< index into points_
-    Vector3 z;
-  };
-
-  struct TwoViews {  ///< second and third frame of the monocular start
-    std::array<std::vector<Seen>, 2> seen;
-    std::array<SE3, 2> T_c_w;
-  };
+  using Seen = SeenPoint;  ///< by index into points_
 
   [[nodiscard]] int rows() const { return rig_.kind == SensorKind::kMono ? 2 : 3; }
   [[nodiscard]] int anchor_at(int anchor) const { return 6 * (anchor - 1); }
@@ -117,13 +109,14 @@ class GaussNewtonFilter {
   [[nodiscard]] SE3 T_c_anchor(int anchor) const {
     return T_c_w_ * anchors_[static_cast<std::size_t>(anchor)].inverse();
   }
-  void add_point(const PointObservation& observation, int anchor);
+  void add_points(std::span<const PointObservation> observations, int anchor);
   void marginalise_pose();
   void pose_becomes_anchor();
   void marginalise_points(std::span<const std::int64_t> lost);
   void append_pose();
   double add_measurements(const std::vector<Seen>& seen, MatrixX* Lambda, VectorX* g) const;
-  bool joint_update(const std::vector<Seen>& seen, int iterations, bool fixed_gauge);
+  bool joint_update(const std::vector<Seen>& seen, int iterations);
+  [[nodiscard]] bool adopt(const AnchoredViews& views);
   [[nodiscard]] Mean mean() const { return {T_c_w_, anchors_, points_}; }
   void set_mean(const Mean& mean);
   void move(const VectorX& delta);
@@ -131,9 +124,6 @@ class GaussNewtonFilter {
   void estimate_motion(const std::vector<Seen>& seen);
   [[nodiscard]] bool innovation(const std::vector<Seen>& seen, const MatrixX* Sigma, MatrixX& S, MatrixX& J_T,
                                 VectorX& d) const;
-  double add_views(const TwoViews& views, MatrixX& H, VectorX& g);
-  [[nodiscard]] bool relinearise_bootstrap(const MatrixX& own, const std::vector<Point>& start,
-                                           TwoViews views);
   void eliminate(const std::vector<int>& indices);
 
   Rig rig_;

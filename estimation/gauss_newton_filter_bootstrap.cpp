@@ -1,8 +1,9 @@
 // Monocular start of the Gauss-Newton filter from three frames  (thesis 4.5.3).
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 
+#include "estimation/anchored_views.hpp"
 #include "estimation/gauss_newton_filter.hpp"
 #include "estimation/sliding_window_filter_prior.hpp"
 
@@ -11,7 +12,6 @@ namespace {
 
 constexpr int kTwoViewIterations = 60;
 constexpr int kThreeViewIterations = 20;
-constexpr double kLeastGain = 1e-6;  // of the squared whitened error
 
 using Matrix65 = Eigen::Matrix<double, 6, 5>;
 
@@ -53,114 +53,48 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   points_.clear();
   T_c_w_ = SE3();
   Lambda_ = MatrixX::Zero(6, 6);
-  for (const PointObservation& o : b0) {
-    if (contains(b1, o.point) && contains(first, o.point)) add_point(o, 0);
+  std::vector<PointObservation> in_all;
+  std::copy_if(b0.begin(), b0.end(), std::back_inserter(in_all),
+               [&](const PointObservation& o) { return contains(b1, o.point) && contains(first, o.point); });
+  add_points(in_all, 0);
+  AnchoredViews views{rig_, options_.sigma_px, {}, {}};
+  for (int j = 0; j < point_count(); ++j) {
+    const Vector3& psi = points_[static_cast<std::size_t>(j)].psi;
+    views.points.push_back({psi, psi, Lambda_.block<3, 3>(point_at(j), point_at(j))});
   }
-  const MatrixX own = Lambda_.topLeftCorner(pose_at(), pose_at());
-  const std::vector<Point> start = points_;
-  // Six unknowns of the motion and three a point, one of them, scale, free: held by the damping.
-  TwoViews views{{match(b1), match(first)}, {}};
-  if (views.seen[0].size() < 6 || !joint_update(views.seen[0], kTwoViewIterations, false)) return false;
-  const double length = T_c_w_.translation().norm();
-  if (!(length > 1e-9)) return false;
-  T_c_w_.translation() /= length;
-  for (Point& point : points_) point.psi.z() *= length;
-  views.T_c_w[0] = T_c_w_;
+  // Six unknowns of the motion and three a point, one of them, scale, free.
+  views.views.push_back({SE3(), match(b1)});
+  if (views.views[0].seen.size() < 6 || !views.minimise(kTwoViewIterations)) return false;
+  if (!views.normalise_scale() || !adopt(views)) return false;
 
-  // Third frame: a standard update after the second pose is marginalised.
-  MatrixX full = Lambda_;
-  VectorX unused = VectorX::Zero(full.rows());
-  if (!std::isfinite(add_measurements(views.seen[0], &full, &unused))) return false;
-  Lambda_ = without_second_pose(full, pose_at(), motions_of_fixed_length(T_c_w_.translation()));
-  estimate_motion(views.seen[1]);
-  append_pose();
-  if (!joint_update(views.seen[1], kThreeViewIterations, true)) return false;
-  views.T_c_w[1] = T_c_w_;
-  const Mean sequential = mean();
-  const MatrixX information = Lambda_;
-  if (!relinearise_bootstrap(own, start, views)) {  // a point behind a camera: the standard update stands
-    set_mean(sequential);
-    Lambda_ = information;
+  // Third frame: a standard update after the second pose is marginalised; if all goes well, only its start.
+  const std::vector<Seen> third = match(first);
+  estimate_motion(third);
+  views.views.push_back({T_c_w_, third});
+  // Two frames of little parallax leave depths and direction of motion too far off to take derivatives at for
+  // good. All three are brought to their common minimum, where the information is taken afresh.
+  if (!views.minimise(kThreeViewIterations) || !views.normalise_scale() || !adopt(views)) {
+    append_pose();
+    if (!joint_update(third, kThreeViewIterations)) return false;
   }
   reference_ = kCurrentPose;
   return true;
 }
 
-/// Adds what both frames measure to [points | second pose | third pose]; returns the squared whitened error.
-double GaussNewtonFilter::add_views(const TwoViews& views, MatrixX& H, VectorX& g) {
-  const int points = pose_at();
-  double chi2 = 0;
-  for (const std::size_t k : {0U, 1U}) {
-    T_c_w_ = views.T_c_w[k];
-    MatrixX part = MatrixX::Zero(points + 6, points + 6);
-    VectorX b = VectorX::Zero(points + 6);
-    chi2 += add_measurements(views.seen[k], &part, &b);
-    const int pose = points + 6 * static_cast<int>(k);
-    H.topLeftCorner(points, points) += part.topLeftCorner(points, points);
-    H.block(pose, 0, 6, points) += part.bottomLeftCorner(6, points);
-    H.block(0, pose, points, 6) += part.topRightCorner(points, 6);
-    H.block<6, 6>(pose, pose) += part.bottomRightCorner<6, 6>();
-    g.head(points) += b.head(points);
-    g.segment<6>(pose) += b.tail<6>();
+/// Takes over the views' minimum and information, the second pose, whose distance is the unit of length,
+/// marginalised. False, and nothing changed, if a point is behind a camera.
+bool GaussNewtonFilter::adopt(const AnchoredViews& views) {
+  const MatrixX full = views.information();
+  if (full.size() == 0) return false;
+  const bool three = views.views.size() == 2;
+  for (std::size_t j = 0; j < points_.size(); ++j) {
+    points_[j].psi = views.points[j].psi;
+    // Before the third frame nothing has been linearised for good.
+    if (three) points_[j].psi_lin = points_[j].psi;
   }
-  return chi2;
-}
-
-/// Two frames of little parallax leave depths and direction of motion too far off to take derivatives at for
-/// good. All three frames are brought to their common minimum, where the information is taken afresh.
-bool GaussNewtonFilter::relinearise_bootstrap(const MatrixX& own, const std::vector<Point>& start,
-                                              TwoViews views) {
-  const int points = pose_at();
-  MatrixX H(points + 12, points + 12);
-  VectorX g(points + 12);
-  const auto linearise = [&] {
-    VectorX x(points);  // from what the first frame knows of each point: its direction
-    for (int j = 0; j < point_count(); ++j) {
-      const auto i = static_cast<std::size_t>(j);
-      x.segment<3>(point_at(j)) = points_[i].psi - start[i].psi;
-    }
-    H.setZero();
-    g.setZero();
-    H.topLeftCorner(points, points) = own;
-    g.head(points) = -(own * x);
-    const double chi2 = -x.dot(g.head(points));
-    return chi2 + add_views(views, H, g);
-  };
-  for (Point& point : points_) point.psi_lin.reset();
-  double current = linearise(), damping = 1e-6;
-  for (int iteration = 0; iteration < kThreeViewIterations && std::isfinite(current); ++iteration) {
-    MatrixX damped = H;  // the floor holds the scale
-    damped.diagonal() += damping * (H.diagonal() + VectorX::Ones(H.rows()));
-    const VectorX delta = damped.llt().solve(g);
-    const TwoViews old_views = views;
-    const std::vector<Point> old_points = points_;
-    for (int j = 0; j < point_count(); ++j) {
-      points_[static_cast<std::size_t>(j)].psi += delta.segment<3>(point_at(j));
-    }
-    for (const int k : {0, 1}) {
-      SE3& T = views.T_c_w[static_cast<std::size_t>(k)];
-      T = SE3::exp(delta.segment<6>(points + 6 * k)) * T;
-    }
-    const double next = linearise();
-    const bool better = next <= current;
-    if (better && current - next < kLeastGain) break;
-    damping = better ? 0.1 * damping : std::max(10 * damping, 1e-4);
-    if (!better) {
-      views = old_views;
-      points_ = old_points;
-    }
-    current = linearise();
-  }
-  const double length = views.T_c_w[0].translation().norm();
-  if (!(length > 1e-9)) return false;
-  for (SE3& T : views.T_c_w) T.translation() /= length;
-  for (Point& point : points_) {
-    point.psi.z() *= length;
-    point.psi_lin = point.psi;
-  }
-  if (!std::isfinite(linearise())) return false;
-  Lambda_ = without_second_pose(H, points, motions_of_fixed_length(views.T_c_w[0].translation()));
-  T_c_w_ = views.T_c_w[1];
+  T_c_w_ = views.views.back().T_c_a;
+  Lambda_ = without_second_pose(full, 3 * point_count(),
+                                motions_of_fixed_length(views.views[0].T_c_a.translation()));
   return true;
 }
 

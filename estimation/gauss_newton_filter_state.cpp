@@ -22,18 +22,21 @@ MatrixX reordered(const MatrixX& m, const std::vector<int>& order) {
 
 }  // namespace
 
-/// Inserts a point and its own information before the current pose.
-void GaussNewtonFilter::add_point(const PointObservation& observation, int anchor) {
-  const InverseDepthFilter start = first_estimate(observation.z);
-  const int at = pose_at();
-  MatrixX grown = MatrixX::Zero(at + 9, at + 9);
+/// Inserts points and their own information before the current pose.
+void GaussNewtonFilter::add_points(std::span<const PointObservation> observations, int anchor) {
+  const int at = pose_at(), added = 3 * static_cast<int>(observations.size());
+  MatrixX grown = MatrixX::Zero(at + added + 6, at + added + 6);
   grown.topLeftCorner(at, at) = Lambda_.topLeftCorner(at, at);
-  grown.block<3, 3>(at, at) = start.information;
   grown.topRightCorner(at, 6) = Lambda_.topRightCorner(at, 6);
   grown.bottomLeftCorner(6, at) = Lambda_.bottomLeftCorner(6, at);
   grown.bottomRightCorner<6, 6>() = Lambda_.bottomRightCorner<6, 6>();
+  for (const PointObservation& observation : observations) {
+    const InverseDepthFilter start = first_estimate(observation.z);
+    points_.push_back({observation.point, anchor, start.psi});
+    const int own = point_at(point_count() - 1);
+    grown.block<3, 3>(own, own) = start.information;
+  }
   Lambda_ = std::move(grown);
-  points_.push_back({observation.point, anchor, start.psi});
 }
 
 void GaussNewtonFilter::eliminate(const std::vector<int>& indices) {

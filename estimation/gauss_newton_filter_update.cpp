@@ -98,9 +98,8 @@ VectorX GaussNewtonFilter::offset(const Mean& from) const {
   return x;
 }
 
-/// Levenberg-Marquardt on eq. 4.18, then Lambda += D^T Lambda_z D  (4.21). fixed_gauge false: the damping
-/// holds the free scale and the information is left to the caller.
-bool GaussNewtonFilter::joint_update(const std::vector<Seen>& seen, int iterations, bool fixed_gauge) {
+/// Levenberg-Marquardt on eq. 4.18, then Lambda += D^T Lambda_z D  (4.21).
+bool GaussNewtonFilter::joint_update(const std::vector<Seen>& seen, int iterations) {
   const double start = thread_seconds();
   const MatrixX prior = Lambda_;
   const Mean before = mean();
@@ -141,7 +140,7 @@ bool GaussNewtonFilter::joint_update(const std::vector<Seen>& seen, int iteratio
     }
     if (!accepted) break;
   }
-  if (fixed_gauge && std::isfinite(current)) {
+  if (std::isfinite(current)) {
     VectorX unused = VectorX::Zero(Lambda_.rows());
     add_measurements(seen, &Lambda_, &unused);
     // What a point knew before is linear in psi: its own anchor's measurement. From here on it is not.
