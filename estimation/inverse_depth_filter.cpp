@@ -1,26 +1,35 @@
 #include "estimation/inverse_depth_filter.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 namespace twofold {
 
+// In units of the point's depth in its anchor frame, h = q x_c = R (x/z, y/z, 1) + q t, nothing is divided by
+// q.
 std::optional<InverseDepthProjection> project_inverse_depth(const Rig& rig, const SE3& T_c_a,
                                                             const Vector3& psi) {
-  constexpr double kMinInverseDepth = 1e-5, kMinDepth = 1e-3;
-  if (!(psi.z() > kMinInverseDepth)) return std::nullopt;
-  const Vector3 x_a = from_inverse_depth(psi);
-  const Vector3 x_c = T_c_a * x_a;
-  if (!(x_c.z() > kMinDepth)) return std::nullopt;
-  const Matrix3 J = rig.project_jacobian(x_c);
+  constexpr double kMinDepth = 1e-3;
+  const double q = psi.z();
+  const Vector3 ray_a(psi.x(), psi.y(), 1);
   const Matrix3 R = T_c_a.rotation();
+  const Vector3& t = T_c_a.translation();
+  const Vector3 h = R * ray_a + q * t;
+  if (!(h.z() > kMinDepth * std::max(q, 1.0))) return std::nullopt;
+  const double fx = rig.camera.fx, fy = rig.camera.fy, b = rig.baseline, z = h.z();
+  const Vector2 uv = rig.camera.project(h);
   InverseDepthProjection result;
-  result.z_hat = rig.project(x_c);
-  result.J_camera << J, -J * hat(x_c);
+  result.z_hat << uv, uv.x() - fx * b * q / z;
+  Matrix3 J;                              // of z_hat by h
+  J << fx / z, 0, -fx * h.x() / (z * z),  //
+      0, fy / z, -fy * h.y() / (z * z),   //
+      fx / z, 0, -fx * (h.x() - b * q) / (z * z);
+  result.J_camera << q * J, -J * hat(h);
   const Matrix3 JR = J * R;
-  result.J_anchor << -JR, JR * hat(x_a);  // x_c = T_c_w T_a_w^-1 exp(-d) x_a
-  result.J_psi = J * inverse_depth_jacobian(R, psi);
+  result.J_anchor << -q * JR, JR * hat(ray_a);  // h = q T_c_w T_a_w^-1 exp(-d) x_a
+  result.J_psi << JR.leftCols<2>(), J * t - Vector3(0, 0, fx * b / z);
   return result;
 }
 

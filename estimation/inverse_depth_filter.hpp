@@ -41,7 +41,8 @@ struct InverseDepthProjection {
   Matrix3 J_psi;
 };
 
-/// None when the point is behind the camera or its inverse depth is not positive.
+/// None when the point is behind the camera. An inverse depth of zero or less, a point at infinity or, by the
+/// noise of a ray without parallax, beyond it, is as good as any other: the error goes on smoothly there.
 [[nodiscard]] std::optional<InverseDepthProjection> project_inverse_depth(const Rig& rig, const SE3& T_c_a,
                                                                           const Vector3& psi);
 

@@ -50,9 +50,15 @@ TEST(FilterInverseDepth, ProjectionJacobiansAreCentralDifferences) {
   for (int trial = 0; trial < 50; ++trial) {
     const SE3 T_c_w = SE3::exp(0.1 * Vector6::NullaryExpr([&] { return n(rng); }));
     const SE3 T_a_w = SE3::exp(0.1 * Vector6::NullaryExpr([&] { return n(rng); }));
-    const Vector3 psi(0.2 * n(rng), 0.2 * n(rng), 0.3 + 0.1 * std::abs(n(rng)));
+    // A third of the points at infinity or beyond, where a depth would be none.
+    const double inverse_depth = trial % 3 == 0 ? -0.1 * std::abs(n(rng)) * (trial % 2) : 0.3 + 0.1 * n(rng);
+    const Vector3 psi(0.2 * n(rng), 0.2 * n(rng), inverse_depth);
     const auto p = project_inverse_depth(rig, T_c_w * T_a_w.inverse(), psi);
     ASSERT_TRUE(p);
+    if (psi.z() > 0) {
+      const Vector3 x_c = T_c_w * T_a_w.inverse() * from_inverse_depth(psi);
+      EXPECT_LT((p->z_hat - rig.project(x_c)).norm(), 1e-9);
+    }
     const auto at = [&](const SE3& c, const SE3& a, const Vector3& q) {
       return project_inverse_depth(rig, c * a.inverse(), q)->z_hat;
     };

@@ -13,6 +13,7 @@ namespace twofold::bench {
 namespace {
 
 constexpr double kSigma = 0.5;
+constexpr double kMinInverseDepth = 1e-3;  // farther points say nothing to bundle adjustment
 
 /// Bundle adjustment pipeline over growing data; frames are pose indices of the problem.
 class BaPipeline {
@@ -131,7 +132,9 @@ PipelineResult run_bundle_adjustment(const Block& block, int iterations) {
     if (!filter.bootstrap(block.bootstrap[0], block.bootstrap[1], block.first)) return result;
     start = thread_seconds();  // the bootstrap is the same for both and not counted
     ba.add_pose(SE3(), true);
-    for (int j = 0; j < filter.point_count(); ++j) ba.add_point(filter.point_id(j), 0, filter.psi(j));
+    for (int j = 0; j < filter.point_count(); ++j) {
+      if (filter.psi(j).z() > kMinInverseDepth) ba.add_point(filter.point_id(j), 0, filter.psi(j));
+    }
     for (const auto& o : block.bootstrap[0]) ba.add_observation(0, o);
     ba.add_pose(ba.motion_only(SE3(), block.bootstrap[1]), false);
     for (const auto& o : block.bootstrap[1]) ba.add_observation(1, o);
@@ -161,7 +164,7 @@ PipelineResult run_bundle_adjustment(const Block& block, int iterations) {
                              kSigma))
             break;
         }
-        if (!(filter.psi.z() > 1e-3)) continue;
+        if (!(filter.psi.z() > kMinInverseDepth)) continue;
       }
       ba.add_point(o.point, pose, filter.psi);
       ba.add_observation(pose, o);
