@@ -80,7 +80,8 @@ bool InverseDepthFilter::update(const Rig& rig, const SE3& T_c_a, const Vector3&
     if (!stereo) J.row(2).setZero();
     Matrix3 H = information + weight * J.transpose() * J;
     const Vector3 g = weight * J.transpose() * residual(p->z_hat) - information * (at - prior);
-    H.diagonal() *= 1 + damping;
+    // The floor keeps a depth that this measurement says nothing about where it is.
+    H.diagonal() += damping * (H.diagonal() + Vector3::Ones());
     const Vector3 delta = H.ldlt().solve(g);
     const Vector3 next = at + delta;
     const double value = delta.allFinite() ? cost(next) : std::numeric_limits<double>::infinity();

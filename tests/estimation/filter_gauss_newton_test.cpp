@@ -116,6 +116,15 @@ TEST(FilterInverseDepth, MonocularDepthGoesFromUnknownToConsistent) {
   EXPECT_NEAR(nees, 3.0, 0.37);  // 99.7 % bound for 400 x 3 degrees of freedom
 }
 
+TEST(FilterInverseDepth, DepthStaysWhereItIsWithoutParallax) {
+  const Rig rig = make_rig(SensorKind::kMono);
+  auto filter = InverseDepthFilter::from_mono(rig.camera, Vector2(300, 200), 0.5);
+  const SE3 T(SO3(), Vector3(3e-16, 0, 0));  // what rounding leaves of no motion
+  EXPECT_TRUE(filter.update(rig, T, Vector3(300.7, 199.6, Rig::kNoRight), 0.5));
+  EXPECT_NEAR(filter.psi.z(), 1, 1e-4);
+  EXPECT_GT(filter.inverse_depth_sigma(), 1e9);
+}
+
 TEST(FilterInverseDepth, BehindTheCameraIsRefused) {
   const Rig rig = make_rig(SensorKind::kMono);
   auto filter = InverseDepthFilter::from_mono(rig.camera, Vector2(300, 200), 0.5);
