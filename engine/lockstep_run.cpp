@@ -153,6 +153,8 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
     }
   }
   tracking_.finish(due_ns, steady_now_ns(), record);
+  if (tracking_.correction().reason != CorrectionReason::kNone)
+    result_.corrections.push_back(tracking_.correction());
   TrackerStep taken = step;
   taken.frame = record.frame_index;
   taken.version = record.snapshot_version;

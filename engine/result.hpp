@@ -12,6 +12,7 @@
 #include "graph/place_book.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/effort.hpp"
+#include "tracking/lost_cause.hpp"
 
 namespace twofold {
 
@@ -49,29 +50,31 @@ enum class CorrectionReason : std::uint8_t {
 /// it was tracked against and in the new one.
 struct PoseCorrection {
   CorrectionReason reason = CorrectionReason::kNone;
+  std::int64_t frame_index = 0;  ///< of the frame that saw the corrected map first
+  std::int64_t t_ns = 0;
   SE3 T_c_w_before;
   SE3 T_c_w_after;
 };
 
-/// What is remembered of every frame.
+/// What is remembered of every frame: kept small, because there is one for each as long as the run goes on.
 struct FrameRecord {
   std::int64_t frame_index = 0;
   std::int64_t t_ns = 0;
-  FrameState state = FrameState::kLost;
-  KeyframeId reference = kNoKeyframe;
-  SE3 T_c_ref;                           ///< pose relative to the reference keyframe: survives map changes
-  SE3 T_c_w_causal;                      ///< pose in the map as it was known at the frame's own time
-  KeyframeId part_causal = kNoKeyframe;  ///< map part whose world frame that was, under its name of then
+  PackedPose T_c_ref;                    ///< pose relative to the reference keyframe: survives map changes
+  PackedPose T_c_w_causal;               ///< pose in the map as it was known at the frame's own time
   double tracked_share = 0;              ///< matched points over points searched, in [0, 1]
-  int inliers = 0;                       ///< measurements the pose rests on
   std::uint64_t snapshot_version = 0;    ///< version of the map it was tracked against
-  bool keyframe = false;                 ///< it was proposed as a keyframe and accepted
+  std::int64_t tracking_ns = 0;          ///< time spent on it by the tracker
+  std::int64_t latency_ns = 0;           ///< from the moment it was due to the moment its pose was known
+  KeyframeId reference = kNoKeyframe;
+  KeyframeId part_causal = kNoKeyframe;  ///< map part of T_c_w_causal's world, under its name of then
+  int inliers = 0;                       ///< measurements the pose rests on
+  FrameState state = FrameState::kLost;
+  bool keyframe = false;                      ///< it was proposed as a keyframe and accepted
   LadderRung rung = LadderRung::kEverything;  ///< what was left out for want of time
-  const char* cause = "";                     ///< why it was lost; empty when tracked
-  PoseCorrection correction;                  ///< of the map, seen first by this frame
-  std::int64_t tracking_ns = 0;               ///< time spent on it by the tracker
-  std::int64_t latency_ns = 0;                ///< from the moment it was due to the moment its pose was known
+  LostCause cause = LostCause::kNone;         ///< why it was lost
 };
+static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 
 /// One keyframe proposal turned into a map version by the mapper.
 struct MapperRound {
@@ -112,7 +115,8 @@ struct ScheduleStreams {
 
 /// All a run leaves behind.
 struct RunResult {
-  std::vector<FrameRecord> frames;  ///< in the order of the source, dropped ones included
+  std::vector<FrameRecord> frames;          ///< in the order of the source, dropped ones included
+  std::vector<PoseCorrection> corrections;  ///< in the order of the frames
   std::vector<MapperRound> rounds;
   std::vector<ClosedLoop> loops;  ///< by appearance, in the order they were found
   GraphSnapshot graph;            ///< after the last round and the final relaxation
@@ -133,7 +137,7 @@ struct RunResult {
 
 /// Pose of a tracked frame in the final map.
 [[nodiscard]] inline SE3 final_T_c_w(const FrameRecord& record, const GraphSnapshot& graph) {
-  return record.T_c_ref * graph.T_k_w(record.reference);
+  return record.T_c_ref.unpacked() * graph.T_k_w(record.reference);
 }
 
 }  // namespace twofold

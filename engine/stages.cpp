@@ -45,15 +45,15 @@ bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, LadderR
   record.t_ns = frame.t_ns;
   record.state = result.status == TrackStatus::kTracking ? FrameState::kTracked : FrameState::kLost;
   record.rung = rung;
-  record.cause = describe(result.cause);
+  record.cause = result.cause;
   record.snapshot_version = graph.version();
   record.reference = result.reference;
-  record.T_c_ref = result.T_c_ref;
+  record.T_c_ref = PackedPose(result.T_c_ref);
   if (record.state == FrameState::kTracked) {
-    record.T_c_w_causal = tracker_.T_c_w(graph);
+    record.T_c_w_causal = PackedPose(tracker_.T_c_w(graph));
     record.part_causal = tracker_.part(graph);
   }
-  announce_correction(graph, record);
+  find_correction(graph, record);
   if (record.state == FrameState::kTracked) last_ = record;
   record.tracked_share = result.tracked_share();
   record.inliers = result.inliers;
@@ -71,28 +71,27 @@ bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, LadderR
 }
 
 /// Where the last tracked frame is in the map of this one, if that is elsewhere than it was said to be.
-void TrackingStage::announce_correction(const GraphSnapshot& graph, FrameRecord& record) const {
+void TrackingStage::find_correction(const GraphSnapshot& graph, const FrameRecord& record) {
+  correction_.reason = CorrectionReason::kNone;
   if (last_.state != FrameState::kTracked || last_.snapshot_version == graph.version() ||
       !graph.contains(last_.reference)) {
     return;
   }
   const SE3 T_c_w = final_T_c_w(last_, graph);
-  const SE3 change = T_c_w.inverse() * last_.T_c_w_causal;
+  const SE3 T_c_w_before = last_.T_c_w_causal.unpacked();
+  const SE3 change = T_c_w.inverse() * T_c_w_before;
   if (change.translation().norm() < kCorrection && change.so3().log().norm() < kCorrectionAngle) return;
   const MapChange& jump = graph.last_jump();
-  record.correction.reason = CorrectionReason::kOptimisation;
-  if (jump.version > last_.snapshot_version) {
-    record.correction.reason = reason_of(jump.kind);
-  }
-  record.correction.T_c_w_before = last_.T_c_w_causal;
-  record.correction.T_c_w_after = T_c_w;
+  const bool jumped = jump.version > last_.snapshot_version;
+  const CorrectionReason reason = jumped ? reason_of(jump.kind) : CorrectionReason::kOptimisation;
+  correction_ = {reason, record.frame_index, record.t_ns, T_c_w_before, T_c_w};
 }
 
 void TrackingStage::proposal_rejected(FrameRecord& record) {
   record.keyframe = false;
   if (tracker_.proposal_rejected()) return;
   record.state = FrameState::kLost;
-  record.cause = describe(LostCause::kNoKeyframeBuffer);
+  record.cause = LostCause::kNoKeyframeBuffer;
   last_ = record;
 }
 

@@ -43,6 +43,8 @@ class TrackingStage {
   /// @return whether `proposal` was filled and should be sent
   bool step(const Frame& frame, const GraphSnapshot& graph, LadderRung rung, ProposalHandle& proposal,
             FrameRecord& record);
+  /// Of the map, seen first by the frame of the last step; of reason kNone when there was none.
+  [[nodiscard]] const PoseCorrection& correction() const { return correction_; }
   /// The filled proposal could not be sent.
   void proposal_rejected(FrameRecord& record);
   /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
@@ -57,7 +59,7 @@ class TrackingStage {
   [[nodiscard]] StageRecorder& times() { return times_; }
 
  private:
-  void announce_correction(const GraphSnapshot& graph, FrameRecord& record) const;
+  void find_correction(const GraphSnapshot& graph, const FrameRecord& record);
 
   Tracker tracker_;
   StageRecorder times_;
@@ -66,6 +68,7 @@ class TrackingStage {
   std::vector<StageId> stages_;
   TraceName version_counter_, rung_counter_;
   FrameRecord last_;  // the last frame that was tracked
+  PoseCorrection correction_;
   bool answer_awaited_ = false;
   const bool can_relocalise_;
 };

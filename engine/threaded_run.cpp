@@ -127,6 +127,7 @@ void ThreadedRun::collect_records(const ProgressSink& progress) {
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
     progress_.queued = proposals_.size_approx();
     result_.frames.push_back(record);
+    if (slot->correction.reason != CorrectionReason::kNone) result_.corrections.push_back(slot->correction);
     slot->frame = {};  // images are freed here, not on the tracker's thread
     slot.reset();
     if (progress) progress(progress_);

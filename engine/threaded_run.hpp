@@ -43,6 +43,7 @@ class ThreadedRun {
     Frame frame;
     std::optional<std::int64_t> next_t_ns;  ///< time stamp of the frame after it, if known
     FrameRecord record;
+    PoseCorrection correction;  ///< seen first by this frame, if there is a reason
   };
   using SlotPool = FramePool<FrameSlot>;
   using SlotHandle = SlotPool::Handle;

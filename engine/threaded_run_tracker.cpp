@@ -10,6 +10,7 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
     if (!slot && !frames_.try_pop(slot)) break;  // ended, and nothing was pushed before that
     const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, slot->next_t_ns, stop);
     slot->record = FrameRecord{};
+    slot->correction.reason = CorrectionReason::kNone;
     if (ladder_.must_drop(arrival)) {
       drop(*slot);
     } else {
@@ -41,6 +42,7 @@ void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
   step.keyframe_withheld = !spare_;
   if (tracking_.step(slot.frame, graph, ladder_.rung(), spare_, slot.record))
     send_proposal(slot.record, step);
+  slot.correction = tracking_.correction();
   schedule_.tracker.append(step);
   ask_where_we_are();
 }

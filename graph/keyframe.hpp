@@ -71,6 +71,7 @@ class PackedPose {
     const Eigen::Quaterniond q(Eigen::Map<const Eigen::Vector4d>(values_.data()).eval());
     return {SO3(q), Eigen::Map<const Vector3>(values_.data() + 4)};
   }
+  friend bool operator==(const PackedPose&, const PackedPose&) = default;
 
  private:
   std::array<double, 7> values_;  ///< quaternion (x, y, z, w), translation

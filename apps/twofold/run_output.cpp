@@ -28,7 +28,7 @@ Trajectory causal_trajectory(const RunResult& result) {
   std::map<KeyframeId, Trajectory> parts;
   for (const FrameRecord& record : result.frames) {
     if (record.state == FrameState::kTracked)
-      parts[record.part_causal].push_back({record.t_ns, record.T_c_w_causal.inverse()});
+      parts[record.part_causal].push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
   }
   const auto most = std::max_element(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
     return a.second.size() < b.second.size();

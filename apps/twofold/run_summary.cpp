@@ -32,7 +32,8 @@ Json late_and_lost(const RunResult& result) {
     const double gap_ms = previous_t_ns == 0 ? 0 : static_cast<double>(record.t_ns - previous_t_ns) * 1e-6;
     previous_t_ns = record.t_ns;
     if (record.state == FrameState::kLost) {
-      lost.push_back({{"frame", record.frame_index}, {"cause", record.cause}, {"ms_since_previous", gap_ms}});
+      lost.push_back(
+          {{"frame", record.frame_index}, {"cause", describe(record.cause)}, {"ms_since_previous", gap_ms}});
     } else if (record.state == FrameState::kDropped) {
       late.push_back({{"frame", record.frame_index},
                       {"rung", describe(record.rung)},
@@ -68,12 +69,10 @@ Json loops_json(const RunResult& result) {
 /// How far the camera jumped in the map, when, and why.
 Json corrections_json(const RunResult& result) {
   Json corrections = Json::array();
-  for (const FrameRecord& record : result.frames) {
-    const PoseCorrection& c = record.correction;
-    if (c.reason == CorrectionReason::kNone) continue;
+  for (const PoseCorrection& c : result.corrections) {
     const SE3 T_before_after = c.T_c_w_before * c.T_c_w_after.inverse();
-    corrections.push_back({{"frame", record.frame_index},
-                           {"t_ns", record.t_ns},
+    corrections.push_back({{"frame", c.frame_index},
+                           {"t_ns", c.t_ns},
                            {"reason", describe(c.reason)},
                            {"moved_m", T_before_after.translation().norm()},
                            {"turned_rad", T_before_after.so3().log().norm()}});

@@ -103,7 +103,7 @@ class EngineCameraTest : public ::testing::Test {
     EXPECT_EQ(result.error, "");
     ASSERT_EQ(result.frames.size(), static_cast<std::size_t>(kFrames));
     for (const FrameRecord& record : result.frames)
-      EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << record.cause;
+      EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << describe(record.cause);
   }
 
   static Rig* rig_;
@@ -148,7 +148,7 @@ TEST_F(EngineCameraTest, ALiveRunIsRepeatedFromItsRecordingAndSchedule) {
       Engine(recording->rig(), options).replay(feed(*recording), *schedule, interrupted);
   expect_all_tracked(repeated);
   for (std::size_t i = 0; i < live.frames.size(); ++i) {
-    EXPECT_EQ(live.frames[i].T_c_w_causal.matrix(), repeated.frames[i].T_c_w_causal.matrix()) << i;
+    EXPECT_EQ(live.frames[i].T_c_w_causal, repeated.frames[i].T_c_w_causal) << i;
     EXPECT_EQ(live.frames[i].t_ns, repeated.frames[i].t_ns) << i;
   }
   EXPECT_EQ(farthest_apart(live, repeated), 0);

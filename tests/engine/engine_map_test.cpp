@@ -72,7 +72,7 @@ class EngineMapTest : public ::testing::Test {
         EXPECT_EQ(record.state, FrameState::kLost) << i;
         continue;
       }
-      ASSERT_EQ(record.state, FrameState::kTracked) << i << ": " << record.cause;
+      ASSERT_EQ(record.state, FrameState::kTracked) << i << ": " << describe(record.cause);
       const SE3 T_c_first = final_T_c_w(record, result.graph) * result.graph.T_k_w(KeyframeId{0}).inverse();
       const SE3 T_c_first_true = T_c_w(shown_first + i) * T_c_w(0).inverse();
       EXPECT_LT((T_c_first.inverse().translation() - T_c_first_true.inverse().translation()).norm(), 0.03)
@@ -140,7 +140,7 @@ TEST_F(EngineMapTest, TheSameRunsGiveTheSameBytes) {
     EXPECT_EQ(bytes_of({small_rig(), a.graph, a.places}), bytes_of({small_rig(), b.graph, b.places}));
     ASSERT_EQ(a.frames.size(), b.frames.size());
     for (std::size_t i = 0; i < a.frames.size(); ++i) {
-      EXPECT_EQ(a.frames[i].T_c_w_causal.matrix(), b.frames[i].T_c_w_causal.matrix()) << i;
+      EXPECT_EQ(a.frames[i].T_c_w_causal, b.frames[i].T_c_w_causal) << i;
     }
   }
 }
@@ -162,7 +162,7 @@ TEST_F(EngineMapTest, AThreadedRunInALoadedMapReplays) {
     ASSERT_EQ(live.frames.size(), replayed.frames.size());
     for (std::size_t i = 0; i < live.frames.size(); ++i) {
       EXPECT_EQ(live.frames[i].state, replayed.frames[i].state) << i;
-      EXPECT_EQ(live.frames[i].T_c_ref.matrix(), replayed.frames[i].T_c_ref.matrix()) << i;
+      EXPECT_EQ(live.frames[i].T_c_ref, replayed.frames[i].T_c_ref) << i;
     }
     EXPECT_EQ(bytes_of({small_rig(), live.graph, live.places}),
               bytes_of({small_rig(), replayed.graph, replayed.places}));

@@ -63,8 +63,8 @@ class EngineTest : public ::testing::Test {
       EXPECT_EQ(a.frames[i].state, b.frames[i].state) << i;
       EXPECT_EQ(a.frames[i].reference, b.frames[i].reference) << i;
       EXPECT_EQ(a.frames[i].snapshot_version, b.frames[i].snapshot_version) << i;
-      EXPECT_EQ(a.frames[i].T_c_ref.matrix(), b.frames[i].T_c_ref.matrix()) << i;
-      EXPECT_EQ(a.frames[i].T_c_w_causal.matrix(), b.frames[i].T_c_w_causal.matrix()) << i;
+      EXPECT_EQ(a.frames[i].T_c_ref, b.frames[i].T_c_ref) << i;
+      EXPECT_EQ(a.frames[i].T_c_w_causal, b.frames[i].T_c_w_causal) << i;
     }
     ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
     ASSERT_EQ(a.graph.point_count(), b.graph.point_count());
@@ -101,7 +101,7 @@ TEST_F(EngineTest, FollowsTheTrueCameraInEveryKindOfRun) {
     EXPECT_EQ(result.error, "");
     ASSERT_EQ(result.frames.size(), static_cast<std::size_t>(kFrames));
     for (const FrameRecord& record : result.frames) {
-      EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << ": " << record.cause;
+      EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << ": " << describe(record.cause);
     }
     EXPECT_GE(result.graph.keyframe_count(), 3U);
     EXPECT_LT(worst_position_error(result), 0.01);  // of a path of about 1.5 m
@@ -185,7 +185,7 @@ TEST_F(EngineTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
       lowest = std::max(lowest, rung);
       before = rung;
       if (record.state == FrameState::kDropped) continue;
-      EXPECT_EQ(record.state, FrameState::kTracked) << record.cause;
+      EXPECT_EQ(record.state, FrameState::kTracked) << describe(record.cause);
     }
     EXPECT_EQ(live.frames.front().rung, LadderRung::kEverything);
     EXPECT_EQ(lowest, kLadderRungs - 1);
@@ -264,7 +264,7 @@ TEST_F(EngineTest, ReportsLostFramesAndRecovers) {
   for (const FrameRecord& record : result.frames) {
     const bool hidden = record.frame_index >= 20 && record.frame_index < 23;
     EXPECT_EQ(record.state, hidden ? FrameState::kLost : FrameState::kTracked) << record.frame_index;
-    EXPECT_EQ(std::string(record.cause).empty(), !hidden) << record.frame_index;
+    EXPECT_EQ(record.cause == LostCause::kNone, !hidden) << record.frame_index;
   }
 }
 
