@@ -214,6 +214,7 @@ void LockstepRun::report(const ProgressSink& progress) {
 
 RunResult LockstepRun::finish() {
   result_.graph = mapping_.finish();
+  mapping_.lineage().hang_on_survivors(result_.frames);
   result_.places = loop_closing_.places();
   result_.checkpoints = checkpoints_.report();
   result_.times.push_back(std::move(tracking_.times()));

@@ -66,7 +66,7 @@ struct FrameRecord {
   std::uint64_t snapshot_version = 0;    ///< version of the map it was tracked against
   std::int64_t tracking_ns = 0;          ///< time spent on it by the tracker
   std::int64_t latency_ns = 0;           ///< from the moment it was due to the moment its pose was known
-  KeyframeId reference = kNoKeyframe;
+  KeyframeId reference = kNoKeyframe;    ///< after the run: the keyframe that stands for it in the final map
   KeyframeId part_causal = kNoKeyframe;  ///< map part of T_c_w_causal's world, under its name of then
   int inliers = 0;                       ///< measurements the pose rests on
   FrameState state = FrameState::kLost;
@@ -86,6 +86,7 @@ struct MapperRound {
   int observations = 0;
   int metric_loops = 0;  ///< edges added by metric loop closure
   int loops = 0;         ///< edges added by large-scale loop closure
+  int late_loops = 0;    ///< that came after the map had forgotten their keyframes
   int relaxed = 0;       ///< keyframes outside of the windows that took a relaxed pose
   std::int64_t duration_ns = 0;
 };

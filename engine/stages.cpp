@@ -74,7 +74,7 @@ bool TrackingStage::step(const Frame& frame, const GraphSnapshot& graph, LadderR
 void TrackingStage::find_correction(const GraphSnapshot& graph, const FrameRecord& record) {
   correction_.reason = CorrectionReason::kNone;
   if (last_.state != FrameState::kTracked || last_.snapshot_version == graph.version() ||
-      !graph.contains(last_.reference)) {
+      !graph.contains(last_.reference) || !graph.survivor(last_.reference)) {
     return;
   }
   const SE3 T_c_w = final_T_c_w(last_, graph);
@@ -138,6 +138,7 @@ MapperRound MappingStage::step(std::span<const ProposalHandle> proposals,
     }
   }
   const MapperReport report = mapper_.step(proposals_, loops_);
+  for (const KeyframeId culled : report.culled_keyframes) lineage_.add(culled, mapper_.graph());
   round.version = mapper_.graph().version();
   round.proposals = static_cast<int>(proposals.size());
   round.inner_window = report.inner_window;
@@ -146,6 +147,7 @@ MapperRound MappingStage::step(std::span<const ProposalHandle> proposals,
   round.observations = report.observations;
   round.metric_loops = report.metric_loops;
   round.loops = report.loops;
+  round.late_loops = report.late_loops;
   round.duration_ns = steady_now_ns() - begin_ns;
   times_.record(round_stage_, begin_ns, round.duration_ns);
   return round;

@@ -6,6 +6,7 @@
 
 #include "camera/frame.hpp"
 #include "engine/frame_pool.hpp"
+#include "engine/lineage.hpp"
 #include "engine/options.hpp"
 #include "engine/result.hpp"
 #include "engine/stage_timer.hpp"
@@ -83,11 +84,14 @@ class MappingStage {
   [[nodiscard]] GraphSnapshot publish() { return mapper_.publish(); }
   /// The last version: all poses agree globally, unless the map was not to change.
   [[nodiscard]] GraphSnapshot finish();
+  /// What became of the keyframes that were culled.
+  [[nodiscard]] const Lineage& lineage() const { return lineage_; }
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
  private:
   Mapper mapper_;
+  Lineage lineage_;
   const bool may_change_;
   StageRecorder times_;
   StageId round_stage_;

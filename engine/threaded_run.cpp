@@ -166,6 +166,7 @@ void ThreadedRun::map_late_loops() {
 RunResult ThreadedRun::finish() {
   map_late_loops();
   result_.graph = mapping_.finish();
+  mapping_.lineage().hang_on_survivors(result_.frames);
   result_.places = loop_closing_.places();
   result_.checkpoints = checkpoints_.report();
   result_.times.push_back(std::move(tracking_.times()));

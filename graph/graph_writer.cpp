@@ -30,14 +30,16 @@ void GraphWriter::add_keyframe(Keyframe keyframe) {
   TWOFOLD_CHECK(index(keyframe.id) == graph_.keyframe_count(), "keyframe ids are dense");
   if (!keyframe.observations) keyframe.observations = no_observations();
   if (!keyframe.edges) keyframe.edges = no_edges();
+  keyframe.anchored = 0;
   graph_.keyframes_.push_back(std::move(keyframe));
 }
 
 void GraphWriter::add_culled_keyframe(const Heir& heir) {
   const KeyframeId id{static_cast<std::uint32_t>(graph_.keyframe_count())};
-  TWOFOLD_CHECK(heir.id != kNoKeyframe && heir.id != id, "a culled keyframe has an heir");
+  TWOFOLD_CHECK(heir.id != id, "a culled keyframe is not its own heir");
   graph_.keyframes_.extend(graph_.keyframe_count() + 1);
-  put_heir(id, heir);
+  graph_.heirs_.extend(graph_.keyframe_count());
+  if (heir.id != kNoKeyframe) put_heir(id, {heir.id, 0, heir.T_this_heir});
 }
 
 void GraphWriter::put_heir(KeyframeId id, const Heir& heir) {
@@ -45,14 +47,24 @@ void GraphWriter::put_heir(KeyframeId id, const Heir& heir) {
   graph_.heirs_.mutate(index(id)) = heir;
 }
 
+/// Counts points by their anchors, so that a culled one is known for as long as it has any.
+std::uint32_t& GraphWriter::anchored(KeyframeId id) {
+  if (!graph_.keyframe(id).culled()) return graph_.keyframes_.mutate(index(id)).anchored;
+  TWOFOLD_CHECK(graph_.heir(id).id != kNoKeyframe, "the anchor of a point is known");
+  return graph_.heirs_.mutate(index(id)).anchored;
+}
+
 void GraphWriter::add_point(PointId id, MapPoint point) {
   TWOFOLD_CHECK(index(id) >= graph_.point_count(), "a point is added once, in order of ids");
+  if (point.alive()) ++anchored(point.anchor);
   graph_.points_.extend(index(id));
   if (!point.observers) point.observers = std::make_shared<const ObserverList>();
   graph_.points_.push_back(std::move(point));
 }
 
 void GraphWriter::set_anchor(PointId id, KeyframeId anchor, const Vector3& psi) {
+  --anchored(graph_.point(id).anchor);
+  ++anchored(anchor);
   MapPoint& point = graph_.points_.mutate(index(id));
   point.anchor = anchor;
   point.psi = psi;
@@ -138,6 +150,7 @@ void GraphWriter::cull_point(PointId id) {
   if (!graph_.point(id).alive()) return;
   const ObserverList observers = *graph_.point(id).observers;
   for (const KeyframeId keyframe : observers) remove_observations(keyframe, std::span(&id, 1));
+  --anchored(graph_.point(id).anchor);
   graph_.points_.mutate(index(id)) = MapPoint{};
   // Points come and go for hours: where all of a chunk are gone, so is the chunk.
   graph_.points_.forget_chunk_if(index(id), [](const MapPoint& point) { return !point.alive(); });
@@ -154,15 +167,46 @@ void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
   remove_observations(id, points);
   const EdgeList edges = *graph_.keyframe(id).edges;
   for (const Edge& edge : edges) remove_edge(id, edge.other);
-  put_heir(id, {heir, PackedPose(T_this_heir)});
+  put_heir(id, {heir, graph_.keyframe(id).anchored, PackedPose(T_this_heir)});
+  heirs_.push_back({id, ++culled_});
   graph_.keyframes_.mutate(index(id)) = Keyframe{};
   graph_.keyframes_.forget_chunk_if(index(id), [](const Keyframe& keyframe) { return keyframe.culled(); });
 }
 
 void GraphWriter::shorten_heirs(KeyframeId id) {
-  if (!graph_.keyframe(id).culled() || !graph_.keyframe(graph_.heir(id).id).culled()) return;
-  const auto [heir, T_this_heir] = graph_.survivor(id);
-  put_heir(id, {heir, PackedPose(T_this_heir)});
+  if (!graph_.keyframe(id).culled()) return;
+  const Heir& heir = graph_.heir(id);
+  if (heir.id == kNoKeyframe || !graph_.keyframe(heir.id).culled()) return;
+  const auto survivor = graph_.survivor(id);
+  put_heir(id, {survivor->id, heir.anchored, PackedPose(survivor->T_this_survivor)});
+}
+
+/// No heir that is kept leads to one that is forgotten: whatever hung on a keyframe when that was culled is
+/// before it in the queue, and so is looked at, and hung on a survivor, before that one's own turn comes.
+void GraphWriter::forget_heirs(std::size_t keep, std::size_t visits) {
+  for (std::size_t n = std::min(visits, heirs_.size()); n > 0; --n) {
+    const Kept kept = heirs_.front();
+    if (culled_ - kept.culled < keep) return;
+    heirs_.pop_front();
+    shorten_heirs(kept.id);
+    if (graph_.heir(kept.id).anchored > 0) {
+      heirs_.push_back(kept);
+      continue;
+    }
+    graph_.heirs_.mutate(index(kept.id)) = Heir{};
+    graph_.heirs_.forget_chunk_if(index(kept.id), [](const Heir& heir) { return heir.id == kNoKeyframe; });
+  }
+}
+
+/// Of a graph made elsewhere, in any order: first all are hung on survivors.
+void GraphWriter::list_heirs() {
+  heirs_.clear();
+  for (std::uint32_t k = 0; k < graph_.keyframe_count(); ++k) {
+    const KeyframeId id{k};
+    if (!graph_.keyframe(id).culled() || graph_.heir(id).id == kNoKeyframe) continue;
+    shorten_heirs(id);
+    heirs_.push_back({id, ++culled_});
+  }
 }
 
 }  // namespace twofold

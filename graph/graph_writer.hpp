@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <deque>
 #include <span>
 
 #include "graph/snapshot.hpp"
@@ -15,7 +17,10 @@ class GraphWriter {
   /// An empty graph; its first published version has number 1.
   GraphWriter() { graph_.version_ = 1; }
   /// Continues from an existing graph, e.g. a loaded map, with the next version number.
-  explicit GraphWriter(const GraphSnapshot& graph) : graph_(graph) { ++graph_.version_; }
+  explicit GraphWriter(const GraphSnapshot& graph) : graph_(graph) {
+    ++graph_.version_;
+    list_heirs();
+  }
 
   /// The private version as it stands, with the version number it will be published under.
   [[nodiscard]] const GraphSnapshot& graph() const { return graph_; }
@@ -24,7 +29,8 @@ class GraphWriter {
 
   /// Appends a keyframe; its id must be graph().keyframe_count(). Lists may be null and are then empty.
   void add_keyframe(Keyframe keyframe);
-  /// Appends a keyframe that was culled; `heir` may be added later.
+  /// Appends a keyframe that was culled; `heir` may be added later, or none: Heir{}. To be followed by
+  /// keep_needed_heirs.
   void add_culled_keyframe(const Heir& heir);
   /// Appends a point without observers; ids skipped by the tracker are filled with culled points.
   void add_point(PointId id, MapPoint point);
@@ -58,20 +64,42 @@ class GraphWriter {
 
   /// Removes all measurements of a point and marks it culled; nothing happens to a point culled before.
   void cull_point(PointId id);
-  /// Removes a keyframe and all it has; only its pose relative to `heir`, which must not be culled, stays
-  /// known. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes along with the
-  /// heir (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
+  /// Removes a keyframe and all it has; only its pose relative to `heir`, which must not be culled, is known
+  /// until it is forgotten. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes
+  /// along with the heir (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
   void cull_keyframe(KeyframeId id, KeyframeId heir);
   /// Lets a culled keyframe hang directly on the one that stayed. Its pose is the same; asking for it no
   /// longer walks along all that were culled in between.
   void shorten_heirs(KeyframeId id);
 
+  /// Forgets heirs that nobody asks for any more: of keyframes that were culled before the newest `keep` and
+  /// have no point left. Looks at `visits` of the oldest at most, in turn; when called with more visits than
+  /// keyframes are culled, heirs are hardly more than `keep` and the anchors of living points.
+  void forget_heirs(std::size_t keep, std::size_t visits = 8);
+  /// Forgets all heirs but those of anchors of living points. Cost grows with the map.
+  void keep_needed_heirs() {
+    list_heirs();
+    forget_heirs(0, heirs_.size());
+  }
+  /// Heirs not forgotten.
+  [[nodiscard]] std::size_t heir_count() const { return heirs_.size(); }
+
  private:
   void remove_observer(PointId point, KeyframeId keyframe);
   void put_edge(KeyframeId id, const Edge& edge);
   void put_heir(KeyframeId id, const Heir& heir);
+  [[nodiscard]] std::uint32_t& anchored(KeyframeId id);
+  void list_heirs();
+
+  /// A culled keyframe whose heir is known, and how many had been culled with it.
+  struct Kept {
+    KeyframeId id;
+    std::size_t culled;
+  };
 
   GraphSnapshot graph_;
+  std::deque<Kept> heirs_;  ///< to be looked at in this order
+  std::size_t culled_ = 0;
 };
 
 }  // namespace twofold

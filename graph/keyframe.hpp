@@ -49,13 +49,14 @@ struct Keyframe {
   KeyframeId part{0};
   std::int64_t frame_index = 0;
   std::int64_t t_ns = 0;
+  std::uint32_t anchored = 0;  ///< points whose anchor it is; counted by GraphWriter
   SE3 T_k_w;                ///< absolute pose; accurate relative to its neighbours, not globally (manifold)
   double median_depth = 0;  ///< of the points it sees [m]
   std::shared_ptr<const ObservationList> observations = no_observations();
   std::shared_ptr<const EdgeList> edges = no_edges();
 
-  /// Nothing remains of a culled keyframe but its Heir: all the above reads as in Keyframe{}. Ask
-  /// GraphSnapshot for its pose and its part.
+  /// Nothing remains of a culled keyframe but, for some time, its Heir: all the above reads as in Keyframe{}.
+  /// Ask GraphSnapshot for its pose and its part.
   [[nodiscard]] bool culled() const { return id == kNoKeyframe; }
 };
 
@@ -77,10 +78,11 @@ class PackedPose {
   std::array<double, 7> values_;  ///< quaternion (x, y, z, w), translation
 };
 
-/// What remains of a culled keyframe, for as long as the map lives: its pose relative to one that stayed,
-/// which may be culled itself later.
+/// What remains of a culled keyframe for as long as somebody may ask (GraphWriter::forget_heirs): its pose
+/// relative to one that stayed, which may be culled itself later.
 struct Heir {
-  KeyframeId id = kNoKeyframe;
+  KeyframeId id = kNoKeyframe;  ///< kNoKeyframe: forgotten
+  std::uint32_t anchored = 0;   ///< points that are still anchored in the culled keyframe
   PackedPose T_this_heir;
 };
 

@@ -21,17 +21,15 @@ void MapBuilder::take_head(ByteReader in) {
 void MapBuilder::take_keyframes(ByteReader in) {
   for (std::uint32_t n = 0; n < kKeyframesPerSection && !in.at_end(); ++n) {
     if (keyframes_.size() == keyframe_count_) throw FormatError{"holds more keyframes than announced"};
-    KeyframeEntry entry = take_keyframe(in);
     const KeyframeId id{static_cast<std::uint32_t>(keyframes_.size())};
+    KeyframeEntry entry = version_ == 1 ? take_keyframe_1(in, id) : take_keyframe(in, id);
     const ObservationList& observations = *entry.keyframe.observations;
     if (!observations.empty() && index(observations.back().point) >= point_count_) {
       throw FormatError{"observes a point that is not there"};
     }
-    edges_.push_back(take_edges(in, id));
-    if (entry.culled() && (!observations.empty() || !edges_.back().empty())) {
+    if (entry.culled() && (!observations.empty() || !entry.edges.empty())) {
       throw FormatError{"holds a culled keyframe with observations or edges"};
     }
-    if (!entry.culled()) entry.keyframe.id = id;
     keyframes_.push_back(std::move(entry));
   }
   in.expect_end();
@@ -76,21 +74,22 @@ void MapBuilder::check_keyframes() const {
   }
 }
 
-/// Each chain of heirs must end in a keyframe that was not culled.
+/// Each chain of heirs that is known must end in a keyframe that was not culled.
 void MapBuilder::check_heirs() const {
   enum : std::uint8_t { kUnknown, kOnTheWay, kGood };
   std::vector<std::uint8_t> state(keyframes_.size(), kUnknown);
   std::vector<std::size_t> chain;
   for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+    if (keyframes_[k].forgotten()) continue;
     chain.clear();
     for (std::size_t at = k; state[at] != kGood;) {
       if (state[at] == kOnTheWay) throw FormatError{"keyframes: heirs go round in a circle"};
       state[at] = kOnTheWay;
       chain.push_back(at);
       if (!keyframes_[at].culled()) break;
-      if (index(keyframes_[at].heir.id) >= keyframes_.size())
-        throw FormatError{"keyframes: an heir is not there"};
       at = index(keyframes_[at].heir.id);
+      if (at >= keyframes_.size() || keyframes_[at].forgotten())
+        throw FormatError{"keyframes: an heir is not there"};
     }
     for (const std::size_t at : chain) state[at] = kGood;
   }
@@ -99,7 +98,8 @@ void MapBuilder::check_heirs() const {
 void MapBuilder::check_points() const {
   for (const MapPoint& point : points_) {
     if (!point.alive()) continue;
-    if (index(point.anchor) >= keyframes_.size()) throw FormatError{"points: an anchor is not there"};
+    if (index(point.anchor) >= keyframes_.size() || keyframes_[index(point.anchor)].forgotten())
+      throw FormatError{"points: an anchor is not there"};
     if (!(point.psi.z() > 0)) throw FormatError{"points: a point is not in front of its anchor"};
     if (point.appearance == nullptr) throw FormatError{"points: a point has no appearance"};
   }
@@ -114,7 +114,8 @@ void MapBuilder::check_places() const {
 
 void MapBuilder::register_observers() {
   observers_.resize(points_.size());
-  for (const auto& [keyframe, heir] : keyframes_) {
+  for (const KeyframeEntry& entry : keyframes_) {
+    const Keyframe& keyframe = entry.keyframe;
     for (const Observation& observation : *keyframe.observations) {
       if (!points_[index(observation.point)].alive())
         throw FormatError{"keyframes: a culled point is observed"};
@@ -131,17 +132,18 @@ void MapBuilder::register_observers() {
 
 /// Both keyframes of an edge keep it; the file has it once.
 void MapBuilder::mirror_edges() {
-  for (std::size_t k = 0; k < edges_.size(); ++k) {
+  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
     const auto id = KeyframeId{static_cast<std::uint32_t>(k)};
-    const std::size_t own = edges_[k].size();
-    for (std::size_t n = 0; n < own && edges_[k][n].other < id; ++n) {
-      const Edge edge = edges_[k][n];
+    const EdgeList& edges = keyframes_[k].edges;
+    const std::size_t own = edges.size();
+    for (std::size_t n = 0; n < own && edges[n].other < id; ++n) {
+      const Edge edge = edges[n];
       if (keyframes_[index(edge.other)].culled())
         throw FormatError{"keyframes: an edge to a culled keyframe"};
       Edge back = edge;
       back.other = id;
       back.T_other_this = edge.T_other_this.inverse();
-      edges_[index(edge.other)].push_back(back);  // newer ones come later: the list stays in order
+      keyframes_[index(edge.other)].edges.push_back(back);  // newer ones come later: the list stays in order
     }
   }
 }
@@ -149,12 +151,12 @@ void MapBuilder::mirror_edges() {
 SavedMap MapBuilder::assemble() {
   GraphWriter writer;
   for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    auto& [keyframe, heir] = keyframes_[k];
-    if (keyframes_[k].culled()) {
+    auto& [keyframe, edges, heir] = keyframes_[k];
+    if (keyframe.culled()) {
       writer.add_culled_keyframe(heir);
       continue;
     }
-    keyframe.edges = std::make_shared<const EdgeList>(std::move(edges_[k]));
+    keyframe.edges = std::make_shared<const EdgeList>(std::move(edges));
     writer.add_keyframe(std::move(keyframe));
   }
   for (std::size_t p = 0; p < points_.size(); ++p) {
@@ -162,6 +164,7 @@ SavedMap MapBuilder::assemble() {
     writer.add_point(PointId{static_cast<std::uint32_t>(p)}, std::move(points_[p]));
   }
   writer.set_reference(reference_);
+  writer.keep_needed_heirs();  // nobody has asked this map for a keyframe yet
   name_parts(writer);
   map_.graph = writer.publish();
   return std::move(map_);

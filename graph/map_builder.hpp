@@ -12,6 +12,8 @@ namespace twofold::map_format {
 /// checked when everything is there. All functions throw FormatError.
 class MapBuilder {
  public:
+  /// Of the file, before anything is taken.
+  void read_version(std::uint16_t version) { version_ = version; }
   void take_head(ByteReader in);
   void take_keyframes(ByteReader in);
   void take_points(ByteReader in);
@@ -30,10 +32,10 @@ class MapBuilder {
   [[nodiscard]] SavedMap assemble();
 
   SavedMap map_;
+  std::uint16_t version_ = kMapFormatVersion;
   KeyframeId reference_ = kNoKeyframe;
   std::uint32_t keyframe_count_ = 0, point_count_ = 0;
   std::vector<KeyframeEntry> keyframes_;
-  std::vector<EdgeList> edges_;  // by keyframe
   std::vector<MapPoint> points_;
   std::vector<ObserverList> observers_;  // by point
 };

@@ -23,34 +23,11 @@ std::shared_ptr<const ObservationList> take_observations(ByteReader& in) {
   return list;
 }
 
-}  // namespace
-
-Rig take_rig(ByteReader& in) {
-  Rig rig;
-  rig.kind = static_cast<SensorKind>(in.take_small(3, "kind of sensor"));
-  PinholeCamera& c = rig.camera;
-  for (double* value : {&c.fx, &c.fy, &c.cx, &c.cy}) *value = in.take_finite();
-  c.width = in.take<std::int32_t>();
-  c.height = in.take<std::int32_t>();
-  if (c.width < 1 || c.height < 1 || !(c.fx > 0) || !(c.fy > 0))
-    throw FormatError{"holds an impossible camera"};
-  for (double* value : {&rig.baseline, &rig.depth_unit, &rig.depth_min, &rig.depth_max}) {
-    *value = in.take_finite();
-  }
-  return rig;
-}
-
-KeyframeEntry take_keyframe(ByteReader& in) {
-  KeyframeEntry entry;
-  Keyframe& keyframe = entry.keyframe;
+void take_state(ByteReader& in, Keyframe& keyframe) {
   keyframe.frame_index = in.take<std::int64_t>();
   keyframe.t_ns = in.take<std::int64_t>();
   keyframe.T_k_w = in.take_pose();
   keyframe.median_depth = in.take_finite();
-  entry.heir.id = KeyframeId{in.take<std::uint32_t>()};
-  entry.heir.T_this_heir = PackedPose(in.take_pose());
-  keyframe.observations = take_observations(in);
-  return entry;
 }
 
 EdgeList take_edges(ByteReader& in, KeyframeId id) {
@@ -68,6 +45,54 @@ EdgeList take_edges(ByteReader& in, KeyframeId id) {
     if (edge.weight < 0) throw FormatError{"holds an edge of negative weight"};
   }
   return list;
+}
+
+}  // namespace
+
+Rig take_rig(ByteReader& in) {
+  Rig rig;
+  rig.kind = static_cast<SensorKind>(in.take_small(3, "kind of sensor"));
+  PinholeCamera& c = rig.camera;
+  for (double* value : {&c.fx, &c.fy, &c.cx, &c.cy}) *value = in.take_finite();
+  c.width = in.take<std::int32_t>();
+  c.height = in.take<std::int32_t>();
+  if (c.width < 1 || c.height < 1 || !(c.fx > 0) || !(c.fy > 0))
+    throw FormatError{"holds an impossible camera"};
+  for (double* value : {&rig.baseline, &rig.depth_unit, &rig.depth_min, &rig.depth_max}) {
+    *value = in.take_finite();
+  }
+  return rig;
+}
+
+KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id) {
+  KeyframeEntry entry;
+  switch (static_cast<EntryKind>(in.take_small(3, "kind of keyframe"))) {
+    case EntryKind::kForgotten:
+      break;
+    case EntryKind::kCulled:
+      entry.heir.id = KeyframeId{in.take<std::uint32_t>()};
+      entry.heir.T_this_heir = PackedPose(in.take_pose());
+      if (entry.forgotten()) throw FormatError{"holds a culled keyframe without an heir"};
+      break;
+    case EntryKind::kKeyframe:
+      entry.keyframe.id = id;
+      take_state(in, entry.keyframe);
+      entry.keyframe.observations = take_observations(in);
+      entry.edges = take_edges(in, id);
+      break;
+  }
+  return entry;
+}
+
+KeyframeEntry take_keyframe_1(ByteReader& in, KeyframeId id) {
+  KeyframeEntry entry;
+  take_state(in, entry.keyframe);
+  entry.heir.id = KeyframeId{in.take<std::uint32_t>()};
+  entry.heir.T_this_heir = PackedPose(in.take_pose());
+  entry.keyframe.observations = take_observations(in);
+  entry.edges = take_edges(in, id);
+  if (entry.heir.id == kNoKeyframe) entry.keyframe.id = id;
+  return entry;
 }
 
 MapPoint take_point(ByteReader& in) {

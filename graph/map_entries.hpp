@@ -14,16 +14,18 @@ namespace twofold::map_format {
 /// whether they fit each other is MapBuilder's affair. All functions throw FormatError.
 
 [[nodiscard]] Rig take_rig(ByteReader& in);
-/// Keyframe without edges and number, which a culled one does not get.
+/// A keyframe, or the heir of one that was culled if that is known.
 struct KeyframeEntry {
-  Keyframe keyframe;
+  Keyframe keyframe;  ///< without edges; a culled one has no number
+  EdgeList edges;     ///< to older keyframes, in order
   Heir heir;
 
-  [[nodiscard]] bool culled() const { return heir.id != kNoKeyframe; }
+  [[nodiscard]] bool culled() const { return keyframe.culled(); }
+  [[nodiscard]] bool forgotten() const { return culled() && heir.id == kNoKeyframe; }
 };
-[[nodiscard]] KeyframeEntry take_keyframe(ByteReader& in);
-/// Edges of keyframe `id` to older ones, in order.
-[[nodiscard]] EdgeList take_edges(ByteReader& in, KeyframeId id);
+[[nodiscard]] KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id);
+/// The same in format version 1.
+[[nodiscard]] KeyframeEntry take_keyframe_1(ByteReader& in, KeyframeId id);
 /// A culled point if it has no anchor.
 [[nodiscard]] MapPoint take_point(ByteReader& in);
 /// Corners are in the image; z stays empty for a monocular rig.

@@ -31,7 +31,9 @@ struct SavedMap {
 ///   `end`, after which nothing follows.
 /// A section with an unknown id is skipped if its id's highest bit is set, and refused otherwise: that is how
 /// a newer program says whether an older one may read on.
-inline constexpr std::uint16_t kMapFormatVersion = 1;
+///
+/// Version 1 had a keyframe's whole entry for culled ones too; it is still read.
+inline constexpr std::uint16_t kMapFormatVersion = 2;
 
 /// Writes to FILE.tmp in the same folder, syncs it, renames it over `file`, syncs the folder: whenever the
 /// program is killed or the disk is full, `file` is the old map or the new one. Memory: one slice. Throws

@@ -43,7 +43,7 @@ SavedMap read_map(std::istream& in, std::uint64_t size, const std::string& name)
   RawSection section;
   int number = 0;
   try {
-    reader.read_header();
+    builder.read_version(reader.read_header());
     do {
       number += 1;
       section.id = ~0U;

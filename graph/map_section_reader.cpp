@@ -8,17 +8,18 @@
 
 namespace twofold::map_format {
 
-void SectionReader::read_header() {
+std::uint16_t SectionReader::read_header() {
   std::array<std::uint8_t, kHeaderBytes> header;
   if (left_ < header.size()) throw FormatError{"too short to be a map"};
   read(header);
   if (std::memcmp(header.data(), kMagic.data(), kMagic.size()) != 0) throw FormatError{"not a map file"};
   std::uint16_t version = 0;
   std::memcpy(&version, header.data() + kMagic.size(), sizeof version);
-  if (version != kMapFormatVersion) {
-    throw FormatError{"written in format version " + std::to_string(version) + ", this program reads " +
+  if (version < 1 || version > kMapFormatVersion) {
+    throw FormatError{"written in format version " + std::to_string(version) + ", this program reads up to " +
                       std::to_string(kMapFormatVersion)};
   }
+  return version;
 }
 
 void SectionReader::next(RawSection& section) {

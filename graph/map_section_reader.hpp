@@ -18,8 +18,8 @@ class SectionReader {
  public:
   SectionReader(std::istream& in, std::uint64_t size) : in_(in), left_(size) {}
 
-  /// What a map file starts with.
-  void read_header();
+  /// What a map file starts with; returns its format version.
+  std::uint16_t read_header();
   /// The next section, whose checksum is right.
   void next(RawSection& section);
 

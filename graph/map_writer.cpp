@@ -103,13 +103,19 @@ void put_edges(ByteWriter& out, const Keyframe& keyframe) {
   }
 }
 
-void put_keyframe(ByteWriter& out, const Keyframe& keyframe, const Heir& heir) {
+void put_culled(ByteWriter& out, const Heir& heir) {
+  if (heir.id == kNoKeyframe) return out.put(EntryKind::kForgotten);
+  out.put(EntryKind::kCulled);
+  out.put(heir.id);
+  out.put(heir.T_this_heir.unpacked());
+}
+
+void put_keyframe(ByteWriter& out, const Keyframe& keyframe) {
+  out.put(EntryKind::kKeyframe);
   out.put(keyframe.frame_index);
   out.put(keyframe.t_ns);
   out.put(keyframe.T_k_w);
   out.put(keyframe.median_depth);
-  out.put(heir.id);
-  out.put(heir.T_this_heir.unpacked());
   out.put(static_cast<std::uint32_t>(keyframe.observations->size()));
   for (const Observation& observation : *keyframe.observations) {
     out.put(observation.point);
@@ -176,7 +182,11 @@ void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph, 
   write_slices(out, Section::kKeyframes, static_cast<std::uint32_t>(graph.keyframe_count()),
                kKeyframesPerSection, [&](ByteWriter& to, std::uint32_t k) {
                  const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-                 put_keyframe(to, keyframe, keyframe.culled() ? graph.heir(KeyframeId{k}) : Heir{});
+                 if (keyframe.culled()) {
+                   put_culled(to, graph.heir(KeyframeId{k}));
+                 } else {
+                   put_keyframe(to, keyframe);
+                 }
                  return true;
                });
   write_slices(out, Section::kPoints, static_cast<std::uint32_t>(graph.point_count()), kPointsPerSection,

@@ -12,7 +12,9 @@ class Renumbering {
       : keyframes_(graph.keyframe_count(), kNoKeyframe), points_(graph.point_count(), kNoPoint) {
     std::uint32_t keyframes = 0, points = 0;
     for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-      if (graph.part(KeyframeId{k}) == part) keyframes_[k] = KeyframeId{keyframes++};
+      const KeyframeId id{k};
+      if (graph.keyframe(id).culled() && graph.heir(id).anchored == 0) continue;
+      if (graph.part(id) == part) keyframes_[k] = KeyframeId{keyframes++};
     }
     for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
       const MapPoint& point = graph.point(PointId{p});
@@ -90,6 +92,14 @@ std::vector<KeyframeId> parts_of(const GraphSnapshot& graph) {
   return parts;
 }
 
+KeyframeId oldest_part(const GraphSnapshot& graph) {
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (!keyframe.culled()) return keyframe.part;
+  }
+  return kNoKeyframe;
+}
+
 SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBook& places, KeyframeId part) {
   const Renumbering number(graph, part);
   GraphWriter writer;
@@ -101,8 +111,8 @@ SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBoo
     const KeyframeId id = number(KeyframeId{k});
     if (id == kNoKeyframe) continue;
     if (keyframe.culled()) {
-      const Heir& heir = graph.heir(KeyframeId{k});
-      writer.add_culled_keyframe({number(heir.id), heir.T_this_heir});
+      const auto [heir, T_this_heir] = *graph.survivor(KeyframeId{k});
+      writer.add_culled_keyframe({number(heir), 0, PackedPose(T_this_heir)});
       continue;
     }
     writer.add_keyframe(renumbered(keyframe, number));

@@ -2,14 +2,16 @@
 
 #include <algorithm>
 
+#include "geometry/check.hpp"
 #include "geometry/inverse_depth.hpp"
 
 namespace twofold {
 
-GraphSnapshot::Survivor GraphSnapshot::survivor(KeyframeId id) const {
+std::optional<GraphSnapshot::Survivor> GraphSnapshot::survivor(KeyframeId id) const {
   Survivor survivor{id, SE3()};
   while (keyframe(survivor.id).culled()) {
     const Heir& next = heir(survivor.id);
+    if (next.id == kNoKeyframe) return std::nullopt;
     survivor = {next.id, survivor.T_this_survivor * next.T_this_heir.unpacked()};
   }
   return survivor;
@@ -18,8 +20,14 @@ GraphSnapshot::Survivor GraphSnapshot::survivor(KeyframeId id) const {
 SE3 GraphSnapshot::T_k_w(KeyframeId id) const {
   const Keyframe& keyframe = this->keyframe(id);
   if (!keyframe.culled()) return keyframe.T_k_w;
-  const auto [heir, T_k_heir] = survivor(id);
-  return T_k_heir * this->keyframe(heir).T_k_w;
+  const auto survivor = this->survivor(id);
+  TWOFOLD_CHECK(survivor, "the pose of a keyframe that was culled and forgotten");
+  return survivor->T_this_survivor * this->keyframe(survivor->id).T_k_w;
+}
+
+KeyframeId GraphSnapshot::part(KeyframeId id) const {
+  const auto survivor = this->survivor(id);
+  return survivor ? keyframe(survivor->id).part : kNoKeyframe;
 }
 
 Vector3 GraphSnapshot::position(PointId id) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "graph/keyframe.hpp"
 #include "graph/map_point.hpp"
@@ -32,19 +33,20 @@ class GraphSnapshot {
 
   [[nodiscard]] const MapChange& last_jump() const { return last_jump_; }
 
-  /// Heir of a culled keyframe as it was when it was culled; it may be culled by now.
+  /// Heir of a culled keyframe; it may be culled by now.
   [[nodiscard]] const Heir& heir(KeyframeId id) const { return heirs_[index(id)]; }
   struct Survivor {
     KeyframeId id = kNoKeyframe;
     SE3 T_this_survivor;
   };
   /// The keyframe that stands for `id`: itself, or, for a culled one, the first that is left along its heirs.
-  [[nodiscard]] Survivor survivor(KeyframeId id) const;
+  /// None if `id` was culled so long ago that its heir is forgotten.
+  [[nodiscard]] std::optional<Survivor> survivor(KeyframeId id) const;
 
-  /// Pose of any keyframe, also of a culled one through its heirs.
+  /// Pose of a keyframe, also of a culled one through its heirs; those must not be forgotten.
   [[nodiscard]] SE3 T_k_w(KeyframeId id) const;
-  /// Map part of any keyframe, also of a culled one: its heirs'.
-  [[nodiscard]] KeyframeId part(KeyframeId id) const { return keyframe(survivor(id).id).part; }
+  /// Map part of a keyframe, also of a culled one: its heirs'. kNoKeyframe if those are forgotten.
+  [[nodiscard]] KeyframeId part(KeyframeId id) const;
   /// Position of a point that is alive, in the world frame [m].
   [[nodiscard]] Vector3 position(PointId id) const;
 
@@ -57,7 +59,7 @@ class GraphSnapshot {
   // Small chunks: what was culled is freed chunk by chunk, and what stays is spread among it.
   PersistentVector<Keyframe, 5, 3> keyframes_;
   PersistentVector<MapPoint, 5, 3> points_;
-  PersistentVector<Heir> heirs_;  ///< of culled keyframes; up to the newest of them
+  PersistentVector<Heir, 5, 2> heirs_;  ///< of culled keyframes; up to the newest of them
 };
 
 /// Binary search in keyframe.observations; nullptr if the keyframe does not observe the point.

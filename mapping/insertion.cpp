@@ -19,8 +19,9 @@ const Observation* observation_of(const KeyframeProposal& proposal, PointId poin
 
 /// The reference, or the keyframe that inherited its place, and the new keyframe's pose relative to it.
 std::pair<KeyframeId, SE3> present_reference(const GraphSnapshot& graph, const KeyframeProposal& proposal) {
-  const auto [id, T_ref_id] = graph.survivor(proposal.reference);
-  return {id, proposal.T_k_ref * T_ref_id};
+  const auto survivor = graph.survivor(proposal.reference);
+  TWOFOLD_CHECK(survivor, "the reference of a proposal was culled too long ago");
+  return {survivor->id, proposal.T_k_ref * survivor->T_this_survivor};
 }
 
 void add_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, const SE3& T_k_w, KeyframeId part) {

@@ -81,8 +81,13 @@ void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
 void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   if (!graph().contains(loop.from) || !graph().contains(loop.to)) return;
   // A constraint of a keyframe that was culled in the meantime passes to its heir.
-  const auto [from, T_loop_from] = graph().survivor(loop.from);
-  const auto [to, T_loop_to] = graph().survivor(loop.to);
+  const auto survivor_from = graph().survivor(loop.from), survivor_to = graph().survivor(loop.to);
+  if (!survivor_from || !survivor_to) {
+    ++report.late_loops;
+    return;
+  }
+  const auto& [from, T_loop_from] = *survivor_from;
+  const auto& [to, T_loop_to] = *survivor_to;
   if (from == to) return;
   const SE3 T_to_from = T_loop_to.inverse() * loop.T_to_from * T_loop_from;
   report.joined += join_parts(writer_, from, to, T_to_from);
@@ -93,7 +98,9 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
 
 void Mapper::revisit(KeyframeId tracker_reference) {
   if (tracker_reference == kNoKeyframe || !graph().contains(tracker_reference)) return;
-  const KeyframeId id = graph().survivor(tracker_reference).id;
+  const auto survivor = graph().survivor(tracker_reference);
+  if (!survivor) return;
+  const KeyframeId id = survivor->id;
   writer_.set_reference(id);
   if (consistent_.contains(id)) return;
   consistent_.clear();
@@ -179,6 +186,7 @@ void Mapper::cull(MapperReport& report) {
   if (options_.culling.keyframes) {
     report.culled_keyframes =
         cull_redundant_keyframes(writer_, window_, options_.culling, report.culled_points);
+    writer_.forget_heirs(static_cast<std::size_t>(options_.culling.keep_heirs));
   }
 }
 

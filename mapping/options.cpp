@@ -31,6 +31,9 @@ std::string MapperOptions::invalid_reason() const {
     return wrong("culling.redundant_observers", ">= 2", culling.redundant_observers);
   }
   if (culling.keep_recent < 0) return wrong("culling.keep_recent", ">= 0", culling.keep_recent);
+  if (culling.keep_heirs < culling.max_keyframes) {
+    return wrong("culling.keep_heirs", ">= culling.max_keyframes", culling.keep_heirs);
+  }
   if (culling.max_misses < 1 || culling.max_misses > 255) {
     return wrong("culling.max_misses", "in [1, 255]", culling.max_misses);
   }

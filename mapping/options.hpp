@@ -32,7 +32,11 @@ struct CullingOptions {
   int redundant_observers = 3;   ///< other keyframes that must see such a point, as finely
   int keep_recent = 8;           ///< newest keyframes are never culled
   int max_keyframes = 2;         ///< culled in one round
-  int max_misses = 8;            ///< keyframes in a row a weak point should have been seen from and was not
+  /// Keyframes culled last whose heirs stay known, >= max_keyframes. Tracker and loop closer may refer to a
+  /// keyframe for as long as a message is under way between the threads: some tens of rounds, each of which
+  /// culls max_keyframes at most.
+  int keep_heirs = 512;
+  int max_misses = 8;  ///< keyframes in a row a weak point should have been seen from and was not
 };
 
 struct MapperOptions {

@@ -53,7 +53,7 @@ bool WindowBuilder::anchor_point(const GraphSnapshot& graph, const DoubleWindow&
   }
   // An anchor that was culled moves with its heir. In the problem such a point hangs on a frame that sees it.
   if (!graph.keyframe(map_point.anchor).culled()) return false;
-  if (!window.contains(graph.survivor(map_point.anchor).id)) return false;
+  if (!window.contains(graph.survivor(map_point.anchor)->id)) return false;
   point.anchor = seen_from;
   const KeyframeId seen_from_id = window.nodes[static_cast<std::size_t>(seen_from)].id;
   const SE3 T_k_a = graph.keyframe(seen_from_id).T_k_w * graph.T_k_w(map_point.anchor).inverse();

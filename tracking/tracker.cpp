@@ -139,9 +139,10 @@ void Tracker::adopt(const GraphSnapshot& graph) {
   }
   local_.adopt(graph);
   if (graph.contains(reference_) && graph.keyframe(reference_).culled()) {
-    const auto [heir, T_ref_heir] = graph.survivor(reference_);
-    T_prev_ref_ = T_prev_ref_ * T_ref_heir;
-    reference_ = heir;
+    const auto heir = graph.survivor(reference_);
+    TWOFOLD_CHECK(heir, "the reference was culled too long ago");
+    T_prev_ref_ = T_prev_ref_ * heir->T_this_survivor;
+    reference_ = heir->id;
   }
 }
 

@@ -27,9 +27,10 @@ void Tracker::relocalise(KeyframeId id, const SE3& T_c_k) {
 bool Tracker::take_hint(const GraphSnapshot& graph) {
   const KeyframeId id = std::exchange(hint_keyframe_, kNoKeyframe);
   if (id == kNoKeyframe || lost_frames_ == 0 || !graph.contains(id)) return false;
-  const auto [survivor, T_k_survivor] = graph.survivor(id);
-  T_prev_ref_ = hint_T_c_k_ * T_k_survivor;
-  reference_ = survivor;
+  const auto survivor = graph.survivor(id);
+  if (!survivor) return false;  // a late answer: the keyframe was culled long ago
+  T_prev_ref_ = hint_T_c_k_ * survivor->T_this_survivor;
+  reference_ = survivor->id;
   candidates_stale_ = true;
   return true;
 }

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "graph/part_extraction.hpp"
 #include "io/io_error.hpp"
 
 namespace twofold {
@@ -69,9 +70,10 @@ void expect_rig_of_map(const MapArguments& arguments, const std::string& source,
 std::optional<std::int64_t> recognised_at(const EngineOptions& options, const RunResult& result) {
   if (!options.map) return std::nullopt;
   const GraphSnapshot& graph = result.graph;
+  const KeyframeId loaded = oldest_part(graph);
   for (const FrameRecord& record : result.frames) {
     if (record.state != FrameState::kTracked || !graph.contains(record.reference)) continue;
-    if (graph.part(record.reference) == graph.part(KeyframeId{0})) return record.frame_index;
+    if (graph.part(record.reference) == loaded) return record.frame_index;
   }
   return std::nullopt;
 }

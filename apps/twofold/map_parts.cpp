@@ -29,8 +29,7 @@ std::vector<MapPart> map_parts(const RunResult& result, const EngineOptions& opt
   std::vector<MapPart> parts;
   for (auto& [id, part] : found) parts.push_back(std::move(part));
   if (parts.empty()) parts.emplace_back();
-  const KeyframeId loaded =
-      options.map && graph.keyframe_count() > 0 ? graph.part(KeyframeId{0}) : kNoKeyframe;
+  const KeyframeId loaded = options.map ? oldest_part(graph) : kNoKeyframe;
   std::stable_sort(parts.begin(), parts.end(), [&](const MapPart& a, const MapPart& b) {
     if (a.id == loaded || b.id == loaded) return a.id == loaded && b.id != loaded;
     return a.trajectory.size() > b.trajectory.size();

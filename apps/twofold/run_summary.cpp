@@ -125,7 +125,11 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
                          [&](const auto& r) { return r.state == state; });
   };
   std::int64_t metric_loops = 0;
-  for (const MapperRound& round : result.rounds) metric_loops += round.metric_loops;
+  std::int64_t late_loops = 0;
+  for (const MapperRound& round : result.rounds) {
+    metric_loops += round.metric_loops;
+    late_loops += round.late_loops;
+  }
   std::size_t keyframes = 0;
   std::size_t points = 0;
   for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k)
@@ -148,6 +152,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"mapper_rounds", result.rounds.size()},
             {"metric_loop_edges", metric_loops},
             {"closed_loops", loops_json(result)},
+            {"loops_too_late", late_loops},
             {"pose_corrections", corrections_json(result)},
             {"proposals_refused", result.proposals_refused},
             {"wall_seconds", result.wall_seconds},

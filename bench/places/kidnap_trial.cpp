@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "graph/part_extraction.hpp"
 #include "io/synthetic/random.hpp"
 #include "io/synthetic/scenes.hpp"
 #include "loopclosure/default_vocabulary.hpp"
@@ -17,13 +18,14 @@ constexpr double kLeastCarried = 4;  // [s] of walk
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 /// True pose of the first frame's camera relative to frame i's, less the estimated one.
-SE3 error_of(const FrameRecord& record, const GraphSnapshot& graph, const SE3& T_c_first_true) {
-  const SE3 T_c_first = final_T_c_w(record, graph) * graph.T_k_w(KeyframeId{0}).inverse();
+SE3 error_of(const FrameRecord& record, const RunResult& result, const SE3& T_c_first_true) {
+  const SE3 T_first_w = final_T_c_w(result.frames.front(), result.graph);
+  const SE3 T_c_first = final_T_c_w(record, result.graph) * T_first_w.inverse();
   return T_c_first.inverse() * T_c_first_true;
 }
 
 bool in_old_map(const FrameRecord& record, const GraphSnapshot& graph) {
-  return graph.part(record.reference) == graph.part(KeyframeId{0});
+  return graph.part(record.reference) == oldest_part(graph);
 }
 
 }  // namespace
@@ -95,7 +97,7 @@ KidnapOutcome KidnapTrials::run(const Kidnapping& kidnapping) {
     if (after && first_seen < 0) first_seen = i;
     outcome.frames_watched += after ? 1 : 0;
     if (record.state != FrameState::kTracked || !in_old_map(record, result.graph)) continue;
-    const SE3 error = error_of(record, result.graph, sequence.T_w_c(i).inverse() * sequence.T_w_c(0));
+    const SE3 error = error_of(record, result, sequence.T_w_c(i).inverse() * sequence.T_w_c(0));
     const double metres = error.translation().norm();
     if (!after) {
       outcome.error_before_m = metres;

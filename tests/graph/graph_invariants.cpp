@@ -49,9 +49,14 @@ std::string broken_edge(const GraphSnapshot& graph, const Keyframe& keyframe) {
   return {};
 }
 
-/// The chain of heirs must end in a keyframe that was not culled.
+bool forgotten(const GraphSnapshot& graph, KeyframeId id) {
+  return graph.keyframe(id).culled() && graph.heir(id).id == kNoKeyframe;
+}
+
+/// The chain of heirs of one that is known must end in a keyframe that was not culled.
 std::string broken_heirs(const GraphSnapshot& graph, KeyframeId id) {
   std::size_t steps = 0;
+  if (forgotten(graph, id)) return {};
   for (KeyframeId heir = id; graph.keyframe(heir).culled(); heir = graph.heir(heir).id) {
     if (!graph.contains(graph.heir(heir).id)) return name(heir) + " was culled and has no heir";
     if (++steps > graph.keyframe_count()) return name(id) + ": heirs go in circles";
@@ -62,7 +67,7 @@ std::string broken_heirs(const GraphSnapshot& graph, KeyframeId id) {
 std::string broken_keyframe(const GraphSnapshot& graph, KeyframeId id) {
   const Keyframe& keyframe = graph.keyframe(id);
   if (!keyframe.observations || !keyframe.edges) return name(id) + " has no lists";
-  if (!graph.T_k_w(id).log().allFinite()) return name(id) + ": pose is not finite";
+  if (!forgotten(graph, id) && !graph.T_k_w(id).log().allFinite()) return name(id) + ": pose is not finite";
   if (keyframe.culled()) {
     if (keyframe.observations->empty() && keyframe.edges->empty()) return {};
     return "culled " + name(id) + " still has observations or edges";
@@ -77,6 +82,7 @@ std::string broken_point(const GraphSnapshot& graph, PointId id, std::size_t min
   if (!point.alive()) return {};
   if (!(point.psi.z() > 0) || !point.psi.allFinite()) return name(id) + ": inverse depth not positive";
   if (point.observers->size() < min_observers) return name(id) + " has too few observers";
+  if (forgotten(graph, point.anchor)) return name(id) + ": its anchor is forgotten";
   for (const KeyframeId observer : *point.observers) {
     if (!find_observation(graph.keyframe(observer), id)) {
       return name(id) + ": observer " + name(observer) + " does not observe it";
@@ -85,6 +91,20 @@ std::string broken_point(const GraphSnapshot& graph, PointId id, std::size_t min
   const Keyframe& anchor = graph.keyframe(point.anchor);
   if (min_observers > 0 && !anchor.culled() && !find_observation(anchor, id)) {
     return name(id) + ": its anchor does not observe it";
+  }
+  return {};
+}
+
+std::string broken_count(const GraphSnapshot& graph) {
+  std::vector<std::uint32_t> anchored(graph.keyframe_count(), 0);
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+    const MapPoint& point = graph.point(PointId{p});
+    if (point.alive()) ++anchored[index(point.anchor)];
+  }
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    const std::uint32_t counted = keyframe.culled() ? graph.heir(KeyframeId{k}).anchored : keyframe.anchored;
+    if (counted != anchored[k]) return name(KeyframeId{k}) + ": anchored points miscounted";
   }
   return {};
 }
@@ -102,7 +122,23 @@ std::string broken_invariant(const GraphSnapshot& graph, std::size_t min_observe
   if (graph.reference() != kNoKeyframe && graph.keyframe(graph.reference()).culled()) {
     return "the reference keyframe is culled";
   }
-  return {};
+  return broken_count(graph);
+}
+
+std::size_t known_heirs(const GraphSnapshot& graph) {
+  std::size_t known = 0;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    known += graph.keyframe(KeyframeId{k}).culled() && !forgotten(graph, KeyframeId{k}) ? 1 : 0;
+  }
+  return known;
+}
+
+std::size_t culled_anchors(const GraphSnapshot& graph) {
+  std::size_t anchors = 0;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    anchors += graph.keyframe(KeyframeId{k}).culled() && graph.heir(KeyframeId{k}).anchored > 0 ? 1 : 0;
+  }
+  return anchors;
 }
 
 int component_count(const GraphSnapshot& graph) {

@@ -131,6 +131,42 @@ TEST_F(MapFileTest, WhatIsSavedIsLoaded) {
   EXPECT_FALSE(fs::exists(file_.string() + ".tmp"));
 }
 
+/// Written by the program that had format version 1.
+TEST_F(MapFileTest, TheOlderFormatIsRead) {
+  const SavedMap loaded = load_map(fs::path(TEST_DATA) / "map_version_1.tfm");
+  EXPECT_EQ(broken_invariant(loaded.graph), "");
+  expect_same(sample_map(12, 30, 14), loaded);
+}
+
+/// The file has what is left; of that, only points still ask for culled keyframes after loading.
+TEST_F(MapFileTest, ForgottenKeyframesTakeAByte) {
+  GraphWriter writer(sample_map(200, 2000, 15).graph);
+  for (std::uint32_t p = 0; p < 1000; ++p) writer.cull_point(PointId{p});
+  const auto size = [&](SavedMap& map) {
+    map.rig = sample_map(2, 2, 1).rig;
+    map.graph = writer.publish();
+    save_map(file_, map);
+    return fs::file_size(file_);
+  };
+  SavedMap map;
+  const std::size_t known = known_heirs(writer.graph());
+  const auto with_all = size(map);
+  const GraphSnapshot before = map.graph;
+  writer.forget_heirs(0, known);
+  const std::size_t kept = culled_anchors(writer.graph());
+  ASSERT_GT(kept, 0U);
+  ASSERT_LT(kept, known);
+  const auto with_needed = size(map);
+  EXPECT_EQ(with_all - with_needed, (known - kept) * (4 + 7 * 8));
+  const SavedMap loaded = load_map(file_);
+  EXPECT_EQ(broken_invariant(loaded.graph), "");
+  EXPECT_EQ(known_heirs(loaded.graph), kept);
+  for (std::uint32_t p = 1000; p < 2000; ++p) {
+    if (!before.point(PointId{p}).alive()) continue;
+    EXPECT_LT((loaded.graph.position(PointId{p}) - before.position(PointId{p})).norm(), 1e-9);
+  }
+}
+
 TEST_F(MapFileTest, AnEmptyMapAndOneOfSeveralSlices) {
   SavedMap empty;
   empty.rig.camera = {500, 500, 320, 240, 640, 480};

@@ -19,7 +19,7 @@ SavedMap two_parts(const SavedMap& first, const SavedMap& second) {
     Keyframe keyframe = second.graph.keyframe(KeyframeId{k});
     if (keyframe.culled()) {
       const Heir& heir = second.graph.heir(KeyframeId{k});
-      writer.add_culled_keyframe({shifted(heir.id), heir.T_this_heir});
+      writer.add_culled_keyframe({shifted(heir.id), 0, heir.T_this_heir});
       continue;
     }
     keyframe.id = shifted(keyframe.id);
@@ -91,6 +91,26 @@ TEST(PartExtraction, PartsComeOutAsTheyWentIn) {
   expect_same(b, second);
   // Its reference was left behind: the newest keyframe that is there
   expect_same(a, first);
+}
+
+TEST(PartExtraction, CulledKeyframesComeAlongOnlyWithPoints) {
+  const SavedMap map = testing::sample_map(40, 240, 4);
+  GraphWriter writer(map.graph);
+  const KeyframeId without{4}, with{13};
+  for (std::uint32_t p = 0; p < writer.graph().point_count(); ++p) {
+    if (writer.graph().point(PointId{p}).anchor == without) writer.cull_point(PointId{p});
+  }
+  const std::size_t known = known_heirs(writer.graph());
+  const SavedMap part = extract_part(map.rig, writer.publish(), map.places, KeyframeId{0});
+  EXPECT_EQ(part.graph.keyframe_count(), map.graph.keyframe_count() - 1);
+  EXPECT_EQ(known_heirs(part.graph), known - 1);
+  EXPECT_TRUE(part.graph.survivor(KeyframeId{index(with) - 1}));
+  EXPECT_EQ(broken_invariant(part.graph), "");
+  EXPECT_EQ(oldest_part(part.graph), KeyframeId{0});
+  writer.forget_heirs(0, known);
+  const SavedMap same = extract_part(map.rig, writer.publish(), map.places, KeyframeId{0});
+  expect_same(part, same);
+  EXPECT_EQ(oldest_part(GraphSnapshot()), kNoKeyframe);
 }
 
 TEST(PartExtraction, NamesFollowEdgesAndHeirs) {

@@ -207,6 +207,32 @@ TEST(Mapper, ANewMapPartStartsItsOwnWindowAndIsJoinedByALoop) {
   EXPECT_EQ(broken_invariant(graph, 2), "");
 }
 
+TEST(Mapper, ALoopOfKeyframesThatAreForgottenIsDroppedAndCounted) {
+  Simulation simulation = spiral(30, 9);
+  Mapper mapper(simulation::thesis_rig(), small_windows());
+  for (int k = 0; k < 15; ++k) map_next(simulation, mapper);
+  GraphWriter writer(mapper.publish());
+  std::vector<PointId> points;
+  for (const Observation& observation : *writer.graph().keyframe(KeyframeId{7}).observations)
+    points.push_back(observation.point);
+  remove_keyframe(writer, KeyframeId{7});
+  LoopConstraint loop;
+  loop.from = writer.graph().reference();
+  loop.to = KeyframeId{7};
+  loop.T_to_from = writer.graph().T_k_w(loop.to) * writer.graph().T_k_w(loop.from).inverse();
+  mapper.adopt(writer.publish());
+  EXPECT_EQ(mapper.step({}, std::span(&loop, 1)).loops, 1) << "its heir takes it";
+  for (const PointId point : points) writer.cull_point(point);
+  writer.forget_heirs(0);
+  ASSERT_FALSE(writer.graph().survivor(loop.to));
+  mapper.adopt(writer.publish());
+  const MapperReport report = mapper.step({}, std::span(&loop, 1), KeyframeId{7});
+  EXPECT_EQ(report.loops, 0);
+  EXPECT_EQ(report.late_loops, 1);
+  EXPECT_EQ(mapper.graph().reference(), loop.from);
+  EXPECT_EQ(broken_invariant(mapper.graph(), 2), "");
+}
+
 TEST(Mapper, TheWindowFormsAroundARevisitedKeyframe) {
   Simulation simulation = spiral(90, 10);
   MapperOptions options = small_windows();
