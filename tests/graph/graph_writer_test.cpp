@@ -222,7 +222,9 @@ TEST(GraphWriter, PlacesOfPointsSurviveForgetting) {
       live.erase(at);
       writer.cull_keyframe(culled.back(), live[rng() % live.size()]);
       writer.forget_heirs(kKeep);
-      if (step % 10 == 0) ASSERT_EQ(broken_invariant(writer.graph()), "");
+      if (step % 10 == 0) {
+        ASSERT_EQ(broken_invariant(writer.graph()), "");
+      }
       for (std::size_t n = culled.size() - std::min(kKeep, culled.size()); n < culled.size(); ++n) {
         ASSERT_TRUE(writer.graph().survivor(culled[n]));
       }
