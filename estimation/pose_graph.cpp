@@ -5,10 +5,10 @@
 #include <limits>
 #include <optional>
 
+#include "estimation/pose_graph_equations.hpp"
 #include "estimation/pose_graph_error.hpp"
 #include "estimation/pose_graph_initialisation.hpp"
 #include "estimation/robust_kernel.hpp"
-#include "estimation/sparse_block_solver.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {
@@ -55,68 +55,30 @@ bool chain_constraints(PoseGraph<Group>& graph) {
 
 template <class Group>
 struct PoseGraphSolver<Group>::Workspace {
-  static constexpr int kDof = Group::kDof;
-  using Tangent = typename Group::Tangent;
-  using Block = typename Group::AdjointMatrix;
+  struct Trial {
+    double cost = std::numeric_limits<double>::infinity();  ///< after the step; the graph's poses are moved
+    double promised = std::numeric_limits<double>::infinity();  ///< decrease of the cost by the linear model
+  };
 
-  std::vector<std::pair<int, int>> edges;  ///< of the analysed structure
-  int poses = -1;
-  BlockStructure structure;
-  SparseBlockSolver system;
-  Eigen::MatrixXd gradient, delta;  ///< H delta = gradient; the step is -delta
+  PoseGraphEquations<Group> equations;
   std::vector<Group> before;
 
-  void analyse(const PoseGraph<Group>& graph) {
-    std::vector<std::pair<int, int>> now;
-    now.reserve(graph.constraints.size());
-    for (const auto& c : graph.constraints) now.emplace_back(c.i, c.j);
-    if (poses == static_cast<int>(graph.poses.size()) && now == edges) return;
-    edges = std::move(now);
-    poses = static_cast<int>(graph.poses.size());
-    structure = analyse_blocks(poses, edges, kDof);
-    system.set_structure(structure, kDof);
-  }
-
-  /// Normal equations H delta = -gradient of half the cost at graph.poses.
-  void linearise(const PoseGraph<Group>& graph, const PoseGraphOptions& options) {
-    const HuberKernel kernel{options.huber};
-    system.set_zero();
-    gradient.setZero(kDof * poses, 1);
-    for (std::size_t k = 0; k < graph.constraints.size(); ++k) {
-      const auto& c = graph.constraints[k];
-      const Group T_i_j = graph.poses[c.i] * graph.poses[c.j].inverse();
-      const Group E = c.T_j_i * T_i_j;
-      const Tangent e = pose_graph_error(E, options.error);
-      // eq. 5.18; and since exp(y) on T_j acts like exp(-Ad y) on T_i with Ad that of T_i_j, J_j = -J_i Ad
-      // (5.19)
-      const Block J_i = pose_graph_error_jacobian(E, e, options.error, options.jacobian) * c.T_j_i.adjoint();
-      const Block ad = T_i_j.adjoint();
-      Block information = c.information;
-      if (options.huber > 0) information *= kernel.weight(e.dot(c.information * e));
-      const Block W_J = information * J_i;
-      const Block H_ii = J_i.transpose() * W_J;
-      const Tangent g_i = W_J.transpose() * e;
-      const Block H_ij = -H_ii * ad;
-      const Block H_jj = -ad.transpose() * H_ij;
-      if (c.i != graph.origin) {
-        system.add_diagonal<kDof>(c.i, H_ii);
-        gradient.template block<kDof, 1>(kDof * c.i, 0) += g_i;
-      }
-      if (c.j != graph.origin) {
-        system.add_diagonal<kDof>(c.j, H_jj);
-        gradient.template block<kDof, 1>(kDof * c.j, 0) -= ad.transpose() * g_i;
-      }
-      if (c.i != graph.origin && c.j != graph.origin) system.add_off_diagonal<kDof>(k, H_ij);
+  /// A step from graph.poses, kept in `before`, with a factor of its own or the last one. It need not lower
+  /// the cost.
+  Trial try_step(PoseGraph<Group>& graph, const PoseGraphOptions& options, double cost, bool own_factor,
+                 double damping) {
+    before = graph.poses;
+    Trial trial;
+    if (own_factor && !equations.system.factorise(damping)) return trial;
+    equations.delta = equations.system.solve(equations.gradient);
+    trial.promised = equations.gradient.cwiseProduct(equations.delta).sum();
+    // An old factor may overshoot where the curvature has grown: halve. A fresh one is left to the damping.
+    const double shortest = own_factor ? 1.0 : 0.25;
+    for (double scale = 1; scale >= shortest && !(trial.cost < cost); scale *= 0.5) {
+      equations.move(before, scale, graph.poses);
+      trial.cost = pose_graph_cost(graph, options.error, options.huber);
     }
-    if (graph.origin >= 0) system.add_diagonal<kDof>(graph.origin, Block::Identity());  // its step is zero
-  }
-
-  /// poses <- exp(-scale delta) start.
-  void move(const std::vector<Group>& start, double scale, std::vector<Group>& moved) const {
-    moved.resize(start.size());
-    for (int i = 0; i < poses; ++i) {
-      moved[i] = Group::exp(-scale * delta.template block<kDof, 1>(kDof * i, 0)) * start[i];
-    }
+    return trial;
   }
 };
 
@@ -207,8 +169,8 @@ SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseG
   if (graph.constraints.empty()) return summary;
   TWOFOLD_CHECK(options.invalid_reason().empty(), "options are valid");
   Workspace& w = *workspace_;
-  w.analyse(graph);
-  Positions<Group> positions(graph, options, w.structure);
+  w.equations.analyse(graph);
+  Positions<Group> positions(graph, options, w.equations.structure);
   summary.initial_cost = pose_graph_cost(graph, options.error, options.huber);
   double cost = positions.chordal(graph, summary.initial_cost, options);
   if (options.on_cost) options.on_cost(0, cost);
@@ -221,25 +183,13 @@ SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseG
   double last_decrease = 1;  // relative to the cost
   summary.termination = Termination::kIterationLimit;
   while (summary.iterations < options.max_iterations) {
-    if (!linearised) w.linearise(graph, options);
+    if (!linearised) w.equations.linearise(graph, options);
     linearised = true;
     ++summary.iterations;
     const bool own_factor = !keep_factor;
     keep_factor = false;
-    w.before = graph.poses;
-    double new_cost = std::numeric_limits<double>::infinity();
-    double promised = std::numeric_limits<double>::infinity();  // decrease of the cost by the linear model
-    if (!own_factor || w.system.factorise(damping.value())) {
-      w.delta = w.system.solve(w.gradient);
-      promised = w.gradient.cwiseProduct(w.delta).sum();
-      // An old factor may overshoot where the curvature has grown: halve. A fresh one is left to the damping.
-      const double shortest = own_factor ? 1.0 : 0.25;
-      for (double scale = 1; scale >= shortest && !(new_cost < cost); scale *= 0.5) {
-        w.move(w.before, scale, graph.poses);
-        new_cost = pose_graph_cost(graph, options.error, options.huber);
-      }
-    }
-    if (!(new_cost < cost)) {
+    const auto [tried_cost, promised] = w.try_step(graph, options, cost, own_factor, damping.value());
+    if (!(tried_cost < cost)) {
       graph.poses = w.before;
       if (!own_factor) continue;  // once more with its own factor
       if (promised >= 0 && promised < options.relative_decrease * cost) {
@@ -250,8 +200,8 @@ SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseG
       summary.termination = Termination::kNoStepFound;
       break;
     }
-    const double gain = (cost - new_cost) / promised;
-    new_cost = positions.resolve(graph, new_cost, options);
+    const double gain = (cost - tried_cost) / promised;
+    const double new_cost = positions.resolve(graph, tried_cost, options);
     const double decrease = (cost - new_cost) / cost;
     ++summary.accepted_steps;
     linearised = false;

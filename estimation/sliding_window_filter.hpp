@@ -10,7 +10,7 @@
 #include "camera/rig.hpp"
 #include "estimation/linearisation.hpp"
 #include "estimation/process_model.hpp"
-#include "estimation/sliding_window_filter_equations.hpp"
+#include "estimation/sliding_window_filter_factor.hpp"
 #include "estimation/sliding_window_filter_prior.hpp"
 
 namespace twofold {
@@ -140,6 +140,8 @@ class SlidingWindowFilter {
   bool set_landmark(std::int64_t id, const Vector3& x_w);
 
  private:
+  static constexpr double kMinDepth = 1e-3;  ///< [m]; nearer or behind: the measurement says nothing
+
   struct Observation {
     int landmark;  ///< index in the state
     Vector3 z;
@@ -171,6 +173,9 @@ class SlidingWindowFilter {
   [[nodiscard]] MotionError linearise_motion(int pose) const;
   [[nodiscard]] double whitened_chi2(int pose, const Observation& observation) const;
   void build_equations();
+  void add_prior();
+  void add_measurements(int pose);
+  void add_motion(int pose);
   [[nodiscard]] double cost() const;
   void update_threshold();
   /// Where derivatives are taken: the prior's point for what the prior knows, if first_estimates().

@@ -1,5 +1,6 @@
 #include "estimation/sliding_window_filter_prior.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include "geometry/cbh.hpp"

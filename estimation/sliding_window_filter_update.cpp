@@ -1,4 +1,5 @@
 // Linearisation of the sliding window filter: the measurement, process and prior parts of SWF eq. 5-7.
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -10,15 +11,10 @@
 namespace twofold {
 namespace {
 
-constexpr double kMinDepth = 1e-3;       // [m]; nearer or behind: the measurement says nothing
 constexpr double kMinInlierSigma = 0.3;  // keeps the Huber threshold off zero on noise-free data
 constexpr int kMinDof = 30;
 constexpr double kUnknownLandmark = 1e-6;  // [1/m^2]
 constexpr double kMedianChi2 = 2.366;      // of three degrees of freedom
-
-double robust_cost(const HuberKernel& kernel, double chi2) {
-  return 0.5 * kernel.rho(chi2);
-}
 
 }  // namespace
 
@@ -93,52 +89,68 @@ void SlidingWindowFilter::build_equations() {
   eq.reset(pose_count(), landmark_count());
   eq.prior_landmarks = prior_.landmark_count();
   eq.prior = prior_.information;
-  if (!poses_.empty()) {  // L^T Pi L and its right-hand side
-    const VectorX d = prior_.difference(points_, poses_.front().T_c_l, shift_);
-    VectorX g = prior_.vector - prior_.information * d;
-    if (!first_estimates()) {
-      const Matrix6 J = cbh_jacobian<SE3>(d.tail<6>(), CbhOrder::kExact);
-      g.tail<6>() = (J.transpose() * g.tail<6>()).eval();
-      eq.prior.rightCols<6>() = (eq.prior.rightCols<6>() * J).eval();
-      eq.prior.bottomRows<6>() = (J.transpose() * eq.prior.bottomRows<6>()).eval();
-    }
-    for (int l = 0; l < eq.prior_landmarks; ++l)
-      eq.g_landmarks[static_cast<std::size_t>(l)] = g.segment<3>(3 * l);
-    eq.g_poses.front() = g.tail<6>();
-    if (oldest_fixed_) {
-      eq.U.front().setIdentity();
-      eq.g_poses.front().setZero();
-    }
-  }
+  if (!poses_.empty()) add_prior();
   for (int j = 0; j < pose_count(); ++j) {
-    const auto p = static_cast<std::size_t>(j);
-    for (const Observation& observation : poses_[p].observations) {  // H^T R^-1 H
-      const ObservationTerm term = linearise(j, observation);
-      if (!term.valid) continue;
-      const auto l = static_cast<std::size_t>(observation.landmark);
-      const Matrix3 WJ_l = term.information * term.J_landmark;
-      const Vector3 Wr = term.information * term.r;
-      eq.V[l].noalias() += term.J_landmark.transpose() * WJ_l;
-      eq.g_landmarks[l].noalias() += term.J_landmark.transpose() * Wr;
-      if (j == 0 && oldest_fixed_) continue;
-      eq.U[p].noalias() += term.J_pose.transpose() * (term.information * term.J_pose);
-      eq.g_poses[p].noalias() += term.J_pose.transpose() * Wr;
-      eq.couplings.push_back({j, observation.landmark, term.J_pose.transpose() * WJ_l});
-    }
-    if (j == 0 || !poses_[p].motion) continue;
-    const MotionError error = linearise_motion(j);  // D^T Q^-1 D
-    const Matrix6 Q_inv = poses_[p].motion->covariance.inverse();
-    eq.has_motion = true;
-    eq.U[p - 1] += error.J_prev.transpose() * Q_inv * error.J_prev;
-    eq.U[p] += error.J_cur.transpose() * Q_inv * error.J_cur;
-    eq.E[p - 1] += error.J_prev.transpose() * Q_inv * error.J_cur;
-    eq.g_poses[p - 1] -= error.J_prev.transpose() * Q_inv * error.e;
-    eq.g_poses[p] -= error.J_cur.transpose() * Q_inv * error.e;
+    add_measurements(j);
+    if (j > 0 && poses_[static_cast<std::size_t>(j)].motion) add_motion(j);
   }
   // A landmark with neither prior nor a valid measurement (behind every camera) stays where it is.
   for (std::size_t l = static_cast<std::size_t>(eq.prior_landmarks); l < eq.V.size(); ++l) {
     if (eq.V[l].isZero(0)) eq.V[l] = kUnknownLandmark * Matrix3::Identity();
   }
+}
+
+/// L^T Pi L and its right-hand side.
+void SlidingWindowFilter::add_prior() {
+  WindowEquations& eq = equations_;
+  const VectorX d = prior_.difference(points_, poses_.front().T_c_l, shift_);
+  VectorX g = prior_.vector - prior_.information * d;
+  if (!first_estimates()) {
+    const Matrix6 J = cbh_jacobian<SE3>(d.tail<6>(), CbhOrder::kExact);
+    g.tail<6>() = (J.transpose() * g.tail<6>()).eval();
+    eq.prior.rightCols<6>() = (eq.prior.rightCols<6>() * J).eval();
+    eq.prior.bottomRows<6>() = (J.transpose() * eq.prior.bottomRows<6>()).eval();
+  }
+  for (int l = 0; l < eq.prior_landmarks; ++l)
+    eq.g_landmarks[static_cast<std::size_t>(l)] = g.segment<3>(3 * l);
+  eq.g_poses.front() = g.tail<6>();
+  if (oldest_fixed_) {
+    eq.U.front().setIdentity();
+    eq.g_poses.front().setZero();
+  }
+}
+
+/// H^T R^-1 H of the measurements of one pose.
+void SlidingWindowFilter::add_measurements(int pose) {
+  WindowEquations& eq = equations_;
+  const auto p = static_cast<std::size_t>(pose);
+  for (const Observation& observation : poses_[p].observations) {
+    const ObservationTerm term = linearise(pose, observation);
+    if (!term.valid) continue;
+    const auto l = static_cast<std::size_t>(observation.landmark);
+    const Matrix3 WJ_l = term.information * term.J_landmark;
+    const Vector3 Wr = term.information * term.r;
+    eq.V[l].noalias() += term.J_landmark.transpose() * WJ_l;
+    eq.g_landmarks[l].noalias() += term.J_landmark.transpose() * Wr;
+    if (pose == 0 && oldest_fixed_) continue;
+    eq.U[p].noalias() += term.J_pose.transpose() * (term.information * term.J_pose);
+    eq.g_poses[p].noalias() += term.J_pose.transpose() * Wr;
+    eq.couplings.push_back({pose, observation.landmark, term.J_pose.transpose() * WJ_l});
+  }
+}
+
+/// D^T Q^-1 D of the motion from the pose before.
+void SlidingWindowFilter::add_motion(int pose) {
+  WindowEquations& eq = equations_;
+  const auto p = static_cast<std::size_t>(pose);
+  const MotionError error = linearise_motion(pose);
+  const Matrix6 Q_inv = poses_[p].motion->covariance.inverse();
+  eq.has_motion = true;
+  eq.U[p - 1] += error.J_prev.transpose() * Q_inv * error.J_prev;
+  eq.U[p] += error.J_cur.transpose() * Q_inv * error.J_cur;
+  eq.E[p - 1] += error.J_prev.transpose() * Q_inv * error.J_cur;
+  eq.g_poses[p - 1] -= error.J_prev.transpose() * Q_inv * error.e;
+  eq.g_poses[p] -= error.J_cur.transpose() * Q_inv * error.e;
 }
 
 double SlidingWindowFilter::cost() const {
@@ -153,7 +165,7 @@ double SlidingWindowFilter::cost() const {
     const Pose& pose = poses_[static_cast<std::size_t>(j)];
     for (const Observation& observation : pose.observations) {
       const double chi2 = whitened_chi2(j, observation);
-      if (chi2 >= 0) sum += robust_cost(kernel, chi2);
+      if (chi2 >= 0) sum += 0.5 * kernel.rho(chi2);
     }
     if (j == 0 || !pose.motion) continue;
     const Vector6 e = motion_error(*pose.motion, poses_[static_cast<std::size_t>(j) - 1].T_c_l, pose.T_c_l).e;
@@ -198,67 +210,6 @@ void SlidingWindowFilter::update_threshold() {
     // Too few surplus residuals to estimate a spread from: the stated variances stand.
     const double sigma = dof >= kMinDof ? std::max(summary_.inlier_sigma, kMinInlierSigma) : 1.0;
     huber_ = options_.huber_sigmas * std::sqrt(3.0) * sigma;
-  }
-}
-
-void SlidingWindowFilter::fit_newest_pose(const WindowFrame& frame) {
-  struct Known {
-    Vector3 x_w;
-    Vector3 z;
-    Matrix3 information;
-  };
-  std::vector<Known> known;
-  for (const LandmarkObservation& o : frame.observations) {
-    const auto found = index_.find(o.landmark);
-    if (found == index_.end() || std::isnan(o.z.z())) continue;
-    known.push_back({points_[static_cast<std::size_t>(found->second)], o.z, o.information});
-  }
-  Pose& pose = poses_.back();
-  if (known.size() < 3 && !frame.motion) return;
-  const HuberKernel kernel{options_.robust ? options_.huber_sigmas * std::sqrt(3.0) : 0.0};
-  const SE3 T_predicted = pose.T_c_l;
-  const Matrix6 prior = frame.motion ? Matrix6(frame.motion->covariance.inverse()) : Matrix6::Zero();
-
-  const auto evaluate = [&](const SE3& T, Matrix6* H, Vector6* g) {
-    const Vector6 e = (T * T_predicted.inverse()).log();
-    double sum = 0.5 * e.dot(prior * e);
-    if (H) *H = prior;
-    if (g) *g = -(prior * e);
-    for (const Known& k : known) {
-      const Vector3 x_c = T * k.x_w;
-      if (x_c.z() < kMinDepth) continue;
-      const Vector3 r = k.z - rig_.project(x_c);
-      const double chi2 = r.dot(k.information * r);
-      sum += robust_cost(kernel, chi2);
-      if (!H) continue;
-      Matrix36 J;
-      const Matrix3 J_x = rig_.project_jacobian(x_c);
-      J << J_x, -J_x * hat(x_c);
-      const Matrix3 W = kernel.weight(chi2) * k.information;
-      *H += J.transpose() * W * J;
-      *g += J.transpose() * (W * r);
-    }
-    return sum;
-  };
-
-  double damping = 1e-6;
-  Matrix6 H;
-  Vector6 g;
-  double current = evaluate(pose.T_c_l, &H, &g);
-  for (int i = 0; i < 10; ++i) {
-    Matrix6 damped = H;
-    damped.diagonal() *= 1 + damping;
-    const Vector6 delta = damped.ldlt().solve(g);
-    const SE3 T = SE3::exp(delta) * pose.T_c_l;
-    const double next = evaluate(T, nullptr, nullptr);
-    if (!std::isfinite(next) || next > current) {
-      damping = std::max(10 * damping, 1e-3);
-      continue;
-    }
-    pose.T_c_l = T;
-    damping *= 0.1;
-    if (g.dot(delta) < 1e-4) break;
-    current = evaluate(T, &H, &g);
   }
 }
 

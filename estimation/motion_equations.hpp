@@ -1,0 +1,136 @@
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include "estimation/motion_only.hpp"
+#include "estimation/observation_model.hpp"
+
+namespace twofold {
+
+// What one pass of motion-only adjustment over the observations does with them, four at a time.
+
+inline constexpr int kLanes = 4;
+using Lanes = Eigen::Array<double, kLanes, 1>;
+
+/// A point behind the camera adds the cost of a far outlier and pulls at nothing: it can neither veto a step
+/// nor be bought by one.
+inline constexpr double kSigmasBehind = 100;
+
+/// kLanes observations side by side.
+struct ObservationBatch {
+  Lanes x, y, z;     // point in the reference frame
+  Lanes u, v, r;     // measurement; r is 0 without a right image
+  Lanes wu, wv, wr;  // information
+  Lanes used;        // 1 or 0
+
+  ObservationBatch(std::span<const MotionObservation> all, std::size_t first, bool inliers_only) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const bool exists = first + lane < all.size();
+      const MotionObservation& o = all[exists ? first + lane : first];
+      x[lane] = o.x_ref.x(), y[lane] = o.x_ref.y(), z[lane] = o.x_ref.z();
+      u[lane] = o.z.x(), v[lane] = o.z.y();
+      r[lane] = o.information.z() == 0 ? 0.0 : o.z.z();
+      wu[lane] = o.information.x(), wv[lane] = o.information.y(), wr[lane] = o.information.z();
+      used[lane] = exists && (o.inlier || !inliers_only) ? 1.0 : 0.0;
+    }
+  }
+};
+
+/// ObservationBatch as seen from the pose under test.
+struct BatchProjection {
+  Lanes x, y, z, inv_z;  // in the camera; z is 1 where the point is behind
+  Lanes eu, ev, er;      // predicted minus measured
+  Lanes chi2;
+  Lanes front;  // 1 or 0
+
+  BatchProjection(const ObservationModel& m, const Matrix3& R, const Vector3& t, const ObservationBatch& b) {
+    x = R(0, 0) * b.x + R(0, 1) * b.y + R(0, 2) * b.z + t.x();
+    y = R(1, 0) * b.x + R(1, 1) * b.y + R(1, 2) * b.z + t.y();
+    z = R(2, 0) * b.x + R(2, 1) * b.y + R(2, 2) * b.z + t.z();
+    for (int lane = 0; lane < kLanes; ++lane) {
+      front[lane] = z[lane] > kMinDepth ? 1.0 : 0.0;
+      z[lane] = z[lane] > kMinDepth ? z[lane] : 1.0;
+    }
+    inv_z = z.inverse();
+    eu = m.fx * x * inv_z + (m.cx - b.u);
+    ev = m.fy * y * inv_z + (m.cy - b.v);
+    er = m.fx * (x - m.baseline) * inv_z + (m.cx - b.r);
+    chi2 = b.wu * eu.square() + b.wv * ev.square() + b.wr * er.square();
+  }
+};
+
+/// Normal equations of the left perturbation, J = d z_hat / d x [I, -[x]x]  (thesis B.21), lane by lane:
+/// with S = J_x^T W J_x and f = J_x^T W e they are [S, -S X; -(S X)^T, -X S X] and (f, x x f), X = [x]x.
+struct MotionEquations {
+  Lanes h[21];  // lower triangle, column by column
+  Lanes g[6];
+  Lanes cost = Lanes::Zero();
+  double used = 0;
+
+  MotionEquations() {
+    for (Lanes& value : h) value.setZero();
+    for (Lanes& value : g) value.setZero();
+  }
+
+  void add(const ObservationModel& m, const ObservationBatch& b, const BatchProjection& p, double delta) {
+    // Huber: with s = sqrt(chi2) and c = min(s, delta), rho = c (2 s - c) and the weight is delta / max(s,
+    // delta).
+    const Lanes s = p.chi2.sqrt();
+    const Lanes clipped = s.min(delta);
+    const double clipped_behind = std::min(kSigmasBehind, delta);
+    const double behind = clipped_behind * (2 * kSigmasBehind - clipped_behind);
+    cost += b.used * (p.front * clipped * (2 * s - clipped) + (1 - p.front) * behind);
+    const Lanes weight = b.used * p.front * delta / s.max(delta);
+
+    const Lanes a = m.fx * p.inv_z, c = m.fy * p.inv_z;
+    const Lanes u = p.x * p.inv_z, v = p.y * p.inv_z, r = (p.x - m.baseline) * p.inv_z;
+    const Lanes wu = weight * b.wu * a, wv = weight * b.wv * c, wr = weight * b.wr * a;
+    const Lanes fu = wu * p.eu, fv = wv * p.ev, fr = wr * p.er;
+    add_gradient(p, fu + fr, fv, -(u * fu + v * fv + r * fr));
+
+    const Lanes auu = wu * a, cvv = wv * c, arr = wr * a;
+    const Lanes s02 = -(auu * u + arr * r), s12 = -cvv * v;
+    add_hessian(p, auu + arr, s02, cvv, s12, auu * u * u + cvv * v * v + arr * r * r);
+  }
+
+  void add_gradient(const BatchProjection& p, const Lanes& f0, const Lanes& f1, const Lanes& f2) {
+    g[0] += f0, g[1] += f1, g[2] += f2;
+    g[3] += p.y * f2 - p.z * f1;
+    g[4] += p.z * f0 - p.x * f2;
+    g[5] += p.x * f1 - p.y * f0;
+  }
+
+  void add_hessian(const BatchProjection& p, const Lanes& s00, const Lanes& s02, const Lanes& s11,
+                   const Lanes& s12, const Lanes& s22) {
+    // Rows of the lower left block (-S X)^T = X S: columns of S crossed from the left by x (s01 = 0).
+    const Lanes m00 = p.y * s02, m01 = p.y * s12 - p.z * s11, m02 = p.y * s22 - p.z * s12;
+    const Lanes m10 = p.z * s00 - p.x * s02, m11 = -p.x * s12, m12 = p.z * s02 - p.x * s22;
+    const Lanes m20 = -p.y * s00, m21 = p.x * s11, m22 = p.x * s12 - p.y * s02;
+    h[0] += s00, h[2] += s02, h[3] += m00, h[4] += m10, h[5] += m20;
+    h[6] += s11, h[7] += s12, h[8] += m01, h[9] += m11, h[10] += m21;
+    h[11] += s22, h[12] += m02, h[13] += m12, h[14] += m22;
+    // Lower right block: rows of M crossed by x, -M X.
+    h[15] += p.y * m02 - p.z * m01;
+    h[16] += p.y * m12 - p.z * m11;
+    h[17] += p.y * m22 - p.z * m21;
+    h[18] += p.z * m10 - p.x * m12;
+    h[19] += p.z * m20 - p.x * m22;
+    h[20] += p.x * m21 - p.y * m20;
+  }
+
+  [[nodiscard]] Matrix6 hessian() const {
+    Matrix6 H;
+    for (int col = 0, n = 0; col < 6; ++col) {
+      for (int row = col; row < 6; ++row, ++n) H(row, col) = H(col, row) = h[n].sum();
+    }
+    return H;
+  }
+  [[nodiscard]] Vector6 gradient() const {
+    Vector6 result;
+    for (int row = 0; row < 6; ++row) result[row] = g[row].sum();
+    return result;
+  }
+};
+
+}  // namespace twofold
