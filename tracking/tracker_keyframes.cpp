@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "geometry/inverse_depth.hpp"
@@ -43,7 +44,7 @@ int Tracker::occupied_regions() const {
         std::clamp(static_cast<int>(z.y() * kRegionRows / rig_.camera.height), 0, kRegionRows - 1);
     occupied |= std::uint64_t{1} << (row * kRegionColumns + column);
   }
-  return __builtin_popcountll(occupied);
+  return std::popcount(occupied);
 }
 
 double Tracker::median_depth(const SE3& T_c_ref) {

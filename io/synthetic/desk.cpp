@@ -4,6 +4,7 @@
 #include "io/synthetic/furniture.hpp"
 #include "io/synthetic/materials.hpp"
 #include "io/synthetic/scenes.hpp"
+#include "io/synthetic/wall_fixtures.hpp"
 
 namespace twofold::synthetic {
 namespace {

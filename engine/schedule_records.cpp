@@ -1,0 +1,72 @@
+#include "engine/schedule_records.hpp"
+
+#include "geometry/check.hpp"
+
+namespace twofold {
+
+// Tracker record: flags (fate, has messages, has refused, keyframe withheld, level in the upper half), frame
+// and version as differences, then what the flags announce.
+void encode_step(std::vector<std::uint8_t>& bytes, const TrackerStep& step, const TrackerStep& last) {
+  TWOFOLD_CHECK(step.degrade_level <= 15, "degrade level");
+  const unsigned flags = static_cast<unsigned>(step.fate) | (step.messages ? 2U : 0U) |
+                         (step.refused ? 4U : 0U) | (step.keyframe_withheld ? 8U : 0U) |
+                         static_cast<unsigned>(step.degrade_level) << 4;
+  bytes.push_back(static_cast<std::uint8_t>(flags));
+  put_varint(bytes, zigzag(static_cast<std::uint64_t>(step.frame), static_cast<std::uint64_t>(last.frame)));
+  put_varint(bytes, zigzag(step.version, last.version));
+  if (step.messages) put_varint(bytes, step.messages);
+  if (step.refused) put_varint(bytes, step.refused);
+}
+TrackerStep decode_step(ByteCursor& in, const TrackerStep& last) {
+  TrackerStep step;
+  const unsigned flags = in.byte();
+  step.fate = static_cast<TrackerStep::Fate>(flags & 1U);
+  step.degrade_level = static_cast<std::uint8_t>(flags >> 4);
+  step.keyframe_withheld = (flags & 8U) != 0;
+  step.frame = static_cast<std::int64_t>(unzigzag(in.varint(), static_cast<std::uint64_t>(last.frame)));
+  step.version = unzigzag(in.varint(), last.version);
+  if (flags & 2U) step.messages = in.varint32();
+  if (flags & 4U) step.refused = in.varint32();
+  return step;
+}
+
+void encode_step(std::vector<std::uint8_t>& bytes, const MapperStep& step, const MapperStep& last) {
+  put_varint(bytes, zigzag(step.version, last.version));
+  for (const std::uint32_t count : {step.proposals, step.loop_messages, step.iterations, step.refused}) {
+    put_varint(bytes, count);
+  }
+}
+MapperStep decode_step(ByteCursor& in, const MapperStep& last) {
+  MapperStep step;
+  step.version = unzigzag(in.varint(), last.version);
+  for (std::uint32_t* count : {&step.proposals, &step.loop_messages, &step.iterations, &step.refused}) {
+    *count = in.varint32();
+  }
+  return step;
+}
+
+void encode_step(std::vector<std::uint8_t>& bytes, const LoopStep& step, const LoopStep& last) {
+  put_varint(bytes, zigzag(step.version, last.version));
+  put_varint(bytes,
+             zigzag(static_cast<std::uint64_t>(step.keyframe), static_cast<std::uint64_t>(last.keyframe)));
+  put_varint(bytes, step.requests);
+  put_varint(bytes, step.refused);
+}
+LoopStep decode_step(ByteCursor& in, const LoopStep& last) {
+  LoopStep step;
+  step.version = unzigzag(in.varint(), last.version);
+  step.keyframe = static_cast<std::int64_t>(unzigzag(in.varint(), static_cast<std::uint64_t>(last.keyframe)));
+  step.requests = in.varint32();
+  step.refused = in.varint32();
+  return step;
+}
+
+void check_order(ByteCursor& in, const TrackerStep& step, const TrackerStep* last) {
+  if (step.frame < 0 || (last != nullptr && step.frame <= last->frame)) in.fail("has frames out of order");
+}
+void check_order(ByteCursor&, const MapperStep&, const MapperStep*) {}
+void check_order(ByteCursor& in, const LoopStep& step, const LoopStep*) {
+  if (step.keyframe < -1) in.fail("has a negative keyframe number");
+}
+
+}  // namespace twofold
