@@ -5,45 +5,10 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "tests/camera/example_rigs.hpp"
+
 namespace twofold {
 namespace {
-
-/// The stereo head of the EuRoC sequences; T_right_left from its T_BS matrices.
-Calibration euroc() {
-  Calibration c;
-  c.kind = SensorKind::kStereo;
-  c.left = {{458.654, 457.296, 367.215, 248.375, 752, 480},
-            {DistortionModel::kRadTan, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}}};
-  c.right = {{457.587, 456.134, 379.999, 255.238, 752, 480},
-             {DistortionModel::kRadTan, {-0.28368365, 0.07451284, -0.00010473, -3.55590700e-05, 0}}};
-  Matrix3 R_b_l, R_b_r;
-  R_b_l << 0.0148655429818, -0.999880929698, 0.00414029679422, 0.999557249008, 0.0149672133247,
-      0.025715529948, -0.0257744366974, 0.00375618835797, 0.999660727178;
-  R_b_r << 0.0125552670891, -0.999755099723, 0.0182237714554, 0.999598781151, 0.0130119051815,
-      0.0251588363115, -0.0253898008918, 0.0179005838253, 0.999517347078;
-  const SE3 T_b_l(R_b_l, Vector3(-0.0216401454975, -0.064676986768, 0.00981073058949));
-  const SE3 T_b_r(R_b_r, Vector3(-0.0198435579556, 0.0453689425024, 0.00786212447038));
-  c.T_right_left = T_b_r.inverse() * T_b_l;
-  return c;
-}
-
-/// A fisheye pair that squints, with different focal lengths and sizes.
-Calibration fisheye() {
-  Calibration c;
-  c.left = {{300, 301, 330, 250, 660, 500},
-            {DistortionModel::kEquidistant, {-0.009, 0.012, -0.012, 0.004, 0}}};
-  c.right = {{310, 309, 310, 235, 640, 480},
-             {DistortionModel::kEquidistant, {-0.007, 0.010, -0.010, 0.003, 0}}};
-  c.T_right_left = SE3(SO3::exp({0.03, -0.05, 0.02}), {-0.2, 0.01, 0.015});
-  return c;
-}
-
-Calibration double_sphere() {
-  Calibration c = fisheye();
-  c.left.distortion = {DistortionModel::kDoubleSphere, {-0.2, 0.55}};
-  c.right.distortion = {DistortionModel::kDoubleSphere, {-0.18, 0.56}};
-  return c;
-}
 
 float sample(const cv::Mat& map, double u, double v) {
   cv::Mat value;
@@ -159,48 +124,6 @@ TEST(Rectifier, EurocBaselineAndFocalLength) {
   EXPECT_NEAR(rectifier.rig().camera.fx, 435, 15);  // about what this head is commonly rectified to
   EXPECT_EQ(rectifier.rig().camera.fx, rectifier.rig().camera.fy);
   EXPECT_LT(rectifier.R_rectified_left().log().norm(), 0.05);
-}
-
-/// A smooth pattern on a plane, imaged by a raw camera.
-cv::Mat image_of_plane(const CameraModel& camera, const SE3& T_c_w, double phase_per_metre) {
-  cv::Mat image(camera.pinhole.height, camera.pinhole.width, CV_8UC1);
-  const SE3 T_w_c = T_c_w.inverse();
-  for (int v = 0; v < image.rows; ++v) {
-    for (int u = 0; u < image.cols; ++u) {
-      const Vector3 ray = T_w_c.so3() * *camera.unproject(Vector2(u, v));
-      const double depth = (4 - T_w_c.translation().z()) / ray.z();  // plane z = 4 of the world
-      const Vector3 x_w = T_w_c.translation() + depth * ray;
-      const double s = std::sin(phase_per_metre * x_w.x()) * std::cos(0.8 * phase_per_metre * x_w.y());
-      image.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(128 + 100 * s);
-    }
-  }
-  return image;
-}
-
-TEST(Rectifier, RectifiedImagesShowTheSamePointAtTheDisparityOfItsDepth) {
-  const Calibration c = euroc();
-  const Rectifier rectifier(c);
-  Frame raw{3, 77, image_of_plane(c.left, SE3(), 4), image_of_plane(c.right, c.T_right_left, 4), {}};
-  ASSERT_EQ(rectifier.mismatch_reason(raw), "");
-  Frame out;
-  rectifier.rectify(raw, out);
-  EXPECT_EQ(out.index, 3);
-  EXPECT_EQ(out.t_ns, 77);
-  const Rig& rig = rectifier.rig();
-  const Vector3 normal = rectifier.R_rectified_left() * Vector3::UnitZ();
-  double sum = 0;
-  int count = 0;
-  for (int v = 10; v < rig.camera.height - 10; v += 9) {
-    for (int u = 80; u < rig.camera.width - 10; u += 9) {
-      const Vector3 ray = rig.camera.unproject(Vector2(u, v));
-      const Vector3 z = rig.project(ray * (4 / normal.dot(ray)));
-      cv::Mat value;
-      cv::getRectSubPix(out.right, {1, 1}, cv::Point2f(z.z(), z.y()), value);
-      sum += std::abs(value.at<std::uint8_t>(0, 0) - out.left.at<std::uint8_t>(v, u));
-      ++count;
-    }
-  }
-  EXPECT_LT(sum / count, 0.8);  // grey levels; rounding alone gives about 0.5
 }
 
 TEST(Rectifier, PassesRectifiedImagesThrough) {

@@ -3,6 +3,7 @@
 #include <ceres/rotation.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <map>
 

@@ -1,6 +1,7 @@
 // Marginalisation: exact on linear problems, against a square-root (QR) form, and inside the filter.
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <random>

@@ -1,0 +1,126 @@
+// The tracker when it loses its way: what it says, and how it comes back.
+#include <gtest/gtest.h>
+
+#include "tests/tracking/tracked_sequence.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace testing;
+
+TEST(Tracker, SaysThatItIsLostAndWhyAndComesBack) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  Odometry odometry(SensorKind::kStereo);
+  for (std::size_t i = 0; i < 15; ++i) odometry.step(sequence[i]);
+  for (std::size_t i = 15; i < 18; ++i) {
+    const TrackResult lost = odometry.step(covered(sequence[i]));
+    EXPECT_EQ(lost.status, TrackStatus::kLost);
+    EXPECT_EQ(lost.cause, LostCause::kCovered);
+    EXPECT_EQ(lost.inliers, 0);
+    EXPECT_FALSE(lost.proposed);
+  }
+  const TrackResult found = odometry.step(sequence[18]);
+  ASSERT_EQ(found.status, TrackStatus::kTracking);
+  EXPECT_LT((odometry.T_c_w(found) * true_T_c_w(18).inverse()).translation().norm(), 0.02);
+}
+
+TEST(Tracker, NeverAllocatesWhenLostOrRelocalisedOrStartingAPart) {
+  if (!allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  Odometry odometry(SensorKind::kStereo);
+  for (std::size_t i = 0; i < 35; ++i) odometry.step(sequence[i]);
+  const Frame dark = covered(sequence[35]);
+  ASSERT_EQ(odometry.step(dark).status, TrackStatus::kLost);
+  EXPECT_EQ(odometry.allocations(), 0u);
+  const std::uint64_t before = allocations();
+  odometry.tracker().relocalise(KeyframeId{0}, true_T_c_w(2));
+  EXPECT_EQ(allocations(), before);
+  ASSERT_EQ(odometry.step(sequence[2]).status, TrackStatus::kTracking);
+  EXPECT_EQ(odometry.allocations(), 0u);
+  // Carried to the start again, and nobody says so: a new part is started after a while.
+  for (std::size_t i = 3; i < 35; ++i) odometry.step(sequence[i]);
+  bool started = false;
+  for (int i = 0; i < 40 && !started; ++i) {
+    Frame frame = sequence[2];
+    frame.index = 100 + i;
+    frame.t_ns = 10'000'000'000 + i * std::int64_t{33'000'000};
+    const TrackResult result = odometry.step(frame);
+    EXPECT_EQ(odometry.allocations(), 0u) << i;
+    started = result.proposed;
+  }
+  EXPECT_TRUE(started);
+}
+
+TEST(Tracker, DoesNotInventAPoseInAnotherPlace) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  Odometry odometry(SensorKind::kStereo);
+  for (std::size_t i = 0; i < 15; ++i) odometry.step(sequence[i]);
+  RenderedScene other(test_rig(SensorKind::kStereo, 320, 240), {3, 2, 5}, 1234);
+  for (int i = 0; i < 5; ++i) {
+    FrameImages images;
+    other.render(true_T_c_w(15 + i), 2, images);
+    Frame frame = sequence[static_cast<std::size_t>(15 + i)];
+    frame.left = images.left.level(0).clone();
+    frame.right = images.right.level(0).clone();
+    EXPECT_EQ(odometry.step(frame).status, TrackStatus::kLost) << i;
+  }
+}
+
+TEST(Tracker, SaysThatItIsLostForWhatWasMissedBefore) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  const auto cause_after = [&](std::int64_t missing, std::int64_t gap_ns) {
+    Odometry odometry(SensorKind::kStereo);
+    for (std::size_t i = 0; i < 15; ++i) odometry.step(sequence[i]);
+    // Turned far away meanwhile.
+    RenderedScene scene(test_rig(SensorKind::kStereo, 320, 240), {3, 2, 5}, 21);
+    FrameImages images;
+    scene.render(SE3(SO3::exp(Vector3(0, 1.2, 0)), Vector3::Zero()) * true_T_c_w(14), 2, images);
+    Frame frame = sequence[15];
+    frame.index += missing;
+    frame.t_ns += gap_ns;
+    frame.left = images.left.level(0).clone();
+    frame.right = images.right.level(0).clone();
+    const TrackResult result = odometry.step(frame);
+    EXPECT_EQ(result.status, TrackStatus::kLost);
+    return result.cause;
+  };
+  EXPECT_EQ(cause_after(20, 700'000'000), LostCause::kFramesMissing);
+  EXPECT_EQ(cause_after(0, 700'000'000), LostCause::kGapInTime);
+  const LostCause neither = cause_after(0, 0);
+  EXPECT_TRUE(neither == LostCause::kTooFewMatches || neither == LostCause::kTooFewCandidates)
+      << describe(neither);
+}
+
+TEST(Tracker, GoesWhereItIsRelocalised) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  Odometry odometry(SensorKind::kStereo);
+  for (std::size_t i = 0; i < 35; ++i) odometry.step(sequence[i]);
+  odometry.step(covered(sequence[35]));
+  // The camera is put back to the start: too far for the last good frame to help.
+  ASSERT_EQ(odometry.step(sequence[2]).status, TrackStatus::kLost);
+  const SE3 wrong(SO3::exp(Vector3(0, 1.5, 0)), Vector3::Zero());
+  odometry.tracker().relocalise(KeyframeId{0}, wrong * true_T_c_w(2));
+  EXPECT_EQ(odometry.step(sequence[2]).status, TrackStatus::kLost);
+  const SE3 off(SO3::exp(Vector3(0.01, -0.01, 0)), Vector3::Zero());
+  odometry.tracker().relocalise(KeyframeId{0}, off * true_T_c_w(2));
+  const TrackResult found = odometry.step(sequence[2]);
+  ASSERT_EQ(found.status, TrackStatus::kTracking);
+  EXPECT_LT((odometry.T_c_w(found) * true_T_c_w(2).inverse()).translation().norm(), 0.01);
+  EXPECT_EQ(odometry.step(sequence[3]).status, TrackStatus::kTracking);
+}
+
+TEST(Tracker, IsPlacedExactlyByAnAnswerThatIsAStepOld) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  Odometry odometry(SensorKind::kStereo);
+  for (std::size_t i = 0; i < 35; ++i) odometry.step(sequence[i]);
+  odometry.step(covered(sequence[35]));
+  // A car's step: near points are beyond the radius of the search, far ones alone would leave it 5 cm off.
+  const SE3 moved_since(SO3(), Vector3(0.27, 0.09, 0.9));
+  odometry.tracker().relocalise(KeyframeId{0}, moved_since * true_T_c_w(2));
+  const TrackResult found = odometry.step(sequence[2]);
+  ASSERT_EQ(found.status, TrackStatus::kTracking);
+  EXPECT_LT((odometry.T_c_w(found) * true_T_c_w(2).inverse()).translation().norm(), 0.01);
+}
+
+}  // namespace
+}  // namespace twofold
