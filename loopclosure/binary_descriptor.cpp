@@ -24,7 +24,7 @@ double gaussian(std::mt19937& rng) {
 
 Vector2 draw_in_disc(std::mt19937& rng) {
   for (;;) {
-    const Vector2 p(kPatternSigma * gaussian(rng), kPatternSigma * gaussian(rng));
+    Vector2 p(kPatternSigma * gaussian(rng), kPatternSigma * gaussian(rng));
     if (p.norm() <= kPatternRadius) return p;
   }
 }

@@ -35,7 +35,7 @@ void CornerSelector::select(const ImagePyramid& pyramid, std::vector<DescribedCo
     grid.cell_px = std::max(kSmallestCell, 4 * static_cast<int>(std::lround(cell / 4)));
     grid.columns = base.cols / grid.cell_px + 1;
     grid.rows = base.rows / grid.cell_px + 1;
-    free_cells_.assign(static_cast<std::size_t>(grid.columns * grid.rows), 0);
+    free_cells_.assign(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows), 0);
     grid.occupied = free_cells_;
     found_.clear();
     found_.reserve(free_cells_.size());
