@@ -39,61 +39,66 @@ TEST(SwfProcessModel, VelocityMovesTheBodyForward) {
   EXPECT_LT((T_b_w_next.inverse().translation() - Vector3(1, 0, 0)).norm(), 1e-12);
 }
 
-TEST(SwfEquations, BothEliminationOrdersAgree) {
+/// Random equations of a window with prior, measurements and motion.
+WindowEquations random_equations(int m, int n, int n_prior) {
   std::mt19937 rng(4);
   std::normal_distribution<double> normal(0, 1);
+  const auto draw = [&] { return normal(rng); };
   WindowEquations eq;
-  const int m = 5, n = 12, n_prior = 4;
   eq.reset(m, n);
   eq.prior_landmarks = n_prior;
-  const MatrixX A = MatrixX::NullaryExpr(30, 3 * n_prior + 6, [&] { return normal(rng); });
+  const MatrixX A = MatrixX::NullaryExpr(30, 3 * n_prior + 6, draw);
   eq.prior = A.transpose() * A;
   eq.has_motion = true;
   for (int j = 0; j < m; ++j) {
     for (int l = 0; l < n; ++l) {
       if ((j + l) % 3 == 0) continue;
-      const Matrix36 J_p = Matrix36::NullaryExpr([&] { return normal(rng); });
-      const Matrix3 J_l = Matrix3::NullaryExpr([&] { return normal(rng); });
+      const Matrix36 J_p = Matrix36::NullaryExpr(draw);
+      const Matrix3 J_l = Matrix3::NullaryExpr(draw);
       eq.U[j] += J_p.transpose() * J_p;
       eq.V[l] += J_l.transpose() * J_l;
       eq.couplings.push_back({j, l, J_p.transpose() * J_l});
     }
-    eq.g_poses[j] = Vector6::NullaryExpr([&] { return normal(rng); });
+    eq.g_poses[j] = Vector6::NullaryExpr(draw);
     if (j + 1 == m) break;
-    const Eigen::Matrix<double, 6, 12> D =
-        Eigen::Matrix<double, 6, 12>::NullaryExpr([&] { return normal(rng); });
+    const Eigen::Matrix<double, 6, 12> D = Eigen::Matrix<double, 6, 12>::NullaryExpr(draw);
     eq.U[j] += D.leftCols<6>().transpose() * D.leftCols<6>();
     eq.U[j + 1] += D.rightCols<6>().transpose() * D.rightCols<6>();
     eq.E[j] += D.leftCols<6>().transpose() * D.rightCols<6>();
   }
-  for (int l = 0; l < n; ++l) eq.g_landmarks[l] = Vector3::NullaryExpr([&] { return normal(rng); });
+  for (int l = 0; l < n; ++l) eq.g_landmarks[l] = Vector3::NullaryExpr(draw);
+  return eq;
+}
 
-  // Dense reference, order [landmarks | poses].
-  const int p0 = 3 * n;
+/// The same as one dense matrix, order [landmarks | poses].
+MatrixX dense_information(const WindowEquations& eq) {
+  const int m = eq.pose_count(), n = eq.landmark_count(), p0 = 3 * n, q = 3 * eq.prior_landmarks;
   MatrixX H = MatrixX::Zero(p0 + 6 * m, p0 + 6 * m);
-  VectorX g(p0 + 6 * m);
-  for (int l = 0; l < n; ++l) {
-    H.block<3, 3>(3 * l, 3 * l) = eq.V[l];
-    g.segment<3>(3 * l) = eq.g_landmarks[l];
-  }
+  for (int l = 0; l < n; ++l) H.block<3, 3>(3 * l, 3 * l) = eq.V[l];
   for (int j = 0; j < m; ++j) {
     H.block<6, 6>(p0 + 6 * j, p0 + 6 * j) = eq.U[j];
-    g.segment<6>(p0 + 6 * j) = eq.g_poses[j];
-    if (j + 1 < m) {
-      H.block<6, 6>(p0 + 6 * j, p0 + 6 * j + 6) = eq.E[j];
-      H.block<6, 6>(p0 + 6 * j + 6, p0 + 6 * j) = eq.E[j].transpose();
-    }
+    if (j + 1 == m) break;
+    H.block<6, 6>(p0 + 6 * j, p0 + 6 * j + 6) = eq.E[j];
+    H.block<6, 6>(p0 + 6 * j + 6, p0 + 6 * j) = eq.E[j].transpose();
   }
   for (const auto& c : eq.couplings) {
     H.block<6, 3>(p0 + 6 * c.pose, 3 * c.landmark) += c.W;
     H.block<3, 6>(3 * c.landmark, p0 + 6 * c.pose) += c.W.transpose();
   }
-  const int q = 3 * n_prior;
   H.topLeftCorner(q, q) += eq.prior.topLeftCorner(q, q);
   H.block(0, p0, q, 6) += eq.prior.topRightCorner(q, 6);
   H.block(p0, 0, 6, q) += eq.prior.bottomLeftCorner(6, q);
   H.block<6, 6>(p0, p0) += eq.prior.bottomRightCorner<6, 6>();
-  const MatrixX inverse = H.inverse();
+  return H;
+}
+
+TEST(SwfEquations, BothEliminationOrdersAgree) {
+  const int m = 5, n = 12, p0 = 3 * n;
+  const WindowEquations eq = random_equations(m, n, 4);
+  VectorX g(p0 + 6 * m);
+  for (int l = 0; l < n; ++l) g.segment<3>(3 * l) = eq.g_landmarks[l];
+  for (int j = 0; j < m; ++j) g.segment<6>(p0 + 6 * j) = eq.g_poses[j];
+  const MatrixX inverse = dense_information(eq).inverse();
   const VectorX x = inverse * g;
 
   for (const auto order : {WindowFactor::Order::kMapOntoPath, WindowFactor::Order::kPathOntoMap}) {
