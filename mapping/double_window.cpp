@@ -107,7 +107,8 @@ void select_double_window(const GraphSnapshot& graph, const MapperOptions& optio
   number_nodes(window);
 }
 
-int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now) {
+int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now,
+                           const std::function<void(KeyframeId, KeyframeId)>& leaves) {
   struct Left {
     KeyframeId from, to;
   };
@@ -128,6 +129,7 @@ int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, cons
   for (const auto& [i, j] : left) {
     const Keyframe& from = graph.keyframe(i);
     const Keyframe& to = graph.keyframe(j);
+    if (leaves) leaves(i, j);
     link_marginalised(writer, i, j, present_weight(from, to), to.T_k_w * from.T_k_w.inverse());
   }
   return static_cast<int>(left.size());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "graph/graph_writer.hpp"
@@ -38,9 +39,11 @@ void select_double_window(const GraphSnapshot& graph, const MapperOptions& optio
 /// Marginalisation when W1 moves on: an edge within the old inner window that is not within the new one gets
 /// the present relative pose as its constraint; so does any edge that would otherwise hang on absolute poses
 /// that are no longer optimised together. Returns the number of edges.
+/// @param leaves  if set, is told of every such edge before
 ///
 /// Afterwards an edge without a constraint of its own has an end in W1 and both ends in the double window.
-int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now);
+int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now,
+                           const std::function<void(KeyframeId from, KeyframeId to)>& leaves = {});
 
 /// Window entry, eq. 6.3: keyframes outside of `consistent`, and all their children in the spanning tree, are
 /// set along the relative poses of the tree's edges, so that a loop that does not add up breaks at the rim

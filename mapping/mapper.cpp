@@ -37,6 +37,7 @@ Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
     : rig_(rig),
       options_(validated(options)),
       builder_(rig, options),
+      measurements_(options),
       loop_closer_(rig, options, std::move(search)),
       point_culler_(rig, options.culling) {}
 
@@ -49,6 +50,7 @@ void Mapper::adopt(const GraphSnapshot& graph) {
   // reference.
   window_ = next_window_ = DoubleWindow();
   unit_ = MapUnit();
+  measurements_.clear();
   consistent_.clear();
   if (graph.reference() != kNoKeyframe) consistent_.set(graph.reference(), 0);
 }
@@ -92,6 +94,7 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   const SE3 T_to_from = T_loop_to.inverse() * loop.T_to_from * T_loop_from;
   report.joined += join_parts(writer_, from, to, T_to_from);
   link_marginalised(writer_, from, to, std::max(1, loop.inliers), T_to_from);
+  measurements_.forget(from, to);
   writer_.announce_jump(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
   ++report.loops;
 }
@@ -111,7 +114,7 @@ void Mapper::revisit(KeyframeId tracker_reference) {
 void Mapper::form_windows(MapperReport& report) {
   const StageTime time(report.ms.window);
   select_double_window(graph(), options_, selection_, next_window_);
-  report.edges_marginalised = marginalise_left_edges(writer_, window_, next_window_);
+  leave_inner_window(report);
   report.poses_set = enter_window(writer_, consistent_, next_window_);
   std::swap(window_, next_window_);
   for (const KeyframeId id : inserted_) {
@@ -123,11 +126,22 @@ void Mapper::form_windows(MapperReport& report) {
   report.outer_window = static_cast<int>(window_.nodes.size() - window_.inner);
 }
 
+void Mapper::leave_inner_window(MapperReport& report) {
+  if (!options_.measured_edges) {
+    report.edges_marginalised = marginalise_left_edges(writer_, window_, next_window_);
+    return;
+  }
+  const Rig rig = builder_.problem().rig;  // as solved last
+  report.edges_marginalised = marginalise_left_edges(
+      writer_, window_, next_window_,
+      [&](KeyframeId from, KeyframeId to) { measurements_.measure(graph(), rig, from, to); });
+}
+
 /// Structure-only after poses were set, then eq. 6.4 over everything in the windows.
 void Mapper::optimise(MapperReport& report) {
   {
     const StageTime time(report.ms.build);
-    builder_.build(graph(), window_);
+    builder_.build(graph(), window_, options_.measured_edges ? &measurements_ : nullptr);
     report.points = static_cast<int>(builder_.problem().points.size());
     report.observations = static_cast<int>(builder_.problem().observations.size());
     report.constraints = static_cast<int>(builder_.problem().constraints.size());
@@ -187,6 +201,7 @@ void Mapper::cull(MapperReport& report) {
     report.culled_keyframes =
         cull_redundant_keyframes(writer_, window_, options_.culling, report.culled_points);
     writer_.forget_heirs(static_cast<std::size_t>(options_.culling.keep_heirs));
+    for (const KeyframeId id : report.culled_keyframes) measurements_.forget(id);
   }
 }
 

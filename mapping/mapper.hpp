@@ -9,6 +9,7 @@
 #include "graph/loop_constraint.hpp"
 #include "mapping/culling.hpp"
 #include "mapping/double_window.hpp"
+#include "mapping/edge_measurements.hpp"
 #include "mapping/insertion.hpp"
 #include "mapping/map_unit.hpp"
 #include "mapping/metric_loop.hpp"
@@ -97,6 +98,7 @@ class Mapper {
   void revisit(KeyframeId tracker_reference);
   void form_windows(MapperReport& report);
   void optimise(MapperReport& report);
+  void leave_inner_window(MapperReport& report);
   void solve_in_own_unit(MapperReport& report);
 
   void remove_outliers(MapperReport& report);
@@ -109,6 +111,7 @@ class Mapper {
   WindowBuilder builder_;
   WindowSolver solver_;
   MapUnit unit_;
+  EdgeMeasurements measurements_;
   MetricLoopCloser loop_closer_;
   PointCuller point_culler_;
 

@@ -16,6 +16,9 @@ std::string MapperOptions::invalid_reason() const {
   if (!(edge.sigma_px > 0)) return wrong("edge.sigma_px", "> 0", edge.sigma_px);
   if (!(edge.trans_share > 0)) return wrong("edge.trans_share", "> 0", edge.trans_share);
   if (!(edge.rot_share > 0)) return wrong("edge.rot_share", "> 0", edge.rot_share);
+  if (!(edge.length_share > 0 && edge.length_share <= 1)) {
+    return wrong("edge.length_share", "in (0, 1]", edge.length_share);
+  }
   if (solver.max_iterations < 1) return wrong("solver.max_iterations", ">= 1", solver.max_iterations);
   if (structure_iterations < 0) return wrong("structure_iterations", ">= 0", structure_iterations);
   if (!(sigma_scale > 0)) return wrong("sigma_scale", "> 0", sigma_scale);

@@ -9,9 +9,10 @@ namespace twofold {
 
 /// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
 struct EdgeInformationOptions {
-  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
-  double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
-  double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
+  double sigma_px = 0.5;       ///< standard deviation of a measurement on level 0 [px]
+  double trans_share = 0.1;    ///< share of the ideal translational precision an edge gets, > 0
+  double rot_share = 0.1;      ///< share of the ideal rotational precision an edge gets, > 0
+  double length_share = 0.05;  ///< of what a measured edge says about its own length, in (0, 1]
 };
 
 /// 6.4.1.
@@ -57,6 +58,9 @@ struct MapperOptions {
   /// Lengths of the map in a unit of its own, see MapUnit and Mapper::metres_per_unit. For maps that are read
   /// with it: the tracker takes the graph's lengths for metres.
   bool own_unit = false;
+  /// Pose-pose constraints are made of measurements (EdgeMeasurements) instead of relative poses with the
+  /// precision of eq. 6.2. Edges that were not measured keep that one.
+  bool measured_edges = false;
   MetricLoopOptions loop;
   CullingOptions culling;
   /// If set, is shown each problem of eq. 6.4 as it stands before the joint optimisation: to take problems

@@ -24,7 +24,8 @@ WindowBuilder::WindowBuilder(const Rig& rig, const MapperOptions& options) : opt
   problem_.rig = rig;
 }
 
-void WindowBuilder::build(const GraphSnapshot& graph, const DoubleWindow& window) {
+void WindowBuilder::build(const GraphSnapshot& graph, const DoubleWindow& window,
+                          const EdgeMeasurements* measurements) {
   problem_.poses.resize(window.nodes.size());
   for (std::size_t n = 0; n < window.nodes.size(); ++n) {
     problem_.poses[n].T_k_w = graph.keyframe(window.nodes[n].id).T_k_w;
@@ -32,7 +33,7 @@ void WindowBuilder::build(const GraphSnapshot& graph, const DoubleWindow& window
   }
   collect_points(graph, window);
   collect_observations(graph, window);
-  collect_constraints(graph, window);
+  collect_constraints(graph, window, measurements);
 }
 
 /// Chooses the frame a point is anchored in within the problem; false if the point has to stay out.
@@ -160,7 +161,8 @@ void WindowBuilder::add_observation(const Observation& observation, int pose) {
   entry.information = measurement_information(problem_.rig, observation.level, has_right) / (scale * scale);
 }
 
-void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window) {
+void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window,
+                                        const EdgeMeasurements* measurements) {
   problem_.constraints.clear();
   for (std::size_t n = 0; n < window.nodes.size(); ++n) {
     const Keyframe& from = graph.keyframe(window.nodes[n].id);
@@ -172,8 +174,17 @@ void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const Double
       if (window.is_inner(other) && (!edge.marginalised || shared_points(from, to) >= options_.theta)) {
         continue;
       }
-      problem_.constraints.push_back({static_cast<int>(n), other, relative_pose(graph, from.id, edge),
-                                      edge_information(from, to, edge, problem_.rig, options_.edge)});
+      // So they do for an edge that has not been measured yet: its points are those of W1.
+      if (measurements && !edge.marginalised && edge.weight >= options_.theta) continue;
+      std::optional<EdgeMeasurements::Constraint> measured;
+      if (measurements) measured = measurements->constraint(graph, from.id, to.id, point_position_);
+      if (!measured) {
+        measured = {relative_pose(graph, from.id, edge),
+                    edge_information(from, to, edge, problem_.rig, options_.edge)};
+      }
+      if (measured->information.isZero(0)) continue;
+      problem_.constraints.push_back(
+          {static_cast<int>(n), other, measured->T_to_from, measured->information});
     }
   }
 }

@@ -6,6 +6,7 @@
 #include "graph/graph_writer.hpp"
 #include "graph/id_map.hpp"
 #include "mapping/double_window.hpp"
+#include "mapping/edge_measurements.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {
@@ -20,7 +21,10 @@ class WindowBuilder {
  public:
   WindowBuilder(const Rig& rig, const MapperOptions& options);
 
-  void build(const GraphSnapshot& graph, const DoubleWindow& window);
+  /// @param measurements  of edges, if they are kept: then an edge speaks for its points outside of the
+  ///                      problem only
+  void build(const GraphSnapshot& graph, const DoubleWindow& window,
+             const EdgeMeasurements* measurements = nullptr);
   [[nodiscard]] WindowProblem& problem() { return problem_; }
   [[nodiscard]] const WindowProblem& problem() const { return problem_; }
   [[nodiscard]] const std::vector<PointId>& point_ids() const { return point_ids_; }
@@ -43,7 +47,8 @@ class WindowBuilder {
   /// Position in the problem of a point that is in front of the pose; -1 for others.
   [[nodiscard]] int usable_point(PointId id, int pose) const;
   void add_observation(const Observation& observation, int pose);
-  void collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window);
+  void collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window,
+                           const EdgeMeasurements* measurements);
   [[nodiscard]] bool anchor_point(const GraphSnapshot& graph, const DoubleWindow& window, PointId id,
                                   int seen_from, WindowProblem::Point& point) const;
 

@@ -33,6 +33,9 @@ int main(int argc, char** argv) {
   app.add_option("--trans-share", options.edge.trans_share, "of an edge's ideal translational precision");
   app.add_option("--rot-share", options.edge.rot_share, "of an edge's ideal rotational precision");
   app.add_flag("--metres", options.metres, "double windows without a unit of the map's own");
+  app.add_option("--length-share", options.edge.length_share,
+                 "of what a measured edge says about its length");
+  app.add_flag("--coarse-edges", options.coarse_edges, "stereo: edges by eq. 6.2 instead of measured ones");
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
   app.add_option("--only", only, "run these parts only: stereo mono double_loop");
   app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);
@@ -65,6 +68,8 @@ int main(int argc, char** argv) {
                                 {"max_anchors", options.max_anchors},
                                 {"trans_share", options.edge.trans_share},
                                 {"rot_share", options.edge.rot_share},
+                                {"length_share", options.edge.length_share},
+                                {"coarse_edges", options.coarse_edges},
                                 {"metres", options.metres}};
     for (const auto& [name, experiment] : all) {
       if (!only.empty() && std::find(only.begin(), only.end(), name) == only.end()) continue;

@@ -17,13 +17,14 @@ constexpr std::size_t kSettled = kInner + kOuter;  // first keyframe that does n
 enum Method : std::size_t { kBa, kConstant, kGlobal, kFixedRim, kMethods };
 constexpr const char* kNames[kMethods] = {"BA", "cDWO", "gDWO", "fixed rim"};
 
-MapperOptions mapper_options(Method method, const DoubleWindowExperimentOptions& options) {
+MapperOptions mapper_options(Method method, SensorKind kind, const DoubleWindowExperimentOptions& options) {
   MapperOptions mapper = simulation_mapper_options(options);
   mapper.inner_window = method == kBa ? kUnbounded : kInner;
   mapper.outer_window = kOuter;
   mapper.global_outer_window = method == kGlobal;
   mapper.fixed_outer_window = method == kFixedRim;
   mapper.own_unit = method != kBa && !options.metres;
+  mapper.measured_edges = kind == SensorKind::kStereo && !options.coarse_edges;
   return mapper;
 }
 
@@ -32,7 +33,7 @@ std::vector<Rounds> run_trial(const Scene& scene, const DoubleWindowExperimentOp
   std::vector<Mapper> mappers;
   std::vector<Feeder> feeders;
   for (std::size_t m = 0; m < kMethods; ++m) {
-    mappers.emplace_back(scene.rig, mapper_options(static_cast<Method>(m), options));
+    mappers.emplace_back(scene.rig, mapper_options(static_cast<Method>(m), scene.rig.kind, options));
     feeders.emplace_back(scene, Association::kGlobal);
   }
   std::vector<Rounds> rounds(kMethods, Rounds(static_cast<std::size_t>(scene.keyframes())));
@@ -125,6 +126,27 @@ void state_cost(const std::vector<MethodRounds>& m, const std::string& kind, Rep
       at_end(kConstant) < at_end(kGlobal) && at_end(kGlobal) < at_end(kBa));
 }
 
+/// Errors of every trial, so that runs over different seeds can be put together.
+nlohmann::json trial_errors(const std::vector<MethodRounds>& methods, unsigned seed) {
+  const std::size_t end = methods[kBa].keyframes(), first = std::min(kSettled, end - 1);
+  const std::size_t last = end - std::min<std::size_t>(100, end - first);
+  auto list = nlohmann::json::array();
+  for (const MethodRounds& method : methods) {
+    for (std::size_t t = 0; t < method.trials.size(); ++t) {
+      const MethodRounds one{method.name, {method.trials[t]}};
+      nlohmann::json& entry = list.emplace_back();
+      entry = {{"method", method.name}, {"seed", seed + t}};
+      const auto add = [&](const char* level, const RelativeError& error) {
+        entry[level] = {{"rmse", error.rmse()}, {"scaled", error.scaled_rmse()}, {"edges", error.edges}};
+      };
+      add("inner", one.error(&Round::inner, first, end));
+      add("both", one.error(&Round::both, first, end));
+      add("all", one.error(&Round::all, last, end));
+    }
+  }
+  return list;
+}
+
 }  // namespace
 
 void spiral_experiment(const DoubleWindowExperimentOptions& options, SensorKind kind, Report& report) {
@@ -144,6 +166,7 @@ void spiral_experiment(const DoubleWindowExperimentOptions& options, SensorKind 
     }
   });
   write_rounds(name, label, methods, kind == SensorKind::kMono, report);
+  report.json()[name] = trial_errors(methods, options.seed);
   state_accuracy(methods, label, report);
   state_cost(methods, label, report);
 }
