@@ -28,6 +28,9 @@ namespace twofold {
 ///
 /// Springs hold lengths, the points of one camera do not: the three-view terms that pairs cannot express let
 /// the scale go. What an edge says about its own length is therefore reduced to a share (length_share).
+///
+/// For an outer window that holds all keyframes: of one that is cut off, the pairs beyond it, and with them
+/// their part of the points they share, are missing.
 class EdgeMeasurements {
  public:
   explicit EdgeMeasurements(const MapperOptions& options) : options_(options) {}

@@ -16,7 +16,7 @@ struct DoubleWindowExperimentOptions {
   SceneOptions scene;
   int max_anchors = 25;         ///< that take places of W2 for their points (6.2.4)
   bool metres = false;          ///< lengths in metres throughout, not in a unit of the map's own (MapUnit)
-  bool coarse_edges = false;    ///< eq. 6.2 and relative poses as estimated, not EdgeMeasurements (stereo)
+  bool coarse_edges = false;    ///< eq. 6.2 for gDWO as well, not EdgeMeasurements (stereo)
   EdgeInformationOptions edge;  ///< shares; sigma_px follows the scene's noise
 };
 

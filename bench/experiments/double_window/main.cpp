@@ -35,7 +35,8 @@ int main(int argc, char** argv) {
   app.add_flag("--metres", options.metres, "double windows without a unit of the map's own");
   app.add_option("--length-share", options.edge.length_share,
                  "of what a measured edge says about its length");
-  app.add_flag("--coarse-edges", options.coarse_edges, "stereo: edges by eq. 6.2 instead of measured ones");
+  app.add_flag("--coarse-edges", options.coarse_edges,
+               "stereo: eq. 6.2 for gDWO's edges as well, which are measured otherwise");
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
   app.add_option("--only", only, "run these parts only: stereo mono double_loop");
   app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);

@@ -24,7 +24,8 @@ MapperOptions mapper_options(Method method, SensorKind kind, const DoubleWindowE
   mapper.global_outer_window = method == kGlobal;
   mapper.fixed_outer_window = method == kFixedRim;
   mapper.own_unit = method != kBa && !options.metres;
-  mapper.measured_edges = kind == SensorKind::kStereo && !options.coarse_edges;
+  // A point's information is split among all pairs of keyframes that see it, of which cDWO has only some.
+  mapper.measured_edges = method == kGlobal && kind == SensorKind::kStereo && !options.coarse_edges;
   return mapper;
 }
 
