@@ -1,4 +1,5 @@
 // Experiments of "Visual SLAM: Why Filter?" (Strasdat 2012, chapter 4).
+#include <malloc.h>
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +12,10 @@
 
 int main(int argc, char** argv) {
   using namespace twofold::bench;
+  // Freed memory stays with the process: pages new from the kernel are no matter of either method, and
+  // whether a matrix gets some hangs on its size and on what ran before.
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
   WhyFilterOptions options;
   std::string out = "why_filter_results";
   std::vector<std::string> only;
