@@ -9,6 +9,16 @@
 #include "geometry/check.hpp"
 
 namespace twofold {
+namespace {
+
+/// resize() alone takes twice the memory when one element is missing, and these live as long as the solver.
+template <class T>
+void resize_exactly(std::vector<T>& values, std::size_t size) {
+  values.reserve(size);
+  values.resize(size);
+}
+
+}  // namespace
 
 void BlockCholesky::set_pattern(CouplingPattern pattern) {
   if (pattern == pattern_ && !column_begin_.empty()) return;
@@ -61,12 +71,12 @@ void BlockCholesky::find_fill() {
   }
   row_begin_.assign(n + 1, 0);
   for (int k = 0; k < n; ++k) row_begin_[k + 1] = row_begin_[k] + row_count[k];
-  row_entries_.resize(row_begin_[n]);
+  resize_exactly(row_entries_, static_cast<std::size_t>(row_begin_[n]));
   std::vector<int> next(row_begin_.begin(), row_begin_.end() - 1);
   for (int j = 0; j < n; ++j) {
     for (int b = column_begin_[j] + 1; b < column_begin_[j + 1]; ++b) row_entries_[next[row_[b]]++] = {j, b};
   }
-  blocks_.resize(row_.size());
+  resize_exactly(blocks_, row_.size());
   inverse_diagonal_.resize(n);
   place_.assign(n, -1);
 }

@@ -56,10 +56,11 @@ std::uint32_t& GraphWriter::anchored(KeyframeId id) {
 
 void GraphWriter::add_point(PointId id, MapPoint point) {
   TWOFOLD_CHECK(index(id) >= graph_.point_count(), "a point is added once, in order of ids");
-  if (point.alive()) ++anchored(point.anchor);
-  graph_.points_.extend(index(id));
+  graph_.points_.extend(std::size_t{index(id)} + 1);
+  if (!point.alive()) return;
+  ++anchored(point.anchor);
   if (!point.observers) point.observers = std::make_shared<const ObserverList>();
-  graph_.points_.push_back(std::move(point));
+  graph_.points_.mutate(index(id)) = std::move(point);
 }
 
 void GraphWriter::set_anchor(PointId id, KeyframeId anchor, const Vector3& psi) {
@@ -151,9 +152,7 @@ void GraphWriter::cull_point(PointId id) {
   const ObserverList observers = *graph_.point(id).observers;
   for (const KeyframeId keyframe : observers) remove_observations(keyframe, std::span(&id, 1));
   --anchored(graph_.point(id).anchor);
-  graph_.points_.mutate(index(id)) = MapPoint{};
-  // Points come and go for hours: where all of a chunk are gone, so is the chunk.
-  graph_.points_.forget_chunk_if(index(id), [](const MapPoint& point) { return !point.alive(); });
+  graph_.points_.forget(index(id));
 }
 
 void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
@@ -169,8 +168,7 @@ void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
   for (const Edge& edge : edges) remove_edge(id, edge.other);
   put_heir(id, {heir, graph_.keyframe(id).anchored, PackedPose(T_this_heir)});
   heirs_.push_back({id, ++culled_});
-  graph_.keyframes_.mutate(index(id)) = Keyframe{};
-  graph_.keyframes_.forget_chunk_if(index(id), [](const Keyframe& keyframe) { return keyframe.culled(); });
+  graph_.keyframes_.forget(index(id));
 }
 
 void GraphWriter::shorten_heirs(KeyframeId id) {
@@ -193,8 +191,7 @@ void GraphWriter::forget_heirs(std::size_t keep, std::size_t visits) {
       heirs_.push_back(kept);
       continue;
     }
-    graph_.heirs_.mutate(index(kept.id)) = Heir{};
-    graph_.heirs_.forget_chunk_if(index(kept.id), [](const Heir& heir) { return heir.id == kNoKeyframe; });
+    graph_.heirs_.forget(index(kept.id));
   }
 }
 

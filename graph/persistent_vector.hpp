@@ -2,19 +2,22 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
-#include <memory>
+#include <cstdint>
 #include <utility>
 
 #include "geometry/check.hpp"
+#include "graph/shared_array.hpp"
 
 namespace twofold {
 
-/// Vector whose copies share structure: a tree of fan-out 2^kBits with values in chunks of 2^kLeafBits at the
-/// leaves. Chunks that were never written, or forgotten, take no memory.
+/// Vector whose copies share structure: a tree of fan-out 2^kBits with chunks of 2^kLeafBits values at the
+/// leaves. Nodes and chunks hold, packed, what is there: entries that were never written, or forgotten, take
+/// no memory, however they are spread among others.
 ///
-/// Copy: O(1). Read: O(log n). push_back, mutate: O(log n), and copies a node only if another version shares
-/// it.
+/// Copy: O(1). Read: O(log n). push_back, mutate, forget: O(log n), and copies a node only if another version
+/// shares it.
 ///
 /// Threads. One thread (the writer) copies, changes and destroys versions; others may only read a version
 /// that was published to them and that the writer keeps alive. Whether a node is shared is asked of its use
@@ -22,21 +25,15 @@ namespace twofold {
 /// published version has the node.
 template <class T, int kBits = 5, int kLeafBits = kBits>
 class PersistentVector {
+  static_assert(kBits > 0 && kBits <= 5 && kLeafBits >= 0 && kLeafBits <= 5, "a bit each in 32");
   static constexpr std::size_t kWidth = std::size_t{1} << kBits;
   static constexpr std::size_t kLeafWidth = std::size_t{1} << kLeafBits;
   static constexpr std::size_t kLeafMask = kLeafWidth - 1;
   static constexpr int kMaxHeight = 64 / kBits + 1;
+  /// A node: those of its places that are taken, packed in their order.
   struct Node {
-    virtual ~Node() = default;
-    Node() = default;
-    Node(const Node&) = default;
-    Node& operator=(const Node&) = delete;
-  };
-  struct Inner final : Node {
-    std::array<std::shared_ptr<Node>, kWidth> children;
-  };
-  struct Leaf final : Node {
-    std::array<T, kLeafWidth> values{};
+    SharedArray entries;        ///< of Node, or T in a leaf
+    std::uint32_t present = 0;  ///< bit n: place n is taken
   };
 
  public:
@@ -47,51 +44,39 @@ class PersistentVector {
 
   /// i < size().
   [[nodiscard]] const T& operator[](std::size_t i) const {
-    const Node* node = root_.get();
-    for (int level = height_; level > 0 && node; --level) {
-      node = static_cast<const Inner*>(node)->children[child_at(level, i)].get();
-    }
-    if (!node) return forgotten();
-    return static_cast<const Leaf*>(node)->values[i & kLeafMask];
+    const T* value = find(i);
+    return value ? *value : forgotten();
   }
 
-  /// Reference for writing to entry i < size(); valid until the next copy of this vector.
+  /// Reference for writing to entry i < size(); valid until this vector is changed otherwise, or copied.
   [[nodiscard]] T& mutate(std::size_t i) {
     TWOFOLD_CHECK(i < size_, "index beyond the vector's end");
-    return leaf_for_writing(i).values[i & kLeafMask];
+    Node* node = &root_;
+    for (int level = height_; level > 0; --level) node = &own<Node>(*node, place_at(level, i));
+    return own<T>(*node, i & kLeafMask);
   }
 
-  /// Frees the chunk of entry i < size() if `forgettable` holds for all its entries: they then read as T{}
-  /// until they are written again. Returns whether it did. Other versions keep theirs.
-  template <class Predicate>
-  bool forget_chunk_if(std::size_t i, Predicate&& forgettable) {
+  /// Entry i < size() reads as T{} until it is written again. Other versions keep theirs.
+  void forget(std::size_t i) {
     TWOFOLD_CHECK(i < size_, "index beyond the vector's end");
-    if (height_ == 0) return false;
-    const std::size_t begin = i & ~kLeafMask;
-    for (std::size_t n = begin; n < begin + kLeafWidth && n < size_; ++n) {
-      if (!forgettable((*this)[n])) return false;
-    }
-    std::array<std::shared_ptr<Node>*, kMaxHeight> path;  // by level; the chunk's own is level 0
+    if (!find(i)) return;
+    std::array<Node*, kMaxHeight + 1> path;  // by level
     path[static_cast<std::size_t>(height_)] = &root_;
     for (int level = height_; level > 0; --level) {
       const auto at = static_cast<std::size_t>(level);
-      path[at - 1] = &own<Inner>(*path[at]).children[child_at(level, i)];
+      path[at - 1] = &own<Node>(*path[at], place_at(level, i));
     }
-    path[0]->reset();
-    // Nodes that lead nowhere go too, the root excepted.
-    for (int level = 1; level < height_; ++level) {
-      const auto& slot = *path[static_cast<std::size_t>(level)];
-      const auto& children = static_cast<const Inner&>(*slot).children;
-      if (std::any_of(children.begin(), children.end(), [](const auto& child) { return child != nullptr; }))
-        break;
-      path[static_cast<std::size_t>(level)]->reset();
+    leave_out<T>(*path[0], i & kLeafMask);
+    for (int level = 1; level <= height_; ++level) {
+      const auto at = static_cast<std::size_t>(level);
+      if (path[at - 1]->present != 0) break;
+      leave_out<Node>(*path[at], place_at(level, i));
     }
-    return true;
   }
 
   void push_back(T value) {
     extend(size_ + 1);
-    leaf_for_writing(size_ - 1).values[(size_ - 1) & kLeafMask] = std::move(value);
+    mutate(size_ - 1) = std::move(value);
   }
 
   /// Makes the vector at least `size` long; new entries read as T{}, and take no memory before they are
@@ -106,42 +91,72 @@ class PersistentVector {
     static const T value{};
     return value;
   }
-  /// Which child of a node at `level` >= 1 (leaves are at 0) leads to entry i.
-  [[nodiscard]] static std::size_t child_at(int level, std::size_t i) {
+  /// Which place of a node at `level` >= 1 (leaves are at 0) leads to entry i.
+  [[nodiscard]] static std::size_t place_at(int level, std::size_t i) {
     return (i >> (kLeafBits + kBits * (level - 1))) & (kWidth - 1);
   }
-  [[nodiscard]] std::size_t capacity() const { return root_ ? kLeafWidth << (kBits * height_) : 0; }
+  [[nodiscard]] std::size_t capacity() const { return kLeafWidth << (kBits * height_); }
 
   void grow() {
-    if (!root_) {
-      root_ = std::make_shared<Leaf>();
-      return;
-    }
-    auto above = std::make_shared<Inner>();
-    above->children[0] = std::move(root_);
+    Node above;
+    if (root_.present != 0) own<Node>(above, 0) = std::move(root_);
     root_ = std::move(above);
     ++height_;
   }
 
-  template <class N>
-  static N& own(std::shared_ptr<Node>& slot) {
-    if (!slot) {
-      slot = std::make_shared<N>();
-    } else if (slot.use_count() > 1) {
-      slot = std::make_shared<N>(static_cast<const N&>(*slot));
-    }
-    return static_cast<N&>(*slot);
-  }
-
-  Leaf& leaf_for_writing(std::size_t i) {
-    std::shared_ptr<Node>* slot = &root_;
+  /// nullptr if entry i takes no memory.
+  [[nodiscard]] const T* find(std::size_t i) const {
+    const Node* node = &root_;
     for (int level = height_; level > 0; --level) {
-      slot = &own<Inner>(*slot).children[child_at(level, i)];
+      node = entry<Node>(*node, place_at(level, i));
+      if (!node) return nullptr;
     }
-    return own<Leaf>(*slot);
+    return entry<T>(*node, i & kLeafMask);
   }
 
-  std::shared_ptr<Node> root_;
+  /// What is in a node's place: a Node, or a T in a leaf; nullptr if it is not taken.
+  template <class E>
+  [[nodiscard]] static E* entry(const Node& node, std::size_t place) {
+    const std::uint32_t bit = std::uint32_t{1} << place;
+    if ((node.present & bit) == 0) return nullptr;
+    return node.entries.template data<E>() + std::popcount(node.present & (bit - 1));
+  }
+
+  /// The same for writing: takes the place if need be.
+  template <class E>
+  [[nodiscard]] static E& own(Node& node, std::size_t place) {
+    const std::uint32_t present = node.present | std::uint32_t{1} << place;
+    if (present != node.present || node.entries.shared()) repack<E>(node, present);
+    return *entry<E>(node, place);
+  }
+  template <class E>
+  static void leave_out(Node& node, std::size_t place) {
+    repack<E>(node, node.present & ~(std::uint32_t{1} << place));
+  }
+
+  /// Gives the node an array of its own, with room for exactly the places in `present`.
+  template <class E>
+  static void repack(Node& node, std::uint32_t present) {
+    Node packed;
+    packed.present = present;
+    if (present != 0) {
+      packed.entries = SharedArray::make<E>(static_cast<std::size_t>(std::popcount(present)));
+      const bool shared = node.entries.shared();
+      E* to = packed.entries.template data<E>();
+      for (std::uint32_t rest = present; rest != 0; rest &= rest - 1, ++to) {
+        E* from = entry<E>(node, static_cast<std::size_t>(std::countr_zero(rest)));
+        if (!from) continue;
+        if (shared) {
+          *to = *from;
+        } else {
+          *to = std::move(*from);
+        }
+      }
+    }
+    node = std::move(packed);
+  }
+
+  Node root_;
   std::size_t size_ = 0;
   int height_ = 0;  ///< levels of inner nodes
 };

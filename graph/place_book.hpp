@@ -26,14 +26,13 @@ class PlaceBook {
   }
 
   void set(KeyframeId id, PlaceAppearance place) {
-    while (places_.size() <= index(id)) places_.push_back(nullptr);
+    places_.extend(std::size_t{index(id)} + 1);
     places_.mutate(index(id)) = std::make_shared<const PlaceAppearance>(std::move(place));
     ++version_;
   }
   /// Of a keyframe that was culled; id must be less than size().
   void forget(KeyframeId id) {
-    places_.mutate(index(id)).reset();
-    (void)places_.forget_chunk_if(index(id), [](const auto& place) { return place == nullptr; });
+    places_.forget(index(id));
     ++version_;
   }
 

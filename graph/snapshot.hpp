@@ -56,10 +56,10 @@ class GraphSnapshot {
   std::uint64_t version_ = 0;
   KeyframeId reference_ = kNoKeyframe;
   MapChange last_jump_;
-  // Small chunks: what was culled is freed chunk by chunk, and what stays is spread among it.
+  // Small chunks: a write copies one.
   PersistentVector<Keyframe, 5, 3> keyframes_;
   PersistentVector<MapPoint, 5, 3> points_;
-  PersistentVector<Heir, 5, 2> heirs_;  ///< of culled keyframes; up to the newest of them
+  PersistentVector<Heir, 5, 3> heirs_;  ///< of culled keyframes; up to the newest of them
 };
 
 /// Binary search in keyframe.observations; nullptr if the keyframe does not observe the point.

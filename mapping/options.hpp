@@ -36,7 +36,7 @@ struct CullingOptions {
   /// Keyframes culled last whose heirs stay known, >= max_keyframes. Tracker and loop closer may refer to a
   /// keyframe for as long as a message is under way between the threads: some tens of rounds, each of which
   /// culls max_keyframes at most.
-  int keep_heirs = 512;
+  int keep_heirs = 128;
   int max_misses = 8;  ///< keyframes in a row a weak point should have been seen from and was not
 };
 

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <memory>
 #include <random>
+#include <tuple>
 #include <vector>
 
 namespace twofold {
@@ -45,10 +48,14 @@ TEST(PersistentVector, VersionsEqualReferenceVectorsUnderRandomWrites) {
     if (action < 40 || truth.empty()) {
       v.push_back(step);
       truth.push_back(step);
-    } else if (action < 96) {
+    } else if (action < 70) {
       const std::size_t i = rng() % truth.size();
       v.mutate(i) = -step;
       truth[i] = -step;
+    } else if (action < 96) {
+      const std::size_t i = rng() % truth.size();
+      v.forget(i);
+      truth[i] = 0;
     } else if (action < 98) {
       versions.emplace_back(v, truth);
     } else if (!versions.empty()) {  // versions die in any order; now and then the writer goes back to one
@@ -109,61 +116,71 @@ TEST(PersistentVector, AppendingLeavesOlderVersionsAtTheirSize) {
   for (std::size_t i = 0; i < 80; ++i) EXPECT_EQ(v[i], static_cast<int>(i));
 }
 
-TEST(PersistentVector, ForgottenChunksReadAsDefaultsUntilWritten) {
+TEST(PersistentVector, ForgottenEntriesReadAsDefaultsUntilWritten) {
   PersistentVector<int, 2> v;
   for (int i = 0; i < 70; ++i) v.push_back(i + 1);
   const PersistentVector<int, 2> version = v;
-  const auto none = [](int) { return false; };
-  const auto all = [](int) { return true; };
-  EXPECT_FALSE(v.forget_chunk_if(9, none));
-  EXPECT_TRUE(v.forget_chunk_if(9, all));
-  EXPECT_TRUE(v.forget_chunk_if(69, all));  // the last one is not full
+  v.forget(9);
+  v.forget(69);
+  v.forget(69);  // nothing to do
   for (std::size_t i = 0; i < 70; ++i) {
-    const bool gone = (i >= 8 && i < 12) || i >= 68;
-    EXPECT_EQ(v[i], gone ? 0 : static_cast<int>(i) + 1);
+    EXPECT_EQ(v[i], i == 9 || i == 69 ? 0 : static_cast<int>(i) + 1);
     EXPECT_EQ(version[i], static_cast<int>(i) + 1);
   }
-  v.mutate(10) = -1;
+  v.mutate(9) = -1;
   v.push_back(-2);
-  EXPECT_EQ(v[10], -1);
-  EXPECT_EQ(v[9], 0);
+  EXPECT_EQ(v[9], -1);
   EXPECT_EQ(v[69], 0);
   EXPECT_EQ(v[70], -2);
-  EXPECT_FALSE(v.forget_chunk_if(9, [](int value) { return value == 0; }));
 }
 
-TEST(PersistentVector, RangesThatWereNeverWrittenOrAllForgottenTakeNoMemory) {
-  struct Living {
-    Living() { ++count(); }
-    Living(const Living& other) : value(other.value) { ++count(); }
-    Living& operator=(const Living&) = default;
-    ~Living() { --count(); }
-    static long& count() {
-      static long living = 0;
-      return living;
-    }
-    int value = 0;
-  };
+/// Knows how many of its kind there are. Aligned as the graph's entries, which have poses.
+struct alignas(32) Living {
+  Living() { ++count; }
+  Living(const Living& other) : value(other.value) { ++count; }
+  Living& operator=(const Living&) = default;
+  ~Living() { --count; }
+  static inline long count = 0;
+  int value = 0;
+};
+
+TEST(PersistentVector, OnlyEntriesThatWereWrittenAndNotForgottenTakeMemory) {
   PersistentVector<Living, 2, 1> v;
   v.extend(1000);
   EXPECT_EQ(v.size(), 1000U);
   EXPECT_EQ(v[999].value, 0);
-  const long none = Living::count();
-  for (std::size_t i = 0; i < 1000; ++i) v.mutate(i).value = static_cast<int>(i);
-  for (std::size_t i = 0; i < 1000; ++i) ASSERT_EQ(v[i].value, static_cast<int>(i));
-  EXPECT_GE(Living::count(), none + 998);
+  const long none = Living::count;  // the one that all unwritten entries read as
+  for (std::size_t i = 0; i < 1000; i += 7) v.mutate(i).value = static_cast<int>(i);
+  EXPECT_EQ(Living::count, none + 143);
+  for (std::size_t i = 0; i < 1000; ++i) ASSERT_EQ(v[i].value, i % 7 == 0 ? static_cast<int>(i) : 0);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(&v[700]) % 32, 0U);
   v.extend(7);  // nothing to do
   EXPECT_EQ(v.size(), 1000U);
-  const auto all = [](const Living&) { return true; };
-  for (std::size_t i = 0; i < 1000; i += 2) EXPECT_TRUE(v.forget_chunk_if(i, all));
-  EXPECT_LE(Living::count(), none);
-  for (std::size_t i = 0; i < 1000; ++i) ASSERT_EQ(v[i].value, 0);
-  EXPECT_TRUE(v.forget_chunk_if(4, all));  // where whole branches are gone
+  for (std::size_t i = 0; i < 1000; i += 14) v.forget(i);
+  EXPECT_EQ(Living::count, none + 71);
+  for (std::size_t i = 0; i < 1000; ++i) ASSERT_EQ(v[i].value, i % 14 == 7 ? static_cast<int>(i) : 0);
+  for (std::size_t i = 0; i < 1000; ++i) v.forget(i);
+  EXPECT_EQ(Living::count, none);
   v.mutate(500).value = 5;
   v.push_back({});
   EXPECT_EQ(v[500].value, 5);
   EXPECT_EQ(v[501].value, 0);
   EXPECT_EQ(v.size(), 1001U);
+}
+
+TEST(PersistentVector, ValuesEndWithTheLastVersionThatHasThem) {
+  const long none = Living::count;
+  {
+    PersistentVector<Living, 2> v;
+    for (int i = 0; i < 100; ++i) v.push_back({});
+    auto version = std::make_unique<PersistentVector<Living, 2>>(v);
+    const long before = Living::count;
+    for (std::size_t i = 0; i < 100; ++i) v.forget(i);
+    EXPECT_EQ(Living::count, before);
+    version.reset();
+    EXPECT_LE(Living::count, before - 100);
+  }
+  EXPECT_LE(Living::count, none + 1);
 }
 
 TEST(PersistentVector, WritingBeyondTheEndIsABug) {
