@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "imaging/guided_search.hpp"
+#include "mapping/edges.hpp"
 
 namespace twofold {
 namespace {
@@ -29,20 +30,6 @@ std::optional<Pull> pull_of(const Rig& rig, const Keyframe& keyframe, const Obse
   Vector3 r = observation.z.cast<double>() - rig.project(x);
   if (!has_right) r.z() = 0;
   return Pull{J.transpose() * information.asDiagonal() * J, J.transpose() * information.cwiseProduct(r)};
-}
-
-template <class Visit>
-void for_shared_points(const Keyframe& a, const Keyframe& b, Visit&& visit) {
-  auto i = a.observations->begin(), j = b.observations->begin();
-  while (i != a.observations->end() && j != b.observations->end()) {
-    if (i->point < j->point) {
-      ++i;
-    } else if (j->point < i->point) {
-      ++j;
-    } else {
-      visit(*i++, *j++);
-    }
-  }
 }
 
 double one_over_n(const GraphSnapshot& graph, PointId id) {

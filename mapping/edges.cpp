@@ -34,16 +34,7 @@ void covisible_keyframes(const GraphSnapshot& graph, KeyframeId id, IdMap& count
 
 int shared_points(const Keyframe& a, const Keyframe& b) {
   int shared = 0;
-  auto i = a.observations->begin(), j = b.observations->begin();
-  while (i != a.observations->end() && j != b.observations->end()) {
-    if (i->point < j->point) {
-      ++i;
-    } else if (j->point < i->point) {
-      ++j;
-    } else {
-      ++shared, ++i, ++j;
-    }
-  }
+  for_shared_points(a, b, [&](const auto&, const auto&) { ++shared; });
   return shared;
 }
 

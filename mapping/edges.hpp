@@ -18,6 +18,21 @@ struct Covisible {
 void covisible_keyframes(const GraphSnapshot& graph, KeyframeId id, IdMap& counts,
                          std::vector<Covisible>& result);
 
+/// visit(observation by a, observation by b) for each point seen from both keyframes, ascending.
+template <class Visit>
+void for_shared_points(const Keyframe& a, const Keyframe& b, Visit&& visit) {
+  auto i = a.observations->begin(), j = b.observations->begin();
+  while (i != a.observations->end() && j != b.observations->end()) {
+    if (i->point < j->point) {
+      ++i;
+    } else if (j->point < i->point) {
+      ++j;
+    } else {
+      visit(*i++, *j++);
+    }
+  }
+}
+
 /// w_ij: number of points seen from both keyframes.
 [[nodiscard]] int shared_points(const Keyframe& a, const Keyframe& b);
 

@@ -5,16 +5,10 @@
 #include <random>
 
 #include "graph/graph_writer.hpp"
+#include "tests/random_pose.hpp"
 
 namespace twofold {
 namespace {
-
-SE3 random_pose(std::mt19937& rng) {
-  std::normal_distribution<double> normal;
-  Vector6 v;
-  for (int i = 0; i < 6; ++i) v[i] = normal(rng);
-  return SE3::exp(v);
-}
 
 /// Frames of keyframes that are culled, and whose heirs are culled, round after round, while the map forgets
 /// and the survivors move: in the end each frame is where the map would have it that forgets nothing.

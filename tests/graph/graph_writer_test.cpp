@@ -9,16 +9,10 @@
 
 #include "geometry/inverse_depth.hpp"
 #include "tests/graph/graph_invariants.hpp"
+#include "tests/random_pose.hpp"
 
 namespace twofold {
 namespace {
-
-SE3 random_pose(std::mt19937& rng) {
-  std::normal_distribution<double> normal;
-  Vector6 v;
-  for (int i = 0; i < 6; ++i) v[i] = normal(rng);
-  return SE3::exp(v);
-}
 
 KeyframeId add_keyframe(GraphWriter& writer, const SE3& T_k_w = SE3()) {
   Keyframe keyframe;

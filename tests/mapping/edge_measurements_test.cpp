@@ -201,18 +201,13 @@ TEST(EdgeMeasurements, AreNotMadeOfTooFewPoints) {
 }
 
 TEST(EdgeMeasurements, KeepAMapThatFitsItsMeasurements) {
-  simulation::Options options;
-  options.rig = simulation::thesis_rig();
-  options.noise_px = 0;
-  options.max_observations = 120;
-  const std::vector<SE3> path = simulation::spiral_path(45, 0.2, 0.8, 1.2);
-  simulation::Simulation simulation(options, simulation::scattered_points(path, 2, 25, 1), path);
+  simulation::Simulation simulation = simulation::noise_free_spiral();
   MapperOptions mapper_options;
   mapper_options.inner_window = 8;
   mapper_options.outer_window = 20;
   mapper_options.culling.keyframes = mapper_options.loop.enabled = false;
   mapper_options.measured_edges = true;
-  Mapper mapper(options.rig, mapper_options);
+  Mapper mapper(simulation.rig(), mapper_options);
   int left = 0;
   while (!simulation.done()) {
     KeyframeProposal* proposal = &simulation.propose(mapper.graph());

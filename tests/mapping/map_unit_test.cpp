@@ -69,18 +69,13 @@ TEST(MapUnit, CountsEachKeyframeOnceByItsLatestReading) {
 }
 
 TEST(MapUnit, ScalesAMapOfWrongScaleWithoutBendingIt) {
-  simulation::Options options;
-  options.rig = simulation::thesis_rig();
-  options.noise_px = 0;
-  options.max_observations = 120;
-  const std::vector<SE3> path = simulation::spiral_path(45, 0.2, 0.8, 1.2);
-  simulation::Simulation simulation(options, simulation::scattered_points(path, 2, 25, 1), path);
+  simulation::Simulation simulation = simulation::noise_free_spiral();
   MapperOptions mapper_options;
   mapper_options.inner_window = 15;
   mapper_options.outer_window = 50;
   mapper_options.culling.keyframes = mapper_options.loop.enabled = false;
   mapper_options.own_unit = true;
-  Mapper mapper(options.rig, mapper_options);
+  Mapper mapper(simulation.rig(), mapper_options);
   const auto map_next = [&] {
     KeyframeProposal* proposal = &simulation.propose(mapper.graph());
     (void)mapper.step(std::span(&proposal, 1));

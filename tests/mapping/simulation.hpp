@@ -8,6 +8,7 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "mapping/metric_loop.hpp"
+#include "tests/mapping/simulated_world.hpp"
 
 namespace twofold::simulation {
 
@@ -61,20 +62,15 @@ class Simulation {
   KeyframeProposal proposal_;
 };
 
-/// Stereo camera of thesis 6.5.1: f = 300, baseline 5 cm, 640 x 480.
-[[nodiscard]] Rig thesis_rig(SensorKind kind = SensorKind::kStereo);
-
-/// Camera above the plane z = 0 at the given height, looking down, its x axis along `heading` [rad].
-[[nodiscard]] SE3 looking_down(double x, double y, double height, double heading);
-
-/// Points around the plane z = 0 wherever the camera comes, `density` per square metre.
-[[nodiscard]] std::vector<Vector3> scattered_points(const std::vector<SE3>& path, double margin,
-                                                    double density, unsigned seed);
-
-/// Archimedean spiral from the centre outwards: loopy and exploring at the same time  (fig. 6.9).
-[[nodiscard]] std::vector<SE3> spiral_path(int keyframes, double step, double spacing, double height);
-/// `laps` rounds of a circle.
-[[nodiscard]] std::vector<SE3> circle_path(int keyframes, double laps, double radius, double height);
+/// A spiral of 45 keyframes measured without noise: whatever is wrong in its map, the mapper did.
+inline Simulation noise_free_spiral() {
+  Options options;
+  options.rig = thesis_rig();
+  options.noise_px = 0;
+  options.max_observations = 120;
+  const std::vector<SE3> path = spiral_path(45, 0.2, 0.8, 1.2);
+  return {options, scattered_points(path, 2, 25, 1), path};
+}
 
 /// RMSE of eq. 6.10 over the edges that `use` accepts [m]; the number of edges if asked for.
 struct RelativeError {
