@@ -49,7 +49,7 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
   auto round = schedule.mapper.begin();
   history_.push_back(snapshot_);
   for (const TrackerStep& step : schedule.tracker) {
-    if (interrupted.load(std::memory_order_relaxed)) {
+    if (interrupted.load(std::memory_order_relaxed)) {  // relaxed: it carries no other data
       result_.interrupted = true;
       return;
     }
@@ -213,14 +213,8 @@ void LockstepRun::report(const ProgressSink& progress) {
 }
 
 RunResult LockstepRun::finish() {
-  result_.graph = mapping_.finish();
-  mapping_.lineage().hang_on_survivors(result_.frames);
-  result_.places = loop_closing_.places();
+  collect_results(tracking_, mapping_, loop_closing_, result_);
   result_.checkpoints = checkpoints_.report();
-  result_.times.push_back(std::move(tracking_.times()));
-  result_.times.push_back(std::move(mapping_.times()));
-  result_.times.push_back(std::move(loop_closing_.times()));
-  result_.loops = std::move(loop_closing_.loops());
   result_.trace = std::move(trace_);
   return std::move(result_);
 }

@@ -26,14 +26,13 @@ struct Futex {
 /// state_ holds a count of wakes (upper 31 bits) and whether the consumer is about to sleep (bit 0). Both
 /// sides change it by read-modify-write, which are totally ordered, so of a wake and the consumer's
 /// announcement one comes first:
-///  - wake first: the announcement reads from its release sequence (acquire), so the re-check of the
-///  condition sees
-///    what the waker wrote before wake, and the consumer does not sleep;
+///  - wake first: the announcement reads from its release sequence (acquire), so the consumer's next check
+///    sees what the waker wrote before wake, and it does not sleep;
 ///  - announcement first: the waker finds bit 0 set and calls the futex, while the changed count keeps the
-///  consumer
-///    from going to sleep if it was not yet asleep.
-/// Therefore release in wake and acquire in the announcement suffice; no seq_cst fence is needed. The count
-/// would have to wrap, 2^31 wakes between announcement and futex call, to be mistaken for no wake.
+///    consumer from going to sleep if it was not yet asleep. Taking the announcement back reads from the wake
+///    (acquire), so the check after sleeping sees what the waker wrote.
+/// Therefore release in wake and acquire in the consumer's changes suffice; no seq_cst fence is needed. The
+/// count would have to wrap, 2^31 wakes between announcement and futex call, to be mistaken for no wake.
 /// std::atomic::wait of libstdc++ 12 gives no timeout, spins and yields before it sleeps, and shares its
 /// sleeper counts between addresses.
 class Parking {

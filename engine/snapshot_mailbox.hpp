@@ -35,11 +35,9 @@ class SnapshotPublisher;
 /// Ordering.
 /// (A) slot_ exchange, release in put -> acquire in latest: publishes the version's contents to the reader.
 /// (B) held_ release in latest -> acquire in held(): the reader's last access to older versions, which
-/// precedes its
-///     call of latest in program order, happens before the writer destroys them.
-/// (C) What put gets back was written by the writer itself and never left the slot: no order is needed for
-/// it. The
-///     reader's exchange writes null, which carries nothing, so that its release half would publish nothing.
+///     precedes its call of latest in program order, happens before the writer destroys them.
+/// (C) What put gets back was written by the writer itself and never left the slot: no order is needed.
+///     The reader's exchange writes null, which carries nothing: its release half would publish nothing.
 template <Versioned T, class Atomics = StdAtomics>
 class SnapshotMailbox {
  public:

@@ -203,4 +203,15 @@ void LoopClosingStage::relax_if_due(const GraphSnapshot& graph) {
   unrelaxed_.reset();
 }
 
+void collect_results(TrackingStage& tracking, MappingStage& mapping, LoopClosingStage& loop_closing,
+                     RunResult& result) {
+  result.graph = mapping.finish();
+  mapping.lineage().hang_on_survivors(result.frames);
+  result.places = loop_closing.places();
+  result.times.push_back(std::move(tracking.times()));
+  result.times.push_back(std::move(mapping.times()));
+  result.times.push_back(std::move(loop_closing.times()));
+  result.loops = std::move(loop_closing.loops());
+}
+
 }  // namespace twofold

@@ -131,4 +131,9 @@ class LoopClosingStage {
   std::optional<LoopConstraint> unrelaxed_;  // newest loop that no relaxation has seen
 };
 
+/// After the last step of any kind of run: the final map with its places and loops, the frames hung on its
+/// keyframes, and the stages' times. Moves what it can out of the stages.
+void collect_results(TrackingStage& tracking, MappingStage& mapping, LoopClosingStage& loop_closing,
+                     RunResult& result);
+
 }  // namespace twofold

@@ -97,9 +97,10 @@ bool ThreadedRun::must_hold_back() const {
   return options_.pacing.speed == 0 && proposals_.size_approx() > 1;
 }
 
+// Relaxed: both flags are raised on this thread.
 bool ThreadedRun::any_thread_failed() const {
   return (tracker_->finished() && !frames_ended_.load(std::memory_order_relaxed)) ||
-         (mapper_->finished() && !proposals_ended_.load(std::memory_order_acquire));
+         (mapper_->finished() && !proposals_ended_.load(std::memory_order_relaxed));
 }
 
 /// Empty only when a thread failed.
@@ -165,14 +166,8 @@ void ThreadedRun::map_late_loops() {
 
 RunResult ThreadedRun::finish() {
   map_late_loops();
-  result_.graph = mapping_.finish();
-  mapping_.lineage().hang_on_survivors(result_.frames);
-  result_.places = loop_closing_.places();
+  collect_results(tracking_, mapping_, loop_closing_, result_);
   result_.checkpoints = checkpoints_.report();
-  result_.times.push_back(std::move(tracking_.times()));
-  result_.times.push_back(std::move(mapping_.times()));
-  result_.times.push_back(std::move(loop_closing_.times()));
-  result_.loops = std::move(loop_closing_.loops());
   result_.schedule = std::move(schedule_);
   result_.trace = std::move(trace_);
   result_.keyframes_not_described = not_described_.load(std::memory_order_relaxed);

@@ -1,13 +1,12 @@
-#include <csignal>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "apps/twofold/calibration_session.hpp"
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/interrupt.hpp"
 #include "io/io_error.hpp"
 #include "io/open_source.hpp"
 #include "io/output_file.hpp"
@@ -24,18 +23,12 @@ struct CalibrateArguments {
   bool quiet = false;
 };
 
-// A signal handler may touch a lock-free atomic; relaxed, because it carries no other data.
-std::atomic<bool> interrupted{false};
-void on_interrupt(int) {
-  interrupted.store(true, std::memory_order_relaxed);
-}
-
 std::unique_ptr<FrameSource> open_raw(const std::string& text) {
   if (!text.starts_with("v4l2:") && !text.starts_with("/dev/"))
     return std::make_unique<RawFolderSource>(text);
   SourceOptions options;
   options.raw = true;
-  options.stop = &interrupted;
+  options.stop = &interrupted();
   return open_source(text, options);
 }
 
@@ -45,13 +38,12 @@ int calibrate(const CalibrateArguments& arguments) {
   CalibrationRequest request{*board, arguments.board, arguments.views, arguments.out, arguments.residuals};
   if (request.plot.empty()) request.plot = fs::path(arguments.out).replace_extension(".png");
   if (request.out.has_parent_path()) prepare_output_folder(request.out.parent_path());
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
+  catch_interrupts();
   const auto source = open_raw(arguments.source);
   const auto say = [&](const std::string& line) {
     if (!arguments.quiet) fmt::print(stderr, "{}\n", line);
   };
-  fmt::print("{}", calibrate_from(*source, request, interrupted, say));
+  fmt::print("{}", calibrate_from(*source, request, interrupted(), say));
   return kOk;
 }
 

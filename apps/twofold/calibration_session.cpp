@@ -89,7 +89,7 @@ ViewCollector collect(FrameSource& source, cv::Size size, const CalibrationReque
   ViewCollector collector(request.board, {size, source.rig().kind == SensorKind::kStereo, source.is_live()},
                           options);
   std::string said;
-  while (!stop.load(std::memory_order_relaxed)) {
+  while (!stop.load(std::memory_order_relaxed)) {  // relaxed: it carries no other data
     Frame frame;
     const FrameStatus status = source.next(frame);
     if (status == FrameStatus::kError) throw IoError(source.error());

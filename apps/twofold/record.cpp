@@ -1,14 +1,13 @@
-#include <csignal>
 
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/record_session.hpp"
 #include "engine/clock.hpp"
 #include "io/calibration_file.hpp"
@@ -26,12 +25,6 @@ struct RecordArguments {
   std::size_t queue = 64;
   bool quiet = false;
 };
-
-// A signal handler may touch a lock-free atomic; relaxed, because it carries no other data.
-std::atomic<bool> interrupted{false};
-void on_interrupt(int) {
-  interrupted.store(true, std::memory_order_relaxed);
-}
 
 void show(const Recorder::Counts& counts, const SourceReport& source, bool last) {
   fmt::print(stderr,
@@ -52,10 +45,9 @@ std::optional<Calibration> calibration_for(const FrameSource& source, const Reco
 int record(const RecordArguments& arguments) {
   SourceOptions options;
   options.raw = true;
-  options.stop = &interrupted;
+  options.stop = &interrupted();
   if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
+  catch_interrupts();
   const std::unique_ptr<FrameSource> source = open_source(arguments.source, options);
   RecorderOptions recorder_options;
   recorder_options.queue_frames = arguments.queue;
@@ -68,7 +60,7 @@ int record(const RecordArguments& arguments) {
     shown_ns = steady_now_ns();
     show(recorder.counts(), source->report(), false);
   };
-  const RecordOutcome outcome = record_from(*source, recorder, arguments.frames, interrupted, tick);
+  const RecordOutcome outcome = record_from(*source, recorder, arguments.frames, interrupted(), tick);
   if (visible) show(outcome.counts, outcome.report, true);
   fmt::print("{}: {}", arguments.out, describe(outcome));
   if (!outcome.problem.empty()) throw std::runtime_error(outcome.problem);

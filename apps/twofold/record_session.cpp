@@ -8,6 +8,7 @@ RecordOutcome record_from(FrameSource& source, Recorder& recorder, std::int64_t 
                           const std::atomic<bool>& stop, const std::function<void()>& tick) {
   FrameStatus status = FrameStatus::kEnd;
   for (std::int64_t n = 0; frames == 0 || n < frames; ++n) {
+    // Relaxed: the flag carries no other data.
     if (stop.load(std::memory_order_relaxed)) break;
     Frame frame;  // a new one each time: the queue keeps the images
     if ((status = source.next(frame)) != FrameStatus::kFrame) break;

@@ -1,14 +1,13 @@
-#include <csignal>
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <fstream>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/map_parts.hpp"
 #include "apps/twofold/run_arguments.hpp"
 #include "apps/twofold/run_filter.hpp"
@@ -22,13 +21,6 @@
 
 namespace twofold {
 namespace {
-
-// A signal handler may touch a lock-free atomic; relaxed, because it carries no other data.
-std::atomic<bool> interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free);
-void on_interrupt(int) {
-  interrupted.store(true, std::memory_order_relaxed);
-}
 
 /// Redrawn in place, a few times a second; nothing when standard error is not a terminal.
 class ProgressLine {
@@ -80,7 +72,7 @@ Schedule load_schedule(const std::string& file) {
 SourceOptions source_options_of(const RunArguments& arguments) {
   SourceOptions options;
   options.preload = arguments.preload;
-  options.stop = &interrupted;
+  options.stop = &interrupted();
   if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
   return options;
 }
@@ -88,9 +80,8 @@ SourceOptions source_options_of(const RunArguments& arguments) {
 int run_with_filter(const RunArguments& arguments) {
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  run_filter(*source, arguments.source, arguments.window, arguments.out, interrupted);
+  catch_interrupts();
+  run_filter(*source, arguments.source, arguments.window, arguments.out, interrupted());
   return kOk;
 }
 
@@ -125,12 +116,11 @@ int run(const RunArguments& arguments) {
     return FeedStatus::kError;
   };
   const ProgressSink progress = [&](const Progress& p) { line.show(p); };
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
+  catch_interrupts();
   const std::vector<std::string> notes = real_time_notes(arguments);
   Engine engine(source->rig(), options);
-  RunResult result = schedule ? engine.replay(feed, *schedule, interrupted, progress)
-                              : engine.run(feed, interrupted, progress);
+  RunResult result = schedule ? engine.replay(feed, *schedule, interrupted(), progress)
+                              : engine.run(feed, interrupted(), progress);
   line.end();
   result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
   std::vector<std::string> maps;

@@ -47,6 +47,7 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
   const auto start = std::chrono::steady_clock::now();
   double slowest_ms = 0, busy_ms = 0;
   Frame frame;
+  // Relaxed: the flag carries no other data.
   while (!stop.load(std::memory_order_relaxed) && source.next(frame) == FrameStatus::kFrame) {
     const auto before = std::chrono::steady_clock::now();
     filter.process(frame);

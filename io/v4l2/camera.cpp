@@ -87,6 +87,7 @@ CameraStatus V4l2Camera::reopen(const std::atomic<bool>& stop) {
   close();
   constexpr int kRetryMs = 100;
   if (std::exchange(restarted_, true)) calls_.sleep_ms(kRetryMs);  // the last new start led nowhere
+  // Relaxed: the flag carries no other data.
   while (!stop.load(std::memory_order_relaxed)) {
     auto started = start();
     if (started) {
@@ -110,6 +111,7 @@ CameraStatus V4l2Camera::next(const std::atomic<bool>& stop, CameraFrame* frame)
   } else {
     waiting_since_ns_ = calls_.now_ns();
   }
+  // Relaxed: the flag carries no other data.
   while (!stop.load(std::memory_order_relaxed)) {
     if (!problem_.empty()) return CameraStatus::kLost;
     if (!stream_) {

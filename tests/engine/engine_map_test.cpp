@@ -1,19 +1,17 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <fstream>
 #include <iterator>
-#include <sstream>
 
-#include "engine/engine.hpp"
 #include "loopclosure/default_vocabulary.hpp"
-#include "tests/engine/small_scene.hpp"
+#include "tests/engine/run_checks.hpp"
 
 namespace twofold {
 namespace {
 
 using testing::render_walk;
+using testing::run_engine;
 using testing::small_rig;
 constexpr auto T_c_w = testing::turning_walk;
 
@@ -27,7 +25,7 @@ class EngineMapTest : public ::testing::Test {
   static void SetUpTestSuite() {
     room_ = new std::vector<Frame>(render_walk(T_c_w, 0, kFrames, 5));
     map_ = new std::shared_ptr<const SavedMap>;
-    const RunResult result = run(options(), frames(0, kMapped));
+    const RunResult result = run_engine(options(), frames(0, kMapped));
     *map_ = std::make_shared<const SavedMap>(SavedMap{small_rig(), result.graph, result.places});
   }
   static void TearDownTestSuite() {
@@ -59,10 +57,6 @@ class EngineMapTest : public ::testing::Test {
     with_map.localise_only = localise_only;
     return with_map;
   }
-  static RunResult run(const EngineOptions& options, const FrameFeed& feed) {
-    std::atomic<bool> interrupted{false};
-    return Engine(small_rig(), options).run(feed, interrupted);
-  }
 
   /// Poses are in the loaded map's frame, that of its first keyframe.
   static void expect_tracked_from(const RunResult& result, int first, int shown_first) {
@@ -73,10 +67,8 @@ class EngineMapTest : public ::testing::Test {
         continue;
       }
       ASSERT_EQ(record.state, FrameState::kTracked) << i << ": " << describe(record.cause);
-      const SE3 T_c_first = final_T_c_w(record, result.graph) * result.graph.T_k_w(KeyframeId{0}).inverse();
       const SE3 T_c_first_true = T_c_w(shown_first + i) * T_c_w(0).inverse();
-      EXPECT_LT((T_c_first.inverse().translation() - T_c_first_true.inverse().translation()).norm(), 0.03)
-          << i;
+      EXPECT_LT(testing::position_error(record, result.graph, T_c_first_true), 0.03) << i;
     }
   }
   static std::string bytes_of(const SavedMap& map) {
@@ -98,7 +90,7 @@ std::shared_ptr<const SavedMap>* EngineMapTest::map_ = nullptr;
 
 TEST_F(EngineMapTest, ALoadedMapIsRecognisedAndGoesOn) {
   constexpr int kFirst = 20;
-  const RunResult result = run(options_with_map(false), frames(kFirst, kFrames));
+  const RunResult result = run_engine(options_with_map(false), frames(kFirst, kFrames));
   ASSERT_EQ(result.error, "");
   expect_tracked_from(result, 1, kFirst);
   const GraphSnapshot& before = (*map_)->graph;
@@ -120,7 +112,7 @@ TEST_F(EngineMapTest, ALoadedMapIsRecognisedAndGoesOn) {
 
 TEST_F(EngineMapTest, LocalisingChangesNothing) {
   const std::string before = bytes_of(**map_);
-  const RunResult result = run(options_with_map(true), frames(10, kMapped));
+  const RunResult result = run_engine(options_with_map(true), frames(10, kMapped));
   ASSERT_EQ(result.error, "");
   expect_tracked_from(result, 1, 10);
   for (const FrameRecord& record : result.frames) EXPECT_FALSE(record.keyframe);
@@ -135,8 +127,8 @@ TEST_F(EngineMapTest, LocalisingChangesNothing) {
 
 TEST_F(EngineMapTest, TheSameRunsGiveTheSameBytes) {
   for (const bool localise_only : {false, true}) {
-    const RunResult a = run(options_with_map(localise_only), frames(20, kFrames));
-    const RunResult b = run(options_with_map(localise_only), frames(20, kFrames));
+    const RunResult a = run_engine(options_with_map(localise_only), frames(20, kFrames));
+    const RunResult b = run_engine(options_with_map(localise_only), frames(20, kFrames));
     EXPECT_EQ(bytes_of({small_rig(), a.graph, a.places}), bytes_of({small_rig(), b.graph, b.places}));
     ASSERT_EQ(a.frames.size(), b.frames.size());
     for (std::size_t i = 0; i < a.frames.size(); ++i) {
@@ -149,21 +141,12 @@ TEST_F(EngineMapTest, AThreadedRunInALoadedMapReplays) {
   for (const bool localise_only : {false, true}) {
     EngineOptions threaded = options_with_map(localise_only);
     threaded.deterministic = false;
-    const RunResult live = run(threaded, frames(20, kFrames));
+    const RunResult live = run_engine(threaded, frames(20, kFrames));
     ASSERT_EQ(live.error, "");
-    std::stringstream file;
-    ASSERT_TRUE(write_schedule(file, live.schedule.tracker, live.schedule.mapper, live.schedule.loop_closer));
-    const auto schedule = read_schedule(file);
-    ASSERT_TRUE(schedule) << schedule.error();
-    std::atomic<bool> interrupted{false};
     const RunResult replayed =
-        Engine(small_rig(), threaded).replay(frames(20, kFrames), *schedule, interrupted);
+        testing::replay_engine(threaded, frames(20, kFrames), testing::schedule_of(live));
     EXPECT_EQ(replayed.error, "");
-    ASSERT_EQ(live.frames.size(), replayed.frames.size());
-    for (std::size_t i = 0; i < live.frames.size(); ++i) {
-      EXPECT_EQ(live.frames[i].state, replayed.frames[i].state) << i;
-      EXPECT_EQ(live.frames[i].T_c_ref, replayed.frames[i].T_c_ref) << i;
-    }
+    testing::expect_same(live, replayed);
     EXPECT_EQ(bytes_of({small_rig(), live.graph, live.places}),
               bytes_of({small_rig(), replayed.graph, replayed.places}));
   }
@@ -178,7 +161,7 @@ TEST_F(EngineMapTest, InAnotherRoomNothingIsRecognised) {
       testing::number_frame(frame, static_cast<int>(next++));
       return FeedStatus::kFrame;
     };
-    const RunResult result = run(options_with_map(localise_only), feed);
+    const RunResult result = run_engine(options_with_map(localise_only), feed);
     ASSERT_EQ(result.error, "");
     const std::size_t loaded = (*map_)->graph.keyframe_count();
     for (const FrameRecord& record : result.frames) {
@@ -222,7 +205,7 @@ TEST_F(EngineMapTest, CheckpointsAreMapsThatLoad) {
       }
       return next(frame);
     };
-    const RunResult result = run(with_checkpoints, feed);
+    const RunResult result = run_engine(with_checkpoints, feed);
     EXPECT_EQ(result.error, "");
     EXPECT_EQ(result.checkpoints.error, "");
     EXPECT_GT(result.checkpoints.saved, deterministic ? 2 : 1);
@@ -236,7 +219,7 @@ TEST_F(EngineMapTest, CheckpointsAreMapsThatLoad) {
 TEST_F(EngineMapTest, ACheckpointThatCannotBeWrittenEndsNoRun) {
   EngineOptions with_checkpoints = options();
   with_checkpoints.checkpoint = {"/proc/no/such/folder/map.tfm", 0.5};
-  const RunResult result = run(with_checkpoints, frames(0, 40));
+  const RunResult result = run_engine(with_checkpoints, frames(0, 40));
   EXPECT_EQ(result.error, "");
   EXPECT_EQ(result.checkpoints.saved, 0);
   EXPECT_NE(result.checkpoints.error.find("cannot be opened"), std::string::npos);

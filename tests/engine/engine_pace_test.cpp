@@ -1,0 +1,108 @@
+// Runs that keep a pace: late frames, the load ladder, and their replays.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <sstream>
+#include <thread>
+
+#include "engine/threaded_run.hpp"
+#include "tests/engine/swaying_camera.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::expect_same;
+using testing::replay_engine;
+using testing::schedule_of;
+using testing::small_rig;
+using EnginePaceTest = testing::SwayingCamera;
+
+TEST_F(EnginePaceTest, LateFramesAreDroppedOnRequestAndReplayed) {
+  EngineOptions options;
+  options.pacing.speed = 2000;  // far faster than any machine can follow
+  options.pacing.late = LatePolicy::kDrop;
+  const RunResult live = run(options);
+  EXPECT_EQ(live.frames.size(), static_cast<std::size_t>(kFrames));
+  const auto dropped = std::count_if(live.frames.begin(), live.frames.end(),
+                                     [](const auto& record) { return record.state == FrameState::kDropped; });
+  EXPECT_GT(dropped, 0);
+  const RunResult replayed = replay_engine(options, feed(), schedule_of(live));
+  EXPECT_EQ(replayed.error, "");
+  expect_same(live, replayed);
+}
+
+/// Time passes when it is read, which is two or three times a frame, and for a while more than a frame has.
+class CostlyClock : public PacingClock {
+ public:
+  std::int64_t now_ns() override {
+    ++readings_;
+    return now_ += readings_ > 20 && readings_ <= 32 ? 25'000'000 : 2'000'000;
+  }
+  void sleep_until(std::int64_t t_ns, const std::stop_token&) override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(3));  // the mapper's time is real
+    now_ = std::max(now_, t_ns);
+  }
+
+ private:
+  std::int64_t now_ = 1'000'000'000;
+  int readings_ = 0;
+};
+
+TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
+  for (const LatePolicy late : {LatePolicy::kQueue, LatePolicy::kDrop}) {
+    EngineOptions options;
+    options.trace = true;
+    options.pacing = {.speed = 1, .late = late};
+    options.ladder.patience = 3;
+    CostlyClock clock;
+    std::atomic<bool> interrupted{false};
+    ThreadedRun run(small_rig(), options, &clock);
+    run.run(feed(), interrupted, {});
+    const RunResult live = run.finish();
+    ASSERT_EQ(live.error, "");
+    ASSERT_EQ(live.frames.size(), static_cast<std::size_t>(kFrames));
+    int lowest = 0;
+    int before = 0;
+    bool rose = false;
+    for (const FrameRecord& record : live.frames) {
+      const int rung = static_cast<int>(record.rung);
+      EXPECT_LE(std::abs(rung - before), 1) << record.frame_index;  // step by step
+      rose |= rung < before;
+      lowest = std::max(lowest, rung);
+      before = rung;
+      if (record.state == FrameState::kDropped) continue;
+      EXPECT_EQ(record.state, FrameState::kTracked) << describe(record.cause);
+    }
+    EXPECT_EQ(live.frames.front().rung, LadderRung::kEverything);
+    EXPECT_EQ(lowest, kLadderRungs - 1);
+    EXPECT_TRUE(rose);
+    const auto dropped = std::count_if(live.frames.begin(), live.frames.end(),
+                                       [](const auto& r) { return r.state == FrameState::kDropped; });
+    EXPECT_EQ(dropped > 0, late == LatePolicy::kDrop);
+    if (late == LatePolicy::kDrop) {
+      EXPECT_EQ(live.frames.back().rung, LadderRung::kEverything);
+    }
+    std::ostringstream trace;
+    ASSERT_TRUE(live.trace->write(trace));
+    EXPECT_NE(trace.str().find("load ladder rung"), std::string::npos);
+
+    const Schedule schedule = schedule_of(live);
+    const RunResult replayed = replay_engine(options, feed(), schedule);
+    EXPECT_EQ(replayed.error, "");
+    expect_same(live, replayed);
+    EXPECT_EQ(schedule_of(replayed), schedule);
+  }
+}
+
+TEST_F(EnginePaceTest, ReplayRefusesARungItDoesNotKnow) {
+  EngineOptions options;
+  Schedule schedule = schedule_of(run(options));
+  schedule.tracker[3].degrade_level = kLadderRungs;
+  const RunResult replayed = replay_engine(options, feed(), schedule);
+  EXPECT_NE(replayed.error.find("rung of the load ladder"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace twofold
