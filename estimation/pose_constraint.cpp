@@ -52,19 +52,4 @@ Vector6 pose_constraint_error(const SE3& T_j_i, const SE3& T_i_w, const SE3& T_j
   return (T_j_i * T_i_w * T_j_w.inverse()).log();
 }
 
-PoseConstraintTerms linearise_pose_constraint(const SE3& T_j_i, const SE3& T_i_w, const SE3& T_j_w) {
-  PoseConstraintTerms terms;
-  terms.v = pose_constraint_error(T_j_i, T_i_w, T_j_w);
-  // T_ji exp(x) T_i T_j^-1 = exp(Ad x) E  and  E exp(-x) = (exp(x) E^-1)^-1
-  const Matrix6 J = se3_left_jacobian_inverse(terms.v);
-  terms.J_i.noalias() = J * T_j_i.adjoint();
-  // The Jacobian at -v differs from J in the sign of its only odd term, -ad(v) / 2.
-  const Matrix3 U = hat(terms.v.head<3>()), W = hat(terms.v.tail<3>());
-  terms.J_j = -J;
-  terms.J_j.topLeftCorner<3, 3>() -= W;
-  terms.J_j.topRightCorner<3, 3>() -= U;
-  terms.J_j.bottomRightCorner<3, 3>() -= W;
-  return terms;
-}
-
 }  // namespace twofold

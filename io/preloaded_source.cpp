@@ -18,9 +18,10 @@ PreloadedSource::PreloadedSource(std::unique_ptr<FrameSource> source, std::size_
   ground_truth_ = source->ground_truth();
   Frame frame;
   FrameStatus status;
+  std::size_t image_bytes = 0;
   while ((status = source->next(frame)) == FrameStatus::kFrame) {
-    image_bytes_ += bytes_of(frame.left) + bytes_of(frame.right) + bytes_of(frame.depth);
-    if (image_bytes_ > max_bytes) {
+    image_bytes += bytes_of(frame.left) + bytes_of(frame.right) + bytes_of(frame.depth);
+    if (image_bytes > max_bytes) {
       throw IoError("preload",
                     fmt::format("the images take more than {} MB: run without --preload", max_bytes >> 20));
     }

@@ -16,8 +16,6 @@ class PreloadedSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(frames_.size());
   }
-  /// Memory the images take.
-  [[nodiscard]] std::size_t image_bytes() const { return image_bytes_; }
 
   static constexpr std::size_t kDefaultMaxBytes = std::size_t{8} << 30;
 
@@ -26,7 +24,6 @@ class PreloadedSource final : public FrameSource {
 
   std::vector<Frame> frames_;
   std::size_t next_ = 0;
-  std::size_t image_bytes_ = 0;
 };
 
 }  // namespace twofold

@@ -1,7 +1,5 @@
 #include "loopclosure/loop_closer.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -52,20 +50,14 @@ void LoopCloser::adopt(const PlaceBook& places) {
 }
 
 std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
-  report_ = {};
   forget_culled(graph);
   if (!graph.contains(keyframe.id) || graph.keyframe(keyframe.id).culled()) return std::nullopt;
   PlaceView view = describer_.describe(keyframe.images, *vocabulary_);
-  report_.corners = static_cast<int>(view.corners.size());
-  report_.with_depth = static_cast<int>(
-      std::count_if(view.z.begin(), view.z.end(), [](const auto& z) { return std::isfinite(z.z()); }));
 
   const double likeness = likeness_with_previous(keyframe.id, view.bag);
   const auto candidates = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
-  report_.candidates = static_cast<int>(candidates.size());
   std::optional<LoopConstraint> loop;
   for (const PlaceCandidate& candidate : candidates) {
-    ++report_.tried;
     const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
     if (!verified) continue;
     loop =

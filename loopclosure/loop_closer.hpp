@@ -32,14 +32,6 @@ struct Relocalisation {
   int inliers = 0;
 };
 
-/// What one step did, for statistics.
-struct LoopCloserReport {
-  int corners = 0;     ///< described
-  int with_depth = 0;  ///< of them
-  int candidates = 0;  ///< places that appearance, topology and the keyframes before agreed about
-  int tried = 0;       ///< of them, until one was verified
-};
-
 /// Large-scale loop closure  (thesis 6.4.2), and relocalisation.
 ///
 /// Remembers how the place of every keyframe looks. Reads snapshots, changes nothing: a loop goes to the
@@ -65,8 +57,6 @@ class LoopCloser {
   /// What is remembered, to be saved with the map or published.
   [[nodiscard]] const PlaceBook& places() const { return places_; }
 
-  [[nodiscard]] const LoopCloserReport& last_report() const { return report_; }
-
  private:
   [[nodiscard]] double likeness_with_previous(KeyframeId id, const BagOfWords& bag) const;
   /// Does the view show the place of keyframe k? First by corners, then by the map's points.
@@ -85,7 +75,6 @@ class LoopCloser {
   std::vector<BagOfWords> bags_;  // by keyframe; of those that have a place
   KeyframeId previous_ = kNoKeyframe;
   std::size_t next_checked_ = 0;  // for culling: places are looked through in turn
-  LoopCloserReport report_;
 };
 
 }  // namespace twofold

@@ -89,8 +89,6 @@ class Mapper {
   [[nodiscard]] const MapperOptions& options() const { return options_; }
   /// Lengths of the graph times this are metres: 1 unless options().own_unit.
   [[nodiscard]] double metres_per_unit() const;
-  /// The problem as it was solved last: for experiments.
-  [[nodiscard]] const WindowProblem& last_problem() const { return builder_.problem(); }
 
  private:
   void insert(const KeyframeProposal& proposal, MapperReport& report);

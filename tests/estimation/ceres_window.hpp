@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "estimation/pose_constraint.hpp"
 #include "estimation/window_problem.hpp"
 #include "geometry/inverse_depth.hpp"
+#include "tests/estimation/pose_constraint_terms.hpp"
 
 namespace twofold {
 

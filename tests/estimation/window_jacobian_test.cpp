@@ -4,8 +4,8 @@
 #include <Eigen/Cholesky>
 
 #include "estimation/observation_model.hpp"
-#include "estimation/pose_constraint.hpp"
 #include "estimation/window_solver.hpp"
+#include "tests/estimation/pose_constraint_terms.hpp"
 #include "tests/estimation/synthetic_window.hpp"
 
 namespace twofold {

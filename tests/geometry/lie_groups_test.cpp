@@ -5,7 +5,6 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "geometry/inverse_depth.hpp"
-#include "geometry/point_jacobians.hpp"
 #include "geometry/se2.hpp"
 #include "geometry/sim3.hpp"
 #include "tests/numeric_derivative.hpp"
@@ -165,18 +164,6 @@ TEST(Sim3, WithoutScaleKeepsCentreAndRays) {
   EXPECT_LT((T.inverse().translation() - centre).norm(), 1e-14);
   const Vector3 x(4, 5, 6);
   EXPECT_LT((S * x).normalized().cross((T * x).normalized()).norm(), 1e-14);
-}
-
-TEST(PointJacobians, MatchCentralDifferences) {
-  const SE3 T = SE3::exp((Vector6() << 1, 2, -1, 0.3, -0.4, 0.5).finished());
-  const Sim3 S(1.7, T.so3(), T.translation());
-  const Vector3 x(0.4, -1.5, 3);
-  const Matrix36 J = central_difference([&](const Vector6& e) { return Vector3(SE3::exp(e) * (T * x)); },
-                                        Vector6::Zero().eval());
-  EXPECT_LT((se3_point_jacobian(T * x) - J).norm(), 1e-8);
-  const Matrix37 J_sim = central_difference([&](const Vector7& e) { return Vector3(Sim3::exp(e) * (S * x)); },
-                                            Vector7::Zero().eval());
-  EXPECT_LT((sim3_point_jacobian(S * x) - J_sim).norm(), 1e-8);
 }
 
 TEST(InverseDepth, JacobianMatchesCentralDifferenceAndMapsInvert) {

@@ -167,7 +167,6 @@ TEST_F(LoopCloserTest, NeighboursAreNoLoops) {
   for (int k = 0; k < kTurn + 4; ++k) {
     add_to_map(k);
     EXPECT_FALSE(closer.step(keyframe(k), graph_));
-    EXPECT_EQ(closer.last_report().candidates, 0);
   }
 }
 
