@@ -84,11 +84,6 @@ std::vector<GaussNewtonFilter::Seen> GaussNewtonFilter::match(
   return seen;
 }
 
-Vector3 GaussNewtonFilter::point_in_world(int point) const {
-  const Point& p = points_[static_cast<std::size_t>(point)];
-  return anchors_[static_cast<std::size_t>(p.anchor)].inverse() * from_inverse_depth(p.psi);
-}
-
 Matrix6 GaussNewtonFilter::pose_covariance() const {
   MatrixX unit = MatrixX::Zero(Lambda_.rows(), 6);
   unit.bottomRows<6>().setIdentity();

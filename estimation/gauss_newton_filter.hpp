@@ -76,7 +76,6 @@ class GaussNewtonFilter {
   }
   [[nodiscard]] int point_count() const { return static_cast<int>(points_.size()); }
   [[nodiscard]] int anchor_count() const { return static_cast<int>(anchors_.size()) - 1; }
-  [[nodiscard]] Vector3 point_in_world(int point) const;
   [[nodiscard]] std::int64_t point_id(int point) const { return points_[static_cast<std::size_t>(point)].id; }
   [[nodiscard]] const Vector3& psi(int point) const { return points_[static_cast<std::size_t>(point)].psi; }
   /// Information of [anchors | points | current pose].
@@ -116,12 +115,14 @@ class GaussNewtonFilter {
   void append_pose();
   double add_measurements(const std::vector<Seen>& seen, MatrixX* Lambda, VectorX* g) const;
   bool joint_update(const std::vector<Seen>& seen, int iterations);
+  void absorb(const std::vector<Seen>& seen);
   [[nodiscard]] bool adopt(const AnchoredViews& views);
   [[nodiscard]] Mean mean() const { return {T_c_w_, anchors_, points_}; }
   void set_mean(const Mean& mean);
   void move(const VectorX& delta);
   [[nodiscard]] VectorX offset(const Mean& from) const;
-  void estimate_motion(const std::vector<Seen>& seen);
+  void estimate_motion(const std::vector<Seen>& all);
+  [[nodiscard]] std::vector<Seen> with_depth(const std::vector<Seen>& all) const;
   [[nodiscard]] bool innovation(const std::vector<Seen>& seen, const MatrixX* Sigma, MatrixX& S, MatrixX& J_T,
                                 VectorX& d) const;
   void eliminate(const std::vector<int>& indices);

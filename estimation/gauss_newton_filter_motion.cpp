@@ -34,10 +34,9 @@ bool GaussNewtonFilter::innovation(const std::vector<Seen>& seen, const MatrixX*
   return true;
 }
 
-/// Expects the state without current pose; moves T_c_w_ from the previous pose.
-void GaussNewtonFilter::estimate_motion(const std::vector<Seen>& all) {
-  // A point whose depth is unknown says nothing about a motion yet: with a start value for its depth taken as
-  // exact it would mislead, with its infinite covariance it cannot be inverted.
+/// A point whose depth is unknown says nothing about a motion yet: with a start value for its depth taken as
+/// exact it would mislead, with its infinite covariance it cannot be inverted.
+std::vector<GaussNewtonFilter::Seen> GaussNewtonFilter::with_depth(const std::vector<Seen>& all) const {
   std::vector<Seen> seen;
   for (const Seen& s : all) {
     const int at = point_at(s.point);
@@ -45,6 +44,12 @@ void GaussNewtonFilter::estimate_motion(const std::vector<Seen>& all) {
     own.information = Lambda_.block<3, 3>(at, at);
     if (std::isfinite(own.inverse_depth_sigma())) seen.push_back(s);
   }
+  return seen;
+}
+
+/// Expects the state without current pose; moves T_c_w_ from the previous pose.
+void GaussNewtonFilter::estimate_motion(const std::vector<Seen>& all) {
+  const std::vector<Seen> seen = with_depth(all);
   if (seen.size() < 4) return;
   MatrixX Sigma;
   const bool use_map = options_.motion != MotionEstimate::kMotionOnly;

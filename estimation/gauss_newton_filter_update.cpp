@@ -98,7 +98,18 @@ VectorX GaussNewtonFilter::offset(const Mean& from) const {
   return x;
 }
 
-/// Levenberg-Marquardt on eq. 4.18, then Lambda += D^T Lambda_z D  (4.21).
+/// Lambda += D^T Lambda_z D  (4.21).
+void GaussNewtonFilter::absorb(const std::vector<Seen>& seen) {
+  VectorX unused = VectorX::Zero(Lambda_.rows());
+  add_measurements(seen, &Lambda_, &unused);
+  // What a point knew before is linear in psi: its own anchor's measurement. From here on it is not.
+  for (const Seen& s : seen) {
+    Point& point = points_[static_cast<std::size_t>(s.point)];
+    if (!point.psi_lin) point.psi_lin = point.psi;
+  }
+}
+
+/// Levenberg-Marquardt on eq. 4.18, then the new information  (4.21).
 bool GaussNewtonFilter::joint_update(const std::vector<Seen>& seen, int iterations) {
   const double start = thread_seconds();
   const MatrixX prior = Lambda_;
@@ -140,15 +151,7 @@ bool GaussNewtonFilter::joint_update(const std::vector<Seen>& seen, int iteratio
     }
     if (!accepted) break;
   }
-  if (std::isfinite(current)) {
-    VectorX unused = VectorX::Zero(Lambda_.rows());
-    add_measurements(seen, &Lambda_, &unused);
-    // What a point knew before is linear in psi: its own anchor's measurement. From here on it is not.
-    for (const Seen& s : seen) {
-      Point& point = points_[static_cast<std::size_t>(s.point)];
-      if (!point.psi_lin) point.psi_lin = point.psi;
-    }
-  }
+  if (std::isfinite(current)) absorb(seen);
   joint_seconds_ = thread_seconds() - start;
   return std::isfinite(current) && (moved || iterations == 0);
 }

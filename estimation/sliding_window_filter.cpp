@@ -81,13 +81,6 @@ std::optional<Vector3> SlidingWindowFilter::find_landmark(std::int64_t id) const
   return landmark(found->second);
 }
 
-bool SlidingWindowFilter::set_landmark(std::int64_t id, const Vector3& x_w) {
-  const auto found = index_.find(id);
-  if (found == index_.end()) return false;
-  points_[static_cast<std::size_t>(found->second)] = T_w_l_.inverse() * x_w;
-  return true;
-}
-
 bool SlidingWindowFilter::set_measurement(int pose, std::int64_t id, const Vector3& z) {
   const auto found = index_.find(id);
   if (found == index_.end()) return false;
@@ -126,16 +119,8 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
       }
     }
     factor_.solve(equations_.g_poses, equations_.g_landmarks, step_);
-    double decrement = 0;  // g^T delta
-    for (std::size_t j = 0; j < step_.poses.size(); ++j)
-      decrement += equations_.g_poses[j].dot(step_.poses[j]);
-    for (std::size_t l = 0; l < step_.landmarks.size(); ++l) {
-      decrement += equations_.g_landmarks[l].dot(step_.landmarks[l]);
-    }
-    std::vector<SE3> old_poses;
-    for (const Pose& pose : poses_) old_poses.push_back(pose.T_c_l);
-    const std::vector<Vector3> old_points = points_;
-    const Vector6 old_shift = shift_;
+    const double decrement = this->decrement();
+    const Estimate before = estimate();
     apply(step_);
     const double next = cost();
     // First-estimate derivatives lead to a point that is not exactly the minimum of the cost, so that close
@@ -144,9 +129,7 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
     const double slack =
         1e-9 * (1 + std::abs(current)) + (first_estimates() ? 1.0 + (reused ? 0.0 : decrement) : 0.0);
     if (!(next <= current + slack) && decrement > options_.stop_decrement) {
-      for (std::size_t j = 0; j < old_poses.size(); ++j) poses_[j].T_c_l = old_poses[j];
-      points_ = old_points;
-      shift_ = old_shift;
+      set_estimate(before);
       factor_is_good = false;
       if (!reused) damping = std::max(10 * damping, 1e-3);
       continue;
@@ -169,6 +152,27 @@ WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
   summary_.poses = pose_count();
   summary_.landmarks = landmark_count();
   return summary_;
+}
+
+double SlidingWindowFilter::decrement() const {
+  double sum = 0;
+  for (std::size_t j = 0; j < step_.poses.size(); ++j) sum += equations_.g_poses[j].dot(step_.poses[j]);
+  for (std::size_t l = 0; l < step_.landmarks.size(); ++l) {
+    sum += equations_.g_landmarks[l].dot(step_.landmarks[l]);
+  }
+  return sum;
+}
+
+SlidingWindowFilter::Estimate SlidingWindowFilter::estimate() const {
+  Estimate estimate{{}, points_, shift_};
+  for (const Pose& pose : poses_) estimate.T_c_l.push_back(pose.T_c_l);
+  return estimate;
+}
+
+void SlidingWindowFilter::set_estimate(const Estimate& estimate) {
+  for (std::size_t j = 0; j < poses_.size(); ++j) poses_[j].T_c_l = estimate.T_c_l[j];
+  points_ = estimate.points;
+  shift_ = estimate.shift;
 }
 
 void SlidingWindowFilter::apply(const WindowStep& step) {

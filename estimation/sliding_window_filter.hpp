@@ -136,9 +136,6 @@ class SlidingWindowFilter {
   /// does not see the landmark.
   bool set_measurement(int pose, std::int64_t id, const Vector3& z);
 
-  /// Moves a start value before the first optimise(); false when the landmark is not in the state.
-  bool set_landmark(std::int64_t id, const Vector3& x_w);
-
  private:
   static constexpr double kMinDepth = 1e-3;  ///< [m]; nearer or behind: the measurement says nothing
 
@@ -164,6 +161,12 @@ class SlidingWindowFilter {
   void remove_oldest(const WindowFrame& frame);
   void delete_oldest(const std::vector<bool>& drop);
   void marginalise_oldest(const std::vector<bool>& drop);
+  struct Blanket;
+  [[nodiscard]] Blanket blanket_of_oldest(const std::vector<bool>& drop) const;
+  void add_prior(Blanket& blanket) const;
+  void add_measurements(Blanket& blanket) const;
+  void add_motion(Blanket& blanket) const;
+  void make_prior(Blanket& blanket);
   /// Sizes of the diagonal blocks of the fill-in that the sparse filters keep: kept landmarks, next pose.
   [[nodiscard]] std::vector<int> fill_in_blocks(std::size_t landmarks) const;
   void compact_landmarks(const std::vector<int>& order);
@@ -182,6 +185,15 @@ class SlidingWindowFilter {
   [[nodiscard]] bool pose_is_linearised_at_prior(int pose) const;
   [[nodiscard]] const SE3& pose_lin(int pose) const;
   [[nodiscard]] const Vector3& landmark_lin(int landmark) const;
+  struct Estimate {
+    std::vector<SE3> T_c_l;
+    std::vector<Vector3> points;
+    Vector6 shift;
+  };
+  [[nodiscard]] Estimate estimate() const;
+  void set_estimate(const Estimate& estimate);
+  /// g^T delta of step_, the expected fall of the cost.
+  [[nodiscard]] double decrement() const;
   void apply(const WindowStep& step);
   void move_frame();
   [[nodiscard]] bool first_estimates() const {

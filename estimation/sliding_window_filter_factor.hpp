@@ -7,9 +7,8 @@
 namespace twofold {
 
 /// Direct solution of WindowEquations by one of two elimination orders, whichever takes fewer operations:
-///  * map onto path: landmarks that no prior couples are eliminated one by one, then poses and prior
-///  landmarks
-///    are factorised densely, O((6m + 3 n_prior)^3 + tracks);
+///  * map onto path: landmarks that no prior couples are eliminated one by one, then the poses and the
+///    landmarks of the prior are factorised densely, O((6m + 3 n_prior)^3 + tracks);
 ///  * path onto map: poses are eliminated along the chain, then the map is factorised, O(6m (3n)^2 + (3n)^3).
 /// Both give the same numbers up to rounding (SWF 2.2). Keeps its buffers between calls.
 class WindowFactor {

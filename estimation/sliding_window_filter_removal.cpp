@@ -45,54 +45,71 @@ std::vector<int> SlidingWindowFilter::fill_in_blocks(std::size_t landmarks) cons
   return sizes;
 }
 
-void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
-  const int n_prior = prior_.landmark_count();
-  if (!first_estimates()) prior_.relinearise(points_, poses_.front().T_c_l);
+/// Everything the oldest pose or the prior touches: the oldest pose's Markov blanket. Unknowns are offsets
+/// from the linearisation point: [oldest pose | dropped landmarks | kept landmarks | next pose].
+struct SlidingWindowFilter::Blanket {
+  std::vector<int> kept;  ///< landmarks of the next prior
+  std::vector<int> rest;  ///< landmarks outside of the blanket
+  std::vector<int> at;    ///< by landmark, its first row; -1 outside of the blanket
+  int eliminated = 0;     ///< rows of the oldest pose and the dropped landmarks
+  MatrixX Lambda;
+  VectorX g;
+  VectorX d;  ///< current state minus linearisation point
+};
 
-  // Everything the oldest pose or the prior touches: its Markov blanket.
+SlidingWindowFilter::Blanket SlidingWindowFilter::blanket_of_oldest(const std::vector<bool>& drop) const {
   std::vector<bool> touched(static_cast<std::size_t>(landmark_count()));
-  std::fill_n(touched.begin(), n_prior, true);
+  std::fill_n(touched.begin(), prior_.landmark_count(), true);
   for (const Observation& o : poses_.front().observations)
     touched[static_cast<std::size_t>(o.landmark)] = true;
-  std::vector<int> dropped, kept, rest;
+  Blanket blanket;
+  std::vector<int> dropped;
   for (int l = 0; l < landmark_count(); ++l) {
     const auto i = static_cast<std::size_t>(l);
-    (drop[i] ? dropped : touched[i] ? kept : rest).push_back(l);
+    (drop[i] ? dropped : touched[i] ? blanket.kept : blanket.rest).push_back(l);
   }
+  int rows = 6;
+  blanket.at.assign(touched.size(), -1);
+  const auto place = [&](int landmark) {
+    blanket.at[static_cast<std::size_t>(landmark)] = rows;
+    rows += 3;
+  };
+  std::for_each(dropped.begin(), dropped.end(), place);
+  blanket.eliminated = rows;
+  std::for_each(blanket.kept.begin(), blanket.kept.end(), place);
+  rows += 6;
+  blanket.Lambda = MatrixX::Zero(rows, rows);
+  blanket.g = VectorX::Zero(rows);
+  blanket.d = VectorX::Zero(rows);
+  return blanket;
+}
 
-  // Unknowns: [oldest pose | dropped landmarks | kept landmarks | next pose], as offsets from the
-  // linearisation point.
-  const int eliminated = 6 + 3 * static_cast<int>(dropped.size());
-  const int next_pose = eliminated + 3 * static_cast<int>(kept.size());
-  std::vector<int> at(touched.size(), -1);
-  for (std::size_t i = 0; i < dropped.size(); ++i)
-    at[static_cast<std::size_t>(dropped[i])] = 6 + 3 * static_cast<int>(i);
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    at[static_cast<std::size_t>(kept[i])] = eliminated + 3 * static_cast<int>(i);
-  }
-  MatrixX Lambda = MatrixX::Zero(next_pose + 6, next_pose + 6);
-  VectorX g = VectorX::Zero(next_pose + 6);
-  VectorX d = VectorX::Zero(next_pose + 6);  // current state minus linearisation point
-
-  // Prior: rows and columns move to their new places.
-  const auto place = [&](int block) { return block == n_prior ? 0 : at[static_cast<std::size_t>(block)]; };
+/// Rows and columns move to their new places.
+void SlidingWindowFilter::add_prior(Blanket& blanket) const {
+  const int n_prior = prior_.landmark_count();
   const int pose_column = 3 * n_prior;
+  const auto& at = blanket.at;
+  const auto place = [&](int landmark) { return at[static_cast<std::size_t>(landmark)]; };
+  MatrixX& Lambda = blanket.Lambda;
   for (int b = 0; b < n_prior; ++b) {
     for (int a = 0; a < n_prior; ++a) {
       Lambda.block<3, 3>(place(a), place(b)) = prior_.information.block<3, 3>(3 * a, 3 * b);
     }
     Lambda.block<6, 3>(0, place(b)) = prior_.information.block<6, 3>(pose_column, 3 * b);
     Lambda.block<3, 6>(place(b), 0) = prior_.information.block<3, 6>(3 * b, pose_column);
-    g.segment<3>(place(b)) = prior_.vector.segment<3>(3 * b);
+    blanket.g.segment<3>(place(b)) = prior_.vector.segment<3>(3 * b);
   }
   Lambda.topLeftCorner<6, 6>() = prior_.information.bottomRightCorner<6, 6>();
-  g.head<6>() = prior_.vector.tail<6>();
-  if (first_estimates()) {
-    const VectorX d_prior = prior_.difference(points_, poses_.front().T_c_l, shift_);
-    for (int a = 0; a < n_prior; ++a) d.segment<3>(place(a)) = d_prior.segment<3>(3 * a);
-    if (pose_is_linearised_at_prior(0)) d.head<6>() = d_prior.tail<6>();
-  }
-  // Measurements of the oldest pose.
+  blanket.g.head<6>() = prior_.vector.tail<6>();
+  if (!first_estimates()) return;
+  const VectorX d_prior = prior_.difference(points_, poses_.front().T_c_l, shift_);
+  for (int a = 0; a < n_prior; ++a) blanket.d.segment<3>(place(a)) = d_prior.segment<3>(3 * a);
+  if (pose_is_linearised_at_prior(0)) blanket.d.head<6>() = d_prior.tail<6>();
+}
+
+/// Of the oldest pose.
+void SlidingWindowFilter::add_measurements(Blanket& blanket) const {
+  auto& [kept, rest, at, eliminated, Lambda, g, d] = blanket;
   for (const Observation& o : poses_.front().observations) {
     const ObservationTerm term = linearise(0, o);
     if (!term.valid) continue;
@@ -106,21 +123,49 @@ void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
     g.head<6>() += term.J_pose.transpose() * term.information * r;
     g.segment<3>(l) += term.J_landmark.transpose() * term.information * r;
   }
-  // Process model to the next pose.
-  if (pose_count() > 1 && poses_[1].motion) {
-    const MotionError error = linearise_motion(1);
-    Eigen::Matrix<double, 6, 12> J;
-    J << error.J_prev, error.J_cur;
-    const Matrix6 Q_inv = poses_[1].motion->covariance.inverse();
-    const Eigen::Matrix<double, 12, 12> H = J.transpose() * Q_inv * J;
-    const Eigen::Matrix<double, 12, 1> h = -J.transpose() * (Q_inv * (error.e - error.J_prev * d.head<6>()));
-    Lambda.topLeftCorner<6, 6>() += H.topLeftCorner<6, 6>();
-    Lambda.topRightCorner<6, 6>() += H.topRightCorner<6, 6>();
-    Lambda.bottomLeftCorner<6, 6>() += H.bottomLeftCorner<6, 6>();
-    Lambda.bottomRightCorner<6, 6>() += H.bottomRightCorner<6, 6>();
-    g.head<6>() += h.head<6>();
-    g.tail<6>() += h.tail<6>();
+}
+
+/// Process model from the oldest to the next pose.
+void SlidingWindowFilter::add_motion(Blanket& blanket) const {
+  if (pose_count() == 1 || !poses_[1].motion) return;
+  const MotionError error = linearise_motion(1);
+  Eigen::Matrix<double, 6, 12> J;
+  J << error.J_prev, error.J_cur;
+  const Matrix6 Q_inv = poses_[1].motion->covariance.inverse();
+  const Eigen::Matrix<double, 12, 12> H = J.transpose() * Q_inv * J;
+  const Eigen::Matrix<double, 12, 1> h =
+      -J.transpose() * (Q_inv * (error.e - error.J_prev * blanket.d.head<6>()));
+  MatrixX& Lambda = blanket.Lambda;
+  Lambda.topLeftCorner<6, 6>() += H.topLeftCorner<6, 6>();
+  Lambda.topRightCorner<6, 6>() += H.topRightCorner<6, 6>();
+  Lambda.bottomLeftCorner<6, 6>() += H.bottomLeftCorner<6, 6>();
+  Lambda.bottomRightCorner<6, 6>() += H.bottomRightCorner<6, 6>();
+  blanket.g.head<6>() += h.head<6>();
+  blanket.g.tail<6>() += h.tail<6>();
+}
+
+/// Of what is left after elimination; what was in the old prior keeps its first estimate.
+void SlidingWindowFilter::make_prior(Blanket& blanket) {
+  WindowPrior next;
+  next.information = std::move(blanket.Lambda);
+  next.vector = std::move(blanket.g);
+  next.T_lin = poses_[1].T_c_l;
+  for (const int l : blanket.kept) {
+    const auto i = static_cast<std::size_t>(l);
+    const bool known = first_estimates() && l < prior_.landmark_count();
+    next.landmarks_lin.push_back(known ? prior_.landmarks_lin[i] : points_[i]);
   }
+  if (first_estimates()) next.fit_frame();
+  prior_ = std::move(next);
+}
+
+void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
+  if (!first_estimates()) prior_.relinearise(points_, poses_.front().T_c_l);
+  Blanket blanket = blanket_of_oldest(drop);
+  add_prior(blanket);
+  add_measurements(blanket);
+  add_motion(blanket);
+  auto& [kept, rest, at, eliminated, Lambda, g, d] = blanket;
   if (oldest_fixed_) {  // known: conditioning on it is dropping it
     Lambda.topRows<6>().setZero();
     Lambda.leftCols<6>().setZero();
@@ -134,18 +179,7 @@ void SlidingWindowFilter::marginalise_oldest(const std::vector<bool>& drop) {
                     options_.removal == PoseRemoval::kMarginalise ? FillIn::kFull : FillIn::kBlockDiagonal,
                     fill_in_blocks(kept.size()));
   g.noalias() += Lambda * d.tail(g.size());
-
-  // The new prior; what was in the old one keeps its first estimate.
-  WindowPrior next;
-  next.information = std::move(Lambda);
-  next.vector = std::move(g);
-  next.T_lin = poses_[1].T_c_l;
-  for (const int l : kept) {
-    const auto i = static_cast<std::size_t>(l);
-    next.landmarks_lin.push_back(first_estimates() && l < n_prior ? prior_.landmarks_lin[i] : points_[i]);
-  }
-  if (first_estimates()) next.fit_frame();
-  prior_ = std::move(next);
+  make_prior(blanket);
   oldest_fixed_ = false;
   poses_.pop_front();
   poses_.front().motion.reset();
