@@ -233,27 +233,5 @@ TEST_F(GuidedSearch, RepeatedTextureGivesNoDepth) {
   EXPECT_TRUE(std::isnan(right_from_row(images, rig_, 400, 240, 0, {})));
 }
 
-TEST(RightFromDepth, IsTheVirtualDisparityAndRefusesHolesAndEdges) {
-  const Rig rig = test_rig(SensorKind::kRgbd);
-  cv::Mat depth(rig.camera.height, rig.camera.width, CV_16UC1, cv::Scalar(2000));
-  EXPECT_NEAR(right_from_depth(depth, rig, 100.25, 50.5), 100.25 - rig.disparity_from_depth(2.0), 1e-9);
-  depth(cv::Rect(200, 0, 100, 100)) = 0;
-  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 250, 50)));  // hole
-  depth(cv::Rect(300, 0, 100, 100)) = 1000;
-  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 400, 50)));  // edge between 1 m and 2 m
-  depth(cv::Rect(0, 200, 50, 50)) = 65000;
-  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 20, 220)));  // beyond the sensor's range
-  EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 0, 220)));   // rim
-}
-
-TEST(MeasurementInformation, FallsByFourALevel) {
-  const Rig rig = test_rig(SensorKind::kStereo);
-  const Eigen::Vector3f fine = measurement_information(rig, 0, true);
-  const Eigen::Vector3f coarse = measurement_information(rig, 1, true);
-  EXPECT_FLOAT_EQ(fine.x(), 4 * coarse.x());
-  EXPECT_FLOAT_EQ(fine.z(), 4 * coarse.z());
-  EXPECT_EQ(measurement_information(rig, 0, false).z(), 0);
-}
-
 }  // namespace
 }  // namespace twofold

@@ -1,4 +1,4 @@
-// The capture state machine against a driver of our own: what it delivers, counts, survives, and refuses.
+// The capture state machine against a driver of our own: what it delivers, counts, and survives.
 #include "io/v4l2/camera.hpp"
 
 #include <gmock/gmock.h>
@@ -6,75 +6,12 @@
 
 #include <cerrno>
 
-#include "fake_device.hpp"
+#include "fake_camera.hpp"
 
 namespace twofold {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr const char* kPath = "/dev/video0";
-constexpr std::size_t kImageBytes = 64 * 48;
-
-FakeFrame good_frame(std::uint64_t k) {
-  return {std::vector<std::uint8_t>(kImageBytes, static_cast<std::uint8_t>(k)),
-          {},
-          0,
-          V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC,
-          {},
-          {},
-          0,
-          0};
-}
-
-class V4l2CameraTest : public ::testing::Test {
- protected:
-  V4l2CameraTest() { device().frame = good_frame; }
-  ~V4l2CameraTest() override {
-    camera_.reset();
-    EXPECT_EQ(calls_.open_descriptors, 0) << "a descriptor leaked";
-    EXPECT_EQ(calls_.mapped, 0) << "a mapping leaked";
-  }
-
-  FakeV4l2::Device& device() { return calls_.devices[kPath]; }
-  void open(CameraOptions options = {}) {
-    options.path = kPath;
-    auto camera = V4l2Camera::open(calls_, options);
-    ASSERT_TRUE(camera.has_value()) << camera.error().text;
-    camera_ = std::move(*camera);
-  }
-  std::string open_error(CameraOptions options = {}) {
-    options.path = kPath;
-    auto camera = V4l2Camera::open(calls_, options);
-    return camera ? "" : camera.error().text;
-  }
-  /// Frame k misbehaves as told; the others do not.
-  void spoil(std::uint64_t which, const std::function<void(FakeFrame&)>& how) {
-    device().frame = [which, how](std::uint64_t k) {
-      FakeFrame frame = good_frame(k);
-      if (k == which) how(frame);
-      return frame;
-    };
-  }
-  /// Reads n frames, which must come, in order of time and of index.
-  std::vector<CameraFrame> read(int n) {
-    std::vector<CameraFrame> frames;
-    for (int i = 0; i < n; ++i) {
-      CameraFrame frame;
-      EXPECT_EQ(camera_->next(stop_, &frame), CameraStatus::kFrame) << camera_->problem();
-      if (!frames.empty()) {
-        EXPECT_GT(frame.t_ns, frames.back().t_ns);
-        EXPECT_GT(frame.index, frames.back().index);
-      }
-      frames.push_back(frame);
-    }
-    return frames;
-  }
-
-  FakeV4l2 calls_;
-  std::unique_ptr<V4l2Camera> camera_;
-  std::atomic<bool> stop_{false};
-};
 
 TEST_F(V4l2CameraTest, DeliversEveryFrameOfAFaultlessCameraInPlace) {
   open();
@@ -255,81 +192,6 @@ TEST_F(V4l2CameraTest, StopsWhenAsked) {
   stop_ = true;
   CameraFrame frame;
   EXPECT_EQ(camera_->next(stop_, &frame), CameraStatus::kStopped);
-}
-
-TEST_F(V4l2CameraTest, RefusesWhatIsNoCamera) {
-  device().capabilities = V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING;
-  EXPECT_THAT(open_error(), HasSubstr("captures no video"));
-  device().capabilities = V4L2_CAP_VIDEO_CAPTURE_MPLANE | V4L2_CAP_STREAMING;
-  EXPECT_THAT(open_error(), HasSubstr("multi-planar"));
-  device().capabilities = V4L2_CAP_VIDEO_CAPTURE;
-  EXPECT_THAT(open_error(), HasSubstr("does not stream"));
-  device().capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
-  device().open = true;
-  EXPECT_THAT(open_error(), HasSubstr("another program"));
-}
-
-TEST_F(V4l2CameraTest, RefusesAnswersThatWouldLeadOutsideTheBuffers) {
-  CameraOptions options;
-  options.format = {PixelFormat::kGrey, 64, 48, 0};
-  device().stride = 63;
-  EXPECT_THAT(open_error(options), HasSubstr("bytes apart"));
-  device().stride = 0xffffffff;
-  EXPECT_THAT(open_error(options), HasSubstr("bytes apart"));
-  device().stride = 0;
-  device().buffer_bytes = kImageBytes - 1;
-  EXPECT_THAT(open_error(options), HasSubstr("gives buffers of"));
-  device().buffer_bytes = kImageBytes;
-  device().buffer_count = 1;
-  EXPECT_THAT(open_error(options), HasSubstr("gives 1 buffers"));
-  device().buffer_count = 1000000;
-  EXPECT_THAT(open_error(options), HasSubstr("gives 1000000 buffers"));
-  device().buffer_count.reset();
-  device().force_width = 128;
-  EXPECT_THAT(open_error(options), HasSubstr("gives GREY 128x48 when asked for GREY 64x48"));
-  device().force_width = 0;
-  options.format = {PixelFormat::kGrey, 0, 0, 0};
-  EXPECT_FALSE(open_error(options).empty());
-}
-
-TEST_F(V4l2CameraTest, ReportsFailuresOfEveryStepOfStarting) {
-  for (const unsigned long request : {VIDIOC_QUERYCAP, VIDIOC_G_FMT, VIDIOC_S_FMT, VIDIOC_REQBUFS,
-                                      VIDIOC_QUERYBUF, VIDIOC_QBUF, VIDIOC_STREAMON}) {
-    const std::size_t times = request == VIDIOC_S_FMT ? 1 : 1;
-    device().errors[request].assign(times, EIO);
-    EXPECT_THAT(open_error(), HasSubstr("Input/output error")) << request;
-    EXPECT_EQ(calls_.open_descriptors, 0);
-    EXPECT_EQ(calls_.mapped, 0);
-  }
-}
-
-TEST_F(V4l2CameraTest, ChoosesTheCheapestFormatOffered) {
-  device().formats = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_RGB24, V4L2_PIX_FMT_YUYV};
-  device().bytes_per_pixel = 2;
-  open();
-  EXPECT_EQ(camera_->format().layout.format, PixelFormat::kYuyv);
-  camera_.reset();
-  device().formats = {V4L2_PIX_FMT_RGB24};
-  EXPECT_THAT(open_error(), HasSubstr("no supported format"));
-}
-
-TEST_F(V4l2CameraTest, SetsControlsWithinTheirRanges) {
-  v4l2_queryctrl query{};
-  query.minimum = 1;
-  query.maximum = 500;
-  device().controls[V4L2_CID_EXPOSURE_ABSOLUTE] = query;
-  device().controls[V4L2_CID_EXPOSURE_AUTO] = query;
-  CameraOptions options;
-  options.settings.exposure_us = 8000;
-  open(options);
-  EXPECT_EQ(device().values[V4L2_CID_EXPOSURE_ABSOLUTE], 80);
-  EXPECT_EQ(device().values[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
-  camera_.reset();
-  options.settings.exposure_us = 1e6;
-  EXPECT_THAT(open_error(options), HasSubstr("must be in 1..500, is 10000"));
-  options.settings.exposure_us.reset();
-  options.settings.gain = 5;
-  EXPECT_THAT(open_error(options), HasSubstr("no control for gain"));
 }
 
 }  // namespace
