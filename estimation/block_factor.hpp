@@ -9,10 +9,12 @@
 namespace twofold {
 
 /// Cholesky factor of a block system. Two kinds share this interface because neither is fast everywhere:
-/// block by block for systems with little fill, where a general library spends its time on book-keeping and
-/// calls of its BLAS; supernodal (CHOLMOD) for systems whose fill makes large dense panels.
+/// block by block for systems with little fill; in panels of columns with the same rows (supernodes) for
+/// those whose fill makes long products. Both are made of products of a fixed number of rows and columns, by
+/// kernels of this project: on panels a few blocks wide a BLAS spends its time on calls and on gathering and
+/// scattering what it works on.
 ///
-/// Not thread-safe. Deterministic with a single-threaded BLAS.
+/// Not thread-safe. Deterministic.
 class BlockFactor {
  public:
   virtual ~BlockFactor() = default;
@@ -27,7 +29,6 @@ class BlockFactor {
 /// Block sizes 1 (scalar), 2, 3, 6, 7. The structure must outlive the factor.
 [[nodiscard]] std::unique_ptr<BlockFactor> make_simplicial_factor(const BlockStructure& structure,
                                                                   int block_size);
-/// Any block size.
 [[nodiscard]] std::unique_ptr<BlockFactor> make_supernodal_factor(const BlockStructure& structure,
                                                                   int block_size);
 

@@ -28,46 +28,95 @@ inline void store4(double* p, const Packet4& value) {
   std::memcpy(p, &value, sizeof value);
 }
 
-/// A += sign * B C^T with A 6x6, B and C 6xK, all column-major and dense.
+/// One outer product of six rows and six columns, added to A in registers.
 ///
 /// Six rows do not fill registers of four. But two columns of six are three registers without a gap: rows 0-3
 /// of the even column, its rows 4-5 with rows 0-1 of the odd column, rows 2-5 of the odd column. Nine
-/// registers hold all of A while the K outer products are added; Eigen's product of this size works in halves
-/// of a register.
+/// registers hold all of A; Eigen's product of this size works in halves of a register.
+template <int kSign>
+[[gnu::always_inline]] inline void accumulate_outer_product(Packet4 (&acc)[9], const double* b,
+                                                            const double* c) {
+  static_assert(kSign == 1 || kSign == -1);
+  const Packet4 b0123 = load4(b);
+  const Packet4 b2345 = load4(b + 2);
+  const Packet4 b4501 = __builtin_shufflevector(b2345, b0123, 2, 3, 4, 5);
+#pragma GCC unroll 3
+  for (int pair = 0; pair < 3; ++pair) {
+    const Packet4 c_even = broadcast4(c + 2 * pair);
+    const Packet4 c_odd = broadcast4(c + 2 * pair + 1);
+    const Packet4 c_both = __builtin_shufflevector(c_even, c_odd, 0, 1, 6, 7);
+    if constexpr (kSign > 0) {
+      acc[3 * pair] += b0123 * c_even;
+      acc[3 * pair + 1] += b4501 * c_both;
+      acc[3 * pair + 2] += b2345 * c_odd;
+    } else {
+      acc[3 * pair] -= b0123 * c_even;
+      acc[3 * pair + 1] -= b4501 * c_both;
+      acc[3 * pair + 2] -= b2345 * c_odd;
+    }
+  }
+}
+
+/// A += sign * B C^T with A 6x6, B and C 6xK, all column-major and dense.
 ///
 /// No __restrict, as C is all read before A is written: with it, a loop over B and A has the numbers of C
 /// broadcast ahead of it, to the stack, and waits for loads.
 template <int kSign, int K>
 inline void add_outer_product(double* a, const double* b, const double* c) {
-  static_assert(kSign == 1 || kSign == -1);
   Packet4 acc[9];
 #pragma GCC unroll 9
   for (int n = 0; n < 9; ++n) acc[n] = load4(a + 4 * n);
 #pragma GCC unroll 6
-  for (int k = 0; k < K; ++k) {
-    const double* bk = b + 6 * k;
-    const double* ck = c + 6 * k;
-    const Packet4 b0123 = load4(bk);
-    const Packet4 b2345 = load4(bk + 2);
-    const Packet4 b4501 = __builtin_shufflevector(b2345, b0123, 2, 3, 4, 5);
-#pragma GCC unroll 3
-    for (int pair = 0; pair < 3; ++pair) {
-      const Packet4 c_even = broadcast4(ck + 2 * pair);
-      const Packet4 c_odd = broadcast4(ck + 2 * pair + 1);
-      const Packet4 c_both = __builtin_shufflevector(c_even, c_odd, 0, 1, 6, 7);
-      if constexpr (kSign > 0) {
-        acc[3 * pair] += b0123 * c_even;
-        acc[3 * pair + 1] += b4501 * c_both;
-        acc[3 * pair + 2] += b2345 * c_odd;
-      } else {
-        acc[3 * pair] -= b0123 * c_even;
-        acc[3 * pair + 1] -= b4501 * c_both;
-        acc[3 * pair + 2] -= b2345 * c_odd;
-      }
-    }
-  }
+  for (int k = 0; k < K; ++k) accumulate_outer_product<kSign>(acc, b + 6 * k, c + 6 * k);
 #pragma GCC unroll 9
   for (int n = 0; n < 9; ++n) store4(a + 4 * n, acc[n]);
+}
+
+/// How many numbers behind the last strip subtract_strip_product may read (and not use).
+inline constexpr int kStripOverrun = 3;
+
+/// A -= B C^T with A NxN, B and C NxK, K even for N = 6, all column-major and dense.
+///
+/// The same with K at run time, and for other N: there a column of A has registers of its own, not all of
+/// them full.
+template <int N>
+inline void subtract_strip_product(double* a, const double* b, const double* c, int K) {
+  if constexpr (N == 6) {
+    Packet4 acc[9];
+#pragma GCC unroll 9
+    for (int n = 0; n < 9; ++n) acc[n] = load4(a + 4 * n);
+    for (int k = 0; k < K; k += 2) {
+#pragma GCC unroll 2
+      for (int u = 0; u < 2; ++u) accumulate_outer_product<-1>(acc, b + 6 * (k + u), c + 6 * (k + u));
+    }
+#pragma GCC unroll 9
+    for (int n = 0; n < 9; ++n) store4(a + 4 * n, acc[n]);
+  } else {
+    constexpr int kPackets = (N + 3) / 4;
+    constexpr int kChains = N <= 3 ? 2 : 1;  // a single short one would wait for its own sums
+    Packet4 acc[kChains][N][kPackets] = {};
+    const auto add_column = [&](Packet4(&sum)[N][kPackets], int k) {
+#pragma GCC unroll 7
+      for (int j = 0; j < N; ++j) {
+        const Packet4 c_jk = broadcast4(c + N * k + j);
+#pragma GCC unroll 2
+        for (int p = 0; p < kPackets; ++p) sum[j][p] += load4(b + N * k + 4 * p) * c_jk;
+      }
+    };
+    int k = 0;
+    for (; k + kChains <= K; k += kChains) {
+#pragma GCC unroll 2
+      for (int chain = 0; chain < kChains; ++chain) add_column(acc[chain], k + chain);
+    }
+    if (k < K) add_column(acc[0], k);
+    for (int j = 0; j < N; ++j) {
+      double column[4 * kPackets];
+      for (int p = 0; p < kPackets; ++p) {
+        store4(column + 4 * p, kChains == 2 ? acc[0][j][p] + acc[kChains - 1][j][p] : acc[0][j][p]);
+      }
+      for (int i = 0; i < N; ++i) a[N * j + i] -= column[i];
+    }
+  }
 }
 
 /// Sets n matrices standing one after the other to zero, as one piece of memory: element by element the

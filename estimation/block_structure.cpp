@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "estimation/cholmod_common.hpp"
@@ -45,50 +44,32 @@ Pattern lower_triangle(int nodes, std::span<const std::pair<int, int>> edges) {
   return pattern;
 }
 
-cholmod_sparse view(Pattern& pattern) {
-  return lower_triangle_view(static_cast<int>(pattern.begin.size()) - 1, pattern.begin, pattern.row, nullptr);
-}
-
-std::vector<int> natural_order(int nodes) {
-  std::vector<int> order(nodes);
-  std::iota(order.begin(), order.end(), 0);
-  return order;
-}
-
-/// The better of minimum degree and nested dissection, postordered.
-std::vector<int> dissected_order(int nodes, cholmod_sparse& A) {
-  std::vector<int> best = natural_order(nodes);
-  double fewest_flops = std::numeric_limits<double>::infinity();
-  for (const int ordering : {CHOLMOD_AMD, CHOLMOD_METIS}) {
-    CholmodCommon common;
-    common.c.nmethods = 1;
-    common.c.method[0].ordering = ordering;
-    common.c.postorder = 1;
-    common.c.supernodal = CHOLMOD_SIMPLICIAL;  // symbolic work on single nodes only
-    cholmod_factor* L = cholmod_analyze(&A, &common.c);
-    if (L != nullptr && common.c.fl < fewest_flops) {
-      fewest_flops = common.c.fl;
-      std::copy_n(static_cast<const int*>(L->Perm), nodes, best.begin());
-    }
-    cholmod_free_factor(&L, &common.c);
-  }
-  return best;
-}
-
-void choose_order(int nodes, std::span<const std::pair<int, int>> edges, int block_size, BlockStructure& s) {
-  // Flops from which nested dissection may earn back its own time, which is several times that of minimum
-  // degree.
-  constexpr double kWorthDissecting = 4e7;
-  s.order = natural_order(nodes);
-  if (nodes == 0) return;
-  Pattern pattern = lower_triangle(nodes, edges);
-  cholmod_sparse A = view(pattern);
+/// Replaces the order by nested dissection's where that takes fewer flops than `flops`.
+void try_dissection(cholmod_sparse& A, double flops, std::vector<int>& order) {
   CholmodCommon common;
-  const bool ordered = cholmod_amd(&A, nullptr, 0, s.order.data(), &common.c) != 0;
+  common.c.nmethods = 1;
+  common.c.method[0].ordering = CHOLMOD_METIS;
+  common.c.supernodal = CHOLMOD_SIMPLICIAL;  // symbolic work on single nodes only
+  cholmod_factor* L = cholmod_analyze(&A, &common.c);
+  if (L != nullptr && common.c.fl < flops) {
+    std::copy_n(static_cast<const int*>(L->Perm), order.size(), order.begin());
+  }
+  cholmod_free_factor(&L, &common.c);
+}
+
+std::vector<int> choose_order(int nodes, std::span<const std::pair<int, int>> edges, int block_size) {
+  // Nested dissection takes ten times the time of minimum degree, as long as a factorisation with this many
+  // flops and more.
+  constexpr double kWorthDissecting = 2e9;
+  std::vector<int> order(nodes);
+  if (nodes == 0) return order;
+  Pattern pattern = lower_triangle(nodes, edges);
+  cholmod_sparse A = lower_triangle_view(nodes, pattern.begin, pattern.row);
+  CholmodCommon common;
+  const bool ordered = cholmod_amd(&A, nullptr, 0, order.data(), &common.c) != 0;
   TWOFOLD_CHECK(ordered, "ordering runs out of memory only");
-  if (common.c.fl * std::pow(block_size, 3) < kWorthDissecting) return;
-  s.order = dissected_order(nodes, A);
-  s.postordered = true;
+  if (common.c.fl * std::pow(block_size, 3) > kWorthDissecting) try_dissection(A, common.c.fl, order);
+  return order;
 }
 
 /// Rows of the factor along the elimination tree: row k has the columns on the paths from those of the
@@ -158,7 +139,7 @@ BlockStructure analyse_blocks(int nodes, std::span<const std::pair<int, int>> ed
     TWOFOLD_CHECK(i != j && i >= 0 && j >= 0 && i < nodes && j < nodes, "edge joins two different nodes");
   }
   BlockStructure s;
-  choose_order(nodes, edges, block_size, s);
+  s.order = choose_order(nodes, edges, block_size);
   s.position.resize(nodes);
   for (int k = 0; k < nodes; ++k) s.position[s.order[k]] = k;
   std::vector<std::pair<int, int>> ordered;

@@ -31,15 +31,14 @@ struct BlockStructure {
   std::vector<int> row_begin;                 ///< row k of the factor left of the diagonal: entries
   std::vector<RowEntry> row_entries;          ///< [begin[k], begin[k + 1])
   double block_products = 0;                  ///< that a factorisation takes
-  bool postordered = false;  ///< children stand right before their parent in the elimination tree
 
   [[nodiscard]] int nodes() const { return static_cast<int>(order.size()); }
   /// Of a factorisation with blocks of this size.
   [[nodiscard]] double flops(int block_size) const;
 };
 
-/// Order by minimum degree (AMD); where a factorisation is long, nested dissection (METIS) is tried too, and
-/// the one with fewer flops is taken.
+/// Order by minimum degree (AMD); where a factorisation is very long, nested dissection (METIS) is tried too,
+/// and the one with fewer flops is taken.
 ///
 /// @param edges       pairs of different nodes in [0, nodes); repetitions are allowed
 /// @param block_size  of the largest system to be factorised

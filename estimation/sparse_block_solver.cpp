@@ -7,12 +7,12 @@
 namespace twofold {
 
 void SparseBlockSolver::set_structure(const BlockStructure& structure, int block_size) {
-  // From here on the gain of dense panels outweighs the costs of a library call.
+  // Flops from which panels gain more than they take to gather.
   constexpr double kWorthPanels = 4e7;
   structure_ = &structure;
   block_size_ = block_size;
   blocks_.assign(structure.system_row.size() * block_size * block_size, 0.0);
-  const bool panels = structure.postordered && structure.flops(block_size) > kWorthPanels;
+  const bool panels = structure.flops(block_size) > kWorthPanels;
   factor_ =
       panels ? make_supernodal_factor(structure, block_size) : make_simplicial_factor(structure, block_size);
 }

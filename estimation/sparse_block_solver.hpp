@@ -13,7 +13,7 @@ namespace twofold {
 /// before. Blocks (i, i) and those of the structure's edges are there; i and j number the nodes as the edges
 /// do. Takes the kind of factor that is faster for the structure.
 ///
-/// Not thread-safe; one instance a thread. Deterministic with a single-threaded BLAS.
+/// Not thread-safe; one instance a thread. Deterministic.
 class SparseBlockSolver {
  public:
   /// All values are zero afterwards. The structure must outlive the solver, or its next set_structure.

@@ -11,6 +11,8 @@
 
 #include "bench/estimation/ceres_pose_graph.hpp"
 #include "bench/estimation/g2o_file.hpp"
+#include "estimation/pose_graph_equations.hpp"
+#include "estimation/pose_graph_initialisation.hpp"
 
 namespace twofold::bench {
 namespace {
@@ -32,6 +34,7 @@ struct Arguments {
   PoseGraphOptions options;
   CeresOptions ceres;
   bool with_ceres = true;
+  bool chordal_ceres = false;
   int repeat = 3;
 };
 
@@ -82,6 +85,12 @@ Run run_ceres(PoseGraph<Group> graph, const Arguments& arguments) {
   CeresOptions options = arguments.ceres;
   const auto start = Clock::now();
   options.on_cost = [&](double cost) { run.history.emplace_back(milliseconds_since(start), cost); };
+  if (arguments.chordal_ceres) {
+    PoseGraphEquations<Group> equations;
+    equations.analyse(graph);
+    PoseGraphPositions<Group> positions(graph, equations.structure);
+    graph.poses = chordal_initialisation(graph, equations.structure, positions);
+  }
   const CeresSummary summary = solve_with_ceres(graph, options);
   run.total_ms = milliseconds_since(start);
   run.iterations = summary.iterations;
@@ -153,6 +162,8 @@ int run(int argc, char** argv) {
   app.add_option("--repeat", arguments.repeat, "runs of each solver; the median time is shown")
       ->check(CLI::Range(1, 99));
   app.add_flag("--no-chordal", no_chordal, "start from the file's poses, without chordal relaxation");
+  app.add_flag("--chordal-ceres", arguments.chordal_ceres,
+               "Ceres starts from this project's chordal relaxation, whose time then is Ceres's too");
   app.add_flag("--no-ceres", no_ceres, "this project's solver alone");
   try {
     app.parse(argc, argv);
@@ -166,7 +177,9 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "pose_graph: {}\n", reason);
     return 2;
   }
-  omp_set_max_active_levels(0);  // one thread for Ceres' CHOLMOD too; see estimation/cholmod_common.hpp
+  // One thread for Ceres too: the supernodal code of its CHOLMOD asks for four at every small copy loop,
+  // whatever omp_set_num_threads says.
+  omp_set_max_active_levels(0);
   try {
     const AnyPoseGraph graph = read_g2o(arguments.file);
     std::visit([&](const auto& g) { compare(g, arguments); }, graph);

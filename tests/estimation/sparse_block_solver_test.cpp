@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
+#include "estimation/panel_structure.hpp"
 #include "geometry/types.hpp"
 
 namespace twofold {
@@ -84,18 +86,16 @@ TYPED_TEST(SparseBlockSolverTest, RefusesAnIndefiniteMatrix) {
   EXPECT_FALSE(system.solver.factorise(0));
 }
 
-/// Enough fill for nested dissection and panels.
-TEST(SparseBlockSolver, BothKindsOfFactorAgree) {
-  constexpr int kNodes = 300, kSize = 6;
-  System<kSize> system(kNodes, 500);
-  ASSERT_TRUE(system.structure.postordered);
+TYPED_TEST(SparseBlockSolverTest, BothKindsOfFactorAgree) {
+  constexpr int kNodes = 120, kSize = TypeParam::value;
+  System<kSize> system(kNodes, 150);
   std::vector<double> blocks(system.structure.system_row.size() * kSize * kSize);
   for (int j = 0; j < kNodes; ++j) {
     for (int b = system.structure.system_begin[j]; b < system.structure.system_begin[j + 1]; ++b) {
       const int row = system.structure.order[system.structure.system_row[b]];
       const int column = system.structure.order[j];
-      Eigen::Map<Matrix6>(blocks.data() + b * kSize * kSize) =
-          system.A.block<kSize, kSize>(kSize * row, kSize * column);
+      Eigen::Map<typename System<kSize>::Block>(blocks.data() + b * kSize * kSize) =
+          system.A.template block<kSize, kSize>(kSize * row, kSize * column);
     }
   }
   const auto simplicial = make_simplicial_factor(system.structure, kSize);
@@ -113,9 +113,13 @@ TEST(SparseBlockSolver, BothKindsOfFactorAgree) {
   EXPECT_FALSE(supernodal->factorise(blocks, 0));
 }
 
-TEST(BlockStructure, FactorHoldsSystemAndFill) {
+/// In minimum degree's order, and in nested dissection's, which a huge block size makes worth its time.
+class BlockStructureTest : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(BlockSizes, BlockStructureTest, testing::Values(1, 10000));
+
+TEST_P(BlockStructureTest, FactorHoldsSystemAndFill) {
   const Edges edges = chain_with_chords(40, 30);
-  const BlockStructure s = analyse_blocks(40, edges, 1);
+  const BlockStructure s = analyse_blocks(40, edges, GetParam());
   // Boolean elimination on the dense pattern.
   Eigen::MatrixXi dense = Eigen::MatrixXi::Identity(40, 40);
   for (const auto& [i, j] : edges)
@@ -132,6 +136,29 @@ TEST(BlockStructure, FactorHoldsSystemAndFill) {
     }
     EXPECT_EQ(rows, std::vector<int>(s.factor_row.begin() + s.factor_begin[j],
                                      s.factor_row.begin() + s.factor_begin[j + 1]));
+  }
+}
+
+TEST_P(BlockStructureTest, PanelsHoldTheFactor) {
+  for (const int nodes : {0, 1, 2, 60}) {
+    const BlockStructure s = analyse_blocks(nodes, chain_with_chords(nodes, nodes), GetParam());
+    const PanelStructure p = gather_panels(s);
+    int column = 0;
+    double trapezoids = 0;
+    for (const auto& panel : p.panels) {
+      trapezoids += panel.width * (panel.height() - 0.5 * (panel.width - 1));
+      EXPECT_EQ(panel.first, column);
+      const auto begin = p.row.begin() + panel.begin, end = p.row.begin() + panel.end;
+      EXPECT_TRUE(std::is_sorted(begin, end));
+      for (; column < panel.first + panel.width; ++column) {
+        EXPECT_EQ(p.row[panel.begin + column - panel.first], column);
+        EXPECT_TRUE(std::includes(begin, end, s.factor_row.begin() + s.factor_begin[column],
+                                  s.factor_row.begin() + s.factor_begin[column + 1]));
+      }
+    }
+    EXPECT_EQ(column, nodes);
+    EXPECT_LE(trapezoids, 1.25 * s.factor_row.size());  // at most a fifth is zeros
+    EXPECT_LE(p.panels.size(), 1 + 0.9 * nodes);
   }
 }
 
