@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/stages.hpp"
-#include "tests/imaging/rendered_scene.hpp"
+#include "tests/imaging/rendered_frames.hpp"
 
 namespace twofold {
 namespace {
@@ -17,18 +17,12 @@ Rig rig() {
   return testing::test_rig(SensorKind::kStereo);
 }
 
+SE3 T_c_w(int i) {
+  return SE3(SO3::exp(Vector3(0, 0.01 * i, 0)), Vector3(-0.01 * i, 0, -0.02 * i));
+}
+
 const std::vector<Frame>& frames() {
-  static const std::vector<Frame> all = [] {
-    testing::RenderedScene scene(rig(), {3, 2, 5}, 21);
-    std::vector<Frame> made;
-    for (int i = 0; i < kFrames; ++i) {
-      FrameImages images;
-      scene.render(SE3(SO3::exp(Vector3(0, 0.01 * i, 0)), Vector3(-0.01 * i, 0, -0.02 * i)), 2, images);
-      made.push_back(
-          {i, i * std::int64_t{33'000'000}, images.left.level(0).clone(), images.right.level(0).clone(), {}});
-    }
-    return made;
-  }();
+  static const std::vector<Frame> all = testing::rendered_frames(rig(), T_c_w, kFrames);
   return all;
 }
 

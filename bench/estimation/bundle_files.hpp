@@ -15,8 +15,7 @@ namespace twofold {
 ///     (rotation vector, translation, f, k1, k2; the camera looks along -z), three a point, one a line.
 ///     Errors of cameras with different f are weighted so that they count in each camera's own pixels;
 ///   - the libmv text layout: cameras points observations; marker space, f cx cy k1 k2 k3 p1 p2; camera point
-///   u
-///     v; a line a camera (rotation vector, translation; +z); a line a point;
+///     u v; a line a camera (rotation vector, translation; +z); a line a point;
 ///   - a folder of stereo tracks: VO_calibration.txt, VO_camera_poses_large.txt, VO_stereo_factors_large.txt.
 ///
 /// Throws std::runtime_error that names file, line and what is wrong.

@@ -5,8 +5,8 @@
 #include <fstream>
 
 #include "bench/estimation/solver_race.hpp"
+#include "bench/estimation/typical_window.hpp"
 #include "estimation/window_problem_io.hpp"
-#include "tests/estimation/synthetic_window.hpp"
 
 namespace twofold {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 struct Arguments {
   std::string file;
   std::string dump;
-  SyntheticWindowOptions generator;
+  SyntheticWindowOptions generator = typical_window_options();
   RaceOptions race;
 };
 
@@ -37,16 +37,6 @@ void run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   twofold::Arguments arguments;
   auto& g = arguments.generator;
-  g.inner = 25;
-  g.outer = 175;
-  g.laps = 1.6;
-  g.points_per_keyframe = 70;
-  g.pixel_noise = 0.7;
-  g.outliers = 0.03;
-  g.missing_right = 0.2;
-  g.constraint_noise = 0.005;
-  g.start_pose_noise = 0.01;
-  g.start_depth_noise = 0.05;
   CLI::App app("Double-window problem: this project's solver beside Ceres");
   app.option_defaults()->always_capture_default();
   app.add_option("--load,file", arguments.file,

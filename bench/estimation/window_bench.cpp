@@ -1,29 +1,19 @@
 // Micro benchmarks of the estimation room on generated problems of the usual size.
 #include <benchmark/benchmark.h>
 
+#include "bench/estimation/typical_window.hpp"
 #include "estimation/motion_only.hpp"
 #include "estimation/point_elimination.hpp"
 #include "estimation/window_solver.hpp"
 #include "estimation/window_state.hpp"
-#include "tests/estimation/synthetic_window.hpp"
 
 namespace twofold {
 namespace {
 
-/// 25 inner and 175 outer keyframes.
 SyntheticWindow typical_window(bool outer_observations) {
-  SyntheticWindowOptions options;
-  options.inner = 25;
-  options.outer = 175;
-  options.laps = 1.6;
+  SyntheticWindowOptions options = typical_window_options();
   options.points_per_keyframe = outer_observations ? 70 : 80;
   options.outer_observations = outer_observations;
-  options.pixel_noise = 0.7;
-  options.outliers = 0.03;
-  options.missing_right = 0.2;
-  options.constraint_noise = 0.005;
-  options.start_pose_noise = 0.01;
-  options.start_depth_noise = 0.05;
   return make_synthetic_window(options);
 }
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/tracking/plain_map.hpp"
-#include "tests/imaging/rendered_scene.hpp"
+#include "tests/imaging/rendered_frames.hpp"
 #include "tracking/tracker.hpp"
 
 namespace twofold {
@@ -26,17 +26,7 @@ Rig rig() {
 }
 
 const std::vector<Frame>& frames() {
-  static const std::vector<Frame> all = [] {
-    testing::RenderedScene scene(rig(), {3, 2, 5}, 21);
-    std::vector<Frame> made;
-    for (int i = 0; i < kFrames; ++i) {
-      FrameImages images;
-      scene.render(T_c_w(i), 2, images);
-      made.push_back(
-          {i, i * std::int64_t{33'000'000}, images.left.level(0).clone(), images.right.level(0).clone(), {}});
-    }
-    return made;
-  }();
+  static const std::vector<Frame> all = testing::rendered_frames(rig(), T_c_w, kFrames);
   return all;
 }
 

@@ -4,8 +4,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <functional>
 
+#include "experiments/parts.hpp"
 #include "experiments/scale_drift/experiments.hpp"
 
 namespace {
@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
   app.add_flag("--smoke", smoke, "small scenes in seconds; fails when a statement does not hold");
   CLI11_PARSE(app, argc, argv);
   if (smoke) shrink(options);
-  const std::vector<std::pair<std::string, std::function<void(const ScaleDriftOptions&, Report&)>>> all = {
+  const Parts<ScaleDriftOptions> all = {
       {"jacobian", jacobian_experiment}, {"circle", circle_experiment}, {"sphere", sphere_experiment}};
   try {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
@@ -65,12 +65,7 @@ int main(int argc, char** argv) {
                                 {"sphere_radius", options.sphere.radius},
                                 {"sphere_noise_px", options.sphere_noise_px},
                                 {"seed", options.seed}};
-    for (const auto& [name, experiment] : all) {
-      if (!only.empty() && std::find(only.begin(), only.end(), name) == only.end()) continue;
-      experiment(options, report);
-      std::printf("done: %s\n", name.c_str());
-      std::fflush(stdout);
-    }
+    run_parts(all, only, options, report);
     std::fputs(report.finish().c_str(), stdout);
     const auto& statements = report.statements();
     const bool hold =

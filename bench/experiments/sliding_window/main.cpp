@@ -3,9 +3,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <functional>
-#include <map>
 
+#include "experiments/parts.hpp"
 #include "experiments/sliding_window/experiments.hpp"
 
 int main(int argc, char** argv) {
@@ -14,14 +13,6 @@ int main(int argc, char** argv) {
   std::string out = "sliding_window_results";
   std::vector<std::string> only;
   int threads = 2;
-  const std::vector<
-      std::pair<std::string, std::function<void(const SlidingWindowExperimentOptions&, Report&)>>>
-      all = {{"convergence", convergence_experiment},     {"vsdf", sparse_marginalisation_experiment},
-             {"patch_warping", patch_warping_experiment}, {"sideways", sideways_experiment},
-             {"track_length", track_length_experiment},   {"run_time", run_time_experiment},
-             {"expansion", expansion_experiment},         {"consistency", consistency_experiment},
-             {"starry_night", starry_night_experiment}};
-
   CLI::App app{"Sliding window filter: figures 2(b), 12-17, consistency, real data with truth"};
   app.add_option("--trials", options.trials, "Monte Carlo trials of the figures")->check(CLI::PositiveNumber);
   app.add_option("--nees-trials", options.nees_trials, "trials of the consistency test")
@@ -40,17 +31,17 @@ int main(int argc, char** argv) {
       "consistency starry_night");
   app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
+  Parts<SlidingWindowExperimentOptions> all = {
+      {"convergence", convergence_experiment},     {"vsdf", sparse_marginalisation_experiment},
+      {"patch_warping", patch_warping_experiment}, {"sideways", sideways_experiment},
+      {"track_length", track_length_experiment},   {"run_time", run_time_experiment},
+      {"expansion", expansion_experiment},         {"consistency", consistency_experiment}};
+  if (!options.data.empty()) all.emplace_back("starry_night", starry_night_experiment);
   try {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));
     Report report(out);
-    for (const auto& [name, experiment] : all) {
-      const bool wanted = only.empty() || std::find(only.begin(), only.end(), name) != only.end();
-      if (!wanted || (name == "starry_night" && options.data.empty())) continue;
-      experiment(options, report);
-      std::printf("done: %s\n", name.c_str());
-      std::fflush(stdout);
-    }
+    run_parts(all, only, options, report);
     std::fputs(report.finish().c_str(), stdout);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -3,11 +3,10 @@
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <ctime>
-#include <functional>
 
+#include "experiments/parts.hpp"
 #include "experiments/why_filter/experiments.hpp"
 
 int main(int argc, char** argv) {
@@ -39,21 +38,15 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "threads over trials")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   if (full) options.trials = options.ba_trials = options.min_trials = 500;
-  const std::vector<std::pair<std::string, std::function<void(const WhyFilterOptions&, Report&)>>> all = {
-      {"preliminary", preliminary_experiment},
-      {"motion", motion_experiment},
-      {"cost", cost_experiment},
-      {"monte_carlo", monte_carlo_experiment}};
+  const Parts<WhyFilterOptions> all = {{"preliminary", preliminary_experiment},
+                                       {"motion", motion_experiment},
+                                       {"cost", cost_experiment},
+                                       {"monte_carlo", monte_carlo_experiment}};
   try {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(threads));
     Report report(out);
-    for (const auto& [name, experiment] : all) {
-      if (!only.empty() && std::find(only.begin(), only.end(), name) == only.end()) continue;
-      experiment(options, report);
-      std::printf("done: %s\n", name.c_str());
-      std::fflush(stdout);
-    }
+    run_parts(all, only, options, report);
     const double minutes = static_cast<double>(std::clock()) / CLOCKS_PER_SEC / 60;
     report.state("run time", "the default run takes at most ten minutes on two cores: 20 of processor time",
                  text("%.1f minutes of processor time", minutes), minutes <= 20);
