@@ -7,6 +7,7 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
   SlotHandle slot;
   const auto ready = [&] { return frames_.try_pop(slot) || frames_ended_.load(std::memory_order_acquire); };
   while (tracker_parking_.wait(stop, ready)) {
+    // A handle that was moved from is empty (PoolHandle).  NOLINTNEXTLINE(bugprone-use-after-move)
     if (!slot && !frames_.try_pop(slot)) break;  // ended, and nothing was pushed before that
     const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, slot->next_t_ns, stop);
     slot->record = FrameRecord{};

@@ -74,6 +74,7 @@ bool GaussNewtonFilter::step(std::span<const std::int64_t> lost, std::span<const
 std::vector<GaussNewtonFilter::Seen> GaussNewtonFilter::match(
     std::span<const PointObservation> observations) const {
   std::vector<std::pair<std::int64_t, int>> index;
+  index.reserve(points_.size());
   for (int j = 0; j < point_count(); ++j) index.emplace_back(points_[static_cast<std::size_t>(j)].id, j);
   std::sort(index.begin(), index.end());
   std::vector<Seen> seen;

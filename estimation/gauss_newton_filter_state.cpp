@@ -1,6 +1,7 @@
 // What the Gauss-Newton filter keeps: points, anchors and the current pose enter and leave its information
 // matrix  (thesis 4.5.2).
 #include <algorithm>
+#include <numeric>
 
 #include "estimation/gauss_newton_filter.hpp"
 #include "estimation/sliding_window_filter_prior.hpp"
@@ -54,8 +55,8 @@ void GaussNewtonFilter::eliminate(const std::vector<int>& indices) {
 }
 
 void GaussNewtonFilter::marginalise_pose() {  // eq. 4.25
-  std::vector<int> indices;
-  for (int i = 0; i < 6; ++i) indices.push_back(pose_at() + i);
+  std::vector<int> indices(6);
+  std::iota(indices.begin(), indices.end(), pose_at());
   if (Lambda_.bottomRightCorner<6, 6>().isZero(0)) {
     Lambda_.conservativeResize(pose_at(), pose_at());
   } else {
@@ -66,10 +67,9 @@ void GaussNewtonFilter::marginalise_pose() {  // eq. 4.25
 /// The old pose moves from the end of the state to the end of the anchors.
 void GaussNewtonFilter::pose_becomes_anchor() {
   const int anchors_end = 6 * anchor_count(), pose = pose_at();
-  std::vector<int> order;
-  for (int i = 0; i < anchors_end; ++i) order.push_back(i);
-  for (int i = 0; i < 6; ++i) order.push_back(pose + i);
-  for (int i = anchors_end; i < pose; ++i) order.push_back(i);
+  std::vector<int> order(static_cast<std::size_t>(pose) + 6);
+  std::iota(order.begin(), order.end(), 0);
+  std::rotate(order.begin() + anchors_end, order.begin() + pose, order.end());
   Lambda_ = reordered(Lambda_, order);
   anchors_.push_back(T_c_w_);
   anchors_lin_.push_back(T_c_w_);

@@ -31,7 +31,7 @@ std::optional<Alignment> align(std::span<const Vector3> x_a, std::span<const Vec
     result.spread_b += y_b.squaredNorm();
   }
   const Eigen::JacobiSVD<Matrix3> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vector3 s = svd.singularValues();
+  const Vector3& s = svd.singularValues();
   if (!(s[1] > kCollinear * s[0])) return std::nullopt;  // also catches H = 0 and NaN
   Vector3 sign(1, 1, 1);
   if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign.z() = -1;

@@ -35,7 +35,7 @@ class WindowBuilder {
   struct Outlier {
     KeyframeId keyframe = kNoKeyframe;
     PointId point = kNoPoint;
-    auto operator<=>(const Outlier&) const = default;
+    auto operator<=>(const Outlier&) const = default;  // NOLINT(modernize-use-nullptr): there is no 0 here
   };
   /// Measurements the solved problem disagrees with, by keyframe, then point.
   void find_outliers(const DoubleWindow& window, std::vector<Outlier>& outliers) const;
