@@ -34,10 +34,10 @@ struct Distortion {
 
   /// Inverse of distort by damped Newton iterations.
   ///
-  /// @return  ideal point; nullopt when xy_d lies outside of the image of the part of the plane on which the
-  /// model is
-  ///          one-to-one around the optical axis (there the polynomial folds back and has no meaningful
-  ///          inverse).
+  /// @param xy_d  distorted coordinates on the plane z = 1
+  /// @return  ideal point; nullopt when xy_d lies outside of the image of that part of the plane on which
+  ///          the model is one-to-one around the optical axis: beyond it the polynomial folds back and has
+  ///          no meaningful inverse.
   [[nodiscard]] std::optional<Vector2> undistort(const Vector2& xy_d) const;
 };
 

@@ -42,10 +42,10 @@ struct EngineOptions {
   std::size_t frame_slots = 8;     ///< frames decoded ahead, or waiting, at most
   std::size_t proposal_slots = 4;  ///< keyframe proposals under way between the threads, a power of two
 
-  std::optional<int> tracker_cpu;  ///< pin the threads
+  std::optional<int> tracker_cpu;  ///< pin the threads to these, >= 0
   std::optional<int> mapper_cpu;
   std::optional<int> loop_closer_cpu;
-  std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker
+  std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
 
   bool trace = false;  ///< keep spans and counters for RunResult::trace
 };

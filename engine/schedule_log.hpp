@@ -28,7 +28,7 @@ struct TrackerStep {
 struct MapperStep {
   std::uint64_t version = 0;        ///< version it published, grows; 0 when it published none
   std::uint32_t proposals = 0;      ///< keyframe proposals consumed
-  std::uint32_t loop_messages = 0;  ///< loop constraints consumed
+  std::uint32_t loop_messages = 0;  ///< messages of the loop closer consumed
   std::uint32_t iterations = 0;     ///< solver iterations it was given or had time for
   std::uint32_t refused = 0;        ///< its messages that found a ring full
   bool operator==(const MapperStep&) const = default;

@@ -51,9 +51,9 @@ struct RansacResult {
 ///
 /// Estimator:
 ///   using Model;  static constexpr int kSampleSize;
-///   int size() const;                                                     number of data
-///   void fit(std::span<const int, kSampleSize>, std::vector<Model>&) const;   appends none, one or several
-///   models double squared_residual(const Model&, int i) const;                   may be infinite
+///   int size() const;                                                          number of data
+///   void fit(std::span<const int, kSampleSize>, std::vector<Model>&) const;    appends none or some models
+///   double squared_residual(const Model&, int i) const;                        may be infinite
 ///
 /// @return  the best model seen, not refined; nullopt when size() < kSampleSize or no model has kSampleSize
 /// inliers. Deterministic: depends on the estimator and the options only.

@@ -48,7 +48,7 @@ class Vocabulary {
   /// tf-idf bag of an image's corners.
   [[nodiscard]] BagOfWords bag(std::span<const DescribedCorner> corners) const;
 
-  /// Little-endian file: "TFVOC", version, counts, nodes, CRC-32 (docs/formats.md). Both throw
+  /// Little-endian file: "TFVOC", version, counts, nodes, CRC-32 (docs/places.md). Both throw
   /// std::runtime_error naming the file and what is wrong; reading trusts nothing in the file.
   void save(const std::filesystem::path& file) const;
   [[nodiscard]] static Vocabulary load(const std::filesystem::path& file);

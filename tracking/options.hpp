@@ -38,7 +38,7 @@ struct TrackerOptions {
   int corner_levels = 3;        ///< levels on which new points are started
   int cell_px = 28;             ///< at most one new point a cell and only where no point is tracked
   int max_new_points = 220;     ///< started in one keyframe
-  float min_corner_score = 12;  ///< Shi-Tomasi
+  float min_corner_score = 12;  ///< Shi-Tomasi [grey^2/px^2]
   int max_failures = 4;         ///< candidates not found so many frames in a row are given up
   int max_candidate_age = 3;    ///< keyframes after which an unconfirmed candidate is given up
 };

@@ -156,8 +156,10 @@ void add_eval_command(CLI::App& app, int& exit_code) {
   command->add_option("ESTIMATE", arguments->estimate, "trajectory, TUM or KITTI form")->required();
   command->add_option("GROUNDTRUTH", arguments->truth, "trajectory, TUM, KITTI or EuRoC form, or a recording")
       ->required();
-  command->add_option("--align", arguments->alignment, "none, se3 or sim3")
-      ->transform(CLI::CheckedTransformer(kAlignments))
+  command
+      ->add_option("--align", arguments->alignment,
+                   "what the estimate may be moved by: nothing, a rigid motion, or with scale")
+      ->transform(CLI::CheckedTransformer(kAlignments).description("{none,se3,sim3}"))
       ->default_str("se3");
   command
       ->add_option("--max-difference", arguments->max_difference_s, "largest difference of time stamps [s]")

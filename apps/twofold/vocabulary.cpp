@@ -156,11 +156,13 @@ void add_train(CLI::App& parent, int& exit_code) {
   command->add_option("--every", arguments->every, "Take each Nth image of folders and sources")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--branching", arguments->options.branching)
+  command->add_option("--branching", arguments->options.branching, "Children of a node of the tree")
       ->check(CLI::Range(2, 64))
       ->capture_default_str();
-  command->add_option("--levels", arguments->options.levels)->check(CLI::Range(1, 6))->capture_default_str();
-  command->add_option("--seed", arguments->options.seed)->capture_default_str();
+  command->add_option("--levels", arguments->options.levels, "Of the tree: at most branching^levels words")
+      ->check(CLI::Range(1, 6))
+      ->capture_default_str();
+  command->add_option("--seed", arguments->options.seed, "Of the first medians")->capture_default_str();
   command->callback([arguments, &exit_code] {
     train(*arguments);
     exit_code = kOk;
