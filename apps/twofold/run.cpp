@@ -1,5 +1,6 @@
 #include <unistd.h>
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <fstream>
 #include <memory>
 
@@ -84,6 +85,33 @@ int run_with_filter(const RunArguments& arguments) {
   return kOk;
 }
 
+FrameFeed feed_from(FrameSource& source) {
+  return [&source](Frame& frame) {
+    switch (source.next(frame)) {
+      case FrameStatus::kFrame:
+        return FeedStatus::kFrame;
+      case FrameStatus::kEnd:
+        return FeedStatus::kEnd;
+      case FrameStatus::kError:
+        break;
+    }
+    return FeedStatus::kError;
+  };
+}
+
+/// Throws what the run failed of: the source, a thread, or that nothing was tracked.
+void expect_success(const std::string& name, const FrameSource& source, const EngineOptions& options,
+                    const RunResult& result) {
+  if (!source.error().empty()) throw IoError("", source.error());
+  if (!result.error.empty()) throw std::runtime_error(result.error);
+  const bool any_tracked =
+      std::any_of(result.frames.begin(), result.frames.end(),
+                  [](const FrameRecord& record) { return record.state == FrameState::kTracked; });
+  if (!any_tracked && options.map)
+    throw std::runtime_error(name + ": no place of the loaded map was recognised");
+  if (!any_tracked) throw std::runtime_error(name + ": no frame could be tracked");
+}
+
 int run(const RunArguments& arguments) {
   if (arguments.estimator == "swf") return run_with_filter(arguments);
   EngineOptions options = engine_options(arguments);
@@ -103,17 +131,7 @@ int run(const RunArguments& arguments) {
   }
 
   ProgressLine line(source->frame_count(), arguments.quiet);
-  const FrameFeed feed = [&](Frame& frame) {
-    switch (source->next(frame)) {
-      case FrameStatus::kFrame:
-        return FeedStatus::kFrame;
-      case FrameStatus::kEnd:
-        return FeedStatus::kEnd;
-      case FrameStatus::kError:
-        break;
-    }
-    return FeedStatus::kError;
-  };
+  const FrameFeed feed = feed_from(*source);
   const ProgressSink progress = [&](const Progress& p) { line.show(p); };
   catch_interrupts();
   const std::vector<std::string> notes = real_time_notes(arguments);
@@ -133,14 +151,7 @@ int run(const RunArguments& arguments) {
   const SourceReport captured = source->report();
   for (const std::string& text : captured.summary) fmt::print("{}\n", text);
   for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
-  if (!source->error().empty()) throw IoError("", source->error());
-  if (!result.error.empty()) throw std::runtime_error(result.error);
-  const bool any_tracked =
-      std::any_of(result.frames.begin(), result.frames.end(),
-                  [](const FrameRecord& record) { return record.state == FrameState::kTracked; });
-  if (!any_tracked && options.map)
-    throw std::runtime_error(arguments.source + ": no place of the loaded map was recognised");
-  if (!any_tracked) throw std::runtime_error(arguments.source + ": no frame could be tracked");
+  expect_success(arguments.source, *source, options, result);
   return kOk;
 }
 
