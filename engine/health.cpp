@@ -1,8 +1,5 @@
 #include "engine/health.hpp"
 
-#include <sys/syscall.h>
-#include <unistd.h>
-
 #include <ctime>
 #include <fstream>
 #include <limits>
@@ -11,9 +8,9 @@
 namespace twofold {
 namespace {
 
-std::optional<double> clock_seconds(clockid_t clock) {
+double process_cpu_seconds() {
   timespec time{};
-  if (clock_gettime(clock, &time) != 0) return std::nullopt;
+  if (clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time) != 0) return 0;
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
@@ -21,7 +18,7 @@ std::optional<double> clock_seconds(clockid_t clock) {
 
 ProcessUsage process_usage() {
   ProcessUsage usage;
-  usage.cpu_seconds = clock_seconds(CLOCK_PROCESS_CPUTIME_ID).value_or(0);
+  usage.cpu_seconds = process_cpu_seconds();
   // Not getrusage: its ru_maxrss survives exec, so that a small program started by a large one looks large.
   std::ifstream status("/proc/self/status");
   std::string key;
@@ -32,23 +29,6 @@ ProcessUsage process_usage() {
     status.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
   }
   return usage;
-}
-
-double thread_cpu_seconds() {
-  return clock_seconds(CLOCK_THREAD_CPUTIME_ID).value_or(0);
-}
-
-std::optional<double> thread_cpu_seconds(pid_t thread) {
-  // The kernel's numbering of per-thread CPU clocks. pthread_getcpuclockid gives the same, but for a thread
-  // that has ended and is not joined yet its answer is the caller's own clock.
-  constexpr clockid_t kPerThread = 4;
-  constexpr clockid_t kScheduled = 2;
-  return clock_seconds(static_cast<clockid_t>(static_cast<unsigned>(~thread) << 3U) | kPerThread |
-                       kScheduled);
-}
-
-pid_t this_thread_id() {
-  return static_cast<pid_t>(syscall(SYS_gettid));
 }
 
 }  // namespace twofold

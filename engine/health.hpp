@@ -1,9 +1,6 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <cstdint>
-#include <optional>
 
 namespace twofold {
 
@@ -16,12 +13,5 @@ struct ProcessUsage {
 
 /// Fields the kernel does not give stay 0.
 [[nodiscard]] ProcessUsage process_usage();
-
-/// CPU time of the calling thread [s].
-[[nodiscard]] double thread_cpu_seconds();
-/// CPU time of a thread of this process by its kernel id [s]; nullopt when it has ended.
-[[nodiscard]] std::optional<double> thread_cpu_seconds(pid_t thread);
-/// Kernel id of the calling thread.
-[[nodiscard]] pid_t this_thread_id();
 
 }  // namespace twofold

@@ -8,20 +8,6 @@ namespace twofold {
 
 LatencyHistogram::LatencyHistogram() : state_(std::make_unique<State>()) {}
 
-void LatencyHistogram::merge(const LatencyHistogram& other) {
-  State& to = *state_;
-  const State& from = *other.state_;
-  for (std::size_t b = 0; b < kBuckets; ++b)
-    add(to.buckets[b], from.buckets[b].load(std::memory_order_relaxed));
-  add(to.sum_ns, from.sum_ns.load(std::memory_order_relaxed));
-  const auto max =
-      std::max(to.max_ns.load(std::memory_order_relaxed), from.max_ns.load(std::memory_order_relaxed));
-  const auto min =
-      std::min(to.min_ns.load(std::memory_order_relaxed), from.min_ns.load(std::memory_order_relaxed));
-  to.max_ns.store(max, std::memory_order_relaxed);
-  to.min_ns.store(min, std::memory_order_relaxed);
-}
-
 std::uint64_t LatencyHistogram::count() const {
   std::uint64_t total = 0;
   for (const auto& bucket : state_->buckets) total += bucket.load(std::memory_order_relaxed);

@@ -53,8 +53,6 @@ class LatencyHistogram {
     if (ns > s.max_ns.load(std::memory_order_relaxed)) s.max_ns.store(ns, std::memory_order_relaxed);
     if (ns < s.min_ns.load(std::memory_order_relaxed)) s.min_ns.store(ns, std::memory_order_relaxed);
   }
-  /// Adds all records of `other`; on this histogram the caller is the recording thread.
-  void merge(const LatencyHistogram& other);
 
   [[nodiscard]] std::uint64_t count() const;
   [[nodiscard]] double mean_ns() const;       ///< 0 when empty, as the following

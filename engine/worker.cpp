@@ -13,8 +13,6 @@
 #include <exception>
 #include <utility>
 
-#include "engine/health.hpp"
-
 namespace twofold {
 
 std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
@@ -45,7 +43,7 @@ std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
 
 void yield_to_other_threads() {
   constexpr int kNice = 10;  // a tenth of the share of a thread that does not yield
-  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(this_thread_id()), kNice);  // never refused
+  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);  // never refused
 }
 
 namespace {
@@ -84,7 +82,6 @@ Worker::~Worker() {
 }
 
 void Worker::run(const std::stop_token& stop, const std::function<void(std::stop_token)>& body) {
-  thread_id_ = this_thread_id();
   notes_ = configure_this_thread(options_);
   started_.store(true, std::memory_order_release);
   started_.notify_one();
@@ -95,7 +92,6 @@ void Worker::run(const std::stop_token& stop, const std::function<void(std::stop
   } catch (...) {
     error_ = options_.name + ": ended by an exception of unknown type";
   }
-  final_cpu_seconds_ = thread_cpu_seconds();
   finished_.store(true, std::memory_order_release);
 }
 
@@ -103,14 +99,6 @@ tl::expected<void, std::string> Worker::join() {
   if (thread_.joinable()) thread_.join();
   if (error_) return tl::make_unexpected(*error_);
   return {};
-}
-
-double Worker::cpu_seconds() const {
-  if (!finished()) {
-    if (const auto seconds = thread_cpu_seconds(thread_id_)) return *seconds;
-  }
-  // The kernel no longer knows the thread, so it has passed its last statement, which raised finished_.
-  return finished() ? final_cpu_seconds_ : 0.0;
 }
 
 }  // namespace twofold

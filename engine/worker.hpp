@@ -44,8 +44,6 @@ class Worker {
   [[nodiscard]] tl::expected<void, std::string> join();
   /// Whether the body has returned or failed; anyone.
   [[nodiscard]] bool finished() const { return finished_.load(std::memory_order_acquire); }
-  /// CPU time the thread has used [s]; anyone, also after it ended.
-  [[nodiscard]] double cpu_seconds() const;
   /// Wishes in the options that were not granted.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   [[nodiscard]] const std::string& name() const { return options_.name; }
@@ -56,11 +54,9 @@ class Worker {
   WorkerOptions options_;
   std::vector<std::string> notes_;     // written before started_ is raised
   std::optional<std::string> error_;   // written before finished_
-  std::atomic<bool> started_{false};   // release -> acquire publishes notes_ and thread_id_
-  std::atomic<bool> finished_{false};  // release -> acquire publishes error_ and final_cpu_seconds_
-  int thread_id_ = 0;
-  double final_cpu_seconds_ = 0;
-  std::jthread thread_;  // last member: starts after, and joins before, everything it uses
+  std::atomic<bool> started_{false};   // release -> acquire publishes notes_
+  std::atomic<bool> finished_{false};  // release -> acquire publishes error_
+  std::jthread thread_;                // last member: starts after, and joins before, everything it uses
 };
 
 }  // namespace twofold

@@ -192,10 +192,6 @@ struct Strip {
 
 }  // namespace
 
-float shi_tomasi_score(const cv::Mat& image, int u, int v) {
-  return static_cast<float>(structure_tensor(image, u, v).smaller_eigenvalue() * kPerPixel);
-}
-
 void detect_corners(const cv::Mat& image, int level, int threshold, float min_score, int border,
                     const CellGrid& grid, std::vector<Corner>& corners) {
   TWOFOLD_CHECK(grid.columns <= kMaxColumns, "image too wide for cells of this size");

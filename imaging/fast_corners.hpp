@@ -31,7 +31,4 @@ struct CellGrid {
 void detect_corners(const cv::Mat& image, int level, int threshold, float min_score, int border,
                     const CellGrid& grid, std::vector<Corner>& corners);
 
-/// Score of a corner; (u, v) at least 5 pixels inside.
-[[nodiscard]] float shi_tomasi_score(const cv::Mat& image, int u, int v);
-
 }  // namespace twofold

@@ -72,23 +72,6 @@ TEST(LatencyHistogram, KeepsOutliersAndNonsense) {
   EXPECT_EQ(histogram.quantile_ns(1.0), 100 * kLargestLatencyNs);
 }
 
-TEST(LatencyHistogram, MergingIsTheSameAsRecordingTogether) {
-  std::mt19937_64 rng(5);
-  std::uniform_int_distribution<std::int64_t> ns(1000, 50'000'000);
-  LatencyHistogram a;
-  LatencyHistogram b;
-  LatencyHistogram both;
-  for (int i = 0; i < 5000; ++i) {
-    const std::int64_t value = ns(rng);
-    (i % 3 == 0 ? a : b).record(value);
-    both.record(value);
-  }
-  a.merge(b);
-  EXPECT_EQ(a.to_json(), both.to_json());
-  a.merge(LatencyHistogram());
-  EXPECT_EQ(a.to_json(), both.to_json());
-}
-
 TEST(LatencyHistogram, JsonHoldsFiguresAndFilledBuckets) {
   LatencyHistogram histogram;
   for (int i = 0; i < 99; ++i) histogram.record(2'000'000);
