@@ -44,10 +44,10 @@ std::string invalid_rectified(const Calibration& c) {
 std::string Calibration::invalid_reason() const {
   if (const auto reason = left.invalid_reason(); !reason.empty()) return "left camera: " + reason;
   if (kind == SensorKind::kStereo) {
-    if (const auto reason = invalid_stereo(*this); !reason.empty()) return reason;
+    if (auto reason = invalid_stereo(*this); !reason.empty()) return reason;
   }
   if (already_rectified) {
-    if (const auto reason = invalid_rectified(*this); !reason.empty()) return reason;
+    if (auto reason = invalid_rectified(*this); !reason.empty()) return reason;
   }
   if (!(fps >= 0) || !std::isfinite(fps)) return "fps must not be negative, is " + std::to_string(fps);
   if (kind == SensorKind::kRgbd) {

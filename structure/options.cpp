@@ -5,7 +5,7 @@
 namespace twofold {
 
 std::string StructureOptions::invalid_reason() const {
-  if (const std::string reason = filter.invalid_reason(); !reason.empty()) return reason;
+  if (std::string reason = filter.invalid_reason(); !reason.empty()) return reason;
   if (features < 8) return "features must be >= 8, is " + std::to_string(features);
   if (!(sigma_px > 0)) return "sigma_px must be > 0, is " + std::to_string(sigma_px);
   if (refinements < 0) return "refinements must be >= 0, is " + std::to_string(refinements);

@@ -97,7 +97,7 @@ std::optional<SE3> StructureFilter::estimate_motion(const std::vector<StereoFeat
   if (!T_start) return std::nullopt;
   const MotionOnlyResult result = optimise_motion(rig_, observations, *T_start, {});
   // Not settled to the last digit within its iterations is good enough to look for the landmarks.
-  if (result.inliers < options_.min_matches) return T_start;
+  if (result.inliers < options_.min_matches) return *T_start;
   return result.T_c_ref;
 }
 
@@ -128,6 +128,7 @@ void StructureFilter::start_tracks(const std::vector<StereoFeature>& features, S
   Occupancy occupancy(rig_.camera, options_.cell_px);
   for (const SurfaceTrack& track : tracks_) occupancy.take(track.z);
   std::vector<const StereoFeature*> best;
+  best.reserve(features.size());
   for (const StereoFeature& feature : features) best.push_back(&feature);
   std::stable_sort(best.begin(), best.end(),
                    [](const auto* a, const auto* b) { return a->score > b->score; });
