@@ -113,13 +113,15 @@ TEST(SnapshotPublisherStress, NoReaderMeetsADeadVersionAndNoneIsLeft) {
   constexpr int kReaders = 2;
   Probe::Counters counters;
   std::array<std::uint64_t, kReaders> taken{};
-  std::atomic<int> broken{0};
+  std::atomic<int> broken{0}, started{0};
   {
     SnapshotPublisher<Probe> publisher(kReaders, Probe(1, counters));
     std::vector<std::jthread> readers;
     for (int r = 0; r < kReaders; ++r) {
       readers.emplace_back([&, r] {
-        std::uint64_t last = 0;
+        std::uint64_t last = publisher.mailbox(r).latest().version();
+        taken[r] = 1;
+        ++started;
         while (last < kVersions) {
           const Probe& probe = publisher.mailbox(r).latest();
           if (probe.version() < last || !probe.intact()) ++broken;
@@ -132,6 +134,8 @@ TEST(SnapshotPublisherStress, NoReaderMeetsADeadVersionAndNoneIsLeft) {
         }
       });
     }
+    // On a busy machine all versions would be published before a reader has begun.
+    while (started < kReaders) std::this_thread::yield();
     for (std::uint64_t v = 2; v <= kVersions; ++v) {
       publisher.publish(Probe(v, counters));
       if (v % 64 == 0) std::this_thread::yield();
