@@ -157,9 +157,10 @@ void add_eval_command(CLI::App& app, int& exit_code) {
   command->add_option("GROUNDTRUTH", arguments->truth, "trajectory, TUM, KITTI or EuRoC form, or a recording")
       ->required();
   command
-      ->add_option("--align", arguments->alignment,
-                   "what the estimate may be moved by: nothing, a rigid motion, or with scale")
-      ->transform(CLI::CheckedTransformer(kAlignments).description("{none,se3,sim3}"))
+      ->add_option_function<std::string>(
+          "--align", [arguments](const std::string& name) { arguments->alignment = kAlignments.at(name); },
+          "what the estimate may be moved by: nothing, a rigid motion, or with scale")
+      ->check(CLI::IsMember({"none", "se3", "sim3"}))
       ->default_str("se3");
   command
       ->add_option("--max-difference", arguments->max_difference_s, "largest difference of time stamps [s]")
