@@ -1,214 +1,140 @@
 // Figures 6.11 and 6.12: one camera twice around a loop; its scale drifts.
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 
-#include "experiments/double_window/experiments.hpp"
+#include "experiments/double_window/double_loop_methods.hpp"
 #include "experiments/double_window/place_recognition.hpp"
-#include "experiments/double_window/rounds.hpp"
-#include "experiments/plot.hpp"
 
 namespace twofold::bench {
 namespace {
 
 constexpr int kInner = 30, kOuter = 100;
+constexpr double kHuberPx = 3;      // as in the scale drift experiment: points are seen three or four times
+constexpr std::size_t kLater = 20;  // keyframes after the closure at which the map is shown again
 
-enum Method : std::size_t { kBa, kConstant, kGlobal, kRigid, kMethods };
-constexpr const char* kNames[kMethods] = {"BA", "cDWO", "gDWO", "cDWO, SE(3) loop"};
-
-MapperOptions mapper_options(Method method, const DoubleWindowExperimentOptions& options) {
+MapperOptions mapper_options(LoopMethod method, const DoubleWindowExperimentOptions& options) {
   MapperOptions mapper = simulation_mapper_options(options);
-  mapper.inner_window = method == kBa ? kUnbounded : kInner;
+  mapper.solver.huber_px = kHuberPx;
+  mapper.inner_window = method == kLoopBa ? kUnbounded : kInner;
   mapper.outer_window = kOuter;
-  mapper.global_outer_window = method == kGlobal;
+  mapper.global_outer_window = method == kLoopGlobal || method == kLoopGlobalRigid;
   return mapper;
 }
 
-struct LoopEvent {
-  int keyframe = 0, to = 0;
-  double scale = 1;
-};
-
-/// The trajectory in the frame of its last keyframe, and truth in the same place at the scale of the last
-/// stretch.
-cv::Mat plot_path(const GraphSnapshot& graph, const Scene& scene, const std::string& title) {
-  const std::size_t last = graph.keyframe_count() - 1;
-  const SE3 T_w_now = scene.T_k_w[last].inverse();
-  const KeyframeId last_id{static_cast<std::uint32_t>(last)}, before{static_cast<std::uint32_t>(last - 10)};
-  const SE3 T_before_last = graph.T_k_w(before) * graph.T_k_w(last_id).inverse();
-  const SE3 T_true = scene.T_k_w[last - 10] * scene.T_k_w[last].inverse();
-  const double scale = T_true.translation().norm() / T_before_last.translation().norm();
-  Series truth{.name = "truth", .colour = 1}, path{.name = "estimate", .colour = 0};
-  for (std::size_t k = 0; k <= last; ++k) {
-    const Vector3 c = scene.T_k_w[k].inverse().translation();
-    truth.x.push_back(c.x());
-    truth.y.push_back(c.y());
-    const SE3 T_last_k =
-        graph.T_k_w(last_id) * graph.T_k_w(KeyframeId{static_cast<std::uint32_t>(k)}).inverse();
-    const Vector3 x = T_w_now * (scale * T_last_k.translation());
-    path.x.push_back(x.x());
-    path.y.push_back(x.y());
-  }
-  PlotOptions plot{
-      .title = title, .x_label = "m", .y_label = "m", .equal_aspect = true, .width = 560, .height = 460};
-  return draw_plot({truth, path}, plot);
-}
-
-struct TrialResult {
-  Rounds rounds;
-  std::vector<LoopEvent> loops;
-  std::vector<cv::Mat> plots;
-};
-
 /// One method on one scene.
-struct Contestant {
-  Contestant(const Scene& scene, const MapperOptions& options)
-      : mapper(scene.rig, options), feeder(scene, Association::kLocal), places(scene, feeder) {}
-  Contestant(const Contestant&) = delete;  // places refers to feeder
+class Contestant {
+ public:
+  Contestant(const Scene& scene, LoopMethod method, const DoubleWindowExperimentOptions& options)
+      : mapper_(scene.rig, mapper_options(method, options),
+                method == kLoopRigid || method == kLoopGlobalRigid ? LoopGroup::kSe3 : LoopGroup::kSim3),
+        feeder_(scene, Association::kLocal),
+        places_(scene, feeder_),
+        scene_(scene) {}
+  Contestant(const Contestant&) = delete;  // places_ refers to feeder_
   Contestant& operator=(const Contestant&) = delete;
 
-  void map_next(Round& round) {
-    const KeyframeProposal& proposal = feeder.propose(mapper.graph());
+  void map_next() {
+    Round& round = trial_.rounds.emplace_back();
+    const KeyframeProposal& proposal = feeder_.propose(mapper_.graph());
     const double start = thread_cpu_ms();
-    const MapperReport report = mapper.step(proposal);
+    const MapperReport report = mapper_.step(proposal);
     record_cost(report, thread_cpu_ms() - start, round);
   }
 
-  DriftMapper mapper;
-  Feeder feeder;
-  PlaceRecognition places;
+  /// Looks for a place seen before, and closes the loop: a part of the same keyframe's round.
+  void close_loop() {
+    const std::size_t k = trial_.rounds.size() - 1;
+    const Recognition seen = places_.look(mapper_.graph());
+    if (seen.found()) {
+      if (trial_.loops.empty()) take_shot("before the loop closes");
+      trial_.loops.push_back({k, index(seen.loop.to), seen.loop.S_to_from.scale()});
+      const double start = thread_cpu_ms();
+      const MapperReport report = mapper_.close(seen.loop, seen.copies);
+      record_cost(report, trial_.rounds.back().cpu_ms + thread_cpu_ms() - start, trial_.rounds.back());
+    }
+    if (!trial_.loops.empty() && k == trial_.loops.front().keyframe + kLater) take_shot("closed");
+    if (k + 1 == static_cast<std::size_t>(scene_.keyframes())) take_shot("second round");
+  }
+
+  void record(const DoubleWindow& window) {
+    record_errors(mapper_.graph(), 1, scene_, window, trial_.rounds.back());
+    record_scale(mapper_.graph(), scene_, window, trial_.rounds.back());
+  }
+
+  [[nodiscard]] const DoubleWindow& window() const { return mapper_.window(); }
+  [[nodiscard]] LoopTrial take() { return std::move(trial_); }
+
+ private:
+  void take_shot(const std::string& when) {
+    const auto shown = [this](KeyframeId id) { return mapper_.window().contains(id); };
+    trial_.shots.push_back({when + ", keyframe " + std::to_string(trial_.rounds.size()),
+                            aligned_centres(mapper_.graph(), scene_),
+                            log_scales(mapper_.graph(), scene_, shown)});
+  }
+
+  DriftMapper mapper_;
+  Feeder feeder_;
+  PlaceRecognition places_;
+  const Scene& scene_;
+  LoopTrial trial_;
 };
 
-/// Looks for a place seen before, and closes the loop.
-void close_loop(Contestant& contestant, Method method, std::size_t k, const Scene& scene, bool plots,
-                TrialResult& result) {
-  const GraphSnapshot& graph = contestant.mapper.graph();
-  Recognition seen = contestant.places.look(graph);
-  const bool last = k + 1 == result.rounds.size(), first_loop = seen.found() && result.loops.empty();
-  if (plots && (last || first_loop)) {
-    const std::string when = std::string(kNames[method]) + ", keyframe " + std::to_string(k + 1);
-    result.plots.push_back(plot_path(graph, scene, when + (first_loop ? ", before the loop closes" : "")));
-  }
-  if (!seen.found()) return;
-  result.loops.push_back(
-      {static_cast<int>(k), static_cast<int>(index(seen.loop.to)), seen.loop.S_to_from.scale()});
-  if (method == kRigid) seen.loop.S_to_from = Sim3(seen.loop.S_to_from.without_scale());
-  contestant.mapper.close(seen.loop, seen.matches);
-}
-
-std::vector<TrialResult> run_trial(const Scene& scene, const DoubleWindowExperimentOptions& options,
-                                   bool plots) {
+/// All methods side by side, so that their errors are taken over the same edges: those of cDWO's windows.
+std::vector<LoopTrial> run_trial(const Scene& scene, const DoubleWindowExperimentOptions& options) {
   std::vector<std::unique_ptr<Contestant>> contestants;
-  std::vector<TrialResult> results(kMethods);
-  const auto count = static_cast<std::size_t>(scene.keyframes());
-  for (std::size_t m = 0; m < kMethods; ++m) {
-    contestants.push_back(
-        std::make_unique<Contestant>(scene, mapper_options(static_cast<Method>(m), options)));
-    results[m].rounds.resize(count);
+  for (std::size_t m = 0; m < kLoopMethods; ++m) {
+    contestants.push_back(std::make_unique<Contestant>(scene, static_cast<LoopMethod>(m), options));
   }
-  for (std::size_t k = 0; k < count; ++k) {
-    for (std::size_t m = 0; m < kMethods; ++m) contestants[m]->map_next(results[m].rounds[k]);
-    for (std::size_t m = 0; m < kMethods; ++m) {
-      record_errors(contestants[m]->mapper.graph(), 1, scene, contestants[kConstant]->mapper.window(),
-                    results[m].rounds[k]);
+  for (int k = 0; k < scene.keyframes(); ++k) {
+    for (auto& contestant : contestants) {
+      contestant->map_next();
+      contestant->close_loop();
     }
-    for (std::size_t m = 0; m < kMethods; ++m) {
-      close_loop(*contestants[m], static_cast<Method>(m), k, scene, plots, results[m]);
-    }
+    for (auto& contestant : contestants) contestant->record(contestants[kLoopConstant]->window());
   }
-  return results;
+  std::vector<LoopTrial> trials;
+  for (auto& contestant : contestants) trials.push_back(contestant->take());
+  return trials;
 }
 
-void state_loops(const std::vector<std::vector<LoopEvent>>& loops, Report& report) {
-  std::size_t once = 0;
-  double drift = 0;
-  auto list = nlohmann::json::array();
-  for (const auto& trial : loops) {
-    once += trial.size() == 1;
-    for (const LoopEvent& loop : trial) list.push_back({loop.keyframe + 1, loop.to + 1, loop.scale});
-    if (!trial.empty()) drift = std::max(drift, std::abs(std::log(trial.front().scale)));
+/// The trial to be shown: that of the largest drift.
+std::size_t most_drift(const LoopTrials& methods) {
+  std::size_t most = 0;
+  double drift = -1;
+  for (std::size_t t = 0; t < methods[kLoopConstant].size(); ++t) {
+    const LoopTrial& trial = methods[kLoopConstant][t];
+    if (trial.loops.empty() || std::abs(std::log(trial.loops.front().scale)) <= drift) continue;
+    drift = std::abs(std::log(trial.loops.front().scale));
+    most = t;
   }
-  report.json()["double_loop"]["cdwo_loops_from_to_scale"] = list;
-  report.state("thesis fig. 6.11", "double loop: the place is recognised once, when it is first seen again",
-               text("once in %zu of %zu trials; largest scale drift at the closure %.1f %%", once,
-                    loops.size(), 100 * (std::exp(drift) - 1)),
-               once == loops.size());
-}
-
-void state_accuracy(const std::vector<MethodRounds>& m, Report& report) {
-  const std::size_t end = m[kBa].keyframes(), half = end / 2;
-  const std::size_t after = std::min(end - 1, half + 20);
-  const double inner =
-      m[kConstant].error(&Round::inner, after, end).rmse() / m[kBa].error(&Round::inner, after, end).rmse();
-  report.state(
-      "thesis fig. 6.12", "double loop, second round: cDWO's inner-window RMSE is within 5 % of BA's",
-      text("%.5f against %.5f, ratio %.3f; gDWO %.5f", m[kConstant].error(&Round::inner, after, end).rmse(),
-           m[kBa].error(&Round::inner, after, end).rmse(), inner,
-           m[kGlobal].error(&Round::inner, after, end).rmse()),
-      inner < 1.05);
-  const auto both = [&](Method a, Method b, std::size_t from, std::size_t to) {
-    return m[a].error(&Round::both, from, to).rmse() / m[b].error(&Round::both, from, to).rmse();
-  };
-  report.state("thesis 6.5.1",
-               "double loop, second round: cDWO takes in loop and drift, its RMSE in both windows is within "
-               "25 % of BA's",
-               text("ratio %.3f (first round %.3f); gDWO %.3f", both(kConstant, kBa, after, end),
-                    both(kConstant, kBa, half / 3, half - 10), both(kGlobal, kBa, after, end)),
-               both(kConstant, kBa, after, end) < 1.25);
-  const std::size_t closing = std::min(end, half + 100);
-  report.state("thesis 6.2.7",
-               "double loop: without a scale at the loop (SE(3)) the windows are worse by 1 % at least",
-               text("RMSE in both windows, keyframes %zu to %zu, SE(3) / Sim(3): %.4f; inner window %.4f",
-                    half + 1, closing, both(kRigid, kConstant, half, closing),
-                    m[kRigid].error(&Round::inner, half, closing).rmse() /
-                        m[kConstant].error(&Round::inner, half, closing).rmse()),
-               both(kRigid, kConstant, half, closing) > 1.01);
-}
-
-void state_cost(const std::vector<MethodRounds>& m, Report& report) {
-  const std::size_t end = m[kBa].keyframes(), half = end / 2, after = std::min(end - 1, half + 20);
-  const double before =
-      m[kConstant].median(&Round::cpu_ms, half - std::min<std::size_t>(half - 1, 15), half - 2);
-  const double later = m[kConstant].median(&Round::cpu_ms, after, end);
-  const double last = m[kConstant].median(&Round::cpu_ms, end - (end - after) / 3, end);
-  report.state(
-      "thesis fig. 6.12",
-      "double loop: cDWO's cost rises slightly at the closure, with the point-to-frame constraints, and "
-      "stays (below 2.5 times)",
-      text("%.2f ms before, %.2f ms in the second round, %.2f ms in its last third; point-to-frame "
-           "constraints %.0f and %.0f; BA %.1f ms at the end",
-           before, later, last,
-           m[kConstant].median(&Round::observations, half - std::min<std::size_t>(half - 1, 15), half - 2),
-           m[kConstant].median(&Round::observations, after, end),
-           m[kBa].median(&Round::cpu_ms, end - 10, end)),
-      later < 2.5 * before && last < 1.25 * later);
+  return most;
 }
 
 }  // namespace
 
 void double_loop_experiment(const DoubleWindowExperimentOptions& options, Report& report) {
-  const auto trials = static_cast<std::size_t>(options.trials);
-  std::vector<MethodRounds> methods(kMethods);
-  for (std::size_t m = 0; m < kMethods; ++m) methods[m] = {kNames[m], std::vector<Rounds>(trials)};
-  std::vector<std::vector<LoopEvent>> loops(trials);
-  std::vector<cv::Mat> plots;
-  tbb::parallel_for(0, options.trials, [&](int trial) {
-    const Scene scene =
-        double_loop_scene(options.scene, options.loop_keyframes, options.seed + static_cast<unsigned>(trial));
-    std::vector<TrialResult> results = run_trial(scene, options, trial == 0);
-    for (std::size_t m = 0; m < kMethods; ++m) {
-      methods[m].trials[static_cast<std::size_t>(trial)] = std::move(results[m].rounds);
-      if (trial == 0) plots.insert(plots.end(), results[m].plots.begin(), results[m].plots.end());
-    }
-    loops[static_cast<std::size_t>(trial)] = std::move(results[kConstant].loops);
+  const auto scene = [&](std::size_t trial) {
+    return double_loop_scene(options.scene, options.loop_keyframes,
+                             options.seed + static_cast<unsigned>(trial));
+  };
+  const auto count = static_cast<std::size_t>(options.trials);
+  LoopTrials methods(kLoopMethods, std::vector<LoopTrial>(count));
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t trial) {
+    std::vector<LoopTrial> results = run_trial(scene(trial), options);
+    for (std::size_t m = 0; m < kLoopMethods; ++m) methods[m][trial] = std::move(results[m]);
   });
-  write_rounds("double_loop", "double loop", methods, true, report);
-  if (!plots.empty()) write_png(report.file("double_loop_paths.png"), tile(plots, 2));
-  state_loops(loops, report);
-  state_accuracy(methods, report);
-  state_cost(methods, report);
+  std::vector<MethodRounds> rounds;
+  for (std::size_t m = 0; m < kLoopMethods; ++m) {
+    rounds.push_back({kLoopNames[m], {}});
+    for (const LoopTrial& trial : methods[m]) rounds[m].trials.push_back(trial.rounds);
+  }
+  write_rounds("double_loop", "double loop", rounds, true, report);
+  const std::size_t shown = most_drift(methods);
+  write_png(report.file("double_loop_paths.png"), draw_loop_paths(methods, shown, scene(shown)));
+  write_png(report.file("double_loop_scales.png"), draw_loop_scales(methods, shown));
+  state_double_loop(methods, options.seed, report);
 }
 
 }  // namespace twofold::bench

@@ -24,9 +24,9 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "of the first trial");
   app.add_option("--noise", options.scene.noise_px, "of a measurement [px]")->check(CLI::PositiveNumber);
   app.add_option("--sightings", options.scene.max_sightings, "points a keyframe measures at most");
-  app.add_option("--density", options.scene.density, "points per square metre");
-  app.add_option("--height", options.scene.height, "of the camera above the ground [m]");
-  app.add_option("--step", options.scene.step, "between keyframes [m]");
+  app.add_option("--density", options.scene.density, "points per square metre of the spiral's ground");
+  app.add_option("--height", options.scene.height, "of the spiral's camera above the ground [m]");
+  app.add_option("--step", options.scene.step, "between keyframes of the spiral [m]");
   app.add_option("--spacing", options.scene.spacing, "between the turns of the spiral [m]");
   app.add_option("--anchors", options.max_anchors,
                  "that may take places of the outer window for their points");
@@ -45,7 +45,6 @@ int main(int argc, char** argv) {
   if (smoke) {
     options.trials = 1;
     options.keyframes = 80;
-    options.loop_keyframes = 180;
   }
   using Part = std::pair<std::string, std::function<void(const DoubleWindowExperimentOptions&, Report&)>>;
   const std::vector<Part> all = {

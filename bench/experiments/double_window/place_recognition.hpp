@@ -10,7 +10,7 @@ namespace twofold::bench {
 /// A place seen again after a large loop: points that the map has twice.
 struct Recognition {
   SimilarityConstraint loop;
-  std::vector<Observation> matches;  ///< of the old points, measured in the new keyframe; ascending
+  std::vector<PointCopies> copies;
 
   [[nodiscard]] bool found() const { return loop.inliers > 0; }
 };
@@ -25,6 +25,9 @@ class PlaceRecognition {
 
  private:
   [[nodiscard]] Recognition match(const GraphSnapshot& graph, KeyframeId from, KeyframeId to) const;
+  [[nodiscard]] std::vector<PointCopies> copies(const GraphSnapshot& graph, KeyframeId from,
+                                                KeyframeId to) const;
+  static void measure(const GraphSnapshot& graph, Recognition& found);
 
   const Scene& scene_;
   const Feeder& feeder_;

@@ -58,6 +58,14 @@ RelativeError MethodRounds::error(RelativeError Round::*level, std::size_t first
   return sum;
 }
 
+ScaleChange MethodRounds::scale(ScaleChange Round::*level, std::size_t first, std::size_t last) const {
+  ScaleChange sum;
+  for (const Rounds& trial : trials) {
+    for (std::size_t k = first; k < last; ++k) sum.add(trial[k].*level);
+  }
+  return sum;
+}
+
 double MethodRounds::median(double Round::*figure, std::size_t first, std::size_t last) const {
   std::vector<double> values;
   for (const Rounds& trial : trials) {
@@ -98,6 +106,12 @@ void record_errors(const GraphSnapshot& graph, double metres_per_unit, const Sce
   round.inner = error([&](KeyframeId id) { return window.is_inner(id); });
   round.both = error([&](KeyframeId id) { return window.contains(id); });
   round.all = error([](KeyframeId) { return true; });
+}
+
+void record_scale(const GraphSnapshot& graph, const Scene& scene, const DoubleWindow& window, Round& round) {
+  round.both_scale = scale_change(graph, scene, [&](KeyframeId id) { return window.contains(id); });
+  round.all_scale = scale_change(graph, scene, [](KeyframeId) { return true; });
+  round.shape = shape_error(graph, scene);
 }
 
 void write_rounds(const std::string& name, const std::string& title, const std::vector<MethodRounds>& methods,

@@ -61,10 +61,11 @@ void find_covisible(Scene& scene, int theta) {
   }
 }
 
-Scene make_scene(const SceneOptions& options, SensorKind kind, std::vector<SE3> path, unsigned seed) {
+Scene make_scene(const SceneOptions& options, const Rig& rig, std::vector<Vector3> points,
+                 std::vector<SE3> path, unsigned seed) {
   Scene scene;
-  scene.rig = simulation::thesis_rig(kind);
-  scene.points = simulation::scattered_points(path, 2, options.density, seed);
+  scene.rig = rig;
+  scene.points = std::move(points);
   scene.T_k_w = std::move(path);
   std::map<Cell, std::vector<int>> cells;
   for (std::size_t p = 0; p < scene.points.size(); ++p) {
@@ -84,6 +85,27 @@ Scene make_scene(const SceneOptions& options, SensorKind kind, std::vector<SE3> 
   return scene;
 }
 
+/// Camera on a circle in the plane z = 0 around the origin, its x axis along the circle.
+SE3 looking_outwards(double radius, double angle) {
+  Matrix3 R_w_c;
+  R_w_c.col(0) << -std::sin(angle), std::cos(angle), 0;
+  R_w_c.col(2) << std::cos(angle), std::sin(angle), 0;
+  R_w_c.col(1) = R_w_c.col(2).cross(R_w_c.col(0));
+  return SE3(R_w_c, radius * R_w_c.col(2)).inverse();
+}
+
+/// Points on a cylinder of height 2 m around the z axis.
+std::vector<Vector3> ring(double radius, long count, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> angle(-std::numbers::pi, std::numbers::pi), height(-1, 1);
+  std::vector<Vector3> points;
+  for (long n = 0; n < count; ++n) {
+    const double a = angle(rng), z = height(rng);
+    points.emplace_back(radius * std::cos(a), radius * std::sin(a), z);
+  }
+  return points;
+}
+
 }  // namespace
 
 double Scene::median_depth(int keyframe) const {
@@ -98,17 +120,24 @@ double Scene::median_depth(int keyframe) const {
 }
 
 Scene spiral_scene(const SceneOptions& options, SensorKind kind, int keyframes, unsigned seed) {
-  return make_scene(options, kind,
-                    simulation::spiral_path(keyframes, options.step, options.spacing, options.height), seed);
+  std::vector<SE3> path = simulation::spiral_path(keyframes, options.step, options.spacing, options.height);
+  std::vector<Vector3> points = simulation::scattered_points(path, 2, options.density, seed);
+  return make_scene(options, simulation::thesis_rig(kind), std::move(points), std::move(path), seed);
 }
 
 Scene double_loop_scene(const SceneOptions& options, int keyframes, unsigned seed) {
   // Keyframes of the second round stand between those of the first: the direction between two that coincide
   // is not defined.
   const double laps = keyframes / (0.5 * keyframes - 0.5);
-  const double radius = options.step * keyframes / (2 * std::numbers::pi * laps);
-  return make_scene(options, SensorKind::kMono,
-                    simulation::circle_path(keyframes, laps, radius, options.height), seed);
+  const double radius = 10 * keyframes / 300.0;
+  std::vector<SE3> path;
+  for (int k = 0; k < keyframes; ++k) {
+    path.push_back(looking_outwards(radius, 2 * std::numbers::pi * laps * k / keyframes));
+  }
+  Rig rig;
+  rig.kind = SensorKind::kMono;
+  rig.camera = {195, 195, 162, 125, 320, 240};  // as in the scale drift experiment
+  return make_scene(options, rig, ring(radius + 1, std::lround(500 * radius), seed), std::move(path), seed);
 }
 
 }  // namespace twofold::bench
