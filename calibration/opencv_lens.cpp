@@ -24,6 +24,7 @@ CameraModel model_of(const Lens& lens, cv::Size size) {
 
 std::vector<cv::Point3f> board_points(const Board& board, const std::vector<int>& ids) {
   std::vector<cv::Point3f> points;
+  points.reserve(ids.size());
   for (const int id : ids) points.push_back(board.corner(id));
   return points;
 }

@@ -43,6 +43,7 @@ int tilted_views(const std::vector<ViewShape>& shapes, double angle) {
   cv::Vec3d middle;  // by coordinate: one odd view does not move it
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
+    values.reserve(shapes.size());
     for (const ViewShape& shape : shapes) values.push_back(shape.normal[axis]);
     std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
                      values.end());

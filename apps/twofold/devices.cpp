@@ -25,6 +25,7 @@ std::vector<std::string> video_nodes() {
     nodes[std::stoi(name.substr(5))] = entry.path();
   }
   std::vector<std::string> paths;
+  paths.reserve(nodes.size());
   for (const auto& [number, path] : nodes) paths.push_back(path);
   return paths;
 }

@@ -14,6 +14,7 @@ namespace {
 
 int show_timing(const std::vector<std::string>& files, const std::string& plot) {
   std::vector<TimingFile> runs;
+  runs.reserve(files.size());
   for (const std::string& file : files) runs.push_back(read_timing(file));
   fmt::print("{}", timing_table(runs));
   if (!plot.empty()) {
