@@ -63,14 +63,6 @@ void GraphWriter::add_point(PointId id, MapPoint point) {
   graph_.points_.mutate(index(id)) = std::move(point);
 }
 
-void GraphWriter::set_anchor(PointId id, KeyframeId anchor, const Vector3& psi) {
-  --anchored(graph_.point(id).anchor);
-  ++anchored(anchor);
-  MapPoint& point = graph_.points_.mutate(index(id));
-  point.anchor = anchor;
-  point.psi = psi;
-}
-
 void GraphWriter::add_observations(KeyframeId id, std::span<const Observation> observations) {
   ObservationList added(observations.begin(), observations.end());
   std::sort(added.begin(), added.end(), by_point);

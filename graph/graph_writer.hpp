@@ -43,14 +43,9 @@ class GraphWriter {
   }
   void set_inverse_depth(PointId id, const Vector3& psi) { graph_.points_.mutate(index(id)).psi = psi; }
   void set_misses(PointId id, std::uint8_t misses) { graph_.points_.mutate(index(id)).misses = misses; }
-  void set_appearance(PointId id, std::shared_ptr<const PointAppearance> appearance) {
-    graph_.points_.mutate(index(id)).appearance = std::move(appearance);
-  }
   void set_reference(KeyframeId id) { graph_.reference_ = id; }
   /// Says that poses jump with the version being made.
   void announce_jump(MapChange::Kind kind) { graph_.last_jump_ = {graph_.version_, kind}; }
-  /// Moves a point to another anchor that observes it; psi is in the new anchor's frame.
-  void set_anchor(PointId id, KeyframeId anchor, const Vector3& psi);
 
   /// Adds measurements to a keyframe, or replaces those of the same points, and registers it as their
   /// observer.

@@ -126,9 +126,9 @@ Scene spiral_scene(const SceneOptions& options, SensorKind kind, int keyframes, 
 }
 
 Scene double_loop_scene(const SceneOptions& options, int keyframes, unsigned seed) {
-  // Keyframes of the second round stand between those of the first: the direction between two that coincide
-  // is not defined.
-  const double laps = keyframes / (0.5 * keyframes - 0.5);
+  // Keyframes of the second round, and the one that begins the third, stand a third of a step beside those of
+  // the first: the direction between two that coincide is not defined.
+  const double laps = keyframes / (keyframes / 2.0 - 1.0 / 3);
   const double radius = 10 * keyframes / 300.0;
   std::vector<SE3> path;
   for (int k = 0; k < keyframes; ++k) {
