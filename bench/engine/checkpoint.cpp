@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <memory>
 #include <random>
 
+#include "bench/mapping/simulated_run.hpp"
 #include "engine/clock.hpp"
 #include "engine/snapshot_mailbox.hpp"
 #include "engine/worker.hpp"
@@ -16,7 +16,6 @@
 #include "loopclosure/default_vocabulary.hpp"
 #include "loopclosure/loop_closer.hpp"
 #include "mapping/mapper.hpp"
-#include "tests/mapping/simulation.hpp"
 
 namespace twofold {
 namespace {
@@ -25,34 +24,6 @@ using simulation::Simulation;
 
 double ms_since(std::int64_t begin_ns) {
   return static_cast<double>(steady_now_ns() - begin_ns) * 1e-6;
-}
-
-double quantile(std::vector<double> values, double q) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-}
-
-/// A straight flight over endless ground: no place is seen twice.
-Simulation exploration(int keyframes) {
-  std::vector<SE3> path;
-  for (int k = 0; k < keyframes; ++k) {
-    path.push_back(
-        simulation::looking_down(0.12 * k, 0.5 * std::sin(0.05 * k), 1.2, 0.1 * std::sin(0.1 * k)));
-  }
-  simulation::Options options;
-  options.rig = simulation::thesis_rig();
-  options.max_observations = 180;
-  return {options, simulation::scattered_points(path, 2, 40, 1), path};
-}
-
-MapperOptions exploring(int inner, int outer) {
-  MapperOptions options;
-  options.inner_window = inner;
-  options.outer_window = outer;
-  options.sigma_scale = 2;  // one pixel of noise
-  options.edge.sigma_px = 1;
-  options.culling.keyframes = false;
-  return options;
 }
 
 /// Each keyframe has as many corners as are described of a real one; what they say does not matter here.
@@ -84,19 +55,19 @@ class Rounds {
   /// @param enough  asked after `count` rounds
   template <class Enough>
   void measure(int count, const char* what, Enough&& enough) {
-    std::vector<double> round_ms, publish_ms;
-    while (static_cast<int>(round_ms.size()) < count || !enough()) {
+    Samples round_ms, publish_ms;
+    while (static_cast<int>(round_ms.values.size()) < count || !enough()) {
       KeyframeProposal* proposal = &simulation_.propose(mapper_.graph());
       std::int64_t begin_ns = steady_now_ns();
       mapper_.step(std::span(&proposal, 1));
-      round_ms.push_back(ms_since(begin_ns));
+      round_ms.add(ms_since(begin_ns));
       begin_ns = steady_now_ns();
       snapshots_.publish(mapper_.publish());
-      publish_ms.push_back(ms_since(begin_ns));
+      publish_ms.add(ms_since(begin_ns));
     }
-    fmt::print("{:<14} {:6} {:9.2f} {:9.2f} {:9.2f} {:11.4f} {:11.4f} {:11.4f}\n", what, round_ms.size(),
-               quantile(round_ms, 0.5), quantile(round_ms, 0.99), quantile(round_ms, 1),
-               quantile(publish_ms, 0.5), quantile(publish_ms, 0.99), quantile(publish_ms, 1));
+    fmt::print("{:<14} {:6} {:9.2f} {:9.2f} {:9.2f} {:11.4f} {:11.4f} {:11.4f}\n", what,
+               round_ms.values.size(), round_ms.quantile(0.5), round_ms.quantile(0.99), round_ms.quantile(1),
+               publish_ms.quantile(0.5), publish_ms.quantile(0.99), publish_ms.quantile(1));
   }
 
  private:
@@ -137,7 +108,7 @@ void run(int keyframes, int rounds, const std::filesystem::path& file) {
   fmt::print("{:<14} {:>6} {:>9} {:>9} {:>9} {:>11} {:>11} {:>11}\n", "", "rounds", "median ms", "p99 ms",
              "max ms", "publish ms", "p99 ms", "max ms");
   measured.measure(rounds, "alone", [] { return true; });
-  std::vector<double> save_ms;
+  Samples save_ms;
   std::atomic<int> saves{0};
   {
     Worker saver({.name = "checkpoints"}, [&](const std::stop_token& stop) {
@@ -145,13 +116,13 @@ void run(int keyframes, int rounds, const std::filesystem::path& file) {
       while (!stop.stop_requested()) {
         const std::int64_t begin_ns = steady_now_ns();
         save_map(file, simulation.rig(), snapshots.mailbox(0).latest(), places);
-        save_ms.push_back(ms_since(begin_ns));
+        save_ms.add(ms_since(begin_ns));
         saves.fetch_add(1, std::memory_order_relaxed);
       }
     });
     measured.measure(rounds, "while saving", [&] { return simulation.done() || saves.load() >= 2; });
   }
-  fmt::print("{} saves, median {:.0f} ms, {:.0f} MB\n", save_ms.size(), quantile(save_ms, 0.5),
+  fmt::print("{} saves, median {:.0f} ms, {:.0f} MB\n", save_ms.values.size(), save_ms.quantile(0.5),
              static_cast<double>(std::filesystem::file_size(file)) * 1e-6);
   measure_loading(file, simulation.rig());
   std::filesystem::remove(file);

@@ -64,51 +64,47 @@ struct Run {
   }
 };
 
-template <class Group>
-void add_costs(Run& run, const PoseGraph<Group>& graph) {
+/// @param solve  (graph, note_cost): optimises the graph, calls note_cost(cost) where it stands in between,
+/// and
+///               returns the number of iterations
+template <class Group, class Solve>
+Run timed(const char* name, PoseGraph<Group> graph, Solve&& solve) {
+  Run run;
+  run.name = name;
+  const auto start = Clock::now();
+  const double cpu_start = cpu_milliseconds();
+  run.iterations =
+      solve(graph, [&](double cost) { run.history.emplace_back(milliseconds_since(start), cost); });
+  run.total_ms = milliseconds_since(start);
+  run.cpu_ms = cpu_milliseconds() - cpu_start;
+  run.memory_mib = peak_memory_mib();
   run.cost_log = pose_graph_cost(graph, PoseGraphError::kLog);
   run.cost_components = pose_graph_cost(graph, PoseGraphError::kComponents);
-}
-
-template <class Group>
-Run run_twofold(PoseGraph<Group> graph, const Arguments& arguments) {
-  Run run;
-  run.name = "twofold";
-  PoseGraphOptions options = arguments.options;
-  const auto start = Clock::now();
-  const double cpu_start = cpu_milliseconds();
-  options.on_cost = [&](int, double cost) { run.history.emplace_back(milliseconds_since(start), cost); };
-  PoseGraphSolver<Group> solver;
-  const SolverSummary summary = solver.solve(graph, options);
-  run.total_ms = milliseconds_since(start);
-  run.cpu_ms = cpu_milliseconds() - cpu_start;
-  run.iterations = summary.iterations;
-  run.memory_mib = peak_memory_mib();
-  add_costs(run, graph);
   return run;
 }
 
 template <class Group>
-Run run_ceres(PoseGraph<Group> graph, const Arguments& arguments) {
-  Run run;
-  run.name = "ceres";
-  CeresOptions options = arguments.ceres;
-  const auto start = Clock::now();
-  const double cpu_start = cpu_milliseconds();
-  options.on_cost = [&](double cost) { run.history.emplace_back(milliseconds_since(start), cost); };
-  if (arguments.chordal_ceres) {
-    PoseGraphEquations<Group> equations;
-    equations.analyse(graph);
-    PoseGraphPositions<Group> positions(graph, equations.structure);
-    graph.poses = chordal_initialisation(graph, equations.structure, positions);
-  }
-  const CeresSummary summary = solve_with_ceres(graph, options);
-  run.total_ms = milliseconds_since(start);
-  run.cpu_ms = cpu_milliseconds() - cpu_start;
-  run.iterations = summary.iterations;
-  run.memory_mib = peak_memory_mib();
-  add_costs(run, graph);
-  return run;
+Run run_twofold(const PoseGraph<Group>& start, const Arguments& arguments) {
+  return timed("twofold", start, [&](PoseGraph<Group>& graph, const auto& note_cost) {
+    PoseGraphOptions options = arguments.options;
+    options.on_cost = [&](int, double cost) { note_cost(cost); };
+    return PoseGraphSolver<Group>().solve(graph, options).iterations;
+  });
+}
+
+template <class Group>
+Run run_ceres(const PoseGraph<Group>& start, const Arguments& arguments) {
+  return timed("ceres", start, [&](PoseGraph<Group>& graph, const auto& note_cost) {
+    CeresOptions options = arguments.ceres;
+    options.on_cost = note_cost;
+    if (arguments.chordal_ceres) {
+      PoseGraphEquations<Group> equations;
+      equations.analyse(graph);
+      PoseGraphPositions<Group> positions(graph, equations.structure);
+      graph.poses = chordal_initialisation(graph, equations.structure, positions);
+    }
+    return solve_with_ceres(graph, options).iterations;
+  });
 }
 
 /// The run with the median total time of `repeat` runs, which differ in nothing else.

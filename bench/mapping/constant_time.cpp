@@ -25,19 +25,6 @@ double us_since(Clock::time_point start) {
   return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
 }
 
-/// A straight flight over endless ground: no place is seen twice.
-Simulation exploration(int keyframes) {
-  std::vector<SE3> path;
-  for (int k = 0; k < keyframes; ++k) {
-    path.push_back(
-        simulation::looking_down(0.12 * k, 0.5 * std::sin(0.05 * k), 1.2, 0.1 * std::sin(0.1 * k)));
-  }
-  simulation::Options options;
-  options.rig = simulation::thesis_rig();
-  options.max_observations = 180;
-  return {options, simulation::scattered_points(path, 2, 40, 1), path};
-}
-
 struct Measurement {
   std::size_t keyframes = 0;
   Samples round_ms, publish_us, destroy_us, search_us;
@@ -110,13 +97,6 @@ LoopMeasurement measure_loops(const Rig& rig, Mapper& mapper) {
   result.moved = mapper.take_relaxation(relaxed);
   result.take_ms = 1e-3 * us_since(start);
   return result;
-}
-
-/// Keyframes are not culled while exploring, so that maps of all sizes have the same windows.
-MapperOptions exploring(int inner, int outer) {
-  MapperOptions options = mapper_options(inner, outer);
-  options.culling.keyframes = false;
-  return options;
 }
 
 nlohmann::json explore(const std::vector<int>& sizes, int rounds) {

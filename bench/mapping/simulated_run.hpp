@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <vector>
@@ -29,6 +30,26 @@ inline MapperOptions mapper_options(int inner, int outer) {
   options.sigma_scale = 2;  // one pixel of noise
   options.edge.sigma_px = 1;
   return options;
+}
+
+/// Keyframes are not culled while exploring, so that maps of all sizes have the same windows.
+inline MapperOptions exploring(int inner, int outer) {
+  MapperOptions options = mapper_options(inner, outer);
+  options.culling.keyframes = false;
+  return options;
+}
+
+/// A straight flight over endless ground: no place is seen twice.
+inline simulation::Simulation exploration(int keyframes) {
+  std::vector<SE3> path;
+  for (int k = 0; k < keyframes; ++k) {
+    path.push_back(
+        simulation::looking_down(0.12 * k, 0.5 * std::sin(0.05 * k), 1.2, 0.1 * std::sin(0.1 * k)));
+  }
+  simulation::Options options;
+  options.rig = simulation::thesis_rig();
+  options.max_observations = 180;
+  return {options, simulation::scattered_points(path, 2, 40, 1), path};
 }
 
 inline MapperReport map_next(simulation::Simulation& simulation, Mapper& mapper) {
