@@ -143,10 +143,7 @@ TEST_F(EngineMapTest, AThreadedRunInALoadedMapReplays) {
     threaded.deterministic = false;
     const RunResult live = run_engine(threaded, frames(20, kFrames));
     ASSERT_EQ(live.error, "");
-    const RunResult replayed =
-        testing::replay_engine(threaded, frames(20, kFrames), testing::schedule_of(live));
-    EXPECT_EQ(replayed.error, "");
-    testing::expect_same(live, replayed);
+    const RunResult replayed = testing::expect_replay(threaded, frames(20, kFrames), live);
     EXPECT_EQ(bytes_of({small_rig(), live.graph, live.places}),
               bytes_of({small_rig(), replayed.graph, replayed.places}));
   }

@@ -13,7 +13,7 @@
 namespace twofold {
 namespace {
 
-using testing::expect_same;
+using testing::expect_replay;
 using testing::replay_engine;
 using testing::schedule_of;
 using testing::small_rig;
@@ -28,9 +28,7 @@ TEST_F(EnginePaceTest, LateFramesAreDroppedOnRequestAndReplayed) {
   const auto dropped = std::count_if(live.frames.begin(), live.frames.end(),
                                      [](const auto& record) { return record.state == FrameState::kDropped; });
   EXPECT_GT(dropped, 0);
-  const RunResult replayed = replay_engine(options, feed(), schedule_of(live));
-  EXPECT_EQ(replayed.error, "");
-  expect_same(live, replayed);
+  expect_replay(options, feed(), live);
 }
 
 /// Time passes when it is read, which is two or three times a frame, and for a while more than a frame has.
@@ -88,11 +86,7 @@ TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
     ASSERT_TRUE(live.trace->write(trace));
     EXPECT_NE(trace.str().find("load ladder rung"), std::string::npos);
 
-    const Schedule schedule = schedule_of(live);
-    const RunResult replayed = replay_engine(options, feed(), schedule);
-    EXPECT_EQ(replayed.error, "");
-    expect_same(live, replayed);
-    EXPECT_EQ(schedule_of(replayed), schedule);
+    expect_replay(options, feed(), live);
   }
 }
 

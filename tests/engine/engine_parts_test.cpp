@@ -8,11 +8,10 @@
 namespace twofold {
 namespace {
 
+using testing::expect_replay;
 using testing::expect_same;
 using testing::position_error;
-using testing::replay_engine;
 using testing::run_engine;
-using testing::schedule_of;
 
 /// Feeds frames one after the other; no image stands for a hand over the lens.
 FrameFeed shown_in_turn(std::vector<Frame> frames) {
@@ -88,9 +87,7 @@ TEST_F(MapPartsTest, AThreadedRunReplays) {
   threaded.pacing.speed = 1;
   const RunResult live = run_engine(threaded, frames());
   ASSERT_EQ(live.error, "");
-  const RunResult replayed = replay_engine(threaded, frames(), schedule_of(live));
-  EXPECT_EQ(replayed.error, "");
-  expect_same(live, replayed);
+  expect_replay(threaded, frames(), live);
 }
 
 TEST_F(MapPartsTest, InAnUnknownPlaceThePartStaysApart) {

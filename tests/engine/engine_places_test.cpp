@@ -8,9 +8,8 @@
 namespace twofold {
 namespace {
 
-using testing::expect_same;
+using testing::expect_replay;
 using testing::position_error;
-using testing::replay_engine;
 using testing::run_engine;
 using testing::schedule_of;
 using EnginePlacesTest = testing::KidnappedCamera;
@@ -67,9 +66,7 @@ TEST_F(EnginePlacesTest, AThreadedRunWithRequestsAndAnswersReplays) {
                          [](const LoopStep& step) { return step.requests > 0; });
   };
   EXPECT_GT(asked(schedule), 0);
-  const RunResult replayed = replay_engine(threaded, kidnapped(false, kUntilFound), schedule);
-  EXPECT_EQ(replayed.error, "");
-  expect_same(live, replayed);
+  expect_replay(threaded, kidnapped(false, kUntilFound), live);
 }
 
 }  // namespace

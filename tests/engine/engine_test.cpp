@@ -9,6 +9,7 @@
 namespace twofold {
 namespace {
 
+using testing::expect_replay;
 using testing::expect_same;
 using testing::replay_engine;
 using testing::schedule_of;
@@ -43,11 +44,7 @@ TEST_F(EngineTest, ScheduleReplaysAThreadedRun) {
     options.pacing.speed = speed;
     const RunResult live = run(options);
     ASSERT_EQ(live.error, "");
-    const Schedule schedule = schedule_of(live);
-    const RunResult replayed = replay_engine(options, feed(), schedule);
-    EXPECT_EQ(replayed.error, "");
-    expect_same(live, replayed);
-    EXPECT_EQ(schedule_of(replayed), schedule);
+    expect_replay(options, feed(), live);
   }
 }
 

@@ -55,6 +55,16 @@ inline void expect_same(const RunResult& a, const RunResult& b) {
   }
 }
 
+/// A run by the schedule that `live` left: the same results, bit for bit, and the same schedule.
+inline RunResult expect_replay(const EngineOptions& options, const FrameFeed& frames, const RunResult& live) {
+  const Schedule schedule = schedule_of(live);
+  RunResult replayed = replay_engine(options, frames, schedule);
+  EXPECT_EQ(replayed.error, "");
+  expect_same(live, replayed);
+  EXPECT_EQ(schedule_of(replayed), schedule);
+  return replayed;
+}
+
 /// Distance between the camera's place in the final map and its true one, both in the first camera's frame
 /// [m].
 /// @param T_c_first_true  of the frame in keyframe 0's frame
