@@ -7,7 +7,7 @@
 
 namespace twofold {
 
-void CheckpointWriter::save(const GraphSnapshot& graph, const PlaceBook& places) {
+void CheckpointWriter::save(const GraphSnapshot& graph, const KeyframeDatabase& places) {
   if (graph.version() == report_.version) return;
   const std::int64_t begin_ns = steady_now_ns();
   try {

@@ -3,7 +3,7 @@
 #include "camera/rig.hpp"
 #include "engine/options.hpp"
 #include "engine/result.hpp"
-#include "graph/place_book.hpp"
+#include "graph/keyframe_database.hpp"
 #include "graph/snapshot.hpp"
 
 namespace twofold {
@@ -20,7 +20,7 @@ class CheckpointWriter {
 
   /// Reads both through these references only. Nothing is written when this version of the graph was saved
   /// before.
-  void save(const GraphSnapshot& graph, const PlaceBook& places);
+  void save(const GraphSnapshot& graph, const KeyframeDatabase& places);
 
   [[nodiscard]] const CheckpointReport& report() const { return report_; }
 

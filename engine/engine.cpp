@@ -29,7 +29,7 @@ class CostMeter {
 Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
   if (const std::string reason = options_.pacing.invalid_reason(); !reason.empty())
     throw std::runtime_error(reason);
-  if (const std::string reason = options_.ladder.invalid_reason(); !reason.empty())
+  if (const std::string reason = options_.effort.invalid_reason(); !reason.empty())
     throw std::runtime_error(reason);
   if (options_.map) {
     if (const std::string difference = rig_difference(rig, options_.map->rig); !difference.empty())

@@ -61,8 +61,8 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
       fail("the schedule belongs to another recording: frame numbers differ");
       return;
     }
-    if (step.degrade_level >= kLadderRungs) {
-      fail("the schedule has a rung of the load ladder that this program does not know");
+    if (step.effort_level >= kEffortLevels) {
+      fail("the schedule has a effort level that this program does not know");
       return;
     }
     if (step.fate == TrackerStep::Fate::kDropped) {
@@ -144,7 +144,7 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
   FrameRecord record;
   ProposalHandle proposal;
   if (!step.keyframe_withheld) proposal = pool_.try_acquire();
-  if (tracking_.step(frame, snapshot_, static_cast<LadderRung>(step.degrade_level), proposal, record)) {
+  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record)) {
     if (step.refused > 0) {
       tracking_.proposal_rejected(record);
       ++result_.proposals_refused;
@@ -168,7 +168,7 @@ void LockstepRun::drop(const Frame& frame, const TrackerStep& step) {
   record.frame_index = frame.index;
   record.t_ns = frame.t_ns;
   record.state = FrameState::kDropped;
-  record.rung = static_cast<LadderRung>(step.degrade_level);
+  record.effort = static_cast<EffortLevel>(step.effort_level);
   result_.schedule.tracker.append(step);
   result_.frames.push_back(record);
 }

@@ -5,7 +5,7 @@
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
-#include "engine/stages.hpp"
+#include "engine/runners.hpp"
 
 namespace twofold {
 
@@ -18,11 +18,11 @@ class LockstepRun {
   void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
   void replay(const FrameFeed& feed, const Schedule& schedule, const std::atomic<bool>& interrupted,
               const ProgressSink& progress);
-  /// Final relaxation; moves the result out.
+  /// Final pose graph optimisation; moves the result out.
   [[nodiscard]] RunResult finish();
 
  private:
-  /// `step` says what the frame meets: rung, answers, whether a keyframe may be made and is refused.
+  /// `step` says what the frame meets: effort, answers, whether a keyframe may be made and is refused.
   void track(const Frame& frame, const TrackerStep& step);
   void answer_request(const GraphSnapshot& graph);
   void map(std::size_t proposals, std::size_t loop_messages);
@@ -42,9 +42,9 @@ class LockstepRun {
   const bool localise_only_;
   std::unique_ptr<Trace> trace_;
   ProposalPool pool_;
-  TrackingStage tracking_;
-  MappingStage mapping_;
-  LoopClosingStage loop_closing_;
+  TrackerRunner tracking_;
+  MapperRunner mapping_;
+  LoopCloserRunner loop_closing_;
   std::deque<ProposalHandle> queue_;
   std::vector<ProposalHandle> consumed_;
   std::deque<ProposalHandle> mapped_;        // keyframes the loop closer has not seen

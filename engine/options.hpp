@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "engine/load_ladder.hpp"
+#include "engine/effort_controller.hpp"
 #include "engine/pacing.hpp"
 #include "graph/map_file.hpp"
 #include "loopclosure/loop_closer.hpp"
@@ -37,7 +37,7 @@ struct EngineOptions {
   /// One thread, one order: each frame is tracked against the map with every earlier keyframe optimised.
   bool deterministic = false;
   PacingOptions pacing{.speed = 0};  ///< of threaded runs
-  LadderOptions ladder;              ///< of threaded runs that keep a pace
+  EffortOptions effort;              ///< of threaded runs that keep a pace
 
   std::size_t frame_slots = 8;     ///< frames decoded ahead, or waiting, at most
   std::size_t proposal_slots = 4;  ///< keyframe proposals under way between the threads, a power of two

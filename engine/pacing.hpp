@@ -12,7 +12,7 @@ namespace twofold {
 
 enum class LatePolicy : std::uint8_t {
   kQueue,  ///< every frame is processed; lateness adds up until the engine catches up
-  kDrop,   ///< frames whose successor is due already may be skipped (LoadLadder says when)
+  kDrop,   ///< frames whose successor is due already may be skipped (EffortController says when)
 };
 
 struct PacingOptions {

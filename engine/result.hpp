@@ -8,8 +8,8 @@
 #include "engine/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
+#include "graph/keyframe_database.hpp"
 #include "graph/loop_constraint.hpp"
-#include "graph/place_book.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/effort.hpp"
 #include "tracking/lost_cause.hpp"
@@ -27,7 +27,7 @@ enum class CorrectionReason : std::uint8_t {
   kNone,
   kOptimisation,  ///< the double window, metric closures included
   kLoopClosure,   ///< a place was recognised
-  kRelaxation,    ///< the whole pose graph was relaxed
+  kPoseGraph,     ///< the whole pose graph was optimised
   kPartsJoined,   ///< the map part of the camera joined another one
 };
 [[nodiscard]] constexpr const char* describe(CorrectionReason reason) {
@@ -38,8 +38,8 @@ enum class CorrectionReason : std::uint8_t {
       return "optimisation";
     case CorrectionReason::kLoopClosure:
       return "loop closure";
-    case CorrectionReason::kRelaxation:
-      return "relaxation";
+    case CorrectionReason::kPoseGraph:
+      return "pose graph optimised";
     case CorrectionReason::kPartsJoined:
       return "map parts joined";
   }
@@ -70,9 +70,9 @@ struct FrameRecord {
   KeyframeId part_causal = kNoKeyframe;  ///< map part of T_c_w_causal's world, under its name of then
   int inliers = 0;                       ///< measurements the pose rests on
   FrameState state = FrameState::kLost;
-  bool keyframe = false;                      ///< it was proposed as a keyframe and accepted
-  LadderRung rung = LadderRung::kEverything;  ///< what was left out for want of time
-  LostCause cause = LostCause::kNone;         ///< why it was lost
+  bool keyframe = false;                          ///< it was proposed as a keyframe and accepted
+  EffortLevel effort = EffortLevel::kEverything;  ///< what was left out for want of time
+  LostCause cause = LostCause::kNone;             ///< why it was lost
 };
 static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 
@@ -87,7 +87,7 @@ struct MapperRound {
   int metric_loops = 0;  ///< edges added by metric loop closure
   int loops = 0;         ///< edges added by large-scale loop closure
   int late_loops = 0;    ///< that came after the map had forgotten their keyframes
-  int relaxed = 0;       ///< keyframes outside of the windows that took a relaxed pose
+  int optimised = 0;     ///< keyframes outside of the windows that took a pose of the pose graph
   std::int64_t duration_ns = 0;
 };
 
@@ -120,8 +120,8 @@ struct RunResult {
   std::vector<PoseCorrection> corrections;  ///< in the order of the frames
   std::vector<MapperRound> rounds;
   std::vector<ClosedLoop> loops;  ///< by appearance, in the order they were found
-  GraphSnapshot graph;            ///< after the last round and the final relaxation
-  PlaceBook places;               ///< how the places of its keyframes look
+  GraphSnapshot graph;            ///< after the last round and the final pose graph optimisation
+  KeyframeDatabase places;        ///< how the places of its keyframes look
   CheckpointReport checkpoints;
   std::vector<StageRecorder> times;  ///< one a thread
   ScheduleStreams schedule;

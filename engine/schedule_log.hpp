@@ -17,7 +17,7 @@ struct TrackerStep {
   std::int64_t frame = 0;     ///< Frame::index, grows from record to record
   std::uint64_t version = 0;  ///< snapshot it was tracked against; 0 when dropped
   Fate fate = Fate::kTracked;
-  std::uint8_t degrade_level = 0;  ///< LadderRung, 0 = nothing left out, <= 15
+  std::uint8_t effort_level = 0;   ///< EffortLevel, 0 = nothing left out, <= 15
   std::uint32_t messages = 0;      ///< relocalisation answers consumed before it
   std::uint32_t refused = 0;       ///< its messages that found a ring full
   bool keyframe_withheld = false;  ///< there was no buffer for a keyframe: the mapper is behind

@@ -7,10 +7,10 @@ namespace twofold {
 // Tracker record: flags (fate, has messages, has refused, keyframe withheld, level in the upper half), frame
 // and version as differences, then what the flags announce.
 void encode_step(std::vector<std::uint8_t>& bytes, const TrackerStep& step, const TrackerStep& last) {
-  TWOFOLD_CHECK(step.degrade_level <= 15, "degrade level");
+  TWOFOLD_CHECK(step.effort_level <= 15, "degrade level");
   const unsigned flags = static_cast<unsigned>(step.fate) | (step.messages ? 2U : 0U) |
                          (step.refused ? 4U : 0U) | (step.keyframe_withheld ? 8U : 0U) |
-                         static_cast<unsigned>(step.degrade_level) << 4;
+                         static_cast<unsigned>(step.effort_level) << 4;
   bytes.push_back(static_cast<std::uint8_t>(flags));
   put_varint(bytes, zigzag(static_cast<std::uint64_t>(step.frame), static_cast<std::uint64_t>(last.frame)));
   put_varint(bytes, zigzag(step.version, last.version));
@@ -21,7 +21,7 @@ TrackerStep decode_step(ByteCursor& in, const TrackerStep& last) {
   TrackerStep step;
   const unsigned flags = in.byte();
   step.fate = static_cast<TrackerStep::Fate>(flags & 1U);
-  step.degrade_level = static_cast<std::uint8_t>(flags >> 4);
+  step.effort_level = static_cast<std::uint8_t>(flags >> 4);
   step.keyframe_withheld = (flags & 8U) != 0;
   step.frame = static_cast<std::int64_t>(unzigzag(in.varint(), static_cast<std::uint64_t>(last.frame)));
   step.version = unzigzag(in.varint(), last.version);

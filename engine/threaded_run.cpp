@@ -40,7 +40,7 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
       places_(1, loop_closing_.places()),
       checkpoints_(rig, options.checkpoint),
       pacer_(options.pacing, clock),
-      ladder_(options.ladder) {
+      effort_controller_(options.effort) {
   consumed_.reserve(ring_size(options.proposal_slots));
   loop_messages_.reserve(ring_size(options.proposal_slots));
 }

@@ -6,9 +6,9 @@
 #include "engine/engine.hpp"
 #include "engine/pacing.hpp"
 #include "engine/parking.hpp"
+#include "engine/runners.hpp"
 #include "engine/snapshot_mailbox.hpp"
 #include "engine/spsc_ring.hpp"
-#include "engine/stages.hpp"
 #include "engine/worker.hpp"
 
 namespace twofold {
@@ -24,14 +24,14 @@ namespace twofold {
 ///
 /// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
 /// withheld (no free buffer, or a full ring), and tracking goes on with the points it has. If the tracker
-/// itself is late, it goes down the load ladder.
+/// itself is late, it goes down the effort levels.
 class ThreadedRun {
  public:
   /// clock: nullptr for the steady clock; otherwise read and slept on by the tracker thread alone.
   ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClock* clock = nullptr);
 
   void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
-  /// Final relaxation; moves the result out.
+  /// Final pose graph optimisation; moves the result out.
   [[nodiscard]] RunResult finish();
 
  private:
@@ -80,9 +80,9 @@ class ThreadedRun {
   RunResult result_;
   Progress progress_;
 
-  TrackingStage tracking_;
-  MappingStage mapping_;
-  LoopClosingStage loop_closing_;
+  TrackerRunner tracking_;
+  MapperRunner mapping_;
+  LoopCloserRunner loop_closing_;
   ScheduleStreams schedule_;
 
   SlotPool slots_;
@@ -96,10 +96,10 @@ class ThreadedRun {
   SpscRing<RequestHandle> requests_;        // tracker -> loop closer; one at most is under way
   SpscRing<RelocalisationAnswer> answers_;  // loop closer -> tracker
   SnapshotPublisher<GraphSnapshot> snapshots_;
-  SnapshotPublisher<PlaceBook> places_;  // loop closer -> checkpoints
+  SnapshotPublisher<KeyframeDatabase> places_;  // loop closer -> checkpoints
   CheckpointWriter checkpoints_;
   Pacer pacer_;
-  LoadLadder ladder_;
+  EffortController effort_controller_;
 
   ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
   std::vector<ProposalHandle> consumed_;    // mapper's

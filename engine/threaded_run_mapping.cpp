@@ -71,7 +71,7 @@ bool ThreadedRun::answer_request() {
 }
 
 void ThreadedRun::publish_places() {
-  const PlaceBook& places = loop_closing_.places();
+  const KeyframeDatabase& places = loop_closing_.places();
   if (checkpoints_.enabled() && places.version() > places_.newest()) places_.publish(places);
 }
 

@@ -12,12 +12,12 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
     const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, slot->next_t_ns, stop);
     slot->record = FrameRecord{};
     slot->correction.reason = CorrectionReason::kNone;
-    if (ladder_.must_drop(arrival)) {
+    if (effort_controller_.must_drop(arrival)) {
       drop(*slot);
     } else {
       track(*slot, snapshots_.mailbox(kTrackerReader).latest());
       tracking_.finish(arrival.scheduled_ns, pacer_.now_ns(), slot->record);
-      ladder_.tracked(slot->record.latency_ns, arrival.period_ns);
+      effort_controller_.tracked(slot->record.latency_ns, arrival.period_ns);
     }
     TWOFOLD_CHECK(done_.try_push(std::move(slot)), "the ring holds every slot of the pool");
     reader_parking_.wake();
@@ -29,19 +29,19 @@ void ThreadedRun::drop(FrameSlot& slot) {
   slot.record.frame_index = slot.frame.index;
   slot.record.t_ns = slot.frame.t_ns;
   slot.record.state = FrameState::kDropped;
-  slot.record.rung = ladder_.rung();
-  schedule_.tracker.append(
-      {slot.frame.index, 0, TrackerStep::Fate::kDropped, static_cast<std::uint8_t>(ladder_.rung())});
-  ladder_.dropped();
+  slot.record.effort = effort_controller_.effort();
+  schedule_.tracker.append({slot.frame.index, 0, TrackerStep::Fate::kDropped,
+                            static_cast<std::uint8_t>(effort_controller_.effort())});
+  effort_controller_.dropped();
 }
 
 void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
   if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
   TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
   take_answers(step);
-  step.degrade_level = static_cast<std::uint8_t>(ladder_.rung());
+  step.effort_level = static_cast<std::uint8_t>(effort_controller_.effort());
   step.keyframe_withheld = !spare_;
-  if (tracking_.step(slot.frame, graph, ladder_.rung(), spare_, slot.record))
+  if (tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record))
     send_proposal(slot.record, step);
   slot.correction = tracking_.correction();
   schedule_.tracker.append(step);

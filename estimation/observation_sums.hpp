@@ -1,7 +1,7 @@
 #pragma once
 
-#include "estimation/block_kernels.hpp"
 #include "estimation/observation_model.hpp"
+#include "sparse/block_kernels.hpp"
 
 namespace twofold {
 

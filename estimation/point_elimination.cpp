@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimation/block_kernels.hpp"
 #include "geometry/inverse_depth.hpp"
+#include "sparse/block_kernels.hpp"
 
 namespace twofold {
 namespace {

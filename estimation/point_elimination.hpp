@@ -3,11 +3,11 @@
 #include <span>
 #include <vector>
 
-#include "estimation/block_cholesky.hpp"
 #include "estimation/observation_model.hpp"
 #include "estimation/observation_sums.hpp"
 #include "estimation/window_layout.hpp"
 #include "estimation/window_state.hpp"
+#include "sparse/block_cholesky.hpp"
 
 namespace twofold {
 

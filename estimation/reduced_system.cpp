@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "estimation/block_kernels.hpp"
 #include "estimation/pose_constraint.hpp"
+#include "sparse/block_kernels.hpp"
 
 namespace twofold {
 

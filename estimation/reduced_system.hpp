@@ -3,11 +3,11 @@
 #include <optional>
 #include <vector>
 
-#include "estimation/block_cholesky.hpp"
 #include "estimation/point_elimination.hpp"
 #include "estimation/window_layout.hpp"
 #include "estimation/window_problem.hpp"
 #include "estimation/window_state.hpp"
+#include "sparse/block_cholesky.hpp"
 
 namespace twofold {
 

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "estimation/block_cholesky.hpp"
 #include "estimation/window_problem.hpp"
+#include "sparse/block_cholesky.hpp"
 
 namespace twofold {
 

@@ -34,24 +34,24 @@ void GraphWriter::add_keyframe(Keyframe keyframe) {
   graph_.keyframes_.push_back(std::move(keyframe));
 }
 
-void GraphWriter::add_culled_keyframe(const Heir& heir) {
+void GraphWriter::add_culled_keyframe(const Replacement& replacement) {
   const KeyframeId id{static_cast<std::uint32_t>(graph_.keyframe_count())};
-  TWOFOLD_CHECK(heir.id != id, "a culled keyframe is not its own heir");
+  TWOFOLD_CHECK(replacement.id != id, "a culled keyframe is not its own replacement");
   graph_.keyframes_.extend(graph_.keyframe_count() + 1);
-  graph_.heirs_.extend(graph_.keyframe_count());
-  if (heir.id != kNoKeyframe) put_heir(id, {heir.id, 0, heir.T_this_heir});
+  graph_.replacements_.extend(graph_.keyframe_count());
+  if (replacement.id != kNoKeyframe) put_replacement(id, {replacement.id, 0, replacement.T_this_replacement});
 }
 
-void GraphWriter::put_heir(KeyframeId id, const Heir& heir) {
-  graph_.heirs_.extend(std::size_t{index(id)} + 1);
-  graph_.heirs_.mutate(index(id)) = heir;
+void GraphWriter::put_replacement(KeyframeId id, const Replacement& replacement) {
+  graph_.replacements_.extend(std::size_t{index(id)} + 1);
+  graph_.replacements_.mutate(index(id)) = replacement;
 }
 
 /// Counts points by their anchors, so that a culled one is known for as long as it has any.
 std::uint32_t& GraphWriter::anchored(KeyframeId id) {
   if (!graph_.keyframe(id).culled()) return graph_.keyframes_.mutate(index(id)).anchored;
-  TWOFOLD_CHECK(graph_.heir(id).id != kNoKeyframe, "the anchor of a point is known");
-  return graph_.heirs_.mutate(index(id)).anchored;
+  TWOFOLD_CHECK(graph_.replacement(id).id != kNoKeyframe, "the anchor of a point is known");
+  return graph_.replacements_.mutate(index(id)).anchored;
 }
 
 void GraphWriter::add_point(PointId id, MapPoint point) {
@@ -147,54 +147,57 @@ void GraphWriter::cull_point(PointId id) {
   graph_.points_.forget(index(id));
 }
 
-void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId heir) {
-  TWOFOLD_CHECK(!graph_.keyframe(heir).culled() && heir != id, "an heir must stay in the map");
+void GraphWriter::cull_keyframe(KeyframeId id, KeyframeId replacement) {
+  TWOFOLD_CHECK(!graph_.keyframe(replacement).culled() && replacement != id,
+                "a replacement must stay in the map");
   TWOFOLD_CHECK(!graph_.keyframe(id).culled() && id != graph_.reference(),
                 "a keyframe is culled once, and never the reference");
-  const SE3 T_this_heir = graph_.keyframe(id).T_k_w * graph_.keyframe(heir).T_k_w.inverse();
+  const SE3 T_this_replacement = graph_.keyframe(id).T_k_w * graph_.keyframe(replacement).T_k_w.inverse();
   std::vector<PointId> points;
   for (const Observation& observation : *graph_.keyframe(id).observations)
     points.push_back(observation.point);
   remove_observations(id, points);
   const EdgeList edges = *graph_.keyframe(id).edges;
   for (const Edge& edge : edges) remove_edge(id, edge.other);
-  put_heir(id, {heir, graph_.keyframe(id).anchored, PackedPose(T_this_heir)});
-  heirs_.push_back({id, ++culled_});
+  put_replacement(id, {replacement, graph_.keyframe(id).anchored, PackedPose(T_this_replacement)});
+  replacements_.push_back({id, ++culled_});
   graph_.keyframes_.forget(index(id));
 }
 
-void GraphWriter::shorten_heirs(KeyframeId id) {
+void GraphWriter::shorten_replacements(KeyframeId id) {
   if (!graph_.keyframe(id).culled()) return;
-  const Heir& heir = graph_.heir(id);
-  if (heir.id == kNoKeyframe || !graph_.keyframe(heir.id).culled()) return;
-  const auto survivor = graph_.survivor(id);
-  put_heir(id, {survivor->id, heir.anchored, PackedPose(survivor->T_this_survivor)});
+  const Replacement& replacement = graph_.replacement(id);
+  if (replacement.id == kNoKeyframe || !graph_.keyframe(replacement.id).culled()) return;
+  const auto live_replacement = graph_.live_replacement(id);
+  put_replacement(id,
+                  {live_replacement->id, replacement.anchored, PackedPose(live_replacement->T_this_live)});
 }
 
-/// No heir that is kept leads to one that is forgotten: whatever hung on a keyframe when that was culled is
-/// before it in the queue, and so is looked at, and hung on a survivor, before that one's own turn comes.
-void GraphWriter::forget_heirs(std::size_t keep, std::size_t visits) {
-  for (std::size_t n = std::min(visits, heirs_.size()); n > 0; --n) {
-    const Kept kept = heirs_.front();
+/// No replacement that is kept leads to one that is forgotten: whatever hung on a keyframe when that was
+/// culled is before it in the queue, and so is looked at, and hung on a live_replacement, before that one's
+/// own turn comes.
+void GraphWriter::forget_replacements(std::size_t keep, std::size_t visits) {
+  for (std::size_t n = std::min(visits, replacements_.size()); n > 0; --n) {
+    const Kept kept = replacements_.front();
     if (culled_ - kept.culled < keep) return;
-    heirs_.pop_front();
-    shorten_heirs(kept.id);
-    if (graph_.heir(kept.id).anchored > 0) {
-      heirs_.push_back(kept);
+    replacements_.pop_front();
+    shorten_replacements(kept.id);
+    if (graph_.replacement(kept.id).anchored > 0) {
+      replacements_.push_back(kept);
       continue;
     }
-    graph_.heirs_.forget(index(kept.id));
+    graph_.replacements_.forget(index(kept.id));
   }
 }
 
-/// Of a graph made elsewhere, in any order: first all are hung on survivors.
-void GraphWriter::list_heirs() {
-  heirs_.clear();
+/// Of a graph made elsewhere, in any order: first all are hung on live_replacements.
+void GraphWriter::list_replacements() {
+  replacements_.clear();
   for (std::uint32_t k = 0; k < graph_.keyframe_count(); ++k) {
     const KeyframeId id{k};
-    if (!graph_.keyframe(id).culled() || graph_.heir(id).id == kNoKeyframe) continue;
-    shorten_heirs(id);
-    heirs_.push_back({id, ++culled_});
+    if (!graph_.keyframe(id).culled() || graph_.replacement(id).id == kNoKeyframe) continue;
+    shorten_replacements(id);
+    replacements_.push_back({id, ++culled_});
   }
 }
 

@@ -19,7 +19,7 @@ class GraphWriter {
   /// Continues from an existing graph, e.g. a loaded map, with the next version number.
   explicit GraphWriter(const GraphSnapshot& graph) : graph_(graph) {
     ++graph_.version_;
-    list_heirs();
+    list_replacements();
   }
 
   /// The private version as it stands, with the version number it will be published under.
@@ -29,9 +29,9 @@ class GraphWriter {
 
   /// Appends a keyframe; its id must be graph().keyframe_count(). Lists may be null and are then empty.
   void add_keyframe(Keyframe keyframe);
-  /// Appends a keyframe that was culled; `heir` may be added later, or none: Heir{}. To be followed by
-  /// keep_needed_heirs.
-  void add_culled_keyframe(const Heir& heir);
+  /// Appends a keyframe that was culled; `replacement` may be added later, or none: Replacement{}. To be
+  /// followed by keep_needed_replacements.
+  void add_culled_keyframe(const Replacement& replacement);
   /// Appends a point without observers; ids skipped by the tracker are filled with culled points.
   void add_point(PointId id, MapPoint point);
 
@@ -59,41 +59,42 @@ class GraphWriter {
 
   /// Removes all measurements of a point and marks it culled; nothing happens to a point culled before.
   void cull_point(PointId id);
-  /// Removes a keyframe and all it has; only its pose relative to `heir`, which must not be culled, is known
-  /// until it is forgotten. Points anchored in it keep anchor, psi and appearance: the anchor's frame goes
-  /// along with the heir (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
-  void cull_keyframe(KeyframeId id, KeyframeId heir);
+  /// Removes a keyframe and all it has; only its pose relative to `replacement`, which must not be culled, is
+  /// known until it is forgotten. Points anchored in it keep anchor, psi and appearance: the anchor's frame
+  /// goes along with the replacement (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
+  void cull_keyframe(KeyframeId id, KeyframeId replacement);
   /// Lets a culled keyframe hang directly on the one that stayed. Its pose is the same; asking for it no
   /// longer walks along all that were culled in between.
-  void shorten_heirs(KeyframeId id);
+  void shorten_replacements(KeyframeId id);
 
-  /// Forgets heirs that nobody asks for any more: of keyframes that were culled before the newest `keep` and
-  /// have no point left. Looks at `visits` of the oldest at most, in turn; when called with more visits than
-  /// keyframes are culled, heirs are hardly more than `keep` and the anchors of living points.
-  void forget_heirs(std::size_t keep, std::size_t visits = 8);
-  /// Forgets all heirs but those of anchors of living points. Cost grows with the map.
-  void keep_needed_heirs() {
-    list_heirs();
-    forget_heirs(0, heirs_.size());
+  /// Forgets replacements that nobody asks for any more: of keyframes that were culled before the newest
+  /// `keep` and have no point left. Looks at `visits` of the oldest at most, in turn; when called with more
+  /// visits than keyframes are culled, replacements are hardly more than `keep` and the anchors of living
+  /// points.
+  void forget_replacements(std::size_t keep, std::size_t visits = 8);
+  /// Forgets all replacements but those of anchors of living points. Cost grows with the map.
+  void keep_needed_replacements() {
+    list_replacements();
+    forget_replacements(0, replacements_.size());
   }
-  /// Heirs not forgotten.
-  [[nodiscard]] std::size_t heir_count() const { return heirs_.size(); }
+  /// Replacements not forgotten.
+  [[nodiscard]] std::size_t replacement_count() const { return replacements_.size(); }
 
  private:
   void remove_observer(PointId point, KeyframeId keyframe);
   void put_edge(KeyframeId id, const Edge& edge);
-  void put_heir(KeyframeId id, const Heir& heir);
+  void put_replacement(KeyframeId id, const Replacement& replacement);
   [[nodiscard]] std::uint32_t& anchored(KeyframeId id);
-  void list_heirs();
+  void list_replacements();
 
-  /// A culled keyframe whose heir is known, and how many had been culled with it.
+  /// A culled keyframe whose replacement is known, and how many had been culled with it.
   struct Kept {
     KeyframeId id;
     std::size_t culled;
   };
 
   GraphSnapshot graph_;
-  std::deque<Kept> heirs_;  ///< to be looked at in this order
+  std::deque<Kept> replacements_;  ///< to be looked at in this order
   std::size_t culled_ = 0;
 };
 

@@ -55,8 +55,8 @@ struct Keyframe {
   std::shared_ptr<const ObservationList> observations = no_observations();
   std::shared_ptr<const EdgeList> edges = no_edges();
 
-  /// Nothing remains of a culled keyframe but, for some time, its Heir: all the above reads as in Keyframe{}.
-  /// Ask GraphSnapshot for its pose and its part.
+  /// Nothing remains of a culled keyframe but, for some time, its Replacement: all the above reads as in
+  /// Keyframe{}. Ask GraphSnapshot for its pose and its part.
   [[nodiscard]] bool culled() const { return id == kNoKeyframe; }
 };
 
@@ -78,12 +78,12 @@ class PackedPose {
   std::array<double, 7> values_;  ///< quaternion (x, y, z, w), translation
 };
 
-/// What remains of a culled keyframe for as long as somebody may ask (GraphWriter::forget_heirs): its pose
-/// relative to one that stayed, which may be culled itself later.
-struct Heir {
+/// What remains of a culled keyframe for as long as somebody may ask (GraphWriter::forget_replacements): its
+/// pose relative to one that stayed, which may be culled itself later.
+struct Replacement {
   KeyframeId id = kNoKeyframe;  ///< kNoKeyframe: forgotten
   std::uint32_t anchored = 0;   ///< points that are still anchored in the culled keyframe
-  PackedPose T_this_heir;
+  PackedPose T_this_replacement;
 };
 
 }  // namespace twofold

@@ -55,7 +55,7 @@ void MapBuilder::take_places(ByteReader in) {
 
 SavedMap MapBuilder::finish() {
   check_keyframes();
-  check_heirs();
+  check_replacements();
   check_points();
   check_places();
   register_observers();
@@ -74,8 +74,8 @@ void MapBuilder::check_keyframes() const {
   }
 }
 
-/// Each chain of heirs that is known must end in a keyframe that was not culled.
-void MapBuilder::check_heirs() const {
+/// Each chain of replacements that is known must end in a keyframe that was not culled.
+void MapBuilder::check_replacements() const {
   enum : std::uint8_t { kUnknown, kOnTheWay, kGood };
   std::vector<std::uint8_t> state(keyframes_.size(), kUnknown);
   std::vector<std::size_t> chain;
@@ -83,13 +83,13 @@ void MapBuilder::check_heirs() const {
     if (keyframes_[k].forgotten()) continue;
     chain.clear();
     for (std::size_t at = k; state[at] != kGood;) {
-      if (state[at] == kOnTheWay) throw FormatError{"keyframes: heirs go round in a circle"};
+      if (state[at] == kOnTheWay) throw FormatError{"keyframes: replacements go round in a circle"};
       state[at] = kOnTheWay;
       chain.push_back(at);
       if (!keyframes_[at].culled()) break;
-      at = index(keyframes_[at].heir.id);
+      at = index(keyframes_[at].replacement.id);
       if (at >= keyframes_.size() || keyframes_[at].forgotten())
-        throw FormatError{"keyframes: an heir is not there"};
+        throw FormatError{"keyframes: a replacement is not there"};
     }
     for (const std::size_t at : chain) state[at] = kGood;
   }
@@ -151,9 +151,9 @@ void MapBuilder::mirror_edges() {
 SavedMap MapBuilder::assemble() {
   GraphWriter writer;
   for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    auto& [keyframe, edges, heir] = keyframes_[k];
+    auto& [keyframe, edges, replacement] = keyframes_[k];
     if (keyframe.culled()) {
-      writer.add_culled_keyframe(heir);
+      writer.add_culled_keyframe(replacement);
       continue;
     }
     keyframe.edges = std::make_shared<const EdgeList>(std::move(edges));
@@ -164,7 +164,7 @@ SavedMap MapBuilder::assemble() {
     writer.add_point(PointId{static_cast<std::uint32_t>(p)}, std::move(points_[p]));
   }
   writer.set_reference(reference_);
-  writer.keep_needed_heirs();  // nobody has asked this map for a keyframe yet
+  writer.keep_needed_replacements();  // nobody has asked this map for a keyframe yet
   name_parts(writer);
   map_.graph = writer.publish();
   return std::move(map_);

@@ -24,7 +24,7 @@ class MapBuilder {
 
  private:
   void check_keyframes() const;
-  void check_heirs() const;
+  void check_replacements() const;
   void check_points() const;
   void check_places() const;
   void register_observers();

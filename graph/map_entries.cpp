@@ -70,9 +70,9 @@ KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id) {
     case EntryKind::kForgotten:
       break;
     case EntryKind::kCulled:
-      entry.heir.id = KeyframeId{in.take<std::uint32_t>()};
-      entry.heir.T_this_heir = PackedPose(in.take_pose());
-      if (entry.forgotten()) throw FormatError{"holds a culled keyframe without an heir"};
+      entry.replacement.id = KeyframeId{in.take<std::uint32_t>()};
+      entry.replacement.T_this_replacement = PackedPose(in.take_pose());
+      if (entry.forgotten()) throw FormatError{"holds a culled keyframe without a replacement"};
       break;
     case EntryKind::kKeyframe:
       entry.keyframe.id = id;
@@ -87,11 +87,11 @@ KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id) {
 KeyframeEntry take_keyframe_1(ByteReader& in, KeyframeId id) {
   KeyframeEntry entry;
   take_state(in, entry.keyframe);
-  entry.heir.id = KeyframeId{in.take<std::uint32_t>()};
-  entry.heir.T_this_heir = PackedPose(in.take_pose());
+  entry.replacement.id = KeyframeId{in.take<std::uint32_t>()};
+  entry.replacement.T_this_replacement = PackedPose(in.take_pose());
   entry.keyframe.observations = take_observations(in);
   entry.edges = take_edges(in, id);
-  if (entry.heir.id == kNoKeyframe) entry.keyframe.id = id;
+  if (entry.replacement.id == kNoKeyframe) entry.keyframe.id = id;
   return entry;
 }
 

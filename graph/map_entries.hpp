@@ -14,14 +14,14 @@ namespace twofold::map_format {
 /// whether they fit each other is MapBuilder's affair. All functions throw FormatError.
 
 [[nodiscard]] Rig take_rig(ByteReader& in);
-/// A keyframe, or the heir of one that was culled if that is known.
+/// A keyframe, or the replacement of one that was culled if that is known.
 struct KeyframeEntry {
   Keyframe keyframe;  ///< without edges; a culled one has no number
   EdgeList edges;     ///< to older keyframes, in order
-  Heir heir;
+  Replacement replacement;
 
   [[nodiscard]] bool culled() const { return keyframe.culled(); }
-  [[nodiscard]] bool forgotten() const { return culled() && heir.id == kNoKeyframe; }
+  [[nodiscard]] bool forgotten() const { return culled() && replacement.id == kNoKeyframe; }
 };
 [[nodiscard]] KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id);
 /// The same in format version 1.

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "camera/rig.hpp"
-#include "graph/place_book.hpp"
+#include "graph/keyframe_database.hpp"
 #include "graph/snapshot.hpp"
 
 namespace twofold {
@@ -22,7 +22,8 @@ class MapFileError : public std::runtime_error {
 struct SavedMap {
   Rig rig;
   GraphSnapshot graph;
-  PlaceBook places;  ///< of keyframes that are in the graph and were not culled; empty: none were described
+  KeyframeDatabase
+      places;  ///< of keyframes that are in the graph and were not culled; empty: none were described
 };
 
 /// Format, little-endian throughout (docs/places.md):
@@ -43,7 +44,7 @@ inline constexpr std::uint16_t kMapFormatVersion = 2;
 /// published to may save them, while their writers go on. Places of keyframes that `graph` does not have, or
 /// has culled, are left out.
 void save_map(const std::filesystem::path& file, const Rig& rig, const GraphSnapshot& graph,
-              const PlaceBook& places);
+              const KeyframeDatabase& places);
 inline void save_map(const std::filesystem::path& file, const SavedMap& map) {
   save_map(file, map.rig, map.graph, map.places);
 }

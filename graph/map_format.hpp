@@ -41,8 +41,8 @@ enum class Section : std::uint32_t { kEnd = 0, kHead = 1, kKeyframes = 2, kPoint
 /// What a keyframe's entry holds, its first byte. In version 1 there is no such byte, and all of it is there.
 enum class EntryKind : std::uint8_t {
   kForgotten,  ///< culled: nothing
-  kCulled,     ///< heir
-  kKeyframe,   ///< all but an heir
+  kCulled,     ///< replacement
+  kKeyframe,   ///< all but an replacement
 };
 
 // Slices of the map a section holds at most: what reader and writer keep in memory beside the map.

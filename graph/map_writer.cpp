@@ -103,11 +103,11 @@ void put_edges(ByteWriter& out, const Keyframe& keyframe) {
   }
 }
 
-void put_culled(ByteWriter& out, const Heir& heir) {
-  if (heir.id == kNoKeyframe) return out.put(EntryKind::kForgotten);
+void put_culled(ByteWriter& out, const Replacement& replacement) {
+  if (replacement.id == kNoKeyframe) return out.put(EntryKind::kForgotten);
   out.put(EntryKind::kCulled);
-  out.put(heir.id);
-  out.put(heir.T_this_heir.unpacked());
+  out.put(replacement.id);
+  out.put(replacement.T_this_replacement.unpacked());
 }
 
 void put_keyframe(ByteWriter& out, const Keyframe& keyframe) {
@@ -169,7 +169,8 @@ void write_slices(ReplacedFile& file, Section section, std::uint32_t count, std:
 
 }  // namespace
 
-void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph, const PlaceBook& places) {
+void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph,
+              const KeyframeDatabase& places) {
   ReplacedFile out(file);
   ByteWriter bytes;
   for (const char c : kMagic) bytes.put(c);
@@ -183,7 +184,7 @@ void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph, 
                kKeyframesPerSection, [&](ByteWriter& to, std::uint32_t k) {
                  const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
                  if (keyframe.culled()) {
-                   put_culled(to, graph.heir(KeyframeId{k}));
+                   put_culled(to, graph.replacement(KeyframeId{k}));
                  } else {
                    put_keyframe(to, keyframe);
                  }

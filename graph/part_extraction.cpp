@@ -13,7 +13,7 @@ class Renumbering {
     std::uint32_t keyframes = 0, points = 0;
     for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
       const KeyframeId id{k};
-      if (graph.keyframe(id).culled() && graph.heir(id).anchored == 0) continue;
+      if (graph.keyframe(id).culled() && graph.replacement(id).anchored == 0) continue;
       if (graph.part(id) == part) keyframes_[k] = KeyframeId{keyframes++};
     }
     for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
@@ -100,7 +100,8 @@ KeyframeId oldest_part(const GraphSnapshot& graph) {
   return kNoKeyframe;
 }
 
-SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBook& places, KeyframeId part) {
+SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const KeyframeDatabase& places,
+                      KeyframeId part) {
   const Renumbering number(graph, part);
   GraphWriter writer;
   SavedMap map;
@@ -111,8 +112,8 @@ SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBoo
     const KeyframeId id = number(KeyframeId{k});
     if (id == kNoKeyframe) continue;
     if (keyframe.culled()) {
-      const auto [heir, T_this_heir] = *graph.survivor(KeyframeId{k});
-      writer.add_culled_keyframe({number(heir), 0, PackedPose(T_this_heir)});
+      const auto [replacement, T_this_replacement] = *graph.live_replacement(KeyframeId{k});
+      writer.add_culled_keyframe({number(replacement), 0, PackedPose(T_this_replacement)});
       continue;
     }
     writer.add_keyframe(renumbered(keyframe, number));

@@ -21,7 +21,7 @@ void name_parts(GraphWriter& writer);
 /// A map of one part alone: its keyframes, those that were culled only if a point is anchored in them, and
 /// points, numbered anew from 0 in the same order, and their places. The reference is kept, or, when it is of
 /// another part, its newest keyframe becomes it.
-[[nodiscard]] SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph, const PlaceBook& places,
-                                    KeyframeId part);
+[[nodiscard]] SavedMap extract_part(const Rig& rig, const GraphSnapshot& graph,
+                                    const KeyframeDatabase& places, KeyframeId part);
 
 }  // namespace twofold

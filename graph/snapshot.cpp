@@ -7,27 +7,27 @@
 
 namespace twofold {
 
-std::optional<GraphSnapshot::Survivor> GraphSnapshot::survivor(KeyframeId id) const {
-  Survivor survivor{id, SE3()};
-  while (keyframe(survivor.id).culled()) {
-    const Heir& next = heir(survivor.id);
+std::optional<GraphSnapshot::LiveReplacement> GraphSnapshot::live_replacement(KeyframeId id) const {
+  LiveReplacement live_replacement{id, SE3()};
+  while (keyframe(live_replacement.id).culled()) {
+    const Replacement& next = replacement(live_replacement.id);
     if (next.id == kNoKeyframe) return std::nullopt;
-    survivor = {next.id, survivor.T_this_survivor * next.T_this_heir.unpacked()};
+    live_replacement = {next.id, live_replacement.T_this_live * next.T_this_replacement.unpacked()};
   }
-  return survivor;
+  return live_replacement;
 }
 
 SE3 GraphSnapshot::T_k_w(KeyframeId id) const {
   const Keyframe& keyframe = this->keyframe(id);
   if (!keyframe.culled()) return keyframe.T_k_w;
-  const auto survivor = this->survivor(id);
-  TWOFOLD_CHECK(survivor, "the pose of a keyframe that was culled and forgotten");
-  return survivor->T_this_survivor * this->keyframe(survivor->id).T_k_w;
+  const auto live_replacement = this->live_replacement(id);
+  TWOFOLD_CHECK(live_replacement, "the pose of a keyframe that was culled and forgotten");
+  return live_replacement->T_this_live * this->keyframe(live_replacement->id).T_k_w;
 }
 
 KeyframeId GraphSnapshot::part(KeyframeId id) const {
-  const auto survivor = this->survivor(id);
-  return survivor ? keyframe(survivor->id).part : kNoKeyframe;
+  const auto live_replacement = this->live_replacement(id);
+  return live_replacement ? keyframe(live_replacement->id).part : kNoKeyframe;
 }
 
 Vector3 GraphSnapshot::position(PointId id) const {

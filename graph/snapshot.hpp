@@ -11,7 +11,7 @@ namespace twofold {
 
 /// A change of many poses at once, as the mapper announces it to those who use poses.
 struct MapChange {
-  enum class Kind : std::uint8_t { kLoopClosure, kRelaxation, kPartsJoined };
+  enum class Kind : std::uint8_t { kLoopClosure, kPoseGraph, kPartsJoined };
   std::uint64_t version = 0;  ///< first version that has it; 0: there was none yet
   Kind kind = Kind::kLoopClosure;
 };
@@ -33,19 +33,19 @@ class GraphSnapshot {
 
   [[nodiscard]] const MapChange& last_jump() const { return last_jump_; }
 
-  /// Heir of a culled keyframe; it may be culled by now.
-  [[nodiscard]] const Heir& heir(KeyframeId id) const { return heirs_[index(id)]; }
-  struct Survivor {
+  /// Replacement of a culled keyframe; it may be culled by now.
+  [[nodiscard]] const Replacement& replacement(KeyframeId id) const { return replacements_[index(id)]; }
+  struct LiveReplacement {
     KeyframeId id = kNoKeyframe;
-    SE3 T_this_survivor;
+    SE3 T_this_live;
   };
-  /// The keyframe that stands for `id`: itself, or, for a culled one, the first that is left along its heirs.
-  /// None if `id` was culled so long ago that its heir is forgotten.
-  [[nodiscard]] std::optional<Survivor> survivor(KeyframeId id) const;
+  /// The keyframe that stands for `id`: itself, or, for a culled one, the first that is left along its
+  /// replacements. None if `id` was culled so long ago that its replacement is forgotten.
+  [[nodiscard]] std::optional<LiveReplacement> live_replacement(KeyframeId id) const;
 
-  /// Pose of a keyframe, also of a culled one through its heirs; those must not be forgotten.
+  /// Pose of a keyframe, also of a culled one through its replacements; those must not be forgotten.
   [[nodiscard]] SE3 T_k_w(KeyframeId id) const;
-  /// Map part of a keyframe, also of a culled one: its heirs'. kNoKeyframe if those are forgotten.
+  /// Map part of a keyframe, also of a culled one: its replacements'. kNoKeyframe if those are forgotten.
   [[nodiscard]] KeyframeId part(KeyframeId id) const;
   /// Position of a point that is alive, in the world frame [m].
   [[nodiscard]] Vector3 position(PointId id) const;
@@ -59,7 +59,7 @@ class GraphSnapshot {
   // Small chunks: a write copies one.
   PersistentVector<Keyframe, 5, 3> keyframes_;
   PersistentVector<MapPoint, 5, 3> points_;
-  PersistentVector<Heir, 5, 3> heirs_;  ///< of culled keyframes; up to the newest of them
+  PersistentVector<Replacement, 5, 3> replacements_;  ///< of culled keyframes; up to the newest of them
 };
 
 /// Binary search in keyframe.observations; nullptr if the keyframe does not observe the point.

@@ -191,7 +191,7 @@ std::vector<Match> keep_inliers(const Rig& rig, const PlaceAppearance& a, const 
 
 /// At least Theta / 2 inliers in the upper, lower, left and right half of both images (6.4.1).
 bool spread_over(const Rig& rig, const PlaceAppearance& view, const std::vector<Match>& matches,
-                 int Match::*side, int theta) {
+                 int Match::*side, int min_inliers) {
   int left = 0, upper = 0;
   for (const Match& match : matches) {
     const Eigen::Vector2f& uv = view.corners[static_cast<std::size_t>(match.*side)].uv;
@@ -199,7 +199,7 @@ bool spread_over(const Rig& rig, const PlaceAppearance& view, const std::vector<
     upper += uv.y() < 0.5F * static_cast<float>(rig.camera.height) ? 1 : 0;
   }
   const int count = static_cast<int>(matches.size());
-  return 4 * std::min({left, count - left, upper, count - upper}) >= theta;
+  return 4 * std::min({left, count - left, upper, count - upper}) >= min_inliers;
 }
 
 }  // namespace

@@ -4,13 +4,13 @@
 #include <optional>
 #include <vector>
 
+#include "graph/keyframe_database.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
-#include "graph/place_book.hpp"
 #include "loopclosure/geometric_verification.hpp"
-#include "loopclosure/map_refinement.hpp"
 #include "loopclosure/place_recogniser.hpp"
 #include "loopclosure/place_view.hpp"
+#include "loopclosure/pose_refinement.hpp"
 
 namespace twofold {
 
@@ -43,7 +43,7 @@ class LoopCloser {
 
   /// Knows the places of a loaded map from now on. Their words are found anew, so that a map does not depend
   /// on the vocabulary it was made with. To be called before the first step.
-  void adopt(const PlaceBook& places);
+  void adopt(const KeyframeDatabase& places);
 
   /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be
   /// called in the order of keyframe ids; ids may be left out.
@@ -55,7 +55,7 @@ class LoopCloser {
                                                          const GraphSnapshot& graph);
 
   /// What is remembered, to be saved with the map or published.
-  [[nodiscard]] const PlaceBook& places() const { return places_; }
+  [[nodiscard]] const KeyframeDatabase& places() const { return places_; }
 
  private:
   [[nodiscard]] double likeness_with_previous(KeyframeId id, const BagOfWords& bag) const;
@@ -70,8 +70,8 @@ class LoopCloser {
   LoopCloserOptions options_;
   PlaceDescriber describer_;
   PlaceRecogniser recogniser_;
-  MapRefinement refinement_;
-  PlaceBook places_;
+  PoseRefinement refinement_;
+  KeyframeDatabase places_;
   std::vector<BagOfWords> bags_;  // by keyframe; of those that have a place
   KeyframeId previous_ = kNoKeyframe;
   std::size_t next_checked_ = 0;  // for culling: places are looked through in turn

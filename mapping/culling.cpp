@@ -19,11 +19,11 @@ bool has_lost_its_anchor(const GraphSnapshot& graph, PointId id) {
   return !anchor.culled() && !find_observation(anchor, id);
 }
 
-/// n and the heir still meet without the culled keyframe: directly, or in a common neighbour.
-bool in_touch(const Keyframe& n, const Keyframe& heir, KeyframeId culled) {
-  if (find_edge(n, heir.id)) return true;
+/// n and the replacement still meet without the culled keyframe: directly, or in a common neighbour.
+bool in_touch(const Keyframe& n, const Keyframe& replacement, KeyframeId culled) {
+  if (find_edge(n, replacement.id)) return true;
   for (const Edge& edge : *n.edges) {
-    if (edge.other != culled && find_edge(heir, edge.other)) return true;
+    if (edge.other != culled && find_edge(replacement, edge.other)) return true;
   }
   return false;
 }
@@ -34,17 +34,18 @@ const Edge& strongest_edge(const Keyframe& keyframe) {
   });
 }
 
-/// Edges from the heir to neighbours of `id` that reach it through `id` alone.
-void keep_connected(GraphWriter& writer, KeyframeId id, KeyframeId heir) {
+/// Edges from the replacement to neighbours of `id` that reach it through `id` alone.
+void keep_connected(GraphWriter& writer, KeyframeId id, KeyframeId replacement) {
   const GraphSnapshot& graph = writer.graph();
   const std::shared_ptr<const EdgeList> edges = graph.keyframe(id).edges;
-  const Edge& to_heir = *find_edge(graph.keyframe(id), heir);
-  const SE3 T_id_heir = relative_pose(graph, id, to_heir).inverse();
+  const Edge& to_replacement = *find_edge(graph.keyframe(id), replacement);
+  const SE3 T_id_replacement = relative_pose(graph, id, to_replacement).inverse();
   for (const Edge& edge : *edges) {
-    if (edge.other == heir || in_touch(graph.keyframe(edge.other), graph.keyframe(heir), id)) continue;
-    const SE3 T_other_heir = relative_pose(graph, id, edge) * T_id_heir;
-    link_marginalised(writer, heir, edge.other, std::max(1, std::min(edge.weight, to_heir.weight)),
-                      T_other_heir);
+    if (edge.other == replacement || in_touch(graph.keyframe(edge.other), graph.keyframe(replacement), id))
+      continue;
+    const SE3 T_other_replacement = relative_pose(graph, id, edge) * T_id_replacement;
+    link_marginalised(writer, replacement, edge.other,
+                      std::max(1, std::min(edge.weight, to_replacement.weight)), T_other_replacement);
   }
 }
 
@@ -88,11 +89,12 @@ bool is_redundant(const GraphSnapshot& graph, KeyframeId id, const CullingOption
 }
 
 int remove_keyframe(GraphWriter& writer, KeyframeId id) {
-  TWOFOLD_CHECK(!writer.graph().keyframe(id).edges->empty(), "a keyframe without neighbours has no heir");
-  const KeyframeId heir = strongest_edge(writer.graph().keyframe(id)).other;
-  keep_connected(writer, id, heir);
+  TWOFOLD_CHECK(!writer.graph().keyframe(id).edges->empty(),
+                "a keyframe without neighbours has no replacement");
+  const KeyframeId replacement = strongest_edge(writer.graph().keyframe(id)).other;
+  keep_connected(writer, id, replacement);
   const std::shared_ptr<const ObservationList> observations = writer.graph().keyframe(id).observations;
-  writer.cull_keyframe(id, heir);
+  writer.cull_keyframe(id, replacement);
   int culled = 0;
   for (const Observation& observation : *observations) {
     if (writer.graph().point(observation.point).observers->size() >= kMinObservers) continue;

@@ -19,9 +19,10 @@ int remove_measurements(GraphWriter& writer, std::span<const WindowBuilder::Outl
 /// other keyframes on the same or a finer pyramid level.
 [[nodiscard]] bool is_redundant(const GraphSnapshot& graph, KeyframeId id, const CullingOptions& options);
 
-/// Takes a keyframe out of the graph. Its strongest neighbour becomes its heir. Neighbours that would lose
-/// touch with the heir get an edge to it, composed along the culled keyframe, so that the graph stays
-/// connected; points left with fewer than two observers are culled. Returns the number of points culled.
+/// Takes a keyframe out of the graph. Its strongest neighbour becomes its replacement. Neighbours that would
+/// lose touch with the replacement get an edge to it, composed along the culled keyframe, so that the graph
+/// stays connected; points left with fewer than two observers are culled. Returns the number of points
+/// culled.
 int remove_keyframe(GraphWriter& writer, KeyframeId id);
 
 /// Culls redundant keyframes of the inner window, newest first, so that what is already mapped stays and

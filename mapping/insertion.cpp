@@ -19,9 +19,9 @@ const Observation* observation_of(const KeyframeProposal& proposal, PointId poin
 
 /// The reference, or the keyframe that inherited its place, and the new keyframe's pose relative to it.
 std::pair<KeyframeId, SE3> present_reference(const GraphSnapshot& graph, const KeyframeProposal& proposal) {
-  const auto survivor = graph.survivor(proposal.reference);
-  TWOFOLD_CHECK(survivor, "the reference of a proposal was culled too long ago");
-  return {survivor->id, proposal.T_k_ref * survivor->T_this_survivor};
+  const auto live_replacement = graph.live_replacement(proposal.reference);
+  TWOFOLD_CHECK(live_replacement, "the reference of a proposal was culled too long ago");
+  return {live_replacement->id, proposal.T_k_ref * live_replacement->T_this_live};
 }
 
 void add_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, const SE3& T_k_w, KeyframeId part) {
@@ -85,8 +85,9 @@ void add_measurements(GraphWriter& writer, const KeyframeProposal& proposal, Ins
   report.observations = static_cast<int>(accepted.size());
 }
 
-/// Edges to all of `reachable` that share theta points, or to the strongest of them, or to `reference`.
-int add_covisibility_edges(GraphWriter& writer, KeyframeId id, KeyframeId reference, int theta,
+/// Edges to all of `reachable` that share min_covisible points, or to the strongest of them, or to
+/// `reference`.
+int add_covisibility_edges(GraphWriter& writer, KeyframeId id, KeyframeId reference, int min_covisible,
                            const IdMap& reachable, IdMap& counts) {
   std::vector<Covisible> covisible;
   covisible_keyframes(writer.graph(), id, counts, covisible);
@@ -95,7 +96,7 @@ int add_covisibility_edges(GraphWriter& writer, KeyframeId id, KeyframeId refere
   for (const Covisible& other : covisible) {
     if (!reachable.contains(other.id)) continue;
     if (other.points > strongest.points) strongest = other;
-    if (other.points < theta) continue;
+    if (other.points < min_covisible) continue;
     link(writer, id, other.id, other.points);
     ++edges;
   }
@@ -106,7 +107,7 @@ int add_covisibility_edges(GraphWriter& writer, KeyframeId id, KeyframeId refere
 
 }  // namespace
 
-InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, int theta,
+InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, int min_covisible,
                                 IdMap& consistent, IdMap& counts) {
   InsertionReport report;
   const bool first_of_part = proposal.reference == kNoKeyframe;
@@ -127,21 +128,21 @@ InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& pro
     if (!first_of_part) consistent.set(reference, 0);
   }
   if (!first_of_part) {
-    report.edges = add_covisibility_edges(writer, proposal.id, reference, theta, consistent, counts);
+    report.edges = add_covisibility_edges(writer, proposal.id, reference, min_covisible, consistent, counts);
   }
   consistent.set(proposal.id, 0);
   writer.set_reference(proposal.id);
   return report;
 }
 
-int register_in_window(GraphWriter& writer, KeyframeId id, const DoubleWindow& window, int theta,
+int register_in_window(GraphWriter& writer, KeyframeId id, const DoubleWindow& window, int min_covisible,
                        IdMap& counts) {
   if (!window.contains(id)) return 0;
   std::vector<Covisible> covisible;
   covisible_keyframes(writer.graph(), id, counts, covisible);
   int added = 0;
   for (const auto& [other, points] : covisible) {
-    if (points < theta || !window.contains(other)) continue;
+    if (points < min_covisible || !window.contains(other)) continue;
     if (find_edge(writer.graph().keyframe(id), other)) continue;
     if (window.is_inner(id) || window.is_inner(other)) {
       link(writer, id, other, points);

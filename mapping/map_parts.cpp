@@ -34,7 +34,8 @@ int join_parts(GraphWriter& writer, KeyframeId from, KeyframeId to, const SE3& T
   int count = 0;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const KeyframeId id{k};
-    if (graph.keyframe(id).culled() || part(id) != old_part) continue;  // those go along with their heirs
+    if (graph.keyframe(id).culled() || part(id) != old_part)
+      continue;  // those go along with their replacements
     writer.set_part(id, new_part);
     writer.set_pose(id, graph.keyframe(id).T_k_w * T_before_w);
     ++count;

@@ -73,7 +73,8 @@ MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals, std::spa
 
 void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
   const StageTime time(report.ms.insert);
-  const InsertionReport insertion = insert_keyframe(writer_, proposal, options_.theta, consistent_, counts_);
+  const InsertionReport insertion =
+      insert_keyframe(writer_, proposal, options_.min_covisible, consistent_, counts_);
   inserted_.push_back(proposal.id);
   ++report.inserted;
   report.new_points += insertion.new_points;
@@ -82,14 +83,14 @@ void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
 
 void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   if (!graph().contains(loop.from) || !graph().contains(loop.to)) return;
-  // A constraint of a keyframe that was culled in the meantime passes to its heir.
-  const auto survivor_from = graph().survivor(loop.from), survivor_to = graph().survivor(loop.to);
-  if (!survivor_from || !survivor_to) {
+  // A constraint of a keyframe that was culled in the meantime passes to its replacement.
+  const auto live_from = graph().live_replacement(loop.from), live_to = graph().live_replacement(loop.to);
+  if (!live_from || !live_to) {
     ++report.late_loops;
     return;
   }
-  const auto& [from, T_loop_from] = *survivor_from;
-  const auto& [to, T_loop_to] = *survivor_to;
+  const auto& [from, T_loop_from] = *live_from;
+  const auto& [to, T_loop_to] = *live_to;
   if (from == to) return;
   const SE3 T_to_from = T_loop_to.inverse() * loop.T_to_from * T_loop_from;
   report.joined += join_parts(writer_, from, to, T_to_from);
@@ -101,9 +102,9 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
 
 void Mapper::revisit(KeyframeId tracker_reference) {
   if (tracker_reference == kNoKeyframe || !graph().contains(tracker_reference)) return;
-  const auto survivor = graph().survivor(tracker_reference);
-  if (!survivor) return;
-  const KeyframeId id = survivor->id;
+  const auto live_replacement = graph().live_replacement(tracker_reference);
+  if (!live_replacement) return;
+  const KeyframeId id = live_replacement->id;
   writer_.set_reference(id);
   if (consistent_.contains(id)) return;
   consistent_.clear();
@@ -118,7 +119,7 @@ void Mapper::form_windows(MapperReport& report) {
   report.poses_set = enter_window(writer_, consistent_, next_window_);
   std::swap(window_, next_window_);
   for (const KeyframeId id : inserted_) {
-    register_in_window(writer_, id, window_, options_.theta, counts_);
+    register_in_window(writer_, id, window_, options_.min_covisible, counts_);
   }
   consistent_.clear();
   for (const TreeNode& node : window_.nodes) consistent_.set(node.id, 0);
@@ -200,35 +201,35 @@ void Mapper::cull(MapperReport& report) {
   if (options_.culling.keyframes) {
     report.culled_keyframes =
         cull_redundant_keyframes(writer_, window_, options_.culling, report.culled_points);
-    writer_.forget_heirs(static_cast<std::size_t>(options_.culling.keep_heirs));
+    writer_.forget_replacements(static_cast<std::size_t>(options_.culling.keep_replacements));
     for (const KeyframeId id : report.culled_keyframes) measurements_.forget(id);
   }
 }
 
-int Mapper::take_relaxation(const PoseRelaxation& relaxation) {
+int Mapper::take_pose_graph(const PoseGraphUpdate& update) {
   IdMap position;
-  for (std::size_t n = 0; n < relaxation.poses.size(); ++n) {
-    position.set(relaxation.poses[n].id, static_cast<int>(n));
+  for (std::size_t n = 0; n < update.poses.size(); ++n) {
+    position.set(update.poses[n].id, static_cast<int>(n));
   }
   // Window nodes are in breadth-first order around the reference.
   const auto held = std::find_if(window_.nodes.begin(), window_.nodes.end(), [&](const TreeNode& node) {
     return position.contains(node.id) && !graph().keyframe(node.id).culled();
   });
   if (held == window_.nodes.end()) return 0;
-  const SE3& T_held_relaxed = relaxation.poses[static_cast<std::size_t>(position.find(held->id))].T_k_w;
-  const SE3 T_relaxed_w = T_held_relaxed.inverse() * graph().keyframe(held->id).T_k_w;
+  const SE3& T_held_optimised = update.poses[static_cast<std::size_t>(position.find(held->id))].T_k_w;
+  const SE3 T_optimised_w = T_held_optimised.inverse() * graph().keyframe(held->id).T_k_w;
   int moved = 0;
-  for (const KeyframePose& pose : relaxation.poses) {
+  for (const KeyframePose& pose : update.poses) {
     if (window_.contains(pose.id) || graph().keyframe(pose.id).culled()) continue;
-    writer_.set_pose(pose.id, pose.T_k_w * T_relaxed_w);
+    writer_.set_pose(pose.id, pose.T_k_w * T_optimised_w);
     ++moved;
   }
-  if (moved > 0) writer_.announce_jump(MapChange::Kind::kRelaxation);
+  if (moved > 0) writer_.announce_jump(MapChange::Kind::kPoseGraph);
   return moved;
 }
 
-RelaxationReport Mapper::relax_all() {
-  return relax_all_poses(writer_, rig_, options_);
+PoseGraphReport Mapper::optimise_all_poses() {
+  return optimised_poses_of_all_parts(writer_, rig_, options_);
 }
 
 }  // namespace twofold

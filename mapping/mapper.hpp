@@ -14,7 +14,7 @@
 #include "mapping/map_unit.hpp"
 #include "mapping/metric_loop.hpp"
 #include "mapping/options.hpp"
-#include "mapping/relaxation.hpp"
+#include "mapping/pose_graph_optimisation.hpp"
 #include "mapping/window_builder.hpp"
 
 namespace twofold {
@@ -76,14 +76,14 @@ class Mapper {
   /// O(1) whatever the size of the map.
   [[nodiscard]] GraphSnapshot publish() { return writer_.publish(); }
 
-  /// Takes over poses that were relaxed beside the mapper, outside of the double window: that one is more
+  /// Takes over poses that were optimised beside the mapper, outside of the double window: that one is more
   /// accurate, and the tracker stands in it. They are moved as a whole so that the reference keyframe, or the
-  /// one of the window nearest to it that the relaxation has, stays where it is. To be followed by a step.
+  /// one of the window nearest to it that that update has, stays where it is. To be followed by a step.
   /// @return keyframes moved
-  int take_relaxation(const PoseRelaxation& relaxation);
+  int take_pose_graph(const PoseGraphUpdate& update);
 
   /// Makes all poses agree globally, e.g. at the end of a run. Cost grows with the map.
-  RelaxationReport relax_all();
+  PoseGraphReport optimise_all_poses();
 
   [[nodiscard]] const DoubleWindow& window() const { return window_; }
   [[nodiscard]] const MapperOptions& options() const { return options_; }

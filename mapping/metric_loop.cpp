@@ -27,7 +27,7 @@ PointSearch guided_point_search(const Rig& rig, double radius_px) {
 
 MetricLoopCloser::MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search)
     : rig_(rig),
-      theta_(options.theta),
+      min_matches_(options.min_covisible),
       options_(options.loop),
       sigma_scale_(options.sigma_scale),
       search_(std::move(search)) {}
@@ -39,15 +39,15 @@ MetricLoopReport MetricLoopCloser::close(GraphWriter& writer, const DoubleWindow
   if (far_.empty()) return report;
   collect_candidates(writer.graph());
   report.searched = static_cast<int>(candidates_.size());
-  if (report.searched < theta_) return report;
+  if (report.searched < min_matches_) return report;
   search_candidates(writer.graph(), images);
   report.found = static_cast<int>(found_.size());
-  if (report.found < theta_) return report;
+  if (report.found < min_matches_) return report;
   const auto T_loop_w = estimate_pose(writer.graph().keyframe(reference_).T_k_w);
   if (!T_loop_w) return report;
   prune(*T_loop_w);
   report.agreed = static_cast<int>(found_.size());
-  if (report.agreed < theta_) return report;
+  if (report.agreed < min_matches_) return report;
   connect(writer, *T_loop_w, report);
   return report;
 }
@@ -130,9 +130,9 @@ void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const Frame
 std::optional<SE3> MetricLoopCloser::estimate_pose(const SE3& T_ref_w) {
   // Within a wide search radius most matches may be wrong, too many for a robust kernel to find the way from
   // T_ref.
-  const auto start = consensus_pose(rig_, motion_, theta_);
+  const auto start = consensus_pose(rig_, motion_, min_matches_);
   const MotionOnlyResult result = optimise_motion(rig_, motion_, start.value_or(T_ref_w), {});
-  if (result.inliers < theta_) return std::nullopt;
+  if (result.inliers < min_matches_) return std::nullopt;
   return result.T_c_ref;
 }
 
@@ -162,7 +162,7 @@ bool MetricLoopCloser::well_spread(const std::vector<std::size_t>& matches) cons
     upper += found_[n].z.y() < 0.5F * static_cast<float>(rig_.camera.height) ? 1 : 0;
   }
   const int count = static_cast<int>(matches.size());
-  return 2 * std::min({left, count - left, upper, count - upper}) >= theta_;
+  return 2 * std::min({left, count - left, upper, count - upper}) >= min_matches_;
 }
 
 void MetricLoopCloser::connect(GraphWriter& writer, const SE3& T_loop_w, MetricLoopReport& report) {
@@ -176,7 +176,7 @@ void MetricLoopCloser::connect(GraphWriter& writer, const SE3& T_loop_w, MetricL
       const int at = found_position_.find(observation.point);
       if (at >= 0) shared.push_back(static_cast<std::size_t>(at));
     }
-    if (static_cast<int>(shared.size()) < theta_ || !well_spread(shared)) continue;
+    if (static_cast<int>(shared.size()) < min_matches_ || !well_spread(shared)) continue;
     const SE3 T_i_ref = writer.graph().keyframe(id).T_k_w * T_loop_w.inverse();  // eq. 6.8
     link_marginalised(writer, reference_, id, static_cast<int>(shared.size()), T_i_ref);
     for (const std::size_t n : shared) accepted[n] = true;

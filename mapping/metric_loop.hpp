@@ -57,7 +57,7 @@ class MetricLoopCloser {
   void connect(GraphWriter& writer, const SE3& T_loop_w, MetricLoopReport& report);
 
   Rig rig_;
-  int theta_;
+  int min_matches_;
   MetricLoopOptions options_;
   double sigma_scale_;
   PointSearch search_;

@@ -12,7 +12,7 @@ std::string MapperOptions::invalid_reason() const {
   if (outer_window < 0) return wrong("outer_window", ">= 0", outer_window);
   if (max_anchors < 0) return wrong("max_anchors", ">= 0", max_anchors);
   if (max_points < 1) return wrong("max_points", ">= 1", max_points);
-  if (theta < 1) return wrong("theta", ">= 1", theta);
+  if (min_covisible < 1) return wrong("min_covisible", ">= 1", min_covisible);
   if (!(edge.sigma_px > 0)) return wrong("edge.sigma_px", "> 0", edge.sigma_px);
   if (!(edge.trans_share > 0)) return wrong("edge.trans_share", "> 0", edge.trans_share);
   if (!(edge.rot_share > 0)) return wrong("edge.rot_share", "> 0", edge.rot_share);
@@ -34,8 +34,8 @@ std::string MapperOptions::invalid_reason() const {
     return wrong("culling.redundant_observers", ">= 2", culling.redundant_observers);
   }
   if (culling.keep_recent < 0) return wrong("culling.keep_recent", ">= 0", culling.keep_recent);
-  if (culling.keep_heirs < culling.max_keyframes) {
-    return wrong("culling.keep_heirs", ">= culling.max_keyframes", culling.keep_heirs);
+  if (culling.keep_replacements < culling.max_keyframes) {
+    return wrong("culling.keep_heirs", ">= culling.max_keyframes", culling.keep_replacements);
   }
   if (culling.max_misses < 1 || culling.max_misses > 255) {
     return wrong("culling.max_misses", "in [1, 255]", culling.max_misses);

@@ -33,10 +33,10 @@ struct CullingOptions {
   int redundant_observers = 3;   ///< other keyframes that must see such a point, as finely
   int keep_recent = 8;           ///< newest keyframes are never culled
   int max_keyframes = 2;         ///< culled in one round
-  /// Keyframes culled last whose heirs stay known, >= max_keyframes. Tracker and loop closer may refer to a
-  /// keyframe for as long as a message is under way between the threads: some tens of rounds, each of which
-  /// culls max_keyframes at most.
-  int keep_heirs = 128;
+  /// Keyframes culled last whose replacements stay known, >= max_keyframes. Tracker and loop closer may refer
+  /// to a keyframe for as long as a message is under way between the threads: some tens of rounds, each of
+  /// which culls max_keyframes at most.
+  int keep_replacements = 128;
   int max_misses = 8;  ///< keyframes in a row a weak point should have been seen from and was not
 };
 
@@ -48,7 +48,7 @@ struct MapperOptions {
   bool fixed_outer_window = false;   ///< holds W2's poses: the hard rim the thesis argues against
   int max_anchors = 25;              ///< anchors that may take places of W2 for their points  (6.2.4)
   int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
-  int theta = 15;                    ///< Theta: covisible points that make an edge, 15 to 30
+  int min_covisible = 15;            ///< Theta: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;
   WindowSolverOptions solver;          ///< joint optimisation of eq. 6.4
   int structure_iterations = 2;        ///< structure-only, after poses were set along edges

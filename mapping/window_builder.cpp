@@ -52,9 +52,10 @@ bool WindowBuilder::anchor_point(const GraphSnapshot& graph, const DoubleWindow&
     }
     return false;
   }
-  // An anchor that was culled moves with its heir. In the problem such a point hangs on a frame that sees it.
+  // An anchor that was culled moves with its replacement. In the problem such a point hangs on a frame that
+  // sees it.
   if (!graph.keyframe(map_point.anchor).culled()) return false;
-  if (!window.contains(graph.survivor(map_point.anchor)->id)) return false;
+  if (!window.contains(graph.live_replacement(map_point.anchor)->id)) return false;
   point.anchor = seen_from;
   const KeyframeId seen_from_id = window.nodes[static_cast<std::size_t>(seen_from)].id;
   const SE3 T_k_a = graph.keyframe(seen_from_id).T_k_w * graph.T_k_w(map_point.anchor).inverse();
@@ -171,11 +172,12 @@ void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const Double
       if (other <= static_cast<int>(n)) continue;  // outside, or met from the other end
       const Keyframe& to = graph.keyframe(edge.other);
       // Within W1 the points speak, except across a loop that has been recognised but not yet matched.
-      if (window.is_inner(other) && (!edge.marginalised || shared_points(from, to) >= options_.theta)) {
+      if (window.is_inner(other) &&
+          (!edge.marginalised || shared_points(from, to) >= options_.min_covisible)) {
         continue;
       }
       // So they do for an edge that has not been measured yet: its points are those of W1.
-      if (measurements && !edge.marginalised && edge.weight >= options_.theta) continue;
+      if (measurements && !edge.marginalised && edge.weight >= options_.min_covisible) continue;
       std::optional<EdgeMeasurements::Constraint> measured;
       if (measurements) measured = measurements->constraint(graph, from.id, to.id, point_position_);
       if (!measured) {
@@ -200,7 +202,7 @@ void WindowBuilder::write_back(GraphWriter& writer, const DoubleWindow& window) 
     const KeyframeId anchor = graph.point(point_ids_[p]).anchor;
     Vector3 psi = solved.psi;
     if (anchor != window.nodes[used].id) {
-      writer.shorten_heirs(anchor);
+      writer.shorten_replacements(anchor);
       const SE3 T_a_used = graph.T_k_w(anchor) * problem_.poses[used].T_k_w.inverse();
       psi = to_inverse_depth(T_a_used * from_inverse_depth(psi));
     }

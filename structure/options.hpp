@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "estimation/sliding_window_filter.hpp"
+#include "filters/sliding_window_filter.hpp"
 #include "geometry/consistent_matches.hpp"
 #include "imaging/guided_search.hpp"
 

@@ -1,4 +1,5 @@
-// As the program has it: OpenCV starts no threads of its own. ThreadSanitizer could not see how it waits for them.
+// As the program has it: OpenCV starts no threads of its own. ThreadSanitizer could not see how it waits for
+// them.
 #include <opencv2/core/utility.hpp>
 
 namespace {

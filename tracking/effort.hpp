@@ -7,9 +7,9 @@
 
 namespace twofold {
 
-/// Rungs of the load ladder, in the order in which work is left out. Each keeps what the ones before it left
+/// Effort levels, in the order in which work is left out. Each keeps what the ones before it left
 /// out.
-enum class LadderRung : std::uint8_t {
+enum class EffortLevel : std::uint8_t {
   kEverything,
   kFewerPoints,      ///< half of the points are searched
   kCoarseAlignment,  ///< dense alignment stops two levels above the finest, and starts once only
@@ -19,28 +19,28 @@ enum class LadderRung : std::uint8_t {
   kDropFrames,       ///< as before; frames whose successor is due are dropped, if the policy allows it
   kCount
 };
-inline constexpr int kLadderRungs = static_cast<int>(LadderRung::kCount);
+inline constexpr int kEffortLevels = static_cast<int>(EffortLevel::kCount);
 
-[[nodiscard]] constexpr const char* describe(LadderRung rung) {
-  switch (rung) {
-    case LadderRung::kEverything:
+[[nodiscard]] constexpr const char* describe(EffortLevel effort) {
+  switch (effort) {
+    case EffortLevel::kEverything:
       return "everything";
-    case LadderRung::kFewerPoints:
+    case EffortLevel::kFewerPoints:
       return "fewer points";
-    case LadderRung::kCoarseAlignment:
+    case EffortLevel::kCoarseAlignment:
       return "coarse alignment";
-    case LadderRung::kFewerIterations:
+    case EffortLevel::kFewerIterations:
       return "fewer iterations";
-    case LadderRung::kDropFrames:
+    case EffortLevel::kDropFrames:
       return "drop frames";
-    case LadderRung::kCount:
+    case EffortLevel::kCount:
       break;
   }
   return "";
 }
 
 /// Upper bounds of one frame's work.
-struct TrackEffort {
+struct EffortBounds {
   int wanted_matches = 0;
   int max_searches = 0;
   int finest_alignment_level = 0;
@@ -50,25 +50,25 @@ struct TrackEffort {
   bool urgent_keyframes_only = false;  ///< see TrackerOptions::urgent_share
 };
 
-[[nodiscard]] inline TrackEffort effort_on(LadderRung rung, const TrackerOptions& options) {
-  TrackEffort effort{options.wanted_matches,         options.max_searches,
-                     options.alignment.finest_level, true,
-                     options.motion.max_iterations,  options.search.refine_iterations};
-  if (rung >= LadderRung::kFewerPoints) {
-    effort.wanted_matches = std::max(options.wanted_matches / 2, options.min_inliers);
-    effort.max_searches = std::max(options.max_searches / 2, effort.wanted_matches);
+[[nodiscard]] inline EffortBounds bounds_of(EffortLevel effort, const TrackerOptions& options) {
+  EffortBounds bounds{options.wanted_matches,         options.max_searches,
+                      options.alignment.finest_level, true,
+                      options.motion.max_iterations,  options.search.refine_iterations};
+  if (effort >= EffortLevel::kFewerPoints) {
+    bounds.wanted_matches = std::max(options.wanted_matches / 2, options.min_inliers);
+    bounds.max_searches = std::max(options.max_searches / 2, bounds.wanted_matches);
   }
-  if (rung >= LadderRung::kCoarseAlignment) {
-    effort.finest_alignment_level =
+  if (effort >= EffortLevel::kCoarseAlignment) {
+    bounds.finest_alignment_level =
         std::min(options.alignment.finest_level + 2, options.alignment.coarsest_level);
-    effort.align_from_rest = false;
+    bounds.align_from_rest = false;
   }
-  if (rung >= LadderRung::kFewerIterations) {
-    effort.motion_iterations = std::max(options.motion.max_iterations / 3, 1);
-    effort.refine_iterations = std::max(options.search.refine_iterations / 3, 1);
-    effort.urgent_keyframes_only = true;
+  if (effort >= EffortLevel::kFewerIterations) {
+    bounds.motion_iterations = std::max(options.motion.max_iterations / 3, 1);
+    bounds.refine_iterations = std::max(options.search.refine_iterations / 3, 1);
+    bounds.urgent_keyframes_only = true;
   }
-  return effort;
+  return bounds;
 }
 
 }  // namespace twofold

@@ -39,7 +39,7 @@ void PointStarter::occupy(const Eigen::Vector2f& uv) {
   occupied_[cell_of(uv)] = 1;
 }
 
-int PointStarter::start(const FrameImages& images, KeyframeId anchor, LocalPoints& local) {
+int PointStarter::start(const FrameImages& images, KeyframeId anchor, ImmaturePoints& local) {
   corners_.clear();
   const CellGrid grid{options_.cell_px, columns_, rows_, occupied_};
   for (int level = 0; level < options_.corner_levels; ++level) {
@@ -71,8 +71,8 @@ bool PointStarter::sees_corners(const FrameImages& images, int wanted) {
 }
 
 bool PointStarter::start_one(const FrameImages& images, const Corner& corner, KeyframeId anchor,
-                             LocalPoints& local) const {
-  LocalPoint point;
+                             ImmaturePoints& local) const {
+  ImmaturePoint point;
   if (!cut_appearance(images.left.level(corner.level), corner.u, corner.v, corner.level, point.appearance)) {
     return false;
   }

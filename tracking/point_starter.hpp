@@ -6,7 +6,7 @@
 #include "camera/rig.hpp"
 #include "imaging/fast_corners.hpp"
 #include "imaging/image_pyramid.hpp"
-#include "tracking/local_points.hpp"
+#include "tracking/immature_points.hpp"
 #include "tracking/options.hpp"
 #include "tracking/quadtree.hpp"
 
@@ -24,14 +24,14 @@ class PointStarter {
   void occupy(const Eigen::Vector2f& uv);
   /// Starts points anchored in keyframe `anchor` where nothing is tracked, evenly over the image; returns how
   /// many.
-  int start(const FrameImages& images, KeyframeId anchor, LocalPoints& local);
+  int start(const FrameImages& images, KeyframeId anchor, ImmaturePoints& local);
   /// Whether corners are seen in so many cells: a quick look at level 1, where noise makes none.
   [[nodiscard]] bool sees_corners(const FrameImages& images, int wanted);
 
  private:
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;
   bool start_one(const FrameImages& images, const Corner& corner, KeyframeId anchor,
-                 LocalPoints& local) const;
+                 ImmaturePoints& local) const;
 
   Rig rig_;
   TrackerOptions options_;

@@ -2,21 +2,21 @@
 
 namespace twofold {
 
-const char* describe(TrackStage stage) {
+const char* describe(TrackerStage stage) {
   switch (stage) {
-    case TrackStage::kPyramid:
+    case TrackerStage::kPyramid:
       return "pyramid";
-    case TrackStage::kAlignment:
+    case TrackerStage::kAlignment:
       return "dense alignment";
-    case TrackStage::kCandidates:
+    case TrackerStage::kCandidates:
       return "candidates";
-    case TrackStage::kSearch:
+    case TrackerStage::kSearch:
       return "guided search";
-    case TrackStage::kMotion:
+    case TrackerStage::kMotion:
       return "motion-only adjustment";
-    case TrackStage::kKeyframe:
+    case TrackerStage::kKeyframe:
       return "keyframe";
-    case TrackStage::kCount:
+    case TrackerStage::kCount:
       break;
   }
   return "";

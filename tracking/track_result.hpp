@@ -11,7 +11,7 @@ namespace twofold {
 
 enum class TrackStatus : std::uint8_t { kInitialising, kTracking, kLost };
 
-enum class TrackStage : std::uint8_t {
+enum class TrackerStage : std::uint8_t {
   kPyramid,
   kAlignment,
   kCandidates,
@@ -20,8 +20,8 @@ enum class TrackStage : std::uint8_t {
   kKeyframe,
   kCount
 };
-inline constexpr std::size_t kTrackStages = static_cast<std::size_t>(TrackStage::kCount);
-[[nodiscard]] const char* describe(TrackStage stage);
+inline constexpr std::size_t kTrackerStages = static_cast<std::size_t>(TrackerStage::kCount);
+[[nodiscard]] const char* describe(TrackerStage stage);
 
 struct TrackResult {
   TrackStatus status = TrackStatus::kInitialising;
@@ -35,7 +35,7 @@ struct TrackResult {
   int inliers = 0;
   float alignment_rms = 0;  ///< [grey]
   bool proposed = false;    ///< the free proposal was filled
-  std::array<std::int64_t, kTrackStages> stage_ns{};
+  std::array<std::int64_t, kTrackerStages> stage_ns{};
 
   [[nodiscard]] double tracked_share() const {
     return searched > 0 ? static_cast<double>(inliers) / searched : 0;

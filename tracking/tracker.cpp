@@ -12,7 +12,7 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kMaxCandidates = 3000;
-constexpr std::size_t kMaxLocalPoints = 1200;
+constexpr std::size_t kMaxImmaturePoints = 1200;
 constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr int kHintRounds = 3;
@@ -23,7 +23,7 @@ constexpr int kHintRounds = 3;
 class Tracker::StageClock {
  public:
   explicit StageClock(TrackResult& result) : result_(result) {}
-  void lap(TrackStage stage) {
+  void lap(TrackerStage stage) {
     const auto now = std::chrono::steady_clock::now();
     result_.stage_ns[static_cast<std::size_t>(stage)] += (now - last_).count();
     last_ = now;
@@ -38,33 +38,33 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
       alignment_(kMaxAlignmentPoints, options.alignment),
-      candidates_(kMaxCandidates),
+      local_map_(kMaxCandidates),
       quadtree_(rig.camera.width, rig.camera.height, kMaxCandidates),
-      local_(kMaxLocalPoints, kMaxPending),
+      immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, options) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   matches_.reserve(searches);
   motion_.reserve(searches);
   inlier_ids_.reserve(searches);
-  depths_.reserve(std::max(searches, kMaxLocalPoints));
+  depths_.reserve(std::max(searches, kMaxImmaturePoints));
   previous_points_.reserve(kMaxAlignmentPoints);
   allocate_images(rig, current_);
   allocate_images(rig, previous_);
 }
 
 TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
-                          LadderRung rung) {
-  effort_ = effort_on(rung, options_);
+                          EffortLevel effort) {
+  bounds_ = bounds_of(effort, options_);
   TrackResult result;
   StageClock clock(result);
   ++frames_;
   const LostCause gap = intervals_.next(frame.index, frame.t_ns);
   if (lost_frames_ == 0) gap_before_loss_ = gap;
   load_images(frame);
-  clock.lap(TrackStage::kPyramid);
+  clock.lap(TrackerStage::kPyramid);
   if (reference_ == kNoKeyframe && !unplaced_) {
     if (start_map(frame, free_proposal, result)) remember_frame(SE3());
-    clock.lap(TrackStage::kKeyframe);
+    clock.lap(TrackerStage::kKeyframe);
     return result;
   }
   adopt(graph);
@@ -79,37 +79,37 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
     }
     remember_frame(result.T_c_ref);
     if (!result.proposed) revisit_reference(graph);
-    clock.lap(TrackStage::kKeyframe);
+    clock.lap(TrackerStage::kKeyframe);
     return result;
   } else if (hinted) {  // it was not that place: the images to try from are still those of the last good
                         // frame
     reference_ = reference_before;
     T_prev_ref_ = T_prev_ref_before;
-    candidates_stale_ = true;
+    local_map_stale_ = true;
   }
   if (new_part_due(frame.t_ns) && start_part(frame, free_proposal, result)) remember_frame(SE3());
-  clock.lap(TrackStage::kKeyframe);
+  clock.lap(TrackerStage::kKeyframe);
   return result;
 }
 
 /// Pose of the frame relative to the reference keyframe, from the points of the map around it.
 bool Tracker::track(const GraphSnapshot& graph, bool hinted, StageClock& clock, TrackResult& result) {
-  if (candidates_stale_) candidates_.rebuild(graph, reference_, local_, options_.neighbour_keyframes);
-  candidates_stale_ = false;
-  clock.lap(TrackStage::kCandidates);
+  if (local_map_stale_) local_map_.rebuild(graph, reference_, immature_points_, options_.neighbour_keyframes);
+  local_map_stale_ = false;
+  clock.lap(TrackerStage::kCandidates);
   SE3 T_c_ref_start = hinted ? T_prev_ref_ : align_to_previous(result);
-  clock.lap(TrackStage::kAlignment);
+  clock.lap(TrackerStage::kAlignment);
   // A hint is the place of an earlier frame: far points are found from there, and lead to where near ones
   // are.
   bool tracked = true;
   for (int round = 0; tracked && round < (hinted ? kHintRounds : 1); ++round) {
     select_candidates(T_c_ref_start, result);
-    clock.lap(TrackStage::kCandidates);
+    clock.lap(TrackerStage::kCandidates);
     search_points(T_c_ref_start, result);
-    clock.lap(TrackStage::kSearch);
+    clock.lap(TrackerStage::kSearch);
     tracked = estimate_pose(T_c_ref_start, result);
     T_c_ref_start = result.T_c_ref;
-    clock.lap(TrackStage::kMotion);
+    clock.lap(TrackerStage::kMotion);
   }
   if (tracked) unplaced_ = false;
   return tracked;
@@ -125,24 +125,24 @@ void Tracker::load_images(const Frame& frame) {
 void Tracker::adopt(const GraphSnapshot& graph) {
   if (graph.version() == graph_version_) return;
   graph_version_ = graph.version();
-  candidates_stale_ = true;
+  local_map_stale_ = true;
   const PendingKeyframe* newest = nullptr;
-  for (const PendingKeyframe& pending : local_.pending()) {
+  for (const PendingKeyframe& pending : immature_points_.pending()) {
     if (graph.contains(pending.id) && !graph.keyframe(pending.id).culled()) newest = &pending;
   }
   if (newest != nullptr && newest->id != reference_) {
     // As it was tracked, not as the map has it now: both frames were placed by the same points.
     const SE3 T_ref_new =
-        relative_pose(graph, local_, reference_, newest->reference) * newest->T_k_ref.inverse();
+        relative_pose(graph, immature_points_, reference_, newest->reference) * newest->T_k_ref.inverse();
     T_prev_ref_ = T_prev_ref_ * T_ref_new;
     reference_ = newest->id;
   }
-  local_.adopt(graph);
+  immature_points_.adopt(graph);
   if (graph.contains(reference_) && graph.keyframe(reference_).culled()) {
-    const auto heir = graph.survivor(reference_);
-    TWOFOLD_CHECK(heir, "the reference was culled too long ago");
-    T_prev_ref_ = T_prev_ref_ * heir->T_this_survivor;
-    reference_ = heir->id;
+    const auto replacement = graph.live_replacement(reference_);
+    TWOFOLD_CHECK(replacement, "the reference was culled too long ago");
+    T_prev_ref_ = T_prev_ref_ * replacement->T_this_live;
+    reference_ = replacement->id;
   }
 }
 
@@ -151,10 +151,10 @@ SE3 Tracker::align_to_previous(TrackResult& result) {
   const SE3 start = lost_frames_ > 0 ? SE3() : T_cur_prev_;
   if (previous_points_.empty()) return start * T_prev_ref_;
   DenseAlignmentResult best = alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_,
-                                               start, effort_.finest_alignment_level);
-  if (effort_.align_from_rest && (!best.converged || best.rms > 0.5 * options_.max_alignment_rms)) {
+                                               start, bounds_.finest_alignment_level);
+  if (bounds_.align_from_rest && (!best.converged || best.rms > 0.5 * options_.max_alignment_rms)) {
     const DenseAlignmentResult rest = alignment_.align(
-        rig_.camera, previous_.left, current_.left, previous_points_, SE3(), effort_.finest_alignment_level);
+        rig_.camera, previous_.left, current_.left, previous_points_, SE3(), bounds_.finest_alignment_level);
     if (rest.converged && (!best.converged || rest.rms < best.rms)) best = rest;
   }
   result.alignment_rms = best.rms;
@@ -172,9 +172,9 @@ void Tracker::remember_frame(const SE3& T_c_ref) {
     if (!motion_[m].inlier) continue;
     previous_points_.push_back({matches_[m].found.z.head<2>().cast<float>(), T_c_ref * motion_[m].x_ref});
   }
-  for (const LocalPoint& point : local_.points()) {
+  for (const ImmaturePoint& point : immature_points_.points()) {
     if (previous_points_.size() == previous_points_.capacity()) break;
-    if (index(point.anchor) + 1 != next_keyframe_ || !candidates_stale_)
+    if (index(point.anchor) + 1 != next_keyframe_ || !local_map_stale_)
       continue;  // started in this very frame
     previous_points_.push_back({point.appearance.uv, from_inverse_depth(point.psi)});
   }

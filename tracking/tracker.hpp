@@ -8,10 +8,10 @@
 #include "camera/rig.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
-#include "tracking/candidate_points.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/effort.hpp"
-#include "tracking/local_points.hpp"
+#include "tracking/immature_points.hpp"
+#include "tracking/local_map.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
@@ -39,9 +39,9 @@ class Tracker {
   /// Tracks one frame against `graph`, which must stay alive while later calls get the same version.
   /// @param free_proposal  buffer for a keyframe proposal, or null: no keyframe can be made in this frame.
   ///                       Filled if and only if the result says `proposed`.
-  /// @param rung           what to leave out
+  /// @param effort           what to leave out
   TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
-                   LadderRung rung = LadderRung::kEverything);
+                   EffortLevel effort = EffortLevel::kEverything);
 
   /// Goes on with a map made before: the numbers of keyframes and points continue its own, and the camera is
   /// lost until `relocalise` says where in it the camera is, or until a new part is started. To be called
@@ -52,7 +52,7 @@ class Tracker {
 
   /// Pose of the last tracked frame in the map as `graph`, that of the last step, has it.
   [[nodiscard]] SE3 T_c_w(const GraphSnapshot& graph) const {
-    return T_prev_ref_ * pose_in_world(graph, local_, reference_);
+    return T_prev_ref_ * pose_in_world(graph, immature_points_, reference_);
   }
 
   /// Images of the last step's frame, if that was lost.
@@ -61,7 +61,7 @@ class Tracker {
   [[nodiscard]] int lost_frames() const { return lost_frames_; }
   /// Map part of the last tracked frame, as `graph`, that of the last step, has it.
   [[nodiscard]] KeyframeId part(const GraphSnapshot& graph) const {
-    return part_of(graph, local_, reference_);
+    return part_of(graph, immature_points_, reference_);
   }
 
   /// The proposal of the last step could not be sent: its numbers are taken back.
@@ -79,7 +79,7 @@ class Tracker {
  private:
   class StageClock;
   struct Match {
-    std::uint32_t point;  ///< position in candidates_.points()
+    std::uint32_t point;  ///< position in local_map_.points()
     PointMatch found;
   };
 
@@ -102,7 +102,7 @@ class Tracker {
                         TrackResult& result);
   void hand_over_images(KeyframeProposal& proposal);
   void collect_observations(KeyframeProposal& proposal);
-  void confirm(LocalPoint& point, KeyframeProposal& proposal);
+  void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
   void start_points(KeyframeId anchor);
   void revisit_reference(const GraphSnapshot& graph);
   [[nodiscard]] int occupied_regions() const;
@@ -110,12 +110,12 @@ class Tracker {
 
   Rig rig_;
   TrackerOptions options_;
-  TrackEffort effort_;  ///< of this step
+  EffortBounds bounds_;  ///< of this step
   FrameImages current_, previous_;
   DenseAlignment alignment_;
-  CandidatePoints candidates_;
+  LocalMap local_map_;
   Quadtree quadtree_;
-  LocalPoints local_;
+  ImmaturePoints immature_points_;
   PointStarter starter_;
 
   KeyframeId reference_ = kNoKeyframe;
@@ -123,7 +123,7 @@ class Tracker {
   SE3 T_prev_ref_;  ///< last good pose
   SE3 T_cur_prev_;  ///< last good motion, the prediction of the next
   std::uint64_t graph_version_ = 0;
-  bool candidates_stale_ = true;
+  bool local_map_stale_ = true;
   int lost_frames_ = 0;
   FrameIntervals intervals_;
   LostCause gap_before_loss_ = LostCause::kNone;  ///< between the last good frame and the next

@@ -25,8 +25,8 @@ void Tracker::prepare(KeyframeProposal& proposal) const {
 bool Tracker::proposal_rejected() {
   --next_keyframe_;
   next_point_ -= points_in_proposal_;
-  local_.retract(KeyframeId{next_keyframe_});
-  candidates_stale_ = true;
+  immature_points_.retract(KeyframeId{next_keyframe_});
+  local_map_stale_ = true;
   if (reference_ != KeyframeId{next_keyframe_}) return true;
   reference_ = kNoKeyframe;
   return false;
@@ -53,7 +53,7 @@ double Tracker::median_depth(const SE3& T_c_ref) {
     if (observation.inlier) depths_.push_back((T_c_ref * observation.x_ref).z());
   }
   if (depths_.empty()) {
-    for (const LocalPoint& point : local_.points()) depths_.push_back(1.0 / point.psi.z());
+    for (const ImmaturePoint& point : immature_points_.points()) depths_.push_back(1.0 / point.psi.z());
   }
   const auto middle = depths_.begin() + static_cast<std::ptrdiff_t>(depths_.size() / 2);
   std::nth_element(depths_.begin(), middle, depths_.end());
@@ -61,19 +61,19 @@ double Tracker::median_depth(const SE3& T_c_ref) {
 }
 
 bool Tracker::keyframe_due(const TrackResult& result, const SE3& T_c_ref) const {
-  if (!local_.room_for_keyframe()) return false;
-  const auto [begin, end] = candidates_.reference_range();
+  if (!immature_points_.room_for_keyframe()) return false;
+  const auto [begin, end] = local_map_.reference_range();
   const double visible =
       end > begin ? static_cast<double>(visible_reference_points_) / static_cast<double>(end - begin) : 0.0;
   const double share = visible * result.matches / std::max(1, result.searched);
   if (share < options_.urgent_share) return true;
-  if (static_cast<int>(local_.pending().size()) >= options_.max_pending) return false;
+  if (static_cast<int>(immature_points_.pending().size()) >= options_.max_pending) return false;
   const double parallax = T_c_ref.translation().norm() / std::max(keyframe_depth_, 1e-3);
   const bool emptied = occupied_regions() < (1 - options_.keyframe_empty) * regions_at_keyframe_;
   // The second keyframe confirms the first one's points: until then there is no map.
   const bool map_is_young =
       next_keyframe_ == first_of_part_ + 1 && parallax > 0.2 * options_.keyframe_parallax;
-  if (effort_.urgent_keyframes_only) return map_is_young;
+  if (bounds_.urgent_keyframes_only) return map_is_young;
   return parallax > options_.keyframe_parallax || share < options_.keyframe_share || emptied || map_is_young;
 }
 
@@ -88,12 +88,12 @@ void Tracker::propose_keyframe(const Frame& frame, const GraphSnapshot& graph, K
   proposal.T_k_ref = result.T_c_ref;
   proposal.median_depth = keyframe_depth_ = median_depth(result.T_c_ref);
   collect_observations(proposal);
-  local_.add_pending({proposal.id, reference_, result.T_c_ref});
+  immature_points_.add_pending({proposal.id, reference_, result.T_c_ref});
   ++next_keyframe_;
   start_points(proposal.id);
   hand_over_images(proposal);
-  local_.drop_stale(proposal.id, options_.max_failures, options_.max_candidate_age);
-  candidates_stale_ = true;
+  immature_points_.drop_stale(proposal.id, options_.max_failures, options_.max_candidate_age);
+  local_map_stale_ = true;
   result.proposed = true;
 }
 
@@ -108,10 +108,10 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
   points_in_proposal_ = 0;
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     if (!motion_[m].inlier) continue;
-    const TrackedPoint& point = candidates_.points()[matches_[m].point];
+    const TrackedPoint& point = local_map_.points()[matches_[m].point];
     PointId id = point.id;
     if (point.local >= 0) {
-      LocalPoint& local = local_.points()[static_cast<std::size_t>(point.local)];
+      ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(point.local)];
       if (local.id == kNoPoint) confirm(local, proposal);
       id = local.id;
     }
@@ -123,7 +123,7 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
 }
 
 /// A candidate was found again in a later keyframe: it gets its number and goes to the map.
-void Tracker::confirm(LocalPoint& point, KeyframeProposal& proposal) {
+void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
   point.id = PointId{next_point_++};
   point.proposed_in = proposal.id;
   ++points_in_proposal_;
@@ -138,7 +138,7 @@ void Tracker::start_points(KeyframeId anchor) {
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     if (motion_[m].inlier) starter_.occupy(matches_[m].found.z.head<2>().cast<float>());
   }
-  starter_.start(current_, anchor, local_);
+  starter_.start(current_, anchor, immature_points_);
   regions_at_keyframe_ = occupied_regions();
 }
 
@@ -146,10 +146,11 @@ void Tracker::start_points(KeyframeId anchor) {
 /// a place, the reference comes back too, and no keyframe is needed  (thesis 6.2.2: V_ref may be an older,
 /// revisited keyframe).
 void Tracker::revisit_reference(const GraphSnapshot& graph) {
-  if (frames_ % kRevisitInterval != 0 || !graph.contains(reference_) || !local_.pending().empty()) return;
+  if (frames_ % kRevisitInterval != 0 || !graph.contains(reference_) || !immature_points_.pending().empty())
+    return;
   inlier_ids_.clear();
   for (std::size_t m = 0; m < matches_.size(); ++m) {
-    const PointId id = candidates_.points()[matches_[m].point].id;
+    const PointId id = local_map_.points()[matches_[m].point].id;
     if (motion_[m].inlier && id != kNoPoint) inlier_ids_.push_back(id);
   }
   std::sort(inlier_ids_.begin(), inlier_ids_.end());
@@ -163,7 +164,7 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
   KeyframeId best = reference_;
   // Changing back and forth helps nobody: a new reference must be clearly better.
   int best_count = shared(reference_) * 6 / 5;
-  for (const KeyframeId id : candidates_.neighbours()) {
+  for (const KeyframeId id : local_map_.neighbours()) {
     const int count = shared(id);
     if (count > best_count) {
       best = id;
@@ -171,9 +172,9 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
     }
   }
   if (best == reference_) return;
-  T_prev_ref_ = T_prev_ref_ * relative_pose(graph, local_, reference_, best);
+  T_prev_ref_ = T_prev_ref_ * relative_pose(graph, immature_points_, reference_, best);
   reference_ = best;
-  candidates_stale_ = true;
+  local_map_stale_ = true;
 }
 
 }  // namespace twofold

@@ -12,14 +12,14 @@ void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
   quadtree_.clear();
   visible_reference_points_ = 0;
   const Matrix3 R_c_ref = T_c_ref.rotation();
-  const auto points = candidates_.points();
-  const auto [reference_begin, reference_end] = candidates_.reference_range();
+  const auto points = local_map_.points();
+  const auto [reference_begin, reference_end] = local_map_.reference_range();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector3 x_c = R_c_ref * points[i].x_ref + T_c_ref.translation();
     if (x_c.z() < 1e-3) continue;
     const Vector2 uv = rig_.camera.project(x_c);
     if (!rig_.camera.contains(uv, 8)) continue;
-    const SE3& T_ref_a = candidates_.T_ref_a(points[i]);
+    const SE3& T_ref_a = local_map_.T_ref_a(points[i]);
     const Vector3 from_anchor = points[i].x_ref - T_ref_a.translation();
     const Vector3 from_here = R_c_ref.transpose() * x_c;
     const double cosine = from_anchor.dot(from_here) / (from_anchor.norm() * from_here.norm());
@@ -35,19 +35,19 @@ void Tracker::search_points(const SE3& T_c_ref, TrackResult& result) {
   matches_.clear();
   result.searched = 0;
   GuidedSearchOptions search = options_.search;
-  search.refine_iterations = effort_.refine_iterations;
+  search.refine_iterations = bounds_.refine_iterations;
   if (lost_frames_ > 0) search.radius_px = options_.lost_radius_px;
   for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
-    if (static_cast<int>(matches_.size()) >= effort_.wanted_matches ||
-        result.searched >= effort_.max_searches) {
+    if (static_cast<int>(matches_.size()) >= bounds_.wanted_matches ||
+        result.searched >= bounds_.max_searches) {
       break;
     }
     ++result.searched;
-    const TrackedPoint& point = candidates_.points()[static_cast<std::size_t>(i)];
-    const SE3 T_c_a = T_c_ref * candidates_.T_ref_a(point);
+    const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
+    const SE3 T_c_a = T_c_ref * local_map_.T_ref_a(point);
     const auto found = find_point(current_, rig_, *point.appearance, point.psi, T_c_a, search);
     if (point.local >= 0) {
-      LocalPoint& local = local_.points()[static_cast<std::size_t>(point.local)];
+      ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(point.local)];
       local.failures = found ? 0 : static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
     }
     if (found) matches_.push_back({static_cast<std::uint32_t>(i), *found});
@@ -60,11 +60,11 @@ bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
   motion_.clear();
   for (const Match& match : matches_) {
     const bool has_right = !std::isnan(match.found.z.z());
-    motion_.push_back({candidates_.points()[match.point].x_ref, match.found.z.cast<float>(),
+    motion_.push_back({local_map_.points()[match.point].x_ref, match.found.z.cast<float>(),
                        measurement_information(rig_, match.found.level, has_right), true});
   }
   MotionOnlyOptions solver = options_.motion;
-  solver.max_iterations = effort_.motion_iterations;
+  solver.max_iterations = bounds_.motion_iterations;
   const MotionOnlyResult motion = optimise_motion(rig_, motion_, T_c_ref_start, solver);
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) {

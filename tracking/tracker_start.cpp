@@ -27,22 +27,22 @@ void Tracker::relocalise(KeyframeId id, const SE3& T_c_k) {
 bool Tracker::take_hint(const GraphSnapshot& graph) {
   const KeyframeId id = std::exchange(hint_keyframe_, kNoKeyframe);
   if (id == kNoKeyframe || lost_frames_ == 0 || !graph.contains(id)) return false;
-  const auto survivor = graph.survivor(id);
-  if (!survivor) return false;  // a late answer: the keyframe was culled long ago
-  T_prev_ref_ = hint_T_c_k_ * survivor->T_this_survivor;
-  reference_ = survivor->id;
-  candidates_stale_ = true;
+  const auto live_replacement = graph.live_replacement(id);
+  if (!live_replacement) return false;  // a late answer: the keyframe was culled long ago
+  T_prev_ref_ = hint_T_c_k_ * live_replacement->T_this_live;
+  reference_ = live_replacement->id;
+  local_map_stale_ = true;
   return true;
 }
 
 bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result) {
   result.status = TrackStatus::kInitialising;
   result.cause = LostCause::kNoKeyframeBuffer;
-  if (proposal == nullptr || !local_.room_for_keyframe()) return false;
+  if (proposal == nullptr || !immature_points_.room_for_keyframe()) return false;
   const KeyframeId id{next_keyframe_};
   starter_.clear();
-  if (starter_.start(current_, id, local_) < kMinStartPoints) {
-    local_.retract(id);
+  if (starter_.start(current_, id, immature_points_) < kMinStartPoints) {
+    immature_points_.retract(id);
     result.cause = LostCause::kNoTexture;
     return false;
   }
@@ -54,11 +54,11 @@ bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackRes
   motion_.clear();
   proposal->median_depth = keyframe_depth_ = median_depth(SE3());
   hand_over_images(*proposal);
-  local_.add_pending({id, kNoKeyframe, SE3()});
+  immature_points_.add_pending({id, kNoKeyframe, SE3()});
   first_of_part_ = next_keyframe_++;
   points_in_proposal_ = 0;
   reference_ = id;
-  candidates_stale_ = true;
+  local_map_stale_ = true;
   regions_at_keyframe_ = 0;
   result.status = TrackStatus::kTracking;
   result.cause = LostCause::kNone;
@@ -81,8 +81,8 @@ bool Tracker::new_part_due(std::int64_t t_ns) {
 /// of both parts is recognised. Not before the map has all that was proposed of the old part, so that nothing
 /// here refers to that any more.
 bool Tracker::start_part(const Frame& frame, KeyframeProposal* proposal, TrackResult& result) {
-  if (proposal == nullptr || !local_.pending().empty()) return false;
-  local_.clear_points();
+  if (proposal == nullptr || !immature_points_.pending().empty()) return false;
+  immature_points_.clear_points();
   TrackResult started = result;
   if (!start_map(frame, proposal, started)) return false;
   unplaced_ = false;

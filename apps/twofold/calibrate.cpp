@@ -6,10 +6,10 @@
 #include "apps/twofold/calibration_session.hpp"
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
-#include "io/io_error.hpp"
-#include "io/open_source.hpp"
-#include "io/output_file.hpp"
-#include "io/raw_folder_source.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/output_file.hpp"
+#include "io/sources/open_source.hpp"
+#include "io/sources/raw_folder_source.hpp"
 
 namespace twofold {
 namespace {

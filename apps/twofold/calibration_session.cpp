@@ -6,10 +6,10 @@
 
 #include "calibration/calibrate.hpp"
 #include "calibration/view_collector.hpp"
-#include "io/calibration_file.hpp"
-#include "io/io_error.hpp"
-#include "io/plot.hpp"
-#include "io/residual_plot.hpp"
+#include "io/files/calibration_file.hpp"
+#include "io/files/io_error.hpp"
+#include "io/plots/plot.hpp"
+#include "io/plots/residual_plot.hpp"
 
 namespace twofold {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "calibration/board.hpp"
-#include "io/frame_source.hpp"
+#include "io/sources/frame_source.hpp"
 
 namespace twofold {
 

@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
-#include "io/doctor/camera.hpp"
-#include "io/doctor/disk.hpp"
-#include "io/doctor/machine.hpp"
-#include "io/io_error.hpp"
-#include "io/v4l2_frames.hpp"
+#include "doctor/camera.hpp"
+#include "doctor/disk.hpp"
+#include "doctor/machine.hpp"
+#include "io/files/io_error.hpp"
+#include "io/sources/v4l2_frames.hpp"
 
 namespace twofold {
 namespace {

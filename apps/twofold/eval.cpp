@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
-#include "io/evaluation.hpp"
-#include "io/io_error.hpp"
-#include "io/open_source.hpp"
-#include "io/output_file.hpp"
-#include "io/plot.hpp"
-#include "io/trajectory_file.hpp"
+#include "evaluation/evaluation.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/output_file.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "io/plots/plot.hpp"
+#include "io/sources/open_source.hpp"
 
 namespace twofold {
 namespace {

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/trajectory.hpp"
 #include "graph/snapshot.hpp"
-#include "io/ply.hpp"
-#include "io/trajectory.hpp"
+#include "io/files/ply.hpp"
 
 namespace twofold {
 

@@ -7,7 +7,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "graph/map_file.hpp"
-#include "io/io_error.hpp"
+#include "io/files/io_error.hpp"
 
 namespace {
 
@@ -17,9 +17,11 @@ void silence_decoders() {
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // AV_LOG_QUIET
 }
 
-/// Rectification and descriptors call OpenCV from the reader's and the loop closer's threads. Threads of its own beside
-/// them would be scheduled on the tracker's core.
-void forbid_hidden_threads() { cv::setNumThreads(1); }
+/// Rectification and descriptors call OpenCV from the reader's and the loop closer's threads. Threads of its
+/// own beside them would be scheduled on the tracker's core.
+void forbid_hidden_threads() {
+  cv::setNumThreads(1);
+}
 
 /// One line, whatever the library put into its message.
 int report(const std::string& what, int exit_code) {

@@ -9,10 +9,10 @@
 #include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "graph/part_extraction.hpp"
-#include "io/io_error.hpp"
-#include "io/output_file.hpp"
-#include "io/ply.hpp"
-#include "io/trajectory_file.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/output_file.hpp"
+#include "io/files/ply.hpp"
+#include "io/files/trajectory_file.hpp"
 
 namespace twofold {
 namespace {

@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "graph/part_extraction.hpp"
-#include "io/io_error.hpp"
+#include "io/files/io_error.hpp"
 
 namespace twofold {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "engine/options.hpp"
 #include "engine/result.hpp"
-#include "io/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 
 namespace twofold {
 

@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/place_set.hpp"
-#include "io/io_error.hpp"
-#include "io/plot.hpp"
+#include "io/files/io_error.hpp"
+#include "io/plots/plot.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/place_recogniser.hpp"
 

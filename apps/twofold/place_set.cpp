@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include "io/image_file.hpp"
-#include "io/io_error.hpp"
-#include "io/open_source.hpp"
+#include "io/files/image_file.hpp"
+#include "io/files/io_error.hpp"
+#include "io/sources/open_source.hpp"
 
 namespace twofold {
 namespace {

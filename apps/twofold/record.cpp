@@ -9,9 +9,9 @@
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/record_session.hpp"
 #include "engine/clock.hpp"
-#include "io/calibration_file.hpp"
-#include "io/open_source.hpp"
-#include "io/recorder.hpp"
+#include "io/files/calibration_file.hpp"
+#include "io/sources/open_source.hpp"
+#include "io/sources/recorder.hpp"
 
 namespace twofold {
 namespace {

@@ -4,8 +4,8 @@
 #include <functional>
 #include <string>
 
-#include "io/frame_source.hpp"
-#include "io/recorder.hpp"
+#include "io/sources/frame_source.hpp"
+#include "io/sources/recorder.hpp"
 
 namespace twofold {
 

@@ -14,10 +14,10 @@
 #include "apps/twofold/run_output.hpp"
 #include "engine/engine.hpp"
 #include "engine/worker.hpp"
-#include "io/io_error.hpp"
-#include "io/open_source.hpp"
-#include "io/output_file.hpp"
-#include "io/recorded_source.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/output_file.hpp"
+#include "io/sources/open_source.hpp"
+#include "io/sources/recording_tee.hpp"
 
 namespace twofold {
 namespace {
@@ -127,7 +127,7 @@ int run(const RunArguments& arguments) {
   }
   expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
   if (!arguments.record.empty()) {
-    source = std::make_unique<RecordedSource>(std::move(source), arguments.record);
+    source = std::make_unique<RecordingTee>(std::move(source), arguments.record);
   }
 
   ProgressLine line(source->frame_count(), arguments.quiet);

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "io/io_error.hpp"
+#include "io/files/io_error.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 
 namespace twofold {

@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
-#include "io/io_error.hpp"
-#include "io/output_file.hpp"
-#include "io/ply.hpp"
-#include "io/trajectory_file.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/output_file.hpp"
+#include "io/files/ply.hpp"
+#include "io/files/trajectory_file.hpp"
 #include "structure/structure_filter.hpp"
 
 namespace twofold {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "io/frame_source.hpp"
+#include "io/sources/frame_source.hpp"
 
 namespace twofold {
 

@@ -12,12 +12,12 @@
 #include "apps/twofold/map_options.hpp"
 #include "apps/twofold/map_parts.hpp"
 #include "apps/twofold/run_summary.hpp"
-#include "io/evaluation.hpp"
-#include "io/io_error.hpp"
-#include "io/output_file.hpp"
-#include "io/plot.hpp"
-#include "io/ply.hpp"
-#include "io/trajectory_file.hpp"
+#include "evaluation/evaluation.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/output_file.hpp"
+#include "io/files/ply.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "io/plots/plot.hpp"
 
 namespace twofold {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "engine/options.hpp"
 #include "engine/result.hpp"
-#include "io/frame_source.hpp"
+#include "io/sources/frame_source.hpp"
 
 namespace twofold {
 

@@ -36,14 +36,14 @@ Json late_and_lost(const RunResult& result) {
           {{"frame", record.frame_index}, {"cause", describe(record.cause)}, {"ms_since_previous", gap_ms}});
     } else if (record.state == FrameState::kDropped) {
       late.push_back({{"frame", record.frame_index},
-                      {"rung", describe(record.rung)},
+                      {"effort level", describe(record.effort)},
                       {"cause", "dropped: its successor was due already"}});
     } else if (record.latency_ns > kLateNs) {
       const bool own = record.tracking_ns > kLateNs / 2;
       late.push_back(
           {{"frame", record.frame_index},
            {"latency_ms", static_cast<double>(record.latency_ns) * 1e-6},
-           {"rung", describe(record.rung)},
+           {"effort level", describe(record.effort)},
            {"tracking_ms", static_cast<double>(record.tracking_ns) * 1e-6},
            {"cause", own ? "tracking it took long" : "it waited: earlier frames, decoding, or no CPU"}});
     }
@@ -99,20 +99,20 @@ Json checkpoints_json(const CheckpointReport& report) {
           {"error", report.error}};
 }
 
-/// Frames on each rung of the load ladder, and where it was changed.
-Json ladder_json(const RunResult& result) {
-  std::array<std::int64_t, kLadderRungs> frames{};
+/// Frames on each effort level, and where it was changed.
+Json effort_json(const RunResult& result) {
+  std::array<std::int64_t, kEffortLevels> frames{};
   Json changes = Json::array();
-  LadderRung rung = LadderRung::kEverything;
+  EffortLevel effort = EffortLevel::kEverything;
   for (const FrameRecord& record : result.frames) {
-    ++frames[static_cast<std::size_t>(record.rung)];
-    if (record.rung != rung) {
-      changes.push_back({{"frame", record.frame_index}, {"rung", describe(record.rung)}});
+    ++frames[static_cast<std::size_t>(record.effort)];
+    if (record.effort != effort) {
+      changes.push_back({{"frame", record.frame_index}, {"effort level", describe(record.effort)}});
     }
-    rung = record.rung;
+    effort = record.effort;
   }
   Json on = Json::object();
-  for (std::size_t r = 0; r < frames.size(); ++r) on[describe(static_cast<LadderRung>(r))] = frames[r];
+  for (std::size_t r = 0; r < frames.size(); ++r) on[describe(static_cast<EffortLevel>(r))] = frames[r];
   return {{"frames", on}, {"changes", changes}};
 }
 
@@ -164,7 +164,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
               {"speed", options.pacing.speed},
               {"inner_window", options.mapper.inner_window},
               {"outer_window", options.mapper.outer_window},
-              {"theta", options.mapper.theta},
+              {"min_covisible", options.mapper.min_covisible},
               {"wanted_matches", options.tracker.wanted_matches}}},
             {"notes", result.notes}};
   json.update(late_and_lost(result));
@@ -173,7 +173,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
 
 Json timing_json(const RunResult& result) {
   Json json;
-  json["load ladder"] = ladder_json(result);
+  json["effort levels"] = effort_json(result);
   for (const StageRecorder& recorder : result.times) json[recorder.thread_name()] = recorder.to_json();
   const LoopLatency latency = loop_latency(result);
   json["latency round loops"] = {{"within 5 s", latency.near.to_json()},

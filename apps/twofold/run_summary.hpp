@@ -15,7 +15,7 @@ namespace twofold {
                                                   const EngineOptions& options, const RunResult& result,
                                                   const std::vector<MapPart>& parts);
 
-/// timing.json: each thread's stages, the latency round loops and elsewhere, frames on the load ladder.
+/// timing.json: each thread's stages, the latency round loops and elsewhere, frames on the effort levels.
 [[nodiscard]] nlohmann::ordered_json timing_json(const RunResult& result);
 
 }  // namespace twofold

@@ -5,9 +5,9 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
-#include "io/latency_plot.hpp"
-#include "io/plot.hpp"
-#include "io/timing_file.hpp"
+#include "io/files/timing_file.hpp"
+#include "io/plots/latency_plot.hpp"
+#include "io/plots/plot.hpp"
 
 namespace twofold {
 namespace {

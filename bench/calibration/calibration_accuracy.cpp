@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "calibration/calibrate.hpp"
-#include "tests/calibration/rendered_board.hpp"
+#include "fixtures/rendered_board.hpp"
 
 namespace twofold {
 namespace {

@@ -27,10 +27,10 @@ double ms_since(std::int64_t begin_ns) {
 }
 
 /// Each keyframe has as many corners as are described of a real one; what they say does not matter here.
-PlaceBook described(std::uint32_t keyframes, const Rig& rig) {
+KeyframeDatabase described(std::uint32_t keyframes, const Rig& rig) {
   constexpr int kCorners = 500;
   std::mt19937_64 rng(1);
-  PlaceBook places;
+  KeyframeDatabase places;
   for (std::uint32_t k = 0; k < keyframes; ++k) {
     PlaceAppearance place;
     for (int n = 0; n < kCorners; ++n) {
@@ -101,7 +101,7 @@ void run(int keyframes, int rounds, const std::filesystem::path& file) {
   mapper.adopt(filler->publish());
   filler.reset();
   fill(mapper, keyframes);
-  const PlaceBook places = described(static_cast<std::uint32_t>(keyframes), simulation.rig());
+  const KeyframeDatabase places = described(static_cast<std::uint32_t>(keyframes), simulation.rig());
 
   SnapshotPublisher<GraphSnapshot> snapshots(1, mapper.publish());
   Rounds measured(simulation, mapper, snapshots);

@@ -1,12 +1,12 @@
-// What recording costs a frame of the tracker: the calls that TrackingStage and ThreadedRun make for one
+// What recording costs a frame of the tracker: the calls that TrackerRunner and ThreadedRun make for one
 // frame (histograms, trace, schedule log, clock readings), and the share of that in a frame's tracking time.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
 #include <vector>
 
-#include "engine/stages.hpp"
-#include "tests/imaging/rendered_frames.hpp"
+#include "engine/runners.hpp"
+#include "fixtures/rendered_frames.hpp"
 
 namespace twofold {
 namespace {
@@ -30,8 +30,8 @@ const std::vector<Frame>& frames() {
 double tracking_ns() {
   EngineOptions options;
   Trace trace;
-  TrackingStage tracking(rig(), options, &trace);
-  MappingStage mapping(rig(), options, nullptr);
+  TrackerRunner tracking(rig(), options, &trace);
+  MapperRunner mapping(rig(), options, nullptr);
   ProposalPool pool(4, [&](KeyframeProposal& proposal) { tracking.prepare(proposal); });
   GraphSnapshot graph = mapping.publish();
   std::int64_t sum = 0;
@@ -39,7 +39,7 @@ double tracking_ns() {
     std::vector<ProposalHandle> proposal;
     proposal.push_back(pool.try_acquire());
     FrameRecord record;
-    const bool proposed = tracking.step(frame, graph, LadderRung::kEverything, proposal.front(), record);
+    const bool proposed = tracking.step(frame, graph, EffortLevel::kEverything, proposal.front(), record);
     sum += record.tracking_ns;
     if (!proposed) continue;
     (void)mapping.step(proposal);
@@ -55,24 +55,24 @@ void recorders_of_one_frame(benchmark::State& state) {
   Trace trace;
   StageRecorder times("tracker", &trace);
   std::vector<StageId> stages;
-  for (std::size_t s = 0; s < kTrackStages; ++s)
-    stages.push_back(times.add_stage(describe(static_cast<TrackStage>(s))));
+  for (std::size_t s = 0; s < kTrackerStages; ++s)
+    stages.push_back(times.add_stage(describe(static_cast<TrackerStage>(s))));
   const StageId frame_stage = times.add_stage("frame");
   const StageId latency_stage = times.add_stage("latency");
   const TraceName version = times.add_counter("version");
-  const TraceName rung = times.add_counter("rung");
+  const TraceName effort = times.add_counter("effort level");
   ScheduleStream<TrackerStep> schedule(std::size_t{64} << 20);
   TrackerStep step;
   const std::int64_t begin_ns = steady_now_ns();
   for (auto _ : state) {
     // Laps of the stages, two for candidates; begin and end of the frame; the latency.
     std::int64_t now_ns = 0;
-    for (std::size_t n = 0; n < kTrackStages + 5; ++n) benchmark::DoNotOptimize(now_ns = steady_now_ns());
+    for (std::size_t n = 0; n < kTrackerStages + 5; ++n) benchmark::DoNotOptimize(now_ns = steady_now_ns());
     times.record(frame_stage, now_ns, 12'345'678);
     for (const StageId stage : stages) times.record(stage, now_ns, 2'345'678);
     times.record(latency_stage, now_ns, 13'345'678);
     times.counter(version, static_cast<std::int64_t>(step.version));
-    times.counter(rung, 0);
+    times.counter(effort, 0);
     ++step.frame;
     step.version += step.frame % 8 == 0;
     schedule.append(step);

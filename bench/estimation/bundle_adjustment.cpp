@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <random>
 
-#include "bench/estimation/bundle_files.hpp"
 #include "bench/estimation/solver_race.hpp"
+#include "fixtures/bundle_files.hpp"
 
 namespace twofold {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "tests/estimation/ceres_window.hpp"
+#include "fixtures/ceres_window.hpp"
 
 namespace twofold {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "tests/estimation/synthetic_window.hpp"
+#include "fixtures/synthetic_window.hpp"
 
 namespace twofold {
 

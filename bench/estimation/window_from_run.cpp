@@ -10,7 +10,7 @@
 
 #include "engine/engine.hpp"
 #include "estimation/window_problem_io.hpp"
-#include "io/open_source.hpp"
+#include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 
 namespace twofold {

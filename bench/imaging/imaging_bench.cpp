@@ -3,10 +3,10 @@
 
 #include <vector>
 
+#include "fixtures/rendered_scene.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/fast_corners.hpp"
 #include "imaging/guided_search.hpp"
-#include "tests/imaging/rendered_scene.hpp"
 
 namespace twofold {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "bench/mapping/live_memory.hpp"
 #include "bench/mapping/simulated_run.hpp"
+#include "fixtures/live_memory.hpp"
 
 namespace twofold {
 namespace {

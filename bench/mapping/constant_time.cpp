@@ -11,8 +11,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "bench/mapping/live_memory.hpp"
 #include "bench/mapping/simulated_run.hpp"
+#include "fixtures/live_memory.hpp"
 #include "graph/neighbourhood.hpp"
 
 namespace twofold {
@@ -89,12 +89,12 @@ LoopMeasurement measure_loops(const Rig& rig, Mapper& mapper) {
     result.window = report.inner_window + report.outer_window;
   }
   const GraphSnapshot closed = mapper.publish();
-  RelaxationReport relaxation;
+  PoseGraphReport report;
   auto start = Clock::now();
-  const PoseRelaxation relaxed = relax_part(closed, closed.reference(), rig, mapper.options(), relaxation);
+  const PoseGraphUpdate optimised = optimise_part(closed, closed.reference(), rig, mapper.options(), report);
   result.relax_ms = 1e-3 * us_since(start);
   start = Clock::now();
-  result.moved = mapper.take_relaxation(relaxed);
+  result.moved = mapper.take_pose_graph(optimised);
   result.take_ms = 1e-3 * us_since(start);
   return result;
 }
@@ -133,7 +133,8 @@ nlohmann::json explore(const std::vector<int>& sizes, int rounds) {
                m.last.inner_window, m.last.outer_window, m.last.points, m.last.observations,
                m.last.constraints);
     fmt::print(
-        "          large loops: round {:.2f} ms with {} keyframes; relaxed beside it in {:.0f} ms; {} poses "
+        "          large loops: round {:.2f} ms with {} keyframes; optimised beside it in {:.0f} ms; {} "
+        "poses "
         "taken in {:.2f} ms\n",
         loops.round_ms.median(), loops.window, loops.relax_ms, loops.moved, loops.take_ms);
     std::fflush(stdout);

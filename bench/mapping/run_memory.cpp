@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/engine.hpp"
-#include "io/open_source.hpp"
+#include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 
 namespace twofold {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "fixtures/simulation.hpp"
 #include "mapping/mapper.hpp"
-#include "tests/mapping/simulation.hpp"
 
 namespace twofold {
 

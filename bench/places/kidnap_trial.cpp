@@ -6,9 +6,9 @@
 #include <stdexcept>
 
 #include "graph/part_extraction.hpp"
-#include "io/synthetic/random.hpp"
-#include "io/synthetic/scenes.hpp"
 #include "loopclosure/default_vocabulary.hpp"
+#include "synthetic/random.hpp"
+#include "synthetic/scenes.hpp"
 
 namespace twofold::bench {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "engine/engine.hpp"
-#include "io/synthetic/synthetic_sequence.hpp"
+#include "synthetic/synthetic_sequence.hpp"
 
 namespace twofold::bench {
 

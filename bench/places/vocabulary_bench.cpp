@@ -1,9 +1,9 @@
 // Looking up words: a descriptor, and all a keyframe does before the place index is asked.
 #include <benchmark/benchmark.h>
 
+#include "fixtures/rendered_scene.hpp"
 #include "loopclosure/corner_selection.hpp"
 #include "loopclosure/default_vocabulary.hpp"
-#include "tests/imaging/rendered_scene.hpp"
 
 namespace twofold {
 namespace {

@@ -11,11 +11,11 @@
 
 #include <fmt/core.h>
 
-#include "io/evaluation.hpp"
-#include "io/open_source.hpp"
-#include "io/trajectory_file.hpp"
+#include "evaluation/evaluation.hpp"
+#include "fixtures/plain_map.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "io/sources/open_source.hpp"
 #include "mapping/mapper.hpp"
-#include "plain_map.hpp"
 #include "tracking/tracker.hpp"
 
 // The tracker in lockstep with a map, by default one that is never optimised: time a frame by stage, drift
@@ -154,16 +154,16 @@ std::vector<TrackedFrame> track(FrameSource& source, const Arguments& arguments,
 
 void print_times(const std::vector<TrackedFrame>& frames) {
   std::vector<double> cpu;
-  std::array<std::vector<double>, kTrackStages> stages;
+  std::array<std::vector<double>, kTrackerStages> stages;
   for (std::size_t i = 1; i < frames.size(); ++i) {  // the first fills buffers
     cpu.push_back(frames[i].cpu_ms);
-    for (std::size_t s = 0; s < kTrackStages; ++s)
+    for (std::size_t s = 0; s < kTrackerStages; ++s)
       stages[s].push_back(1e-6 * static_cast<double>(frames[i].result.stage_ns[s]));
   }
   fmt::print("cpu ms a frame: mean {:.2f} median {:.2f} p99 {:.2f} max {:.2f}\n", mean(cpu),
              percentile(cpu, 0.5), percentile(cpu, 0.99), percentile(cpu, 1));
-  for (std::size_t s = 0; s < kTrackStages; ++s) {
-    fmt::print("  {:24s} mean {:.3f} median {:.3f} p99 {:.3f}\n", describe(static_cast<TrackStage>(s)),
+  for (std::size_t s = 0; s < kTrackerStages; ++s) {
+    fmt::print("  {:24s} mean {:.3f} median {:.3f} p99 {:.3f}\n", describe(static_cast<TrackerStage>(s)),
                mean(stages[s]), percentile(stages[s], 0.5), percentile(stages[s], 0.99));
   }
 }

@@ -1,12 +1,12 @@
-// Dense alignment and motion-only bundle adjustment as the tracker calls them, on each rung of the load
-// ladder, and the tracker as a whole.
+// Dense alignment and motion-only bundle adjustment as the tracker calls them, on each effort of the load
+// effort levels, and the tracker as a whole.
 #include <benchmark/benchmark.h>
 
 #include <random>
 #include <vector>
 
-#include "bench/tracking/plain_map.hpp"
-#include "tests/imaging/rendered_frames.hpp"
+#include "fixtures/plain_map.hpp"
+#include "fixtures/rendered_frames.hpp"
 #include "tracking/tracker.hpp"
 
 namespace twofold {
@@ -32,8 +32,8 @@ const std::vector<Frame>& frames() {
 
 void dense_alignment(benchmark::State& state) {
   const TrackerOptions options;
-  const auto rung = static_cast<LadderRung>(state.range(0));
-  const TrackEffort effort = effort_on(rung, options);
+  const auto effort = static_cast<EffortLevel>(state.range(0));
+  const EffortBounds bounds = bounds_of(effort, options);
   const testing::RenderedScene scene(rig(), {3, 2, 5}, 21);
   const SE3 T_w_previous = T_c_w(4).inverse();
   ImagePyramid previous, current;
@@ -49,29 +49,29 @@ void dense_alignment(benchmark::State& state) {
   DenseAlignment alignment(points.size(), options.alignment);
   DenseAlignmentResult result;
   for (auto _ : state) {
-    result = alignment.align(rig().camera, previous, current, points, SE3(), effort.finest_alignment_level);
+    result = alignment.align(rig().camera, previous, current, points, SE3(), bounds.finest_alignment_level);
   }
   const SE3 error = result.T_cur_prev * (T_c_w(5) * T_w_previous).inverse();
   state.counters["error_mm"] = 1e3 * error.translation().norm();
-  state.SetLabel(describe(rung));
+  state.SetLabel(describe(effort));
 }
 BENCHMARK(dense_alignment)
-    ->ArgName("rung")
-    ->Arg(static_cast<int>(LadderRung::kEverything))
-    ->Arg(static_cast<int>(LadderRung::kCoarseAlignment))
+    ->ArgName("effort level")
+    ->Arg(static_cast<int>(EffortLevel::kEverything))
+    ->Arg(static_cast<int>(EffortLevel::kCoarseAlignment))
     ->Unit(benchmark::kMicrosecond);
 
 void motion_only(benchmark::State& state) {
   const TrackerOptions options;
-  const auto rung = static_cast<LadderRung>(state.range(0));
-  const TrackEffort effort = effort_on(rung, options);
+  const auto effort = static_cast<EffortLevel>(state.range(0));
+  const EffortBounds bounds = bounds_of(effort, options);
   MotionOnlyOptions solver = options.motion;
-  solver.max_iterations = effort.motion_iterations;
+  solver.max_iterations = bounds.motion_iterations;
   const SE3 T_true = T_c_w(1) * T_c_w(0).inverse();
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.7);
   std::vector<MotionObservation> observations;
-  for (int n = 0; n < effort.wanted_matches; ++n) {
+  for (int n = 0; n < bounds.wanted_matches; ++n) {
     const Vector2 uv(std::uniform_real_distribution(20.0, 620.0)(random),
                      std::uniform_real_distribution(20.0, 460.0)(random));
     const Vector3 x = rig().camera.unproject(uv) * std::uniform_real_distribution(1.0, 6.0)(random);
@@ -84,18 +84,18 @@ void motion_only(benchmark::State& state) {
     copy = observations;
     benchmark::DoNotOptimize(optimise_motion(rig(), copy, SE3(), solver));
   }
-  state.SetLabel(describe(rung));
+  state.SetLabel(describe(effort));
 }
 BENCHMARK(motion_only)
-    ->ArgName("rung")
-    ->Arg(static_cast<int>(LadderRung::kEverything))
-    ->Arg(static_cast<int>(LadderRung::kFewerPoints))
-    ->Arg(static_cast<int>(LadderRung::kFewerIterations))
+    ->ArgName("effort level")
+    ->Arg(static_cast<int>(EffortLevel::kEverything))
+    ->Arg(static_cast<int>(EffortLevel::kFewerPoints))
+    ->Arg(static_cast<int>(EffortLevel::kFewerIterations))
     ->Unit(benchmark::kMicrosecond);
 
 /// All of a sequence, keyframes included; the map is not optimised, and making it is not timed.
 void tracker_frame(benchmark::State& state) {
-  const auto rung = static_cast<LadderRung>(state.range(0));
+  const auto effort = static_cast<EffortLevel>(state.range(0));
   KeyframeProposal proposal;
   while (state.KeepRunningBatch(kFrames)) {
     state.PauseTiming();
@@ -105,16 +105,19 @@ void tracker_frame(benchmark::State& state) {
     GraphSnapshot snapshot = map.publish();
     for (const Frame& frame : frames()) {
       state.ResumeTiming();
-      const TrackResult result = tracker.step(frame, snapshot, &proposal, rung);
+      const TrackResult result = tracker.step(frame, snapshot, &proposal, effort);
       state.PauseTiming();
       if (result.proposed) map.insert(proposal);
       if (result.proposed) snapshot = map.publish();
     }
     state.ResumeTiming();
   }
-  state.SetLabel(describe(rung));
+  state.SetLabel(describe(effort));
 }
-BENCHMARK(tracker_frame)->ArgName("rung")->DenseRange(0, kLadderRungs - 2)->Unit(benchmark::kMillisecond);
+BENCHMARK(tracker_frame)
+    ->ArgName("effort level")
+    ->DenseRange(0, kEffortLevels - 2)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace twofold

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "io/calibration_file.hpp"
+#include "fixtures/rendered_board.hpp"
+#include "io/files/calibration_file.hpp"
 #include "tests/apps/command.hpp"
-#include "tests/calibration/rendered_board.hpp"
 
 namespace twofold {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "tests/calibration/rendered_board.hpp"
+#include "fixtures/rendered_board.hpp"
 
 namespace twofold::testing {
 

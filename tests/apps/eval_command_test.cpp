@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "io/trajectory_file.hpp"
+#include "io/files/trajectory_file.hpp"
 #include "tests/apps/command.hpp"
 
 namespace twofold {

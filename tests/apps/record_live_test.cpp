@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/record_session.hpp"
-#include "io/open_source.hpp"
-#include "io/v4l2_source.hpp"
+#include "io/sources/open_source.hpp"
+#include "io/sources/v4l2_source.hpp"
 #include "tests/apps/command.hpp"
 #include "tests/io/v4l2/fake_device.hpp"
 

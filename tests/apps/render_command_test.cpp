@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "io/open_source.hpp"
+#include "io/sources/open_source.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {

@@ -4,9 +4,9 @@
 
 #include <fmt/format.h>
 
-#include "io/trajectory_file.hpp"
+#include "fixtures/rendered_scene.hpp"
+#include "io/files/trajectory_file.hpp"
 #include "tests/apps/command.hpp"
-#include "tests/imaging/rendered_scene.hpp"
 
 namespace twofold {
 namespace {

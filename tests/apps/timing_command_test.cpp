@@ -16,7 +16,7 @@ nlohmann::json times(double factor) {
 }
 
 nlohmann::json file(double factor) {
-  return {{"load ladder",
+  return {{"effort levels",
            {{"frames", {{"everything", 990}, {"fewer points", 10}}}, {"changes", nlohmann::json::array()}}},
           {"tracker", {{"frame", times(factor)}, {"search", times(0.5 * factor)}}},
           {"run", {{"frames", 1000}, {"wall_seconds", 20.0}, {"cpu_seconds", 5.0}, {"peak_rss_mb", 80.0}}}};
@@ -55,7 +55,7 @@ TEST(TimingCommand, BadFilesAreOneLineAndExitCodeTwo) {
   refuse("{\n\n  what}", "t.json:3: this is not JSON");
   refuse("[1]", "not a timing.json");
   refuse("{}", "not a timing.json");
-  refuse(R"({"load ladder": {"frames": {"everything": -1}}})", "load ladder: 'everything' is no count");
+  refuse(R"({"effort levels": {"frames": {"everything": -1}}})", "effort levels: 'everything' is no count");
   refuse(R"({"tracker": 3})", "tracker: is no table");
   refuse(R"({"tracker": {"frame": {"count": -1}}})", "'count' is no count");
   nlohmann::json json = file(1);

@@ -4,7 +4,7 @@
 
 #include <opencv2/aruco/charuco.hpp>
 
-#include "tests/calibration/rendered_board.hpp"
+#include "fixtures/rendered_board.hpp"
 
 namespace twofold {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/calibration/rendered_board.hpp"
+#include "fixtures/rendered_board.hpp"
 
 namespace twofold {
 namespace {

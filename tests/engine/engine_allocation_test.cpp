@@ -2,12 +2,12 @@
 
 #include <vector>
 
-#include "engine/load_ladder.hpp"
-#include "engine/stages.hpp"
+#include "engine/effort_controller.hpp"
+#include "engine/runners.hpp"
+#include "fixtures/rendered_scene.hpp"
 #include "imaging/image_buffers.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "tests/allocation_counter.hpp"
-#include "tests/imaging/rendered_scene.hpp"
 
 namespace twofold {
 namespace {
@@ -35,13 +35,13 @@ TEST(TrackerThread, NeverAllocates) {
   EngineOptions options;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   Trace trace;
-  TrackingStage tracking(rig, options, &trace);
-  MappingStage mapping(rig, options, &trace);
-  LoopClosingStage loop_closing(rig, options, &trace);
+  TrackerRunner tracking(rig, options, &trace);
+  MapperRunner mapping(rig, options, &trace);
+  LoopCloserRunner loop_closing(rig, options, &trace);
   ProposalPool proposals(4, [&](KeyframeProposal& proposal) { tracking.prepare(proposal); });
   RequestPool requests(2, [&](RelocalisationRequest& r) { allocate_images(rig, r.images); });
   ScheduleStream<TrackerStep> schedule;
-  LoadLadder ladder({});
+  EffortController controller({});
   GraphSnapshot graph = mapping.publish();
 
   int keyframes = 0, lost = 0, asked = 0;
@@ -53,11 +53,11 @@ TEST(TrackerThread, NeverAllocates) {
     const std::uint64_t before = allocations();
     FrameRecord record;
     if (answer) tracking.take_answer(*answer);
-    const bool proposed = tracking.step(frame, graph, ladder.rung(), proposal, record);
+    const bool proposed = tracking.step(frame, graph, controller.effort(), proposal, record);
     tracking.finish(0, 40'000'000, record);
-    ladder.tracked(i < 4 ? 40'000'000 : 5'000'000, 33'000'000);
+    controller.tracked(i < 4 ? 40'000'000 : 5'000'000, 33'000'000);
     schedule.append({frame.index, graph.version(), TrackerStep::Fate::kTracked,
-                     static_cast<std::uint8_t>(ladder.rung())});
+                     static_cast<std::uint8_t>(controller.effort())});
     RequestHandle request;
     if (tracking.wants_relocalisation()) {
       request = requests.try_acquire();

@@ -8,10 +8,10 @@
 #include <fmt/format.h>
 
 #include "engine/engine.hpp"
-#include "io/open_source.hpp"
-#include "io/recorded_source.hpp"
-#include "io/synthetic/synthetic_source.hpp"
-#include "io/v4l2_source.hpp"
+#include "io/sources/open_source.hpp"
+#include "io/sources/recording_tee.hpp"
+#include "io/sources/synthetic_source.hpp"
+#include "io/sources/v4l2_source.hpp"
 #include "tests/io/scratch_folder.hpp"
 #include "tests/io/v4l2/fake_device.hpp"
 #include "tests/sanitized.hpp"
@@ -132,7 +132,7 @@ TEST_F(EngineCameraTest, ALiveRunIsRepeatedFromItsRecordingAndSchedule) {
   options.pacing.speed = testing::kSanitized ? 0.2 : 1;
   RunResult live;
   {
-    RecordedSource source(camera(V4L2_PIX_FMT_GREY), scratch.path() / "recording");
+    RecordingTee source(camera(V4L2_PIX_FMT_GREY), scratch.path() / "recording");
     live = run(feed(source), options);
     EXPECT_TRUE(source.report().faults.empty()) << source.report().faults.front();
   }

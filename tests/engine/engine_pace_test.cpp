@@ -1,4 +1,4 @@
-// Runs that keep a pace: late frames, the load ladder, and their replays.
+// Runs that keep a pace: late frames, the effort levels, and their replays.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -53,7 +53,7 @@ TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
     EngineOptions options;
     options.trace = true;
     options.pacing = {.speed = 1, .late = late};
-    options.ladder.patience = 3;
+    options.effort.patience = 3;
     CostlyClock clock;
     std::atomic<bool> interrupted{false};
     ThreadedRun run(small_rig(), options, &clock);
@@ -65,26 +65,26 @@ TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
     int before = 0;
     bool rose = false;
     for (const FrameRecord& record : live.frames) {
-      const int rung = static_cast<int>(record.rung);
-      EXPECT_LE(std::abs(rung - before), 1) << record.frame_index;  // step by step
-      rose |= rung < before;
-      lowest = std::max(lowest, rung);
-      before = rung;
+      const int effort = static_cast<int>(record.effort);
+      EXPECT_LE(std::abs(effort - before), 1) << record.frame_index;  // step by step
+      rose |= effort < before;
+      lowest = std::max(lowest, effort);
+      before = effort;
       if (record.state == FrameState::kDropped) continue;
       EXPECT_EQ(record.state, FrameState::kTracked) << describe(record.cause);
     }
-    EXPECT_EQ(live.frames.front().rung, LadderRung::kEverything);
-    EXPECT_EQ(lowest, kLadderRungs - 1);
+    EXPECT_EQ(live.frames.front().effort, EffortLevel::kEverything);
+    EXPECT_EQ(lowest, kEffortLevels - 1);
     EXPECT_TRUE(rose);
     const auto dropped = std::count_if(live.frames.begin(), live.frames.end(),
                                        [](const auto& r) { return r.state == FrameState::kDropped; });
     EXPECT_EQ(dropped > 0, late == LatePolicy::kDrop);
     if (late == LatePolicy::kDrop) {
-      EXPECT_EQ(live.frames.back().rung, LadderRung::kEverything);
+      EXPECT_EQ(live.frames.back().effort, EffortLevel::kEverything);
     }
     std::ostringstream trace;
     ASSERT_TRUE(live.trace->write(trace));
-    EXPECT_NE(trace.str().find("load ladder rung"), std::string::npos);
+    EXPECT_NE(trace.str().find("effort level"), std::string::npos);
 
     expect_replay(options, feed(), live);
   }
@@ -93,9 +93,9 @@ TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
 TEST_F(EnginePaceTest, ReplayRefusesARungItDoesNotKnow) {
   EngineOptions options;
   Schedule schedule = schedule_of(run(options));
-  schedule.tracker[3].degrade_level = kLadderRungs;
+  schedule.tracker[3].effort_level = kEffortLevels;
   const RunResult replayed = replay_engine(options, feed(), schedule);
-  EXPECT_NE(replayed.error.find("rung of the load ladder"), std::string::npos);
+  EXPECT_NE(replayed.error.find("effort level"), std::string::npos);
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ inline void expect_same(const RunResult& a, const RunResult& b) {
     EXPECT_EQ(a.frames[i].T_c_ref, b.frames[i].T_c_ref) << i;
     EXPECT_EQ(a.frames[i].T_c_w_causal, b.frames[i].T_c_w_causal) << i;
     EXPECT_EQ(a.frames[i].part_causal, b.frames[i].part_causal) << i;
-    EXPECT_EQ(a.frames[i].rung, b.frames[i].rung) << i;
+    EXPECT_EQ(a.frames[i].effort, b.frames[i].effort) << i;
   }
   ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
   ASSERT_EQ(a.graph.point_count(), b.graph.point_count());

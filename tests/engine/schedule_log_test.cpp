@@ -45,7 +45,7 @@ Schedule plausible(int frames, unsigned seed) {
           {version - below(2), static_cast<std::int64_t>(version), one_in(30) ? 1U : 0U, 0});
     }
     TrackerStep step{i, version, TrackerStep::Fate::kTracked, 0, one_in(40) ? 1U : 0U, one_in(60) ? 2U : 0U};
-    if (one_in(20)) step.degrade_level = static_cast<std::uint8_t>(below(16));
+    if (one_in(20)) step.effort_level = static_cast<std::uint8_t>(below(16));
     step.keyframe_withheld = one_in(30);
     if (one_in(25)) step = {i, 0, TrackerStep::Fate::kDropped, 0, 0, 0};
     s.tracker.push_back(step);

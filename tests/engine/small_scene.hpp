@@ -6,8 +6,8 @@
 
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
+#include "fixtures/rendered_scene.hpp"
 #include "geometry/se3.hpp"
-#include "tests/imaging/rendered_scene.hpp"
 
 /// What the engine's tests look at: a stereo rig small enough to render many frames of, in a textured room.
 namespace twofold::testing {

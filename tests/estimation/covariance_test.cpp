@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "estimation/window_solver.hpp"
-#include "tests/estimation/ceres_window.hpp"
-#include "tests/estimation/synthetic_window.hpp"
+#include "fixtures/ceres_window.hpp"
+#include "fixtures/synthetic_window.hpp"
 
 namespace twofold {
 namespace {

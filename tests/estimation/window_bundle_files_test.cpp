@@ -1,4 +1,4 @@
-#include "bench/estimation/bundle_files.hpp"
+#include "fixtures/bundle_files.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "estimation/window_solver.hpp"
-#include "tests/estimation/synthetic_window.hpp"
+#include "fixtures/synthetic_window.hpp"
 
 namespace twofold {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "estimation/pose_elimination.hpp"
-#include "tests/estimation/ceres_window.hpp"
+#include "fixtures/ceres_window.hpp"
 #include "tests/estimation/window_cases.hpp"
 
 namespace twofold {

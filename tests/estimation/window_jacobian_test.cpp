@@ -5,8 +5,8 @@
 
 #include "estimation/observation_model.hpp"
 #include "estimation/window_solver.hpp"
-#include "tests/estimation/pose_constraint_terms.hpp"
-#include "tests/estimation/synthetic_window.hpp"
+#include "fixtures/pose_constraint_terms.hpp"
+#include "fixtures/synthetic_window.hpp"
 
 namespace twofold {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <sstream>
 
-#include "tests/estimation/synthetic_window.hpp"
+#include "fixtures/synthetic_window.hpp"
 
 namespace twofold {
 namespace {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "estimation/window_solver.hpp"
-#include "tests/estimation/synthetic_window.hpp"
+#include "fixtures/synthetic_window.hpp"
 
 namespace twofold {
 namespace {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "bench/mapping/live_memory.hpp"
+#include "fixtures/live_memory.hpp"
 #include "graph/graph_writer.hpp"
 
 namespace twofold {
@@ -27,14 +27,14 @@ TEST(GraphMemory, WhatWasCulledLeavesNothing) {
       published = writer.publish();
       writer.cull_keyframe(id, stays);
       writer.cull_point(PointId{p});
-      writer.forget_heirs(100);
+      writer.forget_replacements(100);
     }
     published = writer.publish();
     return live_heap_bytes();
   };
   const std::size_t after_2000 = come_and_go(2000);
   const std::size_t after_50000 = come_and_go(50000);
-  EXPECT_EQ(writer.heir_count(), 100U);
+  EXPECT_EQ(writer.replacement_count(), 100U);
   // A level or two of inner nodes, for the longer numbers.
   EXPECT_LT(static_cast<double>(after_50000), static_cast<double>(after_2000) + 8192);
 }

@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "tests/graph/graph_invariants.hpp"
+#include "fixtures/graph_invariants.hpp"
 #include "tests/graph/graph_pieces.hpp"
 #include "tests/random_pose.hpp"
 
@@ -143,7 +143,7 @@ TEST(GraphWriter, InvariantsHoldUnderRandomOperations) {
         const std::uint32_t k = pick();
         live.erase(std::find(live.begin(), live.end(), k));
         writer.cull_keyframe(KeyframeId{k}, KeyframeId{pick()});
-        writer.forget_heirs(3);
+        writer.forget_replacements(3);
         for (auto& [p, set] : observers) set.erase(k);
         std::erase_if(edges, [&](const auto& e) { return e.first == k || e.second == k; });
       }

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "tests/graph/graph_invariants.hpp"
+#include "fixtures/graph_invariants.hpp"
 #include "tests/graph/same_map.hpp"
 #include "tests/graph/sample_map.hpp"
 
@@ -78,10 +78,10 @@ TEST_F(MapFileTest, ForgottenKeyframesTakeAByte) {
     return fs::file_size(file_);
   };
   SavedMap map;
-  const std::size_t known = known_heirs(writer.graph());
+  const std::size_t known = known_replacements(writer.graph());
   const auto with_all = size(map);
   const GraphSnapshot before = map.graph;
-  writer.forget_heirs(0, known);
+  writer.forget_replacements(0, known);
   const std::size_t kept = culled_anchors(writer.graph());
   ASSERT_GT(kept, 0U);
   ASSERT_LT(kept, known);
@@ -89,7 +89,7 @@ TEST_F(MapFileTest, ForgottenKeyframesTakeAByte) {
   EXPECT_EQ(with_all - with_needed, (known - kept) * (4 + 7 * 8));
   const SavedMap loaded = load_map(file_);
   EXPECT_EQ(broken_invariant(loaded.graph), "");
-  EXPECT_EQ(known_heirs(loaded.graph), kept);
+  EXPECT_EQ(known_replacements(loaded.graph), kept);
   for (std::uint32_t p = 1000; p < 2000; ++p) {
     if (!before.point(PointId{p}).alive()) continue;
     EXPECT_LT((loaded.graph.position(PointId{p}) - before.position(PointId{p})).norm(), 1e-9);
@@ -157,7 +157,7 @@ TEST_F(MapFileTest, PlacesOfKeyframesTheGraphDoesNotHaveAreLeftOut) {
   SavedMap map = sample_map(20, 100, 13);
   const KeyframeId culled{4};
   ASSERT_TRUE(map.graph.keyframe(culled).culled());
-  const PlaceBook known = map.places;
+  const KeyframeDatabase known = map.places;
   map.places.set(culled, *map.places.find(KeyframeId{6}));
   map.places.set(KeyframeId{25}, *map.places.find(KeyframeId{6}));  // described, not yet in this version
   save_map(file_, map);

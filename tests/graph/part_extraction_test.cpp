@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/graph/graph_invariants.hpp"
+#include "fixtures/graph_invariants.hpp"
 #include "tests/graph/sample_map.hpp"
 
 namespace twofold {
@@ -18,8 +18,8 @@ SavedMap two_parts(const SavedMap& first, const SavedMap& second) {
   for (std::uint32_t k = 0; k < second.graph.keyframe_count(); ++k) {
     Keyframe keyframe = second.graph.keyframe(KeyframeId{k});
     if (keyframe.culled()) {
-      const Heir& heir = second.graph.heir(KeyframeId{k});
-      writer.add_culled_keyframe({shifted(heir.id), 0, heir.T_this_heir});
+      const Replacement& replacement = second.graph.replacement(KeyframeId{k});
+      writer.add_culled_keyframe({shifted(replacement.id), 0, replacement.T_this_replacement});
       continue;
     }
     keyframe.id = shifted(keyframe.id);
@@ -57,7 +57,7 @@ void expect_same(const SavedMap& a, const SavedMap& b) {
     EXPECT_EQ(a.graph.T_k_w(k).matrix(), b.graph.T_k_w(k).matrix());
     ASSERT_EQ(a.graph.keyframe(k).culled(), b.graph.keyframe(k).culled());
     if (a.graph.keyframe(k).culled()) {
-      EXPECT_EQ(a.graph.heir(k).id, b.graph.heir(k).id);
+      EXPECT_EQ(a.graph.replacement(k).id, b.graph.replacement(k).id);
     }
     EXPECT_EQ(a.graph.keyframe(k).edges->size(), b.graph.keyframe(k).edges->size());
     EXPECT_EQ(a.graph.keyframe(k).observations->size(), b.graph.keyframe(k).observations->size());
@@ -100,20 +100,20 @@ TEST(PartExtraction, CulledKeyframesComeAlongOnlyWithPoints) {
   for (std::uint32_t p = 0; p < writer.graph().point_count(); ++p) {
     if (writer.graph().point(PointId{p}).anchor == without) writer.cull_point(PointId{p});
   }
-  const std::size_t known = known_heirs(writer.graph());
+  const std::size_t known = known_replacements(writer.graph());
   const SavedMap part = extract_part(map.rig, writer.publish(), map.places, KeyframeId{0});
   EXPECT_EQ(part.graph.keyframe_count(), map.graph.keyframe_count() - 1);
-  EXPECT_EQ(known_heirs(part.graph), known - 1);
-  EXPECT_TRUE(part.graph.survivor(KeyframeId{index(with) - 1}));
+  EXPECT_EQ(known_replacements(part.graph), known - 1);
+  EXPECT_TRUE(part.graph.live_replacement(KeyframeId{index(with) - 1}));
   EXPECT_EQ(broken_invariant(part.graph), "");
   EXPECT_EQ(oldest_part(part.graph), KeyframeId{0});
-  writer.forget_heirs(0, known);
+  writer.forget_replacements(0, known);
   const SavedMap same = extract_part(map.rig, writer.publish(), map.places, KeyframeId{0});
   expect_same(part, same);
   EXPECT_EQ(oldest_part(GraphSnapshot()), kNoKeyframe);
 }
 
-TEST(PartExtraction, NamesFollowEdgesAndHeirs) {
+TEST(PartExtraction, NamesFollowEdgesAndReplacements) {
   GraphWriter writer(testing::sample_map(30, 90, 3).graph);
   name_parts(writer);
   EXPECT_EQ(parts_of(writer.graph()).size(), static_cast<std::size_t>(component_count(writer.graph())));
@@ -122,7 +122,7 @@ TEST(PartExtraction, NamesFollowEdgesAndHeirs) {
     for (const Edge& edge : *keyframe.edges)
       EXPECT_EQ(writer.graph().keyframe(edge.other).part, keyframe.part);
     if (keyframe.culled()) {
-      EXPECT_EQ(writer.graph().part(writer.graph().heir(KeyframeId{k}).id),
+      EXPECT_EQ(writer.graph().part(writer.graph().replacement(KeyframeId{k}).id),
                 writer.graph().part(KeyframeId{k}));
     }
   }

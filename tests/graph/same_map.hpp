@@ -9,7 +9,7 @@
 
 namespace twofold::testing {
 
-inline void expect_same(const PlaceBook& a, const PlaceBook& b) {
+inline void expect_same(const KeyframeDatabase& a, const KeyframeDatabase& b) {
   for (std::uint32_t k = 0; k < std::max(a.size(), b.size()); ++k) {
     const PlaceAppearance* p = a.find(KeyframeId{k});
     const PlaceAppearance* q = b.find(KeyframeId{k});
@@ -44,12 +44,12 @@ inline void expect_same(const SavedMap& a, const SavedMap& b, double rounding = 
     EXPECT_EQ(k.t_ns, l.t_ns);
     EXPECT_EQ(k.frame_index, l.frame_index);
     if (k.culled()) {
-      const Heir& h = a.graph.heir(KeyframeId{i});
-      EXPECT_EQ(h.id, b.graph.heir(KeyframeId{i}).id);
-      EXPECT_LT(
-          (h.T_this_heir.unpacked().matrix() - b.graph.heir(KeyframeId{i}).T_this_heir.unpacked().matrix())
-              .norm(),
-          1e-13);
+      const Replacement& h = a.graph.replacement(KeyframeId{i});
+      EXPECT_EQ(h.id, b.graph.replacement(KeyframeId{i}).id);
+      EXPECT_LT((h.T_this_replacement.unpacked().matrix() -
+                 b.graph.replacement(KeyframeId{i}).T_this_replacement.unpacked().matrix())
+                    .norm(),
+                1e-13);
     }
     EXPECT_EQ(k.culled(), l.culled());
     EXPECT_LT((k.T_k_w.matrix() - l.T_k_w.matrix()).norm(), 1e-13);

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "fixtures/rendered_scene.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/fast_corners.hpp"
-#include "rendered_scene.hpp"
 
 namespace twofold {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
+#include "fixtures/rendered_scene.hpp"
 #include "imaging/guided_search.hpp"
-#include "rendered_scene.hpp"
 
 namespace twofold {
 namespace {

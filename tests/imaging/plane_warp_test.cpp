@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "rendered_scene.hpp"
+#include "fixtures/rendered_scene.hpp"
 
 namespace twofold::testing {
 namespace {

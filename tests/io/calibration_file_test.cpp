@@ -1,4 +1,4 @@
-#include "io/calibration_file.hpp"
+#include "io/files/calibration_file.hpp"
 
 #include "tests/io/scratch_folder.hpp"
 

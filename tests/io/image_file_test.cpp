@@ -1,4 +1,4 @@
-#include "io/image_file.hpp"
+#include "io/files/image_file.hpp"
 
 #include <fstream>
 #include <random>

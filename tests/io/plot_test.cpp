@@ -1,9 +1,9 @@
-#include "io/plot.hpp"
+#include "io/plots/plot.hpp"
 
 #include <cstring>
 #include <fstream>
 
-#include "io/ply.hpp"
+#include "io/files/ply.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {

@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "io/open_source.hpp"
-#include "io/trajectory_file.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "io/sources/open_source.hpp"
 
 namespace twofold {
 namespace {

@@ -1,4 +1,4 @@
-#include "io/recorder.hpp"
+#include "io/sources/recorder.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -7,9 +7,9 @@
 #include <fstream>
 #include <opencv2/core.hpp>
 
-#include "io/io_error.hpp"
-#include "io/open_source.hpp"
-#include "scratch_folder.hpp"
+#include "io/files/io_error.hpp"
+#include "io/sources/open_source.hpp"
+#include "tests/io/scratch_folder.hpp"
 
 namespace twofold {
 namespace {

@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
-#include "io/io_error.hpp"
+#include "io/files/io_error.hpp"
 
 namespace twofold {
 

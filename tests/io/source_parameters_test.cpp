@@ -1,6 +1,6 @@
-#include "io/source_parameters.hpp"
+#include "io/sources/source_parameters.hpp"
 
-#include "io/open_source.hpp"
+#include "io/sources/open_source.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {

@@ -1,4 +1,4 @@
-#include "io/text_file.hpp"
+#include "io/files/text_file.hpp"
 
 #include "tests/io/scratch_folder.hpp"
 

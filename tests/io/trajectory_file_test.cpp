@@ -1,4 +1,4 @@
-#include "io/trajectory_file.hpp"
+#include "io/files/trajectory_file.hpp"
 
 #include <random>
 

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <map>
 
+#include "fixtures/rendered_scene.hpp"
 #include "graph/graph_writer.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "loopclosure/loop_closer.hpp"
-#include "tests/imaging/rendered_scene.hpp"
 
 namespace twofold {
 namespace {

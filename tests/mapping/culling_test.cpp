@@ -4,9 +4,9 @@
 
 #include <set>
 
+#include "fixtures/graph_invariants.hpp"
+#include "fixtures/simulation.hpp"
 #include "mapping/mapper.hpp"
-#include "tests/graph/graph_invariants.hpp"
-#include "tests/mapping/simulation.hpp"
 #include "tests/mapping/small_graphs.hpp"
 
 namespace twofold {
@@ -118,7 +118,7 @@ TEST(Culling, BrowsingAMappedPlaceDoesNotGrowTheMap) {
   mapping.edge.sigma_px = 1;
   mapping.inner_window = 15;
   mapping.outer_window = 40;
-  mapping.culling.keep_heirs = 20;
+  mapping.culling.keep_replacements = 20;
   Mapper mapper(options.rig, mapping, simulation.search(10));
   std::vector<Size> after_lap;
   for (int n = 1; !simulation.done(); ++n) {
@@ -128,24 +128,24 @@ TEST(Culling, BrowsingAMappedPlaceDoesNotGrowTheMap) {
     ASSERT_EQ(component_count(mapper.graph()), 1);
     if (n % lap == 0) after_lap.push_back(living(mapper.graph()));
   }
-  // Nothing remains of what was culled but what shares a chunk of 8 with something that stayed, heirs of
-  // points' anchors, and for some time others.
-  std::set<const void*> keyframes, points, heirs;
+  // Nothing remains of what was culled but what shares a chunk of 8 with something that stayed, replacements
+  // of points' anchors, and for some time others.
+  std::set<const void*> keyframes, points, replacements;
   for (std::uint32_t i = 0; i < mapper.graph().keyframe_count(); ++i) {
     keyframes.insert(&mapper.graph().keyframe(k(i)));
-    heirs.insert(&mapper.graph().heir(k(i)));
+    replacements.insert(&mapper.graph().replacement(k(i)));
   }
   for (std::uint32_t p = 0; p < mapper.graph().point_count(); ++p)
     points.insert(&mapper.graph().point(PointId{p}));
   EXPECT_LE(keyframes.size(), 8 * (after_lap.back().keyframes + 1));
   EXPECT_LT(keyframes.size(), mapper.graph().keyframe_count() / 2);
   EXPECT_LE(points.size(), 8 * (after_lap.back().points + 1));
-  EXPECT_LE(sizeof(Heir), 64U);
+  EXPECT_LE(sizeof(Replacement), 64U);
   const std::size_t anchors = culled_anchors(mapper.graph());
   EXPECT_LE(anchors, after_lap.back().points);
-  EXPECT_LE(known_heirs(mapper.graph()), 20 + 2 * anchors);
-  EXPECT_LE(heirs.size(), 4 * (20 + 2 * anchors) + 1);
-  EXPECT_LT(known_heirs(mapper.graph()), mapper.graph().keyframe_count() / 2);
+  EXPECT_LE(known_replacements(mapper.graph()), 20 + 2 * anchors);
+  EXPECT_LE(replacements.size(), 4 * (20 + 2 * anchors) + 1);
+  EXPECT_LT(known_replacements(mapper.graph()), mapper.graph().keyframe_count() / 2);
   const Size& second = after_lap[2];
   const Size& last = after_lap.back();
   EXPECT_LE(last.keyframes, second.keyframes * 11 / 10);

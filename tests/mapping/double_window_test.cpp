@@ -4,8 +4,8 @@
 
 #include <numbers>
 
-#include "tests/graph/graph_invariants.hpp"
-#include "tests/mapping/simulation.hpp"
+#include "fixtures/graph_invariants.hpp"
+#include "fixtures/simulation.hpp"
 #include "tests/mapping/small_graphs.hpp"
 
 namespace twofold {

@@ -6,8 +6,8 @@
 
 #include "estimation/pose_constraint.hpp"
 #include "estimation/window_solver.hpp"
+#include "fixtures/simulation.hpp"
 #include "mapping/mapper.hpp"
-#include "tests/mapping/simulation.hpp"
 #include "tests/mapping/small_graphs.hpp"
 
 namespace twofold {

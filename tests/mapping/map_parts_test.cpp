@@ -57,12 +57,12 @@ TEST(MapParts, KeyframesOfOnePartStay) {
 TEST(MapParts, CulledKeyframesGoAlong) {
   GraphWriter writer = chain(6);
   const KeyframeId first = add_part(writer, 4);
-  const KeyframeId culled{index(first) + 1}, heir{index(first) + 2};
+  const KeyframeId culled{index(first) + 1}, replacement{index(first) + 2};
   const GraphSnapshot before = writer.graph();
-  writer.cull_keyframe(culled, heir);
-  EXPECT_EQ(join_parts(writer, heir, KeyframeId{0}, kConstraint), 3);
+  writer.cull_keyframe(culled, replacement);
+  EXPECT_EQ(join_parts(writer, replacement, KeyframeId{0}, kConstraint), 3);
   EXPECT_EQ(writer.graph().part(culled), KeyframeId{0});
-  const std::uint32_t a = index(culled), b = index(heir);
+  const std::uint32_t a = index(culled), b = index(replacement);
   EXPECT_LT((relative(writer.graph(), a, b) * relative(before, a, b).inverse()).log().norm(), 1e-12);
 }
 

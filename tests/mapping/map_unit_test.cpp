@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "fixtures/simulation.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "mapping/mapper.hpp"
-#include "tests/mapping/simulation.hpp"
 
 namespace twofold {
 namespace {

@@ -1,8 +1,8 @@
-// The mapper and the map as a whole: parts, loops, revisits, maps loaded, relaxation.
+// The mapper and the map as a whole: parts, loops, revisits, maps loaded, pose graph optimisation.
 #include <gtest/gtest.h>
 
+#include "fixtures/graph_invariants.hpp"
 #include "mapping/mapper.hpp"
-#include "tests/graph/graph_invariants.hpp"
 #include "tests/mapping/spiral_rounds.hpp"
 
 namespace twofold {
@@ -57,10 +57,10 @@ TEST(Mapper, ALoopOfKeyframesThatAreForgottenIsDroppedAndCounted) {
   loop.to = KeyframeId{7};
   loop.T_to_from = writer.graph().T_k_w(loop.to) * writer.graph().T_k_w(loop.from).inverse();
   mapper.adopt(writer.publish());
-  EXPECT_EQ(mapper.step({}, std::span(&loop, 1)).loops, 1) << "its heir takes it";
+  EXPECT_EQ(mapper.step({}, std::span(&loop, 1)).loops, 1) << "its replacement takes it";
   for (const PointId point : points) writer.cull_point(point);
-  writer.forget_heirs(0);
-  ASSERT_FALSE(writer.graph().survivor(loop.to));
+  writer.forget_replacements(0);
+  ASSERT_FALSE(writer.graph().live_replacement(loop.to));
   mapper.adopt(writer.publish());
   const MapperReport report = mapper.step({}, std::span(&loop, 1), KeyframeId{7});
   EXPECT_EQ(report.loops, 0);
@@ -110,7 +110,7 @@ TEST(Mapper, RelaxingTheWholeMapKeepsTheReferenceAndTheAccuracy) {
   Mapper mapper(simulation::thesis_rig(), options);
   while (!simulation.done()) map_next(simulation, mapper);
   const SE3 T_ref_w = mapper.graph().T_k_w(mapper.graph().reference());
-  const RelaxationReport report = mapper.relax_all();
+  const PoseGraphReport report = mapper.optimise_all_poses();
   EXPECT_EQ(report.parts, 1);
   EXPECT_EQ(report.keyframes, 110);
   EXPECT_LE(report.final_cost, report.initial_cost);

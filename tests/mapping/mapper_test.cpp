@@ -5,7 +5,7 @@
 #include <climits>
 #include <cstring>
 
-#include "tests/graph/graph_invariants.hpp"
+#include "fixtures/graph_invariants.hpp"
 #include "tests/mapping/spiral_rounds.hpp"
 
 namespace twofold {

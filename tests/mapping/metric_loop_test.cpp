@@ -4,9 +4,9 @@
 
 #include <set>
 
+#include "fixtures/graph_invariants.hpp"
+#include "fixtures/simulation.hpp"
 #include "mapping/edges.hpp"
-#include "tests/graph/graph_invariants.hpp"
-#include "tests/mapping/simulation.hpp"
 #include "tests/mapping/small_graphs.hpp"
 
 namespace twofold {
@@ -17,7 +17,7 @@ namespace {
 class MetricLoopTest : public testing::Test {
  protected:
   MetricLoopTest() : rig_(simulation::thesis_rig()) {
-    options_.theta = 20;
+    options_.min_covisible = 20;
     options_.sigma_scale = 2;
     T_ref_true_ = SE3::exp((Vector6() << 0.15, -0.05, 0.1, 0.02, -0.03, 0.05).finished());
   }
@@ -72,7 +72,7 @@ TEST_F(MetricLoopTest, ConnectsTheReferenceWithTheTruePoseInSpiteOfDrift) {
   make_graph(SE3::exp((Vector6() << 0.01, 0.005, -0.01, 0.004, -0.003, 0.002).finished()));
   const MetricLoopReport report = close();
   EXPECT_EQ(report.edges, 1);
-  EXPECT_GE(report.agreed, options_.theta);
+  EXPECT_GE(report.agreed, options_.min_covisible);
   const Edge* edge = find_edge(writer_.graph().keyframe(reference_), old_);
   ASSERT_NE(edge, nullptr);
   EXPECT_TRUE(edge->marginalised);
@@ -98,7 +98,7 @@ TEST_F(MetricLoopTest, WrongMatchesArePruned) {
 TEST_F(MetricLoopTest, MatchesOnOneSideOfTheImageAreNotEnough) {
   make_graph(SE3(), -0.9, -0.25);
   const MetricLoopReport report = close();
-  EXPECT_GE(report.agreed, options_.theta);
+  EXPECT_GE(report.agreed, options_.min_covisible);
   EXPECT_EQ(report.edges, 0);
   EXPECT_EQ(find_edge(writer_.graph().keyframe(reference_), old_), nullptr);
   EXPECT_TRUE(writer_.graph().keyframe(reference_).observations->empty());
@@ -107,8 +107,8 @@ TEST_F(MetricLoopTest, MatchesOnOneSideOfTheImageAreNotEnough) {
 TEST_F(MetricLoopTest, DriftBeyondTheSearchRadiusClosesNothing) {
   make_graph(SE3(SO3(), {0.2, 0, 0}));
   const MetricLoopReport report = close();
-  EXPECT_GE(report.searched, options_.theta);
-  EXPECT_LT(report.found, options_.theta);
+  EXPECT_GE(report.searched, options_.min_covisible);
+  EXPECT_LT(report.found, options_.min_covisible);
   EXPECT_EQ(report.edges, 0);
 }
 

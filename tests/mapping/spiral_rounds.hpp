@@ -2,8 +2,8 @@
 
 #include <span>
 
+#include "fixtures/simulation.hpp"
 #include "mapping/mapper.hpp"
-#include "tests/mapping/simulation.hpp"
 
 /// A mapper fed from a spiral, keyframe by keyframe.
 namespace twofold::simulation {

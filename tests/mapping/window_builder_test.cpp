@@ -6,9 +6,9 @@
 #include <set>
 
 #include "estimation/window_solver.hpp"
+#include "fixtures/graph_invariants.hpp"
+#include "fixtures/simulation.hpp"
 #include "mapping/culling.hpp"
-#include "tests/graph/graph_invariants.hpp"
-#include "tests/mapping/simulation.hpp"
 #include "tests/mapping/small_graphs.hpp"
 
 namespace twofold {

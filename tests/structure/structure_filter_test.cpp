@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "io/evaluation.hpp"
-#include "io/open_source.hpp"
+#include "evaluation/evaluation.hpp"
+#include "io/sources/open_source.hpp"
 
 namespace twofold {
 namespace {

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "../imaging/rendered_scene.hpp"
+#include "fixtures/rendered_scene.hpp"
 
 namespace twofold {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "tests/imaging/rendered_scene.hpp"
+#include "fixtures/rendered_scene.hpp"
 
 namespace twofold {
 namespace {

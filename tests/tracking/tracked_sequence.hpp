@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "../../bench/tracking/plain_map.hpp"
-#include "../imaging/rendered_scene.hpp"
+#include "fixtures/plain_map.hpp"
+#include "fixtures/rendered_scene.hpp"
 #include "tests/allocation_counter.hpp"
 #include "tracking/tracker.hpp"
 
@@ -51,7 +51,7 @@ class Odometry {
     if (pending_) snapshot_ = map_.publish();
     pending_ = false;
     const std::uint64_t before = allocations();
-    const TrackResult result = tracker_.step(frame, snapshot_, &proposal_, rung_);
+    const TrackResult result = tracker_.step(frame, snapshot_, &proposal_, effort_);
     allocations_ = allocations() - before;
     pending_ = result.proposed;
     return result;
@@ -62,7 +62,7 @@ class Odometry {
     return result.T_c_ref;  // the first keyframe is the world
   }
   Tracker& tracker() { return tracker_; }
-  void set_rung(LadderRung rung) { rung_ = rung; }
+  void set_effort(EffortLevel effort) { effort_ = effort; }
   [[nodiscard]] const GraphSnapshot& snapshot() const { return snapshot_; }
   [[nodiscard]] const KeyframeProposal& proposal() const { return proposal_; }
   [[nodiscard]] std::uint64_t allocations() const { return allocations_; }  ///< of the tracker, last step
@@ -73,7 +73,7 @@ class Odometry {
   GraphSnapshot snapshot_ = map_.publish();
   KeyframeProposal proposal_;
   bool pending_ = false;
-  LadderRung rung_ = LadderRung::kEverything;
+  EffortLevel effort_ = EffortLevel::kEverything;
   std::uint64_t allocations_ = 0;
 };
 

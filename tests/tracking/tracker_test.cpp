@@ -145,18 +145,18 @@ TEST(Tracker, DoesNotStartOnAnEmptyWall) {
 }
 
 TEST(Tracker, FollowsTheCameraOnEveryRungOfTheLadder) {
-  for (int rung = 0; rung < kLadderRungs; ++rung) {
+  for (int effort = 0; effort < kEffortLevels; ++effort) {
     Odometry odometry(SensorKind::kStereo);
-    odometry.set_rung(static_cast<LadderRung>(rung));
+    odometry.set_effort(static_cast<EffortLevel>(effort));
     int searched = 0;
     for (int i = 0; i < kFrames; ++i) {
       const TrackResult result = odometry.step(frames(SensorKind::kStereo)[static_cast<std::size_t>(i)]);
-      ASSERT_EQ(result.status, TrackStatus::kTracking) << "rung " << rung << ", frame " << i;
+      ASSERT_EQ(result.status, TrackStatus::kTracking) << "effort level " << effort << ", frame " << i;
       const SE3 error = odometry.T_c_w(result) * true_T_c_w(i).inverse();
-      EXPECT_LT(error.translation().norm(), 0.02) << "rung " << rung << ", frame " << i;
+      EXPECT_LT(error.translation().norm(), 0.02) << "effort level " << effort << ", frame " << i;
       searched = std::max(searched, result.searched);
     }
-    EXPECT_LE(searched, effort_on(static_cast<LadderRung>(rung), TrackerOptions{}).max_searches);
+    EXPECT_LE(searched, bounds_of(static_cast<EffortLevel>(effort), TrackerOptions{}).max_searches);
   }
 }
 

@@ -39,7 +39,7 @@ void DriftMapper::store_edge_scales(KeyframeId a, KeyframeId b) {
 
 MapperReport DriftMapper::step(const KeyframeProposal& proposal) {
   MapperReport report;
-  insert_keyframe(writer_, proposal, options_.theta, consistent_, counts_);
+  insert_keyframe(writer_, proposal, options_.min_covisible, consistent_, counts_);
   // Its lengths are those of the map it was tracked in, as that map stands.
   if (proposal.reference != kNoKeyframe) scale(proposal.id) = scale(proposal.reference);
   changed_.push_back(proposal.id);
@@ -54,7 +54,8 @@ void DriftMapper::move_window(MapperReport& report) {
   propagate_scale(next_window_);
   report.poses_set = enter_window(writer_, consistent_, next_window_);
   std::swap(window_, next_window_);
-  for (const KeyframeId id : changed_) register_in_window(writer_, id, window_, options_.theta, counts_);
+  for (const KeyframeId id : changed_)
+    register_in_window(writer_, id, window_, options_.min_covisible, counts_);
   changed_.clear();
   consistent_.clear();
   for (const TreeNode& node : window_.nodes) consistent_.set(node.id, 0);
@@ -91,7 +92,7 @@ MapperReport DriftMapper::close(SimilarityConstraint loop, std::span<const Point
 }
 
 void DriftMapper::spread(const SimilarityConstraint& loop) {
-  const std::vector<Sim3> S_k_w = relax_loop(graph(), window_, loop, group_);
+  const std::vector<Sim3> S_k_w = optimise_loop(graph(), window_, loop, group_);
   for (std::size_t n = 0; n < window_.nodes.size(); ++n) {
     const KeyframeId id = window_.nodes[n].id;
     writer_.set_pose(id, S_k_w[n].without_scale());

@@ -3,7 +3,7 @@
 #include <map>
 #include <vector>
 
-#include "experiments/double_window/loop_relaxation.hpp"
+#include "experiments/double_window/loop_optimisation.hpp"
 #include "mapping/mapper.hpp"
 
 namespace twofold::bench {
@@ -17,7 +17,7 @@ namespace twofold::bench {
 /// in that frame, of points and of edges, are divided by s. Work follows the window's size, not the map's.
 ///
 /// A loop that lies within the window as a whole would break somewhere in it: there the misfit is spread over
-/// all poses and their scales instead, as in chapter 5 (relax_loop).
+/// all poses and their scales instead, as in chapter 5 (optimise_loop).
 class DriftMapper {
  public:
   DriftMapper(const Rig& rig, const MapperOptions& options, LoopGroup group = LoopGroup::kSim3);

@@ -38,7 +38,7 @@ MapperOptions simulation_mapper_options(const DoubleWindowExperimentOptions& opt
   MapperOptions mapper;
   mapper.max_anchors = options.max_anchors;
   mapper.max_points = kUnbounded;
-  mapper.theta = options.scene.theta;
+  mapper.min_covisible = options.scene.min_covisible;
   mapper.sigma_scale = 2 * options.scene.noise_px;  // imaging gives half a pixel
   mapper.edge = options.edge;
   mapper.edge.sigma_px = options.scene.noise_px;

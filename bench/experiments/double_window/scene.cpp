@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "tests/mapping/simulation.hpp"
+#include "fixtures/simulation.hpp"
 
 namespace twofold::bench {
 namespace {
@@ -45,7 +45,7 @@ std::vector<int> visible_points(const Scene& scene, const std::map<Cell, std::ve
   return visible;
 }
 
-void find_covisible(Scene& scene, int theta) {
+void find_covisible(Scene& scene, int min_covisible) {
   std::vector<std::vector<int>> observers(scene.points.size());
   for (int k = 0; k < scene.keyframes(); ++k) {
     std::map<int, int> shared;
@@ -56,7 +56,7 @@ void find_covisible(Scene& scene, int theta) {
     }
     auto& covisible = scene.covisible.emplace_back();
     for (const auto& [j, count] : shared) {
-      if (count >= theta) covisible.push_back(j);
+      if (count >= min_covisible) covisible.push_back(j);
     }
   }
 }
@@ -81,7 +81,7 @@ Scene make_scene(const SceneOptions& options, const Rig& rig, std::vector<Vector
       seen.push_back({p, z});
     }
   }
-  find_covisible(scene, options.theta);
+  find_covisible(scene, options.min_covisible);
   return scene;
 }
 

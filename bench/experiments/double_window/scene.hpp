@@ -16,7 +16,7 @@ struct SceneOptions {
   double height = 1.2;      ///< of the camera above the ground it looks down on [m]
   double step = 0.2;        ///< between keyframes [m]
   double spacing = 0.8;     ///< between the turns of the spiral [m]
-  int theta = 15;           ///< points seen from both keyframes that make an edge of eq. 6.10
+  int min_covisible = 15;   ///< points seen from both keyframes that make an edge of eq. 6.10
 };
 
 /// One trial: true poses and points, and all measurements, drawn once so that every method gets the same.
@@ -29,7 +29,8 @@ struct Scene {
   std::vector<SE3> T_k_w;                   ///< truth
   std::vector<Vector3> points;              ///< truth, world frame [m]
   std::vector<std::vector<Sighting>> seen;  ///< by keyframe, ascending by point
-  std::vector<std::vector<int>> covisible;  ///< by keyframe: earlier ones that share theta points with it
+  std::vector<std::vector<int>>
+      covisible;  ///< by keyframe: earlier ones that share min_covisible points with it
 
   [[nodiscard]] int keyframes() const { return static_cast<int>(T_k_w.size()); }
   [[nodiscard]] double median_depth(int keyframe) const;
@@ -40,7 +41,7 @@ struct Scene {
 /// Twice around a large loop  (fig. 6.11), of which the thesis prints that its end is met after 150
 /// keyframes: the circle on which its single camera drifts in section 5.4 (radius 10 m, looking outwards onto
 /// a ring of 5000 points one metre further out), 150 of the 720 poses. Other numbers of keyframes are as far
-/// apart. Of the options only noise, sightings and theta are used.
+/// apart. Of the options only noise, sightings and min_covisible are used.
 [[nodiscard]] Scene double_loop_scene(const SceneOptions& options, int keyframes, unsigned seed);
 
 }  // namespace twofold::bench

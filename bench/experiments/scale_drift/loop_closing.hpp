@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "estimation/pose_graph.hpp"
 #include "experiments/scale_drift/exploration.hpp"
+#include "posegraph/pose_graph.hpp"
 
 namespace twofold::bench {
 

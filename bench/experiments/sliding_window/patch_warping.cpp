@@ -4,8 +4,8 @@
 
 #include "experiments/sliding_window/experiments.hpp"
 #include "geometry/absolute_orientation.hpp"
-#include "io/synthetic/synthetic_sequence.hpp"
 #include "structure/structure_filter.hpp"
+#include "synthetic/synthetic_sequence.hpp"
 
 namespace twofold::bench {
 namespace {

@@ -3,7 +3,7 @@
 #include <random>
 #include <vector>
 
-#include "estimation/sliding_window_filter.hpp"
+#include "filters/sliding_window_filter.hpp"
 
 namespace twofold::bench {
 

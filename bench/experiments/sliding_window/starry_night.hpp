@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/sliding_window_filter.hpp"
+#include "filters/sliding_window_filter.hpp"
 
 namespace twofold::bench {
 

@@ -11,7 +11,7 @@ struct WhyFilterOptions {
   int trials = 20;          ///< Monte Carlo trials of the filter in a cheap cell
   int ba_trials = 100;      ///< of bundle adjustment, in every cell; the first ones are the filter's
   int min_trials = 6;       ///< of the filter in the dearest cells: N and M large
-  double cell_seconds = 1;   ///< the filter's trials of a cell are cut to about this processor time
+  double cell_seconds = 1;  ///< the filter's trials of a cell are cut to about this processor time
   std::vector<std::string> settings = {"i", "ii", "iii", "iv"};
   bool large_n = true;  ///< N = 480 for the smallest M of setting i
 };

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "estimation/gauss_newton_filter.hpp"
+#include "filters/gauss_newton_filter.hpp"
 
 namespace twofold::bench {
 

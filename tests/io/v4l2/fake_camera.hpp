@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "fake_device.hpp"
 #include "io/v4l2/camera.hpp"
+#include "tests/io/v4l2/fake_device.hpp"
 
 namespace twofold {
 

@@ -1,4 +1,4 @@
-#include "fake_device.hpp"
+#include "tests/io/v4l2/fake_device.hpp"
 
 #include <poll.h>
 

@@ -1,13 +1,13 @@
-#include "io/v4l2_source.hpp"
+#include "io/sources/v4l2_source.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
 
-#include "fake_device.hpp"
-#include "io/io_error.hpp"
-#include "io/source_parameters.hpp"
+#include "io/files/io_error.hpp"
+#include "io/sources/source_parameters.hpp"
+#include "tests/io/v4l2/fake_device.hpp"
 
 namespace twofold {
 namespace {

@@ -1,0 +1,39 @@
+#include "engine/effort_controller.hpp"
+
+#include "geometry/check.hpp"
+
+namespace twofold {
+
+std::string EffortOptions::invalid_reason() const {
+  if (!(early > 0 && early <= late)) return "effort: early must be in (0, late], is " + std::to_string(early);
+  if (!(drop_after >= late)) return "effort: drop_after must be >= late, is " + std::to_string(drop_after);
+  if (patience < 1) return "effort: patience must be >= 1, is " + std::to_string(patience);
+  return {};
+}
+
+EffortController::EffortController(const EffortOptions& options) : options_(options) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "effort options");
+}
+
+bool EffortController::must_drop(const Arrival& arrival) const {
+  if (!arrival.overtaken) return false;
+  return effort_ == EffortLevel::kDropFrames ||
+         static_cast<double>(arrival.late_ns) > options_.drop_after * static_cast<double>(arrival.period_ns);
+}
+
+void EffortController::tracked(std::int64_t latency_ns, std::int64_t period_ns) {
+  if (period_ns <= 0) return;  // no pace to keep
+  const double lateness = static_cast<double>(latency_ns) / static_cast<double>(period_ns);
+  if (lateness > options_.late) return down();
+  early_frames_ = lateness < options_.early ? early_frames_ + 1 : 0;
+  if (early_frames_ < options_.patience || effort_ == EffortLevel::kEverything) return;
+  effort_ = static_cast<EffortLevel>(static_cast<int>(effort_) - 1);
+  early_frames_ = 0;
+}
+
+void EffortController::down() {
+  early_frames_ = 0;
+  if (effort_ != EffortLevel::kDropFrames) effort_ = static_cast<EffortLevel>(static_cast<int>(effort_) + 1);
+}
+
+}  // namespace twofold

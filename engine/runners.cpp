@@ -1,0 +1,217 @@
+#include "engine/runners.hpp"
+
+namespace twofold {
+namespace {
+
+// Smaller changes of the last frame's pose are not announced: each round of the mapper makes some.
+constexpr double kCorrection = 0.01;         // [m]
+constexpr double kCorrectionAngle = 0.0035;  // [rad]
+// A frame or two are lost now and then; the tracker finds on by itself.
+constexpr int kLostBeforeAsking = 2;
+
+CorrectionReason reason_of(MapChange::Kind kind) {
+  switch (kind) {
+    case MapChange::Kind::kLoopClosure:
+      return CorrectionReason::kLoopClosure;
+    case MapChange::Kind::kPoseGraph:
+      return CorrectionReason::kPoseGraph;
+    case MapChange::Kind::kPartsJoined:
+      break;
+  }
+  return CorrectionReason::kPartsJoined;
+}
+
+}  // namespace
+
+TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
+    : tracker_(rig, options.tracker),
+      times_("tracker", trace),
+      can_relocalise_(options.vocabulary != nullptr) {
+  frame_stage_ = times_.add_stage("frame");
+  latency_stage_ = times_.add_stage("latency from due time");
+  for (std::size_t s = 0; s < kTrackerStages; ++s) {
+    stages_.push_back(times_.add_stage(describe(static_cast<TrackerStage>(s))));
+  }
+  version_counter_ = times_.add_counter("snapshot version");
+  effort_counter_ = times_.add_counter("effort level");
+  if (options.map) tracker_.continue_in(options.map->graph);
+}
+
+bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort,
+                         ProposalHandle& proposal, FrameRecord& record) {
+  const std::int64_t begin_ns = steady_now_ns();
+  const TrackResult result = tracker_.step(frame, graph, proposal ? &*proposal : nullptr, effort);
+  record.frame_index = frame.index;
+  record.t_ns = frame.t_ns;
+  record.state = result.status == TrackStatus::kTracking ? FrameState::kTracked : FrameState::kLost;
+  record.effort = effort;
+  record.cause = result.cause;
+  record.snapshot_version = graph.version();
+  record.reference = result.reference;
+  record.T_c_ref = PackedPose(result.T_c_ref);
+  if (record.state == FrameState::kTracked) {
+    record.T_c_w_causal = PackedPose(tracker_.T_c_w(graph));
+    record.part_causal = tracker_.part(graph);
+  }
+  find_correction(graph, record);
+  if (record.state == FrameState::kTracked) last_ = record;
+  record.tracked_share = result.tracked_share();
+  record.inliers = result.inliers;
+  record.keyframe = result.proposed;
+  record.tracking_ns = steady_now_ns() - begin_ns;
+  times_.record(frame_stage_, begin_ns, record.tracking_ns);
+  std::int64_t at_ns = begin_ns;
+  for (std::size_t s = 0; s < kTrackerStages; ++s) {
+    times_.record(stages_[s], at_ns, result.stage_ns[s]);
+    at_ns += result.stage_ns[s];
+  }
+  times_.counter(version_counter_, static_cast<std::int64_t>(graph.version()));
+  times_.counter(effort_counter_, static_cast<std::int64_t>(effort));
+  return result.proposed;
+}
+
+/// Where the last tracked frame is in the map of this one, if that is elsewhere than it was said to be.
+void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecord& record) {
+  correction_.reason = CorrectionReason::kNone;
+  if (last_.state != FrameState::kTracked || last_.snapshot_version == graph.version() ||
+      !graph.contains(last_.reference) || !graph.live_replacement(last_.reference)) {
+    return;
+  }
+  const SE3 T_c_w = final_T_c_w(last_, graph);
+  const SE3 T_c_w_before = last_.T_c_w_causal.unpacked();
+  const SE3 change = T_c_w.inverse() * T_c_w_before;
+  if (change.translation().norm() < kCorrection && change.so3().log().norm() < kCorrectionAngle) return;
+  const MapChange& jump = graph.last_jump();
+  const bool jumped = jump.version > last_.snapshot_version;
+  const CorrectionReason reason = jumped ? reason_of(jump.kind) : CorrectionReason::kOptimisation;
+  correction_ = {reason, record.frame_index, record.t_ns, T_c_w_before, T_c_w};
+}
+
+void TrackerRunner::proposal_rejected(FrameRecord& record) {
+  record.keyframe = false;
+  if (tracker_.proposal_rejected()) return;
+  record.state = FrameState::kLost;
+  record.cause = LostCause::kNoKeyframeBuffer;
+  last_ = record;
+}
+
+bool TrackerRunner::wants_relocalisation() const {
+  const bool lost = tracker_.unplaced() || tracker_.lost_frames() >= kLostBeforeAsking;
+  return can_relocalise_ && !answer_awaited_ && lost;
+}
+
+bool TrackerRunner::request_relocalisation(RelocalisationRequest& request) {
+  if (!wants_relocalisation()) return false;
+  request.images.copy_from(tracker_.lost_images());
+  answer_awaited_ = true;
+  return true;
+}
+
+void TrackerRunner::take_answer(const RelocalisationAnswer& answer) {
+  answer_awaited_ = false;
+  if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
+}
+
+void TrackerRunner::finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record) {
+  record.latency_ns = now_ns - scheduled_ns;
+  times_.record(latency_stage_, scheduled_ns, record.latency_ns);
+}
+
+MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
+    : mapper_(rig, options.mapper), may_change_(!options.localise_only), times_("mapper", trace) {
+  round_stage_ = times_.add_stage("round");
+  if (options.map) mapper_.adopt(options.map->graph);
+}
+
+MapperRound MapperRunner::step(std::span<const ProposalHandle> proposals,
+                               std::span<const LoopMessage> messages) {
+  const std::int64_t begin_ns = steady_now_ns();
+  proposals_.clear();
+  for (const ProposalHandle& proposal : proposals) proposals_.push_back(&*proposal);
+  MapperRound round;
+  loops_.clear();
+  for (const LoopMessage& message : messages) {
+    if (const auto* loop = std::get_if<LoopConstraint>(&message)) {
+      loops_.push_back(*loop);
+    } else {
+      round.optimised += mapper_.take_pose_graph(std::get<PoseGraphUpdate>(message));
+    }
+  }
+  const MapperReport report = mapper_.step(proposals_, loops_);
+  for (const KeyframeId culled : report.culled_keyframes) replacement_log_.add(culled, mapper_.graph());
+  round.version = mapper_.graph().version();
+  round.proposals = static_cast<int>(proposals.size());
+  round.inner_window = report.inner_window;
+  round.outer_window = report.outer_window;
+  round.points = report.points;
+  round.observations = report.observations;
+  round.metric_loops = report.metric_loops;
+  round.loops = report.loops;
+  round.late_loops = report.late_loops;
+  round.duration_ns = steady_now_ns() - begin_ns;
+  times_.record(round_stage_, begin_ns, round.duration_ns);
+  return round;
+}
+
+GraphSnapshot MapperRunner::finish() {
+  if (may_change_) mapper_.optimise_all_poses();
+  return mapper_.publish();
+}
+
+LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
+    : rig_(rig), mapper_options_(options.mapper), times_("loop closer", trace) {
+  place_stage_ = times_.add_stage("place");
+  pose_graph_stage_ = times_.add_stage("pose graph");
+  relocalise_stage_ = times_.add_stage("relocalisation");
+  if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
+  if (closer_ && options.map) closer_->adopt(options.map->places);
+}
+
+std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
+  messages_.clear();
+  if (!closer_) return messages_;
+  optimise_if_due(graph);
+  const ScopedStage timed(times_, place_stage_);
+  if (const auto loop = closer_->step(keyframe, graph)) {
+    messages_.emplace_back(*loop);
+    const bool joins = graph.part(loop->from) != graph.part(loop->to);
+    loops_.push_back(
+        {*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins});
+    not_optimised_ = loop;
+  }
+  return messages_;
+}
+
+RelocalisationAnswer LoopCloserRunner::relocalise(const RelocalisationRequest& request,
+                                                  const GraphSnapshot& graph) {
+  const ScopedStage timed(times_, relocalise_stage_);
+  return closer_ ? closer_->relocalise(request.images, graph) : std::nullopt;
+}
+
+/// One pose graph optimisation for a run of loops: when the newest of them is in the map.
+void LoopCloserRunner::optimise_if_due(const GraphSnapshot& graph) {
+  if (!not_optimised_ || graph.version() == not_optimised_->snapshot_version) return;
+  const Keyframe& from = graph.keyframe(not_optimised_->from);
+  if (from.culled() || graph.keyframe(not_optimised_->to).culled()) {
+    not_optimised_.reset();
+    return;
+  }
+  if (find_edge(from, not_optimised_->to) == nullptr) return;  // not taken yet
+  const ScopedStage timed(times_, pose_graph_stage_);
+  PoseGraphReport report;
+  messages_.emplace_back(optimise_part(graph, graph.reference(), rig_, mapper_options_, report));
+  not_optimised_.reset();
+}
+
+void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserRunner& loop_closing,
+                     RunResult& result) {
+  result.graph = mapping.finish();
+  mapping.replacement_log().hang_on_live_keyframes(result.frames);
+  result.places = loop_closing.places();
+  result.times.push_back(std::move(tracking.times()));
+  result.times.push_back(std::move(mapping.times()));
+  result.times.push_back(std::move(loop_closing.times()));
+  result.loops = std::move(loop_closing.loops());
+}
+
+}  // namespace twofold

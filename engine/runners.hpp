@@ -1,0 +1,139 @@
+#pragma once
+
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "camera/frame.hpp"
+#include "engine/frame_pool.hpp"
+#include "engine/options.hpp"
+#include "engine/replacement_log.hpp"
+#include "engine/result.hpp"
+#include "engine/stage_timer.hpp"
+#include "graph/keyframe_proposal.hpp"
+#include "graph/loop_constraint.hpp"
+#include "graph/pose_graph_update.hpp"
+#include "loopclosure/loop_closer.hpp"
+#include "mapping/mapper.hpp"
+#include "tracking/tracker.hpp"
+
+namespace twofold {
+
+using ProposalPool = FramePool<KeyframeProposal>;
+using ProposalHandle = ProposalPool::Handle;
+/// From the loop closer to the mapper.
+using LoopMessage = std::variant<LoopConstraint, PoseGraphUpdate>;
+
+/// Of the tracker to the loop closer: where was this frame taken?
+struct RelocalisationRequest {
+  FrameImages images;
+};
+using RequestPool = FramePool<RelocalisationRequest>;
+using RequestHandle = RequestPool::Handle;
+/// The answer, which always comes; nothing when no place was recognised.
+using RelocalisationAnswer = std::optional<Relocalisation>;
+
+/// The tracker's step as every kind of run takes it: track, record, time.
+class TrackerRunner {
+ public:
+  TrackerRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
+
+  /// Makes room in a pooled buffer before the tracker thread starts, so that it allocates nothing.
+  void prepare(KeyframeProposal& proposal) const { tracker_.prepare(proposal); }
+  /// @param proposal  free buffer or empty; stays with the caller
+  /// @return whether `proposal` was filled and should be sent
+  bool step(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort, ProposalHandle& proposal,
+            FrameRecord& record);
+  /// Of the map, seen first by the frame of the last step; of reason kNone when there was none.
+  [[nodiscard]] const PoseCorrection& correction() const { return correction_; }
+  /// The filled proposal could not be sent.
+  void proposal_rejected(FrameRecord& record);
+  /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
+  bool request_relocalisation(RelocalisationRequest& request);
+  /// Before the next step.
+  void take_answer(const RelocalisationAnswer& answer);
+  [[nodiscard]] bool wants_relocalisation() const;
+  /// Completes the record once the pose is known, at `now_ns` on the clock of the pace.
+  void finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record);
+
+  [[nodiscard]] const StageRecorder& times() const { return times_; }
+  [[nodiscard]] StageRecorder& times() { return times_; }
+
+ private:
+  void find_correction(const GraphSnapshot& graph, const FrameRecord& record);
+
+  Tracker tracker_;
+  StageRecorder times_;
+  StageId frame_stage_;
+  StageId latency_stage_;
+  std::vector<StageId> stages_;
+  TraceName version_counter_, effort_counter_;
+  FrameRecord last_;  // the last frame that was tracked
+  PoseCorrection correction_;
+  bool answer_awaited_ = false;
+  const bool can_relocalise_;
+};
+
+/// The mapper's step as every kind of run takes it.
+class MapperRunner {
+ public:
+  MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
+
+  /// One round over the given proposals, oldest first. The new version is then ready to be published.
+  MapperRound step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
+  [[nodiscard]] GraphSnapshot publish() { return mapper_.publish(); }
+  /// The last version: all poses agree globally, unless the map was not to change.
+  [[nodiscard]] GraphSnapshot finish();
+  /// What became of the keyframes that were culled.
+  [[nodiscard]] const ReplacementLog& replacement_log() const { return replacement_log_; }
+  [[nodiscard]] const StageRecorder& times() const { return times_; }
+  [[nodiscard]] StageRecorder& times() { return times_; }
+
+ private:
+  Mapper mapper_;
+  ReplacementLog replacement_log_;
+  const bool may_change_;
+  StageRecorder times_;
+  StageId round_stage_;
+  std::vector<KeyframeProposal*> proposals_;
+  std::vector<LoopConstraint> loops_;
+};
+
+/// The loop closer's step as every kind of run takes it: recognise, verify, and, once the map has taken a
+/// loop, optimise all of it beside the mapper.
+class LoopCloserRunner {
+ public:
+  LoopCloserRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
+
+  /// @return what the mapper should know, in order; valid until the next step
+  std::span<LoopMessage> step(const KeyframeProposal& keyframe, const GraphSnapshot& graph);
+
+  [[nodiscard]] RelocalisationAnswer relocalise(const RelocalisationRequest& request,
+                                                const GraphSnapshot& graph);
+
+  /// How the places it knows look; empty without a vocabulary.
+  [[nodiscard]] const KeyframeDatabase& places() const { return closer_ ? closer_->places() : no_places_; }
+
+  [[nodiscard]] std::vector<ClosedLoop>& loops() { return loops_; }
+  [[nodiscard]] StageRecorder& times() { return times_; }
+
+ private:
+  void optimise_if_due(const GraphSnapshot& graph);
+
+  Rig rig_;
+  MapperOptions mapper_options_;
+  std::optional<LoopCloser> closer_;
+  const KeyframeDatabase no_places_;
+  StageRecorder times_;
+  StageId place_stage_, pose_graph_stage_, relocalise_stage_;
+  std::vector<LoopMessage> messages_;
+  std::vector<ClosedLoop> loops_;
+  std::optional<LoopConstraint> not_optimised_;  // newest loop that no pose graph optimisation has seen
+};
+
+/// After the last step of any kind of run: the final map with its places and loops, the frames hung on its
+/// keyframes, and the stages' times. Moves what it can out of the stages.
+void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserRunner& loop_closing,
+                     RunResult& result);
+
+}  // namespace twofold

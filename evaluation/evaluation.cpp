@@ -1,0 +1,169 @@
+#include "evaluation/evaluation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "geometry/absolute_orientation.hpp"
+
+namespace twofold {
+namespace {
+
+using IndexPair = std::pair<std::size_t, std::size_t>;
+
+double angle_deg(const SO3& R) {
+  return R.log().norm() * 180.0 / std::numbers::pi;
+}
+
+/// Length of the true path from the first pose to each.
+std::vector<double> path_lengths(const std::vector<PosePair>& pairs) {
+  std::vector<double> lengths(pairs.size(), 0.0);
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    lengths[i] = lengths[i - 1] + (pairs[i].T_w_c.translation() - pairs[i - 1].T_w_c.translation()).norm();
+  }
+  return lengths;
+}
+
+/// Every pose with the one nearest to delta later; times increase, so j only moves forward.
+std::vector<IndexPair> pairs_by_time(const std::vector<PosePair>& pairs, double delta_s, double tolerance_s) {
+  std::vector<IndexPair> result;
+  const auto off = [&](std::size_t i, std::size_t j) {
+    return std::abs(static_cast<double>(pairs[j].t_ns - pairs[i].t_ns) * 1e-9 - delta_s);
+  };
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    j = std::max(j, i);
+    while (j + 1 < pairs.size() && off(i, j + 1) <= off(i, j)) ++j;
+    if (j > i && off(i, j) <= tolerance_s) result.emplace_back(i, j);
+  }
+  return result;
+}
+
+/// Consecutive pieces of the path: a piece ends at the first pose at least delta_m from the end of the last
+/// one.
+std::vector<IndexPair> pairs_by_path(const std::vector<double>& lengths, double delta_m) {
+  std::vector<IndexPair> result;
+  std::optional<std::size_t> begin;
+  double from = 0;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    if (lengths[i] - from < delta_m) continue;
+    if (begin) result.emplace_back(*begin, i);
+    begin = i;
+    from = lengths[i];
+  }
+  return result;
+}
+
+RelativeError relative_error(const std::vector<PosePair>& pairs, const std::vector<IndexPair>& steps,
+                             const std::vector<double>& lengths) {
+  std::vector<double> translation, rotation, percent;
+  for (const auto& [i, j] : steps) {
+    const SE3 truth_i_j = pairs[i].T_w_c.inverse() * pairs[j].T_w_c;
+    const SE3 estimate_i_j = pairs[i].T_e_c.inverse() * pairs[j].T_e_c;
+    const SE3 E = truth_i_j.inverse() * estimate_i_j;
+    translation.push_back(E.translation().norm());
+    rotation.push_back(angle_deg(E.so3()));
+    if (lengths[j] > lengths[i]) percent.push_back(100.0 * translation.back() / (lengths[j] - lengths[i]));
+  }
+  return {error_statistics(std::move(translation)), error_statistics(std::move(rotation)),
+          error_statistics(std::move(percent))};
+}
+
+}  // namespace
+
+std::vector<PosePair> associate(const Trajectory& estimate, const Trajectory& truth,
+                                std::int64_t max_difference_ns) {
+  std::vector<PosePair> pairs;
+  std::size_t j = 0;
+  for (const TimedPose& pose : estimate) {
+    const auto difference = [&](std::size_t k) { return std::abs(truth[k].t_ns - pose.t_ns); };
+    while (j + 1 < truth.size() && difference(j + 1) < difference(j)) ++j;
+    if (j < truth.size() && difference(j) <= max_difference_ns) {
+      pairs.push_back({pose.t_ns, pose.T_w_c, truth[j].T_w_c});
+    }
+  }
+  return pairs;
+}
+
+std::optional<Sim3> align(const std::vector<PosePair>& pairs, Alignment alignment) {
+  if (alignment == Alignment::kNone) return Sim3();
+  std::vector<Vector3> x_w, x_e;
+  for (const PosePair& pair : pairs) {
+    x_w.push_back(pair.T_w_c.translation());
+    x_e.push_back(pair.T_e_c.translation());
+  }
+  const auto T_w_e = align_rigid(x_w, x_e);
+  if (!T_w_e) return std::nullopt;
+  if (alignment == Alignment::kSe3) return Sim3(*T_w_e);
+
+  // The rotation does not depend on the scale; then s = sum y_w . R y_e / sum |y_e|^2  (Umeyama eq. 42).
+  const double n = static_cast<double>(pairs.size());
+  const Vector3 zero = Vector3::Zero();
+  const Vector3 mean_w = std::accumulate(x_w.begin(), x_w.end(), zero) / n;
+  const Vector3 mean_e = std::accumulate(x_e.begin(), x_e.end(), zero) / n;
+  double along = 0, spread = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    along += (x_w[i] - mean_w).dot(T_w_e->so3() * (x_e[i] - mean_e));
+    spread += (x_e[i] - mean_e).squaredNorm();
+  }
+  const double s = along / spread;
+  if (!(s > 0)) return std::nullopt;
+  return Sim3(s, T_w_e->so3(), mean_w - s * (T_w_e->so3() * mean_e));
+}
+
+SE3 aligned_pose(const Sim3& S_w_e, const SE3& T_e_c) {
+  return {S_w_e.so3() * T_e_c.so3(),
+          S_w_e.scale() * (S_w_e.so3() * T_e_c.translation()) + S_w_e.translation()};
+}
+
+ErrorStatistics error_statistics(std::vector<double> errors) {
+  ErrorStatistics s;
+  s.count = errors.size();
+  if (errors.empty()) return s;
+  std::sort(errors.begin(), errors.end());
+  const double n = static_cast<double>(errors.size());
+  s.mean = std::accumulate(errors.begin(), errors.end(), 0.0) / n;
+  double squares = 0, deviations = 0;
+  for (const double e : errors) {
+    squares += e * e;
+    deviations += (e - s.mean) * (e - s.mean);
+  }
+  s.rmse = std::sqrt(squares / n);
+  s.stddev = std::sqrt(deviations / n);
+  const std::size_t middle = errors.size() / 2;
+  s.median = errors.size() % 2 == 1 ? errors[middle] : 0.5 * (errors[middle - 1] + errors[middle]);
+  s.min = errors.front();
+  s.max = errors.back();
+  return s;
+}
+
+tl::expected<Evaluation, std::string> evaluate(std::vector<PosePair> pairs,
+                                               const EvaluationOptions& options) {
+  if (pairs.empty()) return tl::unexpected<std::string>("no poses of the two trajectories are close in time");
+  const auto S_w_e = align(pairs, options.alignment);
+  if (!S_w_e) {
+    return tl::unexpected<std::string>(
+        "cannot be aligned: fewer than three poses, or all on one line (align none compares them as they "
+        "are)");
+  }
+  Evaluation result;
+  result.S_w_e = *S_w_e;
+  std::vector<double> rotation_errors;
+  for (PosePair& pair : pairs) {
+    pair.T_e_c = aligned_pose(*S_w_e, pair.T_e_c);
+    result.position_errors.push_back((pair.T_w_c.translation() - pair.T_e_c.translation()).norm());
+    rotation_errors.push_back(angle_deg(pair.T_w_c.so3().inverse() * pair.T_e_c.so3()));
+  }
+  result.absolute = error_statistics(result.position_errors);
+  result.absolute_rotation_deg = error_statistics(std::move(rotation_errors));
+  const auto lengths = path_lengths(pairs);
+  result.path_length = lengths.back();
+  result.per_second =
+      relative_error(pairs, pairs_by_time(pairs, options.delta_s, options.time_tolerance_s), lengths);
+  result.per_metre = relative_error(pairs, pairs_by_path(lengths, options.delta_m), lengths);
+  result.pairs = std::move(pairs);
+  return result;
+}
+
+}  // namespace twofold

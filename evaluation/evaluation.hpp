@@ -1,0 +1,75 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "evaluation/trajectory.hpp"
+#include "geometry/sim3.hpp"
+
+namespace twofold {
+
+/// Estimated and true pose of the camera at one time; `t_ns` is the estimate's.
+struct PosePair {
+  std::int64_t t_ns = 0;
+  SE3 T_e_c;  ///< estimate, in its own world e
+  SE3 T_w_c;  ///< truth
+};
+
+/// For every estimated pose the true one nearest in time, unless farther than max_difference_ns; no
+/// interpolation. Both in the order of time. O(n + m).
+[[nodiscard]] std::vector<PosePair> associate(const Trajectory& estimate, const Trajectory& truth,
+                                              std::int64_t max_difference_ns);
+
+enum class Alignment : std::uint8_t { kNone, kSe3, kSim3 };
+
+/// S_w_e that brings the estimate onto the truth: least squares over positions, Umeyama, PAMI 1991.
+/// The scale is the least-squares one of that paper, as evaluation tools use it.
+/// @return  nullopt when there are fewer than three poses or all lie on one line (the turn around it is
+/// undetermined)
+[[nodiscard]] std::optional<Sim3> align(const std::vector<PosePair>& pairs, Alignment alignment);
+
+/// Pose of the camera in the truth's world; the scale acts on the position only.
+[[nodiscard]] SE3 aligned_pose(const Sim3& S_w_e, const SE3& T_e_c);
+
+struct ErrorStatistics {
+  std::size_t count = 0;
+  double rmse = 0, mean = 0, median = 0, stddev = 0, min = 0, max = 0;  ///< stddev of the population
+};
+/// All zero for no errors.
+[[nodiscard]] ErrorStatistics error_statistics(std::vector<double> errors);
+
+/// Relative pose error over pairs of poses (i, j): E = (Q_i^-1 Q_j)^-1 (P_i^-1 P_j), Q truth, P estimate
+/// (Sturm et al., IROS 2012, eq. 1).
+struct RelativeError {
+  ErrorStatistics translation;   ///< |trans(E)|  [m]
+  ErrorStatistics rotation_deg;  ///< angle of rot(E)
+  ErrorStatistics
+      translation_percent;  ///< |trans(E)| over the true path between i and j, where that is not zero
+};
+
+struct EvaluationOptions {
+  Alignment alignment = Alignment::kSe3;
+  double delta_s = 1.0;            ///< step of the error per time
+  double delta_m = 1.0;            ///< step of the error per distance
+  double time_tolerance_s = 0.05;  ///< pairs whose times differ from delta_s by more are left out
+};
+
+struct Evaluation {
+  Sim3 S_w_e;
+  std::vector<PosePair> pairs;            ///< T_e_c already aligned: of the truth's world
+  std::vector<double> position_errors;    ///< [m] one a pair
+  ErrorStatistics absolute;               ///< ATE: |t_truth - t_aligned|  [m]
+  ErrorStatistics absolute_rotation_deg;  ///< angle between true and aligned orientation
+  RelativeError per_second;               ///< every i with the j nearest to delta_s later
+  RelativeError per_metre;  ///< consecutive pieces of the true path of at least delta_m, as evo's
+                            ///< default ("-d 1 -u m --pairs_from_reference")
+  double path_length = 0;   ///< of the truth over the pairs  [m]
+};
+
+/// @return  why there is nothing to evaluate, when the alignment is undetermined or there are no pairs
+[[nodiscard]] tl::expected<Evaluation, std::string> evaluate(std::vector<PosePair> pairs,
+                                                             const EvaluationOptions& options = {});
+
+}  // namespace twofold

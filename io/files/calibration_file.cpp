@@ -1,0 +1,210 @@
+#include "io/files/calibration_file.hpp"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "io/files/io_error.hpp"
+#include "io/files/kitti_calibration.hpp"
+#include "io/files/yaml_node.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+Distortion distortion_of(const YamlNode& model, const YamlNode* coefficients) {
+  static const std::map<std::string, DistortionModel> kNames{{"none", DistortionModel::kNone},
+                                                             {"radtan", DistortionModel::kRadTan},
+                                                             {"radial-tangential", DistortionModel::kRadTan},
+                                                             {"plumb_bob", DistortionModel::kRadTan},
+                                                             {"equidistant", DistortionModel::kEquidistant}};
+  const auto name = kNames.find(model.text());
+  if (name == kNames.end()) model.fail(fmt::format("is '{}', not none, radtan or equidistant", model.text()));
+  Distortion distortion;
+  distortion.model = name->second;
+  const auto values = coefficients ? coefficients->numbers() : std::vector<double>{};
+  const bool radtan = distortion.model == DistortionModel::kRadTan;
+  const bool count_fits =
+      distortion.model == DistortionModel::kNone || values.size() == 4 || (radtan && values.size() == 5);
+  if (!count_fits) {
+    (coefficients ? *coefficients : model)
+        .fail(fmt::format("{} coefficients do not fit the model", values.size()));
+  }
+  if (distortion.model != DistortionModel::kNone) {
+    std::copy(values.begin(), values.end(), distortion.coefficients.begin());
+  }
+  return distortion;
+}
+
+void read_size(const YamlNode& node, PinholeCamera* camera) {
+  const auto items = node.items();
+  if (items.size() != 2) node.fail("is not [width, height]");
+  camera->width = items[0].integer();
+  camera->height = items[1].integer();
+}
+
+void read_intrinsics(const YamlNode& node, PinholeCamera* camera) {
+  const auto v = node.numbers(4);
+  camera->fx = v[0];
+  camera->fy = v[1];
+  camera->cx = v[2];
+  camera->cy = v[3];
+}
+
+/// EuRoC and Kalibr agree but for the names of two keys.
+CameraModel read_camera(const YamlNode& node, const char* coefficients_key) {
+  CameraModel camera;
+  read_size(node.at("resolution"), &camera.pinhole);
+  const YamlNode model = node.at("camera_model");
+  if (model.text() == "ds") {  // Kalibr: xi, alpha, then the pinhole's
+    const auto v = node.at("intrinsics").numbers(6);
+    camera.distortion.model = DistortionModel::kDoubleSphere;
+    camera.distortion.coefficients = {v[0], v[1]};
+    camera.pinhole = {v[2], v[3], v[4], v[5], camera.pinhole.width, camera.pinhole.height};
+    return camera;
+  }
+  if (model.text() != "pinhole") model.fail(fmt::format("is '{}', not pinhole or ds", model.text()));
+  read_intrinsics(node.at("intrinsics"), &camera.pinhole);
+  if (!node.has("distortion_model")) return camera;
+  if (!node.has(coefficients_key)) {
+    camera.distortion = distortion_of(node.at("distortion_model"), nullptr);
+  } else {
+    const YamlNode coefficients = node.at(coefficients_key);
+    camera.distortion = distortion_of(node.at("distortion_model"), &coefficients);
+  }
+  return camera;
+}
+
+Calibration read_kalibr(const YamlNode& root) {
+  Calibration calibration;
+  calibration.left = read_camera(root.at("cam0"), "distortion_coeffs");
+  calibration.kind = SensorKind::kMono;
+  if (root.has("cam1")) {
+    calibration.kind = SensorKind::kStereo;
+    calibration.right = read_camera(root.at("cam1"), "distortion_coeffs");
+    calibration.T_right_left = root.at("cam1").at("T_cn_cnm1").rigid_motion();
+  }
+  return calibration;
+}
+
+CameraModel read_own_camera(const YamlNode& node) {
+  node.expect_keys({"size", "intrinsics", "distortion"});
+  CameraModel camera;
+  read_size(node.at("size"), &camera.pinhole);
+  read_intrinsics(node.at("intrinsics"), &camera.pinhole);
+  if (node.has("distortion")) {
+    const YamlNode distortion = node.at("distortion");
+    distortion.expect_keys({"model", "coefficients"});
+    const YamlNode coefficients = distortion.at("coefficients");
+    camera.distortion = distortion_of(distortion.at("model"), &coefficients);
+  }
+  return camera;
+}
+
+void read_own_stereo(const YamlNode& root, const std::vector<YamlNode>& cameras, Calibration* calibration) {
+  if (root.has("baseline")) {
+    if (cameras.size() != 1)
+      root.at("baseline").fail("goes with one entry in 'cameras'; else give T_right_left");
+    const double baseline = root.at("baseline").number();
+    if (baseline <= 0) root.at("baseline").fail(fmt::format("is {}, must be positive", baseline));
+    calibration->right = calibration->left;
+    calibration->T_right_left = SE3(SO3(), Vector3(-baseline, 0, 0));
+    calibration->already_rectified = calibration->left.distortion.is_identity();
+    return;
+  }
+  if (cameras.size() != 2)
+    root.at("cameras").fail("needs two entries for stereo, or one and the key 'baseline'");
+  calibration->right = read_own_camera(cameras[1]);
+  calibration->T_right_left = root.at("T_right_left").rigid_motion();
+}
+
+void read_own_depth(const YamlNode& node, Calibration* calibration) {
+  node.expect_keys({"unit", "min", "max", "virtual_baseline"});
+  if (node.has("unit")) calibration->depth_unit = node.at("unit").number();
+  if (node.has("min")) calibration->depth_min = node.at("min").number();
+  if (node.has("max")) calibration->depth_max = node.at("max").number();
+  if (node.has("virtual_baseline")) calibration->virtual_baseline = node.at("virtual_baseline").number();
+}
+
+Calibration read_own(const YamlNode& root) {
+  root.expect_keys({"sensor", "fps", "cameras", "baseline", "T_right_left", "depth", "quality"});
+  static const std::map<std::string, SensorKind> kKinds{
+      {"mono", SensorKind::kMono}, {"stereo", SensorKind::kStereo}, {"rgbd", SensorKind::kRgbd}};
+  const YamlNode sensor = root.at("sensor");
+  const auto kind = kKinds.find(sensor.text());
+  if (kind == kKinds.end()) sensor.fail(fmt::format("is '{}', not mono, stereo or rgbd", sensor.text()));
+  Calibration calibration;
+  calibration.kind = kind->second;
+  if (root.has("fps")) calibration.fps = root.at("fps").number();
+  const auto cameras = root.at("cameras").items();
+  if (cameras.empty()) root.at("cameras").fail("is empty");
+  calibration.left = read_own_camera(cameras[0]);
+  if (calibration.kind == SensorKind::kStereo) {
+    read_own_stereo(root, cameras, &calibration);
+  } else if (cameras.size() != 1) {
+    root.at("cameras").fail("has more than one entry, but the sensor is not stereo");
+  }
+  if (root.has("depth")) read_own_depth(root.at("depth"), &calibration);
+  return calibration;
+}
+
+}  // namespace
+
+EurocCamera read_euroc_camera(const fs::path& file) {
+  const YamlNode root = YamlNode::load(file);
+  EurocCamera camera;
+  camera.model = read_camera(root, "distortion_coefficients");
+  if (root.has("T_BS")) camera.T_b_c = root.at("T_BS").rigid_motion();
+  if (root.has("rate_hz")) camera.rate_hz = root.at("rate_hz").number();
+  return camera;
+}
+
+SE3 read_euroc_sensor_pose(const fs::path& file) {
+  return YamlNode::load(file).at("T_BS").rigid_motion();
+}
+
+Calibration read_euroc_calibration(const fs::path& cam0, const fs::path& cam1) {
+  const EurocCamera left = read_euroc_camera(cam0);
+  const EurocCamera right = read_euroc_camera(cam1);
+  Calibration calibration;
+  calibration.left = left.model;
+  calibration.right = right.model;
+  calibration.T_right_left = read_euroc_sensor_pose(cam1).inverse() * read_euroc_sensor_pose(cam0);
+  calibration.fps = left.rate_hz;
+  return calibration;
+}
+
+Calibration read_calibration(const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) throw IoError(file, "no such calibration file");
+  if (looks_like_kitti_calibration(file)) return read_kitti_calibration(file);
+  const YamlNode root = YamlNode::load(file);
+  if (root.has("cameras")) return read_own(root);
+  if (root.has("cam0")) return read_kalibr(root);
+  if (root.has("camera_model") || root.has("T_BS")) {
+    const EurocCamera camera = read_euroc_camera(file);
+    Calibration calibration;
+    calibration.kind = SensorKind::kMono;
+    calibration.left = camera.model;
+    calibration.fps = camera.rate_hz;
+    return calibration;
+  }
+  throw IoError(file, "has none of the keys 'cameras', 'cam0', 'camera_model' or 'P0:': not a calibration");
+}
+
+void set_missing_size(int width, int height, Calibration* calibration) {
+  for (PinholeCamera* camera : {&calibration->left.pinhole, &calibration->right.pinhole}) {
+    if (camera->width == 0 && camera->height == 0) {
+      camera->width = width;
+      camera->height = height;
+    }
+  }
+}
+
+void expect_valid(const fs::path& file, const Calibration& calibration) {
+  if (const auto reason = calibration.invalid_reason(); !reason.empty()) throw IoError(file, reason);
+}
+
+}  // namespace twofold

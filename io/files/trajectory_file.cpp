@@ -1,0 +1,145 @@
+#include "io/files/trajectory_file.hpp"
+
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "io/files/io_error.hpp"
+#include "io/files/output_file.hpp"
+#include "io/files/text_file.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+using Fields = std::vector<std::string_view>;
+
+Fields fields_of(const fs::path& file, const TextLine& line, std::size_t count, std::string_view separators) {
+  Fields fields = split_fields(line.text, separators);
+  if (fields.size() < count || (separators == " \t" && fields.size() != count)) {
+    throw IoError(file, line.number, fmt::format("has {} fields, {} are needed", fields.size(), count));
+  }
+  return fields;
+}
+
+Vector3 vector_at(const fs::path& file, int line, const Fields& fields, std::size_t first) {
+  return {number_field(file, line, fields[first]), number_field(file, line, fields[first + 1]),
+          number_field(file, line, fields[first + 2])};
+}
+
+SO3 checked_rotation(const fs::path& file, int line, const Eigen::Quaterniond& q) {
+  constexpr double kTolerance = 0.01;  // files carry four decimals and more
+  if (std::abs(q.norm() - 1) > kTolerance) {
+    throw IoError(file, line, fmt::format("the quaternion has length {:.4f}, not 1", q.norm()));
+  }
+  return SO3(q);
+}
+
+/// The benchmark's motion capture has stamps of four decimals, and two of its measurements can round to the
+/// same one (fr2_desk has such a pair). They then differ, but hardly.
+bool rounded_to_same_time(const TimedPose& first, const TimedPose& second) {
+  constexpr double kMaxTranslation = 0.02;  // [m]
+  constexpr double kMaxRotation = 0.035;    // [rad]
+  const Vector6 difference = (first.T_w_c.inverse() * second.T_w_c).log();
+  return first.t_ns == second.t_ns && difference.norm() > 0 &&
+         difference.head<3>().norm() < kMaxTranslation && difference.tail<3>().norm() < kMaxRotation;
+}
+
+}  // namespace
+
+Trajectory read_tum_trajectory(const fs::path& file) {
+  Trajectory trajectory;
+  std::int64_t previous = -1;
+  for (const TextLine& line : read_text_lines(file)) {
+    const Fields fields = fields_of(file, line, 8, " \t");
+    const std::int64_t t_ns = seconds_field(file, line.number, fields[0]);
+    const Vector3 q_xyz = vector_at(file, line.number, fields, 4);
+    const Eigen::Quaterniond q(number_field(file, line.number, fields[7]), q_xyz.x(), q_xyz.y(), q_xyz.z());
+    const TimedPose pose{
+        t_ns, SE3(checked_rotation(file, line.number, q), vector_at(file, line.number, fields, 1))};
+    if (!trajectory.empty() && rounded_to_same_time(trajectory.back(), pose)) continue;
+    expect_increasing(file, line.number, t_ns, &previous);
+    trajectory.push_back(pose);
+  }
+  return trajectory;
+}
+
+Trajectory read_kitti_trajectory(const fs::path& file) {
+  Trajectory trajectory;
+  for (const TextLine& line : read_text_lines(file)) {
+    const Fields fields = fields_of(file, line, 12, " \t");
+    Eigen::Matrix<double, 3, 4> M;
+    for (int i = 0; i < 12; ++i)
+      M(i / 4, i % 4) = number_field(file, line.number, fields[static_cast<std::size_t>(i)]);
+    const Matrix3 R = M.leftCols<3>();
+    constexpr double kTolerance = 0.01;
+    if ((R * R.transpose() - Matrix3::Identity()).norm() > kTolerance || R.determinant() < 0) {
+      throw IoError(file, line.number, "the 3x3 part is not a rotation");
+    }
+    trajectory.push_back({static_cast<std::int64_t>(trajectory.size()), SE3(R, Vector3(M.col(3)))});
+  }
+  return trajectory;
+}
+
+Trajectory read_euroc_trajectory(const fs::path& file) {
+  Trajectory trajectory;
+  std::int64_t previous = -1;
+  for (const TextLine& line : read_text_lines(file)) {
+    const Fields fields = fields_of(file, line, 8, ", \t");
+    const std::int64_t t_ns = nanoseconds_field(file, line.number, fields[0]);
+    const Vector3 q_xyz = vector_at(file, line.number, fields, 5);
+    const Eigen::Quaterniond q(number_field(file, line.number, fields[4]), q_xyz.x(), q_xyz.y(), q_xyz.z());
+    expect_increasing(file, line.number, t_ns, &previous);
+    trajectory.push_back(
+        {t_ns, SE3(checked_rotation(file, line.number, q), vector_at(file, line.number, fields, 1))});
+  }
+  return trajectory;
+}
+
+TrajectoryForm trajectory_form(const fs::path& file) {
+  const auto lines = read_text_lines(file);
+  if (lines.empty()) throw IoError(file, "holds no poses");
+  const std::string& first = lines[0].text;
+  if (first.find(',') != std::string::npos) return TrajectoryForm::kEuroc;
+  const auto count = split_fields(first).size();
+  if (count == 8) return TrajectoryForm::kTum;
+  if (count == 12) return TrajectoryForm::kKitti;
+  throw IoError(file, lines[0].number,
+                fmt::format("{} fields: neither TUM (8), KITTI (12) nor EuRoC form", count));
+}
+
+Trajectory read_trajectory(const fs::path& file) {
+  switch (trajectory_form(file)) {
+    case TrajectoryForm::kTum:
+      return read_tum_trajectory(file);
+    case TrajectoryForm::kKitti:
+      return read_kitti_trajectory(file);
+    case TrajectoryForm::kEuroc:
+      break;
+  }
+  return read_euroc_trajectory(file);
+}
+
+void write_tum_trajectory(const fs::path& file, const Trajectory& trajectory) {
+  std::string text = "# time[s] tx ty tz qx qy qz qw  (T_w_c)\n";
+  for (const TimedPose& pose : trajectory) {
+    const Vector3& t = pose.T_w_c.translation();
+    Eigen::Quaterniond q = pose.T_w_c.so3().quaternion();
+    if (q.w() < 0) q.coeffs() = -q.coeffs();
+    text += fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", ns_to_seconds(pose.t_ns),
+                        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  write_file(file, text);
+}
+
+void write_kitti_trajectory(const fs::path& file, const Trajectory& trajectory) {
+  std::string text;
+  for (const TimedPose& pose : trajectory) {
+    const Matrix4 M = pose.T_w_c.matrix();
+    for (int i = 0; i < 12; ++i) text += fmt::format("{:.9e}{}", M(i / 4, i % 4), i == 11 ? '\n' : ' ');
+  }
+  write_file(file, text);
+}
+
+}  // namespace twofold

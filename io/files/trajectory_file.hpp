@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+
+#include "evaluation/trajectory.hpp"
+
+namespace twofold {
+
+/// TUM form: lines "time[s] tx ty tz qx qy qz qw" of T_w_c  [m].
+/// Throws IoError for anything that is not a finite number, a quaternion that is far from unit length, and
+/// time stamps out of order or repeated.
+[[nodiscard]] Trajectory read_tum_trajectory(const std::filesystem::path& file);
+
+/// KITTI form: lines of the 12 numbers of the 3x4 matrix T_w_c, row by row. There are no time stamps: t_ns
+/// counts lines.
+[[nodiscard]] Trajectory read_kitti_trajectory(const std::filesystem::path& file);
+
+/// EuRoC state_groundtruth_estimate0/data.csv: "time[ns],px,py,pz,qw,qx,qy,qz,..." of T_w_s.
+[[nodiscard]] Trajectory read_euroc_trajectory(const std::filesystem::path& file);
+
+enum class TrajectoryForm : std::uint8_t { kTum, kKitti, kEuroc };
+
+/// Form by the first line: 12 numbers, 8 numbers, or commas. Throws IoError for others and for an empty file.
+[[nodiscard]] TrajectoryForm trajectory_form(const std::filesystem::path& file);
+[[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& file);
+
+/// The same poses always give the same bytes. Throw IoError when the file cannot be written in full (disk
+/// full).
+void write_tum_trajectory(const std::filesystem::path& file, const Trajectory& trajectory);
+void write_kitti_trajectory(const std::filesystem::path& file, const Trajectory& trajectory);
+
+}  // namespace twofold

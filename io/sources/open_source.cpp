@@ -1,0 +1,107 @@
+#include "io/sources/open_source.hpp"
+
+#include <functional>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "io/files/io_error.hpp"
+#include "io/sources/preloaded_source.hpp"
+#include "io/sources/recording.hpp"
+#include "io/sources/source_parameters.hpp"
+#include "io/sources/v4l2_source.hpp"
+#include "io/sources/video.hpp"
+
+#include "io/sources/synthetic_source.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Opener = std::function<std::unique_ptr<FrameSource>(const SourceSpec&, const SourceOptions&)>;
+using RecordingReader = Recording (*)(const fs::path&, const std::optional<fs::path>&, SourceParameters&);
+
+void expect_folder(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(folder, error)) throw IoError(folder, "no such folder");
+  if (!fs::is_directory(folder, error)) throw IoError(folder, "is not a folder");
+  if (fs::is_empty(folder, error) || error)
+    throw IoError(folder, error ? "cannot be read" : "the folder is empty");
+}
+
+Opener recording_opener(RecordingReader read) {
+  return [read](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
+    expect_folder(spec.argument);
+    SourceParameters parameters(spec.text, spec.parameters);
+    Recording recording = read(spec.argument, options.calibration, parameters);
+    parameters.expect_all_taken();
+    return std::make_unique<PlaybackSource>(std::move(recording));
+  };
+}
+
+std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOptions& options) {
+  std::error_code error;
+  if (!fs::is_regular_file(spec.argument, error)) throw IoError(spec.argument, "no such video file");
+  SourceParameters parameters(spec.text, spec.parameters);
+  auto source = std::make_unique<VideoSource>(spec.argument, options.calibration, parameters);
+  parameters.expect_all_taken();
+  return source;
+}
+
+const std::map<std::string, Opener>& openers() {
+  static const std::map<std::string, Opener> kOpeners{
+      {"kitti", recording_opener(read_kitti_recording)},
+      {"euroc", recording_opener(read_euroc_recording)},
+      {"tum", recording_opener(read_tum_recording)},
+      {"images", recording_opener(read_image_folder)},
+      {"video", open_video},
+      {"v4l2",
+       [](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
+         return std::make_unique<V4l2Source>(spec, options);
+       }},
+      {"synthetic", [](const SourceSpec& spec,
+                       const SourceOptions&) { return open_synthetic(spec.argument, spec.parameters); }},
+  };
+  return kOpeners;
+}
+
+/// Scheme for a bare path, from what is in the folder.
+std::string recognise_layout(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_regular_file(path, error)) return "video";
+  if (fs::is_character_file(path, error)) return "v4l2";
+  if (!fs::exists(path, error)) throw IoError(path, "no such file or folder");
+  expect_folder(path);
+  if (fs::exists(path / "mav0") || fs::exists(path / "cam0" / "data.csv")) return "euroc";
+  if (fs::exists(path / "image_0")) return "kitti";
+  if (fs::exists(path / "associations.txt") || fs::exists(path / "rgb.txt")) return "tum";
+  if (fs::exists(path / "times.txt") || fs::exists(path / "left") || fs::exists(path / "calibration.yaml")) {
+    return "images";
+  }
+  throw IoError(path,
+                "no known layout: none of mav0, image_0, rgb.txt, times.txt is there (images:DIR?fps=N?)");
+}
+
+std::string known_schemes() {
+  std::string names;
+  for (const auto& [name, opener] : openers()) names += (names.empty() ? "" : ", ") + name;
+  return names;
+}
+
+}  // namespace
+
+std::unique_ptr<FrameSource> open_source(const std::string& text, const SourceOptions& options) {
+  const SourceSpec spec = parse_source_spec(text);
+  const std::string scheme = spec.scheme.empty() ? recognise_layout(spec.argument) : spec.scheme;
+  const auto opener = openers().find(scheme);
+  if (opener == openers().end()) {
+    throw IoError(text, fmt::format("unknown kind of source '{}' (known: {})", scheme, known_schemes()));
+  }
+  auto source = opener->second(spec, options);
+  if (options.preload && source->is_live()) throw IoError(text, "a camera cannot be preloaded");
+  if (options.preload) source = std::make_unique<PreloadedSource>(std::move(source));
+  return source;
+}
+
+}  // namespace twofold

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "io/sources/frame_source.hpp"
+
+namespace twofold {
+
+struct SourceOptions {
+  /// Overrides the one in the recording (docs/calibration.md).
+  std::optional<std::filesystem::path> calibration;
+  /// Cameras only: images as they are captured, without calibration or rectification.
+  bool raw = false;
+  /// Cameras only: when it becomes true, the source ends. Outlives the source.
+  const std::atomic<bool>* stop = nullptr;
+  bool preload = false;  ///< decode everything into memory before returning
+};
+
+/// Opens a source of frames.
+///
+/// @param text  a path, whose layout is recognised, or scheme:ARGUMENT; either may end in
+/// ?key=value&key=value
+///              (docs/sources.md has the keys)
+///
+///   kitti:DIR        image_0, image_1 (stereo) or image_0 alone (mono); calib.txt, times.txt, poses.txt
+///   euroc:DIR        mav0/cam0, mav0/cam1 with data.csv and sensor.yaml; rectified here
+///   tum:DIR          RGB-D; associations.txt or rgb.txt and depth.txt; groundtruth.txt if there
+///   images:DIR       image files in the order of their names, or left/ with right/ or depth/; times.txt
+///   video:FILE       one image, or two side by side
+///   v4l2:DEVICE      a camera, or two paired by time
+///   synthetic:SCENE  rendered (io/synthetic)
+///
+/// Throws IoError naming the file and what is wrong with it.
+[[nodiscard]] std::unique_ptr<FrameSource> open_source(const std::string& text,
+                                                       const SourceOptions& options = {});
+
+}  // namespace twofold

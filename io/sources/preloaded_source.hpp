@@ -1,0 +1,29 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "io/sources/frame_source.hpp"
+
+namespace twofold {
+
+/// All frames of another source, decoded or rendered beforehand and kept in memory, so that nothing but the
+/// engine runs while it is timed. next costs a few reference counts; the images are shared, never copied.
+class PreloadedSource final : public FrameSource {
+ public:
+  /// Drains `source`. Throws IoError with its message when it fails, or when the images exceed max_bytes.
+  explicit PreloadedSource(std::unique_ptr<FrameSource> source, std::size_t max_bytes = kDefaultMaxBytes);
+  [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
+    return static_cast<std::int64_t>(frames_.size());
+  }
+
+  static constexpr std::size_t kDefaultMaxBytes = std::size_t{8} << 30;
+
+ private:
+  bool read(Frame& frame) override;
+
+  std::vector<Frame> frames_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace twofold

@@ -1,0 +1,105 @@
+#include "io/sources/recording.hpp"
+
+#include <fmt/format.h>
+
+#include "io/files/calibration_file.hpp"
+#include "io/files/image_file.hpp"
+#include "io/files/io_error.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+void expect_size(const fs::path& file, const cv::Mat& image, const PinholeCamera& camera) {
+  if (image.cols == camera.width && image.rows == camera.height) return;
+  throw IoError(file, fmt::format("the image is {}x{}, the calibration or the first image says {}x{}",
+                                  image.cols, image.rows, camera.width, camera.height));
+}
+
+}  // namespace
+
+Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, SourceParameters& parameters) {
+  Calibration calibration = std::move(base);
+  calibration.kind = kind;
+  PinholeCamera& camera = calibration.left.pinhole;
+  for (const auto& [key, value] :
+       {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}}) {
+    const auto given = parameters.take_number(key);
+    if (!given && !from_file) {
+      throw IoError(
+          parameters.subject(),
+          fmt::format("no calibration: give --calib FILE or fx, fy, cx, cy ('{}' is missing)", key));
+    }
+    if (given) *value = *given;
+  }
+  const auto take_positive = [&](const char* key) {
+    const auto given = parameters.take_number(key);
+    if (given && *given <= 0)
+      throw IoError(parameters.subject(), fmt::format("{}={} must be positive", key, *given));
+    return given;
+  };
+  if (const auto scale = take_positive("depth_scale")) calibration.depth_unit = 1.0 / *scale;
+  if (const auto depth = take_positive("depth_min")) calibration.depth_min = *depth;
+  if (const auto depth = take_positive("depth_max")) calibration.depth_max = *depth;
+  const auto baseline = take_positive("baseline");
+  if (kind == SensorKind::kRgbd && baseline) calibration.virtual_baseline = *baseline;
+  if (kind == SensorKind::kStereo && baseline) {
+    calibration.right = calibration.left;
+    calibration.T_right_left = SE3(SO3(), Vector3(-*baseline, 0, 0));
+  } else if (kind == SensorKind::kStereo && !from_file) {
+    throw IoError(parameters.subject(), "no calibration: stereo needs the parameter 'baseline'");
+  }
+  return calibration;
+}
+
+Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_raw) {
+  Trajectory rectified = raw;
+  const SE3 T_raw_rectified(R_rectified_raw.inverse(), Vector3::Zero());
+  for (TimedPose& pose : rectified) pose.T_w_c = pose.T_w_c * T_raw_rectified;
+  return rectified;
+}
+
+PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recording)) {
+  if (recording_.frames.empty()) throw IoError(recording_.folder, "the recording holds no frames");
+  const cv::Mat first = read_grey_image(recording_.frames[0].left);
+  set_missing_size(first.cols, first.rows, &recording_.calibration);
+  expect_valid(recording_.calibration_file, recording_.calibration);
+  expect_size(recording_.frames[0].left, first, recording_.calibration.left.pinhole);
+  try {
+    rectifier_.emplace(recording_.calibration);
+  } catch (const std::runtime_error& e) {
+    throw IoError(recording_.calibration_file, e.what());
+  }
+  rig_ = rectifier_->rig();
+  ground_truth_ = rectified_trajectory(recording_.ground_truth, rectifier_->R_rectified_left());
+}
+
+Frame PlaybackSource::decode(const RecordedFrame& files) const {
+  const Calibration& calibration = recording_.calibration;
+  Frame frame;
+  frame.t_ns = files.t_ns;
+  frame.left = read_grey_image(files.left);
+  expect_size(files.left, frame.left, calibration.left.pinhole);
+  if (calibration.kind == SensorKind::kStereo) {
+    frame.right = read_grey_image(files.right);
+    expect_size(files.right, frame.right, calibration.right.pinhole);
+  }
+  if (calibration.kind == SensorKind::kRgbd) {
+    frame.depth = read_depth_image(files.depth);
+    expect_size(files.depth, frame.depth, calibration.left.pinhole);
+  }
+  return frame;
+}
+
+bool PlaybackSource::read(Frame& frame) {
+  if (next_ == recording_.frames.size()) return false;
+  Frame raw = decode(recording_.frames[next_]);
+  raw.index = static_cast<std::int64_t>(next_);
+  ++next_;
+  frame = Frame();  // its old images may still be held elsewhere: never write into them
+  rectifier_->rectify(raw, frame);
+  return true;
+}
+
+}  // namespace twofold

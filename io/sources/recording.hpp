@@ -1,0 +1,73 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "camera/calibration.hpp"
+#include "camera/rectifier.hpp"
+#include "io/sources/frame_source.hpp"
+#include "io/sources/source_parameters.hpp"
+
+namespace twofold {
+
+/// Image files of one instant.
+struct RecordedFrame {
+  std::int64_t t_ns = 0;
+  std::filesystem::path left;
+  std::filesystem::path right;  ///< stereo, else empty
+  std::filesystem::path depth;  ///< RGB-D, else empty
+};
+
+/// A folder of image files, read but for the images.
+struct Recording {
+  std::filesystem::path folder;
+  std::filesystem::path calibration_file;  ///< named in messages about the calibration
+  Calibration calibration;                 ///< a size of 0 x 0 is taken from the first image
+  std::vector<RecordedFrame> frames;       ///< t_ns strictly increasing
+  Trajectory ground_truth;                 ///< T_w_c of the raw left camera
+};
+
+/// The reader of one layout: a folder to a Recording. `calibration` overrides the file in the folder.
+/// All throw IoError.
+[[nodiscard]] Recording read_kitti_recording(const std::filesystem::path& folder,
+                                             const std::optional<std::filesystem::path>& calibration,
+                                             SourceParameters& parameters);
+[[nodiscard]] Recording read_euroc_recording(const std::filesystem::path& folder,
+                                             const std::optional<std::filesystem::path>& calibration,
+                                             SourceParameters& parameters);
+[[nodiscard]] Recording read_tum_recording(const std::filesystem::path& folder,
+                                           const std::optional<std::filesystem::path>& calibration,
+                                           SourceParameters& parameters);
+[[nodiscard]] Recording read_image_folder(const std::filesystem::path& folder,
+                                          const std::optional<std::filesystem::path>& calibration,
+                                          SourceParameters& parameters);
+
+/// Lays the parameters fx fy cx cy baseline (RGB-D: virtual) depth_scale (units a metre) depth_min depth_max
+/// over `base`. When `base` was not read from a file, the intrinsics and, for stereo, the baseline must be
+/// given.
+[[nodiscard]] Calibration with_parameters(Calibration base, bool from_file, SensorKind kind,
+                                          SourceParameters& parameters);
+
+/// T_w_c with the camera turned from raw to rectified axes.
+[[nodiscard]] Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_raw);
+
+/// Plays a Recording: decodes, checks sizes, rectifies where the calibration asks for it.
+class PlaybackSource final : public FrameSource {
+ public:
+  /// Throws IoError when the calibration is invalid or the first image does not decode.
+  explicit PlaybackSource(Recording recording);
+  [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
+    return static_cast<std::int64_t>(recording_.frames.size());
+  }
+
+ private:
+  bool read(Frame& frame) override;
+  [[nodiscard]] Frame decode(const RecordedFrame& files) const;
+
+  Recording recording_;
+  std::optional<Rectifier> rectifier_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace twofold

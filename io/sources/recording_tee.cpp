@@ -1,0 +1,47 @@
+#include "io/sources/recording_tee.hpp"
+
+#include <fmt/format.h>
+
+#include "io/files/io_error.hpp"
+
+namespace twofold {
+
+RecordingTee::RecordingTee(std::unique_ptr<FrameSource> source, const std::filesystem::path& folder,
+                           const RecorderOptions& options)
+    : source_(std::move(source)),
+      folder_(folder),
+      recorder_(folder, source_->rig().kind, calibration_of(source_->rig()), options) {
+  rig_ = source_->rig();
+  ground_truth_ = source_->ground_truth();
+}
+
+bool RecordingTee::read(Frame& frame) {
+  switch (source_->next(frame)) {
+    case FrameStatus::kFrame:
+      break;
+    case FrameStatus::kEnd:
+      return false;
+    case FrameStatus::kError:
+      throw IoError(source_->error());
+  }
+  frame.index = next_index_++;
+  // A camera does not wait for the disk; what it refused is counted there.
+  (void)recorder_.offer(frame, !source_->is_live());
+  return true;
+}
+
+SourceReport RecordingTee::report() const {
+  SourceReport report = source_->report();
+  const Recorder::Counts counts = recorder_.counts();
+  report.summary.push_back(
+      fmt::format("recorded    {} frames in {}", counts.written + counts.queued, folder_.string()));
+  if (counts.refused > 0) {
+    report.faults.push_back(
+        fmt::format("{} frames are missing in the recording, because writing was too slow or failed: the run "
+                    "cannot be repeated from it",
+                    counts.refused));
+  }
+  return report;
+}
+
+}  // namespace twofold

@@ -1,0 +1,149 @@
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "io/files/calibration_file.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/text_file.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "io/sources/recording.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kMaxDifferenceNs = 20'000'000;  // as the benchmark's own association script
+constexpr double kTumDepthUnit = 1.0 / 5000;  // the benchmark's depth images, where no file says otherwise
+
+struct StampedFile {
+  std::int64_t t_ns = 0;
+  fs::path file;
+};
+
+/// Lines "time file".
+std::vector<StampedFile> read_list(const fs::path& folder, const char* name) {
+  const fs::path file = folder / name;
+  std::vector<StampedFile> entries;
+  std::int64_t previous = -1;
+  for (const TextLine& line : read_text_lines(file)) {
+    const auto fields = split_fields(line.text);
+    if (fields.size() != 2) throw IoError(file, line.number, "is not 'time file'");
+    entries.push_back({seconds_field(file, line.number, fields[0]), folder / fields[1]});
+    expect_increasing(file, line.number, entries.back().t_ns, &previous);
+  }
+  return entries;
+}
+
+/// Lines "time rgb-file time depth-file".
+std::vector<RecordedFrame> read_associations(const fs::path& folder) {
+  const fs::path file = folder / "associations.txt";
+  std::vector<RecordedFrame> frames;
+  std::int64_t previous = -1;
+  for (const TextLine& line : read_text_lines(file)) {
+    const auto fields = split_fields(line.text);
+    if (fields.size() != 4) throw IoError(file, line.number, "is not 'time rgb-file time depth-file'");
+    // Some tools write depth first.
+    const bool depth_first = fields[1].find("depth") != std::string_view::npos;
+    const std::size_t rgb = depth_first ? 2 : 0;
+    const std::size_t depth = depth_first ? 0 : 2;
+    (void)seconds_field(file, line.number, fields[depth]);
+    RecordedFrame frame{seconds_field(file, line.number, fields[rgb]),
+                        folder / fields[rgb + 1],
+                        {},
+                        folder / fields[depth + 1]};
+    expect_increasing(file, line.number, frame.t_ns, &previous);
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+/// Nearest depth image in time for every colour image; each depth image is used once; colour images without
+/// are left out. Both lists are in order, so one pass does.
+std::vector<RecordedFrame> associate(const std::vector<StampedFile>& rgb,
+                                     const std::vector<StampedFile>& depth) {
+  std::vector<RecordedFrame> frames;
+  std::size_t next = 0;
+  for (const StampedFile& colour : rgb) {
+    const auto difference = [&](std::size_t i) { return std::abs(depth[i].t_ns - colour.t_ns); };
+    while (next + 1 < depth.size() && difference(next + 1) <= difference(next)) ++next;
+    if (next == depth.size()) break;
+    if (difference(next) > kMaxDifferenceNs) continue;
+    frames.push_back({colour.t_ns, colour.file, {}, depth[next].file});
+    ++next;
+  }
+  return frames;
+}
+
+/// Lines "key value" (fx fy cx cy [width height depth_scale ...]), found beside some recordings of this
+/// layout.
+void take_camera_text(const fs::path& file, Calibration* calibration) {
+  PinholeCamera& camera = calibration->left.pinhole;
+  double width = 0, height = 0, scale = 0;
+  const std::map<std::string, double*, std::less<>> keys{
+      {"fx", &camera.fx}, {"fy", &camera.fy},  {"cx", &camera.cx},         {"cy", &camera.cy},
+      {"width", &width},  {"height", &height}, {"fps", &calibration->fps}, {"depth_scale", &scale}};
+  std::map<std::string, bool, std::less<>> seen;
+  for (const TextLine& line : read_text_lines(file)) {
+    const auto fields = split_fields(line.text);
+    if (fields.size() != 2) throw IoError(file, line.number, "is not 'key value'");
+    if (const auto key = keys.find(fields[0]); key != keys.end()) {
+      *key->second = number_field(file, line.number, fields[1]);
+      seen[key->first] = true;
+    }
+  }
+  for (const char* key : {"fx", "fy", "cx", "cy"}) {
+    if (!seen[key]) throw IoError(file, fmt::format("key '{}' is missing", key));
+  }
+  if (seen["depth_scale"]) {
+    if (scale <= 0) throw IoError(file, fmt::format("key 'depth_scale' is {}, must be positive", scale));
+    calibration->depth_unit = 1.0 / scale;
+  }
+  if (width < 0 || width > 1e5 || height < 0 || height > 1e5)
+    throw IoError(file, "impossible width or height");
+  camera.width = static_cast<int>(width);
+  camera.height = static_cast<int>(height);
+}
+
+/// --calib, else calibration.yaml, else camera.txt, else parameters alone. `source` is what to name in
+/// messages.
+Calibration read_tum_calibration(const fs::path& folder, const std::optional<fs::path>& given,
+                                 SourceParameters& parameters, fs::path* source) {
+  Calibration base;
+  base.depth_unit = kTumDepthUnit;
+  bool from_file = true;
+  if (given || fs::exists(folder / "calibration.yaml")) {
+    *source = given.value_or(folder / "calibration.yaml");
+    base = read_calibration(*source);
+  } else if (fs::exists(folder / "camera.txt")) {
+    *source = folder / "camera.txt";
+    take_camera_text(*source, &base);
+  } else {
+    *source = parameters.subject();
+    from_file = false;
+  }
+  return with_parameters(std::move(base), from_file, SensorKind::kRgbd, parameters);
+}
+
+}  // namespace
+
+/// TUM RGB-D benchmark: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats
+Recording read_tum_recording(const fs::path& folder, const std::optional<fs::path>& calibration,
+                             SourceParameters& parameters) {
+  Recording recording;
+  recording.folder = folder;
+  if (fs::exists(folder / "associations.txt")) {
+    recording.frames = read_associations(folder);
+  } else {
+    recording.frames = associate(read_list(folder, "rgb.txt"), read_list(folder, "depth.txt"));
+    if (recording.frames.empty()) throw IoError(folder, "no colour image has a depth image within 20 ms");
+  }
+  recording.calibration = read_tum_calibration(folder, calibration, parameters, &recording.calibration_file);
+  if (const fs::path truth = folder / "groundtruth.txt"; fs::exists(truth)) {
+    recording.ground_truth = read_tum_trajectory(truth);
+  }
+  return recording;
+}
+
+}  // namespace twofold

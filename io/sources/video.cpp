@@ -1,0 +1,82 @@
+#include "io/sources/video.hpp"
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include <fmt/format.h>
+
+#include "io/files/calibration_file.hpp"
+#include "io/files/io_error.hpp"
+#include "io/sources/recording.hpp"
+
+namespace twofold {
+
+VideoSource::VideoSource(const std::filesystem::path& file,
+                         const std::optional<std::filesystem::path>& calibration,
+                         SourceParameters& parameters)
+    : file_(file) {
+  take_layout(parameters);
+  const auto fps = parameters.take_number("fps");
+  const SensorKind kind = side_by_side_ ? SensorKind::kStereo : SensorKind::kMono;
+  Calibration base;
+  if (calibration) base = read_calibration(*calibration);
+  Calibration used = with_parameters(base, calibration.has_value(), kind, parameters);
+  const std::filesystem::path calibration_file = calibration.value_or(parameters.subject());
+
+  if (!capture_.open(file.string(), cv::CAP_FFMPEG))
+    throw IoError(file, "is not a video that can be decoded");
+  const int width = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)) / (side_by_side_ ? 2 : 1);
+  const int height = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT));
+  fps_ = fps.value_or(used.fps > 0 ? used.fps : capture_.get(cv::CAP_PROP_FPS));
+  if (!(fps_ > 0) || !std::isfinite(fps_)) throw IoError(file, "has no frame rate: give the parameter fps");
+  set_missing_size(width, height, &used);
+  expect_valid(calibration_file, used);
+  if (used.left.pinhole.width != width || used.left.pinhole.height != height) {
+    throw IoError(file, fmt::format("the images are {}x{}, the calibration is for {}x{}", width, height,
+                                    used.left.pinhole.width, used.left.pinhole.height));
+  }
+  try {
+    rectifier_.emplace(used);
+  } catch (const std::runtime_error& e) {
+    throw IoError(calibration_file, e.what());
+  }
+  rig_ = rectifier_->rig();
+}
+
+void VideoSource::take_layout(SourceParameters& parameters) {
+  const auto layout = parameters.take_text("layout");
+  if (layout && *layout != "mono" && *layout != "side-by-side") {
+    throw IoError(parameters.subject(), fmt::format("layout='{}' is neither mono nor side-by-side", *layout));
+  }
+  side_by_side_ = layout && *layout == "side-by-side";
+}
+
+bool VideoSource::decode(Frame* raw) {
+  cv::Mat image;
+  if (!capture_.read(image) || image.empty()) return false;
+  if (image.channels() == 3) cv::cvtColor(image, image, cv::COLOR_BGR2GRAY);
+  if (image.type() != CV_8UC1)
+    throw IoError(file_, fmt::format("frame {} is neither grey nor colour", index_));
+  const int half = image.cols / 2;
+  // Clones: the halves become images of their own, and the decoder's buffer is reused for the next frame.
+  raw->left = side_by_side_ ? image.colRange(0, half).clone() : image.clone();
+  if (side_by_side_) raw->right = image.colRange(half, 2 * half).clone();
+  return true;
+}
+
+bool VideoSource::read(Frame& frame) {
+  Frame raw;
+  raw.index = index_;
+  raw.t_ns = std::llround(static_cast<double>(index_) / fps_ * 1e9);
+  if (!decode(&raw)) {
+    if (index_ == 0) throw IoError(file_, "holds no frame that can be decoded");
+    return false;
+  }
+  if (const auto reason = rectifier_->mismatch_reason(raw); !reason.empty()) throw IoError(file_, reason);
+  ++index_;
+  frame = Frame();  // its old images may still be held elsewhere: never write into them
+  rectifier_->rectify(raw, frame);
+  return true;
+}
+
+}  // namespace twofold

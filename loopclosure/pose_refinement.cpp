@@ -1,0 +1,62 @@
+#include "loopclosure/pose_refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "imaging/guided_search.hpp"
+
+namespace twofold {
+
+RefinementOutcome PoseRefinement::refine(const GraphSnapshot& graph, KeyframeId place,
+                                         const FrameImages& images, const SE3& T_c_k, RefinedPlace& result) {
+  collect_points(graph, place, T_c_k);
+  if (static_cast<int>(visible_.size()) < 2 * options_.min_inliers) return RefinementOutcome::kTooFewPoints;
+  result.T_c_k = T_c_k;
+  for (const double radius_px : {options_.radius_px, options_.radius_px / 3}) {
+    search(graph, place, images, result.T_c_k, radius_px);
+    const MotionOnlyResult motion = optimise_motion(rig_, found_, result.T_c_k, {});
+    result.inliers = motion.inliers;
+    if (!motion.converged || motion.inliers < options_.min_inliers) return RefinementOutcome::kContradicted;
+    result.T_c_k = motion.T_c_ref;
+  }
+  const bool agreed = result.inliers >= options_.min_inlier_share * static_cast<double>(found_.size());
+  return agreed ? RefinementOutcome::kRefined : RefinementOutcome::kContradicted;
+}
+
+/// Points of the place's neighbourhood N1 that should be visible.
+void PoseRefinement::collect_points(const GraphSnapshot& graph, KeyframeId place, const SE3& T_c_k) {
+  keyframes_.clear();
+  visible_.clear();
+  direct_neighbours(graph, place, static_cast<std::size_t>(options_.neighbours), keyframes_);
+  visible_points(graph, keyframes_, visited_, visible_);
+  const SE3 T_c_w = T_c_k * graph.T_k_w(place);
+  std::erase_if(visible_, [&](PointId id) {
+    const Vector3 x_c = T_c_w * graph.position(id);
+    return !(x_c.z() > 1e-3) || !rig_.camera.contains(rig_.camera.project(x_c), 8);
+  });
+  const auto most = static_cast<std::size_t>(options_.max_points);
+  if (visible_.size() > most) visible_.resize(most);
+}
+
+void PoseRefinement::search(const GraphSnapshot& graph, KeyframeId place, const FrameImages& images,
+                            const SE3& T_c_k, double radius_px) {
+  GuidedSearchOptions options;
+  options.radius_px = radius_px;
+  found_.clear();
+  const SE3 T_k_w = graph.T_k_w(place);
+  for (const PointId id : visible_) {
+    const MapPoint& point = graph.point(id);
+    const SE3 T_c_a = T_c_k * T_k_w * graph.T_k_w(point.anchor).inverse();
+    const auto match = find_point(images, rig_, *point.appearance, point.psi, T_c_a, options);
+    if (!match) continue;
+    const bool has_right = rig_.kind != SensorKind::kMono && std::isfinite(match->z.z());
+    MotionObservation observation;
+    observation.x_ref = T_k_w * graph.position(id);
+    observation.z = match->z.cast<float>();
+    if (!has_right) observation.z.z() = 0;
+    observation.information = measurement_information(rig_, match->level, has_right);
+    found_.push_back(observation);
+  }
+}
+
+}  // namespace twofold

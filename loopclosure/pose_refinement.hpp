@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "estimation/motion_only.hpp"
+#include "graph/neighbourhood.hpp"
+#include "graph/snapshot.hpp"
+#include "imaging/image_pyramid.hpp"
+
+namespace twofold {
+
+struct RefinementOptions {
+  int neighbours = 8;             ///< keyframes of N1 whose points are looked for, the place itself included
+  int max_points = 400;           ///< searched
+  double radius_px = 8;           ///< of the first search; the second one takes a third of it
+  int min_inliers = 20;           ///< Theta
+  double min_inlier_share = 0.6;  ///< of the points found
+};
+
+/// A view placed by the map's points.
+struct RefinedPlace {
+  SE3 T_c_k;
+  int inliers = 0;
+};
+
+enum class RefinementOutcome : std::uint8_t {
+  kRefined,
+  kTooFewPoints,  ///< the map knows fewer than Theta points that should be visible: nothing can be said
+  kContradicted   ///< they should be visible, but are not found where they should be
+};
+
+/// Looks for the map's points around a keyframe in a view whose place was recognised: their patches and their
+/// depths, from many frames, tell the pose far more exactly than corners described one by one, and bear
+/// witness that the descriptors had no part in.
+class PoseRefinement {
+ public:
+  PoseRefinement(const Rig& rig, const RefinementOptions& options) : rig_(rig), options_(options) {}
+
+  /// @param T_c_k   pose of the view relative to keyframe `place`, about right
+  /// @param result  set when refined
+  [[nodiscard]] RefinementOutcome refine(const GraphSnapshot& graph, KeyframeId place,
+                                         const FrameImages& images, const SE3& T_c_k, RefinedPlace& result);
+
+ private:
+  void collect_points(const GraphSnapshot& graph, KeyframeId place, const SE3& T_c_k);
+  void search(const GraphSnapshot& graph, KeyframeId place, const FrameImages& images, const SE3& T_c_k,
+              double radius_px);
+
+  Rig rig_;
+  RefinementOptions options_;
+  std::vector<KeyframeId> keyframes_;
+  std::vector<PointId> visible_;
+  VisitedSet visited_;
+  std::vector<MotionObservation> found_;
+};
+
+}  // namespace twofold

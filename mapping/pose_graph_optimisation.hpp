@@ -1,0 +1,30 @@
+#pragma once
+
+#include "camera/rig.hpp"
+#include "graph/graph_writer.hpp"
+#include "graph/pose_graph_update.hpp"
+#include "mapping/options.hpp"
+
+namespace twofold {
+
+struct PoseGraphReport {
+  int parts = 0;  ///< connected components of the graph
+  int keyframes = 0;
+  int constraints = 0;
+  double initial_cost = 0;
+  double final_cost = 0;
+};
+
+/// Optimises the part of the map that is connected with `root` over all its edges (eq. 6.4 without points,
+/// outer window = everything); `root` is held. Changes nothing: for use beside the mapper, which takes the
+/// result as a message (Mapper::take_pose_graph). Cost grows with the part.
+PoseGraphUpdate optimise_part(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
+                              const MapperOptions& options, PoseGraphReport& report);
+
+/// Optimises all keyframe poses, part by part. Outside of the double window poses are only defined relative
+/// to their neighbours; this makes them agree globally, e.g. before a trajectory is written. The reference
+/// keyframe, or the oldest one of a part without it, stays where it is. Cost grows with the map.
+PoseGraphReport optimised_poses_of_all_parts(GraphWriter& writer, const Rig& rig,
+                                             const MapperOptions& options);
+
+}  // namespace twofold

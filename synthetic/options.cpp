@@ -1,0 +1,58 @@
+#include "synthetic/options.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace twofold::synthetic {
+
+std::string SyntheticOptions::invalid_reason() const {
+  const auto outside = [](const char* name, double value, double low, double high) -> std::string {
+    if (value >= low && value <= high) return {};
+    return fmt::format("{} must be between {} and {}, not {}", name, low, high, value);
+  };
+  const std::string reasons[] = {outside("width", width, 32, 4096),
+                                 outside("height", height, 32, 4096),
+                                 outside("f", f, 10, 100000),
+                                 outside("baseline", baseline, 1e-4, 100),
+                                 outside("fps", fps, 0.01, 1000),
+                                 outside("rounds", rounds, 1e-3, 1e5),
+                                 outside("frames", frames, 0, 1e8),
+                                 outside("noise", noise, 0, 50),
+                                 outside("depth_noise", depth_noise, 0, 10),
+                                 outside("blur", blur, 0, 1),
+                                 outside("exposure", exposure, 0, 0.9),
+                                 outside("drop", drop, 0, 0.9),
+                                 outside("cover_at", cover_at, 0, 1e6),
+                                 outside("cover", cover, 0, 1e6),
+                                 outside("carried_to", carried_to, 0, 1e6)};
+  for (const std::string& reason : reasons)
+    if (!reason.empty()) return reason;
+  return {};
+}
+
+const std::vector<std::string>& scene_names() {
+  static const std::vector<std::string> kNames{"corridor", "courtyard", "descent", "desk"};
+  return kNames;
+}
+
+SyntheticOptions default_options(const std::string& scene) {
+  const auto& names = scene_names();
+  if (std::find(names.begin(), names.end(), scene) == names.end())
+    throw std::invalid_argument(fmt::format("unknown scene '{}' (known: {})", scene, fmt::join(names, ", ")));
+  SyntheticOptions options;
+  options.scene = scene;
+  if (scene == "descent") {  // SWF 4.2: 25 degrees across, 15 cm a frame
+    options.width = 1024;
+    options.height = 768;
+    options.f = 0.5 * 1024 / std::tan(12.5 * 0.017453292519943295);
+    options.baseline = 0.1;
+    options.fps = 10;
+    options.rounds = 1;
+  }
+  return options;
+}
+
+}  // namespace twofold::synthetic

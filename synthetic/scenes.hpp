@@ -1,0 +1,28 @@
+#pragma once
+
+#include <functional>
+
+#include "synthetic/camera_path.hpp"
+#include "synthetic/scene.hpp"
+
+namespace twofold::synthetic {
+
+/// A place and the way a camera takes through it.
+struct Staging {
+  Scene scene;
+  CameraPath path;
+  double round_seconds = 0;  ///< once around, back and forth, or down
+  /// Where a moving box stands at time t [s], and its size; six textures from object_texture.
+  std::function<SE3(double t)> T_w_object;
+  Vector3 object_size = Vector3::Zero();
+  int object_texture = 0;
+};
+
+/// seed changes every texture and small things in the layout; the walls, the path and its length stay.
+[[nodiscard]] Staging make_courtyard(std::uint64_t seed);  ///< 40 m loop between walls, columns and trees
+[[nodiscard]] Staging make_desk(std::uint64_t seed);       ///< things on a desk, looked along from 0.7 m
+[[nodiscard]] Staging make_corridor(std::uint64_t seed);   ///< up and down a corridor of 24 m
+[[nodiscard]] Staging make_descent(
+    std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
+
+}  // namespace twofold::synthetic

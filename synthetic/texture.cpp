@@ -1,0 +1,131 @@
+#include "synthetic/texture.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "geometry/check.hpp"
+
+namespace twofold::synthetic {
+namespace {
+
+/// log2 of a positive normal number, exact at powers of two and linear between them (error < 0.09): enough to
+/// blend two pyramid levels, and the same on every machine.
+float coarse_log2(float x) {
+  const auto bits = std::bit_cast<std::uint32_t>(x);
+  const auto exponent = static_cast<int>(bits >> 23) - 127;
+  const float mantissa = std::bit_cast<float>((bits & 0x007fffffU) | 0x3f800000U);
+  return static_cast<float>(exponent) + (mantissa - 1.0f);
+}
+
+struct Ellipse {
+  float major = 0, minor = 0;      ///< lengths of the axes [texel/px]
+  float major_u = 0, major_v = 0;  ///< the major axis itself [texel/px]
+};
+
+/// Image of the unit circle of a pixel: singular values and first left singular vector of the 2x2 footprint.
+Ellipse ellipse_of(const TexelFootprint& f) {
+  const float uu = f.u_x * f.u_x + f.u_y * f.u_y;
+  const float vv = f.v_x * f.v_x + f.v_y * f.v_y;
+  const float uv = f.u_x * f.v_x + f.u_y * f.v_y;
+  const float difference = uu - vv;
+  const float largest = 0.5f * (uu + vv + std::sqrt(difference * difference + 4 * uv * uv));
+  const float determinant = std::abs(f.u_x * f.v_y - f.u_y * f.v_x);
+  Ellipse e;
+  e.major = std::sqrt(largest) + 1e-6f;
+  e.minor = determinant / e.major;
+  // Of the two equivalent eigenvector formulas, the one without cancellation.
+  const float a_u = difference >= 0 ? largest - vv : uv;
+  const float a_v = difference >= 0 ? uv : largest - uu;
+  const float norm = std::sqrt(a_u * a_u + a_v * a_v);
+  const float scale = norm > 1e-12f ? e.major / norm : 0.0f;
+  e.major_u = a_u * scale;
+  e.major_v = a_v * scale;
+  return e;
+}
+
+}  // namespace
+
+Texture::Texture(const cv::Mat& canvas) {
+  TWOFOLD_CHECK(canvas.type() == CV_32FC1 && canvas.cols >= 2 && canvas.rows >= 2, "texture canvas");
+  Level base{canvas.cols, canvas.rows, {}};
+  base.texels.resize(static_cast<std::size_t>(base.width) * base.height);
+  for (int y = 0; y < base.height; ++y) {
+    const auto* row = canvas.ptr<float>(y);
+    auto* out = base.texels.data() + static_cast<std::size_t>(y) * base.width;
+    for (int x = 0; x < base.width; ++x)
+      out[x] = static_cast<std::uint8_t>(std::clamp(row[x], 0.0f, 255.0f) + 0.5f);
+  }
+  levels_.push_back(std::move(base));
+  while (levels_.back().width >= 4 && levels_.back().height >= 4) {
+    const Level& fine = levels_.back();
+    Level coarse{fine.width / 2, fine.height / 2, {}};
+    coarse.texels.resize(static_cast<std::size_t>(coarse.width) * coarse.height);
+    for (int y = 0; y < coarse.height; ++y) {
+      const auto* above = fine.texels.data() + static_cast<std::size_t>(2 * y) * fine.width;
+      const auto* below = above + fine.width;
+      auto* out = coarse.texels.data() + static_cast<std::size_t>(y) * coarse.width;
+      for (int x = 0; x < coarse.width; ++x) {
+        const int sum = above[2 * x] + above[2 * x + 1] + below[2 * x] + below[2 * x + 1];
+        // Ties alternate so that rounding does not brighten the pyramid from level to level.
+        out[x] = static_cast<std::uint8_t>((sum + 1 + ((x + y) & 1)) >> 2);
+      }
+    }
+    levels_.push_back(std::move(coarse));
+  }
+}
+
+float Texture::Level::bilinear(float u, float v) const {
+  u = std::min(std::max(u, 0.0f), static_cast<float>(width - 1));
+  v = std::min(std::max(v, 0.0f), static_cast<float>(height - 1));
+  const int x = std::min(static_cast<int>(u), width - 2);
+  const int y = std::min(static_cast<int>(v), height - 2);
+  const float a = u - static_cast<float>(x);
+  const float b = v - static_cast<float>(y);
+  const auto* p = texels.data() + static_cast<std::size_t>(y) * width + x;
+  const auto* q = p + width;
+  const float top = static_cast<float>(p[0]) + a * static_cast<float>(p[1] - p[0]);
+  const float bottom = static_cast<float>(q[0]) + a * static_cast<float>(q[1] - q[0]);
+  return top + b * (bottom - top);
+}
+
+float Texture::trilinear(float u, float v, int level, float blend) const {
+  // Texel i of level l covers base texels [2^l (i + 0.5) - 0.5 -+ 2^l / 2].
+  const float scale = std::bit_cast<float>(static_cast<std::uint32_t>(127 - level) << 23);
+  const float fine_u = (u + 0.5f) * scale - 0.5f;
+  const float fine_v = (v + 0.5f) * scale - 0.5f;
+  const float fine = levels_[level].bilinear(fine_u, fine_v);
+  if (blend == 0) return fine;
+  const float coarse = levels_[level + 1].bilinear(0.5f * fine_u - 0.25f, 0.5f * fine_v - 0.25f);
+  return fine + blend * (coarse - fine);
+}
+
+float Texture::sample(float u, float v, const TexelFootprint& footprint) const {
+  const Ellipse e = ellipse_of(footprint);
+  const float ratio = e.major / std::max(std::max(e.minor, 1.0f), e.major / kMaxProbes);
+  const int probes = std::clamp(static_cast<int>(ratio + 0.7f), 1, kMaxProbes);
+  const float width = std::max(e.minor, e.major / static_cast<float>(probes));
+
+  int level = 0;
+  float blend = 0;
+  if (width > 1) {
+    const float lod = coarse_log2(width);
+    level = static_cast<int>(lod);
+    blend = lod - static_cast<float>(level);
+    const int last = static_cast<int>(levels_.size()) - 1;
+    if (level >= last) {
+      level = last;
+      blend = 0;
+    }
+  }
+  if (probes == 1) return trilinear(u, v, level, blend);
+  float sum = 0;
+  const float step = 1.0f / static_cast<float>(probes);
+  for (int i = 0; i < probes; ++i) {
+    const float offset = (static_cast<float>(i) + 0.5f) * step - 0.5f;
+    sum += trilinear(u + offset * e.major_u, v + offset * e.major_v, level, blend);
+  }
+  return sum * step;
+}
+
+}  // namespace twofold::synthetic

@@ -1,0 +1,107 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "synthetic/view_geometry.hpp"
+
+namespace twofold::synthetic {
+
+ViewGeometry::SurfacePoint ViewGeometry::on_quad(const QuadForm& f, float x, float y, float t) const {
+  const float s = t * f.s(x, y);
+  const float q = t * f.q(x, y);
+  const float ku = static_cast<float>(f.texture->width()) / f.width;
+  const float kv = static_cast<float>(f.texture->height()) / f.height;
+  // d(S/w) = (dS - (S/w) dw) / w: the homography's exact derivative.
+  const TexelFootprint footprint{ku * t * (f.s.x - s * f.w.x), ku * t * (f.s.y - s * f.w.y),
+                                 kv * t * (f.q.x - q * f.w.x), kv * t * (f.q.y - q * f.w.y)};
+  return {f.texture, ku * (s - f.s0) - 0.5f, kv * (q - f.q0) - 0.5f, footprint, f.brightness};
+}
+
+TexelFootprint ViewGeometry::project_footprint(const Eigen::Vector3f& normal, const Eigen::Vector3f& grad_u,
+                                               const Eigen::Vector3f& grad_v, float x, float y,
+                                               float t) const {
+  const Eigen::Vector3f d = R_w_c_ * Eigen::Vector3f(x, y, 1);
+  const float facing = std::min(normal.dot(d), -1e-3f * normal.norm());  // bounded at the silhouette
+  const Eigen::Vector3f along_x = t * (R_w_c_.col(0) - normal.dot(R_w_c_.col(0)) / facing * d);
+  const Eigen::Vector3f along_y = t * (R_w_c_.col(1) - normal.dot(R_w_c_.col(1)) / facing * d);
+  return {grad_u.dot(along_x), grad_u.dot(along_y), grad_v.dot(along_x), grad_v.dot(along_y)};
+}
+
+ViewGeometry::SurfacePoint ViewGeometry::on_cylinder(const CylinderForm& f, float x, float y, float t) const {
+  const float px = f.ox + t * dx_(x, y);
+  const float py = f.oy + t * dy_(x, y);
+  const float pz = f.oz + t * dz_(x, y);
+  constexpr float kPi = std::numbers::pi_v<float>;
+  const float ku = static_cast<float>(f.texture->width()) / (2 * kPi);  // texels per radian
+  const float kv = static_cast<float>(f.texture->height()) / f.height;
+  const float inv_r2 = 1 / (f.radius * f.radius);
+  return {f.texture, ku * (std::atan2(py, px) + kPi) - 0.5f, kv * (f.height - pz) - 0.5f,
+          project_footprint({px, py, 0}, ku * inv_r2 * Eigen::Vector3f(-py, px, 0), {0, 0, -kv}, x, y, t),
+          f.brightness};
+}
+
+ViewGeometry::SurfacePoint ViewGeometry::on_sphere(const SphereForm& f, float x, float y, float t) const {
+  const Eigen::Vector3f p = R_w_c_ * Eigen::Vector3f(t * x - f.cx, t * y - f.cy, t - f.cz);
+  int axis = 0;
+  p.cwiseAbs().maxCoeff(&axis);
+  const int a = (axis + 1) % 3;
+  const int b = (axis + 2) % 3;
+  const float inv = 1 / std::abs(p[axis]);
+  const float sign = p[axis] > 0 ? 1.0f : -1.0f;
+  const Texture& texture = f.textures[2 * axis + (p[axis] > 0 ? 0 : 1)];
+  const float ku = 0.5f * static_cast<float>(texture.width());
+  const float kv = 0.5f * static_cast<float>(texture.height());
+  // Cube map: u = p_a / |p_axis|, v = p_b / |p_axis|, both in [-1, 1].
+  Eigen::Vector3f grad_u = Eigen::Vector3f::Zero();
+  Eigen::Vector3f grad_v = Eigen::Vector3f::Zero();
+  grad_u[a] = ku * inv;
+  grad_u[axis] = -ku * sign * p[a] * inv * inv;
+  grad_v[b] = kv * inv;
+  grad_v[axis] = -kv * sign * p[b] * inv * inv;
+  return {&texture, ku * (p[a] * inv + 1) - 0.5f, kv * (p[b] * inv + 1) - 0.5f,
+          project_footprint(p, grad_u, grad_v, x, y, t), f.brightness};
+}
+
+ViewGeometry::SurfacePoint ViewGeometry::on_height_field(const HeightField& f, float x, float y,
+                                                         float t) const {
+  const float px = eye_.x() + t * dx_(x, y);
+  const float py = eye_.y() + t * dy_(x, y);
+  const auto h = static_cast<float>(f.spacing);
+  const float slope_x = (f.height_at(px + h, py) - f.height_at(px - h, py)) / (2 * h);
+  const float slope_y = (f.height_at(px, py + h) - f.height_at(px, py - h)) / (2 * h);
+  const Texture& texture = (*textures_)[f.texture];
+  const float ku = static_cast<float>(texture.width()) / (h * static_cast<float>(f.heights.cols - 1));
+  const float kv = static_cast<float>(texture.height()) / (h * static_cast<float>(f.heights.rows - 1));
+  return {&texture, ku * (px - static_cast<float>(f.x0)) - 0.5f, kv * (py - static_cast<float>(f.y0)) - 0.5f,
+          project_footprint({-slope_x, -slope_y, 1}, {ku, 0, 0}, {0, kv, 0}, x, y, t), 1.0f};
+}
+
+float ViewGeometry::shade(std::int32_t id, float x, float y, float inverse_depth, float footprint) const {
+  if (id == RayPacket::kSky) return sky(x, y);
+  const std::int32_t index = id & kIndexMask;
+  const float t = 1 / inverse_depth;
+  const SurfacePoint point = [&] {
+    switch (id >> kKindShift) {
+      case kQuad:
+        return on_quad(quads_[index], x, y, t);
+      case kCylinder:
+        return on_cylinder(cylinders_[index], x, y, t);
+      case kSphere:
+        return on_sphere(spheres_[index], x, y, t);
+      default:
+        return on_height_field((*height_fields_)[index], x, y, t);
+    }
+  }();
+  const float sx = footprint / static_cast<float>(camera_.fx);
+  const float sy = footprint / static_cast<float>(camera_.fy);
+  const TexelFootprint& r = point.per_ray;
+  return point.brightness *
+         point.texture->sample(point.u, point.v, {r.u_x * sx, r.u_y * sy, r.v_x * sx, r.v_y * sy});
+}
+
+float ViewGeometry::sky(float x, float y) const {
+  const float up = dz_(x, y) / std::sqrt(x * x + y * y + 1);
+  return sky_horizon_ + (sky_zenith_ - sky_horizon_) * std::clamp(up, 0.0f, 1.0f);
+}
+
+}  // namespace twofold::synthetic

@@ -1,0 +1,102 @@
+#include "engine/effort_controller.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace twofold {
+namespace {
+
+constexpr std::int64_t kPeriod = 33'000'000;
+constexpr auto kTop = EffortLevel::kEverything;
+constexpr auto kBottom = EffortLevel::kDropFrames;
+
+std::int64_t latency(double periods) {
+  return static_cast<std::int64_t>(periods * kPeriod);
+}
+
+TEST(EffortController, GoesDownARungForEachLateFrameInTheStatedOrder) {
+  EffortController controller({});
+  std::vector<EffortLevel> levels{controller.effort()};
+  for (int i = 0; i < 6; ++i) {
+    controller.tracked(latency(1.1), kPeriod);
+    levels.push_back(controller.effort());
+  }
+  EXPECT_EQ(levels, (std::vector<EffortLevel>{kTop, EffortLevel::kFewerPoints, EffortLevel::kCoarseAlignment,
+                                              EffortLevel::kFewerIterations, kBottom, kBottom, kBottom}));
+}
+
+TEST(EffortController, ComesBackARungAtATimeAndOnlyAfterPatience) {
+  const EffortOptions options{.patience = 10};
+  EffortController controller(options);
+  for (int i = 0; i < 4; ++i) controller.tracked(latency(2), kPeriod);
+  for (int effort = static_cast<int>(kBottom); effort > 0; --effort) {
+    for (int i = 0; i < options.patience; ++i) {
+      EXPECT_EQ(static_cast<int>(controller.effort()), effort);
+      controller.tracked(latency(0.3), kPeriod);
+    }
+    EXPECT_EQ(static_cast<int>(controller.effort()), effort - 1);
+  }
+  for (int i = 0; i < 50; ++i) controller.tracked(latency(0.3), kPeriod);
+  EXPECT_EQ(controller.effort(), kTop);
+}
+
+TEST(EffortController, StaysBetweenEarlyAndLate) {
+  EffortController controller({});
+  controller.tracked(latency(1.5), kPeriod);
+  for (int i = 0; i < 500; ++i) {
+    // One frame that is neither early nor late begins the count anew.
+    controller.tracked(latency(i % 29 == 0 ? 0.8 : 0.3), kPeriod);
+    EXPECT_EQ(controller.effort(), EffortLevel::kFewerPoints) << i;
+  }
+}
+
+TEST(EffortController, DropsOnTheLastRungOrBeyondTheBoundAndOnlyIfThePolicyAllows) {
+  EffortController controller({.drop_after = 1.5});
+  const Arrival overtaken{0, latency(1.2), kPeriod, true};
+  const Arrival beyond{0, latency(1.6), kPeriod, true};
+  Arrival queued = beyond;
+  queued.overtaken = false;
+  EXPECT_FALSE(controller.must_drop(overtaken));
+  EXPECT_TRUE(controller.must_drop(beyond));
+  EXPECT_FALSE(controller.must_drop(queued));
+  for (int i = 0; i < 4; ++i) controller.dropped();
+  EXPECT_EQ(controller.effort(), kBottom);
+  EXPECT_TRUE(controller.must_drop(overtaken));
+  EXPECT_FALSE(controller.must_drop(queued));
+}
+
+TEST(EffortController, WithoutAPaceNothingIsLate) {
+  EffortController controller({});
+  for (int i = 0; i < 10; ++i) controller.tracked(latency(100), 0);
+  EXPECT_EQ(controller.effort(), kTop);
+}
+
+TEST(EffortOptions, NameWhatIsWrong) {
+  EXPECT_EQ(EffortOptions{}.invalid_reason(), "");
+  EXPECT_NE(EffortOptions{.early = 2}.invalid_reason().find("early"), std::string::npos);
+  EXPECT_NE(EffortOptions{.patience = 0}.invalid_reason().find("patience"), std::string::npos);
+  EXPECT_NE(EffortOptions{.drop_after = 0.5}.invalid_reason().find("drop_after"), std::string::npos);
+}
+
+TEST(EffortBounds, EachRungLeavesOutMore) {
+  const TrackerOptions options;
+  EffortBounds before = bounds_of(kTop, options);
+  EXPECT_EQ(before.wanted_matches, options.wanted_matches);
+  EXPECT_EQ(before.motion_iterations, options.motion.max_iterations);
+  for (int r = 1; r < kEffortLevels; ++r) {
+    const EffortBounds now = bounds_of(static_cast<EffortLevel>(r), options);
+    EXPECT_LE(now.max_searches, before.max_searches);
+    EXPECT_GE(now.finest_alignment_level, before.finest_alignment_level);
+    EXPECT_LE(now.motion_iterations, before.motion_iterations);
+    EXPECT_GE(now.wanted_matches, options.min_inliers);
+    const bool less = now.max_searches < before.max_searches ||
+                      now.finest_alignment_level > before.finest_alignment_level ||
+                      now.motion_iterations < before.motion_iterations;
+    EXPECT_EQ(less, r < static_cast<int>(kBottom));  // the last effort leaves out frames
+    before = now;
+  }
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,44 @@
+#include "tracking/immature_points.hpp"
+
+#include <algorithm>
+
+namespace twofold {
+
+const PendingKeyframe* ImmaturePoints::find_pending(KeyframeId id) const {
+  const auto it = std::find_if(pending_.begin(), pending_.end(), [&](const auto& p) { return p.id == id; });
+  return it != pending_.end() ? &*it : nullptr;
+}
+
+bool ImmaturePoints::add(const ImmaturePoint& point) {
+  if (points_.size() == points_.capacity()) return false;
+  points_.push_back(point);
+  return true;
+}
+
+void ImmaturePoints::adopt(const GraphSnapshot& graph) {
+  std::erase_if(pending_, [&](const PendingKeyframe& keyframe) { return graph.contains(keyframe.id); });
+  std::erase_if(points_, [&](const ImmaturePoint& point) {
+    return point.proposed_in != kNoKeyframe && graph.contains(point.proposed_in);
+  });
+}
+
+void ImmaturePoints::drop_stale(KeyframeId newest, int max_failures, int max_age) {
+  std::erase_if(points_, [&](const ImmaturePoint& point) {
+    if (point.proposed_in != kNoKeyframe) return false;
+    const int age = static_cast<int>(index(newest)) - static_cast<int>(index(point.anchor));
+    return point.failures >= max_failures || age > max_age;
+  });
+}
+
+void ImmaturePoints::retract(KeyframeId id) {
+  std::erase_if(pending_, [&](const PendingKeyframe& keyframe) { return keyframe.id == id; });
+  std::erase_if(points_, [&](const ImmaturePoint& point) { return point.anchor == id; });
+  for (ImmaturePoint& point : points_) {
+    if (point.proposed_in == id) {
+      point.proposed_in = kNoKeyframe;
+      point.id = kNoPoint;
+    }
+  }
+}
+
+}  // namespace twofold

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <vector>
+
+#include "graph/keyframe.hpp"
+#include "graph/snapshot.hpp"
+#include "imaging/point_appearance.hpp"
+
+namespace twofold {
+
+/// A point the tracker started itself and that no snapshot holds yet  (thesis 6.3: candidates are used for
+/// tracking at once, and join the map only when a later keyframe finds them again).
+struct ImmaturePoint {
+  KeyframeId anchor = kNoKeyframe;
+  Vector3 psi{0, 0, 1};
+  Observation anchor_observation;
+  PointAppearance appearance;
+  PointId id = kNoPoint;                 ///< given when it is proposed to the map
+  KeyframeId proposed_in = kNoKeyframe;  ///< the keyframe that found it again
+  std::uint8_t failures = 0;             ///< frames in a row without a match
+};
+
+/// A keyframe that was proposed but is not in the snapshot yet.
+struct PendingKeyframe {
+  KeyframeId id = kNoKeyframe;
+  KeyframeId reference = kNoKeyframe;  ///< kNoKeyframe: first of the map
+  SE3 T_k_ref;
+};
+
+/// The tracker's own points and proposals, until the map has them. Never grows beyond its capacity.
+class ImmaturePoints {
+ public:
+  ImmaturePoints(std::size_t point_capacity, std::size_t keyframe_capacity) {
+    points_.reserve(point_capacity);
+    pending_.reserve(keyframe_capacity);
+  }
+
+  [[nodiscard]] std::vector<ImmaturePoint>& points() { return points_; }
+  [[nodiscard]] const std::vector<ImmaturePoint>& points() const { return points_; }
+  [[nodiscard]] const std::vector<PendingKeyframe>& pending() const { return pending_; }
+  [[nodiscard]] bool room_for_keyframe() const { return pending_.size() < pending_.capacity(); }
+  [[nodiscard]] const PendingKeyframe* find_pending(KeyframeId id) const;
+
+  void add_pending(const PendingKeyframe& keyframe) { pending_.push_back(keyframe); }
+  /// False when full.
+  bool add(const ImmaturePoint& point);
+  /// Forgets all points.
+  void clear_points() { points_.clear(); }
+  /// Forgets what the map has taken over or refused.
+  void adopt(const GraphSnapshot& graph);
+  /// Forgets candidates that failed too often or that `newest - anchor` keyframes did not confirm.
+  void drop_stale(KeyframeId newest, int max_failures, int max_age);
+  /// The proposal of keyframe `id` was refused: its points go, points it confirmed are candidates again.
+  void retract(KeyframeId id);
+
+ private:
+  std::vector<ImmaturePoint> points_;
+  std::vector<PendingKeyframe> pending_;
+};
+
+}  // namespace twofold

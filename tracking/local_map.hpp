@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "graph/neighbourhood.hpp"
+#include "graph/snapshot.hpp"
+#include "tracking/immature_points.hpp"
+
+namespace twofold {
+
+/// A point worth searching for in the next frames.
+struct TrackedPoint {
+  PointId id = kNoPoint;                        ///< kNoPoint: a candidate the map does not know
+  int local = -1;                               ///< position in ImmaturePoints, -1 for map points
+  int anchor = 0;                               ///< position in LocalMap::anchors
+  const PointAppearance* appearance = nullptr;  ///< lives as long as the snapshot, or the local point
+  Vector3 psi{0, 0, 1};
+  Vector3 x_ref{0, 0, 1};  ///< in the reference keyframe's frame [m]
+};
+
+struct AnchorPose {
+  KeyframeId id = kNoKeyframe;
+  SE3 T_ref_a;
+};
+
+/// The candidate set for top-down tracking  (thesis 6.2.5): points seen from N1 of the reference keyframe
+/// (eq. 6.5), and the tracker's own points. Rebuilt when map, reference or own points change; pointers are
+/// valid that long.
+class LocalMap {
+ public:
+  explicit LocalMap(std::size_t capacity);
+
+  /// The reference may be a keyframe of the graph or a pending one.
+  void rebuild(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& local,
+               int max_neighbours);
+
+  [[nodiscard]] std::span<const TrackedPoint> points() const { return points_; }
+  [[nodiscard]] const SE3& T_ref_a(const TrackedPoint& point) const {
+    return anchors_[static_cast<std::size_t>(point.anchor)].T_ref_a;
+  }
+  /// Positions [first, last) of the points that the reference keyframe itself sees.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> reference_range() const { return reference_range_; }
+  /// N1 of the last rebuild, the reference first.
+  [[nodiscard]] std::span<const KeyframeId> neighbours() const { return neighbours_; }
+
+ private:
+  static constexpr std::size_t kTable = 1U << 14;  ///< slots of the set of points met; a power of two
+
+  bool first_sight(PointId id);
+  int anchor_position(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local);
+  void add_neighbour(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local);
+
+  std::vector<TrackedPoint> points_;
+  std::vector<AnchorPose> anchors_;
+  std::vector<KeyframeId> neighbours_;
+  std::vector<std::uint64_t> met_;  // open addressing: round in the high half, point in the low half
+  std::uint32_t round_ = 0;
+  KeyframeId reference_ = kNoKeyframe;
+  std::pair<std::size_t, std::size_t> reference_range_{0, 0};
+};
+
+/// T_k_w of a keyframe in the graph, or of a pending one through the keyframes it was proposed relative to.
+[[nodiscard]] SE3 pose_in_world(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k);
+/// Map part of a keyframe in the graph or pending.
+[[nodiscard]] KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k);
+/// T_k_ref of two keyframes of one part, each in the graph or pending.
+[[nodiscard]] SE3 relative_pose(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k,
+                                KeyframeId ref);
+
+}  // namespace twofold
