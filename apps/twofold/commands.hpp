@@ -1,11 +1,8 @@
 #pragma once
 
-#include <CLI/App.hpp>
+#include "apps/command_line.hpp"
 
 namespace twofold {
-
-/// What the program ends with.
-enum ExitCode : int { kOk = 0, kFailedRun = 1, kBadInput = 2 };
 
 /// One a file: adds its subcommand to the program. The subcommand runs while the command line is parsed,
 /// writes what the program is to end with into exit_code, and throws IoError for input it cannot use.
@@ -18,6 +15,5 @@ void add_record_command(CLI::App& app, int& exit_code);
 void add_render_command(CLI::App& app, int& exit_code);
 void add_run_command(CLI::App& app, int& exit_code);
 void add_timing_command(CLI::App& app, int& exit_code);
-void add_vocabulary_command(CLI::App& app, int& exit_code);
 
 }  // namespace twofold

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/twofold/place_evaluation.hpp"
+#include "apps/vocabulary/place_evaluation.hpp"
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 #include "loopclosure/place_view.hpp"

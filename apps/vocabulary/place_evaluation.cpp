@@ -1,4 +1,4 @@
-#include "apps/twofold/place_evaluation.hpp"
+#include "apps/vocabulary/place_evaluation.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/twofold/place_set.hpp"
+#include "apps/vocabulary/place_set.hpp"
 #include "io/files/io_error.hpp"
 #include "io/plots/plot.hpp"
 #include "loopclosure/geometric_verification.hpp"

@@ -4,17 +4,15 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
 
-#include "apps/twofold/commands.hpp"
-#include "apps/twofold/place_evaluation.hpp"
+#include "apps/command_line.hpp"
+#include "apps/vocabulary/place_evaluation.hpp"
+#include "apps/vocabulary/training_images.hpp"
 #include "engine/clock.hpp"
 #include "io/files/image_file.hpp"
 #include "io/files/io_error.hpp"
-#include "io/plots/plot.hpp"
-#include "io/sources/open_source.hpp"
 #include "loopclosure/corner_selection.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "loopclosure/vocabulary_trainer.hpp"
@@ -26,7 +24,6 @@ namespace fs = std::filesystem;
 
 // Thesis 6.4.2: training images give 500 to 2000 corners each.
 constexpr int kTrainingCorners = 1000;
-constexpr int kTrainingSide = 1024;  // longer side of a training image [px]
 
 struct TrainArguments {
   std::vector<std::string> inputs;
@@ -42,65 +39,6 @@ Vocabulary vocabulary_or_default(const std::string& file) {
   } catch (const std::runtime_error& error) {
     throw IoError(error.what());
   }
-}
-
-cv::Mat reduced(const cv::Mat& image) {
-  const double scale = static_cast<double>(kTrainingSide) / std::max(image.cols, image.rows);
-  if (scale >= 1) return image;
-  cv::Mat small;
-  cv::resize(image, small, cv::Size(), scale, scale, cv::INTER_AREA);
-  return small;
-}
-
-class ImageDescriber {
- public:
-  explicit ImageDescriber(int wanted) : selector_({.wanted = wanted}) {}
-
-  std::vector<DescribedCorner> describe(const cv::Mat& image) {
-    pyramid_.build(image);
-    std::vector<DescribedCorner> corners;
-    selector_.select(pyramid_, corners);
-    describer_.describe(pyramid_, corners);
-    return corners;
-  }
-
- private:
-  CornerSelector selector_;
-  CornerDescriber describer_;
-  ImagePyramid pyramid_;
-};
-
-/// A photograph as a whole, and its quarters at twice the scale if it has the pixels: one image would show a
-/// few things only, and only as they look from afar.
-template <class Use>
-void use_photograph(const cv::Mat& image, const Use& use) {
-  use(reduced(image));
-  if (std::max(image.cols, image.rows) < 2 * kTrainingSide) return;
-  const cv::Size half(image.cols / 2, image.rows / 2);
-  for (const cv::Point corner : {cv::Point(0, 0), cv::Point(half.width, 0), cv::Point(0, half.height),
-                                 cv::Point(half.width, half.height)}) {
-    use(reduced(image(cv::Rect(corner, half))));
-  }
-}
-
-/// Calls `use` with each image of an input: an image file, a folder of images, or a source of frames.
-template <class Use>
-void for_each_image(const std::string& input, int every, const Use& use) {
-  if (fs::is_regular_file(input)) return use_photograph(read_grey_image(input), use);
-  if (fs::is_directory(input)) {
-    const std::vector<fs::path> files = list_images(input);
-    for (std::size_t i = 0; i < files.size(); i += static_cast<std::size_t>(every)) {
-      use_photograph(read_grey_image(files[i]), use);
-    }
-    return;
-  }
-  const auto source = open_source(input);
-  Frame frame;
-  FrameStatus status;
-  while ((status = source->next(frame)) == FrameStatus::kFrame) {
-    if (frame.index % every == 0) use(frame.left);
-  }
-  if (status == FrameStatus::kError) throw IoError(source->error());
 }
 
 void train(const TrainArguments& arguments) {
@@ -194,28 +132,37 @@ void add_evaluate(CLI::App& parent, const std::shared_ptr<std::string>& file, in
   });
 }
 
-}  // namespace
-
-void add_vocabulary_command(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("vocabulary", "Visual words: train, inspect, try");
-  command->require_subcommand(1);
-  auto file = std::make_shared<std::string>();
-  command->add_option("--vocabulary", *file, "Vocabulary file instead of the built-in one");
-  add_train(*command, exit_code);
-  CLI::App* info = command->add_subcommand("info", "Size and weights");
-  info->callback([file, &exit_code] {
+void add_info(CLI::App& parent, const std::shared_ptr<std::string>& file, int& exit_code) {
+  CLI::App* command = parent.add_subcommand("info", "Size and weights");
+  command->callback([file, &exit_code] {
     print_info(*file);
     exit_code = kOk;
   });
-  CLI::App* score = command->add_subcommand("score", "Likeness of two images, 0 to 1");
+}
+
+void add_score(CLI::App& parent, const std::shared_ptr<std::string>& file, int& exit_code) {
   auto images = std::make_shared<std::pair<std::string, std::string>>();
-  score->add_option("A", images->first, "image file")->required();
-  score->add_option("B", images->second, "image file")->required();
-  score->callback([file, images, &exit_code] {
+  CLI::App* command = parent.add_subcommand("score", "Likeness of two images, 0 to 1");
+  command->add_option("A", images->first, "image file")->required();
+  command->add_option("B", images->second, "image file")->required();
+  command->callback([file, images, &exit_code] {
     print_score(*file, images->first, images->second);
     exit_code = kOk;
   });
-  add_evaluate(*command, file, exit_code);
 }
 
+}  // namespace
 }  // namespace twofold
+
+int main(int argc, char** argv) {
+  CLI::App app{"Visual words for Twofold: train, inspect, evaluate", "twofold-vocabulary"};
+  app.require_subcommand(1);
+  auto file = std::make_shared<std::string>();
+  app.add_option("--vocabulary", *file, "Vocabulary file instead of the built-in one");
+  int exit_code = twofold::kOk;
+  twofold::add_train(app, exit_code);
+  twofold::add_info(app, file, exit_code);
+  twofold::add_score(app, file, exit_code);
+  twofold::add_evaluate(app, file, exit_code);
+  return twofold::run_command_line(app, argc, argv, exit_code);
+}

@@ -1,4 +1,4 @@
-#include "apps/twofold/place_set.hpp"
+#include "apps/vocabulary/place_set.hpp"
 
 #include <algorithm>
 #include <cmath>

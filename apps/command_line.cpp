@@ -1,0 +1,55 @@
+#include "apps/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/core/utils/logger.hpp>
+
+#include <fmt/format.h>
+
+#include "graph/map_file.hpp"
+#include "io/files/io_error.hpp"
+
+namespace twofold {
+namespace {
+
+/// Errors are reported once, by us: the image and video decoders stay quiet.
+void silence_decoders() {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // AV_LOG_QUIET
+}
+
+/// Rectification and descriptors call OpenCV from the reader's and the loop closer's threads. Threads of its
+/// own beside them would be scheduled on the tracker's core.
+void forbid_hidden_threads() {
+  cv::setNumThreads(1);
+}
+
+/// One line, whatever the library put into its message.
+int report(const CLI::App& app, const std::string& what, int exit_code) {
+  fmt::print(stderr, "{}: {}\n", app.get_name(), what.substr(0, what.find('\n')));
+  return exit_code;
+}
+
+}  // namespace
+
+int run_command_line(CLI::App& app, int argc, char** argv, const int& exit_code) {
+  silence_decoders();
+  forbid_hidden_threads();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);  // --help
+    const std::string hint = argc == 1 ? "; " + app.get_name() + " --help lists them" : "";
+    return report(app, e.what() + hint, kBadInput);
+  } catch (const IoError& e) {
+    return report(app, e.what(), kBadInput);
+  } catch (const MapFileError& e) {
+    return report(app, e.what(), kBadInput);
+  } catch (const std::exception& e) {
+    return report(app, e.what(), kFailedRun);
+  }
+  return exit_code;
+}
+
+}  // namespace twofold
