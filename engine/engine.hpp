@@ -11,8 +11,8 @@
 namespace twofold {
 
 enum class FeedStatus : std::uint8_t { kFrame, kEnd, kError };
-/// Fills the next frame. The images belong to the engine until the next call but one for the same Frame
-/// object.
+/// Fills the next frame. The engine reads its images until it passes the same Frame object again, and may
+/// pass others in between: a feed that reuses its image buffers needs a set of them for each object.
 using FrameFeed = std::function<FeedStatus(Frame&)>;
 
 /// State of a run for a progress line.

@@ -36,7 +36,7 @@ constexpr std::int64_t latency_bucket_begin_ns(std::size_t bucket) {
 ///
 /// Roles: one thread records. Others may read at any time: every word is a relaxed atomic with that single
 /// writer, so there is no data race, no count ever shrinks, and the reads of one moment may differ by the
-/// record under way. No order stronger than optimised is needed, because no other memory is published by
+/// record under way. No order stronger than relaxed is needed, because no other memory is published by
 /// these words. For exact figures read after joining the recording thread. record: wait-free, no allocation,
 /// no read-modify-write instruction.
 class LatencyHistogram {

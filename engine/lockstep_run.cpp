@@ -62,7 +62,7 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
       return;
     }
     if (step.effort_level >= kEffortLevels) {
-      fail("the schedule has a effort level that this program does not know");
+      fail("the schedule has an effort level that this program does not know");
       return;
     }
     if (step.fate == TrackerStep::Fate::kDropped) {

@@ -22,7 +22,7 @@ class LockstepRun {
   [[nodiscard]] RunResult finish();
 
  private:
-  /// `step` says what the frame meets: effort, answers, whether a keyframe may be made and is refused.
+  /// `step` says what the frame meets: effort level, answers, whether a keyframe may be made and is refused.
   void track(const Frame& frame, const TrackerStep& step);
   void answer_request(const GraphSnapshot& graph);
   void map(std::size_t proposals, std::size_t loop_messages);

@@ -40,7 +40,7 @@ struct EngineOptions {
   EffortOptions effort;              ///< of threaded runs that keep a pace
 
   std::size_t frame_slots = 8;     ///< frames decoded ahead, or waiting, at most
-  std::size_t proposal_slots = 4;  ///< keyframe proposals under way between the threads, a power of two
+  std::size_t proposal_slots = 4;  ///< proposals waiting for the mapper at most, rounded up to a power of two
 
   std::optional<int> tracker_cpu;  ///< pin the threads to these, >= 0
   std::optional<int> mapper_cpu;

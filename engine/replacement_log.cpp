@@ -12,23 +12,23 @@ void ReplacementLog::add(KeyframeId culled, const GraphSnapshot& graph) {
 }
 
 void ReplacementLog::hang_on_live_keyframes(std::vector<FrameRecord>& frames) const {
-  // An replacement that was culled too was culled later: from the newest entry back, live_replacements of
-  // replacements are known.
-  std::vector<GraphSnapshot::LiveReplacement> live_replacements(entries_.size());
+  // A replacement that was culled too was culled later: from the newest entry back, the keyframe that stands
+  // for a replacement is known already.
+  std::vector<GraphSnapshot::LiveReplacement> live(entries_.size());
   IdMap position;
   for (std::size_t n = entries_.size(); n-- > 0;) {
     const Entry& entry = entries_[n];
-    live_replacements[n] = {entry.replacement, entry.T_id_replacement.unpacked()};
+    live[n] = {entry.replacement, entry.T_id_replacement.unpacked()};
     if (const int at = position.find(entry.replacement); at >= 0) {
-      const auto& [id, T_replacement_live] = live_replacements[static_cast<std::size_t>(at)];
-      live_replacements[n] = {id, live_replacements[n].T_this_live * T_replacement_live};
+      const auto& [id, T_replacement_live] = live[static_cast<std::size_t>(at)];
+      live[n] = {id, live[n].T_this_live * T_replacement_live};
     }
     position.set(entry.id, static_cast<int>(n));
   }
   for (FrameRecord& frame : frames) {
     const int at = position.find(frame.reference);
     if (at < 0) continue;
-    const auto& [id, T_ref_live] = live_replacements[static_cast<std::size_t>(at)];
+    const auto& [id, T_ref_live] = live[static_cast<std::size_t>(at)];
     frame.reference = id;
     frame.T_c_ref = PackedPose(frame.T_c_ref.unpacked() * T_ref_live);
   }

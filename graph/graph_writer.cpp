@@ -174,8 +174,8 @@ void GraphWriter::shorten_replacements(KeyframeId id) {
 }
 
 /// No replacement that is kept leads to one that is forgotten: whatever hung on a keyframe when that was
-/// culled is before it in the queue, and so is looked at, and hung on a live_replacement, before that one's
-/// own turn comes.
+/// culled is before it in the queue, and so is looked at, and hung on a keyframe that is not culled,
+/// before that one's own turn comes.
 void GraphWriter::forget_replacements(std::size_t keep, std::size_t visits) {
   for (std::size_t n = std::min(visits, replacements_.size()); n > 0; --n) {
     const Kept kept = replacements_.front();
@@ -190,7 +190,7 @@ void GraphWriter::forget_replacements(std::size_t keep, std::size_t visits) {
   }
 }
 
-/// Of a graph made elsewhere, in any order: first all are hung on live_replacements.
+/// Of a graph made elsewhere, in any order: first all are hung on keyframes that are not culled.
 void GraphWriter::list_replacements() {
   replacements_.clear();
   for (std::uint32_t k = 0; k < graph_.keyframe_count(); ++k) {

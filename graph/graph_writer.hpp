@@ -29,8 +29,8 @@ class GraphWriter {
 
   /// Appends a keyframe; its id must be graph().keyframe_count(). Lists may be null and are then empty.
   void add_keyframe(Keyframe keyframe);
-  /// Appends a keyframe that was culled; `replacement` may be added later, or none: Replacement{}. To be
-  /// followed by keep_needed_replacements.
+  /// Appends a keyframe that was culled. The keyframe `replacement` names may be appended later;
+  /// Replacement{} says that it is forgotten. Call keep_needed_replacements when all are there.
   void add_culled_keyframe(const Replacement& replacement);
   /// Appends a point without observers; ids skipped by the tracker are filled with culled points.
   void add_point(PointId id, MapPoint point);
@@ -63,16 +63,17 @@ class GraphWriter {
   /// known until it is forgotten. Points anchored in it keep anchor, psi and appearance: the anchor's frame
   /// goes along with the replacement (GraphSnapshot::T_k_w). The reference keyframe cannot be culled.
   void cull_keyframe(KeyframeId id, KeyframeId replacement);
-  /// Lets a culled keyframe hang directly on the one that stayed. Its pose is the same; asking for it no
-  /// longer walks along all that were culled in between.
+  /// Makes the first keyframe along a culled one's chain of replacements that is not culled its replacement.
+  /// Its pose stays; asking for it no longer walks along the chain.
   void shorten_replacements(KeyframeId id);
 
-  /// Forgets replacements that nobody asks for any more: of keyframes that were culled before the newest
-  /// `keep` and have no point left. Looks at `visits` of the oldest at most, in turn; when called with more
-  /// visits than keyframes are culled, replacements are hardly more than `keep` and the anchors of living
-  /// points.
+  /// Forgets the replacements of culled keyframes that no living point is anchored in, but for the `keep`
+  /// culled last. Looks at no more than `visits` of them, the oldest first, and goes on from there in the
+  /// next call. Called with more visits than keyframes were culled since the last call, it keeps the number
+  /// of replacements near `keep` plus that of culled anchors.
   void forget_replacements(std::size_t keep, std::size_t visits = 8);
-  /// Forgets all replacements but those of anchors of living points. Cost grows with the map.
+  /// Forgets all replacements but those of keyframes that living points are anchored in. Cost grows with the
+  /// map.
   void keep_needed_replacements() {
     list_replacements();
     forget_replacements(0, replacements_.size());

@@ -4,9 +4,10 @@
 
 namespace twofold {
 
-/// Both number from 0 without gaps and never change their meaning. The tracker hands them out when it
-/// proposes.
+/// Number of a keyframe in its map: the first is 0, the next one 1. It never stands for another keyframe,
+/// even after this one was culled. The tracker chooses it when it proposes the keyframe.
 enum class KeyframeId : std::uint32_t {};
+/// The same for points; a point gets its number when it is found in a second keyframe.
 enum class PointId : std::uint32_t {};
 
 inline constexpr KeyframeId kNoKeyframe{0xffffffffU};

@@ -50,13 +50,13 @@ struct Keyframe {
   std::int64_t frame_index = 0;
   std::int64_t t_ns = 0;
   std::uint32_t anchored = 0;  ///< points whose anchor it is; counted by GraphWriter
-  SE3 T_k_w;                ///< absolute pose; accurate relative to its neighbours, not globally (manifold)
+  SE3 T_k_w;  ///< absolute pose: accurate relative to its neighbours, less so to distant keyframes
   double median_depth = 0;  ///< of the points it sees [m]
   std::shared_ptr<const ObservationList> observations = no_observations();
   std::shared_ptr<const EdgeList> edges = no_edges();
 
-  /// Nothing remains of a culled keyframe but, for some time, its Replacement: all the above reads as in
-  /// Keyframe{}. Ask GraphSnapshot for its pose and its part.
+  /// The fields of a culled keyframe are those of Keyframe{}. For as long as its Replacement is kept,
+  /// GraphSnapshot still knows its pose (T_k_w) and its part.
   [[nodiscard]] bool culled() const { return id == kNoKeyframe; }
 };
 
@@ -78,8 +78,8 @@ class PackedPose {
   std::array<double, 7> values_;  ///< quaternion (x, y, z, w), translation
 };
 
-/// What remains of a culled keyframe for as long as somebody may ask (GraphWriter::forget_replacements): its
-/// pose relative to one that stayed, which may be culled itself later.
+/// The keyframe that stands for a culled one, with the culled one's pose relative to it. It may be culled
+/// later itself. Kept for as long as somebody may ask (GraphWriter::forget_replacements).
 struct Replacement {
   KeyframeId id = kNoKeyframe;  ///< kNoKeyframe: forgotten
   std::uint32_t anchored = 0;   ///< points that are still anchored in the culled keyframe

@@ -42,7 +42,7 @@ enum class Section : std::uint32_t { kEnd = 0, kHead = 1, kKeyframes = 2, kPoint
 enum class EntryKind : std::uint8_t {
   kForgotten,  ///< culled: nothing
   kCulled,     ///< replacement
-  kKeyframe,   ///< all but an replacement
+  kKeyframe,   ///< all but a replacement
 };
 
 // Slices of the map a section holds at most: what reader and writer keep in memory beside the map.

@@ -7,16 +7,16 @@
 
 namespace twofold {
 
-/// Effort levels, in the order in which work is left out. Each keeps what the ones before it left
-/// out.
+/// How much work the tracker does on a frame, from most to least. Each level leaves out what is listed beside
+/// it, and all that the levels above it leave out.
 enum class EffortLevel : std::uint8_t {
   kEverything,
   kFewerPoints,      ///< half of the points are searched
   kCoarseAlignment,  ///< dense alignment stops two levels above the finest, and starts once only
-  kFewerIterations,  ///< a third of the solver's and the patch search's iterations; keyframes only when
-                     ///< tracking would soon be lost without: they are the dearest frames, and the mapper
-                     ///< that works on them wants the same processors
-  kDropFrames,       ///< as before; frames whose successor is due are dropped, if the policy allows it
+  kFewerIterations,  ///< a third of the solver's and the patch search's iterations; keyframes, unless
+                     ///< tracking would soon be lost without one: they are the most expensive frames, and the
+                     ///< mapper, which works on them, needs the same processors
+  kDropFrames,       ///< frames whose successor is due, if LatePolicy allows it
   kCount
 };
 inline constexpr int kEffortLevels = static_cast<int>(EffortLevel::kCount);

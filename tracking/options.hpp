@@ -29,10 +29,11 @@ struct TrackerOptions {
 
   double keyframe_parallax = 0.09;  ///< |t| over median depth since the reference keyframe
   double keyframe_share = 0.65;     ///< of the reference's points still tracked: below it a keyframe is due
-  double keyframe_empty =
-      0.5;  ///< share of image cells with corners' room but no tracked point: above it one is due
-  double urgent_share = 0.35;  ///< below it a keyframe is due even while the mapper is behind
-  int max_pending = 2;         ///< proposals not yet in the map that do not hold back the next one
+  /// A keyframe is due when fewer than 1 - keyframe_empty of the image regions that held a tracked point at
+  /// the last keyframe still hold one.
+  double keyframe_empty = 0.5;
+  double urgent_share = 0.35;  ///< as keyframe_share; below it a keyframe is due whatever max_pending says
+  int max_pending = 2;         ///< with so many proposals on their way to the map no further one is made
 
   int corner_threshold = 10;    ///< FAST [grey]
   int corner_levels = 3;        ///< levels on which new points are started

@@ -1,5 +1,5 @@
-// Dense alignment and motion-only bundle adjustment as the tracker calls them, on each effort of the load
-// effort levels, and the tracker as a whole.
+// Dense alignment and motion-only bundle adjustment as the tracker calls them, on each effort level,
+// and the tracker as a whole.
 #include <benchmark/benchmark.h>
 
 #include <random>
