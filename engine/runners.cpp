@@ -34,7 +34,7 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
   }
   version_counter_ = times_.add_counter("snapshot version");
   effort_counter_ = times_.add_counter("effort level");
-  if (options.map) tracker_.continue_in(options.map->graph);
+  if (options.map) tracker_.continue_from(options.map->graph);
 }
 
 bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort,
@@ -120,7 +120,7 @@ void TrackerRunner::finish(std::int64_t scheduled_ns, std::int64_t now_ns, Frame
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
     : mapper_(rig, options.mapper), may_change_(!options.localise_only), times_("mapper", trace) {
   round_stage_ = times_.add_stage("round");
-  if (options.map) mapper_.adopt(options.map->graph);
+  if (options.map) mapper_.continue_from(options.map->graph);
 }
 
 MapperRound MapperRunner::step(std::span<const ProposalHandle> proposals,
@@ -164,7 +164,7 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
   pose_graph_stage_ = times_.add_stage("pose graph");
   relocalise_stage_ = times_.add_stage("relocalisation");
   if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
-  if (closer_ && options.map) closer_->adopt(options.map->places);
+  if (closer_ && options.map) closer_->continue_from(options.map->places);
 }
 
 std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {

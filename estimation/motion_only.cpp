@@ -64,7 +64,7 @@ struct RoundResult {
   bool converged = false;
 };
 
-/// Levenberg-Marquardt over T with the set of observations held.
+/// Levenberg-Marquardt over T with the set of observations fixed.
 RoundResult run_round(const MotionCost& cost, bool inliers_only, const MotionOnlyOptions& options, SE3& T) {
   MotionEquations current = cost.evaluate(T, inliers_only);
   if (current.used < kMinObservations) return {};

@@ -148,8 +148,8 @@ void PoseElimination::eliminate(int i) {
   }
 }
 
-std::optional<double> PoseElimination::step(const WindowSolverOptions& options, const Values& values,
-                                            double lambda, Values& next) {
+std::optional<double> PoseElimination::advance(const WindowSolverOptions& options, const Values& values,
+                                               double lambda, Values& next) {
   const int poses = static_cast<int>(values.poses.size()), points = static_cast<int>(values.psi.size());
   blocks_.resize(poses);
   couplings_.resize(18 * observations_.size());

@@ -31,8 +31,8 @@ class PoseElimination {
   [[nodiscard]] double cost(const WindowSolverOptions& options, const Values& values) const;
   /// Step of the damped normal equations from `values` to `next`; returns the decrease of the cost the
   /// quadratic model promises, nullopt when the system is not positive definite.
-  [[nodiscard]] std::optional<double> step(const WindowSolverOptions& options, const Values& values,
-                                           double lambda, Values& next);
+  [[nodiscard]] std::optional<double> advance(const WindowSolverOptions& options, const Values& values,
+                                              double lambda, Values& next);
   /// Points go back to the frames of their anchors.
   void write_back(const Values& values, WindowProblem& problem) const;
 

@@ -89,8 +89,8 @@ double ReducedSystem::smallest_pivot_ratio() const {
   return smallest;
 }
 
-std::optional<double> ReducedSystem::step(const WindowProblem& problem, const WindowState& state,
-                                          double lambda, WindowState& next) {
+std::optional<double> ReducedSystem::advance(const WindowProblem& problem, const WindowState& state,
+                                             double lambda, WindowState& next) {
   pose_steps_.resize(gradient_.size());
   for (std::size_t p = 0; p < gradient_.size(); ++p) pose_steps_[p] = -gradient_[p];
   cholesky_.solve(pose_steps_);

@@ -105,8 +105,8 @@ void WindowLayout::collect_group(const WindowProblem& problem, int anchor, std::
       if (!(depth_row[slot].dot(y) + depth_shift[slot] > 2 * kMinDepth)) continue;
       // Only a measurement that counts couples: a pose all of whose points are behind it has no place in the
       // system.
-      const bool both_held = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
-      slots_[group.first_slot + slot].coupled = o.pose != anchor && !both_held;
+      const bool both_fixed = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
+      slots_[group.first_slot + slot].coupled = o.pose != anchor && !both_fixed;
       observations_.push_back({o.z, o.information, slot, -1});
       ++track.observation_count;
     }
@@ -208,16 +208,16 @@ void WindowLayout::sort_observations(const Group& group) {
 void WindowLayout::find_blocks(Group& group, BlockCholesky& system) {
   Slot* slots = &slots_[group.first_slot];
   int* blocks = blocks_.data() + group.first_block;
-  int held = 0;  // they come first
-  while (held < group.coupled_count && slots[held].position < 0) ++held;
-  std::fill_n(blocks, triangle_size(held), -1);
+  int fixed = 0;  // they come first
+  while (fixed < group.coupled_count && slots[fixed].position < 0) ++fixed;
+  std::fill_n(blocks, triangle_size(fixed), -1);
   rows_.resize(group.coupled_count);
   for (int s = 0; s < group.coupled_count; ++s) rows_[s] = slots[s].position;
   column_blocks_.resize(group.coupled_count);
   for (int column = 0; column < group.coupled_count; ++column) {
     const std::size_t below = group.coupled_count - column;
     const std::span<int> found = std::span(column_blocks_).first(below);
-    if (column < held) {
+    if (column < fixed) {
       std::fill(found.begin(), found.end(), -1);
     } else {
       system.block_indices(rows_[column], std::span(rows_).last(below), found);
@@ -227,7 +227,7 @@ void WindowLayout::find_blocks(Group& group, BlockCholesky& system) {
     }
   }
   if (group.anchor_position < 0) return;
-  for (Slot* slot = slots + held; slot != slots + group.coupled_count; ++slot) {
+  for (Slot* slot = slots + fixed; slot != slots + group.coupled_count; ++slot) {
     slot->anchor_is_row = group.anchor_position > slot->position;
     slot->anchor_block = system.block_index(std::max(group.anchor_position, slot->position),
                                             std::min(group.anchor_position, slot->position));

@@ -24,8 +24,8 @@ class WindowLayout {
   /// Motion of one observing pose against the anchor.
   struct Slot {
     int pose = 0;
-    int position = -1;           ///< in the elimination order; -1: held
-    bool coupled = false;        ///< xi is not always zero: neither the anchor itself nor both poses held
+    int position = -1;           ///< in the elimination order; -1: fixed
+    bool coupled = false;        ///< xi is not always zero: neither the anchor itself nor both poses fixed
     int anchor_block = -1;       ///< block of (slot, anchor) in the reduced system, if both are free
     bool anchor_is_row = false;  ///< that block has the anchor as row
   };
@@ -42,7 +42,7 @@ class WindowLayout {
   };
   struct Group {
     int anchor;           ///< pose
-    int anchor_position;  ///< in the elimination order; -1: held
+    int anchor_position;  ///< in the elimination order; -1: fixed
     int first_slot, slot_count;
     int coupled_count;  ///< coupled slots come first, free ones in elimination order
     int first_track, track_count;
@@ -50,7 +50,7 @@ class WindowLayout {
   };
   /// Where a pose-pose constraint goes in the reduced system.
   struct ConstraintPlace {
-    int i, j;   ///< positions; -1: held
+    int i, j;   ///< positions; -1: fixed
     int block;  ///< of (i, j), or (j, i) if that is the lower one; -1 unless both are free
   };
 
@@ -67,7 +67,7 @@ class WindowLayout {
   /// Slot, in the group, of each entry.
   [[nodiscard]] const std::vector<int>& entry_slots() const { return entry_slots_; }
   [[nodiscard]] const std::vector<ConstraintPlace>& constraints() const { return constraints_; }
-  /// Place of a pose in the elimination order; -1 when it is held or nothing depends on it.
+  /// Place of a pose in the elimination order; -1 when it is fixed or nothing depends on it.
   [[nodiscard]] int position(int pose) const { return position_[pose]; }
 
  private:

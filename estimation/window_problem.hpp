@@ -18,7 +18,7 @@ namespace twofold {
 struct WindowProblem {
   struct Pose {
     SE3 T_k_w;
-    bool fixed = false;  ///< held during optimisation (fixed-rim experiments, structure-only problems)
+    bool fixed = false;  ///< does not move during the optimisation
   };
   /// One measurement of a point; those of one point stand together.
   struct Observation {

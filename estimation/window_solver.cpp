@@ -86,7 +86,7 @@ SolverSummary WindowSolver::Workspace::points_first(WindowProblem& problem,
   const auto try_step = [&](double lambda, double cost) -> Trial {
     system.build(problem, options, state, lambda);
     if (!system.factorise()) return {};
-    return judge(system.step(problem, state, lambda, candidate), cost,
+    return judge(system.advance(problem, state, lambda, candidate), cost,
                  [&] { return window_state_cost(problem, system.layout(), options, state.psi, candidate); });
   };
   const double cost = window_state_cost(problem, system.layout(), options, state.psi, state);
@@ -99,7 +99,7 @@ SolverSummary WindowSolver::Workspace::poses_first(WindowProblem& problem,
                                                    const WindowSolverOptions& options) {
   PoseElimination::Values values = pose_elimination.start(problem), next;
   const auto try_step = [&](double lambda, double cost) {
-    return judge(pose_elimination.step(options, values, lambda, next), cost,
+    return judge(pose_elimination.advance(options, values, lambda, next), cost,
                  [&] { return pose_elimination.cost(options, next); });
   };
   const SolverSummary summary =

@@ -30,7 +30,7 @@ class WindowSolver {
   std::unique_ptr<Workspace> workspace_;
 };
 
-/// Optimises each point alone with all poses held (thesis 6.2.3: "a few iterations of structure-only BA").
+/// Optimises each point alone with all poses fixed (thesis 6.2.3: "a few iterations of structure-only BA").
 /// Points that do not improve stay as they were.
 void optimise_structure(WindowProblem& problem, const WindowSolverOptions& options);
 

@@ -116,7 +116,7 @@ class GaussNewtonFilter {
   double add_measurements(const std::vector<Seen>& seen, MatrixX* Lambda, VectorX* g) const;
   bool joint_update(const std::vector<Seen>& seen, int iterations);
   void absorb(const std::vector<Seen>& seen);
-  [[nodiscard]] bool adopt(const AnchoredViews& views);
+  [[nodiscard]] bool start_from(const AnchoredViews& views);
   [[nodiscard]] Mean mean() const { return {T_c_w_, anchors_, points_}; }
   void set_mean(const Mean& mean);
   void move(const VectorX& delta);

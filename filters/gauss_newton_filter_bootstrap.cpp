@@ -65,7 +65,7 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   // Six unknowns of the motion and three a point, one of them, scale, free.
   views.views.push_back({SE3(), match(b1)});
   if (views.views[0].seen.size() < 6 || !views.minimise(kTwoViewIterations)) return false;
-  if (!views.normalise_scale() || !adopt(views)) return false;
+  if (!views.normalise_scale() || !start_from(views)) return false;
 
   // Third frame: a standard update after the second pose is marginalised; if all goes well, only its start.
   const std::vector<Seen> third = match(first);
@@ -73,7 +73,7 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   views.views.push_back({T_c_w_, third});
   // Two frames of little parallax leave depths and direction of motion too far off to take derivatives at for
   // good. All three are brought to their common minimum, where the information is taken afresh.
-  if (!views.minimise(kThreeViewIterations) || !views.normalise_scale() || !adopt(views)) {
+  if (!views.minimise(kThreeViewIterations) || !views.normalise_scale() || !start_from(views)) {
     append_pose();
     if (!joint_update(third, kThreeViewIterations)) return false;
   }
@@ -83,7 +83,7 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
 
 /// Takes over the views' minimum and information, the second pose, whose distance is the unit of length,
 /// marginalised. False, and nothing changed, if a point is behind a camera.
-bool GaussNewtonFilter::adopt(const AnchoredViews& views) {
+bool GaussNewtonFilter::start_from(const AnchoredViews& views) {
   const MatrixX full = views.information();
   if (full.size() == 0) return false;
   const bool three = views.views.size() == 2;

@@ -31,12 +31,12 @@ void SlidingWindowFilter::set_first_pose(const SE3& T_c_w, const std::optional<M
   if (information) prior_.information = *information;
 }
 
-WindowSummary SlidingWindowFilter::step(const WindowFrame& frame) {
+FilterSummary SlidingWindowFilter::step(const FilterFrame& frame) {
   add(frame);
   return optimise();
 }
 
-void SlidingWindowFilter::add(const WindowFrame& frame) {
+void SlidingWindowFilter::add(const FilterFrame& frame) {
   Pose pose;
   pose.frame = next_frame_++;
   if (poses_.empty()) {
@@ -57,7 +57,7 @@ void SlidingWindowFilter::add(const WindowFrame& frame) {
   add_observations(frame);
 }
 
-void SlidingWindowFilter::add_observations(const WindowFrame& frame) {
+void SlidingWindowFilter::add_observations(const FilterFrame& frame) {
   Pose& pose = poses_.back();
   const SE3 T_l_c = pose.T_c_l.inverse();
   for (const LandmarkObservation& observation : frame.observations) {
@@ -92,11 +92,11 @@ bool SlidingWindowFilter::set_measurement(int pose, std::int64_t id, const Vecto
   return false;
 }
 
-WindowSummary SlidingWindowFilter::optimise() {
+FilterSummary SlidingWindowFilter::optimise() {
   return optimise(options_.max_iterations);
 }
 
-WindowSummary SlidingWindowFilter::optimise(int max_iterations) {
+FilterSummary SlidingWindowFilter::optimise(int max_iterations) {
   summary_.iterations = summary_.factorisations = 0;
   summary_.converged = false;
   huber_ = 0;
@@ -213,11 +213,11 @@ void SlidingWindowFilter::move_frame() {
   shift_.setZero();
 }
 
-std::optional<WindowCovariances> SlidingWindowFilter::covariances() {
+std::optional<FilterCovariances> SlidingWindowFilter::covariances() {
   build_equations();
   factor_serves_ = factor_.factorise(equations_, 0.0);
   if (!factor_serves_) return std::nullopt;
-  WindowCovariances result = factor_.covariances();
+  FilterCovariances result = factor_.covariances();
   const Matrix3 R_w_l = T_w_l_.rotation();
   for (Matrix3& C : result.landmarks) C = R_w_l * C * R_w_l.transpose();
   if (oldest_fixed_ && !result.poses.empty()) result.poses.front().setZero();

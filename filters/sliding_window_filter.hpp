@@ -21,7 +21,7 @@ enum class PoseRemoval : std::uint8_t {
   kMarginaliseDiagonal,  ///< VSDF: only the blocks of the Schur complement on the diagonal  (eq. 12)
   kMarginaliseEntries,   ///< eq. 12 as printed, single entries of the diagonal: what is left need not be
                          ///< positive definite, and is not once depth is much less certain than direction
-  kDelete  ///< visual odometry: its information is dropped, the oldest pose left is held fixed (4.2.4)
+  kDelete  ///< visual odometry: its information is dropped, the oldest pose left is fixed (4.2.4)
 };
 
 struct SlidingWindowOptions {
@@ -56,13 +56,13 @@ struct LandmarkObservation {
       Matrix3::Identity();  ///< R^-1 [1/px^2]; for a left-only z the top-left 2 x 2 block counts
 };
 
-struct WindowFrame {
+struct FilterFrame {
   std::optional<MotionInput> motion;  ///< from the previous frame; none: uniform prior on the pose
   std::optional<SE3> T_c_w_start;     ///< start value when there is no motion; default: the previous pose
   std::vector<LandmarkObservation> observations;  ///< at most one a landmark
 };
 
-struct WindowSummary {
+struct FilterSummary {
   int iterations = 0;
   int factorisations = 0;
   bool converged = false;  ///< stop_decrement reached; otherwise the best state found is kept
@@ -97,17 +97,17 @@ class SlidingWindowFilter {
   SlidingWindowFilter(const Rig& rig, const SlidingWindowOptions& options);
 
   /// First pose and its prior information (gauge). Call once, before the first step.
-  /// `information` none: the first pose is held fixed while it is in the window; its removal then leaves the
+  /// `information` none: the first pose is fixed while it is in the window; its removal then leaves the
   /// landmarks the information they have relative to it.
   void set_first_pose(const SE3& T_c_w, const std::optional<Matrix6>& information);
 
   /// One time step  (SWF 3.1): add the pose, remove parameters, add landmarks, update.
-  WindowSummary step(const WindowFrame& frame);
+  FilterSummary step(const FilterFrame& frame);
   /// The steps without the update, for callers that optimise once at the end.
-  void add(const WindowFrame& frame);
-  WindowSummary optimise();
+  void add(const FilterFrame& frame);
+  FilterSummary optimise();
   /// At most so many Gauss-Newton steps; for callers that measure again in between.
-  WindowSummary optimise(int max_iterations);
+  FilterSummary optimise(int max_iterations);
 
   [[nodiscard]] int pose_count() const { return static_cast<int>(poses_.size()); }
   [[nodiscard]] int landmark_count() const { return static_cast<int>(landmarks_.size()); }
@@ -128,9 +128,9 @@ class SlidingWindowFilter {
   /// In the frame l of the window.
   [[nodiscard]] const FilterPrior& prior() const { return prior_; }
 
-  /// Covariances at the current estimate, in the order of pose(i) and landmark(i); zero for a held pose. None
-  /// when the information matrix is singular.
-  [[nodiscard]] std::optional<WindowCovariances> covariances();
+  /// Covariances at the current estimate, in the order of pose(i) and landmark(i); zero for a fixed pose.
+  /// None when the information matrix is singular.
+  [[nodiscard]] std::optional<FilterCovariances> covariances();
 
   /// Replaces a measurement of a frame in the window, number of poses as for T_c_w(); false when that frame
   /// does not see the landmark.
@@ -158,7 +158,7 @@ class SlidingWindowFilter {
     bool valid = false;
   };
 
-  void remove_oldest(const WindowFrame& frame);
+  void remove_oldest(const FilterFrame& frame);
   void delete_oldest(const std::vector<bool>& drop);
   void marginalise_oldest(const std::vector<bool>& drop);
   struct Blanket;
@@ -170,8 +170,8 @@ class SlidingWindowFilter {
   /// Sizes of the diagonal blocks of the fill-in that the sparse filters keep: kept landmarks, next pose.
   [[nodiscard]] std::vector<int> fill_in_blocks(std::size_t landmarks) const;
   void compact_landmarks(const std::vector<int>& order);
-  void add_observations(const WindowFrame& frame);
-  void fit_newest_pose(const WindowFrame& frame);
+  void add_observations(const FilterFrame& frame);
+  void fit_newest_pose(const FilterFrame& frame);
   [[nodiscard]] ObservationTerm linearise(int pose, const Observation& observation) const;
   [[nodiscard]] MotionError linearise_motion(int pose) const;
   [[nodiscard]] double whitened_chi2(int pose, const Observation& observation) const;
@@ -217,8 +217,8 @@ class SlidingWindowFilter {
   std::int64_t next_frame_ = 0;
   SE3 first_T_c_w_;
   double huber_ = 0;  ///< threshold on the whitened residual norm; 0: none
-  WindowSummary summary_;
-  WindowEquations equations_;
+  FilterSummary summary_;
+  FilterEquations equations_;
   FilterFactor factor_;
   bool factor_serves_ = false;  ///< factor_ is of this frame's state, at some estimate of it
   FilterStep step_;

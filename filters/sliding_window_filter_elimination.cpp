@@ -44,7 +44,7 @@ MatrixX inverse_from(const MatrixX& L) {
 
 }  // namespace
 
-void FilterFactor::group_by_landmark(const WindowEquations& eq) {
+void FilterFactor::group_by_landmark(const FilterEquations& eq) {
   const int free = n_ - n_prior_;
   first_.assign(static_cast<std::size_t>(free) + 1, 0);
   for (const auto& c : eq.couplings) {
@@ -63,7 +63,7 @@ void FilterFactor::group_by_landmark(const WindowEquations& eq) {
 }
 
 // Order of the reduced system: [prior landmarks | poses].
-bool FilterFactor::factorise_map_onto_path(const WindowEquations& eq, double damping) {
+bool FilterFactor::factorise_map_onto_path(const FilterEquations& eq, double damping) {
   const int p0 = 3 * n_prior_;
   S_.setZero(p0 + 6 * m_, p0 + 6 * m_);
   if (m_ > 0) S_.topLeftCorner(p0 + 6, p0 + 6) = eq.prior;  // pose 0 follows the prior landmarks
@@ -125,12 +125,12 @@ void FilterFactor::solve_map_onto_path(const std::vector<Vector6>& gp, const std
 }
 
 // Of the inverse L^-T L^-1 only the pose block and the diagonal blocks of the prior landmarks are needed.
-WindowCovariances FilterFactor::covariances_map_onto_path() const {
+FilterCovariances FilterFactor::covariances_map_onto_path() const {
   const int p0 = 3 * n_prior_;
   const MatrixX Y = inverse_factor(S_);
   const auto Y_poses = Y.bottomRightCorner(6 * m_, 6 * m_);
   const MatrixX poses = Y_poses.transpose() * Y_poses;
-  WindowCovariances result;
+  FilterCovariances result;
   for (int j = 0; j < m_; ++j) result.poses.push_back(poses.block<6, 6>(6 * j, 6 * j));
   for (int l = 0; l < n_prior_; ++l) {
     const auto Y_l = Y.block(3 * l, 3 * l, p0 + 6 * m_ - 3 * l, 3);
@@ -151,7 +151,7 @@ WindowCovariances FilterFactor::covariances_map_onto_path() const {
 }
 
 // Poses are eliminated in the order of time; each passes its information to the next one and to the map.
-bool FilterFactor::factorise_path_onto_map(const WindowEquations& eq, double damping) {
+bool FilterFactor::factorise_path_onto_map(const FilterEquations& eq, double damping) {
   const int p0 = 3 * n_prior_;
   S_.setZero(3 * n_, 3 * n_);
   if (m_ > 0) S_.topLeftCorner(p0, p0) = eq.prior.topLeftCorner(p0, p0);
@@ -208,9 +208,9 @@ void FilterFactor::solve_path_onto_map(const std::vector<Vector6>& gp, const std
   }
 }
 
-WindowCovariances FilterFactor::covariances_path_onto_map() const {
+FilterCovariances FilterFactor::covariances_path_onto_map() const {
   const MatrixX map = inverse_from(S_);
-  WindowCovariances result;
+  FilterCovariances result;
   for (int l = 0; l < n_; ++l) result.landmarks.push_back(map.block<3, 3>(3 * l, 3 * l));
   result.poses.resize(static_cast<std::size_t>(m_));
   // x_j = L^-T (y - Y_E x_j+1 - Y_W x_map): carry cov(x_j, map) backwards along the chain.

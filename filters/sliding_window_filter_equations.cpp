@@ -4,7 +4,7 @@
 
 namespace twofold {
 
-void WindowEquations::reset(int poses, int landmarks) {
+void FilterEquations::reset(int poses, int landmarks) {
   U.assign(static_cast<std::size_t>(poses), Matrix6::Zero());
   E.assign(static_cast<std::size_t>(std::max(0, poses - 1)), Matrix6::Zero());
   V.assign(static_cast<std::size_t>(landmarks), Matrix3::Zero());

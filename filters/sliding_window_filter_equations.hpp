@@ -15,7 +15,7 @@ using Matrix63 = Eigen::Matrix<double, 6, 3>;
 /// Unknowns: n landmarks (3 each) and m poses (6 each). The pose block is block tridiagonal (U, E), the
 /// measurement part of the map block is block diagonal (V), the observation block is sparse (W), and the
 /// prior is dense over the first `prior_landmarks` landmarks and pose 0.
-struct WindowEquations {
+struct FilterEquations {
   struct Coupling {  ///< W: block of pose and landmark, 6 x 3
     int pose = 0;
     int landmark = 0;
@@ -42,7 +42,7 @@ struct FilterStep {
   std::vector<Vector3> landmarks;
 };
 
-struct WindowCovariances {
+struct FilterCovariances {
   std::vector<Matrix6> poses;
   std::vector<Matrix3> landmarks;
 };

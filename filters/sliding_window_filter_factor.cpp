@@ -11,7 +11,7 @@ double cubed(double x) {
 
 }  // namespace
 
-bool FilterFactor::factorise(const WindowEquations& eq, double damping, Order order) {
+bool FilterFactor::factorise(const FilterEquations& eq, double damping, Order order) {
   m_ = eq.pose_count();
   n_ = eq.landmark_count();
   n_prior_ = eq.prior_landmarks;
@@ -38,7 +38,7 @@ void FilterFactor::solve(const std::vector<Vector6>& gp, const std::vector<Vecto
   }
 }
 
-WindowCovariances FilterFactor::covariances() const {
+FilterCovariances FilterFactor::covariances() const {
   TWOFOLD_CHECK(order_ != Order::kCheaper, "factorise() first");
   return order_ == Order::kMapOntoPath ? covariances_map_onto_path() : covariances_path_onto_map();
 }

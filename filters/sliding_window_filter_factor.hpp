@@ -6,7 +6,7 @@
 
 namespace twofold {
 
-/// Direct solution of WindowEquations by one of two elimination orders, whichever takes fewer operations:
+/// Direct solution of FilterEquations by one of two elimination orders, whichever takes fewer operations:
 ///  * map onto path: landmarks that no prior couples are eliminated one by one, then the poses and the
 ///    landmarks of the prior are factorised densely, O((6m + 3 n_prior)^3 + tracks);
 ///  * path onto map: poses are eliminated along the chain, then the map is factorised, O(6m (3n)^2 + (3n)^3).
@@ -16,25 +16,25 @@ class FilterFactor {
   enum class Order { kCheaper, kMapOntoPath, kPathOntoMap };
 
   /// False when the equations (with `damping` added to the diagonal) are not positive definite.
-  [[nodiscard]] bool factorise(const WindowEquations& equations, double damping,
+  [[nodiscard]] bool factorise(const FilterEquations& equations, double damping,
                                Order order = Order::kCheaper);
   /// Solves for the given right-hand side with the factor of the last successful factorise().
   void solve(const std::vector<Vector6>& g_poses, const std::vector<Vector3>& g_landmarks,
              FilterStep& step) const;
   /// Diagonal blocks of the inverse.
-  [[nodiscard]] WindowCovariances covariances() const;
+  [[nodiscard]] FilterCovariances covariances() const;
   [[nodiscard]] Order order() const { return order_; }
 
  private:
-  bool factorise_map_onto_path(const WindowEquations& eq, double damping);
-  bool factorise_path_onto_map(const WindowEquations& eq, double damping);
+  bool factorise_map_onto_path(const FilterEquations& eq, double damping);
+  bool factorise_path_onto_map(const FilterEquations& eq, double damping);
   void solve_map_onto_path(const std::vector<Vector6>& gp, const std::vector<Vector3>& gm,
                            FilterStep& step) const;
   void solve_path_onto_map(const std::vector<Vector6>& gp, const std::vector<Vector3>& gm,
                            FilterStep& step) const;
-  [[nodiscard]] WindowCovariances covariances_map_onto_path() const;
-  [[nodiscard]] WindowCovariances covariances_path_onto_map() const;
-  void group_by_landmark(const WindowEquations& eq);
+  [[nodiscard]] FilterCovariances covariances_map_onto_path() const;
+  [[nodiscard]] FilterCovariances covariances_path_onto_map() const;
+  void group_by_landmark(const FilterEquations& eq);
 
   struct FreeCoupling {
     int pose;

@@ -6,7 +6,7 @@
 
 namespace twofold {
 
-void SlidingWindowFilter::remove_oldest(const WindowFrame& frame) {
+void SlidingWindowFilter::remove_oldest(const FilterFrame& frame) {
   const auto n = static_cast<std::size_t>(landmark_count());
   for (const Observation& o : poses_.front().observations)
     --landmarks_[static_cast<std::size_t>(o.landmark)].observations;

@@ -89,7 +89,7 @@ SE3 minimise(const PoseCost& cost, SE3 T_c_l) {
 
 }  // namespace
 
-void SlidingWindowFilter::fit_newest_pose(const WindowFrame& frame) {
+void SlidingWindowFilter::fit_newest_pose(const FilterFrame& frame) {
   std::vector<KnownLandmark> known;
   for (const LandmarkObservation& o : frame.observations) {
     const auto found = index_.find(o.landmark);

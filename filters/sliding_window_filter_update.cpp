@@ -85,7 +85,7 @@ MotionError SlidingWindowFilter::linearise_motion(int pose) const {
 }
 
 void SlidingWindowFilter::build_equations() {
-  WindowEquations& eq = equations_;
+  FilterEquations& eq = equations_;
   eq.reset(pose_count(), landmark_count());
   eq.prior_landmarks = prior_.landmark_count();
   eq.prior = prior_.information;
@@ -102,7 +102,7 @@ void SlidingWindowFilter::build_equations() {
 
 /// L^T Pi L and its right-hand side.
 void SlidingWindowFilter::add_prior() {
-  WindowEquations& eq = equations_;
+  FilterEquations& eq = equations_;
   const VectorX d = prior_.difference(points_, poses_.front().T_c_l, shift_);
   VectorX g = prior_.vector - prior_.information * d;
   if (!first_estimates()) {
@@ -122,7 +122,7 @@ void SlidingWindowFilter::add_prior() {
 
 /// H^T R^-1 H of the measurements of one pose.
 void SlidingWindowFilter::add_measurements(int pose) {
-  WindowEquations& eq = equations_;
+  FilterEquations& eq = equations_;
   const auto p = static_cast<std::size_t>(pose);
   for (const Observation& observation : poses_[p].observations) {
     const ObservationTerm term = linearise(pose, observation);
@@ -141,7 +141,7 @@ void SlidingWindowFilter::add_measurements(int pose) {
 
 /// D^T Q^-1 D of the motion from the pose before.
 void SlidingWindowFilter::add_motion(int pose) {
-  WindowEquations& eq = equations_;
+  FilterEquations& eq = equations_;
   const auto p = static_cast<std::size_t>(pose);
   const MotionError error = linearise_motion(pose);
   const Matrix6 Q_inv = poses_[p].motion->covariance.inverse();

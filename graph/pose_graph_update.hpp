@@ -17,7 +17,7 @@ struct KeyframePose {
 /// good as the version they were computed from, and their world frame is their own.
 struct PoseGraphUpdate {
   std::uint64_t snapshot_version = 0;
-  std::vector<KeyframePose> poses;  ///< first: the keyframe that was held
+  std::vector<KeyframePose> poses;  ///< first: the keyframe that was fixed
 };
 
 }  // namespace twofold

@@ -38,7 +38,7 @@ LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabul
       recogniser_(vocabulary_->word_count(), options.recogniser),
       refinement_(rig, options.refinement) {}
 
-void LoopCloser::adopt(const KeyframeDatabase& places) {
+void LoopCloser::continue_from(const KeyframeDatabase& places) {
   places_ = places;
   bags_.assign(places.size(), {});
   for (std::uint32_t k = 0; k < places.size(); ++k) {

@@ -43,7 +43,7 @@ class LoopCloser {
 
   /// Knows the places of a loaded map from now on. Their words are found anew, so that a map does not depend
   /// on the vocabulary it was made with. To be called before the first step.
-  void adopt(const KeyframeDatabase& places);
+  void continue_from(const KeyframeDatabase& places);
 
   /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be
   /// called in the order of keyframe ids; ids may be left out.

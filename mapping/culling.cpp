@@ -51,7 +51,7 @@ void keep_connected(GraphWriter& writer, KeyframeId id, KeyframeId replacement) 
 
 }  // namespace
 
-int remove_measurements(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers) {
+int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers) {
   std::vector<PointId> points, suspects;
   for (std::size_t n = 0; n < outliers.size(); ++n) {
     points.push_back(outliers[n].point);
@@ -135,7 +135,7 @@ bool PointCuller::in_view(const GraphSnapshot& graph, const MapPoint& point, Poi
          from_anchor.dot(from_here) > kMinViewCosine * from_anchor.norm() * from_here.norm();
 }
 
-int PointCuller::step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const {
+int PointCuller::cull(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const {
   int culled = 0;
   for (const PointId id : points) {
     const MapPoint& point = writer.graph().point(id);

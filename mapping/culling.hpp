@@ -13,7 +13,7 @@ namespace twofold {
 
 /// Removes measurements (sorted by keyframe, then point), and points that are left with fewer than two
 /// observers or lost the measurement of their anchor. Returns the number of points culled.
-int remove_measurements(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers);
+int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers);
 
 /// A keyframe is redundant when `redundant_share` of its points are seen by at least `redundant_observers`
 /// other keyframes on the same or a finer pyramid level.
@@ -37,7 +37,7 @@ class PointCuller {
   PointCuller(const Rig& rig, const CullingOptions& options) : rig_(rig), options_(options) {}
 
   /// Judges the given points by the keyframe that was inserted last. Returns the number of points culled.
-  int step(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const;
+  int cull(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const;
 
  private:
   [[nodiscard]] bool in_view(const GraphSnapshot& graph, const MapPoint& point, PointId id,

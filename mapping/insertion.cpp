@@ -69,7 +69,8 @@ int add_new_points(GraphWriter& writer, const KeyframeProposal& proposal) {
   return added;
 }
 
-void add_measurements(GraphWriter& writer, const KeyframeProposal& proposal, InsertionReport& report) {
+void add_proposed_observations(GraphWriter& writer, const KeyframeProposal& proposal,
+                               InsertionReport& report) {
   std::vector<Observation> accepted;
   accepted.reserve(proposal.observations.size());
   for (const Observation& observation : proposal.observations) {
@@ -122,7 +123,7 @@ InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& pro
   const KeyframeId part = first_of_part ? proposal.id : writer.graph().keyframe(reference).part;
   add_keyframe(writer, proposal, T_k_w, part);
   report.new_points = add_new_points(writer, proposal);
-  add_measurements(writer, proposal, report);
+  add_proposed_observations(writer, proposal, report);
   if (first_of_part || !consistent.contains(reference)) {
     consistent.clear();
     if (!first_of_part) consistent.set(reference, 0);

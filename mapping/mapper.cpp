@@ -44,7 +44,7 @@ Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
 Mapper::Mapper(const Rig& rig, const MapperOptions& options)
     : Mapper(rig, options, guided_point_search(rig, options.loop.search_radius_px)) {}
 
-void Mapper::adopt(const GraphSnapshot& graph) {
+void Mapper::continue_from(const GraphSnapshot& graph) {
   writer_ = GraphWriter(graph);
   // Nothing is known about which absolute poses agree: the first window is set along edges from its
   // reference.
@@ -183,7 +183,7 @@ void Mapper::remove_outliers(MapperReport& report) {
   const StageTime time(report.ms.cull);
   builder_.find_outliers(window_, outliers_);
   report.outliers = static_cast<int>(outliers_.size());
-  report.culled_points += remove_measurements(writer_, outliers_);
+  report.culled_points += remove_outlier_observations(writer_, outliers_);
 }
 
 void Mapper::close_metric_loops(const FrameImages& images, MapperReport& report) {
@@ -196,7 +196,7 @@ void Mapper::close_metric_loops(const FrameImages& images, MapperReport& report)
 void Mapper::cull(MapperReport& report) {
   const StageTime time(report.ms.cull);
   if (options_.culling.points && !inserted_.empty()) {
-    report.culled_points += point_culler_.step(writer_, inserted_.back(), builder_.point_ids());
+    report.culled_points += point_culler_.cull(writer_, inserted_.back(), builder_.point_ids());
   }
   if (options_.culling.keyframes) {
     report.culled_keyframes =
@@ -212,12 +212,12 @@ int Mapper::take_pose_graph(const PoseGraphUpdate& update) {
     position.set(update.poses[n].id, static_cast<int>(n));
   }
   // Window nodes are in breadth-first order around the reference.
-  const auto held = std::find_if(window_.nodes.begin(), window_.nodes.end(), [&](const TreeNode& node) {
+  const auto fixed = std::find_if(window_.nodes.begin(), window_.nodes.end(), [&](const TreeNode& node) {
     return position.contains(node.id) && !graph().keyframe(node.id).culled();
   });
-  if (held == window_.nodes.end()) return 0;
-  const SE3& T_held_optimised = update.poses[static_cast<std::size_t>(position.find(held->id))].T_k_w;
-  const SE3 T_optimised_w = T_held_optimised.inverse() * graph().keyframe(held->id).T_k_w;
+  if (fixed == window_.nodes.end()) return 0;
+  const SE3& T_fixed_optimised = update.poses[static_cast<std::size_t>(position.find(fixed->id))].T_k_w;
+  const SE3 T_optimised_w = T_fixed_optimised.inverse() * graph().keyframe(fixed->id).T_k_w;
   int moved = 0;
   for (const KeyframePose& pose : update.poses) {
     if (window_.contains(pose.id) || graph().keyframe(pose.id).culled()) continue;
@@ -229,7 +229,7 @@ int Mapper::take_pose_graph(const PoseGraphUpdate& update) {
 }
 
 PoseGraphReport Mapper::optimise_all_poses() {
-  return optimised_poses_of_all_parts(writer_, rig_, options_);
+  return optimise_all_parts(writer_, rig_, options_);
 }
 
 }  // namespace twofold

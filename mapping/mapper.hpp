@@ -62,7 +62,7 @@ class Mapper {
   Mapper(const Rig& rig, const MapperOptions& options);
 
   /// Goes on with an existing graph, e.g. a loaded map, instead of the present one.
-  void adopt(const GraphSnapshot& graph);
+  void continue_from(const GraphSnapshot& graph);
 
   /// One round: inserts the proposals (in the order of their ids, which continue the graph's), adds loop
   /// constraints, optimises the double window, closes metric loops, culls.

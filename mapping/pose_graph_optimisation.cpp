@@ -60,8 +60,7 @@ PoseGraphUpdate optimise_part(const GraphSnapshot& graph, KeyframeId root, const
   return update;
 }
 
-PoseGraphReport optimised_poses_of_all_parts(GraphWriter& writer, const Rig& rig,
-                                             const MapperOptions& options) {
+PoseGraphReport optimise_all_parts(GraphWriter& writer, const Rig& rig, const MapperOptions& options) {
   PoseGraphReport report;
   const GraphSnapshot& graph = writer.graph();
   std::vector<KeyframeId> roots{graph.reference()};

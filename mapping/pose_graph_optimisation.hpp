@@ -16,7 +16,7 @@ struct PoseGraphReport {
 };
 
 /// Optimises the part of the map that is connected with `root` over all its edges (eq. 6.4 without points,
-/// outer window = everything); `root` is held. Changes nothing: for use beside the mapper, which takes the
+/// outer window = everything); `root` is fixed. Changes nothing: for use beside the mapper, which takes the
 /// result as a message (Mapper::take_pose_graph). Cost grows with the part.
 PoseGraphUpdate optimise_part(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
                               const MapperOptions& options, PoseGraphReport& report);
@@ -24,7 +24,6 @@ PoseGraphUpdate optimise_part(const GraphSnapshot& graph, KeyframeId root, const
 /// Optimises all keyframe poses, part by part. Outside of the double window poses are only defined relative
 /// to their neighbours; this makes them agree globally, e.g. before a trajectory is written. The reference
 /// keyframe, or the oldest one of a part without it, stays where it is. Cost grows with the map.
-PoseGraphReport optimised_poses_of_all_parts(GraphWriter& writer, const Rig& rig,
-                                             const MapperOptions& options);
+PoseGraphReport optimise_all_parts(GraphWriter& writer, const Rig& rig, const MapperOptions& options);
 
 }  // namespace twofold

@@ -26,7 +26,7 @@ struct PoseGraph {
 
   std::vector<Group> poses;
   std::vector<Constraint> constraints;
-  int origin = 0;  ///< pose that is held; -1: none is, and damping takes the gauge (thesis 6.2.3)
+  int origin = 0;  ///< pose that is fixed; -1: none is, and damping takes the gauge (thesis 6.2.3)
 };
 
 enum class PoseGraphError : std::uint8_t {
@@ -43,8 +43,8 @@ struct PoseGraphOptions {
   /// four per error component already: then the start agrees with the measurements to twice their standard
   /// deviation. Not for Sim3.
   bool chordal_start = false;
-  /// After a step, solve for the positions with the rotations held, a small linear problem, where that lowers
-  /// the cost: it repairs what a long Gauss-Newton step bends. Not for Sim3.
+  /// After a step, solve for the positions with the rotations fixed, a small linear problem, where that
+  /// lowers the cost: it repairs what a long Gauss-Newton step bends. Not for Sim3.
   bool resolve_positions = true;
   int max_iterations = 100;         ///< steps tried, accepted or not, >= 0
   double initial_damping = 0;       ///< relative to the diagonal, >= 0; 0: Gauss-Newton until a step fails.

@@ -25,10 +25,10 @@ class PoseGraphPositions {
 };
 
 /// Start values for a pose graph without any of its own: rotations by chordal relaxation (Martinec & Pajdla,
-/// CVPR 2007; Carlone et al., ICRA 2015), then positions with the rotations held. Two sparse linear
+/// CVPR 2007; Carlone et al., ICRA 2015), then positions with the rotations fixed. Two sparse linear
 /// least-squares problems.
 ///
-/// Rotations: minimise sum k_ji |R_j - R_ji R_i|_F^2 over matrices, with R_origin held, then project each
+/// Rotations: minimise sum k_ji |R_j - R_ji R_i|_F^2 over matrices, with R_origin fixed, then project each
 /// matrix onto the nearest rotation; k is the mean diagonal entry of the rotation information.
 ///
 /// @param structure  of the poses, its edges the graph's constraints

@@ -153,7 +153,7 @@ void StructureFilter::start_tracks(const std::vector<StereoFeature>& features, S
 
 /// One time step of the filter; the first `found_again` tracks were known before this frame.
 void StructureFilter::update(const StructureFrame& report, int found_again) {
-  WindowFrame frame;
+  FilterFrame frame;
   frame.T_c_w_start = report.T_c_w;
   const Matrix3 information = Matrix3::Identity() / (options_.sigma_px * options_.sigma_px);
   for (const SurfaceTrack& track : tracks_) frame.observations.push_back({track.id, track.z, information});

@@ -31,7 +31,7 @@ struct StructureFrame {
   int consistent = 0;    ///< of them, as one rigid body
   int measured = 0;      ///< landmarks found again
   int started = 0;       ///< new landmarks
-  WindowSummary summary;
+  FilterSummary summary;
 };
 
 /// Surface structure from a moving stereo camera in constant time  (SWF 4.1): features are matched all to
@@ -74,7 +74,7 @@ class StructureFilter {
   std::vector<StructureFrame> frames_;
   std::map<std::int64_t, StructurePoint> points_;
   int restarts_ = 0;
-  WindowSummary summary_;
+  FilterSummary summary_;
 };
 
 }  // namespace twofold

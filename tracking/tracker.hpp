@@ -46,7 +46,7 @@ class Tracker {
   /// Goes on with a map made before: the numbers of keyframes and points continue its own, and the camera is
   /// lost until `relocalise` says where in it the camera is, or until a new part is started. To be called
   /// before the first step.
-  void continue_in(const GraphSnapshot& graph);
+  void continue_from(const GraphSnapshot& graph);
   /// The camera was not placed yet in the map it was to continue in, nor in a new part.
   [[nodiscard]] bool unplaced() const { return unplaced_; }
 

@@ -11,7 +11,7 @@ constexpr int kMinStartPoints = 40;
 
 }  // namespace
 
-void Tracker::continue_in(const GraphSnapshot& graph) {
+void Tracker::continue_from(const GraphSnapshot& graph) {
   if (graph.keyframe_count() == 0) return;
   next_keyframe_ = static_cast<std::uint32_t>(graph.keyframe_count());
   next_point_ = static_cast<std::uint32_t>(graph.point_count());

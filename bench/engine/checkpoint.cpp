@@ -82,7 +82,7 @@ void measure_loading(const std::filesystem::path& file, const Rig& rig) {
   const double load_ms = ms_since(begin_ns);
   LoopCloser closer(rig, std::make_shared<const Vocabulary>(load_default_vocabulary()), {});
   begin_ns = steady_now_ns();
-  closer.adopt(map.places);
+  closer.continue_from(map.places);
   fmt::print("load {:.0f} ms, of {} keyframes; words and inverted file anew {:.0f} ms\n", load_ms,
              map.graph.keyframe_count(), ms_since(begin_ns));
 }
@@ -98,7 +98,7 @@ void run(int keyframes, int rounds, const std::filesystem::path& file) {
   };
   fill(*filler, keyframes - 60);
   Mapper mapper(simulation.rig(), exploring(25, 175), simulation.search(10));
-  mapper.adopt(filler->publish());
+  mapper.continue_from(filler->publish());
   filler.reset();
   fill(mapper, keyframes);
   const KeyframeDatabase places = described(static_cast<std::uint32_t>(keyframes), simulation.rig());

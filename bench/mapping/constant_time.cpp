@@ -113,7 +113,7 @@ nlohmann::json explore(const std::vector<int>& sizes, int rounds) {
     };
     fill(*filler, static_cast<std::size_t>(size) - 60);
     auto mapper = std::make_unique<Mapper>(simulation.rig(), exploring(25, 175), simulation.search(10));
-    mapper->adopt(filler->publish());
+    mapper->continue_from(filler->publish());
     filler.reset();
     fill(*mapper, static_cast<std::size_t>(size));
     const Measurement m = measure_rounds(simulation, *mapper, rounds);

@@ -9,7 +9,7 @@
 namespace twofold {
 namespace {
 
-WindowProblem held_window(unsigned seed, double constraint_noise = 0.005) {
+WindowProblem fixed_window(unsigned seed, double constraint_noise = 0.005) {
   SyntheticWindowOptions options;
   options.inner = 5;
   options.outer = 4;
@@ -24,7 +24,7 @@ WindowProblem held_window(unsigned seed, double constraint_noise = 0.005) {
 }
 
 TEST(WindowCovariance, EqualsCeres) {
-  WindowProblem problem = held_window(1);
+  WindowProblem problem = fixed_window(1);
   WindowSolverOptions options;
   options.huber_px = 0;
   options.max_iterations = 50;
@@ -91,7 +91,7 @@ TEST(WindowCovariance, PredictsTheErrorOverManyDraws) {
 }
 
 TEST(WindowCovariance, RefusesAFreeGauge) {
-  WindowProblem problem = held_window(2);
+  WindowProblem problem = fixed_window(2);
   EXPECT_TRUE(WindowCovariance::compute(problem, {}).has_value());
   problem.poses[0].fixed = false;
   EXPECT_FALSE(WindowCovariance::compute(problem, {}).has_value());
@@ -109,7 +109,7 @@ TEST(WindowCovariance, RefusesAFreeScale) {
 }
 
 TEST(WindowCovariance, KnowsNothingOfLonelyPosesAndUnseenPoints) {
-  WindowProblem problem = held_window(3);
+  WindowProblem problem = fixed_window(3);
   problem.poses.push_back({SE3(), false});
   problem.points[0].observation_count = 0;
   const auto covariance = WindowCovariance::compute(problem, {});

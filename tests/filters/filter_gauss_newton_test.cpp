@@ -32,7 +32,7 @@ TEST(FilterGaussNewton, StereoFilterEqualsBatchInTheLinearLimit) {
     if (j > 0) {
       ASSERT_TRUE(filter.step({}, {}, scene.observations[j]));
     }
-    WindowFrame frame;
+    FilterFrame frame;
     for (const auto& o : scene.observations[j]) {
       frame.observations.push_back({o.point, o.z, Matrix3::Identity() / (noise * noise)});
     }
@@ -66,7 +66,7 @@ TEST(FilterGaussNewton, FirstEstimatesKeepTheAccuracyOfBatch) {
     SlidingWindowFilter batch(rig, options);
     batch.set_first_pose(SE3(), std::nullopt);
     for (const auto& seen : scene.observations) {
-      WindowFrame frame;
+      FilterFrame frame;
       for (const PointObservation& o : seen)
         frame.observations.push_back({o.point, o.z, 4 * Matrix3::Identity()});
       batch.step(frame);

@@ -62,7 +62,7 @@ TEST(SwfCeres, UnlimitedWindowIsTheBatchSolution) {
   const SwfScene scene = make_swf_scene({.frames = 8, .points = 40, .seed = 3});
   SlidingWindowFilter filter(scene.rig, exact_options(0));
   filter.set_first_pose(SE3(), swf_first_information());
-  for (const WindowFrame& frame : scene.frames) filter.step(frame);
+  for (const FilterFrame& frame : scene.frames) filter.step(frame);
 
   std::vector<PoseBlock> poses;
   for (const SE3& T : scene.T_c_w) poses.push_back(to_block(T));

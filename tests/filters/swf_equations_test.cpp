@@ -40,11 +40,11 @@ TEST(SwfProcessModel, VelocityMovesTheBodyForward) {
 }
 
 /// Random equations of a window with prior, measurements and motion.
-WindowEquations random_equations(int m, int n, int n_prior) {
+FilterEquations random_equations(int m, int n, int n_prior) {
   std::mt19937 rng(4);
   std::normal_distribution<double> normal(0, 1);
   const auto draw = [&] { return normal(rng); };
-  WindowEquations eq;
+  FilterEquations eq;
   eq.reset(m, n);
   eq.prior_landmarks = n_prior;
   const MatrixX A = MatrixX::NullaryExpr(30, 3 * n_prior + 6, draw);
@@ -71,7 +71,7 @@ WindowEquations random_equations(int m, int n, int n_prior) {
 }
 
 /// The same as one dense matrix, order [landmarks | poses].
-MatrixX dense_information(const WindowEquations& eq) {
+MatrixX dense_information(const FilterEquations& eq) {
   const int m = eq.pose_count(), n = eq.landmark_count(), p0 = 3 * n, q = 3 * eq.prior_landmarks;
   MatrixX H = MatrixX::Zero(p0 + 6 * m, p0 + 6 * m);
   for (int l = 0; l < n; ++l) H.block<3, 3>(3 * l, 3 * l) = eq.V[l];
@@ -94,7 +94,7 @@ MatrixX dense_information(const WindowEquations& eq) {
 
 TEST(SwfEquations, BothEliminationOrdersAgree) {
   const int m = 5, n = 12, p0 = 3 * n;
-  const WindowEquations eq = random_equations(m, n, 4);
+  const FilterEquations eq = random_equations(m, n, 4);
   VectorX g(p0 + 6 * m);
   for (int l = 0; l < n; ++l) g.segment<3>(3 * l) = eq.g_landmarks[l];
   for (int j = 0; j < m; ++j) g.segment<6>(p0 + 6 * j) = eq.g_poses[j];
@@ -106,7 +106,7 @@ TEST(SwfEquations, BothEliminationOrdersAgree) {
     ASSERT_TRUE(factor.factorise(eq, 0.0, order));
     FilterStep step;
     factor.solve(eq.g_poses, eq.g_landmarks, step);
-    const WindowCovariances covariances = factor.covariances();
+    const FilterCovariances covariances = factor.covariances();
     for (int l = 0; l < n; ++l) {
       EXPECT_LT((step.landmarks[l] - x.segment<3>(3 * l)).norm(), 1e-9 * x.norm());
       EXPECT_LT((covariances.landmarks[l] - inverse.block<3, 3>(3 * l, 3 * l)).norm(), 1e-9 * inverse.norm());

@@ -13,7 +13,7 @@ TEST(SwfFilter, FullWindowEqualsBatch) {
   SlidingWindowFilter batch(scene.rig, exact_options(0)), full(scene.rig, exact_options(9));
   batch.set_first_pose(SE3(), swf_first_information());
   full.set_first_pose(SE3(), swf_first_information());
-  for (const WindowFrame& frame : scene.frames) {
+  for (const FilterFrame& frame : scene.frames) {
     batch.add(frame);  // one solve at the end
     full.step(frame);  // solved at every frame
   }
@@ -33,7 +33,7 @@ double distance_to_batch(const SwfScene& scene, const std::optional<Matrix6>& fi
   SlidingWindowFilter filter(scene.rig, options);
   batch.set_first_pose(SE3(), first);
   filter.set_first_pose(SE3(), first);
-  for (const WindowFrame& frame : scene.frames) {
+  for (const FilterFrame& frame : scene.frames) {
     batch.step(frame);
     filter.step(frame);
   }
@@ -79,7 +79,7 @@ TEST(SwfFilter, ReusingTheFactorKeepsTheFixedPoint) {
   SlidingWindowFilter reused(scene.rig, options);
   fresh.set_first_pose(SE3(), swf_first_information());
   reused.set_first_pose(SE3(), swf_first_information());
-  for (const WindowFrame& frame : scene.frames) {
+  for (const FilterFrame& frame : scene.frames) {
     fresh.step(frame);
     reused.step(frame);
     EXPECT_LT((fresh.newest_T_c_w() * reused.newest_T_c_w().inverse()).log().norm(), 1e-8);
@@ -94,8 +94,8 @@ TEST(SwfFilter, WorksWithoutProcessModelAndWithTheFirstPoseHeld) {
     options.window = window;
     SlidingWindowFilter filter(scene.rig, options);
     filter.set_first_pose(SE3(), std::nullopt);
-    for (const WindowFrame& frame : scene.frames) {
-      const WindowSummary summary = filter.step(frame);
+    for (const FilterFrame& frame : scene.frames) {
+      const FilterSummary summary = filter.step(frame);
       EXPECT_TRUE(summary.converged) << "window " << window;
     }
     const Vector6 e = (filter.newest_T_c_w() * scene.T_c_w.back().inverse()).log();
@@ -114,7 +114,7 @@ TEST(SwfFilter, DeletionHoldsTheOldestPoseAndForgets) {
   SlidingWindowFilter filter(scene.rig, options);
   filter.set_first_pose(SE3(), std::nullopt);
   SE3 held;
-  for (const WindowFrame& frame : scene.frames) {
+  for (const FilterFrame& frame : scene.frames) {
     held = filter.pose_count() > 0 ? filter.newest_T_c_w() : SE3();
     filter.step(frame);
   }
@@ -141,8 +141,8 @@ TEST(SwfFilter, HuberThresholdResistsOutliers) {
     options.max_iterations = 20;
     SlidingWindowFilter filter(scene.rig, options);
     filter.set_first_pose(SE3(), std::nullopt);
-    WindowSummary summary;
-    for (const WindowFrame& frame : scene.frames) summary = filter.step(frame);
+    FilterSummary summary;
+    for (const FilterFrame& frame : scene.frames) summary = filter.step(frame);
     const Vector6 e = (filter.newest_T_c_w() * scene.T_c_w.back().inverse()).log();
     error[robust] = e.norm();
     if (robust) {
@@ -166,7 +166,7 @@ TEST(SwfFilter, LeftOnlyMeasurementsContributeAndCannotStartALandmark) {
   options.window = 3;
   SlidingWindowFilter filter(scene.rig, options);
   filter.set_first_pose(SE3(), std::nullopt);
-  for (const WindowFrame& frame : scene.frames) filter.step(frame);
+  for (const FilterFrame& frame : scene.frames) filter.step(frame);
   EXPECT_EQ(filter.landmark_count(), 40);
   EXPECT_FALSE(filter.find_landmark(1000));
   EXPECT_LT((filter.newest_T_c_w() * scene.T_c_w.back().inverse()).log().norm(), 0.1);
@@ -182,7 +182,7 @@ TEST(SwfFilter, StateStaysBoundedAndRunsAreReproducible) {
     options.window = 3;
     SlidingWindowFilter filter(scene.rig, options);
     filter.set_first_pose(SE3(), std::nullopt);
-    for (const WindowFrame& frame : scene.frames) {
+    for (const FilterFrame& frame : scene.frames) {
       largest = std::max(largest, filter.step(frame).landmarks);
       poses[run].push_back(filter.newest_T_c_w().matrix());
     }

@@ -16,7 +16,7 @@ class IteratedEkf {
  public:
   IteratedEkf(const Rig& rig, const Matrix6& information) : rig_(rig), P_(information.inverse()) {}
 
-  void step(const WindowFrame& frame, bool first) {
+  void step(const FilterFrame& frame, bool first) {
     if (!first) predict(*frame.motion);
     std::vector<LandmarkObservation> known, fresh;
     for (const auto& o : frame.observations) (index_.count(o.landmark) ? known : fresh).push_back(o);

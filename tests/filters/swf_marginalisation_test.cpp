@@ -93,7 +93,7 @@ TEST(SwfMarginalisation, FilterCovariancesSurviveRemoval) {
     options.keep_unseen_landmarks = false;
     SlidingWindowFilter filter(scene.rig, options);
     filter.set_first_pose(SE3(), swf_first_information());
-    for (const WindowFrame& frame : scene.frames) filter.step(frame);
+    for (const FilterFrame& frame : scene.frames) filter.step(frame);
     const auto before = filter.covariances();
     ASSERT_TRUE(before);
     const int landmarks = filter.landmark_count();
@@ -101,7 +101,7 @@ TEST(SwfMarginalisation, FilterCovariancesSurviveRemoval) {
     for (int l = 0; l < landmarks; ++l)
       by_id[filter.landmark_id(l)] = before->landmarks[static_cast<std::size_t>(l)];
 
-    WindowFrame blind;  // moves on, sees nothing
+    FilterFrame blind;  // moves on, sees nothing
     blind.motion = MotionInput{};
     filter.add(blind);
     const auto after = filter.covariances();
@@ -129,12 +129,12 @@ TEST(SwfMarginalisation, RemovalNeverMovesTheEstimate) {
       options.removal = removal;
       SlidingWindowFilter filter(scene.rig, options);
       filter.set_first_pose(SE3(), swf_first_information());
-      for (const WindowFrame& frame : scene.frames) filter.step(frame);
+      for (const FilterFrame& frame : scene.frames) filter.step(frame);
       const SE3 T_before = filter.newest_T_c_w();
       std::map<std::int64_t, Vector3> before;
       for (int l = 0; l < filter.landmark_count(); ++l) before[filter.landmark_id(l)] = filter.landmark(l);
 
-      WindowFrame blind;
+      FilterFrame blind;
       blind.motion = MotionInput{};
       filter.step(blind);
       EXPECT_LT((filter.T_c_w(1) * T_before.inverse()).log().norm(), 1e-8);

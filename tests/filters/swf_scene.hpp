@@ -13,7 +13,7 @@ struct SwfScene {
   Rig rig;
   std::vector<SE3> T_c_w;
   std::vector<Vector3> points;
-  std::vector<WindowFrame> frames;
+  std::vector<FilterFrame> frames;
 };
 
 struct SwfSceneOptions {
@@ -51,7 +51,7 @@ inline SwfScene make_swf_scene(const SwfSceneOptions& options) {
     const SE3 T_w_c(SO3::exp(Vector3(0.01 * j, -0.02 * j, 0.015 * j)),
                     Vector3(options.step * j, 0.02 * j, 0.1 * j));
     scene.T_c_w.push_back(j == 0 ? SE3() : SE3::exp(wobble) * T_w_c.inverse());
-    WindowFrame frame;
+    FilterFrame frame;
     if (j > 0 && options.motion) {
       MotionInput input;
       input.covariance = sigma.cwiseAbs2().asDiagonal();

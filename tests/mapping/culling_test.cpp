@@ -77,11 +77,11 @@ TEST(PointCuller, CullsWeakPointsThatAreInViewAndNeverSeenAgain) {
   const PointId again = add_point(writer, rig, {0.05, 0.2, 1}, {k(0), k(3)});
   const std::vector<PointId> points{forgotten, strong, outside, again};
   int culled = 0;
-  for (const std::uint32_t newest : {2U, 3U, 4U, 5U}) culled += culler.step(writer, k(newest), points);
+  for (const std::uint32_t newest : {2U, 3U, 4U, 5U}) culled += culler.cull(writer, k(newest), points);
   EXPECT_EQ(culled, 1);
   EXPECT_FALSE(writer.graph().point(forgotten).alive());
   for (const PointId id : {strong, outside, again}) EXPECT_TRUE(writer.graph().point(id).alive());
-  culler.step(writer, k(6), points);
+  culler.cull(writer, k(6), points);
   EXPECT_FALSE(writer.graph().point(again).alive()) << "three misses since it was last seen";
 }
 

@@ -70,7 +70,7 @@ TEST(MapParts, AProposalWithoutReferenceStartsOneAndALoopJoinsIt) {
   Rig rig;
   rig.baseline = 0.1;
   Mapper mapper(rig, {});
-  mapper.adopt(chain(5).publish());
+  mapper.continue_from(chain(5).publish());
   KeyframeProposal first, second;
   first.id = KeyframeId{5};
   first.median_depth = second.median_depth = 1;

@@ -92,7 +92,7 @@ TEST(MapUnit, ScalesAMapOfWrongScaleWithoutBendingIt) {
     const Vector3& psi = writer.graph().point(PointId{p}).psi;
     writer.set_inverse_depth(PointId{p}, {psi.x(), psi.y(), psi.z() / kScale});
   }
-  mapper.adopt(writer.publish());
+  mapper.continue_from(writer.publish());
   while (!simulation.done()) map_next();
   // The unit has stayed, and in metres the map is right wherever it is.
   EXPECT_NEAR(mapper.metres_per_unit(), 1 / kScale, 2e-3);

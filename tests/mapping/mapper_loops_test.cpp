@@ -56,12 +56,12 @@ TEST(Mapper, ALoopOfKeyframesThatAreForgottenIsDroppedAndCounted) {
   loop.from = writer.graph().reference();
   loop.to = KeyframeId{7};
   loop.T_to_from = writer.graph().T_k_w(loop.to) * writer.graph().T_k_w(loop.from).inverse();
-  mapper.adopt(writer.publish());
+  mapper.continue_from(writer.publish());
   EXPECT_EQ(mapper.step({}, std::span(&loop, 1)).loops, 1) << "its replacement takes it";
   for (const PointId point : points) writer.cull_point(point);
   writer.forget_replacements(0);
   ASSERT_FALSE(writer.graph().live_replacement(loop.to));
-  mapper.adopt(writer.publish());
+  mapper.continue_from(writer.publish());
   const MapperReport report = mapper.step({}, std::span(&loop, 1), KeyframeId{7});
   EXPECT_EQ(report.loops, 0);
   EXPECT_EQ(report.late_loops, 1);
@@ -91,7 +91,7 @@ TEST(Mapper, GoesOnWithAnAdoptedGraph) {
   for (int k = 0; k < 25; ++k) map_next(simulation, first);
   const GraphSnapshot saved = first.publish();
   Mapper second(simulation::thesis_rig(), small_windows());
-  second.adopt(saved);
+  second.continue_from(saved);
   EXPECT_EQ(second.graph().version(), saved.version() + 1);
   while (!simulation.done()) map_next(simulation, second);
   EXPECT_EQ(second.graph().keyframe_count(), 40U);

@@ -161,7 +161,7 @@ TEST_F(WindowBuilderTest, WrongMeasurementsAreFoundAndBadPointsCulled) {
   builder.find_outliers(window_, outliers);
   ASSERT_EQ(outliers.size(), 3U);
   EXPECT_TRUE(std::is_sorted(outliers.begin(), outliers.end()));
-  EXPECT_EQ(remove_measurements(writer_, outliers), 2);
+  EXPECT_EQ(remove_outlier_observations(writer_, outliers), 2);
   EXPECT_TRUE(writer_.graph().point(good).alive());
   EXPECT_FALSE(writer_.graph().point(pair).alive());
   EXPECT_FALSE(writer_.graph().point(anchor).alive());

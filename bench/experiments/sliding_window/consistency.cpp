@@ -33,7 +33,7 @@ void consistency_experiment(const SlidingWindowExperimentOptions& options, Repor
         swf.robust = false;
         SlidingWindowFilter filter(rig, swf);
         filter.set_first_pose(SE3(), std::nullopt);
-        for (const WindowFrame& frame : run.frames) filter.step(frame);
+        for (const FilterFrame& frame : run.frames) filter.step(frame);
         const auto covariances = filter.covariances();
         pose[t] =
             covariances ? pose_nees(filter.newest_T_c_w(), run.T_c_w.back(), covariances->poses.back()) : 1e9;

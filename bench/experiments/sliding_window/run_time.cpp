@@ -26,9 +26,9 @@ Timing time_once(const Rig& rig, const Run& run, const SlidingWindowOptions& opt
   SlidingWindowFilter filter(rig, options);
   filter.set_first_pose(SE3(), std::nullopt);
   Timing timing;
-  for (const WindowFrame& frame : run.frames) {
+  for (const FilterFrame& frame : run.frames) {
     const double start = thread_ms();
-    const WindowSummary summary = filter.step(frame);
+    const FilterSummary summary = filter.step(frame);
     timing.ms.push_back(thread_ms() - start);
     timing.steps.push_back(summary.iterations);
     timing.state.push_back(6.0 * filter.pose_count() + 3.0 * filter.landmark_count());
@@ -175,7 +175,7 @@ void expansion_experiment(const SlidingWindowExperimentOptions& options, Report&
     filter.set_first_pose(SE3(), std::nullopt);
     for (int j = 0; j < kFrames; ++j) {
       const SE3 T(SO3(), Vector3(0, 0, -1.0 * j));
-      WindowFrame frame;
+      FilterFrame frame;
       frame.T_c_w_start = T;
       for (std::size_t l = 0; l < run.landmarks.size(); ++l) {
         LandmarkObservation o;

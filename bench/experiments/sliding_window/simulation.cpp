@@ -49,7 +49,7 @@ Run simulate(const Rig& rig, const RunOptions& options, unsigned seed) {
     if (options.overlap_axis > 0 || ends) run.landmarks.push_back(x);
   }
   for (const SE3& T : run.T_c_w) {
-    WindowFrame frame;
+    FilterFrame frame;
     for (std::size_t l = 0; l < run.landmarks.size(); ++l) {
       const Vector3 x_c = T * run.landmarks[l];
       if (options.overlap_axis > 0 ? !visible(rig, x_c) : x_c.z() < 0.3) continue;

@@ -14,7 +14,7 @@ namespace twofold::bench {
 struct Run {
   std::vector<SE3> T_c_w;
   std::vector<Vector3> landmarks;  ///< by id
-  std::vector<WindowFrame> frames;
+  std::vector<FilterFrame> frames;
 };
 
 struct RunOptions {

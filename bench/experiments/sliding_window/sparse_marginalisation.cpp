@@ -46,7 +46,7 @@ Curves run_curves(const RunOptions& run_options, int trials) {
       options.robust = false;
       SlidingWindowFilter filter(rig, options);
       filter.set_first_pose(SE3(), std::nullopt);
-      for (const WindowFrame& frame : run.frames) {
+      for (const FilterFrame& frame : run.frames) {
         filter.step(frame);
         double claimed = 0;
         if (const auto covariances = filter.covariances()) {

@@ -89,7 +89,7 @@ Track causal(const StarryNight& data, int window, PoseRemoval removal) {
 Track smoothed(const StarryNight& data) {
   SlidingWindowFilter filter(data.rig, filter_options(0, PoseRemoval::kMarginalise));
   filter.set_first_pose(data.T_c_v * data.T_v_i[0], first_information());
-  for (const WindowFrame& frame : data.frames) {
+  for (const FilterFrame& frame : data.frames) {
     filter.add(frame);
     if (filter.pose_count() % 50 == 0) filter.optimise();  // keeps the start of the next poses close
   }

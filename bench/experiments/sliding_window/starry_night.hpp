@@ -15,7 +15,7 @@ struct StarryNight {
   std::vector<double> t;           ///< [s]
   std::vector<SE3> T_v_i;          ///< true vehicle poses (inertial to vehicle)
   std::vector<Vector3> landmarks;  ///< surveyed, inertial frame; used for evaluation only
-  std::vector<WindowFrame> frames;
+  std::vector<FilterFrame> frames;
 };
 
 /// Reads states.txt, observations.txt, landmarks.txt, camera.txt of the folder from step `first` on; throws

@@ -84,7 +84,7 @@ StarryNight load_starry_night(const std::string& folder, int first, int steps) {
     data.t.push_back(row[1]);
     const SO3 C_v_i = SO3::exp(-vector3(row, 2));  // the file's formula has - sin(a) n^
     data.T_v_i.emplace_back(C_v_i, -(C_v_i * vector3(row, 5)));
-    WindowFrame frame;
+    FilterFrame frame;
     if (k > 0) {  // velocities of the previous step carry to this one
       const auto& last = rows[k - 1];
       frame.motion =
