@@ -9,12 +9,12 @@ namespace twofold {
 
 enum class TriangulationError : std::uint8_t { kLowParallax, kBehindCamera };
 
-/// Mid-point triangulation of one landmark from two calibrated views.
+/// Mid-point triangulation of one point from two calibrated views.
 ///
 /// @param bearing_a, bearing_b  unit rays, each in its own camera frame
 /// @param T_a_b                 pose of b in a [m]:  p_a = T_a_b * p_b
 /// @param min_parallax          smallest accepted angle between the rays [rad], > 0
-/// @return  landmark in frame a [m]
+/// @return  the point in frame a [m]
 ///          kLowParallax   angle between the rays < min_parallax
 ///          kBehindCamera  the rays come closest behind either camera
 ///

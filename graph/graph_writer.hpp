@@ -36,7 +36,7 @@ class GraphWriter {
   void add_point(PointId id, MapPoint point);
 
   void set_pose(KeyframeId id, const SE3& T_k_w) { graph_.keyframes_.mutate(index(id)).T_k_w = T_k_w; }
-  /// Moves a keyframe that is not culled to another part, whose world frame T_k_w is then of.
+  /// Moves a keyframe that is not culled to another part; its T_k_w then refers to that part's world frame.
   void set_part(KeyframeId id, KeyframeId part) { graph_.keyframes_.mutate(index(id)).part = part; }
   void set_median_depth(KeyframeId id, double depth) {
     graph_.keyframes_.mutate(index(id)).median_depth = depth;
@@ -47,17 +47,17 @@ class GraphWriter {
   /// Says that poses jump with the version being made.
   void announce_jump(MapChange::Kind kind) { graph_.last_jump_ = {graph_.version_, kind}; }
 
-  /// Adds measurements to a keyframe, or replaces those of the same points, and registers it as their
-  /// observer.
+  /// Adds observations to a keyframe, or replaces those of the same points, and registers it as an observer
+  /// of the points.
   void add_observations(KeyframeId id, std::span<const Observation> observations);
-  /// Removes the measurements of the given points (ascending) from a keyframe.
+  /// Removes the observations of the given points (ascending) from a keyframe.
   void remove_observations(KeyframeId id, std::span<const PointId> points);
 
   /// Adds the edge to both keyframes or replaces it; `edge` is as seen from `id`.
   void set_edge(KeyframeId id, const Edge& edge);
   void remove_edge(KeyframeId id, KeyframeId other);
 
-  /// Removes all measurements of a point and marks it culled; nothing happens to a point culled before.
+  /// Removes all observations of a point and marks it culled; nothing happens to a point culled before.
   void cull_point(PointId id);
   /// Removes a keyframe and all it has; only its pose relative to `replacement`, which must not be culled, is
   /// known until it is forgotten. Points anchored in it keep anchor, psi and appearance: the anchor's frame

@@ -9,8 +9,9 @@
 
 namespace twofold {
 
-/// Scratch map from ids to small numbers: a hash table with linear probing. Its memory follows the most it
-/// ever held, not the ids, which grow for as long as the camera moves. Cleared in O(1) by counting rounds.
+/// Scratch map from ids to small numbers: a hash table with linear probing. Its memory is proportional to the
+/// most ids it ever held at once, not to the ids' values, which grow for as long as the camera moves. Cleared
+/// in O(1) by counting rounds.
 class IdMap {
  public:
   void clear() {

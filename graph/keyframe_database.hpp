@@ -9,16 +9,16 @@
 
 namespace twofold {
 
-/// How the places of a map's keyframes look, by keyframe; a keyframe may have none. A value: copying is O(1),
-/// versions share what did not change.
+/// What recognition remembers of the keyframes of a map; of some it may remember nothing. A value: copying is
+/// O(1), and versions share what did not change.
 ///
-/// Threads: as PersistentVector has it. One thread (the loop closer's) copies, changes and destroys versions;
-/// others read versions that were published to them.
+/// Threads: the rules of PersistentVector. One thread, the loop closer's, copies, changes and destroys
+/// versions; others read versions that were published to them.
 class KeyframeDatabase {
  public:
-  /// Grows with every change; 1 for an empty book.
+  /// Grows with every change; 1 for an empty database.
   [[nodiscard]] std::uint64_t version() const { return version_; }
-  /// Keyframes from this number on have no place.
+  /// Greater than the number of every keyframe in it.
   [[nodiscard]] std::size_t size() const { return places_.size(); }
   /// Null: the keyframe was never described, or is forgotten.
   [[nodiscard]] const PlaceAppearance* find(KeyframeId id) const {
@@ -30,7 +30,7 @@ class KeyframeDatabase {
     places_.mutate(index(id)) = std::make_shared<const PlaceAppearance>(std::move(place));
     ++version_;
   }
-  /// Of a keyframe that was culled; id must be less than size().
+  /// Forgets a keyframe that was culled; id must be less than size().
   void forget(KeyframeId id) {
     places_.forget(index(id));
     ++version_;

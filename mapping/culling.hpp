@@ -11,8 +11,8 @@
 
 namespace twofold {
 
-/// Removes measurements (sorted by keyframe, then point), and points that are left with fewer than two
-/// observers or lost the measurement of their anchor. Returns the number of points culled.
+/// Removes observations (sorted by keyframe, then point), and the points that are left with fewer than two
+/// observers or that their anchor no longer observes. Returns the number of points culled.
 int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers);
 
 /// A keyframe is redundant when `redundant_share` of its points are seen by at least `redundant_observers`
@@ -30,13 +30,13 @@ int remove_keyframe(GraphWriter& writer, KeyframeId id);
 std::vector<KeyframeId> cull_redundant_keyframes(GraphWriter& writer, const DoubleWindow& window,
                                                  const CullingOptions& options, int& culled_points);
 
-/// Finds points that add nothing: seen from two keyframes only, and not seen again from keyframe after
-/// keyframe that had them well in view.
+/// Culls points that add nothing: seen from two keyframes only, and not seen again although keyframe after
+/// keyframe had them well in view.
 class PointCuller {
  public:
   PointCuller(const Rig& rig, const CullingOptions& options) : rig_(rig), options_(options) {}
 
-  /// Judges the given points by the keyframe that was inserted last. Returns the number of points culled.
+  /// Judges the given points by the newest keyframe. Returns the number of points culled.
   int cull(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const;
 
  private:

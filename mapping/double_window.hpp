@@ -37,17 +37,18 @@ void select_double_window(const GraphSnapshot& graph, const MapperOptions& optio
                           DoubleWindow& window);
 
 /// Marginalisation when W1 moves on: an edge within the old inner window that is not within the new one gets
-/// the present relative pose as its constraint; so does any edge that would otherwise hang on absolute poses
-/// that are no longer optimised together. Returns the number of edges.
-/// @param leaves  if set, is told of every such edge before
-///
-/// Afterwards an edge without a constraint of its own has an end in W1 and both ends in the double window.
+/// the present relative pose as its constraint. So does any other edge that would otherwise depend on
+/// absolute poses that are no longer optimised together. Afterwards an edge without a constraint of its own
+/// has an end in W1 and both ends in the double window.
+/// @param leaves  if set, is called for every such edge before it gets its constraint
+/// @return  number of edges
 int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now,
                            const std::function<void(KeyframeId from, KeyframeId to)>& leaves = {});
 
-/// Window entry, eq. 6.3: keyframes outside of `consistent`, and all their children in the spanning tree, are
-/// set along the relative poses of the tree's edges, so that a loop that does not add up breaks at the rim
-/// and not near the reference. Returns the number of poses set.
+/// Window entry, eq. 6.3: the poses of keyframes outside of `consistent`, and of all their children in the
+/// spanning tree, are set along the relative poses of the tree's edges. If the edges of a loop contradict
+/// each other, the contradiction thus appears at the rim of the window and not near the reference. Returns
+/// the number of poses set.
 int enter_window(GraphWriter& writer, const IdMap& consistent, const DoubleWindow& window);
 
 }  // namespace twofold

@@ -21,14 +21,15 @@ struct InsertionReport {
 /// Its pose hangs on the present pose of the proposal's reference (through its replacement, if that was
 /// culled in the meantime). Edges go to the keyframes of `consistent` that share at least min_covisible
 /// points with it, at least one to its strongest neighbour there or to the proposal's reference, so that the
-/// graph stays connected. `consistent` are the keyframes whose absolute poses agree with one another; the new
-/// one joins. If the reference is none of them, the set starts anew around the reference.
+/// graph stays connected. `consistent` holds the keyframes whose absolute poses agree with one another; the
+/// new keyframe is added. If the proposal's reference is not among them, the set is first reduced to the
+/// reference.
 InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, int min_covisible,
                                 IdMap& consistent, IdMap& counts);
 
 /// Second half of local registration, once all poses of the window agree: edges to keyframes of the double
-/// window that share at least min_covisible points with `id` but were not at hand when it was inserted.
-/// Returns the number of edges added.
+/// window that share at least min_covisible points with `id` but were not in `consistent` when it was
+/// inserted. Returns the number of edges added.
 int register_in_window(GraphWriter& writer, KeyframeId id, const DoubleWindow& window, int min_covisible,
                        IdMap& counts);
 

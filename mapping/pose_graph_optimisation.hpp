@@ -15,9 +15,9 @@ struct PoseGraphReport {
   double final_cost = 0;
 };
 
-/// Optimises the part of the map that is connected with `root` over all its edges (eq. 6.4 without points,
-/// outer window = everything); `root` is fixed. Changes nothing: for use beside the mapper, which takes the
-/// result as a message (Mapper::take_pose_graph). Cost grows with the part.
+/// Optimises the poses of all keyframes that are connected with `root` (eq. 6.4 without points, with
+/// everything in the outer window); `root` is fixed. Changes nothing: it runs beside the mapper, which takes
+/// the result as a message (Mapper::take_pose_graph). Cost grows with the number of keyframes.
 PoseGraphUpdate optimise_part(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
                               const MapperOptions& options, PoseGraphReport& report);
 

@@ -6,8 +6,9 @@
 
 namespace twofold {
 
-/// Which blocks a symmetric block system and its Cholesky factor have, in an order of elimination that keeps
-/// the fill small. Of the graph alone: one analysis serves systems of any block size over the same graph.
+/// Which blocks a symmetric block system and its Cholesky factor have, in an elimination order that keeps the
+/// fill small. It depends on the graph alone: one analysis serves systems of any block size over the same
+/// graph.
 ///
 /// Rows and columns below are positions in the elimination order; blocks stand column by column, the diagonal
 /// block first, then rows rising.

@@ -10,8 +10,9 @@ namespace twofold {
 /// Neighbouring columns of a block factor with the same rows, or almost, gathered into panels: the supernodes
 /// of sparse Cholesky factorisation (Davis, Direct Methods for Sparse Linear Systems, 4.8).
 ///
-/// The rows of a panel rise and begin with its own columns, so that it is one dense trapezoid. Where columns
-/// do not match, and above the diagonal, blocks are stored that the factor does not have.
+/// The rows of a panel ascend and begin with its own columns, so that it is one dense trapezoid. Where its
+/// columns differ in their rows, and above the diagonal, it stores blocks of zeros that the factor does not
+/// have.
 struct PanelStructure {
   struct Panel {
     int first, width;    ///< columns [first, first + width)

@@ -34,10 +34,10 @@ struct StructureFrame {
   FilterSummary summary;
 };
 
-/// Surface structure from a moving stereo camera in constant time  (SWF 4.1): features are matched all to
-/// all, Moravec's check and robust motion-only adjustment give the motion, landmarks are measured by patches
-/// warped through their plane's homography and again after Gauss-Newton steps, and the sliding window filter
-/// estimates poses and landmarks.
+/// Surface structure from a moving stereo camera in constant time  (SWF 4.1). All features of two frames are
+/// matched with each other; Moravec's check and robust motion-only adjustment give the motion; landmarks are
+/// measured by patches warped through the homography of their plane, and measured again after Gauss-Newton
+/// steps; the sliding window filter estimates poses and landmarks.
 ///
 /// Single-threaded; the same frames give the same result. Stereo only.
 class StructureFilter {

@@ -47,8 +47,8 @@ struct TimingFile {
 [[nodiscard]] TimingFile read_timing(const std::filesystem::path& file);
 
 /// Table of all stages, a line a stage and run, the runs of a stage below each other; behind each run after
-/// the first how its p50 and p99 compare with the first one's. Ends with the effort levels and
-/// what the runs cost.
+/// the first how its p50 and p99 compare with the first one's. Ends with the effort levels and what the runs
+/// cost.
 [[nodiscard]] std::string timing_table(const std::vector<TimingFile>& runs);
 
 }  // namespace twofold

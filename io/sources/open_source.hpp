@@ -32,7 +32,7 @@ struct SourceOptions {
 ///   images:DIR       image files in the order of their names, or left/ with right/ or depth/; times.txt
 ///   video:FILE       one image, or two side by side
 ///   v4l2:DEVICE      a camera, or two paired by time
-///   synthetic:SCENE  rendered (io/synthetic)
+///   synthetic:SCENE  rendered (synthetic/)
 ///
 /// Throws IoError naming the file and what is wrong with it.
 [[nodiscard]] std::unique_ptr<FrameSource> open_source(const std::string& text,
