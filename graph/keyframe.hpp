@@ -23,8 +23,6 @@ struct Edge {
   int weight = 0;             ///< w_ij: points visible in both keyframes
   bool marginalised = false;  ///< else the relative pose is that of the two absolute poses
   SE3 T_other_this;           ///< constraint, of use only when marginalised [m]
-  double parallax =
-      0;  ///< |t_other_this| over the mean scene depth; lambda_trans is proportional to it (eq. 6.2)
 };
 
 using ObservationList = std::vector<Observation>;  ///< ascending by point
@@ -44,8 +42,8 @@ using EdgeList = std::vector<Edge>;                ///< ascending by other keyfr
 /// place.
 struct Keyframe {
   KeyframeId id = kNoKeyframe;
-  /// First keyframe of the map part whose world frame T_k_w is of; those of different parts have nothing to
-  /// do with each other.
+  /// Names the map part: its first keyframe. T_k_w refers to the part's world frame; the world frames of two
+  /// parts have no known relation.
   KeyframeId part{0};
   std::int64_t frame_index = 0;
   std::int64_t t_ns = 0;

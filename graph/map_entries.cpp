@@ -39,7 +39,7 @@ EdgeList take_edges(ByteReader& in, KeyframeId id) {
     edge.weight = in.take<std::int32_t>();
     edge.marginalised = in.take_small(2, "flag") != 0;
     edge.T_other_this = in.take_pose();
-    edge.parallax = in.take_finite();
+    (void)in.take_finite();  // a number that older programs kept with an edge
     if (!(edge.other < id)) throw FormatError{"holds an edge to a keyframe that is not there"};
     if (n > 0 && !(list[n - 1].other < edge.other)) throw FormatError{"edges out of order"};
     if (edge.weight < 0) throw FormatError{"holds an edge of negative weight"};

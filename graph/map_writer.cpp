@@ -99,7 +99,7 @@ void put_edges(ByteWriter& out, const Keyframe& keyframe) {
     out.put(std::int32_t{edge.weight});
     out.put(static_cast<std::uint8_t>(edge.marginalised));
     out.put(edge.T_other_this);
-    out.put(edge.parallax);
+    out.put(0.0);  // in the place of a number that older programs kept with an edge
   }
 }
 

@@ -38,17 +38,10 @@ int shared_points(const Keyframe& a, const Keyframe& b) {
   return shared;
 }
 
-double parallax(const Keyframe& a, const Keyframe& b, const SE3& T_b_a) {
-  return T_b_a.translation().norm() / mean_depth(a, b);
-}
-
 void link(GraphWriter& writer, KeyframeId from, KeyframeId to, int weight) {
-  const Keyframe& a = writer.graph().keyframe(from);
-  const Keyframe& b = writer.graph().keyframe(to);
   Edge edge;
   edge.other = to;
   edge.weight = weight;
-  edge.parallax = parallax(a, b, b.T_k_w * a.T_k_w.inverse());
   writer.set_edge(from, edge);
 }
 
@@ -59,7 +52,6 @@ void link_marginalised(GraphWriter& writer, KeyframeId from, KeyframeId to, int 
   edge.weight = weight;
   edge.marginalised = true;
   edge.T_other_this = T_to_from;
-  edge.parallax = parallax(writer.graph().keyframe(from), writer.graph().keyframe(to), T_to_from);
   writer.set_edge(from, edge);
 }
 

@@ -36,9 +36,6 @@ void for_shared_points(const Keyframe& a, const Keyframe& b, Visit&& visit) {
 /// w_ij: number of points seen from both keyframes.
 [[nodiscard]] int shared_points(const Keyframe& a, const Keyframe& b);
 
-/// |t| over the mean of both keyframes' median depths.
-[[nodiscard]] double parallax(const Keyframe& a, const Keyframe& b, const SE3& T_b_a);
-
 /// Adds or updates the edge without a constraint of its own: its relative pose is that of the two absolute
 /// poses, which must agree with each other.
 void link(GraphWriter& writer, KeyframeId from, KeyframeId to, int weight);

@@ -30,7 +30,6 @@ inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
       edge.weight = 40 / back;
       edge.marginalised = back == 2;
       if (edge.marginalised) edge.T_other_this = random_pose();
-      edge.parallax = 0.1 * back;
       writer.set_edge(keyframe.id, edge);
     }
   }
