@@ -105,12 +105,6 @@ class FramePool {
     return {};
   }
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
-  /// Objects in use, for counters; anyone. Relaxed: publishes nothing, and is out of date when it returns.
-  [[nodiscard]] std::size_t in_use_approx() const {
-    std::size_t used = 0;
-    for (std::size_t i = 0; i < capacity_; ++i) used += slots_[i].users.load(std::memory_order_relaxed) != 0;
-    return used;
-  }
 
  private:
   using Slot = internal::PoolSlot<T, Atomics>;

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <stdexcept>
 
 #include "mapping/edges.hpp"
 #include "mapping/map_parts.hpp"
+#include "mapping/mapper_hook.hpp"
 
 namespace twofold {
 namespace {
@@ -37,7 +39,6 @@ Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
     : rig_(rig),
       options_(validated(options)),
       builder_(rig, options),
-      measurements_(options),
       loop_closer_(rig, options, std::move(search)),
       point_culler_(rig, options.culling) {}
 
@@ -49,19 +50,17 @@ void Mapper::continue_from(const GraphSnapshot& graph) {
   // Nothing is known about which absolute poses agree: the first window is set along edges from its
   // reference.
   window_ = next_window_ = DoubleWindow();
-  unit_ = MapUnit();
-  measurements_.clear();
   consistent_.clear();
+  if (options_.hook) options_.hook->graph_replaced();
   if (graph.reference() != kNoKeyframe) consistent_.set(graph.reference(), 0);
 }
 
-MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals, std::span<const LoopConstraint> loops,
-                          KeyframeId tracker_reference) {
+MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals,
+                          std::span<const LoopConstraint> loops) {
   MapperReport report;
   inserted_.clear();
   for (const KeyframeProposal* proposal : proposals) insert(*proposal, report);
   for (const LoopConstraint& loop : loops) add_loop(loop, report);
-  if (proposals.empty()) revisit(tracker_reference);
   if (graph().reference() == kNoKeyframe) return report;
   form_windows(report);
   optimise(report);
@@ -95,20 +94,9 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   const SE3 T_to_from = T_loop_to.inverse() * loop.T_to_from * T_loop_from;
   report.joined += join_parts(writer_, from, to, T_to_from);
   link_marginalised(writer_, from, to, std::max(1, loop.inliers), T_to_from);
-  measurements_.forget(from, to);
+  if (options_.hook) options_.hook->loop_closed(from, to);
   writer_.announce_jump(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
   ++report.loops;
-}
-
-void Mapper::revisit(KeyframeId tracker_reference) {
-  if (tracker_reference == kNoKeyframe || !graph().contains(tracker_reference)) return;
-  const auto live_replacement = graph().live_replacement(tracker_reference);
-  if (!live_replacement) return;
-  const KeyframeId id = live_replacement->id;
-  writer_.set_reference(id);
-  if (consistent_.contains(id)) return;
-  consistent_.clear();
-  consistent_.set(id, 0);
 }
 
 /// Both windows around the reference; edges that W1 leaves behind; poses and edges of what entered  (6.2.3).
@@ -128,21 +116,20 @@ void Mapper::form_windows(MapperReport& report) {
 }
 
 void Mapper::leave_inner_window(MapperReport& report) {
-  if (!options_.measured_edges) {
-    report.edges_marginalised = marginalise_left_edges(writer_, window_, next_window_);
-    return;
+  std::function<void(KeyframeId, KeyframeId)> leaves;
+  if (options_.hook) {
+    leaves = [&](KeyframeId from, KeyframeId to) {
+      options_.hook->edge_leaves(graph(), builder_.problem(), from, to);
+    };
   }
-  const Rig rig = builder_.problem().rig;  // as solved last
-  report.edges_marginalised = marginalise_left_edges(
-      writer_, window_, next_window_,
-      [&](KeyframeId from, KeyframeId to) { measurements_.measure(graph(), rig, from, to); });
+  report.edges_marginalised = marginalise_left_edges(writer_, window_, next_window_, leaves);
 }
 
 /// Structure-only after poses were set, then eq. 6.4 over everything in the windows.
 void Mapper::optimise(MapperReport& report) {
   {
     const StageTime time(report.ms.build);
-    builder_.build(graph(), window_, options_.measured_edges ? &measurements_ : nullptr);
+    builder_.build(graph(), window_);
     report.points = static_cast<int>(builder_.problem().points.size());
     report.observations = static_cast<int>(builder_.problem().observations.size());
     report.constraints = static_cast<int>(builder_.problem().constraints.size());
@@ -154,29 +141,12 @@ void Mapper::optimise(MapperReport& report) {
       structure.max_iterations = options_.structure_iterations;
       optimise_structure(builder_.problem(), structure);
     }
-    if (options_.watch_problem) options_.watch_problem(builder_.problem());
-    if (options_.own_unit && rig_.kind != SensorKind::kMono) {
-      solve_in_own_unit(report);
-    } else {
-      report.solver = solver_.solve(builder_.problem(), options_.solver);
-    }
+    if (options_.hook) options_.hook->before_solve(window_, builder_.problem());
+    report.solver = solver_.solve(builder_.problem(), options_.solver);
+    if (options_.hook) options_.hook->after_solve(window_, builder_.problem());
   }
   const StageTime time(report.ms.write);
   builder_.write_back(writer_, window_);
-}
-
-/// Solves for shape in a unit that nothing but the edges holds: the window's disparities tell its points'
-/// depths from each other, but with the baseline that suits them best they do not pull at the scale of W2.
-void Mapper::solve_in_own_unit(MapperReport& report) {
-  WindowProblem& problem = builder_.problem();
-  unit_.read(problem, window_);
-  problem.rig.baseline = unit_.window_baseline(rig_);
-  report.solver = solver_.solve(problem, options_.solver);
-  unit_.read(problem, window_);
-}
-
-double Mapper::metres_per_unit() const {
-  return rig_.baseline > 0 ? rig_.baseline / unit_.map_baseline(rig_) : 1;
 }
 
 void Mapper::remove_outliers(MapperReport& report) {
@@ -202,7 +172,9 @@ void Mapper::cull(MapperReport& report) {
     report.culled_keyframes =
         cull_redundant_keyframes(writer_, window_, options_.culling, report.culled_points);
     writer_.forget_replacements(static_cast<std::size_t>(options_.culling.keep_replacements));
-    for (const KeyframeId id : report.culled_keyframes) measurements_.forget(id);
+    if (options_.hook) {
+      for (const KeyframeId id : report.culled_keyframes) options_.hook->keyframe_culled(id);
+    }
   }
 }
 

@@ -9,9 +9,7 @@
 #include "graph/loop_constraint.hpp"
 #include "mapping/culling.hpp"
 #include "mapping/double_window.hpp"
-#include "mapping/edge_measurements.hpp"
 #include "mapping/insertion.hpp"
-#include "mapping/map_unit.hpp"
 #include "mapping/metric_loop.hpp"
 #include "mapping/options.hpp"
 #include "mapping/pose_graph_optimisation.hpp"
@@ -34,10 +32,10 @@ struct MapperReport {
   int observations = 0;
   int constraints = 0;
   int poses_set = 0;           ///< on window entry
-  int edges_marginalised = 0;  ///< frames that left W1
+  int edges_marginalised = 0;  ///< of keyframes that left W1
   SolverSummary solver;
 
-  int outliers = 0;      ///< measurements removed
+  int outliers = 0;      ///< observations removed
   int metric_loops = 0;  ///< edges added by metric loop closure
   MetricLoopReport loop_search;
   int culled_points = 0;
@@ -52,8 +50,8 @@ struct MapperReport {
 
 /// Double-window optimisation: keeps the SLAM graph  (thesis 6.2, 6.4.1).
 ///
-/// The only one who changes the graph. Single-threaded; starts no threads; the same calls give the same graph
-/// bit for bit. A round costs the same whatever the size of the map, unless a window is unbounded.
+/// Nobody else changes the graph. Single-threaded; starts no threads; the same calls give the same graph bit
+/// for bit. A round costs the same whatever the size of the map, unless a window is unbounded.
 class Mapper {
  public:
   /// Options must be valid (see MapperOptions::invalid_reason).
@@ -66,19 +64,17 @@ class Mapper {
 
   /// One round: inserts the proposals (in the order of their ids, which continue the graph's), adds loop
   /// constraints, optimises the double window, closes metric loops, culls.
-  /// @param tracker_reference  where the tracker is now, if there are no proposals: the windows form around
-  ///                           it when an old place is revisited; kNoKeyframe leaves the reference
-  MapperReport step(std::span<KeyframeProposal* const> proposals, std::span<const LoopConstraint> loops = {},
-                    KeyframeId tracker_reference = kNoKeyframe);
+  MapperReport step(std::span<KeyframeProposal* const> proposals, std::span<const LoopConstraint> loops = {});
 
   /// The private version; it becomes the next published one.
   [[nodiscard]] const GraphSnapshot& graph() const { return writer_.graph(); }
   /// O(1) whatever the size of the map.
   [[nodiscard]] GraphSnapshot publish() { return writer_.publish(); }
 
-  /// Takes over poses that were optimised beside the mapper, outside of the double window: that one is more
-  /// accurate, and the tracker stands in it. They are moved as a whole so that the reference keyframe, or the
-  /// one of the window nearest to it that that update has, stays where it is. To be followed by a step.
+  /// Takes over poses that were optimised beside the mapper, for keyframes outside of the double window:
+  /// inside, poses are more accurate, and the tracker relies on them. All are moved together, so that the
+  /// reference keyframe stays where it is; if the update lacks it, the nearest keyframe of the window that
+  /// the update has. To be followed by a step.
   /// @return keyframes moved
   int take_pose_graph(const PoseGraphUpdate& update);
 
@@ -87,17 +83,13 @@ class Mapper {
 
   [[nodiscard]] const DoubleWindow& window() const { return window_; }
   [[nodiscard]] const MapperOptions& options() const { return options_; }
-  /// Lengths of the graph times this are metres: 1 unless options().own_unit.
-  [[nodiscard]] double metres_per_unit() const;
 
  private:
   void insert(const KeyframeProposal& proposal, MapperReport& report);
   void add_loop(const LoopConstraint& loop, MapperReport& report);
-  void revisit(KeyframeId tracker_reference);
   void form_windows(MapperReport& report);
   void optimise(MapperReport& report);
   void leave_inner_window(MapperReport& report);
-  void solve_in_own_unit(MapperReport& report);
 
   void remove_outliers(MapperReport& report);
   void close_metric_loops(const FrameImages& images, MapperReport& report);
@@ -108,8 +100,6 @@ class Mapper {
   GraphWriter writer_;
   WindowBuilder builder_;
   WindowSolver solver_;
-  MapUnit unit_;
-  EdgeMeasurements measurements_;
   MetricLoopCloser loop_closer_;
   PointCuller point_culler_;
 

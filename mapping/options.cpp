@@ -16,9 +16,6 @@ std::string MapperOptions::invalid_reason() const {
   if (!(edge.sigma_px > 0)) return wrong("edge.sigma_px", "> 0", edge.sigma_px);
   if (!(edge.trans_share > 0)) return wrong("edge.trans_share", "> 0", edge.trans_share);
   if (!(edge.rot_share > 0)) return wrong("edge.rot_share", "> 0", edge.rot_share);
-  if (!(edge.length_share > 0 && edge.length_share <= 1)) {
-    return wrong("edge.length_share", "in (0, 1]", edge.length_share);
-  }
   if (solver.max_iterations < 1) return wrong("solver.max_iterations", ">= 1", solver.max_iterations);
   if (structure_iterations < 0) return wrong("structure_iterations", ">= 0", structure_iterations);
   if (!(sigma_scale > 0)) return wrong("sigma_scale", "> 0", sigma_scale);
@@ -35,7 +32,7 @@ std::string MapperOptions::invalid_reason() const {
   }
   if (culling.keep_recent < 0) return wrong("culling.keep_recent", ">= 0", culling.keep_recent);
   if (culling.keep_replacements < culling.max_keyframes) {
-    return wrong("culling.keep_heirs", ">= culling.max_keyframes", culling.keep_replacements);
+    return wrong("culling.keep_replacements", ">= culling.max_keyframes", culling.keep_replacements);
   }
   if (culling.max_misses < 1 || culling.max_misses > 255) {
     return wrong("culling.max_misses", "in [1, 255]", culling.max_misses);

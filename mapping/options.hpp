@@ -1,18 +1,19 @@
 #pragma once
 
-#include <functional>
+#include <memory>
 #include <string>
 
 #include "estimation/window_problem.hpp"
 
 namespace twofold {
 
+class MapperHook;
+
 /// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
 struct EdgeInformationOptions {
-  double sigma_px = 0.5;       ///< standard deviation of a measurement on level 0 [px]
-  double trans_share = 0.1;    ///< share of the ideal translational precision an edge gets, > 0
-  double rot_share = 0.1;      ///< share of the ideal rotational precision an edge gets, > 0
-  double length_share = 0.05;  ///< of what a measured edge says about its own length, in (0, 1]
+  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
+  double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
+  double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
 };
 
 /// 6.4.1.
@@ -45,7 +46,6 @@ struct MapperOptions {
   int outer_window = 175;            ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO), anchors
                                      ///< included
   bool global_outer_window = false;  ///< gDWO: the outer window is all the rest of the map
-  bool fixed_outer_window = false;   ///< holds W2's poses: the hard rim the thesis argues against
   int max_anchors = 25;              ///< anchors that may take places of W2 for their points  (6.2.4)
   int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
   int min_covisible = 15;            ///< Theta: covisible points that make an edge, 15 to 30
@@ -55,17 +55,9 @@ struct MapperOptions {
   double sigma_scale = 1;              ///< multiplies the standard deviation that imaging gives a measurement
   double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom
   double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom
-  /// Lengths of the map in a unit of its own, see MapUnit and Mapper::metres_per_unit. For maps that are read
-  /// with it: the tracker takes the graph's lengths for metres.
-  bool own_unit = false;
-  /// Pose-pose constraints are made of measurements (EdgeMeasurements) instead of relative poses with the
-  /// precision of eq. 6.2. Edges that were not measured keep that one.
-  bool measured_edges = false;
   MetricLoopOptions loop;
   CullingOptions culling;
-  /// If set, is shown each problem of eq. 6.4 as it stands before the joint optimisation: to take problems
-  /// out of a running mapper and measure solvers on them.
-  std::function<void(const WindowProblem&)> watch_problem;
+  std::shared_ptr<MapperHook> hook;  ///< an experiment's; null: none
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -6,6 +6,7 @@
 #include "geometry/inverse_depth.hpp"
 #include "imaging/guided_search.hpp"
 #include "mapping/edges.hpp"
+#include "mapping/mapper_hook.hpp"
 
 namespace twofold {
 namespace {
@@ -24,16 +25,14 @@ WindowBuilder::WindowBuilder(const Rig& rig, const MapperOptions& options) : opt
   problem_.rig = rig;
 }
 
-void WindowBuilder::build(const GraphSnapshot& graph, const DoubleWindow& window,
-                          const EdgeMeasurements* measurements) {
+void WindowBuilder::build(const GraphSnapshot& graph, const DoubleWindow& window) {
   problem_.poses.resize(window.nodes.size());
   for (std::size_t n = 0; n < window.nodes.size(); ++n) {
-    problem_.poses[n].T_k_w = graph.keyframe(window.nodes[n].id).T_k_w;
-    problem_.poses[n].fixed = options_.fixed_outer_window && n >= window.inner;
+    problem_.poses[n] = {graph.keyframe(window.nodes[n].id).T_k_w, false};
   }
   collect_points(graph, window);
   collect_observations(graph, window);
-  collect_constraints(graph, window, measurements);
+  collect_constraints(graph, window);
 }
 
 /// Chooses the frame a point is anchored in within the problem; false if the point has to stay out.
@@ -162,8 +161,7 @@ void WindowBuilder::add_observation(const Observation& observation, int pose) {
   entry.information = measurement_information(problem_.rig, observation.level, has_right) / (scale * scale);
 }
 
-void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window,
-                                        const EdgeMeasurements* measurements) {
+void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window) {
   problem_.constraints.clear();
   for (std::size_t n = 0; n < window.nodes.size(); ++n) {
     const Keyframe& from = graph.keyframe(window.nodes[n].id);
@@ -176,17 +174,11 @@ void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const Double
           (!edge.marginalised || shared_points(from, to) >= options_.min_covisible)) {
         continue;
       }
-      // So they do for an edge that has not been measured yet: its points are those of W1.
-      if (measurements && !edge.marginalised && edge.weight >= options_.min_covisible) continue;
-      std::optional<EdgeMeasurements::Constraint> measured;
-      if (measurements) measured = measurements->constraint(graph, from.id, to.id, point_position_);
-      if (!measured) {
-        measured = {relative_pose(graph, from.id, edge),
-                    edge_information(from, to, edge, problem_.rig, options_.edge)};
-      }
-      if (measured->information.isZero(0)) continue;
-      problem_.constraints.push_back(
-          {static_cast<int>(n), other, measured->T_to_from, measured->information});
+      WindowProblem::PoseConstraint constraint{static_cast<int>(n), other,
+                                               relative_pose(graph, from.id, edge),
+                                               edge_information(from, to, edge, problem_.rig, options_.edge)};
+      if (options_.hook) options_.hook->constrain(graph, from, edge, point_position_, constraint);
+      if (!constraint.information.isZero(0)) problem_.constraints.push_back(constraint);
     }
   }
 }

@@ -6,7 +6,6 @@
 #include "graph/graph_writer.hpp"
 #include "graph/id_map.hpp"
 #include "mapping/double_window.hpp"
-#include "mapping/edge_measurements.hpp"
 #include "mapping/options.hpp"
 
 namespace twofold {
@@ -14,17 +13,14 @@ namespace twofold {
 /// Translates between the graph and the optimisation problem of eq. 6.4. Buffers are kept between rounds.
 ///
 /// Pose n of the problem is window.nodes[n]. Points are those seen from W1 whose anchor is at hand (6.2.4)
-/// and which the window measures at least twice; measurements of them from the outer window are included.
-/// Measurements that start behind their camera have no gradient to follow and stay out of the round.
+/// and which the window observes at least twice; observations of them from the outer window are included. An
+/// observation of a point that starts behind the camera has no useful gradient and is left out of the round.
 /// Pose-pose constraints are the edges with an end in W2 and both ends in the double window.
 class WindowBuilder {
  public:
   WindowBuilder(const Rig& rig, const MapperOptions& options);
 
-  /// @param measurements  of edges, if they are kept: then an edge speaks for its points outside of the
-  ///                      problem only
-  void build(const GraphSnapshot& graph, const DoubleWindow& window,
-             const EdgeMeasurements* measurements = nullptr);
+  void build(const GraphSnapshot& graph, const DoubleWindow& window);
   [[nodiscard]] WindowProblem& problem() { return problem_; }
   [[nodiscard]] const WindowProblem& problem() const { return problem_; }
   [[nodiscard]] const std::vector<PointId>& point_ids() const { return point_ids_; }
@@ -37,7 +33,7 @@ class WindowBuilder {
     PointId point = kNoPoint;
     auto operator<=>(const Outlier&) const = default;  // NOLINT(modernize-use-nullptr): there is no 0 here
   };
-  /// Measurements the solved problem disagrees with, by keyframe, then point.
+  /// Observations the solved problem disagrees with, by keyframe, then point.
   void find_outliers(const DoubleWindow& window, std::vector<Outlier>& outliers) const;
 
  private:
@@ -47,8 +43,7 @@ class WindowBuilder {
   /// Position in the problem of a point that is in front of the pose; -1 for others.
   [[nodiscard]] int usable_point(PointId id, int pose) const;
   void add_observation(const Observation& observation, int pose);
-  void collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window,
-                           const EdgeMeasurements* measurements);
+  void collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window);
   [[nodiscard]] bool anchor_point(const GraphSnapshot& graph, const DoubleWindow& window, PointId id,
                                   int seen_from, WindowProblem::Point& point) const;
 

@@ -26,8 +26,9 @@ struct RaceOptions {
   bool euclidean = false;  ///< run Ceres also with Euclidean points in the world
 };
 
-/// Solves the problem by WindowSolver and by Ceres with each of its Schur solvers: same start, same kernels,
-/// analytic Jacobians, one thread each. Each in a process of its own, so that its memory can be told.
+/// Solves the problem by WindowSolver (by PoseElimination, where that is cheaper) and by Ceres with each of
+/// its Schur solvers: same start, same kernels, analytic Jacobians, one thread each. Each in a process of its
+/// own, so that its memory can be told.
 [[nodiscard]] std::vector<SolverCourse> race(const WindowProblem& problem, const RaceOptions& options);
 
 /// Table of when each came within `share` of the best cost any of them reached.

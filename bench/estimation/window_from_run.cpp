@@ -9,9 +9,10 @@
 #include <stdexcept>
 
 #include "engine/engine.hpp"
-#include "estimation/window_problem_io.hpp"
+#include "fixtures/window_problem_io.hpp"
 #include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
+#include "mapping/mapper_hook.hpp"
 
 namespace twofold {
 namespace {
@@ -30,6 +31,26 @@ struct RunProblem {
   int rounds = 0;  ///< the mapper made in all
 };
 
+/// Keeps the problem of the round that is wanted.
+class ProblemTaker : public MapperHook {
+ public:
+  /// `taken` must outlive this.
+  ProblemTaker(int round, RunProblem& taken) : round_(round), taken_(taken) {}
+
+  void before_solve(const DoubleWindow&, WindowProblem& problem) override {
+    ++taken_.rounds;
+    const bool wanted =
+        round_ > 0 ? taken_.rounds == round_ : problem.poses.size() >= taken_.problem.poses.size();
+    if (!wanted) return;
+    taken_.problem = problem;
+    taken_.round = taken_.rounds;
+  }
+
+ private:
+  int round_;
+  RunProblem& taken_;
+};
+
 /// Runs the engine over the source, one thread and one order, and takes the problem one of the mapper's
 /// rounds starts its joint optimisation from: the newest keyframe is where the tracker put it. Throws
 /// std::runtime_error when the source cannot be opened or read, or there was no such round.
@@ -41,14 +62,7 @@ RunProblem window_from_run(const RunOptions& options) {
   engine_options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   engine_options.mapper.inner_window = options.inner;
   engine_options.mapper.outer_window = options.outer;
-  engine_options.mapper.watch_problem = [&](const WindowProblem& problem) {
-    ++taken.rounds;
-    const bool wanted = options.round > 0 ? taken.rounds == options.round
-                                          : problem.poses.size() >= taken.problem.poses.size();
-    if (!wanted) return;
-    taken.problem = problem;
-    taken.round = taken.rounds;
-  };
+  engine_options.mapper.hook = std::make_shared<ProblemTaker>(options.round, taken);
   const FrameFeed feed = [&](Frame& frame) {
     const FrameStatus status = source->next(frame);
     if (status == FrameStatus::kFrame) return FeedStatus::kFrame;

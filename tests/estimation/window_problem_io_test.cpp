@@ -1,4 +1,4 @@
-#include "estimation/window_problem_io.hpp"
+#include "fixtures/window_problem_io.hpp"
 
 #include <gtest/gtest.h>
 

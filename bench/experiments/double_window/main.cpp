@@ -33,8 +33,7 @@ int main(int argc, char** argv) {
   app.add_option("--trans-share", options.edge.trans_share, "of an edge's ideal translational precision");
   app.add_option("--rot-share", options.edge.rot_share, "of an edge's ideal rotational precision");
   app.add_flag("--metres", options.metres, "double windows without a unit of the map's own");
-  app.add_option("--length-share", options.edge.length_share,
-                 "of what a measured edge says about its length");
+  app.add_option("--length-share", options.length_share, "of what a measured edge says about its length");
   app.add_flag("--coarse-edges", options.coarse_edges,
                "stereo: eq. 6.2 for gDWO's edges as well, which are measured otherwise");
   app.add_option("--out", out, "folder for CSV, JSON, plots and the table");
@@ -68,7 +67,7 @@ int main(int argc, char** argv) {
                                 {"max_anchors", options.max_anchors},
                                 {"trans_share", options.edge.trans_share},
                                 {"rot_share", options.edge.rot_share},
-                                {"length_share", options.edge.length_share},
+                                {"length_share", options.length_share},
                                 {"coarse_edges", options.coarse_edges},
                                 {"metres", options.metres}};
     for (const auto& [name, experiment] : all) {

@@ -2,7 +2,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <memory>
 
+#include "experiments/double_window/experimental_mapping.hpp"
 #include "experiments/double_window/experiments.hpp"
 #include "experiments/double_window/feeder.hpp"
 #include "experiments/double_window/rounds.hpp"
@@ -17,24 +19,36 @@ constexpr std::size_t kSettled = kInner + kOuter;  // first keyframe that does n
 enum Method : std::size_t { kBa, kConstant, kGlobal, kFixedRim, kMethods };
 constexpr const char* kNames[kMethods] = {"BA", "cDWO", "gDWO", "fixed rim"};
 
-MapperOptions mapper_options(Method method, SensorKind kind, const DoubleWindowExperimentOptions& options) {
+MapperOptions mapper_options(Method method, const DoubleWindowExperimentOptions& options) {
   MapperOptions mapper = simulation_mapper_options(options);
   mapper.inner_window = method == kBa ? kUnbounded : kInner;
   mapper.outer_window = kOuter;
   mapper.global_outer_window = method == kGlobal;
-  mapper.fixed_outer_window = method == kFixedRim;
-  mapper.own_unit = method != kBa && !options.metres;
-  // A point's information is split among all pairs of keyframes that see it, of which cDWO has only some.
-  mapper.measured_edges = method == kGlobal && kind == SensorKind::kStereo && !options.coarse_edges;
   return mapper;
+}
+
+ExperimentalMappingOptions mapping_options(Method method, SensorKind kind,
+                                           const DoubleWindowExperimentOptions& options) {
+  ExperimentalMappingOptions mapping;
+  mapping.fixed_rim = method == kFixedRim;
+  mapping.own_unit = method != kBa && !options.metres;
+  // A point's information is split among all pairs of keyframes that see it, of which cDWO has only some.
+  mapping.measured_edges = method == kGlobal && kind == SensorKind::kStereo && !options.coarse_edges;
+  mapping.length_share = options.length_share;
+  return mapping;
 }
 
 /// All methods side by side, so that their errors are taken over the same edges: those of cDWO's windows.
 std::vector<Rounds> run_trial(const Scene& scene, const DoubleWindowExperimentOptions& options) {
   std::vector<Mapper> mappers;
+  std::vector<std::shared_ptr<ExperimentalMapping>> hooks;
   std::vector<Feeder> feeders;
   for (std::size_t m = 0; m < kMethods; ++m) {
-    mappers.emplace_back(scene.rig, mapper_options(static_cast<Method>(m), scene.rig.kind, options));
+    const auto method = static_cast<Method>(m);
+    MapperOptions mapper = mapper_options(method, options);
+    mapper.hook = hooks.emplace_back(std::make_shared<ExperimentalMapping>(
+        scene.rig, mapper, mapping_options(method, scene.rig.kind, options)));
+    mappers.emplace_back(scene.rig, mapper);
     feeders.emplace_back(scene, Association::kGlobal);
   }
   std::vector<Rounds> rounds(kMethods, Rounds(static_cast<std::size_t>(scene.keyframes())));
@@ -46,7 +60,7 @@ std::vector<Rounds> run_trial(const Scene& scene, const DoubleWindowExperimentOp
       record_cost(report, thread_cpu_ms() - start, rounds[m][k]);
     }
     for (std::size_t m = 0; m < kMethods; ++m) {
-      record_errors(mappers[m].graph(), mappers[m].metres_per_unit(), scene, mappers[kConstant].window(),
+      record_errors(mappers[m].graph(), hooks[m]->metres_per_unit(), scene, mappers[kConstant].window(),
                     rounds[m][k]);
     }
   }

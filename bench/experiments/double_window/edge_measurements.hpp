@@ -7,9 +7,8 @@
 #include "camera/rig.hpp"
 #include "graph/id_map.hpp"
 #include "graph/snapshot.hpp"
-#include "mapping/options.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 
 /// Pose-pose constraints made of measurements: what the points seen from two keyframes said about their
 /// relative pose when W1 left them, in place of eq. 6.2 and of the relative pose as it had been estimated.
@@ -33,7 +32,10 @@ namespace twofold {
 /// their part of the points they share, are missing.
 class EdgeMeasurements {
  public:
-  explicit EdgeMeasurements(const MapperOptions& options) : options_(options) {}
+  /// @param sigma_scale   MapperOptions::sigma_scale
+  /// @param length_share  of what an edge says about its own length, in (0, 1]
+  EdgeMeasurements(double sigma_scale, double length_share)
+      : sigma_scale_(sigma_scale), length_share_(length_share) {}
 
   struct Constraint {
     SE3 T_to_from;
@@ -67,8 +69,8 @@ class EdgeMeasurements {
   [[nodiscard]] std::optional<Measured> measured(const GraphSnapshot& graph, const Rig& rig,
                                                  const Keyframe& a, const Keyframe& b) const;
 
-  MapperOptions options_;
+  double sigma_scale_, length_share_;
   std::map<std::pair<KeyframeId, KeyframeId>, Measured> measured_;  ///< by (a, b), a < b
 };
 
-}  // namespace twofold
+}  // namespace twofold::bench

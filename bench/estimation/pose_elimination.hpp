@@ -10,7 +10,8 @@
 namespace twofold {
 
 /// Normal equations of bundle adjustment with the poses eliminated, for problems with few points and many
-/// poses: what remains is a dense system of three unknowns a point.
+/// poses: what remains is a dense system of three unknowns a point. Windows of the mapper never look like
+/// that, some files of other projects do.
 ///
 /// Points keep their inverse depth form, but about the place their anchor had at the start, which stays put:
 /// then an observation depends on one pose and one point, and poses are independent given the points.
@@ -35,6 +36,9 @@ class PoseElimination {
                                               double lambda, Values& next);
   /// Points go back to the frames of their anchors.
   void write_back(const Values& values, WindowProblem& problem) const;
+
+  /// As WindowSolver::solve.
+  SolverSummary solve(WindowProblem& problem, const WindowSolverOptions& options);
 
  private:
   /// Couplings of one pose, transposed: three rows an observation, so that all work on them runs down

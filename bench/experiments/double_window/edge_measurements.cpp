@@ -1,4 +1,4 @@
-#include "mapping/edge_measurements.hpp"
+#include "experiments/double_window/edge_measurements.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include "imaging/guided_search.hpp"
 #include "mapping/edges.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 namespace {
 
 constexpr double kMinDepth = 1e-3;     // [units of the map]
@@ -54,8 +54,8 @@ std::optional<EdgeMeasurements::Measured> EdgeMeasurements::measured(const Graph
   Vector6 tension = Vector6::Zero();
   for_shared_points(a, b, [&](const Observation& seen_a, const Observation& seen_b) {
     const Vector3 x_w = graph.position(seen_a.point);
-    const auto pull_a = pull_of(rig, a, seen_a, x_w, options_.sigma_scale);
-    const auto pull_b = pull_of(rig, b, seen_b, x_w, options_.sigma_scale);
+    const auto pull_a = pull_of(rig, a, seen_a, x_w, sigma_scale_);
+    const auto pull_b = pull_of(rig, b, seen_b, x_w, sigma_scale_);
     if (!pull_a || !pull_b) return;
     const double share = one_over_n(graph, seen_a.point);
     Eigen::Matrix<double, 3, 6> G;  // world frame: forces and stiffness need not be turned
@@ -70,7 +70,7 @@ std::optional<EdgeMeasurements::Measured> EdgeMeasurements::measured(const Graph
   edge.T_b_a = SE3::exp(factor.solve(tension)) * b.T_k_w * a.T_k_w.inverse();
   Vector6 longer = Vector6::Zero();
   longer.head<3>() = edge.T_b_a.translation();
-  soften(longer, 1 - options_.edge.length_share, edge.information);
+  soften(longer, 1 - length_share_, edge.information);
   return edge;
 }
 
@@ -106,4 +106,4 @@ void EdgeMeasurements::forget(KeyframeId id) {
                 [&](const auto& entry) { return entry.first.first == id || entry.first.second == id; });
 }
 
-}  // namespace twofold
+}  // namespace twofold::bench

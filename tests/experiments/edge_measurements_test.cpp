@@ -1,16 +1,17 @@
-#include "mapping/edge_measurements.hpp"
+#include "bench/experiments/double_window/edge_measurements.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 
+#include "bench/experiments/double_window/experimental_mapping.hpp"
 #include "estimation/pose_constraint.hpp"
 #include "estimation/window_solver.hpp"
 #include "fixtures/simulation.hpp"
 #include "mapping/mapper.hpp"
 #include "tests/mapping/small_graphs.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 namespace {
 
 /// Four cameras that see the same sixty points, with noise; points are where they fit best.
@@ -19,7 +20,6 @@ class EdgeMeasurementsTest : public testing::Test {
   static constexpr std::uint32_t kViews = 4, kPoints = 60;
 
   EdgeMeasurementsTest() : rig_(simulation::thesis_rig()) {
-    options_.edge.length_share = 1;
     std::vector<KeyframeId> all;
     for (std::uint32_t n = 0; n < kViews; ++n) {
       Vector6 pose;
@@ -106,7 +106,7 @@ class EdgeMeasurementsTest : public testing::Test {
 };
 
 TEST_F(EdgeMeasurementsTest, PassOnWhatThePointsWantOfEachPose) {
-  EdgeMeasurements edges(options_);
+  EdgeMeasurements edges(1, 1);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
   std::vector<SE3> poses;
   for (std::uint32_t j = 0; j < kViews; ++j) {
@@ -136,7 +136,7 @@ TEST_F(EdgeMeasurementsTest, PassOnWhatThePointsWantOfEachPose) {
 
 TEST_F(EdgeMeasurementsTest, CountAPointOnceHoweverManyEdgesShareIt) {
   // With one more keyframe that sees all points, each pair's share goes from 1/4 to 1/5.
-  EdgeMeasurements edges(options_);
+  EdgeMeasurements edges(1, 1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(0), k(2)));
   const Matrix6 before = information(edges, 0, 2);
   const KeyframeId fifth = add_keyframe(writer_, writer_.graph().T_k_w(k(1)));
@@ -147,7 +147,7 @@ TEST_F(EdgeMeasurementsTest, CountAPointOnceHoweverManyEdgesShareIt) {
 }
 
 TEST_F(EdgeMeasurementsTest, SpeakForPointsOutsideOfTheProblemOnly) {
-  EdgeMeasurements edges(options_);
+  EdgeMeasurements edges(1, 1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(1), k(3)));
   IdMap position;
   for (std::uint32_t p = 0; p < kPoints; ++p) position.set(PointId{p}, 0);  // looked at and left out
@@ -161,10 +161,9 @@ TEST_F(EdgeMeasurementsTest, SpeakForPointsOutsideOfTheProblemOnly) {
 }
 
 TEST_F(EdgeMeasurementsTest, KeepAShareOfWhatTheySayAboutLengthAndAllElse) {
-  EdgeMeasurements edges(options_);
+  EdgeMeasurements edges(1, 1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(0), k(3)));
-  options_.edge.length_share = 0.1;
-  EdgeMeasurements soft_edges(options_);
+  EdgeMeasurements soft_edges(1, 0.1);
   ASSERT_TRUE(soft_edges.measure(writer_.graph(), rig_, k(0), k(3)));
   const SE3 T = edges.constraint(writer_.graph(), k(0), k(3), {})->T_to_from;
   EXPECT_EQ(T.translation(), soft_edges.constraint(writer_.graph(), k(0), k(3), {})->T_to_from.translation());
@@ -179,7 +178,7 @@ TEST_F(EdgeMeasurementsTest, KeepAShareOfWhatTheySayAboutLengthAndAllElse) {
 }
 
 TEST_F(EdgeMeasurementsTest, AreForgottenWithTheirKeyframeOrForAnotherConstraint) {
-  EdgeMeasurements edges(options_);
+  EdgeMeasurements edges(1, 1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(0), k(1)));
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(2), k(0)));
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(2), k(3)));
@@ -195,7 +194,7 @@ TEST(EdgeMeasurements, AreNotMadeOfTooFewPoints) {
   GraphWriter writer = chain(2);
   const Rig rig = simulation::thesis_rig();
   add_point(writer, rig, {0.1, 0.1, 1.5}, {KeyframeId{0}, KeyframeId{1}});
-  EdgeMeasurements edges{MapperOptions()};
+  EdgeMeasurements edges(1, 0.05);
   EXPECT_FALSE(edges.measure(writer.graph(), rig, KeyframeId{0}, KeyframeId{1}));
   EXPECT_FALSE(edges.constraint(writer.graph(), KeyframeId{0}, KeyframeId{1}, {}));
 }
@@ -206,7 +205,8 @@ TEST(EdgeMeasurements, KeepAMapThatFitsItsMeasurements) {
   mapper_options.inner_window = 8;
   mapper_options.outer_window = 20;
   mapper_options.culling.keyframes = mapper_options.loop.enabled = false;
-  mapper_options.measured_edges = true;
+  mapper_options.hook = std::make_shared<ExperimentalMapping>(
+      simulation.rig(), mapper_options, ExperimentalMappingOptions{.measured_edges = true});
   Mapper mapper(simulation.rig(), mapper_options);
   int left = 0;
   while (!simulation.done()) {
@@ -225,4 +225,4 @@ TEST(EdgeMeasurements, KeepAMapThatFitsItsMeasurements) {
 }
 
 }  // namespace
-}  // namespace twofold
+}  // namespace twofold::bench

@@ -1,10 +1,10 @@
-#include "mapping/map_unit.hpp"
+#include "experiments/double_window/map_unit.hpp"
 
 #include <algorithm>
 
 #include "geometry/inverse_depth.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 
 MapUnit::Sums& MapUnit::Sums::operator+=(const Sums& other) {
   dz += other.dz;
@@ -49,4 +49,4 @@ void MapUnit::read(const WindowProblem& problem, const DoubleWindow& window) {
   }
 }
 
-}  // namespace twofold
+}  // namespace twofold::bench

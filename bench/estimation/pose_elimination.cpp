@@ -1,8 +1,10 @@
-#include "estimation/pose_elimination.hpp"
+#include "bench/estimation/pose_elimination.hpp"
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "estimation/minimise.hpp"
 #include "geometry/inverse_depth.hpp"
 
 namespace twofold {
@@ -210,6 +212,17 @@ void PoseElimination::write_back(const Values& values, WindowProblem& problem) c
     const Vector3 y = problem.poses[point.anchor].T_k_w * (T_w_frame_[k] * from_inverse_depth(values.psi[k]));
     if (y.z() > kMinDepth) point.psi = to_inverse_depth(y);
   }
+}
+
+SolverSummary PoseElimination::solve(WindowProblem& problem, const WindowSolverOptions& options) {
+  Values values = start(problem), next;
+  const auto try_step = [&](double lambda, double present) {
+    return judge_step(advance(options, values, lambda, next), present, [&] { return cost(options, next); });
+  };
+  const SolverSummary summary =
+      minimise(cost(options, values), options, try_step, [&] { std::swap(values, next); });
+  if (summary.accepted_steps > 0) write_back(values, problem);
+  return summary;
 }
 
 }  // namespace twofold

@@ -5,17 +5,19 @@
 #include "estimation/window_problem.hpp"
 #include "mapping/double_window.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 
 /// The map's own unit of length, for rigs that measure disparities.
 ///
-/// What a few keyframes' disparities say about scale is poor, and pose-pose edges cannot tell it from what
-/// points say about shape: hundreds of them repeat, each as if it knew it by itself, the one error they have
-/// in common, the scale of the windows they were made in, and hold it against all that is measured later.
-/// So lengths of the map, in W1 as in the edges, are in a unit that the edges carry on, and one number, the
-/// baseline in that unit, is estimated beside eq. 6.4 from the disparities of all keyframes, each counted
-/// once: least squares of z_kp = baseline d_kp, structure given, with d = f / depth [px / unit] and z the
-/// measured disparity of point p in keyframe k. A keyframe is read anew as long as it is in W1.
+/// The disparities of a few keyframes measure the scale poorly. A pose-pose edge freezes the scale of the
+/// window it was made in, and hundreds of edges made in one window share its error; eq. 6.4 takes them for
+/// independent measurements, so that the disparities measured later cannot correct it.
+///
+/// With this class all lengths, in W1 as in the edges, are in the map's own unit, and the baseline in that
+/// unit is estimated beside eq. 6.4 from the disparities of all keyframes, each counted once: the least
+/// squares solution of z_kp = baseline d_kp over all points p of all keyframes k, with z the measured
+/// disparity [px] and d = f / depth [px / unit], depths as the map has them. A keyframe's sums are renewed as
+/// long as it is in W1.
 ///
 /// One unit for the whole map: its scale must drift by less than the disparities of a window can tell. Holds
 /// where paths keep crossing; a long exploration would have to forget.
@@ -41,4 +43,4 @@ class MapUnit {
   Sums window_, map_;
 };
 
-}  // namespace twofold
+}  // namespace twofold::bench

@@ -1,12 +1,13 @@
-#include "mapping/map_unit.hpp"
+#include "bench/experiments/double_window/map_unit.hpp"
 
 #include <gtest/gtest.h>
 
+#include "bench/experiments/double_window/experimental_mapping.hpp"
 #include "fixtures/simulation.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "mapping/mapper.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 namespace {
 
 /// Three cameras in a row that see the same twenty points. Keyframe n's disparities are those of a baseline
@@ -74,14 +75,16 @@ TEST(MapUnit, ScalesAMapOfWrongScaleWithoutBendingIt) {
   mapper_options.inner_window = 15;
   mapper_options.outer_window = 50;
   mapper_options.culling.keyframes = mapper_options.loop.enabled = false;
-  mapper_options.own_unit = true;
+  const auto hook = std::make_shared<ExperimentalMapping>(simulation.rig(), mapper_options,
+                                                          ExperimentalMappingOptions{.own_unit = true});
+  mapper_options.hook = hook;
   Mapper mapper(simulation.rig(), mapper_options);
   const auto map_next = [&] {
     KeyframeProposal* proposal = &simulation.propose(mapper.graph());
     (void)mapper.step(std::span(&proposal, 1));
   };
   for (int k = 0; k < 12; ++k) map_next();
-  EXPECT_NEAR(mapper.metres_per_unit(), 1, 1e-3);
+  EXPECT_NEAR(hook->metres_per_unit(), 1, 1e-3);
   GraphWriter writer(mapper.graph());
   constexpr double kScale = 1.02;
   for (std::uint32_t k = 0; k < writer.graph().keyframe_count(); ++k) {
@@ -95,16 +98,16 @@ TEST(MapUnit, ScalesAMapOfWrongScaleWithoutBendingIt) {
   mapper.continue_from(writer.publish());
   while (!simulation.done()) map_next();
   // The unit has stayed, and in metres the map is right wherever it is.
-  EXPECT_NEAR(mapper.metres_per_unit(), 1 / kScale, 2e-3);
+  EXPECT_NEAR(hook->metres_per_unit(), 1 / kScale, 2e-3);
   double worst = 0;
   for (std::uint32_t k = 1; k < mapper.graph().keyframe_count(); ++k) {
     const KeyframeId i{k}, j{k - 1};
     const SE3 T_i_j = mapper.graph().T_k_w(i) * mapper.graph().T_k_w(j).inverse();
     const SE3 T_true = simulation.true_pose(i) * simulation.true_pose(j).inverse();
-    worst = std::max(worst, (mapper.metres_per_unit() * T_i_j.translation() - T_true.translation()).norm());
+    worst = std::max(worst, (hook->metres_per_unit() * T_i_j.translation() - T_true.translation()).norm());
   }
   EXPECT_LT(worst, 0.2 * 2e-3);  // of steps of 0.2 m; a map bent between the two scales would be off by 0.02
 }
 
 }  // namespace
-}  // namespace twofold
+}  // namespace twofold::bench
