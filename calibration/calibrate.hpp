@@ -19,6 +19,9 @@ struct CalibrationOptions {
   double max_focal_std = 0.003;     ///< standard deviation of fx, fy by themselves
   double max_baseline_std = 0.005;  ///< of the baseline by itself
   double outlier = 3.0;             ///< views with so many times the median error are left out; 0: none
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Corners of one view and how far they are from where the calibrated camera sees them.

@@ -4,6 +4,7 @@
 
 #include "calibration/calibrate_alone.hpp"
 #include "calibration/refusal.hpp"
+#include "geometry/check.hpp"
 
 namespace twofold {
 namespace {
@@ -75,6 +76,7 @@ std::vector<int> all_of(std::size_t count) {
 
 tl::expected<AloneFit, std::string> calibrate_alone(const std::vector<BoardView>& views, const Board& board,
                                                     cv::Size size, const CalibrationOptions& options) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "calibration options");
   if (auto reason = refusal_of_views(views, size, options); !reason.empty())
     return tl::make_unexpected(std::move(reason));
   try {

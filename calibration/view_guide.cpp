@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "geometry/check.hpp"
+
 namespace twofold {
 namespace {
 
@@ -57,7 +59,9 @@ ViewGuide::ViewGuide(const Board& board, cv::Size size, const ViewGuideOptions& 
       size_(size),
       options_(options),
       novelty_px_(options.novelty * std::hypot(size.width, size.height)),
-      novelty_angle_(options.novelty_angle) {}
+      novelty_angle_(options.novelty_angle) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "view guide options");
+}
 
 bool ViewGuide::is_new(const Entry& entry, const std::vector<Entry>& others) const {
   return std::all_of(others.begin(), others.end(), [&](const Entry& other) {

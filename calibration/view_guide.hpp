@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "calibration/view_shape.hpp"
 
 namespace twofold {
@@ -12,6 +14,9 @@ struct ViewGuideOptions {
   double wanted_zoom = 1.5;      ///< largest over smallest view
   double novelty = 0.03;         ///< rms distance of corners from every chosen view [image diagonals], or ...
   double novelty_angle = 0.25;   ///< ... another tilt than every chosen view that is nearer [rad]
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Chooses views for a calibration and says what is still missing, in words for the person who holds the

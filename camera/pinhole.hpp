@@ -4,6 +4,13 @@
 
 namespace twofold {
 
+/// Whether a point in the camera frame can be looked for in an image: no real point is nearer to a camera
+/// than a millimetre, and one behind it has no projection.
+[[nodiscard]] inline bool in_front_of_camera(const Vector3& x_c) {
+  constexpr double kNearest = 1e-3;  // [m]
+  return x_c.z() > kNearest;
+}
+
 /// Pinhole camera without distortion  (thesis eq. 3.3, with fx != fy allowed).
 ///
 /// Pixels (u, v); (0, 0) is the centre of the top-left pixel. Camera axes: x right, y down, z forward.

@@ -1,14 +1,16 @@
 #include "engine/effort_controller.hpp"
 
 #include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
 
 namespace twofold {
 
 std::string EffortOptions::invalid_reason() const {
-  if (!(early > 0 && early <= late)) return "effort: early must be in (0, late], is " + std::to_string(early);
-  if (!(drop_after >= late)) return "effort: drop_after must be >= late, is " + std::to_string(drop_after);
-  if (patience < 1) return "effort: patience must be >= 1, is " + std::to_string(patience);
-  return {};
+  return OptionCheck()
+      .that(early > 0 && early <= late, "early", "in (0, late]", early)
+      .that(drop_after >= late, "drop_after", ">= late", drop_after)
+      .at_least("patience", patience, 1)
+      .reason();
 }
 
 EffortController::EffortController(const EffortOptions& options) : options_(options) {

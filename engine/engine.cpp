@@ -27,10 +27,7 @@ class CostMeter {
 }  // namespace
 
 Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
-  if (const std::string reason = options_.pacing.invalid_reason(); !reason.empty())
-    throw std::runtime_error(reason);
-  if (const std::string reason = options_.effort.invalid_reason(); !reason.empty())
-    throw std::runtime_error(reason);
+  if (const std::string reason = options_.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
   if (options_.map) {
     if (const std::string difference = rig_difference(rig, options_.map->rig); !difference.empty())
       throw std::runtime_error("the map was made with another camera: " + difference);
@@ -39,7 +36,6 @@ Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std:
   }
   if (options_.localise_only && !options_.map)
     throw std::runtime_error("localisation only needs a map to localise in");
-  if (!(options_.checkpoint.period >= 0)) throw std::runtime_error("checkpoint.period must be >= 0");
   if (rig.kind == SensorKind::kMono) {
     throw std::runtime_error("this source has a single camera without depth; stereo or RGB-D is needed");
   }

@@ -19,6 +19,9 @@ namespace twofold {
 struct CheckpointOptions {
   std::filesystem::path file;
   double period = 0;  ///< [s] >= 0; 0: none. By the clock; in runs on one thread by the frames' time stamps
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct EngineOptions {
@@ -48,6 +51,9 @@ struct EngineOptions {
   std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
 
   bool trace = false;  ///< keep spans and counters for RunResult::trace
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 }  // namespace twofold

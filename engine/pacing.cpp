@@ -5,12 +5,12 @@
 #include <cmath>
 
 #include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
 
 namespace twofold {
 
 std::string PacingOptions::invalid_reason() const {
-  if (std::isfinite(speed) && speed >= 0) return {};
-  return "speed must be finite and not negative, is " + std::to_string(speed);
+  return OptionCheck().that(std::isfinite(speed) && speed >= 0, "speed", "finite and >= 0", speed).reason();
 }
 
 void PacingClock::sleep_until(std::int64_t t_ns, const std::stop_token& stop) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
@@ -16,12 +17,15 @@ struct MotionObservation {
 };
 
 struct MotionOnlyOptions {
-  int max_iterations = 10;
-  double huber_px = 1.5;              ///< on the whitened residual norm
-  double inlier_chi2_mono = 5.991;    ///< 95 % of chi-square with 2 degrees of freedom
-  double inlier_chi2_stereo = 7.815;  ///< 95 % of chi-square with 3 degrees of freedom
-  int rounds = 2;           ///< outliers are put aside after each round and judged again in the next
+  int max_iterations = 10;            ///< of a round, >= 1
+  double huber_px = 1.5;              ///< on the whitened residual norm; <= 0: no kernel
+  double inlier_chi2_mono = 5.991;    ///< 95 % of chi-square with 2 degrees of freedom, > 0
+  double inlier_chi2_stereo = 7.815;  ///< 95 % of chi-square with 3 degrees of freedom, > 0
+  int rounds = 2;           ///< outliers are put aside after each and judged again in the next, >= 1
   double stop_step = 1e-7;  ///< stop when the step is smaller (norm of the tangent vector)
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct MotionOnlyResult {

@@ -8,8 +8,9 @@
 
 namespace twofold {
 
-/// Points nearer to the image plane than this count as behind the camera [m]: far below any real depth, far
-/// above rounding.
+/// Solvers take a point nearer to the image plane than this for one behind the camera [m]. Far above
+/// rounding, but far below in_front_of_camera, so that a step may bring any point that was looked for
+/// somewhat nearer.
 inline constexpr double kMinDepth = 1e-6;
 
 /// Smallest inverse depth the solvers let a point take [1/m]: points at infinity stay representable and

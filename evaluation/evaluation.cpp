@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include "geometry/absolute_orientation.hpp"
+#include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
 
 namespace twofold {
 namespace {
@@ -140,6 +142,7 @@ ErrorStatistics error_statistics(std::vector<double> errors) {
 
 tl::expected<Evaluation, std::string> evaluate(std::vector<PosePair> pairs,
                                                const EvaluationOptions& options) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "evaluation options");
   if (pairs.empty()) return tl::unexpected<std::string>("no poses of the two trajectories are close in time");
   const auto S_w_e = align(pairs, options.alignment);
   if (!S_w_e) {
@@ -164,6 +167,14 @@ tl::expected<Evaluation, std::string> evaluate(std::vector<PosePair> pairs,
   result.per_metre = relative_error(pairs, pairs_by_path(lengths, options.delta_m), lengths);
   result.pairs = std::move(pairs);
   return result;
+}
+
+std::string EvaluationOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("delta_s", delta_s, 0)
+      .above("delta_m", delta_m, 0)
+      .at_least("time_tolerance_s", time_tolerance_s, 0)
+      .reason();
 }
 
 }  // namespace twofold

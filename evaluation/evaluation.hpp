@@ -54,11 +54,14 @@ struct EvaluationOptions {
   double delta_s = 1.0;            ///< step of the error per time
   double delta_m = 1.0;            ///< step of the error per distance
   double time_tolerance_s = 0.05;  ///< pairs whose times differ from delta_s by more are left out
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct Evaluation {
   Sim3 S_w_e;
-  std::vector<PosePair> pairs;            ///< T_e_c already aligned: of the truth's world
+  std::vector<PosePair> pairs;            ///< T_e_c already aligned: in the truth's world
   std::vector<double> position_errors;    ///< [m] one a pair
   ErrorStatistics absolute;               ///< ATE: |t_truth - t_aligned|  [m]
   ErrorStatistics absolute_rotation_deg;  ///< angle between true and aligned orientation

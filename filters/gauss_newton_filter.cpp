@@ -5,14 +5,18 @@
 #include <stdexcept>
 
 #include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
 
 namespace twofold {
 
 std::string GaussNewtonFilterOptions::invalid_reason() const {
-  if (!(sigma_px > 0)) return "sigma_px must be > 0, is " + std::to_string(sigma_px);
-  if (iterations < 0) return "iterations must be >= 0, is " + std::to_string(iterations);
-  if (motion_iterations < 0) return "motion_iterations must be >= 0, is " + std::to_string(motion_iterations);
-  return {};
+  return OptionCheck()
+      .above("sigma_px", sigma_px, 0)
+      .at_least("iterations", iterations, 0)
+      .at_least("motion_iterations", motion_iterations, 0)
+      .at_least("two_view_iterations", two_view_iterations, 1)
+      .at_least("three_view_iterations", three_view_iterations, 1)
+      .reason();
 }
 
 GaussNewtonFilter::GaussNewtonFilter(const Rig& rig, const GaussNewtonFilterOptions& options)

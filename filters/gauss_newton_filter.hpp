@@ -23,7 +23,9 @@ enum class MotionEstimate : std::uint8_t {
 struct GaussNewtonFilterOptions {
   double sigma_px = 0.5;  ///< of every measurement component, > 0
   int iterations = 3;  ///< Levenberg-Marquardt steps of the joint update, >= 0; 0: the motion estimate stands
-  int motion_iterations = 10;
+  int motion_iterations = 10;      ///< of the motion estimate, >= 0
+  int two_view_iterations = 60;    ///< of the monocular start from two frames, which begins far off, >= 1
+  int three_view_iterations = 20;  ///< when the third frame joins, >= 1
   MotionEstimate motion = MotionEstimate::kMotionOnly;
   /// First estimates bring the filter to bundle adjustment's accuracy.
   Linearisation linearisation = Linearisation::kFirstEstimate;

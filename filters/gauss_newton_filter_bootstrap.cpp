@@ -10,9 +10,6 @@
 namespace twofold {
 namespace {
 
-constexpr int kTwoViewIterations = 60;
-constexpr int kThreeViewIterations = 20;
-
 using Matrix65 = Eigen::Matrix<double, 6, 5>;
 
 /// Left perturbations (v, omega) of a pose that keep the length of t: d|t|^2 / 2 = t^T v.
@@ -64,7 +61,7 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   }
   // Six unknowns of the motion and three a point, one of them, scale, free.
   views.views.push_back({SE3(), match(b1)});
-  if (views.views[0].seen.size() < 6 || !views.minimise(kTwoViewIterations)) return false;
+  if (views.views[0].seen.size() < 6 || !views.minimise(options_.two_view_iterations)) return false;
   if (!views.normalise_scale() || !start_from(views)) return false;
 
   // Third frame: a standard update after the second pose is marginalised; if all goes well, only its start.
@@ -73,9 +70,9 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   views.views.push_back({T_c_w_, third});
   // Two frames of little parallax leave depths and direction of motion too far off to take derivatives at for
   // good. All three are brought to their common minimum, where the information is taken afresh.
-  if (!views.minimise(kThreeViewIterations) || !views.normalise_scale() || !start_from(views)) {
+  if (!views.minimise(options_.three_view_iterations) || !views.normalise_scale() || !start_from(views)) {
     append_pose();
-    if (!joint_update(third, kThreeViewIterations)) return false;
+    if (!joint_update(third, options_.three_view_iterations)) return false;
   }
   reference_ = kCurrentPose;
   return true;

@@ -5,16 +5,21 @@
 #include <stdexcept>
 
 #include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
 
 namespace twofold {
 
 std::string SlidingWindowOptions::invalid_reason() const {
-  if (window < 0) return "window must be >= 0, is " + std::to_string(window);
-  if (!(huber_sigmas > 0)) return "huber_sigmas must be > 0, is " + std::to_string(huber_sigmas);
-  if (max_iterations < 0) return "max_iterations must be >= 0, is " + std::to_string(max_iterations);
-  if (!(initial_damping >= 0)) return "initial_damping must be >= 0, is " + std::to_string(initial_damping);
-  if (!(min_disparity_px > 0)) return "min_disparity_px must be > 0, is " + std::to_string(min_disparity_px);
-  return {};
+  return OptionCheck()
+      .at_least("window", window, 0)
+      .above("huber_sigmas", huber_sigmas, 0)
+      .above("min_inlier_sigma", min_inlier_sigma, 0)
+      .at_least("min_spread_dof", min_spread_dof, 1)
+      .at_least("max_iterations", max_iterations, 0)
+      .at_least("stop_decrement", stop_decrement, 0)
+      .at_least("initial_damping", initial_damping, 0)
+      .above("min_disparity_px", min_disparity_px, 0)
+      .reason();
 }
 
 SlidingWindowFilter::SlidingWindowFilter(const Rig& rig, const SlidingWindowOptions& options)

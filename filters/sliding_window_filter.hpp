@@ -36,8 +36,11 @@ struct SlidingWindowOptions {
 
   bool robust = true;         ///< Huber kernel, threshold from the inliers' spread  (SWF 3.1.3)
   double huber_sigmas = 2.0;  ///< threshold, in standard deviations of the inliers' whitened components, > 0
-  int max_iterations = 10;    ///< Gauss-Newton steps an update, >= 0
-  double stop_decrement = 1e-4;  ///< stop when g^T delta, the expected fall of the cost, is smaller
+  double min_inlier_sigma =
+      0.3;                  ///< ... which is taken for this at least, so that noise-free data have one, > 0
+  int min_spread_dof = 30;  ///< ... and for 1 with fewer surplus measurements than this to tell it from, >= 1
+  int max_iterations = 10;  ///< Gauss-Newton steps an update, >= 0
+  double stop_decrement = 1e-4;  ///< stop when g^T delta, the expected fall of the cost, is smaller, >= 0
   bool reuse_factor = true;    ///< later steps of a frame's updates keep the first factor while they contract
                                ///< fast; the fixed point is the same
   double initial_damping = 0;  ///< Levenberg-Marquardt term to start with, absolute, >= 0
@@ -137,8 +140,6 @@ class SlidingWindowFilter {
   bool set_measurement(int pose, std::int64_t id, const Vector3& z);
 
  private:
-  static constexpr double kMinDepth = 1e-3;  ///< [m]; nearer or behind: the measurement says nothing
-
   struct Observation {
     int landmark;  ///< index in the state
     Vector3 z;

@@ -19,14 +19,9 @@ struct KnownLandmark {
 /// Half the robust cost of one pose T_c_l, given landmarks and where the motion predicts it.
 class PoseCost {
  public:
-  PoseCost(const Rig& rig, double min_depth, double huber, const std::vector<KnownLandmark>& landmarks,
-           const SE3& T_predicted, const Matrix6& prior)
-      : rig_(rig),
-        min_depth_(min_depth),
-        kernel_{huber},
-        landmarks_(landmarks),
-        T_predicted_(T_predicted),
-        prior_(prior) {}
+  PoseCost(const Rig& rig, double huber, const std::vector<KnownLandmark>& landmarks, const SE3& T_predicted,
+           const Matrix6& prior)
+      : rig_(rig), kernel_{huber}, landmarks_(landmarks), T_predicted_(T_predicted), prior_(prior) {}
 
   [[nodiscard]] double at(const SE3& T_c_l) const { return evaluate(T_c_l, nullptr, nullptr); }
   /// Also the normal equations H delta = g of a step exp(delta) T_c_l.
@@ -40,7 +35,7 @@ class PoseCost {
     if (g) *g = -(prior_ * e);
     for (const KnownLandmark& known : landmarks_) {
       const Vector3 x_c = T_c_l * known.x_l;
-      if (x_c.z() < min_depth_) continue;
+      if (!in_front_of_camera(x_c)) continue;
       const Vector3 r = known.z - rig_.project(x_c);
       const double chi2 = r.dot(known.information * r);
       sum += 0.5 * kernel_.rho(chi2);
@@ -56,7 +51,6 @@ class PoseCost {
   }
 
   const Rig& rig_;
-  double min_depth_;
   HuberKernel kernel_;
   const std::vector<KnownLandmark>& landmarks_;
   SE3 T_predicted_;
@@ -100,7 +94,7 @@ void SlidingWindowFilter::fit_newest_pose(const FilterFrame& frame) {
   Pose& pose = poses_.back();
   const double huber = options_.robust ? options_.huber_sigmas * std::sqrt(3.0) : 0.0;
   const Matrix6 prior = frame.motion ? Matrix6(frame.motion->covariance.inverse()) : Matrix6::Zero();
-  pose.T_c_l = minimise(PoseCost(rig_, kMinDepth, huber, known, pose.T_c_l, prior), pose.T_c_l);
+  pose.T_c_l = minimise(PoseCost(rig_, huber, known, pose.T_c_l, prior), pose.T_c_l);
 }
 
 }  // namespace twofold

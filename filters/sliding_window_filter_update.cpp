@@ -11,9 +11,7 @@
 namespace twofold {
 namespace {
 
-constexpr double kMinInlierSigma = 0.3;  // keeps the Huber threshold off zero on noise-free data
-constexpr int kMinDof = 30;
-constexpr double kUnknownLandmark = 1e-6;  // [1/m^2]
+constexpr double kUnknownLandmark = 1e-6;  // [1/m^2]: keeps the system regular, and moves nothing
 constexpr double kMedianChi2 = 2.366;      // of three degrees of freedom
 
 }  // namespace
@@ -35,7 +33,7 @@ const Vector3& SlidingWindowFilter::landmark_lin(int landmark) const {
 double SlidingWindowFilter::whitened_chi2(int pose, const Observation& observation) const {
   const Vector3 x_c =
       poses_[static_cast<std::size_t>(pose)].T_c_l * points_[static_cast<std::size_t>(observation.landmark)];
-  if (x_c.z() < kMinDepth) return -1;
+  if (!in_front_of_camera(x_c)) return -1;
   Vector3 r = observation.z - rig_.project(x_c);
   if (std::isnan(r.z())) return r.head<2>().dot(observation.information.topLeftCorner<2, 2>() * r.head<2>());
   return r.dot(observation.information * r);
@@ -48,7 +46,7 @@ SlidingWindowFilter::ObservationTerm SlidingWindowFilter::linearise(int pose,
       poses_[static_cast<std::size_t>(pose)].T_c_l * points_[static_cast<std::size_t>(observation.landmark)];
   const SE3& T_lin = pose_lin(pose);
   const Vector3 x_lin = T_lin * landmark_lin(observation.landmark);
-  if (x_c.z() < kMinDepth || x_lin.z() < kMinDepth) return term;
+  if (!in_front_of_camera(x_c) || !in_front_of_camera(x_lin)) return term;
 
   term.valid = true;
   term.r = observation.z - rig_.project(x_c);
@@ -189,7 +187,8 @@ void SlidingWindowFilter::update_threshold() {
   if (huber_ == 0) {  // no threshold yet: three times the robust spread given by the median
     std::nth_element(chi2s.begin(), chi2s.begin() + static_cast<std::ptrdiff_t>(chi2s.size() / 2),
                      chi2s.end());
-    limit2 = 9.0 * 3.0 * std::max(chi2s[chi2s.size() / 2] / kMedianChi2, kMinInlierSigma * kMinInlierSigma);
+    const double least = options_.min_inlier_sigma * options_.min_inlier_sigma;
+    limit2 = 9.0 * 3.0 * std::max(chi2s[chi2s.size() / 2] / kMedianChi2, least);
   }
   double sum = 0;
   int inliers = 0;
@@ -208,7 +207,8 @@ void SlidingWindowFilter::update_threshold() {
   summary_.inlier_sigma = std::sqrt(sum / std::max(1, dof));
   if (options_.robust) {
     // Too few surplus residuals to estimate a spread from: the stated variances stand.
-    const double sigma = dof >= kMinDof ? std::max(summary_.inlier_sigma, kMinInlierSigma) : 1.0;
+    const double sigma =
+        dof >= options_.min_spread_dof ? std::max(summary_.inlier_sigma, options_.min_inlier_sigma) : 1.0;
     huber_ = options_.huber_sigmas * std::sqrt(3.0) * sigma;
   }
 }

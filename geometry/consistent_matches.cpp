@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "geometry/option_check.hpp"
+
 namespace twofold {
 namespace {
 
@@ -45,6 +47,10 @@ bool agree(const PointMatch3d& a, const PointMatch3d& b, const ConsistencyOption
 }
 
 }  // namespace
+
+std::string ConsistencyOptions::invalid_reason() const {
+  return OptionCheck().at_least("threshold", threshold, 0).at_least("sigmas", sigmas, 0).reason();
+}
 
 std::vector<int> consistent_matches(std::span<const PointMatch3d> matches,
                                     const ConsistencyOptions& options) {

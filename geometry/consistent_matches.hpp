@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "geometry/types.hpp"
@@ -16,6 +17,9 @@ struct PointMatch3d {
 struct ConsistencyOptions {
   double threshold = 0.02;  ///< theta_C: distances that differ by less agree in any case [m], >= 0
   double sigmas = 3;        ///< ... and by less than so many standard deviations of the difference, >= 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Moravec's consistency check  (SWF 4.1.1): whatever the motion, a rigid body keeps the distances between

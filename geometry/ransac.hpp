@@ -7,7 +7,10 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
+
+#include "geometry/option_check.hpp"
 
 namespace twofold {
 
@@ -37,6 +40,15 @@ struct RansacOptions {
   double confidence = 0.999;  ///< probability of having drawn one sample without outliers, in (0, 1)
   int max_iterations = 1000;  ///< samples, >= 1
   std::uint64_t seed = 1;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const {
+    return OptionCheck()
+        .above("threshold", threshold, 0)
+        .that(confidence > 0 && confidence < 1, "confidence", "in (0, 1)", confidence)
+        .at_least("max_iterations", max_iterations, 1)
+        .reason();
+  }
 };
 
 template <class Model>

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
@@ -17,6 +18,9 @@ struct GuidedSearchOptions {
   float noise = 3;             ///< grey levels two views of the same surface differ by anyway
   int refine_iterations = 12;  ///< upper bound of sub-pixel Lucas-Kanade steps
   double right_search_px = 6;  ///< stereo: half range along the row around the predicted u_r, level pixels
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct PointMatch {

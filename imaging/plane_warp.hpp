@@ -2,6 +2,7 @@
 
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 
 #include "camera/pinhole.hpp"
 #include "geometry/se3.hpp"
@@ -51,6 +52,9 @@ struct SurfaceAlignmentOptions {
   double settled_px = 0.003;  ///< stop when a step is shorter [level px]
   double max_move_px = 4;     ///< farther from the predicted place is another feature [level px]
   bool along_row = false;     ///< move along the row only: right images of a rectified pair
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Lucas-Kanade over a translation, gain and offset, between a patch and a view warped back to the patch's

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "imaging/fast_corners.hpp"
@@ -12,6 +13,9 @@ struct CornerSelectionOptions {
   int levels = 3;       ///< pyramid levels searched, in [1, 3]
   int threshold = 8;    ///< FAST [grey]
   float min_score = 6;  ///< Shi-Tomasi, see Corner
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Picks the corners of an image that describe its place: each level is parted into cells, each cell gives

@@ -2,8 +2,6 @@
 
 #include <stdexcept>
 
-#include <fmt/format.h>
-
 namespace twofold {
 namespace {
 
@@ -17,17 +15,6 @@ LoopCloserOptions validated(const LoopCloserOptions& options) {
 }
 
 }  // namespace
-
-std::string LoopCloserOptions::invalid_reason() const {
-  if (corners.levels < 1 || corners.levels > 3) {
-    return fmt::format("corners.levels must be 1, 2 or 3, is {}", corners.levels);
-  }
-  if (corners.wanted < 1) return fmt::format("corners.wanted must be >= 1, is {}", corners.wanted);
-  if (recogniser.max_candidates < 1) {
-    return fmt::format("recogniser.max_candidates must be >= 1, is {}", recogniser.max_candidates);
-  }
-  return verification.invalid_reason();
-}
 
 LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary,
                        const LoopCloserOptions& options)

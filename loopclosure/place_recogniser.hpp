@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "graph/snapshot.hpp"
@@ -14,6 +15,9 @@ struct RecogniserOptions {
   double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing
   int consistency = 2;          ///< successive keyframes that must agree about the place, >= 1
   int same_place = 6;           ///< keyframes this many edges-or-numbers apart show the same place
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Hypotheses of places seen before, by appearance and topology  (thesis 6.4.2).

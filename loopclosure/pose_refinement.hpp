@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "estimation/motion_only.hpp"
@@ -16,6 +17,9 @@ struct RefinementOptions {
   double radius_px = 8;           ///< of the first search; the second one takes a third of it
   int min_inliers = 20;           ///< Theta
   double min_inlier_share = 0.6;  ///< of the points found
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// A view placed by the map's points.
@@ -30,9 +34,9 @@ enum class RefinementOutcome : std::uint8_t {
   kContradicted   ///< they should be visible, but are not found where they should be
 };
 
-/// Looks for the map's points around a keyframe in a view whose place was recognised: their patches and their
-/// depths, from many frames, tell the pose far more exactly than corners described one by one, and bear
-/// witness that the descriptors had no part in.
+/// Looks for the map's points around a keyframe in a view whose place was recognised. Their patches, and
+/// depths estimated from many frames, give the pose far more exactly than described corners with depths from
+/// one frame; and they are evidence that does not depend on the descriptors.
 class PoseRefinement {
  public:
   PoseRefinement(const Rig& rig, const RefinementOptions& options) : rig_(rig), options_(options) {}

@@ -6,6 +6,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "geometry/check.hpp"
+
 namespace twofold {
 namespace {
 
@@ -116,6 +118,7 @@ std::vector<Vocabulary::Node> grow_tree(const Members& all, const VocabularyTrai
 
 Vocabulary train_vocabulary(const std::vector<std::vector<BinaryDescriptor>>& images,
                             const VocabularyTrainerOptions& options) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "vocabulary trainer options");
   Members all;
   for (const auto& image : images) {
     for (const BinaryDescriptor& descriptor : image) all.push_back(&descriptor);

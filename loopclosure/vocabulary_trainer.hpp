@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "loopclosure/vocabulary.hpp"
@@ -12,6 +13,9 @@ struct VocabularyTrainerOptions {
   int levels = 4;          ///< 10^4 words with the default branching (thesis 6.4.2), in [1, 6]
   int iterations = 12;     ///< of k-medians at each node
   std::uint32_t seed = 1;  ///< same descriptors and seed, same tree
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Hierarchical k-medians: at each node the descriptors are parted around `branching` medians (majority of

@@ -9,10 +9,7 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kMinObservers = 2;
-constexpr double kViewBorderPx = 30;
-constexpr double kMinViewCosine = 0.9;
-constexpr double kMaxScaleChange = 1.5;
+constexpr std::size_t kMinObservers = 2;  // seen from one keyframe alone, a point ties nothing together
 
 bool has_lost_its_anchor(const GraphSnapshot& graph, PointId id) {
   const Keyframe& anchor = graph.keyframe(graph.point(id).anchor);
@@ -127,12 +124,13 @@ bool PointCuller::in_view(const GraphSnapshot& graph, const MapPoint& point, Poi
   const SE3 T_w_a = graph.T_k_w(point.anchor).inverse();
   const Vector3 x_w = graph.position(id);
   const Vector3 x_k = T_k_w * x_w;
-  if (!(x_k.z() > 1e-3) || !rig_.camera.contains(rig_.camera.project(x_k), kViewBorderPx)) return false;
+  if (!in_front_of_camera(x_k)) return false;
+  if (!rig_.camera.contains(rig_.camera.project(x_k), options_.view_border_px)) return false;
   const Vector3 from_anchor = x_w - T_w_a.translation();
   const Vector3 from_here = x_w - T_k_w.inverse().translation();
   const double ratio = from_anchor.norm() / from_here.norm();
-  return ratio < kMaxScaleChange && ratio * kMaxScaleChange > 1 &&
-         from_anchor.dot(from_here) > kMinViewCosine * from_anchor.norm() * from_here.norm();
+  return ratio < options_.max_scale_change && ratio * options_.max_scale_change > 1 &&
+         from_anchor.dot(from_here) > options_.min_view_cosine * from_anchor.norm() * from_here.norm();
 }
 
 int PointCuller::cull(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const {

@@ -8,18 +8,16 @@
 namespace twofold {
 namespace {
 
-constexpr double kInlierSigmas = 4;  // a pose of three noisy depths is rough
-constexpr int kMaxSamples = 400;
-
 class PoseFromThreePoints {
  public:
   using Model = SE3;
   static constexpr int kSampleSize = 3;
 
-  PoseFromThreePoints(const Rig& rig, std::span<const MotionObservation> matches) : rig_(rig) {
+  PoseFromThreePoints(const Rig& rig, std::span<const MotionObservation> matches, double min_disparity_px)
+      : rig_(rig) {
     for (const MotionObservation& match : matches) {
       const Vector3 z = match.z.cast<double>();
-      if (match.information.z() > 0 && z.x() - z.z() > 0.5)
+      if (match.information.z() > 0 && z.x() - z.z() > min_disparity_px)
         data_.push_back({match.x_ref, z, match.information.x()});
     }
   }
@@ -37,7 +35,7 @@ class PoseFromThreePoints {
   [[nodiscard]] double squared_residual(const SE3& T_c_ref, int i) const {
     const Datum& datum = data_[static_cast<std::size_t>(i)];
     const Vector3 x_c = T_c_ref * datum.x_ref;
-    if (!(x_c.z() > 1e-3)) return 1e12;
+    if (!in_front_of_camera(x_c)) return 1e12;
     return datum.information * (rig_.camera.project(x_c) - datum.z.head<2>()).squaredNorm();
   }
 
@@ -53,11 +51,12 @@ class PoseFromThreePoints {
 
 }  // namespace
 
-std::optional<SE3> consensus_pose(const Rig& rig, std::span<const MotionObservation> matches,
-                                  int min_inliers) {
-  const PoseFromThreePoints estimator(rig, matches);
-  const auto found =
-      ransac(estimator, {.threshold = kInlierSigmas, .confidence = 0.99, .max_iterations = kMaxSamples});
+std::optional<SE3> consensus_pose(const Rig& rig, std::span<const MotionObservation> matches, int min_inliers,
+                                  const LoopConsensusOptions& options) {
+  const PoseFromThreePoints estimator(rig, matches, options.min_disparity_px);
+  const auto found = ransac(estimator, {.threshold = options.inlier_sigmas,
+                                        .confidence = options.confidence,
+                                        .max_iterations = options.max_samples});
   if (!found || static_cast<int>(found->inliers.size()) < min_inliers) return std::nullopt;
   return found->model;
 }

@@ -5,6 +5,7 @@
 
 #include "camera/rig.hpp"
 #include "estimation/motion_only.hpp"
+#include "mapping/options.hpp"
 
 namespace twofold {
 
@@ -14,6 +15,6 @@ namespace twofold {
 ///
 /// @return nothing when fewer than `min_inliers` matches agree
 [[nodiscard]] std::optional<SE3> consensus_pose(const Rig& rig, std::span<const MotionObservation> matches,
-                                                int min_inliers);
+                                                int min_inliers, const LoopConsensusOptions& options);
 
 }  // namespace twofold

@@ -1,7 +1,6 @@
 #include "mapping/metric_loop.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "geometry/inverse_depth.hpp"
@@ -9,12 +8,6 @@
 #include "mapping/loop_consensus.hpp"
 
 namespace twofold {
-namespace {
-
-constexpr int kColumns = 8;
-constexpr int kRows = 6;
-
-}  // namespace
 
 PointSearch guided_point_search(const Rig& rig, double radius_px) {
   GuidedSearchOptions options;
@@ -70,8 +63,9 @@ void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
   near_points_.clear();
   candidates_.clear();
   visible_points(graph, near_, visited_, near_points_);
-  std::array<int, kColumns * kRows> taken{};
-  const int per_cell = (options_.max_searches + kColumns * kRows - 1) / (kColumns * kRows);
+  const int cells = options_.columns * options_.rows;
+  const int per_cell = (options_.max_searches + cells - 1) / cells;
+  taken_.assign(static_cast<std::size_t>(cells), 0);
   for (const KeyframeId id : far_) {
     for (const Observation& observation : *graph.keyframe(id).observations) {
       if (!visited_.insert(index(observation.point))) continue;
@@ -79,9 +73,9 @@ void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
       const Vector3 x_w = graph.position(observation.point);
       Vector2 uv;
       if (!well_visible(graph, point, x_w, uv)) continue;
-      const int column = static_cast<int>(uv.x() * kColumns / rig_.camera.width);
-      const int row = static_cast<int>(uv.y() * kRows / rig_.camera.height);
-      int& in_cell = taken[static_cast<std::size_t>(row * kColumns + column)];
+      const int column = static_cast<int>(uv.x() * options_.columns / rig_.camera.width);
+      const int row = static_cast<int>(uv.y() * options_.rows / rig_.camera.height);
+      int& in_cell = taken_[static_cast<std::size_t>(row * options_.columns + column)];
       if (in_cell == per_cell) continue;
       ++in_cell;
       candidates_.push_back({observation.point, x_w});
@@ -93,7 +87,7 @@ bool MetricLoopCloser::well_visible(const GraphSnapshot& graph, const MapPoint& 
                                     Vector2& uv) const {
   const SE3& T_ref_w = graph.keyframe(reference_).T_k_w;
   const Vector3 x_ref = T_ref_w * x_w;
-  if (!(x_ref.z() > 1e-3)) return false;
+  if (!in_front_of_camera(x_ref)) return false;
   uv = rig_.camera.project(x_ref);
   if (!rig_.camera.contains(uv, options_.border_px)) return false;
   const Vector3 from_anchor = x_w - graph.T_k_w(point.anchor).inverse().translation();
@@ -130,7 +124,7 @@ void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const Frame
 std::optional<SE3> MetricLoopCloser::estimate_pose(const SE3& T_ref_w) {
   // Within a wide search radius most matches may be wrong, too many for a robust kernel to find the way from
   // T_ref.
-  const auto start = consensus_pose(rig_, motion_, min_matches_);
+  const auto start = consensus_pose(rig_, motion_, min_matches_, options_.consensus);
   const MotionOnlyResult result = optimise_motion(rig_, motion_, start.value_or(T_ref_w), {});
   if (result.inliers < min_matches_) return std::nullopt;
   return result.T_c_ref;
@@ -141,7 +135,7 @@ void MetricLoopCloser::prune(const SE3& T_loop_w) {
   std::size_t kept = 0;
   for (std::size_t n = 0; n < found_.size(); ++n) {
     const Vector3 x = T_loop_w * motion_[n].x_ref;
-    if (!(x.z() > 1e-3)) continue;
+    if (!in_front_of_camera(x)) continue;
     Vector3 error = (rig_.project(x) - motion_[n].z.cast<double>()) / std::ldexp(1.0, found_[n].level);
     if (motion_[n].information.z() == 0) error.z() = 0;
     if (error.cwiseAbs().maxCoeff() > options_.max_error_px) continue;

@@ -67,6 +67,7 @@ class MetricLoopCloser {
   std::vector<KeyframeId> far_;   ///< N2 without N1
   VisitedSet visited_;            ///< points seen from N1, and those met
   std::vector<PointId> near_points_;
+  std::vector<int> taken_;             ///< candidates by cell of the image
   std::vector<Candidate> candidates_;  ///< A
   std::vector<Observation> found_;     ///< measurements of candidates_, in step with motion_
   std::vector<MotionObservation> motion_;

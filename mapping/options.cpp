@@ -1,43 +1,72 @@
 #include "mapping/options.hpp"
 
-#include <fmt/format.h>
+#include "geometry/option_check.hpp"
 
 namespace twofold {
 
+std::string EdgeInformationOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("sigma_px", sigma_px, 0)
+      .above("trans_share", trans_share, 0)
+      .above("rot_share", rot_share, 0)
+      .reason();
+}
+
+std::string LoopConsensusOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("inlier_sigmas", inlier_sigmas, 0)
+      .at_least("max_samples", max_samples, 1)
+      .that(confidence > 0 && confidence < 1, "confidence", "in (0, 1)", confidence)
+      .at_least("min_disparity_px", min_disparity_px, 0)
+      .reason();
+}
+
+std::string MetricLoopOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("neighbourhood", neighbourhood, 0)
+      .at_least("max_searches", max_searches, 0)
+      .at_least("columns", columns, 1)
+      .at_least("rows", rows, 1)
+      .above("search_radius_px", search_radius_px, 0)
+      .above("max_error_px", max_error_px, 0)
+      .at_least("border_px", border_px, 0)
+      .above("max_view_angle", max_view_angle, 0)
+      .nested("consensus", consensus.invalid_reason())
+      .reason();
+}
+
+std::string CullingOptions::invalid_reason() const {
+  return OptionCheck()
+      .share("redundant_share", redundant_share)
+      .at_least("redundant_observers", redundant_observers, 2)
+      .at_least("keep_recent", keep_recent, 0)
+      .at_least("max_keyframes", max_keyframes, 0)
+      .that(keep_replacements >= max_keyframes, "keep_replacements", ">= max_keyframes", keep_replacements)
+      .within("max_misses", max_misses, 1, 255)
+      .at_least("view_border_px", view_border_px, 0)
+      .within("min_view_cosine", min_view_cosine, -1, 1)
+      .at_least("max_scale_change", max_scale_change, 1)
+      .reason();
+}
+
 std::string MapperOptions::invalid_reason() const {
-  const auto wrong = [](const char* field, const char* rule, double value) {
-    return fmt::format("{} must be {}, not {}", field, rule, value);
-  };
-  if (inner_window < 1) return wrong("inner_window", ">= 1", inner_window);
-  if (outer_window < 0) return wrong("outer_window", ">= 0", outer_window);
-  if (max_anchors < 0) return wrong("max_anchors", ">= 0", max_anchors);
-  if (max_points < 1) return wrong("max_points", ">= 1", max_points);
-  if (min_covisible < 1) return wrong("min_covisible", ">= 1", min_covisible);
-  if (!(edge.sigma_px > 0)) return wrong("edge.sigma_px", "> 0", edge.sigma_px);
-  if (!(edge.trans_share > 0)) return wrong("edge.trans_share", "> 0", edge.trans_share);
-  if (!(edge.rot_share > 0)) return wrong("edge.rot_share", "> 0", edge.rot_share);
-  if (solver.max_iterations < 1) return wrong("solver.max_iterations", ">= 1", solver.max_iterations);
-  if (structure_iterations < 0) return wrong("structure_iterations", ">= 0", structure_iterations);
-  if (!(sigma_scale > 0)) return wrong("sigma_scale", "> 0", sigma_scale);
-  if (!(outlier_chi2_mono > 0)) return wrong("outlier_chi2_mono", "> 0", outlier_chi2_mono);
-  if (!(outlier_chi2_stereo > 0)) return wrong("outlier_chi2_stereo", "> 0", outlier_chi2_stereo);
-  if (loop.neighbourhood < 0) return wrong("loop.neighbourhood", ">= 0", loop.neighbourhood);
-  if (loop.max_searches < 0) return wrong("loop.max_searches", ">= 0", loop.max_searches);
-  if (!(loop.max_error_px > 0)) return wrong("loop.max_error_px", "> 0", loop.max_error_px);
-  if (!(culling.redundant_share > 0 && culling.redundant_share <= 1)) {
-    return wrong("culling.redundant_share", "in (0, 1]", culling.redundant_share);
-  }
-  if (culling.redundant_observers < 2) {
-    return wrong("culling.redundant_observers", ">= 2", culling.redundant_observers);
-  }
-  if (culling.keep_recent < 0) return wrong("culling.keep_recent", ">= 0", culling.keep_recent);
-  if (culling.keep_replacements < culling.max_keyframes) {
-    return wrong("culling.keep_replacements", ">= culling.max_keyframes", culling.keep_replacements);
-  }
-  if (culling.max_misses < 1 || culling.max_misses > 255) {
-    return wrong("culling.max_misses", "in [1, 255]", culling.max_misses);
-  }
-  return {};
+  return OptionCheck()
+      .at_least("inner_window", inner_window, 1)
+      .at_least("outer_window", outer_window, 0)
+      .at_least("max_anchors", max_anchors, 0)
+      .at_least("max_points", max_points, 1)
+      .above("min_inverse_depth", min_inverse_depth, 0)
+      .above("max_inverse_depth", max_inverse_depth, min_inverse_depth)
+      .at_least("min_covisible", min_covisible, 1)
+      .nested("edge", edge.invalid_reason())
+      .nested("solver", solver.invalid_reason())
+      .at_least("structure_iterations", structure_iterations, 0)
+      .above("sigma_scale", sigma_scale, 0)
+      .above("outlier_chi2_mono", outlier_chi2_mono, 0)
+      .above("outlier_chi2_stereo", outlier_chi2_stereo, 0)
+      .nested("loop", loop.invalid_reason())
+      .nested("culling", culling.invalid_reason())
+      .reason();
 }
 
 }  // namespace twofold

@@ -11,34 +11,63 @@ class MapperHook;
 
 /// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
 struct EdgeInformationOptions {
-  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px]
+  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px], > 0
   double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
   double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// 6.4.1.
+/// Pose from matches of which most may be wrong; see consensus_pose.
+struct LoopConsensusOptions {
+  double inlier_sigmas = 4;  ///< reprojection error of an inlier, > 0: a pose of three noisy depths is rough
+  int max_samples = 400;     ///< RANSAC draws at most, >= 1
+  double confidence = 0.99;  ///< of having drawn three inliers, in (0, 1)
+  double min_disparity_px = 0.5;  ///< farther points are not drawn: their depth is a guess, >= 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Metric loop closure  (6.4.1).
 struct MetricLoopOptions {
   bool enabled = true;
-  int neighbourhood = 100;  ///< |N2|: nearest members of the double window whose points are tried
-  int max_searches = 240;   ///< points searched in one round, spread over the image
-  double search_radius_px = 10;
-  double max_error_px = 1;      ///< of points that agree with T_loop, on their pyramid level
-  double border_px = 10;        ///< predictions closer to the image's edge are not searched
-  double max_view_angle = 0.9;  ///< between the anchor's and the reference's ray to a point [rad]
+  int neighbourhood = 100;       ///< |N2|: nearest members of the double window whose points are tried, >= 0
+  int max_searches = 240;        ///< points searched in one round, spread over the image's cells, >= 0
+  int columns = 8;               ///< cells of the image for that, >= 1
+  int rows = 6;                  ///< likewise
+  double search_radius_px = 10;  ///< > 0
+  double max_error_px = 1;       ///< of points that agree with T_loop, on their pyramid level, > 0
+  double border_px = 10;         ///< predictions closer to the image's edge are not searched, >= 0
+  double max_view_angle = 0.9;   ///< between the anchor's and the reference's ray to a point [rad]
+  LoopConsensusOptions consensus;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct CullingOptions {
   bool keyframes = true;
   bool points = true;
-  double redundant_share = 0.9;  ///< of a keyframe's points that others see as well
-  int redundant_observers = 3;   ///< other keyframes that must see such a point, as finely
-  int keep_recent = 8;           ///< newest keyframes are never culled
-  int max_keyframes = 2;         ///< culled in one round
+  double redundant_share = 0.9;  ///< of a keyframe's points that others see as well, in (0, 1]
+  int redundant_observers = 3;   ///< other keyframes that must see such a point, as finely, >= 2
+  int keep_recent = 8;           ///< newest keyframes are never culled, >= 0
+  int max_keyframes = 2;         ///< culled in one round, >= 0
   /// Keyframes culled last whose replacements stay known, >= max_keyframes. Tracker and loop closer may refer
   /// to a keyframe for as long as a message is under way between the threads: some tens of rounds, each of
   /// which culls max_keyframes at most.
   int keep_replacements = 128;
-  int max_misses = 8;  ///< keyframes in a row a weak point should have been seen from and was not
+  int max_misses =
+      8;  ///< keyframes in a row a weak point should have been seen from and was not, in [1, 255]
+  // A keyframe should have seen a point that projects this far inside of its image [px], and whose patch
+  // looks there much as it did from the anchor: nearly the same direction and distance.
+  double view_border_px = 30;     ///< >= 0
+  double min_view_cosine = 0.9;   ///< of the angle between both rays, in [-1, 1]
+  double max_scale_change = 1.5;  ///< ratio of both distances, either way, >= 1
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct MapperOptions {
@@ -48,6 +77,8 @@ struct MapperOptions {
   bool global_outer_window = false;  ///< gDWO: the outer window is all the rest of the map
   int max_anchors = 25;              ///< anchors that may take places of W2 for their points  (6.2.4)
   int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
+  double min_inverse_depth = 1e-5;   ///< [1/m] > 0; farther points say nothing about translation
+  double max_inverse_depth = 1e3;    ///< [1/m]; nearer ones are mistakes
   int min_covisible = 15;            ///< Theta: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;
   WindowSolverOptions solver;          ///< joint optimisation of eq. 6.4

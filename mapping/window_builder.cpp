@@ -11,12 +11,8 @@
 namespace twofold {
 namespace {
 
-constexpr double kMinInverseDepth = 1e-5;  // farther points say nothing about translation
-constexpr double kMaxInverseDepth = 1e3;
-constexpr double kMinDepth = 1e-3;  // [m]
-
-bool plausible(const Vector3& psi) {
-  return psi.allFinite() && psi.z() > kMinInverseDepth && psi.z() < kMaxInverseDepth;
+bool plausible(const Vector3& psi, const MapperOptions& options) {
+  return psi.allFinite() && psi.z() > options.min_inverse_depth && psi.z() < options.max_inverse_depth;
 }
 
 }  // namespace
@@ -59,7 +55,7 @@ bool WindowBuilder::anchor_point(const GraphSnapshot& graph, const DoubleWindow&
   const KeyframeId seen_from_id = window.nodes[static_cast<std::size_t>(seen_from)].id;
   const SE3 T_k_a = graph.keyframe(seen_from_id).T_k_w * graph.T_k_w(map_point.anchor).inverse();
   point.psi = to_inverse_depth(T_k_a * from_inverse_depth(map_point.psi));
-  return plausible(point.psi);
+  return plausible(point.psi, options_);
 }
 
 void WindowBuilder::collect_points(const GraphSnapshot& graph, const DoubleWindow& window) {
@@ -144,7 +140,7 @@ int WindowBuilder::usable_point(PointId id, int pose) const {
   const int p = point_position_.find(id) - 1;
   if (p < 0) return -1;
   const SE3& T_k_w = problem_.poses[static_cast<std::size_t>(pose)].T_k_w;
-  return (T_k_w * positions_w_[static_cast<std::size_t>(p)]).z() > kMinDepth ? p : -1;
+  return in_front_of_camera(T_k_w * positions_w_[static_cast<std::size_t>(p)]) ? p : -1;
 }
 
 void WindowBuilder::add_observation(const Observation& observation, int pose) {
@@ -198,7 +194,7 @@ void WindowBuilder::write_back(GraphWriter& writer, const DoubleWindow& window) 
       const SE3 T_a_used = graph.T_k_w(anchor) * problem_.poses[used].T_k_w.inverse();
       psi = to_inverse_depth(T_a_used * from_inverse_depth(psi));
     }
-    if (plausible(psi)) writer.set_inverse_depth(point_ids_[p], psi);
+    if (plausible(psi, options_)) writer.set_inverse_depth(point_ids_[p], psi);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "estimation/robust_kernel.hpp"
 #include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
 #include "posegraph/pose_graph_equations.hpp"
 #include "posegraph/pose_graph_error.hpp"
 #include "posegraph/pose_graph_initialisation.hpp"
@@ -14,11 +15,11 @@
 namespace twofold {
 
 std::string PoseGraphOptions::invalid_reason() const {
-  if (max_iterations < 0) return "max_iterations must be >= 0, is " + std::to_string(max_iterations);
-  if (!(initial_damping >= 0)) return "initial_damping must be >= 0, is " + std::to_string(initial_damping);
-  if (!(relative_decrease >= 0))
-    return "relative_decrease must be >= 0, is " + std::to_string(relative_decrease);
-  return {};
+  return OptionCheck()
+      .at_least("max_iterations", max_iterations, 0)
+      .at_least("initial_damping", initial_damping, 0)
+      .at_least("relative_decrease", relative_decrease, 0)
+      .reason();
 }
 
 template <class Group>

@@ -26,6 +26,7 @@ struct StructureOptions {
   int cell_px = 24;             ///< at most one landmark a cell is started, > 0
   int corner_threshold = 8;     ///< FAST [grey]
   float min_corner_score = 20;  ///< Shi-Tomasi [grey^2/px^2]
+  double min_disparity_px = 1;  ///< of a corner: below it a point's distance is a guess, > 0
   double search_share = 0.25;   ///< features of successive frames are matched within this share of the width
   double max_sad_ratio = 0.8;   ///< best over second-best sum of differences, < 1
   ConsistencyOptions consistency;

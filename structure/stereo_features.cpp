@@ -11,8 +11,8 @@
 namespace twofold {
 namespace {
 
-constexpr int kBorder = 12;          // [px] room for a patch
-constexpr double kMinDisparity = 1;  // [px] below it a point's distance is a guess
+constexpr int kBorder = 12;               // [px] room for a patch
+constexpr double kWholePixelSigma = 0.3;  // [px] of a coordinate rounded to whole pixels: 1 / sqrt(12)
 
 int sum_of_differences(const Patch& a, const Patch& b, int mean_difference) {
   int sum = 0;
@@ -61,7 +61,7 @@ std::vector<StereoFeature> find_stereo_features(const FrameImages& images, const
     const double u_r = right_from_row(images, rig, corner.u, corner.v, 0, options.search);
     feature.z = Vector3(corner.u, corner.v, u_r);
     feature.score = corner.score;
-    if (!(corner.u - u_r >= kMinDisparity)) continue;  // also when there is none
+    if (!(corner.u - u_r >= options.min_disparity_px)) continue;  // also when there is none
     features.push_back(feature);
   }
   return features;
@@ -108,8 +108,7 @@ std::vector<FeatureMatch> consistent_feature_matches(const std::vector<StereoFea
   for (const FeatureMatch& match : matches) {
     const Vector3& z_0 = previous[static_cast<std::size_t>(match.previous)].z;
     const Vector3& z_1 = current[static_cast<std::size_t>(match.current)].z;
-    // Corners are whole pixels, a little uncertain for that.
-    const double sigma = std::hypot(options.sigma_px, 0.3);
+    const double sigma = std::hypot(options.sigma_px, kWholePixelSigma);
     points.push_back({rig.unproject(z_0), rig.unproject(z_1), stereo_covariance(rig, z_0, sigma),
                       stereo_covariance(rig, z_1, sigma)});
   }

@@ -182,7 +182,7 @@ void StructureFilter::give_up_outliers() {
     const auto x_w = filter_->find_landmark(track.id);
     if (!x_w) return true;
     const Vector3 x_c = T_c_w * *x_w;
-    if (x_c.z() < 1e-2) return true;
+    if (!in_front_of_camera(x_c)) return true;
     const Vector3 r = track.z - rig_.project(x_c);
     return r.head<2>().norm() > options_.max_residual_px || std::abs(r.z()) > options_.max_residual_px;
   };

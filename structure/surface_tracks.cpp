@@ -21,7 +21,7 @@ Matrix3 shifted(const Matrix3& H, const Vector2& by) {
 std::optional<Matrix3> warp(const SurfaceTrack& track, const PinholeCamera& camera, const Vector3& x_a,
                             const SE3& T_v_a, PatchModel model) {
   const Vector3 x_v = T_v_a * x_a;
-  if (x_v.z() < 1e-2 || x_a.z() < 1e-2) return std::nullopt;
+  if (!in_front_of_camera(x_v) || !in_front_of_camera(x_a)) return std::nullopt;
   const Vector2 uv = camera.project(x_v);
   Matrix3 H = Matrix3::Identity();
   if (model == PatchModel::kPlane) {

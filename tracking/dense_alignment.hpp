@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "camera/rig.hpp"
@@ -15,6 +16,9 @@ struct DenseAlignmentOptions {
   int max_iterations = 8;    ///< per level
   float huber_grey = 8;      ///< kernel on the grey difference
   double settled_px = 0.05;  ///< stop a level when the step moves the points by less, in its pixels
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Where the earlier image is compared: a pixel whose depth is known.

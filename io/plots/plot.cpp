@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
 #include "io/files/output_file.hpp"
 #include "io/plots/plot_ink.hpp"
 
@@ -184,7 +186,12 @@ int up_axis_of(const Trajectory& trajectory) {
   return axis;
 }
 
+std::string PlotOptions::invalid_reason() const {
+  return OptionCheck().within("up_axis", up_axis, 0, 2).at_least("long_side", long_side, 1).reason();
+}
+
 cv::Mat draw_top_down(const std::vector<PlotTrack>& tracks, const PlotOptions& options) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "plot options");
   const Axes axes = fit_axes(tracks, options);
   const auto coloured =
       std::find_if(tracks.begin(), tracks.end(), [](const auto& t) { return !t.values.empty(); });

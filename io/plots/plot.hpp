@@ -30,6 +30,9 @@ struct PlotOptions {
   std::string value_label = "error [m]";
   int up_axis = 2;      ///< axis of the world to look along: 0, 1 or 2; see up_axis_of
   int long_side = 760;  ///< of the area inside the axes, before margins [px]
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Axis of the world (0, 1, 2) that the cameras' vertical is nearest to on average. Recordings differ: in

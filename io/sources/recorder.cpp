@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "geometry/option_check.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 
@@ -57,11 +58,18 @@ Calibration calibration_of(const Rig& rig) {
   return calibration;
 }
 
+std::string RecorderOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("queue_frames", static_cast<double>(queue_frames), 1)
+      .within("png_compression", png_compression, 0, 9)
+      .reason();
+}
+
 Recorder::Recorder(const fs::path& folder, SensorKind kind, const std::optional<Calibration>& calibration,
                    const RecorderOptions& options)
     : mav_(folder / "mav0"), cameras_(kind == SensorKind::kStereo ? 2 : 1), options_(options) {
   if (kind == SensorKind::kRgbd) throw IoError(folder, "depth cannot be recorded in this layout");
-  if (options.queue_frames < 1) throw IoError(folder, "the write queue must hold a frame at least");
+  if (const std::string reason = options.invalid_reason(); !reason.empty()) throw IoError(folder, reason);
   if (fs::exists(mav_)) throw IoError(folder, "holds a recording already; name another folder");
   for (int c = 0; c < cameras_; ++c) {
     const fs::path camera = mav_ / fmt::format("cam{}", c);

@@ -19,6 +19,9 @@ namespace twofold {
 struct RecorderOptions {
   std::size_t queue_frames = 64;  ///< frames waiting to be written, >= 1; bounds the memory used
   int png_compression = 1;        ///< 0..9: 1 keeps up with cameras, 9 is small
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Writes frames into a folder of EuRoC layout: mav0/cam0 (and cam1) with data/STAMP.png, data.csv,

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "geometry/option_check.hpp"
 #include "io/files/io_error.hpp"
 
 namespace twofold {
@@ -81,9 +82,6 @@ V4l2FramesOptions take_v4l2_options(const std::string& device, SourceParameters&
   camera.buffers = take_integer(parameters, "buffers", camera.buffers);
   camera.stall_timeout_ms = take_integer(parameters, "stall_ms", camera.stall_timeout_ms);
   camera.reconnect_ms = take_integer(parameters, "reconnect_ms", camera.reconnect_ms);
-  if (const auto reason = camera.invalid_reason(); !reason.empty())
-    throw IoError(parameters.subject(), reason);
-
   const auto layout = parameters.take_text("layout");
   if (layout && *layout != "mono" && *layout != "side-by-side") {
     throw IoError(parameters.subject(), fmt::format("layout='{}' is neither mono nor side-by-side", *layout));
@@ -104,7 +102,18 @@ V4l2FramesOptions take_v4l2_options(const std::string& device, SourceParameters&
     }
   }
   options.pairing_tolerance_ms = parameters.take_number("pairing_ms");
+  if (const auto reason = options.invalid_reason(); !reason.empty()) {
+    throw IoError(parameters.subject(), reason);
+  }
   return options;
+}
+
+std::string V4l2FramesOptions::invalid_reason() const {
+  OptionCheck check;
+  check.nested("first", first.invalid_reason());
+  if (second) check.nested("second", second->invalid_reason());
+  if (pairing_tolerance_ms) check.at_least("pairing_tolerance_ms", *pairing_tolerance_ms, 0);
+  return check.reason();
 }
 
 V4l2Frames::V4l2Frames(V4l2Calls& calls, V4l2FramesOptions options)
@@ -121,7 +130,6 @@ V4l2Frames::V4l2Frames(V4l2Calls& calls, V4l2FramesOptions options)
   second_ = open(*options_.second);
   double tolerance_ms = 500.0 / (fps() > 0 ? fps() : 30.0);
   if (options_.pairing_tolerance_ms) tolerance_ms = *options_.pairing_tolerance_ms;
-  if (!(tolerance_ms >= 0)) throw IoError(options_.second->path, "pairing_ms must not be negative");
   pairer_.emplace(std::llround(tolerance_ms * 1e6));
 }
 

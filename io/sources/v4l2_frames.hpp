@@ -24,6 +24,9 @@ struct V4l2FramesOptions {
   std::optional<double> pairing_tolerance_ms = std::nullopt;  ///< default: half a frame interval
 
   [[nodiscard]] SensorKind kind() const;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Takes the parameters size=640x480, fps=, format=, layout=mono|side-by-side, right=DEVICE, depth=DEVICE,

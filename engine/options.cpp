@@ -1,0 +1,28 @@
+#include "engine/options.hpp"
+
+#include "geometry/option_check.hpp"
+
+namespace twofold {
+
+std::string CheckpointOptions::invalid_reason() const {
+  return OptionCheck().at_least("period", period, 0).reason();
+}
+
+std::string EngineOptions::invalid_reason() const {
+  OptionCheck check;
+  check.nested("tracker", tracker.invalid_reason())
+      .nested("mapper", mapper.invalid_reason())
+      .nested("loop_closer", loop_closer.invalid_reason())
+      .nested("checkpoint", checkpoint.invalid_reason())
+      .nested("pacing", pacing.invalid_reason())
+      .nested("effort", effort.invalid_reason())
+      .at_least("frame_slots", static_cast<double>(frame_slots), 1)
+      .at_least("proposal_slots", static_cast<double>(proposal_slots), 1);
+  if (tracker_cpu) check.at_least("tracker_cpu", *tracker_cpu, 0);
+  if (mapper_cpu) check.at_least("mapper_cpu", *mapper_cpu, 0);
+  if (loop_closer_cpu) check.at_least("loop_closer_cpu", *loop_closer_cpu, 0);
+  if (fifo_priority) check.within("fifo_priority", *fifo_priority, 1, 99);
+  return check.reason();
+}
+
+}  // namespace twofold

@@ -1,0 +1,26 @@
+#include "geometry/option_check.hpp"
+#include "imaging/guided_search.hpp"
+#include "imaging/plane_warp.hpp"
+
+namespace twofold {
+
+std::string GuidedSearchOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("radius_px", radius_px, 0)
+      .above("max_rms", max_rms, 0)
+      .above("max_rms_share", max_rms_share, 0)
+      .at_least("noise", noise, 0)
+      .at_least("refine_iterations", refine_iterations, 1)
+      .above("right_search_px", right_search_px, 0)
+      .reason();
+}
+
+std::string SurfaceAlignmentOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_iterations", max_iterations, 1)
+      .above("settled_px", settled_px, 0)
+      .above("max_move_px", max_move_px, 0)
+      .reason();
+}
+
+}  // namespace twofold

@@ -1,0 +1,55 @@
+#include "geometry/option_check.hpp"
+#include "loopclosure/loop_closer.hpp"
+#include "loopclosure/vocabulary_trainer.hpp"
+
+namespace twofold {
+
+std::string CornerSelectionOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("wanted", wanted, 1)
+      .within("levels", levels, 1, 3)
+      .at_least("threshold", threshold, 1)
+      .at_least("min_score", min_score, 0)
+      .reason();
+}
+
+std::string RecogniserOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("near_keyframes", near_keyframes, 0)
+      .at_least("max_candidates", max_candidates, 1)
+      .at_least("min_score", min_score, 0)
+      .at_least("min_reference", min_reference, 0)
+      .at_least("consistency", consistency, 1)
+      .at_least("same_place", same_place, 0)
+      .reason();
+}
+
+std::string RefinementOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("neighbours", neighbours, 1)
+      .at_least("max_points", max_points, 1)
+      .above("radius_px", radius_px, 0)
+      .at_least("min_inliers", min_inliers, 3)
+      .within("min_inlier_share", min_inlier_share, 0, 1)
+      .reason();
+}
+
+std::string LoopCloserOptions::invalid_reason() const {
+  return OptionCheck()
+      .nested("corners", corners.invalid_reason())
+      .nested("recogniser", recogniser.invalid_reason())
+      .nested("verification", verification.invalid_reason())
+      .nested("refinement", refinement.invalid_reason())
+      .at_least("relocalisation_candidates", relocalisation_candidates, 1)
+      .reason();
+}
+
+std::string VocabularyTrainerOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("branching", branching, 2)
+      .within("levels", levels, 1, 6)
+      .at_least("iterations", iterations, 1)
+      .reason();
+}
+
+}  // namespace twofold

@@ -1,0 +1,93 @@
+// All that a run can be told: what each room's options say of themselves, and that the engine names the one.
+#include "engine/options.hpp"
+
+#include "engine/engine.hpp"
+#include "fixtures/option_rules.hpp"
+#include "fixtures/rendered_scene.hpp"
+#include "imaging/plane_warp.hpp"
+#include "loopclosure/vocabulary_trainer.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::expect_rules;
+
+TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
+  expect_rules<GuidedSearchOptions>({{"radius_px", [](auto& o) { o.radius_px = 0; }},
+                                     {"max_rms", [](auto& o) { o.max_rms = 0; }},
+                                     {"refine_iterations", [](auto& o) { o.refine_iterations = 0; }},
+                                     {"right_search_px", [](auto& o) { o.right_search_px = 0; }}});
+  expect_rules<SurfaceAlignmentOptions>({{"max_iterations", [](auto& o) { o.max_iterations = 0; }},
+                                         {"max_move_px", [](auto& o) { o.max_move_px = 0; }}});
+  expect_rules<MotionOnlyOptions>({{"max_iterations", [](auto& o) { o.max_iterations = 0; }},
+                                   {"rounds", [](auto& o) { o.rounds = 0; }},
+                                   {"inlier_chi2_mono", [](auto& o) { o.inlier_chi2_mono = 0; }}});
+  expect_rules<WindowSolverOptions>({{"max_iterations", [](auto& o) { o.max_iterations = 0; }},
+                                     {"initial_damping", [](auto& o) { o.initial_damping = -1; }}});
+}
+
+TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
+  expect_rules<TrackerOptions>({{"alignment.coarsest_level", [](auto& o) { o.alignment.finest_level = 5; }},
+                                {"search.radius_px", [](auto& o) { o.search.radius_px = -1; }},
+                                {"motion.rounds", [](auto& o) { o.motion.rounds = 0; }},
+                                {"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
+                                {"min_inliers", [](auto& o) { o.min_inliers = 2; }},
+                                {"keyframe_share", [](auto& o) { o.keyframe_share = 1.1; }},
+                                {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
+                                {"cell_px", [](auto& o) { o.cell_px = 0; }}});
+}
+
+TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {
+  expect_rules<MapperOptions>(
+      {{"inner_window", [](auto& o) { o.inner_window = 0; }},
+       {"outer_window", [](auto& o) { o.outer_window = -1; }},
+       {"max_inverse_depth", [](auto& o) { o.max_inverse_depth = o.min_inverse_depth; }},
+       {"edge.rot_share", [](auto& o) { o.edge.rot_share = 0; }},
+       {"solver.max_iterations", [](auto& o) { o.solver.max_iterations = 0; }},
+       {"sigma_scale", [](auto& o) { o.sigma_scale = 0; }},
+       {"loop.columns", [](auto& o) { o.loop.columns = 0; }},
+       {"loop.consensus.confidence", [](auto& o) { o.loop.consensus.confidence = 1; }},
+       {"culling.redundant_observers", [](auto& o) { o.culling.redundant_observers = 1; }},
+       {"culling.keep_replacements", [](auto& o) { o.culling.keep_replacements = 1; }},
+       {"culling.max_misses", [](auto& o) { o.culling.max_misses = 256; }},
+       {"culling.max_scale_change", [](auto& o) { o.culling.max_scale_change = 0.9; }}});
+}
+
+TEST(Options, OfTheLoopCloserSayWhyTheyAreInvalid) {
+  expect_rules<LoopCloserOptions>(
+      {{"corners.levels", [](auto& o) { o.corners.levels = 4; }},
+       {"corners.wanted", [](auto& o) { o.corners.wanted = 0; }},
+       {"recogniser.consistency", [](auto& o) { o.recogniser.consistency = 0; }},
+       {"verification.min_inliers", [](auto& o) { o.verification.min_inliers = 3; }},
+       {"refinement.min_inlier_share", [](auto& o) { o.refinement.min_inlier_share = 1.5; }},
+       {"relocalisation_candidates", [](auto& o) { o.relocalisation_candidates = 0; }}});
+  expect_rules<VocabularyTrainerOptions>(
+      {{"branching", [](auto& o) { o.branching = 1; }}, {"levels", [](auto& o) { o.levels = 7; }}});
+}
+
+TEST(Options, OfTheEngineSayWhyTheyAreInvalid) {
+  expect_rules<EngineOptions>(
+      {{"tracker.min_inliers", [](auto& o) { o.tracker.min_inliers = 0; }},
+       {"mapper.inner_window", [](auto& o) { o.mapper.inner_window = 0; }},
+       {"loop_closer.corners.wanted", [](auto& o) { o.loop_closer.corners.wanted = 0; }},
+       {"checkpoint.period", [](auto& o) { o.checkpoint.period = -1; }},
+       {"pacing.speed", [](auto& o) { o.pacing.speed = -1; }},
+       {"effort.patience", [](auto& o) { o.effort.patience = 0; }},
+       {"frame_slots", [](auto& o) { o.frame_slots = 0; }},
+       {"tracker_cpu", [](auto& o) { o.tracker_cpu = -1; }},
+       {"fifo_priority", [](auto& o) { o.fifo_priority = 100; }}});
+}
+
+TEST(Options, TheEngineRefusesThoseThatAreInvalid) {
+  EngineOptions options;
+  options.tracker.cell_px = 0;
+  try {
+    Engine(testing::test_rig(SensorKind::kStereo), options);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "tracker.cell_px must be >= 1, is 0");
+  }
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,47 @@
+#include "tracking/options.hpp"
+
+#include "geometry/option_check.hpp"
+
+namespace twofold {
+
+std::string DenseAlignmentOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("finest_level", finest_level, 0)
+      .that(coarsest_level >= finest_level, "coarsest_level", ">= finest_level", coarsest_level)
+      .at_least("max_iterations", max_iterations, 1)
+      .above("huber_grey", huber_grey, 0)
+      .at_least("settled_px", settled_px, 0)
+      .reason();
+}
+
+std::string TrackerOptions::invalid_reason() const {
+  return OptionCheck()
+      .nested("alignment", alignment.invalid_reason())
+      .nested("search", search.invalid_reason())
+      .nested("motion", motion.invalid_reason())
+      .at_least("max_searches", max_searches, 1)
+      .within("wanted_matches", wanted_matches, 1, max_searches)
+      .at_least("neighbour_keyframes", neighbour_keyframes, 1)
+      .within("max_view_angle_cos", max_view_angle_cos, -1, 1)
+      .at_least("min_inliers", min_inliers, 3)
+      .within("min_inlier_share", min_inlier_share, 0, 1)
+      .above("lost_radius_px", lost_radius_px, 0)
+      .at_least("new_part_after", new_part_after, 0)
+      .at_least("min_corners_seen", min_corners_seen, 0)
+      .above("max_alignment_rms", max_alignment_rms, 0)
+      .above("keyframe_parallax", keyframe_parallax, 0)
+      .within("keyframe_share", keyframe_share, 0, 1)
+      .within("keyframe_empty", keyframe_empty, 0, 1)
+      .within("urgent_share", urgent_share, 0, keyframe_share)
+      .at_least("max_pending", max_pending, 1)
+      .at_least("corner_threshold", corner_threshold, 1)
+      .at_least("corner_levels", corner_levels, 1)
+      .at_least("cell_px", cell_px, 1)
+      .at_least("max_new_points", max_new_points, 1)
+      .at_least("min_corner_score", min_corner_score, 0)
+      .at_least("max_failures", max_failures, 1)
+      .at_least("max_candidate_age", max_candidate_age, 0)
+      .reason();
+}
+
+}  // namespace twofold
