@@ -11,8 +11,7 @@
 namespace twofold {
 
 enum class FeedStatus : std::uint8_t { kFrame, kEnd, kError };
-/// Fills the next frame. The images belong to the engine until the next call but one for the same Frame
-/// object.
+/// Fills the next frame. The engine keeps the images as long as it needs them: nobody writes into them again.
 using FrameFeed = std::function<FeedStatus(Frame&)>;
 
 /// State of a run for a progress line.

@@ -28,19 +28,25 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
   FeedStatus status = FeedStatus::kEnd;
   // Relaxed: the flag carries no other data; seeing it a frame later is as good.
   while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
-    track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = localise_only_});
-    if (request_) answer_request(snapshot_);
-    if (!queue_.empty()) {
-      map(queue_.size(), 0);
-      close_loops(*mapped_.front(), snapshot_, 0);
-      mapped_.clear();
-      if (!loop_messages_.empty()) map(0, loop_messages_.size());
-    }
-    checkpoint_if_due(frame.t_ns);
-    report(progress);
+    (void)step(frame);
+    if (progress) progress(progress_);
   }
   result_.interrupted = interrupted.load(std::memory_order_relaxed);
   if (status == FeedStatus::kError) fail("the input ended with an error");
+}
+
+const FrameRecord& LockstepRun::step(const Frame& frame) {
+  track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = localise_only_});
+  if (request_) answer_request(snapshot_);
+  if (!queue_.empty()) {
+    map(queue_.size(), 0);
+    close_loops(*mapped_.front(), snapshot_, 0);
+    mapped_.clear();
+    if (!loop_messages_.empty()) map(0, loop_messages_.size());
+  }
+  checkpoint_if_due(frame.t_ns);
+  count_frame();
+  return result_.frames.back();
 }
 
 void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
@@ -85,7 +91,8 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     track(frame, step);
     replay_loop_steps(schedule);
     checkpoint_if_due(frame.t_ns);
-    report(progress);
+    count_frame();
+    if (progress) progress(progress_);
   }
   for (; round != schedule.mapper.end() && can_map(*round); ++round) {
     map(round->proposals, round->loop_messages);
@@ -152,7 +159,7 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
       queue_.push_back(std::move(proposal));
     }
   }
-  tracking_.finish(due_ns, steady_now_ns(), record);
+  tracking_.finish(due_ns, steady_now_ns(), snapshot_, record);
   if (tracking_.correction().reason != CorrectionReason::kNone)
     result_.corrections.push_back(tracking_.correction());
   TrackerStep taken = step;
@@ -201,7 +208,7 @@ void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
   if (!first) checkpoints_.save(snapshot_, loop_closing_.places());
 }
 
-void LockstepRun::report(const ProgressSink& progress) {
+void LockstepRun::count_frame() {
   const FrameRecord& record = result_.frames.back();
   ++progress_.frames;
   progress_.lost += record.state == FrameState::kLost;
@@ -209,7 +216,6 @@ void LockstepRun::report(const ProgressSink& progress) {
   progress_.tracked_share = record.tracked_share;
   progress_.map_version = snapshot_.version();
   progress_.queued = queue_.size();
-  if (progress) progress(progress_);
 }
 
 RunResult LockstepRun::finish() {

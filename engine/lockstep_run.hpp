@@ -15,7 +15,10 @@ class LockstepRun {
  public:
   LockstepRun(const Rig& rig, const EngineOptions& options);
 
+  /// The deterministic run: each frame is mapped before the next one.
   void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
+  /// One frame of it. The record is valid until the next call.
+  const FrameRecord& step(const Frame& frame);
   void replay(const FrameFeed& feed, const Schedule& schedule, const std::atomic<bool>& interrupted,
               const ProgressSink& progress);
   /// Final pose graph optimisation; moves the result out.
@@ -36,7 +39,7 @@ class LockstepRun {
   void drop(const Frame& frame, const TrackerStep& step);
   /// By the time of the recording: the same in every run.
   void checkpoint_if_due(std::int64_t t_ns);
-  void report(const ProgressSink& progress);
+  void count_frame();
   void fail(const std::string& why) { result_.error = why; }
 
   const bool localise_only_;

@@ -26,9 +26,11 @@ CorrectionReason reason_of(MapChange::Kind kind) {
 TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
     : tracker_(rig, options.tracker),
       times_("tracker", trace),
+      on_pose_(options.on_pose),
       can_relocalise_(options.vocabulary != nullptr) {
   frame_stage_ = times_.add_stage("frame");
   latency_stage_ = times_.add_stage("latency from due time");
+  listener_stage_ = times_.add_stage("pose listener");
   for (std::size_t s = 0; s < kTrackerStages; ++s) {
     stages_.push_back(times_.add_stage(describe(static_cast<TrackerStage>(s))));
   }
@@ -112,9 +114,13 @@ void TrackerRunner::take_answer(const RelocalisationAnswer& answer) {
   if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
 }
 
-void TrackerRunner::finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record) {
+void TrackerRunner::finish(std::int64_t scheduled_ns, std::int64_t now_ns, const GraphSnapshot& graph,
+                           FrameRecord& record) {
   record.latency_ns = now_ns - scheduled_ns;
   times_.record(latency_stage_, scheduled_ns, record.latency_ns);
+  if (!on_pose_) return;
+  const ScopedStage timed(times_, listener_stage_);
+  on_pose_(record, graph);
 }
 
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)

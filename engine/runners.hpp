@@ -53,8 +53,10 @@ class TrackerRunner {
   /// Before the next step.
   void take_answer(const RelocalisationAnswer& answer);
   [[nodiscard]] bool wants_relocalisation() const;
-  /// Completes the record once the pose is known, at `now_ns` on the clock of the pace.
-  void finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record);
+  /// Completes the record once the pose is known, at `now_ns` on the clock of the pace, and tells the
+  /// listener. `graph` is that of the step.
+  void finish(std::int64_t scheduled_ns, std::int64_t now_ns, const GraphSnapshot& graph,
+              FrameRecord& record);
 
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
@@ -66,8 +68,10 @@ class TrackerRunner {
   StageRecorder times_;
   StageId frame_stage_;
   StageId latency_stage_;
+  StageId listener_stage_;
   std::vector<StageId> stages_;
   TraceName version_counter_, effort_counter_;
+  PoseListener on_pose_;
   FrameRecord last_;  // the last frame that was tracked
   PoseCorrection correction_;
   bool answer_awaited_ = false;

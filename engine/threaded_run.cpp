@@ -47,6 +47,24 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
 
 void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
                       const ProgressSink& progress) {
+  const FrameSink show = [&](const FrameRecord&, const PoseCorrection&) {
+    if (progress) progress(progress_);
+  };
+  start();
+  FeedStatus status = FeedStatus::kEnd;
+  Frame frame;
+  // Relaxed: the flag carries no other data.
+  while (!interrupted.load(std::memory_order_relaxed) && wait_for_room(show) &&
+         (status = feed(frame)) == FeedStatus::kFrame) {
+    push(std::move(frame));
+  }
+  result_.interrupted = interrupted.load(std::memory_order_relaxed);
+  if (status == FeedStatus::kError) result_.error = "the input ended with an error";
+  stop();
+  collect(show);
+}
+
+void ThreadedRun::start() {
   loop_closer_.emplace(
       WorkerOptions{.name = "loop closer", .cpu = options_.loop_closer_cpu, .fifo_priority = {}},
       [this](const std::stop_token& stop) { loop_closer_thread(stop); });
@@ -59,31 +77,44 @@ void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
     checkpointer_.emplace(WorkerOptions{.name = "checkpoints", .cpu = {}, .fifo_priority = {}},
                           [this](const std::stop_token& stop) { checkpoint_thread(stop); });
   }
-  read_frames(feed, interrupted, progress);
-  join_threads();
-  collect_records(progress);
 }
 
-void ThreadedRun::read_frames(const FrameFeed& feed, const std::atomic<bool>& interrupted,
-                              const ProgressSink& progress) {
-  SlotHandle previous;  // kept back until the time stamp of its successor is known
-  FeedStatus status = FeedStatus::kEnd;
-  // Relaxed: the flag carries no other data.
-  while (!interrupted.load(std::memory_order_relaxed)) {
-    SlotHandle slot = free_slot(progress);
-    if (!slot || (status = feed(slot->frame)) != FeedStatus::kFrame) break;
-    if (previous) {
-      previous->next_t_ns = slot->frame.t_ns;
-      send(std::move(previous));
-    }
-    slot->next_t_ns.reset();
-    previous = std::move(slot);
+bool ThreadedRun::has_room() {
+  if (!free_slot_) free_slot_ = slots_.try_acquire();
+  return free_slot_ && !must_hold_back();
+}
+
+void ThreadedRun::push(Frame frame) {
+  TWOFOLD_CHECK(free_slot_, "there is room for the frame");
+  free_slot_->frame = std::move(frame);
+  free_slot_->next_t_ns.reset();
+  if (held_back_) {
+    held_back_->next_t_ns = free_slot_->frame.t_ns;
+    send(std::move(held_back_));
   }
-  if (previous) send(std::move(previous));
-  result_.interrupted = interrupted.load(std::memory_order_relaxed);
-  if (status == FeedStatus::kError) result_.error = "the input ended with an error";
+  held_back_ = std::move(free_slot_);
+}
+
+void ThreadedRun::wait(std::chrono::steady_clock::time_point deadline) {
+  const bool full = !has_room();
+  const auto ready = [&] { return done_.size_approx() > 0 || (full && has_room()); };
+  (void)reader_parking_.wait_until({}, deadline, ready);
+}
+
+bool ThreadedRun::wait_for_room(const FrameSink& sink) {
+  for (;;) {
+    collect(sink);
+    if (failed()) return false;
+    if (has_room()) return true;
+    wait(std::chrono::steady_clock::now() + kFailureCheck);
+  }
+}
+
+void ThreadedRun::stop() {
+  if (held_back_) send(std::move(held_back_));
   frames_ended_.store(true, std::memory_order_release);
   tracker_parking_.wake();
+  join_threads();
 }
 
 void ThreadedRun::send(SlotHandle slot) {
@@ -98,25 +129,12 @@ bool ThreadedRun::must_hold_back() const {
 }
 
 // Relaxed: both flags are raised on this thread.
-bool ThreadedRun::any_thread_failed() const {
+bool ThreadedRun::failed() const {
   return (tracker_->finished() && !frames_ended_.load(std::memory_order_relaxed)) ||
          (mapper_->finished() && !proposals_ended_.load(std::memory_order_relaxed));
 }
 
-/// Empty only when a thread failed.
-ThreadedRun::SlotHandle ThreadedRun::free_slot(const ProgressSink& progress) {
-  for (;;) {
-    collect_records(progress);
-    if (any_thread_failed()) return {};
-    if (!must_hold_back()) {
-      if (SlotHandle slot = slots_.try_acquire()) return slot;
-    }
-    const auto ready = [this] { return done_.size_approx() > 0 && !must_hold_back(); };
-    (void)reader_parking_.wait_until({}, std::chrono::steady_clock::now() + kFailureCheck, ready);
-  }
-}
-
-void ThreadedRun::collect_records(const ProgressSink& progress) {
+void ThreadedRun::collect(const FrameSink& sink) {
   SlotHandle slot;
   while (done_.try_pop(slot)) {
     const FrameRecord& record = slot->record;
@@ -130,8 +148,8 @@ void ThreadedRun::collect_records(const ProgressSink& progress) {
     result_.frames.push_back(record);
     if (slot->correction.reason != CorrectionReason::kNone) result_.corrections.push_back(slot->correction);
     slot->frame = {};  // images are freed here, not on the tracker's thread
+    if (sink) sink(record, slot->correction);
     slot.reset();
-    if (progress) progress(progress_);
   }
 }
 

@@ -13,6 +13,9 @@
 
 namespace twofold {
 
+/// Takes a frame that is done with, and the correction of the map that was seen first by it, if any.
+using FrameSink = std::function<void(const FrameRecord&, const PoseCorrection&)>;
+
 /// The live engine: three threads that share snapshots and rings, fed by the calling thread.
 ///
 ///   reader --frames--> tracker --proposals--> mapper --keyframes--> loop closer
@@ -30,7 +33,29 @@ class ThreadedRun {
   /// clock: nullptr for the steady clock; otherwise read and slept on by the tracker thread alone.
   ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClock* clock = nullptr);
 
+  /// Frames from a feed, until it ends, `interrupted` is true or a thread fails: all of the calls below.
   void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
+
+  // The same a frame at a time. One thread makes these calls: start, then has_room, push, collect and wait in
+  // any order, then stop and finish. None but wait, stop and finish blocks.
+
+  void start();
+  /// Whether a frame can be pushed now. Room is made by collect.
+  [[nodiscard]] bool has_room();
+  /// Hands a frame to the tracker; there must be room. Frame::index and time stamps grow.
+  void push(Frame frame);
+  /// Takes back the frames that are done with, in the order they were pushed. The argument of `sink`, which
+  /// may be empty, is valid during the call only.
+  void collect(const FrameSink& sink);
+  /// Sleeps until a frame can be collected, or there is room where there was none; not beyond `deadline`.
+  void wait(std::chrono::steady_clock::time_point deadline);
+  /// A thread has ended early: what is pushed from now on is not tracked, and stop says why.
+  [[nodiscard]] bool failed() const;
+  /// Counts of what was collected.
+  [[nodiscard]] const Progress& progress() const { return progress_; }
+  /// No more frames: returns when all that were pushed have been tracked and mapped. They can still be
+  /// collected.
+  void stop();
   /// Final pose graph optimisation; moves the result out.
   [[nodiscard]] RunResult finish();
 
@@ -49,12 +74,10 @@ class ThreadedRun {
   using SlotHandle = SlotPool::Handle;
 
   // On the calling thread.
-  void read_frames(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
-  SlotHandle free_slot(const ProgressSink& progress);
+  /// False when a thread failed.
+  [[nodiscard]] bool wait_for_room(const FrameSink& sink);
   void send(SlotHandle slot);
-  void collect_records(const ProgressSink& progress);
   [[nodiscard]] bool must_hold_back() const;
-  [[nodiscard]] bool any_thread_failed() const;
   void join_threads();
 
   // One each on its own thread.
@@ -63,7 +86,7 @@ class ThreadedRun {
   void loop_closer_thread(const std::stop_token& stop);
   void checkpoint_thread(const std::stop_token& stop);
 
-  void track(FrameSlot& slot, const GraphSnapshot& graph);
+  void track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph);
   void drop(FrameSlot& slot);
   void send_proposal(FrameRecord& record, TrackerStep& step);
   void take_messages();
@@ -101,6 +124,8 @@ class ThreadedRun {
   Pacer pacer_;
   EffortController effort_controller_;
 
+  SlotHandle free_slot_;                    // feeding thread's: where the next frame goes
+  SlotHandle held_back_;                    // feeding thread's: until its successor's time stamp is known
   ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
   std::vector<ProposalHandle> consumed_;    // mapper's
   std::vector<LoopMessage> loop_messages_;  // mapper's, of this round

@@ -15,9 +15,7 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
     if (effort_controller_.must_drop(arrival)) {
       drop(*slot);
     } else {
-      track(*slot, snapshots_.mailbox(kTrackerReader).latest());
-      tracking_.finish(arrival.scheduled_ns, pacer_.now_ns(), slot->record);
-      effort_controller_.tracked(slot->record.latency_ns, arrival.period_ns);
+      track(*slot, arrival, snapshots_.mailbox(kTrackerReader).latest());
     }
     TWOFOLD_CHECK(done_.try_push(std::move(slot)), "the ring holds every slot of the pool");
     reader_parking_.wake();
@@ -35,7 +33,7 @@ void ThreadedRun::drop(FrameSlot& slot) {
   effort_controller_.dropped();
 }
 
-void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
+void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph) {
   if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
   TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
   take_answers(step);
@@ -43,6 +41,8 @@ void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
   step.keyframe_withheld = !spare_;
   if (tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record))
     send_proposal(slot.record, step);
+  tracking_.finish(arrival.scheduled_ns, pacer_.now_ns(), graph, slot.record);
+  effort_controller_.tracked(slot.record.latency_ns, arrival.period_ns);
   slot.correction = tracking_.correction();
   schedule_.tracker.append(step);
   ask_where_we_are();

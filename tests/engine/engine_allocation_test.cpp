@@ -54,7 +54,7 @@ TEST(TrackerThread, NeverAllocates) {
     FrameRecord record;
     if (answer) tracking.take_answer(*answer);
     const bool proposed = tracking.step(frame, graph, controller.effort(), proposal, record);
-    tracking.finish(0, 40'000'000, record);
+    tracking.finish(0, 40'000'000, graph, record);
     controller.tracked(i < 4 ? 40'000'000 : 5'000'000, 33'000'000);
     schedule.append({frame.index, graph.version(), TrackerStep::Fate::kTracked,
                      static_cast<std::uint8_t>(controller.effort())});
