@@ -26,6 +26,14 @@ class CostMeter {
 
 }  // namespace
 
+void Progress::count(const FrameRecord& record) {
+  ++frames;
+  lost += record.state == FrameState::kLost;
+  dropped += record.state == FrameState::kDropped;
+  keyframes += record.keyframe;
+  tracked_share = record.tracked_share;
+}
+
 Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
   if (const std::string reason = options_.pacing.invalid_reason(); !reason.empty())
     throw std::runtime_error(reason);

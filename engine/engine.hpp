@@ -23,6 +23,9 @@ struct Progress {
   std::uint64_t map_version = 0;
   std::int64_t keyframes = 0;  ///< accepted so far
   std::size_t queued = 0;      ///< proposals waiting for the mapper
+
+  /// Another frame is done with.
+  void count(const FrameRecord& record);
 };
 using ProgressSink = std::function<void(const Progress&)>;
 

@@ -45,7 +45,7 @@ const FrameRecord& LockstepRun::step(const Frame& frame) {
     if (!loop_messages_.empty()) map(0, loop_messages_.size());
   }
   checkpoint_if_due(frame.t_ns);
-  count_frame();
+  count(result_.frames.back());
   return result_.frames.back();
 }
 
@@ -73,6 +73,8 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     }
     if (step.fate == TrackerStep::Fate::kDropped) {
       drop(frame, step);
+      count(result_.frames.back());
+      if (progress) progress(progress_);
       continue;
     }
     for (; snapshot_.version() < step.version; ++round) {
@@ -91,7 +93,7 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     track(frame, step);
     replay_loop_steps(schedule);
     checkpoint_if_due(frame.t_ns);
-    count_frame();
+    count(result_.frames.back());
     if (progress) progress(progress_);
   }
   for (; round != schedule.mapper.end() && can_map(*round); ++round) {
@@ -117,7 +119,8 @@ void LockstepRun::replay_loop_steps(const Schedule& schedule) {
     const auto is_older = [&](const ProposalHandle& p) {
       return static_cast<std::int64_t>(index(p->id)) < step.keyframe;
     };
-    while (!mapped_.empty() && is_older(mapped_.front())) mapped_.pop_front();  // found the ring full
+    for (; !mapped_.empty() && is_older(mapped_.front()); mapped_.pop_front())
+      ++result_.keyframes_not_described;  // found the ring full
     if (mapped_.empty() || static_cast<std::int64_t>(index(mapped_.front()->id)) != step.keyframe) {
       fail("the schedule does not fit the input: the loop closer would need another keyframe");
       return;
@@ -151,14 +154,8 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
   FrameRecord record;
   ProposalHandle proposal;
   if (!step.keyframe_withheld) proposal = pool_.try_acquire();
-  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record)) {
-    if (step.refused > 0) {
-      tracking_.proposal_rejected(record);
-      ++result_.proposals_refused;
-    } else {
-      queue_.push_back(std::move(proposal));
-    }
-  }
+  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record))
+    queue_.push_back(std::move(proposal));
   tracking_.finish(due_ns, steady_now_ns(), snapshot_, record);
   if (tracking_.correction().reason != CorrectionReason::kNone)
     result_.corrections.push_back(tracking_.correction());
@@ -191,13 +188,12 @@ void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
     taken_messages_.push_back(std::move(loop_messages_.front()));
     loop_messages_.pop_front();
   }
-  const MapperRound round = mapping_.step(consumed_, taken_messages_);
+  const std::uint64_t version = mapping_.step(consumed_, taken_messages_);
   for (ProposalHandle& keyframe : consumed_) mapped_.push_back(std::move(keyframe));
   consumed_.clear();
   snapshot_ = mapping_.publish();
   result_.schedule.mapper.append(
-      {round.version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
-  result_.rounds.push_back(round);
+      {version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
 }
 
 void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
@@ -208,12 +204,8 @@ void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
   if (!first) checkpoints_.save(snapshot_, loop_closing_.places());
 }
 
-void LockstepRun::count_frame() {
-  const FrameRecord& record = result_.frames.back();
-  ++progress_.frames;
-  progress_.lost += record.state == FrameState::kLost;
-  progress_.keyframes += record.keyframe;
-  progress_.tracked_share = record.tracked_share;
+void LockstepRun::count(const FrameRecord& record) {
+  progress_.count(record);
   progress_.map_version = snapshot_.version();
   progress_.queued = queue_.size();
 }

@@ -25,7 +25,7 @@ class LockstepRun {
   [[nodiscard]] RunResult finish();
 
  private:
-  /// `step` says what the frame meets: effort, answers, whether a keyframe may be made and is refused.
+  /// `step` says what the frame meets: effort, answers, whether a keyframe may be made.
   void track(const Frame& frame, const TrackerStep& step);
   void answer_request(const GraphSnapshot& graph);
   void map(std::size_t proposals, std::size_t loop_messages);
@@ -39,7 +39,7 @@ class LockstepRun {
   void drop(const Frame& frame, const TrackerStep& step);
   /// By the time of the recording: the same in every run.
   void checkpoint_if_due(std::int64_t t_ns);
-  void count_frame();
+  void count(const FrameRecord& record);
   void fail(const std::string& why) { result_.error = why; }
 
   const bool localise_only_;

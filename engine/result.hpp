@@ -70,25 +70,18 @@ struct FrameRecord {
   KeyframeId part_causal = kNoKeyframe;  ///< map part of T_c_w_causal's world, under its name of then
   int inliers = 0;                       ///< measurements the pose rests on
   FrameState state = FrameState::kLost;
-  bool keyframe = false;                          ///< it was proposed as a keyframe and accepted
+  bool keyframe = false;                          ///< it was proposed as a keyframe
   EffortLevel effort = EffortLevel::kEverything;  ///< what was left out for want of time
   LostCause cause = LostCause::kNone;             ///< why it was lost
 };
 static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 
-/// One keyframe proposal turned into a map version by the mapper.
-struct MapperRound {
-  std::uint64_t version = 0;  ///< published afterwards
-  int proposals = 0;          ///< consumed
-  int inner_window = 0;
-  int outer_window = 0;
-  int points = 0;
-  int observations = 0;
-  int metric_loops = 0;  ///< edges added by metric loop closure
-  int loops = 0;         ///< edges added by large-scale loop closure
-  int late_loops = 0;    ///< that came after the map had forgotten their keyframes
-  int optimised = 0;     ///< keyframes outside of the windows that took a pose of the pose graph
-  std::int64_t duration_ns = 0;
+/// What the mapper did in all.
+struct MappingTotals {
+  std::int64_t rounds = 0;        ///< each a version of the map
+  std::int64_t metric_loops = 0;  ///< edges added by metric loop closure
+  std::int64_t loops = 0;         ///< edges added by large-scale loop closure
+  std::int64_t late_loops = 0;    ///< that came after the map had forgotten their keyframes
 };
 
 /// A loop that was closed by appearance.
@@ -118,7 +111,7 @@ struct ScheduleStreams {
 struct RunResult {
   std::vector<FrameRecord> frames;          ///< in the order of the source, dropped ones included
   std::vector<PoseCorrection> corrections;  ///< in the order of the frames
-  std::vector<MapperRound> rounds;
+  MappingTotals mapping;
   std::vector<ClosedLoop> loops;  ///< by appearance, in the order they were found
   GraphSnapshot graph;            ///< after the last round and the final pose graph optimisation
   KeyframeDatabase places;        ///< how the places of its keyframes look
@@ -127,7 +120,6 @@ struct RunResult {
   ScheduleStreams schedule;
   std::unique_ptr<Trace> trace;               ///< null unless asked for
   std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted
-  std::uint64_t proposals_refused = 0;        ///< a keyframe was due, but queue or pool were full
   std::uint64_t keyframes_not_described = 0;  ///< the loop closer's queue was full
   bool interrupted = false;
   std::string error;       ///< empty, or why the run ended early (a thread failed, the input broke)

@@ -46,8 +46,6 @@ class TrackerRunner {
             FrameRecord& record);
   /// Of the map, seen first by the frame of the last step; of reason kNone when there was none.
   [[nodiscard]] const PoseCorrection& correction() const { return correction_; }
-  /// The filled proposal could not be sent.
-  void proposal_rejected(FrameRecord& record);
   /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
   bool request_relocalisation(RelocalisationRequest& request);
   /// Before the next step.
@@ -83,13 +81,15 @@ class MapperRunner {
  public:
   MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
 
-  /// One round over the given proposals, oldest first. The new version is then ready to be published.
-  MapperRound step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
+  /// One round over the given proposals, oldest first.
+  /// @return the new version of the map, ready to be published
+  std::uint64_t step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
   [[nodiscard]] GraphSnapshot publish() { return mapper_.publish(); }
   /// The last version: all poses agree globally, unless the map was not to change.
   [[nodiscard]] GraphSnapshot finish();
   /// What became of the keyframes that were culled.
   [[nodiscard]] const ReplacementLog& replacement_log() const { return replacement_log_; }
+  [[nodiscard]] const MappingTotals& totals() const { return totals_; }
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
@@ -97,6 +97,7 @@ class MapperRunner {
   Mapper mapper_;
   ReplacementLog replacement_log_;
   const bool may_change_;
+  MappingTotals totals_;
   StageRecorder times_;
   StageId round_stage_;
   std::vector<KeyframeProposal*> proposals_;

@@ -13,7 +13,7 @@ namespace twofold {
 namespace {
 
 constexpr std::string_view kMagic = "TWFSCHED";
-constexpr std::uint8_t kFormatVersion = 2;
+constexpr std::uint8_t kFormatVersion = 3;
 constexpr std::array<const char*, 3> kSectionNames = {"tracker", "mapper", "loop closer"};
 constexpr std::size_t kLargestFile = std::size_t{256} << 20;
 

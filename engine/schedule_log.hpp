@@ -19,7 +19,6 @@ struct TrackerStep {
   Fate fate = Fate::kTracked;
   std::uint8_t effort_level = 0;   ///< EffortLevel, 0 = nothing left out, <= 15
   std::uint32_t messages = 0;      ///< relocalisation answers consumed before it
-  std::uint32_t refused = 0;       ///< its messages that found a ring full
   bool keyframe_withheld = false;  ///< there was no buffer for a keyframe: the mapper is behind
   bool operator==(const TrackerStep&) const = default;
 };
@@ -29,8 +28,6 @@ struct MapperStep {
   std::uint64_t version = 0;        ///< version it published, grows; 0 when it published none
   std::uint32_t proposals = 0;      ///< keyframe proposals consumed
   std::uint32_t loop_messages = 0;  ///< messages of the loop closer consumed
-  std::uint32_t iterations = 0;     ///< solver iterations it was given or had time for
-  std::uint32_t refused = 0;        ///< its messages that found a ring full
   bool operator==(const MapperStep&) const = default;
 };
 

@@ -30,7 +30,7 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
                       [this](KeyframeProposal& proposal) { tracking_.prepare(proposal); }),
       frames_(ring_size(options.frame_slots)),
       done_(ring_size(options.frame_slots)),
-      proposals_(ring_size(options.proposal_slots)),
+      proposals_(ring_size(proposals_pool_.capacity())),
       keyframes_(ring_size(options.proposal_slots)),
       loops_(ring_size(options.proposal_slots)),
       request_pool_(kRequests, [&](RelocalisationRequest& request) { allocate_images(rig, request.images); }),
@@ -138,11 +138,7 @@ void ThreadedRun::collect(const FrameSink& sink) {
   SlotHandle slot;
   while (done_.try_pop(slot)) {
     const FrameRecord& record = slot->record;
-    ++progress_.frames;
-    progress_.lost += record.state == FrameState::kLost;
-    progress_.dropped += record.state == FrameState::kDropped;
-    progress_.keyframes += record.keyframe;
-    progress_.tracked_share = record.tracked_share;
+    progress_.count(record);
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
     progress_.queued = proposals_.size_approx();
     result_.frames.push_back(record);
@@ -176,10 +172,9 @@ void ThreadedRun::join_threads() {
 void ThreadedRun::map_late_loops() {
   take_messages();
   if (loop_messages_.empty()) return;
-  const MapperRound round = mapping_.step({}, loop_messages_);
+  const std::uint64_t version = mapping_.step({}, loop_messages_);
   (void)mapping_.publish();
-  schedule_.mapper.append({round.version, 0, static_cast<std::uint32_t>(loop_messages_.size())});
-  result_.rounds.push_back(round);
+  schedule_.mapper.append({version, 0, static_cast<std::uint32_t>(loop_messages_.size())});
 }
 
 RunResult ThreadedRun::finish() {

@@ -25,9 +25,9 @@ using FrameSink = std::function<void(const FrameRecord&, const PoseCorrection&)>
 ///
 /// A fourth thread, if checkpoints are wanted, saves what mapper and loop closer published: it only reads.
 ///
-/// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
-/// withheld (no free buffer, or a full ring), and tracking goes on with the points it has. If the tracker
-/// itself is late, it goes down the effort levels.
+/// The tracker never waits for another thread but for its next frame. If the mapper is behind, there is no
+/// free buffer for a keyframe, and tracking goes on with the points it has. If the tracker itself is late, it
+/// goes down the effort levels.
 class ThreadedRun {
  public:
   /// clock: nullptr for the steady clock; otherwise read and slept on by the tracker thread alone.
@@ -88,7 +88,7 @@ class ThreadedRun {
 
   void track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph);
   void drop(FrameSlot& slot);
-  void send_proposal(FrameRecord& record, TrackerStep& step);
+  void send_proposal();
   void take_messages();
   void take_answers(TrackerStep& step);
   void ask_where_we_are();
@@ -112,7 +112,7 @@ class ThreadedRun {
   ProposalPool proposals_pool_;
   SpscRing<SlotHandle> frames_;         // reader -> tracker
   SpscRing<SlotHandle> done_;           // tracker -> reader; as long as the pool, so that it cannot be full
-  SpscRing<ProposalHandle> proposals_;  // tracker -> mapper
+  SpscRing<ProposalHandle> proposals_;  // tracker -> mapper; as long as the pool, likewise
   SpscRing<ProposalHandle> keyframes_;  // mapper -> loop closer
   SpscRing<LoopMessage> loops_;         // loop closer -> mapper
   RequestPool request_pool_;

@@ -23,21 +23,18 @@ void ThreadedRun::mapper_thread(const std::stop_token& stop) {
   while (mapper_parking_.wait(stop, ready)) {
     take_messages();
     if (consumed_.empty() && loop_messages_.empty()) break;  // ended
-    MapperRound round = mapping_.step(consumed_, loop_messages_);
+    const std::uint64_t version = mapping_.step(consumed_, loop_messages_);
     snapshots_.publish(mapping_.publish());
-    map_version_.store(round.version, std::memory_order_relaxed);
-    MapperStep step{round.version, static_cast<std::uint32_t>(round.proposals),
-                    static_cast<std::uint32_t>(loop_messages_.size())};
+    map_version_.store(version, std::memory_order_relaxed);
+    schedule_.mapper.append({version, static_cast<std::uint32_t>(consumed_.size()),
+                             static_cast<std::uint32_t>(loop_messages_.size())});
     for (ProposalHandle& proposal : consumed_) {
-      if (keyframes_.try_push(std::move(proposal))) continue;
-      ++step.refused;
-      not_described_.fetch_add(1, std::memory_order_relaxed);
+      // The loop closer is behind by a whole ring: it does not get to know this keyframe.
+      if (!keyframes_.try_push(std::move(proposal))) not_described_.fetch_add(1, std::memory_order_relaxed);
     }
     consumed_.clear();
     loop_parking_.wake();
     reader_parking_.wake();
-    schedule_.mapper.append(step);
-    result_.rounds.push_back(round);  // read by others after the join only
   }
 }
 

@@ -39,9 +39,9 @@ void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnap
   take_answers(step);
   step.effort_level = static_cast<std::uint8_t>(effort_controller_.effort());
   step.keyframe_withheld = !spare_;
-  if (tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record))
-    send_proposal(slot.record, step);
+  const bool proposed = tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record);
   tracking_.finish(arrival.scheduled_ns, pacer_.now_ns(), graph, slot.record);
+  if (proposed) send_proposal();
   effort_controller_.tracked(slot.record.latency_ns, arrival.period_ns);
   slot.correction = tracking_.correction();
   schedule_.tracker.append(step);
@@ -65,14 +65,9 @@ void ThreadedRun::ask_where_we_are() {
   loop_parking_.wake();
 }
 
-void ThreadedRun::send_proposal(FrameRecord& record, TrackerStep& step) {
-  if (proposals_.try_push(std::move(spare_))) {
-    mapper_parking_.wake();
-    return;
-  }
-  // The mapper is behind by a whole ring: this keyframe is given up, its buffer kept.
-  tracking_.proposal_rejected(record);
-  step.refused = 1;
+void ThreadedRun::send_proposal() {
+  TWOFOLD_CHECK(proposals_.try_push(std::move(spare_)), "the ring holds every proposal of the pool");
+  mapper_parking_.wake();
 }
 
 }  // namespace twofold

@@ -114,13 +114,12 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
     return std::count_if(result.frames.begin(), result.frames.end(),
                          [&](const auto& r) { return r.state == state; });
   };
-  std::int64_t metric_loops = 0;
-  for (const MapperRound& round : result.rounds) metric_loops += round.metric_loops;
   fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", result.frames.size(),
              count(FrameState::kTracked), count(FrameState::kLost), count(FrameState::kDropped),
              result.interrupted ? ", interrupted" : "");
   fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
-             result.graph.keyframe_count(), result.rounds.size(), metric_loops, result.loops.size());
+             result.graph.keyframe_count(), result.mapping.rounds, result.mapping.metric_loops,
+             result.loops.size());
   if (options.map) {
     const auto frame = recognised_at(options, result);
     fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),

@@ -124,12 +124,6 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
     return std::count_if(result.frames.begin(), result.frames.end(),
                          [&](const auto& r) { return r.state == state; });
   };
-  std::int64_t metric_loops = 0;
-  std::int64_t late_loops = 0;
-  for (const MapperRound& round : result.rounds) {
-    metric_loops += round.metric_loops;
-    late_loops += round.late_loops;
-  }
   std::size_t keyframes = 0;
   std::size_t points = 0;
   for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k)
@@ -149,12 +143,11 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"loaded_map", loaded_map_json(options, result)},
             {"checkpoints", checkpoints_json(result.checkpoints)},
             {"map_parts", parts_json(parts)},
-            {"mapper_rounds", result.rounds.size()},
-            {"metric_loop_edges", metric_loops},
+            {"mapper_rounds", result.mapping.rounds},
+            {"metric_loop_edges", result.mapping.metric_loops},
             {"closed_loops", loops_json(result)},
-            {"loops_too_late", late_loops},
+            {"loops_too_late", result.mapping.late_loops},
             {"pose_corrections", corrections_json(result)},
-            {"proposals_refused", result.proposals_refused},
             {"wall_seconds", result.wall_seconds},
             {"cpu_seconds", result.cpu_seconds},
             {"cpu_ms_per_frame", 1e3 * result.cpu_seconds / frames},
