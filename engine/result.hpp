@@ -19,7 +19,7 @@ namespace twofold {
 enum class FrameState : std::uint8_t {
   kTracked,  ///< pose known
   kLost,     ///< looked at, no trustworthy pose
-  kDropped   ///< never looked at: it came while a newer frame was already due (--late drop)
+  kDropped   ///< never looked at: when its turn came, its successor was there (LatePolicy)
 };
 
 /// Why poses in the world changed for a reason other than motion.
@@ -65,7 +65,7 @@ struct FrameRecord {
   double tracked_share = 0;              ///< matched points over points searched, in [0, 1]
   std::uint64_t snapshot_version = 0;    ///< version of the map it was tracked against
   std::int64_t tracking_ns = 0;          ///< time spent on it by the tracker
-  std::int64_t latency_ns = 0;           ///< from the moment it was due to the moment its pose was known
+  std::int64_t latency_ns = 0;           ///< from its exposure (Pacer) to the moment its pose was known
   KeyframeId reference = kNoKeyframe;    ///< after the run: the keyframe that stands for it in the final map
   KeyframeId part_causal = kNoKeyframe;  ///< map part of T_c_w_causal's world, under its name of then
   int inliers = 0;                       ///< measurements the pose rests on
@@ -127,6 +127,9 @@ struct RunResult {
   double wall_seconds = 0;
   double peak_rss_mb = 0;
 };
+
+/// Latencies of all frames that were looked at.
+[[nodiscard]] LatencyHistogram exposure_to_pose(const RunResult& result);
 
 /// Pose of a tracked frame in the final map.
 [[nodiscard]] inline SE3 final_T_c_w(const FrameRecord& record, const GraphSnapshot& graph) {

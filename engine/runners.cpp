@@ -29,7 +29,7 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
       on_pose_(options.on_pose),
       can_relocalise_(options.vocabulary != nullptr) {
   frame_stage_ = times_.add_stage("frame");
-  latency_stage_ = times_.add_stage("latency from due time");
+  latency_stage_ = times_.add_stage("exposure to pose");
   listener_stage_ = times_.add_stage("pose listener");
   for (std::size_t s = 0; s < kTrackerStages; ++s) {
     stages_.push_back(times_.add_stage(describe(static_cast<TrackerStage>(s))));
@@ -106,10 +106,10 @@ void TrackerRunner::take_answer(const RelocalisationAnswer& answer) {
   if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
 }
 
-void TrackerRunner::finish(std::int64_t scheduled_ns, std::int64_t now_ns, const GraphSnapshot& graph,
+void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph,
                            FrameRecord& record) {
-  record.latency_ns = now_ns - scheduled_ns;
-  times_.record(latency_stage_, scheduled_ns, record.latency_ns);
+  record.latency_ns = now_ns - exposed_ns;
+  times_.record(latency_stage_, exposed_ns, record.latency_ns);
   if (!on_pose_) return;
   const ScopedStage timed(times_, listener_stage_);
   on_pose_(record, graph);

@@ -53,8 +53,7 @@ class TrackerRunner {
   [[nodiscard]] bool wants_relocalisation() const;
   /// Completes the record once the pose is known, at `now_ns` on the clock of the pace, and tells the
   /// listener. `graph` is that of the step.
-  void finish(std::int64_t scheduled_ns, std::int64_t now_ns, const GraphSnapshot& graph,
-              FrameRecord& record);
+  void finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph, FrameRecord& record);
 
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }

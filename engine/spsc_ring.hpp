@@ -58,6 +58,12 @@ class SpscRing {
     return true;
   }
 
+  /// Consumer. What try_pop would give, null when that is nothing; valid until the next try_pop.
+  [[nodiscard]] const T* peek() {
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    return refresh(head) ? &slots_[head & mask_] : nullptr;
+  }
+
   /// Consumer. Whether a try_pop would succeed now.
   [[nodiscard]] bool has_value() { return refresh(head_.load(std::memory_order_relaxed)); }
 

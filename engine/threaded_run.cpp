@@ -40,7 +40,7 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
       places_(1, loop_closing_.places()),
       checkpoints_(rig, options.checkpoint),
       pacer_(options.pacing, clock),
-      effort_controller_(options.effort) {
+      effort_controller_(options.effort, options.pacing.late) {
   consumed_.reserve(ring_size(options.proposal_slots));
   loop_messages_.reserve(ring_size(options.proposal_slots));
 }
@@ -87,12 +87,8 @@ bool ThreadedRun::has_room() {
 void ThreadedRun::push(Frame frame) {
   TWOFOLD_CHECK(free_slot_, "there is room for the frame");
   free_slot_->frame = std::move(frame);
-  free_slot_->next_t_ns.reset();
-  if (held_back_) {
-    held_back_->next_t_ns = free_slot_->frame.t_ns;
-    send(std::move(held_back_));
-  }
-  held_back_ = std::move(free_slot_);
+  TWOFOLD_CHECK(frames_.try_push(std::move(free_slot_)), "the ring holds every slot of the pool");
+  tracker_parking_.wake();
 }
 
 void ThreadedRun::wait(std::chrono::steady_clock::time_point deadline) {
@@ -111,21 +107,15 @@ bool ThreadedRun::wait_for_room(const FrameSink& sink) {
 }
 
 void ThreadedRun::stop() {
-  if (held_back_) send(std::move(held_back_));
   frames_ended_.store(true, std::memory_order_release);
   tracker_parking_.wake();
   join_threads();
 }
 
-void ThreadedRun::send(SlotHandle slot) {
-  TWOFOLD_CHECK(frames_.try_push(std::move(slot)), "the ring holds every slot of the pool");
-  tracker_parking_.wake();
-}
-
 /// As fast as possible means as fast as the map can follow: without a clock to keep, frames wait for the
 /// mapper.
 bool ThreadedRun::must_hold_back() const {
-  return options_.pacing.speed == 0 && proposals_.size_approx() > 1;
+  return !options_.pacing.keeps_pace() && proposals_.size_approx() > 1;
 }
 
 // Relaxed: both flags are raised on this thread.

@@ -66,7 +66,6 @@ class ThreadedRun {
 
   struct FrameSlot {
     Frame frame;
-    std::optional<std::int64_t> next_t_ns;  ///< time stamp of the frame after it, if known
     FrameRecord record;
     PoseCorrection correction;  ///< seen first by this frame, if there is a reason
   };
@@ -76,7 +75,6 @@ class ThreadedRun {
   // On the calling thread.
   /// False when a thread failed.
   [[nodiscard]] bool wait_for_room(const FrameSink& sink);
-  void send(SlotHandle slot);
   [[nodiscard]] bool must_hold_back() const;
   void join_threads();
 
@@ -88,6 +86,7 @@ class ThreadedRun {
 
   void track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph);
   void drop(FrameSlot& slot);
+  [[nodiscard]] std::optional<std::int64_t> successor_t_ns();
   void send_proposal();
   void take_messages();
   void take_answers(TrackerStep& step);
@@ -125,7 +124,6 @@ class ThreadedRun {
   EffortController effort_controller_;
 
   SlotHandle free_slot_;                    // feeding thread's: where the next frame goes
-  SlotHandle held_back_;                    // feeding thread's: until its successor's time stamp is known
   ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
   std::vector<ProposalHandle> consumed_;    // mapper's
   std::vector<LoopMessage> loop_messages_;  // mapper's, of this round

@@ -9,7 +9,8 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
   while (tracker_parking_.wait(stop, ready)) {
     // A handle that was moved from is empty (PoolHandle).  NOLINTNEXTLINE(bugprone-use-after-move)
     if (!slot && !frames_.try_pop(slot)) break;  // ended, and nothing was pushed before that
-    const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, slot->next_t_ns, stop);
+    const Arrival arrival = pacer_.wait_for(
+        slot->frame.t_ns, [this] { return successor_t_ns(); }, stop);
     slot->record = FrameRecord{};
     slot->correction.reason = CorrectionReason::kNone;
     if (effort_controller_.must_drop(arrival)) {
@@ -21,6 +22,13 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
     reader_parking_.wake();
   }
   spare_.reset();
+}
+
+/// Of the frame that waits behind the one in hand.
+std::optional<std::int64_t> ThreadedRun::successor_t_ns() {
+  const SlotHandle* const next = frames_.peek();
+  if (next == nullptr) return std::nullopt;
+  return (*next)->frame.t_ns;
 }
 
 void ThreadedRun::drop(FrameSlot& slot) {
@@ -40,7 +48,7 @@ void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnap
   step.effort_level = static_cast<std::uint8_t>(effort_controller_.effort());
   step.keyframe_withheld = !spare_;
   const bool proposed = tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record);
-  tracking_.finish(arrival.scheduled_ns, pacer_.now_ns(), graph, slot.record);
+  tracking_.finish(arrival.exposed_ns, pacer_.now_ns(), graph, slot.record);
   if (proposed) send_proposal();
   effort_controller_.tracked(slot.record.latency_ns, arrival.period_ns);
   slot.correction = tracking_.correction();

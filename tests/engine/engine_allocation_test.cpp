@@ -41,7 +41,7 @@ TEST(TrackerThread, NeverAllocates) {
   ProposalPool proposals(4, [&](KeyframeProposal& proposal) { tracking.prepare(proposal); });
   RequestPool requests(2, [&](RelocalisationRequest& r) { allocate_images(rig, r.images); });
   ScheduleStream<TrackerStep> schedule;
-  EffortController controller({});
+  EffortController controller({}, LatePolicy::kQueue);
   GraphSnapshot graph = mapping.publish();
 
   int keyframes = 0, lost = 0, asked = 0;
