@@ -113,7 +113,7 @@ void LockstepRun::replay_loop_steps(const Schedule& schedule) {
     if (step.version > snapshot_.version() || (step.requests > 0 && !request_)) return;
     while (history_.front().version() < step.version) history_.pop_front();
     if (step.requests > 0) {
-      answer_request(history_.front());
+      answer_request(history_.front(), step.refused > 0);
       continue;
     }
     const auto is_older = [&](const ProposalHandle& p) {
@@ -130,10 +130,10 @@ void LockstepRun::replay_loop_steps(const Schedule& schedule) {
   }
 }
 
-void LockstepRun::answer_request(const GraphSnapshot& graph) {
-  answer_ = loop_closing_.relocalise(*request_, graph);
+void LockstepRun::answer_request(const GraphSnapshot& graph, bool refused) {
+  answer_ = refused ? RelocalisationAnswer() : loop_closing_.relocalise(*request_, graph);
   request_.reset();
-  result_.schedule.loop_closer.append({graph.version(), -1, 1});
+  result_.schedule.loop_closer.append({graph.version(), -1, 1, refused ? 1U : 0U});
 }
 
 void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph,

@@ -27,7 +27,8 @@ class LockstepRun {
  private:
   /// `step` says what the frame meets: effort, answers, whether a keyframe may be made.
   void track(const Frame& frame, const TrackerStep& step);
-  void answer_request(const GraphSnapshot& graph);
+  /// `refused`: with nothing, as a loop closer does that has failed.
+  void answer_request(const GraphSnapshot& graph, bool refused = false);
   void map(std::size_t proposals, std::size_t loop_messages);
   /// One step of the loop closer for a keyframe; the last `refused` of its messages found the ring full.
   void close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph, std::size_t refused);

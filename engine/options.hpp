@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "engine/effort_controller.hpp"
 #include "engine/pacing.hpp"
@@ -56,6 +57,10 @@ struct EngineOptions {
   std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
 
   PoseListener on_pose;  ///< may be empty
+
+  /// For tests of failures: called by the thread of that name ("tracker", "mapper", "loop closer",
+  /// "checkpoints") of a threaded run before each of its steps, which fails with what this throws.
+  std::function<void(std::string_view thread)> before_step;
 
   bool trace = false;  ///< keep spans and counters for RunResult::trace
 };

@@ -36,7 +36,7 @@ struct LoopStep {
   std::uint64_t version = 0;   ///< snapshot it used
   std::int64_t keyframe = -1;  ///< keyframe consumed, -1 = none
   std::uint32_t requests = 0;  ///< relocalisation requests consumed
-  std::uint32_t refused = 0;   ///< its messages that found a ring full
+  std::uint32_t refused = 0;   ///< its messages that found a ring full; 1 of a request: it was not looked at
   bool operator==(const LoopStep&) const = default;
 };
 

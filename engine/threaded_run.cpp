@@ -107,6 +107,7 @@ bool ThreadedRun::wait_for_room(const FrameSink& sink) {
 }
 
 void ThreadedRun::stop() {
+  stopped_ = true;
   frames_ended_.store(true, std::memory_order_release);
   tracker_parking_.wake();
   join_threads();
@@ -118,10 +119,11 @@ bool ThreadedRun::must_hold_back() const {
   return !options_.pacing.keeps_pace() && proposals_.size_approx() > 1;
 }
 
-// Relaxed: both flags are raised on this thread.
 bool ThreadedRun::failed() const {
-  return (tracker_->finished() && !frames_ended_.load(std::memory_order_relaxed)) ||
-         (mapper_->finished() && !proposals_ended_.load(std::memory_order_relaxed));
+  const auto ended = [](const std::optional<Worker>& worker) { return worker && worker->finished(); };
+  if (stopped_) return false;
+  return loop_closer_failed_.load(std::memory_order_relaxed) || ended(tracker_) || ended(mapper_) ||
+         ended(loop_closer_) || ended(checkpointer_);
 }
 
 void ThreadedRun::collect(const FrameSink& sink) {

@@ -49,7 +49,7 @@ class ThreadedRun {
   void collect(const FrameSink& sink);
   /// Sleeps until a frame can be collected, or there is room where there was none; not beyond `deadline`.
   void wait(std::chrono::steady_clock::time_point deadline);
-  /// A thread has ended early: what is pushed from now on is not tracked, and stop says why.
+  /// A thread has ended early: time to stop; RunResult::error says why.
   [[nodiscard]] bool failed() const;
   /// Counts of what was collected.
   [[nodiscard]] const Progress& progress() const { return progress_; }
@@ -93,6 +93,14 @@ class ThreadedRun {
   void ask_where_we_are();
   /// False when there was no request.
   bool answer_request();
+  void close_loops(const std::stop_token& stop);
+  void send_answer(RelocalisationAnswer answer, const LoopStep& step);
+  /// To every request, until the tracker has ended.
+  void answer_nothing(const std::stop_token& stop);
+  /// Before each step of a thread.
+  void begin_step(const char* thread) const {
+    if (options_.before_step) options_.before_step(thread);
+  }
   void send_loops(std::span<LoopMessage> messages, LoopStep& step);
   void map_late_loops();
   void publish_places();
@@ -127,11 +135,15 @@ class ThreadedRun {
   ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
   std::vector<ProposalHandle> consumed_;    // mapper's
   std::vector<LoopMessage> loop_messages_;  // mapper's, of this round
+  bool answering_ = false;                  // loop closer's: it has taken a request
+  bool stopped_ = false;                    // feeding thread's
 
   Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_, checkpoint_parking_;
   // Each is raised by the thread before in the chain, with release, after its last push: who sees it
   // (acquire) and then finds the ring empty has seen everything.
   std::atomic<bool> frames_ended_{false}, proposals_ended_{false}, keyframes_ended_{false};
+  // Raised by a loop closer that has failed and goes on answering; relaxed, because it publishes nothing.
+  std::atomic<bool> loop_closer_failed_{false};
   // Counters for the progress line; relaxed, because they publish nothing.
   std::atomic<std::uint64_t> map_version_{0}, not_described_{0};
 

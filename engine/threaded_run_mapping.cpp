@@ -23,6 +23,7 @@ void ThreadedRun::mapper_thread(const std::stop_token& stop) {
   while (mapper_parking_.wait(stop, ready)) {
     take_messages();
     if (consumed_.empty() && loop_messages_.empty()) break;  // ended
+    begin_step("mapper");
     const std::uint64_t version = mapping_.step(consumed_, loop_messages_);
     snapshots_.publish(mapping_.publish());
     map_version_.store(version, std::memory_order_relaxed);
@@ -38,7 +39,19 @@ void ThreadedRun::mapper_thread(const std::stop_token& stop) {
   }
 }
 
+/// A loop closer that fails still answers the camera that asks where it is: nothing found.
 void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
+  try {
+    close_loops(stop);
+  } catch (...) {
+    loop_closer_failed_.store(true, std::memory_order_relaxed);
+    reader_parking_.wake();
+    answer_nothing(stop);
+    throw;
+  }
+}
+
+void ThreadedRun::close_loops(const std::stop_token& stop) {
   ProposalHandle keyframe;
   const auto ready = [&] {
     return keyframe || requests_.size_approx() > 0 || keyframes_.try_pop(keyframe) ||
@@ -47,6 +60,7 @@ void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
   while (loop_parking_.wait(stop, ready)) {
     if (answer_request()) continue;  // a lost camera comes first
     if (!keyframe && !keyframes_.try_pop(keyframe)) break;
+    begin_step("loop closer");
     const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
     LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
     send_loops(loop_closing_.step(*keyframe, graph), step);
@@ -59,12 +73,31 @@ void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
 bool ThreadedRun::answer_request() {
   RequestHandle request;
   if (!requests_.try_pop(request)) return false;
+  answering_ = true;
+  begin_step("loop closer");
   const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
   RelocalisationAnswer answer = loop_closing_.relocalise(*request, graph);
   request.reset();  // before the answer: the next request finds its buffer free
-  TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
-  schedule_.loop_closer.append({graph.version(), -1, 1});
+  send_answer(std::move(answer), {graph.version(), -1, 1});
   return true;
+}
+
+void ThreadedRun::send_answer(RelocalisationAnswer answer, const LoopStep& step) {
+  TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
+  answering_ = false;
+  schedule_.loop_closer.append(step);
+}
+
+void ThreadedRun::answer_nothing(const std::stop_token& stop) {
+  RequestHandle request;
+  const auto ready = [&] {
+    return answering_ || requests_.try_pop(request) || keyframes_ended_.load(std::memory_order_acquire);
+  };
+  while (loop_parking_.wait(stop, ready)) {
+    if (!answering_ && !request && !requests_.try_pop(request)) return;
+    request.reset();
+    send_answer(std::nullopt, {snapshots_.mailbox(kLoopReader).latest().version(), -1, 1, 1});
+  }
 }
 
 void ThreadedRun::publish_places() {
@@ -88,6 +121,7 @@ void ThreadedRun::checkpoint_thread(const std::stop_token& stop) {
     const auto due = std::chrono::steady_clock::now() + std::chrono::nanoseconds(checkpoints_.period_ns());
     (void)checkpoint_parking_.wait_until(stop, due, [] { return false; });
     if (stop.stop_requested()) return;  // the caller saves the final map
+    begin_step("checkpoints");
     checkpoints_.save(snapshots_.mailbox(kCheckpointReader).latest(), places_.mailbox(0).latest());
   }
 }

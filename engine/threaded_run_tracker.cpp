@@ -11,6 +11,7 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
     if (!slot && !frames_.try_pop(slot)) break;  // ended, and nothing was pushed before that
     const Arrival arrival = pacer_.wait_for(
         slot->frame.t_ns, [this] { return successor_t_ns(); }, stop);
+    begin_step("tracker");
     slot->record = FrameRecord{};
     slot->correction.reason = CorrectionReason::kNone;
     if (effort_controller_.must_drop(arrival)) {
