@@ -30,9 +30,8 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
                       [this](KeyframeProposal& proposal) { tracking_.prepare(proposal); }),
       frames_(ring_size(options.frame_slots)),
       done_(ring_size(options.frame_slots)),
-      proposals_(ring_size(proposals_pool_.capacity())),
+      mapper_inbox_(ring_size(proposals_pool_.capacity()), ring_size(options.proposal_slots)),
       keyframes_(ring_size(options.proposal_slots)),
-      loops_(ring_size(options.proposal_slots)),
       request_pool_(kRequests, [&](RelocalisationRequest& request) { allocate_images(rig, request.images); }),
       requests_(kRequests),
       answers_(kRequests),
@@ -40,10 +39,7 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
       places_(1, loop_closing_.places()),
       checkpoints_(rig, options.checkpoint),
       pacer_(options.pacing, clock),
-      effort_controller_(options.effort, options.pacing.late) {
-  consumed_.reserve(ring_size(options.proposal_slots));
-  loop_messages_.reserve(ring_size(options.proposal_slots));
-}
+      effort_controller_(options.effort, options.pacing.late) {}
 
 void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
                       const ProgressSink& progress) {
@@ -116,7 +112,7 @@ void ThreadedRun::stop() {
 /// As fast as possible means as fast as the map can follow: without a clock to keep, frames wait for the
 /// mapper.
 bool ThreadedRun::must_hold_back() const {
-  return !options_.pacing.keeps_pace() && proposals_.size_approx() > 1;
+  return !options_.pacing.keeps_pace() && mapper_inbox_.proposals_approx() > 1;
 }
 
 bool ThreadedRun::failed() const {
@@ -132,7 +128,7 @@ void ThreadedRun::collect(const FrameSink& sink) {
     const FrameRecord& record = slot->record;
     progress_.count(record);
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
-    progress_.queued = proposals_.size_approx();
+    progress_.queued = mapper_inbox_.proposals_approx();
     result_.frames.push_back(record);
     if (slot->correction.reason != CorrectionReason::kNone) result_.corrections.push_back(slot->correction);
     slot->frame = {};  // images are freed here, not on the tracker's thread
@@ -162,11 +158,11 @@ void ThreadedRun::join_threads() {
 
 /// The loop closer ends after the mapper: what it sent last is taken here, all threads being gone.
 void ThreadedRun::map_late_loops() {
-  take_messages();
-  if (loop_messages_.empty()) return;
-  const std::uint64_t version = mapping_.step({}, loop_messages_);
+  (void)mapper_inbox_.take();
+  if (mapper_inbox_.loops().empty()) return;
+  const std::uint64_t version = mapping_.step({}, mapper_inbox_.loops());
   (void)mapping_.publish();
-  schedule_.mapper.append({version, 0, static_cast<std::uint32_t>(loop_messages_.size())});
+  schedule_.mapper.append({version, 0, static_cast<std::uint32_t>(mapper_inbox_.loops().size())});
 }
 
 RunResult ThreadedRun::finish() {

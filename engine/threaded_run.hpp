@@ -4,6 +4,7 @@
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
+#include "engine/mapper_inbox.hpp"
 #include "engine/pacing.hpp"
 #include "engine/parking.hpp"
 #include "engine/runners.hpp"
@@ -88,7 +89,6 @@ class ThreadedRun {
   void drop(FrameSlot& slot);
   [[nodiscard]] std::optional<std::int64_t> successor_t_ns();
   void send_proposal();
-  void take_messages();
   void take_answers(TrackerStep& step);
   void ask_where_we_are();
   /// False when there was no request.
@@ -119,9 +119,8 @@ class ThreadedRun {
   ProposalPool proposals_pool_;
   SpscRing<SlotHandle> frames_;         // reader -> tracker
   SpscRing<SlotHandle> done_;           // tracker -> reader; as long as the pool, so that it cannot be full
-  SpscRing<ProposalHandle> proposals_;  // tracker -> mapper; as long as the pool, likewise
+  MapperInbox mapper_inbox_;            // tracker, loop closer -> mapper
   SpscRing<ProposalHandle> keyframes_;  // mapper -> loop closer
-  SpscRing<LoopMessage> loops_;         // loop closer -> mapper
   RequestPool request_pool_;
   SpscRing<RequestHandle> requests_;        // tracker -> loop closer; one at most is under way
   SpscRing<RelocalisationAnswer> answers_;  // loop closer -> tracker
@@ -131,12 +130,10 @@ class ThreadedRun {
   Pacer pacer_;
   EffortController effort_controller_;
 
-  SlotHandle free_slot_;                    // feeding thread's: where the next frame goes
-  ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
-  std::vector<ProposalHandle> consumed_;    // mapper's
-  std::vector<LoopMessage> loop_messages_;  // mapper's, of this round
-  bool answering_ = false;                  // loop closer's: it has taken a request
-  bool stopped_ = false;                    // feeding thread's
+  SlotHandle free_slot_;    // feeding thread's: where the next frame goes
+  ProposalHandle spare_;    // tracker's: the buffer the next keyframe goes to
+  bool answering_ = false;  // loop closer's: it has taken a request
+  bool stopped_ = false;    // feeding thread's
 
   Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_, checkpoint_parking_;
   // Each is raised by the thread before in the chain, with release, after its last push: who sees it

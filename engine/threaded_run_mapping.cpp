@@ -3,37 +3,25 @@
 
 namespace twofold {
 
-void ThreadedRun::take_messages() {
-  consumed_.clear();
-  ProposalHandle proposal;
-  while (consumed_.size() < consumed_.capacity() && proposals_.try_pop(proposal)) {
-    consumed_.push_back(std::move(proposal));
-  }
-  loop_messages_.clear();
-  while (loop_messages_.size() < loop_messages_.capacity() && loops_.has_value()) {
-    (void)loops_.try_pop(loop_messages_.emplace_back());
-  }
-}
-
 void ThreadedRun::mapper_thread(const std::stop_token& stop) {
   const auto ready = [this] {
-    return proposals_.size_approx() > 0 || loops_.size_approx() > 0 ||
-           proposals_ended_.load(std::memory_order_acquire);
+    return !mapper_inbox_.empty() || proposals_ended_.load(std::memory_order_acquire);
   };
   while (mapper_parking_.wait(stop, ready)) {
-    take_messages();
-    if (consumed_.empty() && loop_messages_.empty()) break;  // ended
+    if (!mapper_inbox_.take()) break;  // ended
     begin_step("mapper");
-    const std::uint64_t version = mapping_.step(consumed_, loop_messages_);
+    const std::span<ProposalHandle> proposals = mapper_inbox_.proposals();
+    const std::span<const LoopMessage> loops = mapper_inbox_.loops();
+    const std::uint64_t version = mapping_.step(proposals, loops);
     snapshots_.publish(mapping_.publish());
     map_version_.store(version, std::memory_order_relaxed);
-    schedule_.mapper.append({version, static_cast<std::uint32_t>(consumed_.size()),
-                             static_cast<std::uint32_t>(loop_messages_.size())});
-    for (ProposalHandle& proposal : consumed_) {
-      // The loop closer is behind by a whole ring: it does not get to know this keyframe.
+    schedule_.mapper.append(
+        {version, static_cast<std::uint32_t>(proposals.size()), static_cast<std::uint32_t>(loops.size())});
+    for (ProposalHandle& proposal : proposals) {
+      // The loop closer may be behind by a whole ring: it then does not get to know this keyframe.
       if (!keyframes_.try_push(std::move(proposal))) not_described_.fetch_add(1, std::memory_order_relaxed);
+      proposal.reset();
     }
-    consumed_.clear();
     loop_parking_.wake();
     reader_parking_.wake();
   }
@@ -108,7 +96,7 @@ void ThreadedRun::publish_places() {
 /// A ring that is full takes nothing more of this step; a loop that is lost is found again.
 void ThreadedRun::send_loops(std::span<LoopMessage> messages, LoopStep& step) {
   std::size_t sent = 0;
-  while (sent < messages.size() && loops_.try_push(std::move(messages[sent]))) ++sent;
+  while (sent < messages.size() && mapper_inbox_.try_send(std::move(messages[sent]))) ++sent;
   step.refused = static_cast<std::uint32_t>(messages.size() - sent);
   if (sent > 0) mapper_parking_.wake();
 }

@@ -75,7 +75,7 @@ void ThreadedRun::ask_where_we_are() {
 }
 
 void ThreadedRun::send_proposal() {
-  TWOFOLD_CHECK(proposals_.try_push(std::move(spare_)), "the ring holds every proposal of the pool");
+  mapper_inbox_.send(std::move(spare_));
   mapper_parking_.wake();
 }
 
