@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/chunked_vector.hpp"
 #include "engine/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
@@ -109,8 +110,8 @@ struct ScheduleStreams {
 
 /// All a run leaves behind.
 struct RunResult {
-  std::vector<FrameRecord> frames;          ///< in the order of the source, dropped ones included
-  std::vector<PoseCorrection> corrections;  ///< in the order of the frames
+  ChunkedVector<FrameRecord> frames;          ///< in the order of the source, dropped ones included
+  ChunkedVector<PoseCorrection> corrections;  ///< in the order of the frames
   MappingTotals mapping;
   std::vector<ClosedLoop> loops;  ///< by appearance, in the order they were found
   GraphSnapshot graph;            ///< after the last round and the final pose graph optimisation

@@ -9,6 +9,8 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "engine/chunked_vector.hpp"
+
 namespace twofold {
 
 /// What one frame met in the tracker. Together with the input images it determines the tracker's step.
@@ -50,20 +52,19 @@ struct Schedule {
 };
 
 /// Bytes of one thread's records, each about three to five: differences to the record before as
-/// variable-length integers. Used by that thread only, without locks, and read after it was joined. Room for
-/// `reserve_bytes` is made at start, so that appending allocates nothing until that is used up (1 MiB: hours
-/// at 30 frames a second).
+/// variable-length integers. Used by one thread at a time, without locks, and read when the run is over.
+/// Appending allocates now and then, so the tracker leaves it to the thread that takes its frames back.
 template <class Step>
 class ScheduleStream {
  public:
-  explicit ScheduleStream(std::size_t reserve_bytes = 1U << 20) { bytes_.reserve(reserve_bytes); }
   void append(const Step& step);
 
   [[nodiscard]] std::uint64_t records() const { return records_; }
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
+  [[nodiscard]] const ChunkedVector<std::uint8_t, 65536>& bytes() const { return bytes_; }
 
  private:
-  std::vector<std::uint8_t> bytes_;
+  ChunkedVector<std::uint8_t, 65536> bytes_;
+  std::vector<std::uint8_t> record_;  // the one that is being appended
   std::uint64_t records_ = 0;
   Step last_;
 };

@@ -130,6 +130,7 @@ void ThreadedRun::collect(const FrameSink& sink) {
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
     progress_.queued = mapper_inbox_.proposals_approx();
     result_.frames.push_back(record);
+    schedule_.tracker.append(slot->step);
     if (slot->correction.reason != CorrectionReason::kNone) result_.corrections.push_back(slot->correction);
     slot->frame = {};  // images are freed here, not on the tracker's thread
     if (sink) sink(record, slot->correction);

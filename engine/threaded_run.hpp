@@ -68,6 +68,7 @@ class ThreadedRun {
   struct FrameSlot {
     Frame frame;
     FrameRecord record;
+    TrackerStep step;           ///< for the schedule
     PoseCorrection correction;  ///< seen first by this frame, if there is a reason
   };
   using SlotPool = FramePool<FrameSlot>;

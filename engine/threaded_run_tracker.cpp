@@ -37,14 +37,15 @@ void ThreadedRun::drop(FrameSlot& slot) {
   slot.record.t_ns = slot.frame.t_ns;
   slot.record.state = FrameState::kDropped;
   slot.record.effort = effort_controller_.effort();
-  schedule_.tracker.append({slot.frame.index, 0, TrackerStep::Fate::kDropped,
-                            static_cast<std::uint8_t>(effort_controller_.effort())});
+  slot.step = {slot.frame.index, 0, TrackerStep::Fate::kDropped,
+               static_cast<std::uint8_t>(effort_controller_.effort())};
   effort_controller_.dropped();
 }
 
 void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph) {
   if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
-  TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
+  TrackerStep& step = slot.step;
+  step = {slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
   take_answers(step);
   step.effort_level = static_cast<std::uint8_t>(effort_controller_.effort());
   step.keyframe_withheld = !spare_;
@@ -53,7 +54,6 @@ void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnap
   if (proposed) send_proposal();
   effort_controller_.tracked(slot.record.latency_ns, arrival.period_ns);
   slot.correction = tracking_.correction();
-  schedule_.tracker.append(step);
   ask_where_we_are();
 }
 
