@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "engine/atomics.hpp"
+#include "geometry/atomics.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {

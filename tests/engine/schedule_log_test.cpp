@@ -142,9 +142,11 @@ TEST(ScheduleLog, FramesOutOfOrderAreRefused) {
   EXPECT_NE(parsed.error().find("frames out of order"), std::string::npos) << parsed.error();
 }
 
-TEST(ScheduleLog, RandomBytesNeverCrashTheReader) {
+/// Refused with a reason, or a log that can be written again.
+TEST(ScheduleLog, RandomBytesAreRefusedOrALog) {
   std::mt19937 rng(17);
   const auto good = bytes_of(plausible(30, 3));
+  int refused = 0;
   for (int i = 0; i < 20'000; ++i) {
     auto bytes = good;
     bytes.resize(rng() % (good.size() + 40), 0);
@@ -152,8 +154,16 @@ TEST(ScheduleLog, RandomBytesNeverCrashTheReader) {
     for (std::size_t at = keep; at < bytes.size(); ++at) {
       if (rng() % 4 == 0) bytes[at] = static_cast<std::uint8_t>(rng());
     }
-    (void)parse_schedule(bytes);
+    const auto parsed = parse_schedule(bytes);
+    if (parsed) {
+      EXPECT_EQ(parse_schedule(bytes_of(*parsed)), parsed);
+      continue;
+    }
+    ++refused;
+    EXPECT_EQ(parsed.error().find("schedule log: "), 0U) << parsed.error();
+    EXPECT_GT(parsed.error().size(), std::string("schedule log: ").size());
   }
+  EXPECT_GT(refused, 19'000);
 }
 
 TEST(ScheduleLog, StreamsInAndOut) {
