@@ -1,19 +1,32 @@
 #include "engine/checkpoint_writer.hpp"
 
 #include <algorithm>
+#include <exception>
+#include <utility>
 
 #include "engine/clock.hpp"
 #include "graph/map_file.hpp"
 
 namespace twofold {
 
+CheckpointWriter::CheckpointWriter(const Rig& rig, CheckpointOptions options, Save save)
+    : rig_(rig), options_(std::move(options)), save_(std::move(save)) {}
+
+void CheckpointWriter::save_whole_map(const std::filesystem::path& file, const Rig& rig,
+                                      const GraphSnapshot& graph, const KeyframeDatabase& places) {
+  save_map(file, rig, graph, places);
+}
+
 void CheckpointWriter::save(const GraphSnapshot& graph, const KeyframeDatabase& places) {
   if (graph.version() == report_.version) return;
   const std::int64_t begin_ns = steady_now_ns();
   try {
-    save_map(options_.file, rig_, graph, places);
-  } catch (const MapFileError& error) {
+    save_(options_.file, rig_, graph, places);
+  } catch (const std::exception& error) {
     report_.error = error.what();
+    return;
+  } catch (...) {
+    report_.error = "an exception of unknown type";
     return;
   }
   ++report_.saved;

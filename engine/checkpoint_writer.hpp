@@ -1,5 +1,8 @@
 #pragma once
 
+#include <filesystem>
+#include <functional>
+
 #include "camera/rig.hpp"
 #include "engine/options.hpp"
 #include "engine/result.hpp"
@@ -9,11 +12,14 @@
 namespace twofold {
 
 /// Saves published versions of a map to one file, whole each time (save_map). Used by one thread; the report
-/// is read after that was joined. A save that fails is reported, and the next one tries again: a full disk
-/// must not end a run.
+/// is read after that was joined. A save that fails, whatever it throws, is reported, and the next one tries
+/// again: a full disk must not end a run.
 class CheckpointWriter {
  public:
-  CheckpointWriter(const Rig& rig, CheckpointOptions options) : rig_(rig), options_(std::move(options)) {}
+  using Save = std::function<void(const std::filesystem::path&, const Rig&, const GraphSnapshot&,
+                                  const KeyframeDatabase&)>;
+  /// save: save_map, but for tests.
+  CheckpointWriter(const Rig& rig, CheckpointOptions options, Save save = save_whole_map);
 
   [[nodiscard]] bool enabled() const { return options_.period > 0; }
   [[nodiscard]] std::int64_t period_ns() const { return static_cast<std::int64_t>(options_.period * 1e9); }
@@ -25,8 +31,12 @@ class CheckpointWriter {
   [[nodiscard]] const CheckpointReport& report() const { return report_; }
 
  private:
+  static void save_whole_map(const std::filesystem::path& file, const Rig& rig, const GraphSnapshot& graph,
+                             const KeyframeDatabase& places);
+
   Rig rig_;
   CheckpointOptions options_;
+  Save save_;
   CheckpointReport report_;
 };
 

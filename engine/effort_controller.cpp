@@ -13,12 +13,14 @@ std::string EffortOptions::invalid_reason() const {
       .reason();
 }
 
-EffortController::EffortController(const EffortOptions& options) : options_(options) {
+EffortController::EffortController(const EffortOptions& options, LatePolicy late)
+    : options_(options), late_(late) {
   TWOFOLD_CHECK(options.invalid_reason().empty(), "effort options");
 }
 
 bool EffortController::must_drop(const Arrival& arrival) const {
-  if (!arrival.overtaken) return false;
+  if (!arrival.overtaken || late_ == LatePolicy::kQueue) return false;
+  if (late_ == LatePolicy::kNewest) return true;
   return effort_ == EffortLevel::kDropFrames ||
          static_cast<double>(arrival.late_ns) > options_.drop_after * static_cast<double>(arrival.period_ns);
 }

@@ -29,11 +29,12 @@ struct EffortOptions {
 /// the log.
 class EffortController {
  public:
-  explicit EffortController(const EffortOptions& options);
+  EffortController(const EffortOptions& options, LatePolicy late);
 
   [[nodiscard]] EffortLevel effort() const { return effort_; }
-  /// Whether the frame whose turn it is is to be dropped: the policy allows it (Arrival::overtaken), and
-  /// either nothing else is left to leave out or the delay would grow beyond its bound.
+  /// Whether the frame whose turn it is is to be dropped: its successor is there, and the policy wants only
+  /// that, or allows to drop and either nothing else is left to leave out or the delay would grow beyond its
+  /// bound.
   [[nodiscard]] bool must_drop(const Arrival& arrival) const;
 
   /// A frame's pose was known `latency_ns` after it was due.
@@ -44,6 +45,7 @@ class EffortController {
   void down();
 
   EffortOptions options_;
+  LatePolicy late_;
   EffortLevel effort_ = EffortLevel::kEverything;
   int early_frames_ = 0;  ///< in a row
 };

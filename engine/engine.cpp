@@ -26,6 +26,22 @@ class CostMeter {
 
 }  // namespace
 
+void Progress::count(const FrameRecord& record) {
+  ++frames;
+  lost += record.state == FrameState::kLost;
+  dropped += record.state == FrameState::kDropped;
+  keyframes += record.keyframe;
+  tracked_share = record.tracked_share;
+}
+
+LatencyHistogram exposure_to_pose(const RunResult& result) {
+  LatencyHistogram latency;
+  for (const FrameRecord& record : result.frames) {
+    if (record.state != FrameState::kDropped) latency.record(record.latency_ns);
+  }
+  return latency;
+}
+
 Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
   if (const std::string reason = options_.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
   if (options_.map) {

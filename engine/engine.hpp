@@ -11,8 +11,7 @@
 namespace twofold {
 
 enum class FeedStatus : std::uint8_t { kFrame, kEnd, kError };
-/// Fills the next frame. The engine reads its images until it passes the same Frame object again, and may
-/// pass others in between: a feed that reuses its image buffers needs a set of them for each object.
+/// Fills the next frame. The engine keeps the images as long as it needs them: nobody writes into them again.
 using FrameFeed = std::function<FeedStatus(Frame&)>;
 
 /// State of a run for a progress line.
@@ -24,6 +23,9 @@ struct Progress {
   std::uint64_t map_version = 0;
   std::int64_t keyframes = 0;  ///< accepted so far
   std::size_t queued = 0;      ///< proposals waiting for the mapper
+
+  /// Another frame is done with.
+  void count(const FrameRecord& record);
 };
 using ProgressSink = std::function<void(const Progress&)>;
 

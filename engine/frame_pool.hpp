@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "engine/atomics.hpp"
+#include "geometry/atomics.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {

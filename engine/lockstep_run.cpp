@@ -28,19 +28,25 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
   FeedStatus status = FeedStatus::kEnd;
   // Relaxed: the flag carries no other data; seeing it a frame later is as good.
   while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
-    track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = localise_only_});
-    if (request_) answer_request(snapshot_);
-    if (!queue_.empty()) {
-      map(queue_.size(), 0);
-      close_loops(*mapped_.front(), snapshot_, 0);
-      mapped_.clear();
-      if (!loop_messages_.empty()) map(0, loop_messages_.size());
-    }
-    checkpoint_if_due(frame.t_ns);
-    report(progress);
+    (void)step(frame);
+    if (progress) progress(progress_);
   }
   result_.interrupted = interrupted.load(std::memory_order_relaxed);
   if (status == FeedStatus::kError) fail("the input ended with an error");
+}
+
+const FrameRecord& LockstepRun::step(const Frame& frame) {
+  track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = localise_only_});
+  if (request_) answer_request(snapshot_);
+  if (!queue_.empty()) {
+    map(queue_.size(), 0);
+    close_loops(*mapped_.front(), snapshot_, 0);
+    mapped_.clear();
+    if (!loop_messages_.empty()) map(0, loop_messages_.size());
+  }
+  checkpoint_if_due(frame.t_ns);
+  count(result_.frames.back());
+  return result_.frames.back();
 }
 
 void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
@@ -67,6 +73,8 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     }
     if (step.fate == TrackerStep::Fate::kDropped) {
       drop(frame, step);
+      count(result_.frames.back());
+      if (progress) progress(progress_);
       continue;
     }
     for (; snapshot_.version() < step.version; ++round) {
@@ -85,7 +93,8 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     track(frame, step);
     replay_loop_steps(schedule);
     checkpoint_if_due(frame.t_ns);
-    report(progress);
+    count(result_.frames.back());
+    if (progress) progress(progress_);
   }
   for (; round != schedule.mapper.end() && can_map(*round); ++round) {
     map(round->proposals, round->loop_messages);
@@ -104,13 +113,14 @@ void LockstepRun::replay_loop_steps(const Schedule& schedule) {
     if (step.version > snapshot_.version() || (step.requests > 0 && !request_)) return;
     while (history_.front().version() < step.version) history_.pop_front();
     if (step.requests > 0) {
-      answer_request(history_.front());
+      answer_request(history_.front(), step.refused > 0);
       continue;
     }
     const auto is_older = [&](const ProposalHandle& p) {
       return static_cast<std::int64_t>(index(p->id)) < step.keyframe;
     };
-    while (!mapped_.empty() && is_older(mapped_.front())) mapped_.pop_front();  // found the ring full
+    for (; !mapped_.empty() && is_older(mapped_.front()); mapped_.pop_front())
+      ++result_.keyframes_not_described;  // found the ring full
     if (mapped_.empty() || static_cast<std::int64_t>(index(mapped_.front()->id)) != step.keyframe) {
       fail("the schedule does not fit the input: the loop closer would need another keyframe");
       return;
@@ -120,10 +130,10 @@ void LockstepRun::replay_loop_steps(const Schedule& schedule) {
   }
 }
 
-void LockstepRun::answer_request(const GraphSnapshot& graph) {
-  answer_ = loop_closing_.relocalise(*request_, graph);
+void LockstepRun::answer_request(const GraphSnapshot& graph, bool refused) {
+  answer_ = refused ? RelocalisationAnswer() : loop_closing_.relocalise(*request_, graph);
   request_.reset();
-  result_.schedule.loop_closer.append({graph.version(), -1, 1});
+  result_.schedule.loop_closer.append({graph.version(), -1, 1, refused ? 1U : 0U});
 }
 
 void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph,
@@ -144,15 +154,9 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
   FrameRecord record;
   ProposalHandle proposal;
   if (!step.keyframe_withheld) proposal = pool_.try_acquire();
-  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record)) {
-    if (step.refused > 0) {
-      tracking_.proposal_rejected(record);
-      ++result_.proposals_refused;
-    } else {
-      queue_.push_back(std::move(proposal));
-    }
-  }
-  tracking_.finish(due_ns, steady_now_ns(), record);
+  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record))
+    queue_.push_back(std::move(proposal));
+  tracking_.finish(due_ns, steady_now_ns(), snapshot_, record);
   if (tracking_.correction().reason != CorrectionReason::kNone)
     result_.corrections.push_back(tracking_.correction());
   TrackerStep taken = step;
@@ -184,13 +188,12 @@ void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
     taken_messages_.push_back(std::move(loop_messages_.front()));
     loop_messages_.pop_front();
   }
-  const MapperRound round = mapping_.step(consumed_, taken_messages_);
+  const std::uint64_t version = mapping_.step(consumed_, taken_messages_);
   for (ProposalHandle& keyframe : consumed_) mapped_.push_back(std::move(keyframe));
   consumed_.clear();
   snapshot_ = mapping_.publish();
   result_.schedule.mapper.append(
-      {round.version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
-  result_.rounds.push_back(round);
+      {version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
 }
 
 void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
@@ -201,15 +204,10 @@ void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
   if (!first) checkpoints_.save(snapshot_, loop_closing_.places());
 }
 
-void LockstepRun::report(const ProgressSink& progress) {
-  const FrameRecord& record = result_.frames.back();
-  ++progress_.frames;
-  progress_.lost += record.state == FrameState::kLost;
-  progress_.keyframes += record.keyframe;
-  progress_.tracked_share = record.tracked_share;
+void LockstepRun::count(const FrameRecord& record) {
+  progress_.count(record);
   progress_.map_version = snapshot_.version();
   progress_.queued = queue_.size();
-  if (progress) progress(progress_);
 }
 
 RunResult LockstepRun::finish() {

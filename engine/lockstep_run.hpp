@@ -15,16 +15,20 @@ class LockstepRun {
  public:
   LockstepRun(const Rig& rig, const EngineOptions& options);
 
+  /// The deterministic run: each frame is mapped before the next one.
   void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
+  /// One frame of it. The record is valid until the next call.
+  const FrameRecord& step(const Frame& frame);
   void replay(const FrameFeed& feed, const Schedule& schedule, const std::atomic<bool>& interrupted,
               const ProgressSink& progress);
   /// Final pose graph optimisation; moves the result out.
   [[nodiscard]] RunResult finish();
 
  private:
-  /// `step` says what the frame meets: effort level, answers, whether a keyframe may be made and is refused.
+  /// `step` says what the frame meets: effort level, answers, whether a keyframe may be made.
   void track(const Frame& frame, const TrackerStep& step);
-  void answer_request(const GraphSnapshot& graph);
+  /// `refused`: with nothing, as a loop closer does that has failed.
+  void answer_request(const GraphSnapshot& graph, bool refused = false);
   void map(std::size_t proposals, std::size_t loop_messages);
   /// One step of the loop closer for a keyframe; the last `refused` of its messages found the ring full.
   void close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph, std::size_t refused);
@@ -36,7 +40,7 @@ class LockstepRun {
   void drop(const Frame& frame, const TrackerStep& step);
   /// By the time of the recording: the same in every run.
   void checkpoint_if_due(std::int64_t t_ns);
-  void report(const ProgressSink& progress);
+  void count(const FrameRecord& record);
   void fail(const std::string& why) { result_.error = why; }
 
   const bool localise_only_;

@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "engine/effort_controller.hpp"
 #include "engine/pacing.hpp"
@@ -14,6 +16,13 @@
 #include "tracking/options.hpp"
 
 namespace twofold {
+
+struct FrameRecord;
+
+/// Told of each frame that was looked at, tracked or lost, as soon as its pose is known, with the map it was
+/// tracked against; both are valid during the call only. Called on the thread of the tracker, which goes on
+/// when it returns: it must not block, allocate or throw. Its time is a stage of its own ("pose listener").
+using PoseListener = std::function<void(const FrameRecord& record, const GraphSnapshot& graph)>;
 
 /// The map as it stands, saved again and again during a run.
 struct CheckpointOptions {
@@ -49,6 +58,12 @@ struct EngineOptions {
   std::optional<int> mapper_cpu;
   std::optional<int> loop_closer_cpu;
   std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
+
+  PoseListener on_pose;  ///< may be empty
+
+  /// For tests of failures: called by the thread of that name ("tracker", "mapper", "loop closer",
+  /// "checkpoints") of a threaded run before each of its steps, which fails with what this throws.
+  std::function<void(std::string_view thread)> before_step;
 
   bool trace = false;  ///< keep spans and counters for RunResult::trace
 

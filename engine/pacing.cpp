@@ -23,30 +23,28 @@ Pacer::Pacer(const PacingOptions& options, PacingClock* clock)
   TWOFOLD_CHECK(options.invalid_reason().empty(), "pacing options");
 }
 
-std::int64_t Pacer::due_ns(std::int64_t t_ns) const {
+std::int64_t Pacer::exposed_ns(std::int64_t t_ns) const {
+  if (options_.live) return t_ns;
   return start_ns_ + std::llround(static_cast<double>(t_ns - first_t_ns_) / options_.speed);
 }
 
-Arrival Pacer::wait_for(std::int64_t t_ns, std::optional<std::int64_t> next_t_ns,
-                        const std::stop_token& stop) {
+Arrival Pacer::wait_for(std::int64_t t_ns, const std::stop_token& stop) {
   std::int64_t now_ns = clock_->now_ns();
-  if (options_.speed == 0) return {now_ns, 0, 0, false};
-  const bool first = !started_;
-  if (first) {
+  if (!options_.keeps_pace()) return {now_ns, 0, 0, false};
+  if (!started_) {
     started_ = true;
     first_t_ns_ = t_ns;
     start_ns_ = now_ns;
   }
-  Arrival arrival{due_ns(t_ns), 0, 0, false};
-  if (next_t_ns) period_ns_ = due_ns(*next_t_ns) - arrival.scheduled_ns;
-  arrival.period_ns = period_ns_;
-  if (now_ns < arrival.scheduled_ns) {
-    clock_->sleep_until(arrival.scheduled_ns, stop);
+  interval_.add(t_ns);
+  Arrival arrival;
+  arrival.exposed_ns = exposed_ns(t_ns);
+  arrival.period_ns = exposed_ns(t_ns + interval_.ns()) - arrival.exposed_ns;
+  if (!options_.live && now_ns < arrival.exposed_ns) {
+    clock_->sleep_until(arrival.exposed_ns, stop);
     now_ns = clock_->now_ns();
   }
-  arrival.late_ns = std::max<std::int64_t>(now_ns - arrival.scheduled_ns, 0);
-  arrival.overtaken =
-      options_.late == LatePolicy::kDrop && !first && next_t_ns && now_ns >= due_ns(*next_t_ns);
+  arrival.late_ns = std::max<std::int64_t>(now_ns - arrival.exposed_ns, 0);
   return arrival;
 }
 

@@ -5,6 +5,7 @@
 #include <stop_token>
 #include <string>
 
+#include "camera/usual_interval.hpp"
 #include "engine/clock.hpp"
 #include "engine/parking.hpp"
 
@@ -13,11 +14,17 @@ namespace twofold {
 enum class LatePolicy : std::uint8_t {
   kQueue,  ///< every frame is processed; lateness adds up until the engine catches up
   kDrop,   ///< frames whose successor is due already may be skipped (EffortController says when)
+  kNewest  ///< a frame whose successor is due already is skipped
 };
 
 struct PacingOptions {
   double speed = 1.0;                    ///< recorded seconds a second; 0 = as fast as possible; finite, >= 0
-  LatePolicy late = LatePolicy::kQueue;  ///< without meaning at speed 0
+  LatePolicy late = LatePolicy::kQueue;  ///< without meaning without a pace
+  /// Frames come from a camera, when they are taken, and their time stamps are of the steady clock: the pace
+  /// is the camera's, `speed` has no meaning.
+  bool live = false;
+
+  [[nodiscard]] bool keeps_pace() const { return live || speed > 0; }
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -37,41 +44,52 @@ class PacingClock {
 
 /// What became of one frame's turn.
 struct Arrival {
-  std::int64_t scheduled_ns = 0;  ///< when the frame was due on the steady clock; latency counts from here
-  std::int64_t late_ns = 0;       ///< how long after that its turn came, >= 0
-  std::int64_t period_ns = 0;     ///< from its due time to its successor's; 0: there is no pace
-  bool overtaken = false;         ///< its successor is due already, and the policy allows to skip it
+  std::int64_t exposed_ns = 0;  ///< when the frame was exposed on the steady clock; latency counts from here
+  std::int64_t late_ns = 0;     ///< how long after that its turn came, >= 0
+  std::int64_t period_ns = 0;   ///< between exposures, usually; 0: there is no pace, or it is not known yet
+  bool overtaken = false;       ///< its successor is exposed already
 };
 
-/// Gives out recorded frames at the pace at which they were taken.
+/// Says when each frame was exposed, on the steady clock, and waits for that where it is still to come.
 ///
-/// The first frame is due when it is asked for, every other one (t - t_first) / speed later. Frames are due
-/// by this schedule, never by when the last one was finished: a frame that waited for its predecessors is
-/// late by the whole wait, so that one slow frame shows in the latency of all it delayed (no coordinated
-/// omission). At speed 0 a frame is due when it is asked for.
+/// A camera's frame was exposed at its time stamp: there is nothing to wait for. A recorded frame is given
+/// out at the pace at which it was taken: the first is exposed when it is asked for, every other one (t -
+/// t_first) / speed later. Exposures follow this schedule, never the end of the work on the frame before: a
+/// frame that waited for its predecessors is late by the whole wait, so that one slow frame shows in the
+/// latency of all it delayed (no coordinated omission). Without a pace a frame is exposed when it is asked
+/// for.
 class Pacer {
  public:
   /// clock: nullptr for the steady clock; otherwise outlives the pacer.
   explicit Pacer(const PacingOptions& options, PacingClock* clock = nullptr);
 
-  /// Waits for the turn of the frame taken at t_ns. next_t_ns: time stamp of its successor, nullopt for the
-  /// last frame, which is never overtaken. Nor is the first. A stop request ends the wait early.
-  [[nodiscard]] Arrival wait_for(std::int64_t t_ns, std::optional<std::int64_t> next_t_ns,
-                                 const std::stop_token& stop);
+  /// Waits for the exposure of the frame with time stamp t_ns; a stop request ends that early.
+  /// @param successor_t_ns  asked after the wait: time stamp of the frame behind it, nullopt when none is
+  /// there
+  template <class SuccessorStamp>
+  [[nodiscard]] Arrival wait_for(std::int64_t t_ns, SuccessorStamp&& successor_t_ns,
+                                 const std::stop_token& stop) {
+    Arrival arrival = wait_for(t_ns, stop);
+    const std::optional<std::int64_t> next_t_ns = successor_t_ns();
+    arrival.overtaken =
+        options_.keeps_pace() && next_t_ns && exposed_ns(*next_t_ns) <= arrival.exposed_ns + arrival.late_ns;
+    return arrival;
+  }
 
   /// Time on the clock that frames are paced by [ns].
   [[nodiscard]] std::int64_t now_ns() { return clock_->now_ns(); }
 
  private:
-  [[nodiscard]] std::int64_t due_ns(std::int64_t t_ns) const;
+  [[nodiscard]] Arrival wait_for(std::int64_t t_ns, const std::stop_token& stop);
+  [[nodiscard]] std::int64_t exposed_ns(std::int64_t t_ns) const;
 
   PacingOptions options_;
   PacingClock steady_;
   PacingClock* clock_;
+  UsualInterval interval_;  // by time stamps
   bool started_ = false;
   std::int64_t first_t_ns_ = 0;
   std::int64_t start_ns_ = 0;
-  std::int64_t period_ns_ = 0;  // of the frame before: the last one has no successor
 };
 
 }  // namespace twofold

@@ -5,7 +5,7 @@
 #include <optional>
 #include <stop_token>
 
-#include "engine/atomics.hpp"
+#include "geometry/atomics.hpp"
 
 namespace twofold {
 

@@ -1,5 +1,7 @@
 #include "engine/replacement_log.hpp"
 
+#include <vector>
+
 #include "geometry/check.hpp"
 #include "graph/id_map.hpp"
 
@@ -11,7 +13,7 @@ void ReplacementLog::add(KeyframeId culled, const GraphSnapshot& graph) {
   entries_.push_back({culled, replacement.id, replacement.T_this_replacement});
 }
 
-void ReplacementLog::hang_on_live_keyframes(std::vector<FrameRecord>& frames) const {
+void ReplacementLog::hang_on_live_keyframes(ChunkedVector<FrameRecord>& frames) const {
   // A replacement that was culled too was culled later: from the newest entry back, the keyframe that stands
   // for a replacement is known already.
   std::vector<GraphSnapshot::LiveReplacement> live(entries_.size());
@@ -25,7 +27,8 @@ void ReplacementLog::hang_on_live_keyframes(std::vector<FrameRecord>& frames) co
     }
     position.set(entry.id, static_cast<int>(n));
   }
-  for (FrameRecord& frame : frames) {
+  for (std::size_t n = 0; n < frames.size(); ++n) {
+    FrameRecord& frame = frames[n];
     const int at = position.find(frame.reference);
     if (at < 0) continue;
     const auto& [id, T_ref_live] = live[static_cast<std::size_t>(at)];

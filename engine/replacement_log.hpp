@@ -1,7 +1,6 @@
 #pragma once
 
-#include <vector>
-
+#include "engine/chunked_vector.hpp"
 #include "engine/result.hpp"
 #include "graph/snapshot.hpp"
 
@@ -19,7 +18,7 @@ class ReplacementLog {
 
   /// Hangs each frame whose reference was culled on the keyframe that stands for it in the final map. Poses
   /// in the map stay what they were.
-  void hang_on_live_keyframes(std::vector<FrameRecord>& frames) const;
+  void hang_on_live_keyframes(ChunkedVector<FrameRecord>& frames) const;
 
  private:
   struct Entry {
@@ -27,7 +26,7 @@ class ReplacementLog {
     KeyframeId replacement = kNoKeyframe;  ///< in the map when `id` was culled
     PackedPose T_id_replacement;
   };
-  std::vector<Entry> entries_;
+  ChunkedVector<Entry> entries_;
 };
 
 }  // namespace twofold

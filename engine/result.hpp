@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/chunked_vector.hpp"
 #include "engine/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
@@ -19,7 +20,7 @@ namespace twofold {
 enum class FrameState : std::uint8_t {
   kTracked,  ///< pose known
   kLost,     ///< looked at, no trustworthy pose
-  kDropped   ///< never looked at: it came while a newer frame was already due (--late drop)
+  kDropped   ///< never looked at: when its turn came, its successor was there (LatePolicy)
 };
 
 /// Why poses in the world changed for a reason other than motion.
@@ -65,30 +66,23 @@ struct FrameRecord {
   double tracked_share = 0;              ///< matched points over points searched, in [0, 1]
   std::uint64_t snapshot_version = 0;    ///< version of the map it was tracked against
   std::int64_t tracking_ns = 0;          ///< time spent on it by the tracker
-  std::int64_t latency_ns = 0;           ///< from the moment it was due to the moment its pose was known
+  std::int64_t latency_ns = 0;           ///< from its exposure (Pacer) to the moment its pose was known
   KeyframeId reference = kNoKeyframe;    ///< after the run: the keyframe that stands for it in the final map
   KeyframeId part_causal = kNoKeyframe;  ///< map part of T_c_w_causal's world, under its name of then
   int inliers = 0;                       ///< measurements the pose rests on
   FrameState state = FrameState::kLost;
-  bool keyframe = false;                          ///< it was proposed as a keyframe and accepted
+  bool keyframe = false;                          ///< it was proposed as a keyframe
   EffortLevel effort = EffortLevel::kEverything;  ///< what was left out for want of time
   LostCause cause = LostCause::kNone;             ///< why it was lost
 };
 static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 
-/// One keyframe proposal turned into a map version by the mapper.
-struct MapperRound {
-  std::uint64_t version = 0;  ///< published afterwards
-  int proposals = 0;          ///< consumed
-  int inner_window = 0;
-  int outer_window = 0;
-  int points = 0;
-  int observations = 0;
-  int metric_loops = 0;  ///< edges added by metric loop closure
-  int loops = 0;         ///< edges added by large-scale loop closure
-  int late_loops = 0;    ///< that came after the map had forgotten their keyframes
-  int optimised = 0;     ///< keyframes outside of the windows that took a pose of the pose graph
-  std::int64_t duration_ns = 0;
+/// What the mapper did in all.
+struct MappingTotals {
+  std::int64_t rounds = 0;        ///< each a version of the map
+  std::int64_t metric_loops = 0;  ///< edges added by metric loop closure
+  std::int64_t loops = 0;         ///< edges added by large-scale loop closure
+  std::int64_t late_loops = 0;    ///< that came after the map had forgotten their keyframes
 };
 
 /// A loop that was closed by appearance.
@@ -116,9 +110,9 @@ struct ScheduleStreams {
 
 /// All a run leaves behind.
 struct RunResult {
-  std::vector<FrameRecord> frames;          ///< in the order of the source, dropped ones included
-  std::vector<PoseCorrection> corrections;  ///< in the order of the frames
-  std::vector<MapperRound> rounds;
+  ChunkedVector<FrameRecord> frames;          ///< in the order of the source, dropped ones included
+  ChunkedVector<PoseCorrection> corrections;  ///< in the order of the frames
+  MappingTotals mapping;
   std::vector<ClosedLoop> loops;  ///< by appearance, in the order they were found
   GraphSnapshot graph;            ///< after the last round and the final pose graph optimisation
   KeyframeDatabase places;        ///< how the places of its keyframes look
@@ -127,7 +121,6 @@ struct RunResult {
   ScheduleStreams schedule;
   std::unique_ptr<Trace> trace;               ///< null unless asked for
   std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted
-  std::uint64_t proposals_refused = 0;        ///< a keyframe was due, but queue or pool were full
   std::uint64_t keyframes_not_described = 0;  ///< the loop closer's queue was full
   bool interrupted = false;
   std::string error;       ///< empty, or why the run ended early (a thread failed, the input broke)
@@ -135,6 +128,9 @@ struct RunResult {
   double wall_seconds = 0;
   double peak_rss_mb = 0;
 };
+
+/// Latencies of all frames that were looked at.
+[[nodiscard]] LatencyHistogram exposure_to_pose(const RunResult& result);
 
 /// Pose of a tracked frame in the final map.
 [[nodiscard]] inline SE3 final_T_c_w(const FrameRecord& record, const GraphSnapshot& graph) {

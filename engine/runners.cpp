@@ -26,9 +26,11 @@ CorrectionReason reason_of(MapChange::Kind kind) {
 TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
     : tracker_(rig, options.tracker),
       times_("tracker", trace),
+      on_pose_(options.on_pose),
       can_relocalise_(options.vocabulary != nullptr) {
   frame_stage_ = times_.add_stage("frame");
-  latency_stage_ = times_.add_stage("latency from due time");
+  latency_stage_ = times_.add_stage("exposure to pose");
+  listener_stage_ = times_.add_stage("pose listener");
   for (std::size_t s = 0; s < kTrackerStages; ++s) {
     stages_.push_back(times_.add_stage(describe(static_cast<TrackerStage>(s))));
   }
@@ -87,14 +89,6 @@ void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecor
   correction_ = {reason, record.frame_index, record.t_ns, T_c_w_before, T_c_w};
 }
 
-void TrackerRunner::proposal_rejected(FrameRecord& record) {
-  record.keyframe = false;
-  if (tracker_.proposal_rejected()) return;
-  record.state = FrameState::kLost;
-  record.cause = LostCause::kNoKeyframeBuffer;
-  last_ = record;
-}
-
 bool TrackerRunner::wants_relocalisation() const {
   const bool lost = tracker_.unplaced() || tracker_.lost_frames() >= kLostBeforeAsking;
   return can_relocalise_ && !answer_awaited_ && lost;
@@ -112,9 +106,13 @@ void TrackerRunner::take_answer(const RelocalisationAnswer& answer) {
   if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
 }
 
-void TrackerRunner::finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record) {
-  record.latency_ns = now_ns - scheduled_ns;
-  times_.record(latency_stage_, scheduled_ns, record.latency_ns);
+void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph,
+                           FrameRecord& record) {
+  record.latency_ns = now_ns - exposed_ns;
+  times_.record(latency_stage_, exposed_ns, record.latency_ns);
+  if (!on_pose_) return;
+  const ScopedStage timed(times_, listener_stage_);
+  on_pose_(record, graph);
 }
 
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
@@ -123,34 +121,26 @@ MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* 
   if (options.map) mapper_.continue_from(options.map->graph);
 }
 
-MapperRound MapperRunner::step(std::span<const ProposalHandle> proposals,
-                               std::span<const LoopMessage> messages) {
-  const std::int64_t begin_ns = steady_now_ns();
+std::uint64_t MapperRunner::step(std::span<const ProposalHandle> proposals,
+                                 std::span<const LoopMessage> messages) {
+  const ScopedStage timed(times_, round_stage_);
   proposals_.clear();
   for (const ProposalHandle& proposal : proposals) proposals_.push_back(&*proposal);
-  MapperRound round;
   loops_.clear();
   for (const LoopMessage& message : messages) {
     if (const auto* loop = std::get_if<LoopConstraint>(&message)) {
       loops_.push_back(*loop);
     } else {
-      round.optimised += mapper_.take_pose_graph(std::get<PoseGraphUpdate>(message));
+      (void)mapper_.take_pose_graph(std::get<PoseGraphUpdate>(message));
     }
   }
   const MapperReport report = mapper_.step(proposals_, loops_);
   for (const KeyframeId culled : report.culled_keyframes) replacement_log_.add(culled, mapper_.graph());
-  round.version = mapper_.graph().version();
-  round.proposals = static_cast<int>(proposals.size());
-  round.inner_window = report.inner_window;
-  round.outer_window = report.outer_window;
-  round.points = report.points;
-  round.observations = report.observations;
-  round.metric_loops = report.metric_loops;
-  round.loops = report.loops;
-  round.late_loops = report.late_loops;
-  round.duration_ns = steady_now_ns() - begin_ns;
-  times_.record(round_stage_, begin_ns, round.duration_ns);
-  return round;
+  ++totals_.rounds;
+  totals_.metric_loops += report.metric_loops;
+  totals_.loops += report.loops;
+  totals_.late_loops += report.late_loops;
+  return mapper_.graph().version();
 }
 
 GraphSnapshot MapperRunner::finish() {
@@ -207,6 +197,7 @@ void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserR
                      RunResult& result) {
   result.graph = mapping.finish();
   mapping.replacement_log().hang_on_live_keyframes(result.frames);
+  result.mapping = mapping.totals();
   result.places = loop_closing.places();
   result.times.push_back(std::move(tracking.times()));
   result.times.push_back(std::move(mapping.times()));

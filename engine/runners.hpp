@@ -46,15 +46,14 @@ class TrackerRunner {
             FrameRecord& record);
   /// Of the map, seen first by the frame of the last step; of reason kNone when there was none.
   [[nodiscard]] const PoseCorrection& correction() const { return correction_; }
-  /// The filled proposal could not be sent.
-  void proposal_rejected(FrameRecord& record);
   /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
   bool request_relocalisation(RelocalisationRequest& request);
   /// Before the next step.
   void take_answer(const RelocalisationAnswer& answer);
   [[nodiscard]] bool wants_relocalisation() const;
-  /// Completes the record once the pose is known, at `now_ns` on the clock of the pace.
-  void finish(std::int64_t scheduled_ns, std::int64_t now_ns, FrameRecord& record);
+  /// Completes the record once the pose is known, at `now_ns` on the clock of the pace, and tells the
+  /// listener. `graph` is that of the step.
+  void finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph, FrameRecord& record);
 
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
@@ -66,8 +65,10 @@ class TrackerRunner {
   StageRecorder times_;
   StageId frame_stage_;
   StageId latency_stage_;
+  StageId listener_stage_;
   std::vector<StageId> stages_;
   TraceName version_counter_, effort_counter_;
+  PoseListener on_pose_;
   FrameRecord last_;  // the last frame that was tracked
   PoseCorrection correction_;
   bool answer_awaited_ = false;
@@ -79,13 +80,15 @@ class MapperRunner {
  public:
   MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
 
-  /// One round over the given proposals, oldest first. The new version is then ready to be published.
-  MapperRound step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
+  /// One round over the given proposals, oldest first.
+  /// @return the new version of the map, ready to be published
+  std::uint64_t step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
   [[nodiscard]] GraphSnapshot publish() { return mapper_.publish(); }
   /// The last version: all poses agree globally, unless the map was not to change.
   [[nodiscard]] GraphSnapshot finish();
   /// What became of the keyframes that were culled.
   [[nodiscard]] const ReplacementLog& replacement_log() const { return replacement_log_; }
+  [[nodiscard]] const MappingTotals& totals() const { return totals_; }
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
@@ -93,6 +96,7 @@ class MapperRunner {
   Mapper mapper_;
   ReplacementLog replacement_log_;
   const bool may_change_;
+  MappingTotals totals_;
   StageRecorder times_;
   StageId round_stage_;
   std::vector<KeyframeProposal*> proposals_;

@@ -13,7 +13,7 @@ namespace twofold {
 namespace {
 
 constexpr std::string_view kMagic = "TWFSCHED";
-constexpr std::uint8_t kFormatVersion = 2;
+constexpr std::uint8_t kFormatVersion = 3;
 constexpr std::array<const char*, 3> kSectionNames = {"tracker", "mapper", "loop closer"};
 constexpr std::size_t kLargestFile = std::size_t{256} << 20;
 
@@ -52,7 +52,7 @@ void put_section(std::vector<std::uint8_t>& file, std::uint8_t id, const Schedul
   file.push_back(id);
   put_varint(file, stream.records());
   put_varint(file, stream.bytes().size());
-  file.insert(file.end(), stream.bytes().begin(), stream.bytes().end());
+  for (const auto& chunk : stream.bytes().chunks()) file.insert(file.end(), chunk.begin(), chunk.end());
   const std::uint32_t crc = crc32(std::span(file).subspan(begin));
   for (unsigned shift = 0; shift < 32; shift += 8) file.push_back(static_cast<std::uint8_t>(crc >> shift));
 }
@@ -85,7 +85,9 @@ std::optional<std::string> parse_section(std::span<const std::uint8_t> file, Byt
 
 template <class Step>
 void ScheduleStream<Step>::append(const Step& step) {
-  encode_step(bytes_, step, last_);
+  record_.clear();
+  encode_step(record_, step, last_);
+  for (const std::uint8_t byte : record_) bytes_.push_back(byte);
   last_ = step;
   ++records_;
 }

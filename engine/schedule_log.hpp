@@ -9,6 +9,8 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "engine/chunked_vector.hpp"
+
 namespace twofold {
 
 /// What one frame met in the tracker. Together with the input images it determines the tracker's step.
@@ -19,7 +21,6 @@ struct TrackerStep {
   Fate fate = Fate::kTracked;
   std::uint8_t effort_level = 0;   ///< EffortLevel, 0 = nothing left out, <= 15
   std::uint32_t messages = 0;      ///< relocalisation answers consumed before it
-  std::uint32_t refused = 0;       ///< its messages that found a ring full
   bool keyframe_withheld = false;  ///< there was no buffer for a keyframe: the mapper is behind
   bool operator==(const TrackerStep&) const = default;
 };
@@ -29,8 +30,6 @@ struct MapperStep {
   std::uint64_t version = 0;        ///< version it published, grows; 0 when it published none
   std::uint32_t proposals = 0;      ///< keyframe proposals consumed
   std::uint32_t loop_messages = 0;  ///< messages of the loop closer consumed
-  std::uint32_t iterations = 0;     ///< solver iterations it was given or had time for
-  std::uint32_t refused = 0;        ///< its messages that found a ring full
   bool operator==(const MapperStep&) const = default;
 };
 
@@ -39,7 +38,7 @@ struct LoopStep {
   std::uint64_t version = 0;   ///< snapshot it used
   std::int64_t keyframe = -1;  ///< keyframe consumed, -1 = none
   std::uint32_t requests = 0;  ///< relocalisation requests consumed
-  std::uint32_t refused = 0;   ///< its messages that found a ring full
+  std::uint32_t refused = 0;   ///< its messages that found a ring full; 1 of a request: it was not looked at
   bool operator==(const LoopStep&) const = default;
 };
 
@@ -53,20 +52,19 @@ struct Schedule {
 };
 
 /// Bytes of one thread's records, each about three to five: differences to the record before as
-/// variable-length integers. Used by that thread only, without locks, and read after it was joined. Room for
-/// `reserve_bytes` is made at start, so that appending allocates nothing until that is used up (1 MiB: hours
-/// at 30 frames a second).
+/// variable-length integers. Used by one thread at a time, without locks, and read when the run is over.
+/// Appending allocates now and then, so the tracker leaves it to the thread that takes its frames back.
 template <class Step>
 class ScheduleStream {
  public:
-  explicit ScheduleStream(std::size_t reserve_bytes = 1U << 20) { bytes_.reserve(reserve_bytes); }
   void append(const Step& step);
 
   [[nodiscard]] std::uint64_t records() const { return records_; }
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const { return bytes_; }
+  [[nodiscard]] const ChunkedVector<std::uint8_t, 65536>& bytes() const { return bytes_; }
 
  private:
-  std::vector<std::uint8_t> bytes_;
+  ChunkedVector<std::uint8_t, 65536> bytes_;
+  std::vector<std::uint8_t> record_;  // the one that is being appended
   std::uint64_t records_ = 0;
   Step last_;
 };

@@ -4,18 +4,16 @@
 
 namespace twofold {
 
-// Tracker record: flags (fate, has messages, has refused, keyframe withheld, level in the upper half), frame
-// and version as differences, then what the flags announce.
+// Tracker record: flags (fate, has messages, 4 is free, keyframe withheld, level in the upper half), frame
+// and version as differences, then the number of messages if the flags announce it.
 void encode_step(std::vector<std::uint8_t>& bytes, const TrackerStep& step, const TrackerStep& last) {
   TWOFOLD_CHECK(step.effort_level <= 15, "degrade level");
   const unsigned flags = static_cast<unsigned>(step.fate) | (step.messages ? 2U : 0U) |
-                         (step.refused ? 4U : 0U) | (step.keyframe_withheld ? 8U : 0U) |
-                         static_cast<unsigned>(step.effort_level) << 4;
+                         (step.keyframe_withheld ? 8U : 0U) | static_cast<unsigned>(step.effort_level) << 4;
   bytes.push_back(static_cast<std::uint8_t>(flags));
   put_varint(bytes, zigzag(static_cast<std::uint64_t>(step.frame), static_cast<std::uint64_t>(last.frame)));
   put_varint(bytes, zigzag(step.version, last.version));
   if (step.messages) put_varint(bytes, step.messages);
-  if (step.refused) put_varint(bytes, step.refused);
 }
 TrackerStep decode_step(ByteCursor& in, const TrackerStep& last) {
   TrackerStep step;
@@ -26,22 +24,19 @@ TrackerStep decode_step(ByteCursor& in, const TrackerStep& last) {
   step.frame = static_cast<std::int64_t>(unzigzag(in.varint(), static_cast<std::uint64_t>(last.frame)));
   step.version = unzigzag(in.varint(), last.version);
   if (flags & 2U) step.messages = in.varint32();
-  if (flags & 4U) step.refused = in.varint32();
   return step;
 }
 
 void encode_step(std::vector<std::uint8_t>& bytes, const MapperStep& step, const MapperStep& last) {
   put_varint(bytes, zigzag(step.version, last.version));
-  for (const std::uint32_t count : {step.proposals, step.loop_messages, step.iterations, step.refused}) {
-    put_varint(bytes, count);
-  }
+  put_varint(bytes, step.proposals);
+  put_varint(bytes, step.loop_messages);
 }
 MapperStep decode_step(ByteCursor& in, const MapperStep& last) {
   MapperStep step;
   step.version = unzigzag(in.varint(), last.version);
-  for (std::uint32_t* count : {&step.proposals, &step.loop_messages, &step.iterations, &step.refused}) {
-    *count = in.varint32();
-  }
+  step.proposals = in.varint32();
+  step.loop_messages = in.varint32();
   return step;
 }
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/atomics.hpp"
+#include "geometry/atomics.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "engine/atomics.hpp"
+#include "geometry/atomics.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {
@@ -56,6 +56,12 @@ class SpscRing {
     value = std::move(slots_[head & mask_]);
     head_.store(head + 1, std::memory_order_release);  // (B)
     return true;
+  }
+
+  /// Consumer. What try_pop would give, null when that is nothing; valid until the next try_pop.
+  [[nodiscard]] const T* peek() {
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    return refresh(head) ? &slots_[head & mask_] : nullptr;
   }
 
   /// Consumer. Whether a try_pop would succeed now.

@@ -30,9 +30,8 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
                       [this](KeyframeProposal& proposal) { tracking_.prepare(proposal); }),
       frames_(ring_size(options.frame_slots)),
       done_(ring_size(options.frame_slots)),
-      proposals_(ring_size(options.proposal_slots)),
+      mapper_inbox_(ring_size(proposals_pool_.capacity()), ring_size(options.proposal_slots)),
       keyframes_(ring_size(options.proposal_slots)),
-      loops_(ring_size(options.proposal_slots)),
       request_pool_(kRequests, [&](RelocalisationRequest& request) { allocate_images(rig, request.images); }),
       requests_(kRequests),
       answers_(kRequests),
@@ -40,13 +39,28 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
       places_(1, loop_closing_.places()),
       checkpoints_(rig, options.checkpoint),
       pacer_(options.pacing, clock),
-      effort_controller_(options.effort) {
-  consumed_.reserve(ring_size(options.proposal_slots));
-  loop_messages_.reserve(ring_size(options.proposal_slots));
-}
+      effort_controller_(options.effort, options.pacing.late) {}
 
 void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
                       const ProgressSink& progress) {
+  const FrameSink show = [&](const FrameRecord&, const PoseCorrection&) {
+    if (progress) progress(progress_);
+  };
+  start();
+  FeedStatus status = FeedStatus::kEnd;
+  Frame frame;
+  // Relaxed: the flag carries no other data.
+  while (!interrupted.load(std::memory_order_relaxed) && wait_for_room(show) &&
+         (status = feed(frame)) == FeedStatus::kFrame) {
+    push(std::move(frame));
+  }
+  result_.interrupted = interrupted.load(std::memory_order_relaxed);
+  if (status == FeedStatus::kError) result_.error = "the input ended with an error";
+  stop();
+  collect(show);
+}
+
+void ThreadedRun::start() {
   loop_closer_.emplace(
       WorkerOptions{.name = "loop closer", .cpu = options_.loop_closer_cpu, .fifo_priority = {}},
       [this](const std::stop_token& stop) { loop_closer_thread(stop); });
@@ -59,79 +73,68 @@ void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
     checkpointer_.emplace(WorkerOptions{.name = "checkpoints", .cpu = {}, .fifo_priority = {}},
                           [this](const std::stop_token& stop) { checkpoint_thread(stop); });
   }
-  read_frames(feed, interrupted, progress);
-  join_threads();
-  collect_records(progress);
 }
 
-void ThreadedRun::read_frames(const FrameFeed& feed, const std::atomic<bool>& interrupted,
-                              const ProgressSink& progress) {
-  SlotHandle previous;  // kept back until the time stamp of its successor is known
-  FeedStatus status = FeedStatus::kEnd;
-  // Relaxed: the flag carries no other data.
-  while (!interrupted.load(std::memory_order_relaxed)) {
-    SlotHandle slot = free_slot(progress);
-    if (!slot || (status = feed(slot->frame)) != FeedStatus::kFrame) break;
-    if (previous) {
-      previous->next_t_ns = slot->frame.t_ns;
-      send(std::move(previous));
-    }
-    slot->next_t_ns.reset();
-    previous = std::move(slot);
+bool ThreadedRun::has_room() {
+  if (!free_slot_) free_slot_ = slots_.try_acquire();
+  return free_slot_ && !must_hold_back();
+}
+
+void ThreadedRun::push(Frame frame) {
+  TWOFOLD_CHECK(free_slot_, "there is room for the frame");
+  free_slot_->frame = std::move(frame);
+  TWOFOLD_CHECK(frames_.try_push(std::move(free_slot_)), "the ring holds every slot of the pool");
+  tracker_parking_.wake();
+}
+
+void ThreadedRun::wait(std::chrono::steady_clock::time_point deadline) {
+  const bool full = !has_room();
+  const auto ready = [&] { return done_.size_approx() > 0 || (full && has_room()); };
+  (void)reader_parking_.wait_until({}, deadline, ready);
+}
+
+bool ThreadedRun::wait_for_room(const FrameSink& sink) {
+  for (;;) {
+    collect(sink);
+    if (failed()) return false;
+    if (has_room()) return true;
+    wait(std::chrono::steady_clock::now() + kFailureCheck);
   }
-  if (previous) send(std::move(previous));
-  result_.interrupted = interrupted.load(std::memory_order_relaxed);
-  if (status == FeedStatus::kError) result_.error = "the input ended with an error";
+}
+
+void ThreadedRun::stop() {
+  stopped_ = true;
   frames_ended_.store(true, std::memory_order_release);
   tracker_parking_.wake();
-}
-
-void ThreadedRun::send(SlotHandle slot) {
-  TWOFOLD_CHECK(frames_.try_push(std::move(slot)), "the ring holds every slot of the pool");
-  tracker_parking_.wake();
+  join_threads();
 }
 
 /// As fast as possible means as fast as the map can follow: without a clock to keep, frames wait for the
 /// mapper.
 bool ThreadedRun::must_hold_back() const {
-  return options_.pacing.speed == 0 && proposals_.size_approx() > 1;
+  return !options_.pacing.keeps_pace() && mapper_inbox_.proposals_approx() > 1;
 }
 
-// Relaxed: both flags are raised on this thread.
-bool ThreadedRun::any_thread_failed() const {
-  return (tracker_->finished() && !frames_ended_.load(std::memory_order_relaxed)) ||
-         (mapper_->finished() && !proposals_ended_.load(std::memory_order_relaxed));
+bool ThreadedRun::failed() const {
+  const auto ended = [](const std::optional<Worker>& worker) { return worker && worker->finished(); };
+  if (stopped_) return false;
+  return loop_closer_failed_.load(std::memory_order_relaxed) || ended(tracker_) || ended(mapper_) ||
+         ended(loop_closer_) || ended(checkpointer_);
 }
 
-/// Empty only when a thread failed.
-ThreadedRun::SlotHandle ThreadedRun::free_slot(const ProgressSink& progress) {
-  for (;;) {
-    collect_records(progress);
-    if (any_thread_failed()) return {};
-    if (!must_hold_back()) {
-      if (SlotHandle slot = slots_.try_acquire()) return slot;
-    }
-    const auto ready = [this] { return done_.size_approx() > 0 && !must_hold_back(); };
-    (void)reader_parking_.wait_until({}, std::chrono::steady_clock::now() + kFailureCheck, ready);
-  }
-}
-
-void ThreadedRun::collect_records(const ProgressSink& progress) {
+void ThreadedRun::collect(const FrameSink& sink) {
   SlotHandle slot;
   while (done_.try_pop(slot)) {
     const FrameRecord& record = slot->record;
-    ++progress_.frames;
-    progress_.lost += record.state == FrameState::kLost;
-    progress_.dropped += record.state == FrameState::kDropped;
-    progress_.keyframes += record.keyframe;
-    progress_.tracked_share = record.tracked_share;
+    progress_.count(record);
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
-    progress_.queued = proposals_.size_approx();
+    progress_.queued = mapper_inbox_.proposals_approx();
     result_.frames.push_back(record);
+    schedule_.tracker.append(slot->step);
     if (slot->correction.reason != CorrectionReason::kNone) result_.corrections.push_back(slot->correction);
     slot->frame = {};  // images are freed here, not on the tracker's thread
+    if (sink) sink(record, slot->correction);
     slot.reset();
-    if (progress) progress(progress_);
   }
 }
 
@@ -156,12 +159,11 @@ void ThreadedRun::join_threads() {
 
 /// The loop closer ends after the mapper: what it sent last is taken here, all threads being gone.
 void ThreadedRun::map_late_loops() {
-  take_messages();
-  if (loop_messages_.empty()) return;
-  const MapperRound round = mapping_.step({}, loop_messages_);
+  (void)mapper_inbox_.take();
+  if (mapper_inbox_.loops().empty()) return;
+  const std::uint64_t version = mapping_.step({}, mapper_inbox_.loops());
   (void)mapping_.publish();
-  schedule_.mapper.append({round.version, 0, static_cast<std::uint32_t>(loop_messages_.size())});
-  result_.rounds.push_back(round);
+  schedule_.mapper.append({version, 0, static_cast<std::uint32_t>(mapper_inbox_.loops().size())});
 }
 
 RunResult ThreadedRun::finish() {

@@ -4,6 +4,7 @@
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
+#include "engine/mapper_inbox.hpp"
 #include "engine/pacing.hpp"
 #include "engine/parking.hpp"
 #include "engine/runners.hpp"
@@ -12,6 +13,9 @@
 #include "engine/worker.hpp"
 
 namespace twofold {
+
+/// Takes a frame that is done with, and the correction of the map that was seen first by it, if any.
+using FrameSink = std::function<void(const FrameRecord&, const PoseCorrection&)>;
 
 /// The live engine: three threads that share snapshots and rings, fed by the calling thread.
 ///
@@ -22,15 +26,37 @@ namespace twofold {
 ///
 /// A fourth thread, if checkpoints are wanted, saves what mapper and loop closer published: it only reads.
 ///
-/// The tracker never waits for another thread but for its next frame. If the mapper is behind, keyframes are
-/// withheld (no free buffer, or a full ring), and tracking goes on with the points it has. If the tracker
-/// itself is late, it goes down the effort levels.
+/// The tracker never waits for another thread but for its next frame. If the mapper is behind, there is no
+/// free buffer for a keyframe, and tracking goes on with the points it has. If the tracker itself is late, it
+/// goes down the effort levels.
 class ThreadedRun {
  public:
   /// clock: nullptr for the steady clock; otherwise read and slept on by the tracker thread alone.
   ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClock* clock = nullptr);
 
+  /// Frames from a feed, until it ends, `interrupted` is true or a thread fails: all of the calls below.
   void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
+
+  // The same a frame at a time. One thread makes these calls: start, then has_room, push, collect and wait in
+  // any order, then stop and finish. None but wait, stop and finish blocks.
+
+  void start();
+  /// Whether a frame can be pushed now. Room is made by collect.
+  [[nodiscard]] bool has_room();
+  /// Hands a frame to the tracker; there must be room. Frame::index and time stamps grow.
+  void push(Frame frame);
+  /// Takes back the frames that are done with, in the order they were pushed. The argument of `sink`, which
+  /// may be empty, is valid during the call only.
+  void collect(const FrameSink& sink);
+  /// Sleeps until a frame can be collected, or there is room where there was none; not beyond `deadline`.
+  void wait(std::chrono::steady_clock::time_point deadline);
+  /// A thread has ended early: time to stop; RunResult::error says why.
+  [[nodiscard]] bool failed() const;
+  /// Counts of what was collected.
+  [[nodiscard]] const Progress& progress() const { return progress_; }
+  /// No more frames: returns when all that were pushed have been tracked and mapped. They can still be
+  /// collected.
+  void stop();
   /// Final pose graph optimisation; moves the result out.
   [[nodiscard]] RunResult finish();
 
@@ -41,20 +67,17 @@ class ThreadedRun {
 
   struct FrameSlot {
     Frame frame;
-    std::optional<std::int64_t> next_t_ns;  ///< time stamp of the frame after it, if known
     FrameRecord record;
+    TrackerStep step;           ///< for the schedule
     PoseCorrection correction;  ///< seen first by this frame, if there is a reason
   };
   using SlotPool = FramePool<FrameSlot>;
   using SlotHandle = SlotPool::Handle;
 
   // On the calling thread.
-  void read_frames(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
-  SlotHandle free_slot(const ProgressSink& progress);
-  void send(SlotHandle slot);
-  void collect_records(const ProgressSink& progress);
+  /// False when a thread failed.
+  [[nodiscard]] bool wait_for_room(const FrameSink& sink);
   [[nodiscard]] bool must_hold_back() const;
-  [[nodiscard]] bool any_thread_failed() const;
   void join_threads();
 
   // One each on its own thread.
@@ -63,14 +86,22 @@ class ThreadedRun {
   void loop_closer_thread(const std::stop_token& stop);
   void checkpoint_thread(const std::stop_token& stop);
 
-  void track(FrameSlot& slot, const GraphSnapshot& graph);
+  void track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph);
   void drop(FrameSlot& slot);
-  void send_proposal(FrameRecord& record, TrackerStep& step);
-  void take_messages();
+  [[nodiscard]] std::optional<std::int64_t> successor_t_ns();
+  void send_proposal();
   void take_answers(TrackerStep& step);
   void ask_where_we_are();
   /// False when there was no request.
   bool answer_request();
+  void close_loops(const std::stop_token& stop);
+  void send_answer(RelocalisationAnswer answer, const LoopStep& step);
+  /// To every request, until the tracker has ended.
+  void answer_nothing(const std::stop_token& stop);
+  /// Before each step of a thread.
+  void begin_step(const char* thread) const {
+    if (options_.before_step) options_.before_step(thread);
+  }
   void send_loops(std::span<LoopMessage> messages, LoopStep& step);
   void map_late_loops();
   void publish_places();
@@ -89,9 +120,8 @@ class ThreadedRun {
   ProposalPool proposals_pool_;
   SpscRing<SlotHandle> frames_;         // reader -> tracker
   SpscRing<SlotHandle> done_;           // tracker -> reader; as long as the pool, so that it cannot be full
-  SpscRing<ProposalHandle> proposals_;  // tracker -> mapper
+  MapperInbox mapper_inbox_;            // tracker, loop closer -> mapper
   SpscRing<ProposalHandle> keyframes_;  // mapper -> loop closer
-  SpscRing<LoopMessage> loops_;         // loop closer -> mapper
   RequestPool request_pool_;
   SpscRing<RequestHandle> requests_;        // tracker -> loop closer; one at most is under way
   SpscRing<RelocalisationAnswer> answers_;  // loop closer -> tracker
@@ -101,14 +131,17 @@ class ThreadedRun {
   Pacer pacer_;
   EffortController effort_controller_;
 
-  ProposalHandle spare_;                    // tracker's: the buffer the next keyframe goes to
-  std::vector<ProposalHandle> consumed_;    // mapper's
-  std::vector<LoopMessage> loop_messages_;  // mapper's, of this round
+  SlotHandle free_slot_;    // feeding thread's: where the next frame goes
+  ProposalHandle spare_;    // tracker's: the buffer the next keyframe goes to
+  bool answering_ = false;  // loop closer's: it has taken a request
+  bool stopped_ = false;    // feeding thread's
 
   Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_, checkpoint_parking_;
   // Each is raised by the thread before in the chain, with release, after its last push: who sees it
   // (acquire) and then finds the ring empty has seen everything.
   std::atomic<bool> frames_ended_{false}, proposals_ended_{false}, keyframes_ended_{false};
+  // Raised by a loop closer that has failed and goes on answering; relaxed, because it publishes nothing.
+  std::atomic<bool> loop_closer_failed_{false};
   // Counters for the progress line; relaxed, because they publish nothing.
   std::atomic<std::uint64_t> map_version_{0}, not_described_{0};
 

@@ -3,45 +3,43 @@
 
 namespace twofold {
 
-void ThreadedRun::take_messages() {
-  consumed_.clear();
-  ProposalHandle proposal;
-  while (consumed_.size() < consumed_.capacity() && proposals_.try_pop(proposal)) {
-    consumed_.push_back(std::move(proposal));
-  }
-  loop_messages_.clear();
-  while (loop_messages_.size() < loop_messages_.capacity() && loops_.has_value()) {
-    (void)loops_.try_pop(loop_messages_.emplace_back());
-  }
-}
-
 void ThreadedRun::mapper_thread(const std::stop_token& stop) {
   const auto ready = [this] {
-    return proposals_.size_approx() > 0 || loops_.size_approx() > 0 ||
-           proposals_ended_.load(std::memory_order_acquire);
+    return !mapper_inbox_.empty() || proposals_ended_.load(std::memory_order_acquire);
   };
   while (mapper_parking_.wait(stop, ready)) {
-    take_messages();
-    if (consumed_.empty() && loop_messages_.empty()) break;  // ended
-    MapperRound round = mapping_.step(consumed_, loop_messages_);
+    if (!mapper_inbox_.take()) break;  // ended
+    begin_step("mapper");
+    const std::span<ProposalHandle> proposals = mapper_inbox_.proposals();
+    const std::span<const LoopMessage> loops = mapper_inbox_.loops();
+    const std::uint64_t version = mapping_.step(proposals, loops);
     snapshots_.publish(mapping_.publish());
-    map_version_.store(round.version, std::memory_order_relaxed);
-    MapperStep step{round.version, static_cast<std::uint32_t>(round.proposals),
-                    static_cast<std::uint32_t>(loop_messages_.size())};
-    for (ProposalHandle& proposal : consumed_) {
-      if (keyframes_.try_push(std::move(proposal))) continue;
-      ++step.refused;
-      not_described_.fetch_add(1, std::memory_order_relaxed);
+    map_version_.store(version, std::memory_order_relaxed);
+    schedule_.mapper.append(
+        {version, static_cast<std::uint32_t>(proposals.size()), static_cast<std::uint32_t>(loops.size())});
+    for (ProposalHandle& proposal : proposals) {
+      // The loop closer may be behind by a whole ring: it then does not get to know this keyframe.
+      if (!keyframes_.try_push(std::move(proposal))) not_described_.fetch_add(1, std::memory_order_relaxed);
+      proposal.reset();
     }
-    consumed_.clear();
     loop_parking_.wake();
     reader_parking_.wake();
-    schedule_.mapper.append(step);
-    result_.rounds.push_back(round);  // read by others after the join only
   }
 }
 
+/// A loop closer that fails still answers the camera that asks where it is: nothing found.
 void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
+  try {
+    close_loops(stop);
+  } catch (...) {
+    loop_closer_failed_.store(true, std::memory_order_relaxed);
+    reader_parking_.wake();
+    answer_nothing(stop);
+    throw;
+  }
+}
+
+void ThreadedRun::close_loops(const std::stop_token& stop) {
   ProposalHandle keyframe;
   const auto ready = [&] {
     return keyframe || requests_.size_approx() > 0 || keyframes_.try_pop(keyframe) ||
@@ -50,6 +48,7 @@ void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
   while (loop_parking_.wait(stop, ready)) {
     if (answer_request()) continue;  // a lost camera comes first
     if (!keyframe && !keyframes_.try_pop(keyframe)) break;
+    begin_step("loop closer");
     const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
     LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
     send_loops(loop_closing_.step(*keyframe, graph), step);
@@ -62,12 +61,31 @@ void ThreadedRun::loop_closer_thread(const std::stop_token& stop) {
 bool ThreadedRun::answer_request() {
   RequestHandle request;
   if (!requests_.try_pop(request)) return false;
+  answering_ = true;
+  begin_step("loop closer");
   const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
   RelocalisationAnswer answer = loop_closing_.relocalise(*request, graph);
   request.reset();  // before the answer: the next request finds its buffer free
-  TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
-  schedule_.loop_closer.append({graph.version(), -1, 1});
+  send_answer(std::move(answer), {graph.version(), -1, 1});
   return true;
+}
+
+void ThreadedRun::send_answer(RelocalisationAnswer answer, const LoopStep& step) {
+  TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
+  answering_ = false;
+  schedule_.loop_closer.append(step);
+}
+
+void ThreadedRun::answer_nothing(const std::stop_token& stop) {
+  RequestHandle request;
+  const auto ready = [&] {
+    return answering_ || requests_.try_pop(request) || keyframes_ended_.load(std::memory_order_acquire);
+  };
+  while (loop_parking_.wait(stop, ready)) {
+    if (!answering_ && !request && !requests_.try_pop(request)) return;
+    request.reset();
+    send_answer(std::nullopt, {snapshots_.mailbox(kLoopReader).latest().version(), -1, 1, 1});
+  }
 }
 
 void ThreadedRun::publish_places() {
@@ -78,7 +96,7 @@ void ThreadedRun::publish_places() {
 /// A ring that is full takes nothing more of this step; a loop that is lost is found again.
 void ThreadedRun::send_loops(std::span<LoopMessage> messages, LoopStep& step) {
   std::size_t sent = 0;
-  while (sent < messages.size() && loops_.try_push(std::move(messages[sent]))) ++sent;
+  while (sent < messages.size() && mapper_inbox_.try_send(std::move(messages[sent]))) ++sent;
   step.refused = static_cast<std::uint32_t>(messages.size() - sent);
   if (sent > 0) mapper_parking_.wake();
 }
@@ -91,6 +109,7 @@ void ThreadedRun::checkpoint_thread(const std::stop_token& stop) {
     const auto due = std::chrono::steady_clock::now() + std::chrono::nanoseconds(checkpoints_.period_ns());
     (void)checkpoint_parking_.wait_until(stop, due, [] { return false; });
     if (stop.stop_requested()) return;  // the caller saves the final map
+    begin_step("checkpoints");
     checkpoints_.save(snapshots_.mailbox(kCheckpointReader).latest(), places_.mailbox(0).latest());
   }
 }

@@ -9,15 +9,15 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
   while (tracker_parking_.wait(stop, ready)) {
     // A handle that was moved from is empty (PoolHandle).  NOLINTNEXTLINE(bugprone-use-after-move)
     if (!slot && !frames_.try_pop(slot)) break;  // ended, and nothing was pushed before that
-    const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, slot->next_t_ns, stop);
+    const Arrival arrival = pacer_.wait_for(
+        slot->frame.t_ns, [this] { return successor_t_ns(); }, stop);
+    begin_step("tracker");
     slot->record = FrameRecord{};
     slot->correction.reason = CorrectionReason::kNone;
     if (effort_controller_.must_drop(arrival)) {
       drop(*slot);
     } else {
-      track(*slot, snapshots_.mailbox(kTrackerReader).latest());
-      tracking_.finish(arrival.scheduled_ns, pacer_.now_ns(), slot->record);
-      effort_controller_.tracked(slot->record.latency_ns, arrival.period_ns);
+      track(*slot, arrival, snapshots_.mailbox(kTrackerReader).latest());
     }
     TWOFOLD_CHECK(done_.try_push(std::move(slot)), "the ring holds every slot of the pool");
     reader_parking_.wake();
@@ -25,26 +25,35 @@ void ThreadedRun::tracker_thread(const std::stop_token& stop) {
   spare_.reset();
 }
 
+/// Of the frame that waits behind the one in hand.
+std::optional<std::int64_t> ThreadedRun::successor_t_ns() {
+  const SlotHandle* const next = frames_.peek();
+  if (next == nullptr) return std::nullopt;
+  return (*next)->frame.t_ns;
+}
+
 void ThreadedRun::drop(FrameSlot& slot) {
   slot.record.frame_index = slot.frame.index;
   slot.record.t_ns = slot.frame.t_ns;
   slot.record.state = FrameState::kDropped;
   slot.record.effort = effort_controller_.effort();
-  schedule_.tracker.append({slot.frame.index, 0, TrackerStep::Fate::kDropped,
-                            static_cast<std::uint8_t>(effort_controller_.effort())});
+  slot.step = {slot.frame.index, 0, TrackerStep::Fate::kDropped,
+               static_cast<std::uint8_t>(effort_controller_.effort())};
   effort_controller_.dropped();
 }
 
-void ThreadedRun::track(FrameSlot& slot, const GraphSnapshot& graph) {
+void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph) {
   if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
-  TrackerStep step{slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
+  TrackerStep& step = slot.step;
+  step = {slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
   take_answers(step);
   step.effort_level = static_cast<std::uint8_t>(effort_controller_.effort());
   step.keyframe_withheld = !spare_;
-  if (tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record))
-    send_proposal(slot.record, step);
+  const bool proposed = tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record);
+  tracking_.finish(arrival.exposed_ns, pacer_.now_ns(), graph, slot.record);
+  if (proposed) send_proposal();
+  effort_controller_.tracked(slot.record.latency_ns, arrival.period_ns);
   slot.correction = tracking_.correction();
-  schedule_.tracker.append(step);
   ask_where_we_are();
 }
 
@@ -65,14 +74,9 @@ void ThreadedRun::ask_where_we_are() {
   loop_parking_.wake();
 }
 
-void ThreadedRun::send_proposal(FrameRecord& record, TrackerStep& step) {
-  if (proposals_.try_push(std::move(spare_))) {
-    mapper_parking_.wake();
-    return;
-  }
-  // The mapper is behind by a whole ring: this keyframe is given up, its buffer kept.
-  tracking_.proposal_rejected(record);
-  step.refused = 1;
+void ThreadedRun::send_proposal() {
+  mapper_inbox_.send(std::move(spare_));
+  mapper_parking_.wake();
 }
 
 }  // namespace twofold

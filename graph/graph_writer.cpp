@@ -42,6 +42,11 @@ void GraphWriter::add_culled_keyframe(const Replacement& replacement) {
   if (replacement.id != kNoKeyframe) put_replacement(id, {replacement.id, 0, replacement.T_this_replacement});
 }
 
+void GraphWriter::add_forgotten_keyframes(std::size_t count) {
+  graph_.keyframes_.extend(graph_.keyframe_count() + count);
+  graph_.replacements_.extend(graph_.keyframe_count());
+}
+
 void GraphWriter::put_replacement(KeyframeId id, const Replacement& replacement) {
   graph_.replacements_.extend(std::size_t{index(id)} + 1);
   graph_.replacements_.mutate(index(id)) = replacement;

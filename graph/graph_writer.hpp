@@ -32,8 +32,12 @@ class GraphWriter {
   /// Appends a keyframe that was culled. The keyframe `replacement` names may be appended later;
   /// Replacement{} says that it is forgotten. Call keep_needed_replacements when all are there.
   void add_culled_keyframe(const Replacement& replacement);
+  /// Appends `count` keyframes that were culled and are forgotten; O(1), and they take no memory.
+  void add_forgotten_keyframes(std::size_t count);
   /// Appends a point without observers; ids skipped by the tracker are filled with culled points.
   void add_point(PointId id, MapPoint point);
+  /// Appends culled points up to `count` points in all; O(1), and they take no memory.
+  void fill_with_culled_points(std::size_t count) { graph_.points_.extend(count); }
 
   void set_pose(KeyframeId id, const SE3& T_k_w) { graph_.keyframes_.mutate(index(id)).T_k_w = T_k_w; }
   /// Moves a keyframe that is not culled to another part; its T_k_w then refers to that part's world frame.

@@ -7,6 +7,16 @@
 #include "graph/part_extraction.hpp"
 
 namespace twofold::map_format {
+namespace {
+
+template <class Entries, class Id>
+auto find_entry(Entries& entries, Id id) -> decltype(entries.data()) {
+  const auto at = std::lower_bound(entries.begin(), entries.end(), id,
+                                   [](const auto& entry, Id wanted) { return entry.id < wanted; });
+  return at == entries.end() || at->id != id ? nullptr : &*at;
+}
+
+}  // namespace
 
 void MapBuilder::take_head(ByteReader in) {
   map_.rig = take_rig(in);
@@ -15,14 +25,27 @@ void MapBuilder::take_head(ByteReader in) {
   keyframe_count_ = in.take<std::uint32_t>();
   point_count_ = in.take<std::uint32_t>();
   in.expect_end();
-  if (keyframe_count_ > kMaxCount || point_count_ > kMaxCount) throw FormatError{"announces too large a map"};
+  if (keyframe_count_ > kMaxKeyframes || point_count_ > kMaxPoints)
+    throw FormatError{"announces too large a map"};
+}
+
+const KeyframeEntry* MapBuilder::find(KeyframeId id) const {
+  return find_entry(keyframes_, id);
+}
+KeyframeEntry* MapBuilder::find(KeyframeId id) {
+  return find_entry(keyframes_, id);
+}
+MapBuilder::PointEntry* MapBuilder::find(PointId id) {
+  return find_entry(points_, id);
 }
 
 void MapBuilder::take_keyframes(ByteReader in) {
   for (std::uint32_t n = 0; n < kKeyframesPerSection && !in.at_end(); ++n) {
-    if (keyframes_.size() == keyframe_count_) throw FormatError{"holds more keyframes than announced"};
-    const KeyframeId id{static_cast<std::uint32_t>(keyframes_.size())};
+    const KeyframeId id{next_keyframe_};
     KeyframeEntry entry = version_ == 1 ? take_keyframe_1(in, id) : take_keyframe(in, id);
+    const std::uint32_t run = version_ >= 3 && entry.forgotten() ? in.take_run() : 1;
+    if (run > keyframe_count_ - next_keyframe_) throw FormatError{"holds more keyframes than announced"};
+    next_keyframe_ += run;
     const ObservationList& observations = *entry.keyframe.observations;
     if (!observations.empty() && index(observations.back().point) >= point_count_) {
       throw FormatError{"observes a point that is not there"};
@@ -30,15 +53,18 @@ void MapBuilder::take_keyframes(ByteReader in) {
     if (entry.culled() && (!observations.empty() || !entry.edges.empty())) {
       throw FormatError{"holds a culled keyframe with observations or edges"};
     }
-    keyframes_.push_back(std::move(entry));
+    if (!entry.forgotten()) keyframes_.push_back(std::move(entry));
   }
   in.expect_end();
 }
 
 void MapBuilder::take_points(ByteReader in) {
   for (std::uint32_t n = 0; n < kPointsPerSection && !in.at_end(); ++n) {
-    if (points_.size() == point_count_) throw FormatError{"holds more points than announced"};
-    points_.push_back(take_point(in));
+    PointEntry entry{PointId{next_point_}, take_point(in), {}};
+    const std::uint32_t run = version_ >= 3 && !entry.point.alive() ? in.take_run() : 1;
+    if (run > point_count_ - next_point_) throw FormatError{"holds more points than announced"};
+    next_point_ += run;
+    if (entry.point.alive()) points_.push_back(std::move(entry));
   }
   in.expect_end();
 }
@@ -49,6 +75,7 @@ void MapBuilder::take_places(ByteReader in) {
     if (index(id) < map_.places.size()) throw FormatError{"places out of order"};
     if (index(id) >= keyframe_count_) throw FormatError{"holds the place of a keyframe that is not there"};
     map_.places.set(id, take_place(in, map_.rig));
+    places_.push_back(id);
   }
   in.expect_end();
 }
@@ -64,14 +91,15 @@ SavedMap MapBuilder::finish() {
 }
 
 void MapBuilder::check_keyframes() const {
-  if (keyframes_.size() != keyframe_count_) throw FormatError{"keyframes: fewer than announced"};
-  if (points_.size() != point_count_) throw FormatError{"points: fewer than announced"};
-  if (reference_ == kNoKeyframe ? !keyframes_.empty() : index(reference_) >= keyframes_.size()) {
+  if (next_keyframe_ != keyframe_count_) throw FormatError{"keyframes: fewer than announced"};
+  if (next_point_ != point_count_) throw FormatError{"points: fewer than announced"};
+  if (reference_ == kNoKeyframe ? keyframe_count_ > 0 : index(reference_) >= keyframe_count_) {
     throw FormatError{"head: the reference keyframe is not there"};
   }
-  if (reference_ != kNoKeyframe && keyframes_[index(reference_)].culled()) {
+  if (reference_ == kNoKeyframe) return;
+  const KeyframeEntry* reference = find(reference_);
+  if (reference == nullptr || reference->culled())
     throw FormatError{"head: the reference keyframe was culled"};
-  }
 }
 
 /// Each chain of replacements that is known must end in a keyframe that was not culled.
@@ -80,51 +108,46 @@ void MapBuilder::check_replacements() const {
   std::vector<std::uint8_t> state(keyframes_.size(), kUnknown);
   std::vector<std::size_t> chain;
   for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    if (keyframes_[k].forgotten()) continue;
     chain.clear();
     for (std::size_t at = k; state[at] != kGood;) {
       if (state[at] == kOnTheWay) throw FormatError{"keyframes: replacements go round in a circle"};
       state[at] = kOnTheWay;
       chain.push_back(at);
       if (!keyframes_[at].culled()) break;
-      at = index(keyframes_[at].replacement.id);
-      if (at >= keyframes_.size() || keyframes_[at].forgotten())
-        throw FormatError{"keyframes: a replacement is not there"};
+      const KeyframeEntry* next = find(keyframes_[at].replacement.id);
+      if (next == nullptr) throw FormatError{"keyframes: a replacement is not there"};
+      at = static_cast<std::size_t>(next - keyframes_.data());
     }
     for (const std::size_t at : chain) state[at] = kGood;
   }
 }
 
 void MapBuilder::check_points() const {
-  for (const MapPoint& point : points_) {
-    if (!point.alive()) continue;
-    if (index(point.anchor) >= keyframes_.size() || keyframes_[index(point.anchor)].forgotten())
-      throw FormatError{"points: an anchor is not there"};
-    if (!(point.psi.z() > 0)) throw FormatError{"points: a point is not in front of its anchor"};
-    if (point.appearance == nullptr) throw FormatError{"points: a point has no appearance"};
+  for (const PointEntry& entry : points_) {
+    if (find(entry.point.anchor) == nullptr) throw FormatError{"points: an anchor is not there"};
+    if (!(entry.point.psi.z() > 0)) throw FormatError{"points: a point is not in front of its anchor"};
+    if (entry.point.appearance == nullptr) throw FormatError{"points: a point has no appearance"};
   }
 }
 
 void MapBuilder::check_places() const {
-  for (std::uint32_t k = 0; k < map_.places.size(); ++k) {
-    if (map_.places.find(KeyframeId{k}) != nullptr && keyframes_[k].culled())
-      throw FormatError{"places: a culled keyframe has a place"};
+  for (const KeyframeId id : places_) {
+    const KeyframeEntry* entry = find(id);
+    if (entry == nullptr || entry->culled()) throw FormatError{"places: a culled keyframe has a place"};
   }
 }
 
 void MapBuilder::register_observers() {
-  observers_.resize(points_.size());
   for (const KeyframeEntry& entry : keyframes_) {
-    const Keyframe& keyframe = entry.keyframe;
-    for (const Observation& observation : *keyframe.observations) {
-      if (!points_[index(observation.point)].alive())
-        throw FormatError{"keyframes: a culled point is observed"};
-      observers_[index(observation.point)].push_back(keyframe.id);
+    for (const Observation& observation : *entry.keyframe.observations) {
+      PointEntry* point = find(observation.point);
+      if (point == nullptr) throw FormatError{"keyframes: a culled point is observed"};
+      point->observers.push_back(entry.id);
     }
   }
-  for (std::size_t p = 0; p < points_.size(); ++p) {
-    if (!points_[p].alive() || keyframes_[index(points_[p].anchor)].culled()) continue;
-    if (!std::binary_search(observers_[p].begin(), observers_[p].end(), points_[p].anchor)) {
+  for (const PointEntry& entry : points_) {
+    if (find(entry.point.anchor)->culled()) continue;
+    if (!std::binary_search(entry.observers.begin(), entry.observers.end(), entry.point.anchor)) {
       throw FormatError{"points: an anchor does not observe its point"};
     }
   }
@@ -132,37 +155,37 @@ void MapBuilder::register_observers() {
 
 /// Both keyframes of an edge keep it; the file has it once.
 void MapBuilder::mirror_edges() {
-  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    const auto id = KeyframeId{static_cast<std::uint32_t>(k)};
-    const EdgeList& edges = keyframes_[k].edges;
-    const std::size_t own = edges.size();
-    for (std::size_t n = 0; n < own && edges[n].other < id; ++n) {
-      const Edge edge = edges[n];
-      if (keyframes_[index(edge.other)].culled())
-        throw FormatError{"keyframes: an edge to a culled keyframe"};
+  for (KeyframeEntry& entry : keyframes_) {
+    const std::size_t own = entry.edges.size();
+    for (std::size_t n = 0; n < own && entry.edges[n].other < entry.id; ++n) {
+      const Edge edge = entry.edges[n];
+      KeyframeEntry* other = find(edge.other);
+      if (other == nullptr || other->culled()) throw FormatError{"keyframes: an edge to a culled keyframe"};
       Edge back = edge;
-      back.other = id;
+      back.other = entry.id;
       back.T_other_this = edge.T_other_this.inverse();
-      keyframes_[index(edge.other)].edges.push_back(back);  // newer ones come later: the list stays in order
+      other->edges.push_back(back);  // newer ones come later: the list stays in order
     }
   }
 }
 
 SavedMap MapBuilder::assemble() {
   GraphWriter writer;
-  for (std::size_t k = 0; k < keyframes_.size(); ++k) {
-    auto& [keyframe, edges, replacement] = keyframes_[k];
-    if (keyframe.culled()) {
-      writer.add_culled_keyframe(replacement);
+  for (KeyframeEntry& entry : keyframes_) {
+    writer.add_forgotten_keyframes(index(entry.id) - writer.graph().keyframe_count());
+    if (entry.culled()) {
+      writer.add_culled_keyframe(entry.replacement);
       continue;
     }
-    keyframe.edges = std::make_shared<const EdgeList>(std::move(edges));
-    writer.add_keyframe(std::move(keyframe));
+    entry.keyframe.edges = std::make_shared<const EdgeList>(std::move(entry.edges));
+    writer.add_keyframe(std::move(entry.keyframe));
   }
-  for (std::size_t p = 0; p < points_.size(); ++p) {
-    points_[p].observers = std::make_shared<const ObserverList>(std::move(observers_[p]));
-    writer.add_point(PointId{static_cast<std::uint32_t>(p)}, std::move(points_[p]));
+  writer.add_forgotten_keyframes(keyframe_count_ - writer.graph().keyframe_count());
+  for (PointEntry& entry : points_) {
+    entry.point.observers = std::make_shared<const ObserverList>(std::move(entry.observers));
+    writer.add_point(entry.id, std::move(entry.point));
   }
+  writer.fill_with_culled_points(point_count_);
   writer.set_reference(reference_);
   writer.keep_needed_replacements();  // nobody has asked this map for a keyframe yet
   name_parts(writer);

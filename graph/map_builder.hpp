@@ -9,7 +9,8 @@
 namespace twofold::map_format {
 
 /// Puts a map together from the sections of its file, in any order after the head. Cross references are
-/// checked when everything is there. All functions throw FormatError.
+/// checked when everything is there. Keyframes that are forgotten and points that are culled are counted and
+/// not kept. All functions throw FormatError.
 class MapBuilder {
  public:
   /// Of the file, before anything is taken.
@@ -23,6 +24,17 @@ class MapBuilder {
   [[nodiscard]] SavedMap finish();
 
  private:
+  struct PointEntry {
+    PointId id = kNoPoint;
+    MapPoint point;
+    ObserverList observers;
+  };
+  /// Null: it is not there, or forgotten.
+  [[nodiscard]] const KeyframeEntry* find(KeyframeId id) const;
+  [[nodiscard]] KeyframeEntry* find(KeyframeId id);
+  /// Null: it is not there, or culled.
+  [[nodiscard]] PointEntry* find(PointId id);
+
   void check_keyframes() const;
   void check_replacements() const;
   void check_points() const;
@@ -35,9 +47,10 @@ class MapBuilder {
   std::uint16_t version_ = kMapFormatVersion;
   KeyframeId reference_ = kNoKeyframe;
   std::uint32_t keyframe_count_ = 0, point_count_ = 0;
-  std::vector<KeyframeEntry> keyframes_;
-  std::vector<MapPoint> points_;
-  std::vector<ObserverList> observers_;  // by point
+  std::uint32_t next_keyframe_ = 0, next_point_ = 0;  // as many were taken
+  std::vector<KeyframeEntry> keyframes_;              // in order of their ids, like the next two
+  std::vector<PointEntry> points_;
+  std::vector<KeyframeId> places_;
 };
 
 }  // namespace twofold::map_format

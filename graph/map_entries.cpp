@@ -66,6 +66,7 @@ Rig take_rig(ByteReader& in) {
 
 KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id) {
   KeyframeEntry entry;
+  entry.id = id;
   switch (static_cast<EntryKind>(in.take_small(3, "kind of keyframe"))) {
     case EntryKind::kForgotten:
       break;
@@ -86,6 +87,7 @@ KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id) {
 
 KeyframeEntry take_keyframe_1(ByteReader& in, KeyframeId id) {
   KeyframeEntry entry;
+  entry.id = id;
   take_state(in, entry.keyframe);
   entry.replacement.id = KeyframeId{in.take<std::uint32_t>()};
   entry.replacement.T_this_replacement = PackedPose(in.take_pose());

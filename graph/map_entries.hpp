@@ -16,6 +16,7 @@ namespace twofold::map_format {
 [[nodiscard]] Rig take_rig(ByteReader& in);
 /// A keyframe, or the replacement of one that was culled if that is known.
 struct KeyframeEntry {
+  KeyframeId id = kNoKeyframe;
   Keyframe keyframe;  ///< without edges; a culled one has no number
   EdgeList edges;     ///< to older keyframes, in order
   Replacement replacement;
@@ -26,7 +27,7 @@ struct KeyframeEntry {
 [[nodiscard]] KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id);
 /// The same in format version 1.
 [[nodiscard]] KeyframeEntry take_keyframe_1(ByteReader& in, KeyframeId id);
-/// A culled point if it has no anchor.
+/// A culled point, of which nothing follows, if it has no anchor.
 [[nodiscard]] MapPoint take_point(ByteReader& in);
 /// Corners are in the image; z stays empty for a monocular rig.
 [[nodiscard]] PlaceAppearance take_place(ByteReader& in, const Rig& rig);

@@ -33,12 +33,14 @@ struct SavedMap {
 /// A section with an unknown id is skipped if its id's highest bit is set, and refused otherwise: that is how
 /// a newer program says whether an older one may read on.
 ///
-/// Version 1 had a keyframe's whole entry for culled ones too; it is still read.
-inline constexpr std::uint16_t kMapFormatVersion = 2;
+/// Version 2 had an entry each for forgotten keyframes and culled points that follow each other, version 1
+/// a keyframe's whole entry for culled ones too; both are still read.
+inline constexpr std::uint16_t kMapFormatVersion = 3;
 
 /// Writes to FILE.tmp in the same folder, syncs it, renames it over `file`, syncs the folder: whenever the
 /// program is killed or the disk is full, `file` is the old map or the new one. Memory: one slice. Throws
-/// MapFileError; the temporary file is then removed.
+/// MapFileError; the temporary file is then removed. A graph with more keyframes or points, culled ones
+/// included, than load_map takes is refused before anything is written.
 ///
 /// Looks at graph and places through these references only and copies neither, so that any reader they were
 /// published to may save them, while their writers go on. Places of keyframes that `graph` does not have, or
@@ -50,7 +52,8 @@ inline void save_map(const std::filesystem::path& file, const SavedMap& map) {
 }
 
 /// Reads a map; trusts nothing in it: sizes are checked against the file's before anything is allocated,
-/// numbers against each other, and the graph's invariants hold afterwards. Throws MapFileError.
+/// numbers against each other, and the graph's invariants hold afterwards. What is culled and forgotten takes
+/// no memory, so that no file takes more than a few times its size. Throws MapFileError.
 [[nodiscard]] SavedMap load_map(const std::filesystem::path& file);
 /// The same from a stream of `size` bytes; `name` stands in messages.
 [[nodiscard]] SavedMap read_map(std::istream& in, std::uint64_t size, const std::string& name);

@@ -40,7 +40,7 @@ enum class Section : std::uint32_t { kEnd = 0, kHead = 1, kKeyframes = 2, kPoint
 
 /// What a keyframe's entry holds, its first byte. In version 1 there is no such byte, and all of it is there.
 enum class EntryKind : std::uint8_t {
-  kForgotten,  ///< culled: nothing
+  kForgotten,  ///< culled: how many such keyframes follow each other; in version 2 nothing: it is one
   kCulled,     ///< replacement
   kKeyframe,   ///< all but a replacement
 };
@@ -49,8 +49,10 @@ enum class EntryKind : std::uint8_t {
 inline constexpr std::uint32_t kKeyframesPerSection = 1024;
 inline constexpr std::uint32_t kPointsPerSection = 16384;
 inline constexpr std::uint32_t kPlacesPerSection = 256;
-inline constexpr std::uint32_t kMaxCount = 1U << 28;  // keyframes or points of a map
-inline constexpr std::uint8_t kLevels = 16;           // of a pyramid: a file's numbers are below this
+// Of a map, culled ones included: what a camera makes in some months.
+inline constexpr std::uint32_t kMaxKeyframes = 1U << 24;
+inline constexpr std::uint32_t kMaxPoints = 1U << 28;
+inline constexpr std::uint8_t kLevels = 16;  // of a pyramid: a file's numbers are below this
 
 /// Collects the bytes of a section.
 class ByteWriter {
@@ -123,6 +125,12 @@ class ByteReader {
   std::size_t take_count(std::size_t entry_bytes) {
     const auto count = take<std::uint32_t>();
     if (count > bytes_.size() / entry_bytes) throw FormatError{"is too short for the entries it announces"};
+    return count;
+  }
+  /// How many entries one stands for.
+  std::uint32_t take_run() {
+    const auto count = take<std::uint32_t>();
+    if (count == 0) throw FormatError{"holds a run of nothing"};
     return count;
   }
   /// Flag or enumerator below `end`.

@@ -103,8 +103,23 @@ void put_edges(ByteWriter& out, const Keyframe& keyframe) {
   }
 }
 
+bool is_forgotten(const GraphSnapshot& graph, std::uint32_t k) {
+  return graph.keyframe(KeyframeId{k}).culled() && graph.replacement(KeyframeId{k}).id == kNoKeyframe;
+}
+
+bool is_culled_point(const GraphSnapshot& graph, std::uint32_t p) {
+  return !graph.point(PointId{p}).alive();
+}
+
+/// Number of entries from `begin` on, up to `end`, that are `like` it.
+template <class Like>
+std::uint32_t run_length(std::uint32_t begin, std::uint32_t end, Like&& like) {
+  std::uint32_t i = begin;
+  while (i < end && like(i)) ++i;
+  return i - begin;
+}
+
 void put_culled(ByteWriter& out, const Replacement& replacement) {
-  if (replacement.id == kNoKeyframe) return out.put(EntryKind::kForgotten);
   out.put(EntryKind::kCulled);
   out.put(replacement.id);
   out.put(replacement.T_this_replacement.unpacked());
@@ -125,16 +140,46 @@ void put_keyframe(ByteWriter& out, const Keyframe& keyframe) {
   put_edges(out, keyframe);
 }
 
+/// Keyframe k, or all forgotten ones from there on.
+/// @return how many
+std::uint32_t put_keyframes(ByteWriter& out, const GraphSnapshot& graph, std::uint32_t k) {
+  const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+  const auto count = static_cast<std::uint32_t>(graph.keyframe_count());
+  if (const std::uint32_t run = run_length(k, count, [&](auto n) { return is_forgotten(graph, n); })) {
+    out.put(EntryKind::kForgotten);
+    out.put(run);
+    return run;
+  }
+  if (keyframe.culled()) {
+    put_culled(out, graph.replacement(KeyframeId{k}));
+  } else {
+    put_keyframe(out, keyframe);
+  }
+  return 1;
+}
+
 /// Observers follow from the keyframes' observations.
 void put_point(ByteWriter& out, const MapPoint& point) {
   out.put(point.anchor);
-  if (!point.alive()) return;
   out.put_vector(point.psi);
   out.put(static_cast<std::uint8_t>(point.appearance != nullptr));
   if (point.appearance == nullptr) return;
   out.put_vector(point.appearance->uv);
   out.put(point.appearance->level);
   out.put_bytes(point.appearance->pixels);
+}
+
+/// Point p, or all culled ones from there on.
+/// @return how many
+std::uint32_t put_points(ByteWriter& out, const GraphSnapshot& graph, std::uint32_t p) {
+  const auto count = static_cast<std::uint32_t>(graph.point_count());
+  if (const std::uint32_t run = run_length(p, count, [&](auto n) { return is_culled_point(graph, n); })) {
+    out.put(kNoKeyframe);  // as the anchor
+    out.put(run);
+    return run;
+  }
+  put_point(out, graph.point(PointId{p}));
+  return 1;
 }
 
 void put_place(ByteWriter& out, KeyframeId id, const PlaceAppearance& place) {
@@ -151,26 +196,37 @@ void put_place(ByteWriter& out, KeyframeId id, const PlaceAppearance& place) {
   }
 }
 
-/// Writes entries [0, count) in sections of up to `per_section`.
-/// @param put  puts entry i into a ByteWriter; false: there is nothing to put
+/// Writes what there is of [0, count) in sections of up to `per_section` entries.
+/// @param put  puts one entry, for i and maybe for what follows, into a ByteWriter, or nothing, if there is
+///             nothing to put for i; returns for how many it did, at least 1
 template <class Put>
 void write_slices(ReplacedFile& file, Section section, std::uint32_t count, std::uint32_t per_section,
                   Put&& put) {
   ByteWriter bytes;
   std::uint32_t entries = 0;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    entries += put(bytes, i) ? 1 : 0;
-    if (entries == 0 || (entries < per_section && i + 1 < count)) continue;
+  for (std::uint32_t i = 0; i < count;) {
+    const std::size_t before = bytes.bytes().size();
+    i += put(bytes, i);
+    entries += bytes.bytes().size() > before ? 1 : 0;
+    if (entries == 0 || (entries < per_section && i < count)) continue;
     write_section(file, section, bytes.bytes());
     bytes.clear();
     entries = 0;
   }
 }
 
+void expect_loadable(const fs::path& file, const GraphSnapshot& graph) {
+  if (graph.keyframe_count() <= kMaxKeyframes && graph.point_count() <= kMaxPoints) return;
+  throw MapFileError(file.string() +
+                     ": the map is too large to be saved: " + std::to_string(graph.keyframe_count()) +
+                     " keyframes, " + std::to_string(graph.point_count()) + " points have been made");
+}
+
 }  // namespace
 
 void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph,
               const KeyframeDatabase& places) {
+  expect_loadable(file, graph);
   ReplacedFile out(file);
   ByteWriter bytes;
   for (const char c : kMagic) bytes.put(c);
@@ -181,27 +237,17 @@ void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph,
   put_head(bytes, rig, graph);
   write_section(out, Section::kHead, bytes.bytes());
   write_slices(out, Section::kKeyframes, static_cast<std::uint32_t>(graph.keyframe_count()),
-               kKeyframesPerSection, [&](ByteWriter& to, std::uint32_t k) {
-                 const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-                 if (keyframe.culled()) {
-                   put_culled(to, graph.replacement(KeyframeId{k}));
-                 } else {
-                   put_keyframe(to, keyframe);
-                 }
-                 return true;
-               });
+               kKeyframesPerSection,
+               [&](ByteWriter& to, std::uint32_t k) { return put_keyframes(to, graph, k); });
   write_slices(out, Section::kPoints, static_cast<std::uint32_t>(graph.point_count()), kPointsPerSection,
-               [&](ByteWriter& to, std::uint32_t p) {
-                 put_point(to, graph.point(PointId{p}));
-                 return true;
-               });
+               [&](ByteWriter& to, std::uint32_t p) { return put_points(to, graph, p); });
   const std::size_t described = std::min(places.size(), graph.keyframe_count());
   write_slices(out, Section::kPlaces, static_cast<std::uint32_t>(described), kPlacesPerSection,
                [&](ByteWriter& to, std::uint32_t k) {
                  const PlaceAppearance* place = places.find(KeyframeId{k});
-                 if (place == nullptr || graph.keyframe(KeyframeId{k}).culled()) return false;
-                 put_place(to, KeyframeId{k}, *place);
-                 return true;
+                 if (place != nullptr && !graph.keyframe(KeyframeId{k}).culled())
+                   put_place(to, KeyframeId{k}, *place);
+                 return 1U;
                });
   write_section(out, Section::kEnd, {});
   out.commit();

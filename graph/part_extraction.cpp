@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "graph/id_map.hpp"
+
 namespace twofold {
 namespace {
 
@@ -59,25 +61,27 @@ MapPoint renumbered(const MapPoint& point, const Renumbering& number) {
 
 void name_parts(GraphWriter& writer) {
   const GraphSnapshot& graph = writer.graph();
-  std::vector<KeyframeId> name(graph.keyframe_count(), kNoKeyframe);
+  IdMap name;  // number of the part's first keyframe
   std::vector<KeyframeId> open;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
-    if (name[k] != kNoKeyframe || graph.keyframe(KeyframeId{k}).culled()) continue;
-    name[k] = KeyframeId{k};
+    if (name.contains(KeyframeId{k}) || graph.keyframe(KeyframeId{k}).culled()) continue;
+    name.set(k, static_cast<int>(k));
     open.push_back(KeyframeId{k});
     while (!open.empty()) {
       const KeyframeId at = open.back();
       open.pop_back();
       for (const Edge& edge : *graph.keyframe(at).edges) {
-        if (name[index(edge.other)] != kNoKeyframe) continue;
-        name[index(edge.other)] = KeyframeId{k};
+        if (name.contains(edge.other)) continue;
+        name.set(edge.other, static_cast<int>(k));
         open.push_back(edge.other);
       }
     }
   }
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-    if (!keyframe.culled() && keyframe.part != name[k]) writer.set_part(KeyframeId{k}, name[k]);
+    if (keyframe.culled()) continue;
+    const KeyframeId part{static_cast<std::uint32_t>(name.find(k))};
+    if (keyframe.part != part) writer.set_part(KeyframeId{k}, part);
   }
 }
 

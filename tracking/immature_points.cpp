@@ -30,15 +30,4 @@ void ImmaturePoints::drop_stale(KeyframeId newest, int max_failures, int max_age
   });
 }
 
-void ImmaturePoints::retract(KeyframeId id) {
-  std::erase_if(pending_, [&](const PendingKeyframe& keyframe) { return keyframe.id == id; });
-  std::erase_if(points_, [&](const ImmaturePoint& point) { return point.anchor == id; });
-  for (ImmaturePoint& point : points_) {
-    if (point.proposed_in == id) {
-      point.proposed_in = kNoKeyframe;
-      point.id = kNoPoint;
-    }
-  }
-}
-
 }  // namespace twofold

@@ -46,12 +46,10 @@ class ImmaturePoints {
   bool add(const ImmaturePoint& point);
   /// Forgets all points.
   void clear_points() { points_.clear(); }
-  /// Forgets what the map has taken over or refused.
+  /// Forgets what the map has taken over.
   void adopt(const GraphSnapshot& graph);
   /// Forgets candidates that failed too often or that `newest - anchor` keyframes did not confirm.
   void drop_stale(KeyframeId newest, int max_failures, int max_age);
-  /// The proposal of keyframe `id` was refused: its points go, points it confirmed are candidates again.
-  void retract(KeyframeId id);
 
  private:
   std::vector<ImmaturePoint> points_;

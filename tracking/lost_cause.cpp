@@ -68,11 +68,11 @@ LostCause FrameIntervals::next(std::int64_t index, std::int64_t t_ns) {
     const std::int64_t interval = t_ns - t_ns_;
     if (index > index_ + 1) {
       gap = LostCause::kFramesMissing;
-    } else if (usual_ns_ > 0 && static_cast<double>(interval) > kGap * static_cast<double>(usual_ns_)) {
+    } else if (usual_.ns() > 0 && static_cast<double>(interval) > kGap * static_cast<double>(usual_.ns())) {
       gap = LostCause::kGapInTime;
     }
-    if (interval > 0 && (usual_ns_ == 0 || interval < usual_ns_)) usual_ns_ = interval;
   }
+  usual_.add(t_ns);
   any_ = true;
   index_ = index;
   t_ns_ = t_ns;

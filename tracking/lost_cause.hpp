@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "camera/usual_interval.hpp"
 #include "imaging/image_pyramid.hpp"
 
 namespace twofold {
@@ -29,7 +30,7 @@ enum class LostCause : std::uint8_t {
 [[nodiscard]] LostCause explain_loss(LostCause found, const ImagePyramid& now, const ImagePyramid& last_good,
                                      LostCause gap);
 
-/// Watches numbers and time stamps of frames for gaps. The usual interval is the shortest seen.
+/// Watches numbers and time stamps of frames for gaps.
 class FrameIntervals {
  public:
   /// kNone, kFramesMissing or kGapInTime between the frame before and this one.
@@ -39,7 +40,7 @@ class FrameIntervals {
   bool any_ = false;
   std::int64_t index_ = 0;
   std::int64_t t_ns_ = 0;
-  std::int64_t usual_ns_ = 0;  ///< 0: not known yet
+  UsualInterval usual_;
 };
 
 }  // namespace twofold

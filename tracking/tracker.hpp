@@ -64,10 +64,6 @@ class Tracker {
     return part_of(graph, immature_points_, reference_);
   }
 
-  /// The proposal of the last step could not be sent: its numbers are taken back.
-  /// @return  false when it was to start a map or map part: the last frame has no pose then
-  bool proposal_rejected();
-
   /// Hint of the loop closer: the camera was recognised at T_c_k relative to keyframe `id`. The next step, if
   /// its graph has the keyframe, looks for points around there, and forgets the hint. Ignored while tracking.
   void relocalise(KeyframeId id, const SE3& T_c_k);
@@ -135,7 +131,6 @@ class Tracker {
   std::uint32_t next_keyframe_ = 0;
   std::uint32_t first_of_part_ = 0;  ///< the newest part's
   std::uint32_t next_point_ = 0;
-  std::uint32_t points_in_proposal_ = 0;
   int regions_at_keyframe_ = 0;
   double keyframe_depth_ = 0;  ///< median depth at the last keyframe [m]
 

@@ -22,16 +22,6 @@ void Tracker::prepare(KeyframeProposal& proposal) const {
   allocate_images(rig_, proposal.images);
 }
 
-bool Tracker::proposal_rejected() {
-  --next_keyframe_;
-  next_point_ -= points_in_proposal_;
-  immature_points_.retract(KeyframeId{next_keyframe_});
-  local_map_stale_ = true;
-  if (reference_ != KeyframeId{next_keyframe_}) return true;
-  reference_ = kNoKeyframe;
-  return false;
-}
-
 /// Number of parts of the image, of 8 x 6, in which a point is tracked.
 int Tracker::occupied_regions() const {
   std::uint64_t occupied = 0;
@@ -105,7 +95,6 @@ void Tracker::hand_over_images(KeyframeProposal& proposal) {
 }
 
 void Tracker::collect_observations(KeyframeProposal& proposal) {
-  points_in_proposal_ = 0;
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     if (!motion_[m].inlier) continue;
     const TrackedPoint& point = local_map_.points()[matches_[m].point];
@@ -126,7 +115,6 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
 void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
   point.id = PointId{next_point_++};
   point.proposed_in = proposal.id;
-  ++points_in_proposal_;
   Observation anchor_observation = point.anchor_observation;
   anchor_observation.point = point.id;
   proposal.new_points.push_back({point.id, point.anchor, point.psi, anchor_observation, point.appearance});

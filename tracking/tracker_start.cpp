@@ -42,7 +42,7 @@ bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackRes
   const KeyframeId id{next_keyframe_};
   starter_.clear();
   if (starter_.start(current_, id, immature_points_) < kMinStartPoints) {
-    immature_points_.retract(id);
+    immature_points_.clear_points();  // there were none but these
     result.cause = LostCause::kNoTexture;
     return false;
   }
@@ -56,7 +56,6 @@ bool Tracker::start_map(const Frame& frame, KeyframeProposal* proposal, TrackRes
   hand_over_images(*proposal);
   immature_points_.add_pending({id, kNoKeyframe, SE3()});
   first_of_part_ = next_keyframe_++;
-  points_in_proposal_ = 0;
   reference_ = id;
   local_map_stale_ = true;
   regions_at_keyframe_ = 0;

@@ -7,7 +7,7 @@
 
 namespace twofold {
 
-/// Latency of frames, from when they were due to when their pose was known, near closed loops and elsewhere:
+/// Latency of frames, from their exposure to their pose, near closed loops and elsewhere:
 /// what a closure costs the tracker.
 struct LoopLatency {
   LatencyHistogram near;  ///< from 1 s before to 4 s after a frame whose place was recognised

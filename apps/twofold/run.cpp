@@ -120,8 +120,10 @@ int run(const RunArguments& arguments) {
   if (!arguments.replay_schedule.empty()) schedule = load_schedule(arguments.replay_schedule);
   prepare_output_folder(arguments.out);
   std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options_of(arguments));
-  // A camera's frames are due when they are taken, whether anybody asks for a pace or not.
-  if (source->is_live() && options.pacing.speed == 0) options.pacing.speed = 1;
+  if (source->is_live()) {
+    options.pacing.live = true;
+    if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
+  }
   if (source->rig().kind == SensorKind::kMono) {
     throw IoError(arguments.source, "has a single camera without depth; stereo or RGB-D is needed");
   }

@@ -1,6 +1,7 @@
 #include "apps/twofold/run_arguments.hpp"
 
 #include <cstdlib>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -11,6 +12,9 @@
 
 namespace twofold {
 namespace {
+
+const std::map<std::string, LatePolicy> kLatePolicies{
+    {"queue", LatePolicy::kQueue}, {"drop", LatePolicy::kDrop}, {"newest", LatePolicy::kNewest}};
 
 std::vector<int> parse_numbers(const std::string& text, std::size_t count, const char* option) {
   std::vector<int> numbers;
@@ -46,7 +50,7 @@ EngineOptions engine_options(const RunArguments& arguments) {
       throw IoError("--speed", fmt::format("must be 'max' or a positive number, is '{}'", arguments.speed));
     }
   }
-  options.pacing.late = arguments.late == "drop" ? LatePolicy::kDrop : LatePolicy::kQueue;
+  if (!arguments.late.empty()) options.pacing.late = kLatePolicies.at(arguments.late);
   const std::vector<int> windows = parse_numbers(arguments.windows, 2, "--windows");
   options.mapper.inner_window = windows[0];
   options.mapper.outer_window = windows[1];
@@ -75,11 +79,14 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
       ->required();
   command.add_option("--calib", arguments.calibration, "Calibration file instead of the recording's own");
   command.add_option("--out", arguments.out, "Folder for trajectories, map, timing")->capture_default_str();
-  command.add_option("--speed", arguments.speed, "Recorded seconds a second (1, 2, ...), or max")
+  command
+      .add_option("--speed", arguments.speed,
+                  "Recorded seconds a second (1, 2, ...), or max; cameras set their own pace")
       ->capture_default_str();
-  command.add_option("--late", arguments.late, "Frames that are late: queue or drop")
-      ->check(CLI::IsMember({"queue", "drop"}))
-      ->capture_default_str();
+  command
+      .add_option("--late", arguments.late,
+                  "Frames that are late: queue (recordings do), drop, or newest (cameras do)")
+      ->check(CLI::IsMember(kLatePolicies));
   command.add_option("--windows", arguments.windows, "Keyframes in the inner and outer window")
       ->capture_default_str();
   command

@@ -14,7 +14,7 @@ struct RunArguments {
   std::string calibration;
   std::string out = "out/run";
   std::string speed = "max";
-  std::string late = "queue";
+  std::string late;  // empty: as the source wants it
   std::string windows = "25,175";
   std::string replay_schedule;
   std::string trace;

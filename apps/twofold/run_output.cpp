@@ -108,19 +108,28 @@ void write_trace(const std::filesystem::path& file, const RunResult& result) {
   if (!result.trace || !result.trace->write(out)) throw IoError(file.string(), "the trace cannot be written");
 }
 
+namespace {
+
+std::string durations(const LatencyHistogram& h) {
+  const auto ms = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-6; };
+  return fmt::format("mean {:.2f} ms, p50 {:.2f}, p99 {:.2f}, max {:.2f}", h.mean_ns() * 1e-6,
+                     ms(h.quantile_ns(0.5)), ms(h.quantile_ns(0.99)), ms(h.max_ns()));
+}
+
+}  // namespace
+
 void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
                    const RunResult& result) {
   const auto count = [&](FrameState state) {
     return std::count_if(result.frames.begin(), result.frames.end(),
                          [&](const auto& r) { return r.state == state; });
   };
-  std::int64_t metric_loops = 0;
-  for (const MapperRound& round : result.rounds) metric_loops += round.metric_loops;
   fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", result.frames.size(),
              count(FrameState::kTracked), count(FrameState::kLost), count(FrameState::kDropped),
              result.interrupted ? ", interrupted" : "");
   fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
-             result.graph.keyframe_count(), result.rounds.size(), metric_loops, result.loops.size());
+             result.graph.keyframe_count(), result.mapping.rounds, result.mapping.metric_loops,
+             result.loops.size());
   if (options.map) {
     const auto frame = recognised_at(options, result);
     fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),
@@ -138,11 +147,9 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
   }
   for (const StageRecorder& recorder : result.times) {
     if (recorder.thread_name() == "loop closer") continue;
-    const LatencyHistogram& h = recorder.histogram(0);
-    fmt::print("{:<11} mean {:.2f} ms, p50 {:.2f}, p99 {:.2f}, max {:.2f}\n", recorder.thread_name(),
-               h.mean_ns() * 1e-6, static_cast<double>(h.quantile_ns(0.5)) * 1e-6,
-               static_cast<double>(h.quantile_ns(0.99)) * 1e-6, static_cast<double>(h.max_ns()) * 1e-6);
+    fmt::print("{:<11} {}\n", recorder.thread_name(), durations(recorder.histogram(0)));
   }
+  if (options.pacing.keeps_pace()) fmt::print("exposure to pose: {}\n", durations(exposure_to_pose(result)));
   const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
   fmt::print("cost        {:.1f} s wall, {:.1f} s CPU ({:.1f} CPU-ms a frame), {:.0f} MB at most\n",
              result.wall_seconds, result.cpu_seconds, 1e3 * result.cpu_seconds / frames, result.peak_rss_mb);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
@@ -11,8 +12,24 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// A frame counts as late in the report when its pose was known later than this after it was due.
-constexpr std::int64_t kLateNs = 33'000'000;
+/// A frame counts as late in the report when its pose was known later than this after its exposure: when the
+/// next one was exposed, at the pace of the run, or at that of the recording if the run kept none.
+std::int64_t late_ns(const PacingOptions& pacing, const RunResult& result) {
+  UsualInterval interval;
+  for (const FrameRecord& record : result.frames) interval.add(record.t_ns);
+  const double speed = pacing.live || pacing.speed == 0 ? 1 : pacing.speed;
+  return std::llround(static_cast<double>(interval.ns()) / speed);
+}
+
+/// Of a run that kept a pace; nothing otherwise, because nothing says when its frames were exposed.
+Json exposure_to_pose_json(const PacingOptions& pacing, const RunResult& result) {
+  if (!pacing.keeps_pace()) return nullptr;
+  const LatencyHistogram latency = exposure_to_pose(result);
+  const auto ms = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-6; };
+  return {{"p50_ms", ms(latency.quantile_ns(0.5))},
+          {"p99_ms", ms(latency.quantile_ns(0.99))},
+          {"max_ms", ms(latency.max_ns())}};
+}
 
 Json parts_json(const std::vector<MapPart>& parts) {
   Json json = Json::array();
@@ -24,7 +41,8 @@ Json parts_json(const std::vector<MapPart>& parts) {
   return json;
 }
 
-Json late_and_lost(const RunResult& result) {
+Json late_and_lost(const PacingOptions& pacing, const RunResult& result) {
+  const std::int64_t period_ns = late_ns(pacing, result);
   Json lost = Json::array();
   Json late = Json::array();
   std::int64_t previous_t_ns = 0;
@@ -37,9 +55,9 @@ Json late_and_lost(const RunResult& result) {
     } else if (record.state == FrameState::kDropped) {
       late.push_back({{"frame", record.frame_index},
                       {"effort level", describe(record.effort)},
-                      {"cause", "dropped: its successor was due already"}});
-    } else if (record.latency_ns > kLateNs) {
-      const bool own = record.tracking_ns > kLateNs / 2;
+                      {"cause", "dropped: its successor was there already"}});
+    } else if (record.latency_ns > period_ns) {
+      const bool own = record.tracking_ns > period_ns / 2;
       late.push_back(
           {{"frame", record.frame_index},
            {"latency_ms", static_cast<double>(record.latency_ns) * 1e-6},
@@ -124,12 +142,6 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
     return std::count_if(result.frames.begin(), result.frames.end(),
                          [&](const auto& r) { return r.state == state; });
   };
-  std::int64_t metric_loops = 0;
-  std::int64_t late_loops = 0;
-  for (const MapperRound& round : result.rounds) {
-    metric_loops += round.metric_loops;
-    late_loops += round.late_loops;
-  }
   std::size_t keyframes = 0;
   std::size_t points = 0;
   for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k)
@@ -149,25 +161,26 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"loaded_map", loaded_map_json(options, result)},
             {"checkpoints", checkpoints_json(result.checkpoints)},
             {"map_parts", parts_json(parts)},
-            {"mapper_rounds", result.rounds.size()},
-            {"metric_loop_edges", metric_loops},
+            {"mapper_rounds", result.mapping.rounds},
+            {"metric_loop_edges", result.mapping.metric_loops},
             {"closed_loops", loops_json(result)},
-            {"loops_too_late", late_loops},
+            {"loops_too_late", result.mapping.late_loops},
             {"pose_corrections", corrections_json(result)},
-            {"proposals_refused", result.proposals_refused},
             {"wall_seconds", result.wall_seconds},
             {"cpu_seconds", result.cpu_seconds},
+            {"exposure_to_pose", exposure_to_pose_json(options.pacing, result)},
             {"cpu_ms_per_frame", 1e3 * result.cpu_seconds / frames},
             {"peak_rss_mb", result.peak_rss_mb},
             {"options",
              {{"deterministic", options.deterministic},
+              {"live", options.pacing.live},
               {"speed", options.pacing.speed},
               {"inner_window", options.mapper.inner_window},
               {"outer_window", options.mapper.outer_window},
               {"min_covisible", options.mapper.min_covisible},
               {"wanted_matches", options.tracker.wanted_matches}}},
             {"notes", result.notes}};
-  json.update(late_and_lost(result));
+  json.update(late_and_lost(options.pacing, result));
   return json;
 }
 

@@ -166,7 +166,7 @@ void scoped_stage_with_trace(benchmark::State& state) {
 BENCHMARK(scoped_stage_with_trace);
 
 void schedule_append(benchmark::State& state) {
-  ScheduleStream<TrackerStep> stream(std::size_t{64} << 20);
+  ScheduleStream<TrackerStep> stream;
   TrackerStep step;
   for (auto _ : state) {
     ++step.frame;

@@ -61,7 +61,7 @@ void recorders_of_one_frame(benchmark::State& state) {
   const StageId latency_stage = times.add_stage("latency");
   const TraceName version = times.add_counter("version");
   const TraceName effort = times.add_counter("effort level");
-  ScheduleStream<TrackerStep> schedule(std::size_t{64} << 20);
+  ScheduleStream<TrackerStep> schedule;
   TrackerStep step;
   const std::int64_t begin_ns = steady_now_ns();
   for (auto _ : state) {

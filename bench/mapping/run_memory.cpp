@@ -57,6 +57,21 @@ MeasuredRun measure(const std::string& text) {
   return run;
 }
 
+/// What grows with the time, not with the place.
+void print_records(const RunResult& result) {
+  const auto line = [](const char* what, std::size_t count, std::size_t bytes) {
+    fmt::print("          on record: {:>9} {:<12} {:9.2f} MiB\n", count, what,
+               static_cast<double>(bytes) / (kKiB * kKiB));
+  };
+  const ScheduleStreams& schedule = result.schedule;
+  line("frames", result.frames.size(), result.frames.size() * sizeof(FrameRecord));
+  line("corrections", result.corrections.size(), result.corrections.size() * sizeof(PoseCorrection));
+  line("loops", result.loops.size(), result.loops.size() * sizeof(ClosedLoop));
+  line(
+      "steps", schedule.tracker.records() + schedule.mapper.records() + schedule.loop_closer.records(),
+      schedule.tracker.bytes().size() + schedule.mapper.bytes().size() + schedule.loop_closer.bytes().size());
+}
+
 void print(const std::string& text, const MeasuredRun& run) {
   const std::vector<Sample>& samples = run.samples;
   if (samples.size() < 4) throw std::runtime_error(text + ": too few keyframes to tell");
@@ -75,8 +90,8 @@ void print(const std::string& text, const MeasuredRun& run) {
   std::size_t living = 0;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k)
     living += !graph.keyframe(KeyframeId{k}).culled();
-  fmt::print("          in the end {} of {} keyframes are in the map; {} frames of {} bytes are on record\n",
-             living, graph.keyframe_count(), run.result.frames.size(), sizeof(FrameRecord));
+  fmt::print("          in the end {} of {} keyframes are in the map\n", living, graph.keyframe_count());
+  print_records(run.result);
 }
 
 }  // namespace

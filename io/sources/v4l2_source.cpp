@@ -44,6 +44,16 @@ void V4l2Source::set_up_calibration(SourceParameters& parameters, const SourceOp
   rig_ = rectifier_->rig();
 }
 
+namespace {
+
+/// The image, or a copy if it lies in the driver's memory, which goes back with the next call: such a Mat has
+/// no memory of its own.
+cv::Mat keep(const cv::Mat& image) {
+  return image.u == nullptr ? image.clone() : image;
+}
+
+}  // namespace
+
 bool V4l2Source::read(Frame& frame) {
   Frame raw;
   if (frames_.next(*stop_, &raw) == V4l2Frames::Status::kStopped) return false;
@@ -53,12 +63,11 @@ bool V4l2Source::read(Frame& frame) {
     rectifier_->rectify(raw, frame);
     return true;
   }
-  // The driver's memory goes back with the next call.
   frame.index = raw.index;
   frame.t_ns = raw.t_ns;
-  frame.left = raw.left.clone();
-  frame.right = raw.right.clone();
-  frame.depth = raw.depth.clone();
+  frame.left = keep(raw.left);
+  frame.right = keep(raw.right);
+  frame.depth = keep(raw.depth);
   return true;
 }
 

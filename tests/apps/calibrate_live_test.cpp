@@ -9,11 +9,11 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "apps/twofold/calibration_session.hpp"
+#include "fixtures/fake_device.hpp"
 #include "io/files/calibration_file.hpp"
 #include "io/sources/v4l2_source.hpp"
 #include "tests/apps/calibrating_person.hpp"
 #include "tests/io/scratch_folder.hpp"
-#include "tests/io/v4l2/fake_device.hpp"
 
 namespace twofold {
 namespace {

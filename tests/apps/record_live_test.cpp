@@ -5,10 +5,10 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/record_session.hpp"
+#include "fixtures/fake_device.hpp"
 #include "io/sources/open_source.hpp"
 #include "io/sources/v4l2_source.hpp"
 #include "tests/apps/command.hpp"
-#include "tests/io/v4l2/fake_device.hpp"
 
 namespace twofold {
 namespace {

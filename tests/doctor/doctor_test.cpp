@@ -5,8 +5,8 @@
 #include "doctor/camera.hpp"
 #include "doctor/disk.hpp"
 #include "doctor/machine.hpp"
+#include "fixtures/fake_device.hpp"
 #include "tests/io/scratch_folder.hpp"
-#include "tests/io/v4l2/fake_device.hpp"
 
 namespace twofold {
 namespace {

@@ -16,7 +16,7 @@ std::int64_t latency(double periods) {
 }
 
 TEST(EffortController, GoesDownARungForEachLateFrameInTheStatedOrder) {
-  EffortController controller({});
+  EffortController controller({}, LatePolicy::kDrop);
   std::vector<EffortLevel> levels{controller.effort()};
   for (int i = 0; i < 6; ++i) {
     controller.tracked(latency(1.1), kPeriod);
@@ -28,7 +28,7 @@ TEST(EffortController, GoesDownARungForEachLateFrameInTheStatedOrder) {
 
 TEST(EffortController, ComesBackARungAtATimeAndOnlyAfterPatience) {
   const EffortOptions options{.patience = 10};
-  EffortController controller(options);
+  EffortController controller(options, LatePolicy::kDrop);
   for (int i = 0; i < 4; ++i) controller.tracked(latency(2), kPeriod);
   for (int effort = static_cast<int>(kBottom); effort > 0; --effort) {
     for (int i = 0; i < options.patience; ++i) {
@@ -42,7 +42,7 @@ TEST(EffortController, ComesBackARungAtATimeAndOnlyAfterPatience) {
 }
 
 TEST(EffortController, StaysBetweenEarlyAndLate) {
-  EffortController controller({});
+  EffortController controller({}, LatePolicy::kDrop);
   controller.tracked(latency(1.5), kPeriod);
   for (int i = 0; i < 500; ++i) {
     // One frame that is neither early nor late begins the count anew.
@@ -52,7 +52,7 @@ TEST(EffortController, StaysBetweenEarlyAndLate) {
 }
 
 TEST(EffortController, DropsOnTheLastRungOrBeyondTheBoundAndOnlyIfThePolicyAllows) {
-  EffortController controller({.drop_after = 1.5});
+  EffortController controller({.drop_after = 1.5}, LatePolicy::kDrop);
   const Arrival overtaken{0, latency(1.2), kPeriod, true};
   const Arrival beyond{0, latency(1.6), kPeriod, true};
   Arrival queued = beyond;
@@ -66,8 +66,17 @@ TEST(EffortController, DropsOnTheLastRungOrBeyondTheBoundAndOnlyIfThePolicyAllow
   EXPECT_FALSE(controller.must_drop(queued));
 }
 
+TEST(EffortController, TheNewestFrameWinsAtOnceAndAQueueLosesNone) {
+  const Arrival waited{0, latency(3), kPeriod, false};
+  const Arrival overtaken{0, latency(0.1), kPeriod, true};
+  const EffortController newest({}, LatePolicy::kNewest);
+  EXPECT_TRUE(newest.must_drop(overtaken));
+  EXPECT_FALSE(newest.must_drop(waited));
+  EXPECT_FALSE(EffortController({}, LatePolicy::kQueue).must_drop({0, latency(9), kPeriod, true}));
+}
+
 TEST(EffortController, WithoutAPaceNothingIsLate) {
-  EffortController controller({});
+  EffortController controller({}, LatePolicy::kDrop);
   for (int i = 0; i < 10; ++i) controller.tracked(latency(100), 0);
   EXPECT_EQ(controller.effort(), kTop);
 }

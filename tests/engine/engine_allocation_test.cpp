@@ -14,8 +14,8 @@ namespace {
 
 using testing::allocations;
 
-/// All that the tracker thread does with a frame, with recorders, trace and schedule log on: tracked frames,
-/// keyframes, lost frames, the question where it is, and its answer.
+/// All that the tracker thread does with a frame, with recorders and trace on: tracked frames, keyframes,
+/// lost frames, the question where it is, and its answer.
 TEST(TrackerThread, NeverAllocates) {
   if (!testing::allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
   const Rig rig = testing::test_rig(SensorKind::kStereo, 320, 240);
@@ -40,8 +40,7 @@ TEST(TrackerThread, NeverAllocates) {
   LoopCloserRunner loop_closing(rig, options, &trace);
   ProposalPool proposals(4, [&](KeyframeProposal& proposal) { tracking.prepare(proposal); });
   RequestPool requests(2, [&](RelocalisationRequest& r) { allocate_images(rig, r.images); });
-  ScheduleStream<TrackerStep> schedule;
-  EffortController controller({});
+  EffortController controller({}, LatePolicy::kQueue);
   GraphSnapshot graph = mapping.publish();
 
   int keyframes = 0, lost = 0, asked = 0;
@@ -54,10 +53,8 @@ TEST(TrackerThread, NeverAllocates) {
     FrameRecord record;
     if (answer) tracking.take_answer(*answer);
     const bool proposed = tracking.step(frame, graph, controller.effort(), proposal, record);
-    tracking.finish(0, 40'000'000, record);
+    tracking.finish(0, 40'000'000, graph, record);
     controller.tracked(i < 4 ? 40'000'000 : 5'000'000, 33'000'000);
-    schedule.append({frame.index, graph.version(), TrackerStep::Fate::kTracked,
-                     static_cast<std::uint8_t>(controller.effort())});
     RequestHandle request;
     if (tracking.wants_relocalisation()) {
       request = requests.try_acquire();

@@ -2,18 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <sstream>
 
-#include <fmt/format.h>
-
 #include "engine/engine.hpp"
+#include "fixtures/fake_device.hpp"
+#include "fixtures/side_by_side_camera.hpp"
 #include "io/sources/open_source.hpp"
 #include "io/sources/recording_tee.hpp"
 #include "io/sources/synthetic_source.hpp"
 #include "io/sources/v4l2_source.hpp"
 #include "tests/io/scratch_folder.hpp"
-#include "tests/io/v4l2/fake_device.hpp"
 #include "tests/sanitized.hpp"
 
 namespace twofold {
@@ -37,9 +35,7 @@ class EngineCameraTest : public ::testing::Test {
   }
 
   static FakeFrame stream_frame(std::uint64_t k, std::uint32_t format) {
-    const Frame& frame = frames_->at(std::min<std::size_t>(k, kFrames - 1));
-    cv::Mat both;
-    cv::hconcat(frame.left, frame.right, both);
+    const cv::Mat both = testing::side_by_side(frames_->at(std::min<std::size_t>(k, kFrames - 1)));
     FakeFrame made;
     if (format == V4L2_PIX_FMT_MJPEG) {
       cv::imencode(".jpg", both, made.bytes, {cv::IMWRITE_JPEG_QUALITY, 95});
@@ -56,17 +52,10 @@ class EngineCameraTest : public ::testing::Test {
   static std::unique_ptr<FrameSource> camera(std::uint32_t format) {
     auto driver = std::make_unique<FakeV4l2>();
     FakeV4l2::Device& device = driver->devices["/dev/video0"];
-    device.formats = {format};
-    device.width = 640;
-    device.height = 240;
-    device.bytes_per_pixel = format == V4L2_PIX_FMT_GREY ? 1 : 2;
-    device.buffer_bytes = 640 * 240 * 2;
+    testing::set_up_side_by_side(device, *rig_, format);
     device.frame = [format](std::uint64_t k) { return stream_frame(k, format); };
-    const PinholeCamera& c = rig_->camera;
-    const std::string text =
-        fmt::format("v4l2:/dev/video0?layout=side-by-side&fx={}&fy={}&cx={}&cy={}&baseline={}", c.fx, c.fy,
-                    c.cx, c.cy, rig_->baseline);
-    return std::make_unique<V4l2Source>(parse_source_spec(text), SourceOptions{}, std::move(driver));
+    return std::make_unique<V4l2Source>(parse_source_spec(testing::side_by_side_source(*rig_)),
+                                        SourceOptions{}, std::move(driver));
   }
 
   /// The source's first frames: a camera has no last one.

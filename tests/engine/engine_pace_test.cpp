@@ -29,6 +29,25 @@ TEST_F(EnginePaceTest, LateFramesAreDroppedOnRequestAndReplayed) {
                                      [](const auto& record) { return record.state == FrameState::kDropped; });
   EXPECT_GT(dropped, 0);
   expect_replay(options, feed(), live);
+  Progress last;
+  std::atomic<bool> interrupted{false};
+  (void)Engine(small_rig(), options).replay(feed(), schedule_of(live), interrupted, [&](const Progress& p) {
+    last = p;
+  });
+  EXPECT_EQ(last.frames, kFrames);
+  EXPECT_EQ(last.dropped, dropped);
+}
+
+TEST_F(EnginePaceTest, EveryProposedKeyframeReachesTheMapHoweverShortTheQueueIs) {
+  EngineOptions options;
+  options.pacing.speed = 2000;
+  options.proposal_slots = 1;
+  const RunResult live = run(options);
+  const auto proposed = std::count_if(live.frames.begin(), live.frames.end(),
+                                      [](const auto& record) { return record.keyframe; });
+  EXPECT_GE(proposed, 2);
+  EXPECT_EQ(live.graph.keyframe_count(), static_cast<std::size_t>(proposed));
+  expect_replay(options, feed(), live);
 }
 
 /// Time passes when it is read, which is two or three times a frame, and for a while more than a frame has.

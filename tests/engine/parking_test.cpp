@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <thread>
@@ -19,12 +20,24 @@ TEST(Parking, DoesNotSleepWhenReady) {
   EXPECT_TRUE(parking.wait({}, [] { return true; }));
 }
 
-TEST(Parking, AWakeBeforeTheWaitIsNotNeededForAConditionThatHolds) {
+TEST(Parking, AWakeEndsTheSleepLongBeforeItsDeadline) {
   Parking parking;
-  bool value = false;
-  parking.wake();
+  std::atomic<bool> value{false};
+  std::atomic<int> looks{0};
+  const auto begin = std::chrono::steady_clock::now();
+  std::jthread sleeper([&] {
+    const auto ready = [&] {
+      ++looks;
+      return value.load();
+    };
+    EXPECT_TRUE(parking.wait_until({}, begin + 60s, ready));
+  });
+  while (looks < 2) std::this_thread::yield();  // before and after its announcement: now it goes to sleep
+  std::this_thread::sleep_for(5ms);
   value = true;
-  EXPECT_TRUE(parking.wait({}, [&] { return value; }));
+  parking.wake();
+  sleeper.join();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 30s);
 }
 
 TEST(Parking, EndsAtTheDeadlineAndNotBefore) {

@@ -18,7 +18,7 @@ TEST(ReplacementLog, FramesOfForgottenKeyframesKeepTheirPlace) {
   GraphWriter forgetful, faithful;
   ReplacementLog replacement_log;
   std::vector<KeyframeId> live;
-  std::vector<FrameRecord> frames;
+  ChunkedVector<FrameRecord> frames;
   const auto cull = [&](std::size_t n) {
     const KeyframeId id = live[n];
     live.erase(live.begin() + static_cast<std::ptrdiff_t>(n));
@@ -39,7 +39,7 @@ TEST(ReplacementLog, FramesOfForgottenKeyframesKeepTheirPlace) {
       frame.T_c_ref = PackedPose(random_pose(rng));
       frames.push_back(frame);
     }
-    frames.emplace_back();  // a lost one
+    frames.push_back({});  // a lost one
     const KeyframeId moved = live[rng() % live.size()];
     const SE3 T_moved_w = random_pose(rng);
     for (GraphWriter* writer : {&forgetful, &faithful}) writer->set_pose(moved, T_moved_w);
@@ -50,7 +50,7 @@ TEST(ReplacementLog, FramesOfForgottenKeyframesKeepTheirPlace) {
     forgetful.forget_replacements(2);
     for (const KeyframeId id : {first, second}) replacement_log.add(id, forgetful.graph());
   }
-  const std::vector<FrameRecord> before = frames;
+  const ChunkedVector<FrameRecord> before = frames;
   replacement_log.hang_on_live_keyframes(frames);
   int hung_anew = 0;
   for (std::size_t n = 0; n < frames.size(); ++n) {

@@ -7,6 +7,7 @@
 
 #include "engine/engine.hpp"
 #include "tests/engine/small_scene.hpp"
+#include "tests/graph/same_map.hpp"
 
 /// Runs of the engine with the rig of small_scene.hpp, and what its tests ask of their results.
 namespace twofold::testing {
@@ -32,6 +33,42 @@ inline Schedule schedule_of(const RunResult& result) {
   return schedule.value_or(Schedule());
 }
 
+/// Keyframes with their observations and edges, points, places.
+inline void expect_same_map(const RunResult& a, const RunResult& b) {
+  expect_same(SavedMap{small_rig(), a.graph, a.places}, SavedMap{small_rig(), b.graph, b.places});
+  if (::testing::Test::HasFatalFailure()) return;
+  for (std::uint32_t k = 0; k < a.graph.keyframe_count(); ++k) {
+    const KeyframeId id{k};
+    EXPECT_EQ(a.graph.T_k_w(id).matrix(), b.graph.T_k_w(id).matrix()) << k;
+    EXPECT_EQ(a.graph.part(id), b.graph.part(id)) << k;
+    const EdgeList &of_a = *a.graph.keyframe(id).edges, &of_b = *b.graph.keyframe(id).edges;
+    for (std::size_t n = 0; n < of_a.size(); ++n)
+      EXPECT_EQ(of_a[n].T_other_this.matrix(), of_b[n].T_other_this.matrix()) << k << " " << n;
+  }
+}
+
+/// Loops closed by appearance, and the corrections of the pose that frames saw.
+inline void expect_same_loops(const RunResult& a, const RunResult& b) {
+  ASSERT_EQ(a.loops.size(), b.loops.size());
+  for (std::size_t n = 0; n < a.loops.size(); ++n) {
+    const ClosedLoop &p = a.loops[n], &q = b.loops[n];
+    EXPECT_EQ(p.constraint.from, q.constraint.from) << n;
+    EXPECT_EQ(p.constraint.to, q.constraint.to) << n;
+    EXPECT_EQ(p.constraint.T_to_from.matrix(), q.constraint.T_to_from.matrix()) << n;
+    EXPECT_EQ(p.constraint.inliers, q.constraint.inliers) << n;
+    EXPECT_EQ(p.T_to_from_before.matrix(), q.T_to_from_before.matrix()) << n;
+    EXPECT_EQ(p.t_ns, q.t_ns) << n;
+  }
+  ASSERT_EQ(a.corrections.size(), b.corrections.size());
+  for (std::size_t n = 0; n < a.corrections.size(); ++n) {
+    const PoseCorrection &p = a.corrections[n], &q = b.corrections[n];
+    EXPECT_EQ(p.reason, q.reason) << n;
+    EXPECT_EQ(p.frame_index, q.frame_index) << n;
+    EXPECT_EQ(p.T_c_w_before.matrix(), q.T_c_w_before.matrix()) << n;
+    EXPECT_EQ(p.T_c_w_after.matrix(), q.T_c_w_after.matrix()) << n;
+  }
+}
+
 /// Bit for bit.
 inline void expect_same(const RunResult& a, const RunResult& b) {
   ASSERT_EQ(a.frames.size(), b.frames.size());
@@ -44,15 +81,12 @@ inline void expect_same(const RunResult& a, const RunResult& b) {
     EXPECT_EQ(a.frames[i].part_causal, b.frames[i].part_causal) << i;
     EXPECT_EQ(a.frames[i].effort, b.frames[i].effort) << i;
   }
-  ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
-  ASSERT_EQ(a.graph.point_count(), b.graph.point_count());
-  for (std::uint32_t k = 0; k < a.graph.keyframe_count(); ++k) {
-    EXPECT_EQ(a.graph.T_k_w(KeyframeId{k}).matrix(), b.graph.T_k_w(KeyframeId{k}).matrix()) << k;
-    EXPECT_EQ(a.graph.part(KeyframeId{k}), b.graph.part(KeyframeId{k})) << k;
-  }
-  for (std::uint32_t p = 0; p < a.graph.point_count(); ++p) {
-    EXPECT_EQ(a.graph.point(PointId{p}).psi, b.graph.point(PointId{p}).psi) << p;
-  }
+  expect_same_map(a, b);
+  expect_same_loops(a, b);
+  EXPECT_EQ(a.mapping.rounds, b.mapping.rounds);
+  EXPECT_EQ(a.mapping.metric_loops, b.mapping.metric_loops);
+  EXPECT_EQ(a.mapping.loops, b.mapping.loops);
+  EXPECT_EQ(a.mapping.late_loops, b.mapping.late_loops);
 }
 
 /// A run by the schedule that `live` left: the same results, bit for bit, and the same schedule.

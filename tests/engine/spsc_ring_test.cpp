@@ -46,7 +46,11 @@ TEST(SpscRing, KeepsOrderAndSizeOverManyTurns) {
     }
     for (int k = 0; k < 1 + turn % 5; ++k) {
       int value = -1;
+      const int* const front = ring.peek();
+      const int seen = front == nullptr ? -1 : *front;
+      ASSERT_EQ(front != nullptr, ring.has_value());
       if (!ring.try_pop(value)) break;
+      ASSERT_EQ(value, seen);
       ASSERT_EQ(value, next_out++);
     }
     ASSERT_EQ(ring.size_approx(), static_cast<std::size_t>(next_in - next_out));

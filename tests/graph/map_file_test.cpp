@@ -4,12 +4,15 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <csignal>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 
 #include "fixtures/graph_invariants.hpp"
+#include "fixtures/live_memory.hpp"
 #include "tests/graph/same_map.hpp"
 #include "tests/graph/sample_map.hpp"
 
@@ -33,6 +36,10 @@ class MapFileTest : public ::testing::Test {
     std::ifstream in(file, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
+  /// Content of a file's first section.
+  static std::string head_of(const fs::path& file) {
+    return bytes_of(file).substr(8 + 12, 1 + 4 * 8 + 2 * 4 + 4 * 8 + 8 + 3 * 4);
+  }
   static SavedMap parse(const std::string& bytes) {
     std::istringstream in(bytes);
     return read_map(in, bytes.size(), "test");
@@ -47,7 +54,53 @@ class MapFileTest : public ::testing::Test {
     return "";
   }
 
+  static bool is_forgotten(const GraphSnapshot& graph, std::uint32_t k) {
+    return graph.keyframe(KeyframeId{k}).culled() && graph.replacement(KeyframeId{k}).id == kNoKeyframe;
+  }
+
   fs::path folder_, file_;
+};
+
+/// Bytes of a map file as somebody might write them by hand; checksums are right.
+class HandMade {
+ public:
+  explicit HandMade(std::uint8_t version) : bytes_{'T', 'F', 'M', 'A', 'P', char(version), 0, 0} {}
+  void section(std::uint32_t id, const std::string& content) {
+    std::string section(12, '\0');
+    const std::uint64_t length = content.size();
+    std::memcpy(section.data(), &id, 4);
+    std::memcpy(section.data() + 4, &length, 8);
+    section += content;
+    const auto crc = static_cast<std::uint32_t>(
+        crc32_z(0, reinterpret_cast<const Bytef*>(section.data()), section.size()));
+    bytes_ += section;
+    bytes_.append(reinterpret_cast<const char*>(&crc), 4);
+  }
+  void head(const std::string& head_of_a_map, std::uint32_t keyframes, std::uint32_t points) {
+    std::string head = head_of_a_map;
+    std::memcpy(head.data() + head.size() - 8, &keyframes, 4);
+    std::memcpy(head.data() + head.size() - 4, &points, 4);
+    section(1, head);
+  }
+  void end() { section(0, ""); }
+  [[nodiscard]] const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+/// Reads from memory and looks, whenever a section is fetched, how much of it the program holds.
+class WatchedBuffer : public std::stringbuf {
+ public:
+  explicit WatchedBuffer(const std::string& bytes) : std::stringbuf(bytes, std::ios::in) {}
+  [[nodiscard]] std::size_t most_live() const { return most_live_; }
+
+ private:
+  std::streamsize xsgetn(char* to, std::streamsize count) override {
+    most_live_ = std::max(most_live_, live_heap_bytes());
+    return std::stringbuf::xsgetn(to, count);
+  }
+  std::size_t most_live_ = 0;
 };
 
 TEST_F(MapFileTest, WhatIsSavedIsLoaded) {
@@ -60,15 +113,17 @@ TEST_F(MapFileTest, WhatIsSavedIsLoaded) {
   EXPECT_FALSE(fs::exists(file_.string() + ".tmp"));
 }
 
-/// Written by the program that had format version 1.
-TEST_F(MapFileTest, TheOlderFormatIsRead) {
-  const SavedMap loaded = load_map(fs::path(TEST_DATA) / "map_version_1.tfm");
-  EXPECT_EQ(broken_invariant(loaded.graph), "");
-  expect_same(sample_map(12, 30, 14), loaded, 1e-14);
+/// Written by the programs that had these versions.
+TEST_F(MapFileTest, OlderFormatsAreRead) {
+  for (const char* file : {"map_version_1.tfm", "map_version_2.tfm"}) {
+    const SavedMap loaded = load_map(fs::path(TEST_DATA) / file);
+    EXPECT_EQ(broken_invariant(loaded.graph), "");
+    expect_same(sample_map(12, 30, 14), loaded, 1e-14);
+  }
 }
 
 /// The file has what is left; of that, only points still ask for culled keyframes after loading.
-TEST_F(MapFileTest, ForgottenKeyframesTakeAByte) {
+TEST_F(MapFileTest, ForgottenKeyframesAreOnlyCounted) {
   GraphWriter writer(sample_map(200, 2000, 15).graph);
   for (std::uint32_t p = 0; p < 1000; ++p) writer.cull_point(PointId{p});
   const auto size = [&](SavedMap& map) {
@@ -86,7 +141,10 @@ TEST_F(MapFileTest, ForgottenKeyframesTakeAByte) {
   ASSERT_GT(kept, 0U);
   ASSERT_LT(kept, known);
   const auto with_needed = size(map);
-  EXPECT_EQ(with_all - with_needed, (known - kept) * (4 + 7 * 8));
+  std::size_t runs = 0;
+  for (std::uint32_t k = 0; k < map.graph.keyframe_count(); ++k)
+    runs += is_forgotten(map.graph, k) && (k == 0 || !is_forgotten(map.graph, k - 1)) ? 1 : 0;
+  EXPECT_EQ(with_all - with_needed, (known - kept) * (1 + 4 + 7 * 8) - runs * (1 + 4));
   const SavedMap loaded = load_map(file_);
   EXPECT_EQ(broken_invariant(loaded.graph), "");
   EXPECT_EQ(known_replacements(loaded.graph), kept);
@@ -94,6 +152,77 @@ TEST_F(MapFileTest, ForgottenKeyframesTakeAByte) {
     if (!before.point(PointId{p}).alive()) continue;
     EXPECT_LT((loaded.graph.position(PointId{p}) - before.position(PointId{p})).norm(), 1e-9);
   }
+}
+
+/// A million keyframes and points come and go: the file counts them, and does not grow.
+TEST_F(MapFileTest, WhatIsGoneTakesNoSpace) {
+  SavedMap map = sample_map(60, 900, 16);
+  save_map(file_, map);
+  const auto before = fs::file_size(file_);
+  GraphWriter writer(map.graph);
+  writer.add_forgotten_keyframes(1'000'000);
+  writer.fill_with_culled_points(2'000'000);
+  map.graph = writer.publish();
+  save_map(file_, map);
+  EXPECT_LE(fs::file_size(file_), before + (1 + 4) + (4 + 4));
+  const SavedMap loaded = load_map(file_);
+  EXPECT_EQ(loaded.graph.keyframe_count(), 1'000'060U);
+  EXPECT_EQ(loaded.graph.point_count(), 2'000'000U);
+  expect_same(map, loaded);
+}
+
+TEST_F(MapFileTest, NoFileTakesMoreMemoryThanAFewTimesItsSize) {
+  save_map(file_, SavedMap{sample_map(2, 2, 1).rig, {}, {}});
+  const std::string head = head_of(file_);
+  for (const std::uint8_t version : {2, 3}) {
+    HandMade file(version);
+    constexpr std::uint32_t kSections = 1000, kEntries = 1024;
+    file.head(head, kSections * kEntries, 0);
+    // One forgotten keyframe each.
+    std::string entries;
+    for (std::uint32_t n = 0; n < kEntries; ++n)
+      entries += version == 2 ? std::string(1, '\0') : std::string("\0\1\0\0\0", 5);
+    for (std::uint32_t n = 0; n < kSections; ++n) file.section(2, entries);
+    file.end();
+    const std::size_t live = live_heap_bytes();
+    WatchedBuffer buffer(file.bytes());
+    const std::size_t own = live_heap_bytes() - live;
+    std::istream in(&buffer);
+    EXPECT_THROW((void)read_map(in, file.bytes().size(), "test"), MapFileError);  // no reference keyframe
+    EXPECT_LT(buffer.most_live() - live - own, 4 * file.bytes().size()) << "version " << int{version};
+  }
+}
+
+TEST_F(MapFileTest, RunsThatAreEmptyOrTooLongAreRefused) {
+  save_map(file_, SavedMap{sample_map(2, 2, 1).rig, {}, {}});
+  const std::string head = head_of(file_);
+  const auto error = [&](std::uint32_t keyframes, std::uint32_t points, const std::string& keyframe_run,
+                         const std::string& point_run) {
+    HandMade file(3);
+    file.head(head, keyframes, points);
+    if (!keyframe_run.empty()) file.section(2, std::string(1, '\0') + keyframe_run);
+    if (!point_run.empty()) file.section(3, std::string(4, '\xff') + point_run);
+    file.end();
+    return error_of(file.bytes());
+  };
+  const std::string none("\0\0\0\0", 4), five("\5\0\0\0", 4);
+  EXPECT_NE(error(5, 0, none, "").find("run of nothing"), std::string::npos);
+  EXPECT_NE(error(0, 5, "", none).find("run of nothing"), std::string::npos);
+  EXPECT_NE(error(4, 0, five, "").find("more keyframes than announced"), std::string::npos);
+  EXPECT_NE(error(0, 4, "", five).find("more points than announced"), std::string::npos);
+  EXPECT_EQ(error(0, 5, "", five), "");
+  EXPECT_NE(error(1U << 24 | 1, 0, five, "").find("too large a map"), std::string::npos);
+}
+
+TEST_F(MapFileTest, WhatCouldNotBeLoadedIsNotSaved) {
+  SavedMap map = sample_map(4, 10, 17);
+  save_map(file_, map);
+  const std::string before = bytes_of(file_);
+  GraphWriter writer(map.graph);
+  writer.add_forgotten_keyframes(1U << 24);
+  map.graph = writer.publish();
+  EXPECT_THROW(save_map(file_, map), MapFileError);
+  EXPECT_EQ(bytes_of(file_), before);
 }
 
 TEST_F(MapFileTest, AnEmptyMapAndOneOfSeveralSlices) {

@@ -17,6 +17,7 @@
 #include "engine/frame_pool.hpp"
 #include "engine/snapshot_mailbox.hpp"
 #include "engine/spsc_ring.hpp"
+#include "graph/shared_array.hpp"
 
 // Model checker; its warnings are its own.
 #pragma GCC diagnostic push
@@ -77,7 +78,7 @@ class ModelAtomic {
                                     std::add_pointer_t<std::remove_const_t<std::remove_pointer_t<V>>>, V>;
 
  public:
-  explicit ModelAtomic(V value) { value_.store(unconst(value), rl::mo_relaxed, $); }
+  ModelAtomic(V value) { value_.store(unconst(value), rl::mo_relaxed, $); }
   V load(std::memory_order order) const { return value_.load(model_order(order, Access::kLoad), $); }
   void store(V value, std::memory_order order) { value_.store(value, model_order(order, Access::kStore), $); }
   V exchange(V value, std::memory_order order) {

@@ -75,5 +75,14 @@ TEST(FrameIntervals, TellMissingFramesFromGapsInTime) {
   EXPECT_EQ(intervals.next(9, 466 * kMs), LostCause::kFramesMissing);
 }
 
+TEST(FrameIntervals, TwoFramesThatComeTogetherMakeNoGapsOfTheOthers) {
+  FrameIntervals intervals;
+  std::int64_t t_ns = 0;
+  for (int i = 0; i < 40; ++i) {
+    t_ns += i == 10 ? 2'000'000 : 33'000'000;
+    EXPECT_EQ(intervals.next(i, t_ns), LostCause::kNone) << i;
+  }
+}
+
 }  // namespace
 }  // namespace twofold

@@ -90,37 +90,6 @@ TEST(Tracker, NumbersKeyframesAndPointsWithoutGaps) {
   EXPECT_GT(points, 100u);
 }
 
-TEST(Tracker, TakesNumbersBackWhenAProposalWasRejected) {
-  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
-  Tracker tracker(test_rig(SensorKind::kStereo, 320, 240), {});
-  PlainMap map;
-  GraphSnapshot snapshot = map.publish();
-  KeyframeProposal proposal;
-  std::uint32_t keyframes = 0;
-  std::uint32_t points = 0;
-  int rejected = 0;
-  for (const Frame& frame : sequence) {
-    const TrackResult result = tracker.step(frame, snapshot, &proposal);
-    if (!result.proposed) continue;
-    EXPECT_EQ(index(proposal.id), keyframes);
-    if (!proposal.new_points.empty()) {
-      EXPECT_EQ(index(proposal.new_points.front().id), points);
-    }
-    if (frame.index % 2 == 1) {  // the ring is full every other frame
-      tracker.proposal_rejected();
-      ++rejected;
-      continue;
-    }
-    ++keyframes;
-    points += static_cast<std::uint32_t>(proposal.new_points.size());
-    map.insert(proposal);
-    snapshot = map.publish();
-  }
-  EXPECT_GT(rejected, 1);
-  EXPECT_GT(keyframes, 2u);
-  EXPECT_EQ(snapshot.keyframe_count(), keyframes);
-}
-
 TEST(Tracker, MakesNoKeyframeWithoutABuffer) {
   Tracker tracker(test_rig(SensorKind::kStereo, 320, 240), {});
   PlainMap map;

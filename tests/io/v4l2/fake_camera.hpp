@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "io/v4l2/camera.hpp"
-#include "tests/io/v4l2/fake_device.hpp"
+#include "fixtures/fake_device.hpp"
 
 namespace twofold {
 

@@ -7,7 +7,7 @@
 
 #include "io/files/io_error.hpp"
 #include "io/sources/source_parameters.hpp"
-#include "tests/io/v4l2/fake_device.hpp"
+#include "fixtures/fake_device.hpp"
 
 namespace twofold {
 namespace {

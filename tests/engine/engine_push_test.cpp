@@ -1,0 +1,124 @@
+// Runs that are given their frames one at a time, and who is told of each pose.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "engine/lockstep_run.hpp"
+#include "engine/threaded_run.hpp"
+#include "tests/engine/swaying_camera.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::expect_replay;
+using testing::expect_same;
+using testing::small_rig;
+
+constexpr auto kLongest = std::chrono::minutes(5);
+
+class EnginePushTest : public testing::SwayingCamera {
+ protected:
+  static const Frame& frame(std::size_t i) { return frames_->at(i); }
+
+  static void wait_for_room(ThreadedRun& run, const FrameSink& sink = {}) {
+    while (!run.has_room()) {
+      run.collect(sink);
+      ASSERT_FALSE(run.failed());
+      run.wait(std::chrono::steady_clock::now() + kLongest);
+    }
+  }
+};
+
+TEST_F(EnginePushTest, PushedFramesAreCollectedInOrderAndReplay) {
+  ThreadedRun run(small_rig(), {});
+  run.start();
+  std::vector<std::int64_t> collected;
+  const FrameSink sink = [&](const FrameRecord& record, const PoseCorrection&) {
+    EXPECT_EQ(record.state, FrameState::kTracked) << describe(record.cause);
+    collected.push_back(record.frame_index);
+  };
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    wait_for_room(run, sink);
+    run.push(frame(i));
+  }
+  run.stop();
+  run.collect(sink);
+  EXPECT_EQ(run.progress().frames, kFrames);
+  const RunResult result = run.finish();
+  EXPECT_EQ(result.error, "");
+  ASSERT_EQ(result.frames.size(), static_cast<std::size_t>(kFrames));
+  ASSERT_EQ(collected.size(), result.frames.size());
+  for (std::size_t i = 0; i < collected.size(); ++i) EXPECT_EQ(collected[i], static_cast<std::int64_t>(i));
+  expect_replay({}, feed(), result);
+}
+
+TEST_F(EnginePushTest, AFullRunTakesNoMoreAndNeverBlocks) {
+  std::atomic<bool> may_go_on{false};
+  EngineOptions options;
+  options.frame_slots = 4;
+  options.on_pose = [&](const FrameRecord&, const GraphSnapshot&) {
+    may_go_on.wait(false, std::memory_order_acquire);  // what a listener must never do: it holds the tracker
+  };
+  ThreadedRun run(small_rig(), options);
+  run.start();
+  std::size_t pushed = 0;
+  for (; run.has_room(); ++pushed) run.push(frame(pushed));
+  EXPECT_EQ(pushed, options.frame_slots);
+  may_go_on.store(true, std::memory_order_release);
+  may_go_on.notify_all();
+  wait_for_room(run);
+  run.push(frame(pushed++));
+  run.stop();
+  run.collect({});
+  EXPECT_EQ(run.progress().frames, static_cast<std::int64_t>(pushed));
+}
+
+TEST_F(EnginePushTest, TheListenerHearsOfEveryPoseOnTheTrackersThread) {
+  struct Heard {
+    std::int64_t frame;
+    PackedPose T_c_w;
+    std::uint64_t version_said, version_given;
+    std::int64_t latency_ns;
+  };
+  for (const bool deterministic : {true, false}) {
+    std::vector<Heard> heard;
+    std::set<std::thread::id> threads;
+    EngineOptions options;
+    options.deterministic = deterministic;
+    options.on_pose = [&](const FrameRecord& record, const GraphSnapshot& graph) {
+      heard.push_back({record.frame_index, record.T_c_w_causal, record.snapshot_version, graph.version(),
+                       record.latency_ns});
+      threads.insert(std::this_thread::get_id());
+    };
+    const RunResult result = testing::run_engine(options, feed());
+    ASSERT_EQ(heard.size(), result.frames.size());
+    for (std::size_t i = 0; i < heard.size(); ++i) {
+      EXPECT_EQ(heard[i].frame, result.frames[i].frame_index);
+      EXPECT_EQ(heard[i].T_c_w, result.frames[i].T_c_w_causal);
+      EXPECT_EQ(heard[i].version_said, heard[i].version_given);
+      EXPECT_EQ(heard[i].latency_ns, result.frames[i].latency_ns);
+    }
+    EXPECT_EQ(threads.size(), 1U);
+    EXPECT_EQ(threads.contains(std::this_thread::get_id()), deterministic);
+    EXPECT_EQ(result.times.front().to_json()["pose listener"]["count"], kFrames);
+  }
+}
+
+TEST_F(EnginePushTest, ALockstepRunTakesOneFrameAtATime) {
+  EngineOptions options;
+  options.deterministic = true;
+  LockstepRun run(small_rig(), options);
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    const FrameRecord& record = run.step(frame(i));
+    EXPECT_EQ(record.frame_index, static_cast<std::int64_t>(i));
+    EXPECT_EQ(record.state, FrameState::kTracked);
+  }
+  expect_same(run.finish(), testing::run_engine(options, feed()));
+}
+
+}  // namespace
+}  // namespace twofold
