@@ -9,13 +9,25 @@ const PendingKeyframe* ImmaturePoints::find_pending(KeyframeId id) const {
   return it != pending_.end() ? &*it : nullptr;
 }
 
+void ImmaturePoints::add_pending(const PendingKeyframe& keyframe) {
+  pending_.push_back(keyframe);
+  ++revision_;
+}
+
+void ImmaturePoints::clear_points() {
+  points_.clear();
+  ++revision_;
+}
+
 bool ImmaturePoints::add(const ImmaturePoint& point) {
   if (points_.size() == points_.capacity()) return false;
+  ++revision_;
   points_.push_back(point);
   return true;
 }
 
 void ImmaturePoints::adopt(const GraphSnapshot& graph) {
+  ++revision_;
   std::erase_if(pending_, [&](const PendingKeyframe& keyframe) { return graph.contains(keyframe.id); });
   std::erase_if(points_, [&](const ImmaturePoint& point) {
     return point.proposed_in != kNoKeyframe && graph.contains(point.proposed_in);
@@ -23,6 +35,7 @@ void ImmaturePoints::adopt(const GraphSnapshot& graph) {
 }
 
 void ImmaturePoints::drop_stale(KeyframeId newest, int max_failures, int max_age) {
+  ++revision_;
   std::erase_if(points_, [&](const ImmaturePoint& point) {
     if (point.proposed_in != kNoKeyframe) return false;
     const int age = static_cast<int>(index(newest)) - static_cast<int>(index(point.anchor));

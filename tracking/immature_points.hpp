@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "graph/keyframe.hpp"
@@ -41,11 +42,14 @@ class ImmaturePoints {
   [[nodiscard]] bool room_for_keyframe() const { return pending_.size() < pending_.capacity(); }
   [[nodiscard]] const PendingKeyframe* find_pending(KeyframeId id) const;
 
-  void add_pending(const PendingKeyframe& keyframe) { pending_.push_back(keyframe); }
+  /// Grows whenever points or proposals come or go: what was derived from them is then out of date.
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+
+  void add_pending(const PendingKeyframe& keyframe);
   /// False when full.
   bool add(const ImmaturePoint& point);
   /// Forgets all points.
-  void clear_points() { points_.clear(); }
+  void clear_points();
   /// Forgets what the map has taken over.
   void adopt(const GraphSnapshot& graph);
   /// Forgets candidates that failed too often or that `newest - anchor` keyframes did not confirm.
@@ -54,6 +58,7 @@ class ImmaturePoints {
  private:
   std::vector<ImmaturePoint> points_;
   std::vector<PendingKeyframe> pending_;
+  std::uint64_t revision_ = 0;
 };
 
 }  // namespace twofold

@@ -59,7 +59,7 @@ int LocalMap::anchor_position(const GraphSnapshot& graph, KeyframeId id, const I
     if (anchors_[i].id == id) return static_cast<int>(i);
   }
   if (anchors_.size() == anchors_.capacity()) return -1;
-  anchors_.push_back({id, relative_pose(graph, local, reference_, id)});
+  anchors_.push_back({id, relative_pose(graph, local, origin_.reference, id)});
   return static_cast<int>(anchors_.size()) - 1;
 }
 
@@ -77,9 +77,16 @@ void LocalMap::add_neighbour(const GraphSnapshot& graph, KeyframeId id, const Im
   }
 }
 
-void LocalMap::rebuild(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& local,
-                       int max_neighbours) {
-  reference_ = reference;
+void LocalMap::update(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& local,
+                      int max_neighbours) {
+  const Origin origin{graph.version(), local.revision(), reference};
+  if (origin == origin_) return;
+  origin_ = origin;
+  rebuild(graph, local, max_neighbours);
+}
+
+void LocalMap::rebuild(const GraphSnapshot& graph, const ImmaturePoints& local, int max_neighbours) {
+  const KeyframeId reference = origin_.reference;
   points_.clear();
   anchors_.clear();
   neighbours_.clear();

@@ -27,15 +27,15 @@ struct AnchorPose {
 };
 
 /// The candidate set for top-down tracking  (thesis 6.2.5): points seen from N1 of the reference keyframe
-/// (eq. 6.5), and the tracker's own points. Rebuilt when map, reference or own points change; pointers are
-/// valid that long.
+/// (eq. 6.5), and the tracker's own points. Pointers are valid until map, reference or own points change.
 class LocalMap {
  public:
   explicit LocalMap(std::size_t capacity);
 
-  /// The reference may be a keyframe of the graph or a pending one.
-  void rebuild(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& local,
-               int max_neighbours);
+  /// Collects the points around `reference`, a keyframe of the graph or a pending one, unless nothing of that
+  /// has changed since the last time.
+  void update(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& local,
+              int max_neighbours);
 
   [[nodiscard]] std::span<const TrackedPoint> points() const { return points_; }
   [[nodiscard]] const SE3& T_ref_a(const TrackedPoint& point) const {
@@ -43,12 +43,23 @@ class LocalMap {
   }
   /// Positions [first, last) of the points that the reference keyframe itself sees.
   [[nodiscard]] std::pair<std::size_t, std::size_t> reference_range() const { return reference_range_; }
-  /// N1 of the last rebuild, the reference first.
+  /// Of the map that the points were collected from.
+  [[nodiscard]] std::uint64_t version() const { return origin_.version; }
+  /// N1 of the reference, which comes first.
   [[nodiscard]] std::span<const KeyframeId> neighbours() const { return neighbours_; }
 
  private:
   static constexpr std::size_t kTable = 1U << 14;  ///< slots of the set of points met; a power of two
 
+  /// What the points were collected from.
+  struct Origin {
+    std::uint64_t version = 0;   ///< of the map
+    std::uint64_t revision = 0;  ///< of the tracker's own points
+    KeyframeId reference = kNoKeyframe;
+    friend bool operator==(const Origin&, const Origin&) = default;
+  };
+
+  void rebuild(const GraphSnapshot& graph, const ImmaturePoints& local, int max_neighbours);
   bool first_sight(PointId id);
   int anchor_position(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local);
   void add_neighbour(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local);
@@ -58,7 +69,7 @@ class LocalMap {
   std::vector<KeyframeId> neighbours_;
   std::vector<std::uint64_t> met_;  // open addressing: round in the high half, point in the low half
   std::uint32_t round_ = 0;
-  KeyframeId reference_ = kNoKeyframe;
+  Origin origin_;
   std::pair<std::size_t, std::size_t> reference_range_{0, 0};
 };
 

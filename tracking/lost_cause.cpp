@@ -79,6 +79,25 @@ LostCause FrameIntervals::next(std::int64_t index, std::int64_t t_ns) {
   return gap;
 }
 
+void LossHistory::begin_frame(std::int64_t index, std::int64_t t_ns) {
+  const LostCause gap = intervals_.next(index, t_ns);
+  if (lost_frames_ == 0) gap_before_ = gap;
+}
+
+void LossHistory::placed() {
+  lost_frames_ = 0;
+  seeing_since_ns_ = 0;
+}
+
+double LossHistory::seeing_for(bool corners_in_view, std::int64_t t_ns) {
+  if (!corners_in_view) {
+    seeing_since_ns_ = 0;
+  } else if (seeing_since_ns_ == 0) {
+    seeing_since_ns_ = t_ns;
+  }
+  return corners_in_view ? static_cast<double>(t_ns - seeing_since_ns_) / 1e9 : 0;
+}
+
 const char* describe(LostCause cause) {
   switch (cause) {
     case LostCause::kNone:

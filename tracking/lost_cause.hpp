@@ -43,4 +43,26 @@ class FrameIntervals {
   UsualInterval usual_;
 };
 
+/// Since when the camera has been lost, and after what.
+class LossHistory {
+ public:
+  /// Before a frame is tracked.
+  void begin_frame(std::int64_t index, std::int64_t t_ns);
+  void lost() { ++lost_frames_; }
+  void placed();
+  /// @return for how long corners have been in view of the lost camera [s]
+  double seeing_for(bool corners_in_view, std::int64_t t_ns);
+
+  /// Frames since the last one with a pose.
+  [[nodiscard]] int lost_frames() const { return lost_frames_; }
+  /// Between the last good frame and the one after it: kFramesMissing, kGapInTime or kNone.
+  [[nodiscard]] LostCause gap_before() const { return gap_before_; }
+
+ private:
+  FrameIntervals intervals_;
+  int lost_frames_ = 0;
+  LostCause gap_before_ = LostCause::kNone;
+  std::int64_t seeing_since_ns_ = 0;  ///< 0: not
+};
+
 }  // namespace twofold

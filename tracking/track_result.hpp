@@ -30,6 +30,7 @@ struct TrackResult {
   SE3 T_c_ref;  ///< pose relative to the reference keyframe; meaningful while kTracking
   Matrix6 information = Matrix6::Zero();  ///< of T_c_ref, left perturbation (v, omega)
   int candidates = 0;                     ///< points that should be visible
+  double reference_in_view = 0;           ///< share of the reference keyframe's points that should be visible
   int searched = 0;
   int matches = 0;
   int inliers = 0;

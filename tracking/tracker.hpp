@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,8 +11,11 @@
 #include "graph/snapshot.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/effort.hpp"
+#include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
+#include "tracking/keyframe_decision.hpp"
 #include "tracking/local_map.hpp"
+#include "tracking/lost_cause.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
@@ -52,50 +56,57 @@ class Tracker {
 
   /// Pose of the last tracked frame in the map as `graph`, that of the last step, has it.
   [[nodiscard]] SE3 T_c_w(const GraphSnapshot& graph) const {
-    return T_prev_ref_ * pose_in_world(graph, immature_points_, reference_);
+    return last_.T_c_ref * pose_in_world(graph, immature_points_, last_.reference);
   }
 
   /// Images of the last step's frame, if that was lost.
   [[nodiscard]] const FrameImages& lost_images() const { return current_; }
   /// Frames since the last one with a pose.
-  [[nodiscard]] int lost_frames() const { return lost_frames_; }
+  [[nodiscard]] int lost_frames() const { return loss_.lost_frames(); }
   /// Map part of the last tracked frame, as `graph`, that of the last step, has it.
   [[nodiscard]] KeyframeId part(const GraphSnapshot& graph) const {
-    return part_of(graph, immature_points_, reference_);
+    return part_of(graph, immature_points_, last_.reference);
   }
 
   /// Hint of the loop closer: the camera was recognised at T_c_k relative to keyframe `id`. The next step, if
   /// its graph has the keyframe, looks for points around there, and forgets the hint. Ignored while tracking.
-  void relocalise(KeyframeId id, const SE3& T_c_k);
+  void relocalise(KeyframeId id, const SE3& T_c_k) { hint_ = Placement{id, T_c_k}; }
 
   /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
   /// and diagnosis. Valid until the next step.
   [[nodiscard]] std::span<const MotionObservation> last_observations() const { return motion_; }
 
  private:
-  class StageClock;
   struct Match {
     std::uint32_t point;  ///< position in local_map_.points()
     PointMatch found;
   };
+  /// Of keyframes and points: the next ones.
+  struct Numbers {
+    std::uint32_t keyframe = 0;
+    std::uint32_t first_of_part = 0;  ///< the newest part's
+    std::uint32_t point = 0;
+  };
 
   void load_images(const Frame& frame);
-  void adopt(const GraphSnapshot& graph);
-  bool start_map(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
-  bool take_hint(const GraphSnapshot& graph);
-  bool track(const GraphSnapshot& graph, bool hinted, StageClock& clock, TrackResult& result);
-  bool start_part(const Frame& frame, KeyframeProposal* proposal, TrackResult& result);
-  [[nodiscard]] bool new_part_due(std::int64_t t_ns);
-  SE3 align_to_previous(TrackResult& result);
-  void select_candidates(const SE3& T_c_ref, TrackResult& result);
-  void search_points(const SE3& T_c_ref, TrackResult& result);
-  bool estimate_pose(const SE3& T_c_ref_start, TrackResult& result);
-  void give_up_frame(LostCause cause, TrackResult& result);
-  void remember_frame(const SE3& T_c_ref);
+  void follow(const GraphSnapshot& graph);
 
-  [[nodiscard]] bool keyframe_due(const TrackResult& result, const SE3& T_c_ref) const;
-  void propose_keyframe(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal& proposal,
-                        TrackResult& result);
+  bool start_map(FrameStep& step);
+  bool start_part(FrameStep& step);
+  LostCause make_first_keyframe(FrameStep& step);
+  [[nodiscard]] SearchStart search_start(const GraphSnapshot& graph);
+
+  bool track(FrameStep& step);
+  SE3 align_to_previous(FrameStep& step);
+  void select_candidates(const SE3& T_c_ref, TrackResult& result);
+  void search_points(const SE3& T_c_ref, FrameStep& step);
+  bool estimate_pose(const Placement& start, FrameStep& step);
+  void give_up_frame(LostCause cause, TrackResult& result);
+  void remember_frame(const TrackResult& result);
+
+  void propose_keyframe_if_due(FrameStep& step);
+  void propose_keyframe(FrameStep& step);
+  void begin_proposal(const Placement& placement, FrameStep& step);
   void hand_over_images(KeyframeProposal& proposal);
   void collect_observations(KeyframeProposal& proposal);
   void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
@@ -104,42 +115,30 @@ class Tracker {
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
 
-  Rig rig_;
-  TrackerOptions options_;
-  EffortBounds bounds_;  ///< of this step
-  FrameImages current_, previous_;
+  const Rig rig_;
+  const TrackerOptions options_;
+  FrameImages current_, previous_;  ///< of the frame at hand, and of the last good one
   DenseAlignment alignment_;
   LocalMap local_map_;
   Quadtree quadtree_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
 
-  KeyframeId reference_ = kNoKeyframe;
-  bool unplaced_ = false;
-  SE3 T_prev_ref_;  ///< last good pose
+  Placement last_;  ///< of the last good frame
   SE3 T_cur_prev_;  ///< last good motion, the prediction of the next
-  std::uint64_t graph_version_ = 0;
-  bool local_map_stale_ = true;
-  int lost_frames_ = 0;
-  FrameIntervals intervals_;
-  LostCause gap_before_loss_ = LostCause::kNone;  ///< between the last good frame and the next
-  KeyframeId hint_keyframe_ = kNoKeyframe;        ///< of relocalise
-  SE3 hint_T_c_k_;
+  LossHistory loss_;
+  std::optional<Placement> hint_;  ///< of relocalise
+  bool unplaced_ = false;
   std::uint32_t frames_ = 0;
-  std::int64_t seeing_since_ns_ = 0;  ///< lost, but with corners in view, since then; 0: not
+  Numbers next_;
+  KeyframeView last_keyframe_;
 
-  std::uint32_t next_keyframe_ = 0;
-  std::uint32_t first_of_part_ = 0;  ///< the newest part's
-  std::uint32_t next_point_ = 0;
-  int regions_at_keyframe_ = 0;
-  double keyframe_depth_ = 0;  ///< median depth at the last keyframe [m]
-
+  // Of the last frame searched.
   std::vector<Match> matches_;
-  std::vector<MotionObservation> motion_;
+  std::vector<MotionObservation> motion_;  ///< of matches_, one each
   std::vector<AlignmentPoint> previous_points_;
-  std::vector<PointId> inlier_ids_;
+  std::vector<PointId> inlier_ids_;  ///< scratch, as the next
   std::vector<double> depths_;
-  int visible_reference_points_ = 0;
 };
 
 }  // namespace twofold

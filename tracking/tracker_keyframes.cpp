@@ -50,41 +50,40 @@ double Tracker::median_depth(const SE3& T_c_ref) {
   return *middle;
 }
 
-bool Tracker::keyframe_due(const TrackResult& result, const SE3& T_c_ref) const {
-  if (!immature_points_.room_for_keyframe()) return false;
-  const auto [begin, end] = local_map_.reference_range();
-  const double visible =
-      end > begin ? static_cast<double>(visible_reference_points_) / static_cast<double>(end - begin) : 0.0;
-  const double share = visible * result.matches / std::max(1, result.searched);
-  if (share < options_.urgent_share) return true;
-  if (static_cast<int>(immature_points_.pending().size()) >= options_.max_pending) return false;
-  const double parallax = T_c_ref.translation().norm() / std::max(keyframe_depth_, 1e-3);
-  const bool emptied = occupied_regions() < (1 - options_.keyframe_empty) * regions_at_keyframe_;
-  // The second keyframe confirms the first one's points: until then there is no map.
-  const bool map_is_young =
-      next_keyframe_ == first_of_part_ + 1 && parallax > 0.2 * options_.keyframe_parallax;
-  if (bounds_.urgent_keyframes_only) return map_is_young;
-  return parallax > options_.keyframe_parallax || share < options_.keyframe_share || emptied || map_is_young;
+void Tracker::propose_keyframe_if_due(FrameStep& step) {
+  const KeyframeBacklog backlog{immature_points_.room_for_keyframe(),
+                                static_cast<int>(immature_points_.pending().size()),
+                                next_.keyframe == next_.first_of_part + 1};
+  if (step.free_proposal != nullptr &&
+      keyframe_due(step.result, last_keyframe_, occupied_regions(), backlog, options_, step.bounds)) {
+    propose_keyframe(step);
+  }
 }
 
-void Tracker::propose_keyframe(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal& proposal,
-                               TrackResult& result) {
-  proposal.clear();
-  proposal.id = KeyframeId{next_keyframe_};
-  proposal.frame_index = frame.index;
-  proposal.t_ns = frame.t_ns;
-  proposal.snapshot_version = graph.version();
-  proposal.reference = reference_;
-  proposal.T_k_ref = result.T_c_ref;
-  proposal.median_depth = keyframe_depth_ = median_depth(result.T_c_ref);
+void Tracker::propose_keyframe(FrameStep& step) {
+  KeyframeProposal& proposal = *step.free_proposal;
+  last_keyframe_.median_depth = median_depth(step.result.T_c_ref);
+  begin_proposal({step.result.reference, step.result.T_c_ref}, step);
   collect_observations(proposal);
-  immature_points_.add_pending({proposal.id, reference_, result.T_c_ref});
-  ++next_keyframe_;
   start_points(proposal.id);
+  last_keyframe_.occupied_regions = occupied_regions();
   hand_over_images(proposal);
   immature_points_.drop_stale(proposal.id, options_.max_failures, options_.max_candidate_age);
-  local_map_stale_ = true;
-  result.proposed = true;
+}
+
+/// Numbers the keyframe, whose pose relative to its reference is `placement`.
+void Tracker::begin_proposal(const Placement& placement, FrameStep& step) {
+  KeyframeProposal& proposal = *step.free_proposal;
+  proposal.clear();
+  proposal.id = KeyframeId{next_.keyframe++};
+  proposal.frame_index = step.frame.index;
+  proposal.t_ns = step.frame.t_ns;
+  proposal.snapshot_version = step.graph.version();
+  proposal.reference = placement.reference;
+  proposal.T_k_ref = placement.T_c_ref;
+  proposal.median_depth = last_keyframe_.median_depth;
+  immature_points_.add_pending({proposal.id, placement.reference, placement.T_c_ref});
+  step.result.proposed = true;
 }
 
 /// To be done with the frame: the next one is aligned to its left image, and needs nothing else of it.
@@ -113,7 +112,7 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
 
 /// A candidate was found again in a later keyframe: it gets its number and goes to the map.
 void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
-  point.id = PointId{next_point_++};
+  point.id = PointId{next_.point++};
   point.proposed_in = proposal.id;
   Observation anchor_observation = point.anchor_observation;
   anchor_observation.point = point.id;
@@ -127,14 +126,14 @@ void Tracker::start_points(KeyframeId anchor) {
     if (motion_[m].inlier) starter_.occupy(matches_[m].found.z.head<2>().cast<float>());
   }
   starter_.start(current_, anchor, immature_points_);
-  regions_at_keyframe_ = occupied_regions();
 }
 
 /// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to
 /// a place, the reference comes back too, and no keyframe is needed  (thesis 6.2.2: V_ref may be an older,
 /// revisited keyframe).
 void Tracker::revisit_reference(const GraphSnapshot& graph) {
-  if (frames_ % kRevisitInterval != 0 || !graph.contains(reference_) || !immature_points_.pending().empty())
+  if (frames_ % kRevisitInterval != 0 || !graph.contains(last_.reference) ||
+      !immature_points_.pending().empty())
     return;
   inlier_ids_.clear();
   for (std::size_t m = 0; m < matches_.size(); ++m) {
@@ -149,9 +148,9 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
     }
     return count;
   };
-  KeyframeId best = reference_;
+  KeyframeId best = last_.reference;
   // Changing back and forth helps nobody: a new reference must be clearly better.
-  int best_count = shared(reference_) * 6 / 5;
+  int best_count = shared(last_.reference) * 6 / 5;
   for (const KeyframeId id : local_map_.neighbours()) {
     const int count = shared(id);
     if (count > best_count) {
@@ -159,10 +158,8 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
       best_count = count;
     }
   }
-  if (best == reference_) return;
-  T_prev_ref_ = T_prev_ref_ * relative_pose(graph, immature_points_, reference_, best);
-  reference_ = best;
-  local_map_stale_ = true;
+  if (best == last_.reference) return;
+  last_ = {best, last_.T_c_ref * relative_pose(graph, immature_points_, last_.reference, best)};
 }
 
 }  // namespace twofold

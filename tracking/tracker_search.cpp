@@ -10,7 +10,7 @@ namespace twofold {
 /// Points that should be visible  (thesis 6.2.5), into the quadtree.
 void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
   quadtree_.clear();
-  visible_reference_points_ = 0;
+  std::size_t reference_points_in_view = 0;
   const Matrix3 R_c_ref = T_c_ref.rotation();
   const auto points = local_map_.points();
   const auto [reference_begin, reference_end] = local_map_.reference_range();
@@ -24,22 +24,26 @@ void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
     const Vector3 from_here = R_c_ref.transpose() * x_c;
     const double cosine = from_anchor.dot(from_here) / (from_anchor.norm() * from_here.norm());
     if (cosine < options_.max_view_angle_cos) continue;
-    if (i >= reference_begin && i < reference_end) ++visible_reference_points_;
+    if (i >= reference_begin && i < reference_end) ++reference_points_in_view;
     quadtree_.insert(uv.cast<float>(), static_cast<std::uint32_t>(i));
   }
   result.candidates = static_cast<int>(quadtree_.size());
+  const auto reference_points = static_cast<double>(reference_end - reference_begin);
+  result.reference_in_view =
+      reference_points > 0 ? static_cast<double>(reference_points_in_view) / reference_points : 0.0;
 }
 
 /// Guided search in equi-distributed order (thesis 3.4.3) until enough points were found.
-void Tracker::search_points(const SE3& T_c_ref, TrackResult& result) {
+void Tracker::search_points(const SE3& T_c_ref, FrameStep& step) {
+  TrackResult& result = step.result;
   matches_.clear();
   result.searched = 0;
   GuidedSearchOptions search = options_.search;
-  search.refine_iterations = bounds_.refine_iterations;
-  if (lost_frames_ > 0) search.radius_px = options_.lost_radius_px;
+  search.refine_iterations = step.bounds.refine_iterations;
+  if (loss_.lost_frames() > 0) search.radius_px = options_.lost_radius_px;
   for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
-    if (static_cast<int>(matches_.size()) >= bounds_.wanted_matches ||
-        result.searched >= bounds_.max_searches) {
+    if (static_cast<int>(matches_.size()) >= step.bounds.wanted_matches ||
+        result.searched >= step.bounds.max_searches) {
       break;
     }
     ++result.searched;
@@ -56,7 +60,8 @@ void Tracker::search_points(const SE3& T_c_ref, TrackResult& result) {
 }
 
 /// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted.
-bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
+bool Tracker::estimate_pose(const Placement& start, FrameStep& step) {
+  TrackResult& result = step.result;
   motion_.clear();
   for (const Match& match : matches_) {
     const bool has_right = !std::isnan(match.found.z.z());
@@ -64,8 +69,8 @@ bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
                        measurement_information(rig_, match.found.level, has_right), true});
   }
   MotionOnlyOptions solver = options_.motion;
-  solver.max_iterations = bounds_.motion_iterations;
-  const MotionOnlyResult motion = optimise_motion(rig_, motion_, T_c_ref_start, solver);
+  solver.max_iterations = step.bounds.motion_iterations;
+  const MotionOnlyResult motion = optimise_motion(rig_, motion_, start.T_c_ref, solver);
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) {
     give_up_frame(LostCause::kTooFewCandidates, result);
@@ -76,7 +81,7 @@ bool Tracker::estimate_pose(const SE3& T_c_ref_start, TrackResult& result) {
     give_up_frame(LostCause::kInconsistentMatches, result);
   } else {
     result.status = TrackStatus::kTracking;
-    result.reference = reference_;
+    result.reference = start.reference;
     result.T_c_ref = motion.T_c_ref;
     result.information = motion.information;
     return true;

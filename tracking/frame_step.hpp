@@ -1,0 +1,49 @@
+#pragma once
+
+#include <chrono>
+
+#include "camera/frame.hpp"
+#include "graph/keyframe_proposal.hpp"
+#include "graph/snapshot.hpp"
+#include "tracking/effort.hpp"
+#include "tracking/track_result.hpp"
+
+namespace twofold {
+
+/// Where the camera is.
+struct Placement {
+  KeyframeId reference = kNoKeyframe;
+  SE3 T_c_ref;
+};
+
+/// Where the search for one frame's pose begins.
+struct SearchStart {
+  Placement placement;
+  bool recognised = false;  ///< the loop closer says so, of an earlier frame; else: the last good frame's
+};
+
+/// What belongs to one frame only: handed from stage to stage of the tracker, which writes the result.
+class FrameStep {
+ public:
+  FrameStep(const Frame& new_frame, const GraphSnapshot& map, KeyframeProposal* buffer,
+            const EffortBounds& limits)
+      : frame(new_frame), graph(map), free_proposal(buffer), bounds(limits) {}
+
+  const Frame& frame;
+  const GraphSnapshot& graph;
+  KeyframeProposal* const free_proposal;  ///< null: no keyframe can be made
+  const EffortBounds bounds;
+  TrackResult result;
+
+  /// Attributes the time since the last lap to a stage.
+  void lap(TrackerStage stage) {
+    const auto now = std::chrono::steady_clock::now();
+    result.stage_ns[static_cast<std::size_t>(stage)] += (now - last_lap_).count();
+    last_lap_ = now;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_lap_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace twofold

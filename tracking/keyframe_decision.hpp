@@ -1,0 +1,30 @@
+#pragma once
+
+#include "tracking/effort.hpp"
+#include "tracking/options.hpp"
+#include "tracking/track_result.hpp"
+
+namespace twofold {
+
+/// What a keyframe is judged by: how the scene looked when it was made.
+struct KeyframeView {
+  double median_depth = 0;   ///< [m]
+  int occupied_regions = 0;  ///< parts of the image in which a point was tracked
+};
+
+/// What stands in the way of a keyframe, or makes one welcome.
+struct KeyframeBacklog {
+  bool room = false;          ///< for one more proposal
+  int pending = 0;            ///< proposals not yet in the map
+  bool map_is_young = false;  ///< it has one keyframe only, whose points wait to be confirmed
+};
+
+/// Whether the frame should become a keyframe: the camera has moved on, or too little is left of what it saw
+/// (thesis 6.2.5).
+/// @param last  of the newest keyframe
+/// @param occupied_regions  of this frame
+[[nodiscard]] bool keyframe_due(const TrackResult& result, const KeyframeView& last, int occupied_regions,
+                                const KeyframeBacklog& backlog, const TrackerOptions& options,
+                                const EffortBounds& bounds);
+
+}  // namespace twofold
