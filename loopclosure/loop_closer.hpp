@@ -36,7 +36,7 @@ struct Relocalisation {
 ///
 /// Remembers how the place of every keyframe looks. Reads snapshots, changes nothing: a loop goes to the
 /// mapper as a message. Single-threaded; the same calls give the same answers. A step's cost grows with the
-/// inverted file's lists only.
+/// inverted file's lists only, and memory with the keyframes that are not culled.
 class LoopCloser {
  public:
   LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
@@ -58,11 +58,9 @@ class LoopCloser {
   [[nodiscard]] const KeyframeDatabase& places() const { return places_; }
 
  private:
-  [[nodiscard]] double likeness_with_previous(KeyframeId id, const BagOfWords& bag) const;
   /// Does the view show the place of keyframe k? First by corners, then by the map's points.
   [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
                                                      const FrameImages& images, const GraphSnapshot& graph);
-  void forget_culled(const GraphSnapshot& graph);
   void remember(KeyframeId id, PlaceView view);
 
   Rig rig_;
@@ -72,9 +70,7 @@ class LoopCloser {
   PlaceRecogniser recogniser_;
   PoseRefinement refinement_;
   KeyframeDatabase places_;
-  std::vector<BagOfWords> bags_;  // by keyframe; of those that have a place
-  KeyframeId previous_ = kNoKeyframe;
-  std::size_t next_checked_ = 0;  // for culling: places are looked through in turn
+  std::optional<BagOfWords> previous_;  // of the keyframe described last
 };
 
 }  // namespace twofold

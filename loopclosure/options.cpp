@@ -21,6 +21,7 @@ std::string RecogniserOptions::invalid_reason() const {
       .at_least("min_reference", min_reference, 0)
       .at_least("consistency", consistency, 1)
       .at_least("same_place", same_place, 0)
+      .at_least("culled_visits", culled_visits, 1)
       .reason();
 }
 

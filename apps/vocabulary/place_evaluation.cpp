@@ -40,7 +40,7 @@ struct Answer {
 std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSet& set,
                         const Vocabulary& vocabulary) {
   PlaceIndex index(vocabulary.word_count());
-  VisitedSet excluded;
+  const auto any = [](KeyframeId) { return true; };
   std::vector<Answer> answers;
   const RecogniserOptions recogniser;
   const bool has_depth = set.rig.kind != SensorKind::kMono;
@@ -51,9 +51,8 @@ std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSe
       index.add(KeyframeId{static_cast<std::uint32_t>(added)},
                 set.places[static_cast<std::size_t>(added)].view.bag);
     }
-    excluded.reset(0);
     const auto candidates =
-        index.query(view.bag, excluded, static_cast<std::size_t>(recogniser.max_candidates));
+        index.query(view.bag, static_cast<std::size_t>(recogniser.max_candidates), any);
     if (candidates.empty()) continue;
     const double reference =
         bag_score(view.bag, set.places[static_cast<std::size_t>(std::max(i - 1, 0))].view.bag);
