@@ -5,8 +5,6 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kCheckedForCulling = 64;  // places a step
-
 LoopCloserOptions validated(const LoopCloserOptions& options) {
   if (const std::string reason = options.invalid_reason(); !reason.empty()) {
     throw std::runtime_error("loop closer options: " + reason);
@@ -23,32 +21,32 @@ LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabul
       options_(validated(options)),
       describer_(rig, options.corners),
       recogniser_(vocabulary_->word_count(), options.recogniser),
-      refinement_(rig, options.refinement) {}
+      refinement_(rig, options.refinement),
+      probation_(options.probation) {}
 
 void LoopCloser::continue_from(const KeyframeDatabase& places) {
   places_ = places;
-  bags_.assign(places.size(), {});
   for (std::uint32_t k = 0; k < places.size(); ++k) {
     const PlaceAppearance* place = places.find(KeyframeId{k});
-    if (place == nullptr) continue;
-    bags_[k] = vocabulary_->bag(place->corners);
-    recogniser_.add(KeyframeId{k}, bags_[k]);
+    if (place != nullptr) recogniser_.add(KeyframeId{k}, vocabulary_->bag(place->corners));
   }
 }
 
 std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
-  forget_culled(graph);
+  for (const KeyframeId culled : recogniser_.forget_culled(graph)) places_.forget(culled);
   if (!graph.contains(keyframe.id) || graph.keyframe(keyframe.id).culled()) return std::nullopt;
   PlaceView view = describer_.describe(keyframe.images, *vocabulary_);
 
-  const double likeness = likeness_with_previous(keyframe.id, view.bag);
+  // How much this scene's neighbouring views look alike; 0 at the start of a map.
+  const double likeness = previous_ ? bag_score(view.bag, *previous_) : 0;
   const auto candidates = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
   std::optional<LoopConstraint> loop;
   for (const PlaceCandidate& candidate : candidates) {
     const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
     if (!verified) continue;
-    loop =
-        LoopConstraint{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k, verified->inliers};
+    const LoopConstraint seen{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k,
+                              verified->inliers};
+    if (probation_.confirms(seen, graph)) loop = seen;
     break;
   }
   remember(keyframe.id, std::move(view));
@@ -57,8 +55,8 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
 
 std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, const GraphSnapshot& graph) {
   const PlaceView view = describer_.describe(images, *vocabulary_);
-  const auto candidates =
-      recogniser_.query_anywhere(view.bag, static_cast<std::size_t>(options_.relocalisation_candidates));
+  const auto candidates = recogniser_.query_anywhere(
+      view.bag, static_cast<std::size_t>(options_.relocalisation_candidates), graph);
   for (const PlaceCandidate& candidate : candidates) {
     if (auto verified = verify(candidate.keyframe, view, images, graph)) return verified;
   }
@@ -67,8 +65,9 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
 
 std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& view,
                                                  const FrameImages& images, const GraphSnapshot& graph) {
-  if (!graph.contains(k) || graph.keyframe(k).culled()) return std::nullopt;
-  const auto place = verify_place(rig_, *places_.find(k), view, options_.verification);
+  if (!graph.contains(k)) return std::nullopt;
+  collect_views(k, graph);
+  const auto place = verify_place(rig_, views_, view, options_.verification);
   if (!place) return std::nullopt;
   RefinedPlace refined;
   switch (refinement_.refine(graph, k, images, place->T_b_a, refined)) {
@@ -82,31 +81,23 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
   return std::nullopt;
 }
 
-/// How much this scene's neighbouring views look alike; 0 at the start of a map.
-double LoopCloser::likeness_with_previous(KeyframeId id, const BagOfWords& bag) const {
-  if (previous_ == kNoKeyframe || previous_ >= id || places_.find(previous_) == nullptr) return 0;
-  return bag_score(bag, bags_[index(previous_)]);
+/// The place's own view and those of its neighbours.
+void LoopCloser::collect_views(KeyframeId k, const GraphSnapshot& graph) {
+  neighbours_.clear();
+  direct_neighbours(graph, k, static_cast<std::size_t>(options_.place_views), neighbours_);
+  views_.clear();
+  for (const KeyframeId n : neighbours_) {
+    const PlaceAppearance* view = places_.find(n);
+    if (view == nullptr) continue;
+    const SE3 T_n_k = n == k ? SE3() : relative_pose(graph, k, *find_edge(graph.keyframe(k), n));
+    views_.push_back({view, T_n_k});
+  }
 }
 
 void LoopCloser::remember(KeyframeId id, PlaceView view) {
   recogniser_.add(id, view.bag);
-  if (bags_.size() <= index(id)) bags_.resize(index(id) + 1);
-  bags_[index(id)] = std::move(view.bag);
+  previous_ = std::move(view.bag);
   places_.set(id, std::move(view));
-  previous_ = id;
-}
-
-/// A bounded number of places is looked at each step, so that memory follows the map and no step is long.
-void LoopCloser::forget_culled(const GraphSnapshot& graph) {
-  for (std::size_t n = 0; n < std::min(kCheckedForCulling, places_.size()); ++n) {
-    next_checked_ = next_checked_ + 1 < places_.size() ? next_checked_ + 1 : 0;
-    const KeyframeId id{static_cast<std::uint32_t>(next_checked_)};
-    if (places_.find(id) == nullptr || id == previous_) continue;
-    if (!graph.contains(id) || !graph.keyframe(id).culled()) continue;
-    recogniser_.remove(id, bags_[next_checked_]);
-    bags_[next_checked_] = {};
-    places_.forget(id);
-  }
 }
 
 }  // namespace twofold

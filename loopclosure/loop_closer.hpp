@@ -8,6 +8,7 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
 #include "loopclosure/geometric_verification.hpp"
+#include "loopclosure/loop_probation.hpp"
 #include "loopclosure/place_recogniser.hpp"
 #include "loopclosure/place_view.hpp"
 #include "loopclosure/pose_refinement.hpp"
@@ -19,7 +20,9 @@ struct LoopCloserOptions {
   RecogniserOptions recogniser;
   VerificationOptions verification;
   RefinementOptions refinement;
-  int relocalisation_candidates = 8;  ///< places tried for a lost camera
+  ProbationOptions probation;
+  int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included
+  int relocalisation_candidates = 10;  ///< places tried for a lost camera
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -36,7 +39,7 @@ struct Relocalisation {
 ///
 /// Remembers how the place of every keyframe looks. Reads snapshots, changes nothing: a loop goes to the
 /// mapper as a message. Single-threaded; the same calls give the same answers. A step's cost grows with the
-/// inverted file's lists only.
+/// inverted file's lists only, and memory with the keyframes that are not culled.
 class LoopCloser {
  public:
   LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
@@ -45,8 +48,8 @@ class LoopCloser {
   /// on the vocabulary it was made with. To be called before the first step.
   void continue_from(const KeyframeDatabase& places);
 
-  /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be
-  /// called in the order of keyframe ids; ids may be left out.
+  /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before, once
+  /// that is confirmed. To be called in the order of keyframe ids; ids may be left out.
   [[nodiscard]] std::optional<LoopConstraint> step(const KeyframeProposal& keyframe,
                                                    const GraphSnapshot& graph);
 
@@ -58,11 +61,10 @@ class LoopCloser {
   [[nodiscard]] const KeyframeDatabase& places() const { return places_; }
 
  private:
-  [[nodiscard]] double likeness_with_previous(KeyframeId id, const BagOfWords& bag) const;
   /// Does the view show the place of keyframe k? First by corners, then by the map's points.
   [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
                                                      const FrameImages& images, const GraphSnapshot& graph);
-  void forget_culled(const GraphSnapshot& graph);
+  void collect_views(KeyframeId k, const GraphSnapshot& graph);
   void remember(KeyframeId id, PlaceView view);
 
   Rig rig_;
@@ -71,10 +73,11 @@ class LoopCloser {
   PlaceDescriber describer_;
   PlaceRecogniser recogniser_;
   PoseRefinement refinement_;
+  LoopProbation probation_;
   KeyframeDatabase places_;
-  std::vector<BagOfWords> bags_;  // by keyframe; of those that have a place
-  KeyframeId previous_ = kNoKeyframe;
-  std::size_t next_checked_ = 0;  // for culling: places are looked through in turn
+  std::vector<KeyframeId> neighbours_;
+  std::vector<PlacedView> views_;
+  std::optional<BagOfWords> previous_;  // of the keyframe described last
 };
 
 }  // namespace twofold

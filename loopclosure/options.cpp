@@ -21,16 +21,46 @@ std::string RecogniserOptions::invalid_reason() const {
       .at_least("min_reference", min_reference, 0)
       .at_least("consistency", consistency, 1)
       .at_least("same_place", same_place, 0)
+      .at_least("culled_visits", culled_visits, 1)
+      .reason();
+}
+
+std::string VerificationOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_distance", max_distance, 1)
+      .above("max_error_px", max_error_px, 0)
+      .above("ransac_error_px", ransac_error_px, 0)
+      .above("max_stretch", max_stretch, 0)
+      .at_least("max_iterations", max_iterations, 1)
+      .at_least("min_hypothesis", min_hypothesis, 3)
+      .above("guided_radius_px", guided_radius_px, 0)
+      .at_least("guided_distance", guided_distance, 1)
+      .at_least("min_inliers", min_inliers, 4)
+      .within("min_inlier_share", min_inlier_share, 0, 1)
+      .at_least("min_in_half", min_in_half, 0)
+      .at_least("min_disparity_px", min_disparity_px, 0)
       .reason();
 }
 
 std::string RefinementOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("neighbours", neighbours, 1)
-      .at_least("max_points", max_points, 1)
+      .at_least("min_visible", min_visible, 1)
+      .at_least("max_points", max_points, min_visible)
+      .at_least("border_px", border_px, 0)
       .above("radius_px", radius_px, 0)
+      .above("second_radius_px", second_radius_px, 0)
       .at_least("min_inliers", min_inliers, 3)
       .within("min_inlier_share", min_inlier_share, 0, 1)
+      .within("min_visible_share", min_visible_share, 0, 1)
+      .reason();
+}
+
+std::string ProbationOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("max_shift", max_shift, 0)
+      .above("max_angle_deg", max_angle_deg, 0)
+      .at_least("patience", patience, 1)
       .reason();
 }
 
@@ -40,6 +70,8 @@ std::string LoopCloserOptions::invalid_reason() const {
       .nested("recogniser", recogniser.invalid_reason())
       .nested("verification", verification.invalid_reason())
       .nested("refinement", refinement.invalid_reason())
+      .nested("probation", probation.invalid_reason())
+      .at_least("place_views", place_views, 1)
       .at_least("relocalisation_candidates", relocalisation_candidates, 1)
       .reason();
 }

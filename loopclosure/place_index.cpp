@@ -4,43 +4,65 @@
 
 namespace twofold {
 
-void PlaceIndex::add(KeyframeId keyframe, const BagOfWords& bag) {
-  for (const auto& [word, weight] : bag) lists_[word].push_back({keyframe, weight});
-  if (scores_.size() <= index(keyframe)) scores_.resize(index(keyframe) + 1, 0.0F);
-  ++keyframe_count_;
-}
-
-void PlaceIndex::remove(KeyframeId keyframe, const BagOfWords& bag) {
-  for (const auto& [word, weight] : bag) {
-    std::erase_if(lists_[word], [&](const Entry& entry) { return entry.keyframe == keyframe; });
+void PlaceIndex::add(KeyframeId keyframe, BagOfWords bag) {
+  if (free_.empty()) {
+    free_.push_back(static_cast<Slot>(slots_.size()));
+    slots_.emplace_back();
   }
-  --keyframe_count_;
+  const Slot slot = free_.back();
+  free_.pop_back();
+  for (const auto& [word, weight] : bag) lists_[word].push_back({slot, weight});
+  slots_[slot] = {keyframe, std::move(bag)};
 }
 
-std::vector<PlaceCandidate> PlaceIndex::query(const BagOfWords& bag, const VisitedSet& excluded,
-                                              std::size_t max_count) {
+std::vector<KeyframeId> PlaceIndex::forget(std::size_t visits, const Predicate& gone) {
+  std::vector<KeyframeId> forgotten;
+  for (std::size_t n = std::min(visits, slots_.size()); n > 0; --n) {
+    if (next_visited_ >= slots_.size()) next_visited_ = 0;
+    const auto slot = static_cast<Slot>(next_visited_++);
+    const KeyframeId keyframe = slots_[slot].keyframe;
+    if (keyframe == kNoKeyframe || !gone(keyframe)) continue;
+    remove(slot);
+    forgotten.push_back(keyframe);
+  }
+  return forgotten;
+}
+
+void PlaceIndex::remove(Slot slot) {
+  for (const auto& [word, weight] : slots_[slot].bag) {
+    std::erase_if(lists_[word], [&](const Entry& entry) { return entry.slot == slot; });
+  }
+  slots_[slot] = {};
+  free_.push_back(slot);
+}
+
+std::vector<PlaceCandidate> PlaceIndex::query(const BagOfWords& bag, std::size_t max_count,
+                                              const Predicate& admitted) {
   touched_.clear();
   for (const auto& [word, weight] : bag) {
     for (const Entry& entry : lists_[word]) {
-      float& score = scores_[index(entry.keyframe)];
-      if (score == 0) touched_.push_back(entry.keyframe);
+      float& score = slots_[entry.slot].score;
+      if (score == 0) touched_.push_back(entry.slot);
       score += std::min(weight, entry.weight);
     }
   }
-  std::vector<PlaceCandidate> candidates;
-  for (const KeyframeId keyframe : touched_) {
-    float& score = scores_[index(keyframe)];
-    if (!excluded.contains(index(keyframe))) candidates.push_back({keyframe, score});
-    score = 0;
+  std::vector<PlaceCandidate> heap;
+  heap.reserve(touched_.size());
+  for (const Slot slot : touched_) {
+    heap.push_back({slots_[slot].keyframe, slots_[slot].score});
+    slots_[slot].score = 0;
   }
-  const auto better = [](const PlaceCandidate& a, const PlaceCandidate& b) {
-    return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe;
+  const auto worse = [](const PlaceCandidate& a, const PlaceCandidate& b) {
+    return a.score != b.score ? a.score < b.score : a.keyframe > b.keyframe;
   };
-  const std::size_t count = std::min(max_count, candidates.size());
-  std::partial_sort(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(count),
-                    candidates.end(), better);
-  candidates.resize(count);
-  return candidates;
+  std::make_heap(heap.begin(), heap.end(), worse);
+  std::vector<PlaceCandidate> best;
+  while (!heap.empty() && best.size() < max_count) {
+    std::pop_heap(heap.begin(), heap.end(), worse);
+    if (admitted(heap.back().keyframe)) best.push_back(heap.back());
+    heap.pop_back();
+  }
+  return best;
 }
 
 }  // namespace twofold

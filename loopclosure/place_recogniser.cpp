@@ -3,6 +3,14 @@
 #include <algorithm>
 
 namespace twofold {
+namespace {
+
+/// A keyframe newer than the snapshot is not culled.
+bool is_culled(const GraphSnapshot& graph, KeyframeId id) {
+  return graph.contains(id) && graph.keyframe(id).culled();
+}
+
+}  // namespace
 
 PlaceRecogniser::PlaceRecogniser(std::size_t word_count, const RecogniserOptions& options)
     : options_(options), index_(word_count) {}
@@ -13,8 +21,9 @@ std::vector<PlaceCandidate> PlaceRecogniser::recognise(KeyframeId id, const BagO
   std::vector<Hypothesis> hypotheses;
   if (reference_score >= options_.min_reference) {
     exclude_near(id, graph);
+    const auto admitted = [&](KeyframeId k) { return !excluded_.contains(index(k)) && !is_culled(graph, k); };
     for (const PlaceCandidate& candidate :
-         index_.query(bag, excluded_, static_cast<std::size_t>(options_.max_candidates))) {
+         index_.query(bag, static_cast<std::size_t>(options_.max_candidates), admitted)) {
       if (candidate.score < options_.min_score * reference_score) break;  // best first
       int length = 1;
       for (const Hypothesis& before : hypotheses_) {
@@ -29,9 +38,14 @@ std::vector<PlaceCandidate> PlaceRecogniser::recognise(KeyframeId id, const BagO
   return confirmed;
 }
 
-std::vector<PlaceCandidate> PlaceRecogniser::query_anywhere(const BagOfWords& bag, std::size_t max_count) {
-  excluded_.reset(0);
-  return index_.query(bag, excluded_, max_count);
+std::vector<PlaceCandidate> PlaceRecogniser::query_anywhere(const BagOfWords& bag, std::size_t max_count,
+                                                            const GraphSnapshot& graph) {
+  return index_.query(bag, max_count, [&](KeyframeId k) { return !is_culled(graph, k); });
+}
+
+std::vector<KeyframeId> PlaceRecogniser::forget_culled(const GraphSnapshot& graph) {
+  return index_.forget(static_cast<std::size_t>(options_.culled_visits),
+                       [&](KeyframeId k) { return is_culled(graph, k); });
 }
 
 /// Keyframes newer than the snapshot are near too: they were made just now.

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/neighbourhood.hpp"
 #include "graph/snapshot.hpp"
 #include "loopclosure/place_index.hpp"
 
@@ -10,11 +11,14 @@ namespace twofold {
 
 struct RecogniserOptions {
   int near_keyframes = 60;      ///< this many around the query by breadth-first search are never candidates
-  int max_candidates = 5;       ///< of a query
+  int max_candidates = 10;      ///< of a query
   double min_score = 0.4;       ///< of a candidate, relative to the score with the keyframe before
   double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing
   int consistency = 2;          ///< successive keyframes that must agree about the place, >= 1
   int same_place = 6;           ///< keyframes this many edges-or-numbers apart show the same place
+  /// Places looked at for each one added, in turn, whether their keyframe was culled: bounds a step's time;
+  /// at most one place in so many is of a culled keyframe. >= 1
+  int culled_visits = 64;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -31,8 +35,10 @@ class PlaceRecogniser {
   PlaceRecogniser(std::size_t word_count, const RecogniserOptions& options);
 
   /// Adds a keyframe to the index.
-  void add(KeyframeId id, const BagOfWords& bag) { index_.add(id, bag); }
-  void remove(KeyframeId id, const BagOfWords& bag) { index_.remove(id, bag); }
+  void add(KeyframeId id, BagOfWords bag) { index_.add(id, std::move(bag)); }
+  /// Takes some of the keyframes that `graph` has culled out of the index, and says which.
+  std::vector<KeyframeId> forget_culled(const GraphSnapshot& graph);
+  [[nodiscard]] std::size_t keyframe_count() const { return index_.keyframe_count(); }
 
   /// Candidates for the keyframe `id` (not added yet, or added), best first. To be called for keyframes in
   /// the order they were made: the calls before are what a candidate must be consistent with.
@@ -41,7 +47,9 @@ class PlaceRecogniser {
                                                       double reference_score, const GraphSnapshot& graph);
 
   /// Candidates anywhere in the map, best first, without the tests that need a history: for a lost camera.
-  [[nodiscard]] std::vector<PlaceCandidate> query_anywhere(const BagOfWords& bag, std::size_t max_count);
+  /// Here as there, a culled keyframe is no candidate.
+  [[nodiscard]] std::vector<PlaceCandidate> query_anywhere(const BagOfWords& bag, std::size_t max_count,
+                                                           const GraphSnapshot& graph);
 
  private:
   /// A place that the last queries agreed about.

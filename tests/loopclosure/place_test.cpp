@@ -1,28 +1,21 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
-#include "fixtures/rendered_scene.hpp"
-#include "graph/graph_writer.hpp"
-#include "loopclosure/default_vocabulary.hpp"
-#include "loopclosure/loop_closer.hpp"
+#include "loopclosure/geometric_verification.hpp"
+#include "loopclosure/place_view.hpp"
+#include "tests/loopclosure/turning_camera.hpp"
 
 namespace twofold {
 namespace {
 
+using testing::pose;
 using testing::RenderedScene;
 using testing::test_rig;
-
-SE3 pose(double yaw, const Vector3& x_w) {
-  const SO3 R_c_w = SO3::exp(Vector3(0, yaw, 0));
-  return SE3(R_c_w, -(R_c_w * x_w));
-}
-
-std::shared_ptr<const Vocabulary> vocabulary() {
-  static const auto kVocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  return kVocabulary;
-}
+using testing::vocabulary;
 
 /// Two rooms of the same size with different walls, described by the same rig.
 class PlaceTest : public ::testing::TestWithParam<SensorKind> {
@@ -35,6 +28,12 @@ class PlaceTest : public ::testing::TestWithParam<SensorKind> {
     FrameImages images;
     scene.render(T_c_w, 2.0, images);
     return describer_.describe(images, *vocabulary());
+  }
+  std::optional<VerifiedPlace> verify(const PlaceView& a, const PlaceView& b,
+                                      VerificationOptions options = {},
+                                      VerificationReport* report = nullptr) {
+    const PlacedView place{&a, SE3()};
+    return verify_place(rig_, {&place, 1}, b, options, report);
   }
 };
 
@@ -67,7 +66,7 @@ TEST_P(PlaceTest, VerifiesTheSamePlaceAndFindsThePose) {
   const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5});
   const SE3 T_b_w = pose(-0.05, {-0.1, 0, -0.2});
   VerificationReport report;
-  const auto verified = verify_place(rig_, view(1, T_a_w), view(1, T_b_w), {}, &report);
+  const auto verified = verify(view(1, T_a_w), view(1, T_b_w), {}, &report);
   ASSERT_TRUE(verified) << report.matches << " matches, " << report.ransac_inliers << " in RANSAC, "
                         << report.inliers << " of " << report.guided << " guided";
   const Vector6 error = (verified->T_b_a * (T_b_w * T_a_w.inverse()).inverse()).log();
@@ -78,9 +77,58 @@ TEST_P(PlaceTest, VerifiesTheSamePlaceAndFindsThePose) {
 
 TEST_P(PlaceTest, RejectsAnotherRoomAndAnotherWall) {
   for (std::uint32_t room = 2; room < 8; ++room) {
-    EXPECT_FALSE(verify_place(rig_, view(1, pose(0, {0, 0, 0})), view(room, pose(0, {0, 0, 0})), {})) << room;
+    EXPECT_FALSE(verify(view(1, pose(0, {0, 0, 0})), view(room, pose(0, {0, 0, 0})), {})) << room;
   }
-  EXPECT_FALSE(verify_place(rig_, view(1, pose(0, {0, 0, 0})), view(1, pose(2.5, {0, 0, 0})), {}));
+  EXPECT_FALSE(verify(view(1, pose(0, {0, 0, 0})), view(1, pose(2.5, {0, 0, 0})), {}));
+}
+
+TEST_P(PlaceTest, EachRuleOfVerificationRefusesAlone) {
+  const PlaceView a = view(1, pose(0.1, {0.2, 0.1, -0.5})), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  VerificationReport report;
+  ASSERT_TRUE(verify(a, b, {}, &report));
+  VerificationOptions options;
+  options.min_inliers = report.inliers + 1;
+  EXPECT_FALSE(verify(a, b, options)) << "inliers";
+  options = {};
+  options.min_hypothesis = report.ransac_inliers + 1;
+  EXPECT_FALSE(verify(a, b, options)) << "matches that agree";
+  options = {};
+  options.min_in_half = report.inliers / 2 + 1;
+  EXPECT_FALSE(verify(a, b, options)) << "spread";
+  options = {};
+  options.min_inlier_share = 1;
+  options.max_error_px = 0.2;
+  options.min_inliers = 4;
+  options.min_in_half = 0;
+  EXPECT_FALSE(verify(a, b, options, &report)) << "share";
+  EXPECT_GE(report.inliers, 4);
+}
+
+TEST_P(PlaceTest, CornersOfOneSideOfTheImageAreNoLoop) {
+  const PlaceView a = view(1, pose(0, {0, 0, 0}));
+  PlaceView b = view(1, pose(0.02, {0.05, 0, 0}));
+  ASSERT_TRUE(verify(a, b));
+  for (std::size_t j = 0; j < b.corners.size(); ++j) {
+    if (b.corners[j].uv.x() > 300) b.corners[j].descriptor = {};
+  }
+  VerificationReport report;
+  EXPECT_FALSE(verify(a, b, {}, &report));
+  EXPECT_GE(report.inliers, VerificationOptions().min_inliers);
+  EXPECT_FALSE(report.well_spread);
+}
+
+/// Half of the corners are missing in the place's own view; its neighbour has them.
+TEST_P(PlaceTest, NeighboursLendTheirCorners) {
+  const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5}), T_n_w = pose(0.12, {0.25, 0.1, -0.5});
+  PlaceView a = view(1, T_a_w);
+  const PlaceView n = view(1, T_n_w), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  for (std::size_t i = 0; i < a.corners.size(); i += 2) a.z[i].z() = static_cast<float>(Rig::kNoRight);
+  VerificationReport alone, together;
+  (void)verify(a, b, {}, &alone);
+  const std::array<PlacedView, 2> place{{{&a, SE3()}, {&n, T_n_w * T_a_w.inverse()}}};
+  ASSERT_TRUE(verify_place(rig_, place, b, {}, &together));
+  EXPECT_EQ(together.matches, alone.matches);
+  EXPECT_GT(together.inliers, 1.3 * alone.inliers);
 }
 
 TEST_P(PlaceTest, LooksMoreLikeItselfThanLikeAnyOther) {
@@ -92,129 +140,6 @@ TEST_P(PlaceTest, LooksMoreLikeItselfThanLikeAnyOther) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, PlaceTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd));
-
-/// A camera that turns once around itself in a room and a bit more: keyframes joined one to the next.
-class LoopCloserTest : public ::testing::Test {
- protected:
-  static constexpr int kTurn = 30;  // keyframes a turn
-  Rig rig_ = test_rig(SensorKind::kRgbd, 320, 240);
-  GraphWriter writer_;
-  GraphSnapshot graph_;
-
-  static SE3 truth(int k) { return pose(2 * M_PI * k / kTurn, {0.2 * std::sin(0.4 * k), 0, 0}); }
-
-  static LoopCloserOptions options() {
-    LoopCloserOptions options;
-    options.recogniser.near_keyframes = 12;
-    return options;
-  }
-
-  KeyframeProposal keyframe(int k, std::uint32_t room = 1) {
-    RenderedScene scene(rig_, Vector3(3, 2, 4), room);
-    KeyframeProposal proposal;
-    proposal.id = KeyframeId{static_cast<std::uint32_t>(k)};
-    scene.render(truth(k), 1.5, proposal.images);
-    return proposal;
-  }
-
-  void add_to_map(int k) {
-    Keyframe added;
-    added.id = KeyframeId{static_cast<std::uint32_t>(k)};
-    added.T_k_w = truth(k);
-    writer_.add_keyframe(added);
-    writer_.set_reference(added.id);
-    if (k > 0) {
-      Edge edge;
-      edge.other = KeyframeId{static_cast<std::uint32_t>(k - 1)};
-      edge.weight = 50;
-      writer_.set_edge(added.id, edge);
-    }
-    graph_ = writer_.publish();
-  }
-};
-
-TEST_F(LoopCloserTest, ClosesTheLoopWhenTheCameraComesBackAndNotBefore) {
-  LoopCloser closer(rig_, vocabulary(), options());
-  int loops = 0;
-  for (int k = 0; k < kTurn + 6; ++k) {
-    add_to_map(k);
-    const auto loop = closer.step(keyframe(k), graph_);
-    if (!loop) continue;
-    ++loops;
-    EXPECT_GE(k, kTurn - 3);
-    EXPECT_EQ(loop->snapshot_version, graph_.version());
-    EXPECT_EQ(index(loop->to), static_cast<std::uint32_t>(k));
-    const SE3 T_to_from = truth(k) * truth(static_cast<int>(index(loop->from))).inverse();
-    EXPECT_LT((loop->T_to_from * T_to_from.inverse()).log().norm(), 0.06);
-  }
-  EXPECT_GE(loops, 2);
-}
-
-TEST_F(LoopCloserTest, OneLikenessAloneIsNotEnough) {
-  LoopCloserOptions strict = options();
-  strict.recogniser.consistency = 100;
-  LoopCloser closer(rig_, vocabulary(), strict);
-  for (int k = 0; k < kTurn + 4; ++k) {
-    add_to_map(k);
-    EXPECT_FALSE(closer.step(keyframe(k), graph_));
-  }
-}
-
-TEST_F(LoopCloserTest, NeighboursAreNoLoops) {
-  LoopCloserOptions wide = options();
-  wide.recogniser.near_keyframes = 1000;  // the whole map is near
-  LoopCloser closer(rig_, vocabulary(), wide);
-  for (int k = 0; k < kTurn + 4; ++k) {
-    add_to_map(k);
-    EXPECT_FALSE(closer.step(keyframe(k), graph_));
-  }
-}
-
-TEST_F(LoopCloserTest, RelocalisesInTheMapAndNotElsewhere) {
-  LoopCloser closer(rig_, vocabulary(), options());
-  for (int k = 0; k < kTurn; ++k) {
-    add_to_map(k);
-    (void)closer.step(keyframe(k), graph_);
-  }
-  for (int i = 0; i < 10; ++i) {
-    const SE3 T_c_w = pose(0.6 * i + 0.03, {0.1, 0.05, 0.1});
-    RenderedScene scene(rig_, Vector3(3, 2, 4), 1);
-    FrameImages images;
-    scene.render(T_c_w, 1.5, images);
-    const auto found = closer.relocalise(images, graph_);
-    ASSERT_TRUE(found) << i;
-    const SE3 T_c_w_found = found->T_c_k * graph_.T_k_w(found->keyframe);
-    EXPECT_LT((T_c_w_found * T_c_w.inverse()).log().norm(), 0.06) << i;
-    RenderedScene elsewhere(rig_, Vector3(3, 2, 4), 100 + static_cast<std::uint32_t>(i));
-    elsewhere.render(T_c_w, 1.5, images);
-    EXPECT_FALSE(closer.relocalise(images, graph_)) << i;
-  }
-}
-
-TEST_F(LoopCloserTest, CulledKeyframesAreForgotten) {
-  LoopCloser closer(rig_, vocabulary(), options());
-  for (int k = 0; k < 6; ++k) {
-    add_to_map(k);
-    (void)closer.step(keyframe(k), graph_);
-  }
-  const KeyframeProposal old = keyframe(1);
-  ASSERT_TRUE(closer.relocalise(old.images, graph_));
-  for (std::uint32_t k = 0; k < 5; ++k) writer_.cull_keyframe(KeyframeId{k}, KeyframeId{5});
-  graph_ = writer_.publish();
-  add_to_map(6);
-  (void)closer.step(keyframe(6), graph_);
-  const auto found = closer.relocalise(old.images, graph_);
-  if (found) {
-    EXPECT_GE(index(found->keyframe), 5U);
-  }
-}
-
-TEST(LoopCloserOptions, NameWhatIsWrong) {
-  LoopCloserOptions options;
-  EXPECT_EQ(options.invalid_reason(), "");
-  options.verification.min_inliers = 3;
-  EXPECT_NE(options.invalid_reason().find("min_inliers"), std::string::npos);
-}
 
 }  // namespace
 }  // namespace twofold

@@ -109,11 +109,8 @@ TEST_F(VocabularyTest, IndexFindsTheOtherViewsOfAPlaceAndHonoursExclusion) {
   std::vector<BagOfWords> bags;
   for (const auto& image : images_) bags.push_back(vocabulary_.bag(corners_of(image)));
   for (std::uint32_t k = 0; k < bags.size(); ++k) places.add(KeyframeId{k}, bags[k]);
-  VisitedSet excluded;
   for (std::uint32_t k = 0; k < bags.size(); ++k) {
-    excluded.reset(bags.size());
-    excluded.insert(k);
-    const auto found = places.query(bags[k], excluded, 2);
+    const auto found = places.query(bags[k], 2, [&](KeyframeId id) { return id != KeyframeId{k}; });
     ASSERT_EQ(found.size(), 2U);
     for (const PlaceCandidate& candidate : found) {
       EXPECT_EQ(index(candidate.keyframe) / 3, k / 3);
