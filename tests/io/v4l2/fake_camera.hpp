@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "io/v4l2/camera.hpp"
 #include "fixtures/fake_device.hpp"
+#include "io/v4l2/camera.hpp"
 
 namespace twofold {
 

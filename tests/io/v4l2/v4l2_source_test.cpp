@@ -5,9 +5,9 @@
 
 #include <opencv2/core.hpp>
 
+#include "fixtures/fake_device.hpp"
 #include "io/files/io_error.hpp"
 #include "io/sources/source_parameters.hpp"
-#include "fixtures/fake_device.hpp"
 
 namespace twofold {
 namespace {
