@@ -167,6 +167,7 @@ void ThreadedRun::map_late_loops() {
 }
 
 RunResult ThreadedRun::finish() {
+  collect({});
   map_late_loops();
   collect_results(tracking_, mapping_, loop_closing_, result_);
   result_.checkpoints = checkpoints_.report();

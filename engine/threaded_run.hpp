@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
@@ -57,7 +58,7 @@ class ThreadedRun {
   /// No more frames: returns when all that were pushed have been tracked and mapped. They can still be
   /// collected.
   void stop();
-  /// Final pose graph optimisation; moves the result out.
+  /// Collects what was not, and optimises the whole pose graph; moves the result out.
   [[nodiscard]] RunResult finish();
 
  private:

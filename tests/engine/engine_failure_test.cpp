@@ -11,6 +11,7 @@
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/threaded_run.hpp"
+#include "graph/graph_writer.hpp"
 #include "tests/engine/kidnapped_camera.hpp"
 
 namespace twofold {
@@ -92,7 +93,7 @@ TEST_F(EngineFailureTest, ALostCameraIsAnsweredWhenTheLoopCloserFails) {
   EXPECT_EQ(result.error, "loop closer: out of order");
   std::uint32_t answers = 0;
   for (const TrackerStep& step : testing::schedule_of(result).tracker) answers += step.messages;
-  EXPECT_EQ(answers, 1U);
+  EXPECT_GE(answers, 1U);
 }
 
 TEST(CheckpointWriter, ReportsWhateverASaveThrowsAndTriesAgain) {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kGap = 500 * kMs;
-constexpr std::size_t kFrames = 45;
+constexpr std::size_t kFrames = 60;
 
 /// One pose as it was heard of outside of the engine.
 struct Heard {
