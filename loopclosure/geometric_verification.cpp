@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include <fmt/format.h>
-
 #include "estimation/motion_only.hpp"
 #include "geometry/absolute_orientation.hpp"
 #include "geometry/ransac.hpp"
@@ -15,32 +13,30 @@
 namespace twofold {
 namespace {
 
+/// A corner of b and the corner of one of the place's views that it is taken for.
 struct Match {
-  int a = 0;
+  int view = 0;  ///< of the place
+  int corner = 0;
   int b = 0;
+  Vector3 x_a;  ///< the place's point, in the frame of its own view [m]
 };
 
 bool has_depth(const Eigen::Vector3f& z, const VerificationOptions& options) {
   return z.x() - z.z() > options.min_disparity_px;  // false for NaN
 }
 
-/// Best and second best partner of each of the view's corners.
+/// The partner whose descriptor is nearest, the first among equals.
 struct Nearest {
   int best = -1;
   int distance = 257;
-  int second = 257;
   void offer(int candidate, int d) {
-    if (d < distance) {
-      second = distance;
-      distance = d;
-      best = candidate;
-    } else if (d < second) {
-      second = d;
-    }
+    if (d >= distance) return;
+    distance = d;
+    best = candidate;
   }
 };
 
-std::vector<Match> match_descriptors(const PlaceAppearance& a, const PlaceAppearance& b,
+std::vector<Match> match_descriptors(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                                      const VerificationOptions& options) {
   std::vector<Nearest> of_a(a.corners.size()), of_b(b.corners.size());
   for (std::size_t i = 0; i < a.corners.size(); ++i) {
@@ -56,9 +52,8 @@ std::vector<Match> match_descriptors(const PlaceAppearance& a, const PlaceAppear
     if (nearest.best < 0 || nearest.distance > options.max_distance) continue;
     const auto j = static_cast<std::size_t>(nearest.best);
     if (of_b[j].best != static_cast<int>(i)) continue;
-    if (nearest.distance > options.max_ratio * nearest.second) continue;
     if (!has_depth(a.z[i], options) || !has_depth(b.z[j], options)) continue;
-    matches.push_back({static_cast<int>(i), nearest.best});
+    matches.push_back({0, static_cast<int>(i), nearest.best, rig.unproject(a.z[i].cast<double>())});
   }
   return matches;
 }
@@ -77,12 +72,9 @@ class RigidEstimator {
   static constexpr int kSampleSize = 3;
 
   RigidEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                 const std::vector<Match>& matches)
-      : rig_(rig), a_(a), b_(b), matches_(matches) {
-    for (const Match& match : matches) {
-      x_a_.push_back(rig.unproject(z_a(match).cast<double>()));
-      x_b_.push_back(rig.unproject(z_b(match).cast<double>()));
-    }
+                 const std::vector<Match>& matches, double max_stretch)
+      : rig_(rig), a_(a), b_(b), matches_(matches), max_stretch_(max_stretch) {
+    for (const Match& match : matches) x_b_.push_back(rig.unproject(z_b(match).cast<double>()));
   }
 
   [[nodiscard]] int size() const { return static_cast<int>(matches_.size()); }
@@ -90,8 +82,12 @@ class RigidEstimator {
   void fit(std::span<const int, 3> sample, std::vector<SE3>& models) const {
     std::array<Vector3, 3> x_a, x_b;
     for (std::size_t k = 0; k < 3; ++k) {
-      x_a[k] = x_a_[static_cast<std::size_t>(sample[k])];
-      x_b[k] = x_b_[static_cast<std::size_t>(sample[k])];
+      const auto m = static_cast<std::size_t>(sample[k]);
+      const auto next = static_cast<std::size_t>(sample[(k + 1) % 3]);
+      x_a[k] = matches_[m].x_a;
+      x_b[k] = x_b_[m];
+      const double in_a = (x_a[k] - matches_[next].x_a).norm(), in_b = (x_b[k] - x_b_[next]).norm();
+      if (std::abs(in_a - in_b) > max_stretch_ * std::max(in_a, in_b)) return;
     }
     if (const auto T_b_a = align_rigid(x_b, x_a)) models.push_back(*T_b_a);
   }
@@ -100,14 +96,14 @@ class RigidEstimator {
   [[nodiscard]] double squared_residual(const SE3& T_b_a, int i) const {
     const auto m = static_cast<std::size_t>(i);
     const Match& match = matches_[m];
-    const double in_b = squared_error(rig_, T_b_a * x_a_[m], z_b(match), level(b_, match.b));
-    const double in_a = squared_error(rig_, T_b_a.inverse() * x_b_[m], z_a(match), level(a_, match.a));
+    const double in_b = squared_error(rig_, T_b_a * match.x_a, z_b(match), level(b_, match.b));
+    const double in_a = squared_error(rig_, T_b_a.inverse() * x_b_[m], z_a(match), level(a_, match.corner));
     return std::max(in_a, in_b);
   }
 
  private:
   [[nodiscard]] const Eigen::Vector3f& z_a(const Match& m) const {
-    return a_.z[static_cast<std::size_t>(m.a)];
+    return a_.z[static_cast<std::size_t>(m.corner)];
   }
   [[nodiscard]] const Eigen::Vector3f& z_b(const Match& m) const {
     return b_.z[static_cast<std::size_t>(m.b)];
@@ -120,48 +116,81 @@ class RigidEstimator {
   const PlaceAppearance& a_;
   const PlaceAppearance& b_;
   const std::vector<Match>& matches_;
-  std::vector<Vector3> x_a_, x_b_;
+  double max_stretch_;
+  std::vector<Vector3> x_b_;
 };
 
-/// Best partner in b, near to where T_b_a says, of each corner of a that has depth; a corner of b serves
-/// once.
-/// @param expected  counts the corners of a that should be visible in b
-std::vector<Match> match_guided(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                                const SE3& T_b_a, const VerificationOptions& options, int& expected) {
-  std::vector<Nearest> of_b(b.corners.size());
-  expected = 0;
-  for (std::size_t i = 0; i < a.corners.size(); ++i) {
-    if (!has_depth(a.z[i], options)) continue;
-    const Vector3 x_b = T_b_a * rig.unproject(a.z[i].cast<double>());
-    if (!(x_b.z() > 1e-3)) continue;
-    const Vector2 uv = rig.camera.project(x_b);
-    if (!rig.camera.contains(uv, kDescriptorBorder)) continue;
-    ++expected;
+/// The corners of a view from top to bottom, so that a search looks at a few rows only.
+class CornersByRow {
+ public:
+  explicit CornersByRow(const std::vector<DescribedCorner>& corners) : corners_(corners) {
+    for (std::size_t j = 0; j < corners.size(); ++j) order_.push_back(static_cast<int>(j));
+    std::stable_sort(order_.begin(), order_.end(), [&](int i, int j) { return row(i) < row(j); });
+    for (const DescribedCorner& corner : corners) top_level_ = std::max(top_level_, int{corner.level});
+  }
+
+  /// The corner most like `descriptor` within `radius_px` pixels of its own level around uv.
+  [[nodiscard]] Nearest nearest(const Vector2& uv, const BinaryDescriptor& descriptor,
+                                double radius_px) const {
+    const double widest = std::ldexp(radius_px, top_level_);
+    const auto from =
+        std::partition_point(order_.begin(), order_.end(), [&](int j) { return row(j) < uv.y() - widest; });
     Nearest nearest;
-    for (std::size_t j = 0; j < b.corners.size(); ++j) {
-      const double radius = std::ldexp(options.guided_radius_px, b.corners[j].level);
-      if ((b.corners[j].uv.cast<double>() - uv).cwiseAbs().maxCoeff() > radius) continue;
-      nearest.offer(static_cast<int>(j), hamming_distance(a.corners[i].descriptor, b.corners[j].descriptor));
+    for (auto it = from; it != order_.end() && row(*it) <= uv.y() + widest; ++it) {
+      const DescribedCorner& corner = corners_[static_cast<std::size_t>(*it)];
+      const double radius = std::ldexp(radius_px, corner.level);
+      if ((corner.uv.cast<double>() - uv).cwiseAbs().maxCoeff() > radius) continue;
+      nearest.offer(*it, hamming_distance(descriptor, corner.descriptor));
     }
-    if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
-    of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(i), nearest.distance);
+    return nearest;
+  }
+
+ private:
+  [[nodiscard]] double row(int j) const { return corners_[static_cast<std::size_t>(j)].uv.y(); }
+
+  const std::vector<DescribedCorner>& corners_;
+  std::vector<int> order_;
+  int top_level_ = 0;
+};
+
+/// Best partner in b, near to where T_b_a says, of each corner of the place that has depth; a corner of b
+/// serves once.
+std::vector<Match> match_guided(const Rig& rig, std::span<const PlacedView> place, const PlaceAppearance& b,
+                                const CornersByRow& corners_of_b, const SE3& T_b_a, double radius_px,
+                                const VerificationOptions& options) {
+  std::vector<Match> offered;
+  std::vector<Nearest> of_b(b.corners.size());
+  for (std::size_t v = 0; v < place.size(); ++v) {
+    const PlaceAppearance& view = *place[v].appearance;
+    const SE3 T_a_v = place[v].T_v_a.inverse();
+    for (std::size_t i = 0; i < view.corners.size(); ++i) {
+      if (!has_depth(view.z[i], options)) continue;
+      const Vector3 x_a = T_a_v * rig.unproject(view.z[i].cast<double>());
+      const Vector3 x_b = T_b_a * x_a;
+      if (!(x_b.z() > 1e-3)) continue;
+      const Vector2 uv = rig.camera.project(x_b);
+      if (!rig.camera.contains(uv, kDescriptorBorder)) continue;
+      const Nearest nearest = corners_of_b.nearest(uv, view.corners[i].descriptor, radius_px);
+      if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
+      of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(offered.size()), nearest.distance);
+      offered.push_back({static_cast<int>(v), static_cast<int>(i), nearest.best, x_a});
+    }
   }
   std::vector<Match> matches;
-  for (std::size_t j = 0; j < of_b.size(); ++j) {
-    if (of_b[j].best >= 0) matches.push_back({of_b[j].best, static_cast<int>(j)});
+  for (const Nearest& nearest : of_b) {
+    if (nearest.best >= 0) matches.push_back(offered[static_cast<std::size_t>(nearest.best)]);
   }
   return matches;
 }
 
-SE3 refine(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-           const std::vector<Match>& matches, const SE3& T_b_a) {
+SE3 refine(const Rig& rig, const PlaceAppearance& b, const std::vector<Match>& matches, const SE3& T_b_a) {
   std::vector<MotionObservation> observations;
   observations.reserve(matches.size());
   for (const Match& match : matches) {
     const Eigen::Vector3f& z_b = b.z[static_cast<std::size_t>(match.b)];
     const bool has_right = std::isfinite(z_b.z());
     MotionObservation observation;
-    observation.x_ref = rig.unproject(a.z[static_cast<std::size_t>(match.a)].cast<double>());
+    observation.x_ref = match.x_a;
     observation.z = z_b;
     if (!has_right) observation.z.z() = 0;
     observation.information =
@@ -172,14 +201,12 @@ SE3 refine(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
   return result.converged ? result.T_c_ref : T_b_a;
 }
 
-std::vector<Match> keep_inliers(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                                const std::vector<Match>& matches, const SE3& T_b_a,
-                                const VerificationOptions& options) {
+std::vector<Match> keep_inliers(const Rig& rig, const PlaceAppearance& b, const std::vector<Match>& matches,
+                                const SE3& T_b_a, const VerificationOptions& options) {
   std::vector<Match> kept;
   for (const Match& match : matches) {
-    const auto i = static_cast<std::size_t>(match.a);
     const auto j = static_cast<std::size_t>(match.b);
-    const Vector3 x_b = T_b_a * rig.unproject(a.z[i].cast<double>());
+    const Vector3 x_b = T_b_a * match.x_a;
     Eigen::Vector3f z_b = b.z[j];
     // A corner without depth in b is judged by its place in the left image alone.
     if (!std::isfinite(z_b.z()) && x_b.z() > 1e-3) z_b.z() = static_cast<float>(rig.project(x_b).z());
@@ -189,58 +216,79 @@ std::vector<Match> keep_inliers(const Rig& rig, const PlaceAppearance& a, const 
   return kept;
 }
 
-/// At least Theta / 2 inliers in the upper, lower, left and right half of both images (6.4.1).
-bool spread_over(const Rig& rig, const PlaceAppearance& view, const std::vector<Match>& matches,
-                 int Match::*side, int min_inliers) {
-  int left = 0, upper = 0;
-  for (const Match& match : matches) {
-    const Eigen::Vector2f& uv = view.corners[static_cast<std::size_t>(match.*side)].uv;
-    left += uv.x() < 0.5F * static_cast<float>(rig.camera.width) ? 1 : 0;
-    upper += uv.y() < 0.5F * static_cast<float>(rig.camera.height) ? 1 : 0;
+/// Enough corners in the upper, lower, left and right half of the image.
+class Spread {
+ public:
+  explicit Spread(const PinholeCamera& camera) : centre_(0.5F * camera.width, 0.5F * camera.height) {}
+  void add(const Eigen::Vector2f& uv) {
+    ++(uv.x() < centre_.x() ? left_ : right_);
+    ++(uv.y() < centre_.y() ? upper_ : lower_);
   }
-  const int count = static_cast<int>(matches.size());
-  return 4 * std::min({left, count - left, upper, count - upper}) >= min_inliers;
+  [[nodiscard]] int least() const { return std::min({left_, right_, upper_, lower_}); }
+
+ private:
+  Eigen::Vector2f centre_;
+  int left_ = 0, right_ = 0, upper_ = 0, lower_ = 0;
+};
+
+bool well_spread(const Rig& rig, std::span<const PlacedView> place, const PlaceAppearance& b,
+                 const std::vector<Match>& matches, int min_in_half) {
+  Spread in_place(rig.camera), in_b(rig.camera);
+  for (const Match& match : matches) {
+    const PlaceAppearance& view = *place[static_cast<std::size_t>(match.view)].appearance;
+    in_place.add(view.corners[static_cast<std::size_t>(match.corner)].uv);
+    in_b.add(b.corners[static_cast<std::size_t>(match.b)].uv);
+  }
+  return std::min(in_place.least(), in_b.least()) >= min_in_half;
+}
+
+/// Pose that explains most of the matches between b and the place's own view.
+std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
+                                   const VerificationOptions& options, VerificationReport& report) {
+  const std::vector<Match> matches = match_descriptors(rig, a, b, options);
+  report.matches = static_cast<int>(matches.size());
+  const RigidEstimator estimator(rig, a, b, matches, options.max_stretch);
+  const auto found = ransac(estimator, RansacOptions{.threshold = options.ransac_error_px,
+                                                     .max_iterations = options.max_iterations});
+  if (!found) return std::nullopt;
+  report.ransac_inliers = static_cast<int>(found->inliers.size());
+  if (report.ransac_inliers < options.min_hypothesis) return std::nullopt;
+  std::vector<Match> inliers;
+  for (const int i : found->inliers) inliers.push_back(matches[static_cast<std::size_t>(i)]);
+  return refine(rig, b, inliers, found->model);
+}
+
+bool has_positions(const PlaceAppearance& view) {
+  return view.z.size() == view.corners.size();
 }
 
 }  // namespace
 
-std::string VerificationOptions::invalid_reason() const {
-  if (max_ratio <= 0 || max_ratio > 1) return fmt::format("max_ratio must be in (0, 1], is {}", max_ratio);
-  if (min_inliers < 4) return fmt::format("min_inliers must be >= 4, is {}", min_inliers);
-  if (max_error_px <= 0) return fmt::format("max_error_px must be > 0, is {}", max_error_px);
-  if (max_iterations < 1) return fmt::format("max_iterations must be >= 1, is {}", max_iterations);
-  return "";
-}
-
-std::optional<VerifiedPlace> verify_place(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                                          const VerificationOptions& options, VerificationReport* report) {
+std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const PlacedView> place,
+                                          const PlaceAppearance& b, const VerificationOptions& options,
+                                          VerificationReport* report) {
   VerificationReport unwanted;
   VerificationReport& r = report != nullptr ? *report : unwanted;
   r = {};
-  if (a.z.size() != a.corners.size() || b.z.size() != b.corners.size()) return std::nullopt;
-  const std::vector<Match> matches = match_descriptors(a, b, options);
-  r.matches = static_cast<int>(matches.size());
-  const RigidEstimator estimator(rig, a, b, matches);
-  const auto found = ransac(estimator, RansacOptions{.threshold = 2 * options.max_error_px,
-                                                     .max_iterations = options.max_iterations});
-  if (!found) return std::nullopt;
-  r.ransac_inliers = static_cast<int>(found->inliers.size());
-  if (r.ransac_inliers < options.min_inliers / 3) return std::nullopt;
+  for (const PlacedView& view : place) {
+    if (!has_positions(*view.appearance)) return std::nullopt;
+  }
+  if (place.empty() || !has_positions(b)) return std::nullopt;
+  const auto hypothesis = find_hypothesis(rig, *place[0].appearance, b, options, r);
+  if (!hypothesis) return std::nullopt;
 
-  SE3 T_b_a = found->model;
+  SE3 T_b_a = *hypothesis;
+  const CornersByRow corners_of_b(b.corners);
   std::vector<Match> inliers;
-  for (const int i : found->inliers) inliers.push_back(matches[static_cast<std::size_t>(i)]);
-  T_b_a = refine(rig, a, b, inliers, T_b_a);
-  int expected = 0;
-  for (int round = 0; round < 2; ++round) {
-    const std::vector<Match> guided = match_guided(rig, a, b, T_b_a, options, expected);
+  for (const double radius : {1.0, 0.5, 0.5}) {
+    const std::vector<Match> guided =
+        match_guided(rig, place, b, corners_of_b, T_b_a, radius * options.guided_radius_px, options);
     r.guided = static_cast<int>(guided.size());
-    T_b_a = refine(rig, a, b, guided, T_b_a);
-    inliers = keep_inliers(rig, a, b, guided, T_b_a, options);
+    T_b_a = refine(rig, b, guided, T_b_a);
+    inliers = keep_inliers(rig, b, guided, T_b_a, options);
   }
   r.inliers = static_cast<int>(inliers.size());
-  r.well_spread = spread_over(rig, a, inliers, &Match::a, options.min_inliers) &&
-                  spread_over(rig, b, inliers, &Match::b, options.min_inliers);
+  r.well_spread = well_spread(rig, place, b, inliers, options.min_in_half);
   if (r.inliers < options.min_inliers || r.inliers < options.min_inlier_share * r.guided || !r.well_spread) {
     return std::nullopt;
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include "camera/rig.hpp"
@@ -10,42 +11,57 @@
 namespace twofold {
 
 struct VerificationOptions {
-  int max_distance = 70;    ///< of a match's descriptors [bits]
-  double max_ratio = 0.85;  ///< of the best to the second best distance, in (0, 1]
-  int min_inliers = 30;     ///< Theta
-  double min_inlier_share =
-      0.3;                      ///< of the corners that should be visible in the other view and were matched
-  double max_error_px = 3;      ///< reprojection error of an inlier, pixels of the corner's level
-  double guided_radius_px = 6;  ///< guided matching around the prediction, pixels of the corner's level
-  int guided_distance = 80;     ///< descriptors in guided matching [bits]
-  int max_iterations = 1500;    ///< RANSAC: finds a good sample at inlier shares down to a sixth (0.999)
+  int max_distance = 50;          ///< of a match's descriptors [bits]
+  double max_error_px = 3;        ///< reprojection error of an inlier, pixels of the corner's level
+  double ransac_error_px = 9;     ///< ... of a match that agrees with three others: their pose is rough
+  double max_stretch = 0.15;      ///< by so much of its length a sample's side may differ between the views
+  int max_iterations = 5000;      ///< samples; most fail at their sides already
+  int min_hypothesis = 6;         ///< matches that must agree before the pose is tried by guided matching
+  double guided_radius_px = 8;    ///< of the first round of guided matching, pixels of the corner's level;
+                                  ///< the later rounds take half of it
+  int guided_distance = 64;       ///< descriptors in guided matching [bits]
+  int min_inliers = 30;           ///< Theta
+  double min_inlier_share = 0.4;  ///< of the guided matches: what is near by chance seldom fits
+  /// Inliers in the upper, lower, left and right half of either view, so that the pose does not hang on one
+  /// corner of the image. Theta / 2, as for metric loops (6.4.1), would refuse views that share half of what
+  /// they see (docs/places.md).
+  int min_in_half = 4;
   double min_disparity_px = 1;  ///< corners farther than this tell nothing about translation
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
 };
 
+/// A view of a place, and where it was seen from.
+struct PlacedView {
+  const PlaceAppearance* appearance = nullptr;
+  SE3 T_v_a;  ///< pose relative to the place's own view a: p_v = T_v_a * p_a  [m]
+};
+
 struct VerifiedPlace {
   SE3 T_b_a;        ///< p_b = T_b_a * p_a  [m]
-  int inliers = 0;  ///< guided matches within the error bound, each with depth in a
+  int inliers = 0;  ///< corners of b within the error bound, each of a corner of the place that has depth
 };
 
 /// What became of a pair of views; for statistics and tests.
 struct VerificationReport {
-  int matches = 0;  ///< of descriptors, mutual and unambiguous, both with depth
+  int matches = 0;  ///< of descriptors, mutual, both with depth
   int ransac_inliers = 0;
   int guided = 0;  ///< matched by guided search at the end
   int inliers = 0;
   bool well_spread = false;
 };
 
-/// Do two keyframes see the same place?  (thesis 5.3.1, 6.4.2)
+/// Does view b show the place?  (thesis 5.3.1, 6.4.2)
 ///
-/// Mutual nearest descriptors; 3-point RANSAC on 3D-3D matches (eq. 5.11 - 5.14 with s = 1, eq. 6.9), errors
-/// measured where they arise, in pixels; guided matching with the pose found; robust refinement; at least
-/// Theta inliers, spread over both halves of the image in each direction, as metric closures must be (6.4.1).
+/// Mutual nearest descriptors of b and the place's own view; 3-point RANSAC on 3D-3D matches (eq. 5.11 - 5.14
+/// with s = 1, eq. 6.9), errors measured where they arise, in pixels; a sample whose triangles differ is no
+/// sample (a rigid body keeps its lengths). From the pose found on, the corners of all views of the place are
+/// looked for in b: what one view missed, its neighbours may have. At least Theta inliers, well spread.
 /// Deterministic.
-[[nodiscard]] std::optional<VerifiedPlace> verify_place(const Rig& rig, const PlaceAppearance& a,
+///
+/// @param place  the place's own view a first, with T_v_a = identity; then, if there are, its neighbours'
+[[nodiscard]] std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const PlacedView> place,
                                                         const PlaceAppearance& b,
                                                         const VerificationOptions& options,
                                                         VerificationReport* report = nullptr);

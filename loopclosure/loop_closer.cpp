@@ -53,8 +53,8 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
 
 std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, const GraphSnapshot& graph) {
   const PlaceView view = describer_.describe(images, *vocabulary_);
-  const auto candidates =
-      recogniser_.query_anywhere(view.bag, static_cast<std::size_t>(options_.relocalisation_candidates), graph);
+  const auto candidates = recogniser_.query_anywhere(
+      view.bag, static_cast<std::size_t>(options_.relocalisation_candidates), graph);
   for (const PlaceCandidate& candidate : candidates) {
     if (auto verified = verify(candidate.keyframe, view, images, graph)) return verified;
   }
@@ -64,7 +64,8 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
 std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& view,
                                                  const FrameImages& images, const GraphSnapshot& graph) {
   if (!graph.contains(k)) return std::nullopt;
-  const auto place = verify_place(rig_, *places_.find(k), view, options_.verification);
+  collect_views(k, graph);
+  const auto place = verify_place(rig_, views_, view, options_.verification);
   if (!place) return std::nullopt;
   RefinedPlace refined;
   switch (refinement_.refine(graph, k, images, place->T_b_a, refined)) {
@@ -76,6 +77,19 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
       break;
   }
   return std::nullopt;
+}
+
+/// The place's own view and those of its neighbours.
+void LoopCloser::collect_views(KeyframeId k, const GraphSnapshot& graph) {
+  neighbours_.clear();
+  direct_neighbours(graph, k, static_cast<std::size_t>(options_.place_views), neighbours_);
+  views_.clear();
+  for (const KeyframeId n : neighbours_) {
+    const PlaceAppearance* view = places_.find(n);
+    if (view == nullptr) continue;
+    const SE3 T_n_k = n == k ? SE3() : relative_pose(graph, k, *find_edge(graph.keyframe(k), n));
+    views_.push_back({view, T_n_k});
+  }
 }
 
 void LoopCloser::remember(KeyframeId id, PlaceView view) {

@@ -19,7 +19,8 @@ struct LoopCloserOptions {
   RecogniserOptions recogniser;
   VerificationOptions verification;
   RefinementOptions refinement;
-  int relocalisation_candidates = 8;  ///< places tried for a lost camera
+  int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included
+  int relocalisation_candidates = 10;  ///< places tried for a lost camera
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -45,8 +46,7 @@ class LoopCloser {
   /// on the vocabulary it was made with. To be called before the first step.
   void continue_from(const KeyframeDatabase& places);
 
-  /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be
-  /// called in the order of keyframe ids; ids may be left out.
+  /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be called in the order of keyframe ids; ids may be left out.
   [[nodiscard]] std::optional<LoopConstraint> step(const KeyframeProposal& keyframe,
                                                    const GraphSnapshot& graph);
 
@@ -61,6 +61,7 @@ class LoopCloser {
   /// Does the view show the place of keyframe k? First by corners, then by the map's points.
   [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
                                                      const FrameImages& images, const GraphSnapshot& graph);
+  void collect_views(KeyframeId k, const GraphSnapshot& graph);
   void remember(KeyframeId id, PlaceView view);
 
   Rig rig_;
@@ -70,6 +71,8 @@ class LoopCloser {
   PlaceRecogniser recogniser_;
   PoseRefinement refinement_;
   KeyframeDatabase places_;
+  std::vector<KeyframeId> neighbours_;
+  std::vector<PlacedView> views_;
   std::optional<BagOfWords> previous_;  // of the keyframe described last
 };
 

@@ -25,6 +25,23 @@ std::string RecogniserOptions::invalid_reason() const {
       .reason();
 }
 
+std::string VerificationOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_distance", max_distance, 1)
+      .above("max_error_px", max_error_px, 0)
+      .above("ransac_error_px", ransac_error_px, 0)
+      .above("max_stretch", max_stretch, 0)
+      .at_least("max_iterations", max_iterations, 1)
+      .at_least("min_hypothesis", min_hypothesis, 3)
+      .above("guided_radius_px", guided_radius_px, 0)
+      .at_least("guided_distance", guided_distance, 1)
+      .at_least("min_inliers", min_inliers, 4)
+      .within("min_inlier_share", min_inlier_share, 0, 1)
+      .at_least("min_in_half", min_in_half, 0)
+      .at_least("min_disparity_px", min_disparity_px, 0)
+      .reason();
+}
+
 std::string RefinementOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("neighbours", neighbours, 1)
@@ -41,6 +58,7 @@ std::string LoopCloserOptions::invalid_reason() const {
       .nested("recogniser", recogniser.invalid_reason())
       .nested("verification", verification.invalid_reason())
       .nested("refinement", refinement.invalid_reason())
+      .at_least("place_views", place_views, 1)
       .at_least("relocalisation_candidates", relocalisation_candidates, 1)
       .reason();
 }

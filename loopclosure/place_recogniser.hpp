@@ -11,7 +11,7 @@ namespace twofold {
 
 struct RecogniserOptions {
   int near_keyframes = 60;      ///< this many around the query by breadth-first search are never candidates
-  int max_candidates = 5;       ///< of a query
+  int max_candidates = 10;      ///< of a query
   double min_score = 0.4;       ///< of a candidate, relative to the score with the keyframe before
   double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing
   int consistency = 2;          ///< successive keyframes that must agree about the place, >= 1

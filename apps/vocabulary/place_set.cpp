@@ -117,16 +117,23 @@ void TruePairs::parse(const std::string& text) {
   if (pairs_.empty()) throw IoError("--pairs", "no pairs");
 }
 
-/// Between the bounds and twice the bounds both answers are right: part of the view is shared.
-Truth TruePairs::from_poses(int a, int b) const {
+TruePairs::Separation TruePairs::between(int a, int b) const {
   const SE3 T_a_b = set_.places[static_cast<std::size_t>(a)].T_w_c->inverse() *
                     *set_.places[static_cast<std::size_t>(b)].T_w_c;
-  const double distance = T_a_b.translation().norm();
   const double angle = std::acos(std::clamp(T_a_b.rotation()(2, 2), -1.0, 1.0)) * 180 / std::numbers::pi;
-  if (distance <= arguments_.max_distance && angle <= arguments_.max_angle_deg) return Truth::kSame;
-  if (distance > 2.5 * arguments_.max_distance || angle > 2.5 * arguments_.max_angle_deg)
-    return Truth::kOther;
-  return Truth::kUndecided;
+  return {T_a_b.translation().norm() / arguments_.max_distance, angle / arguments_.max_angle_deg};
+}
+
+double TruePairs::separation(int a, int b) const {
+  const Separation apart = between(a, b);
+  return apart.distance + apart.angle;
+}
+
+/// Between the bounds and 2.5 times the bounds both answers are right: part of the view is shared.
+Truth TruePairs::from_poses(int a, int b) const {
+  const Separation apart = between(a, b);
+  if (apart.distance <= 1 && apart.angle <= 1) return Truth::kSame;
+  return apart.distance > 2.5 || apart.angle > 2.5 ? Truth::kOther : Truth::kUndecided;
 }
 
 }  // namespace twofold

@@ -38,9 +38,17 @@ class TruePairs {
   TruePairs(const PlaceEvaluationArguments& arguments, const PlaceSet& set);
 
   [[nodiscard]] Truth of(int a, int b) const;
+  /// How far two images with true poses were taken apart: 1 is the bound of what is the same place, once in
+  /// distance and once in angle.
+  [[nodiscard]] double separation(int a, int b) const;
 
  private:
+  struct Separation {
+    double distance, angle;  ///< in units of the bounds
+  };
+
   void parse(const std::string& text);
+  [[nodiscard]] Separation between(int a, int b) const;
   [[nodiscard]] Truth from_poses(int a, int b) const;
 
   const PlaceEvaluationArguments& arguments_;

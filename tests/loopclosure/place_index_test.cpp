@@ -52,7 +52,8 @@ TEST(PlaceIndex, ForgetsWithinOneTurn) {
   EXPECT_EQ(forgotten, 10U);
   EXPECT_EQ(index.keyframe_count(), 10U);
   for (std::uint32_t k = 0; k < 20; ++k) {
-    for (const PlaceCandidate& candidate : index.query(bag(k), 20, any)) EXPECT_FALSE(odd(candidate.keyframe));
+    for (const PlaceCandidate& candidate : index.query(bag(k), 20, any))
+      EXPECT_FALSE(odd(candidate.keyframe));
   }
 }
 

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/place_view.hpp"
@@ -26,6 +28,12 @@ class PlaceTest : public ::testing::TestWithParam<SensorKind> {
     FrameImages images;
     scene.render(T_c_w, 2.0, images);
     return describer_.describe(images, *vocabulary());
+  }
+  std::optional<VerifiedPlace> verify(const PlaceView& a, const PlaceView& b,
+                                      VerificationOptions options = {},
+                                      VerificationReport* report = nullptr) {
+    const PlacedView place{&a, SE3()};
+    return verify_place(rig_, {&place, 1}, b, options, report);
   }
 };
 
@@ -58,7 +66,7 @@ TEST_P(PlaceTest, VerifiesTheSamePlaceAndFindsThePose) {
   const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5});
   const SE3 T_b_w = pose(-0.05, {-0.1, 0, -0.2});
   VerificationReport report;
-  const auto verified = verify_place(rig_, view(1, T_a_w), view(1, T_b_w), {}, &report);
+  const auto verified = verify(view(1, T_a_w), view(1, T_b_w), {}, &report);
   ASSERT_TRUE(verified) << report.matches << " matches, " << report.ransac_inliers << " in RANSAC, "
                         << report.inliers << " of " << report.guided << " guided";
   const Vector6 error = (verified->T_b_a * (T_b_w * T_a_w.inverse()).inverse()).log();
@@ -69,9 +77,58 @@ TEST_P(PlaceTest, VerifiesTheSamePlaceAndFindsThePose) {
 
 TEST_P(PlaceTest, RejectsAnotherRoomAndAnotherWall) {
   for (std::uint32_t room = 2; room < 8; ++room) {
-    EXPECT_FALSE(verify_place(rig_, view(1, pose(0, {0, 0, 0})), view(room, pose(0, {0, 0, 0})), {})) << room;
+    EXPECT_FALSE(verify(view(1, pose(0, {0, 0, 0})), view(room, pose(0, {0, 0, 0})), {})) << room;
   }
-  EXPECT_FALSE(verify_place(rig_, view(1, pose(0, {0, 0, 0})), view(1, pose(2.5, {0, 0, 0})), {}));
+  EXPECT_FALSE(verify(view(1, pose(0, {0, 0, 0})), view(1, pose(2.5, {0, 0, 0})), {}));
+}
+
+TEST_P(PlaceTest, EachRuleOfVerificationRefusesAlone) {
+  const PlaceView a = view(1, pose(0.1, {0.2, 0.1, -0.5})), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  VerificationReport report;
+  ASSERT_TRUE(verify(a, b, {}, &report));
+  VerificationOptions options;
+  options.min_inliers = report.inliers + 1;
+  EXPECT_FALSE(verify(a, b, options)) << "inliers";
+  options = {};
+  options.min_hypothesis = report.ransac_inliers + 1;
+  EXPECT_FALSE(verify(a, b, options)) << "matches that agree";
+  options = {};
+  options.min_in_half = report.inliers / 2 + 1;
+  EXPECT_FALSE(verify(a, b, options)) << "spread";
+  options = {};
+  options.min_inlier_share = 1;
+  options.max_error_px = 0.2;
+  options.min_inliers = 4;
+  options.min_in_half = 0;
+  EXPECT_FALSE(verify(a, b, options, &report)) << "share";
+  EXPECT_GE(report.inliers, 4);
+}
+
+TEST_P(PlaceTest, CornersOfOneSideOfTheImageAreNoLoop) {
+  const PlaceView a = view(1, pose(0, {0, 0, 0}));
+  PlaceView b = view(1, pose(0.02, {0.05, 0, 0}));
+  ASSERT_TRUE(verify(a, b));
+  for (std::size_t j = 0; j < b.corners.size(); ++j) {
+    if (b.corners[j].uv.x() > 300) b.corners[j].descriptor = {};
+  }
+  VerificationReport report;
+  EXPECT_FALSE(verify(a, b, {}, &report));
+  EXPECT_GE(report.inliers, VerificationOptions().min_inliers);
+  EXPECT_FALSE(report.well_spread);
+}
+
+/// Half of the corners are missing in the place's own view; its neighbour has them.
+TEST_P(PlaceTest, NeighboursLendTheirCorners) {
+  const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5}), T_n_w = pose(0.12, {0.25, 0.1, -0.5});
+  PlaceView a = view(1, T_a_w);
+  const PlaceView n = view(1, T_n_w), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  for (std::size_t i = 0; i < a.corners.size(); i += 2) a.z[i].z() = static_cast<float>(Rig::kNoRight);
+  VerificationReport alone, together;
+  (void)verify(a, b, {}, &alone);
+  const std::array<PlacedView, 2> place{{{&a, SE3()}, {&n, T_n_w * T_a_w.inverse()}}};
+  ASSERT_TRUE(verify_place(rig_, place, b, {}, &together));
+  EXPECT_EQ(together.matches, alone.matches);
+  EXPECT_GT(together.inliers, 1.3 * alone.inliers);
 }
 
 TEST_P(PlaceTest, LooksMoreLikeItselfThanLikeAnyOther) {
