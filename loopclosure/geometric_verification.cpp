@@ -292,7 +292,7 @@ std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const Placed
   if (r.inliers < options.min_inliers || r.inliers < options.min_inlier_share * r.guided || !r.well_spread) {
     return std::nullopt;
   }
-  return VerifiedPlace{refine(rig, b, inliers, T_b_a), r.inliers};
+  return VerifiedPlace{T_b_a, r.inliers};
 }
 
 }  // namespace twofold

@@ -30,9 +30,9 @@ struct Tried {
 /// The best answer to one query.
 struct Answer {
   int query = 0;
-  int place = -1;
-  double score = 0;  ///< relative to the score with the image before
-  bool verified = false;
+  int place = -1;     ///< of recognition alone
+  double score = 0;   ///< relative to the score with the image before
+  int verified = -1;  ///< place; -1: none of the candidates was
   SE3 T_query_place;  ///< when verified
   std::vector<Tried> tried;
 };
@@ -69,8 +69,7 @@ void verify_candidates(const PlaceSet& set, const TruePairs& truth, int end, dou
         verify_place(set.rig, views_of(set, truth, tried.place, end), view, {}, &tried.stages);
     tried.verified = verified.has_value();
     if (!verified) continue;
-    answer.verified = true;
-    answer.place = tried.place;
+    answer.verified = tried.place;
     answer.T_query_place = verified->T_b_a;
     return;
   }
@@ -156,13 +155,15 @@ void print_recognition(std::vector<Answer> answers, const TruePairs& truth, int 
 /// How wrong the pose of a verified answer is.
 struct PoseError {
   double distance, angle_deg;
-  /// Far beyond what a right closure is wrong by, far below what a wrong one is.
-  [[nodiscard]] bool wrong() const { return distance > 0.25 || angle_deg > 6; }
+  /// By more than a third of what may lie between two images of the same place.
+  [[nodiscard]] bool wrong(const PlaceEvaluationArguments& arguments) const {
+    return 3 * distance > arguments.max_distance || 3 * angle_deg > arguments.max_angle_deg;
+  }
 };
 
 std::optional<PoseError> pose_error(const PlaceSet& set, const Answer& answer) {
   const auto& T_w_q = set.places[static_cast<std::size_t>(answer.query)].T_w_c;
-  const auto& T_w_p = set.places[static_cast<std::size_t>(answer.place)].T_w_c;
+  const auto& T_w_p = set.places[static_cast<std::size_t>(answer.verified)].T_w_c;
   if (!T_w_q || !T_w_p) return std::nullopt;
   const SE3 error = answer.T_query_place * T_w_p->inverse() * *T_w_q;
   const double angle = error.so3().log().norm() * 180 / std::numbers::pi;
@@ -180,9 +181,10 @@ std::optional<std::pair<double, double>> print_verified(const PlaceEvaluationArg
   int recalled = 0;
   std::vector<double> errors_m, errors_deg;
   for (const Answer& answer : answers) {
-    if (!answer.verified) continue;
+    if (answer.verified < 0) continue;
     const auto error = pose_error(set, answer);
-    const bool right = error ? !error->wrong() : truth.of(answer.query, answer.place) == Truth::kSame;
+    const bool right =
+        error ? !error->wrong(arguments) : truth.of(answer.query, answer.verified) == Truth::kSame;
     ++(right ? counts.right : counts.wrong);
     recalled += right && answerable(arguments, truth, answer.query) ? 1 : 0;
     if (!error) continue;
