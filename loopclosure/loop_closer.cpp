@@ -21,7 +21,8 @@ LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabul
       options_(validated(options)),
       describer_(rig, options.corners),
       recogniser_(vocabulary_->word_count(), options.recogniser),
-      refinement_(rig, options.refinement) {}
+      refinement_(rig, options.refinement),
+      probation_(options.probation) {}
 
 void LoopCloser::continue_from(const KeyframeDatabase& places) {
   places_ = places;
@@ -43,8 +44,9 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   for (const PlaceCandidate& candidate : candidates) {
     const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
     if (!verified) continue;
-    loop =
-        LoopConstraint{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k, verified->inliers};
+    const LoopConstraint seen{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k,
+                              verified->inliers};
+    if (probation_.confirms(seen, graph)) loop = seen;
     break;
   }
   remember(keyframe.id, std::move(view));

@@ -8,6 +8,7 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
 #include "loopclosure/geometric_verification.hpp"
+#include "loopclosure/loop_probation.hpp"
 #include "loopclosure/place_recogniser.hpp"
 #include "loopclosure/place_view.hpp"
 #include "loopclosure/pose_refinement.hpp"
@@ -19,6 +20,7 @@ struct LoopCloserOptions {
   RecogniserOptions recogniser;
   VerificationOptions verification;
   RefinementOptions refinement;
+  ProbationOptions probation;
   int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included
   int relocalisation_candidates = 10;  ///< places tried for a lost camera
 
@@ -46,7 +48,8 @@ class LoopCloser {
   /// on the vocabulary it was made with. To be called before the first step.
   void continue_from(const KeyframeDatabase& places);
 
-  /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before. To be called in the order of keyframe ids; ids may be left out.
+  /// Describes and remembers a keyframe that `graph` has, and tells whether its place was seen before, once
+  /// that is confirmed. To be called in the order of keyframe ids; ids may be left out.
   [[nodiscard]] std::optional<LoopConstraint> step(const KeyframeProposal& keyframe,
                                                    const GraphSnapshot& graph);
 
@@ -70,6 +73,7 @@ class LoopCloser {
   PlaceDescriber describer_;
   PlaceRecogniser recogniser_;
   PoseRefinement refinement_;
+  LoopProbation probation_;
   KeyframeDatabase places_;
   std::vector<KeyframeId> neighbours_;
   std::vector<PlacedView> views_;

@@ -45,10 +45,22 @@ std::string VerificationOptions::invalid_reason() const {
 std::string RefinementOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("neighbours", neighbours, 1)
-      .at_least("max_points", max_points, 1)
+      .at_least("min_visible", min_visible, 1)
+      .at_least("max_points", max_points, min_visible)
+      .at_least("border_px", border_px, 0)
       .above("radius_px", radius_px, 0)
+      .above("second_radius_px", second_radius_px, 0)
       .at_least("min_inliers", min_inliers, 3)
       .within("min_inlier_share", min_inlier_share, 0, 1)
+      .within("min_visible_share", min_visible_share, 0, 1)
+      .reason();
+}
+
+std::string ProbationOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("max_shift", max_shift, 0)
+      .above("max_angle_deg", max_angle_deg, 0)
+      .at_least("patience", patience, 1)
       .reason();
 }
 
@@ -58,6 +70,7 @@ std::string LoopCloserOptions::invalid_reason() const {
       .nested("recogniser", recogniser.invalid_reason())
       .nested("verification", verification.invalid_reason())
       .nested("refinement", refinement.invalid_reason())
+      .nested("probation", probation.invalid_reason())
       .at_least("place_views", place_views, 1)
       .at_least("relocalisation_candidates", relocalisation_candidates, 1)
       .reason();

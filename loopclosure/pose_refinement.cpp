@@ -10,16 +10,17 @@ namespace twofold {
 RefinementOutcome PoseRefinement::refine(const GraphSnapshot& graph, KeyframeId place,
                                          const FrameImages& images, const SE3& T_c_k, RefinedPlace& result) {
   collect_points(graph, place, T_c_k);
-  if (static_cast<int>(visible_.size()) < 2 * options_.min_inliers) return RefinementOutcome::kTooFewPoints;
+  if (static_cast<int>(visible_.size()) < options_.min_visible) return RefinementOutcome::kTooFewPoints;
   result.T_c_k = T_c_k;
-  for (const double radius_px : {options_.radius_px, options_.radius_px / 3}) {
+  for (const double radius_px : {options_.radius_px, options_.second_radius_px}) {
     search(graph, place, images, result.T_c_k, radius_px);
     const MotionOnlyResult motion = optimise_motion(rig_, found_, result.T_c_k, {});
     result.inliers = motion.inliers;
     if (!motion.converged || motion.inliers < options_.min_inliers) return RefinementOutcome::kContradicted;
     result.T_c_k = motion.T_c_ref;
   }
-  const bool agreed = result.inliers >= options_.min_inlier_share * static_cast<double>(found_.size());
+  const bool agreed = result.inliers >= options_.min_inlier_share * static_cast<double>(found_.size()) &&
+                      result.inliers >= options_.min_visible_share * static_cast<double>(visible_.size());
   return agreed ? RefinementOutcome::kRefined : RefinementOutcome::kContradicted;
 }
 
@@ -32,7 +33,7 @@ void PoseRefinement::collect_points(const GraphSnapshot& graph, KeyframeId place
   const SE3 T_c_w = T_c_k * graph.T_k_w(place);
   std::erase_if(visible_, [&](PointId id) {
     const Vector3 x_c = T_c_w * graph.position(id);
-    return !(x_c.z() > 1e-3) || !rig_.camera.contains(rig_.camera.project(x_c), 8);
+    return !(x_c.z() > 1e-3) || !rig_.camera.contains(rig_.camera.project(x_c), options_.border_px);
   });
   const auto most = static_cast<std::size_t>(options_.max_points);
   if (visible_.size() > most) visible_.resize(most);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,11 +11,15 @@
 namespace twofold {
 
 struct RefinementOptions {
-  int neighbours = 8;             ///< keyframes of N1 whose points are looked for, the place itself included
-  int max_points = 400;           ///< searched
-  double radius_px = 8;           ///< of the first search; the second one takes a third of it
-  int min_inliers = 20;           ///< Theta
-  double min_inlier_share = 0.6;  ///< of the points found
+  int neighbours = 8;    ///< keyframes of N1 whose points are looked for, the place itself included
+  int max_points = 400;  ///< searched
+  int min_visible = 40;  ///< points that should be in view; fewer say nothing
+  double border_px = 8;  ///< a point nearer than this to the image's border is not looked for
+  double radius_px = 8;  ///< of the first search, pixels of the searched level
+  double second_radius_px = 8.0 / 3;  ///< of the second one, from the pose the first one found
+  int min_inliers = 20;               ///< Theta
+  double min_inlier_share = 0.6;      ///< of the points found
+  double min_visible_share = 0.1;     ///< ... and of those looked for: the others should be seen and are not
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -30,8 +33,8 @@ struct RefinedPlace {
 
 enum class RefinementOutcome : std::uint8_t {
   kRefined,
-  kTooFewPoints,  ///< the map knows fewer than Theta points that should be visible: nothing can be said
-  kContradicted   ///< they should be visible, but are not found where they should be
+  kTooFewPoints,  ///< the map knows fewer than min_visible points that should be seen: nothing can be said
+  kContradicted   ///< they should be seen, but too few are found where they should be
 };
 
 /// Looks for the map's points around a keyframe in a view whose place was recognised. Their patches, and

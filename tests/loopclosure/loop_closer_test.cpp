@@ -128,11 +128,48 @@ TEST_F(LoopCloserTest, EveryPlaceIsFoundAfterHundredsOfThousandsOfKeyframes) {
   for (const KeyframeProposal& view : views) EXPECT_TRUE(closer.relocalise(view.images, graph_));
 }
 
+/// The map is bent: it has the second round beside the first.
+TEST_F(LoopCloserTest, ALoopThatMovesTheMapWaitsForASecondWitness) {
+  LoopCloser closer(rig_, vocabulary(), options());
+  std::vector<int> closed;
+  for (int k = 0; k < kTurn + 6; ++k) {
+    add_to_map(k);
+    if (k > kTurn / 2) {
+      const SE3 drift(SO3::exp({0, 0.1, 0}), Vector3(0.8, 0, 0.5));
+      writer_.set_pose(KeyframeId{static_cast<std::uint32_t>(k)}, drift * truth(k));
+      graph_ = writer_.publish();
+    }
+    if (closer.step(keyframe(k), graph_)) closed.push_back(k);
+  }
+  LoopCloserOptions trusting = options();
+  trusting.probation.max_shift = 100;
+  trusting.probation.max_angle_deg = 180;
+  LoopCloser at_once(rig_, vocabulary(), trusting);
+  std::vector<int> seen;
+  for (int k = 0; k < kTurn + 6; ++k) {
+    if (at_once.step(keyframe(k), graph_)) seen.push_back(k);
+  }
+  ASSERT_GE(seen.size(), 3U);
+  ASSERT_FALSE(closed.empty());
+  EXPECT_GT(closed.front(), seen.front()) << "the first one is a witness only";
+  EXPECT_LE(closed.front(), seen[2]);
+}
+
 TEST(LoopCloserOptions, NameWhatIsWrong) {
-  LoopCloserOptions options;
-  EXPECT_EQ(options.invalid_reason(), "");
-  options.verification.min_inliers = 3;
-  EXPECT_NE(options.invalid_reason().find("min_inliers"), std::string::npos);
+  EXPECT_EQ(LoopCloserOptions().invalid_reason(), "");
+  const auto reason = [](auto&& spoil) {
+    LoopCloserOptions options;
+    spoil(options);
+    return options.invalid_reason();
+  };
+  EXPECT_EQ(reason([](auto& o) { o.verification.min_inliers = 3; }),
+            "verification.min_inliers must be >= 4, is 3");
+  EXPECT_EQ(reason([](auto& o) { o.refinement.min_visible_share = 2; }),
+            "refinement.min_visible_share must be in [0, 1], is 2");
+  EXPECT_EQ(reason([](auto& o) { o.recogniser.consistency = 0; }),
+            "recogniser.consistency must be >= 1, is 0");
+  EXPECT_EQ(reason([](auto& o) { o.probation.patience = 0; }), "probation.patience must be >= 1, is 0");
+  EXPECT_EQ(reason([](auto& o) { o.place_views = 0; }), "place_views must be >= 1, is 0");
 }
 
 }  // namespace

@@ -45,6 +45,7 @@ class TurningCamera : public ::testing::Test {
     Keyframe added;
     added.id = KeyframeId{static_cast<std::uint32_t>(k)};
     added.T_k_w = truth(k);
+    added.median_depth = 3;
     writer_.add_keyframe(added);
     writer_.set_reference(added.id);
     if (k > 0) {

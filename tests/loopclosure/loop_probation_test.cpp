@@ -1,0 +1,91 @@
+#include "loopclosure/loop_probation.hpp"
+
+#include <gtest/gtest.h>
+
+#include "graph/graph_writer.hpp"
+
+namespace twofold {
+namespace {
+
+/// Keyframes 0 to 19 along a line, one a metre; from 10 on they are where 0 to 9 are, but the map, which has
+/// drifted, does not know.
+class LoopProbationTest : public ::testing::Test {
+ protected:
+  LoopProbationTest() {
+    for (std::uint32_t k = 0; k < 20; ++k) add(k, drift_ * truth(k), KeyframeId{0});
+    graph_ = writer_.publish();
+  }
+
+  void add(std::uint32_t k, const SE3& T_k_w, KeyframeId part) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{k};
+    keyframe.part = part;
+    keyframe.T_k_w = k < 10 ? truth(k) : T_k_w;
+    keyframe.median_depth = 5;
+    writer_.add_keyframe(keyframe);
+    writer_.set_reference(keyframe.id);
+  }
+  static SE3 truth(std::uint32_t k) { return {SO3(), Vector3(-1.0 * (k % 10), 0, 0)}; }
+  /// What the images say, wrong by `error`.
+  static LoopConstraint loop(std::uint32_t from, std::uint32_t to, const SE3& error = SE3()) {
+    return {1, KeyframeId{from}, KeyframeId{to}, error * truth(to) * truth(from).inverse(), 100};
+  }
+
+  const SE3 drift_{SO3::exp({0, 0.2, 0}), Vector3(2, 0, 1)};
+  const SE3 wrong_{SO3(), Vector3(1, 0, 0)};  // beyond 0.15 of the depth
+  GraphWriter writer_;
+  GraphSnapshot graph_;
+  LoopProbation probation_{{}};
+};
+
+TEST_F(LoopProbationTest, OneAloneWaitsTwoThatAgreeJoin) {
+  EXPECT_FALSE(probation_.confirms(loop(1, 11), graph_));
+  EXPECT_TRUE(probation_.confirms(loop(3, 12), graph_));
+  EXPECT_TRUE(probation_.confirms(loop(3, 13), graph_)) << "and so does every one that agrees from then on";
+}
+
+TEST_F(LoopProbationTest, AWrongOneFindsNoWitness) {
+  EXPECT_FALSE(probation_.confirms(loop(1, 11, wrong_), graph_));
+  EXPECT_FALSE(probation_.confirms(loop(2, 12), graph_)) << "the right one's first witness is itself";
+  EXPECT_FALSE(probation_.confirms(loop(3, 13, wrong_.inverse()), graph_));
+  EXPECT_TRUE(probation_.confirms(loop(4, 14), graph_)) << "whom the wrong ones do not hold up";
+}
+
+TEST_F(LoopProbationTest, AWrongDirectionIsNoAgreement) {
+  EXPECT_FALSE(probation_.confirms(loop(1, 11), graph_));
+  EXPECT_FALSE(probation_.confirms(loop(2, 12, SE3(SO3::exp({0, 0.15, 0}), Vector3::Zero())), graph_));
+}
+
+TEST_F(LoopProbationTest, AKeyframeIsNoWitnessOfItself) {
+  EXPECT_FALSE(probation_.confirms(loop(1, 11), graph_));
+  EXPECT_FALSE(probation_.confirms(loop(2, 11), graph_));
+}
+
+TEST_F(LoopProbationTest, TheMapItselfIsAWitness) {
+  for (std::uint32_t k = 10; k < 20; ++k) writer_.set_pose(KeyframeId{k}, truth(k));
+  graph_ = writer_.publish();
+  EXPECT_TRUE(probation_.confirms(loop(1, 11), graph_));
+  EXPECT_FALSE(probation_.confirms(loop(2, 12, wrong_), graph_));
+}
+
+TEST_F(LoopProbationTest, PatienceEnds) {
+  ProbationOptions options;
+  options.patience = 3;
+  LoopProbation probation(options);
+  EXPECT_FALSE(probation.confirms(loop(1, 11), graph_));
+  EXPECT_FALSE(probation.confirms(loop(1, 15), graph_));
+  EXPECT_TRUE(probation.confirms(loop(1, 18), graph_));
+}
+
+/// Poses of different parts say nothing about each other: the map is no witness, and two loops agree along
+/// each part's own poses.
+TEST_F(LoopProbationTest, PartsAreJoinedByTwo) {
+  for (std::uint32_t k = 20; k < 24; ++k) add(k, truth(k), KeyframeId{20});
+  graph_ = writer_.publish();
+  EXPECT_FALSE(probation_.confirms(loop(1, 21), graph_));
+  EXPECT_FALSE(probation_.confirms(loop(2, 22, wrong_), graph_));
+  EXPECT_TRUE(probation_.confirms(loop(2, 23), graph_));
+}
+
+}  // namespace
+}  // namespace twofold
