@@ -42,19 +42,23 @@ LatencyHistogram exposure_to_pose(const RunResult& result) {
   return latency;
 }
 
-Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
-  if (const std::string reason = options_.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
-  if (options_.map) {
-    if (const std::string difference = rig_difference(rig, options_.map->rig); !difference.empty())
+void expect_valid(const Rig& rig, const EngineOptions& options) {
+  if (const std::string reason = options.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
+  if (options.map) {
+    if (const std::string difference = rig_difference(rig, options.map->rig); !difference.empty())
       throw std::runtime_error("the map was made with another camera: " + difference);
-    if (!options_.vocabulary)
+    if (!options.vocabulary)
       throw std::runtime_error("a camera finds itself in a map by recognition: a vocabulary is needed");
   }
-  if (options_.localise_only && !options_.map)
+  if (options.localise_only && !options.map)
     throw std::runtime_error("localisation only needs a map to localise in");
   if (rig.kind == SensorKind::kMono) {
     throw std::runtime_error("this source has a single camera without depth; stereo or RGB-D is needed");
   }
+}
+
+Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
+  expect_valid(rig_, options_);
 }
 
 RunResult Engine::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,

@@ -29,12 +29,15 @@ struct Progress {
 };
 using ProgressSink = std::function<void(const Progress&)>;
 
+/// Throws std::runtime_error when an option is invalid, or does not go with the rig, naming it.
+void expect_valid(const Rig& rig, const EngineOptions& options);
+
 /// Runs tracker, mapper and loop closer over a stream of frames, in one of three ways that differ only in who
 /// decides the order of steps: three threads and the clock; one thread and one fixed order
 /// (EngineOptions::deterministic); or one thread and the order that a threaded run left in its schedule log.
 class Engine {
  public:
-  /// Throws std::runtime_error when an option is invalid, naming it.
+  /// Throws as expect_valid.
   Engine(const Rig& rig, EngineOptions options);
 
   /// Returns when the feed ends, `interrupted` becomes true, or a thread fails (RunResult::error). In each

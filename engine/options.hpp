@@ -17,12 +17,19 @@
 
 namespace twofold {
 
-struct FrameRecord;
+struct PoseReport;
 
-/// Told of each frame that was looked at, tracked or lost, as soon as its pose is known, with the map it was
-/// tracked against; both are valid during the call only. Called on the thread of the tracker, which goes on
-/// when it returns: it must not block, allocate or throw. Its time is a stage of its own ("pose listener").
-using PoseListener = std::function<void(const FrameRecord& record, const GraphSnapshot& graph)>;
+/// Told of each frame that was looked at, tracked or lost, as soon as its pose is known. Called on the thread
+/// of the tracker, which goes on when it returns: it must not block, allocate or throw. Its time is a stage
+/// of its own ("pose listener").
+using PoseListener = std::function<void(const PoseReport&)>;
+
+/// Told of each version of the map when it is published, and of the windows it was made in; valid during the
+/// call only, but for copies of the graph. Called on the mapper's thread, which waits for it, and where the
+/// run is made and finished.
+using MapListener = std::function<void(const GraphSnapshot& graph, const DoubleWindow& window)>;
+/// The same for how places look, on the loop closer's thread.
+using PlacesListener = std::function<void(const KeyframeDatabase& places)>;
 
 /// The map as it stands, saved again and again during a run.
 struct CheckpointOptions {
@@ -59,7 +66,9 @@ struct EngineOptions {
   std::optional<int> loop_closer_cpu;
   std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
 
-  PoseListener on_pose;  ///< may be empty
+  PoseListener on_pose;      ///< may be empty
+  MapListener on_map;        ///< likewise
+  PlacesListener on_places;  ///< likewise
 
   /// For tests of failures: called by the thread of that name ("tracker", "mapper", "loop closer",
   /// "checkpoints") of a threaded run before each of its steps, which fails with what this throws.

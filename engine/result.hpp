@@ -77,6 +77,15 @@ struct FrameRecord {
 };
 static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 
+/// A frame as soon as its pose is known; valid during the listener's call only.
+struct PoseReport {
+  const FrameRecord& record;
+  const GraphSnapshot& graph;        ///< the map it was tracked against
+  const PoseCorrection& correction;  ///< of the map, seen first by this frame, if there is a reason
+  Matrix6 information;               ///< of T_c_ref, left perturbation (v, omega); of tracked frames
+  std::int64_t exposed_ns = 0;       ///< when the frame was exposed (Pacer)
+};
+
 /// What the mapper did in all.
 struct MappingTotals {
   std::int64_t rounds = 0;        ///< each a version of the map

@@ -48,6 +48,7 @@ bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortL
   record.state = result.status == TrackStatus::kTracking ? FrameState::kTracked : FrameState::kLost;
   record.effort = effort;
   record.cause = result.cause;
+  information_ = result.information;
   record.snapshot_version = graph.version();
   record.reference = result.reference;
   record.T_c_ref = PackedPose(result.T_c_ref);
@@ -112,11 +113,14 @@ void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const G
   times_.record(latency_stage_, exposed_ns, record.latency_ns);
   if (!on_pose_) return;
   const ScopedStage timed(times_, listener_stage_);
-  on_pose_(record, graph);
+  on_pose_({record, graph, correction_, information_, exposed_ns});
 }
 
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
-    : mapper_(rig, options.mapper), may_change_(!options.localise_only), times_("mapper", trace) {
+    : mapper_(rig, options.mapper),
+      on_map_(options.on_map),
+      may_change_(!options.localise_only),
+      times_("mapper", trace) {
   round_stage_ = times_.add_stage("round");
   if (options.map) mapper_.continue_from(options.map->graph);
 }
@@ -143,18 +147,28 @@ std::uint64_t MapperRunner::step(std::span<const ProposalHandle> proposals,
   return mapper_.graph().version();
 }
 
+GraphSnapshot MapperRunner::publish() {
+  GraphSnapshot graph = mapper_.publish();
+  if (on_map_) on_map_(graph, mapper_.window());
+  return graph;
+}
+
 GraphSnapshot MapperRunner::finish() {
   if (may_change_) mapper_.optimise_all_poses();
-  return mapper_.publish();
+  return publish();
 }
 
 LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
-    : rig_(rig), mapper_options_(options.mapper), times_("loop closer", trace) {
+    : rig_(rig),
+      mapper_options_(options.mapper),
+      on_places_(options.on_places),
+      times_("loop closer", trace) {
   place_stage_ = times_.add_stage("place");
   pose_graph_stage_ = times_.add_stage("pose graph");
   relocalise_stage_ = times_.add_stage("relocalisation");
   if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
   if (closer_ && options.map) closer_->continue_from(options.map->places);
+  if (closer_ && on_places_) on_places_(closer_->places());
 }
 
 std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
@@ -169,6 +183,7 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
         {*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins});
     not_optimised_ = loop;
   }
+  if (on_places_) on_places_(closer_->places());
   return messages_;
 }
 

@@ -71,6 +71,7 @@ class TrackerRunner {
   PoseListener on_pose_;
   FrameRecord last_;  // the last frame that was tracked
   PoseCorrection correction_;
+  Matrix6 information_ = Matrix6::Zero();  // of the last step's pose
   bool answer_awaited_ = false;
   const bool can_relocalise_;
 };
@@ -83,7 +84,8 @@ class MapperRunner {
   /// One round over the given proposals, oldest first.
   /// @return the new version of the map, ready to be published
   std::uint64_t step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
-  [[nodiscard]] GraphSnapshot publish() { return mapper_.publish(); }
+  /// The listener is told.
+  [[nodiscard]] GraphSnapshot publish();
   /// The last version: all poses agree globally, unless the map was not to change.
   [[nodiscard]] GraphSnapshot finish();
   /// What became of the keyframes that were culled.
@@ -94,6 +96,7 @@ class MapperRunner {
 
  private:
   Mapper mapper_;
+  MapListener on_map_;
   ReplacementLog replacement_log_;
   const bool may_change_;
   MappingTotals totals_;
@@ -126,6 +129,7 @@ class LoopCloserRunner {
 
   Rig rig_;
   MapperOptions mapper_options_;
+  PlacesListener on_places_;
   std::optional<LoopCloser> closer_;
   const KeyframeDatabase no_places_;
   StageRecorder times_;

@@ -19,10 +19,12 @@ namespace twofold {
 /// Copy: O(1). Read: O(log n). push_back, mutate, forget: O(log n), and copies a node only if another version
 /// shares it.
 ///
-/// Threads. One thread (the writer) copies, changes and destroys versions; others may only read a version
-/// that was published to them and that the writer keeps alive. Whether a node is shared is asked of its use
-/// count: it can only be raised by copying, which only the writer does, so a count of one means that no
-/// published version has the node.
+/// Threads. One thread (the writer) changes versions, and publishes some. Others may read a version that was
+/// published to them while somebody keeps it alive; they may copy it meanwhile, and destroy their copies when
+/// they like. Whether a node is shared is asked of its use count: whoever raises it copies a version that has
+/// the node already, so a count of one means that the writer's own version alone has it, which nobody else
+/// copies. The count's order (SharedArray) lets the writer change a node only after the reads of those who
+/// gave it up.
 template <class T, int kBits = 5, int kLeafBits = kBits>
 class PersistentVector {
   static_assert(kBits > 0 && kBits <= 5 && kLeafBits >= 0 && kLeafBits <= 5, "a bit each in 32");

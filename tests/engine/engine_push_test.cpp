@@ -60,7 +60,7 @@ TEST_F(EnginePushTest, AFullRunTakesNoMoreAndNeverBlocks) {
   std::atomic<bool> may_go_on{false};
   EngineOptions options;
   options.frame_slots = 4;
-  options.on_pose = [&](const FrameRecord&, const GraphSnapshot&) {
+  options.on_pose = [&](const PoseReport&) {
     may_go_on.wait(false, std::memory_order_acquire);  // what a listener must never do: it holds the tracker
   };
   ThreadedRun run(small_rig(), options);
@@ -89,9 +89,10 @@ TEST_F(EnginePushTest, TheListenerHearsOfEveryPoseOnTheTrackersThread) {
     std::set<std::thread::id> threads;
     EngineOptions options;
     options.deterministic = deterministic;
-    options.on_pose = [&](const FrameRecord& record, const GraphSnapshot& graph) {
-      heard.push_back({record.frame_index, record.T_c_w_causal, record.snapshot_version, graph.version(),
-                       record.latency_ns});
+    options.on_pose = [&](const PoseReport& report) {
+      const FrameRecord& record = report.record;
+      heard.push_back({record.frame_index, record.T_c_w_causal, record.snapshot_version,
+                       report.graph.version(), record.latency_ns});
       threads.insert(std::this_thread::get_id());
     };
     const RunResult result = testing::run_engine(options, feed());
