@@ -14,6 +14,11 @@ target_compile_options(twofold_options INTERFACE
   -march=${TWOFOLD_ARCH} -Wall -Wextra -Wno-array-bounds -Wno-restrict -Wshadow -Wnon-virtual-dtor)
 # Eigen's alignment decides the layout of public types: fixed here, so that it does not follow -march.
 target_compile_definitions(twofold_options INTERFACE EIGEN_MAX_ALIGN_BYTES=32 TWOFOLD_ARCH="${TWOFOLD_ARCH}")
+if(TWOFOLD_SHARED)
+  # For all files, as libtwofold.so takes in the libraries; hidden, so that functions are still inlined and called as in
+  # a program.
+  target_compile_options(twofold_options INTERFACE -fPIC -fvisibility=hidden -fvisibility-inlines-hidden)
+endif()
 if(TWOFOLD_WERROR)
   target_compile_options(twofold_options INTERFACE -Werror)
 endif()

@@ -9,6 +9,7 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/map_parts.hpp"
+#include "apps/twofold/pose_streaming.hpp"
 #include "apps/twofold/run_arguments.hpp"
 #include "apps/twofold/run_filter.hpp"
 #include "apps/twofold/run_output.hpp"
@@ -78,6 +79,7 @@ SourceOptions source_options_of(const RunArguments& arguments) {
 }
 
 int run_with_filter(const RunArguments& arguments) {
+  if (!arguments.poses.empty()) throw IoError("--poses", "is not for --estimator swf");
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
   catch_interrupts();
@@ -132,6 +134,8 @@ int run(const RunArguments& arguments) {
     source = std::make_unique<RecordingTee>(std::move(source), arguments.record);
   }
 
+  PoseStreaming poses(arguments.poses, arguments.poses_form);
+  options.on_pose = poses.listener();
   ProgressLine line(source->frame_count(), arguments.quiet);
   const FrameFeed feed = feed_from(*source);
   const ProgressSink progress = [&](const Progress& p) { line.show(p); };
@@ -141,6 +145,7 @@ int run(const RunArguments& arguments) {
   RunResult result = schedule ? engine.replay(feed, *schedule, interrupted(), progress)
                               : engine.run(feed, interrupted(), progress);
   line.end();
+  poses.finish();
   result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
   std::vector<std::string> maps;
   if (!arguments.map.save.empty()) {

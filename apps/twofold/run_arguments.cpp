@@ -97,6 +97,12 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--window", arguments.window, "Poses the sliding window filter keeps (0: all)")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  command.add_option("--poses", arguments.poses,
+                     "Poses while they arise: - (standard output), FILE, udp:HOST:PORT, unix:PATH, "
+                     "zmq:tcp://127.0.0.1:5556; may be repeated");
+  command.add_option("--poses-form", arguments.poses_form, "json or tum, a line a frame")
+      ->check(CLI::IsMember({"json", "tum"}))
+      ->capture_default_str();
   command.add_option("--vocabulary", arguments.vocabulary, "Vocabulary file instead of the built-in one");
   command.add_option("--record", arguments.record,
                      "Record the frames into this folder: the run can be repeated from it and schedule.log");

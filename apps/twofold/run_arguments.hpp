@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 #include "apps/twofold/map_options.hpp"
 #include "engine/options.hpp"
@@ -21,6 +22,8 @@ struct RunArguments {
   std::string pin;
   std::string vocabulary;
   std::string record;
+  std::vector<std::string> poses;
+  std::string poses_form = "json";
   std::string estimator = "engine";
   int window = 10;
   MapArguments map;

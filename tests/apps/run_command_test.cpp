@@ -201,6 +201,40 @@ TEST_F(RunCommand, BrokenRecordingsAreOneLineAndExitCodeTwo) {
   damaged("left and right counts differ", "", [&] { fs::remove(recording_ / "image_1/000023.png"); });
 }
 
+TEST_F(RunCommand, PosesLeaveTheProgramWhileItRuns) {
+  const std::string file = folder_ / "live.txt";
+  const Outcome outcome = run_recording("--deterministic --poses-form tum --poses '" + file + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const Trajectory live = read_tum_trajectory(file);
+  const Trajectory causal = read_tum_trajectory(folder_ / "result/trajectory_causal.txt");
+  ASSERT_EQ(live.size(), static_cast<std::size_t>(kFrames));
+  for (std::size_t i = 0; i < live.size(); ++i) {
+    EXPECT_EQ(live[i].t_ns, causal[i].t_ns);
+    EXPECT_LT((live[i].T_w_c.inverse() * causal[i].T_w_c).log().norm(), 1e-6);
+  }
+}
+
+TEST_F(RunCommand, StandardOutputBelongsToThePosesWhenTheyGoThere) {
+  const Outcome outcome = run_recording("--deterministic --poses -");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("frames      24 (24 tracked"), std::string::npos) << outcome.err;
+  std::istringstream lines(outcome.out);
+  int tracked = 0;
+  for (std::string line; std::getline(lines, line);) {
+    tracked += nlohmann::json::parse(line).value("state", "") == "tracked";
+  }
+  EXPECT_EQ(tracked, kFrames);
+}
+
+TEST_F(RunCommand, PosesThatNobodyReadsAnyMoreDoNotEndTheRun) {
+  const std::string command = std::string(TWOFOLD_BINARY) + " run 'kitti:" + recording_.string() +
+                              "' --out '" + (folder_ / "result") + "' --poses - 2>'" + (folder_ / "err") +
+                              "' | head -1 >'" + (folder_ / "out") + "'";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(nlohmann::json::parse(result("summary.json"))["tracked"], kFrames);
+  expect_bad_input(run_recording("--poses udp:nonsense"), "--poses: udp:nonsense: must be udp:HOST:PORT");
+}
+
 TEST_F(RunCommand, RecordingWithoutTextureIsAFailedRun) {
   for (int i = 0; i < kFrames; ++i) {
     for (const char* side : {"image_0", "image_1"}) {

@@ -18,6 +18,7 @@
 #include "engine/snapshot_mailbox.hpp"
 #include "engine/spsc_ring.hpp"
 #include "graph/shared_array.hpp"
+#include "slam/latest_value.hpp"
 
 // Model checker; its warnings are its own.
 #pragma GCC diagnostic push
@@ -78,6 +79,7 @@ class ModelAtomic {
                                     std::add_pointer_t<std::remove_const_t<std::remove_pointer_t<V>>>, V>;
 
  public:
+  ModelAtomic() : ModelAtomic(V{}) {}
   ModelAtomic(V value) { value_.store(unconst(value), rl::mo_relaxed, $); }
   V load(std::memory_order order) const { return value_.load(model_order(order, Access::kLoad), $); }
   void store(V value, std::memory_order order) { value_.store(value, model_order(order, Access::kStore), $); }

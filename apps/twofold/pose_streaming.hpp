@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "engine/options.hpp"
+#include "slam/pose_reporter.hpp"
+#include "streams/pose_streams.hpp"
+
+namespace twofold {
+
+/// Poses of a run while it runs, as --poses asks for them.
+class PoseStreaming {
+ public:
+  /// Throws IoError naming the target. If one is standard output, what the program has to say to people goes
+  /// to standard error from here on.
+  PoseStreaming(const std::vector<std::string>& targets, const std::string& form);
+
+  /// For EngineOptions::on_pose; empty when nobody asked. Not valid beyond this object.
+  [[nodiscard]] PoseListener listener();
+  /// After the run.
+  void finish();
+
+ private:
+  PoseReporter reporter_;  // tracker's
+  std::optional<PoseStreams> streams_;
+};
+
+}  // namespace twofold

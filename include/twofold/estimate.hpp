@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+
+#include "twofold/types.hpp"
+
+namespace twofold {
+
+enum class TrackingState : std::uint8_t {
+  kTracked,  ///< the pose is known
+  kLost,     ///< looked at, no trustworthy pose
+  kUnplaced  ///< lost since the start, in a loaded map of which no place was recognised yet
+};
+[[nodiscard]] TWOFOLD_API const char* to_string(TrackingState state);
+
+inline constexpr std::uint32_t kNoId = 0xffffffffU;
+
+/// What is known of the camera at one frame. Trivially copyable.
+struct PoseEstimate {
+  std::int64_t frame = 0;  ///< counts pushed frames from 0, dropped ones included
+  std::int64_t t_ns = 0;   ///< the frame's own time
+  TrackingState state = TrackingState::kLost;
+  bool keyframe = false;     ///< proposed as a keyframe of the map
+  std::uint8_t effort = 0;   ///< effort level, 0: nothing left out (docs/architecture.md)
+  const char* reason = "";   ///< why it is lost, in words; a string that lives as long as the program
+  std::int32_t points = 0;   ///< measurements the pose rests on
+  double tracked_share = 0;  ///< those over the points looked for, in [0, 1]
+
+  // Of tracked frames only:
+  Pose T_world_camera;             ///< in the world of `map_part`, as the map has it now
+  std::uint32_t map_part = kNoId;  ///< first keyframe of the part; parts have worlds of their own
+  std::uint32_t reference_keyframe = kNoId;
+  Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
+  /// 6x6 row by row, of delta in T_world_camera * exp(delta), delta = (translation [m], rotation [rad]) in
+  /// the camera's axes: from the frame's own measurements with the map taken as true.
+  std::array<double, 36> covariance{};
+  /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
+  /// none.
+  std::array<double, 6> velocity{};
+
+  std::uint64_t map_version = 0;  ///< it was tracked against
+  std::int64_t exposed_ns = 0;    ///< when the frame was due, on CLOCK_MONOTONIC
+  std::int64_t latency_ns = 0;    ///< from then to the moment the pose was known
+};
+static_assert(std::is_trivially_copyable_v<PoseEstimate>);
+
+/// Why poses given out before are no longer what the map says.
+enum class MapEventKind : std::uint8_t {
+  kOptimisation,    ///< the double window moved the camera's surroundings by more than a centimetre
+  kLoopClosure,     ///< a place was recognised
+  kPoseGraph,       ///< the whole pose graph was optimised
+  kPartsJoined,     ///< the camera's map part joined another one, and took its world
+  kRelocalisation,  ///< the lost camera found itself in the map
+  kNewPart          ///< the lost camera began a map part with a world of its own
+};
+[[nodiscard]] TWOFOLD_API const char* to_string(MapEventKind kind);
+
+/// Announced before the pose of the first frame that saw it. Corrections say where the last tracked frame was
+/// and where the corrected map has it; after a relocalisation, `after` is the frame that found itself.
+struct MapEvent {
+  MapEventKind kind = MapEventKind::kOptimisation;
+  std::int64_t frame = 0;  ///< that saw it first
+  std::int64_t t_ns = 0;
+  std::uint64_t map_version = 0;
+  std::uint32_t keyframe = kNoId;  ///< reference keyframe of that frame
+  std::uint32_t map_part_before = kNoId;
+  std::uint32_t map_part = kNoId;
+  Pose T_world_camera_before;
+  Pose T_world_camera_after;
+  double moved = 0;   ///< distance between the two [m]; of no meaning across map parts
+  double turned = 0;  ///< angle between the two [rad]; likewise
+};
+static_assert(std::is_trivially_copyable_v<MapEvent>);
+
+}  // namespace twofold

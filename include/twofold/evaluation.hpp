@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "twofold/source.hpp"
+
+namespace twofold {
+
+/// TUM, KITTI or EuRoC form, told by the first line. Throws std::runtime_error naming the file and line.
+[[nodiscard]] TWOFOLD_API std::vector<StampedPose> load_trajectory(const std::filesystem::path& file);
+/// TUM form: lines "time[s] tx ty tz qx qy qz qw". Throws std::runtime_error when it cannot be written.
+TWOFOLD_API void save_trajectory(const std::filesystem::path& file,
+                                 const std::vector<StampedPose>& trajectory);
+
+enum class AlignBy : std::uint8_t { kNothing, kRigidMotion, kSimilarity };
+
+struct ComparisonOptions {
+  AlignBy align = AlignBy::kRigidMotion;  ///< how the estimate is brought onto the truth first
+  double max_time_difference_s = 0.02;    ///< between a pose and the true one nearest in time, > 0
+};
+
+/// How far an estimate is from the truth.
+struct TrajectoryError {
+  std::size_t pairs = 0;     ///< poses that have a true one
+  double path_length = 0;    ///< of the truth over the pairs [m]
+  double ate_rmse = 0;       ///< absolute trajectory error: root mean square of the distances [m]
+  double ate_mean = 0;       ///< [m]
+  double ate_median = 0;     ///< [m]
+  double ate_max = 0;        ///< [m]
+  double rotation_rmse = 0;  ///< angle between true and aligned orientation [rad]
+  double rpe_rmse = 0;       ///< relative error over one second: translation [m]
+  double scale = 1;          ///< the estimate's lengths times this are the truth's; 1 unless kSimilarity
+};
+
+/// Throws std::invalid_argument when there is nothing to compare or the alignment is undetermined.
+[[nodiscard]] TWOFOLD_API TrajectoryError compare(const std::vector<StampedPose>& estimate,
+                                                  const std::vector<StampedPose>& truth,
+                                                  const ComparisonOptions& options = {});
+
+}  // namespace twofold

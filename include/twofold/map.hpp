@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "twofold/estimate.hpp"
+
+namespace twofold {
+
+/// One version of the map. It never changes and may be held as long as one likes, by any thread: the mapper
+/// goes on meanwhile and waits for nobody. A copy is another handle of the same version.
+///
+/// Memory: versions share what they have in common. One that is held keeps what the map has replaced since;
+/// memory_bytes() bounds that from above. Slam::held_maps() counts the handles' versions.
+/// Threads: all functions may be called by several threads at once.
+class TWOFOLD_API MapSnapshot {
+ public:
+  struct Keyframe {
+    std::uint32_t id = kNoId;
+    std::uint32_t part = kNoId;  ///< first keyframe of its map part; each part has a world of its own
+    std::int64_t frame = 0;
+    std::int64_t t_ns = 0;
+    Pose T_world_camera;
+    std::uint32_t points = 0;  ///< it sees
+    std::uint8_t window = 0;   ///< 1, 2: in W1, W2 of the mapper's last round; 0: in neither
+    bool has_place = false;    ///< described, so that it can be recognised
+  };
+
+  struct Point {
+    std::uint32_t id = kNoId;
+    std::uint32_t anchor = kNoId;      ///< keyframe that it was first seen in; may be gone by now
+    std::uint32_t observers = 0;       ///< keyframes that see it
+    std::array<double, 3> position{};  ///< in the world of its part [m]
+    /// 3x3 row by row [m^2], from all its measurements with the keyframes' poses taken as true; all zero when
+    /// they do not determine the point.
+    std::array<double, 9> covariance{};
+  };
+
+  enum class EdgeKind : std::uint8_t {
+    kCovisible,     ///< follows the two absolute poses, which are optimised together
+    kMarginalised,  ///< a relative pose of its own, kept since its ends were optimised together
+  };
+  struct Edge {
+    std::uint32_t from = kNoId;
+    std::uint32_t to = kNoId;  ///< > from
+    EdgeKind kind = EdgeKind::kCovisible;
+    std::uint32_t shared_points = 0;
+    Pose T_to_from;
+  };
+
+  struct Part {
+    std::uint32_t id = kNoId;
+    std::uint32_t keyframes = 0;
+  };
+
+  /// An empty map, of version 0.
+  MapSnapshot();
+  MapSnapshot(const MapSnapshot&);
+  MapSnapshot& operator=(const MapSnapshot&);
+  MapSnapshot(MapSnapshot&&) noexcept;
+  MapSnapshot& operator=(MapSnapshot&&) noexcept;
+  ~MapSnapshot();
+
+  [[nodiscard]] std::uint64_t version() const;
+  /// Keyframe in the middle of the windows; kNoId in an empty map.
+  [[nodiscard]] std::uint32_t reference() const;
+
+  // Each is made anew by its call, ascending by id, culled ones left out: O(size of the map).
+  [[nodiscard]] std::vector<Keyframe> keyframes() const;
+  /// @param with_covariance  false leaves the covariances zero, at a tenth of the time
+  [[nodiscard]] std::vector<Point> points(bool with_covariance = true) const;
+  [[nodiscard]] std::vector<Edge> edges() const;
+  /// Ascending by id: map parts that no place joined yet.
+  [[nodiscard]] std::vector<Part> parts() const;
+
+  /// What keyframes, points, their lists and appearances take, shared or not. O(size of the map).
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+  struct Impl;
+  explicit MapSnapshot(std::shared_ptr<const Impl> impl);
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,154 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "twofold/estimate.hpp"
+#include "twofold/map.hpp"
+#include "twofold/types.hpp"
+
+namespace twofold {
+
+enum class RunMode : std::uint8_t {
+  kThreaded,      ///< tracker, mapper and loop closer on threads of their own
+  kDeterministic  ///< all within push, on the caller's thread: same frames, same bytes
+};
+
+struct SlamOptions {
+  RunMode mode = RunMode::kThreaded;
+  /// Frames are pushed when they are taken, and their times are of CLOCK_MONOTONIC: latency counts from
+  /// there, a tracker that is late leaves work out, and of the frames that wait the newest wins. Otherwise
+  /// frames are a recording's, and tracked as fast as the map can follow. Of threaded runs.
+  bool live = false;
+
+  /// Map to go on with (.tfm); empty: start one. The camera is unplaced until a place of it is recognised.
+  std::filesystem::path map = {};
+  bool localise_only = false;  ///< poses in `map`, which must be given and does not change
+  /// Recognise places: closes large loops, finds a lost camera, joins map parts. Needed for `map`.
+  bool places = true;
+  std::filesystem::path vocabulary = {};  ///< instead of the built-in one
+
+  int inner_window = 25;   ///< keyframes optimised with their points, >= 1
+  int outer_window = 175;  ///< keyframes around them optimised by relative poses, >= 0
+  int frame_buffers = 8;   ///< frames waiting for the tracker at most, >= 2; a push beyond them is dropped
+
+  std::optional<int> tracker_cpu = {};  ///< pin the threads to these, >= 0
+  std::optional<int> mapper_cpu = {};
+  std::optional<int> loop_closer_cpu = {};
+  std::optional<int> fifo_priority = {};  ///< SCHED_FIFO for the tracker, 1..99
+};
+
+enum class PushStatus : std::uint8_t {
+  kQueued,   ///< on its way to the tracker, or, in a deterministic run, tracked
+  kDropped,  ///< in order, but there was no room: the tracker is behind
+  kRefused   ///< not to be used, and not counted as a frame
+};
+struct PushResult {
+  PushStatus status = PushStatus::kQueued;
+  std::string reason;  ///< of kDropped and kRefused: one sentence that names what is wrong
+
+  explicit operator bool() const { return status == PushStatus::kQueued; }
+};
+
+/// What a stage of a thread took, over the whole run.
+struct StageTime {
+  std::string thread;  ///< tracker, mapper, loop closer
+  std::string stage;   ///< "frame", "latency from due time", "pose listener": the callbacks, ...
+  std::uint64_t count = 0;
+  double mean_ms = 0, p50_ms = 0, p99_ms = 0, max_ms = 0;
+};
+
+/// What a run came to.
+struct SlamSummary {
+  std::int64_t frames = 0;  ///< queued or dropped
+  std::int64_t tracked = 0;
+  std::int64_t lost = 0;  ///< unplaced ones included
+  std::int64_t dropped = 0;
+  /// Poses of the tracked frames in the final map, in the order of time. `map_part` of each tells its world.
+  struct FinalPose {
+    std::int64_t t_ns = 0;
+    std::uint32_t map_part = kNoId;
+    Pose T_world_camera;
+  };
+  std::vector<FinalPose> trajectory;
+  std::vector<StageTime> timings;
+  std::vector<std::string> notes;  ///< wishes (pinning, priority) that were not granted
+  std::vector<std::string>
+      errors;  ///< what went wrong on the way: a callback that threw, a thread that ended
+};
+
+/// Versions of the map that somebody holds.
+struct HeldMaps {
+  std::size_t versions = 0;
+  std::uint64_t oldest = 0;  ///< 0: none
+};
+
+/// Frames in, poses and a map out.
+///
+///   Slam slam(rig, {});
+///   slam.on_pose([](const PoseEstimate& pose) { ... });
+///   while (camera >> frame) slam.push(frame);
+///   slam.finish();
+///
+/// Threads: every function may be called by any thread, several at once; those that push take turns.
+class TWOFOLD_API Slam {
+ public:
+  using PoseCallback = std::function<void(const PoseEstimate&)>;
+  using EventCallback = std::function<void(const MapEvent&)>;
+
+  /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
+  /// when a file cannot be used.
+  Slam(const CameraRig& rig, const SlamOptions& options);
+  /// Finishes.
+  ~Slam();
+  Slam(const Slam&) = delete;
+  Slam& operator=(const Slam&) = delete;
+
+  /// Called for every frame that was looked at, on the tracker's thread, which waits for it: neither block in
+  /// it nor call push or finish. The time it takes is a stage of its own among SlamSummary::timings ("pose
+  /// listener"), and in the next frame's latency. A callback that throws is not called again; tracking goes
+  /// on, and errors() says what it threw. To be set before the first push, else std::logic_error is thrown.
+  void on_pose(PoseCallback callback);
+  /// The same for corrections of the map; called before the pose of the frame that saw them.
+  void on_event(EventCallback callback);
+
+  /// Never waits for mapper or loop closer; in a threaded run, not for the tracker either. Refused are images
+  /// that do not fit the rig, time that does not grow, and frames after finish().
+  PushResult push(const FrameView& frame);
+  /// Whether a push would find room now; without another pushing thread, it will.
+  [[nodiscard]] bool has_room() const;
+  /// Waits until there is room, at most for `timeout_ns`: for recordings, of which no frame should be
+  /// dropped, and which the map should follow.
+  [[nodiscard]] bool wait_for_room(std::int64_t timeout_ns);
+
+  /// Of the newest frame; nothing before the first. Wait-free: no lock, no retry, whatever the tracker does.
+  [[nodiscard]] std::optional<PoseEstimate> latest() const;
+
+  /// The newest version of the map. O(1); the tracker and the mapper do not notice.
+  [[nodiscard]] MapSnapshot map() const;
+  [[nodiscard]] HeldMaps held_maps() const;
+  /// Writes the newest version to a map file, on this thread, while the run goes on. The file is the old one
+  /// or the new one whenever the process is killed. Throws std::runtime_error naming file and reason.
+  void save_map(const std::filesystem::path& file) const;
+
+  /// What went wrong so far; tracking goes on unless it says otherwise.
+  [[nodiscard]] std::vector<std::string> errors() const;
+
+  /// Tracks what is queued, makes all poses agree globally and ends the threads. A second call gives the same
+  /// answer. map() and save_map() then have the final map.
+  SlamSummary finish();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Twofold's version, as "0.1.0".
+[[nodiscard]] TWOFOLD_API const char* version();
+
+}  // namespace twofold

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "twofold/types.hpp"
+
+namespace twofold {
+
+/// Where the camera was at one time.
+struct StampedPose {
+  std::int64_t t_ns = 0;
+  Pose T_world_camera;
+};
+
+struct SourceSettings {
+  std::filesystem::path calibration = {};  ///< instead of the recording's own; empty: its own
+  bool preload = false;                    ///< decode everything into memory before the constructor returns
+};
+
+/// Frames of a recording, a video, a rendered scene or a camera, rectified.
+///
+/// Named as on the command line (docs/sources.md): a path, or euroc:DIR, kitti:DIR, tum:DIR, images:DIR,
+/// video:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. One thread at a time; stop() by any.
+class TWOFOLD_API Source {
+ public:
+  /// Throws std::runtime_error naming the file and what is wrong with it.
+  explicit Source(const std::string& name, const SourceSettings& settings = {});
+  ~Source();
+  Source(Source&&) noexcept;
+  Source& operator=(Source&&) noexcept;
+
+  [[nodiscard]] const CameraRig& rig() const;
+  /// Frames in all, where that is known beforehand.
+  [[nodiscard]] std::optional<std::int64_t> frame_count() const;
+  /// Frames come when they are taken, not when they are asked for.
+  [[nodiscard]] bool is_live() const;
+  /// Of the rig's camera, in the order of time; empty when there is none.
+  [[nodiscard]] const std::vector<StampedPose>& ground_truth() const;
+
+  /// The next frame, with an owner: it may be pushed and kept. False at the end. Throws std::runtime_error
+  /// when the input breaks.
+  bool next(FrameView& frame);
+  /// A camera ends; for recordings, the next call of next() is the last.
+  void stop();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+/// Marks what the shared library exports; everything else in it is hidden.
+#define TWOFOLD_API __attribute__((visibility("default")))
+#define TWOFOLD_HIDDEN __attribute__((visibility("hidden")))  // what is inside of such a class
+
+/// The public face of Twofold: `#include <twofold/slam.hpp>` and `find_package(Twofold)`.
+///
+/// Everywhere: metres, radians, nanoseconds. T_a_b takes points of frame b to frame a, p_a = T_a_b * p_b.
+/// Camera axes: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel. No type here
+/// changes its layout with the compiler's flags.
+namespace twofold {
+
+/// Rigid motion T_a_b: p_a = q * p_b * q^-1 + t.
+struct Pose {
+  std::array<double, 4> q{0, 0, 0, 1};  ///< unit quaternion (x, y, z, w)
+  std::array<double, 3> t{0, 0, 0};     ///< [m]
+
+  friend bool operator==(const Pose&, const Pose&) = default;
+};
+
+/// T_a_c = T_a_b * T_b_c.
+[[nodiscard]] TWOFOLD_API Pose compose(const Pose& T_a_b, const Pose& T_b_c);
+/// T_b_a of T_a_b.
+[[nodiscard]] TWOFOLD_API Pose inverse(const Pose& T_a_b);
+/// p_a = T_a_b * p_b  [m].
+[[nodiscard]] TWOFOLD_API std::array<double, 3> transform(const Pose& T_a_b,
+                                                          const std::array<double, 3>& p_b);
+
+enum class Sensor : std::uint8_t { kStereo, kRgbd };
+
+/// A rectified sensor: pinhole cameras without distortion; for stereo the right one is shifted by `baseline`
+/// along x, so that corresponding points lie in the same row.
+struct CameraRig {
+  Sensor sensor = Sensor::kStereo;
+  int width = 0;              ///< [px] > 0
+  int height = 0;             ///< [px] > 0
+  double fx = 0;              ///< [px] > 0
+  double fy = 0;              ///< [px] > 0
+  double cx = 0;              ///< [px]
+  double cy = 0;              ///< [px]
+  double baseline = 0;        ///< [m] > 0; RGB-D: of a virtual right camera, 0.08 will do
+  double depth_unit = 0.001;  ///< RGB-D: metres per unit of the depth image, > 0
+  double depth_min = 0.3;     ///< RGB-D: nearer readings are holes [m]
+  double depth_max = 8.0;     ///< RGB-D: farther readings are holes [m]
+};
+
+enum class ImageFormat : std::uint8_t {
+  kGrey8,   ///< one byte a pixel
+  kRgb8,    ///< three bytes a pixel; turned to grey
+  kBgr8,    ///< likewise, in OpenCV's order
+  kDepth16  ///< two bytes a pixel in the machine's order, 0: no reading
+};
+
+/// Pixels that belong to somebody else.
+struct ImageView {
+  const void* data = nullptr;  ///< first pixel of the top row; null: no image
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride = 0;  ///< bytes from one row to the next, >= width * bytes a pixel
+  ImageFormat format = ImageFormat::kGrey8;
+};
+
+/// The images of one instant.
+struct FrameView {
+  std::int64_t t_ns = 0;  ///< when it was taken; must grow from frame to frame
+  ImageView left;         ///< grey or colour
+  ImageView right;        ///< stereo: as left
+  ImageView depth;        ///< RGB-D: kDepth16, registered to left
+  /// Keeps the pixels alive and unchanged: grey images and depth are then used where they are. Without it
+  /// they are copied.
+  std::shared_ptr<const void> owner;
+};
+
+}  // namespace twofold

@@ -1,0 +1,83 @@
+#include "slam/conversions.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include <fmt/format.h>
+
+namespace twofold {
+namespace {
+
+void expect(bool rule, const char* field, const char* what, double value) {
+  if (!rule) throw std::invalid_argument(fmt::format("rig.{} must be {}, is {}", field, what, value));
+}
+
+bool positive(double value) {
+  return std::isfinite(value) && value > 0;
+}
+
+}  // namespace
+
+Pose to_pose(const SE3& T_a_b) {
+  const Eigen::Quaterniond& q = T_a_b.so3().quaternion();
+  const Vector3& t = T_a_b.translation();
+  return {{q.x(), q.y(), q.z(), q.w()}, {t.x(), t.y(), t.z()}};
+}
+
+SE3 to_se3(const Pose& T_a_b) {
+  const auto& q = T_a_b.q;
+  return {SO3(Eigen::Quaterniond(q[3], q[0], q[1], q[2])), Vector3(T_a_b.t[0], T_a_b.t[1], T_a_b.t[2])};
+}
+
+CameraRig to_camera_rig(const Rig& rig) {
+  const PinholeCamera& c = rig.camera;
+  return {rig.kind == SensorKind::kRgbd ? Sensor::kRgbd : Sensor::kStereo,
+          c.width,
+          c.height,
+          c.fx,
+          c.fy,
+          c.cx,
+          c.cy,
+          rig.baseline,
+          rig.depth_unit,
+          rig.depth_min,
+          rig.depth_max};
+}
+
+Rig to_rig(const CameraRig& rig) {
+  expect(rig.width > 0, "width", "> 0", rig.width);
+  expect(rig.height > 0, "height", "> 0", rig.height);
+  expect(positive(rig.fx), "fx", "> 0", rig.fx);
+  expect(positive(rig.fy), "fy", "> 0", rig.fy);
+  expect(std::isfinite(rig.cx), "cx", "a number", rig.cx);
+  expect(std::isfinite(rig.cy), "cy", "a number", rig.cy);
+  expect(positive(rig.baseline), "baseline", "> 0", rig.baseline);
+  Rig inside;
+  inside.kind = rig.sensor == Sensor::kRgbd ? SensorKind::kRgbd : SensorKind::kStereo;
+  inside.camera = {rig.fx, rig.fy, rig.cx, rig.cy, rig.width, rig.height};
+  inside.baseline = rig.baseline;
+  if (rig.sensor != Sensor::kRgbd) return inside;
+  expect(positive(rig.depth_unit), "depth_unit", "> 0", rig.depth_unit);
+  expect(positive(rig.depth_min), "depth_min", "> 0", rig.depth_min);
+  expect(rig.depth_max > rig.depth_min, "depth_max", "> depth_min", rig.depth_max);
+  inside.depth_unit = rig.depth_unit;
+  inside.depth_min = rig.depth_min;
+  inside.depth_max = rig.depth_max;
+  return inside;
+}
+
+Pose compose(const Pose& T_a_b, const Pose& T_b_c) {
+  return to_pose(to_se3(T_a_b) * to_se3(T_b_c));
+}
+
+Pose inverse(const Pose& T_a_b) {
+  return to_pose(to_se3(T_a_b).inverse());
+}
+
+std::array<double, 3> transform(const Pose& T_a_b, const std::array<double, 3>& p_b) {
+  const Vector3 p_a = to_se3(T_a_b) * Vector3(p_b[0], p_b[1], p_b[2]);
+  return {p_a.x(), p_a.y(), p_a.z()};
+}
+
+}  // namespace twofold

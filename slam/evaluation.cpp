@@ -1,0 +1,67 @@
+#include "twofold/evaluation.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "evaluation/evaluation.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "slam/conversions.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+Trajectory to_trajectory(const std::vector<StampedPose>& poses) {
+  Trajectory trajectory;
+  for (const StampedPose& pose : poses) trajectory.push_back({pose.t_ns, to_se3(pose.T_world_camera)});
+  return trajectory;
+}
+
+Alignment alignment_of(AlignBy align) {
+  switch (align) {
+    case AlignBy::kNothing:
+      return Alignment::kNone;
+    case AlignBy::kRigidMotion:
+      return Alignment::kSe3;
+    case AlignBy::kSimilarity:
+      break;
+  }
+  return Alignment::kSim3;
+}
+
+}  // namespace
+
+std::vector<StampedPose> load_trajectory(const std::filesystem::path& file) {
+  std::vector<StampedPose> poses;
+  for (const TimedPose& pose : read_trajectory(file)) poses.push_back({pose.t_ns, to_pose(pose.T_w_c)});
+  return poses;
+}
+
+void save_trajectory(const std::filesystem::path& file, const std::vector<StampedPose>& trajectory) {
+  write_tum_trajectory(file, to_trajectory(trajectory));
+}
+
+TrajectoryError compare(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truth,
+                        const ComparisonOptions& options) {
+  if (!(options.max_time_difference_s > 0))
+    throw std::invalid_argument("options.max_time_difference_s must be > 0");
+  const auto farthest = static_cast<std::int64_t>(options.max_time_difference_s * 1e9);
+  EvaluationOptions inside;
+  inside.alignment = alignment_of(options.align);
+  const auto result = evaluate(associate(to_trajectory(estimate), to_trajectory(truth), farthest), inside);
+  if (!result) throw std::invalid_argument(result.error());
+  TrajectoryError error;
+  error.pairs = result->pairs.size();
+  error.path_length = result->path_length;
+  error.ate_rmse = result->absolute.rmse;
+  error.ate_mean = result->absolute.mean;
+  error.ate_median = result->absolute.median;
+  error.ate_max = result->absolute.max;
+  error.rotation_rmse = result->absolute_rotation_deg.rmse * kDegree;
+  error.rpe_rmse = result->per_second.translation.rmse;
+  error.scale = result->S_w_e.scale();
+  return error;
+}
+
+}  // namespace twofold

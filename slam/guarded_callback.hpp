@@ -1,0 +1,52 @@
+#pragma once
+
+#include <atomic>
+#include <exception>
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace twofold {
+
+/// A user's function that the tracker calls: until it throws.
+///
+/// Roles: `set` before the first call; one thread calls; anyone asks for the error.
+/// Ordering: failed_ release -> acquire publishes what_, which is written once.
+template <class Argument>
+class GuardedCallback {
+ public:
+  using Function = std::function<void(const Argument&)>;
+
+  explicit GuardedCallback(std::string name) : name_(std::move(name)) {}
+
+  void set(Function function) { function_ = std::move(function); }
+
+  void operator()(const Argument& argument) {
+    if (!function_ || failed_.load(std::memory_order_relaxed)) return;  // relaxed: raised by this thread
+    try {
+      function_(argument);
+    } catch (const std::exception& error) {
+      fail(error.what());
+    } catch (...) {
+      fail("an exception of unknown type");
+    }
+  }
+
+  [[nodiscard]] std::optional<std::string> error() const {
+    if (!failed_.load(std::memory_order_acquire)) return std::nullopt;
+    return what_;
+  }
+
+ private:
+  void fail(const char* what) {
+    what_ = "the callback of " + name_ + " threw, and is not called any more: " + what;
+    failed_.store(true, std::memory_order_release);
+  }
+
+  const std::string name_;
+  Function function_;
+  std::string what_;
+  std::atomic<bool> failed_{false};
+};
+
+}  // namespace twofold

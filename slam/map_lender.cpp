@@ -1,0 +1,44 @@
+#include "slam/map_lender.hpp"
+
+#include <algorithm>
+
+namespace twofold {
+
+void MapLender::publish(const GraphSnapshot& graph, const DoubleWindow& window) {
+  MapVersion map;
+  map.graph = graph;
+  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
+    (n < window.inner ? map.inner_window : map.outer_window).push_back(window.nodes[n].id);
+  }
+  maps_.publish(std::move(map));
+}
+
+std::shared_ptr<const MapVersion> MapLender::newest() {
+  const std::scoped_lock lock(borrowers_);
+  const MapVersion& map = maps_.mailbox(0).latest();
+  const KeyframeDatabase& places = places_.mailbox(0).latest();
+  std::erase_if(loans_, [](const auto& loan) { return loan.expired(); });
+  if (!loans_.empty()) {
+    const auto last = loans_.back().lock();
+    if (last && last->version() == map.version() && last->places.version() == places.version()) return last;
+  }
+  auto loan = std::make_shared<MapVersion>(map);
+  loan->places = places;
+  loans_.push_back(loan);
+  return loan;
+}
+
+MapLender::Loans MapLender::held() {
+  const std::scoped_lock lock(borrowers_);
+  Loans loans;
+  for (const auto& weak : loans_) {
+    const auto loan = weak.lock();
+    if (!loan) continue;
+    ++loans.versions;
+    const std::uint64_t version = loan->graph.version();
+    if (loans.versions == 1 || version < loans.oldest) loans.oldest = version;
+  }
+  return loans;
+}
+
+}  // namespace twofold

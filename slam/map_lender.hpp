@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "engine/snapshot_mailbox.hpp"
+#include "graph/keyframe_database.hpp"
+#include "graph/snapshot.hpp"
+#include "mapping/double_window.hpp"
+
+namespace twofold {
+
+/// A map as it is lent out: handles of the versions that were newest then. Never changes.
+struct MapVersion {
+  GraphSnapshot graph;
+  std::vector<KeyframeId> inner_window;  ///< W1 of the round that made the graph
+  std::vector<KeyframeId> outer_window;  ///< W2
+  KeyframeDatabase places;
+
+  /// Counts from 1: a map before the first is empty and has graph version 0.
+  [[nodiscard]] std::uint64_t version() const { return graph.version() + 1; }
+};
+
+/// Lends the newest map to any number of threads, each for as long as it likes, while mapper and loop closer
+/// go on.
+///
+/// Roles: the mapper publishes maps, the loop closer places, both wait-free; borrowers call newest and held,
+/// and take turns at a mutex that neither of the two ever takes. A loan is a copy of handles: it keeps the
+/// nodes that the map has replaced since, and gives them up on the thread that lets go of it last
+/// (PersistentVector says why that is sound).
+class MapLender {
+ public:
+  /// Mapper. Versions grow.
+  void publish(const GraphSnapshot& graph, const DoubleWindow& window);
+  /// Loop closer. Does nothing when this version was published before.
+  void publish(const KeyframeDatabase& places) {
+    if (places.version() > places_.newest()) places_.publish(places);
+  }
+
+  /// Borrowers. O(1). The same object as before, while that is held and nothing newer was published.
+  [[nodiscard]] std::shared_ptr<const MapVersion> newest();
+
+  struct Loans {
+    std::size_t versions = 0;
+    std::uint64_t oldest = 0;  ///< version of the map; 0: nothing is held
+  };
+  /// Borrowers. What is held now.
+  [[nodiscard]] Loans held();
+
+ private:
+  SnapshotPublisher<MapVersion> maps_{1, {}};  // whose places are empty
+  SnapshotPublisher<KeyframeDatabase> places_{1, {}};
+  std::mutex borrowers_;  // guards the readers' ends of both publishers, and loans_
+  std::vector<std::weak_ptr<const MapVersion>> loans_;
+};
+
+}  // namespace twofold

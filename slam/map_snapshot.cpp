@@ -1,0 +1,155 @@
+#include "slam/map_snapshot.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "graph/part_extraction.hpp"
+#include "imaging/guided_search.hpp"
+#include "slam/conversions.hpp"
+
+namespace twofold {
+namespace {
+
+const std::shared_ptr<const MapSnapshot::Impl>& empty_map() {
+  static const auto kEmpty =
+      std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{{}, std::make_shared<const MapVersion>()});
+  return kEmpty;
+}
+
+/// Calls visit(keyframe) for those that were not culled, ascending.
+template <class Visit>
+void for_each_keyframe(const GraphSnapshot& graph, const Visit& visit) {
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (!keyframe.culled()) visit(keyframe);
+  }
+}
+
+/// (sum over observers of J^T Omega J)^-1, J = d z / d x_w: the poses are taken as true.
+void find_covariance(const Rig& rig, const GraphSnapshot& graph, PointId id, MapSnapshot::Point& point) {
+  const Vector3 x_w(point.position[0], point.position[1], point.position[2]);
+  Matrix3 information = Matrix3::Zero();
+  for (const KeyframeId observer : *graph.point(id).observers) {
+    const Keyframe& keyframe = graph.keyframe(observer);
+    const Observation* seen = find_observation(keyframe, id);
+    const Vector3 x_k = keyframe.T_k_w * x_w;
+    if (seen == nullptr || !(x_k.z() > 0)) continue;
+    const bool has_right = seen->z.z() == seen->z.z();  // else NaN
+    const Matrix3 J = rig.project_jacobian(x_k) * keyframe.T_k_w.rotation();
+    const Vector3 weight = measurement_information(rig, seen->level, has_right).cast<double>();
+    information += J.transpose() * weight.asDiagonal() * J;
+  }
+  const Eigen::LDLT<Matrix3> factor(information);
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return;
+  Eigen::Map<Matrix3>(point.covariance.data()) = factor.solve(Matrix3::Identity());
+}
+
+}  // namespace
+
+MapSnapshot::MapSnapshot() : impl_(empty_map()) {}
+MapSnapshot::MapSnapshot(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+MapSnapshot::MapSnapshot(const MapSnapshot&) = default;
+MapSnapshot& MapSnapshot::operator=(const MapSnapshot&) = default;
+MapSnapshot::MapSnapshot(MapSnapshot&& other) noexcept : impl_(std::exchange(other.impl_, empty_map())) {}
+MapSnapshot& MapSnapshot::operator=(MapSnapshot&& other) noexcept {
+  impl_ = std::exchange(other.impl_, empty_map());
+  return *this;
+}
+MapSnapshot::~MapSnapshot() = default;
+
+std::uint64_t MapSnapshot::version() const {
+  return impl_->map->graph.version();
+}
+
+std::uint32_t MapSnapshot::reference() const {
+  return index(impl_->map->graph.reference());
+}
+
+std::vector<MapSnapshot::Keyframe> MapSnapshot::keyframes() const {
+  const MapVersion& map = *impl_->map;
+  std::vector<std::uint8_t> window(map.graph.keyframe_count(), 0);
+  const auto mark = [&](const std::vector<KeyframeId>& members, std::uint8_t number) {
+    for (const KeyframeId member : members) {
+      if (map.graph.contains(member)) window[index(member)] = number;
+    }
+  };
+  mark(map.outer_window, 2);
+  mark(map.inner_window, 1);
+  std::vector<Keyframe> keyframes;
+  for_each_keyframe(map.graph, [&](const twofold::Keyframe& from) {
+    Keyframe& keyframe = keyframes.emplace_back();
+    keyframe.id = index(from.id);
+    keyframe.part = index(from.part);
+    keyframe.frame = from.frame_index;
+    keyframe.t_ns = from.t_ns;
+    keyframe.T_world_camera = to_pose(from.T_k_w.inverse());
+    keyframe.points = static_cast<std::uint32_t>(from.observations->size());
+    keyframe.window = window[index(from.id)];
+    keyframe.has_place = map.places.find(from.id) != nullptr;
+  });
+  return keyframes;
+}
+
+std::vector<MapSnapshot::Point> MapSnapshot::points(bool with_covariance) const {
+  const GraphSnapshot& graph = impl_->map->graph;
+  std::vector<Point> points;
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+    const MapPoint& from = graph.point(PointId{p});
+    if (!from.alive()) continue;
+    Point& point = points.emplace_back();
+    point.id = p;
+    point.anchor = index(from.anchor);
+    point.observers = static_cast<std::uint32_t>(from.observers->size());
+    Eigen::Map<Vector3>(point.position.data()) = graph.position(PointId{p});
+    if (with_covariance) find_covariance(impl_->rig, graph, PointId{p}, point);
+  }
+  return points;
+}
+
+std::vector<MapSnapshot::Edge> MapSnapshot::edges() const {
+  const GraphSnapshot& graph = impl_->map->graph;
+  std::vector<Edge> edges;
+  for_each_keyframe(graph, [&](const twofold::Keyframe& from) {
+    for (const twofold::Edge& edge : *from.edges) {
+      if (edge.other < from.id) continue;  // both ends list it
+      edges.push_back({index(from.id), index(edge.other),
+                       edge.marginalised ? EdgeKind::kMarginalised : EdgeKind::kCovisible,
+                       static_cast<std::uint32_t>(edge.weight),
+                       to_pose(relative_pose(graph, from.id, edge))});
+    }
+  });
+  return edges;
+}
+
+std::vector<MapSnapshot::Part> MapSnapshot::parts() const {
+  const GraphSnapshot& graph = impl_->map->graph;
+  std::vector<Part> parts;
+  for (const KeyframeId id : parts_of(graph)) parts.push_back({index(id), 0});
+  for_each_keyframe(graph, [&](const twofold::Keyframe& keyframe) {
+    const auto part = std::lower_bound(parts.begin(), parts.end(), index(keyframe.part),
+                                       [](const Part& p, std::uint32_t id) { return p.id < id; });
+    ++part->keyframes;
+  });
+  return parts;
+}
+
+std::size_t MapSnapshot::memory_bytes() const {
+  const MapVersion& map = *impl_->map;
+  std::size_t bytes = 0;
+  for_each_keyframe(map.graph, [&](const twofold::Keyframe& keyframe) {
+    bytes += sizeof keyframe + keyframe.observations->size() * sizeof(Observation) +
+             keyframe.edges->size() * sizeof(twofold::Edge);
+    if (const PlaceAppearance* place = map.places.find(keyframe.id)) {
+      bytes += sizeof *place + place->corners.size() * sizeof(DescribedCorner) +
+               place->z.size() * sizeof(Eigen::Vector3f);
+    }
+  });
+  for (std::uint32_t p = 0; p < map.graph.point_count(); ++p) {
+    const MapPoint& point = map.graph.point(PointId{p});
+    if (!point.alive()) continue;
+    bytes += sizeof point + sizeof(PointAppearance) + point.observers->size() * sizeof(KeyframeId);
+  }
+  return bytes;
+}
+
+}  // namespace twofold

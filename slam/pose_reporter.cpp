@@ -1,0 +1,119 @@
+#include "slam/pose_reporter.hpp"
+
+#include <Eigen/Cholesky>
+
+#include "slam/conversions.hpp"
+
+namespace twofold {
+namespace {
+
+MapEventKind kind_of(CorrectionReason reason) {
+  switch (reason) {
+    case CorrectionReason::kLoopClosure:
+      return MapEventKind::kLoopClosure;
+    case CorrectionReason::kPoseGraph:
+      return MapEventKind::kPoseGraph;
+    case CorrectionReason::kPartsJoined:
+      return MapEventKind::kPartsJoined;
+    case CorrectionReason::kOptimisation:
+    case CorrectionReason::kNone:
+      break;
+  }
+  return MapEventKind::kOptimisation;
+}
+
+TrackingState state_of(const FrameRecord& record) {
+  if (record.state == FrameState::kTracked) return TrackingState::kTracked;
+  return record.cause == LostCause::kUnplaced ? TrackingState::kUnplaced : TrackingState::kLost;
+}
+
+/// J^T W J is of delta in T_c_w <- exp(delta) T_c_w; for T_w_c the same delta stands on the right, negative,
+/// which a covariance does not show.
+void invert_information(const Matrix6& information, std::array<double, 36>& covariance) {
+  const Eigen::LDLT<Matrix6> factor(information);
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return;
+  Eigen::Map<Matrix6>(covariance.data()) = factor.solve(Matrix6::Identity());  // symmetric: either order
+}
+
+MapEvent event_of(MapEventKind kind, const PoseEstimate& now) {
+  MapEvent event;
+  event.kind = kind;
+  event.frame = now.frame;
+  event.t_ns = now.t_ns;
+  event.map_version = now.map_version;
+  event.keyframe = now.reference_keyframe;
+  event.map_part = now.map_part;
+  return event;
+}
+
+void set_poses(const SE3& T_w_before, const SE3& T_w_after, MapEvent& event) {
+  event.T_world_camera_before = to_pose(T_w_before);
+  event.T_world_camera_after = to_pose(T_w_after);
+  event.moved = (T_w_after.translation() - T_w_before.translation()).norm();
+  event.turned = (T_w_before.so3().inverse() * T_w_after.so3()).log().norm();
+}
+
+}  // namespace
+
+PoseEstimate PoseReporter::next(const PoseReport& report, Events& events) {
+  const FrameRecord& record = report.record;
+  PoseEstimate now;
+  now.frame = record.frame_index;
+  now.t_ns = record.t_ns;
+  now.state = state_of(record);
+  now.keyframe = record.keyframe;
+  now.effort = static_cast<std::uint8_t>(record.effort);
+  now.reason = describe(record.cause);
+  now.points = record.inliers;
+  now.tracked_share = record.tracked_share;
+  now.map_version = record.snapshot_version;
+  now.exposed_ns = report.exposed_ns;
+  now.latency_ns = record.latency_ns;
+  if (record.state == FrameState::kTracked) {
+    const SE3 T_c_w = record.T_c_w_causal.unpacked();
+    now.T_world_camera = to_pose(T_c_w.inverse());
+    now.map_part = index(record.part_causal);
+    now.reference_keyframe = index(record.reference);
+    now.T_reference_camera = to_pose(record.T_c_ref.unpacked().inverse());
+    invert_information(report.information, now.covariance);
+    if (const auto T_last_w = last_T_c_w(report)) {
+      const double dt = static_cast<double>(record.t_ns - last_.t_ns) * 1e-9;
+      Eigen::Map<Vector6>(now.velocity.data()) = (*T_last_w * T_c_w.inverse()).log() / dt;
+    }
+  }
+  find_events(report, now, events);
+  if (record.state == FrameState::kTracked) last_ = record;
+  was_lost_ = record.state != FrameState::kTracked;
+  return now;
+}
+
+std::optional<SE3> PoseReporter::last_T_c_w(const PoseReport& report) const {
+  if (last_.state != FrameState::kTracked) return std::nullopt;
+  const GraphSnapshot& graph = report.graph;
+  const bool known = graph.contains(last_.reference) && graph.live_replacement(last_.reference);
+  const KeyframeId part = known ? graph.part(last_.reference) : last_.part_causal;
+  if (part != report.record.part_causal) return std::nullopt;
+  return known ? final_T_c_w(last_, graph) : last_.T_c_w_causal.unpacked();
+}
+
+void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now, Events& events) const {
+  if (report.correction.reason != CorrectionReason::kNone) {
+    MapEvent& event = events.correction.emplace(event_of(kind_of(report.correction.reason), now));
+    event.map_part_before = index(last_.part_causal);
+    if (event.map_part == kNoId) event.map_part = index(report.graph.part(last_.reference));
+    set_poses(report.correction.T_c_w_before.inverse(), report.correction.T_c_w_after.inverse(), event);
+  }
+  if (now.state != TrackingState::kTracked || !was_lost_) return;
+  // The tracker has started a part whose first keyframe the mapper has not seen yet.
+  const bool new_part = !report.graph.contains(report.record.part_causal);
+  const bool first_map = new_part && report.graph.keyframe_count() == 0;
+  if (first_map) return;
+  MapEvent& event = events.placing.emplace(
+      event_of(new_part ? MapEventKind::kNewPart : MapEventKind::kRelocalisation, now));
+  const SE3 T_w_now = to_se3(now.T_world_camera);
+  if (last_.state == FrameState::kTracked) event.map_part_before = index(last_.part_causal);
+  const auto T_last_w = last_T_c_w(report);
+  set_poses(T_last_w ? T_last_w->inverse() : T_w_now, T_w_now, event);
+}
+
+}  // namespace twofold

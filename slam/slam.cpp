@@ -1,0 +1,257 @@
+#include "twofold/slam.hpp"
+
+#include <fmt/format.h>
+
+#include <mutex>
+#include <stdexcept>
+
+#include "engine/clock.hpp"
+#include "graph/map_file.hpp"
+#include "slam/conversions.hpp"
+#include "slam/frame_intake.hpp"
+#include "slam/guarded_callback.hpp"
+#include "slam/latest_value.hpp"
+#include "slam/map_lender.hpp"
+#include "slam/map_snapshot.hpp"
+#include "slam/pipeline.hpp"
+#include "slam/pose_reporter.hpp"
+#include "slam/slam_options.hpp"
+#include "slam/summary.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr const char* kEndedEarly = "a thread of the engine has ended early: finish() says why";
+
+}  // namespace
+
+class TWOFOLD_HIDDEN Slam::Impl {
+ public:
+  Impl(const CameraRig& camera_rig, const SlamOptions& options)
+      : rig_(to_rig(camera_rig)), live_(options.live), frame_buffers_(options.frame_buffers), intake_(rig_) {
+    EngineOptions engine = engine_options(options);
+    engine.on_pose = [this](const PoseReport& report) { tell(report); };
+    engine.on_map = [this](const GraphSnapshot& graph, const DoubleWindow& window) {
+      maps.publish(graph, window);
+    };
+    engine.on_places = [this](const KeyframeDatabase& places) { maps.publish(places); };
+    pipeline_ = make_pipeline(rig_, engine);
+  }
+
+  template <class Callback, class Function>
+  void set(Callback& callback, Function function) {
+    const std::scoped_lock turn(pushing_);
+    if (pushed_ || summary_) throw std::logic_error("callbacks are set before the first push");
+    callback.set(std::move(function));
+  }
+
+  PushResult push(const FrameView& frame);
+  /// Empty when the frame can be tracked.
+  [[nodiscard]] std::string refusal(const FrameView& frame);
+  bool wait_for_room(std::int64_t timeout_ns);
+  [[nodiscard]] bool has_room() {
+    const std::scoped_lock turn(pushing_);
+    return !summary_ && pipeline_->has_room();
+  }
+  [[nodiscard]] std::vector<std::string> errors() const;
+  const SlamSummary& finish();
+
+  GuardedCallback<PoseEstimate> on_pose{"on_pose"};
+  GuardedCallback<MapEvent> on_event{"on_event"};
+  LatestValue<PoseEstimate> latest;
+  MapLender maps;
+  [[nodiscard]] const Rig& rig() const { return rig_; }
+
+ private:
+  void tell(const PoseReport& report);
+  /// A thread of the engine has ended early; errors() says so from now on.
+  [[nodiscard]] bool failed();
+
+  const Rig rig_;
+  const bool live_;
+  const int frame_buffers_;
+  PoseReporter reporter_;  // tracker's
+
+  std::mutex pushing_;  // guards what follows: whoever pushes or finishes has his turn
+  FrameIntake intake_;
+  bool pushed_ = false;
+  std::int64_t no_room_ = 0;  // frames dropped on the way in
+  std::optional<SlamSummary> summary_;
+
+  mutable std::mutex errors_;  // guards engine_error_
+  std::string engine_error_;
+  std::unique_ptr<Pipeline> pipeline_;  // last: its threads end before what they use is destroyed
+};
+
+/// On the tracker's thread.
+void Slam::Impl::tell(const PoseReport& report) {
+  PoseReporter::Events events;
+  const PoseEstimate estimate = reporter_.next(report, events);
+  if (events.correction) on_event(*events.correction);
+  if (events.placing) on_event(*events.placing);
+  latest.put(estimate);
+  on_pose(estimate);
+}
+
+bool Slam::Impl::failed() {
+  if (!pipeline_->failed()) return false;
+  const std::scoped_lock lock(errors_);
+  engine_error_ = kEndedEarly;
+  return true;
+}
+
+std::string Slam::Impl::refusal(const FrameView& frame) {
+  if (summary_) return "the run is over: finish() was called";
+  if (failed()) return kEndedEarly;
+  if (std::string why = intake_.refusal(frame); !why.empty()) return why;
+  constexpr std::int64_t kPlausible = 10'000'000'000;  // what a live frame may be late [ns]
+  const std::int64_t late_ns = steady_now_ns() - frame.t_ns;
+  if (live_ && std::abs(late_ns) > kPlausible)
+    return fmt::format("a live frame's time must be of CLOCK_MONOTONIC; this one's is {:.3f} s from now",
+                       static_cast<double>(-late_ns) * 1e-9);
+  return "";
+}
+
+PushResult Slam::Impl::push(const FrameView& frame) {
+  const std::scoped_lock turn(pushing_);
+  if (std::string why = refusal(frame); !why.empty()) return {PushStatus::kRefused, std::move(why)};
+  pushed_ = true;
+  if (!pipeline_->has_room()) {
+    intake_.skip(frame);
+    ++no_room_;
+    return {PushStatus::kDropped,
+            fmt::format("the tracker is behind: {} frames are waiting for it already", frame_buffers_)};
+  }
+  pipeline_->push(intake_.take(frame));
+  return {};
+}
+
+bool Slam::Impl::wait_for_room(std::int64_t timeout_ns) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::nanoseconds(timeout_ns);
+  constexpr auto kFailureCheck = std::chrono::milliseconds(50);
+  for (;;) {
+    const std::scoped_lock turn(pushing_);
+    if (summary_ || failed()) return false;
+    if (pipeline_->has_room()) return true;
+    const auto now = std::chrono::steady_clock::now();
+    if (now >= deadline) return false;
+    pipeline_->wait(std::min(deadline, now + kFailureCheck));
+  }
+}
+
+std::vector<std::string> Slam::Impl::errors() const {
+  std::vector<std::string> errors;
+  if (const auto error = on_event.error()) errors.push_back(*error);
+  if (const auto error = on_pose.error()) errors.push_back(*error);
+  const std::scoped_lock lock(errors_);
+  if (!engine_error_.empty()) errors.push_back(engine_error_);
+  return errors;
+}
+
+const SlamSummary& Slam::Impl::finish() {
+  const std::scoped_lock turn(pushing_);
+  if (summary_) return *summary_;
+  RunResult result = pipeline_->finish();
+  summary_ = summarise(result);
+  summary_->frames += no_room_;
+  summary_->dropped += no_room_;
+  pipeline_.reset();
+  {
+    const std::scoped_lock lock(errors_);
+    engine_error_ = result.error;
+  }
+  summary_->errors = errors();
+  return *summary_;
+}
+
+Slam::Slam(const CameraRig& rig, const SlamOptions& options) : impl_(std::make_unique<Impl>(rig, options)) {}
+
+Slam::~Slam() {
+  try {
+    impl_->finish();
+  } catch (...) {  // nobody is left to be told
+  }
+}
+
+void Slam::on_pose(PoseCallback callback) {
+  impl_->set(impl_->on_pose, std::move(callback));
+}
+
+void Slam::on_event(EventCallback callback) {
+  impl_->set(impl_->on_event, std::move(callback));
+}
+
+PushResult Slam::push(const FrameView& frame) {
+  return impl_->push(frame);
+}
+
+bool Slam::has_room() const {
+  return impl_->has_room();
+}
+
+bool Slam::wait_for_room(std::int64_t timeout_ns) {
+  return impl_->wait_for_room(timeout_ns);
+}
+
+std::optional<PoseEstimate> Slam::latest() const {
+  return impl_->latest.get();
+}
+
+MapSnapshot Slam::map() const {
+  return MapSnapshot(
+      std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{impl_->rig(), impl_->maps.newest()}));
+}
+
+HeldMaps Slam::held_maps() const {
+  const MapLender::Loans loans = impl_->maps.held();
+  return {loans.versions, loans.oldest};
+}
+
+void Slam::save_map(const std::filesystem::path& file) const {
+  const auto map = impl_->maps.newest();
+  twofold::save_map(file, impl_->rig(), map->graph, map->places);
+}
+
+std::vector<std::string> Slam::errors() const {
+  return impl_->errors();
+}
+
+SlamSummary Slam::finish() {
+  return impl_->finish();
+}
+
+const char* version() {
+  return TWOFOLD_VERSION;
+}
+
+const char* to_string(TrackingState state) {
+  switch (state) {
+    case TrackingState::kTracked:
+      return "tracked";
+    case TrackingState::kLost:
+      return "lost";
+    case TrackingState::kUnplaced:
+      break;
+  }
+  return "unplaced";
+}
+
+const char* to_string(MapEventKind kind) {
+  switch (kind) {
+    case MapEventKind::kOptimisation:
+      return "optimisation";
+    case MapEventKind::kLoopClosure:
+      return "loop closure";
+    case MapEventKind::kPoseGraph:
+      return "pose graph";
+    case MapEventKind::kPartsJoined:
+      return "parts joined";
+    case MapEventKind::kRelocalisation:
+      return "relocalisation";
+    case MapEventKind::kNewPart:
+      break;
+  }
+  return "new part";
+}
+
+}  // namespace twofold

@@ -1,0 +1,47 @@
+#include "slam/slam_options.hpp"
+
+#include <stdexcept>
+
+#include "loopclosure/default_vocabulary.hpp"
+
+namespace twofold {
+namespace {
+
+void expect_sensible(const SlamOptions& options) {
+  const auto expect = [](bool rule, const char* what) {
+    if (!rule) throw std::invalid_argument(what);
+  };
+  expect(options.frame_buffers >= 2, "options.frame_buffers must be >= 2");
+  expect(!options.live || options.mode == RunMode::kThreaded, "options.live needs RunMode::kThreaded");
+  expect(!options.localise_only || !options.map.empty(), "options.localise_only needs options.map");
+  expect(options.map.empty() || options.places,
+         "options.map needs options.places, by which the camera finds itself in the map");
+}
+
+}  // namespace
+
+EngineOptions engine_options(const SlamOptions& options) {
+  expect_sensible(options);
+  EngineOptions engine;
+  engine.deterministic = options.mode == RunMode::kDeterministic;
+  engine.pacing.live = options.live;
+  engine.pacing.late = LatePolicy::kNewest;
+  engine.localise_only = options.localise_only;
+  engine.mapper.inner_window = options.inner_window;
+  engine.mapper.outer_window = options.outer_window;
+  if (const std::string why = engine.mapper.invalid_reason(); !why.empty())
+    throw std::invalid_argument("options: " + why);
+  engine.frame_slots = static_cast<std::size_t>(options.frame_buffers);
+  engine.tracker_cpu = options.tracker_cpu;
+  engine.mapper_cpu = options.mapper_cpu;
+  engine.loop_closer_cpu = options.loop_closer_cpu;
+  engine.fifo_priority = options.fifo_priority;
+  if (options.places) {
+    engine.vocabulary = std::make_shared<const Vocabulary>(
+        options.vocabulary.empty() ? load_default_vocabulary() : Vocabulary::load(options.vocabulary));
+  }
+  if (!options.map.empty()) engine.map = std::make_shared<const SavedMap>(load_map(options.map));
+  return engine;
+}
+
+}  // namespace twofold

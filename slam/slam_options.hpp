@@ -1,0 +1,12 @@
+#pragma once
+
+#include "engine/options.hpp"
+#include "twofold/slam.hpp"
+
+namespace twofold {
+
+/// Reads the files that the options name. Throws std::invalid_argument naming an option that makes no sense,
+/// and std::runtime_error naming a file that cannot be used.
+[[nodiscard]] EngineOptions engine_options(const SlamOptions& options);
+
+}  // namespace twofold

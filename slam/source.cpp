@@ -1,0 +1,74 @@
+#include "twofold/source.hpp"
+
+#include <array>
+#include <atomic>
+#include <stdexcept>
+
+#include "io/sources/open_source.hpp"
+#include "slam/conversions.hpp"
+#include "twofold/opencv.hpp"
+
+namespace twofold {
+
+struct TWOFOLD_HIDDEN Source::Impl {
+  Impl(const std::string& name, const SourceSettings& settings) {
+    SourceOptions options;
+    options.preload = settings.preload;
+    options.stop = &stop;
+    if (!settings.calibration.empty()) options.calibration = settings.calibration;
+    source = open_source(name, options);
+    if (source->rig().kind == SensorKind::kMono)
+      throw std::runtime_error(name + ": has a single camera without depth; stereo or RGB-D is needed");
+    rig = to_camera_rig(source->rig());
+    for (const TimedPose& pose : source->ground_truth()) truth.push_back({pose.t_ns, to_pose(pose.T_w_c)});
+  }
+
+  std::atomic<bool> stop{false};  // relaxed: it carries nothing else
+  std::unique_ptr<FrameSource> source;
+  CameraRig rig;
+  std::vector<StampedPose> truth;
+};
+
+Source::Source(const std::string& name, const SourceSettings& settings)
+    : impl_(std::make_unique<Impl>(name, settings)) {}
+Source::~Source() = default;
+Source::Source(Source&&) noexcept = default;
+Source& Source::operator=(Source&&) noexcept = default;
+
+const CameraRig& Source::rig() const {
+  return impl_->rig;
+}
+
+std::optional<std::int64_t> Source::frame_count() const {
+  return impl_->source->frame_count();
+}
+
+bool Source::is_live() const {
+  return impl_->source->is_live();
+}
+
+const std::vector<StampedPose>& Source::ground_truth() const {
+  return impl_->truth;
+}
+
+bool Source::next(FrameView& view) {
+  Frame frame;
+  if (impl_->stop.load(std::memory_order_relaxed)) return false;
+  switch (impl_->source->next(frame)) {
+    case FrameStatus::kFrame:
+      break;
+    case FrameStatus::kEnd:
+      return false;
+    case FrameStatus::kError:
+      throw std::runtime_error(impl_->source->error());
+  }
+  view = impl_->rig.sensor == Sensor::kRgbd ? rgbd_frame(frame.t_ns, frame.left, frame.depth)
+                                            : stereo_frame(frame.t_ns, frame.left, frame.right);
+  return true;
+}
+
+void Source::stop() {
+  impl_->stop.store(true, std::memory_order_relaxed);
+}
+
+}  // namespace twofold

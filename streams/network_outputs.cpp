@@ -1,0 +1,131 @@
+#include "streams/network_outputs.hpp"
+
+#include <netdb.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <vector>
+
+#include "streams/line_reader.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kMaxReaders = 16;
+
+[[noreturn]] void fail(const std::string& target, const std::string& why) {
+  throw std::runtime_error(target + ": " + why);
+}
+
+class UdpOutput final : public PoseOutput {
+ public:
+  UdpOutput(FileDescriptor socket, PoseForm form) : socket_(std::move(socket)), form_(form) {}
+
+  void offer(const std::string& lines) override {
+    if (missed_ > 0 && send(missed_line(missed_, form_))) missed_ = 0;
+    if (!send(lines)) ++missed_;
+  }
+  void miss(std::uint64_t lines) override { missed_ += lines; }
+
+ private:
+  bool send(const std::string& lines) {
+    return ::send(socket_.get(), lines.data(), lines.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
+  }
+
+  FileDescriptor socket_;
+  PoseForm form_;
+  std::uint64_t missed_ = 0;
+};
+
+class UnixOutput final : public PoseOutput {
+ public:
+  UnixOutput(FileDescriptor listening, std::string path, PoseForm form)
+      : listening_(std::move(listening)), path_(std::move(path)), form_(form) {}
+  ~UnixOutput() override { ::unlink(path_.c_str()); }
+
+  void offer(const std::string& lines) override {
+    welcome();
+    for (LineReader& reader : readers_) reader.offer(lines);
+    std::erase_if(readers_, [](const LineReader& reader) { return reader.gone(); });
+  }
+  void miss(std::uint64_t lines) override {
+    for (LineReader& reader : readers_) reader.miss(lines);
+  }
+  bool flush() override {
+    bool done = true;
+    for (LineReader& reader : readers_) done &= reader.flush() || reader.gone();
+    return done;
+  }
+
+ private:
+  void welcome() {
+    while (readers_.size() < kMaxReaders) {
+      FileDescriptor connection(::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC));
+      if (!connection) return;
+      readers_.emplace_back(std::move(connection), form_);
+    }
+  }
+
+  FileDescriptor listening_;
+  std::string path_;
+  PoseForm form_;
+  std::vector<LineReader> readers_;
+};
+
+sockaddr_un unix_address(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path)
+    fail("unix:" + path,
+         "a path of 1 to " + std::to_string(sizeof address.sun_path - 1) + " characters is needed");
+  std::memcpy(address.sun_path, path.data(), path.size());
+  return address;
+}
+
+/// A socket that was left behind by a process that is gone.
+bool is_abandoned(const std::string& path, const sockaddr_un& address) {
+  struct stat found {};
+  if (::lstat(path.c_str(), &found) != 0 || !S_ISSOCK(found.st_mode)) return false;
+  const FileDescriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  const auto* to = reinterpret_cast<const sockaddr*>(&address);
+  return ::connect(probe.get(), to, sizeof address) != 0 && errno == ECONNREFUSED;
+}
+
+}  // namespace
+
+std::unique_ptr<PoseOutput> open_udp(const std::string& address, PoseForm form) {
+  const std::string target = "udp:" + address;
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0) fail(target, "must be udp:HOST:PORT");
+  std::string host = address.substr(0, colon);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  if (const int error = ::getaddrinfo(host.c_str(), address.c_str() + colon + 1, &hints, &found))
+    fail(target, ::gai_strerror(error));
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> list(found, &::freeaddrinfo);
+  for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
+    FileDescriptor socket(::socket(at->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    if (socket && ::connect(socket.get(), at->ai_addr, at->ai_addrlen) == 0)
+      return std::make_unique<UdpOutput>(std::move(socket), form);
+  }
+  fail(target, std::strerror(errno));
+}
+
+std::unique_ptr<PoseOutput> open_unix(const std::string& path, PoseForm form) {
+  const sockaddr_un address = unix_address(path);
+  if (is_abandoned(path, address)) ::unlink(path.c_str());
+  FileDescriptor listening(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!listening ||
+      ::bind(listening.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(listening.get(), kMaxReaders) != 0)
+    fail("unix:" + path, std::strerror(errno));
+  return std::make_unique<UnixOutput>(std::move(listening), path, form);
+}
+
+}  // namespace twofold

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "streams/pose_lines.hpp"
+
+namespace twofold {
+
+/// Where lines go. One thread; no call waits for whoever reads.
+class PoseOutput {
+ public:
+  virtual ~PoseOutput() = default;
+  /// One or more whole lines; not empty.
+  virtual void offer(const std::string& lines) = 0;
+  /// Lines that were lost on the way here: readers are told with the next line.
+  virtual void miss(std::uint64_t lines) = 0;
+  /// Tries to hand over what is under way. True when nothing is left, or nobody who could take it.
+  virtual bool flush() { return true; }
+};
+
+/// @param target  "-": standard output; udp:HOST:PORT; unix:PATH, a socket that any number of readers may
+///                connect to and leave; zmq:ENDPOINT, which publishes there; else a file, or a pipe with a
+///                name, that somebody reads
+///
+/// Throws std::runtime_error naming the target and what is wrong with it.
+[[nodiscard]] std::unique_ptr<PoseOutput> open_pose_output(const std::string& target, PoseForm form);
+
+}  // namespace twofold

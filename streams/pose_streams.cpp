@@ -1,0 +1,76 @@
+#include "streams/pose_streams.hpp"
+
+#include <pthread.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+namespace twofold {
+namespace {
+
+constexpr auto kLastCall = std::chrono::milliseconds(500);
+
+/// A pipe without a reader is an error of write, not the end of the process. The signal would go to the
+/// thread that writes.
+void block_sigpipe() {
+  sigset_t pipe;
+  sigemptyset(&pipe);
+  sigaddset(&pipe, SIGPIPE);
+  pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
+}
+
+}  // namespace
+
+PoseStreams::PoseStreams(std::vector<std::unique_ptr<PoseOutput>> outputs, PoseForm form)
+    : outputs_(std::move(outputs)), form_(form) {
+  writer_.emplace(WorkerOptions{.name = "pose writer"}, [this](const std::stop_token& stop) { write(stop); });
+}
+
+void PoseStreams::push(const Item& item) {
+  Item copy = item;
+  if (!ring_.try_push(std::move(copy))) {
+    missed_.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  parking_.wake();
+}
+
+void PoseStreams::write(const std::stop_token& stop) {
+  block_sigpipe();
+  while (parking_.wait(stop, [this] { return ring_.has_value(); })) write_queued();
+  hand_over_rest();
+}
+
+void PoseStreams::write_queued() {
+  Item item;
+  while (ring_.try_pop(item)) {
+    const std::string lines = std::holds_alternative<PoseEstimate>(item)
+                                  ? pose_line(std::get<PoseEstimate>(item), form_)
+                                  : event_line(std::get<MapEvent>(item), form_);
+    const std::uint64_t missed = missed_.exchange(0, std::memory_order_relaxed);
+    for (const auto& output : outputs_) {
+      if (missed > 0) output->miss(missed);
+      if (!lines.empty()) output->offer(lines);
+    }
+  }
+}
+
+void PoseStreams::hand_over_rest() {
+  const auto deadline = std::chrono::steady_clock::now() + kLastCall;
+  for (;;) {
+    bool done = true;
+    for (const auto& output : outputs_) done &= output->flush();
+    if (done || std::chrono::steady_clock::now() >= deadline) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+void PoseStreams::finish() {
+  if (!writer_) return;
+  writer_->request_stop();
+  (void)writer_->join();
+  writer_.reset();
+}
+
+}  // namespace twofold

@@ -1,0 +1,126 @@
+#include "slam/frame_intake.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+namespace twofold {
+namespace {
+
+constexpr int kWidth = 8, kHeight = 6;
+
+Rig rig_of(SensorKind kind) {
+  Rig rig;
+  rig.kind = kind;
+  rig.camera = {10, 10, 4, 3, kWidth, kHeight};
+  rig.baseline = 0.1;
+  return rig;
+}
+
+class FrameIntakeTest : public ::testing::Test {
+ protected:
+  FrameIntakeTest() : pixels_(3 * 16 * kHeight) {
+    for (std::size_t i = 0; i < pixels_.size(); ++i) pixels_[i] = static_cast<std::uint8_t>(7 * i);
+  }
+  [[nodiscard]] ImageView image(ImageFormat format = ImageFormat::kGrey8, std::ptrdiff_t stride = 40) const {
+    return {pixels_.data(), kWidth, kHeight, stride, format};
+  }
+  [[nodiscard]] FrameView stereo(std::int64_t t_ns = 1) const {
+    return {t_ns, image(), image(), {}, nullptr};
+  }
+
+  static void expect_refused(const FrameIntake& intake, const FrameView& frame, const std::string& part) {
+    const std::string reason = intake.refusal(frame);
+    EXPECT_NE(reason.find(part), std::string::npos) << "reason: '" << reason << "'";
+  }
+
+  std::vector<std::uint8_t> pixels_;
+};
+
+TEST_F(FrameIntakeTest, SaysWhatIsWrongWithAnImage) {
+  const FrameIntake intake(rig_of(SensorKind::kStereo));
+  EXPECT_EQ(intake.refusal(stereo()), "");
+  FrameView frame = stereo();
+  frame.left.width = 9;
+  expect_refused(intake, frame, "the left image is 9x6, the rig's are 8x6");
+  frame = stereo();
+  frame.right = {};
+  expect_refused(intake, frame, "the right image is missing");
+  frame = stereo();
+  frame.right.format = ImageFormat::kDepth16;
+  expect_refused(intake, frame, "the right image is depth16");
+  frame = stereo();
+  frame.left.stride = 7;
+  expect_refused(intake, frame, "stride is 7 bytes, but a row takes 8");
+  frame = stereo();
+  frame.left.format = ImageFormat::kBgr8;
+  frame.left.stride = 23;
+  expect_refused(intake, frame, "stride is 23 bytes, but a row takes 24");
+}
+
+TEST_F(FrameIntakeTest, RgbdNeedsDepth) {
+  const FrameIntake intake(rig_of(SensorKind::kRgbd));
+  FrameView frame{1, image(), {}, image(ImageFormat::kDepth16), nullptr};
+  EXPECT_EQ(intake.refusal(frame), "");
+  frame.depth.format = ImageFormat::kGrey8;
+  expect_refused(intake, frame, "the depth image is grey8, but must be depth16");
+  frame.depth = {};
+  expect_refused(intake, frame, "the depth image is missing");
+}
+
+TEST_F(FrameIntakeTest, TimeMustGrow) {
+  FrameIntake intake(rig_of(SensorKind::kStereo));
+  EXPECT_EQ(intake.take(stereo(5)).index, 0);
+  expect_refused(intake, stereo(5), "time does not grow");
+  expect_refused(intake, stereo(4), "time does not grow");
+  EXPECT_EQ(intake.take(stereo(6)).index, 1) << "a frame that was refused has no number";
+  intake.skip(stereo(7));
+  expect_refused(intake, stereo(7), "time does not grow");
+  EXPECT_EQ(intake.take(stereo(8)).index, 3);
+}
+
+TEST_F(FrameIntakeTest, CopiesPixelsThatNobodyKeeps) {
+  FrameIntake intake(rig_of(SensorKind::kStereo));
+  const Frame frame = intake.take(stereo());
+  const std::uint8_t before = frame.left.at<std::uint8_t>(2, 3);
+  EXPECT_EQ(before, pixels_[2 * 40 + 3]);
+  pixels_.assign(pixels_.size(), 0);
+  EXPECT_EQ(frame.left.at<std::uint8_t>(2, 3), before);
+}
+
+TEST_F(FrameIntakeTest, KeepsTheOwnerAsLongAsThePixelsAreUsed) {
+  FrameIntake intake(rig_of(SensorKind::kRgbd));
+  auto owner = std::make_shared<int>(1);
+  const std::weak_ptr<int> watched = owner;
+  FrameView view{1, image(), {}, image(ImageFormat::kDepth16), owner};
+  Frame frame = intake.take(view);
+  EXPECT_EQ(frame.left.data, pixels_.data());
+  EXPECT_EQ(frame.depth.data, pixels_.data());
+  EXPECT_EQ(frame.depth.step[0], 40U);
+  owner.reset();
+  view.owner.reset();
+  EXPECT_FALSE(watched.expired());
+  cv::Mat another = frame.left;
+  frame = {};
+  EXPECT_FALSE(watched.expired());
+  another.release();
+  EXPECT_TRUE(watched.expired());
+}
+
+TEST_F(FrameIntakeTest, ColourBecomesGrey) {
+  FrameIntake intake(rig_of(SensorKind::kStereo));
+  for (auto& pixel : pixels_) pixel = 0;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u)
+      pixels_[static_cast<std::size_t>(40 * v + 3 * u)] = 200;  // first channel
+  }
+  const auto grey_of = [&](ImageFormat format, std::int64_t t_ns) {
+    return intake.take({t_ns, image(format), image(format), {}, nullptr}).left.at<std::uint8_t>(1, 1);
+  };
+  EXPECT_EQ(grey_of(ImageFormat::kRgb8, 1), 60);  // 0.299 of red
+  EXPECT_EQ(grey_of(ImageFormat::kBgr8, 2), 23);  // 0.114 of blue
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,108 @@
+#include "slam/map_lender.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "graph/graph_writer.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::uint32_t kKeyframes = 70;  // more than two leaves of the tree
+
+/// Every keyframe stands at x = number.
+void set_all(GraphWriter& writer, double number) {
+  for (std::uint32_t k = 0; k < kKeyframes; ++k) {
+    writer.set_pose(KeyframeId{k}, SE3(SO3(), Vector3(number, 0, 0)));
+  }
+}
+
+GraphWriter writer_with_keyframes() {
+  GraphWriter writer;
+  for (std::uint32_t k = 0; k < kKeyframes; ++k) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{k};
+    writer.add_keyframe(std::move(keyframe));
+  }
+  return writer;
+}
+
+/// x of all keyframes, NaN when they differ.
+double number_of(const MapVersion& map) {
+  const double first = map.graph.keyframe(KeyframeId{0}).T_k_w.translation().x();
+  for (std::uint32_t k = 1; k < kKeyframes; ++k) {
+    if (map.graph.keyframe(KeyframeId{k}).T_k_w.translation().x() != first) return std::nan("");
+  }
+  return first;
+}
+
+TEST(MapLender, LendsTheNewestVersionAndCountsWhatIsHeld) {
+  MapLender lender;
+  EXPECT_EQ(lender.newest()->graph.keyframe_count(), 0U);
+  GraphWriter writer = writer_with_keyframes();
+  set_all(writer, 1);
+  DoubleWindow window;
+  window.nodes.resize(3);
+  for (std::uint32_t n = 0; n < 3; ++n) window.nodes[n].id = KeyframeId{n};
+  window.inner = 1;
+  lender.publish(writer.publish(), window);
+  const auto first = lender.newest();
+  EXPECT_EQ(first->inner_window, std::vector<KeyframeId>{KeyframeId{0}});
+  EXPECT_EQ(first->outer_window, (std::vector<KeyframeId>{KeyframeId{1}, KeyframeId{2}}));
+  EXPECT_EQ(lender.newest(), first) << "nothing newer was published";
+  EXPECT_EQ(lender.held().versions, 1U);
+  set_all(writer, 2);
+  lender.publish(writer.publish(), window);
+  auto second = lender.newest();
+  EXPECT_EQ(number_of(*first), 1);
+  EXPECT_EQ(number_of(*second), 2);
+  EXPECT_EQ(lender.held().versions, 2U);
+  EXPECT_EQ(lender.held().oldest, first->graph.version());
+  second.reset();
+  EXPECT_EQ(lender.held().versions, 1U);
+}
+
+TEST(MapLender, PlacesComeWithTheMap) {
+  MapLender lender;
+  const auto before = lender.newest();
+  KeyframeDatabase places;
+  places.set(KeyframeId{4}, PlaceAppearance{});
+  lender.publish(places);
+  lender.publish(places);  // the same version again: nothing happens
+  EXPECT_NE(lender.newest()->places.find(KeyframeId{4}), nullptr);
+  EXPECT_EQ(before->places.find(KeyframeId{4}), nullptr);
+}
+
+// Borrowers copy and destroy versions while the writer changes its own, whose nodes they share.
+TEST(MapLender, VersionsStayWholeWhileTheWriterGoesOn) {
+  constexpr int kVersions = 2000;
+  MapLender lender;
+  GraphWriter writer = writer_with_keyframes();
+  lender.publish(writer.publish(), {});
+  std::atomic<bool> done{false};
+  std::atomic<int> broken{0};
+  std::vector<std::thread> borrowers;
+  for (int b = 0; b < 2; ++b) {
+    borrowers.emplace_back([&, b] {
+      std::vector<std::shared_ptr<const MapVersion>> kept;
+      while (!done.load(std::memory_order_relaxed)) {
+        kept.push_back(lender.newest());
+        for (const auto& map : kept) broken += std::isnan(number_of(*map));
+        if (kept.size() > static_cast<std::size_t>(3 + b)) kept.erase(kept.begin());
+      }
+    });
+  }
+  for (int v = 1; v <= kVersions; ++v) {
+    set_all(writer, v);
+    lender.publish(writer.publish(), {});
+  }
+  done.store(true, std::memory_order_relaxed);
+  for (std::thread& borrower : borrowers) borrower.join();
+  EXPECT_EQ(broken, 0);
+  EXPECT_EQ(number_of(*lender.newest()), kVersions);
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,117 @@
+#include "slam/pose_reporter.hpp"
+
+#include <gtest/gtest.h>
+
+#include "graph/graph_writer.hpp"
+#include "slam/conversions.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::int64_t kPeriod = 100'000'000;
+
+/// A graph of one keyframe, and frames tracked against it.
+class PoseReporterTest : public ::testing::Test {
+ protected:
+  PoseReporterTest() {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{0};
+    writer_.add_keyframe(std::move(keyframe));
+    graph_ = writer_.publish();
+  }
+
+  FrameRecord tracked(int index, const SE3& T_c_w) {
+    FrameRecord record;
+    record.frame_index = index;
+    record.t_ns = index * kPeriod;
+    record.state = FrameState::kTracked;
+    record.reference = KeyframeId{0};
+    record.part_causal = KeyframeId{0};
+    record.T_c_ref = PackedPose(T_c_w * graph_.T_k_w(KeyframeId{0}).inverse());
+    record.T_c_w_causal = PackedPose(T_c_w);
+    record.snapshot_version = graph_.version();
+    return record;
+  }
+  static FrameRecord lost(int index) {
+    FrameRecord record;
+    record.frame_index = index;
+    record.t_ns = index * kPeriod;
+    record.cause = LostCause::kCovered;
+    return record;
+  }
+  PoseEstimate report(const FrameRecord& record, const Matrix6& information = Matrix6::Identity()) {
+    events_ = {};
+    return reporter_.next({record, graph_, correction_, information, 7}, events_);
+  }
+
+  GraphWriter writer_;
+  GraphSnapshot graph_;
+  PoseCorrection correction_;
+  PoseReporter reporter_;
+  PoseReporter::Events events_;
+};
+
+TEST_F(PoseReporterTest, VelocityIsOfTheCameraInItsOwnAxes) {
+  // The camera looks along the world's x axis and flies along it at 2 m/s, turning by 0.5 rad/s to the right.
+  const SE3 T_w_first(SO3::exp(Vector3(0, M_PI / 2, 0)), Vector3::Zero());
+  const Vector6 motion = (Vector6() << 0, 0, 0.2, 0, 0.05, 0).finished();  // in 0.1 s
+  EXPECT_EQ(report(tracked(0, T_w_first.inverse())).velocity, (std::array<double, 6>{}));
+  const PoseEstimate second = report(tracked(1, (T_w_first * SE3::exp(motion)).inverse()));
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(second.velocity[static_cast<std::size_t>(i)], 10 * motion[i], 1e-9);
+}
+
+TEST_F(PoseReporterTest, ACorrectionOfTheMapIsNoMotion) {
+  (void)report(tracked(0, SE3()));
+  const SE3 jump(SO3(), Vector3(0, 5, 0));
+  writer_.set_pose(KeyframeId{0}, jump);
+  graph_ = writer_.publish();
+  correction_ = {CorrectionReason::kLoopClosure, 1, kPeriod, SE3(), jump};
+  const PoseEstimate pose = report(tracked(1, jump));
+  for (const double v : pose.velocity) EXPECT_NEAR(v, 0, 1e-12);
+  ASSERT_TRUE(events_.correction);
+  EXPECT_EQ(events_.correction->kind, MapEventKind::kLoopClosure);
+  EXPECT_EQ(events_.correction->keyframe, 0U);
+  EXPECT_NEAR(events_.correction->moved, 5, 1e-12);
+  EXPECT_EQ(events_.correction->T_world_camera_after, to_pose(jump.inverse()));
+}
+
+TEST_F(PoseReporterTest, CovarianceIsTheInverseOfTheInformation) {
+  Matrix6 A = Matrix6::Random();
+  const Matrix6 information = A * A.transpose() + Matrix6::Identity();
+  const PoseEstimate pose = report(tracked(0, SE3()), information);
+  const Eigen::Map<const Matrix6> covariance(pose.covariance.data());
+  EXPECT_LT((covariance * information - Matrix6::Identity()).norm(), 1e-9);
+  EXPECT_EQ(report(tracked(1, SE3()), Matrix6::Zero()).covariance, (std::array<double, 36>{}));
+}
+
+TEST_F(PoseReporterTest, ALostCameraThatFindsItselfIsAnEvent) {
+  (void)report(tracked(0, SE3()));
+  const PoseEstimate gone = report(lost(1));
+  EXPECT_EQ(gone.state, TrackingState::kLost);
+  EXPECT_STREQ(gone.reason, describe(LostCause::kCovered));
+  EXPECT_EQ(gone.map_part, kNoId);
+  EXPECT_FALSE(events_.placing);
+  const SE3 elsewhere(SO3(), Vector3(0, 0, 3));
+  (void)report(tracked(2, elsewhere));
+  ASSERT_TRUE(events_.placing);
+  EXPECT_EQ(events_.placing->kind, MapEventKind::kRelocalisation);
+  EXPECT_NEAR(events_.placing->moved, 3, 1e-12);
+  EXPECT_EQ(events_.placing->map_part_before, 0U);
+  (void)report(tracked(3, elsewhere));
+  EXPECT_FALSE(events_.placing);
+}
+
+TEST_F(PoseReporterTest, APartThatTheMapDoesNotHaveYetIsNew) {
+  (void)report(tracked(0, SE3()));
+  (void)report(lost(1));
+  FrameRecord record = tracked(2, SE3());
+  record.reference = record.part_causal = KeyframeId{1};
+  const PoseEstimate pose = report(record);
+  EXPECT_EQ(pose.map_part, 1U);
+  EXPECT_EQ(pose.velocity, (std::array<double, 6>{})) << "worlds of different parts have nothing in common";
+  ASSERT_TRUE(events_.placing);
+  EXPECT_EQ(events_.placing->kind, MapEventKind::kNewPart);
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,144 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include <unistd.h>
+
+#include "tests/slam/slam_run.hpp"
+
+namespace twofold {
+namespace {
+
+class SlamMapTest : public testing::SlamRun {
+ protected:
+  SlamMapTest()
+      : file_(
+            (std::filesystem::temp_directory_path() / ("slam_map_" + std::to_string(::getpid()) + ".tfm"))) {}
+  ~SlamMapTest() override { std::filesystem::remove(file_); }
+
+  std::filesystem::path file_;
+};
+
+TEST_F(SlamMapTest, TheMapHasItsKeyframesPointsEdgesAndWindows) {
+  Slam slam(rig(), {.mode = RunMode::kDeterministic, .inner_window = 2, .outer_window = 2});
+  push_all(slam);
+  (void)slam.finish();
+  const MapSnapshot map = slam.map();
+  const auto keyframes = map.keyframes();
+  ASSERT_GE(keyframes.size(), 3U);
+  std::set<std::uint32_t> ids;
+  for (const auto& keyframe : keyframes) {
+    ids.insert(keyframe.id);
+    EXPECT_EQ(keyframe.part, keyframes[0].id);
+    EXPECT_GT(keyframe.points, 20U);
+    EXPECT_TRUE(keyframe.has_place);
+  }
+  const auto in_window = [&](int window) {
+    return std::count_if(keyframes.begin(), keyframes.end(),
+                         [&](const auto& k) { return k.window == window; });
+  };
+  EXPECT_EQ(in_window(1), 2);
+  EXPECT_LE(in_window(2), 2);
+  EXPECT_GE(in_window(2), 1);
+  EXPECT_TRUE(ids.contains(map.reference()));
+  const auto edges = map.edges();
+  EXPECT_GE(edges.size() + 1, keyframes.size()) << "the keyframes hang together";
+  for (const auto& edge : edges) {
+    EXPECT_LT(edge.from, edge.to);
+    EXPECT_TRUE(ids.contains(edge.from) && ids.contains(edge.to));
+  }
+  ASSERT_EQ(map.parts().size(), 1U);
+  EXPECT_EQ(map.parts()[0].keyframes, keyframes.size());
+  EXPECT_GT(map.memory_bytes(), map.points(false).size() * 256);
+}
+
+TEST_F(SlamMapTest, CovariancesOfPointsGrowWithTheirDistance) {
+  Slam slam(rig(), deterministic());
+  push_all(slam);
+  (void)slam.finish();
+  std::vector<std::pair<double, double>> depth_and_deviation;
+  for (const auto& point : slam.map().points()) {
+    const double variance = point.covariance[0] + point.covariance[4] + point.covariance[8];
+    ASSERT_GT(variance, 0);
+    EXPECT_EQ(point.covariance[1], point.covariance[3]);
+    depth_and_deviation.emplace_back(std::hypot(point.position[0], point.position[1], point.position[2]),
+                                     std::sqrt(variance));
+  }
+  ASSERT_GT(depth_and_deviation.size(), 100U);
+  std::sort(depth_and_deviation.begin(), depth_and_deviation.end());
+  const auto mean_of = [&](std::size_t begin, std::size_t end) {
+    double sum = 0;
+    for (std::size_t i = begin; i < end; ++i) sum += depth_and_deviation[i].second;
+    return sum / static_cast<double>(end - begin);
+  };
+  const std::size_t third = depth_and_deviation.size() / 3;
+  EXPECT_GT(mean_of(2 * third, 3 * third), mean_of(0, third));
+  EXPECT_LT(mean_of(0, third), 0.1);
+}
+
+TEST_F(SlamMapTest, AHeldMapStaysAsItWasAndIsCounted) {
+  Slam slam(rig(), deterministic());
+  push_all(slam, 0, 15);
+  const MapSnapshot held = slam.map();
+  const auto before = held.keyframes();
+  const std::uint64_t version = held.version();
+  push_all(slam, 15);
+  (void)slam.finish();
+  MapSnapshot newest = slam.map();
+  EXPECT_GT(newest.version(), version);
+  EXPECT_GT(newest.keyframes().size(), before.size());
+  EXPECT_EQ(slam.held_maps().versions, 2U);
+  EXPECT_EQ(slam.held_maps().oldest, version);
+  newest = MapSnapshot();
+  EXPECT_EQ(slam.held_maps().versions, 1U);
+  const auto after = held.keyframes();
+  ASSERT_EQ(after.size(), before.size());
+  for (std::size_t k = 0; k < after.size(); ++k) EXPECT_EQ(after[k].T_world_camera, before[k].T_world_camera);
+}
+
+TEST_F(SlamMapTest, ASnapshotOutlivesItsSlam) {
+  MapSnapshot map;
+  EXPECT_EQ(map.version(), 0U);
+  EXPECT_TRUE(map.keyframes().empty() && map.points().empty() && map.edges().empty() && map.parts().empty());
+  {
+    Slam slam(rig(), {});
+    push_all(slam, 0, 20);
+    (void)slam.finish();
+    map = slam.map();
+  }
+  const MapSnapshot copy = map;
+  map = MapSnapshot();
+  EXPECT_GT(copy.points().size(), 50U);
+}
+
+TEST_F(SlamMapTest, ACameraFindsItselfInASavedMap) {
+  {
+    Slam slam(rig(), deterministic());
+    push_all(slam);
+    (void)slam.finish();
+    slam.save_map(file_);
+  }
+  std::vector<PoseEstimate> poses;
+  std::vector<MapEvent> events;
+  Slam slam(rig(), {.mode = RunMode::kDeterministic, .map = file_, .localise_only = true});
+  const std::uint64_t loaded = slam.map().version();
+  const std::size_t keyframes = slam.map().keyframes().size();
+  EXPECT_GT(keyframes, 2U) << "the map is there before the first frame";
+  slam.on_pose([&](const PoseEstimate& pose) { poses.push_back(pose); });
+  slam.on_event([&](const MapEvent& event) { events.push_back(event); });
+  push_all(slam);
+  const SlamSummary summary = slam.finish();
+  EXPECT_EQ(poses.front().state, TrackingState::kUnplaced);
+  EXPECT_EQ(poses.back().state, TrackingState::kTracked);
+  EXPECT_GT(summary.tracked, kFrames / 2);
+  ASSERT_FALSE(events.empty());
+  EXPECT_EQ(events[0].kind, MapEventKind::kRelocalisation);
+  EXPECT_EQ(events[0].map_part_before, kNoId);
+  EXPECT_EQ(slam.map().keyframes().size(), keyframes);
+  EXPECT_GE(slam.map().version(), loaded);
+  EXPECT_THROW(slam.save_map("/nowhere/at.all"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace twofold

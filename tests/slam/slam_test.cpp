@@ -1,0 +1,206 @@
+#include "twofold/slam.hpp"
+
+#include <atomic>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <thread>
+
+#include "loopclosure/default_vocabulary.hpp"
+#include "tests/slam/slam_run.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::run_engine;
+
+class SlamTest : public testing::SlamRun {};
+
+TEST_F(SlamTest, DeterministicRunsGiveTheEnginesBytes) {
+  EngineOptions options;
+  options.deterministic = true;
+  options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  const RunResult expected = run_engine(options, feed());
+  std::vector<PoseEstimate> poses;
+  Slam slam(rig(), deterministic());
+  slam.on_pose([&](const PoseEstimate& pose) { poses.push_back(pose); });
+  push_all(slam);
+  const SlamSummary summary = slam.finish();
+  ASSERT_EQ(poses.size(), expected.frames.size());
+  ASSERT_EQ(summary.trajectory.size(), expected.frames.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const FrameRecord& record = expected.frames[i];
+    EXPECT_EQ(poses[i].T_world_camera, to_pose(record.T_c_w_causal.unpacked().inverse())) << i;
+    EXPECT_EQ(poses[i].map_version, record.snapshot_version);
+    EXPECT_EQ(poses[i].points, record.inliers);
+    EXPECT_EQ(summary.trajectory[i].T_world_camera, to_pose(final_T_c_w(record, expected.graph).inverse()));
+  }
+  EXPECT_EQ(summary.frames, kFrames);
+  EXPECT_EQ(summary.tracked, kFrames);
+}
+
+TEST_F(SlamTest, ThreadedRunsFollowTheCamera) {
+  std::vector<PoseEstimate> poses;
+  Slam slam(rig(), {});
+  slam.on_pose([&](const PoseEstimate& pose) { poses.push_back(pose); });
+  push_all(slam);
+  const SlamSummary summary = slam.finish();
+  EXPECT_EQ(summary.tracked, kFrames);
+  EXPECT_TRUE(summary.errors.empty());
+  ASSERT_EQ(poses.size(), static_cast<std::size_t>(kFrames));
+  const SE3 T_world_first = to_se3(poses[0].T_world_camera);
+  for (int i = 0; i < kFrames; ++i) {
+    const auto& pose = poses[static_cast<std::size_t>(i)];
+    const SE3 T_first_now = T_world_first.inverse() * to_se3(pose.T_world_camera);
+    const SE3 truth = T_c_w(0) * T_c_w(i).inverse();
+    EXPECT_LT((T_first_now.translation() - truth.translation()).norm(), 0.02) << i;
+    EXPECT_GT(pose.covariance[0], 0) << i;
+    EXPECT_LT(pose.covariance[0], 1e-3) << i;
+  }
+  // A frame takes 1/30 s.
+  const Vector6 velocity = 30 * (T_c_w(19) * T_c_w(20).inverse()).log();
+  for (int k = 0; k < 6; ++k)
+    EXPECT_NEAR(poses[20].velocity[static_cast<std::size_t>(k)], velocity[k], 0.1) << k;
+}
+
+TEST_F(SlamTest, FramesThatCannotBeUsedAreRefusedAndNothingIsLost) {
+  Slam slam(rig(), deterministic());
+  push_all(slam, 0, 10);
+  FrameView backwards = view(5);
+  EXPECT_EQ(slam.push(backwards).status, PushStatus::kRefused);
+  FrameView small = view(10);
+  small.left.width /= 2;
+  const PushResult refused = slam.push(small);
+  EXPECT_EQ(refused.status, PushStatus::kRefused);
+  EXPECT_NE(refused.reason.find("160x240"), std::string::npos) << refused.reason;
+  push_all(slam, 10);
+  const SlamSummary summary = slam.finish();
+  EXPECT_EQ(summary.frames, kFrames);
+  EXPECT_EQ(summary.tracked, kFrames);
+}
+
+TEST_F(SlamTest, AfterTheEndAnswersAreKept) {
+  Slam slam(rig(), deterministic());
+  push_all(slam, 0, 20);
+  const SlamSummary first = slam.finish();
+  const PushResult late = slam.push(view(20));
+  EXPECT_EQ(late.status, PushStatus::kRefused);
+  EXPECT_NE(late.reason.find("finish"), std::string::npos) << late.reason;
+  EXPECT_FALSE(slam.wait_for_room(0));
+  EXPECT_FALSE(slam.has_room());
+  EXPECT_THROW(slam.on_pose({}), std::logic_error);
+  EXPECT_EQ(slam.finish().frames, first.frames);
+  EXPECT_EQ(slam.latest()->frame, 19);
+  EXPECT_FALSE(slam.map().keyframes().empty());
+}
+
+TEST_F(SlamTest, ACallbackThatThrowsIsReportedAndTrackingGoesOn) {
+  for (const RunMode mode : {RunMode::kThreaded, RunMode::kDeterministic}) {
+    int calls = 0;
+    Slam slam(rig(), {.mode = mode});
+    slam.on_pose([&](const PoseEstimate& pose) {
+      ++calls;
+      if (pose.frame == 5) throw std::runtime_error("no room on the table");
+    });
+    push_all(slam);
+    const SlamSummary summary = slam.finish();
+    EXPECT_EQ(calls, 6);
+    EXPECT_EQ(summary.tracked, kFrames);
+    ASSERT_EQ(summary.errors.size(), 1U);
+    EXPECT_NE(summary.errors[0].find("on_pose"), std::string::npos);
+    EXPECT_NE(summary.errors[0].find("no room on the table"), std::string::npos);
+    EXPECT_EQ(slam.errors(), summary.errors);
+    EXPECT_EQ(slam.latest()->frame, kFrames - 1);
+  }
+}
+
+TEST_F(SlamTest, ASlowCallbackIsAStageOfItsOwn) {
+  Slam slam(rig(), {});
+  slam.on_pose([](const PoseEstimate&) { std::this_thread::sleep_for(std::chrono::milliseconds(3)); });
+  push_all(slam, 0, 20);
+  for (const StageTime& time : slam.finish().timings) {
+    if (time.stage != "pose listener") continue;
+    EXPECT_EQ(time.thread, "tracker");
+    EXPECT_EQ(time.count, 20U);
+    EXPECT_GE(time.p50_ms, 3);
+    return;
+  }
+  FAIL() << "no such stage";
+}
+
+TEST_F(SlamTest, CallbacksAreSetBeforeTheFirstPush) {
+  Slam slam(rig(), deterministic());
+  slam.on_pose([](const PoseEstimate&) {});
+  push_all(slam, 0, 1);
+  EXPECT_THROW(slam.on_pose({}), std::logic_error);
+  EXPECT_THROW(slam.on_event({}), std::logic_error);
+}
+
+TEST_F(SlamTest, AFrameWithoutRoomIsDroppedAndPushDoesNotWait) {
+  std::atomic<bool> may_go_on{false};
+  SlamOptions options;
+  options.frame_buffers = 3;
+  Slam slam(rig(), options);
+  slam.on_pose([&](const PoseEstimate&) { may_go_on.wait(false); });  // holds the tracker, as none should
+  std::size_t queued = 0;
+  PushResult pushed;
+  while ((pushed = slam.push(view(queued)))) ++queued;
+  EXPECT_EQ(queued, 3U);
+  EXPECT_EQ(pushed.status, PushStatus::kDropped);
+  EXPECT_NE(pushed.reason.find("tracker is behind"), std::string::npos) << pushed.reason;
+  EXPECT_FALSE(slam.wait_for_room(1'000'000));
+  may_go_on = true;
+  may_go_on.notify_all();
+  ASSERT_TRUE(slam.wait_for_room(60'000'000'000));
+  EXPECT_TRUE(slam.push(view(queued + 1)));
+  const SlamSummary summary = slam.finish();
+  EXPECT_EQ(summary.frames, 5);
+  EXPECT_EQ(summary.dropped, 1);
+  EXPECT_EQ(slam.latest()->frame, 4) << "numbers count dropped frames";
+}
+
+TEST_F(SlamTest, LiveFramesMustBearTheTimeOfTheClock) {
+  Slam slam(rig(), {.live = true});
+  const PushResult pushed = slam.push(view(0));
+  EXPECT_EQ(pushed.status, PushStatus::kRefused);
+  EXPECT_NE(pushed.reason.find("CLOCK_MONOTONIC"), std::string::npos) << pushed.reason;
+  FrameView now = view(0);
+  now.t_ns = steady_now_ns();
+  EXPECT_TRUE(slam.push(now));
+  (void)slam.finish();
+  EXPECT_EQ(slam.latest()->exposed_ns, now.t_ns);
+  EXPECT_GT(slam.latest()->latency_ns, 0);
+}
+
+std::string what_is_wrong(const CameraRig& rig, const SlamOptions& options) {
+  try {
+    const Slam slam(rig, options);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "nothing";
+}
+
+TEST_F(SlamTest, OptionsAndRigsThatMakeNoSenseAreNamed) {
+  const auto expect = [](const std::string& what, const std::string& part) {
+    EXPECT_NE(what.find(part), std::string::npos) << what;
+  };
+  CameraRig rig_without_baseline = rig();
+  rig_without_baseline.baseline = 0;
+  expect(what_is_wrong(rig_without_baseline, {}), "rig.baseline must be > 0, is 0");
+  CameraRig rig_without_focus = rig();
+  rig_without_focus.fx = std::numeric_limits<double>::quiet_NaN();
+  expect(what_is_wrong(rig_without_focus, {}), "rig.fx");
+  CameraRig rgbd = rig();
+  rgbd.sensor = Sensor::kRgbd;
+  rgbd.depth_max = 0.1;
+  expect(what_is_wrong(rgbd, {}), "rig.depth_max");
+  expect(what_is_wrong(rig(), {.localise_only = true}), "options.localise_only needs options.map");
+  expect(what_is_wrong(rig(), {.inner_window = 0}), "inner_window");
+  expect(what_is_wrong(rig(), {.frame_buffers = 1}), "frame_buffers");
+  expect(what_is_wrong(rig(), {.mode = RunMode::kDeterministic, .live = true}), "options.live");
+  EXPECT_THROW(Slam(rig(), {.map = "/nowhere/at.all"}), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace twofold

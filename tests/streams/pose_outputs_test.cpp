@@ -1,0 +1,146 @@
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include <cstring>
+
+#include "streams/file_descriptor.hpp"
+#include "streams/pose_output.hpp"
+#include "tests/io/scratch_folder.hpp"
+#include "tests/streams/numbered_poses.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::Heard;
+using testing::numbered_pose;
+
+std::string line(int frame) {
+  return pose_line(numbered_pose(frame), PoseForm::kJson);
+}
+
+/// What has arrived.
+std::string receive(const FileDescriptor& from) {
+  std::string text, some(65536, '\0');
+  ssize_t size = 0;
+  while ((size = ::recv(from.get(), some.data(), some.size(), MSG_DONTWAIT)) > 0)
+    text.append(some, 0, static_cast<std::size_t>(size));
+  return text;
+}
+
+FileDescriptor connect_to(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+  FileDescriptor fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  EXPECT_EQ(::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  return fd;
+}
+
+std::string why_not(const std::string& target) {
+  try {
+    (void)open_pose_output(target, PoseForm::kJson);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(PoseOutputs, AFileHasEveryLine) {
+  const ScratchFolder folder;
+  const auto output = open_pose_output(folder / "poses.jsonl", PoseForm::kJson);
+  for (int i = 0; i < 100; ++i) output->offer(line(i));
+  EXPECT_TRUE(output->flush());
+  std::stringstream text;
+  text << std::ifstream(folder / "poses.jsonl").rdbuf();
+  Heard heard;
+  heard.take(text.str());
+  EXPECT_EQ(heard.frames.size(), 100U);
+}
+
+TEST(PoseOutputs, UnixReadersComeAndGo) {
+  const ScratchFolder folder;
+  const std::string path = folder / "poses.socket";
+  const auto output = open_pose_output("unix:" + path, PoseForm::kJson);
+  output->offer(line(0));
+  FileDescriptor first = connect_to(path);
+  output->offer(line(1));
+  const FileDescriptor second = connect_to(path);
+  output->offer(line(2));
+  Heard by_first, by_second;
+  by_first.take(receive(first));
+  first = FileDescriptor();
+  for (int i = 3; i < 6; ++i) output->offer(line(i));
+  by_second.take(receive(second));
+  EXPECT_EQ(by_first.frames, (std::vector<std::int64_t>{1, 2}));
+  EXPECT_EQ(by_second.frames, (std::vector<std::int64_t>{2, 3, 4, 5}));
+}
+
+TEST(PoseOutputs, OneDeadUnixReaderDoesNotHoldTheOthersUp) {
+  const ScratchFolder folder;
+  const std::string path = folder / "poses.socket";
+  const auto output = open_pose_output("unix:" + path, PoseForm::kJson);
+  const FileDescriptor dead = connect_to(path);
+  const FileDescriptor alive = connect_to(path);
+  Heard heard;
+  for (int i = 0; i < 5000; ++i) {
+    output->offer(line(i));
+    heard.take(receive(alive));
+  }
+  EXPECT_EQ(heard.frames.size(), 5000U);
+  EXPECT_FALSE(output->flush()) << "the dead one's lines are under way for ever";
+}
+
+TEST(PoseOutputs, AnAbandonedUnixSocketIsReplacedAndALivingOneIsNot) {
+  const ScratchFolder folder;
+  const std::string path = folder / "poses.socket";
+  {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    const FileDescriptor left(::socket(AF_UNIX, SOCK_STREAM, 0));
+    ASSERT_EQ(::bind(left.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  }
+  auto output = open_pose_output("unix:" + path, PoseForm::kJson);
+  EXPECT_NE(why_not("unix:" + path).find("in use"), std::string::npos);
+  output.reset();
+  EXPECT_FALSE(std::filesystem::exists(path));
+  folder.write("file", "kept");
+  EXPECT_NE(why_not("unix:" + (folder / "file")), "");
+  EXPECT_TRUE(std::filesystem::exists(folder / "file"));
+}
+
+TEST(PoseOutputs, UdpSendsALineADatagram) {
+  const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  ASSERT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  socklen_t size = sizeof address;
+  ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
+  const auto output =
+      open_pose_output("udp:127.0.0.1:" + std::to_string(ntohs(address.sin_port)), PoseForm::kJson);
+  output->miss(3);
+  for (int i = 0; i < 4; ++i) output->offer(line(i));
+  Heard heard;
+  heard.take(receive(socket));
+  EXPECT_EQ(heard.frames, (std::vector<std::int64_t>{0, 1, 2, 3}));
+  EXPECT_EQ(heard.missed, 3);
+}
+
+TEST(PoseOutputs, WhatCannotBeOpenedIsNamed) {
+  const ScratchFolder folder;
+  const std::string pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_NE(why_not(pipe).find("nobody reads this pipe"), std::string::npos) << why_not(pipe);
+  EXPECT_NE(why_not("/nowhere/at/all").find("/nowhere/at/all"), std::string::npos);
+  EXPECT_NE(why_not("udp:localhost").find("udp:HOST:PORT"), std::string::npos);
+  EXPECT_NE(why_not("udp:no.such.host.invalid:1").find("udp:no.such.host.invalid:1"), std::string::npos);
+  EXPECT_NE(why_not("unix:" + std::string(200, 'x')).find("characters"), std::string::npos);
+  EXPECT_NE(why_not("zmq:nonsense"), "");
+}
+
+}  // namespace
+}  // namespace twofold
