@@ -50,6 +50,9 @@ std::string Calibration::invalid_reason() const {
     if (auto reason = invalid_rectified(*this); !reason.empty()) return reason;
   }
   if (!(fps >= 0) || !std::isfinite(fps)) return "fps must not be negative, is " + std::to_string(fps);
+  if (!(readout >= 0) || !std::isfinite(readout)) {
+    return "readout must not be negative, is " + std::to_string(readout);
+  }
   if (kind == SensorKind::kRgbd) {
     if (!(depth_unit > 0)) return "depth_unit must be positive, is " + std::to_string(depth_unit);
     if (!(depth_min >= 0 && depth_max > depth_min)) return "depth_min, depth_max must satisfy 0 <= min < max";

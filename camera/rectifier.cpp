@@ -151,6 +151,7 @@ Rectifier::Rectifier(const Calibration& calibration, const RectifierOptions& opt
   rig_.depth_unit = calibration.depth_unit;
   rig_.depth_min = calibration.depth_min;
   rig_.depth_max = calibration.depth_max;
+  rig_.readout = calibration.readout;
   if (stereo) rig_.baseline = calibration.T_right_left.translation().norm();
   if (calibration.kind == SensorKind::kRgbd) rig_.baseline = calibration.virtual_baseline;
   raw_left_size_ = {calibration.left.pinhole.width, calibration.left.pinhole.height};

@@ -22,6 +22,7 @@ struct Rig {
   double depth_unit = 0.001;  ///< RGB-D: metres per unit of the 16-bit depth image
   double depth_min = 0.3;     ///< RGB-D: nearer readings are holes [m]
   double depth_max = 8.0;     ///< RGB-D: farther readings are holes [m]
+  double readout = 0;         ///< rolling shutter: from the exposure of the first row to that of the last [s]
 
   static constexpr double kNoRight = std::numeric_limits<double>::quiet_NaN();
 

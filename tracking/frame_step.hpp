@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "camera/frame.hpp"
+#include "camera/rolling_shutter.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/effort.hpp"
@@ -33,6 +34,7 @@ class FrameStep {
   const GraphSnapshot& graph;
   KeyframeProposal* const free_proposal;  ///< null: no keyframe can be made
   const EffortBounds bounds;
+  RollingShutter shutter;  ///< as the camera moves in this frame, as far as known
   TrackResult result;
 
   /// Attributes the time since the last lap to a stage.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/inverse_depth.hpp"
+
 namespace twofold {
 namespace {
 
@@ -39,7 +41,8 @@ void PointStarter::occupy(const Eigen::Vector2f& uv) {
   occupied_[cell_of(uv)] = 1;
 }
 
-int PointStarter::start(const FrameImages& images, KeyframeId anchor, ImmaturePoints& local) {
+int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
+                        ImmaturePoints& local) {
   corners_.clear();
   const CellGrid grid{options_.cell_px, columns_, rows_, occupied_};
   for (int level = 0; level < options_.corner_levels; ++level) {
@@ -54,7 +57,11 @@ int PointStarter::start(const FrameImages& images, KeyframeId anchor, ImmaturePo
   for (std::int64_t i = quadtree_.next(); i >= 0 && started < options_.max_new_points; i = quadtree_.next()) {
     const Corner& corner = corners_[static_cast<std::size_t>(i)];
     const Eigen::Vector2f uv = at_level_zero(corner);
-    if (occupied_[cell_of(uv)] != 0 || !start_one(images, corner, anchor, local)) continue;
+    ImmaturePoint point;
+    point.anchor = anchor;
+    if (occupied_[cell_of(uv)] != 0 || !measure(images, corner, point)) continue;
+    if (!shutter.at_rest()) move_to_mid_exposure(shutter, point);
+    if (!local.add(point)) break;
     occupy(uv);
     ++started;
   }
@@ -70,9 +77,7 @@ bool PointStarter::sees_corners(const FrameImages& images, int wanted) {
   return static_cast<int>(corners_.size()) >= wanted;
 }
 
-bool PointStarter::start_one(const FrameImages& images, const Corner& corner, KeyframeId anchor,
-                             ImmaturePoints& local) const {
-  ImmaturePoint point;
+bool PointStarter::measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const {
   if (!cut_appearance(images.left.level(corner.level), corner.u, corner.v, corner.level, point.appearance)) {
     return false;
   }
@@ -83,11 +88,18 @@ bool PointStarter::start_one(const FrameImages& images, const Corner& corner, Ke
   if (std::isnan(u_r)) return false;
   const double disparity = std::max(uv.x() - u_r, kFarthestDisparity);
   const Vector3 ray = rig_.camera.unproject(uv);
-  point.anchor = anchor;
   point.psi = {ray.x(), ray.y(), 1.0 / rig_.depth_from_disparity(disparity)};
   point.anchor_observation.z = {point.appearance.uv.x(), point.appearance.uv.y(), static_cast<float>(u_r)};
   point.anchor_observation.level = corner.level;
-  return local.add(point);
+  return true;
+}
+
+void PointStarter::move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const {
+  Observation& seen = point.anchor_observation;
+  const Vector3 x_c = shutter.T_row_c(seen.z.y()).inverse() * from_inverse_depth(point.psi);
+  if (!(x_c.z() > 0)) return;
+  point.psi = to_inverse_depth(x_c);
+  seen.z = shutter.at_mid_exposure(rig_, seen.z.cast<double>(), x_c).cast<float>();
 }
 
 }  // namespace twofold

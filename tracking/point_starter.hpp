@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "camera/rig.hpp"
+#include "camera/rolling_shutter.hpp"
 #include "imaging/fast_corners.hpp"
 #include "imaging/image_pyramid.hpp"
 #include "tracking/immature_points.hpp"
@@ -23,15 +24,16 @@ class PointStarter {
   /// A point is tracked at this level-0 pixel: none is needed near it.
   void occupy(const Eigen::Vector2f& uv);
   /// Starts points anchored in keyframe `anchor` where nothing is tracked, evenly over the image; returns how
-  /// many.
-  int start(const FrameImages& images, KeyframeId anchor, ImmaturePoints& local);
+  /// many. The anchor's pose is that at mid-exposure.
+  int start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
+            ImmaturePoints& local);
   /// Whether corners are seen in so many cells: a quick look at level 1, where noise makes none.
   [[nodiscard]] bool sees_corners(const FrameImages& images, int wanted);
 
  private:
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;
-  bool start_one(const FrameImages& images, const Corner& corner, KeyframeId anchor,
-                 ImmaturePoints& local) const;
+  [[nodiscard]] bool measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const;
+  void move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const;
 
   Rig rig_;
   TrackerOptions options_;

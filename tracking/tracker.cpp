@@ -47,7 +47,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   if (map_exists) follow(graph);
   const bool tracked = map_exists && track(step);
   if (tracked) propose_keyframe_if_due(step);
-  if (tracked || (map_exists ? start_part(step) : start_map(step))) remember_frame(step.result);
+  if (tracked || (map_exists ? start_part(step) : start_map(step))) remember_frame(step);
   if (tracked && !step.result.proposed) revisit_reference(graph);
   step.lap(TrackerStage::kKeyframe);
   return step.result;
@@ -62,7 +62,10 @@ bool Tracker::track(FrameStep& step) {
   }
   local_map_.update(step.graph, start.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  if (!recognised) start.T_c_ref = align_to_previous(step);
+  if (!recognised) {
+    start.T_c_ref = align_to_previous(step);
+    step.shutter = shutter_at(start.T_c_ref, step.frame);
+  }
   step.lap(TrackerStage::kAlignment);
   // A place recognised is that of an earlier frame: far points are found from there, and lead to where near
   // ones are.
@@ -124,22 +127,26 @@ SE3 Tracker::align_to_previous(FrameStep& step) {
 }
 
 /// What the next frame starts from.
-void Tracker::remember_frame(const TrackResult& result) {
+void Tracker::remember_frame(const FrameStep& step) {
+  const TrackResult& result = step.result;
   T_cur_prev_ = loss_.lost_frames() > 0 ? SE3() : result.T_c_ref * last_.T_c_ref.inverse();
   last_ = {result.reference, result.T_c_ref};
+  last_t_ns_ = step.frame.t_ns;
   loss_.placed();
   unplaced_ = false;
   previous_points_.clear();
   for (std::size_t m = 0; m < matches_.size() && previous_points_.size() < previous_points_.capacity(); ++m) {
     if (!motion_[m].inlier) continue;
-    previous_points_.push_back(
-        {matches_[m].found.z.head<2>().cast<float>(), last_.T_c_ref * motion_[m].x_ref});
+    const Vector3& z = matches_[m].found.z;
+    const SE3 T_row_ref = step.shutter.seen_from(rig_, last_.T_c_ref, motion_[m].x_ref);
+    previous_points_.push_back({z.head<2>().cast<float>(), T_row_ref * motion_[m].x_ref});
   }
   for (const ImmaturePoint& point : immature_points_.points()) {
     if (previous_points_.size() == previous_points_.capacity()) break;
     const bool started_in_this_frame = result.proposed && index(point.anchor) + 1 == next_.keyframe;
     if (!started_in_this_frame) continue;
-    previous_points_.push_back({point.appearance.uv, from_inverse_depth(point.psi)});
+    const Vector3 x_c = from_inverse_depth(point.psi);
+    previous_points_.push_back({point.appearance.uv, step.shutter.seen_from(rig_, SE3(), x_c) * x_c});
   }
   std::swap(current_, previous_);
 }

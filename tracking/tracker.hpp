@@ -98,11 +98,13 @@ class Tracker {
 
   bool track(FrameStep& step);
   SE3 align_to_previous(FrameStep& step);
+  [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, FrameStep& step);
+  void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   bool estimate_pose(const Placement& start, FrameStep& step);
   void give_up_frame(LostCause cause, TrackResult& result);
-  void remember_frame(const TrackResult& result);
+  void remember_frame(const FrameStep& step);
 
   void propose_keyframe_if_due(FrameStep& step);
   void propose_keyframe(FrameStep& step);
@@ -110,7 +112,7 @@ class Tracker {
   void hand_over_images(KeyframeProposal& proposal);
   void collect_observations(KeyframeProposal& proposal);
   void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
-  void start_points(KeyframeId anchor);
+  void start_points(KeyframeId anchor, const RollingShutter& shutter);
   void revisit_reference(const GraphSnapshot& graph);
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
@@ -124,8 +126,9 @@ class Tracker {
   ImmaturePoints immature_points_;
   PointStarter starter_;
 
-  Placement last_;  ///< of the last good frame
-  SE3 T_cur_prev_;  ///< last good motion, the prediction of the next
+  std::int64_t last_t_ns_ = 0;  ///< of the last good frame
+  Placement last_;              ///< of the last good frame
+  SE3 T_cur_prev_;              ///< last good motion, the prediction of the next
   LossHistory loss_;
   std::optional<Placement> hint_;  ///< of relocalise
   bool unplaced_ = false;

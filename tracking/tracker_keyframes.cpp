@@ -65,7 +65,7 @@ void Tracker::propose_keyframe(FrameStep& step) {
   last_keyframe_.median_depth = median_depth(step.result.T_c_ref);
   begin_proposal({step.result.reference, step.result.T_c_ref}, step);
   collect_observations(proposal);
-  start_points(proposal.id);
+  start_points(proposal.id, step.shutter);
   last_keyframe_.occupied_regions = occupied_regions();
   hand_over_images(proposal);
   immature_points_.drop_stale(proposal.id, options_.max_failures, options_.max_candidate_age);
@@ -103,8 +103,8 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
       if (local.id == kNoPoint) confirm(local, proposal);
       id = local.id;
     }
-    const PointMatch& found = matches_[m].found;
-    proposal.observations.push_back({id, found.z.cast<float>(), static_cast<std::uint8_t>(found.level)});
+    const auto level = static_cast<std::uint8_t>(matches_[m].found.level);
+    proposal.observations.push_back({id, motion_[m].z, level});
   }
   std::sort(proposal.observations.begin(), proposal.observations.end(),
             [](const Observation& a, const Observation& b) { return a.point < b.point; });
@@ -120,12 +120,12 @@ void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
 }
 
 /// New points where nothing is tracked.
-void Tracker::start_points(KeyframeId anchor) {
+void Tracker::start_points(KeyframeId anchor, const RollingShutter& shutter) {
   starter_.clear();
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     if (motion_[m].inlier) starter_.occupy(matches_[m].found.z.head<2>().cast<float>());
   }
-  starter_.start(current_, anchor, immature_points_);
+  starter_.start(current_, anchor, shutter, immature_points_);
 }
 
 /// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to

@@ -6,6 +6,11 @@
 #include "tracking/tracker.hpp"
 
 namespace twofold {
+namespace {
+
+constexpr int kShutterRounds = 3;
+
+}  // namespace
 
 /// Points that should be visible  (thesis 6.2.5), into the quadtree.
 void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
@@ -48,7 +53,7 @@ void Tracker::search_points(const SE3& T_c_ref, FrameStep& step) {
     }
     ++result.searched;
     const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
-    const SE3 T_c_a = T_c_ref * local_map_.T_ref_a(point);
+    const SE3 T_c_a = step.shutter.seen_from(rig_, T_c_ref, point.x_ref) * local_map_.T_ref_a(point);
     const auto found = find_point(current_, rig_, *point.appearance, point.psi, T_c_a, search);
     if (point.local >= 0) {
       ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(point.local)];
@@ -59,18 +64,39 @@ void Tracker::search_points(const SE3& T_c_ref, FrameStep& step) {
   result.matches = static_cast<int>(matches_.size());
 }
 
-/// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted.
-bool Tracker::estimate_pose(const Placement& start, FrameStep& step) {
-  TrackResult& result = step.result;
+/// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on.
+RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const {
+  const double seconds = static_cast<double>(frame.t_ns - last_t_ns_) * 1e-9;
+  if (rig_.readout == 0 || loss_.lost_frames() > 0 || !(seconds > 0)) return {};
+  return {rig_, (T_c_ref * last_.T_c_ref.inverse()).log() / seconds};
+}
+
+/// What was found, as a global shutter would have seen it.
+void Tracker::observe_matches(const SE3& T_c_ref, const RollingShutter& shutter) {
   motion_.clear();
   for (const Match& match : matches_) {
     const bool has_right = !std::isnan(match.found.z.z());
-    motion_.push_back({local_map_.points()[match.point].x_ref, match.found.z.cast<float>(),
-                       measurement_information(rig_, match.found.level, has_right), true});
+    const Vector3& x_ref = local_map_.points()[match.point].x_ref;
+    const Vector3 z = shutter.at_mid_exposure(rig_, match.found.z, T_c_ref * x_ref);
+    motion_.push_back(
+        {x_ref, z.cast<float>(), measurement_information(rig_, match.found.level, has_right), true});
   }
+}
+
+/// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted. Where rows are read one
+/// after the other, how they move is known by the result only: a few rounds.
+bool Tracker::estimate_pose(const Placement& start, FrameStep& step) {
+  TrackResult& result = step.result;
   MotionOnlyOptions solver = options_.motion;
   solver.max_iterations = step.bounds.motion_iterations;
-  const MotionOnlyResult motion = optimise_motion(rig_, motion_, start.T_c_ref, solver);
+  MotionOnlyResult motion;
+  motion.T_c_ref = start.T_c_ref;
+  const int rounds = step.shutter.at_rest() ? 1 : kShutterRounds;
+  for (int round = 0; round < rounds; ++round) {
+    observe_matches(motion.T_c_ref, step.shutter);
+    motion = optimise_motion(rig_, motion_, motion.T_c_ref, solver);
+    if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step.frame);
+  }
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) {
     give_up_frame(LostCause::kTooFewCandidates, result);

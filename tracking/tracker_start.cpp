@@ -51,9 +51,10 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
     return LostCause::kNoKeyframeBuffer;
   }
   const KeyframeId id{next_.keyframe};
+  step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();
   starter_.clear();
-  if (starter_.start(current_, id, immature_points_) < kMinStartPoints) {
+  if (starter_.start(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
     immature_points_.clear_points();  // there were none but these
     return LostCause::kNoTexture;
   }

@@ -129,7 +129,7 @@ void read_own_depth(const YamlNode& node, Calibration* calibration) {
 }
 
 Calibration read_own(const YamlNode& root) {
-  root.expect_keys({"sensor", "fps", "cameras", "baseline", "T_right_left", "depth", "quality"});
+  root.expect_keys({"sensor", "fps", "readout", "cameras", "baseline", "T_right_left", "depth", "quality"});
   static const std::map<std::string, SensorKind> kKinds{
       {"mono", SensorKind::kMono}, {"stereo", SensorKind::kStereo}, {"rgbd", SensorKind::kRgbd}};
   const YamlNode sensor = root.at("sensor");
@@ -138,6 +138,7 @@ Calibration read_own(const YamlNode& root) {
   Calibration calibration;
   calibration.kind = kind->second;
   if (root.has("fps")) calibration.fps = root.at("fps").number();
+  if (root.has("readout")) calibration.readout = root.at("readout").number();
   const auto cameras = root.at("cameras").items();
   if (cameras.empty()) root.at("cameras").fail("is empty");
   calibration.left = read_own_camera(cameras[0]);

@@ -33,13 +33,14 @@ TEST(CalibrationFile, OwnForm) {
   EXPECT_EQ(c.fps, 20);
   EXPECT_EQ(c.invalid_reason(), "");
 
-  const auto rgbd = read_calibration(
-      folder.write("d.yaml",
-                   "sensor: rgbd\ncameras: [{size: [640, 480], intrinsics: [525, 525, 319.5, 239.5]}]\n"
-                   "depth: {unit: 0.0002, max: 5, virtual_baseline: 0.075}\n"));
+  const auto rgbd = read_calibration(folder.write(
+      "d.yaml",
+      "sensor: rgbd\nreadout: 0.025\ncameras: [{size: [640, 480], intrinsics: [525, 525, 319.5, 239.5]}]\n"
+      "depth: {unit: 0.0002, max: 5, virtual_baseline: 0.075}\n"));
   EXPECT_EQ(rgbd.depth_unit, 0.0002);
   EXPECT_EQ(rgbd.depth_max, 5);
   EXPECT_EQ(rgbd.virtual_baseline, 0.075);
+  EXPECT_EQ(rgbd.readout, 0.025);
 }
 
 TEST(CalibrationFile, NamesTheKeyThatIsWrong) {
@@ -54,6 +55,7 @@ TEST(CalibrationFile, NamesTheKeyThatIsWrong) {
       {with(kStereo, "[500,", "[.nan,"), "not a finite number"},
       {with(kStereo, "500, 501,", "500,"), "has 3 numbers, 4 are needed"},
       {with(kStereo, "fps: 20", "fsp: 20"), "unknown key 'fsp'"},
+      {with(kStereo, "fps: 20", "readout: -0.01"), "readout must not be negative"},
       {with(kStereo, "radtan", "fancy"), "'fancy'"},
       {with(kStereo, "T_right_left: [1,", "T_right_left: [2,"), "not a rotation and a translation"},
       {with(kStereo, "stereo", "sonar"), "'sonar'"},

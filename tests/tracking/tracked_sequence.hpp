@@ -44,7 +44,8 @@ inline SE3 true_T_c_w(int i) {
 /// Tracker and map in lockstep.
 class Odometry {
  public:
-  explicit Odometry(SensorKind kind) : tracker_(test_rig(kind, 320, 240), {}) { tracker_.prepare(proposal_); }
+  explicit Odometry(SensorKind kind) : Odometry(test_rig(kind, 320, 240)) {}
+  explicit Odometry(const Rig& rig) : tracker_(rig, {}) { tracker_.prepare(proposal_); }
 
   TrackResult step(const Frame& frame) {
     if (pending_) map_.insert(proposal_);

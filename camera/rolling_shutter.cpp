@@ -1,0 +1,24 @@
+#include "camera/rolling_shutter.hpp"
+
+namespace twofold {
+
+RollingShutter::RollingShutter(const Rig& rig, const Vector6& velocity)
+    : at_rest_(rig.readout == 0 || velocity.isZero(0)),
+      velocity_(velocity),
+      seconds_per_row_(rig.readout / rig.camera.height),
+      half_readout_(0.5 * rig.readout) {}
+
+Vector3 RollingShutter::at_mid_exposure(const Rig& rig, const Vector3& z, const Vector3& x_c) const {
+  if (at_rest_) return z;
+  const Vector3 x_row = T_row_c(z.y()) * x_c;
+  if (!(x_c.z() > 0) || !(x_row.z() > 0)) return z;
+  return z + rig.project(x_c) - rig.project(x_row);
+}
+
+SE3 RollingShutter::seen_from(const Rig& rig, const SE3& T_c_w, const Vector3& x_w) const {
+  if (at_rest_) return T_c_w;
+  const Vector3 x_c = T_c_w * x_w;
+  return x_c.z() > 0 ? T_row_c(rig.camera.project(x_c).y()) * T_c_w : T_c_w;
+}
+
+}  // namespace twofold
