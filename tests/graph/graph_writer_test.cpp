@@ -73,12 +73,12 @@ TEST(GraphWriter, EdgesAreSymmetricWithInverseRelativePoses) {
   const KeyframeId a = add_keyframe(writer, random_pose(rng));
   const KeyframeId b = add_keyframe(writer, random_pose(rng));
   const SE3 T_b_a = random_pose(rng);
-  writer.set_edge(a, {b, 12, true, T_b_a, 0.3});
+  writer.set_edge(a, {b, 12, true, T_b_a});
   const Edge* back = find_edge(writer.graph().keyframe(b), a);
   ASSERT_NE(back, nullptr);
   EXPECT_LT((back->T_other_this * T_b_a).log().norm(), 1e-12);
   EXPECT_LT((relative_pose(writer.graph(), b, *back) * T_b_a).log().norm(), 1e-12);
-  writer.set_edge(b, {a, 7, false, SE3(), 0.1});  // replaced from the other side
+  writer.set_edge(b, {a, 7, false, SE3()});  // replaced from the other side
   EXPECT_EQ(find_edge(writer.graph().keyframe(a), b)->weight, 7);
   const SE3 T_b_a_absolute = writer.graph().T_k_w(b) * writer.graph().T_k_w(a).inverse();
   const SE3 T_a_b = relative_pose(writer.graph(), b, *find_edge(writer.graph().keyframe(b), a));
@@ -129,7 +129,7 @@ TEST(GraphWriter, InvariantsHoldUnderRandomOperations) {
         const std::uint32_t a = pick(), b = pick();
         if (a == b) continue;
         writer.set_edge(KeyframeId{a},
-                        {KeyframeId{b}, static_cast<int>(rng() % 50), rng() % 2 == 0, random_pose(rng), 0.1});
+                        {KeyframeId{b}, static_cast<int>(rng() % 50), rng() % 2 == 0, random_pose(rng)});
         edges.insert(std::minmax(a, b));
       } else if (action == 17) {
         const std::uint32_t a = pick(), b = pick();
