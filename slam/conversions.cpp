@@ -42,7 +42,8 @@ CameraRig to_camera_rig(const Rig& rig) {
           rig.baseline,
           rig.depth_unit,
           rig.depth_min,
-          rig.depth_max};
+          rig.depth_max,
+          rig.readout};
 }
 
 Rig to_rig(const CameraRig& rig) {
@@ -57,6 +58,8 @@ Rig to_rig(const CameraRig& rig) {
   inside.kind = rig.sensor == Sensor::kRgbd ? SensorKind::kRgbd : SensorKind::kStereo;
   inside.camera = {rig.fx, rig.fy, rig.cx, rig.cy, rig.width, rig.height};
   inside.baseline = rig.baseline;
+  expect(rig.readout >= 0, "readout", ">= 0", rig.readout);
+  inside.readout = rig.readout;
   if (rig.sensor != Sensor::kRgbd) return inside;
   expect(positive(rig.depth_unit), "depth_unit", "> 0", rig.depth_unit);
   expect(positive(rig.depth_min), "depth_min", "> 0", rig.depth_min);

@@ -114,13 +114,13 @@ double rate_of(const Trajectory& truth) {
   return shortest > 0 ? kNsPerSecond / static_cast<double>(shortest) : 1.0;
 }
 
-class Progress {
+class RenderProgress {
  public:
-  explicit Progress(std::int64_t total) : total_(total), shown_(isatty(STDERR_FILENO) != 0) {}
+  explicit RenderProgress(std::int64_t total) : total_(total), shown_(isatty(STDERR_FILENO) != 0) {}
   void step() {
     if (++done_; shown_ && done_ % 10 == 0) fmt::print(stderr, "\rrendered {} of {} frames", done_, total_);
   }
-  ~Progress() {
+  ~RenderProgress() {
     if (shown_) fmt::print(stderr, "\r\033[K");
   }
   [[nodiscard]] std::int64_t done() const { return done_; }
@@ -153,7 +153,7 @@ void run_render(const RenderArguments& arguments) {
   if (rig.kind == SensorKind::kStereo) right = std::make_unique<SensorFolder>(mav / "cam1");
   if (rig.kind == SensorKind::kRgbd) depth = std::make_unique<SensorFolder>(mav / "depth0");
 
-  Progress progress(source->frame_count().value_or(0));
+  RenderProgress progress(source->frame_count().value_or(0));
   std::string associations;
   Frame frame;
   FrameStatus status;

@@ -48,6 +48,7 @@ struct CameraRig {
   double depth_unit = 0.001;  ///< RGB-D: metres per unit of the depth image, > 0
   double depth_min = 0.3;     ///< RGB-D: nearer readings are holes [m]
   double depth_max = 8.0;     ///< RGB-D: farther readings are holes [m]
+  double readout = 0;         ///< rolling shutter: from the exposure of the first row to that of the last [s]
 };
 
 enum class ImageFormat : std::uint8_t {

@@ -10,7 +10,7 @@
 namespace twofold {
 namespace {
 
-constexpr const char* kScene = "synthetic:desk?frames=5&sensor=rgbd&size=64x48";
+constexpr const char* kScene = "synthetic:desk?frames=5&sensor=rgbd&width=64&height=48";
 
 TEST(PublicSource, GivesFramesThatOutliveIt) {
   FrameView first, frame;
