@@ -56,7 +56,8 @@ Measured measure(const Scene& scene, int gap_ms) {
   Measured measured;
   EngineOptions options;
   options.pacing = {.late = LatePolicy::kNewest, .live = true};
-  options.on_pose = [&](const FrameRecord& record, const GraphSnapshot&) {
+  options.on_pose = [&](const PoseReport& report) {
+    const FrameRecord& record = report.record;
     measured.truth.record(camera.now_ns() - record.t_ns);
   };
   V4l2Source source(parse_source_spec(testing::side_by_side_source(scene.rig)), {}, std::move(driver));

@@ -67,7 +67,8 @@ TEST_F(EngineFailureTest, AThreadThatFailsEndsTheRunAtOnceAndIsNamed) {
 TEST_F(EngineFailureTest, ALostCameraIsAnsweredWhenTheLoopCloserFails) {
   EngineOptions options = threaded();
   std::atomic<bool> lost{false};
-  options.on_pose = [&](const FrameRecord& record, const GraphSnapshot&) {
+  options.on_pose = [&](const PoseReport& report) {
+    const FrameRecord& record = report.record;
     lost = record.frame_index >= kFrames && record.state == FrameState::kLost;
   };
   options.before_step = [&](std::string_view thread) {

@@ -55,7 +55,8 @@ class LiveLatencyTest : public ::testing::Test {
     };
     opened_with_ = std::move(driver);
     options_.pacing = {.late = LatePolicy::kNewest, .live = true};
-    options_.on_pose = [this](const FrameRecord& record, const GraphSnapshot&) {
+    options_.on_pose = [this](const PoseReport& report) {
+      const FrameRecord& record = report.record;
       heard_.push_back({record.frame_index, record.latency_ns, driver_->now_ns() - record.t_ns});
       newest_heard_.store(record.frame_index, std::memory_order_relaxed);
       if (pause_tracker_at_ == record.frame_index)
