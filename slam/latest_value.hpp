@@ -20,8 +20,8 @@ namespace twofold {
 /// slot before; it writes into a slot only when as many have left.
 ///
 /// Bound: a reader that is stopped in the middle of its copy occupies one slot. If kSlots - 1 of them are
-/// occupied, each by a reader that was stopped while another value was newest, put gives up: the value before
-/// stays the newest until the next put.
+/// occupied, each by a reader that was stopped while another value was newest, or that has left without the
+/// writer having seen it yet, put gives up: the value before stays the newest until the next put.
 ///
 /// Ordering.
 /// (A) state_ exchange, release in put -> addition, acquire in get: the slot's value is there before it is
