@@ -25,6 +25,7 @@ void print(const twofold::PoseEstimate& pose) {
 int run(const char* name, const char* calibration) {
   twofold::Source camera(name, {.calibration = calibration});
   twofold::Slam slam(camera.rig(), {.live = camera.is_live()});
+  // Corrections are rare: a line is little to ask of the thread of the tracker, which calls this.
   slam.on_event([](const twofold::MapEvent& event) {
     std::printf("        %s: the camera's place moved by %.3f m\n", to_string(event.kind), event.moved);
   });

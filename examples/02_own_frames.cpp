@@ -1,5 +1,6 @@
 // Frames of your own, with OpenCV and Eigen: a rectified stereo recording of EuRoC layout, read by hand.
 //   02_own_frames RECORDING fx fy cx cy baseline
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -51,7 +52,7 @@ int run(const std::string& recording, twofold::CameraRig rig) {
     if (const auto pushed = slam.push(twofold::stereo_frame(t_ns, left, right)); !pushed)
       throw std::runtime_error(pushed.reason);
     const auto pose = slam.latest();
-    if (pose->state != twofold::TrackingState::kTracked) continue;
+    if (!pose || pose->state != twofold::TrackingState::kTracked) continue;
     const Eigen::Vector3d now = twofold::to_eigen(pose->T_world_camera).translation();
     const double deviation = std::sqrt(twofold::covariance(*pose).topLeftCorner<3, 3>().trace());
     std::printf("%.3f %.3f %.3f  +- %.4f m\n", now.x(), now.y(), now.z(), deviation);

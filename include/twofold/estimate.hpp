@@ -35,7 +35,7 @@ struct PoseEstimate {
   Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
   /// 6x6 row by row, of delta in T_world_camera * exp(delta), delta = (translation [m], rotation [rad]) in
   /// the camera's axes: from the frame's own measurements with the map taken as true. Zero for the frame
-  /// that starts a map part: it is where the world is.
+  /// that starts a map part: that frame defines the world.
   std::array<double, 36> covariance{};
   /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
   /// none.

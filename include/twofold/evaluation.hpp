@@ -8,7 +8,9 @@
 
 namespace twofold {
 
-/// TUM, KITTI or EuRoC form, told by the first line. Throws std::runtime_error naming the file and line.
+/// TUM, KITTI or EuRoC form, told by the first line; a KITTI file has no times, t_ns is then the line's
+/// number; an EuRoC file has poses of the body, not of the camera. Throws std::runtime_error naming the file
+/// and line.
 [[nodiscard]] TWOFOLD_API std::vector<StampedPose> load_trajectory(const std::filesystem::path& file);
 /// TUM form: lines "time[s] tx ty tz qx qy qz qw". Throws std::runtime_error when it cannot be written.
 TWOFOLD_API void save_trajectory(const std::filesystem::path& file,
@@ -18,7 +20,7 @@ enum class AlignBy : std::uint8_t { kNothing, kRigidMotion, kSimilarity };
 
 struct ComparisonOptions {
   AlignBy align = AlignBy::kRigidMotion;  ///< how the estimate is brought onto the truth first
-  double max_time_difference_s = 0.02;    ///< between a pose and the true one nearest in time, > 0
+  double max_time_difference_s = 0.01;    ///< between a pose and the true one nearest in time, > 0
 };
 
 /// How far an estimate is from the truth.

@@ -72,7 +72,7 @@ class TWOFOLD_API MapSnapshot {
   /// @param with_covariance  false leaves the covariances zero, at a tenth of the time
   [[nodiscard]] std::vector<Point> points(bool with_covariance = true) const;
   [[nodiscard]] std::vector<Edge> edges() const;
-  /// Ascending by id: map parts that no place joined yet.
+  /// All map parts, ascending by id; one when everything is connected.
   [[nodiscard]] std::vector<Part> parts() const;
 
   /// What keyframes, points, their lists and appearances take, shared or not. O(size of the map).

@@ -28,12 +28,13 @@ namespace twofold {
   }
 }
 
-/// A frame that shares the images' pixels and keeps them: they are not to be written to again, as
-/// cv::VideoCapture does with the image it is given a second time; clone it then.
+/// A frame that shares the images' pixels and keeps them. Do not overwrite them afterwards: cv::VideoCapture
+/// reuses the image it is given, so pass image.clone().
 [[nodiscard]] inline FrameView stereo_frame(std::int64_t t_ns, const cv::Mat& left, const cv::Mat& right) {
   auto owner = std::make_shared<const std::array<cv::Mat, 2>>(std::array<cv::Mat, 2>{left, right});
   return {t_ns, view(left), view(right), {}, std::move(owner)};
 }
+/// The same of a colour or grey image and its registered depth, CV_16UC1.
 [[nodiscard]] inline FrameView rgbd_frame(std::int64_t t_ns, const cv::Mat& image, const cv::Mat& depth) {
   auto owner = std::make_shared<const std::array<cv::Mat, 2>>(std::array<cv::Mat, 2>{image, depth});
   return {t_ns, view(image), {}, view(depth), std::move(owner)};

@@ -22,11 +22,13 @@ enum class RunMode : std::uint8_t {
 struct SlamOptions {
   RunMode mode = RunMode::kThreaded;
   /// Frames are pushed when they are taken, and their times are of CLOCK_MONOTONIC: latency counts from
-  /// there, a tracker that is late leaves work out, and of the frames that wait the newest wins. Otherwise
-  /// frames are a recording's, and tracked as fast as the map can follow. Of threaded runs.
+  /// there, a tracker that is late leaves work out, and of the frames that wait the newest wins; frames more
+  /// than 10 s from now are refused. Otherwise frames are a recording's, and tracked as fast as the map can
+  /// follow. No effect in deterministic runs.
   bool live = false;
 
-  /// Map to go on with (.tfm); empty: start one. The camera is unplaced until a place of it is recognised.
+  /// Map to go on with (.tfm); empty: start one. The camera is unplaced until a place of it is recognised,
+  /// or, after a second, in a map part of its own.
   std::filesystem::path map = {};
   bool localise_only = false;  ///< poses in `map`, which must be given and does not change
   /// Recognise places: closes large loops, finds a lost camera, joins map parts. Needed for `map`.
@@ -44,7 +46,9 @@ struct SlamOptions {
 };
 
 enum class PushStatus : std::uint8_t {
-  kQueued,   ///< on its way to the tracker, or, in a deterministic run, tracked
+  /// On its way to the tracker, or, in a deterministic run, tracked. With `live` a newer frame may still
+  /// take its turn: it then counts as dropped, and nobody is called.
+  kQueued,
   kDropped,  ///< in order, but there was no room: the tracker is behind
   kRefused   ///< not to be used, and not counted as a frame
 };
@@ -58,7 +62,7 @@ struct PushResult {
 /// What a stage of a thread took, over the whole run.
 struct StageTime {
   std::string thread;  ///< tracker, mapper, loop closer
-  std::string stage;   ///< "frame", "latency from due time", "pose listener": the callbacks, ...
+  std::string stage;   ///< "frame", "exposure to pose", "pose listener": the callbacks, ...
   std::uint64_t count = 0;
   double mean_ms = 0, p50_ms = 0, p99_ms = 0, max_ms = 0;
 };
@@ -77,7 +81,7 @@ struct SlamSummary {
   };
   std::vector<FinalPose> trajectory;
   std::vector<StageTime> timings;
-  std::vector<std::string> notes;  ///< wishes (pinning, priority) that were not granted
+  std::vector<std::string> notes;  ///< requested settings (pinning, priority) that could not be applied
   std::vector<std::string>
       errors;  ///< what went wrong on the way: a callback that threw, a thread that ended
 };
@@ -102,7 +106,7 @@ class TWOFOLD_API Slam {
   using EventCallback = std::function<void(const MapEvent&)>;
 
   /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
-  /// when a file cannot be used.
+  /// when a file cannot be used, a processor or priority is not to be had, or the rig is not the map's.
   Slam(const CameraRig& rig, const SlamOptions& options);
   /// Finishes.
   ~Slam();
@@ -117,8 +121,9 @@ class TWOFOLD_API Slam {
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
 
-  /// Never waits for mapper or loop closer; in a threaded run, not for the tracker either. Refused are images
-  /// that do not fit the rig, time that does not grow, and frames after finish().
+  /// In a threaded run it waits for no thread of the engine, only for another caller inside push, has_room,
+  /// wait_for_room or finish; in a deterministic one it returns when the frame is tracked and mapped. Refused
+  /// are images that do not fit the rig, time stamps that do not increase, and frames after finish().
   PushResult push(const FrameView& frame);
   /// Whether a push would find room now; without another pushing thread, it will.
   [[nodiscard]] bool has_room() const;
@@ -126,14 +131,16 @@ class TWOFOLD_API Slam {
   /// dropped, and which the map should follow.
   [[nodiscard]] bool wait_for_room(std::int64_t timeout_ns);
 
-  /// Of the newest frame; nothing before the first. Wait-free: no lock, no retry, whatever the tracker does.
+  /// Of the newest frame that was processed, tracked or lost; nothing before the first. Wait-free: no lock,
+  /// no retry, whatever the tracker does.
   [[nodiscard]] std::optional<PoseEstimate> latest() const;
 
   /// The newest version of the map. O(1); the tracker and the mapper do not notice.
   [[nodiscard]] MapSnapshot map() const;
   [[nodiscard]] HeldMaps held_maps() const;
-  /// Writes the newest version to a map file, on this thread, while the run goes on. The file is the old one
-  /// or the new one whenever the process is killed. Throws std::runtime_error naming file and reason.
+  /// Writes the newest version to a map file, on this thread, while the run goes on. The file is
+  /// replaced atomically: a crash leaves either the old or the new version. Throws std::runtime_error naming
+  /// file and reason.
   void save_map(const std::filesystem::path& file) const;
 
   /// What went wrong so far; tracking goes on unless it says otherwise.

@@ -38,13 +38,14 @@ enum class Sensor : std::uint8_t { kStereo, kRgbd };
 /// along x, so that corresponding points lie in the same row.
 struct CameraRig {
   Sensor sensor = Sensor::kStereo;
-  int width = 0;              ///< [px] > 0
-  int height = 0;             ///< [px] > 0
-  double fx = 0;              ///< [px] > 0
-  double fy = 0;              ///< [px] > 0
-  double cx = 0;              ///< [px]
-  double cy = 0;              ///< [px]
-  double baseline = 0;        ///< [m] > 0; RGB-D: of a virtual right camera, 0.08 will do
+  int width = 0;   ///< [px] > 0
+  int height = 0;  ///< [px] > 0
+  double fx = 0;   ///< [px] > 0
+  double fy = 0;   ///< [px] > 0
+  double cx = 0;   ///< [px]
+  double cy = 0;   ///< [px]
+  double baseline =
+      0;  ///< [m] > 0; RGB-D: of the virtual right camera that turns depth into disparity, say 0.08
   double depth_unit = 0.001;  ///< RGB-D: metres per unit of the depth image, > 0
   double depth_min = 0.3;     ///< RGB-D: nearer readings are holes [m]
   double depth_max = 8.0;     ///< RGB-D: farther readings are holes [m]
