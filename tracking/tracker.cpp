@@ -14,7 +14,7 @@ constexpr std::size_t kMaxCandidates = 3000;
 constexpr std::size_t kMaxImmaturePoints = 1200;
 constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxAlignmentPoints = 240;
-constexpr int kRoundsFromHint = 3;
+constexpr int kRoundsFromRough = 3;
 
 }  // namespace
 
@@ -24,6 +24,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       alignment_(kMaxAlignmentPoints, options.alignment),
       local_map_(kMaxCandidates),
       quadtree_(rig.camera.width, rig.camera.height, kMaxCandidates),
+      wide_search_(rig, kMaxAlignmentPoints, options.wide_search),
       immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, options) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
@@ -55,31 +56,41 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
 
 /// Pose of the frame relative to a reference keyframe, from the points of the map around that.
 bool Tracker::track(FrameStep& step) {
-  auto [start, recognised] = search_start(step.graph);
-  if (start.reference == kNoKeyframe) {
+  SearchStart start = search_start(step.graph);
+  if (start.placement.reference == kNoKeyframe) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }
-  local_map_.update(step.graph, start.reference, immature_points_, options_.neighbour_keyframes);
+  local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  if (!recognised) {
-    start.T_c_ref = align_to_previous(step);
-    step.shutter = shutter_at(start.T_c_ref, step.frame);
-  }
+  if (!start.rough) start.placement.T_c_ref = align_to_previous(step);
   step.lap(TrackerStage::kAlignment);
-  // A place recognised is that of an earlier frame: far points are found from there, and lead to where near
-  // ones are.
-  bool tracked = true;
-  for (int round = 0; tracked && round < (recognised ? kRoundsFromHint : 1); ++round) {
-    select_candidates(start.T_c_ref, step.result);
+  LostCause cause = search_from(start, step);
+  if (cause != LostCause::kNone && !start.rough) {
+    const auto T_cur_prev = wide_search_.find(previous_.left, current_, previous_points_, options_.search);
+    step.lap(TrackerStage::kAlignment);
+    if (T_cur_prev) cause = search_from({{last_.reference, *T_cur_prev * last_.T_c_ref}, true}, step);
+  }
+  if (cause != LostCause::kNone) give_up_frame(cause, step.result);
+  return cause == LostCause::kNone;
+}
+
+/// Points where they should be, where they are, and the pose that fits: once from a good start, a few times
+/// from a rough one.
+LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
+  SE3& T_c_ref = start.placement.T_c_ref;
+  step.shutter = start.rough ? RollingShutter() : shutter_at(T_c_ref, step.frame);
+  LostCause cause = LostCause::kNone;
+  for (int round = 0; cause == LostCause::kNone && round < (start.rough ? kRoundsFromRough : 1); ++round) {
+    select_candidates(T_c_ref, step.result);
     step.lap(TrackerStage::kCandidates);
-    search_points(start.T_c_ref, step);
+    search_points(start, step);
     step.lap(TrackerStage::kSearch);
-    tracked = estimate_pose(start, step);
-    start.T_c_ref = step.result.T_c_ref;
+    cause = estimate_pose(start.placement, step);
+    T_c_ref = step.result.T_c_ref;
     step.lap(TrackerStage::kMotion);
   }
-  return tracked;
+  return cause;
 }
 
 void Tracker::load_images(const Frame& frame) {

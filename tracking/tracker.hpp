@@ -97,12 +97,13 @@ class Tracker {
   [[nodiscard]] SearchStart search_start(const GraphSnapshot& graph);
 
   bool track(FrameStep& step);
+  LostCause search_from(SearchStart start, FrameStep& step);
   SE3 align_to_previous(FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
-  void search_points(const SE3& T_c_ref, FrameStep& step);
+  void search_points(const SearchStart& start, FrameStep& step);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
-  bool estimate_pose(const Placement& start, FrameStep& step);
+  LostCause estimate_pose(const Placement& start, FrameStep& step);
   void give_up_frame(LostCause cause, TrackResult& result);
   void remember_frame(const FrameStep& step);
 
@@ -123,6 +124,7 @@ class Tracker {
   DenseAlignment alignment_;
   LocalMap local_map_;
   Quadtree quadtree_;
+  WideSearch wide_search_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
 
@@ -137,7 +139,7 @@ class Tracker {
   KeyframeView last_keyframe_;
 
   // Of the last frame searched.
-  std::vector<Match> matches_;
+  std::vector<Match> matches_;             ///< those of map points first
   std::vector<MotionObservation> motion_;  ///< of matches_, one each
   std::vector<AlignmentPoint> previous_points_;
   std::vector<PointId> inlier_ids_;  ///< scratch, as the next

@@ -37,7 +37,8 @@ bool Tracker::start_map(FrameStep& step) {
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
   const bool corners_in_view = starter_.sees_corners(current_, options_.min_corners_seen);
-  if (loss_.seeing_for(corners_in_view, step.frame.t_ns) < options_.new_part_after || !corners_in_view) {
+  if (loss_.seeing_for(corners_in_view, step.frame.t_ns) < options_.new_part_after || !corners_in_view ||
+      loss_.lost_frames() < options_.new_part_frames) {
     return false;
   }
   if (step.free_proposal == nullptr || !immature_points_.pending().empty()) return false;
