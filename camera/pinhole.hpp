@@ -1,14 +1,16 @@
 #pragma once
 
+#include <optional>
+
 #include "geometry/types.hpp"
 
 namespace twofold {
 
 /// Whether a point in the camera frame can be looked for in an image: no real point is nearer to a camera
 /// than a millimetre, and one behind it has no projection.
+inline constexpr double kNearestDepth = 1e-3;  ///< [m]
 [[nodiscard]] inline bool in_front_of_camera(const Vector3& x_c) {
-  constexpr double kNearest = 1e-3;  // [m]
-  return x_c.z() > kNearest;
+  return x_c.z() > kNearestDepth;
 }
 
 /// Pinhole camera without distortion  (thesis eq. 3.3, with fx != fy allowed).
@@ -42,6 +44,13 @@ struct PinholeCamera {
   [[nodiscard]] bool contains(const Vector2& uv, double border = 0) const {
     return uv.x() >= border && uv.y() >= border && uv.x() <= width - 1 - border &&
            uv.y() <= height - 1 - border;
+  }
+  /// Pixel of a point in the camera frame, if it is in view: in front, and `border` pixels inside the image.
+  [[nodiscard]] std::optional<Vector2> find_in_view(const Vector3& x_c, double border = 0) const {
+    if (!in_front_of_camera(x_c)) return std::nullopt;
+    const Vector2 uv = project(x_c);
+    if (!contains(uv, border)) return std::nullopt;
+    return uv;
   }
   /// Camera of pyramid level `level`: level pixel p covers level-0 pixels (p + 0.5) 2^level - 0.5 around its
   /// centre.

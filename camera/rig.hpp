@@ -9,6 +9,15 @@ namespace twofold {
 
 enum class SensorKind : std::uint8_t { kMono, kStereo, kRgbd };
 
+/// Standard deviations of what is measured in images: the only place that says so.
+struct MeasurementNoise {
+  double sigma_px =
+      0.5;  ///< of a sub-pixel match on pyramid level 0, as found on rendered views; doubles a level
+  /// Of the virtual right coordinate that an RGB-D camera's depth becomes: constant in disparity, on any
+  /// level.
+  double depth_sigma_px = 0.7;
+};
+
 /// Rectified camera rig: the left (or only) camera and, for stereo and RGB-D, a right camera shifted by
 /// `baseline`.
 ///
@@ -23,6 +32,8 @@ struct Rig {
   double depth_min = 0.3;     ///< RGB-D: nearer readings are holes [m]
   double depth_max = 8.0;     ///< RGB-D: farther readings are holes [m]
   double readout = 0;         ///< rolling shutter: from the exposure of the first row to that of the last [s]
+
+  MeasurementNoise noise;
 
   static constexpr double kNoRight = std::numeric_limits<double>::quiet_NaN();
 
@@ -47,6 +58,10 @@ struct Rig {
     return camera.fx * baseline / disparity;
   }
   [[nodiscard]] double disparity_from_depth(double depth) const { return camera.fx * baseline / depth; }
+  /// Diagonal of Lambda_z of a measurement taken on pyramid level `level` [1/px^2]; the third entry is 0
+  /// without a right coordinate.
+  [[nodiscard]] Eigen::Vector3f information(const Eigen::Vector3f& z, int level) const;
+
   /// Point in the left camera's frame; z.x() - z.z() must be positive  (eq. 3.9).
   [[nodiscard]] Vector3 unproject(const Vector3& z) const {
     return camera.unproject(z.head<2>()) * depth_from_disparity(z.x() - z.z());

@@ -1,6 +1,7 @@
 #include "engine/lockstep_run.hpp"
 
 #include <algorithm>
+#include <bit>
 
 namespace twofold {
 namespace {
@@ -10,15 +11,20 @@ constexpr std::size_t kReplayRoom = 64;
 // A deterministic run maps and describes each proposal before the next frame.
 constexpr std::size_t kDeterministicRoom = 6;
 
+std::size_t pool_size(const EngineOptions& options) {
+  return options.deterministic ? kDeterministicRoom : options.proposal_slots + kReplayRoom;
+}
+
 }  // namespace
 
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
     : localise_only_(options.localise_only),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
-      pool_(options.deterministic ? kDeterministicRoom : options.proposal_slots + kReplayRoom),
+      pool_(pool_size(options)),
       tracking_(rig, options, trace_.get()),
       mapping_(rig, options, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
+      mapper_inbox_(std::bit_ceil(pool_size(options)), std::bit_ceil(pool_size(options))),
       checkpoints_(rig, options.checkpoint),
       snapshot_(mapping_.publish()) {}
 
@@ -38,11 +44,11 @@ void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
 const FrameRecord& LockstepRun::step(const Frame& frame) {
   track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = localise_only_});
   if (request_) answer_request(snapshot_);
-  if (!queue_.empty()) {
-    map(queue_.size(), 0);
+  if (const std::size_t proposals = mapper_inbox_.proposals_approx(); proposals > 0) {
+    map(proposals, 0);
     close_loops(*mapped_.front(), snapshot_, 0);
     mapped_.clear();
-    if (!loop_messages_.empty()) map(0, loop_messages_.size());
+    if (const std::size_t loops = mapper_inbox_.loops_approx(); loops > 0) map(0, loops);
   }
   checkpoint_if_due(frame.t_ns);
   count(result_.frames.back());
@@ -104,7 +110,8 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
 }
 
 bool LockstepRun::can_map(const MapperStep& round) const {
-  return round.proposals <= queue_.size() && round.loop_messages <= loop_messages_.size();
+  return round.proposals <= mapper_inbox_.proposals_approx() &&
+         round.loop_messages <= mapper_inbox_.loops_approx();
 }
 
 void LockstepRun::replay_loop_steps(const Schedule& schedule) {
@@ -140,7 +147,9 @@ void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnaps
                               std::size_t refused) {
   const std::span<LoopMessage> messages = loop_closing_.step(keyframe, graph);
   const std::size_t sent = messages.size() - std::min(refused, messages.size());
-  for (LoopMessage& message : messages.first(sent)) loop_messages_.push_back(std::move(message));
+  for (LoopMessage& message : messages.first(sent)) {
+    if (!mapper_inbox_.try_send(std::move(message))) fail("the schedule leaves too many loops waiting");
+  }
   result_.schedule.loop_closer.append({graph.version(), static_cast<std::int64_t>(index(keyframe.id)), 0,
                                        static_cast<std::uint32_t>(messages.size() - sent)});
 }
@@ -155,7 +164,7 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
   ProposalHandle proposal;
   if (!step.keyframe_withheld) proposal = pool_.try_acquire();
   if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record))
-    queue_.push_back(std::move(proposal));
+    mapper_inbox_.send(std::move(proposal));
   tracking_.finish(due_ns, steady_now_ns(), snapshot_, record);
   if (tracking_.correction().reason != CorrectionReason::kNone)
     result_.corrections.push_back(tracking_.correction());
@@ -178,19 +187,9 @@ void LockstepRun::drop(const Frame& frame, const TrackerStep& step) {
 }
 
 void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
-  consumed_.clear();
-  for (std::size_t i = 0; i < proposals; ++i) {
-    consumed_.push_back(std::move(queue_.front()));
-    queue_.pop_front();
-  }
-  taken_messages_.clear();
-  for (std::size_t i = 0; i < loop_messages; ++i) {
-    taken_messages_.push_back(std::move(loop_messages_.front()));
-    loop_messages_.pop_front();
-  }
-  const std::uint64_t version = mapping_.step(consumed_, taken_messages_);
-  for (ProposalHandle& keyframe : consumed_) mapped_.push_back(std::move(keyframe));
-  consumed_.clear();
+  (void)mapper_inbox_.take(proposals, loop_messages);
+  const std::uint64_t version = mapping_.step(mapper_inbox_.proposals(), mapper_inbox_.loops());
+  for (ProposalHandle& keyframe : mapper_inbox_.proposals()) mapped_.push_back(std::move(keyframe));
   snapshot_ = mapping_.publish();
   result_.schedule.mapper.append(
       {version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
@@ -207,7 +206,7 @@ void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
 void LockstepRun::count(const FrameRecord& record) {
   progress_.count(record);
   progress_.map_version = snapshot_.version();
-  progress_.queued = queue_.size();
+  progress_.queued = mapper_inbox_.proposals_approx();
 }
 
 RunResult LockstepRun::finish() {

@@ -5,6 +5,7 @@
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
+#include "engine/mapper_inbox.hpp"
 #include "engine/runners.hpp"
 
 namespace twofold {
@@ -49,13 +50,10 @@ class LockstepRun {
   TrackerRunner tracking_;
   MapperRunner mapping_;
   LoopCloserRunner loop_closing_;
-  std::deque<ProposalHandle> queue_;
-  std::vector<ProposalHandle> consumed_;
-  std::deque<ProposalHandle> mapped_;        // keyframes the loop closer has not seen
-  std::deque<LoopMessage> loop_messages_;    // on their way to the mapper
-  std::vector<LoopMessage> taken_messages_;  // of this round
-  std::size_t next_loop_step_ = 0;           // of a replay
-  std::deque<GraphSnapshot> history_;        // of a replay: versions that loop closer steps may still need
+  MapperInbox mapper_inbox_;
+  std::deque<ProposalHandle> mapped_;  // keyframes the loop closer has not seen
+  std::size_t next_loop_step_ = 0;     // of a replay
+  std::deque<GraphSnapshot> history_;  // of a replay: versions that loop closer steps may still need
   std::optional<RelocalisationRequest> request_;
   std::optional<RelocalisationAnswer> answer_;
   CheckpointWriter checkpoints_;

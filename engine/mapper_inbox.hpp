@@ -15,9 +15,8 @@ namespace twofold {
 class MapperInbox {
  public:
   /// @param proposals  of the pool that all keyframes come from, a power of two or more: none is ever refused
-  /// @param a_round    keyframes, and loops, that one take gives out at most, and loops that may wait; a
-  /// power
-  ///                   of two
+  /// @param a_round    keyframes, and loops, that one take gives out at most, and loops that may wait;
+  ///                   a power of two
   MapperInbox(std::size_t proposals, std::size_t a_round) : proposals_(proposals), loops_(a_round) {
     taken_proposals_.reserve(a_round);
     taken_loops_.reserve(a_round);
@@ -32,17 +31,20 @@ class MapperInbox {
 
   /// Keyframes that wait; anyone, as SpscRing::size_approx.
   [[nodiscard]] std::size_t proposals_approx() const { return proposals_.size_approx(); }
+  [[nodiscard]] std::size_t loops_approx() const { return loops_.size_approx(); }
 
   /// Mapper.
   [[nodiscard]] bool empty() { return !proposals_.has_value() && !loops_.has_value(); }
   /// Mapper: fills proposals() and loops(), oldest first. False when there was nothing.
-  [[nodiscard]] bool take() {
+  [[nodiscard]] bool take() { return take(taken_proposals_.capacity(), taken_loops_.capacity()); }
+  /// The same, with so many at most.
+  [[nodiscard]] bool take(std::size_t proposals, std::size_t loops) {
     taken_proposals_.clear();
     ProposalHandle proposal;
-    while (taken_proposals_.size() < taken_proposals_.capacity() && proposals_.try_pop(proposal))
+    while (taken_proposals_.size() < proposals && proposals_.try_pop(proposal))
       taken_proposals_.push_back(std::move(proposal));
     taken_loops_.clear();
-    while (taken_loops_.size() < taken_loops_.capacity() && loops_.has_value())
+    while (taken_loops_.size() < loops && loops_.has_value())
       (void)loops_.try_pop(taken_loops_.emplace_back());
     return !taken_proposals_.empty() || !taken_loops_.empty();
   }

@@ -8,11 +8,6 @@
 namespace twofold {
 namespace {
 
-// Standard deviation of a sub-pixel match on level 0 [px], as found on rendered views with sensor noise.
-constexpr float kSigmaPx = 0.5F;
-// The same of the virtual right coordinate of a structured light camera, whose error is constant in
-// disparity.
-constexpr float kDepthSigmaPx = 0.7F;
 constexpr double kNearestBaselines = 2.5;
 constexpr int kMargin = Patch::kSize;  // whole patches, and room for the sub-pixel search around them
 
@@ -199,14 +194,6 @@ double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, i
     return Rig::kNoRight;
   }
   return from_level(aligned->uv.x(), level);
-}
-
-Eigen::Vector3f measurement_information(const Rig& rig, int level, bool has_right) {
-  const float sigma = kSigmaPx * std::ldexp(1.0F, level);
-  const float information = 1 / (sigma * sigma);
-  if (!has_right) return {information, information, 0};
-  if (rig.kind != SensorKind::kRgbd) return {information, information, information};
-  return {information, information, 1 / (kDepthSigmaPx * kDepthSigmaPx)};
 }
 
 }  // namespace twofold

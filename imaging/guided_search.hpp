@@ -25,7 +25,7 @@ struct GuidedSearchOptions {
 
 struct PointMatch {
   Vector3 z{0, 0, 0};  ///< (u_l, v_l, u_r) level-0 pixels; u_r is Rig::kNoRight if it was not found
-  int level = 0;       ///< pyramid level of the match: its standard deviation is about sigma_0 * 2^level
+  int level = 0;       ///< pyramid level of the match: its noise is Rig::noise of that level
   float rms = 0;       ///< remaining difference [grey]
 };
 
@@ -51,8 +51,5 @@ struct PointMatch {
 /// @param u, v  whole pixels of `level`
 [[nodiscard]] double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, int level,
                                     const GuidedSearchOptions& options);
-
-/// Diagonal of Lambda_z of a measurement taken on `level` [1/px^2]; third entry 0 without right coordinate.
-[[nodiscard]] Eigen::Vector3f measurement_information(const Rig& rig, int level, bool has_right);
 
 }  // namespace twofold

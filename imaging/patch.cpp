@@ -64,7 +64,7 @@ void fill_patch(const Pixel* bordered, std::ptrdiff_t stride, Patch& patch) {
 std::optional<PatchWarp> predict_warp(const PinholeCamera& camera, const Vector3& psi, const SE3& T_c_a) {
   const Matrix3 R = T_c_a.rotation();
   const Vector3 x_c = R * from_inverse_depth(psi) + T_c_a.translation();
-  if (!(x_c.z() > 1e-3) || !(psi.z() > 0)) return std::nullopt;
+  if (!in_front_of_camera(x_c) || !(psi.z() > 0)) return std::nullopt;
   PatchWarp warp;
   // Moving by one pixel in the anchor moves the point by 1 / (f q) in its plane of constant depth.
   const Matrix23 J = camera.project_jacobian(x_c);

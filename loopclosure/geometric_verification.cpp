@@ -60,7 +60,7 @@ std::vector<Match> match_descriptors(const Rig& rig, const PlaceAppearance& a, c
 
 /// Error of a measurement in units of the pixels of its level; infinite behind the camera.
 double squared_error(const Rig& rig, const Vector3& x, const Eigen::Vector3f& z, int level) {
-  if (!(x.z() > 1e-3)) return std::numeric_limits<double>::infinity();
+  if (!in_front_of_camera(x)) return std::numeric_limits<double>::infinity();
   const Vector3 e = rig.project(x) - z.cast<double>();
   return e.squaredNorm() * std::ldexp(1.0, -2 * level);
 }
@@ -167,10 +167,9 @@ std::vector<Match> match_guided(const Rig& rig, std::span<const PlacedView> plac
       if (!has_depth(view.z[i], options)) continue;
       const Vector3 x_a = T_a_v * rig.unproject(view.z[i].cast<double>());
       const Vector3 x_b = T_b_a * x_a;
-      if (!(x_b.z() > 1e-3)) continue;
-      const Vector2 uv = rig.camera.project(x_b);
-      if (!rig.camera.contains(uv, kDescriptorBorder)) continue;
-      const Nearest nearest = corners_of_b.nearest(uv, view.corners[i].descriptor, radius_px);
+      const auto uv = rig.camera.find_in_view(x_b, kDescriptorBorder);
+      if (!uv) continue;
+      const Nearest nearest = corners_of_b.nearest(*uv, view.corners[i].descriptor, radius_px);
       if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
       of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(offered.size()), nearest.distance);
       offered.push_back({static_cast<int>(v), static_cast<int>(i), nearest.best, x_a});
@@ -188,14 +187,8 @@ SE3 refine(const Rig& rig, const PlaceAppearance& b, const std::vector<Match>& m
   observations.reserve(matches.size());
   for (const Match& match : matches) {
     const Eigen::Vector3f& z_b = b.z[static_cast<std::size_t>(match.b)];
-    const bool has_right = std::isfinite(z_b.z());
-    MotionObservation observation;
-    observation.x_ref = match.x_a;
-    observation.z = z_b;
-    if (!has_right) observation.z.z() = 0;
-    observation.information =
-        measurement_information(rig, b.corners[static_cast<std::size_t>(match.b)].level, has_right);
-    observations.push_back(observation);
+    const int level = b.corners[static_cast<std::size_t>(match.b)].level;
+    observations.push_back({match.x_a, z_b, rig.information(z_b, level)});
   }
   const MotionOnlyResult result = optimise_motion(rig, observations, T_b_a, {});
   return result.converged ? result.T_c_ref : T_b_a;
@@ -209,7 +202,8 @@ std::vector<Match> keep_inliers(const Rig& rig, const PlaceAppearance& b, const 
     const Vector3 x_b = T_b_a * match.x_a;
     Eigen::Vector3f z_b = b.z[j];
     // A corner without depth in b is judged by its place in the left image alone.
-    if (!std::isfinite(z_b.z()) && x_b.z() > 1e-3) z_b.z() = static_cast<float>(rig.project(x_b).z());
+    if (!std::isfinite(z_b.z()) && in_front_of_camera(x_b))
+      z_b.z() = static_cast<float>(rig.project(x_b).z());
     const double bound = options.max_error_px * options.max_error_px;
     if (squared_error(rig, x_b, z_b, b.corners[j].level) <= bound) kept.push_back(match);
   }

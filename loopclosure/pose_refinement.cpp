@@ -32,8 +32,7 @@ void PoseRefinement::collect_points(const GraphSnapshot& graph, KeyframeId place
   visible_points(graph, keyframes_, visited_, visible_);
   const SE3 T_c_w = T_c_k * graph.T_k_w(place);
   std::erase_if(visible_, [&](PointId id) {
-    const Vector3 x_c = T_c_w * graph.position(id);
-    return !(x_c.z() > 1e-3) || !rig_.camera.contains(rig_.camera.project(x_c), options_.border_px);
+    return !rig_.camera.find_in_view(T_c_w * graph.position(id), options_.border_px);
   });
   const auto most = static_cast<std::size_t>(options_.max_points);
   if (visible_.size() > most) visible_.resize(most);
@@ -50,13 +49,8 @@ void PoseRefinement::search(const GraphSnapshot& graph, KeyframeId place, const 
     const SE3 T_c_a = T_c_k * T_k_w * graph.T_k_w(point.anchor).inverse();
     const auto match = find_point(images, rig_, *point.appearance, point.psi, T_c_a, options);
     if (!match) continue;
-    const bool has_right = rig_.kind != SensorKind::kMono && std::isfinite(match->z.z());
-    MotionObservation observation;
-    observation.x_ref = T_k_w * graph.position(id);
-    observation.z = match->z.cast<float>();
-    if (!has_right) observation.z.z() = 0;
-    observation.information = measurement_information(rig_, match->level, has_right);
-    found_.push_back(observation);
+    const Eigen::Vector3f z = match->z.cast<float>();
+    found_.push_back({T_k_w * graph.position(id), z, rig_.information(z, match->level)});
   }
 }
 

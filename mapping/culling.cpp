@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/inverse_depth.hpp"
+#include "imaging/view_change.hpp"
 #include "mapping/edges.hpp"
 
 namespace twofold {
@@ -124,13 +125,12 @@ bool PointCuller::in_view(const GraphSnapshot& graph, const MapPoint& point, Poi
   const SE3 T_w_a = graph.T_k_w(point.anchor).inverse();
   const Vector3 x_w = graph.position(id);
   const Vector3 x_k = T_k_w * x_w;
-  if (!in_front_of_camera(x_k)) return false;
-  if (!rig_.camera.contains(rig_.camera.project(x_k), options_.view_border_px)) return false;
+  if (!rig_.camera.find_in_view(x_k, options_.view_border_px)) return false;
   const Vector3 from_anchor = x_w - T_w_a.translation();
   const Vector3 from_here = x_w - T_k_w.inverse().translation();
-  const double ratio = from_anchor.norm() / from_here.norm();
+  const auto [cosine, ratio] = ViewChange::between(from_anchor, from_here);
   return ratio < options_.max_scale_change && ratio * options_.max_scale_change > 1 &&
-         from_anchor.dot(from_here) > options_.min_view_cosine * from_anchor.norm() * from_here.norm();
+         cosine > options_.min_view_cosine;
 }
 
 int PointCuller::cull(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const {

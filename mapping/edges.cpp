@@ -57,7 +57,7 @@ void link_marginalised(GraphWriter& writer, KeyframeId from, KeyframeId to, int 
 
 Matrix6 edge_information(const Keyframe& from, const Keyframe& to, const Edge& edge, const Rig& rig,
                          const EdgeInformationOptions& options) {
-  const double ideal = rig.camera.fx / (std::numbers::sqrt2 * options.sigma_px);
+  const double ideal = rig.camera.fx / (std::numbers::sqrt2 * rig.noise.sigma_px);
   const double lambda_rot = options.rot_share * ideal;
   const double lambda_trans = options.trans_share * ideal / mean_depth(from, to);
   Vector6 diagonal;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/inverse_depth.hpp"
+#include "imaging/view_change.hpp"
 #include "mapping/edges.hpp"
 #include "mapping/loop_consensus.hpp"
 
@@ -19,11 +20,7 @@ PointSearch guided_point_search(const Rig& rig, double radius_px) {
 }
 
 MetricLoopCloser::MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search)
-    : rig_(rig),
-      min_matches_(options.min_covisible),
-      options_(options.loop),
-      sigma_scale_(options.sigma_scale),
-      search_(std::move(search)) {}
+    : rig_(rig), min_matches_(options.min_covisible), options_(options.loop), search_(std::move(search)) {}
 
 MetricLoopReport MetricLoopCloser::close(GraphWriter& writer, const DoubleWindow& window,
                                          const FrameImages& images) {
@@ -71,10 +68,10 @@ void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
       if (!visited_.insert(index(observation.point))) continue;
       const MapPoint& point = graph.point(observation.point);
       const Vector3 x_w = graph.position(observation.point);
-      Vector2 uv;
-      if (!well_visible(graph, point, x_w, uv)) continue;
-      const int column = static_cast<int>(uv.x() * options_.columns / rig_.camera.width);
-      const int row = static_cast<int>(uv.y() * options_.rows / rig_.camera.height);
+      const auto uv = find_in_view(graph, point, x_w);
+      if (!uv) continue;
+      const int column = static_cast<int>(uv->x() * options_.columns / rig_.camera.width);
+      const int row = static_cast<int>(uv->y() * options_.rows / rig_.camera.height);
       int& in_cell = taken_[static_cast<std::size_t>(row * options_.columns + column)];
       if (in_cell == per_cell) continue;
       ++in_cell;
@@ -83,17 +80,14 @@ void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
   }
 }
 
-bool MetricLoopCloser::well_visible(const GraphSnapshot& graph, const MapPoint& point, const Vector3& x_w,
-                                    Vector2& uv) const {
+/// Pixel of a point that should look in the reference keyframe much as it did in its anchor.
+std::optional<Vector2> MetricLoopCloser::find_in_view(const GraphSnapshot& graph, const MapPoint& point,
+                                                      const Vector3& x_w) const {
   const SE3& T_ref_w = graph.keyframe(reference_).T_k_w;
-  const Vector3 x_ref = T_ref_w * x_w;
-  if (!in_front_of_camera(x_ref)) return false;
-  uv = rig_.camera.project(x_ref);
-  if (!rig_.camera.contains(uv, options_.border_px)) return false;
   const Vector3 from_anchor = x_w - graph.T_k_w(point.anchor).inverse().translation();
   const Vector3 from_here = x_w - T_ref_w.inverse().translation();
-  return from_anchor.dot(from_here) >
-         std::cos(options_.max_view_angle) * from_anchor.norm() * from_here.norm();
+  if (ViewChange::between(from_anchor, from_here).cosine < options_.min_view_cosine) return std::nullopt;
+  return rig_.camera.find_in_view(T_ref_w * x_w, options_.border_px);
 }
 
 void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const FrameImages& images) {
@@ -108,15 +102,8 @@ void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const Frame
     observation.point = candidate.id;
     observation.z = match->z.cast<float>();
     observation.level = static_cast<std::uint8_t>(match->level);
-    const bool has_right = rig_.kind != SensorKind::kMono && std::isfinite(match->z.z());
-    const auto scale = static_cast<float>(sigma_scale_);
-    MotionObservation motion;
-    motion.x_ref = candidate.x_w;
-    motion.z = observation.z;
-    motion.information = measurement_information(rig_, match->level, has_right) / (scale * scale);
-    if (!has_right) motion.z.z() = 0;
     found_.push_back(observation);
-    motion_.push_back(motion);
+    motion_.push_back({candidate.x_w, observation.z, rig_.information(observation.z, match->level)});
   }
 }
 

@@ -48,8 +48,8 @@ class MetricLoopCloser {
 
   void split_neighbourhoods(const GraphSnapshot& graph, const DoubleWindow& window);
   void collect_candidates(const GraphSnapshot& graph);
-  [[nodiscard]] bool well_visible(const GraphSnapshot& graph, const MapPoint& point, const Vector3& x_w,
-                                  Vector2& uv) const;
+  [[nodiscard]] std::optional<Vector2> find_in_view(const GraphSnapshot& graph, const MapPoint& point,
+                                                    const Vector3& x_w) const;
   void search_candidates(const GraphSnapshot& graph, const FrameImages& images);
   [[nodiscard]] std::optional<SE3> estimate_pose(const SE3& T_ref_w);
   void prune(const SE3& T_loop_w);
@@ -59,7 +59,6 @@ class MetricLoopCloser {
   Rig rig_;
   int min_matches_;
   MetricLoopOptions options_;
-  double sigma_scale_;
   PointSearch search_;
 
   KeyframeId reference_ = kNoKeyframe;

@@ -5,11 +5,7 @@
 namespace twofold {
 
 std::string EdgeInformationOptions::invalid_reason() const {
-  return OptionCheck()
-      .above("sigma_px", sigma_px, 0)
-      .above("trans_share", trans_share, 0)
-      .above("rot_share", rot_share, 0)
-      .reason();
+  return OptionCheck().above("trans_share", trans_share, 0).above("rot_share", rot_share, 0).reason();
 }
 
 std::string LoopConsensusOptions::invalid_reason() const {
@@ -30,7 +26,7 @@ std::string MetricLoopOptions::invalid_reason() const {
       .above("search_radius_px", search_radius_px, 0)
       .above("max_error_px", max_error_px, 0)
       .at_least("border_px", border_px, 0)
-      .above("max_view_angle", max_view_angle, 0)
+      .within("min_view_cosine", min_view_cosine, -1, 1)
       .nested("consensus", consensus.invalid_reason())
       .reason();
 }
@@ -61,7 +57,6 @@ std::string MapperOptions::invalid_reason() const {
       .nested("edge", edge.invalid_reason())
       .nested("solver", solver.invalid_reason())
       .at_least("structure_iterations", structure_iterations, 0)
-      .above("sigma_scale", sigma_scale, 0)
       .above("outlier_chi2_mono", outlier_chi2_mono, 0)
       .above("outlier_chi2_stereo", outlier_chi2_stereo, 0)
       .nested("loop", loop.invalid_reason())

@@ -11,7 +11,6 @@ class MapperHook;
 
 /// Eq. 6.2: Lambda = w diag(lambda_trans^2 I, lambda_rot^2 I); see edge_information.
 struct EdgeInformationOptions {
-  double sigma_px = 0.5;     ///< standard deviation of a measurement on level 0 [px], > 0
   double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
   double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
 
@@ -40,7 +39,8 @@ struct MetricLoopOptions {
   double search_radius_px = 10;  ///< > 0
   double max_error_px = 1;       ///< of points that agree with T_loop, on their pyramid level, > 0
   double border_px = 10;         ///< predictions closer to the image's edge are not searched, >= 0
-  double max_view_angle = 0.9;   ///< between the anchor's and the reference's ray to a point [rad]
+  double min_view_cosine =
+      0.6216;  ///< of the angle between the anchor's and the reference's ray to a point, in [-1, 1]
   LoopConsensusOptions consensus;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
@@ -83,7 +83,6 @@ struct MapperOptions {
   EdgeInformationOptions edge;
   WindowSolverOptions solver;          ///< joint optimisation of eq. 6.4
   int structure_iterations = 2;        ///< structure-only, after poses were set along edges
-  double sigma_scale = 1;              ///< multiplies the standard deviation that imaging gives a measurement
   double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom
   double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom
   MetricLoopOptions loop;

@@ -149,12 +149,9 @@ void WindowBuilder::add_observation(const Observation& observation, int pose) {
   const auto p = static_cast<std::size_t>(at);
   auto& entry = problem_.observations[static_cast<std::size_t>(problem_.points[p].first_observation) +
                                       static_cast<std::size_t>(filled_[p]++)];
-  const bool has_right = problem_.rig.kind != SensorKind::kMono && std::isfinite(observation.z.z());
-  const auto scale = static_cast<float>(options_.sigma_scale);
   entry.pose = pose;
   entry.z = observation.z;
-  if (!has_right) entry.z.z() = 0;
-  entry.information = measurement_information(problem_.rig, observation.level, has_right) / (scale * scale);
+  entry.information = problem_.rig.information(observation.z, observation.level);
 }
 
 void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window) {

@@ -33,10 +33,9 @@ void find_covariance(const Rig& rig, const GraphSnapshot& graph, PointId id, Map
     const Keyframe& keyframe = graph.keyframe(observer);
     const Observation* seen = find_observation(keyframe, id);
     const Vector3 x_k = keyframe.T_k_w * x_w;
-    if (seen == nullptr || !(x_k.z() > 0)) continue;
-    const bool has_right = seen->z.z() == seen->z.z();  // else NaN
+    if (seen == nullptr || !in_front_of_camera(x_k)) continue;
     const Matrix3 J = rig.project_jacobian(x_k) * keyframe.T_k_w.rotation();
-    const Vector3 weight = measurement_information(rig, seen->level, has_right).cast<double>();
+    const Vector3 weight = rig.information(seen->z, seen->level).cast<double>();
     information += J.transpose() * weight.asDiagonal() * J;
   }
   const Eigen::LDLT<Matrix3> factor(information);

@@ -67,7 +67,7 @@ bool DenseAlignment::prepare_point(const PinholeCamera& level_camera, const cv::
   const float u = (point.uv.x() + 0.5F) * s - 0.5F;
   const float v = (point.uv.y() + 0.5F) * s - 0.5F;
   Bilinear window{};
-  if (point.x.z() < 1e-3 || !window_at(image, u, v, kSize / 2 + 1, kSize + 2, window)) return false;
+  if (!in_front_of_camera(point.x) || !window_at(image, u, v, kSize / 2 + 1, kSize + 2, window)) return false;
   const auto shifted = [&](int du, int dv, Pixels& pixels) {
     Bilinear w = window;
     w.p += (1 + dv) * w.stride + 1 + du;
@@ -118,7 +118,7 @@ void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& 
     if (usable_[i] == 0) continue;
     ++usable;
     const Vector3 x = R * points[i].x + t;
-    if (x.z() < 1e-3) continue;
+    if (!in_front_of_camera(x)) continue;
     const Vector2 uv = level_camera.project(x);
     Bilinear window{};
     if (!(uv.cwiseAbs().maxCoeff() < 1e5) ||

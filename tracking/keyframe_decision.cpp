@@ -10,8 +10,7 @@ bool keyframe_due(const TrackResult& result, const KeyframeView& last, int occup
   const double share = result.reference_in_view * result.matches / std::max(1, result.searched);
   if (share < options.urgent_share) return true;
   if (backlog.pending >= options.max_pending) return false;
-  constexpr double kNearest = 1e-3;  // [m]
-  const double parallax = result.T_c_ref.translation().norm() / std::max(last.median_depth, kNearest);
+  const double parallax = result.T_c_ref.translation().norm() / std::max(last.median_depth, kNearestDepth);
   // The second keyframe confirms the first one's points: until then there is no map.
   const bool first_needs_second = backlog.map_is_young && parallax > 0.2 * options.keyframe_parallax;
   if (bounds.urgent_keyframes_only) return first_needs_second;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "imaging/view_change.hpp"
 #include "tracking/tracker.hpp"
 
 namespace twofold {
@@ -21,16 +22,14 @@ void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
   const auto [reference_begin, reference_end] = local_map_.reference_range();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector3 x_c = R_c_ref * points[i].x_ref + T_c_ref.translation();
-    if (x_c.z() < 1e-3) continue;
-    const Vector2 uv = rig_.camera.project(x_c);
-    if (!rig_.camera.contains(uv, 8)) continue;
+    const auto uv = rig_.camera.find_in_view(x_c, options_.border_px);
+    if (!uv) continue;
     const SE3& T_ref_a = local_map_.T_ref_a(points[i]);
     const Vector3 from_anchor = points[i].x_ref - T_ref_a.translation();
     const Vector3 from_here = R_c_ref.transpose() * x_c;
-    const double cosine = from_anchor.dot(from_here) / (from_anchor.norm() * from_here.norm());
-    if (cosine < options_.max_view_angle_cos) continue;
+    if (ViewChange::between(from_anchor, from_here).cosine < options_.min_view_cosine) continue;
     if (i >= reference_begin && i < reference_end) ++reference_points_in_view;
-    quadtree_.insert(uv.cast<float>(), static_cast<std::uint32_t>(i));
+    quadtree_.insert(uv->cast<float>(), static_cast<std::uint32_t>(i));
   }
   result.candidates = static_cast<int>(quadtree_.size());
   const auto reference_points = static_cast<double>(reference_end - reference_begin);
@@ -75,11 +74,9 @@ RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const
 void Tracker::observe_matches(const SE3& T_c_ref, const RollingShutter& shutter) {
   motion_.clear();
   for (const Match& match : matches_) {
-    const bool has_right = !std::isnan(match.found.z.z());
     const Vector3& x_ref = local_map_.points()[match.point].x_ref;
-    const Vector3 z = shutter.at_mid_exposure(rig_, match.found.z, T_c_ref * x_ref);
-    motion_.push_back(
-        {x_ref, z.cast<float>(), measurement_information(rig_, match.found.level, has_right), true});
+    const Eigen::Vector3f z = shutter.at_mid_exposure(rig_, match.found.z, T_c_ref * x_ref).cast<float>();
+    motion_.push_back({x_ref, z, rig_.information(z, match.found.level)});
   }
 }
 

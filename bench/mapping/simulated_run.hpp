@@ -27,8 +27,6 @@ inline MapperOptions mapper_options(int inner, int outer) {
   MapperOptions options;
   options.inner_window = inner;
   options.outer_window = outer;
-  options.sigma_scale = 2;  // one pixel of noise
-  options.edge.sigma_px = 1;
   return options;
 }
 

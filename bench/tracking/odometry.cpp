@@ -73,7 +73,7 @@ struct ResidualStatistics {
   std::array<std::array<int, 2>, 4> inliers{};
 
   void add(const Rig& rig, const SE3& T_c_ref, std::span<const MotionObservation> observations) {
-    const double finest = measurement_information(rig, 0, false).x();
+    const double finest = rig.information({0, 0, 0}, 0).x();
     for (const MotionObservation& o : observations) {
       const auto level = static_cast<std::size_t>(std::lround(0.5 * std::log2(finest / o.information.x())));
       if (level >= by_level.size()) continue;

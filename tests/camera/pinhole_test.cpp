@@ -37,5 +37,28 @@ TEST(Pinhole, PyramidLevelKeepsTheAreaOfPixels) {
   EXPECT_LT((half.project(ray) - Vector2(10, 20)).norm(), 1e-12);
 }
 
+TEST(Pinhole, FindsInViewWhatIsInFrontAndInside) {
+  EXPECT_TRUE(kCamera.find_in_view({0, 0, 2}));
+  EXPECT_EQ(kCamera.find_in_view({0, 0, 2}), kCamera.project({0, 0, 2}));
+  EXPECT_FALSE(kCamera.find_in_view({0, 0, -2}));      // behind
+  EXPECT_FALSE(kCamera.find_in_view({0, 0, 0.0005}));  // nearer than any point
+  EXPECT_FALSE(kCamera.find_in_view({2, 0, 2}));       // beside
+  const Vector3 near_rim = kCamera.unproject({5, 100});
+  EXPECT_TRUE(kCamera.find_in_view(near_rim, 4));
+  EXPECT_FALSE(kCamera.find_in_view(near_rim, 6));
+}
+
+TEST(MeasurementNoise, FallsByFourALevelAndIsNoneWithoutARightCoordinate) {
+  Rig rig{SensorKind::kStereo, kCamera, 0.12};
+  rig.noise = {.sigma_px = 2, .depth_sigma_px = 4};
+  EXPECT_EQ(rig.information({1, 1, 1}, 0), Eigen::Vector3f(0.25F, 0.25F, 0.25F));
+  EXPECT_EQ(rig.information({1, 1, 1}, 1), Eigen::Vector3f(0.0625F, 0.0625F, 0.0625F));
+  EXPECT_EQ(rig.information({1, 1, static_cast<float>(Rig::kNoRight)}, 0), Eigen::Vector3f(0.25F, 0.25F, 0));
+  rig.kind = SensorKind::kRgbd;
+  EXPECT_EQ(rig.information({1, 1, 1}, 1), Eigen::Vector3f(0.0625F, 0.0625F, 0.0625F));
+  rig.kind = SensorKind::kMono;
+  EXPECT_EQ(rig.information({1, 1, 1}, 0), Eigen::Vector3f(0.25F, 0.25F, 0));
+}
+
 }  // namespace
 }  // namespace twofold

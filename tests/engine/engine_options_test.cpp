@@ -44,7 +44,6 @@ TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {
        {"max_inverse_depth", [](auto& o) { o.max_inverse_depth = o.min_inverse_depth; }},
        {"edge.rot_share", [](auto& o) { o.edge.rot_share = 0; }},
        {"solver.max_iterations", [](auto& o) { o.solver.max_iterations = 0; }},
-       {"sigma_scale", [](auto& o) { o.sigma_scale = 0; }},
        {"loop.columns", [](auto& o) { o.loop.columns = 0; }},
        {"loop.consensus.confidence", [](auto& o) { o.loop.consensus.confidence = 1; }},
        {"culling.redundant_observers", [](auto& o) { o.culling.redundant_observers = 1; }},

@@ -24,14 +24,5 @@ TEST(RightFromDepth, IsTheVirtualDisparityAndRefusesHolesAndEdges) {
   EXPECT_TRUE(std::isnan(right_from_depth(depth, rig, 0, 220)));   // rim
 }
 
-TEST(MeasurementInformation, FallsByFourALevel) {
-  const Rig rig = test_rig(SensorKind::kStereo);
-  const Eigen::Vector3f fine = measurement_information(rig, 0, true);
-  const Eigen::Vector3f coarse = measurement_information(rig, 1, true);
-  EXPECT_FLOAT_EQ(fine.x(), 4 * coarse.x());
-  EXPECT_FLOAT_EQ(fine.z(), 4 * coarse.z());
-  EXPECT_EQ(measurement_information(rig, 0, false).z(), 0);
-}
-
 }  // namespace
 }  // namespace twofold

@@ -114,8 +114,6 @@ TEST(Culling, BrowsingAMappedPlaceDoesNotGrowTheMap) {
   const std::vector<SE3> path = simulation::circle_path(lap * laps, laps, 0.8, 1.2);
   simulation::Simulation simulation(options, simulation::scattered_points(path, 2, 25, 1), path);
   MapperOptions mapping;
-  mapping.sigma_scale = 2;
-  mapping.edge.sigma_px = 1;
   mapping.inner_window = 15;
   mapping.outer_window = 40;
   mapping.culling.keep_replacements = 20;

@@ -182,14 +182,14 @@ TEST(MarginaliseLeftEdges, RecomputesWhatLeftTheInnerWindowAndOnlyThat) {
 }
 
 TEST(EdgeInformation, FollowsEquation62) {
-  const Rig rig = simulation::thesis_rig();
+  Rig rig = simulation::thesis_rig();
+  rig.noise.sigma_px = 0.5;
   Keyframe a, b;
   a.median_depth = 2;
   b.median_depth = 4;
   Edge edge;
   edge.weight = 50;
   EdgeInformationOptions options;
-  options.sigma_px = 0.5;
   options.rot_share = 0.2;
   options.trans_share = 0.1;
   const Matrix6 information = edge_information(a, b, edge, rig, options);

@@ -18,7 +18,6 @@ class MetricLoopTest : public testing::Test {
  protected:
   MetricLoopTest() : rig_(simulation::thesis_rig()) {
     options_.min_covisible = 20;
-    options_.sigma_scale = 2;
     T_ref_true_ = SE3::exp((Vector6() << 0.15, -0.05, 0.1, 0.02, -0.03, 0.05).finished());
   }
 
@@ -129,7 +128,7 @@ TEST_F(MetricLoopTest, WorkIsBoundedAndSpread) {
 
 TEST_F(MetricLoopTest, PointsSeenFromAnotherSideAreNotSearched) {
   make_graph(SE3());
-  options_.loop.max_view_angle = 0.02;
+  options_.loop.min_view_cosine = std::cos(0.02);
   EXPECT_EQ(close().found, 0);
 }
 

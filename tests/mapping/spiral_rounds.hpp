@@ -13,8 +13,6 @@ inline MapperOptions small_windows() {
   MapperOptions options;
   options.inner_window = 15;
   options.outer_window = 50;
-  options.sigma_scale = 2;  // one pixel of noise
-  options.edge.sigma_px = 1;
   options.culling.keyframes = options.culling.points = false;
   options.loop.enabled = false;
   return options;

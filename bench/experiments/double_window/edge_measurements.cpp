@@ -9,7 +9,6 @@
 namespace twofold::bench {
 namespace {
 
-constexpr double kMinDepth = 1e-3;     // [units of the map]
 constexpr double kMinShare = 1e-3;     // an edge with less than this outside of the problem says nothing
 constexpr double kMinDiagonal = 1e-9;  // of a factor: below it a direction is not determined
 
@@ -20,15 +19,13 @@ struct Pull {
 };
 
 std::optional<Pull> pull_of(const Rig& rig, const Keyframe& keyframe, const Observation& observation,
-                            const Vector3& x_w, double sigma_scale) {
+                            const Vector3& x_w) {
   const Vector3 x = keyframe.T_k_w * x_w;
-  if (x.z() < kMinDepth) return std::nullopt;
-  const bool has_right = rig.kind != SensorKind::kMono && std::isfinite(observation.z.z());
-  const Vector3 information =
-      measurement_information(rig, observation.level, has_right).cast<double>() / (sigma_scale * sigma_scale);
+  if (!in_front_of_camera(x)) return std::nullopt;
+  const Vector3 information = rig.information(observation.z, observation.level).cast<double>();
   const Matrix3 J = rig.project_jacobian(x) * keyframe.T_k_w.so3().matrix();
   Vector3 r = observation.z.cast<double>() - rig.project(x);
-  if (!has_right) r.z() = 0;
+  if (information.z() == 0) r.z() = 0;
   return Pull{J.transpose() * information.asDiagonal() * J, J.transpose() * information.cwiseProduct(r)};
 }
 
@@ -54,8 +51,8 @@ std::optional<EdgeMeasurements::Measured> EdgeMeasurements::measured(const Graph
   Vector6 tension = Vector6::Zero();
   for_shared_points(a, b, [&](const Observation& seen_a, const Observation& seen_b) {
     const Vector3 x_w = graph.position(seen_a.point);
-    const auto pull_a = pull_of(rig, a, seen_a, x_w, sigma_scale_);
-    const auto pull_b = pull_of(rig, b, seen_b, x_w, sigma_scale_);
+    const auto pull_a = pull_of(rig, a, seen_a, x_w);
+    const auto pull_b = pull_of(rig, b, seen_b, x_w);
     if (!pull_a || !pull_b) return;
     const double share = one_over_n(graph, seen_a.point);
     Eigen::Matrix<double, 3, 6> G;  // world frame: forces and stiffness need not be turned

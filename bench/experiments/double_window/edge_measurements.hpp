@@ -32,10 +32,8 @@ namespace twofold::bench {
 /// their part of the points they share, are missing.
 class EdgeMeasurements {
  public:
-  /// @param sigma_scale   MapperOptions::sigma_scale
   /// @param length_share  of what an edge says about its own length, in (0, 1]
-  EdgeMeasurements(double sigma_scale, double length_share)
-      : sigma_scale_(sigma_scale), length_share_(length_share) {}
+  explicit EdgeMeasurements(double length_share) : length_share_(length_share) {}
 
   struct Constraint {
     SE3 T_to_from;
@@ -69,7 +67,7 @@ class EdgeMeasurements {
   [[nodiscard]] std::optional<Measured> measured(const GraphSnapshot& graph, const Rig& rig,
                                                  const Keyframe& a, const Keyframe& b) const;
 
-  double sigma_scale_, length_share_;
+  double length_share_;
   std::map<std::pair<KeyframeId, KeyframeId>, Measured> measured_;  ///< by (a, b), a < b
 };
 

@@ -6,7 +6,7 @@ ExperimentalMapping::ExperimentalMapping(const Rig& rig, const MapperOptions& ma
                                          const ExperimentalMappingOptions& options)
     : rig_(rig), min_covisible_(mapper.min_covisible), fixed_rim_(options.fixed_rim) {
   if (options.own_unit && rig.kind != SensorKind::kMono) unit_.emplace();
-  if (options.measured_edges) measurements_.emplace(mapper.sigma_scale, options.length_share);
+  if (options.measured_edges) measurements_.emplace(options.length_share);
 }
 
 void ExperimentalMapping::graph_replaced() {

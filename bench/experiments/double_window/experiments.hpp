@@ -14,11 +14,11 @@ struct DoubleWindowExperimentOptions {
   int loop_keyframes = 300;  ///< of the double loop: two rounds
   unsigned seed = 1;         ///< of the first trial
   SceneOptions scene;
-  int max_anchors = 25;         ///< that take places of W2 for their points (6.2.4)
-  bool metres = false;          ///< lengths in metres throughout, not in a unit of the map's own (MapUnit)
-  bool coarse_edges = false;    ///< eq. 6.2 for gDWO as well, not EdgeMeasurements (stereo)
-  double length_share = 0.05;   ///< of what a measured edge says about its own length
-  EdgeInformationOptions edge;  ///< shares; sigma_px follows the scene's noise
+  int max_anchors = 25;        ///< that take places of W2 for their points (6.2.4)
+  bool metres = false;         ///< lengths in metres throughout, not in a unit of the map's own (MapUnit)
+  bool coarse_edges = false;   ///< eq. 6.2 for gDWO as well, not EdgeMeasurements (stereo)
+  double length_share = 0.05;  ///< of what a measured edge says about its own length
+  EdgeInformationOptions edge;
 };
 
 constexpr int kUnbounded = std::numeric_limits<int>::max() / 4;  // window size of BA over everything

@@ -39,9 +39,7 @@ MapperOptions simulation_mapper_options(const DoubleWindowExperimentOptions& opt
   mapper.max_anchors = options.max_anchors;
   mapper.max_points = kUnbounded;
   mapper.min_covisible = options.scene.min_covisible;
-  mapper.sigma_scale = 2 * options.scene.noise_px;  // imaging gives half a pixel
   mapper.edge = options.edge;
-  mapper.edge.sigma_px = options.scene.noise_px;
   mapper.solver.max_iterations = 3;
   // Perfect association: there are no outliers to look for, no metric loops to find, and nothing to cull.
   mapper.solver.huber_px = 0;

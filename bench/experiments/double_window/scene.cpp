@@ -65,6 +65,7 @@ Scene make_scene(const SceneOptions& options, const Rig& rig, std::vector<Vector
                  std::vector<SE3> path, unsigned seed) {
   Scene scene;
   scene.rig = rig;
+  scene.rig.noise.sigma_px = options.noise_px;
   scene.points = std::move(points);
   scene.T_k_w = std::move(path);
   std::map<Cell, std::vector<int>> cells;

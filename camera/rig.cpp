@@ -1,0 +1,16 @@
+#include "camera/rig.hpp"
+
+#include <cmath>
+
+namespace twofold {
+
+Eigen::Vector3f Rig::information(const Eigen::Vector3f& z, int level) const {
+  const float sigma = std::ldexp(static_cast<float>(noise.sigma_px), level);
+  const float pixel = 1 / (sigma * sigma);
+  if (kind == SensorKind::kMono || !std::isfinite(z.z())) return {pixel, pixel, 0};
+  if (kind == SensorKind::kStereo) return {pixel, pixel, pixel};
+  const auto depth_sigma = static_cast<float>(noise.depth_sigma_px);
+  return {pixel, pixel, 1 / (depth_sigma * depth_sigma)};
+}
+
+}  // namespace twofold
