@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kLeastGain = 1e-6;  // of the squared whitened error: the minimum is reached
 constexpr int kMaxAttempts = 8;      // dampings tried for one step
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kImpossible = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -62,7 +62,7 @@ double AnchoredViews::cost() const {
   for (const View& view : views) {
     for (const SeenPoint& seen : view.seen) {
       const auto p = project_inverse_depth(rig, view.T_c_a, points[static_cast<std::size_t>(seen.point)].psi);
-      if (!p) return kInfinity;
+      if (!p) return kImpossible;
       chi2 += weight * (seen.z - p->z_hat).head(rows).squaredNorm();
     }
   }
@@ -108,7 +108,7 @@ bool AnchoredViews::minimise(int max_iterations) {
   std::vector<Vector3> points_step;
   for (int iteration = 0; iteration < max_iterations && linearise(equations); ++iteration) {
     const AnchoredViews before = *this;
-    double next = kInfinity;
+    double next = kImpossible;
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
       if (equations.solve(damping, poses_step, points_step)) {
         move(poses_step, points_step);

@@ -4,7 +4,7 @@
 
 namespace twofold {
 namespace {
-constexpr double kSmallAngle = 1e-3;
+constexpr double kSe2SeriesBelow = 1e-3;
 }  // namespace
 
 SE2::SE2(double angle, const Vector2& t) : cos_(std::cos(angle)), sin_(std::sin(angle)), t_(t) {}
@@ -13,7 +13,7 @@ SE2 SE2::exp(const Vector3& v_w) {
   const double w = v_w.z();
   const double w2 = w * w;
   // V = [a, -b; b, a] with a = sin w / w, b = (1 - cos w) / w
-  const bool small = std::abs(w) < kSmallAngle;
+  const bool small = std::abs(w) < kSe2SeriesBelow;
   const double a = small ? 1 - w2 * (1.0 / 6 - w2 / 120) : std::sin(w) / w;
   const double b = small ? w * (0.5 - w2 * (1.0 / 24 - w2 / 720)) : (1 - std::cos(w)) / w;
   return {w, Vector2(a * v_w.x() - b * v_w.y(), b * v_w.x() + a * v_w.y())};
@@ -23,8 +23,8 @@ Vector3 SE2::log() const {
   const double w = angle();
   // V^-1 = [h, w/2; -w/2, h] with h = (w/2) cot(w/2)
   const double w2 = w * w;
-  const double h = std::abs(w) < kSmallAngle ? 1 - w2 * (1.0 / 12 + w2 / 720)
-                                             : 0.5 * w * std::cos(0.5 * w) / std::sin(0.5 * w);
+  const double h = std::abs(w) < kSe2SeriesBelow ? 1 - w2 * (1.0 / 12 + w2 / 720)
+                                                 : 0.5 * w * std::cos(0.5 * w) / std::sin(0.5 * w);
   return {h * t_.x() + 0.5 * w * t_.y(), -0.5 * w * t_.x() + h * t_.y(), w};
 }
 

@@ -6,7 +6,7 @@ namespace twofold {
 namespace {
 // Where the closed forms of the coefficients lose digits to cancellation, their Taylor series have full
 // accuracy.
-constexpr double kSmallAngle = 1e-2;
+constexpr double kSe3SeriesBelow = 1e-2;
 }  // namespace
 
 SE3 SE3::exp(const Vector6& v_w) {
@@ -16,7 +16,7 @@ SE3 SE3::exp(const Vector6& v_w) {
   const double theta = std::sqrt(theta2);
   double b;  // (1 - cos theta) / theta^2
   double c;  // (theta - sin theta) / theta^3
-  if (theta < kSmallAngle) {
+  if (theta < kSe3SeriesBelow) {
     b = 0.5 - theta2 * (1.0 / 24 - theta2 * (1.0 / 720 - theta2 / 40320));
     c = 1.0 / 6 - theta2 * (1.0 / 120 - theta2 * (1.0 / 5040 - theta2 / 362880));
   } else {
@@ -32,7 +32,7 @@ Vector6 SE3::log() const {
   const double theta2 = w.squaredNorm();
   const double theta = std::sqrt(theta2);
   // V^-1 = I - [w]/2 + d [w]^2,  d = (1 - theta/2 cot(theta/2)) / theta^2
-  const double d = theta < kSmallAngle
+  const double d = theta < kSe3SeriesBelow
                        ? 1.0 / 12 + theta2 * (1.0 / 720 + theta2 * (1.0 / 30240 + theta2 / 1209600))
                        : (1.0 - 0.5 * theta * std::cos(0.5 * theta) / std::sin(0.5 * theta)) / theta2;
   const Vector3 w_t = w.cross(t_);

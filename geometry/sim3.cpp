@@ -13,8 +13,8 @@ struct Coefficients {
 };
 
 // Below this angle the closed form loses digits like 1 / theta^2.
-constexpr double kSmallAngle = 0.5;
-constexpr int kThetaTerms = 7;  // (theta^2)^7 / 16! < 1e-17 at kSmallAngle
+constexpr double kSim3SeriesBelow = 0.5;
+constexpr int kThetaTerms = 7;  // (theta^2)^7 / 16! < 1e-17 at kSim3SeriesBelow
 
 /// Series in theta^2. The moments I_n = int_0^1 u^n e^(sigma u) du come from I_(n-1) = (e^sigma - sigma I_n)
 /// / n, which damps errors when run downwards; it needs no division by sigma and so no limit.
@@ -42,7 +42,7 @@ Coefficients coefficients_small_angle(double sigma, double theta2) {
 
 Coefficients coefficients(double sigma, double theta) {
   const double theta2 = theta * theta;
-  if (theta < kSmallAngle) return coefficients_small_angle(sigma, theta2);
+  if (theta < kSim3SeriesBelow) return coefficients_small_angle(sigma, theta2);
   const double A = std::exp(sigma) * std::sin(theta);
   const double B = std::exp(sigma) * std::cos(theta);
   const double c = sigma == 0 ? 1.0 : std::expm1(sigma) / sigma;

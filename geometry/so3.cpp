@@ -5,14 +5,14 @@
 namespace twofold {
 namespace {
 // Below this angle the Taylor expansions used here are exact to double precision.
-constexpr double kSmallAngle = 1e-4;
+constexpr double kSo3SeriesBelow = 1e-4;
 }  // namespace
 
 SO3 SO3::exp(const Vector3& w) {
   const double theta = w.norm();
   const double half = 0.5 * theta;
   // sin(theta/2)/theta = 1/2 - theta^2/48 + O(theta^4)
-  const double k = theta < kSmallAngle ? 0.5 - theta * theta / 48.0 : std::sin(half) / theta;
+  const double k = theta < kSo3SeriesBelow ? 0.5 - theta * theta / 48.0 : std::sin(half) / theta;
   return unchecked(Eigen::Quaterniond(std::cos(half), k * w.x(), k * w.y(), k * w.z()));
 }
 
@@ -23,7 +23,7 @@ Vector3 SO3::log() const {
   const Vector3 v = sign * q_.vec();
   const double sin_half = v.norm();
   // atan2 stays accurate at both ends; near zero 2 atan2(s, c) / s -> 2/c - (2/3) s^2/c^3.
-  const double k = sin_half < kSmallAngle
+  const double k = sin_half < kSo3SeriesBelow
                        ? 2.0 / cos_half - 2.0 / 3.0 * sin_half * sin_half / (cos_half * cos_half * cos_half)
                        : 2.0 * std::atan2(sin_half, cos_half) / sin_half;
   return k * v;

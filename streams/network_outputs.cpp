@@ -80,8 +80,8 @@ sockaddr_un unix_address(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path)
-    fail("unix:" + path,
-         "a path of 1 to " + std::to_string(sizeof address.sun_path - 1) + " characters is needed");
+    fail(fmt::format("unix:{}", path),
+         fmt::format("a path of 1 to {} characters is needed", sizeof address.sun_path - 1));
   std::memcpy(address.sun_path, path.data(), path.size());
   return address;
 }

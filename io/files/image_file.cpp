@@ -76,4 +76,10 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   return files;
 }
 
+void expect_size(const fs::path& file, const cv::Mat& image, const PinholeCamera& camera) {
+  if (image.cols == camera.width && image.rows == camera.height) return;
+  throw IoError(file, fmt::format("the image is {}x{}, the calibration or the first image says {}x{}",
+                                  image.cols, image.rows, camera.width, camera.height));
+}
+
 }  // namespace twofold

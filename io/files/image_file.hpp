@@ -4,6 +4,8 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "camera/pinhole.hpp"
+
 namespace twofold {
 
 /// Largest image accepted from a file [pixels]; sizes in files are not trusted before anything is allocated.
@@ -18,6 +20,10 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 
 /// A depth image as CV_16UC1; throws as above and when the file holds anything but one channel of 16 bits.
 [[nodiscard]] cv::Mat read_depth_image(const std::filesystem::path& file);
+
+/// Throws IoError naming the file when the image does not have the camera's size, which its calibration or
+/// the recording's first image said.
+void expect_size(const std::filesystem::path& file, const cv::Mat& image, const PinholeCamera& camera);
 
 /// Files in `folder` with an image's extension (png, jpg, jpeg, pgm, tif, tiff, bmp), sorted by name. Throws
 /// IoError when the folder is missing or holds none.

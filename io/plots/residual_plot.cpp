@@ -11,13 +11,13 @@ namespace {
 
 using namespace plot_ink;
 
-constexpr int kWidth = 640, kMargin = 24, kTop = 64, kBottom = 36;  // [px] of the picture
+constexpr int kWidth = 640, kMargin = 24, kHeader = 64, kFooter = 36;  // [px] of the picture
 
 void draw_panel(cv::Mat& canvas, const ResidualPanel& panel, int left, double magnified) {
   const double scale = static_cast<double>(kSuper * kWidth) / panel.size.width;
-  const cv::Rect inside(left, kSuper * kTop, kSuper * kWidth, static_cast<int>(scale * panel.size.height));
+  const cv::Rect inside(left, kSuper * kHeader, kSuper * kWidth, static_cast<int>(scale * panel.size.height));
   cv::rectangle(canvas, inside, kInk, kSuper);
-  put_text(canvas, panel.title, {left, kSuper * (kTop - 12)}, 0.5, Anchor::kLeft, {20, 20, 20});
+  put_text(canvas, panel.title, {left, kSuper * (kHeader - 12)}, 0.5, Anchor::kLeft, {20, 20, 20});
   const auto point = [&](const cv::Point2f& p, const cv::Point2f& r) {
     return cv::Point(inside.x + cvRound(scale * (p.x + magnified * r.x)),
                      inside.y + cvRound(scale * (p.y + magnified * r.y)));
@@ -36,7 +36,7 @@ cv::Mat draw_residuals(const std::vector<ResidualPanel>& panels, double magnifie
   for (const ResidualPanel& panel : panels)
     height = std::max(height, kSuper * kWidth * panel.size.height / std::max(panel.size.width, 1));
   const int columns = static_cast<int>(panels.size());
-  cv::Mat canvas(height + kSuper * (kTop + kBottom), kSuper * (columns * (kWidth + kMargin) + kMargin),
+  cv::Mat canvas(height + kSuper * (kHeader + kFooter), kSuper * (columns * (kWidth + kMargin) + kMargin),
                  CV_8UC3, kWhite);
   for (int c = 0; c < columns; ++c)
     draw_panel(canvas, panels[static_cast<std::size_t>(c)], kSuper * (kMargin + c * (kWidth + kMargin)),

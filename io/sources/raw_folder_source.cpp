@@ -25,12 +25,6 @@ Layout layout_of(const fs::path& folder) {
   return {folder / "left", fs::is_directory(folder / "right") ? folder / "right" : fs::path()};
 }
 
-void expect_size(const fs::path& file, const cv::Mat& image, const PinholeCamera& camera) {
-  if (image.cols == camera.width && image.rows == camera.height) return;
-  throw IoError(file, fmt::format("the image is {}x{}, the first one {}x{}", image.cols, image.rows,
-                                  camera.width, camera.height));
-}
-
 }  // namespace
 
 RawFolderSource::RawFolderSource(const fs::path& folder) {

@@ -7,17 +7,7 @@
 #include "io/files/io_error.hpp"
 
 namespace twofold {
-namespace {
-
 namespace fs = std::filesystem;
-
-void expect_size(const fs::path& file, const cv::Mat& image, const PinholeCamera& camera) {
-  if (image.cols == camera.width && image.rows == camera.height) return;
-  throw IoError(file, fmt::format("the image is {}x{}, the calibration or the first image says {}x{}",
-                                  image.cols, image.rows, camera.width, camera.height));
-}
-
-}  // namespace
 
 Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, SourceParameters& parameters) {
   Calibration calibration = std::move(base);

@@ -112,7 +112,7 @@ V4l2Expected<PixelFormat> V4l2Device::choose_format(const CaptureFormat& wanted)
     }
   }
   std::string names;
-  for (const FormatEntry& entry : offered) names += " " + fourcc_text(entry.fourcc);
+  for (const FormatEntry& entry : offered) names += fmt::format(" {}", fourcc_text(entry.fourcc));
   return tl::unexpected(V4l2Error{0, fmt::format("offers no supported format at {}x{} (its formats:{})",
                                                  wanted.width, wanted.height, names)});
 }

@@ -106,7 +106,7 @@ class EdgeMeasurementsTest : public testing::Test {
 };
 
 TEST_F(EdgeMeasurementsTest, PassOnWhatThePointsWantOfEachPose) {
-  EdgeMeasurements edges(1, 1);
+  EdgeMeasurements edges(1);
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
   std::vector<SE3> poses;
   for (std::uint32_t j = 0; j < kViews; ++j) {
@@ -136,7 +136,7 @@ TEST_F(EdgeMeasurementsTest, PassOnWhatThePointsWantOfEachPose) {
 
 TEST_F(EdgeMeasurementsTest, CountAPointOnceHoweverManyEdgesShareIt) {
   // With one more keyframe that sees all points, each pair's share goes from 1/4 to 1/5.
-  EdgeMeasurements edges(1, 1);
+  EdgeMeasurements edges(1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(0), k(2)));
   const Matrix6 before = information(edges, 0, 2);
   const KeyframeId fifth = add_keyframe(writer_, writer_.graph().T_k_w(k(1)));
@@ -147,7 +147,7 @@ TEST_F(EdgeMeasurementsTest, CountAPointOnceHoweverManyEdgesShareIt) {
 }
 
 TEST_F(EdgeMeasurementsTest, SpeakForPointsOutsideOfTheProblemOnly) {
-  EdgeMeasurements edges(1, 1);
+  EdgeMeasurements edges(1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(1), k(3)));
   IdMap position;
   for (std::uint32_t p = 0; p < kPoints; ++p) position.set(PointId{p}, 0);  // looked at and left out
@@ -161,9 +161,9 @@ TEST_F(EdgeMeasurementsTest, SpeakForPointsOutsideOfTheProblemOnly) {
 }
 
 TEST_F(EdgeMeasurementsTest, KeepAShareOfWhatTheySayAboutLengthAndAllElse) {
-  EdgeMeasurements edges(1, 1);
+  EdgeMeasurements edges(1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(0), k(3)));
-  EdgeMeasurements soft_edges(1, 0.1);
+  EdgeMeasurements soft_edges(0.1);
   ASSERT_TRUE(soft_edges.measure(writer_.graph(), rig_, k(0), k(3)));
   const SE3 T = edges.constraint(writer_.graph(), k(0), k(3), {})->T_to_from;
   EXPECT_EQ(T.translation(), soft_edges.constraint(writer_.graph(), k(0), k(3), {})->T_to_from.translation());
@@ -178,7 +178,7 @@ TEST_F(EdgeMeasurementsTest, KeepAShareOfWhatTheySayAboutLengthAndAllElse) {
 }
 
 TEST_F(EdgeMeasurementsTest, AreForgottenWithTheirKeyframeOrForAnotherConstraint) {
-  EdgeMeasurements edges(1, 1);
+  EdgeMeasurements edges(1);
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(0), k(1)));
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(2), k(0)));
   ASSERT_TRUE(edges.measure(writer_.graph(), rig_, k(2), k(3)));
@@ -194,7 +194,7 @@ TEST(EdgeMeasurements, AreNotMadeOfTooFewPoints) {
   GraphWriter writer = chain(2);
   const Rig rig = simulation::thesis_rig();
   add_point(writer, rig, {0.1, 0.1, 1.5}, {KeyframeId{0}, KeyframeId{1}});
-  EdgeMeasurements edges(1, 0.05);
+  EdgeMeasurements edges(0.05);
   EXPECT_FALSE(edges.measure(writer.graph(), rig, KeyframeId{0}, KeyframeId{1}));
   EXPECT_FALSE(edges.constraint(writer.graph(), KeyframeId{0}, KeyframeId{1}, {}));
 }

@@ -138,7 +138,7 @@ TEST(PoseOutputs, WhatCannotBeOpenedIsNamed) {
   EXPECT_NE(why_not("/nowhere/at/all").find("/nowhere/at/all"), std::string::npos);
   EXPECT_NE(why_not("udp:localhost").find("udp:HOST:PORT"), std::string::npos);
   EXPECT_NE(why_not("udp:no.such.host.invalid:1").find("udp:no.such.host.invalid:1"), std::string::npos);
-  EXPECT_NE(why_not("unix:" + std::string(200, 'x')).find("characters"), std::string::npos);
+  EXPECT_NE(why_not(std::string("unix:").append(200, 'x')).find("characters"), std::string::npos);
   EXPECT_NE(why_not("zmq:nonsense"), "");
 }
 
