@@ -11,7 +11,7 @@ target_include_directories(twofold_options INTERFACE ${PROJECT_SOURCE_DIR})
 target_link_libraries(twofold_options INTERFACE fmt::fmt)
 
 target_compile_options(twofold_options INTERFACE
-  -march=${TWOFOLD_ARCH} -Wall -Wextra -Wno-array-bounds -Wno-restrict -Wshadow -Wnon-virtual-dtor)
+  -march=${TWOFOLD_ARCH} -Wall -Wextra -Wno-array-bounds $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> -Wshadow -Wnon-virtual-dtor)
 # Eigen's alignment decides the layout of public types: fixed here, so that it does not follow -march.
 target_compile_definitions(twofold_options INTERFACE EIGEN_MAX_ALIGN_BYTES=32 TWOFOLD_ARCH="${TWOFOLD_ARCH}")
 if(TWOFOLD_SHARED)
