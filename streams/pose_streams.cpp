@@ -24,35 +24,24 @@ void block_sigpipe() {
 
 PoseStreams::PoseStreams(std::vector<std::unique_ptr<PoseOutput>> outputs, PoseForm form)
     : outputs_(std::move(outputs)), form_(form) {
-  writer_.emplace(WorkerOptions{.name = "pose writer"}, [this](const std::stop_token& stop) { write(stop); });
+  writer_.emplace(WorkerOptions{.name = "pose writer"}, [this](const std::stop_token&) { write_all(); });
 }
 
-void PoseStreams::push(const Item& item) {
-  Item copy = item;
-  if (!ring_.try_push(std::move(copy))) {
-    missed_.fetch_add(1, std::memory_order_relaxed);
-    return;
-  }
-  parking_.wake();
-}
-
-void PoseStreams::write(const std::stop_token& stop) {
+void PoseStreams::write_all() {
   block_sigpipe();
-  while (parking_.wait(stop, [this] { return ring_.has_value(); })) write_queued();
+  PoseOrEvent item;
+  while (queue_.next(item) == QueueStatus::kItem) write(item);
   hand_over_rest();
 }
 
-void PoseStreams::write_queued() {
-  Item item;
-  while (ring_.try_pop(item)) {
-    const std::string lines = std::holds_alternative<PoseEstimate>(item)
-                                  ? pose_line(std::get<PoseEstimate>(item), form_)
-                                  : event_line(std::get<MapEvent>(item), form_);
-    const std::uint64_t missed = missed_.exchange(0, std::memory_order_relaxed);
-    for (const auto& output : outputs_) {
-      if (missed > 0) output->miss(missed);
-      if (!lines.empty()) output->offer(lines);
-    }
+void PoseStreams::write(const PoseOrEvent& item) {
+  const std::string lines = std::holds_alternative<PoseEstimate>(item)
+                                ? pose_line(std::get<PoseEstimate>(item), form_)
+                                : event_line(std::get<MapEvent>(item), form_);
+  const std::uint64_t missed = queue_.take_missed();
+  for (const auto& output : outputs_) {
+    if (missed > 0) output->miss(missed);
+    if (!lines.empty()) output->offer(lines);
   }
 }
 
@@ -68,7 +57,7 @@ void PoseStreams::hand_over_rest() {
 
 void PoseStreams::finish() {
   if (!writer_) return;
-  writer_->request_stop();
+  queue_.close();
   (void)writer_->join();
   writer_.reset();
 }

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "twofold/types.hpp"
+
+namespace twofold {
+
+/// Makes the rectified frames that Slam takes of those that a camera gives: straight lines straight, and for
+/// stereo, corresponding points in the same row. Sources do this by themselves.
+///
+/// Threads: rectify may be called by several at once.
+class TWOFOLD_API FrameRectifier {
+ public:
+  /// @param calibration    file of any form that docs/calibration.md has, as `twofold calibrate` writes
+  /// @param width, height  of the raw images [px], of calibrations that do not state it; 0: it does
+  ///
+  /// Throws std::runtime_error naming the file and what is wrong, a single camera without depth included.
+  explicit FrameRectifier(const std::filesystem::path& calibration, int width = 0, int height = 0);
+  ~FrameRectifier();
+  FrameRectifier(FrameRectifier&&) noexcept;
+  FrameRectifier& operator=(FrameRectifier&&) noexcept;
+
+  /// What the rectified frames are of.
+  [[nodiscard]] const CameraRig& rig() const;
+  /// @return  grey images, and depth, with an owner; those of `raw` themselves when they are rectified
+  ///          already. Throws std::invalid_argument when `raw` is not of the calibrated cameras.
+  [[nodiscard]] FrameView rectify(const FrameView& raw) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace twofold

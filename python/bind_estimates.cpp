@@ -1,0 +1,213 @@
+#include <pybind11/operators.h>
+#include <pybind11/stl.h>
+
+#include <fmt/format.h>
+
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "twofold/estimate.hpp"
+
+namespace twofold::python {
+namespace {
+
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+void expect_shape(const Array& array, py::ssize_t last, const char* what) {
+  if (array.ndim() < 1 || array.ndim() > 2 || array.shape(array.ndim() - 1) != last)
+    throw py::value_error(what);
+}
+
+Pose make_pose(const Array& t, const Array& q) {
+  if (t.ndim() != 1 || t.shape(0) != 3) throw py::value_error("t must have shape (3,)");
+  if (q.ndim() != 1 || q.shape(0) != 4) throw py::value_error("q must have shape (4,)");
+  Pose pose{{q.at(0), q.at(1), q.at(2), q.at(3)}, {t.at(0), t.at(1), t.at(2)}};
+  const auto& [x, y, z, w] = pose.q;
+  if (std::abs(x * x + y * y + z * z + w * w - 1) > 1e-3) throw py::value_error("q must be of length 1");
+  return pose;
+}
+
+/// (3,) or (N, 3) points of frame b in frame a.
+py::array transform_points(const Pose& T_a_b, const Array& points_b) {
+  expect_shape(points_b, 3, "points must have shape (3,) or (N, 3)");
+  py::array_t<double> points_a(
+      std::vector<py::ssize_t>(points_b.shape(), points_b.shape() + points_b.ndim()));
+  const double* from = points_b.data();
+  double* to = points_a.mutable_data();
+  for (py::ssize_t i = 0; i < points_b.size(); i += 3) {
+    const auto p_a = transform(T_a_b, {from[i], from[i + 1], from[i + 2]});
+    std::copy(p_a.begin(), p_a.end(), to + i);
+  }
+  return points_a;
+}
+
+py::array matrix_of(const Pose& T_a_b) {
+  py::array_t<double> matrix({4, 4});
+  auto m = matrix.mutable_unchecked<2>();
+  const Pose R_a_b{T_a_b.q, {0, 0, 0}};
+  for (py::ssize_t column = 0; column < 3; ++column) {
+    std::array<double, 3> axis{};
+    axis[static_cast<std::size_t>(column)] = 1;
+    const auto turned = transform(R_a_b, axis);
+    for (py::ssize_t row = 0; row < 3; ++row) m(row, column) = turned[static_cast<std::size_t>(row)];
+    m(column, 3) = T_a_b.t[static_cast<std::size_t>(column)];
+    m(3, column) = 0;
+  }
+  m(3, 3) = 1;
+  return matrix;
+}
+
+std::string text_of(const Pose& pose) {
+  return fmt::format("Pose(t=[{:.4f}, {:.4f}, {:.4f}], q=[{:.4f}, {:.4f}, {:.4f}, {:.4f}])", pose.t[0],
+                     pose.t[1], pose.t[2], pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
+}
+
+void bind_pose(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(Pose, q, t);
+  py::class_<Pose>(module, "Pose",
+                   "Rigid motion T_a_b: takes points of frame b to frame a, p_a = T_a_b @ p_b.")
+      .def(py::init<>(), "The identity.")
+      .def(py::init(&make_pose), py::arg("t"), py::arg("q"),
+           "From t (3,) [m] and the unit quaternion q (4,), x y z w.")
+      .def_property_readonly(
+          "t", [](const py::object& self) { return view_of(self.cast<const Pose&>().t.data(), {3}, self); },
+          "Translation (3,) [m], read-only.")
+      .def_property_readonly(
+          "q", [](const py::object& self) { return view_of(self.cast<const Pose&>().q.data(), {4}, self); },
+          "Unit quaternion (4,), x y z w, read-only.")
+      .def("matrix", &matrix_of, "The 4x4 matrix, a new array.")
+      .def("inverse", &inverse, "T_b_a.")
+      .def(
+          "__matmul__", [](const Pose& a, const Pose& b) { return compose(a, b); }, py::is_operator(),
+          "T_a_c = T_a_b @ T_b_c; of points (3,) or (N, 3) [m], a new array of the same shape.")
+      .def("__matmul__", &transform_points, py::is_operator())
+      .def(py::self == py::self)
+      .def("__repr__", &text_of);
+}
+
+void bind_rig(py::module_& module) {
+  py::enum_<Sensor>(module, "Sensor").value("STEREO", Sensor::kStereo).value("RGBD", Sensor::kRgbd);
+  const CameraRig d;
+  py::class_<CameraRig>(
+      module, "CameraRig",
+      "A rectified sensor: pinhole cameras without distortion; of a stereo pair the right one is\n"
+      "shifted by `baseline` along x.")
+      .def(py::init([](Sensor sensor, int width, int height, double fx, double fy, double cx, double cy,
+                       double baseline, double depth_unit, double depth_min, double depth_max,
+                       double readout) {
+             return CameraRig{sensor, width,    height,     fx,        fy,        cx,
+                              cy,     baseline, depth_unit, depth_min, depth_max, readout};
+           }),
+           py::kw_only(), py::arg("sensor") = d.sensor, py::arg("width"), py::arg("height"), py::arg("fx"),
+           py::arg("fy"), py::arg("cx"), py::arg("cy"), py::arg("baseline"),
+           py::arg("depth_unit") = d.depth_unit, py::arg("depth_min") = d.depth_min,
+           py::arg("depth_max") = d.depth_max, py::arg("readout") = d.readout,
+           "Sizes, focal lengths and principal point in pixels; baseline in metres, of RGB-D that of the "
+           "virtual right\n"
+           "camera (0.08); depth_unit: metres per unit of the depth image; readings outside depth_min to "
+           "depth_max [m]\n"
+           "are holes; readout of a rolling shutter [s].")
+      .def_readwrite("sensor", &CameraRig::sensor)
+      .def_readwrite("width", &CameraRig::width)
+      .def_readwrite("height", &CameraRig::height)
+      .def_readwrite("fx", &CameraRig::fx)
+      .def_readwrite("fy", &CameraRig::fy)
+      .def_readwrite("cx", &CameraRig::cx)
+      .def_readwrite("cy", &CameraRig::cy)
+      .def_readwrite("baseline", &CameraRig::baseline)
+      .def_readwrite("depth_unit", &CameraRig::depth_unit)
+      .def_readwrite("depth_min", &CameraRig::depth_min)
+      .def_readwrite("depth_max", &CameraRig::depth_max)
+      .def_readwrite("readout", &CameraRig::readout);
+}
+
+void bind_estimate(py::module_& module) {
+  py::enum_<TrackingState>(module, "TrackingState")
+      .value("TRACKED", TrackingState::kTracked, "the pose is known")
+      .value("LOST", TrackingState::kLost, "looked at, no trustworthy pose")
+      .value("UNPLACED", TrackingState::kUnplaced, "in a loaded map, no place of which was recognised yet");
+  py::class_<PoseEstimate>(module, "PoseEstimate", "What is known of the camera at one frame.")
+      .def_readonly("frame", &PoseEstimate::frame, "Counts pushed frames from 0, dropped ones included.")
+      .def_readonly("t_ns", &PoseEstimate::t_ns, "The frame's own time [ns].")
+      .def_readonly("state", &PoseEstimate::state)
+      .def_property_readonly(
+          "tracked", [](const PoseEstimate& pose) { return pose.state == TrackingState::kTracked; },
+          "Whether the pose is known; without it, what follows `points` means nothing.")
+      .def_readonly("keyframe", &PoseEstimate::keyframe, "Whether it was proposed as a keyframe of the map.")
+      .def_readonly("effort", &PoseEstimate::effort, "Effort level; 0: nothing was left out.")
+      .def_property_readonly(
+          "reason", [](const PoseEstimate& pose) { return pose.reason; }, "Why it is lost, in words.")
+      .def_readonly("points", &PoseEstimate::points, "Measurements that the pose rests on.")
+      .def_readonly("tracked_share", &PoseEstimate::tracked_share,
+                    "Those over the points looked for, 0 to 1.")
+      .def_readonly("T_world_camera", &PoseEstimate::T_world_camera, "In the world of `map_part`.")
+      .def_readonly("map_part", &PoseEstimate::map_part,
+                    "First keyframe of the part; parts have worlds of their own.")
+      .def_readonly("reference_keyframe", &PoseEstimate::reference_keyframe)
+      .def_readonly("T_reference_camera", &PoseEstimate::T_reference_camera,
+                    "This survives corrections of the map.")
+      .def_property_readonly(
+          "covariance",
+          [](const py::object& self) {
+            return view_of(self.cast<const PoseEstimate&>().covariance.data(), {6, 6}, self);
+          },
+          "(6, 6), read-only: of (translation [m], rotation [rad]) in the camera's axes, with the map taken "
+          "as true.")
+      .def_property_readonly(
+          "velocity",
+          [](const py::object& self) {
+            return view_of(self.cast<const PoseEstimate&>().velocity.data(), {6}, self);
+          },
+          "(6,), read-only: linear [m/s] and angular [rad/s], in the camera's axes.")
+      .def_readonly("map_version", &PoseEstimate::map_version,
+                    "Version of the map that it was tracked against.")
+      .def_readonly("exposed_ns", &PoseEstimate::exposed_ns,
+                    "When the frame was due, on CLOCK_MONOTONIC [ns].")
+      .def_readonly("latency_ns", &PoseEstimate::latency_ns,
+                    "From then to the moment the pose was known [ns].")
+      .def("__repr__", [](const PoseEstimate& pose) {
+        if (pose.state == TrackingState::kTracked)
+          return fmt::format("<PoseEstimate {}: {}>", pose.frame, text_of(pose.T_world_camera));
+        return fmt::format("<PoseEstimate {}: {}: {}>", pose.frame, to_string(pose.state), pose.reason);
+      });
+}
+
+void bind_event(py::module_& module) {
+  py::enum_<MapEventKind>(module, "MapEventKind")
+      .value("OPTIMISATION", MapEventKind::kOptimisation)
+      .value("LOOP_CLOSURE", MapEventKind::kLoopClosure)
+      .value("POSE_GRAPH", MapEventKind::kPoseGraph)
+      .value("PARTS_JOINED", MapEventKind::kPartsJoined)
+      .value("RELOCALISATION", MapEventKind::kRelocalisation)
+      .value("NEW_PART", MapEventKind::kNewPart);
+  py::class_<MapEvent>(module, "MapEvent", "Why poses given out before are no longer what the map says.")
+      .def_readonly("kind", &MapEvent::kind)
+      .def_readonly("frame", &MapEvent::frame, "The first that saw it.")
+      .def_readonly("t_ns", &MapEvent::t_ns)
+      .def_readonly("map_version", &MapEvent::map_version)
+      .def_readonly("keyframe", &MapEvent::keyframe, "Reference keyframe of that frame.")
+      .def_readonly("map_part_before", &MapEvent::map_part_before)
+      .def_readonly("map_part", &MapEvent::map_part)
+      .def_readonly("T_world_camera_before", &MapEvent::T_world_camera_before)
+      .def_readonly("T_world_camera_after", &MapEvent::T_world_camera_after)
+      .def_readonly("moved", &MapEvent::moved,
+                    "Distance between the two [m]; of no meaning across map parts.")
+      .def_readonly("turned", &MapEvent::turned, "Angle between the two [rad]; likewise.")
+      .def("__repr__", [](const MapEvent& event) {
+        return fmt::format("<MapEvent {} at frame {}: moved {:.3f} m>", to_string(event.kind), event.frame,
+                           event.moved);
+      });
+}
+
+}  // namespace
+
+void bind_types(py::module_& module) {
+  bind_pose(module);
+  bind_rig(module);
+}
+
+void bind_estimates(py::module_& module) {
+  bind_estimate(module);
+  bind_event(module);
+}
+
+}  // namespace twofold::python

@@ -1,0 +1,130 @@
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "python/frames.hpp"
+#include "python/trajectory.hpp"
+#include "twofold/rectifier.hpp"
+
+namespace twofold::python {
+namespace {
+
+ImageFormat colour_format(const std::string& colours) {
+  if (colours == "bgr") return ImageFormat::kBgr8;
+  if (colours == "rgb") return ImageFormat::kRgb8;
+  throw py::value_error("colours must be 'bgr' or 'rgb', is '" + colours + "'");
+}
+
+PythonFrame make_frame(std::int64_t t_ns, const py::object& left, const py::object& right,
+                       const py::object& depth, const std::string& colours) {
+  release_arrays();
+  PythonFrame frame;
+  auto owner = std::make_unique<ArrayOwner>();
+  const ImageFormat format = colour_format(colours);
+  frame.view.t_ns = t_ns;
+  frame.view.left = image_view(left, "left", format, *owner, frame.copied);
+  frame.view.right = image_view(right, "right", format, *owner, frame.copied);
+  frame.view.depth = image_view(depth, "depth", ImageFormat::kDepth16, *owner, frame.copied);
+  frame.view.owner = ArrayOwner::share(std::move(owner));
+  return frame;
+}
+
+template <ImageView FrameView::*kImage>
+py::object image_of(const py::object& self) {
+  return array_of(self.cast<const PythonFrame&>().view.*kImage, self);
+}
+
+void bind_frame(py::module_& module) {
+  py::class_<PythonFrame>(module, "Frame",
+                          "The images of one instant.\n\n"
+                          "Grey images (uint8, height x width) and depth (uint16, likewise) are used where "
+                          "they are: do not write into\n"
+                          "them afterwards. Colour (uint8, height x width x 3) is turned to grey, a copy, "
+                          "when the frame is pushed. An\n"
+                          "array whose rows do not lie row after row, pixel beside pixel (a transposed or "
+                          "mirrored one), is copied here;\n"
+                          "`copied` names it.")
+      .def(py::init(&make_frame), py::arg("t_ns"), py::arg("left"), py::arg("right") = py::none(),
+           py::arg("depth") = py::none(), py::kw_only(), py::arg("colours") = "bgr",
+           "t_ns [ns] must grow from frame to frame; colours: order in colour images, 'bgr' or 'rgb'.")
+      .def_property_readonly("t_ns", [](const PythonFrame& frame) { return frame.view.t_ns; })
+      .def_property_readonly("left", &image_of<&FrameView::left>, "A read-only view of the pixels.")
+      .def_property_readonly("right", &image_of<&FrameView::right>, "The same, or None.")
+      .def_property_readonly("depth", &image_of<&FrameView::depth>, "The same, or None.")
+      .def_property_readonly(
+          "copied", [](const PythonFrame& frame) { return py::tuple(py::cast(frame.copied)); },
+          "Names of the images that were copied when the frame was made.");
+}
+
+std::optional<PythonFrame> next_frame(Source& source) {
+  PythonFrame frame;
+  const py::gil_scoped_release unlocked;
+  if (!source.next(frame.view)) return std::nullopt;
+  return frame;
+}
+
+void bind_source(py::module_& module) {
+  py::class_<Source, std::shared_ptr<Source>>(
+      module, "Source",
+      "Frames of a recording, a video, a rendered scene or a camera, rectified.\n\n"
+      "Named as on the command line: a path, or euroc:DIR, kitti:DIR, tum:DIR, images:DIR, video:FILE, "
+      "v4l2:DEVICE,\n"
+      "synthetic:SCENE, with ?key=value&key=value. Iterating gives Frames; the interpreter runs on "
+      "meanwhile.")
+      .def(py::init([](const std::string& name, const std::optional<std::filesystem::path>& calibration,
+                       bool preload) {
+             const py::gil_scoped_release unlocked;
+             return std::make_shared<Source>(name, SourceSettings{calibration.value_or(""), preload});
+           }),
+           py::arg("name"), py::kw_only(), py::arg("calibration") = py::none(), py::arg("preload") = false,
+           "calibration: file instead of the recording's own; preload: decode everything now. Raises "
+           "RuntimeError.")
+      .def_property_readonly("rig", &Source::rig, py::return_value_policy::copy)
+      .def_property_readonly("frame_count", &Source::frame_count, "None where it is not known beforehand.")
+      .def_property_readonly("is_live", &Source::is_live,
+                             "Frames come when they are taken, not when asked for.")
+      .def_property_readonly(
+          "ground_truth", [](const Source& source) { return PoseList{source.ground_truth()}; },
+          "Trajectory of the rig's camera; empty when there is none.")
+      .def("next", &next_frame, "The next frame, or None at the end.")
+      .def("stop", &Source::stop, "A camera ends; of recordings, no more frames are given. From any thread.")
+      .def("__iter__", [](const py::object& self) { return self; })
+      .def("__next__",
+           [](Source& source) {
+             auto frame = next_frame(source);
+             if (!frame) throw py::stop_iteration();
+             return *std::move(frame);
+           })
+      .def("__enter__", [](const py::object& self) { return self; })
+      .def("__exit__", [](Source& source, const py::args&) { source.stop(); });
+}
+
+void bind_rectifier(py::module_& module) {
+  py::class_<FrameRectifier>(module, "FrameRectifier",
+                             "Makes rectified frames of those that a camera gives, by a calibration file.")
+      .def(py::init<const std::filesystem::path&, int, int>(), py::arg("calibration"), py::arg("width") = 0,
+           py::arg("height") = 0,
+           "width, height [px]: of the raw images, for calibrations that do not state it. Raises "
+           "RuntimeError.")
+      .def_property_readonly("rig", &FrameRectifier::rig, py::return_value_policy::copy,
+                             "What the rectified frames are of.")
+      .def(
+          "rectify",
+          [](const FrameRectifier& self, const PythonFrame& raw) {
+            const py::gil_scoped_release unlocked;
+            return PythonFrame{self.rectify(raw.view), {}};
+          },
+          py::arg("raw"),
+          "Grey images, and depth. Raises ValueError when the frame is not of the calibrated cameras.");
+}
+
+}  // namespace
+
+void bind_frames(py::module_& module) {
+  bind_frame(module);
+  bind_source(module);
+  bind_rectifier(module);
+}
+
+}  // namespace twofold::python

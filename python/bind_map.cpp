@@ -1,0 +1,96 @@
+#include "twofold/map.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <mutex>
+
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "python/map_rows.hpp"
+
+namespace twofold::python {
+namespace {
+
+template <class Row>
+py::array rows_of(const py::object& self, const std::vector<Row>& rows) {
+  return view_of(rows.data(), {static_cast<py::ssize_t>(rows.size())}, self);
+}
+
+/// The rows are made without the interpreter's lock; several threads may ask at once.
+template <class Row, class Make>
+py::array lazily(const py::object& self, MapRows::Lazy<Row> MapRows::*member, const Make& make) {
+  auto& map = self.cast<MapRows&>();
+  auto& lazy = map.*member;
+  {
+    const py::gil_scoped_release unlocked;
+    std::call_once(lazy.made, [&] { lazy.rows = make(map.snapshot); });
+  }
+  return rows_of(self, lazy.rows);
+}
+
+void register_rows() {
+  using Map = MapSnapshot;
+  PYBIND11_NUMPY_DTYPE(Map::Keyframe, id, part, frame, t_ns, T_world_camera, points, window, has_place);
+  PYBIND11_NUMPY_DTYPE(Map::Point, id, anchor, observers, position, covariance);
+  PYBIND11_NUMPY_DTYPE(Map::Edge, from, to, kind, shared_points, T_to_from);
+  PYBIND11_NUMPY_DTYPE(Map::Part, id, keyframes);
+}
+
+}  // namespace
+
+void bind_map(py::module_& module) {
+  register_rows();
+  py::class_<MapRows>(
+      module, "Map",
+      "One version of the map, which never changes and may be held as long as one likes.\n\n"
+      "Tables are structured arrays, ascending by id, made when first asked for: read-only views that hold "
+      "this object.\n"
+      "While it is held, what the map has replaced since stays in memory, at most memory_bytes().")
+      .def_property_readonly("version", [](const MapRows& self) { return self.snapshot.version(); })
+      .def_property_readonly(
+          "reference", [](const MapRows& self) { return self.snapshot.reference(); },
+          "Keyframe in the middle of the windows; NO_ID in an empty map.")
+      .def(
+          "keyframes",
+          [](const py::object& self) {
+            return lazily(self, &MapRows::keyframes, [](const MapSnapshot& map) { return map.keyframes(); });
+          },
+          "(N,) with fields id, part, frame, t_ns [ns], T_world_camera (q: x y z w, t [m]), points (it "
+          "sees), window (1, 2:\n"
+          "in W1, W2; 0: in neither), has_place (it can be recognised).")
+      .def(
+          "points",
+          [](const py::object& self, bool covariance) {
+            return lazily(self, covariance ? &MapRows::points : &MapRows::bare_points,
+                          [covariance](const MapSnapshot& map) { return map.points(covariance); });
+          },
+          py::arg("covariance") = true,
+          "(N,) with fields id, anchor (keyframe it was first seen in), observers (keyframes that see it), "
+          "position (3,)\n"
+          "[m], covariance (9,): 3x3 row by row [m^2]; without covariance zeros, at a tenth of the time.")
+      .def(
+          "edges",
+          [](const py::object& self) {
+            return lazily(self, &MapRows::edges, [](const MapSnapshot& map) { return map.edges(); });
+          },
+          "(N,) with fields from, to (> from), kind (0: covisible, 1: marginalised), shared_points, "
+          "T_to_from (q, t).")
+      .def(
+          "parts",
+          [](const py::object& self) {
+            return lazily(self, &MapRows::parts, [](const MapSnapshot& map) { return map.parts(); });
+          },
+          "(N,) with fields id, keyframes (their number); one when everything is connected.")
+      .def(
+          "memory_bytes",
+          [](const MapRows& self) {
+            const py::gil_scoped_release unlocked;
+            return self.snapshot.memory_bytes();
+          },
+          "What it holds, shared with newer versions or not; O(size of the map).")
+      .def("__repr__",
+           [](const MapRows& self) { return fmt::format("<Map version {}>", self.snapshot.version()); });
+}
+
+}  // namespace twofold::python

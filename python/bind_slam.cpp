@@ -1,0 +1,262 @@
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <bit>
+#include <mutex>
+
+#include <fmt/format.h>
+
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "python/frames.hpp"
+#include "python/map_rows.hpp"
+#include "python/trajectory.hpp"
+#include "twofold/pose_queue.hpp"
+#include "twofold/slam.hpp"
+
+namespace twofold::python {
+namespace {
+
+using Unlocked = py::call_guard<py::gil_scoped_release>;
+
+constexpr std::size_t kItemsAFrame = 3;  // a pose, and at most two events before it
+
+std::int64_t to_ns(double seconds) {
+  return static_cast<std::int64_t>(seconds * 1e9);
+}
+
+/// Python's end of a queue: who asks takes turns.
+class Updates {
+ public:
+  explicit Updates(std::size_t capacity) : queue(capacity) {}
+
+  /// None when nothing came in time; StopIteration after the end.
+  py::object next(double timeout) {
+    PoseOrEvent item;
+    QueueStatus status = QueueStatus::kTimeout;
+    {
+      const py::gil_scoped_release unlocked;
+      const std::scoped_lock turn(readers_);
+      status = queue.next(item, to_ns(timeout));
+    }
+    if (status == QueueStatus::kEnd) throw py::stop_iteration();
+    if (status == QueueStatus::kTimeout) return py::none();
+    return std::visit([](const auto& value) { return py::cast(value); }, item);
+  }
+
+  PoseQueue queue;
+
+ private:
+  std::mutex readers_;  // never held by a thread that wants the interpreter's lock
+};
+
+/// Slam, and the queue that its tracker puts poses and events into: no Python runs on the tracker's thread.
+class SlamWithUpdates {
+ public:
+  SlamWithUpdates(const CameraRig& rig, const SlamOptions& options)
+      : items_in_flight(kItemsAFrame * static_cast<std::size_t>(std::max(options.frame_buffers, 1) + 1)),
+        updates(std::make_shared<Updates>(std::bit_ceil(std::max<std::size_t>(512, 4 * items_in_flight)))),
+        slam(rig, options) {
+    slam.on_pose([queue = &updates->queue](const PoseEstimate& pose) { queue->put(pose); });
+    slam.on_event([queue = &updates->queue](const MapEvent& event) { queue->put(event); });
+  }
+  /// Whoever reads comes to the end.
+  ~SlamWithUpdates() { finish(); }
+
+  SlamSummary finish() {
+    SlamSummary summary = slam.finish();
+    updates->queue.close();
+    return summary;
+  }
+
+  const std::size_t items_in_flight;
+  const std::shared_ptr<Updates> updates;
+  Slam slam;
+};
+
+struct DeleteUnlocked {
+  void operator()(SlamWithUpdates* slam) const {
+    {
+      const py::gil_scoped_release unlocked;
+      delete slam;
+    }
+    release_arrays();
+  }
+};
+
+/// Pushes a source's frames until it ends or the reader of the updates closes them. A recording waits for
+/// the map, and for whoever reads; a camera for nobody.
+void feed(Source& source, SlamWithUpdates& to) {
+  PoseQueue& queue = to.updates->queue;
+  FrameView frame;
+  while (!queue.closed() && source.next(frame)) {
+    if (!source.is_live()) {
+      if (!queue.wait_for_room(to.items_in_flight)) return;
+      while (!to.slam.wait_for_room(to_ns(0.1))) {
+        if (queue.closed() || !to.slam.errors().empty()) return;
+      }
+    }
+    (void)to.slam.push(frame);
+  }
+}
+
+void bind_push(py::module_& module) {
+  py::enum_<PushStatus>(module, "PushStatus")
+      .value("QUEUED", PushStatus::kQueued, "on its way to the tracker")
+      .value("DROPPED", PushStatus::kDropped, "there was no room: the tracker is behind")
+      .value("REFUSED", PushStatus::kRefused, "not to be used, and not counted as a frame");
+  py::class_<PushResult>(module, "PushResult",
+                         "Whether a frame was queued, dropped or refused; true when queued.")
+      .def_readonly("status", &PushResult::status)
+      .def_readonly("reason", &PushResult::reason, "Of dropped and refused frames: what is wrong.")
+      .def("__bool__", [](const PushResult& self) { return static_cast<bool>(self); })
+      .def("__repr__", [](const PushResult& self) {
+        return self ? std::string("<PushResult: queued>") : "<PushResult: " + self.reason + ">";
+      });
+}
+
+/// The poses of each map part, parts in the order of their ids.
+std::map<std::uint32_t, PoseList> trajectories_of(const SlamSummary& summary) {
+  std::map<std::uint32_t, PoseList> trajectories;
+  for (const auto& pose : summary.trajectory)
+    trajectories[pose.map_part].poses.push_back({pose.t_ns, pose.T_world_camera});
+  return trajectories;
+}
+
+void bind_summary(py::module_& module) {
+  py::class_<StageTime>(module, "StageTime", "What a stage of a thread took, over the whole run.")
+      .def_readonly("thread", &StageTime::thread)
+      .def_readonly("stage", &StageTime::stage)
+      .def_readonly("count", &StageTime::count)
+      .def_readonly("mean_ms", &StageTime::mean_ms)
+      .def_readonly("p50_ms", &StageTime::p50_ms)
+      .def_readonly("p99_ms", &StageTime::p99_ms)
+      .def_readonly("max_ms", &StageTime::max_ms)
+      .def("__repr__", [](const StageTime& self) {
+        return fmt::format("<StageTime {}, {}: {} times, mean {:.3f} ms, p99 {:.3f} ms>", self.thread,
+                           self.stage, self.count, self.mean_ms, self.p99_ms);
+      });
+  py::class_<SlamSummary>(module, "Summary", "What a run came to.")
+      .def_readonly("frames", &SlamSummary::frames, "Queued or dropped.")
+      .def_readonly("tracked", &SlamSummary::tracked)
+      .def_readonly("lost", &SlamSummary::lost)
+      .def_readonly("dropped", &SlamSummary::dropped)
+      .def_property_readonly(
+          "trajectory",
+          [](const SlamSummary& self) {
+            PoseList longest;
+            for (auto& [part, trajectory] : trajectories_of(self))
+              if (trajectory.poses.size() > longest.poses.size()) longest = std::move(trajectory);
+            return longest;
+          },
+          "Poses of the tracked frames in the final map: those of the map part that has most of them.")
+      .def_property_readonly("trajectories", &trajectories_of,
+                             "The same of every map part, by the part's id.")
+      .def_readonly("timings", &SlamSummary::timings)
+      .def_readonly("notes", &SlamSummary::notes, "Requested settings that could not be applied.")
+      .def_readwrite("errors", &SlamSummary::errors, "What went wrong on the way.")
+      .def("__repr__", [](const SlamSummary& self) {
+        return fmt::format("<Summary of {} frames: {} tracked, {} lost, {} dropped>", self.frames,
+                           self.tracked, self.lost, self.dropped);
+      });
+}
+
+using MaybePath = std::optional<std::filesystem::path>;
+
+std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
+    const CameraRig& rig, RunMode mode, bool live, const MaybePath& map, bool localise_only, bool places,
+    const MaybePath& vocabulary, int inner_window, int outer_window, int frame_buffers,
+    std::optional<int> tracker_cpu, std::optional<int> mapper_cpu, std::optional<int> loop_closer_cpu,
+    std::optional<int> fifo_priority) {
+  const SlamOptions options{
+      mode,         live,         map.value_or(""), localise_only, places,     vocabulary.value_or(""),
+      inner_window, outer_window, frame_buffers,    tracker_cpu,   mapper_cpu, loop_closer_cpu,
+      fifo_priority};
+  const py::gil_scoped_release unlocked;
+  return std::unique_ptr<SlamWithUpdates, DeleteUnlocked>(new SlamWithUpdates(rig, options));
+}
+
+PushResult push(SlamWithUpdates& self, const PythonFrame& frame) {
+  release_arrays();
+  const py::gil_scoped_release unlocked;
+  return self.slam.push(frame.view);
+}
+
+SlamSummary finish(SlamWithUpdates& self) {
+  SlamSummary summary;
+  {
+    const py::gil_scoped_release unlocked;
+    summary = self.finish();
+  }
+  release_arrays();
+  return summary;
+}
+
+void bind_slam_class(py::module_& module) {
+  const SlamOptions d;
+  py::class_<SlamWithUpdates, std::unique_ptr<SlamWithUpdates, DeleteUnlocked>>(module, "Slam")
+      .def(py::init(&make_slam), py::arg("rig"), py::kw_only(), py::arg("mode") = d.mode,
+           py::arg("live") = d.live, py::arg("map") = py::none(), py::arg("localise_only") = d.localise_only,
+           py::arg("places") = d.places, py::arg("vocabulary") = py::none(),
+           py::arg("inner_window") = d.inner_window, py::arg("outer_window") = d.outer_window,
+           py::arg("frame_buffers") = d.frame_buffers, py::arg("tracker_cpu") = d.tracker_cpu,
+           py::arg("mapper_cpu") = d.mapper_cpu, py::arg("loop_closer_cpu") = d.loop_closer_cpu,
+           py::arg("fifo_priority") = d.fifo_priority)
+      .def(
+          "push", &push, py::arg("frame"),
+          "Queued, dropped because there is no room, or refused (images that do not fit the rig, time that "
+          "does not grow),\n"
+          "and why. Waits for no thread of the engine, but in a deterministic run tracks and maps the frame.")
+      .def(
+          "has_room", [](const SlamWithUpdates& self) { return self.slam.has_room(); }, Unlocked(),
+          "Whether a push would find room now.")
+      .def(
+          "wait_for_room",
+          [](SlamWithUpdates& self, double timeout) { return self.slam.wait_for_room(to_ns(timeout)); },
+          py::arg("timeout"), Unlocked(),
+          "Waits at most for timeout [s]; for recordings, of which no frame should be dropped.")
+      .def(
+          "latest", [](const SlamWithUpdates& self) { return self.slam.latest(); },
+          "Of the newest frame that was processed, tracked or lost; None before the first. Waits for nobody.")
+      .def(
+          "map",
+          [](const SlamWithUpdates& self) {
+            const py::gil_scoped_release unlocked;
+            return std::make_unique<MapRows>(self.slam.map());
+          },
+          "The newest version of the map; O(1).")
+      .def(
+          "held_maps",
+          [](const SlamWithUpdates& self) {
+            const HeldMaps held = self.slam.held_maps();
+            return py::make_tuple(held.versions, held.oldest);
+          },
+          "How many versions of the map somebody holds, and the oldest of them; 0: none.")
+      .def(
+          "save_map",
+          [](const SlamWithUpdates& self, const std::filesystem::path& file) { self.slam.save_map(file); },
+          py::arg("file"), Unlocked(),
+          "Writes the newest version to a map file, which is replaced atomically. Raises RuntimeError.")
+      .def("errors", [](const SlamWithUpdates& self) { return self.slam.errors(); })
+      .def("finish", &finish)
+      .def_property_readonly("_updates", [](const SlamWithUpdates& self) { return self.updates; });
+}
+
+}  // namespace
+
+void bind_slam(py::module_& module) {
+  py::enum_<RunMode>(module, "RunMode")
+      .value("THREADED", RunMode::kThreaded, "tracker, mapper and loop closer on threads of their own")
+      .value("DETERMINISTIC", RunMode::kDeterministic, "all within push: same frames, same bytes");
+  bind_push(module);
+  bind_summary(module);
+  py::class_<Updates, std::shared_ptr<Updates>>(module, "Updates")
+      .def("next", &Updates::next, py::arg("timeout"))
+      .def(
+          "close", [](Updates& self) { self.queue.close(); }, Unlocked())
+      .def("take_missed", [](Updates& self) { return self.queue.take_missed(); });
+  bind_slam_class(module);
+  module.def("feed", &feed, py::arg("source"), py::arg("slam"), Unlocked());
+}
+
+}  // namespace twofold::python

@@ -1,0 +1,65 @@
+"""Real-time visual SLAM: where the camera is, and what the place looks like.
+
+    for pose in twofold.run("euroc:recordings/room"):
+        print(pose.t_ns, pose.T_world_camera.t)
+
+Everywhere: metres, radians, nanoseconds; T_a_b takes points of frame b to frame a; camera axes x right, y down, z
+forward; quaternions x y z w.
+"""
+
+from ._core import (
+    NO_ID,
+    AlignBy,
+    CameraRig,
+    Frame,
+    FrameRectifier,
+    Map,
+    MapEvent,
+    MapEventKind,
+    Pose,
+    PoseEstimate,
+    PushResult,
+    PushStatus,
+    RunMode,
+    Sensor,
+    Source,
+    StageTime,
+    Summary,
+    TrackingState,
+    Trajectory,
+    TrajectoryError,
+    __version__,
+    compare,
+    load_trajectory,
+)
+from ._run import Run, run
+from ._slam import Slam
+
+__all__ = [
+    "NO_ID",
+    "AlignBy",
+    "CameraRig",
+    "Frame",
+    "FrameRectifier",
+    "Map",
+    "MapEvent",
+    "MapEventKind",
+    "Pose",
+    "PoseEstimate",
+    "PushResult",
+    "PushStatus",
+    "Run",
+    "RunMode",
+    "Sensor",
+    "Slam",
+    "Source",
+    "StageTime",
+    "Summary",
+    "TrackingState",
+    "Trajectory",
+    "TrajectoryError",
+    "__version__",
+    "compare",
+    "load_trajectory",
+    "run",
+]

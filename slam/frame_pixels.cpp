@@ -1,0 +1,91 @@
+#include "slam/frame_pixels.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include <fmt/format.h>
+
+namespace twofold {
+namespace {
+
+/// OpenCV counts the matrices that share the pixels and calls this when none is left.
+class OwnerAllocator : public cv::MatAllocator {
+ public:
+  using Owner = std::shared_ptr<const void>;
+
+  [[nodiscard]] cv::Mat wrap(const ImageView& view, int type, const Owner& owner) const {
+    auto* pixels = static_cast<std::uint8_t*>(const_cast<void*>(view.data));  // the engine only reads them
+    cv::Mat image(view.height, view.width, type, pixels, static_cast<std::size_t>(view.stride));
+    image.u = new cv::UMatData(this);
+    image.u->data = image.u->origdata = pixels;
+    image.u->size = static_cast<std::size_t>(view.stride) * static_cast<std::size_t>(view.height);
+    image.u->userdata = new Owner(owner);
+    image.u->refcount = 1;
+    image.allocator = const_cast<OwnerAllocator*>(this);
+    return image;
+  }
+
+  cv::UMatData* allocate(int dims, const int* sizes, int type, void* data, std::size_t* step,
+                         cv::AccessFlag flags, cv::UMatUsageFlags usage) const override {
+    return cv::Mat::getStdAllocator()->allocate(dims, sizes, type, data, step, flags, usage);
+  }
+  bool allocate(cv::UMatData* data, cv::AccessFlag flags, cv::UMatUsageFlags usage) const override {
+    return cv::Mat::getStdAllocator()->allocate(data, flags, usage);
+  }
+  void deallocate(cv::UMatData* data) const override {
+    if (data == nullptr) return;
+    delete static_cast<Owner*>(data->userdata);
+    delete data;
+  }
+};
+
+const char* name_of(ImageFormat format) {
+  switch (format) {
+    case ImageFormat::kGrey8:
+      return "grey8";
+    case ImageFormat::kRgb8:
+      return "rgb8";
+    case ImageFormat::kBgr8:
+      return "bgr8";
+    case ImageFormat::kDepth16:
+      break;
+  }
+  return "depth16";
+}
+
+int type_of(ImageFormat format) {
+  if (format == ImageFormat::kGrey8) return CV_8UC1;
+  return format == ImageFormat::kDepth16 ? CV_16UC1 : CV_8UC3;
+}
+
+}  // namespace
+
+std::string pixels_refusal(const char* name, const ImageView& view, bool depth) {
+  if (view.data == nullptr) return fmt::format("the {} image is missing", name);
+  if (view.width <= 0 || view.height <= 0)
+    return fmt::format("the {} image is {}x{}", name, view.width, view.height);
+  if ((view.format == ImageFormat::kDepth16) != depth)
+    return fmt::format("the {} image is {}, but must be {}", name, name_of(view.format),
+                       depth ? "depth16" : "grey8, rgb8 or bgr8");
+  const auto row = static_cast<std::ptrdiff_t>(CV_ELEM_SIZE(type_of(view.format))) * view.width;
+  if (view.stride < row)
+    return fmt::format("the {} image's stride is {} bytes, but a row takes {}", name, view.stride, row);
+  return "";
+}
+
+cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owner) {
+  static const auto& kAllocator = *new OwnerAllocator;  // outlives every image
+  if (view.data == nullptr) return {};
+  const int type = type_of(view.format);
+  if (owner && type != CV_8UC3) return kAllocator.wrap(view, type, owner);
+  const cv::Mat theirs(view.height, view.width, type, const_cast<void*>(view.data),
+                       static_cast<std::size_t>(view.stride));
+  cv::Mat ours;
+  if (type == CV_8UC3) {
+    cv::cvtColor(theirs, ours, view.format == ImageFormat::kRgb8 ? cv::COLOR_RGB2GRAY : cv::COLOR_BGR2GRAY);
+  } else {
+    theirs.copyTo(ours);
+  }
+  return ours;
+}
+
+}  // namespace twofold

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "twofold/types.hpp"
+
+namespace twofold {
+
+/// Empty when the view describes an image, of depth or not, whose pixels can be read; else one sentence that
+/// says what is wrong.
+/// @param name  of the image, for the sentence
+[[nodiscard]] std::string pixels_refusal(const char* name, const ImageView& view, bool depth);
+
+/// The pixels of a view that is not refused, CV_8UC1 or CV_16UC1; an empty image for a view without data.
+/// With an owner, grey images and depth stay where they are, and the image keeps the owner; else they are
+/// copied. Colour is turned to grey.
+[[nodiscard]] cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owner);
+
+}  // namespace twofold

@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import grey
+from numpy.typing import NDArray
+
+import twofold
+
+
+def test_pixels_stay_where_they_are() -> None:
+    left, right = grey(48, 64), grey(48, 64)
+    depth = grey(48, 64).astype(np.uint16)
+    frame = twofold.Frame(7, left, right, depth)
+    assert frame.t_ns == 7
+    assert frame.copied == ()
+    assert np.shares_memory(frame.left, left)
+    assert frame.right is not None and np.shares_memory(frame.right, right)
+    assert frame.depth is not None and np.shares_memory(frame.depth, depth)
+    assert not frame.left.flags.writeable
+
+
+def test_a_cut_out_of_a_larger_image_is_not_copied() -> None:
+    both = grey(48, 128)
+    frame = twofold.Frame(0, both[:, :64], both[:, 64:])
+    assert frame.copied == ()
+    assert frame.right is not None
+    np.testing.assert_array_equal(frame.right, both[:, 64:])
+
+
+@pytest.mark.parametrize(
+    "image", [grey(64, 48).T, grey(48, 64)[:, ::-1], grey(48, 64)[::-1], np.broadcast_to(grey(1, 64), (48, 64))]
+)
+def test_other_layouts_are_copied_and_named(image: NDArray[np.uint8]) -> None:
+    frame = twofold.Frame(0, grey(48, 64), image)
+    assert frame.copied == ("right",)
+    assert frame.right is not None
+    np.testing.assert_array_equal(frame.right, image)
+
+
+def test_what_is_no_image_is_named() -> None:
+    with pytest.raises(TypeError, match="left: an image must be a numpy array"):
+        twofold.Frame(0, [[1, 2], [3, 4]])  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="right: must be uint8"):
+        twofold.Frame(0, grey(4, 4), grey(4, 4).astype(np.float32))
+    with pytest.raises(ValueError, match="depth: must be uint16"):
+        twofold.Frame(0, grey(4, 4), depth=grey(4, 4))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="left: must be uint8 of shape"):
+        twofold.Frame(0, np.zeros((4, 4, 4), np.uint8))
+    with pytest.raises(ValueError, match="'bgr' or 'rgb'"):
+        twofold.Frame(0, grey(4, 4), colours="gbr")
+
+
+def test_colour_is_turned_to_grey_in_its_order(rig: twofold.CameraRig) -> None:
+    reds = np.zeros((rig.height, rig.width, 3), np.uint8)
+    reds[..., 0] = 255
+    frame = twofold.Frame(0, reds, reds, colours="rgb")
+    assert frame.left.shape == (rig.height, rig.width, 3)
+    with twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+        assert slam.push(frame)
+
+
+def test_arrays_are_given_back_when_the_engine_is_done_with_them(
+    frames: list[twofold.Frame], rig: twofold.CameraRig
+) -> None:
+    arrays = [(np.array(frame.left), np.array(frame.right)) for frame in frames]
+    free = sys.getrefcount(arrays[0][0])
+    with twofold.Slam(rig) as slam:
+        for frame, (left, right) in zip(frames, arrays, strict=True):
+            assert slam.wait_for_room(60)
+            assert slam.push(twofold.Frame(frame.t_ns, left, right))
+    del left, right
+    assert [sys.getrefcount(pair[0]) for pair in arrays] == [free] * len(arrays)
+
+
+def test_sources_give_frames_and_truth() -> None:
+    source = twofold.Source("synthetic:desk?frames=3&sensor=rgbd&width=64&height=48")
+    assert source.frame_count == 3
+    assert not source.is_live
+    assert source.rig.sensor == twofold.Sensor.RGBD
+    frames = list(source)
+    assert len(frames) == 3
+    assert frames[0].right is None
+    assert frames[0].depth is not None and frames[0].depth.dtype == np.uint16
+    np.testing.assert_array_equal(source.ground_truth.t_ns, [frame.t_ns for frame in frames])
+    with pytest.raises(RuntimeError, match="/nowhere"):
+        twofold.Source("euroc:/nowhere")
+
+
+def test_rectifiers_follow_the_calibration(stereo_yaml: Path) -> None:
+    rectifier = twofold.FrameRectifier(stereo_yaml)
+    assert rectifier.rig.width == 64
+    assert rectifier.rig.baseline == pytest.approx(0.1)
+    left = grey(48, 64)
+    frame = rectifier.rectify(twofold.Frame(5, left, left))
+    assert frame.t_ns == 5
+    np.testing.assert_array_equal(frame.left, left)
+    with pytest.raises(ValueError, match="right"):
+        rectifier.rectify(twofold.Frame(5, left, grey(48, 32)))
+    with pytest.raises(RuntimeError, match="nowhere.yaml"):
+        twofold.FrameRectifier("nowhere.yaml")

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import gc
+import signal
+import subprocess
+import sys
+import weakref
+
+import numpy as np
+import pytest
+from conftest import SCENE
+
+import twofold
+
+
+def test_a_run_gives_every_pose() -> None:
+    frames = [pose.frame for pose in twofold.run(SCENE)]
+    assert frames == list(range(40))
+
+
+def test_a_recording_waits_for_who_iterates() -> None:
+    with twofold.run("synthetic:desk?frames=700&width=64&height=48", places=False) as run:
+        frames = [pose.frame for pose in run]
+        assert frames == list(range(700))
+        assert run.slam.missed() == 0
+
+
+def test_a_loop_may_be_left() -> None:
+    run = twofold.run("synthetic:desk?frames=100000&width=64&height=48")
+    for pose in run:
+        if pose.frame == 5:
+            break
+    summary = run.finish()
+    assert 5 < summary.frames < 100000
+    gone = weakref.ref(run)
+    del run
+    gc.collect()
+    assert gone() is None
+
+
+def test_what_the_source_raises_comes_at_the_end(tmp_path: object) -> None:
+    folder = f"{tmp_path}/images"
+    record(folder)
+    poses = twofold.run(f"images:{folder}?fps=30&fx=50&fy=50&cx=31&cy=23&baseline=0.1")
+    with pytest.raises(RuntimeError, match="3.png"):
+        list(poses)
+
+
+def record(folder: str) -> None:
+    """Five image pairs, of which the fourth is damaged."""
+    cv2 = pytest.importorskip("cv2")
+    from pathlib import Path
+
+    for side in "left", "right":
+        (Path(folder) / side).mkdir(parents=True)
+        for i in range(5):
+            file = Path(folder) / side / f"{i}.png"
+            cv2.imwrite(str(file), np.full((48, 64), 40 * i, np.uint8))
+            if i == 3:
+                file.write_bytes(file.read_bytes()[:60])
+
+
+def python(script: str, *, interrupt: bool = False) -> subprocess.CompletedProcess[str]:
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if interrupt:
+        assert process.stdout is not None
+        process.stdout.readline()  # the loop runs
+        process.send_signal(signal.SIGINT)
+    out, error = process.communicate(timeout=120)
+    return subprocess.CompletedProcess(process.args, process.returncode, out, error)
+
+
+ENDLESS = "synthetic:desk?frames=1000000&width=64&height=48"
+
+
+def test_ctrl_c_works() -> None:
+    done = python(
+        f"import twofold\nfor pose in twofold.run({ENDLESS!r}):\n    print(pose.frame, flush=True)", interrupt=True
+    )
+    assert "KeyboardInterrupt" in done.stderr
+    assert done.returncode == -signal.SIGINT
+
+
+def test_a_script_may_end_in_the_middle() -> None:
+    done = python(
+        f"import twofold\nrun = twofold.run({ENDLESS!r})\nnext(iter(run))\n"
+        "slam = twofold.Slam(run.source.rig)\nslam.on_pose(print)\n"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_runs_can_be_compared_with_the_truth(finished: twofold.Run) -> None:
+    trajectory = finished.finish().trajectory
+    error = twofold.compare(trajectory, finished.source.ground_truth)
+    assert error.pairs == 40
+    assert error.ate_rmse < 0.005
+    scaled = twofold.Trajectory(trajectory.t_ns, trajectory.positions * 0.5, trajectory.orientations)
+    similar = twofold.compare(scaled, trajectory, align=twofold.AlignBy.SIMILARITY)
+    assert similar.scale == pytest.approx(2)
+    with pytest.raises(ValueError):
+        twofold.compare(twofold.Trajectory([], np.zeros((0, 3)), np.zeros((0, 4))), trajectory)
+
+
+def test_trajectories_survive_their_file(finished: twofold.Run, tmp_path: object) -> None:
+    trajectory = finished.finish().trajectory
+    trajectory.save(f"{tmp_path}/poses.txt")
+    read = twofold.load_trajectory(f"{tmp_path}/poses.txt")
+    np.testing.assert_array_equal(read.t_ns, trajectory.t_ns)
+    np.testing.assert_allclose(read.positions, trajectory.positions, atol=1e-6)
+
+
+def test_poses_compose() -> None:
+    quarter = np.sqrt(0.5)
+    T_a_b = twofold.Pose([1, 0, 0], [0, 0, quarter, quarter])  # a quarter turn about z
+    np.testing.assert_allclose(T_a_b @ [1, 0, 0], [1, 1, 0], atol=1e-12)
+    points = np.array([[0.0, 1, 2], [3, 4, 5]])
+    homogeneous = np.column_stack([points, np.ones(2)])
+    np.testing.assert_allclose(T_a_b @ points, (homogeneous @ T_a_b.matrix().T)[:, :3], atol=1e-12)
+    np.testing.assert_allclose((T_a_b @ T_a_b.inverse()).matrix(), np.eye(4), atol=1e-12)
+    assert T_a_b == twofold.Pose(T_a_b.t, T_a_b.q)
+    assert not T_a_b.t.flags.writeable
+    with pytest.raises(ValueError, match="length 1"):
+        twofold.Pose([0, 0, 0], [0, 0, 0, 2])

@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import SCENE, grey
+
+import twofold
+
+
+def push_all(slam: twofold.Slam, frames: list[twofold.Frame]) -> None:
+    for frame in frames:
+        assert slam.wait_for_room(60)
+        pushed = slam.push(frame)
+        assert pushed, pushed.reason
+
+
+def test_deterministic_runs_repeat_themselves(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    positions = []
+    for _ in range(2):
+        with twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+            push_all(slam, frames)
+            positions.append(slam.finish().trajectory.positions)
+    assert positions[0].shape == (40, 3)
+    np.testing.assert_array_equal(positions[0], positions[1])
+
+
+def test_poses_come_from_the_queue_in_order(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    slam = twofold.Slam(rig)
+    push_all(slam, frames)
+    summary = slam.finish()
+    poses = list(slam.poses())
+    assert [pose.frame for pose in poses] == list(range(40))
+    assert summary.tracked == 40
+    assert slam.missed() == 0
+    latest = slam.latest()
+    assert latest is not None and latest.frame == 39
+    pose = poses[-1]
+    assert pose.tracked and pose.covariance.shape == (6, 6) and pose.velocity.shape == (6,)
+    np.testing.assert_allclose(pose.covariance, pose.covariance.T)
+    assert "exposure to pose" in {time.stage for time in summary.timings}
+
+
+def test_callbacks_run_on_a_thread_of_their_own(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    seen: list[int] = []
+    threads: set[str] = set()
+
+    def on_pose(pose: twofold.PoseEstimate) -> None:
+        seen.append(pose.frame)
+        threads.add(threading.current_thread().name)
+
+    slam = twofold.Slam(rig)
+    slam.on_pose(on_pose)
+    with pytest.raises(RuntimeError, match="one reader"):
+        slam.updates()
+    push_all(slam, frames)
+    slam.finish()
+    assert seen == list(range(40))
+    assert threads == {"twofold callbacks"}
+
+
+def test_a_callback_that_raises_is_reported(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    calls = []
+
+    def on_pose(pose: twofold.PoseEstimate) -> None:
+        calls.append(pose.frame)
+        raise KeyError("the table")
+
+    with twofold.Slam(rig) as slam:
+        slam.on_pose(on_pose)
+        push_all(slam, frames)
+        summary = slam.finish()
+    assert calls == [0]
+    assert summary.tracked == 40
+    assert summary.errors == ["the callback of on_pose raised, and is not called any more: KeyError: 'the table'"]
+
+
+def test_a_slow_callback_loses_poses_but_holds_up_nobody(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    gate = threading.Event()
+    seen: list[int] = []
+    slam = twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC)
+
+    def on_pose(pose: twofold.PoseEstimate) -> None:
+        gate.wait(60)
+        seen.append(pose.frame)
+
+    slam.on_pose(on_pose)
+    last = frames[-1].t_ns
+    for turn in range(20):
+        push_all(slam, [twofold.Frame(frame.t_ns + turn * (last + 1), frame.left, frame.right) for frame in frames])
+    gate.set()
+    summary = slam.finish()
+    assert summary.frames == 800
+    missed = slam.missed()
+    assert missed > 0
+    assert len(seen) < 800
+
+
+def test_what_cannot_be_used_is_refused_with_a_reason(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    slam = twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC)
+    small = slam.push(twofold.Frame(0, grey(48, 64), grey(48, 64)))
+    assert not small and small.status == twofold.PushStatus.REFUSED
+    assert "64x48" in small.reason
+    assert slam.push(frames[1])
+    assert "time does not grow" in slam.push(frames[0]).reason
+    slam.finish()
+    assert "finish" in slam.push(frames[2]).reason
+    with pytest.raises(ValueError, match="inner_window"):
+        twofold.Slam(rig, inner_window=0)
+    with pytest.raises(RuntimeError, match="/nowhere"):
+        twofold.Slam(rig, map="/nowhere/at.all")
+
+
+def test_maps_are_read_only_views_that_hold_their_version(finished: twofold.Run) -> None:
+    map_now = finished.slam.map()
+    points = map_now.points()
+    assert points.base is map_now
+    assert np.shares_memory(points, map_now.points())
+    assert not points.flags.writeable
+    held = finished.slam.held_maps()
+    assert held[0] >= 1
+    version = map_now.version
+    keyframes, edges, parts = map_now.keyframes(), map_now.edges(), map_now.parts()
+    del map_now
+    assert version > 0
+    assert len(keyframes) > 1 and keyframes["T_world_camera"]["t"].shape == (len(keyframes), 3)
+    assert len(points) > 30 and np.isfinite(points["position"]).all()
+    assert (points["covariance"][:, 0] > 0).any()
+    assert set(edges["from"]) <= set(keyframes["id"])
+    assert (edges["from"] < edges["to"]).all()
+    assert parts["keyframes"].sum() == len(keyframes)
+
+
+def test_a_map_survives_its_file(finished: twofold.Run, tmp_path: Path) -> None:
+    finished.slam.save_map(tmp_path / "desk.tfm")
+    with twofold.run(SCENE, map=tmp_path / "desk.tfm", localise_only=True, mode=twofold.RunMode.DETERMINISTIC) as run:
+        placed = sum(pose.tracked for pose in run)
+    assert placed > 20
+
+
+def test_the_interpreters_lock_holds_up_neither_feeder_nor_tracker() -> None:
+    run = twofold.run(SCENE)
+    updates = run.updates()
+    next(updates)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(100)  # nobody else gets the lock while this thread computes
+    try:
+        deadline = time.monotonic() + 60
+        while True:
+            latest = run.slam.latest()
+            if (latest is not None and latest.frame >= 30) or time.monotonic() > deadline:
+                break
+    finally:
+        sys.setswitchinterval(interval)
+    assert latest is not None and latest.frame >= 30
+    run.finish()

@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import twofold
+from twofold import _core
+
+PACKAGE = Path(twofold.__file__).parent
+
+
+def check(*command: str) -> None:
+    done = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, timeout=500)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_mypy_finds_nothing_to_say() -> None:
+    pytest.importorskip("mypy")
+    tests = [str(file) for file in Path(__file__).parent.glob("*.py")]
+    check("mypy", "--strict", "--cache-dir=/dev/null", str(PACKAGE))
+    check("mypy", "--strict", "--cache-dir=/dev/null", *tests)
+
+
+def test_the_stub_describes_what_is_there() -> None:
+    stub = ast.parse((PACKAGE / "_core.pyi").read_text())
+    classes = [node for node in stub.body if isinstance(node, ast.ClassDef)]
+    assert {node.name for node in classes} == {name for name, value in vars(_core).items() if isinstance(value, type)}
+    for node in classes:
+        described = {member.name for member in node.body if isinstance(member, ast.FunctionDef)}
+        described |= {ast.unparse(member.target) for member in node.body if isinstance(member, ast.AnnAssign)}
+        there = set(vars(getattr(_core, node.name)))
+        assert described - there <= {"__init__", "__eq__", "__hash__"}, node.name
+        assert {name for name in there if not name.startswith("_")} <= described, node.name

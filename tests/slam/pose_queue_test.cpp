@@ -1,0 +1,78 @@
+#include "twofold/pose_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+namespace twofold {
+namespace {
+
+PoseEstimate numbered(std::int64_t frame) {
+  PoseEstimate pose;
+  pose.frame = frame;
+  return pose;
+}
+
+std::int64_t number_of(const PoseOrEvent& item) {
+  return std::visit([](const auto& value) { return value.frame; }, item);
+}
+
+TEST(PoseQueue, GivesWhatWasPutInOrderAndThenTheEnd) {
+  PoseQueue queue(4);
+  PoseOrEvent item;
+  EXPECT_EQ(queue.next(item, 0), QueueStatus::kTimeout);
+  queue.put(numbered(1));
+  MapEvent event;
+  event.frame = 2;
+  queue.put(event);
+  queue.close();
+  EXPECT_EQ(queue.next(item), QueueStatus::kItem);
+  EXPECT_TRUE(std::holds_alternative<PoseEstimate>(item));
+  EXPECT_EQ(queue.next(item), QueueStatus::kItem);
+  EXPECT_EQ(std::get<MapEvent>(item).frame, 2);
+  EXPECT_EQ(queue.next(item), QueueStatus::kEnd);
+}
+
+TEST(PoseQueue, WhatHasNoRoomIsCounted) {
+  PoseQueue queue(4);
+  for (int i = 0; i < 7; ++i) queue.put(numbered(i));
+  EXPECT_EQ(queue.take_missed(), 3U);
+  EXPECT_EQ(queue.take_missed(), 0U);
+  PoseOrEvent item;
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_EQ(queue.next(item, 0), QueueStatus::kItem);
+    EXPECT_EQ(number_of(item), i);
+  }
+}
+
+TEST(PoseQueue, NothingIsMissedByWhoWaitsForRoom) {
+  constexpr int kItems = 20'000;
+  PoseQueue queue(8);
+  std::thread teller([&] {
+    for (int i = 0; i < kItems; ++i) {
+      ASSERT_TRUE(queue.wait_for_room(1));
+      queue.put(numbered(i));
+    }
+    queue.close();
+  });
+  PoseOrEvent item;
+  std::int64_t expected = 0;
+  while (queue.next(item) == QueueStatus::kItem) EXPECT_EQ(number_of(item), expected++);
+  teller.join();
+  EXPECT_EQ(expected, kItems);
+  EXPECT_EQ(queue.take_missed(), 0U);
+}
+
+TEST(PoseQueue, ClosingWakesWhoWaits) {
+  PoseQueue queue(2);
+  queue.put(numbered(0));
+  queue.put(numbered(1));
+  EXPECT_FALSE(queue.wait_for_room(1, 1'000'000));
+  std::thread pacer([&] { EXPECT_FALSE(queue.wait_for_room(1)); });
+  queue.close();
+  pacer.join();
+  EXPECT_TRUE(queue.closed());
+}
+
+}  // namespace
+}  // namespace twofold
