@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -80,10 +81,11 @@ static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 /// A frame as soon as its pose is known; valid during the listener's call only.
 struct PoseReport {
   const FrameRecord& record;
-  const GraphSnapshot& graph;        ///< the map it was tracked against
-  const PoseCorrection& correction;  ///< of the map, seen first by this frame, if there is a reason
-  Matrix6 information;               ///< of T_c_ref, left perturbation (v, omega); of tracked frames
-  std::int64_t exposed_ns = 0;       ///< when the frame was exposed (Pacer)
+  const GraphSnapshot& graph;              ///< the map it was tracked against
+  const PoseCorrection& correction;        ///< of the map, seen first by this frame, if there is a reason
+  Matrix6 information;                     ///< of T_c_ref, left perturbation (v, omega); of tracked frames
+  std::int64_t exposed_ns = 0;             ///< when the frame was exposed (Pacer)
+  std::span<const std::int64_t> stage_ns;  ///< what each TrackerStage took
 };
 
 /// What the mapper did in all.

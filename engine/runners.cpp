@@ -49,6 +49,7 @@ bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortL
   record.effort = effort;
   record.cause = result.cause;
   information_ = result.information;
+  stage_ns_ = result.stage_ns;
   record.snapshot_version = graph.version();
   record.reference = result.reference;
   record.T_c_ref = PackedPose(result.T_c_ref);
@@ -113,7 +114,7 @@ void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const G
   times_.record(latency_stage_, exposed_ns, record.latency_ns);
   if (!on_pose_) return;
   const ScopedStage timed(times_, listener_stage_);
-  on_pose_({record, graph, correction_, information_, exposed_ns});
+  on_pose_({record, graph, correction_, information_, exposed_ns, stage_ns_});
 }
 
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)

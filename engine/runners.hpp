@@ -71,7 +71,8 @@ class TrackerRunner {
   PoseListener on_pose_;
   FrameRecord last_;  // the last frame that was tracked
   PoseCorrection correction_;
-  Matrix6 information_ = Matrix6::Zero();  // of the last step's pose
+  Matrix6 information_ = Matrix6::Zero();                // of the last step's pose
+  std::array<std::int64_t, kTrackerStages> stage_ns_{};  // of the last step
   bool answer_awaited_ = false;
   const bool can_relocalise_;
 };

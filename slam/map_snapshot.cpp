@@ -98,6 +98,7 @@ std::vector<MapSnapshot::Point> MapSnapshot::points(bool with_covariance) const 
     Point& point = points.emplace_back();
     point.id = p;
     point.anchor = index(from.anchor);
+    point.part = index(graph.part(from.anchor));
     point.observers = static_cast<std::uint32_t>(from.observers->size());
     Eigen::Map<Vector3>(point.position.data()) = graph.position(PointId{p});
     if (with_covariance) find_covariance(impl_->rig, graph, PointId{p}, point);

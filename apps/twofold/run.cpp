@@ -8,6 +8,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
+#include "apps/twofold/live_view.hpp"
 #include "apps/twofold/map_parts.hpp"
 #include "apps/twofold/pose_streaming.hpp"
 #include "apps/twofold/run_arguments.hpp"
@@ -80,6 +81,7 @@ SourceOptions source_options_of(const RunArguments& arguments) {
 
 int run_with_filter(const RunArguments& arguments) {
   if (!arguments.poses.empty()) throw IoError("--poses", "is not for --estimator swf");
+  if (arguments.view.port) throw IoError("--view", "is not for --estimator swf");
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
   catch_interrupts();
@@ -87,10 +89,11 @@ int run_with_filter(const RunArguments& arguments) {
   return kOk;
 }
 
-FrameFeed feed_from(FrameSource& source) {
-  return [&source](Frame& frame) {
+FrameFeed feed_from(FrameSource& source, LiveView& view) {
+  return [&](Frame& frame) {
     switch (source.next(frame)) {
       case FrameStatus::kFrame:
+        view.show(frame);
         return FeedStatus::kFrame;
       case FrameStatus::kEnd:
         return FeedStatus::kEnd;
@@ -136,8 +139,9 @@ int run(const RunArguments& arguments) {
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   options.on_pose = poses.listener();
+  LiveView view(arguments.view, arguments.source, *source, options);
   ProgressLine line(source->frame_count(), arguments.quiet);
-  const FrameFeed feed = feed_from(*source);
+  const FrameFeed feed = feed_from(*source, view);
   const ProgressSink progress = [&](const Progress& p) { line.show(p); };
   catch_interrupts();
   const std::vector<std::string> notes = real_time_notes(arguments);
@@ -146,6 +150,7 @@ int run(const RunArguments& arguments) {
                               : engine.run(feed, interrupted(), progress);
   line.end();
   poses.finish();
+  view.finish();
   result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
   std::vector<std::string> maps;
   if (!arguments.map.save.empty()) {

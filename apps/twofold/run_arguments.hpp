@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/twofold/live_view.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "engine/options.hpp"
 
@@ -27,6 +28,7 @@ struct RunArguments {
   std::string estimator = "engine";
   int window = 10;
   MapArguments map;
+  ViewArguments view;
   bool no_metric_loops = false;
   bool no_places = false;
   bool deterministic = false;

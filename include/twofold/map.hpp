@@ -31,6 +31,7 @@ class TWOFOLD_API MapSnapshot {
   struct Point {
     std::uint32_t id = kNoId;
     std::uint32_t anchor = kNoId;      ///< keyframe that it was first seen in; may be gone by now
+    std::uint32_t part = kNoId;        ///< map part, whose world `position` is in
     std::uint32_t observers = 0;       ///< keyframes that see it
     std::array<double, 3> position{};  ///< in the world of its part [m]
     /// 3x3 row by row [m^2], from all its measurements with the keyframes' poses taken as true; all zero when

@@ -1,10 +1,14 @@
 #include "io/files/ply.hpp"
 
 #include <bit>
+#include <cstring>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include <fmt/format.h>
 
+#include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 
 namespace twofold {
@@ -18,15 +22,26 @@ void append(const T& value, std::string* bytes) {
   bytes->append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
-}  // namespace
+template <class T>
+void take(const char*& bytes, T& value) {
+  std::memcpy(&value, bytes, sizeof(T));
+  bytes += sizeof(T);
+}
 
-void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> points) {
-  std::string bytes = fmt::format(
+constexpr std::size_t kPointBytes = 3 * sizeof(double) + 3 + sizeof(float);
+
+std::string header(std::size_t points) {
+  return fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex {}\n"
       "property double x\nproperty double y\nproperty double z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float stddev\nend_header\n",
-      points.size());
-  constexpr std::size_t kPointBytes = 3 * sizeof(double) + 3 + sizeof(float);
+      points);
+}
+
+}  // namespace
+
+void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> points) {
+  std::string bytes = header(points.size());
   bytes.reserve(bytes.size() + points.size() * kPointBytes);
   for (const PlyPoint& point : points) {
     for (const double x : point.x_w) append(x, &bytes);
@@ -34,6 +49,26 @@ void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> poin
     append(point.stddev, &bytes);
   }
   write_file(file, bytes);
+}
+
+std::vector<PlyPoint> read_ply(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw IoError(file.string(), "cannot be opened");
+  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  // The file's size tells the number of points, and so what its header must be.
+  const std::size_t end = bytes.find("end_header\n");
+  const std::size_t begin = end == std::string::npos ? bytes.size() : end + std::strlen("end_header\n");
+  const std::size_t count = (bytes.size() - begin) / kPointBytes;
+  if (bytes.size() != begin + count * kPointBytes || bytes.compare(0, begin, header(count)) != 0)
+    throw IoError(file.string(), "is no PLY file of this program, or damaged");
+  std::vector<PlyPoint> points(count);
+  const char* at = bytes.data() + begin;
+  for (PlyPoint& point : points) {
+    for (double& x : point.x_w) take(at, x);
+    for (std::uint8_t& c : point.rgb) take(at, c);
+    take(at, point.stddev);
+  }
+  return points;
 }
 
 }  // namespace twofold

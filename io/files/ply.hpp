@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <vector>
 
 #include "geometry/types.hpp"
 
@@ -18,5 +19,8 @@ struct PlyPoint {
 /// Writes a binary little-endian PLY with vertex properties x y z (double), red green blue, stddev (float).
 /// Throws IoError when the file cannot be written in full.
 void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> points);
+
+/// Reads what write_ply writes, and no other form. Throws IoError.
+[[nodiscard]] std::vector<PlyPoint> read_ply(const std::filesystem::path& file);
 
 }  // namespace twofold

@@ -45,5 +45,21 @@ TEST(Ply, WritesHeaderAndPoints) {
   EXPECT_IO_ERROR(write_ply("/nonexistent/m.ply", points), "cannot be written");
 }
 
+TEST(Ply, ReadsWhatWasWrittenAndNothingElse) {
+  const ScratchFolder folder;
+  const PlyPoint points[] = {{Vector3(1, 2, 3), {10, 20, 30}, 0.5f}, {Vector3(-4, 0, 0), {}, 0}};
+  write_ply(folder.path() / "m.ply", points);
+  const auto read = read_ply(folder.path() / "m.ply");
+  ASSERT_EQ(read.size(), 2U);
+  EXPECT_EQ(read[0].x_w, points[0].x_w);
+  EXPECT_EQ(read[0].rgb, points[0].rgb);
+  EXPECT_EQ(read[0].stddev, 0.5F);
+  EXPECT_EQ(read[1].x_w, points[1].x_w);
+  std::filesystem::resize_file(folder.path() / "m.ply",
+                               std::filesystem::file_size(folder.path() / "m.ply") - 1);
+  EXPECT_IO_ERROR((void)read_ply(folder.path() / "m.ply"), "damaged");
+  EXPECT_IO_ERROR((void)read_ply(folder.path() / "none.ply"), "cannot be opened");
+}
+
 }  // namespace
 }  // namespace twofold

@@ -1,0 +1,184 @@
+#include "apps/twofold/finished_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "apps/twofold/map_options.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/ply.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "slam/conversions.hpp"
+#include "slam/map_snapshot.hpp"
+
+namespace twofold {
+namespace {
+
+using Json = nlohmann::json;
+
+float seconds(std::int64_t t_ns, std::int64_t start_ns) {
+  return static_cast<float>(1e-9 * static_cast<double>(t_ns - start_ns));
+}
+
+void copy_position(const Vector3& from, float (&to)[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(from[i]);
+}
+
+std::vector<ViewKeyframe> keyframes_of(const Trajectory& poses, std::int64_t start_ns) {
+  std::vector<ViewKeyframe> keyframes;
+  for (const TimedPose& pose : poses) {
+    ViewKeyframe& keyframe = keyframes.emplace_back();
+    keyframe.id = static_cast<std::uint32_t>(keyframes.size() - 1);
+    keyframe.t = seconds(pose.t_ns, start_ns);
+    copy_position(pose.T_w_c.translation(), keyframe.position);
+    for (int i = 0; i < 4; ++i)
+      keyframe.orientation[i] = static_cast<float>(pose.T_w_c.so3().quaternion().coeffs()[i]);
+  }
+  return keyframes;
+}
+
+std::vector<ViewPoint> points_of(const std::vector<PlyPoint>& from) {
+  std::vector<ViewPoint> points;
+  for (const PlyPoint& p : from) {
+    ViewPoint& point = points.emplace_back();
+    point.id = static_cast<std::uint32_t>(points.size() - 1);
+    copy_position(p.x_w, point.position);
+    point.deviation = deviation_code(p.stddev);
+  }
+  return points;
+}
+
+/// Frames of a finished run hang on the keyframe before them.
+class PathBuilder {
+ public:
+  PathBuilder(const Trajectory& keyframes, const Trajectory& causal, std::int64_t start_ns)
+      : keyframes_(keyframes), start_ns_(start_ns) {
+    for (const TimedPose& pose : causal) causal_.emplace(pose.t_ns, pose.T_w_c.translation());
+  }
+
+  [[nodiscard]] ViewPathFrame tracked(std::uint32_t number, const TimedPose& pose) const {
+    ViewPathFrame frame;
+    frame.frame = number;
+    frame.t = seconds(pose.t_ns, start_ns_);
+    const auto causal = causal_.find(pose.t_ns);
+    copy_position(causal == causal_.end() ? pose.T_w_c.translation() : causal->second, frame.causal);
+    frame.reference = kNoId;
+    const auto after = std::upper_bound(keyframes_.begin(), keyframes_.end(), pose.t_ns,
+                                        [](std::int64_t t_ns, const TimedPose& k) { return t_ns < k.t_ns; });
+    if (keyframes_.empty()) return frame;
+    const auto reference = after == keyframes_.begin() ? after : std::prev(after);
+    frame.reference = static_cast<std::uint32_t>(reference - keyframes_.begin());
+    frame.keyframe = reference->t_ns == pose.t_ns ? 1 : 0;
+    set_pose_in_reference(to_pose(reference->T_w_c.inverse() * pose.T_w_c), frame);
+    return frame;
+  }
+
+ private:
+  const Trajectory& keyframes_;
+  std::int64_t start_ns_;
+  std::map<std::int64_t, Vector3> causal_;
+};
+
+Json read_json(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  if (!in) throw IoError(file.string(), "is missing: is this the output folder of a run?");
+  Json json = Json::parse(in, nullptr, false);
+  if (json.is_discarded()) throw IoError(file.string(), "is no JSON");
+  return json;
+}
+
+/// Frames in the order of their numbers: the summary says which were lost, why, and how long after the one
+/// before.
+void add_path(const Trajectory& poses, const PathBuilder& builder, const Json& summary, ViewScene& scene) {
+  std::map<std::int64_t, Json> lost;
+  for (const Json& entry : summary.value("why_lost", Json::array()))
+    lost.emplace(entry.value("frame", -1), entry);
+  std::uint32_t number = 0;
+  float t = 0;
+  for (const TimedPose& pose : poses) {
+    for (auto entry = lost.find(number); entry != lost.end(); entry = lost.find(++number)) {
+      ViewPathFrame frame;
+      frame.frame = number;
+      frame.t = t += static_cast<float>(1e-3 * entry->second.value("ms_since_previous", 0.0));
+      frame.reference = frame.part = kNoId;
+      frame.state = static_cast<std::uint8_t>(TrackingState::kLost);
+      frame.reason = scene.reason_number(entry->second.value("cause", "").c_str());
+      scene.add(frame);
+    }
+    const ViewPathFrame frame = builder.tracked(number++, pose);
+    t = frame.t;
+    scene.add(frame);
+  }
+}
+
+std::string kind_of(const std::string& reason) {
+  if (reason == describe(CorrectionReason::kPoseGraph)) return to_string(MapEventKind::kPoseGraph);
+  if (reason == describe(CorrectionReason::kPartsJoined)) return to_string(MapEventKind::kPartsJoined);
+  return reason;
+}
+
+void add_events(const Json& summary, const Trajectory& poses, std::int64_t start_ns, ViewScene& scene) {
+  for (const Json& correction : summary.value("pose_corrections", Json::array())) {
+    ViewEvent event;
+    event.kind = kind_of(correction.value("reason", ""));
+    const std::int64_t t_ns = correction.value("t_ns", std::int64_t{0});
+    event.t = seconds(t_ns, start_ns);
+    event.frame = correction.value("frame", 0U);
+    event.part = event.part_before = 0;
+    event.moved = correction.value("moved_m", 0.0);
+    event.turned = correction.value("turned_rad", 0.0);
+    const auto at = std::lower_bound(poses.begin(), poses.end(), t_ns,
+                                     [](const TimedPose& pose, std::int64_t t) { return pose.t_ns < t; });
+    if (at != poses.end()) event.before = event.after = to_pose(at->T_w_c).t;
+    scene.add(std::move(event));
+  }
+}
+
+}  // namespace
+
+void show_finished_run(const std::filesystem::path& folder, ViewScene& scene, ViewTitle& title) {
+  const Json summary = read_json(folder / "summary.json");
+  const Trajectory poses = read_tum_trajectory(folder / "trajectory.txt");
+  const Trajectory keyframes = read_tum_trajectory(folder / "keyframes.txt");
+  if (poses.empty()) throw IoError((folder / "trajectory.txt").string(), "holds no pose");
+  const std::int64_t start_ns = poses.front().t_ns;
+  scene.begin(start_ns);
+  title.title = fmt::format("{} ({})", summary.value("source", ""), folder.string());
+  scene.show({1, points_of(read_ply(folder / "map.ply")), keyframes_of(keyframes, start_ns), {}});
+  const PathBuilder builder(keyframes, read_tum_trajectory(folder / "trajectory_causal.txt"), start_ns);
+  add_path(poses, builder, summary, scene);
+  add_events(summary, poses, start_ns, scene);
+}
+
+void show_map_file(const std::filesystem::path& file, ViewScene& scene, ViewTitle& title) {
+  constexpr std::size_t kFewPoints = 300'000;  // more would take seconds to find the covariances of
+  SavedMap saved = open_map(file.string());
+  auto version = std::make_shared<MapVersion>();
+  version->graph = std::move(saved.graph);
+  version->places = std::move(saved.places);
+  title.rig = to_camera_rig(saved.rig);
+  title.title = file.filename().string();
+  title.has_deviations = version->graph.point_count() < kFewPoints;
+  const MapSnapshot map(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{saved.rig, version}));
+  std::int64_t start_ns = 0;
+  if (const auto keyframes = map.keyframes(); !keyframes.empty()) start_ns = keyframes.front().t_ns;
+  scene.begin(start_ns);
+  const ViewMap view = view_of(map, start_ns, title.has_deviations);
+  scene.show(view);
+  for (std::uint32_t n = 0; const ViewKeyframe& keyframe : view.keyframes) {
+    ViewPathFrame frame;
+    frame.frame = n++;
+    frame.t = keyframe.t;
+    frame.reference = keyframe.id;
+    frame.part = keyframe.part;
+    frame.keyframe = 1;
+    std::copy_n(keyframe.position, 3, frame.causal);
+    scene.add(frame);
+  }
+}
+
+}  // namespace twofold

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "engine/options.hpp"
+#include "io/sources/frame_source.hpp"
+#include "slam/map_lender.hpp"
+#include "slam/pose_reporter.hpp"
+#include "twofold/viewer.hpp"
+
+namespace twofold {
+
+inline constexpr int kUsualViewPort = 8420;
+
+/// What is said about the viewer on a command line.
+struct ViewArguments {
+  std::optional<int> port;  ///< nothing: no viewer
+  std::string bind = "127.0.0.1";
+};
+
+/// --view [PORT] and --view-bind.
+void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description);
+/// The address and, when others can reach it, a warning.
+void print_view_address(const std::string& address, bool is_open_to_network);
+
+/// The viewer of `twofold run --view`; nothing without that option.
+class LiveView {
+ public:
+  /// Adds its listeners to those of `options`, which are called as before. Throws IoError when the port is
+  /// not to be had or the program was built without the viewer.
+  LiveView(const ViewArguments& arguments, const std::string& title, const FrameSource& source,
+           EngineOptions& options);
+
+  /// The reader's thread, with each frame it reads.
+  void show(const Frame& frame);
+  /// After the run, when the last map is there.
+  void finish();
+
+ private:
+  void listen(EngineOptions& options);
+
+  PoseReporter reporter_;  // tracker's
+  MapLender maps_;
+  std::unique_ptr<Viewer> viewer_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,42 @@
+// A run in a browser while it runs:
+//   05_viewer [SOURCE [SECONDS_TO_STAY]]
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <thread>
+
+#include <twofold/slam.hpp>
+#include <twofold/source.hpp>
+#include <twofold/viewer.hpp>
+
+namespace {
+
+void run(const char* name, int seconds_to_stay) {
+  twofold::Source source(name);
+  twofold::Slam slam(source.rig(), {.live = source.is_live()});
+  twofold::Viewer viewer(source.rig(), [&] { return slam.map(); }, {.title = name, .port = 0});
+  slam.on_pose([&](const twofold::PoseEstimate& pose) { viewer.tell(pose); });
+  slam.on_event([&](const twofold::MapEvent& event) { viewer.tell(event); });
+  std::printf("open %s\n", viewer.address().c_str());
+
+  twofold::FrameView frame;
+  for (std::int64_t n = 0; source.next(frame); ++n) {
+    if (!source.is_live()) (void)slam.wait_for_room(1'000'000'000);
+    slam.push(frame);
+    if (viewer.wants_image()) viewer.show(n, frame.left, frame.owner);
+  }
+  const twofold::SlamSummary summary = slam.finish();
+  std::printf("%lld of %lld frames tracked\n", static_cast<long long>(summary.tracked),
+              static_cast<long long>(summary.frames));
+  std::this_thread::sleep_for(std::chrono::seconds(seconds_to_stay));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  run(argc > 1 ? argv[1] : "synthetic:courtyard?frames=300", argc > 2 ? std::atoi(argv[2]) : 60);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 1;
+}

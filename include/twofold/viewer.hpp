@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "twofold/estimate.hpp"
+#include "twofold/map.hpp"
+#include "twofold/types.hpp"
+
+namespace twofold {
+
+struct ViewerOptions {
+  std::string title = {};  ///< shown in the page
+  /// Address to listen on. Any but a loopback address shows camera and map to the network, unencrypted: from
+  /// another machine, `ssh -L 8420:localhost:8420 ROBOT` is the better way.
+  std::string bind = "127.0.0.1";
+  int port = 8420;                       ///< 0: any that is free
+  std::vector<std::string> stages = {};  ///< names of what `tell` is given times of, at most 8
+  double frame_period = 0;               ///< the budget of a frame [s]; 0: as the frames' times say
+  std::vector<Pose> truth = {};          ///< T_world_camera of the true path, if it is known, in any world
+  std::vector<std::int64_t> truth_t_ns = {};  ///< its times, as many, ascending
+};
+
+/// Shows a run in a browser while it runs: map, windows, path, events, times (docs/viewer.md).
+///
+///   Slam slam(rig, {});
+///   Viewer viewer(rig, [&] { return slam.map(); }, {.title = "my robot"});
+///   slam.on_pose([&](const PoseEstimate& pose) { viewer.tell(pose); });
+///   slam.on_event([&](const MapEvent& event) { viewer.tell(event); });
+///   std::puts(viewer.address().c_str());
+///
+/// A thread of its own, of the lowest priority, does everything; nobody waits for it or for who looks.
+/// Component `viewer` of the package: find_package(Twofold COMPONENTS viewer), Twofold::viewer.
+class TWOFOLD_API Viewer {
+ public:
+  /// @param map  asked for the newest map now and then, by the viewer's thread; may be empty
+  /// Throws std::runtime_error when the port is not to be had, or the library was built without the page.
+  Viewer(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options = {});
+  /// Finishes.
+  ~Viewer();
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
+
+  /// With its token: who knows it may look.
+  [[nodiscard]] std::string address() const;
+  [[nodiscard]] bool is_open_to_network() const;
+
+  // Of one thread, the tracker's: copies into a ring, and nothing else; no lock, no allocation, no system
+  // call. If the viewer falls behind by the whole ring (1024 frames), frames are left out.
+
+  /// @param stage_ns  what its stages took, in the order of ViewerOptions::stages
+  void tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns = {});
+  void tell(const MapEvent& event);
+
+  // Of one thread, that of the images' source.
+
+  /// Whether an image would be shown if it came now: at most five a second are, while somebody looks.
+  [[nodiscard]] bool wants_image() const;
+  /// @param left   grey or colour; `owner` keeps its pixels alive and unchanged until the viewer is done
+  void show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner);
+
+  /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most a second.
+  void finish();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Whether viewers can be made: false when the library was built without Node.js.
+[[nodiscard]] TWOFOLD_API bool has_viewer();
+
+}  // namespace twofold

@@ -1,0 +1,40 @@
+#include "tests/apps/command.hpp"
+
+namespace twofold {
+namespace {
+
+TEST(ViewCommand, SaysWhatIsMissingOrWrong) {
+  const ScratchFolder folder;
+  expect_bad_input(run(folder, "view '" + (folder / "none.tfm") + "'"), "none.tfm");
+  const std::string empty = folder / "empty";
+  std::filesystem::create_directory(empty);
+  expect_bad_input(run(folder, "view '" + empty + "'"), "summary.json: is missing");
+  folder.write("empty/summary.json", "{");
+  expect_bad_input(run(folder, "view '" + empty + "'"), "summary.json: is no JSON");
+}
+
+TEST(ViewCommand, AFilterIsNotViewed) {
+  const ScratchFolder folder;
+  expect_bad_input(
+      run(folder, "run synthetic:desk?frames=2 --estimator swf --view --out '" + (folder / "out") + "'"),
+      "--view: is not for --estimator swf");
+}
+
+TEST(ViewCommand, RunSaysWhereToLook) {
+  const ScratchFolder folder;
+  const Outcome seen =
+      run(folder, "run 'synthetic:desk?frames=20&width=320&height=240' --quiet --view 0 --out '" +
+                      (folder / "out") + "'");
+  if (seen.err.find("without the viewer") != std::string::npos) GTEST_SKIP() << "built without the viewer";
+  EXPECT_EQ(seen.exit_code, 0) << seen.err;
+  EXPECT_NE(seen.err.find("view at     http://127.0.0.1:"), std::string::npos) << seen.err;
+  EXPECT_EQ(seen.err.find("unencrypted"), std::string::npos);
+  const Outcome taken = run(
+      folder,
+      "run 'synthetic:desk?frames=2&width=320&height=240' --quiet --view 0 --view-bind 192.0.2.1 --out '" +
+          (folder / "out") + "'");
+  expect_bad_input(taken, "192.0.2.1");
+}
+
+}  // namespace
+}  // namespace twofold

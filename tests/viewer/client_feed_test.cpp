@@ -1,0 +1,104 @@
+#include "viewer/client_feed.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "tests/viewer/small_map.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::small_map;
+using testing::tracked_pose;
+
+class ClientFeedTest : public ::testing::Test {
+ protected:
+  /// Everything the client gets, which deals with each message at once.
+  std::vector<ViewMessage> drain(ClientFeed& feed) {
+    std::vector<ViewMessage> messages;
+    while (auto message = feed.next(image_)) {
+      messages.push_back(*message);
+      EXPECT_TRUE(feed.take("ack"));
+    }
+    return messages;
+  }
+  static ViewMessageHeader header(const ViewMessage& message) {
+    ViewMessageHeader header;
+    std::memcpy(&header, message.bytes->data(), sizeof header);
+    return header;
+  }
+
+  ViewScene scene_;
+  ViewTitle title_{.title = "a \"title\" with \xff"};
+  ViewImage image_;
+};
+
+TEST_F(ClientFeedTest, GreetsThenTellsEverythingThenIsSilent) {
+  scene_.show(small_map(3));
+  scene_.add(tracked_pose(0, 0), {});
+  MapEvent closed;
+  closed.kind = MapEventKind::kLoopClosure;
+  scene_.add(closed);
+  ClientFeed feed(scene_, title_);
+  const auto messages = drain(feed);
+  ASSERT_EQ(messages.size(), 4U);
+  EXPECT_TRUE(messages[0].text);
+  EXPECT_NE(messages[0].bytes->find("\"hello\""), std::string::npos);
+  EXPECT_NE(messages[1].bytes->find("loop closure"), std::string::npos);
+  EXPECT_EQ(header(messages[2]).kind, ViewMessageKind::kFrames);
+  EXPECT_EQ(header(messages[3]).kind, ViewMessageKind::kDelta);
+  EXPECT_EQ(header(messages[3]).number, kWhole | kLast);
+  EXPECT_TRUE(drain(feed).empty());
+}
+
+TEST_F(ClientFeedTest, NewestWins) {
+  scene_.show(small_map(1));
+  ClientFeed feed(scene_, title_);
+  drain(feed);
+  for (std::int64_t n = 0; n < 2000; ++n) scene_.add(tracked_pose(n, 0), {});
+  for (std::uint32_t k = 2; k < 30; ++k) scene_.show(small_map(k, k));
+  const auto messages = drain(feed);
+  ASSERT_EQ(messages.size(), 2U) << "one of the newest frames, one that leads to the newest map";
+  EXPECT_EQ(header(messages[0]).number, ViewScene::kLiveFrames);
+  EXPECT_EQ(header(messages[1]).b, scene_.revision());
+}
+
+TEST_F(ClientFeedTest, WhoDealsWithNothingGetsNothingMore) {
+  ClientFeed feed(scene_, title_);
+  int messages = 0;
+  for (std::int64_t n = 0; n < 1000; ++n) {
+    scene_.add(tracked_pose(n, 0), {});
+    while (feed.next(image_)) ++messages;
+  }
+  EXPECT_EQ(messages, ClientFeed::kUnacknowledged);
+  EXPECT_TRUE(feed.take("ack"));
+  EXPECT_TRUE(feed.next(image_));
+}
+
+TEST_F(ClientFeedTest, NonsenseIsRefused) {
+  ClientFeed feed(scene_, title_);
+  for (const std::string_view nonsense : {"", "ack", "acknowledge", "images", "images on ", "stop"})
+    EXPECT_FALSE(ClientFeed(scene_, title_).take(nonsense)) << nonsense;
+  EXPECT_TRUE(feed.take("images on"));
+  EXPECT_TRUE(feed.wants_images());
+}
+
+TEST_F(ClientFeedTest, ImagesGoToThoseWhoWantThem) {
+  image_ = {1, std::make_shared<const std::string>("picture")};
+  ClientFeed with(scene_, title_), without(scene_, title_);
+  EXPECT_TRUE(with.take("images on"));
+  EXPECT_EQ(drain(with).back().bytes, image_.message);
+  EXPECT_EQ(drain(without).size(), 1U);
+  EXPECT_TRUE(drain(with).empty()) << "the same image twice";
+}
+
+TEST_F(ClientFeedTest, LastWordsComeLast) {
+  scene_.show(small_map(3));
+  ClientFeed feed(scene_, title_);
+  feed.end("that was all");
+  EXPECT_NE(drain(feed).back().bytes->find("that was all"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace twofold

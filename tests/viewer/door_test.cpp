@@ -1,0 +1,77 @@
+#include "viewer/door.hpp"
+
+#include <gtest/gtest.h>
+
+namespace twofold {
+namespace {
+
+const std::string kSecret = "00112233445566778899aabbccddeeff";
+
+class ViewDoorTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] Admission page(const std::string& target, const std::string& host = "127.0.0.1:8420",
+                               const std::string& origin = "", const std::string& cookie = "") const {
+    return door_.judge({"GET", target, host, origin, cookie, false});
+  }
+  [[nodiscard]] Admission socket(const std::string& origin, const std::string& cookie,
+                                 const std::string& host = "127.0.0.1:8420") const {
+    return door_.judge({"GET", "/live?token=" + kSecret, host, origin, cookie, true});
+  }
+
+  ViewDoor door_{kSecret, 8420, "robot"};
+  const std::string cookie_ = "twofold-8420=" + kSecret;
+};
+
+TEST_F(ViewDoorTest, TokenOpensThePageAndCookieTheRest) {
+  EXPECT_EQ(page("/?token=" + kSecret), Admission::kByToken);
+  EXPECT_EQ(page("/?a=b&token=" + kSecret), Admission::kByToken);
+  EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "", "other=1; " + cookie_), Admission::kByCookie);
+  EXPECT_EQ(socket("http://127.0.0.1:8420", cookie_), Admission::kByCookie);
+}
+
+TEST_F(ViewDoorTest, WithoutTokenOrWithAnotherNobodyEnters) {
+  EXPECT_EQ(page("/"), Admission::kNoToken);
+  EXPECT_EQ(page("/?token="), Admission::kNoToken);
+  EXPECT_EQ(page("/?token=" + kSecret.substr(1) + "0"), Admission::kNoToken);
+  EXPECT_EQ(page("/?token=" + kSecret + "0"), Admission::kNoToken);
+  EXPECT_EQ(page("/?nottoken=" + kSecret), Admission::kNoToken);
+  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8421=" + kSecret), Admission::kNoToken);
+  EXPECT_EQ(socket("http://127.0.0.1:8420", ""), Admission::kNoToken) << "a token in a socket's address";
+}
+
+TEST_F(ViewDoorTest, NamesOfOthersAreRefused) {
+  for (const char* host :
+       {"", "evil.example", "evil.example:8420", "127.0.0.1.evil.example", "localhost.evil.example:8420",
+        "127.0.0.1:", "127.0.0.1:84200000", "127.0.0.1:84a", "[::1", "robot.example", "127.0.0.1 "})
+    EXPECT_EQ(page("/?token=" + kSecret, host), Admission::kBadHost) << host;
+  for (const char* host :
+       {"localhost", "localhost:9000", "127.0.0.1:8420", "[::1]:8420", "192.168.1.7:8420", "robot:8420"})
+    EXPECT_EQ(page("/?token=" + kSecret, host), Admission::kByToken) << host;
+}
+
+TEST_F(ViewDoorTest, PagesOfOthersAreRefused) {
+  for (const char* origin :
+       {"", "null", "http://evil.example", "https://127.0.0.1:8420", "http://127.0.0.1:3000",
+        "http://127.0.0.1:8420.evil.example", "http://localhost:8420"})
+    EXPECT_EQ(socket(origin, cookie_), Admission::kBadOrigin) << origin;
+  EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "http://evil.example", cookie_), Admission::kBadOrigin);
+}
+
+TEST_F(ViewDoorTest, AnswersGetAlone) {
+  EXPECT_EQ(door_.judge({"POST", "/?token=" + kSecret, "127.0.0.1:8420", "", cookie_, false}),
+            Admission::kBadMethod);
+}
+
+TEST_F(ViewDoorTest, CookieIsNoScriptsAndNoOtherSites) {
+  EXPECT_EQ(door_.set_cookie(), cookie_ + "; Path=/; HttpOnly; SameSite=Strict");
+}
+
+TEST(RandomSecret, Has128Bits) {
+  const std::string secret = random_secret();
+  EXPECT_EQ(secret.size(), 32U);
+  EXPECT_EQ(secret.find_first_not_of("0123456789abcdef"), std::string::npos);
+  EXPECT_NE(secret, random_secret());
+}
+
+}  // namespace
+}  // namespace twofold

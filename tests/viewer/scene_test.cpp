@@ -1,0 +1,148 @@
+#include "viewer/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/viewer/small_map.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::small_map;
+using testing::tracked_pose;
+
+std::string hexadecimal(const std::string& bytes) {
+  std::string text;
+  for (const char c : bytes) text += fmt::format("{:02x}", static_cast<unsigned char>(c));
+  return text;
+}
+
+/// The records of one kind in a delta.
+template <class Record>
+std::vector<Record> records(const ViewScene::Delta& delta, ViewBlock kind) {
+  std::vector<Record> found;
+  for (const auto& message : delta) {
+    for (std::size_t at = sizeof(ViewMessageHeader); at < message->size();) {
+      std::uint32_t block[2];
+      std::memcpy(block, message->data() + at, sizeof block);
+      const std::size_t sizes[] = {0, 28, 4, 52, 4, 12, 8, 56, 4};
+      at += sizeof block;
+      if (block[0] == static_cast<std::uint32_t>(kind)) {
+        const std::size_t before = found.size();
+        found.resize(before + block[1]);
+        std::memcpy(static_cast<void*>(&found[before]), message->data() + at, block[1] * sizeof(Record));
+      }
+      at += block[1] * sizes[block[0]];
+    }
+  }
+  return found;
+}
+
+TEST(ViewScene, MessagesAreThoseThatThePageIsTestedWith) {
+  ViewScene scene;
+  scene.show(small_map(3));
+  const std::array<std::int64_t, 2> stages{1'000'000, 2'500'000};
+  scene.add(tracked_pose(4, 2), stages);
+  const auto whole = scene.delta(0);
+  const Revision before = scene.revision();
+  ViewMap map = small_map(3, 2);
+  map.keyframes.erase(map.keyframes.begin() + 1);
+  map.points.erase(map.points.begin());
+  map.edges.erase(map.edges.begin());
+  scene.show(map);
+  const auto later = scene.delta(before);
+  ASSERT_EQ(whole->size(), 1U);
+  ASSERT_EQ(later->size(), 1U);
+  std::ifstream in(TWOFOLD_MESSAGES);
+  const auto messages = nlohmann::json::parse(in);
+  EXPECT_EQ(hexadecimal(*(*whole)[0]), messages["whole"].get<std::string>());
+  EXPECT_EQ(hexadecimal(*(*later)[0]), messages["later"].get<std::string>());
+  const std::string live(reinterpret_cast<const char*>(&scene.live(0)), sizeof(ViewLiveFrame));
+  EXPECT_EQ(hexadecimal(live), messages["live"].get<std::string>());
+}
+
+TEST(ViewScene, FramesMoveToAnotherKeyframeWhenTheirsGoes) {
+  ViewScene scene;
+  scene.show(small_map(3));
+  scene.add(tracked_pose(4, 2), {});
+  ViewMap map = small_map(2, 2);
+  map.keyframes[1].position[1] = 5;  // the map has moved it, and what hung on keyframe 2 moves along
+  scene.show(map);
+  const auto path = records<ViewPathFrame>(*scene.delta(0), ViewBlock::kPath);
+  ASSERT_EQ(path.size(), 1U);
+  EXPECT_EQ(path[0].reference, 1U);
+  EXPECT_FLOAT_EQ(path[0].in_reference[0], 1);  // keyframe 2 was one metre to the right of it
+  EXPECT_FLOAT_EQ(path[0].in_reference[1], 0);
+  EXPECT_FLOAT_EQ(path[0].in_reference[2], 0.125);
+  EXPECT_FLOAT_EQ(path[0].causal[0], 2);
+}
+
+TEST(ViewScene, NoticesGrossMotionOfPointsOnly) {
+  ViewScene scene;
+  ViewMap map = small_map(2);
+  scene.show(map);
+  const Revision before = scene.revision();
+  map.points[0].position[0] += 0.001F;
+  map.points[1].position[0] += 0.01F;
+  map.version = 2;
+  scene.show(map);
+  const auto points = records<ViewPoint>(*scene.delta(before), ViewBlock::kPoints);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_EQ(points[0].id, 3U);
+}
+
+TEST(ViewScene, LargeMapsComeInMessagesOfBoundedSize) {
+  ViewScene scene;
+  scene.show(small_map(20000));
+  const auto delta = scene.delta(0);
+  EXPECT_GT(delta->size(), 5U);
+  std::size_t last = 0;
+  for (const auto& message : *delta) {
+    EXPECT_LE(message->size(), ViewScene::kMessageBytes);
+    ViewMessageHeader header;
+    std::memcpy(&header, message->data(), sizeof header);
+    EXPECT_EQ((header.number & kWhole) != 0, message == delta->front());
+    last += (header.number & kLast) != 0;
+  }
+  EXPECT_EQ(last, 1U);
+  const auto points = records<ViewPoint>(*delta, ViewBlock::kPoints);
+  ASSERT_EQ(points.size(), 20000U);
+  EXPECT_EQ(points.back().id, 3U * 19999);
+  EXPECT_EQ(scene.delta(0), delta) << "made twice";
+}
+
+TEST(ViewScene, PathIsThinnedOutAndNeverForgotten) {
+  ViewScene scene;
+  for (std::uint32_t n = 0; n < ViewScene::kMaxPath + 1; ++n) scene.add(ViewPathFrame{.frame = n});
+  const auto path = records<ViewPathFrame>(*scene.delta(0), ViewBlock::kPath);
+  EXPECT_EQ(path.size(), ViewScene::kMaxPath + 1 - ViewScene::kMaxPath / 4);
+  EXPECT_EQ(path.front().frame, 0U);
+  EXPECT_EQ(path[1].frame, 2U);
+  EXPECT_EQ(path.back().frame, ViewScene::kMaxPath);
+}
+
+TEST(ViewScene, ReasonsAreNumbered) {
+  ViewScene scene;
+  PoseEstimate pose = tracked_pose(1, 0);
+  pose.state = TrackingState::kLost;
+  pose.reason = "too dark";
+  scene.add(pose, {});
+  scene.add(tracked_pose(2, 0), {});
+  EXPECT_EQ(scene.live(0).reason, 1);
+  EXPECT_EQ(scene.live(1).reason, 0);
+  EXPECT_EQ(scene.reasons(), (std::vector<std::string>{"", "too dark"}));
+}
+
+TEST(ViewScene, DeviationsAreCodedWithinATenth) {
+  for (double deviation = 1e-4; deviation < 100; deviation *= 1.3)
+    EXPECT_NEAR(std::exp2((deviation_code(deviation) - 128) / 8.0) / deviation, 1, 0.1);
+  EXPECT_EQ(deviation_code(0), 0);
+}
+
+}  // namespace
+}  // namespace twofold

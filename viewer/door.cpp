@@ -1,0 +1,98 @@
+#include "viewer/door.hpp"
+
+#include <arpa/inet.h>
+#include <sys/random.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace twofold {
+namespace {
+
+/// Name or address of "HOST", "HOST:PORT", "[ADDRESS]:PORT"; empty when it is none of these.
+std::string_view host_name(std::string_view host) {
+  const bool bracketed = host.starts_with('[');
+  const std::size_t end = bracketed ? host.find(']') : host.find(':');
+  const std::string_view name =
+      bracketed ? host.substr(1, end == host.npos ? 0 : end - 1) : host.substr(0, end);
+  std::string_view rest = end == host.npos ? std::string_view() : host.substr(bracketed ? end + 1 : end);
+  if (rest.empty()) return name;
+  const bool is_port = rest.size() > 1 && rest.size() <= 6 && rest[0] == ':' &&
+                       std::all_of(rest.begin() + 1, rest.end(), [](char c) { return c >= '0' && c <= '9'; });
+  return is_port ? name : std::string_view();
+}
+
+bool is_address(std::string_view name) {
+  const std::string text(name.substr(0, INET6_ADDRSTRLEN));
+  std::array<unsigned char, sizeof(in6_addr)> bytes{};
+  return inet_pton(AF_INET, text.c_str(), bytes.data()) == 1 ||
+         inet_pton(AF_INET6, text.c_str(), bytes.data()) == 1;
+}
+
+/// Value of `name` in "name=value<separator>name=value"; empty when it is not there.
+std::string_view value_of(std::string_view list, std::string_view name, char separator) {
+  while (!list.empty()) {
+    const std::size_t end = std::min(list.find(separator), list.size());
+    std::string_view item = list.substr(0, end);
+    list.remove_prefix(std::min(end + 1, list.size()));
+    item.remove_prefix(std::min(item.find_first_not_of(' '), item.size()));
+    if (item.size() > name.size() && item.starts_with(name) && item[name.size()] == '=')
+      return item.substr(name.size() + 1);
+  }
+  return {};
+}
+
+}  // namespace
+
+ViewDoor::ViewDoor(std::string secret, int port, std::string machine_name)
+    : secret_(std::move(secret)),
+      cookie_name_(fmt::format("twofold-{}", port)),
+      machine_name_(std::move(machine_name)) {}
+
+Admission ViewDoor::judge(const DoorRequest& request) const {
+  if (request.method != "GET") return Admission::kBadMethod;
+  if (!is_this_machine(host_name(request.host))) return Admission::kBadHost;
+  const bool must_say = request.is_upgrade;
+  if ((must_say || !request.origin.empty()) && request.origin != fmt::format("http://{}", request.host))
+    return Admission::kBadOrigin;
+  if (is_secret(value_of(request.cookie, cookie_name_, ';'))) return Admission::kByCookie;
+  const std::size_t query = std::min(request.target.find('?'), request.target.size());
+  const std::string_view parameters = request.target.substr(std::min(query + 1, request.target.size()));
+  if (!request.is_upgrade && is_secret(value_of(parameters, "token", '&'))) return Admission::kByToken;
+  return Admission::kNoToken;
+}
+
+std::string ViewDoor::set_cookie() const {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict", cookie_name_, secret_);
+}
+
+/// Addresses are safe: a page of another site can only come here by a name of its own.
+bool ViewDoor::is_this_machine(std::string_view name) const {
+  return name == "localhost" || (!name.empty() && name == machine_name_) || is_address(name);
+}
+
+/// Takes as long for a near miss as for any other.
+bool ViewDoor::is_secret(std::string_view text) const {
+  if (text.size() != secret_.size()) return false;
+  unsigned different = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) different |= static_cast<unsigned char>(text[i] ^ secret_[i]);
+  return different == 0;
+}
+
+std::string_view path_of(std::string_view target) {
+  return target.substr(0, target.find('?'));
+}
+
+std::string random_secret() {
+  std::array<unsigned char, 16> bytes{};
+  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw std::runtime_error("the system gives no random numbers");
+  std::string digits;
+  for (const unsigned char byte : bytes) digits += fmt::format("{:02x}", byte);
+  return digits;
+}
+
+}  // namespace twofold

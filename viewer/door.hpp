@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace twofold {
+
+/// What decides whether a request is answered; header fields are empty when they are missing.
+struct DoorRequest {
+  std::string_view method, target, host, origin, cookie;
+  bool is_upgrade = false;  ///< to a WebSocket
+};
+
+enum class Admission : std::uint8_t {
+  kByCookie,
+  kByToken,    ///< in the address: the answer shall set the cookie
+  kBadMethod,  ///< other than GET
+  kBadHost,  ///< a name that is not this machine's: somebody's page may have pointed it here (DNS rebinding)
+  kBadOrigin,  ///< another site's page asks; browsers always say so when a WebSocket is opened
+  kNoToken,    ///< neither token nor cookie, or wrong ones
+};
+
+/// Who may look: those who know the token, with a browser that speaks to this very server.
+class ViewDoor {
+ public:
+  /// @param secret  32 hexadecimal digits; @param port  names the cookie, as browsers share them among ports
+  ViewDoor(std::string secret, int port, std::string machine_name);
+
+  [[nodiscard]] Admission judge(const DoorRequest& request) const;
+  [[nodiscard]] const std::string& token() const { return secret_; }
+  /// Value of Set-Cookie.
+  [[nodiscard]] std::string set_cookie() const;
+
+ private:
+  [[nodiscard]] bool is_this_machine(std::string_view host) const;
+  [[nodiscard]] bool is_secret(std::string_view text) const;
+
+  std::string secret_, cookie_name_, machine_name_;
+};
+
+/// Target without its query.
+[[nodiscard]] std::string_view path_of(std::string_view target);
+/// 128 bits of the system's random numbers in hexadecimal digits. Throws std::runtime_error when it has none.
+[[nodiscard]] std::string random_secret();
+
+}  // namespace twofold

@@ -1,0 +1,422 @@
+// The page: joins connection, model and picture, and what the user does with them.
+import 'uplot/dist/uPlot.min.css';
+import './style.css';
+import {COLOURINGS, type Colouring} from './cloud.ts';
+import {Connection, type Link} from './connection.ts';
+import {Model} from './model.ts';
+import {eventColour, type Theme} from './palette.ts';
+import {Sight} from './sight.ts';
+import {Stage, type Layer, type View} from './stage.ts';
+import {Strip} from './strip.ts';
+import {Timeline, clock, describe, lostStretches, metres} from './timeline.ts';
+import {PROTOCOL, State, type Delta, type Frames, type Image, type Keyframe, type MapEvent, type Text} from './wire.ts';
+
+const $ = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
+
+/** An element with text and children; what a user or file named is never taken for HTML. */
+function make(tag: string, text = '', ...children: Node[]): HTMLElement {
+  const element = document.createElement(tag);
+  element.textContent = text;
+  element.append(...children);
+  return element;
+}
+
+const LAYERS: [Layer | 'image', string, string][] = [
+  ['points', 'Points', ''], ['keyframes', 'Keyframes', 'two'], ['final', 'Final path', '--final'],
+  ['causal', 'Causal path', '--causal'], ['truth', 'True path', '--truth'], ['covisible', 'Covisibility', '--covisible'],
+  ['marginalised', 'Marginalised', '--marginalised'], ['returns', 'Returns, over 10 s', '--back'], ['grid', 'Grid', ''],
+  ['image', 'Camera image', ''],
+];
+const KEYS: [string, string][] = [
+  ['1 2 3', 'follow, from above, free'], ['space', 'play or stop'], ['← →', 'a second back, on'], ['end', 'now'],
+  ['M', 'measure between two points'], ['P K C E', 'points, keyframes, causal path, edges'], ['I', 'camera image'],
+  ['S', 'save a picture'], ['F', 'full screen'], ['T', 'dark or light'], ['esc', 'let go of what is selected'], ['H', 'these keys'],
+];
+const EFFORTS = ['everything', 'fewer points', 'coarse alignment', 'fewer iterations', 'drop frames'];
+
+class Page {
+  readonly model = new Model();
+  readonly stage = new Stage($('stage'), this.model);
+  readonly strip = new Strip($('strip'), this.model);
+  readonly timeline = new Timeline($('timeline'), $('tip'), this.model);
+  readonly sight = new Sight($('sight'), this.model, this.stage.cloud);
+  private readonly connection: Connection;
+  private link: Link = 'connecting';
+  private measuring = false;
+  private playing = 0;
+  private stale = true;
+  private part: number | 'camera' | 'all' = 'camera';
+
+  constructor() {
+    history.replaceState(null, '', '/');  // the token is in a cookie by now, and needs no second place
+    this.connection = new Connection({
+      binary: (message) => this.take(message),
+      text: (message) => this.read(message),
+      link: (state, message) => this.showLink(state, message),
+    });
+    this.makePanels();
+    this.listen();
+    this.setTheme((localStorage.getItem('theme') as Theme | null) ?? 'dark');
+    setInterval(() => this.refresh(), 200);
+  }
+
+  private take(message: Delta | Frames | Image): void {
+    if (message.kind === 'image') {
+      this.sight.take(message);
+    } else if (message.kind === 'frames') {
+      this.model.addLive(message.frames);
+      this.stage.redraw();
+    } else {
+      if (message.whole) this.stage.cloud.clear();
+      this.model.take(message);
+      this.stage.cloud.take(message.points, message.pointsGone);
+      this.stage.changed();
+    }
+    this.stale = true;
+  }
+
+  private read(message: Text): void {
+    if (message.hello) {
+      this.model.forget();
+      this.model.hello = message.hello;
+      if (message.hello.protocol !== PROTOCOL) location.reload();
+      document.title = `${message.hello.title} – Twofold`;
+      $('title').textContent = message.hello.title;
+      document.body.classList.toggle('finished', !message.hello.live);
+      this.makeStages();
+    }
+    if (message.reasons) this.model.reasons = message.reasons;
+    if (message.truth) this.model.truth = message.truth;
+    if (message.events) {
+      this.model.events.push(...message.events);
+      this.makeEvents();
+    }
+    this.stage.changed();
+    this.stale = true;
+  }
+
+  private showLink(state: Link, message: string): void {
+    this.link = state;
+    $('message').textContent = message;
+    $('message').hidden = state === 'open';
+    $('message').classList.toggle('calm', state === 'ended');
+    this.stale = true;
+  }
+
+  /** Whatever is text, a few times a second. */
+  private refresh(): void {
+    this.sight.draw();
+    if (this.playing) this.play();
+    if (!this.stale) return;
+    this.stale = false;
+    this.choosePart();
+    this.showState();
+    this.showFigures();
+    if ($('strip').clientWidth > 0) this.strip.draw();
+    this.timeline.draw();
+    this.showKeyframe();
+    this.showTape();
+    document.body.dataset.ready = String(this.model.keyframes.size > 0);
+  }
+
+  /** Parts have worlds of their own: shown is the camera's, one that was chosen, or all at once. */
+  private choosePart(): void {
+    const parts = this.model.parts();
+    $('part-row').hidden = parts.length < 2;
+    const select = $<HTMLSelectElement>('part');
+    const wanted = ['camera', 'all', ...parts.map(([part]) => String(part))];
+    if ([...select.options].map((option) => option.value).join() !== wanted.join()) {
+      select.replaceChildren(new Option('where the camera is', 'camera'), new Option('all, unrelated', 'all'),
+        ...parts.map(([part, keyframes]) => new Option(`${part} (${keyframes} keyframes)`, String(part))));
+      select.value = String(this.part);
+    }
+    const camera = this.stage.pose()?.part ?? parts[0]?.[0] ?? null;
+    const shown = this.part === 'all' || parts.length < 2 ? null : this.part === 'camera' ? camera : this.part;
+    if (shown === this.stage.part) return;
+    this.stage.part = shown;
+    this.stage.changed();
+  }
+
+  private showState(): void {
+    const pill = $('state');
+    const newest = this.model.live.at(-1);
+    const set = (text: string, kind: string) => {
+      pill.textContent = text;
+      pill.className = `pill ${kind}`;
+    };
+    if (this.link === 'connecting') return set('connecting', '');
+    if (this.link === 'broken') return set('no connection', 'bad');
+    if (this.stage.time !== null) return set(`at ${clock(this.stage.time)}`, 'middling');
+    if (this.model.hello && !this.model.hello.live) return set('finished', '');
+    if (this.link === 'ended') return set('ended', '');
+    if (!newest) return set('waiting for frames', '');
+    if (newest.state !== State.tracked) {
+      const name = newest.state === State.lost ? 'lost' : 'unplaced';
+      const reason = this.model.reasons[newest.reason];
+      return set(reason ? `${name}: ${reason}` : name, 'bad');
+    }
+    return newest.effort > 0 ? set(`tracked, ${EFFORTS[newest.effort]}`, 'middling') : set('tracked', 'good');
+  }
+
+  private showFigures(): void {
+    const newest = this.model.live.at(-1);
+    const lost = this.model.path.reduce((sum, frame) => sum + (frame.state === State.tracked ? 0 : 1), 0);
+    const count = (n: number) => n.toLocaleString('en');
+    const figures: [string, string, boolean][] = [
+      ['frame', count(newest?.frame ?? this.model.path.at(-1)?.frame ?? 0), false],
+      ['keyframes', count(this.model.keyframes.size), false],
+      ['points', count(this.stage.cloud.size), false],
+      ['map', newest ? `v${newest.mapVersion}` : '–', true],
+      ['latency', newest ? `${newest.latencyMs.toFixed(1)} ms` : '–', false],
+      ['found', newest ? `${(100 * newest.trackedShare).toFixed(0)} %` : '–', true],
+      ['lost', count(lost), true],
+    ];
+    $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
+      const item = make('div', '', make('dt', name), make('dd', value));
+      item.classList.toggle('minor', minor);
+      return item;
+    }));
+  }
+
+  private makePanels(): void {
+    $('layers').replaceChildren(...LAYERS.map(([layer, name, colour]) => {
+      const sample = make('i');
+      if (colour === 'two') sample.className = 'two';
+      else if (colour) sample.style.background = `var(${colour})`;
+      const box = document.createElement('input');
+      box.type = 'checkbox';
+      box.id = `layer-${layer}`;
+      box.checked = layer !== 'image';
+      box.addEventListener('change', () => this.setLayer(layer, box.checked));
+      const label = make('label', '', sample, make('span', name), box);
+      return label;
+    }));
+    $('colouring').replaceChildren(...COLOURINGS.map((name) => new Option(name === 'observers' ? 'times seen' : name, name)));
+    $('keys').replaceChildren(make('table', '', ...KEYS.map(([key, what]) => make('tr', '', make('td', '', make('kbd', key)), make('td', what)))));
+    this.setView('follow');
+  }
+
+  private setLayer(layer: Layer | 'image', on: boolean): void {
+    $<HTMLInputElement>(`layer-${layer}`).checked = on;
+    if (layer === 'image') {
+      $('sight').hidden = !on;
+      this.connection.setImages(on);
+      return;
+    }
+    this.stage.layers[layer] = on;
+    this.stage.changed();
+  }
+  private toggle(...layers: (Layer | 'image')[]): void {
+    for (const layer of layers) this.setLayer(layer, !$<HTMLInputElement>(`layer-${layer}`).checked);
+  }
+
+  private makeStages(): void {
+    const entry = (name: string, set: (sample: HTMLElement) => void) => {
+      const sample = make('i');
+      set(sample);
+      return make('li', '', sample, make('span', name));
+    };
+    $('stages').replaceChildren(
+      entry('exposure to pose', (i) => ((i.className = 'line'), (i.style.background = 'var(--text)'))),
+      entry('budget', (i) => (i.className = 'dash')),
+      ...Strip.legend(this.model.hello!.stages).map(([name, colour]) => entry(name, (i) => (i.style.background = colour))));
+    const deviation = [...$<HTMLSelectElement>('colouring').options].find((option) => option.value === 'deviation');
+    if (deviation) deviation.disabled = !this.model.hello!.hasDeviations;
+  }
+
+  private makeEvents(): void {
+    const newest = this.model.events.slice(-100).reverse();
+    $('events').replaceChildren(...newest.map((event) => {
+      const sample = make('i');
+      sample.style.background = eventColour(event.kind);
+      const [kind, ...rest] = describe(event).split(' · ');
+      const item = make('li', '', sample, make('div', kind, make('small', rest.join(' · '))), make('time', clock(event.t)));
+      item.addEventListener('click', () => this.goTo(event));
+      return item;
+    }));
+  }
+
+  private goTo(event: MapEvent): void {
+    this.timeline.set(event.t);
+    this.setView('free');
+    this.stage.lookAt(event.after);
+  }
+
+  private setView(view: View): void {
+    this.stage.setView(view);
+    for (const button of document.querySelectorAll<HTMLButtonElement>('#views button')) button.classList.toggle('on', button.dataset.view === view);
+  }
+  private setTheme(theme: Theme): void {
+    document.documentElement.dataset.theme = theme;
+    localStorage.setItem('theme', theme);
+    $('theme').textContent = theme === 'dark' ? 'Light' : 'Dark';
+    this.stage.setTheme(theme);
+    this.stale = true;
+  }
+
+  private showKeyframe(): void {
+    const keyframe = this.stage.selected === null ? undefined : this.model.keyframes.get(this.stage.selected);
+    $('keyframe').hidden = !keyframe;
+    if (!keyframe) return;
+    const row = (name: string, value: string) => make('tr', '', make('td', name), make('td', value));
+    const neighbours = this.model.neighbours(keyframe.id).sort((a, b) => b.sharedPoints - a.sharedPoints);
+    const jump = neighbours.slice(0, 8).map((edge) => {
+      const other = edge.from === keyframe.id ? edge.to : edge.from;
+      const button = make('button', `${other} · ${edge.sharedPoints}`);
+      button.title = `${edge.marginalised ? 'marginalised' : 'covisible'}, ${edge.sharedPoints} shared points`;
+      button.addEventListener('click', () => this.select(other));
+      return button;
+    });
+    $('keyframe').replaceChildren(
+      make('h2', `Keyframe ${keyframe.id}`),
+      make('table', '', row('frame', `${keyframe.frame}, ${clock(keyframe.t)}`), row('window', ['neither', 'inner', 'outer'][keyframe.window]),
+        row('points it sees', String(keyframe.points)), row('position', keyframe.position.map((x) => x.toFixed(2)).join(', ')),
+        row('map part', String(keyframe.part)), row('can be recognised', keyframe.hasPlace ? 'yes' : 'no'), row('neighbours', String(neighbours.length))),
+      make('p', '', ...jump));
+  }
+  private select(id: number | null): void {
+    this.stage.selected = id;
+    this.stage.changed();
+    this.stale = true;
+  }
+
+  private showTape(): void {
+    const [from, to] = this.stage.measured;
+    $('tape').hidden = !this.measuring;
+    $('tape').textContent = !from ? 'click the first point' : !to ? 'click the second point' : metres(from.distanceTo(to));
+  }
+  private setMeasuring(on: boolean): void {
+    this.measuring = on;
+    this.stage.measured = [];
+    $('measure').setAttribute('aria-pressed', String(on));
+    $('stage').classList.toggle('measuring', on);
+    this.stage.changed();
+    this.stale = true;
+  }
+
+  private click(x: number, y: number): void {
+    if (!this.measuring) {
+      const picked = this.stage.pick(x, y, 'keyframe');
+      this.select(picked && 'keyframe' in picked ? picked.keyframe.id : null);
+      if (picked) $('side').classList.add('open');
+      return;
+    }
+    const picked = this.stage.pick(x, y, 'point');
+    if (!picked || !('point' in picked)) return;
+    if (this.stage.measured.length === 2) this.stage.measured = [];
+    this.stage.measured.push(picked.point);
+    this.stage.changed();
+    this.stale = true;
+  }
+
+  private savePicture(): void {
+    this.stage.picture((blob) => {
+      if (!blob) return;
+      const link = document.createElement('a');
+      link.href = URL.createObjectURL(blob);
+      link.download = `twofold-${this.model.live.at(-1)?.frame ?? 'map'}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+  }
+
+  private setPlaying(on: boolean): void {
+    this.playing = on ? performance.now() : 0;
+    if (on && this.stage.time === null) this.timeline.set(0);
+    $('play').textContent = on ? '❚❚' : '▶';
+  }
+  /** At the run's own pace; longer ones so that half a minute shows all. */
+  private play(): void {
+    const now = performance.now();
+    const speed = Math.max(1, this.model.endTime() / 30);
+    this.timeline.move((speed * (now - this.playing)) / 1000);
+    this.playing = now;
+    if (this.stage.time === null) this.setPlaying(false);
+  }
+
+  private listen(): void {
+    this.timeline.onTime = (time) => {
+      this.stage.time = time;
+      this.stage.changed();
+      this.stale = true;
+    };
+    this.timeline.onEvent = (event) => this.goTo(event);
+    for (const button of document.querySelectorAll<HTMLButtonElement>('#views button'))
+      button.addEventListener('click', () => this.setView(button.dataset.view as View));
+    $('colouring').addEventListener('change', () => {
+      this.stage.cloud.setColouring($<HTMLSelectElement>('colouring').value as Colouring);
+      this.stage.redraw();
+    });
+    $('size').addEventListener('input', () => {
+      this.stage.cloud.setPointSize(Number($<HTMLInputElement>('size').value));
+      this.stage.redraw();
+    });
+    $('part').addEventListener('change', () => {
+      const value = $<HTMLSelectElement>('part').value;
+      this.part = value === 'camera' || value === 'all' ? value : Number(value);
+      this.stale = true;
+    });
+    const on = (id: string, act: () => void) => $(id).addEventListener('click', act);
+    on('measure', () => this.setMeasuring(!this.measuring));
+    on('shot', () => this.savePicture());
+    on('full', () => void (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
+    on('theme', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark'));
+    on('help', () => $<HTMLDialogElement>('keys').showModal());
+    on('keys', () => $<HTMLDialogElement>('keys').close());
+    on('now', () => this.timeline.set(null));
+    on('play', () => this.setPlaying(!this.playing));
+    on('open-show', () => $('show').classList.toggle('open'));
+    on('open-side', () => $('side').classList.toggle('open'));
+    this.listenToPointer();
+    addEventListener('keydown', (event) => this.key(event));
+  }
+
+  /** A click is a press that hardly moved. */
+  private listenToPointer(): void {
+    let at = [0, 0];
+    $('stage').addEventListener('pointerdown', (event) => (at = [event.offsetX, event.offsetY]));
+    $('stage').addEventListener('pointerup', (event) => {
+      if (Math.hypot(event.offsetX - at[0], event.offsetY - at[1]) < 5) this.click(event.offsetX, event.offsetY);
+    });
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLSelectElement) return;
+    const keys: Record<string, () => void> = {
+      '1': () => this.setView('follow'), '2': () => this.setView('top'), '3': () => this.setView('free'),
+      ' ': () => this.setPlaying(!this.playing), arrowleft: () => this.timeline.move(-1), arrowright: () => this.timeline.move(1),
+      end: () => this.timeline.set(null), m: () => this.setMeasuring(!this.measuring), p: () => this.toggle('points'),
+      k: () => this.toggle('keyframes'), c: () => this.toggle('causal'), e: () => this.toggle('covisible', 'marginalised', 'returns'),
+      i: () => this.toggle('image'), s: () => this.savePicture(), f: () => $('full').click(), t: () => $('theme').click(),
+      h: () => $('help').click(), '?': () => $('help').click(),
+      escape: () => {
+        this.setMeasuring(false);
+        this.select(null);
+      },
+    };
+    const act = keys[event.key.toLowerCase()];
+    if (!act) return;
+    event.preventDefault();
+    act();
+  }
+
+  /** For tests: what is shown, in numbers. */
+  report(): object {
+    return {
+      link: this.link, live: this.model.live.length, newest: this.model.live.at(-1)?.frame ?? -1, keyframes: this.model.keyframes.size,
+      inner: this.windowSize(1), outer: this.windowSize(2), points: this.stage.cloud.size, path: this.model.path.length,
+      events: this.model.events.length, lost: lostStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs,
+      edges: this.model.edges.size, mapVersion: this.model.mapVersion,
+    };
+  }
+  private windowSize(window: number): number {
+    return [...this.model.keyframes.values()].filter((keyframe: Keyframe) => keyframe.window === window).length;
+  }
+}
+
+declare global {
+  interface Window {
+    twofold: Page;
+  }
+}
+window.twofold = new Page();

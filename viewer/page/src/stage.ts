@@ -1,0 +1,427 @@
+// The picture: map, windows, edges, paths, camera; drawn when something has changed.
+import * as THREE from 'three';
+import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
+import {Cloud} from './cloud.ts';
+import {ThinLines, WideLines, wide, type Segments} from './lines.ts';
+import type {CameraPose, Model} from './model.ts';
+import {PALETTES, type Palette, type Theme} from './palette.ts';
+import {State, type Keyframe, type PathFrame} from './wire.ts';
+
+export type View = 'follow' | 'top' | 'free';
+export type Layer = 'points' | 'keyframes' | 'covisible' | 'marginalised' | 'returns' | 'causal' | 'final' | 'truth' | 'grid';
+export type Picked = {keyframe: Keyframe} | {point: THREE.Vector3} | null;
+
+const SLOW_MS = 45;
+const FAST_MS = 25;
+const MOST_PATH = 20000;  // segments drawn of a path
+
+export class Stage {
+  readonly cloud = new Cloud();
+  readonly layers: Record<Layer, boolean> = {
+    points: true, keyframes: true, covisible: true, marginalised: true, returns: true, causal: true, final: true, truth: true, grid: true,
+  };
+  view: View = 'follow';
+  /** Seconds; null: now. */
+  time: number | null = null;
+  part: number | null = null;
+  selected: number | null = null;
+  measured: THREE.Vector3[] = [];
+  drawn = 0;
+  frameMs = 16;
+
+  private readonly renderer: THREE.WebGLRenderer;
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(50, 1, 0.02, 5000);
+  private readonly controls: OrbitControls;
+  private readonly world = new THREE.Group();  // the map's frame: y down, z forward
+  private readonly final = new WideLines(wide(3), 3);
+  private readonly causal = new WideLines(wide(1.6), 2);
+  private readonly truth = new WideLines(wide(1.5, 0.7), 1);
+  private readonly windows = new WideLines(wide(1.8), 4);
+  private readonly body = new WideLines(wide(3), 6);
+  private readonly tape = new WideLines(wide(3), 7);
+  private readonly keyframes = new ThinLines(0.8);
+  private readonly edges = new ThinLines(0.22);
+  private grid: THREE.GridHelper | null = null;
+  private palette: Palette = PALETTES.dark;
+  private dirty = true;
+  private lines = true;  // to be made anew
+  private frustum = 0.1;
+  private extent = {size: 2, centre: new THREE.Vector3(), lowest: -1};
+  private share = 1;
+  private lastFrame = 0;
+  private quiet = 0;
+  private readonly target = new THREE.Vector3();
+  private moved = false;  // by hand
+
+  constructor(private readonly canvas: HTMLCanvasElement, private readonly model: Model) {
+    const slow = drawsInSoftware();
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: !slow, preserveDrawingBuffer: true, powerPreference: 'low-power'});
+    this.renderer.setPixelRatio(slow ? 1 : Math.min(devicePixelRatio, 2));
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.addEventListener('change', () => this.redraw());
+    this.controls.addEventListener('start', () => (this.moved = true));
+    this.world.rotation.x = Math.PI;
+    this.world.add(this.cloud.group, this.edges.object, this.keyframes.object, this.truth.object, this.causal.object,
+      this.final.object, this.windows.object, this.body.object, this.tape.object);
+    this.scene.add(this.world);
+    for (const lines of [this.final, this.causal, this.truth, this.windows, this.body, this.tape]) lines.material.depthTest = false;
+    this.setTheme('dark');
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+    this.setView('follow');
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  setTheme(theme: Theme): void {
+    this.palette = PALETTES[theme];
+    this.renderer.setClearColor(this.palette.background);
+    if (this.grid) {
+      this.scene.remove(this.grid);
+      this.grid.dispose();
+      this.grid = null;
+    }
+    this.changed();
+  }
+
+  setView(view: View): void {
+    this.view = view;
+    this.moved = false;
+    this.controls.minPolarAngle = 0;
+    this.controls.maxPolarAngle = view === 'top' ? 0.001 : Math.PI;
+    this.redraw();
+  }
+
+  /** The model has changed: lines are made anew with the next frame. */
+  changed(): void {
+    this.lines = true;
+    this.dirty = true;
+  }
+  redraw(): void {
+    this.dirty = true;
+  }
+
+  /** The camera's pose at the time shown. */
+  pose(): CameraPose | null {
+    if (this.time !== null) {
+      const frame = this.model.frameAt(this.time);
+      return frame ? this.model.finalPose(frame) : null;
+    }
+    const live = this.model.newestTracked();
+    if (live) return live;
+    const last = this.model.frameAt(Infinity);
+    return last ? this.model.finalPose(last) : null;
+  }
+  /** Its position in the picture's frame: y up. */
+  private here(): THREE.Vector3 | null {
+    const pose = this.pose();
+    return pose && this.isShown(pose.part) ? up(pose.position) : null;
+  }
+
+  isShown(part: number): boolean {
+    return this.part === null || part === this.part;
+  }
+
+  private resize(): void {
+    const {clientWidth, clientHeight} = this.canvas;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  private frame(now: number): void {
+    requestAnimationFrame((next) => this.frame(next));
+    if (!this.dirty) {
+      this.quiet = now;
+      return;
+    }
+    this.dirty = false;
+    this.pace(now);
+    if (this.lines) this.makeLines();
+    this.lines = false;
+    this.makeBody();
+    this.aim();
+    this.renderer.render(this.scene, this.camera);
+    ++this.drawn;
+  }
+
+  /** A machine that cannot draw twenty frames a second draws fewer points; one at rest draws all. */
+  private pace(now: number): void {
+    const took = now - Math.max(this.lastFrame, this.quiet);
+    this.lastFrame = now;
+    if (took > 1000) return;
+    this.frameMs += 0.2 * (took - this.frameMs);
+    const least = Math.min(1, 50000 / Math.max(1, this.cloud.size));
+    const share = this.frameMs > SLOW_MS ? 0.9 * this.share : this.frameMs < FAST_MS ? 1.1 * this.share : this.share;
+    const bounded = Math.min(1, Math.max(least, share));
+    if (bounded === this.share) return;
+    this.share = bounded;
+    this.cloud.setShare(bounded);
+  }
+
+  private makeLines(): void {
+    this.extent = this.findExtent();
+    this.frustum = this.frustumSize();
+    this.makePaths();
+    this.makeKeyframes();
+    this.makeEdges();
+    this.makeTruth();
+    this.makeTape();
+    this.makeGrid();
+    this.cloud.group.visible = this.layers.points;
+    this.cloud.showPart(this.part);
+    this.cloud.showUntil(this.time === null ? 1e9 : this.lastKeyframe(this.time));
+  }
+
+  private lastKeyframe(time: number): number {
+    let last = 0;
+    for (const keyframe of this.model.keyframes.values()) if (keyframe.t <= time && keyframe.id > last) last = keyframe.id;
+    return last;
+  }
+
+  /** Half of the usual distance between keyframes that follow each other. */
+  private frustumSize(): number {
+    const steps: number[] = [];
+    let last: Keyframe | null = null;
+    for (const keyframe of this.model.keyframes.values()) {
+      if (last && last.part === keyframe.part) steps.push(distance(last.position, keyframe.position));
+      last = keyframe;
+    }
+    if (steps.length === 0) return this.frustum;
+    steps.sort((a, b) => a - b);
+    return Math.max(0.03, 0.55 * steps[steps.length >> 1], 0.008 * this.extent.size);
+  }
+
+  private makePaths(): void {
+    const end = this.time === null ? this.model.path.length : this.model.indexOf((frame) => frame.t > this.time!);
+    const step = Math.max(1, Math.ceil(end / MOST_PATH));
+    const final = this.final.begin();
+    const causal = this.causal.begin();
+    let last: PathFrame | null = null;
+    let lastFinal: number[] = [];
+    for (let i = 0; i < end; i += step) {
+      const frame = this.model.path[i];
+      const part = this.model.partOf(frame);
+      if (frame.state !== State.tracked || !this.isShown(part)) {
+        last = null;
+        continue;
+      }
+      const position = this.model.finalPosition(frame);
+      if (last && this.model.partOf(last) === part) final.add(lastFinal, position, this.palette.final);
+      if (last && last.part === frame.part) causal.add(last.causal, frame.causal, this.palette.causal);
+      last = frame;
+      lastFinal = position;
+    }
+    this.final.end();
+    this.causal.end();
+    this.final.object.visible = this.layers.final;
+    this.causal.object.visible = this.layers.causal;
+  }
+
+  private corners(scale: number): number[][] {
+    const rig = this.model.hello?.rig ?? {width: 4, height: 3, fx: 4, fy: 4, cx: 1.5, cy: 1};
+    return [[0, 0], [rig.width, 0], [rig.width, rig.height], [0, rig.height]].map(([u, v]) =>
+      [((u - rig.cx) / rig.fx) * scale, ((v - rig.cy) / rig.fy) * scale, scale]);
+  }
+
+  private addFrustum(to: Segments, pose: CameraPose | Keyframe, scale: number, colour: THREE.Color): void {
+    const q = new THREE.Quaternion(...pose.orientation);
+    const ends = this.corners(scale).map((c) => new THREE.Vector3(...c).applyQuaternion(q).toArray().map((x, k) => x + pose.position[k]));
+    for (let i = 0; i < 4; ++i) {
+      to.add(pose.position, ends[i], colour);
+      to.add(ends[i], ends[(i + 1) % 4], colour);
+    }
+  }
+
+  private makeKeyframes(): void {
+    const windows = this.windows.begin();
+    const others = this.keyframes.begin();
+    for (const keyframe of this.model.keyframes.values()) {
+      if (!this.isShown(keyframe.part) || (this.time !== null && keyframe.t > this.time)) continue;
+      const isSelected = keyframe.id === this.selected;
+      const colour = [this.palette.keyframe, this.palette.inner, this.palette.outer][keyframe.window];
+      if (isSelected) this.addFrustum(windows, keyframe, 1.3 * this.frustum, this.palette.selected);
+      else this.addFrustum(keyframe.window === 0 ? others : windows, keyframe, this.frustum, colour);
+    }
+    this.windows.end();
+    this.keyframes.end();
+    this.windows.object.visible = this.keyframes.object.visible = this.layers.keyframes;
+  }
+
+  private makeEdges(): void {
+    const segments = this.edges.begin();
+    for (const edge of this.model.edges.values()) {
+      const from = this.model.keyframes.get(edge.from);
+      const to = this.model.keyframes.get(edge.to);
+      if (!from || !to || !this.isShown(from.part) || from.part !== to.part) continue;
+      if (this.time !== null && Math.max(from.t, to.t) > this.time) continue;
+      const layer = this.model.isReturn(edge) ? 'returns' : edge.marginalised ? 'marginalised' : 'covisible';
+      if (!this.layers[layer]) continue;
+      const colour = layer === 'returns' ? this.palette.back : this.palette[layer];
+      segments.add(from.position, to.position, colour);
+    }
+    this.edges.end();
+  }
+
+  private makeTruth(): void {
+    const segments = this.truth.begin();
+    const truth = this.model.truth;
+    if (truth && this.layers.truth && this.isShown(truth.part)) {
+      for (let i = 1; i < truth.path.length; ++i)
+        segments.add(truth.path[i - 1].slice(1), truth.path[i].slice(1), this.palette.truth);
+    }
+    this.truth.end();
+  }
+
+  private makeTape(): void {
+    const segments = this.tape.begin();
+    const cross = 0.25 * this.frustum;
+    for (const point of this.measured) {
+      for (const axis of [[cross, 0, 0], [0, cross, 0], [0, 0, cross]]) {
+        const p = point.toArray();
+        segments.add(p.map((x, k) => x - axis[k]), p.map((x, k) => x + axis[k]), this.palette.measure);
+      }
+    }
+    if (this.measured.length === 2) segments.add(this.measured[0].toArray(), this.measured[1].toArray(), this.palette.measure);
+    this.tape.end();
+  }
+
+  /** Squares of one, ten or a hundred metres below the path, wherever that is. */
+  private makeGrid(): void {
+    const {size, centre, lowest} = this.extent;
+    const square = 10 ** Math.round(Math.log10(Math.max(size, 0.1) / 12));
+    const wanted = `${square} ${Math.ceil((1.6 * size) / square)}`;
+    if (this.grid?.name !== wanted) {
+      if (this.grid) {
+        this.scene.remove(this.grid);
+        this.grid.dispose();
+      }
+      const squares = Math.min(200, Math.ceil((1.6 * size) / square));
+      this.grid = new THREE.GridHelper(squares * square, squares, this.palette.grid, this.palette.grid);
+      this.grid.name = wanted;
+      this.scene.add(this.grid);
+    }
+    this.grid.visible = this.layers.grid;
+    this.grid.position.set(square * Math.round(centre.x / square), lowest, square * Math.round(centre.z / square));
+  }
+
+  /** Of keyframes, path and most points, in the picture's frame; the lowest of the former two. */
+  private findExtent(): {size: number; centre: THREE.Vector3; lowest: number} {
+    const box = new THREE.Box3();
+    for (const keyframe of this.model.keyframes.values()) if (this.isShown(keyframe.part)) box.expandByPoint(up(keyframe.position));
+    const step = Math.max(1, this.model.path.length >> 10);
+    for (let i = 0; i < this.model.path.length; i += step) {
+      const frame = this.model.path[i];
+      if (frame.state === State.tracked && this.isShown(this.model.partOf(frame))) box.expandByPoint(up(this.model.finalPosition(frame)));
+    }
+    if (box.isEmpty()) return {size: 2, centre: new THREE.Vector3(), lowest: -1};
+    const lowest = box.min.y - Math.max(0.02 * box.getSize(new THREE.Vector3()).length(), 6 * this.frustum);
+    if (!this.cloud.box.isEmpty()) box.union(this.cloud.box);
+    const size = box.getSize(new THREE.Vector3());
+    return {size: Math.max(size.x, size.z, 1), centre: box.getCenter(new THREE.Vector3()), lowest};
+  }
+
+  private makeBody(): void {
+    const segments = this.body.begin();
+    const pose = this.pose();
+    if (pose && this.isShown(pose.part)) this.addFrustum(segments, pose, 2.2 * this.frustum, this.palette.camera);
+    this.body.end();
+  }
+
+  private aim(): void {
+    if (this.view === 'top') this.aimFromAbove();
+    if (this.view === 'follow') this.follow();
+    this.controls.update();
+    const away = this.camera.position.distanceTo(this.controls.target);
+    this.camera.near = Math.max(0.01, away / 200);
+    this.camera.far = Math.max(100, away * 100);
+    this.camera.updateProjectionMatrix();
+  }
+
+  private aimFromAbove(): void {
+    if (this.moved) return;
+    const {size, centre} = this.extent;
+    const height = (0.6 * size) / Math.tan((this.camera.fov * Math.PI) / 360) / Math.min(1, this.camera.aspect) + centre.y;
+    this.controls.target.copy(centre);
+    this.camera.position.set(centre.x, centre.y + height, centre.z);
+  }
+
+  /** The view moves along from behind and above, or keeps the angle and distance that it was given by hand. */
+  private follow(): void {
+    const at = this.here();
+    if (!at) return;
+    if (!this.moved) {
+      const distance = Math.max(0.7 * this.extent.size, 20 * this.frustum);
+      this.controls.target.copy(this.target);
+      this.camera.position.copy(this.target).add(new THREE.Vector3(0.3, 0.6, 0.75).multiplyScalar(distance));
+    }
+    const far = at.distanceTo(this.target) > 60 * this.frustum;
+    const step = at.clone().sub(this.target).multiplyScalar(far ? 1 : 0.25);
+    if (step.length() < 1e-4 * this.frustum) return;
+    this.target.add(step);
+    this.controls.target.add(step);
+    this.camera.position.add(step);
+    this.dirty = true;
+  }
+
+  /** What is under the pointer: keyframes within 14 pixels, or points. */
+  pick(x: number, y: number, what: 'keyframe' | 'point'): Picked {
+    const {clientWidth: w, clientHeight: h} = this.canvas;
+    const M = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse).multiply(this.world.matrixWorld).elements;
+    let nearest = 14;
+    let picked: Picked = null;
+    const offer = (px: number, py: number, pz: number): boolean => {
+      const depth = M[3] * px + M[7] * py + M[11] * pz + M[15];
+      if (depth <= 0) return false;
+      const u = (0.5 + (0.5 * (M[0] * px + M[4] * py + M[8] * pz + M[12])) / depth) * w;
+      const v = (0.5 - (0.5 * (M[1] * px + M[5] * py + M[9] * pz + M[13])) / depth) * h;
+      const away = Math.hypot(u - x, v - y);
+      if (away >= nearest) return false;
+      nearest = away;
+      return true;
+    };
+    if (what === 'point') {
+      this.cloud.visit((px, py, pz) => {
+        if (offer(px, py, pz)) picked = {point: new THREE.Vector3(px, py, pz)};
+      });
+    } else {
+      for (const keyframe of this.model.keyframes.values())
+        if (this.isShown(keyframe.part) && offer(...keyframe.position)) picked = {keyframe};
+    }
+    return picked;
+  }
+
+  /** Moves the view to a position of the map. */
+  lookAt(position: readonly [number, number, number]): void {
+    const step = up(position).sub(this.controls.target);
+    this.controls.target.add(step);
+    this.camera.position.add(step);
+    this.target.copy(this.controls.target);
+    this.redraw();
+  }
+
+  picture(done: (blob: Blob | null) => void): void {
+    this.renderer.render(this.scene, this.camera);
+    this.canvas.toBlob(done, 'image/png');
+  }
+}
+
+/** Smooth edges and dense pixels are for those who have a graphics processor. */
+function drawsInSoftware(): boolean {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  const name = gl?.getExtension('WEBGL_debug_renderer_info');
+  const software = !gl || !name || /swiftshader|llvmpipe|software/i.test(String(gl.getParameter(name.UNMASKED_RENDERER_WEBGL)));
+  gl?.getExtension('WEBGL_lose_context')?.loseContext();
+  return software;
+}
+
+function up(p: readonly [number, number, number]): THREE.Vector3 {
+  return new THREE.Vector3(p[0], -p[1], -p[2]);
+}
+
+function distance(a: readonly number[], b: readonly number[]): number {
+  return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}

@@ -1,0 +1,73 @@
+// What each stage of the tracker took, frame by frame, with the budget line.
+import uPlot from 'uplot';
+import type {Model} from './model.ts';
+import type {LiveFrame} from './wire.ts';
+
+const SHOWN = 240;
+const STAGES = ['#4e79a7', '#59a14f', '#edc948', '#f28e2b', '#b07aa1', '#76b7b2', '#ff9da7', '#9c755f'];
+
+export class Strip {
+  private plot: uPlot | null = null;
+  private made = '';
+
+  constructor(private readonly place: HTMLElement, private readonly model: Model) {
+    new ResizeObserver(() => this.fit()).observe(place);
+  }
+
+  private fit(): void {
+    this.plot?.setSize({width: this.place.clientWidth, height: this.place.clientHeight});
+  }
+
+  draw(): void {
+    const frames = this.model.live.slice(-SHOWN);
+    if (this.place.clientWidth === 0 || frames.length < 2) return;
+    const stages = this.model.hello?.stages ?? [];
+    const made = `${stages.join()} ${document.documentElement.dataset.theme}`;
+    if (this.made !== made) {
+      this.plot?.destroy();
+      this.plot = this.make(stages);
+      this.made = made;
+    }
+    const budget = this.model.periodMs();
+    this.plot!.setData([
+      frames.map((frame) => frame.frame),
+      ...this.stacked(frames, stages.length),
+      frames.map((frame) => frame.latencyMs),
+      frames.map(() => budget),
+    ]);
+  }
+
+  /** Sums of the stages, the largest first, so that each area covers the upper part of the one before. */
+  private stacked(frames: LiveFrame[], stages: number): number[][] {
+    const sums: number[][] = [];
+    for (let s = stages; s > 0; --s) sums.push(frames.map((frame) => frame.stageMs.slice(0, s).reduce((sum, ms) => sum + ms, 0)));
+    return sums;
+  }
+
+  private make(stages: string[]): uPlot {
+    const style = getComputedStyle(this.place);
+    const text = style.getPropertyValue('--faint');
+    const grid = {stroke: style.getPropertyValue('--track'), width: 1};
+    const areas = stages.map((label, s) => ({label, fill: STAGES[s], stroke: STAGES[s], width: 0, points: {show: false}})).reverse();
+    return new uPlot({
+      width: this.place.clientWidth,
+      height: this.place.clientHeight,
+      legend: {show: false},
+      cursor: {show: false},
+      scales: {x: {time: false}, y: {range: (_, _min, max) => [0, Math.max(1.15 * max, 1)]}},
+      axes: [
+        {stroke: text, grid, ticks: {show: false}, size: 22, font: '10px system-ui', gap: 2},
+        {stroke: text, grid, ticks: {show: false}, size: 34, font: '10px system-ui', gap: 2, values: (_, ms) => ms.map((x) => `${x}`)},
+      ],
+      series: [
+        {}, ...areas,
+        {label: 'exposure to pose', stroke: style.getPropertyValue('--text'), width: 1.5, points: {show: false}},
+        {label: 'budget', stroke: '#ff5a5f', width: 1.5, dash: [6, 4], points: {show: false}},
+      ],
+    }, [[0], ...stages.map(() => [0]), [0], [0]], this.place);
+  }
+
+  static legend(stages: string[]): [string, string][] {
+    return stages.map((name, s) => [name, STAGES[s]]);
+  }
+}

@@ -1,0 +1,173 @@
+// The time line: events, stretches in which the camera was lost, and the time that is shown.
+import type {Model} from './model.ts';
+import {eventColour} from './palette.ts';
+import {State, type MapEvent} from './wire.ts';
+
+export interface LostStretch {
+  begin: number;
+  end: number;
+  frames: number;
+  reason: string;
+}
+
+/** Frames lost in a row for the same reason; times are until the next frame. */
+export function lostStretches(model: Model): LostStretch[] {
+  const stretches: LostStretch[] = [];
+  let open: LostStretch | null = null;
+  for (const frame of model.path) {
+    const reason = model.reasons[frame.reason] ?? '';
+    if (open) open.end = frame.t;
+    if (frame.state === State.tracked) open = null;
+    else if (open && open.reason === reason) ++open.frames;
+    else stretches.push((open = {begin: frame.t, end: frame.t, frames: 1, reason}));
+  }
+  return stretches;
+}
+
+export class Timeline {
+  onTime: (time: number | null) => void = () => {};
+  onEvent: (event: MapEvent) => void = () => {};
+  time: number | null = null;
+  private readonly context: CanvasRenderingContext2D;
+  private stretches: LostStretch[] = [];
+
+  constructor(private readonly canvas: HTMLCanvasElement, private readonly tip: HTMLElement, private readonly model: Model) {
+    this.context = canvas.getContext('2d')!;
+    let dragging = false;
+    canvas.addEventListener('pointerdown', (event) => {
+      const hit = this.eventAt(event.offsetX, event.offsetY);
+      if (hit) this.onEvent(hit);
+      dragging = !hit;
+      if (dragging) {
+        canvas.setPointerCapture(event.pointerId);
+        this.seek(event.offsetX);
+      }
+    });
+    canvas.addEventListener('pointermove', (event) => {
+      if (dragging) this.seek(event.offsetX);
+      this.explain(event);
+    });
+    canvas.addEventListener('pointerup', () => (dragging = false));
+    canvas.addEventListener('pointerleave', () => (tip.hidden = true));
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  /** Time by `step` seconds; beyond the end is now. */
+  move(step: number): void {
+    const end = this.model.endTime();
+    const t = Math.max(0, (this.time ?? end) + step);
+    this.set(t >= end ? null : t);
+  }
+  set(time: number | null): void {
+    this.time = time;
+    this.onTime(time);
+    this.draw();
+  }
+
+  private seek(x: number): void {
+    const t = this.timeAt(x);
+    this.set(t >= 0.997 * this.model.endTime() ? null : t);
+  }
+  private get width(): number {
+    return this.canvas.clientWidth;
+  }
+  private x(t: number): number {
+    return 8 + ((this.width - 16) * t) / Math.max(this.model.endTime(), 1e-3);
+  }
+  private timeAt(x: number): number {
+    return Math.min(1, Math.max(0, (x - 8) / (this.width - 16))) * this.model.endTime();
+  }
+
+  private eventAt(x: number, y: number): MapEvent | null {
+    if (y > 18) return null;
+    let nearest: MapEvent | null = null;
+    let away = 6;
+    for (const event of this.model.events) {
+      const d = Math.abs(this.x(event.t) - x);
+      if (d >= away) continue;
+      away = d;
+      nearest = event;
+    }
+    return nearest;
+  }
+
+  private explain(pointer: PointerEvent): void {
+    const event = this.eventAt(pointer.offsetX, pointer.offsetY);
+    const t = this.timeAt(pointer.offsetX);
+    const lost = this.stretches.find((stretch) => this.x(stretch.begin) - 2 <= pointer.offsetX && pointer.offsetX <= this.x(stretch.end) + 2);
+    const text = event ? describe(event) : lost ? `lost for ${lost.frames} frame${lost.frames > 1 ? 's' : ''}: ${lost.reason}` : clock(t);
+    this.tip.textContent = text;
+    this.tip.hidden = false;
+    const room = this.tip.parentElement!.clientWidth - this.tip.offsetWidth - 8;
+    this.tip.style.left = `${Math.max(8, Math.min(room, pointer.offsetX - this.tip.offsetWidth / 2))}px`;
+  }
+
+  draw(): void {
+    const {canvas, context: c} = this;
+    const scale = Math.min(devicePixelRatio, 2);
+    const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+    if (canvas.width !== Math.round(w * scale) || canvas.height !== Math.round(h * scale)) {
+      canvas.width = Math.round(w * scale);
+      canvas.height = Math.round(h * scale);
+    }
+    this.stretches = lostStretches(this.model);
+    const style = getComputedStyle(canvas);
+    c.setTransform(scale, 0, 0, scale, 0, 0);
+    c.clearRect(0, 0, w, h);
+    const line = 24;
+    c.fillStyle = style.getPropertyValue('--track');
+    c.fillRect(8, line - 2, w - 16, 4);
+    const end = this.model.endTime();
+    c.fillStyle = style.getPropertyValue('--final');
+    c.fillRect(8, line - 2, this.x(this.time ?? end) - 8, 4);
+    c.fillStyle = eventColour('lost');
+    for (const lost of this.stretches) c.fillRect(this.x(lost.begin), line - 4, Math.max(2, this.x(lost.end) - this.x(lost.begin)), 8);
+    for (const event of this.model.events) this.mark(event);
+    this.ticks(end, line, h, style);
+    c.fillStyle = style.getPropertyValue('--text');
+    c.beginPath();
+    c.arc(this.x(this.time ?? end), line, 6, 0, 2 * Math.PI);
+    c.fill();
+  }
+
+  /** What moved the camera far stands high. */
+  private mark(event: MapEvent): void {
+    const c = this.context;
+    const small = event.kind === 'optimisation';
+    c.fillStyle = eventColour(event.kind);
+    c.beginPath();
+    c.arc(this.x(event.t), small ? 13 : 9, small ? 2 : 4.5, 0, 2 * Math.PI);
+    c.fill();
+  }
+
+  private ticks(end: number, line: number, height: number, style: CSSStyleDeclaration): void {
+    const c = this.context;
+    const most = Math.max(2, this.width / 90);
+    const step = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600].find((s) => end / s <= most) ?? 7200;
+    c.fillStyle = style.getPropertyValue('--faint');
+    c.font = '10px system-ui, sans-serif';
+    c.textAlign = 'center';
+    for (let t = 0; t <= end; t += step) {
+      c.fillRect(this.x(t), line + 4, 1, 3);
+      if (this.x(t) < this.width - 24) c.fillText(clock(t), Math.max(18, this.x(t)), Math.min(height - 1, line + 16));
+    }
+  }
+}
+
+export function clock(t: number): string {
+  const s = Math.max(0, t);
+  const minutes = Math.floor(s / 60);
+  const rest = (s % 60).toFixed(s < 60 ? 1 : 0);
+  return minutes > 0 ? `${minutes}:${rest.padStart(2, '0')}` : `${rest} s`;
+}
+
+export function metres(d: number): string {
+  return d < 1 ? `${(100 * d).toFixed(d < 0.1 ? 1 : 0)} cm` : `${d.toFixed(2)} m`;
+}
+
+export function describe(event: MapEvent): string {
+  if (event.text) return `${event.kind} · ${event.text}`;
+  const moved = event.partBefore === event.part ? `moved ${metres(event.moved)}, turned ${((180 / Math.PI) * event.turned).toFixed(2)}°`
+    : `part ${event.partBefore === 0xffffffff ? '–' : event.partBefore} → ${event.part}`;
+  return `${event.kind} · frame ${event.frame} · ${moved}`;
+}

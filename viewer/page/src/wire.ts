@@ -1,0 +1,238 @@
+// The server's messages (viewer/wire_format.hpp), decoded. Arrays of points are views of the message.
+
+export const PROTOCOL = 1;
+export const NO_ID = 0xffffffff;
+
+export interface Keyframe {
+  id: number;
+  part: number;
+  frame: number;
+  t: number;
+  position: [number, number, number];
+  orientation: [number, number, number, number];
+  points: number;
+  window: number;
+  hasPlace: boolean;
+}
+
+export interface Edge {
+  from: number;
+  to: number;
+  sharedPoints: number;
+  marginalised: boolean;
+}
+
+export const enum State {
+  tracked = 0,
+  lost = 1,
+  unplaced = 2,
+}
+
+interface Frame {
+  frame: number;
+  t: number;
+  reference: number;
+  part: number;
+  state: State;
+  reason: number;
+  keyframe: boolean;
+  effort: number;
+  latencyMs: number;
+}
+
+export interface PathFrame extends Frame {
+  causal: [number, number, number];
+  inReference: [number, number, number];
+  turned: [number, number, number, number];
+}
+
+export interface LiveFrame extends Frame {
+  position: [number, number, number];
+  orientation: [number, number, number, number];
+  trackedShare: number;
+  points: number;
+  mapVersion: number;
+  stageMs: number[];
+}
+
+/** Points as they came: each POINT_WORDS words, as whole numbers and as floating-point ones. */
+export interface PointBlock {
+  count: number;
+  words: Uint32Array;
+  floats: Float32Array;
+}
+export const POINT_WORDS = 7;
+
+export interface Delta {
+  kind: 'delta';
+  whole: boolean;
+  last: boolean;
+  from: number;
+  to: number;
+  points: PointBlock[];
+  pointsGone: number[];
+  keyframes: Keyframe[];
+  keyframesGone: number[];
+  edges: Edge[];
+  edgesGone: {from: number; to: number}[];
+  path: PathFrame[];
+  pathGone: number[];
+}
+export interface Frames {
+  kind: 'frames';
+  frames: LiveFrame[];
+}
+export interface Image {
+  kind: 'image';
+  frame: number;
+  width: number;
+  height: number;
+  jpeg: Uint8Array<ArrayBuffer>;
+}
+
+const HEADER = 16;
+const SIZES = {keyframe: 52, edge: 12, path: 56, live: 96};
+
+class Reader {
+  readonly view: DataView;
+  at = HEADER;
+  constructor(readonly buffer: ArrayBuffer) {
+    this.view = new DataView(buffer);
+  }
+  u8 = (offset: number) => this.view.getUint8(this.at + offset);
+  u16 = (offset: number) => this.view.getUint16(this.at + offset, true);
+  i16 = (offset: number) => this.view.getInt16(this.at + offset, true);
+  u32 = (offset: number) => this.view.getUint32(this.at + offset, true);
+  f32 = (offset: number) => this.view.getFloat32(this.at + offset, true);
+  xyz = (o: number): [number, number, number] => [this.f32(o), this.f32(o + 4), this.f32(o + 8)];
+  xyzw = (o: number): [number, number, number, number] => [this.f32(o), this.f32(o + 4), this.f32(o + 8), this.f32(o + 12)];
+
+  list<T>(count: number, size: number, read: () => T): T[] {
+    if (this.at + count * size > this.buffer.byteLength) throw new Error('a message ends within a record');
+    const records: T[] = [];
+    for (let i = 0; i < count; ++i, this.at += size) records.push(read());
+    return records;
+  }
+}
+
+function keyframe(r: Reader): Keyframe {
+  return {
+    id: r.u32(0), part: r.u32(4), frame: r.u32(8), t: r.f32(12), position: r.xyz(16), orientation: r.xyzw(28),
+    points: r.u32(44), window: r.u8(48), hasPlace: r.u8(49) !== 0,
+  };
+}
+
+function edge(r: Reader): Edge {
+  return {from: r.u32(0), to: r.u32(4), sharedPoints: r.u16(8), marginalised: r.u8(10) !== 0};
+}
+
+function frame(r: Reader, latencyAt: number): Frame {
+  return {
+    frame: r.u32(0), t: r.f32(4), reference: r.u32(8), part: r.u32(12), state: r.u8(16), reason: r.u8(17),
+    keyframe: r.u8(18) !== 0, effort: r.u8(19), latencyMs: r.f32(latencyAt),
+  };
+}
+
+function pathFrame(r: Reader): PathFrame {
+  return {
+    ...frame(r, 20), causal: r.xyz(24), inReference: r.xyz(36),
+    turned: [r.i16(48) / 32767, r.i16(50) / 32767, r.i16(52) / 32767, r.i16(54) / 32767],
+  };
+}
+
+function liveFrame(r: Reader): LiveFrame {
+  return {
+    ...frame(r, 56), position: r.xyz(20), orientation: r.xyzw(32), trackedShare: r.f32(48), points: r.u32(52),
+    mapVersion: r.u32(60),
+    stageMs: Array.from({length: 8}, (_, s) => r.f32(64 + 4 * s)),
+  };
+}
+
+function pointBlock(r: Reader, count: number): PointBlock {
+  const words = new Uint32Array(r.buffer, r.at, count * POINT_WORDS);
+  const floats = new Float32Array(r.buffer, r.at, count * POINT_WORDS);
+  r.at += 4 * count * POINT_WORDS;
+  return {count, words, floats};
+}
+
+function decodeDelta(r: Reader, flags: number, from: number, to: number): Delta {
+  const delta: Delta = {
+    kind: 'delta', whole: (flags & 1) !== 0, last: (flags & 2) !== 0, from, to, points: [], pointsGone: [],
+    keyframes: [], keyframesGone: [], edges: [], edgesGone: [], path: [], pathGone: [],
+  };
+  const key = () => r.u32(0);
+  while (r.at < r.buffer.byteLength) {
+    const block = r.u32(0);
+    const count = r.u32(4);
+    r.at += 8;
+    switch (block) {
+      case 1: delta.points.push(pointBlock(r, count)); break;
+      case 2: delta.pointsGone.push(...r.list(count, 4, key)); break;
+      case 3: delta.keyframes.push(...r.list(count, SIZES.keyframe, () => keyframe(r))); break;
+      case 4: delta.keyframesGone.push(...r.list(count, 4, key)); break;
+      case 5: delta.edges.push(...r.list(count, SIZES.edge, () => edge(r))); break;
+      case 6: delta.edgesGone.push(...r.list(count, 8, () => ({from: r.u32(4), to: r.u32(0)}))); break;
+      case 7: delta.path.push(...r.list(count, SIZES.path, () => pathFrame(r))); break;
+      case 8: delta.pathGone.push(...r.list(count, 4, key)); break;
+      default: throw new Error(`unknown block ${block}`);
+    }
+  }
+  return delta;
+}
+
+export function decode(buffer: ArrayBuffer): Delta | Frames | Image {
+  const header = new DataView(buffer);
+  const [kind, number, a, b] = [0, 4, 8, 12].map((at) => header.getUint32(at, true));
+  const reader = new Reader(buffer);
+  switch (kind) {
+    case 1: return decodeDelta(reader, number, a, b);
+    case 2: return {kind: 'frames', frames: reader.list(number, SIZES.live, () => liveFrame(reader))};
+    case 3: return {kind: 'image', frame: number, width: a, height: b, jpeg: new Uint8Array(buffer, HEADER)};
+    default: throw new Error(`unknown message ${kind}`);
+  }
+}
+
+// Text messages.
+
+export interface Rig {
+  width: number;
+  height: number;
+  fx: number;
+  fy: number;
+  cx: number;
+  cy: number;
+}
+export interface Hello {
+  protocol: number;
+  title: string;
+  rig: Rig | null;
+  stages: string[];
+  live: boolean;
+  hasDeviations: boolean;
+  periodMs: number;
+}
+export interface Truth {
+  part: number;
+  /** t, x, y, z */
+  path: [number, number, number, number][];
+}
+export interface MapEvent {
+  kind: string;
+  text: string;
+  frame: number;
+  t: number;
+  keyframe: number;
+  partBefore: number;
+  part: number;
+  moved: number;
+  turned: number;
+  before: [number, number, number];
+  after: [number, number, number];
+}
+export interface Text {
+  hello?: Hello;
+  reasons?: string[];
+  truth?: Truth;
+  events?: MapEvent[];
+  status?: {ended: boolean; message: string};
+}

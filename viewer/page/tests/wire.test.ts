@@ -1,0 +1,51 @@
+// The decoder against bytes that the C++ side writes: tests/viewer/scene_test.cpp compares with the same file.
+import assert from 'node:assert/strict';
+import {readFileSync} from 'node:fs';
+import {test} from 'node:test';
+import {Model} from '../src/model.ts';
+import {decode, type Delta, type Frames} from '../src/wire.ts';
+
+const messages = JSON.parse(readFileSync(process.env.MESSAGES!, 'utf8')) as Record<string, string>;
+
+function bytes(...hexadecimal: string[]): ArrayBuffer {
+  return Uint8Array.from(Buffer.from(hexadecimal.join(''), 'hex')).buffer;
+}
+
+test('a whole map', () => {
+  const delta = decode(bytes(messages.whole)) as Delta;
+  assert.equal(delta.kind, 'delta');
+  assert.ok(delta.whole && delta.last);
+  assert.deepEqual([delta.from, delta.to], [0, 2]);
+  assert.deepEqual(delta.keyframes.map((k) => [k.id, k.frame, k.t, k.position[0], k.window, k.points]), [[0, 0, 0, 0, 2, 7], [1, 10, 0.5, 1, 2, 7], [2, 20, 1, 2, 1, 7]]);
+  assert.deepEqual(delta.edges, [{from: 0, to: 1, sharedPoints: 12, marginalised: false}, {from: 1, to: 2, sharedPoints: 12, marginalised: true}]);
+  assert.equal(delta.points[0].count, 3);
+  assert.deepEqual([...delta.points[0].floats.slice(8, 11)], [1, 0.25, 4]);
+  const [frame] = delta.path;
+  assert.deepEqual([frame.frame, frame.reference, frame.latencyMs], [4, 2, 12.5]);
+  assert.deepEqual(frame.inReference, [0, 0, 0.125]);
+  assert.deepEqual(frame.turned, [0, 0, 0, 1]);
+});
+
+test('a delta on top of it', () => {
+  const model = new Model();
+  model.take(decode(bytes(messages.whole)) as Delta);
+  const delta = decode(bytes(messages.later)) as Delta;
+  assert.ok(!delta.whole);
+  assert.deepEqual(delta.pointsGone, [0]);
+  model.take(delta);
+  assert.deepEqual([...model.keyframes.keys()], [0, 2]);
+  assert.deepEqual([...model.edges.keys()], ['1-2']);
+  assert.deepEqual(model.finalPosition(model.path[0]), [2, 0, 0.125]);
+});
+
+test('live frames', () => {
+  const header = '02000000' + '01000000' + '00000000' + '00000000';
+  const {frames} = decode(bytes(header, messages.live)) as Frames;
+  assert.equal(frames.length, 1);
+  assert.deepEqual([frames[0].frame, frames[0].points, frames[0].trackedShare, frames[0].mapVersion], [4, 90, 0.75, 1]);
+  assert.deepEqual(frames[0].stageMs.slice(0, 3), [1, 2.5, 0]);
+});
+
+test('messages that end too early are refused', () => {
+  for (const cut of [8, 40, 200, 360]) assert.throws(() => decode(bytes(messages.whole.slice(0, 2 * cut))));
+});

@@ -1,0 +1,261 @@
+#include "viewer/scene.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+namespace twofold {
+namespace {
+
+constexpr float kMoved = 0.002F;   // what moves less is not told again [m]
+constexpr float kTurned = 0.001F;  // likewise [components of a unit quaternion]
+
+bool moved(const float (&a)[3], const float (&b)[3], float limit = kMoved) {
+  for (int i = 0; i < 3; ++i) {
+    if (!(std::abs(a[i] - b[i]) <= limit)) return true;
+  }
+  return false;
+}
+
+Eigen::Isometry3f T_w_k(const ViewKeyframe& keyframe) {
+  Eigen::Isometry3f T = Eigen::Isometry3f::Identity();
+  const float* q = keyframe.orientation;
+  T.linear() = Eigen::Quaternionf(q[3], q[0], q[1], q[2]).toRotationMatrix();
+  T.translation() = Eigen::Map<const Eigen::Vector3f>(keyframe.position);
+  return T;
+}
+
+std::int16_t packed(float component) {
+  return static_cast<std::int16_t>(std::lround(32767 * std::clamp(component, -1.0F, 1.0F)));
+}
+
+/// Of a pose in the old reference keyframe to one in the new.
+void move(const Eigen::Isometry3f& T_new_old, ViewPathFrame& frame) {
+  Eigen::Map<Eigen::Vector3f> p(frame.in_reference);
+  p = (T_new_old * p).eval();
+  const std::int16_t* q = frame.turned;
+  const Eigen::Quaternionf q_old(q[3], q[0], q[1], q[2]);
+  const Eigen::Quaternionf q_new = Eigen::Quaternionf(T_new_old.rotation()) * q_old.normalized();
+  for (int i = 0; i < 4; ++i) frame.turned[i] = packed(q_new.coeffs()[i]);
+}
+
+/// The keyframe with the greatest id up to `id`, else the first; one without id when there is none.
+const ViewKeyframe& nearest(const std::vector<ViewKeyframe>& keyframes, std::uint32_t id) {
+  static const ViewKeyframe kNone{.id = kNoId, .part = kNoId};
+  if (keyframes.empty()) return kNone;
+  const auto after =
+      std::upper_bound(keyframes.begin(), keyframes.end(), id,
+                       [](std::uint32_t k, const ViewKeyframe& keyframe) { return k < keyframe.id; });
+  return after == keyframes.begin() ? *after : *std::prev(after);
+}
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0);
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+/// Cuts blocks into messages.
+class DeltaWriter {
+ public:
+  DeltaWriter(Revision from, Revision to)
+      : header_{ViewMessageKind::kDelta, from == 0 ? kWhole : 0U, from, to} {
+    open();
+  }
+
+  template <class Record>
+  void block(ViewBlock kind, const std::vector<Record>& records) {
+    for (std::size_t begin = 0; begin < records.size();) {
+      if (bytes_.size() + 8 + sizeof(Record) > ViewScene::kMessageBytes) close();
+      const std::size_t room = (ViewScene::kMessageBytes - bytes_.size() - 8) / sizeof(Record);
+      const std::size_t count = std::min(room, records.size() - begin);
+      append(bytes_, kind);
+      append(bytes_, static_cast<std::uint32_t>(count));
+      bytes_.append(reinterpret_cast<const char*>(&records[begin]), count * sizeof(Record));
+      begin += count;
+    }
+  }
+  [[nodiscard]] ViewScene::Delta finish() {
+    header_.number |= kLast;
+    std::memcpy(bytes_.data(), &header_, sizeof header_);
+    messages_.push_back(std::make_shared<const std::string>(std::move(bytes_)));
+    return std::move(messages_);
+  }
+
+ private:
+  void open() {
+    bytes_.clear();
+    append(bytes_, header_);
+  }
+  void close() {
+    messages_.push_back(std::make_shared<const std::string>(std::move(bytes_)));
+    header_.number &= ~static_cast<std::uint32_t>(kWhole);  // only the first makes the page forget
+    open();
+  }
+
+  ViewMessageHeader header_;
+  std::string bytes_;
+  ViewScene::Delta messages_;
+};
+
+}  // namespace
+
+void set_pose_in_reference(const Pose& T_reference_camera, ViewPathFrame& frame) {
+  std::copy_n(T_reference_camera.t.begin(), 3, frame.in_reference);
+  for (int i = 0; i < 4; ++i) frame.turned[i] = packed(static_cast<float>(T_reference_camera.q[i]));
+}
+
+bool differs(const ViewPoint& shown, const ViewPoint& now) {
+  return moved(shown.position, now.position) || shown.part != now.part || shown.anchor != now.anchor ||
+         shown.observers / 4 != now.observers / 4;
+}
+
+bool differs(const ViewKeyframe& shown, const ViewKeyframe& now) {
+  for (int i = 0; i < 4; ++i) {
+    if (std::abs(shown.orientation[i] - now.orientation[i]) > kTurned) return true;
+  }
+  return moved(shown.position, now.position) || shown.part != now.part || shown.window != now.window ||
+         shown.points != now.points || shown.has_place != now.has_place;
+}
+
+bool differs(const ViewEdge& shown, const ViewEdge& now) {
+  return shown.marginalised != now.marginalised || shown.shared_points / 8 != now.shared_points / 8;
+}
+
+std::uint8_t ViewScene::reason_number(const char* reason) {
+  const auto at = std::find(reasons_.begin(), reasons_.end(), reason);
+  if (at != reasons_.end()) return static_cast<std::uint8_t>(at - reasons_.begin());
+  if (reasons_.size() == 255) return 0;
+  reasons_.emplace_back(reason);
+  return static_cast<std::uint8_t>(reasons_.size() - 1);
+}
+
+void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns) {
+  begin(pose.t_ns);
+  ViewLiveFrame live;
+  live.frame = static_cast<std::uint32_t>(pose.frame);
+  live.t = seconds(pose.t_ns);
+  live.reference = pose.reference_keyframe;
+  live.part = pose.map_part;
+  live.state = static_cast<std::uint8_t>(pose.state);
+  live.reason = reason_number(pose.reason);
+  live.keyframe = pose.keyframe ? 1 : 0;
+  live.effort = pose.effort;
+  std::copy_n(pose.T_world_camera.t.begin(), 3, live.position);
+  std::copy_n(pose.T_world_camera.q.begin(), 4, live.orientation);
+  live.tracked_share = static_cast<float>(pose.tracked_share);
+  live.points = static_cast<std::uint32_t>(pose.points);
+  live.latency_ms = static_cast<float>(1e-6 * static_cast<double>(pose.latency_ns));
+  live.map_version = static_cast<std::uint32_t>(pose.map_version);
+  for (std::size_t s = 0; s < stage_ns.size() && s < kViewStages; ++s)
+    live.stage_ms[s] = static_cast<float>(1e-6 * static_cast<double>(stage_ns[s]));
+  live_.push_back(live);
+  if (live_.size() > kLiveFrames) live_.pop_front();
+  ++end_live_;
+
+  ViewPathFrame frame;
+  frame.frame = live.frame;
+  frame.t = live.t;
+  frame.reference = live.reference;
+  frame.part = live.part;
+  frame.state = live.state;
+  frame.reason = live.reason;
+  frame.keyframe = live.keyframe;
+  frame.effort = live.effort;
+  frame.latency_ms = live.latency_ms;
+  std::copy_n(live.position, 3, frame.causal);
+  set_pose_in_reference(pose.T_reference_camera, frame);
+  add(frame);
+}
+
+void ViewScene::add(const ViewPathFrame& frame) {
+  path_.append(frame, ++revision_);
+  if (path_.size() > kMaxPath) {
+    path_.drop(revision_, [](std::size_t i) { return i < kMaxPath / 2 && i % 2 == 1; });
+  }
+}
+
+void ViewScene::add(const MapEvent& event) {
+  begin(event.t_ns);
+  ViewEvent view;
+  view.kind = to_string(event.kind);
+  view.frame = static_cast<std::uint32_t>(event.frame);
+  view.t = seconds(event.t_ns);
+  view.keyframe = event.keyframe;
+  view.part_before = event.map_part_before;
+  view.part = event.map_part;
+  view.moved = event.moved;
+  view.turned = event.turned;
+  view.before = event.T_world_camera_before.t;
+  view.after = event.T_world_camera_after.t;
+  add(std::move(view));
+}
+
+void ViewScene::add(ViewEvent event) {
+  events_.push_back(std::move(event));
+  if (events_.size() > kMaxEvents) events_.pop_front();
+  ++end_event_;
+}
+
+void ViewScene::show(const ViewMap& map) {
+  const Revision next = revision_ + 1;
+  rebind_path(map.keyframes, next);
+  keyframes_.replace(map.keyframes, next);
+  points_.replace(map.points, next);
+  edges_.replace(map.edges, next);
+  map_version_ = map.version;
+  revision_ = next;
+}
+
+void ViewScene::show_keyframes(const std::vector<ViewKeyframe>& keyframes) {
+  const Revision next = revision_ + 1;
+  rebind_path(keyframes, next);
+  keyframes_.replace(keyframes, next);
+  revision_ = next;
+}
+
+void ViewScene::rebind_path(const std::vector<ViewKeyframe>& next, Revision revision) {
+  path_.change_all(revision, [&](ViewPathFrame& frame) {
+    const ViewKeyframe* gone = keyframes_.find(frame.reference);
+    if (gone == nullptr || nearest(next, gone->id).id == gone->id) return false;
+    const ViewKeyframe& replacement = nearest(next, gone->id);
+    frame.reference = replacement.part == gone->part ? replacement.id : kNoId;
+    // Both as they were together, if they were.
+    const ViewKeyframe* before = keyframes_.find(replacement.id);
+    move(T_w_k(before != nullptr ? *before : replacement).inverse() * T_w_k(*gone), frame);
+    return true;
+  });
+}
+
+std::shared_ptr<const ViewScene::Delta> ViewScene::delta(Revision since) const {
+  const bool known =
+      points_.knows(since) && keyframes_.knows(since) && edges_.knows(since) && path_.knows(since);
+  if (!known) since = 0;
+  std::erase_if(encoded_, [](const Encoded& encoded) { return encoded.delta.expired(); });
+  for (const Encoded& encoded : encoded_) {
+    if (encoded.since != since || encoded.to != revision_) continue;
+    if (auto delta = encoded.delta.lock()) return delta;
+  }
+  auto delta = encode(since);
+  encoded_.push_back({since, revision_, delta});
+  return delta;
+}
+
+std::shared_ptr<const ViewScene::Delta> ViewScene::encode(Revision since) const {
+  DeltaWriter writer(since, revision_);
+  // Points last: they are the most, and the picture begins with the path.
+  writer.block(ViewBlock::kKeyframesGone, keyframes_.gone_since(since));
+  writer.block(ViewBlock::kKeyframes, keyframes_.changed_since(since));
+  writer.block(ViewBlock::kPathGone, path_.gone_since(since));
+  writer.block(ViewBlock::kPath, path_.changed_since(since));
+  writer.block(ViewBlock::kEdgesGone, edges_.gone_since(since));
+  writer.block(ViewBlock::kEdges, edges_.changed_since(since));
+  writer.block(ViewBlock::kPointsGone, points_.gone_since(since));
+  writer.block(ViewBlock::kPoints, points_.changed_since(since));
+  return std::make_shared<const Delta>(writer.finish());
+}
+
+}  // namespace twofold

@@ -1,0 +1,142 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "twofold/estimate.hpp"
+#include "twofold/map.hpp"
+#include "viewer/change_set.hpp"
+#include "viewer/wire_format.hpp"
+
+namespace twofold {
+
+// Whether the change is worth telling: a hair's breadth is not, or each round of the mapper would tell all
+// points again.
+[[nodiscard]] bool differs(const ViewPoint& shown, const ViewPoint& now);
+[[nodiscard]] bool differs(const ViewKeyframe& shown, const ViewKeyframe& now);
+[[nodiscard]] bool differs(const ViewEdge& shown, const ViewEdge& now);
+
+/// A map as the page gets it; each list ascending by key.
+struct ViewMap {
+  std::uint64_t version = 0;
+  std::vector<ViewPoint> points;
+  std::vector<ViewKeyframe> keyframes;
+  std::vector<ViewEdge> edges;
+};
+
+/// Times of `t_ns` are counted from `start_ns`. O(size of the map); covariances take ten times as long as the
+/// rest.
+[[nodiscard]] ViewMap view_of(const MapSnapshot& map, std::int64_t start_ns, bool with_covariance);
+
+[[nodiscard]] std::vector<ViewKeyframe> keyframes_of(const MapSnapshot& map, std::int64_t start_ns);
+
+/// Code of ViewPoint::deviation.
+[[nodiscard]] std::uint8_t deviation_code(double deviation);
+
+/// Where the camera truly was, in the world of a map part.
+struct ViewTruth {
+  std::uint32_t part = 0;
+  std::vector<std::array<float, 4>> path;  ///< t [s], x, y, z [m]
+};
+
+/// Something that happened, for the time line.
+struct ViewEvent {
+  std::string kind;
+  std::string text;  ///< a sentence; may be empty
+  std::uint32_t frame = 0;
+  float t = 0;  ///< [s]
+  std::uint32_t keyframe = kNoId;
+  std::uint32_t part_before = kNoId;
+  std::uint32_t part = kNoId;
+  double moved = 0;                         ///< [m]
+  double turned = 0;                        ///< [rad]
+  std::array<double, 3> before{}, after{};  ///< the camera's positions [m]
+};
+
+/// Sets `in_reference` and `turned`.
+void set_pose_in_reference(const Pose& T_reference_camera, ViewPathFrame& frame);
+
+/// Everything that is shown: the map, the path, the newest frames, events; as deltas between revisions.
+///
+/// One thread. Memory: the map, at most kMaxPath frames (of older ones every second is left out, again and
+/// again), and the newest frames and events.
+class ViewScene {
+ public:
+  static constexpr std::size_t kMaxPath = 1U << 17;  // 73 minutes at 30 frames a second
+  static constexpr std::size_t kLiveFrames = 512;
+  static constexpr std::size_t kMaxEvents = 4096;
+
+  void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns);
+  void add(const MapEvent& event);
+  void add(ViewEvent event);
+  void add(const ViewPathFrame& frame);
+  void set_truth(ViewTruth truth) { truth_ = std::move(truth); }
+  /// The map is now this.
+  void show(const ViewMap& map);
+  /// Its keyframes alone, which the path hangs on.
+  void show_keyframes(const std::vector<ViewKeyframe>& keyframes);
+
+  [[nodiscard]] Revision revision() const { return revision_; }
+  [[nodiscard]] std::uint64_t map_version() const { return map_version_; }
+  /// Messages that lead from a revision to the present one, each of about kMessageBytes at most. Not for
+  /// since = revision(). Those who ask for the same get the same ones.
+  using Delta = std::vector<std::shared_ptr<const std::string>>;
+  static constexpr std::size_t kMessageBytes = 256U << 10;
+  [[nodiscard]] std::shared_ptr<const Delta> delta(Revision since) const;
+
+  /// Live frames are numbered as they come; those before first_live() are forgotten.
+  [[nodiscard]] std::uint64_t first_live() const { return end_live_ - live_.size(); }
+  [[nodiscard]] std::uint64_t end_live() const { return end_live_; }
+  [[nodiscard]] const ViewLiveFrame& live(std::uint64_t number) const { return live_[number - first_live()]; }
+
+  /// Likewise.
+  [[nodiscard]] std::uint64_t first_event() const { return end_event_ - events_.size(); }
+  [[nodiscard]] std::uint64_t end_event() const { return end_event_; }
+  [[nodiscard]] const ViewEvent& event(std::uint64_t number) const { return events_[number - first_event()]; }
+
+  /// Number of a reason in reasons(), which grows when it is new; 0 when there are too many.
+  [[nodiscard]] std::uint8_t reason_number(const char* reason);
+  [[nodiscard]] const std::optional<ViewTruth>& truth() const { return truth_; }
+  [[nodiscard]] const std::vector<std::string>& reasons() const { return reasons_; }
+  /// Time stamp of the scene's first moment: that of the first pose or event, or what it was told to be.
+  [[nodiscard]] std::optional<std::int64_t> start_ns() const { return start_ns_; }
+  void begin(std::int64_t t_ns) {
+    if (!start_ns_) start_ns_ = t_ns;
+  }
+  [[nodiscard]] std::size_t keyframe_count() const { return keyframes_.size(); }
+  [[nodiscard]] std::size_t point_count() const { return points_.size(); }
+
+ private:
+  [[nodiscard]] float seconds(std::int64_t t_ns) const {
+    return static_cast<float>(1e-9 * static_cast<double>(t_ns - *start_ns_));
+  }
+  /// Hangs frames of the path on keyframes that stay.
+  void rebind_path(const std::vector<ViewKeyframe>& next, Revision revision);
+  [[nodiscard]] std::shared_ptr<const Delta> encode(Revision since) const;
+
+  Revision revision_ = 0;
+  std::uint64_t map_version_ = 0;
+  ChangeSet<ViewPoint> points_;
+  ChangeSet<ViewKeyframe> keyframes_;
+  ChangeSet<ViewEdge> edges_;
+  ChangeSet<ViewPathFrame> path_;
+  std::deque<ViewLiveFrame> live_;
+  std::deque<ViewEvent> events_;
+  std::uint64_t end_live_ = 0, end_event_ = 0;
+  std::vector<std::string> reasons_{""};
+  std::optional<std::int64_t> start_ns_;
+  std::optional<ViewTruth> truth_;
+  struct Encoded {
+    Revision since = 0, to = 0;
+    std::weak_ptr<const Delta> delta;
+  };
+  mutable std::vector<Encoded> encoded_;  // those that somebody is still sending
+};
+
+}  // namespace twofold

@@ -1,0 +1,374 @@
+// The one file that includes Boost.Beast, which takes long to compile.
+#include "viewer/server.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+
+#include "twofold/viewer.hpp"
+#include "viewer/door.hpp"
+#include "viewer/page_files.hpp"
+
+namespace twofold {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+namespace websocket = boost::beast::websocket;
+using tcp = asio::ip::tcp;
+using Clock = std::chrono::steady_clock;
+using Error = boost::system::error_code;
+using Request = http::request<http::empty_body>;
+
+constexpr std::size_t kConnections = 32;
+constexpr std::size_t kViewers = 8;
+constexpr std::size_t kHeaderBytes = 8U << 10;
+constexpr std::size_t kMessageBytes = 64;
+constexpr int kMessagesASecond = 500;
+constexpr auto kRequestTime = std::chrono::seconds(5);
+constexpr auto kWriteTime = std::chrono::seconds(10);
+constexpr auto kLastCall = std::chrono::seconds(1);
+
+/// What the connections share; outlives them.
+struct Hall {
+  const ViewScene& scene;
+  const ViewTitle& title;
+  ViewDoor door;
+  std::size_t& connections;
+  ViewImage image = {};
+};
+
+std::string_view field(const Request& request, http::field name) {
+  const auto value = request[name];
+  return {value.data(), value.size()};
+}
+
+DoorRequest door_request(const Request& request) {
+  const auto method = request.method_string();
+  const auto target = request.target();
+  return {{method.data(), method.size()},      {target.data(), target.size()},
+          field(request, http::field::host),   field(request, http::field::origin),
+          field(request, http::field::cookie), websocket::is_upgrade(request)};
+}
+
+/// Counts a connection for as long as it is there.
+class Seat {
+ public:
+  explicit Seat(std::size_t& taken) : taken_(&taken) { ++*taken_; }
+  Seat(Seat&& other) noexcept : taken_(std::exchange(other.taken_, nullptr)) {}
+  Seat& operator=(Seat&&) = delete;
+  ~Seat() {
+    if (taken_ != nullptr) --*taken_;
+  }
+
+ private:
+  std::size_t* taken_;
+};
+
+/// A browser that watches. Reads and writes keep it alive; it ends when both have failed.
+class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
+ public:
+  ViewerConnection(Hall& hall, Seat seat, beast::tcp_stream stream)
+      : hall_(hall), seat_(std::move(seat)), socket_(std::move(stream)), feed_(hall.scene, hall.title) {}
+
+  void accept(const Request& request) {
+    beast::get_lowest_layer(socket_).expires_never();
+    socket_.set_option(websocket::stream_base::timeout{kRequestTime, std::chrono::seconds(60), true});
+    socket_.read_message_max(kMessageBytes);
+    socket_.binary(true);
+    socket_.async_accept(request, [self = shared_from_this()](Error error) {
+      if (error) return self->close();
+      self->open_ = true;
+      self->read();
+      self->write();
+    });
+  }
+  [[nodiscard]] bool is_closed() const { return closed_; }
+  [[nodiscard]] ClientFeed& feed() { return feed_; }
+  [[nodiscard]] bool is_idle() const { return closed_ || !writing_; }
+
+  /// What is due, unless a message is on its way.
+  void write() {
+    if (!open_ || closed_) return;
+    if (writing_) {
+      if (Clock::now() - write_began_ > kWriteTime) close();
+      return;
+    }
+    std::optional<ViewMessage> message = feed_.next(hall_.image);
+    if (!message) return;
+    writing_ = true;
+    write_began_ = Clock::now();
+    socket_.text(message->text);
+    const auto bytes = message->bytes;
+    socket_.async_write(asio::buffer(*bytes), [self = shared_from_this(), bytes](Error error, std::size_t) {
+      self->writing_ = false;
+      if (error) return self->close();
+      self->write();
+    });
+  }
+  void close() {
+    closed_ = true;
+    Error ignored;
+    beast::get_lowest_layer(socket_).socket().close(ignored);
+  }
+
+ private:
+  void read() {
+    socket_.async_read(buffer_, [self = shared_from_this()](Error error, std::size_t) {
+      if (error || !self->take()) return self->close();
+      self->read();
+      self->write();
+    });
+  }
+  bool take() {
+    const auto now = Clock::now();
+    if (now - second_began_ > std::chrono::seconds(1)) {
+      second_began_ = now;
+      messages_ = 0;
+    }
+    const auto bytes = buffer_.data();
+    const bool sensible =
+        ++messages_ <= kMessagesASecond && feed_.take({static_cast<const char*>(bytes.data()), bytes.size()});
+    buffer_.consume(buffer_.size());
+    return sensible;
+  }
+
+  Hall& hall_;
+  Seat seat_;
+  websocket::stream<beast::tcp_stream> socket_;
+  ClientFeed feed_;
+  beast::flat_buffer buffer_;
+  bool open_ = false, closed_ = false, writing_ = false;
+  Clock::time_point write_began_, second_began_;
+  int messages_ = 0;
+};
+
+using Viewers = std::vector<std::shared_ptr<ViewerConnection>>;
+
+/// Answers one request, or becomes a viewer's connection.
+class Visitor : public std::enable_shared_from_this<Visitor> {
+ public:
+  Visitor(Hall& hall, Viewers& viewers, tcp::socket socket)
+      : hall_(hall), viewers_(viewers), seat_(hall.connections), stream_(std::move(socket)) {
+    parser_.header_limit(kHeaderBytes);
+    parser_.body_limit(0);
+  }
+
+  void read() {
+    stream_.expires_after(kRequestTime);
+    http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](Error error, std::size_t) {
+      if (!error) self->answer();
+    });
+  }
+
+ private:
+  void answer() {
+    const Request& request = parser_.get();
+    const Admission admission = hall_.door.judge(door_request(request));
+    switch (admission) {
+      case Admission::kBadMethod:
+        return refuse(http::status::method_not_allowed, "only GET is answered here");
+      case Admission::kBadHost:
+        return refuse(http::status::forbidden, "this server does not go by that name");
+      case Admission::kBadOrigin:
+        return refuse(http::status::forbidden, "pages of other sites may not look");
+      case Admission::kNoToken:
+        return refuse(http::status::forbidden, "open the address that the program printed, with its token");
+      case Admission::kByCookie:
+      case Admission::kByToken:
+        break;
+    }
+    if (websocket::is_upgrade(request)) return let_view();
+    send_file(admission == Admission::kByToken);
+  }
+
+  void let_view() {
+    if (viewers_.size() >= kViewers)
+      return refuse(http::status::service_unavailable, "as many viewers as there may be are watching");
+    viewers_.push_back(std::make_shared<ViewerConnection>(hall_, std::move(seat_), std::move(stream_)));
+    viewers_.back()->accept(parser_.get());
+  }
+
+  void send_file(bool set_cookie) {
+    const std::string_view target(parser_.get().target().data(), parser_.get().target().size());
+    const auto files = page_files();
+    const auto file = std::find_if(files.begin(), files.end(),
+                                   [&](const PageFile& f) { return f.path == path_of(target); });
+    if (file == files.end()) return refuse(http::status::not_found, "there is no such file");
+    set_head(http::status::ok, file->type);
+    response_.set(http::field::content_encoding, "gzip");
+    if (set_cookie) response_.set(http::field::set_cookie, hall_.door.set_cookie());
+    response_.body() = std::string(file->gzip);
+    send();
+  }
+  void refuse(http::status status, const char* why) {
+    set_head(status, "text/plain; charset=utf-8");
+    response_.body() = std::string(why) + "\n";
+    send();
+  }
+  /// Everything comes from here, nothing is guessed, nobody frames it, nothing is kept.
+  void set_head(http::status status, std::string_view type) {
+    response_.result(status);
+    response_.keep_alive(false);
+    response_.set(http::field::content_type, {type.data(), type.size()});
+    response_.set("Content-Security-Policy",
+                  "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+                  "connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'");
+    response_.set("X-Content-Type-Options", "nosniff");
+    response_.set("X-Frame-Options", "DENY");
+    response_.set("Referrer-Policy", "no-referrer");
+    response_.set("Cross-Origin-Resource-Policy", "same-origin");
+    response_.set("Cross-Origin-Opener-Policy", "same-origin");
+    response_.set(http::field::cache_control, "no-store");
+  }
+  void send() {
+    response_.prepare_payload();
+    stream_.expires_after(kRequestTime);
+    http::async_write(stream_, response_, [self = shared_from_this()](Error, std::size_t) {
+      Error ignored;
+      self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    });
+  }
+
+  Hall& hall_;
+  Viewers& viewers_;
+  Seat seat_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_{2 * kHeaderBytes};
+  http::request_parser<http::empty_body> parser_;
+  http::response<http::string_body> response_;
+};
+
+std::string machine_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+tcp::acceptor listen(asio::io_context& context, const ViewServerOptions& options) {
+  const auto fail = [&](const Error& error) {
+    throw std::runtime_error(fmt::format("{}, port {}: {}", options.bind, options.port, error.message()));
+  };
+  Error error;
+  const auto address = asio::ip::make_address(options.bind, error);
+  if (error) fail(error);
+  const tcp::endpoint endpoint(address, static_cast<std::uint16_t>(options.port));
+  tcp::acceptor acceptor(context);
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  if (error) fail(error);
+  return acceptor;
+}
+
+std::string printed_address(const tcp::endpoint& at, const std::string& token) {
+  const std::string text = at.address().to_string();
+  const std::string host = at.address().is_v6() ? "[" + text + "]" : text;
+  return fmt::format("http://{}:{}/?token={}", host, at.port(), token);
+}
+
+}  // namespace
+
+class ViewServer::Impl {
+ public:
+  Impl(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title)
+      : acceptor_(listen(context_, options)),
+        timer_(context_),
+        hall_{
+            scene, title, {random_secret(), acceptor_.local_endpoint().port(), machine_name()}, connections_},
+        address_(printed_address(acceptor_.local_endpoint(), hall_.door.token())) {}
+
+  void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words) {
+    accept();
+    while (!stop.stop_requested()) {
+      serve(viewers_.empty() ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10));
+      look_around(tick);
+    }
+    look_around(tick, true);
+    for (const auto& viewer : viewers_) viewer->feed().end(last_words());
+    const auto deadline = Clock::now() + kLastCall;
+    for (int idle = 0; idle < 3 && Clock::now() < deadline;) {
+      for (const auto& viewer : viewers_) viewer->write();
+      serve(std::chrono::milliseconds(10));
+      const auto done = [](const auto& viewer) { return viewer->is_idle(); };
+      idle = std::all_of(viewers_.begin(), viewers_.end(), done) ? idle + 1 : 0;
+    }
+  }
+  const std::string& address() const { return address_; }
+  bool is_open_to_network() const { return !acceptor_.local_endpoint().address().is_loopback(); }
+
+ private:
+  void serve(std::chrono::milliseconds time) {
+    bool over = false;
+    timer_.expires_after(time);
+    timer_.async_wait([&over](Error) { over = true; });
+    context_.restart();
+    while (!over) context_.run_one();
+  }
+
+  void look_around(const Tick& tick, bool is_last = false) {
+    if (!accepting_) accept();
+    std::erase_if(viewers_, [](const auto& viewer) { return viewer->is_closed(); });
+    Audience audience{viewers_.size(), false, is_last};
+    for (const auto& viewer : viewers_) audience.wants_images |= viewer->feed().wants_images();
+    tick(audience, hall_.image);
+    for (const auto& viewer : viewers_) viewer->write();
+  }
+
+  void accept() {
+    accepting_ = true;
+    acceptor_.async_accept([this](Error error, tcp::socket socket) {
+      accepting_ = false;
+      if (error) return;  // no file descriptors, perhaps: again at the next tick
+      if (connections_ < kConnections) {
+        socket.set_option(tcp::no_delay(true), error);
+        std::make_shared<Visitor>(hall_, viewers_, std::move(socket))->read();
+      }
+      accept();
+    });
+  }
+
+  std::size_t connections_ = 0;  // before the context, whose handlers hold connections until the end
+  asio::io_context context_{1};
+  tcp::acceptor acceptor_;
+  asio::steady_timer timer_;
+  Hall hall_;
+  Viewers viewers_;
+  std::string address_;
+  bool accepting_ = false;
+};
+
+ViewServer::ViewServer(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title)
+    : impl_(std::make_unique<Impl>(options, scene, title)) {}
+ViewServer::~ViewServer() = default;
+
+const std::string& ViewServer::address() const {
+  return impl_->address();
+}
+
+bool ViewServer::is_open_to_network() const {
+  return impl_->is_open_to_network();
+}
+
+void ViewServer::run(const std::stop_token& stop, const Tick& tick,
+                     const std::function<std::string()>& last_words) {
+  impl_->run(stop, tick, last_words);
+}
+
+bool has_viewer() {
+  return true;
+}
+
+}  // namespace twofold

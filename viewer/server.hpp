@@ -1,0 +1,54 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "viewer/client_feed.hpp"
+
+namespace twofold {
+
+struct ViewServerOptions {
+  std::string bind =
+      "127.0.0.1";  ///< address to listen on; others than loopback show the scene to the network
+  int port = 0;     ///< 0: any that is free
+};
+
+/// Serves page and scene over HTTP and WebSocket to those who know the token. One thread does everything,
+/// that of `run`.
+///
+/// Bounds: 32 connections, 8 of them viewers; requests of 8 KiB and without a body; 5 s for a request to come
+/// in; messages of a viewer of 64 bytes, and 500 of them a second; 10 s for a message to a viewer to go out.
+/// What exceeds a bound is refused, or its connection closed.
+class ViewServer {
+ public:
+  /// Listens from here on. Throws std::runtime_error when the address cannot be had, or the program was built
+  /// without the page (no_server.cpp).
+  ViewServer(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title);
+  ~ViewServer();
+  ViewServer(const ViewServer&) = delete;
+  ViewServer& operator=(const ViewServer&) = delete;
+
+  /// For people: http://127.0.0.1:8420/?token=...
+  [[nodiscard]] const std::string& address() const;
+  /// Somebody can be reached who is not at this machine.
+  [[nodiscard]] bool is_open_to_network() const;
+
+  struct Audience {
+    std::size_t viewers = 0;
+    bool wants_images = false;
+    bool is_last = false;  ///< the last call
+  };
+  /// Called every 10 ms while somebody is looking, else every 100 ms: brings the scene up to date.
+  using Tick = std::function<void(const Audience&, ViewImage& newest)>;
+  /// Until a stop is asked for; viewers then get what they still lack, for at most a second, and
+  /// `last_words()`.
+  void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace twofold

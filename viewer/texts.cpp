@@ -1,0 +1,60 @@
+#include "viewer/texts.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace twofold {
+namespace {
+
+using Json = nlohmann::json;
+
+Json json_of(const CameraRig& rig) {
+  return {{"width", rig.width}, {"height", rig.height}, {"fx", rig.fx},
+          {"fy", rig.fy},       {"cx", rig.cx},         {"cy", rig.cy}};
+}
+
+Json json_of(const ViewEvent& event) {
+  return {{"kind", event.kind},     {"text", event.text},         {"frame", event.frame},
+          {"t", event.t},           {"keyframe", event.keyframe}, {"partBefore", event.part_before},
+          {"part", event.part},     {"moved", event.moved},       {"turned", event.turned},
+          {"before", event.before}, {"after", event.after}};
+}
+
+/// Names of files may hold bytes that are no UTF-8.
+std::string text_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string hello_text(const ViewTitle& title) {
+  const Json rig = title.rig ? json_of(*title.rig) : Json();
+  return text_of({{"hello",
+                   {{"protocol", kViewProtocol},
+                    {"title", title.title},
+                    {"rig", rig},
+                    {"stages", title.stages},
+                    {"live", title.live},
+                    {"hasDeviations", title.has_deviations},
+                    {"periodMs", title.period_ms}}}});
+}
+
+std::string reasons_text(const std::vector<std::string>& reasons) {
+  return text_of({{"reasons", reasons}});
+}
+
+std::string truth_text(const ViewTruth& truth) {
+  return text_of({{"truth", {{"part", truth.part}, {"path", truth.path}}}});
+}
+
+std::string events_text(const ViewScene& scene, std::uint64_t begin) {
+  Json events = Json::array();
+  for (std::uint64_t n = std::max(begin, scene.first_event()); n < scene.end_event(); ++n)
+    events.push_back(json_of(scene.event(n)));
+  return text_of({{"events", events}});
+}
+
+std::string ended_text(const std::string& message) {
+  return text_of({{"status", {{"ended", true}, {"message", message}}}});
+}
+
+}  // namespace twofold

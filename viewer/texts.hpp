@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "twofold/types.hpp"
+#include "viewer/scene.hpp"
+
+namespace twofold {
+
+/// What does not change while a viewer is there.
+struct ViewTitle {
+  std::string title = {};                ///< what is shown: a source, a map file, a folder
+  std::optional<CameraRig> rig = {};     ///< frusta have its shape
+  std::vector<std::string> stages = {};  ///< names of ViewLiveFrame::stage_ms
+  bool live = true;                      ///< else finished: there is a time slider and nothing to come
+  bool has_deviations = false;           ///< of points
+  double period_ms = 0;                  ///< between two frames: the budget; 0: as the frames' times say
+};
+
+// JSON texts of the protocol (wire_format.hpp).
+[[nodiscard]] std::string hello_text(const ViewTitle& title);
+[[nodiscard]] std::string reasons_text(const std::vector<std::string>& reasons);
+[[nodiscard]] std::string truth_text(const ViewTruth& truth);
+/// Events from number `begin` on.
+[[nodiscard]] std::string events_text(const ViewScene& scene, std::uint64_t begin);
+/// {"status": {"ended": true, "message": ...}}: nothing is to come.
+[[nodiscard]] std::string ended_text(const std::string& message);
+
+}  // namespace twofold

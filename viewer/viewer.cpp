@@ -1,0 +1,211 @@
+#include "twofold/viewer.hpp"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <optional>
+#include <variant>
+
+#include "engine/clock.hpp"
+#include "engine/spsc_ring.hpp"
+#include "engine/worker.hpp"
+#include "viewer/image_message.hpp"
+#include "viewer/server.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::int64_t kMapPeriodNs = 200'000'000;  // between two looks at the map while somebody watches
+constexpr std::int64_t kNobodyPeriodNs =
+    1'000'000'000;                      // likewise, of the keyframes alone, while nobody does
+constexpr std::int64_t kMapShare = 60;  // a look that took long makes the next wait this many times that
+constexpr std::int64_t kImagePeriodNs = 200'000'000;
+constexpr std::size_t kRing = 1024;
+
+struct ToldFrame {
+  PoseEstimate pose;
+  std::array<std::int64_t, kViewStages> stage_ns{};
+  std::size_t stages = 0;
+};
+
+struct HeldImage {
+  std::int64_t frame = 0;
+  ImageView pixels;
+  std::shared_ptr<const void> owner;
+};
+
+/// The true path in the world of a tracked pose, which stands where the true pose nearest in time does; at
+/// most 4096 positions.
+ViewTruth truth_beside(const PoseEstimate& pose, const ViewerOptions& options) {
+  const auto& times = options.truth_t_ns;
+  auto nearest = std::lower_bound(times.begin(), times.end(), pose.t_ns);
+  if (nearest == times.end() ||
+      (nearest != times.begin() && pose.t_ns - *std::prev(nearest) < *nearest - pose.t_ns))
+    --nearest;
+  const Pose T_world_truth = compose(pose.T_world_camera, inverse(options.truth[nearest - times.begin()]));
+  ViewTruth truth{pose.map_part, {}};
+  for (std::size_t i = 0; i < times.size(); i += times.size() / 4096 + 1) {
+    const auto p = transform(T_world_truth, options.truth[i].t);
+    const double t = 1e-9 * static_cast<double>(times[i] - pose.t_ns);
+    truth.path.push_back({float(t), float(p[0]), float(p[1]), float(p[2])});
+  }
+  return truth;
+}
+
+ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
+  ViewTitle title;
+  title.title = options.title;
+  title.rig = rig;
+  title.stages = options.stages;
+  title.period_ms = 1e3 * options.frame_period;
+  return title;
+}
+
+void take_lowest_priority() {
+  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 19);  // never refused
+}
+
+}  // namespace
+
+class TWOFOLD_HIDDEN Viewer::Impl {
+ public:
+  Impl(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options)
+      : map_(std::move(map)),
+        options_(options),
+        title_(title_of(rig, options)),
+        server_({options.bind, options.port}, scene_, title_) {
+    thread_.emplace(WorkerOptions{.name = "viewer"}, [this](const std::stop_token& stop) {
+      take_lowest_priority();
+      server_.run(
+          stop, [this](const ViewServer::Audience& audience, ViewImage& newest) { tick(audience, newest); },
+          [] { return std::string("the run is over"); });
+    });
+  }
+  ~Impl() {
+    finish();
+    delete image_.load(std::memory_order_relaxed);  // relaxed: both threads are gone
+  }
+
+  void push(const std::variant<ToldFrame, MapEvent>& told) {
+    auto copy = told;
+    (void)ring_.try_push(std::move(copy));  // full: the page does without
+  }
+  /// The newest image wins; the older is freed here.
+  void put(HeldImage* image) {
+    wants_image_.store(false, std::memory_order_relaxed);
+    delete image_.exchange(image, std::memory_order_acq_rel);
+  }
+  bool wants_image() const { return wants_image_.load(std::memory_order_relaxed); }
+  const ViewServer& server() const { return server_; }
+  void finish() {
+    if (!thread_) return;
+    thread_->request_stop();
+    (void)thread_->join();
+    thread_.reset();
+  }
+
+ private:
+  void tick(const ViewServer::Audience& audience, ViewImage& newest) {
+    std::variant<ToldFrame, MapEvent> told;
+    while (ring_.try_pop(told)) {
+      if (const auto* frame = std::get_if<ToldFrame>(&told)) {
+        scene_.add(frame->pose, std::span(frame->stage_ns).first(frame->stages));
+        find_truth(frame->pose);
+      } else {
+        scene_.add(std::get<MapEvent>(told));
+      }
+    }
+    look_at_map(audience);
+    look_at_image(audience.wants_images, newest);
+  }
+
+  void find_truth(const PoseEstimate& pose) {
+    if (scene_.truth() || pose.state != TrackingState::kTracked || options_.truth.empty() ||
+        options_.truth.size() != options_.truth_t_ns.size())
+      return;
+    scene_.set_truth(truth_beside(pose, options_));
+  }
+
+  /// Not before the first pose: times are counted from there.
+  void look_at_map(const ViewServer::Audience& audience) {
+    const std::int64_t begin_ns = steady_now_ns();
+    const bool watched = audience.viewers > 0;
+    const bool due = audience.is_last || begin_ns >= (watched ? map_due_ns_ : keyframes_due_ns_);
+    if (!map_ || !scene_.start_ns() || !due) return;
+    const MapSnapshot map = map_();
+    if (!watched) {
+      scene_.show_keyframes(keyframes_of(map, *scene_.start_ns()));
+    } else if (map.version() != scene_.map_version()) {
+      scene_.show(view_of(map, *scene_.start_ns(), false));
+    }
+    const std::int64_t now_ns = steady_now_ns();
+    const std::int64_t rest_ns = kMapShare * (now_ns - begin_ns);
+    map_due_ns_ = now_ns + std::max(kMapPeriodNs, rest_ns);
+    keyframes_due_ns_ = now_ns + std::max(kNobodyPeriodNs, rest_ns);
+  }
+
+  void look_at_image(bool wanted, ViewImage& newest) {
+    const std::int64_t now_ns = steady_now_ns();
+    if (!wanted || now_ns < image_due_ns_) return;
+    const std::unique_ptr<HeldImage> image(image_.exchange(nullptr, std::memory_order_acq_rel));
+    wants_image_.store(image == nullptr, std::memory_order_relaxed);
+    if (image == nullptr) return;
+    image_due_ns_ = now_ns + kImagePeriodNs;
+    newest = {newest.number + 1,
+              std::make_shared<const std::string>(image_message(image->frame, image->pixels))};
+  }
+
+  const std::function<MapSnapshot()> map_;
+  const ViewerOptions options_;
+  const ViewTitle title_;
+  ViewScene scene_;
+  ViewServer server_;
+  SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
+  std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, image_due_ns_ = 0;
+  // Exchanged by both ends, each with acquire and release: pixels written before are seen by whoever takes
+  // them, and whoever frees them comes after their last reader.
+  std::atomic<HeldImage*> image_{nullptr};
+  std::atomic<bool> wants_image_{false};  // relaxed: a wish; it publishes nothing
+  std::optional<Worker> thread_;          // last: joins before what it uses is destroyed
+};
+
+Viewer::Viewer(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options)
+    : impl_(std::make_unique<Impl>(rig, std::move(map), options)) {}
+Viewer::~Viewer() = default;
+
+std::string Viewer::address() const {
+  return impl_->server().address();
+}
+
+bool Viewer::is_open_to_network() const {
+  return impl_->server().is_open_to_network();
+}
+
+void Viewer::tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns) {
+  ToldFrame frame{pose};
+  frame.stages = std::min(stage_ns.size(), frame.stage_ns.size());
+  std::copy_n(stage_ns.begin(), frame.stages, frame.stage_ns.begin());
+  impl_->push(frame);
+}
+
+void Viewer::tell(const MapEvent& event) {
+  impl_->push(event);
+}
+
+bool Viewer::wants_image() const {
+  return impl_->wants_image();
+}
+
+void Viewer::show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner) {
+  if (left.data == nullptr || left.format == ImageFormat::kDepth16) return;
+  impl_->put(new HeldImage{frame, left, std::move(owner)});
+}
+
+void Viewer::finish() {
+  impl_->finish();
+}
+
+}  // namespace twofold
