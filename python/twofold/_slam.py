@@ -8,7 +8,7 @@ import traceback
 import weakref
 from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _core
 from ._core import MapEvent, PoseEstimate
@@ -77,9 +77,11 @@ class Slam(_core.Slam):
 
     _dispatcher: _Dispatcher | None = None
 
-    def __init__(self, rig: _core.CameraRig, **options: Any) -> None:
-        super().__init__(rig, **options)
-        _open.add(self)
+    if not TYPE_CHECKING:  # the types are those of _core.Slam
+
+        def __init__(self, rig, **options):
+            super().__init__(rig, **options)
+            _open.add(self)
 
     def on_pose(self, callback: Callable[[PoseEstimate], object]) -> None:
         """Called for every frame that was looked at, soon after, on a thread of its own: a slow one holds up nobody, but

@@ -35,3 +35,10 @@ def test_the_stub_describes_what_is_there() -> None:
         there = set(vars(getattr(_core, node.name)))
         assert described - there <= {"__init__", "__eq__", "__hash__"}, node.name
         assert {name for name in there if not name.startswith("_")} <= described, node.name
+
+
+def test_options_are_typed(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    (tmp_path / "user.py").write_text("import twofold\n\ndef f(rig: twofold.CameraRig) -> None:\n    twofold.Slam(rig, inner=3)\n")
+    with pytest.raises(AssertionError, match='Unexpected keyword argument "inner"'):
+        check("mypy", "--strict", "--cache-dir=/dev/null", str(tmp_path / "user.py"))
