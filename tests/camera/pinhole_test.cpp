@@ -12,8 +12,15 @@ namespace {
 
 const PinholeCamera kCamera{450, 455, 320, 240, 640, 480};
 
+Rig stereo_rig() {
+  Rig rig;
+  rig.camera = kCamera;
+  rig.baseline = 0.12;
+  return rig;
+}
+
 TEST(Pinhole, JacobiansMatchCentralDifferences) {
-  const Rig rig{SensorKind::kStereo, kCamera, 0.12};
+  const Rig rig = stereo_rig();
   std::mt19937 rng(7);
   std::uniform_real_distribution<double> xy(-2, 2), depth(0.5, 20);
   for (int i = 0; i < 200; ++i) {
@@ -49,7 +56,7 @@ TEST(Pinhole, FindsInViewWhatIsInFrontAndInside) {
 }
 
 TEST(MeasurementNoise, FallsByFourALevelAndIsNoneWithoutARightCoordinate) {
-  Rig rig{SensorKind::kStereo, kCamera, 0.12};
+  Rig rig = stereo_rig();
   rig.noise = {.sigma_px = 2, .depth_sigma_px = 4};
   EXPECT_EQ(rig.information({1, 1, 1}, 0), Eigen::Vector3f(0.25F, 0.25F, 0.25F));
   EXPECT_EQ(rig.information({1, 1, 1}, 1), Eigen::Vector3f(0.0625F, 0.0625F, 0.0625F));
