@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "estimation/pose_consensus.hpp"
 #include "estimation/window_problem.hpp"
 
 namespace twofold {
@@ -19,17 +20,6 @@ struct EdgeInformationOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// Pose from matches of which most may be wrong; see consensus_pose.
-struct LoopConsensusOptions {
-  double inlier_sigmas = 4;  ///< reprojection error of an inlier, > 0: a pose of three noisy depths is rough
-  int max_samples = 400;     ///< RANSAC draws at most, >= 1
-  double confidence = 0.99;  ///< of having drawn three inliers, in (0, 1)
-  double min_disparity_px = 0.5;  ///< farther points are not drawn: their depth is a guess, >= 0
-
-  /// Empty when valid; otherwise names the field, the rule and the value.
-  [[nodiscard]] std::string invalid_reason() const;
-};
-
 /// Metric loop closure  (6.4.1).
 struct MetricLoopOptions {
   bool enabled = true;
@@ -41,7 +31,7 @@ struct MetricLoopOptions {
   double max_error_px = 1;       ///< of points that agree with T_loop, on their pyramid level, > 0
   double border_px = 10;         ///< predictions closer to the image's edge are not searched, >= 0
   double max_view_angle = 0.9;   ///< between the anchor's and the reference's ray to a point [rad]
-  LoopConsensusOptions consensus;
+  PoseConsensusOptions consensus;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
