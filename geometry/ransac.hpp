@@ -58,6 +58,14 @@ struct RansacResult {
   int iterations = 0;        ///< samples drawn
 };
 
+/// Best model seen by RANSAC, and how many data agree with it.
+template <class Model>
+struct BestModel {
+  Model model;
+  int inliers = 0;
+  int iterations = 0;  ///< samples drawn
+};
+
 /// Adaptive RANSAC (Fischler & Bolles, CACM 1981) with the truncated quadratic score of MSAC (Torr &
 /// Zisserman, 2000), which prefers, among models with the same inliers, the one that fits them better.
 ///
@@ -67,22 +75,23 @@ struct RansacResult {
 ///   void fit(std::span<const int, kSampleSize>, std::vector<Model>&) const;    appends none or some models
 ///   double squared_residual(const Model&, int i) const;                        may be infinite
 ///
+/// @param models  scratch: with room for what one sample yields, nothing is allocated
 /// @return  the best model seen, not refined; nullopt when size() < kSampleSize or no model has kSampleSize
 /// inliers. Deterministic: depends on the estimator and the options only.
 template <class Estimator>
-[[nodiscard]] std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator,
-                                                                            const RansacOptions& options) {
+[[nodiscard]] std::optional<BestModel<typename Estimator::Model>> best_model(
+    const Estimator& estimator, const RansacOptions& options,
+    std::vector<typename Estimator::Model>& models) {
   using Model = typename Estimator::Model;
   constexpr int kSample = Estimator::kSampleSize;
   const int n = estimator.size();
   if (n < kSample) return std::nullopt;
   const double threshold2 = options.threshold * options.threshold;
   SplitMix64 random(options.seed);
-  std::optional<Model> best;
+  std::optional<BestModel<Model>> best;
   double best_score = std::numeric_limits<double>::infinity();
   int needed = options.max_iterations;
   int iteration = 0;
-  std::vector<Model> models;
   for (; iteration < needed; ++iteration) {
     std::array<int, kSample> sample;
     for (int k = 0; k < kSample; ++k) {
@@ -102,7 +111,7 @@ template <class Estimator>
       }
       if (score >= best_score || inliers < kSample) continue;
       best_score = score;
-      best = model;
+      best = BestModel<Model>{model, inliers, 0};
       // 1 - (1 - w^k)^N >= confidence, w the inlier share
       const double p_good = std::pow(static_cast<double>(inliers) / n, kSample);
       const double draws = p_good >= 1 ? 1 : std::log(1 - options.confidence) / std::log1p(-p_good);
@@ -110,10 +119,21 @@ template <class Estimator>
                                               : options.max_iterations;
     }
   }
+  if (best) best->iterations = iteration;
+  return best;
+}
+
+/// best_model, with the data that agree with it.
+template <class Estimator>
+[[nodiscard]] std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator,
+                                                                            const RansacOptions& options) {
+  std::vector<typename Estimator::Model> models;
+  const auto best = best_model(estimator, options, models);
   if (!best) return std::nullopt;
-  RansacResult<Model> result{*best, {}, iteration};
-  for (int i = 0; i < n; ++i) {
-    if (estimator.squared_residual(*best, i) <= threshold2) result.inliers.push_back(i);
+  RansacResult<typename Estimator::Model> result{best->model, {}, best->iterations};
+  const double threshold2 = options.threshold * options.threshold;
+  for (int i = 0; i < estimator.size(); ++i) {
+    if (estimator.squared_residual(best->model, i) <= threshold2) result.inliers.push_back(i);
   }
   return result;
 }

@@ -171,8 +171,11 @@ bool leads_back(const cv::Mat& left, const cv::Mat& right, int u_right, int u_le
 
 double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, int level,
                       const GuidedSearchOptions& options) {
-  const cv::Mat& left = images.left.level(level);
-  const cv::Mat& right = images.right.level(level);
+  return right_from_row(images.left.level(level), images.right.level(level), rig, u, v, level, options);
+}
+
+double right_from_row(const cv::Mat& left, const cv::Mat& right, const Rig& rig, int u, int v, int level,
+                      const GuidedSearchOptions& options) {
   Patch patch;
   if (!cut_patch(left, u, v, patch)) return Rig::kNoRight;
   // Nearer than a few baselines hardly anything is in both images of a parallel rig.
@@ -194,6 +197,15 @@ double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, i
     return Rig::kNoRight;
   }
   return from_level(aligned->uv.x(), level);
+}
+
+double right_of_corner(const FrameImages& images, const Rig& rig, const Vector2& uv, int level,
+                       const GuidedSearchOptions& options) {
+  if (rig.kind == SensorKind::kMono) return Rig::kNoRight;
+  if (rig.kind == SensorKind::kRgbd) return right_from_depth(images.depth, rig, uv.x(), uv.y());
+  const Eigen::Vector2f on_level = to_level(uv, level);
+  return right_from_row(images, rig, static_cast<int>(std::lround(on_level.x())),
+                        static_cast<int>(std::lround(on_level.y())), level, options);
 }
 
 }  // namespace twofold

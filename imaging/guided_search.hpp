@@ -52,4 +52,14 @@ struct PointMatch {
 [[nodiscard]] double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, int level,
                                     const GuidedSearchOptions& options);
 
+/// The same in two images of `level` of which a row of one belongs to the same row of the other.
+[[nodiscard]] double right_from_row(const cv::Mat& left, const cv::Mat& right, const Rig& rig, int u, int v,
+                                    int level, const GuidedSearchOptions& options);
+
+/// Right coordinate of a corner whose depth is unknown, from the right image or the depth image, whichever
+/// the rig has. NaN when there is none.
+/// @param uv  level-0 pixel of a whole pixel of `level`
+[[nodiscard]] double right_of_corner(const FrameImages& images, const Rig& rig, const Vector2& uv, int level,
+                                     const GuidedSearchOptions& options);
+
 }  // namespace twofold

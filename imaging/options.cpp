@@ -1,8 +1,18 @@
 #include "geometry/option_check.hpp"
+#include "imaging/corner_selection.hpp"
 #include "imaging/guided_search.hpp"
 #include "imaging/plane_warp.hpp"
 
 namespace twofold {
+
+std::string CornerSelectionOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("wanted", wanted, 1)
+      .within("levels", levels, 1, 3)
+      .at_least("threshold", threshold, 1)
+      .at_least("min_score", min_score, 0)
+      .reason();
+}
 
 std::string GuidedSearchOptions::invalid_reason() const {
   return OptionCheck()

@@ -7,8 +7,8 @@
 #include "estimation/motion_only.hpp"
 #include "geometry/absolute_orientation.hpp"
 #include "geometry/ransac.hpp"
+#include "imaging/binary_descriptor.hpp"
 #include "imaging/guided_search.hpp"
-#include "loopclosure/binary_descriptor.hpp"
 
 namespace twofold {
 namespace {
@@ -25,30 +25,13 @@ bool has_depth(const Eigen::Vector3f& z, const VerificationOptions& options) {
   return z.x() - z.z() > options.min_disparity_px;  // false for NaN
 }
 
-/// The partner whose descriptor is nearest, the first among equals.
-struct Nearest {
-  int best = -1;
-  int distance = 257;
-  void offer(int candidate, int d) {
-    if (d >= distance) return;
-    distance = d;
-    best = candidate;
-  }
-};
-
 std::vector<Match> match_descriptors(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                                      const VerificationOptions& options) {
-  std::vector<Nearest> of_a(a.corners.size()), of_b(b.corners.size());
-  for (std::size_t i = 0; i < a.corners.size(); ++i) {
-    for (std::size_t j = 0; j < b.corners.size(); ++j) {
-      const int d = hamming_distance(a.corners[i].descriptor, b.corners[j].descriptor);
-      of_a[i].offer(static_cast<int>(j), d);
-      of_b[j].offer(static_cast<int>(i), d);
-    }
-  }
+  std::vector<NearestDescriptor> of_a, of_b;
+  find_nearest(a.corners, b.corners, of_a, of_b);
   std::vector<Match> matches;
   for (std::size_t i = 0; i < of_a.size(); ++i) {
-    const Nearest& nearest = of_a[i];
+    const NearestDescriptor& nearest = of_a[i];
     if (nearest.best < 0 || nearest.distance > options.max_distance) continue;
     const auto j = static_cast<std::size_t>(nearest.best);
     if (of_b[j].best != static_cast<int>(i)) continue;
@@ -130,12 +113,12 @@ class CornersByRow {
   }
 
   /// The corner most like `descriptor` within `radius_px` pixels of its own level around uv.
-  [[nodiscard]] Nearest nearest(const Vector2& uv, const BinaryDescriptor& descriptor,
-                                double radius_px) const {
+  [[nodiscard]] NearestDescriptor nearest(const Vector2& uv, const BinaryDescriptor& descriptor,
+                                          double radius_px) const {
     const double widest = std::ldexp(radius_px, top_level_);
     const auto from =
         std::partition_point(order_.begin(), order_.end(), [&](int j) { return row(j) < uv.y() - widest; });
-    Nearest nearest;
+    NearestDescriptor nearest;
     for (auto it = from; it != order_.end() && row(*it) <= uv.y() + widest; ++it) {
       const DescribedCorner& corner = corners_[static_cast<std::size_t>(*it)];
       const double radius = std::ldexp(radius_px, corner.level);
@@ -159,7 +142,7 @@ std::vector<Match> match_guided(const Rig& rig, std::span<const PlacedView> plac
                                 const CornersByRow& corners_of_b, const SE3& T_b_a, double radius_px,
                                 const VerificationOptions& options) {
   std::vector<Match> offered;
-  std::vector<Nearest> of_b(b.corners.size());
+  std::vector<NearestDescriptor> of_b(b.corners.size());
   for (std::size_t v = 0; v < place.size(); ++v) {
     const PlaceAppearance& view = *place[v].appearance;
     const SE3 T_a_v = place[v].T_v_a.inverse();
@@ -169,14 +152,14 @@ std::vector<Match> match_guided(const Rig& rig, std::span<const PlacedView> plac
       const Vector3 x_b = T_b_a * x_a;
       const auto uv = rig.camera.find_in_view(x_b, kDescriptorBorder);
       if (!uv) continue;
-      const Nearest nearest = corners_of_b.nearest(*uv, view.corners[i].descriptor, radius_px);
+      const NearestDescriptor nearest = corners_of_b.nearest(*uv, view.corners[i].descriptor, radius_px);
       if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
       of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(offered.size()), nearest.distance);
       offered.push_back({static_cast<int>(v), static_cast<int>(i), nearest.best, x_a});
     }
   }
   std::vector<Match> matches;
-  for (const Nearest& nearest : of_b) {
+  for (const NearestDescriptor& nearest : of_b) {
     if (nearest.best >= 0) matches.push_back(offered[static_cast<std::size_t>(nearest.best)]);
   }
   return matches;

@@ -4,15 +4,6 @@
 
 namespace twofold {
 
-std::string CornerSelectionOptions::invalid_reason() const {
-  return OptionCheck()
-      .at_least("wanted", wanted, 1)
-      .within("levels", levels, 1, 3)
-      .at_least("threshold", threshold, 1)
-      .at_least("min_score", min_score, 0)
-      .reason();
-}
-
 std::string RecogniserOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("near_keyframes", near_keyframes, 0)

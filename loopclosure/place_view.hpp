@@ -2,7 +2,7 @@
 
 #include "camera/rig.hpp"
 #include "graph/place_appearance.hpp"
-#include "loopclosure/corner_selection.hpp"
+#include "imaging/corner_selection.hpp"
 #include "loopclosure/vocabulary.hpp"
 
 namespace twofold {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "loopclosure/binary_descriptor.hpp"
+#include "imaging/binary_descriptor.hpp"
 
 namespace twofold {
 

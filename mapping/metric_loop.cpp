@@ -6,7 +6,6 @@
 #include "geometry/inverse_depth.hpp"
 #include "imaging/view_change.hpp"
 #include "mapping/edges.hpp"
-#include "mapping/loop_consensus.hpp"
 
 namespace twofold {
 
@@ -111,7 +110,7 @@ void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const Frame
 std::optional<SE3> MetricLoopCloser::estimate_pose(const SE3& T_ref_w) {
   // Within a wide search radius most matches may be wrong, too many for a robust kernel to find the way from
   // T_ref.
-  const auto start = consensus_pose(rig_, motion_, min_matches_, options_.consensus);
+  const auto start = PoseConsensus(rig_, motion_.size(), options_.consensus).find(motion_, min_matches_);
   const MotionOnlyResult result = optimise_motion(rig_, motion_, start.value_or(T_ref_w), {});
   if (result.inliers < min_matches_) return std::nullopt;
   return result.T_c_ref;

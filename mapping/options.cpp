@@ -8,15 +8,6 @@ std::string EdgeInformationOptions::invalid_reason() const {
   return OptionCheck().above("trans_share", trans_share, 0).above("rot_share", rot_share, 0).reason();
 }
 
-std::string LoopConsensusOptions::invalid_reason() const {
-  return OptionCheck()
-      .above("inlier_sigmas", inlier_sigmas, 0)
-      .at_least("max_samples", max_samples, 1)
-      .that(confidence > 0 && confidence < 1, "confidence", "in (0, 1)", confidence)
-      .at_least("min_disparity_px", min_disparity_px, 0)
-      .reason();
-}
-
 std::string MetricLoopOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("neighbourhood", neighbourhood, 0)

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "estimation/pose_consensus.hpp"
 #include "estimation/window_problem.hpp"
 
 namespace twofold {
@@ -13,17 +14,6 @@ class MapperHook;
 struct EdgeInformationOptions {
   double trans_share = 0.1;  ///< share of the ideal translational precision an edge gets, > 0
   double rot_share = 0.1;    ///< share of the ideal rotational precision an edge gets, > 0
-
-  /// Empty when valid; otherwise names the field, the rule and the value.
-  [[nodiscard]] std::string invalid_reason() const;
-};
-
-/// Pose from matches of which most may be wrong; see consensus_pose.
-struct LoopConsensusOptions {
-  double inlier_sigmas = 4;  ///< reprojection error of an inlier, > 0: a pose of three noisy depths is rough
-  int max_samples = 400;     ///< RANSAC draws at most, >= 1
-  double confidence = 0.99;  ///< of having drawn three inliers, in (0, 1)
-  double min_disparity_px = 0.5;  ///< farther points are not drawn: their depth is a guess, >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -41,7 +31,7 @@ struct MetricLoopOptions {
   double border_px = 10;         ///< predictions closer to the image's edge are not searched, >= 0
   double min_view_cosine =
       0.6216;  ///< of the angle between the anchor's and the reference's ray to a point, in [-1, 1]
-  LoopConsensusOptions consensus;
+  PoseConsensusOptions consensus;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

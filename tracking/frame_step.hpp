@@ -20,7 +20,9 @@ struct Placement {
 /// Where the search for one frame's pose begins.
 struct SearchStart {
   Placement placement;
-  bool recognised = false;  ///< the loop closer says so, of an earlier frame; else: the last good frame's
+  /// Found by appearance, maybe of an earlier frame: far points are found from there, and lead to where near
+  /// ones are. Else: the last good frame's, from where images are aligned.
+  bool rough = false;
 };
 
 /// What belongs to one frame only: handed from stage to stage of the tracker, which writes the result.

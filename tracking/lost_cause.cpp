@@ -104,6 +104,11 @@ const char* describe(LostCause cause) {
       return "";
     case LostCause::kNoTexture:
       return "too few corners with depth to start a map";
+    case LostCause::kImagesSwapped:
+      return "too few corners with depth: left and right image are swapped";
+    case LostCause::kRowsMisaligned:
+      return "too few corners with depth: rows of the right image lie higher or lower than the left's; "
+             "rectify the pair";
     case LostCause::kTooFewCandidates:
       return "hardly any map point should be visible";
     case LostCause::kTooFewMatches:

@@ -14,10 +14,20 @@ std::string DenseAlignmentOptions::invalid_reason() const {
       .reason();
 }
 
+std::string WideSearchOptions::invalid_reason() const {
+  return OptionCheck()
+      .nested("corners", corners.invalid_reason())
+      .at_least("max_distance", max_distance, 1)
+      .at_least("min_agreeing", min_agreeing, 3)
+      .nested("consensus", consensus.invalid_reason())
+      .reason();
+}
+
 std::string TrackerOptions::invalid_reason() const {
   return OptionCheck()
       .nested("alignment", alignment.invalid_reason())
       .nested("search", search.invalid_reason())
+      .nested("wide_search", wide_search.invalid_reason())
       .nested("motion", motion.invalid_reason())
       .at_least("max_searches", max_searches, 1)
       .within("wanted_matches", wanted_matches, 1, max_searches)
@@ -26,8 +36,12 @@ std::string TrackerOptions::invalid_reason() const {
       .within("min_view_cosine", min_view_cosine, -1, 1)
       .at_least("min_inliers", min_inliers, 3)
       .within("min_inlier_share", min_inlier_share, 0, 1)
+      .share("doubted_inlier_share", doubted_inlier_share)
+      .share("rough_inlier_share", rough_inlier_share)
+      .share("rough_visible_share", rough_visible_share)
       .above("lost_radius_px", lost_radius_px, 0)
       .at_least("new_part_after", new_part_after, 0)
+      .at_least("new_part_frames", new_part_frames, 0)
       .at_least("min_corners_seen", min_corners_seen, 0)
       .above("max_alignment_rms", max_alignment_rms, 0)
       .above("keyframe_parallax", keyframe_parallax, 0)

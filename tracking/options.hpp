@@ -5,29 +5,36 @@
 #include "estimation/motion_only.hpp"
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
+#include "tracking/wide_search.hpp"
 
 namespace twofold {
 
 struct TrackerOptions {
   DenseAlignmentOptions alignment;
   GuidedSearchOptions search;
+  WideSearchOptions wide_search;
   /// A step of 1e-5 moves no projection by a hundredth of a pixel. Outliers: beyond 99 % of chi-square,
   /// because real errors (rolling shutter, calibration, depth of a point seen from one place only) have long
   /// tails.
   MotionOnlyOptions motion{
       .max_iterations = 15, .inlier_chi2_mono = 9.210, .inlier_chi2_stereo = 11.345, .stop_step = 1e-5};
 
-  int wanted_matches = 180;        ///< stop searching once so many points were found in a frame
-  int max_searches = 320;          ///< upper bound of points searched in a frame
-  int neighbour_keyframes = 20;    ///< N1 is cut off after the strongest so many
-  double border_px = 8;            ///< points predicted closer to the image's edge are not searched, >= 0
-  double min_view_cosine = 0.7;    ///< of the angle between a point's first ray and today's, in [-1, 1]
-  int min_inliers = 18;            ///< fewer: lost
-  double min_inlier_share = 0.25;  ///< of the matches found: fewer: lost
-  double lost_radius_px = 8;       ///< search radius while lost
-  double new_part_after = 1;       ///< lost for so long while corners are seen: a new map part is started [s]
-  int min_corners_seen = 40;       ///< fewer: the lens is covered, or there is nothing to see
-  double max_alignment_rms = 25;   ///< the dense pose is not trusted above this [grey]
+  int wanted_matches = 180;      ///< stop searching once so many points were found in a frame
+  int max_searches = 320;        ///< upper bound of points searched in a frame
+  int neighbour_keyframes = 20;  ///< N1 is cut off after the strongest so many
+  double border_px = 8;          ///< points predicted closer to the image's edge are not searched, >= 0
+  double min_view_cosine = 0.7;  ///< of the angle between a point's first ray and today's, in [-1, 1]
+  int min_inliers = 18;  ///< fewer: lost
+  double min_inlier_share = 0.25;     ///< of the matches found: fewer: lost
+  double lost_radius_px = 8;          ///< search radius while lost
+  double doubted_inlier_share = 0.5;  ///< of the matches: with fewer a wider search may find a better pose
+  /// A pose found by appearance must explain so much of the points found from it...
+  double rough_inlier_share = 0.6;
+  double rough_visible_share = 0.2;  ///< ... and of those that should be visible
+  double new_part_after = 1;      ///< lost for so long while corners are seen: a new map part is started [s]
+  int new_part_frames = 5;        ///< ... and for so many frames
+  int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see
+  double max_alignment_rms = 25;  ///< the dense pose is not trusted above this [grey]
 
   double keyframe_parallax = 0.09;  ///< |t| over median depth since the reference keyframe
   double keyframe_share = 0.65;     ///< of the reference's points still tracked: below it a keyframe is due

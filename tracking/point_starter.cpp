@@ -10,6 +10,8 @@ namespace {
 
 constexpr std::size_t kMaxCorners = 4096;
 constexpr int kBorder = 12;                 // of a level: room for the patch and its search
+constexpr int kMaxRowShift = 4;             // between left and right image, looked for [px]
+constexpr int kClearly = 3;                 // times as many corners with depth: that was the mistake
 constexpr double kFarthestDisparity = 0.3;  // [px] below it the depth is as good as infinite
 
 Eigen::Vector2f at_level_zero(const Corner& corner) {
@@ -77,14 +79,38 @@ bool PointStarter::sees_corners(const FrameImages& images, int wanted) {
   return static_cast<int>(corners_.size()) >= wanted;
 }
 
+LostCause PointStarter::explain_missing_depth(const FrameImages& images, int wanted) {
+  const cv::Mat& left = images.left.level(0);
+  const cv::Mat& right = images.right.level(0);
+  const int enough = std::max(wanted, kClearly * count_depths(left, right));
+  if (count_depths(right, left) >= enough) return LostCause::kImagesSwapped;
+  for (int shift = 1; shift <= kMaxRowShift; ++shift) {
+    const cv::Range upper(0, left.rows - shift), lower(shift, left.rows);
+    if (count_depths(left.rowRange(upper), right.rowRange(lower)) >= enough ||
+        count_depths(left.rowRange(lower), right.rowRange(upper)) >= enough) {
+      return LostCause::kRowsMisaligned;
+    }
+  }
+  return LostCause::kNoTexture;
+}
+
+/// Corners of level 0 that are found in the right image.
+int PointStarter::count_depths(const cv::Mat& left, const cv::Mat& right) {
+  clear();
+  corners_.clear();
+  detect_corners(left, 0, options_.corner_threshold, options_.min_corner_score, kBorder,
+                 {options_.cell_px, columns_, rows_, occupied_}, corners_);
+  return static_cast<int>(std::count_if(corners_.begin(), corners_.end(), [&](const Corner& corner) {
+    return !std::isnan(right_from_row(left, right, rig_, corner.u, corner.v, 0, options_.search));
+  }));
+}
+
 bool PointStarter::measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const {
   if (!cut_appearance(images.left.level(corner.level), corner.u, corner.v, corner.level, point.appearance)) {
     return false;
   }
   const Vector2 uv = point.appearance.uv.cast<double>();
-  const double u_r = rig_.kind == SensorKind::kStereo
-                         ? right_from_row(images, rig_, corner.u, corner.v, corner.level, options_.search)
-                         : right_from_depth(images.depth, rig_, uv.x(), uv.y());
+  const double u_r = right_of_corner(images, rig_, uv, corner.level, options_.search);
   if (std::isnan(u_r)) return false;
   const double disparity = std::max(uv.x() - u_r, kFarthestDisparity);
   const Vector3 ray = rig_.camera.unproject(uv);

@@ -8,6 +8,7 @@
 #include "imaging/fast_corners.hpp"
 #include "imaging/image_pyramid.hpp"
 #include "tracking/immature_points.hpp"
+#include "tracking/lost_cause.hpp"
 #include "tracking/options.hpp"
 #include "tracking/quadtree.hpp"
 
@@ -30,7 +31,12 @@ class PointStarter {
   /// Whether corners are seen in so many cells: a quick look at level 1, where noise makes none.
   [[nodiscard]] bool sees_corners(const FrameImages& images, int wanted);
 
+  /// Of a stereo pair that gives too few points: kImagesSwapped or kRowsMisaligned if the pair would give
+  /// them that way, else kNoTexture. Bounded, but as much work as several starts.
+  [[nodiscard]] LostCause explain_missing_depth(const FrameImages& images, int wanted);
+
  private:
+  [[nodiscard]] int count_depths(const cv::Mat& left, const cv::Mat& right);
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;
   [[nodiscard]] bool measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const;
   void move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const;

@@ -14,7 +14,21 @@ constexpr std::size_t kMaxCandidates = 3000;
 constexpr std::size_t kMaxImmaturePoints = 1200;
 constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxAlignmentPoints = 240;
-constexpr int kRoundsFromHint = 3;
+constexpr std::size_t kRecentViews = 4;
+constexpr int kRoundsFromRough = 3;
+
+/// A pose that few points agree on, of few that were found: a wider search may know a better one.
+bool hardly_supported(const TrackResult& result, const TrackerOptions& options) {
+  return result.inliers < options.doubted_inlier_share * result.matches &&
+         result.inliers < options.rough_visible_share * result.searched;
+}
+
+RecentView room_for_view(const Rig& rig, const WideSearch& search) {
+  RecentView view;
+  allocate_images(rig, view.images);
+  search.prepare(view.corners);
+  return view;
+}
 
 }  // namespace
 
@@ -24,6 +38,8 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       alignment_(kMaxAlignmentPoints, options.alignment),
       local_map_(kMaxCandidates),
       quadtree_(rig.camera.width, rig.camera.height, kMaxCandidates),
+      wide_search_(rig, options.wide_search),
+      recent_views_(kRecentViews, room_for_view(rig, wide_search_)),
       immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, options) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
@@ -34,6 +50,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   previous_points_.reserve(kMaxAlignmentPoints);
   allocate_images(rig, current_);
   allocate_images(rig, previous_);
+  wide_search_.prepare(previous_corners_);
 }
 
 TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
@@ -55,31 +72,45 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
 
 /// Pose of the frame relative to a reference keyframe, from the points of the map around that.
 bool Tracker::track(FrameStep& step) {
-  auto [start, recognised] = search_start(step.graph);
-  if (start.reference == kNoKeyframe) {
+  SearchStart start = search_start(step.graph);
+  if (start.placement.reference == kNoKeyframe) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }
-  local_map_.update(step.graph, start.reference, immature_points_, options_.neighbour_keyframes);
+  local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  if (!recognised) {
-    start.T_c_ref = align_to_previous(step);
-    step.shutter = shutter_at(start.T_c_ref, step.frame);
-  }
+  if (!start.rough) start.placement.T_c_ref = align_to_previous(step);
   step.lap(TrackerStage::kAlignment);
-  // A place recognised is that of an earlier frame: far points are found from there, and lead to where near
-  // ones are.
-  bool tracked = true;
-  for (int round = 0; tracked && round < (recognised ? kRoundsFromHint : 1); ++round) {
-    select_candidates(start.T_c_ref, step.result);
+  LostCause cause = search_from(start, step);
+  const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
+  if ((cause == LostCause::kNone && !doubted) || search_widely(step)) return true;
+  if (doubted) {  // nothing better
+    local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
+    cause = search_from(start, step);
+  }
+  if (cause != LostCause::kNone) give_up_frame(cause, step.result);
+  return cause == LostCause::kNone;
+}
+
+/// Points where they should be, where they are, and the pose that fits: once from a good start, a few times
+/// from a rough one.
+LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
+  SE3& T_c_ref = start.placement.T_c_ref;
+  step.shutter = start.rough ? RollingShutter() : shutter_at(T_c_ref, step.frame);
+  LostCause cause = LostCause::kNone;
+  const int rounds = start.rough ? kRoundsFromRough : 1;
+  for (int round = 0; cause == LostCause::kNone && round < rounds; ++round) {
+    const bool wide = start.rough ? round + 1 < rounds : loss_.lost_frames() > 0;
+    select_candidates(T_c_ref, step.result);
     step.lap(TrackerStage::kCandidates);
-    search_points(start.T_c_ref, step);
+    search_points(T_c_ref, wide ? options_.lost_radius_px : options_.search.radius_px, step);
     step.lap(TrackerStage::kSearch);
-    tracked = estimate_pose(start, step);
-    start.T_c_ref = step.result.T_c_ref;
+    cause = estimate_pose(start.placement, step);
+    T_c_ref = step.result.T_c_ref;
     step.lap(TrackerStage::kMotion);
   }
-  return tracked;
+  const bool doubtful = cause == LostCause::kNone && start.rough && !well_supported(step.result);
+  return doubtful ? LostCause::kInconsistentMatches : cause;
 }
 
 void Tracker::load_images(const Frame& frame) {
@@ -129,7 +160,8 @@ SE3 Tracker::align_to_previous(FrameStep& step) {
 /// What the next frame starts from.
 void Tracker::remember_frame(const FrameStep& step) {
   const TrackResult& result = step.result;
-  T_cur_prev_ = loss_.lost_frames() > 0 ? SE3() : result.T_c_ref * last_.T_c_ref.inverse();
+  const bool goes_on = loss_.lost_frames() == 0 && result.reference == last_.reference;
+  T_cur_prev_ = goes_on ? result.T_c_ref * last_.T_c_ref.inverse() : SE3();
   last_ = {result.reference, result.T_c_ref};
   last_t_ns_ = step.frame.t_ns;
   loss_.placed();
@@ -148,6 +180,8 @@ void Tracker::remember_frame(const FrameStep& step) {
     const Vector3 x_c = from_inverse_depth(point.psi);
     previous_points_.push_back({point.appearance.uv, step.shutter.seen_from(rig_, SE3(), x_c) * x_c});
   }
+  previous_corners_.clear();
+  previous_is_keyframe_ = result.proposed;
   std::swap(current_, previous_);
 }
 

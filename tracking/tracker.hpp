@@ -19,6 +19,7 @@
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
+#include "tracking/recent_views.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
@@ -97,12 +98,18 @@ class Tracker {
   [[nodiscard]] SearchStart search_start(const GraphSnapshot& graph);
 
   bool track(FrameStep& step);
+  LostCause search_from(SearchStart start, FrameStep& step);
+  [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
+  bool search_widely(FrameStep& step);
+  bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
+                        const Placement& view, FrameStep& step);
+  [[nodiscard]] bool well_supported(const TrackResult& result) const;
   SE3 align_to_previous(FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
-  void search_points(const SE3& T_c_ref, FrameStep& step);
+  void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
-  bool estimate_pose(const Placement& start, FrameStep& step);
+  LostCause estimate_pose(const Placement& start, FrameStep& step);
   void give_up_frame(LostCause cause, TrackResult& result);
   void remember_frame(const FrameStep& step);
 
@@ -123,6 +130,8 @@ class Tracker {
   DenseAlignment alignment_;
   LocalMap local_map_;
   Quadtree quadtree_;
+  WideSearch wide_search_;
+  RecentViews recent_views_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
 
@@ -137,10 +146,12 @@ class Tracker {
   KeyframeView last_keyframe_;
 
   // Of the last frame searched.
-  std::vector<Match> matches_;
+  std::vector<Match> matches_;             ///< those of map points first
   std::vector<MotionObservation> motion_;  ///< of matches_, one each
   std::vector<AlignmentPoint> previous_points_;
-  std::vector<PointId> inlier_ids_;  ///< scratch, as the next
+  std::vector<DescribedCorner> previous_corners_;  ///< empty: not described yet
+  bool previous_is_keyframe_ = false;              ///< then its images are among the recent views
+  std::vector<PointId> inlier_ids_;                ///< scratch, as the next
   std::vector<double> depths_;
 };
 

@@ -38,13 +38,13 @@ void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
 }
 
 /// Guided search in equi-distributed order (thesis 3.4.3) until enough points were found.
-void Tracker::search_points(const SE3& T_c_ref, FrameStep& step) {
+void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& step) {
   TrackResult& result = step.result;
   matches_.clear();
   result.searched = 0;
   GuidedSearchOptions search = options_.search;
   search.refine_iterations = step.bounds.refine_iterations;
-  if (loss_.lost_frames() > 0) search.radius_px = options_.lost_radius_px;
+  search.radius_px = radius_px;
   for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
     if (static_cast<int>(matches_.size()) >= step.bounds.wanted_matches ||
         result.searched >= step.bounds.max_searches) {
@@ -82,7 +82,7 @@ void Tracker::observe_matches(const SE3& T_c_ref, const RollingShutter& shutter)
 
 /// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted. Where rows are read one
 /// after the other, how they move is known by the result only: a few rounds.
-bool Tracker::estimate_pose(const Placement& start, FrameStep& step) {
+LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   TrackResult& result = step.result;
   MotionOnlyOptions solver = options_.motion;
   solver.max_iterations = step.bounds.motion_iterations;
@@ -95,21 +95,23 @@ bool Tracker::estimate_pose(const Placement& start, FrameStep& step) {
     if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step.frame);
   }
   result.inliers = motion.inliers;
-  if (result.candidates < options_.min_inliers) {
-    give_up_frame(LostCause::kTooFewCandidates, result);
-  } else if (result.matches < options_.min_inliers) {
-    give_up_frame(LostCause::kTooFewMatches, result);
-  } else if (motion.inliers < options_.min_inliers ||
-             motion.inliers < options_.min_inlier_share * result.matches) {
-    give_up_frame(LostCause::kInconsistentMatches, result);
-  } else {
-    result.status = TrackStatus::kTracking;
-    result.reference = start.reference;
-    result.T_c_ref = motion.T_c_ref;
-    result.information = motion.information;
-    return true;
+  if (result.candidates < options_.min_inliers) return LostCause::kTooFewCandidates;
+  if (result.matches < options_.min_inliers) return LostCause::kTooFewMatches;
+  if (motion.inliers < options_.min_inliers || motion.inliers < options_.min_inlier_share * result.matches) {
+    return LostCause::kInconsistentMatches;
   }
-  return false;
+  result.status = TrackStatus::kTracking;
+  result.reference = start.reference;
+  result.T_c_ref = motion.T_c_ref;
+  result.information = motion.information;
+  return LostCause::kNone;
+}
+
+/// A pose found by appearance is believed when the map's points are found where they should be seen from
+/// there: from a wrong one some are found as well, but few agree.
+bool Tracker::well_supported(const TrackResult& result) const {
+  return result.inliers >= options_.rough_inlier_share * result.matches &&
+         result.inliers >= options_.rough_visible_share * result.searched;
 }
 
 }  // namespace twofold

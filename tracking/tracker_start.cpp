@@ -22,13 +22,48 @@ void Tracker::continue_from(const GraphSnapshot& graph) {
 SearchStart Tracker::search_start(const GraphSnapshot& graph) {
   const std::optional<Placement> hint = std::exchange(hint_, std::nullopt);
   if (!hint || loss_.lost_frames() == 0 || !graph.contains(hint->reference)) return {last_, false};
-  const auto live = graph.live_replacement(hint->reference);
-  if (!live) return {last_, false};  // a late answer: the keyframe was culled long ago
-  return {{live->id, hint->T_c_ref * live->T_this_live}, true};
+  const auto place = placement_of(graph, hint->reference);
+  if (!place) return {last_, false};  // a late answer: the keyframe was culled long ago
+  return {{place->reference, hint->T_c_ref * place->T_c_ref}, true};
+}
+
+/// A keyframe as the map has it: itself, or the one that was left in its place.
+std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, KeyframeId id) const {
+  if (immature_points_.find_pending(id) != nullptr) return Placement{id, SE3()};
+  const auto live = graph.contains(id) ? graph.live_replacement(id) : std::nullopt;
+  return live ? std::optional(Placement{live->id, live->T_this_live}) : std::nullopt;
+}
+
+/// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
+bool Tracker::search_widely(FrameStep& step) {
+  if (last_.reference == kNoKeyframe) return false;
+  wide_search_.look_at(current_);
+  if (!previous_is_keyframe_ && search_from_view(previous_, previous_corners_, last_, step)) return true;
+  const KeyframeId part = part_of(step.graph, immature_points_, last_.reference);
+  for (std::size_t age = 0; age < recent_views_.size(); ++age) {
+    RecentView& view = recent_views_[age];
+    const auto placement = placement_of(step.graph, view.id);
+    if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
+    if (search_from_view(view.images, view.corners, *placement, step)) return true;
+  }
+  return false;
+}
+
+/// What looks alike proposes a pose, the map's points around there decide.
+bool Tracker::search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
+                               const Placement& view, FrameStep& step) {
+  const auto T_c_view = wide_search_.find(images, corners, options_.search);
+  step.lap(TrackerStage::kAlignment);
+  if (!T_c_view) return false;
+  local_map_.update(step.graph, view.reference, immature_points_, options_.neighbour_keyframes);
+  return search_from({{view.reference, *T_c_view * view.T_c_ref}, true}, step) == LostCause::kNone;
 }
 
 bool Tracker::start_map(FrameStep& step) {
   step.result.cause = make_first_keyframe(step);
+  if (step.result.cause == LostCause::kNoTexture && rig_.kind == SensorKind::kStereo) {
+    step.result.cause = starter_.explain_missing_depth(current_, kMinStartPoints);
+  }
   return step.result.cause == LostCause::kNone;
 }
 
@@ -37,7 +72,8 @@ bool Tracker::start_map(FrameStep& step) {
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
   const bool corners_in_view = starter_.sees_corners(current_, options_.min_corners_seen);
-  if (loss_.seeing_for(corners_in_view, step.frame.t_ns) < options_.new_part_after || !corners_in_view) {
+  if (loss_.seeing_for(corners_in_view, step.frame.t_ns) < options_.new_part_after || !corners_in_view ||
+      loss_.lost_frames() < options_.new_part_frames) {
     return false;
   }
   if (step.free_proposal == nullptr || !immature_points_.pending().empty()) return false;

@@ -11,9 +11,9 @@
 #include "apps/vocabulary/place_evaluation.hpp"
 #include "apps/vocabulary/training_images.hpp"
 #include "engine/clock.hpp"
+#include "imaging/corner_selection.hpp"
 #include "io/files/image_file.hpp"
 #include "io/files/io_error.hpp"
-#include "loopclosure/corner_selection.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "loopclosure/vocabulary_trainer.hpp"
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "imaging/binary_descriptor.hpp"
+#include "imaging/corner_selection.hpp"
 #include "imaging/image_pyramid.hpp"
-#include "loopclosure/binary_descriptor.hpp"
-#include "loopclosure/corner_selection.hpp"
 
 namespace twofold {
 

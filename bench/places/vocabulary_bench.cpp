@@ -2,7 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include "fixtures/rendered_scene.hpp"
-#include "loopclosure/corner_selection.hpp"
+#include "imaging/corner_selection.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 
 namespace twofold {

@@ -29,9 +29,11 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
 TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
   expect_rules<TrackerOptions>({{"alignment.coarsest_level", [](auto& o) { o.alignment.finest_level = 5; }},
                                 {"search.radius_px", [](auto& o) { o.search.radius_px = -1; }},
+                                {"wide_search.min_agreeing", [](auto& o) { o.wide_search.min_agreeing = 2; }},
                                 {"motion.rounds", [](auto& o) { o.motion.rounds = 0; }},
                                 {"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
                                 {"min_inliers", [](auto& o) { o.min_inliers = 2; }},
+                                {"new_part_frames", [](auto& o) { o.new_part_frames = -1; }},
                                 {"keyframe_share", [](auto& o) { o.keyframe_share = 1.1; }},
                                 {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
                                 {"cell_px", [](auto& o) { o.cell_px = 0; }}});

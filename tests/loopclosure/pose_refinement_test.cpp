@@ -4,9 +4,9 @@
 
 #include "geometry/inverse_depth.hpp"
 #include "graph/graph_writer.hpp"
+#include "imaging/corner_selection.hpp"
 #include "imaging/fast_corners.hpp"
 #include "imaging/patch.hpp"
-#include "loopclosure/corner_selection.hpp"
 #include "tests/loopclosure/turning_camera.hpp"
 
 namespace twofold {

@@ -1,4 +1,4 @@
-#include "loopclosure/corner_selection.hpp"
+#include "imaging/corner_selection.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,8 @@
-#include "loopclosure/binary_descriptor.hpp"
+#include "imaging/binary_descriptor.hpp"
 
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
 #include <random>
 
 namespace twofold {
@@ -48,6 +47,28 @@ float centroid_angle(const cv::Mat& image, int u, int v) {
 
 }  // namespace
 
+bool can_be_described(const ImagePyramid& pyramid, const DescribedCorner& corner) {
+  const cv::Mat& image = pyramid.level(corner.level);
+  const float scale = std::ldexp(1.0F, -corner.level);
+  const float u = (corner.uv.x() + 0.5F) * scale - 0.5F;
+  const float v = (corner.uv.y() + 0.5F) * scale - 0.5F;
+  return u >= kDescriptorBorder && v >= kDescriptorBorder && u <= image.cols - 1 - kDescriptorBorder &&
+         v <= image.rows - 1 - kDescriptorBorder;
+}
+
+void find_nearest(std::span<const DescribedCorner> a, std::span<const DescribedCorner> b,
+                  std::vector<NearestDescriptor>& of_a, std::vector<NearestDescriptor>& of_b) {
+  of_a.assign(a.size(), {});
+  of_b.assign(b.size(), {});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const int d = hamming_distance(a[i].descriptor, b[j].descriptor);
+      of_a[i].offer(static_cast<int>(j), d);
+      of_b[j].offer(static_cast<int>(i), d);
+    }
+  }
+}
+
 CornerDescriber::CornerDescriber() {
   std::mt19937 rng(kPatternSeed);
   for (std::size_t i = 0; i < 256; ++i) {
@@ -65,19 +86,20 @@ CornerDescriber::CornerDescriber() {
   }
 }
 
+void CornerDescriber::prepare(const ImagePyramid& pyramid) {
+  for (std::size_t l = 0; l < smooth_.size(); ++l) {
+    filter_.apply(pyramid.level(static_cast<int>(l)), smooth_[l]);
+  }
+}
+
 void CornerDescriber::describe(const ImagePyramid& pyramid, std::vector<DescribedCorner>& corners) {
   std::array<bool, ImagePyramid::kLevels> smoothed{};
   std::erase_if(corners, [&](DescribedCorner& corner) {
+    if (!can_be_described(pyramid, corner)) return true;
     const std::size_t l = corner.level;
-    const cv::Mat& image = pyramid.level(static_cast<int>(l));
-    const float scale = std::ldexp(1.0F, -corner.level);
-    const float u = (corner.uv.x() + 0.5F) * scale - 0.5F;
-    const float v = (corner.uv.y() + 0.5F) * scale - 0.5F;
-    const bool inside = u >= kDescriptorBorder && v >= kDescriptorBorder &&
-                        u <= image.cols - 1 - kDescriptorBorder && v <= image.rows - 1 - kDescriptorBorder;
-    if (!inside) return true;
+    const cv::Mat& image = pyramid.level(corner.level);
     if (!smoothed[l]) {
-      cv::GaussianBlur(image, smooth_[l], cv::Size(7, 7), 2.0);
+      filter_.apply(image, smooth_[l]);
       smoothed[l] = true;
     }
     describe_one(image, smooth_[l], corner);

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "imaging/binary_descriptor.hpp"
 #include "imaging/fast_corners.hpp"
-#include "loopclosure/binary_descriptor.hpp"
 
 namespace twofold {
 

@@ -1,0 +1,44 @@
+#include "imaging/gaussian_filter.hpp"
+
+#include <array>
+#include <cstdint>
+
+namespace twofold {
+namespace {
+
+constexpr std::array<std::uint32_t, GaussianFilter::kBorder + 1> kWeights{56, 48, 34, 18};  // 256ths
+static_assert(kWeights[0] + 2 * (kWeights[1] + kWeights[2] + kWeights[3]) == 256);
+
+/// Weighted sum of the pixel and its neighbours, `stride` pixels apart.
+template <class Pixel>
+std::uint32_t weighted(const Pixel* p, std::ptrdiff_t stride) {
+  std::uint32_t sum = kWeights[0] * p[0];
+  for (std::ptrdiff_t d = 1; d <= GaussianFilter::kBorder; ++d) {
+    sum += kWeights[static_cast<std::size_t>(d)] * (std::uint32_t{p[d * stride]} + p[-d * stride]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+void GaussianFilter::apply(const cv::Mat& image, cv::Mat& smooth) {
+  smooth.create(image.rows, image.cols, CV_8UC1);
+  rows_.create(image.rows, image.cols, CV_16UC1);
+  for (int v = 0; v < image.rows; ++v) {
+    const auto* in = image.ptr<std::uint8_t>(v);
+    auto* out = rows_.ptr<std::uint16_t>(v);
+    for (int u = kBorder; u < image.cols - kBorder; ++u) {
+      out[u] = static_cast<std::uint16_t>(weighted(in + u, 1));
+    }
+  }
+  const auto stride = static_cast<std::ptrdiff_t>(rows_.step1());
+  for (int v = kBorder; v < image.rows - kBorder; ++v) {
+    const auto* in = rows_.ptr<std::uint16_t>(v);
+    auto* out = smooth.ptr<std::uint8_t>(v);
+    for (int u = kBorder; u < image.cols - kBorder; ++u) {
+      out[u] = static_cast<std::uint8_t>((weighted(in + u, stride) + (1U << 15)) >> 16);
+    }
+  }
+}
+
+}  // namespace twofold

@@ -1,0 +1,54 @@
+#include "tracking/wide_search.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "fixtures/rendered_scene.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace testing;
+
+class WideSearchTest : public ::testing::TestWithParam<SensorKind> {
+ protected:
+  const Rig rig_ = test_rig(GetParam(), 320, 240);
+};
+
+TEST_P(WideSearchTest, FindsAMotionThatNothingForetold) {
+  RenderedScene scene(rig_, {3, 2, 5}, 21);
+  FrameImages previous, current;
+  scene.render(SE3(), 2, previous);
+  WideSearch search(rig_, {});
+  std::vector<DescribedCorner> corners;
+  for (const double yaw : {-0.3, -0.15, 0.15, 0.3}) {
+    const SE3 T_cur_prev(SO3::exp(Vector3(0.05, yaw, 0.04)), Vector3(0.1, -0.05, 0.15));
+    scene.render(T_cur_prev, 2, current);
+    search.look_at(current);
+    const auto found = search.find(previous, corners, {});
+    ASSERT_TRUE(found) << yaw;
+    const SE3 error = *found * T_cur_prev.inverse();
+    EXPECT_LT(error.translation().norm(), 0.1) << yaw;
+    EXPECT_LT(error.so3().log().norm(), 0.02) << yaw;
+  }
+}
+
+TEST_P(WideSearchTest, FindsNothingInAnotherPlace) {
+  RenderedScene scene(rig_, {3, 2, 5}, 21), other(rig_, {3, 2, 5}, 1234);
+  FrameImages previous, current;
+  scene.render(SE3(), 2, previous);
+  other.render(SE3(), 2, current);
+  WideSearch search(rig_, {});
+  std::vector<DescribedCorner> corners;
+  search.look_at(current);
+  EXPECT_FALSE(search.find(previous, corners, {}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, WideSearchTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd),
+                         [](const auto& sensor) {
+                           return sensor.param == SensorKind::kStereo ? "Stereo" : "Rgbd";
+                         });
+
+}  // namespace
+}  // namespace twofold
