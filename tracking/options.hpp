@@ -19,12 +19,12 @@ struct TrackerOptions {
   MotionOnlyOptions motion{
       .max_iterations = 15, .inlier_chi2_mono = 9.210, .inlier_chi2_stereo = 11.345, .stop_step = 1e-5};
 
-  int wanted_matches = 180;      ///< stop searching once so many points were found in a frame
-  int max_searches = 320;        ///< upper bound of points searched in a frame
-  int neighbour_keyframes = 20;  ///< N1 is cut off after the strongest so many
-  double border_px = 8;          ///< points predicted closer to the image's edge are not searched, >= 0
-  double min_view_cosine = 0.7;  ///< of the angle between a point's first ray and today's, in [-1, 1]
-  int min_inliers = 18;  ///< fewer: lost
+  int wanted_matches = 180;           ///< stop searching once so many points were found in a frame
+  int max_searches = 320;             ///< upper bound of points searched in a frame
+  int neighbour_keyframes = 20;       ///< N1 is cut off after the strongest so many
+  double border_px = 8;               ///< points predicted closer to the image's edge are not searched, >= 0
+  double min_view_cosine = 0.7;       ///< of the angle between a point's first ray and today's, in [-1, 1]
+  int min_inliers = 18;               ///< fewer: lost
   double min_inlier_share = 0.25;     ///< of the matches found: fewer: lost
   double lost_radius_px = 8;          ///< search radius while lost
   double doubted_inlier_share = 0.5;  ///< of the matches: with fewer a wider search may find a better pose

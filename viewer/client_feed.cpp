@@ -22,9 +22,9 @@ std::optional<ViewMessage> ClientFeed::next(const ViewImage& newest) {
     } else if (wants_images_ && newest.message != nullptr && newest.number > image_) {
       image_ = newest.number;
       message = ViewMessage{newest.message};
-    } else if (ended_) {
-      message = ViewMessage{shared(ended_text(*ended_)), true};
-      ended_.reset();
+    } else if (last_words_ && !ended_) {
+      message = ViewMessage{shared(ended_text(*last_words_)), true};
+      ended_ = true;
     }
   }
   if (message) ++unacknowledged_;

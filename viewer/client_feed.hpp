@@ -40,7 +40,9 @@ class ClientFeed {
 
   [[nodiscard]] bool wants_images() const { return wants_images_; }
   /// Nothing more will come, and why; the last message.
-  void end(std::string message) { ended_ = std::move(message); }
+  void end(std::string message) { last_words_ = std::move(message); }
+  /// The last message was handed out.
+  [[nodiscard]] bool has_ended() const { return ended_; }
 
  private:
   [[nodiscard]] std::optional<ViewMessage> next_text();
@@ -58,7 +60,8 @@ class ClientFeed {
   std::size_t piece_ = 0;  // of delta_, to be sent next
   std::uint64_t image_ = 0;
   bool wants_images_ = false;
-  std::optional<std::string> ended_;
+  std::optional<std::string> last_words_;
+  bool ended_ = false;
   int unacknowledged_ = 0;
 };
 

@@ -39,7 +39,7 @@ constexpr std::size_t kMessageBytes = 64;
 constexpr int kMessagesASecond = 500;
 constexpr auto kRequestTime = std::chrono::seconds(5);
 constexpr auto kWriteTime = std::chrono::seconds(10);
-constexpr auto kLastCall = std::chrono::seconds(1);
+constexpr auto kLastCall = std::chrono::seconds(3);
 
 /// What the connections share; outlives them.
 struct Hall {
@@ -97,7 +97,7 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
   }
   [[nodiscard]] bool is_closed() const { return closed_; }
   [[nodiscard]] ClientFeed& feed() { return feed_; }
-  [[nodiscard]] bool is_idle() const { return closed_ || !writing_; }
+  [[nodiscard]] bool is_done() const { return closed_ || (feed_.has_ended() && !writing_); }
 
   /// What is due, unless a message is on its way.
   void write() {
@@ -299,11 +299,10 @@ class ViewServer::Impl {
     look_around(tick, true);
     for (const auto& viewer : viewers_) viewer->feed().end(last_words());
     const auto deadline = Clock::now() + kLastCall;
-    for (int idle = 0; idle < 3 && Clock::now() < deadline;) {
+    const auto is_done = [](const auto& viewer) { return viewer->is_done(); };
+    while (!std::all_of(viewers_.begin(), viewers_.end(), is_done) && Clock::now() < deadline) {
       for (const auto& viewer : viewers_) viewer->write();
       serve(std::chrono::milliseconds(10));
-      const auto done = [](const auto& viewer) { return viewer->is_idle(); };
-      idle = std::all_of(viewers_.begin(), viewers_.end(), done) ? idle + 1 : 0;
     }
   }
   const std::string& address() const { return address_; }

@@ -42,7 +42,7 @@ class ViewServer {
   };
   /// Called every 10 ms while somebody is looking, else every 100 ms: brings the scene up to date.
   using Tick = std::function<void(const Audience&, ViewImage& newest)>;
-  /// Until a stop is asked for; viewers then get what they still lack, for at most a second, and
+  /// Until a stop is asked for; viewers then get what they still lack, for at most three seconds, and
   /// `last_words()`.
   void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <ctime>
 #include <optional>
 #include <variant>
 
@@ -21,7 +22,7 @@ namespace {
 constexpr std::int64_t kMapPeriodNs = 200'000'000;  // between two looks at the map while somebody watches
 constexpr std::int64_t kNobodyPeriodNs =
     1'000'000'000;                      // likewise, of the keyframes alone, while nobody does
-constexpr std::int64_t kMapShare = 60;  // a look that took long makes the next wait this many times that
+constexpr std::int64_t kMapShare = 60;  // the next look waits this many times what one cost
 constexpr std::int64_t kImagePeriodNs = 200'000'000;
 constexpr std::size_t kRing = 1024;
 
@@ -62,6 +63,13 @@ ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   title.stages = options.stages;
   title.period_ms = 1e3 * options.frame_period;
   return title;
+}
+
+/// What the calling thread has computed: on a busy machine less than time has passed.
+std::int64_t thread_cpu_ns() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return time.tv_sec * 1'000'000'000 + time.tv_nsec;
 }
 
 void take_lowest_priority() {
@@ -131,9 +139,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
 
   /// Not before the first pose: times are counted from there.
   void look_at_map(const ViewServer::Audience& audience) {
-    const std::int64_t begin_ns = steady_now_ns();
+    const std::int64_t begin_cpu_ns = thread_cpu_ns();
     const bool watched = audience.viewers > 0;
-    const bool due = audience.is_last || begin_ns >= (watched ? map_due_ns_ : keyframes_due_ns_);
+    const bool due = audience.is_last || steady_now_ns() >= (watched ? map_due_ns_ : keyframes_due_ns_);
     if (!map_ || !scene_.start_ns() || !due) return;
     const MapSnapshot map = map_();
     if (!watched) {
@@ -142,7 +150,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
       scene_.show(view_of(map, *scene_.start_ns(), false));
     }
     const std::int64_t now_ns = steady_now_ns();
-    const std::int64_t rest_ns = kMapShare * (now_ns - begin_ns);
+    const std::int64_t rest_ns = kMapShare * (thread_cpu_ns() - begin_cpu_ns);
     map_due_ns_ = now_ns + std::max(kMapPeriodNs, rest_ns);
     keyframes_due_ns_ = now_ns + std::max(kNobodyPeriodNs, rest_ns);
   }

@@ -63,7 +63,8 @@ class TWOFOLD_API Viewer {
   /// @param left   grey or colour; `owner` keeps its pixels alive and unchanged until the viewer is done
   void show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner);
 
-  /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most a second.
+  /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most three
+  /// seconds.
   void finish();
 
  private:

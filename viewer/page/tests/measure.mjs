@@ -40,7 +40,7 @@ async function oneRun(viewers, name) {
     try {
       const now = threadSeconds(run.process.pid, 'viewer');
       if (Number.isNaN(began)) began = now;
-      seconds = now - began;
+      if (!Number.isNaN(now)) seconds = now - began;
       megabytes = Math.max(megabytes, memory(run.process.pid));
     } catch { /* it has ended */ }
   }, 250);

@@ -6,7 +6,7 @@ import {chromium} from 'playwright-core';
 export const TWOFOLD = process.env.TWOFOLD ?? 'build/release/apps/twofold/twofold';
 
 /** Until `check` gives something true; throws after `ms`. */
-export async function until(what, check, ms = 20000) {
+export async function until(what, check, ms = 40000) {
   const end = performance.now() + ms;
   for (;;) {
     const value = await check();
