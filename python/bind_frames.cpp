@@ -1,6 +1,8 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <optional>
+
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/frames.hpp"

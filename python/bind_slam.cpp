@@ -1,7 +1,9 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <algorithm>
 #include <bit>
+#include <map>
 #include <mutex>
 
 #include <fmt/format.h>
