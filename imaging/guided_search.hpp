@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -51,6 +52,13 @@ struct PointMatch {
 /// @param u, v  whole pixels of `level`
 [[nodiscard]] double right_from_row(const FrameImages& images, const Rig& rig, int u, int v, int level,
                                     const GuidedSearchOptions& options);
+
+/// Whether what is left of the difference [grey] between a patch and where it was found is small enough.
+[[nodiscard]] bool looks_alike(const Patch& patch, float rms, const GuidedSearchOptions& options);
+
+/// Whether a patch is much more alike where it fits best than where it fits second best, not beside that;
+/// both as zero_mean_ssd measures it.
+[[nodiscard]] bool is_unambiguous(std::int64_t best, std::int64_t second);
 
 /// Diagonal of Lambda_z of a measurement taken on `level` [1/px^2]; third entry 0 without right coordinate.
 [[nodiscard]] Eigen::Vector3f measurement_information(const Rig& rig, int level, bool has_right);
