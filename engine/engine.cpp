@@ -52,9 +52,6 @@ void expect_valid(const Rig& rig, const EngineOptions& options) {
   }
   if (options.localise_only && !options.map)
     throw std::runtime_error("localisation only needs a map to localise in");
-  if (rig.kind == SensorKind::kMono) {
-    throw std::runtime_error("this source has a single camera without depth; stereo or RGB-D is needed");
-  }
 }
 
 Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {

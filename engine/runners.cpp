@@ -27,7 +27,7 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
     : tracker_(rig, options.tracker),
       times_("tracker", trace),
       on_pose_(options.on_pose),
-      can_relocalise_(options.vocabulary != nullptr) {
+      can_relocalise_(options.vocabulary != nullptr && rig.kind != SensorKind::kMono) {
   frame_stage_ = times_.add_stage("frame");
   latency_stage_ = times_.add_stage("exposure to pose");
   listener_stage_ = times_.add_stage("pose listener");
@@ -167,7 +167,8 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
   place_stage_ = times_.add_stage("place");
   pose_graph_stage_ = times_.add_stage("pose graph");
   relocalise_stage_ = times_.add_stage("relocalisation");
-  if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
+  if (options.vocabulary && rig.kind != SensorKind::kMono)
+    closer_.emplace(rig, options.vocabulary, options.loop_closer);
   if (closer_ && options.map) closer_->continue_from(options.map->places);
   if (closer_ && on_places_) on_places_(closer_->places());
 }

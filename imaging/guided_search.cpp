@@ -5,24 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "imaging/level_pixels.hpp"
+
 namespace twofold {
 namespace {
 
 constexpr double kNearestBaselines = 2.5;
 constexpr int kMargin = Patch::kSize;  // whole patches, and room for the sub-pixel search around them
-
-Eigen::Vector2f to_level(const Vector2& uv, int level) {
-  const double s = std::ldexp(1.0, -level);
-  return ((uv.array() + 0.5) * s - 0.5).matrix().cast<float>();
-}
-
-double from_level(double p, int level) {
-  return (p + 0.5) * std::ldexp(1.0, level) - 0.5;
-}
-
-bool good_match(const Patch& patch, float rms, const GuidedSearchOptions& options) {
-  return rms <= options.max_rms && rms <= options.max_rms_share * patch.deviation + options.noise;
-}
 
 /// Best whole pixel within the radius; nothing when the window leaves the image.
 std::optional<Eigen::Vector2f> search_disc(const Patch& patch, const cv::Mat& image,
@@ -69,12 +58,21 @@ double search_right(const Patch& patch, const cv::Mat& right, const Eigen::Vecto
   }
   const auto aligned =
       align_patch_in_row(patch, right, {static_cast<float>(best_u), left_uv.y()}, options.refine_iterations);
-  if (!aligned || !good_match(patch, aligned->rms, options)) return Rig::kNoRight;
+  if (!aligned || !looks_alike(patch, aligned->rms, options)) return Rig::kNoRight;
   const double u_r = from_level(aligned->uv.x(), level);
   return u_r < from_level(left_uv.x(), level) ? u_r : Rig::kNoRight;
 }
 
 }  // namespace
+
+bool is_unambiguous(std::int64_t best, std::int64_t second) {
+  constexpr int kNoiseSsd = 4 * 64 * 4;  // four times what noise of two grey levels adds to a patch
+  return second * 4 > best * 5 + kNoiseSsd;
+}
+
+bool looks_alike(const Patch& patch, float rms, const GuidedSearchOptions& options) {
+  return rms <= options.max_rms && rms <= options.max_rms_share * patch.deviation + options.noise;
+}
 
 std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
                                      const PointAppearance& appearance, const Vector3& psi, const SE3& T_c_a,
@@ -89,7 +87,7 @@ std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
   const auto found = search_disc(patch, image, to_level(warp->uv, *level), options.radius_px);
   if (!found) return std::nullopt;
   const auto aligned = align_patch(patch, image, *found, options.refine_iterations);
-  if (!aligned || !good_match(patch, aligned->rms, options)) return std::nullopt;
+  if (!aligned || !looks_alike(patch, aligned->rms, options)) return std::nullopt;
 
   PointMatch match;
   match.level = *level;
@@ -127,8 +125,6 @@ double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v
 }
 
 namespace {
-
-constexpr int kNoiseSsd = 4 * 64 * 4;  // four times what noise of two grey levels adds to a patch
 
 /// Cost of the patch at every pixel [first, first + count) of a row, and where it is least.
 struct RowCosts {
@@ -186,10 +182,10 @@ double right_from_row(const cv::Mat& left, const cv::Mat& right, const Rig& rig,
   if (first > last || v < kMargin || v >= right.rows - kMargin) return Rig::kNoRight;
   const RowCosts costs(patch, right, v, first, last);
   const std::int64_t second = costs.second_best();
-  if (second * 4 <= std::int64_t{costs.best} * 5 + kNoiseSsd) return Rig::kNoRight;
+  if (!is_unambiguous(costs.best, second)) return Rig::kNoRight;
   const auto aligned = align_patch_in_row(
       patch, right, {static_cast<float>(costs.best_u), static_cast<float>(v)}, options.refine_iterations);
-  if (!aligned || !good_match(patch, aligned->rms, options) || aligned->uv.x() >= static_cast<float>(u)) {
+  if (!aligned || !looks_alike(patch, aligned->rms, options) || aligned->uv.x() >= static_cast<float>(u)) {
     return Rig::kNoRight;
   }
   // Not quite alone: the match looked for in the left image must lead back.

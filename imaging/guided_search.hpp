@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -61,5 +62,12 @@ struct PointMatch {
 /// @param uv  level-0 pixel of a whole pixel of `level`
 [[nodiscard]] double right_of_corner(const FrameImages& images, const Rig& rig, const Vector2& uv, int level,
                                      const GuidedSearchOptions& options);
+
+/// Whether what is left of the difference [grey] between a patch and where it was found is small enough.
+[[nodiscard]] bool looks_alike(const Patch& patch, float rms, const GuidedSearchOptions& options);
+
+/// Whether a patch is much more alike where it fits best than where it fits second best, not beside that;
+/// both as zero_mean_ssd measures it.
+[[nodiscard]] bool is_unambiguous(std::int64_t best, std::int64_t second);
 
 }  // namespace twofold

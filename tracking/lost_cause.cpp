@@ -127,6 +127,16 @@ const char* describe(LostCause cause) {
       return "frames before it were dropped, and the camera moved on";
     case LostCause::kGapInTime:
       return "a gap in the time stamps, and the camera moved on";
+    case LostCause::kTooFewCorners:
+      return "too few corners to start a map";
+    case LostCause::kTooLittleParallax:
+      return "too little parallax to start a map";
+    case LostCause::kRotatingOnly:
+      return "rotating only: no depth to start a map with";
+    case LostCause::kNoCommonMotion:
+      return "corners do not move as one moving camera sees them";
+    case LostCause::kPlaneUndecided:
+      return "a plane: two motions explain how it looks";
   }
   return "";
 }

@@ -20,7 +20,13 @@ enum class LostCause : std::uint8_t {
   kCovered,              ///< the image has hardly any contrast left: a hand, darkness, glare
   kBlurred,              ///< fine detail is gone, contrast is not
   kFramesMissing,        ///< frames before it were dropped: the camera moved on unseen
-  kGapInTime             ///< the source's time stamps jump, with no frame missing by number
+  kGapInTime,            ///< the source's time stamps jump, with no frame missing by number
+  // What one camera waits for before it can start a map.
+  kTooFewCorners,      ///< hardly anything could be followed
+  kTooLittleParallax,  ///< it has not moved enough to see depth
+  kRotatingOnly,       ///< it turns on the spot
+  kNoCommonMotion,     ///< corners do not move as one moving camera sees them
+  kPlaneUndecided      ///< a plane, and two motions explain how it looks
 };
 [[nodiscard]] const char* describe(LostCause cause);
 

@@ -56,6 +56,8 @@ std::string TrackerOptions::invalid_reason() const {
       .at_least("min_corner_score", min_corner_score, 0)
       .at_least("max_failures", max_failures, 1)
       .at_least("max_candidate_age", max_candidate_age, 0)
+      .nested("first_structure", first_structure.invalid_reason())
+      .nested("seeds", seeds.invalid_reason())
       .reason();
 }
 

@@ -5,6 +5,8 @@
 #include "estimation/motion_only.hpp"
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
+#include "tracking/depth_seeds.hpp"
+#include "tracking/first_structure.hpp"
 #include "tracking/wide_search.hpp"
 
 namespace twofold {
@@ -51,6 +53,10 @@ struct TrackerOptions {
   float min_corner_score = 12;  ///< Shi-Tomasi [grey^2/px^2]
   int max_failures = 4;         ///< candidates not found so many frames in a row are given up
   int max_candidate_age = 3;    ///< keyframes after which an unconfirmed candidate is given up
+
+  // One camera only.
+  FirstStructureOptions first_structure;
+  DepthSeedOptions seeds;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -43,8 +43,8 @@ void PointStarter::occupy(const Eigen::Vector2f& uv) {
   occupied_[cell_of(uv)] = 1;
 }
 
-int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
-                        ImmaturePoints& local) {
+/// Corners of the free cells, into the quadtree.
+void PointStarter::spread_corners(const FrameImages& images) {
   corners_.clear();
   const CellGrid grid{options_.cell_px, columns_, rows_, occupied_};
   for (int level = 0; level < options_.corner_levels; ++level) {
@@ -55,6 +55,11 @@ int PointStarter::start(const FrameImages& images, KeyframeId anchor, const Roll
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     quadtree_.insert(at_level_zero(corners_[i]), static_cast<std::uint32_t>(i));
   }
+}
+
+int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
+                        ImmaturePoints& local) {
+  spread_corners(images);
   int started = 0;
   for (std::int64_t i = quadtree_.next(); i >= 0 && started < options_.max_new_points; i = quadtree_.next()) {
     const Corner& corner = corners_[static_cast<std::size_t>(i)];
@@ -68,6 +73,23 @@ int PointStarter::start(const FrameImages& images, KeyframeId anchor, const Roll
     ++started;
   }
   return started;
+}
+
+void PointStarter::choose_corners(const FrameImages& images, std::vector<PointAppearance>& appearances) {
+  spread_corners(images);
+  const std::size_t room = appearances.capacity() - appearances.size();
+  const std::size_t full =
+      appearances.size() + std::min(room, static_cast<std::size_t>(options_.max_new_points));
+  PointAppearance appearance;
+  for (std::int64_t i = quadtree_.next(); i >= 0 && appearances.size() < full; i = quadtree_.next()) {
+    const Corner& corner = corners_[static_cast<std::size_t>(i)];
+    const bool free = occupied_[cell_of(at_level_zero(corner))] == 0;
+    if (!free ||
+        !cut_appearance(images.left.level(corner.level), corner.u, corner.v, corner.level, appearance))
+      continue;
+    occupy(appearance.uv);
+    appearances.push_back(appearance);
+  }
 }
 
 bool PointStarter::sees_corners(const FrameImages& images, int wanted) {

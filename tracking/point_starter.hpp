@@ -7,6 +7,7 @@
 #include "camera/rolling_shutter.hpp"
 #include "imaging/fast_corners.hpp"
 #include "imaging/image_pyramid.hpp"
+#include "imaging/point_appearance.hpp"
 #include "tracking/immature_points.hpp"
 #include "tracking/lost_cause.hpp"
 #include "tracking/options.hpp"
@@ -28,6 +29,9 @@ class PointStarter {
   /// many. The anchor's pose is that at mid-exposure.
   int start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
             ImmaturePoints& local);
+  /// For one camera: patches where nothing is tracked, evenly over the image, appended to `appearances` up to
+  /// its capacity and TrackerOptions::max_new_points. Marks their places as occupied.
+  void choose_corners(const FrameImages& images, std::vector<PointAppearance>& appearances);
   /// Whether corners are seen in so many cells: a quick look at level 1, where noise makes none.
   [[nodiscard]] bool sees_corners(const FrameImages& images, int wanted);
 
@@ -38,6 +42,7 @@ class PointStarter {
  private:
   [[nodiscard]] int count_depths(const cv::Mat& left, const cv::Mat& right);
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;
+  void spread_corners(const FrameImages& images);
   [[nodiscard]] bool measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const;
   void move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const;
 

@@ -13,6 +13,7 @@ namespace {
 constexpr std::size_t kMaxCandidates = 3000;
 constexpr std::size_t kMaxImmaturePoints = 1200;
 constexpr std::size_t kMaxPending = 12;
+constexpr std::size_t kMaxSeeds = 600;
 constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr std::size_t kRecentViews = 4;
 constexpr int kRoundsFromRough = 3;
@@ -48,6 +49,11 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   inlier_ids_.reserve(searches);
   depths_.reserve(std::max(searches, kMaxImmaturePoints));
   previous_points_.reserve(kMaxAlignmentPoints);
+  if (rig.kind == SensorKind::kMono) {
+    monocular_start_.emplace(rig, options);
+    seeds_.emplace(rig, options.search, options.seeds, kMaxSeeds);
+    new_corners_.reserve(static_cast<std::size_t>(options.max_new_points));
+  }
   allocate_images(rig, current_);
   allocate_images(rig, previous_);
   wide_search_.prepare(previous_corners_);
@@ -63,6 +69,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   const bool map_exists = last_.reference != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
   const bool tracked = map_exists && track(step);
+  if (tracked && seeds_) observe_seeds(step);
   if (tracked) propose_keyframe_if_due(step);
   if (tracked || (map_exists ? start_part(step) : start_map(step))) remember_frame(step);
   if (tracked && !step.result.proposed) revisit_reference(graph);
@@ -175,6 +182,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   }
   for (const ImmaturePoint& point : immature_points_.points()) {
     if (previous_points_.size() == previous_points_.capacity()) break;
+    if (rig_.kind == SensorKind::kMono) break;  // it has no depth where it starts a point
     const bool started_in_this_frame = result.proposed && index(point.anchor) + 1 == next_.keyframe;
     if (!started_in_this_frame) continue;
     const Vector3 x_c = from_inverse_depth(point.psi);
@@ -183,6 +191,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   previous_corners_.clear();
   previous_is_keyframe_ = result.proposed;
   std::swap(current_, previous_);
+  if (monocular_start_) monocular_start_->reset();
 }
 
 }  // namespace twofold

@@ -10,12 +10,14 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/dense_alignment.hpp"
+#include "tracking/depth_seeds.hpp"
 #include "tracking/effort.hpp"
 #include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
 #include "tracking/keyframe_decision.hpp"
 #include "tracking/local_map.hpp"
 #include "tracking/lost_cause.hpp"
+#include "tracking/monocular_start.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
@@ -25,11 +27,12 @@
 namespace twofold {
 
 /// From images to poses: the stereo front-end of thesis 6.3, RGB-D as stereo with a virtual right image
-/// (6.5.3).
+/// (6.5.3). One camera differs in where a point's depth comes from: at the start from its motion
+/// (MonocularStart), later from filters along epipolar lines (DepthSeeds); its unit of length is its own.
 ///
-/// Single-threaded and deterministic. After construction nothing is allocated, keyframes included if their
-/// buffers were prepared, and no reference count of a snapshot is touched. Work per frame is bounded by the
-/// options.
+/// Single-threaded and deterministic. After construction (one camera: once it has started) nothing is
+/// allocated, keyframes included if their buffers were prepared, and no reference count of a snapshot is
+/// touched. Work per frame is bounded by the options.
 ///
 /// The tracker numbers keyframes when it proposes them and points when they are found a second time. Its own
 /// pose is relative to a reference keyframe, so that it moves along when a newer snapshot moves that
@@ -95,6 +98,8 @@ class Tracker {
   bool start_map(FrameStep& step);
   bool start_part(FrameStep& step);
   LostCause make_first_keyframe(FrameStep& step);
+  LostCause start_from_motion(FrameStep& step);
+  bool confirm_start(const MonocularStartResult& start, FrameStep& step);
   [[nodiscard]] SearchStart search_start(const GraphSnapshot& graph);
 
   bool track(FrameStep& step);
@@ -120,6 +125,8 @@ class Tracker {
   void collect_observations(KeyframeProposal& proposal);
   void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
   void start_points(KeyframeId anchor, const RollingShutter& shutter);
+  void observe_seeds(const FrameStep& step);
+  void start_seeds(KeyframeId anchor);
   void revisit_reference(const GraphSnapshot& graph);
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
@@ -134,6 +141,9 @@ class Tracker {
   RecentViews recent_views_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
+  // One camera only: where its depths come from.
+  std::optional<MonocularStart> monocular_start_;
+  std::optional<DepthSeeds> seeds_;
 
   std::int64_t last_t_ns_ = 0;  ///< of the last good frame
   Placement last_;              ///< of the last good frame
@@ -153,6 +163,7 @@ class Tracker {
   bool previous_is_keyframe_ = false;              ///< then its images are among the recent views
   std::vector<PointId> inlier_ids_;                ///< scratch, as the next
   std::vector<double> depths_;
+  std::vector<PointAppearance> new_corners_;
 };
 
 }  // namespace twofold

@@ -126,6 +126,7 @@ void Tracker::start_points(KeyframeId anchor, const RollingShutter& shutter) {
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     if (motion_[m].inlier) starter_.occupy(matches_[m].found.z.head<2>().cast<float>());
   }
+  if (seeds_) return start_seeds(anchor);
   starter_.start(current_, anchor, shutter, immature_points_);
 }
 

@@ -86,6 +86,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   if (step.free_proposal == nullptr || !immature_points_.room_for_keyframe()) {
     return LostCause::kNoKeyframeBuffer;
   }
+  if (monocular_start_) return start_from_motion(step);
   const KeyframeId id{next_.keyframe};
   step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();

@@ -74,6 +74,7 @@ Schedule load_schedule(const std::string& file) {
 SourceOptions source_options_of(const RunArguments& arguments) {
   SourceOptions options;
   options.preload = arguments.preload;
+  options.left_only = arguments.camera == "mono";
   options.stop = &interrupted();
   if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
   return options;
@@ -129,9 +130,6 @@ int run(const RunArguments& arguments) {
     options.pacing.live = true;
     if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
   }
-  if (source->rig().kind == SensorKind::kMono) {
-    throw IoError(arguments.source, "has a single camera without depth; stereo or RGB-D is needed");
-  }
   expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
   if (!arguments.record.empty()) {
     source = std::make_unique<RecordingTee>(std::move(source), arguments.record);
@@ -159,6 +157,8 @@ int run(const RunArguments& arguments) {
   write_run_output(arguments.out, arguments.source, *source, options, result);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, options, result);
+  if (source->rig().kind == SensorKind::kMono)
+    fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");
   for (const std::string& map : maps) fmt::print("map in      {}\n", map);
   const SourceReport captured = source->report();
   for (const std::string& text : captured.summary) fmt::print("{}\n", text);

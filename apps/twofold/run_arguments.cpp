@@ -78,6 +78,11 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
                   "video, synthetic, v4l2)")
       ->required();
   command.add_option("--calib", arguments.calibration, "Calibration file instead of the recording's own");
+  command
+      .add_option("--camera", arguments.camera,
+                  "all: what the source has; mono: its left camera alone, whose scale is arbitrary")
+      ->check(CLI::IsMember({"all", "mono"}))
+      ->capture_default_str();
   command.add_option("--out", arguments.out, "Folder for trajectories, map, timing")->capture_default_str();
   command
       .add_option("--speed", arguments.speed,

@@ -14,6 +14,7 @@ namespace twofold {
 struct RunArguments {
   std::string source;
   std::string calibration;
+  std::string camera = "all";
   std::string out = "out/run";
   std::string speed = "max";
   std::string late;  // empty: as the source wants it

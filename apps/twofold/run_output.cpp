@@ -50,14 +50,14 @@ void remove_part_files(const std::filesystem::path& folder, std::size_t parts) {
 
 /// The run and the truth from above; without truth, the run alone.
 cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
-                 const Trajectory& causal_poses, const Trajectory& truth) {
+                 const Trajectory& causal_poses, const Trajectory& truth, Alignment alignment) {
   PlotOptions plot;
   plot.title = source_text;
   plot.subtitle = fmt::format("{} poses", final_poses.size());
   Trajectory shown = final_poses;
   Trajectory shown_causal = causal_poses;
   const auto pairs = associate(final_poses, truth, 10'000'000);
-  if (const auto evaluation = evaluate(pairs)) {
+  if (const auto evaluation = evaluate(pairs, {.alignment = alignment})) {
     for (auto& pose : shown) pose.T_w_c = aligned_pose(evaluation->S_w_e, pose.T_w_c);
     for (auto& pose : shown_causal) pose.T_w_c = aligned_pose(evaluation->S_w_e, pose.T_w_c);
     plot.subtitle = fmt::format("{} poses, {:.1f} m, final ATE {:.4f} m ({:.3f} %)", final_poses.size(),
@@ -89,7 +89,10 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   }
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
-  write_file(folder / "summary.json", summary_json(source_text, options, result, parts).dump(2) + "\n");
+  const bool one_camera = source.rig().kind == SensorKind::kMono;
+  nlohmann::ordered_json summary = summary_json(source_text, options, result, parts);
+  summary["scale"] = one_camera ? "arbitrary" : "metric";
+  write_file(folder / "summary.json", summary.dump(2) + "\n");
   std::ostringstream schedule;
   if (!write_schedule(schedule, result.schedule.tracker, result.schedule.mapper,
                       result.schedule.loop_closer)) {
@@ -99,7 +102,8 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",
-              draw_run(source_text, final_poses, causal_poses, source.ground_truth()));
+              draw_run(source_text, final_poses, causal_poses, source.ground_truth(),
+                       one_camera ? Alignment::kSim3 : Alignment::kSe3));
   }
 }
 

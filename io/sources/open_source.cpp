@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "io/files/io_error.hpp"
+#include "io/sources/left_camera_source.hpp"
 #include "io/sources/preloaded_source.hpp"
 #include "io/sources/recording.hpp"
 #include "io/sources/source_parameters.hpp"
@@ -99,6 +100,9 @@ std::unique_ptr<FrameSource> open_source(const std::string& text, const SourceOp
     throw IoError(text, fmt::format("unknown kind of source '{}' (known: {})", scheme, known_schemes()));
   }
   auto source = opener->second(spec, options);
+  if (options.left_only && source->rig().kind != SensorKind::kMono) {
+    source = std::make_unique<LeftCameraSource>(std::move(source));
+  }
   if (options.preload && source->is_live()) throw IoError(text, "a camera cannot be preloaded");
   if (options.preload) source = std::make_unique<PreloadedSource>(std::move(source));
   return source;

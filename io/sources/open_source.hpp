@@ -17,7 +17,8 @@ struct SourceOptions {
   bool raw = false;
   /// Cameras only: when it becomes true, the source ends. Outlives the source.
   const std::atomic<bool>* stop = nullptr;
-  bool preload = false;  ///< decode everything into memory before returning
+  bool left_only = false;  ///< one camera: right and depth images are left out
+  bool preload = false;    ///< decode everything into memory before returning
 };
 
 /// Opens a source of frames.

@@ -4,6 +4,8 @@
 
 #include <atomic>
 
+#include "fixtures/corner_walk.hpp"
+#include "geometry/absolute_orientation.hpp"
 #include "tests/engine/swaying_camera.hpp"
 
 namespace twofold {
@@ -95,10 +97,34 @@ TEST_F(EngineTest, ReportsLostFramesAndRecovers) {
   }
 }
 
-TEST_F(EngineTest, RefusesAMonocularRig) {
+TEST(Engine, OneCameraIsFollowedUpToScale) {
+  const std::vector<Frame> frames = testing::render_walk(testing::corner_walk, 0, 40, 5);
   Rig rig = small_rig();
   rig.kind = SensorKind::kMono;
-  EXPECT_THROW(Engine(rig, {}), std::runtime_error);
+  rig.baseline = 0;
+  for (const bool deterministic : {true, false}) {
+    EngineOptions options;
+    options.deterministic = deterministic;
+    const std::atomic<bool> interrupted{false};
+    const FrameFeed feed = [&, next = std::size_t{0}](Frame& frame) mutable {
+      if (next == frames.size()) return FeedStatus::kEnd;
+      frame = frames[next++];
+      return FeedStatus::kFrame;
+    };
+    const RunResult result = Engine(rig, options).run(feed, interrupted);
+    EXPECT_EQ(result.error, "");
+    std::vector<Vector3> estimated, truth;
+    for (const FrameRecord& record : result.frames) {
+      EXPECT_TRUE(estimated.empty() || record.state == FrameState::kTracked) << record.frame_index;
+      if (record.state != FrameState::kTracked) continue;
+      estimated.push_back(final_T_c_w(record, result.graph).inverse().translation());
+      truth.push_back(testing::corner_walk(static_cast<int>(record.frame_index)).inverse().translation());
+    }
+    ASSERT_GT(estimated.size(), result.frames.size() / 2);
+    const auto S = align_similarity(truth, estimated);
+    ASSERT_TRUE(S);
+    for (std::size_t n = 0; n < truth.size(); ++n) EXPECT_LT((*S * estimated[n] - truth[n]).norm(), 0.02);
+  }
 }
 
 }  // namespace

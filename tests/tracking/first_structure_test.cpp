@@ -1,0 +1,130 @@
+#include "tracking/first_structure.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "fixtures/rendered_scene.hpp"
+#include "geometry/inverse_depth.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::test_rig;
+
+/// Points of a scene, and where the camera is from the first to the last frame, s in [0, 1].
+struct Setting {
+  std::function<Vector3(int i, double s)> point;
+  std::function<SE3(double s)> T_c_first;
+};
+
+/// Corners with half a pixel of noise; one in ten follows something else.
+CornerViews views_of(const Setting& setting, std::uint32_t seed, int corners = 160) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> noise(0, 0.4);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const Rig rig = test_rig(SensorKind::kMono);
+  const auto seen = [&](int i, double s) -> Vector2 {
+    return rig.camera.project(setting.T_c_first(s) * setting.point(i, s)) + Vector2(noise(rng), noise(rng));
+  };
+  CornerViews views;
+  for (int i = 0; i < corners; ++i) {
+    const Vector2 astray = i % 10 == 0 ? Vector2(40 * unit(rng), 40 * unit(rng)) : Vector2::Zero();
+    views.first.push_back(seen(i, 0));
+    views.between.push_back(seen(i, 0.4) + 0.5 * astray);
+    views.last.push_back(seen(i, 1) + astray);
+  }
+  return views;
+}
+
+/// Spread over the image, at depths from 3 to 12.
+Vector3 scattered(int i, double) {
+  std::mt19937 rng(static_cast<std::uint32_t>(7 * i + 1));
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const double depth = 7.5 + 4.5 * unit(rng);
+  return depth * Vector3(0.5 * unit(rng), 0.35 * unit(rng), 1);
+}
+
+Vector3 on_a_plane(int i, double s) {
+  const Vector3 ray = scattered(i, s) / scattered(i, s).z();
+  return ray * 6 / (1 + 0.4 * ray.x() - 0.2 * ray.y());
+}
+
+std::function<SE3(double)> moving(const Vector3& t, const Vector3& w) {
+  return [=](double s) { return SE3::exp(s * (Vector6() << t, w).finished()); };
+}
+
+const Rig kRig = test_rig(SensorKind::kMono);
+
+void expect_start(const Setting& setting, const char* what) {
+  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+    const auto start = first_structure(kRig, views_of(setting, seed), {});
+    ASSERT_TRUE(start) << what << ", " << seed << ": " << describe(start.error());
+    const SE3 truth = setting.T_c_first(1);
+    EXPECT_LT((start->T_last_first.so3().inverse() * truth.so3()).log().norm(), 0.012) << what << seed;
+    EXPECT_LT((start->T_last_first.translation().normalized() - truth.translation().normalized()).norm(),
+              0.12)
+        << what << seed;
+    // Ratios of depths are those of the scene.
+    std::vector<double> ratios, depths;
+    for (std::size_t n = 0; n < start->corners.size(); ++n) {
+      depths.push_back(1 / start->psi[n].z());
+      ratios.push_back(depths.back() / setting.point(start->corners[n], 0).z());
+    }
+    std::sort(ratios.begin(), ratios.end());
+    std::sort(depths.begin(), depths.end());
+    EXPECT_NEAR(depths[depths.size() / 2], 1, 1e-9);
+    EXPECT_LT(ratios[ratios.size() * 3 / 4] / ratios[ratios.size() / 4], 1.25) << what << seed;
+  }
+}
+
+void expect_wait(const Setting& setting, LostCause cause, const char* what) {
+  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+    const auto start = first_structure(kRig, views_of(setting, seed), {});
+    ASSERT_FALSE(start) << what << seed;
+    EXPECT_EQ(start.error(), cause) << what << seed << ": " << describe(start.error());
+  }
+}
+
+TEST(FirstStructure, StartsWhateverTheDirectionOfMotion) {
+  expect_start({scattered, moving({-0.6, 0, 0}, {0, 0, 0})}, "sideways");
+  expect_start({scattered, moving({-0.6, 0.1, 0.1}, {0.02, 0.08, -0.03})}, "turning");
+  expect_start({scattered, moving({0, 0, -1.4}, {0, 0.01, 0})}, "forward");
+}
+
+TEST(FirstStructure, StartsOnAPlaneWhenOneMotionAloneExplainsIt) {
+  expect_start({on_a_plane, moving({-2.0, 0.4, -1.4}, {0, 0.08, 0})}, "plane");
+}
+
+TEST(FirstStructure, WaitsOnAPlaneThatTwoMotionsExplain) {
+  // So little motion that both planes stay in front of the camera, and the frame between is no help.
+  expect_wait({on_a_plane, moving({-0.4, 0.1, -0.2}, {0, 0.02, 0})}, LostCause::kPlaneUndecided, "plane");
+}
+
+TEST(FirstStructure, WaitsWhileTheCameraStandsOrTurnsOnTheSpot) {
+  expect_wait({scattered, moving({0, 0, 0}, {0, 0, 0})}, LostCause::kTooLittleParallax, "standing");
+  expect_wait({scattered, moving({0, 0, 0}, {0.03, 0.12, 0})}, LostCause::kRotatingOnly, "turning");
+  expect_wait({scattered, moving({-0.02, 0, 0}, {0.03, 0.12, 0})}, LostCause::kRotatingOnly,
+              "turning, nearly");
+}
+
+TEST(FirstStructure, IsNotStartedBySomethingThatMoves) {
+  const auto passing = [](int i, double s) {
+    return Vector3(scattered(i, s) + (i % 3 == 0 ? s * Vector3(0.8, 0, 0) : Vector3(0, 0, 0)));
+  };
+  const auto start = first_structure(kRig, views_of({passing, moving({0, 0, 0}, {0, 0, 0})}, 1), {});
+  ASSERT_FALSE(start);
+  // Not even while the camera turns.
+  const auto turning = first_structure(kRig, views_of({passing, moving({0, 0, 0}, {0, 0.1, 0})}, 1), {});
+  ASSERT_FALSE(turning);
+}
+
+TEST(FirstStructure, NeedsCorners) {
+  const auto start = first_structure(kRig, views_of({scattered, moving({-0.6, 0, 0}, {0, 0, 0})}, 1, 30), {});
+  ASSERT_FALSE(start);
+  EXPECT_EQ(start.error(), LostCause::kTooFewCorners);
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,105 @@
+// The tracker with one camera: when it starts, what it waits for, and that it then follows the camera up to
+// scale.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <vector>
+
+#include "fixtures/corner_walk.hpp"
+#include "geometry/absolute_orientation.hpp"
+#include "tests/tracking/tracked_sequence.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace testing;
+
+/// Left images of a walk through the room.
+std::vector<Frame> walk(const std::function<SE3(int i)>& T_c_w, int count) {
+  const Rig rig = test_rig(SensorKind::kMono, 320, 240);
+  RenderedScene scene(rig, {3, 2, 5}, 21);
+  std::vector<Frame> frames;
+  for (int i = 0; i < count; ++i)
+    frames.push_back({i, i * std::int64_t{33'000'000}, scene.render_one(T_c_w(i), 2), {}, {}});
+  return frames;
+}
+
+const std::vector<Frame>& before_the_corner() {
+  static const std::vector<Frame> frames = walk(corner_walk, kFrames);
+  return frames;
+}
+
+TEST(TrackerOneCamera, FollowsTheCameraUpToScale) {
+  Odometry odometry(SensorKind::kMono);
+  std::vector<Vector3> estimated, truth;
+  int lost_after_start = 0, keyframes = 0;
+  for (int i = 0; i < kFrames; ++i) {
+    const TrackResult result = odometry.step(before_the_corner()[static_cast<std::size_t>(i)]);
+    keyframes += result.proposed;
+    if (result.status != TrackStatus::kTracking) {
+      lost_after_start += !estimated.empty();
+      continue;
+    }
+    estimated.push_back(odometry.T_c_w(result).inverse().translation());
+    truth.push_back(corner_walk(i).inverse().translation());
+  }
+  ASSERT_GT(estimated.size(), 20u);
+  EXPECT_EQ(lost_after_start, 0);
+  EXPECT_GT(keyframes, 2);
+  const auto S = align_similarity(truth, estimated);
+  ASSERT_TRUE(S);
+  for (std::size_t n = 0; n < truth.size(); ++n) EXPECT_LT((*S * estimated[n] - truth[n]).norm(), 0.02) << n;
+}
+
+TEST(TrackerOneCamera, AllocatesNothingOnceItHasStarted) {
+  if (!allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
+  Odometry odometry(SensorKind::kMono);
+  bool started = false;
+  for (const Frame& frame : before_the_corner()) {
+    const bool tracked = odometry.step(frame).status == TrackStatus::kTracking;
+    if (started) {
+      EXPECT_EQ(odometry.allocations(), 0u) << frame.index;
+    }
+    started = started || tracked;
+  }
+  EXPECT_TRUE(started);
+}
+
+TEST(TrackerOneCamera, StartsTheSameInEveryRun) {
+  TrackResult first[2];
+  for (TrackResult& result : first) {
+    Odometry odometry(SensorKind::kMono);
+    for (const Frame& frame : before_the_corner()) {
+      result = odometry.step(frame);
+      if (result.status == TrackStatus::kTracking) break;
+    }
+  }
+  EXPECT_EQ(first[0].T_c_ref.log(), first[1].T_c_ref.log());
+  EXPECT_GT(first[0].T_c_ref.translation().norm(), 0);
+}
+
+TEST(TrackerOneCamera, StandingItWaitsForParallax) {
+  const Rig rig = test_rig(SensorKind::kMono, 320, 240);
+  Odometry odometry(rig);
+  for (const Frame& frame : walk([](int) { return SE3(); }, 12)) {
+    const TrackResult result = odometry.step(frame);
+    EXPECT_EQ(result.status, TrackStatus::kInitialising);
+    EXPECT_EQ(result.cause, LostCause::kTooLittleParallax);
+  }
+}
+
+TEST(TrackerOneCamera, TurningOnTheSpotItSaysSo) {
+  const Rig rig = test_rig(SensorKind::kMono, 320, 240);
+  Odometry odometry(rig);
+  int said = 0;
+  const auto turning = [](int i) { return SE3(SO3::exp(Vector3(0.003 * i, 0.017 * i, 0)), Vector3::Zero()); };
+  for (const Frame& frame : walk(turning, 24)) {
+    const TrackResult result = odometry.step(frame);
+    EXPECT_EQ(result.status, TrackStatus::kInitialising) << frame.index;
+    said += result.cause == LostCause::kRotatingOnly;
+  }
+  EXPECT_GT(said, 12);
+}
+
+}  // namespace
+}  // namespace twofold

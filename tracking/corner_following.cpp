@@ -1,0 +1,84 @@
+#include "tracking/corner_following.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "imaging/guided_search.hpp"
+#include "imaging/level_pixels.hpp"
+#include "imaging/patch.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kCoarsest = 3;      // coarser patches cover what moves differently
+constexpr int kFirstRadius = 8;   // [px of the coarsest level] of a corner whose motion is not known
+constexpr int kCoarseRadius = 4;  // [px of the coarsest level]
+constexpr int kRadius = 2;        // [px of a finer level]
+constexpr int kMaxIterations = 12;
+
+struct LevelPatch {
+  Patch patch;
+  Eigen::Vector2f whole;  ///< pixel of the level around which it was cut
+};
+
+/// False when it is too near to the border.
+bool cut_at(const ImagePyramid& images, int level, const Eigen::Vector2f& uv, LevelPatch& cut) {
+  const Eigen::Vector2f p = to_level(uv.cast<double>(), level);
+  cut.whole = {std::round(p.x()), std::round(p.y())};
+  return cut_patch(images.level(level), static_cast<int>(cut.whole.x()), static_cast<int>(cut.whole.y()),
+                   cut.patch);
+}
+
+/// Most similar whole pixel of a square around `centre`; the centre itself when the square leaves the image.
+Eigen::Vector2f search_square(const Patch& patch, const cv::Mat& image, const Eigen::Vector2f& centre,
+                              int radius) {
+  const int u0 = static_cast<int>(std::lround(centre.x()));
+  const int v0 = static_cast<int>(std::lround(centre.y()));
+  constexpr int kMargin = Patch::kSize;
+  int best = std::numeric_limits<int>::max();
+  Eigen::Vector2f result = centre;
+  for (int v = std::max(v0 - radius, kMargin); v <= std::min(v0 + radius, image.rows - 1 - kMargin); ++v) {
+    for (int u = std::max(u0 - radius, kMargin); u <= std::min(u0 + radius, image.cols - 1 - kMargin); ++u) {
+      const int ssd = zero_mean_ssd(patch, image, u, v);
+      if (ssd >= best) continue;
+      best = ssd;
+      result = {static_cast<float>(u), static_cast<float>(v)};
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+bool follow_corner(const ImagePyramid& previous, const ImagePyramid& current, FollowedCorner& corner) {
+  const int finest = corner.appearance.level;
+  Eigen::Vector2f motion = corner.motion.value_or(Eigen::Vector2f::Zero());
+  LevelPatch cut;
+  for (int level = kCoarsest; level >= finest; --level) {
+    if (!cut_at(previous, level, corner.uv, cut)) continue;
+    const float s = std::ldexp(1.0F, -level);
+    int radius = kRadius;
+    if (level == kCoarsest) radius = corner.motion ? kCoarseRadius : kFirstRadius;
+    motion = (search_square(cut.patch, current.level(level), cut.whole + s * motion, radius) - cut.whole) / s;
+  }
+  // The corner's own patch, so that errors do not add up; once it looks otherwise, that of the last frame.
+  Patch own;
+  warp_patch(corner.appearance, Eigen::Matrix2d::Identity(), finest, own);
+  const cv::Mat& image = current.level(finest);
+  const Eigen::Vector2f start = to_level((corner.uv + motion).cast<double>(), finest);
+  auto found = align_patch(own, image, start, kMaxIterations);
+  if (found && looks_alike(own, found->rms, {})) {
+    motion = from_level(found->uv, finest).cast<float>() - corner.uv;
+  } else {
+    if (!cut_at(previous, finest, corner.uv, cut)) return false;
+    const float s = std::ldexp(1.0F, -finest);
+    found = align_patch(cut.patch, image, cut.whole + s * motion, kMaxIterations);
+    if (!found || !looks_alike(cut.patch, found->rms, {})) return false;
+    motion = (found->uv - cut.whole) / s;
+  }
+  corner.uv += motion;
+  corner.motion = motion;
+  return true;
+}
+
+}  // namespace twofold

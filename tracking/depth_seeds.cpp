@@ -1,0 +1,136 @@
+#include "tracking/depth_seeds.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/option_check.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr float kShortestStretch = 2;  // [level px] below it nothing is learnt of an unknown depth
+constexpr int kFilterSteps = 5;
+constexpr double kFarthest = 1e-3;  // inverse depth of a point at infinity, in 1 / median depth
+
+double sigma_px(const Rig& rig, int level) {
+  return 1 / std::sqrt(measurement_information(rig, level, false).x());
+}
+
+/// Least squares inverse depth of a ray of the anchor that is seen at uv.
+double triangulated(const PinholeCamera& camera, const Vector3& ray_a, const SE3& T_c_a, const Vector2& uv) {
+  const Vector3 bearing = camera.unproject(uv);
+  const Vector3 sight = bearing.cross(T_c_a.translation());
+  return -sight.dot(bearing.cross(T_c_a.rotation() * ray_a)) / std::max(sight.squaredNorm(), 1e-300);
+}
+
+}  // namespace
+
+std::string DepthSeedOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_observed", max_observed, 1)
+      .above("nearest", nearest, 0)
+      .above("range_sigmas", range_sigmas, 0)
+      .above("min_gain", min_gain, 0)
+      .at_least("min_looks", min_looks, 1)
+      .above("near_error", near_error, 0)
+      .at_least("far_error", far_error, 0)
+      .at_least("max_misses", max_misses, 1)
+      .at_least("max_first_misses", max_first_misses, 1)
+      .at_least("max_age", max_age, 1)
+      .reason();
+}
+
+DepthSeeds::DepthSeeds(const Rig& rig, const GuidedSearchOptions& search, const DepthSeedOptions& options,
+                       std::size_t capacity)
+    : rig_(rig), search_(search), options_(options) {
+  seeds_.reserve(capacity);
+}
+
+void DepthSeeds::add(KeyframeId anchor, const PointAppearance& appearance) {
+  if (seeds_.size() == seeds_.capacity()) return;
+  Seed seed;
+  seed.anchor = anchor;
+  seed.appearance = appearance;
+  seed.uv = appearance.uv;
+  seed.filter = InverseDepthFilter::from_mono(rig_.camera, appearance.uv.cast<double>(),
+                                              sigma_px(rig_, appearance.level));
+  seeds_.push_back(seed);
+}
+
+void DepthSeeds::drop_stale(KeyframeId newest) {
+  std::erase_if(seeds_, [&](const Seed& seed) {
+    return index(newest) - index(seed.anchor) > static_cast<std::uint32_t>(options_.max_age);
+  });
+}
+
+InverseDepthRange DepthSeeds::range_of(const Seed& seed, double median_depth) const {
+  const double nearest = 1 / (options_.nearest * median_depth);
+  if (!known(seed)) return {0, nearest, 1 / median_depth};
+  const double half = options_.range_sigmas * seed.filter.inverse_depth_sigma();
+  const double q = seed.filter.psi.z();
+  return {std::clamp(q - half, 0.0, nearest), std::clamp(q + half, 0.0, nearest),
+          std::clamp(q, 0.0, nearest)};
+}
+
+/// Another look from nearly the same place sees the same thing again, its errors included: it is no new
+/// witness.
+bool DepthSeeds::worth_a_look(const Seed& seed, const EpipolarStretch& stretch, const SE3& T_c_a) const {
+  if (!known(seed)) return stretch.length_px() > kShortestStretch;
+  const auto p = project_inverse_depth(rig_, T_c_a, seed.filter.psi);
+  if (!p) return false;
+  const double sigma = seed.filter.inverse_depth_sigma();
+  const double per_px = p->J_psi.col(2).head<2>().norm() / sigma_px(rig_, stretch.level);
+  return per_px * per_px * sigma * sigma > options_.min_gain;
+}
+
+void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const SE3& T_c_a, double median_depth) const {
+  const Vector3 ray_a(seed.filter.psi.x(), seed.filter.psi.y(), 1);
+  const auto stretch =
+      epipolar_stretch(rig_.camera, seed.appearance, ray_a, T_c_a, range_of(seed, median_depth));
+  if (!stretch) return;
+  if (!worth_a_look(seed, *stretch, T_c_a)) return;
+  const auto found = find_along(images, seed.appearance, *stretch, search_);
+  if (!found) {
+    ++seed.misses;
+    return;
+  }
+  if (!known(seed)) {
+    seed.filter.psi.z() = std::max(0.0, triangulated(rig_.camera, ray_a, T_c_a, found->z.head<2>()));
+  }
+  if (!seed.filter.update(rig_, T_c_a, found->z, sigma_px(rig_, found->level), kFilterSteps)) {
+    ++seed.misses;
+    return;
+  }
+  seed.uv = found->z.head<2>().cast<float>();
+  seed.misses = 0;
+  ++seed.looks;
+}
+
+bool DepthSeeds::mature(const Seed& seed, double median_depth) const {
+  if (seed.looks < options_.min_looks) return false;
+  const double q = std::max(seed.filter.psi.z(), 0.0);
+  return seed.filter.inverse_depth_sigma() <
+         std::max(options_.near_error * q, options_.far_error / median_depth);
+}
+
+ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const {
+  ImmaturePoint point;
+  point.anchor = seed.anchor;
+  point.appearance = seed.appearance;
+  point.psi = seed.filter.psi;
+  point.psi.z() = std::max(point.psi.z(), kFarthest / median_depth);
+  point.anchor_observation.z = {seed.appearance.uv.x(), seed.appearance.uv.y(),
+                                std::numeric_limits<float>::quiet_NaN()};
+  point.anchor_observation.level = seed.appearance.level;
+  return point;
+}
+
+/// Hands over what is known well enough, and gives up what was not found again.
+void DepthSeeds::keep_immature(double median_depth, ImmaturePoints& ready) {
+  std::erase_if(seeds_, [&](const Seed& seed) {
+    if (seed.misses >= (known(seed) ? options_.max_misses : options_.max_first_misses)) return true;
+    return mature(seed, median_depth) && ready.add(point_of(seed, median_depth));
+  });
+}
+
+}  // namespace twofold

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+#include "tracking/lost_cause.hpp"
+
+namespace twofold {
+
+struct FirstStructureOptions {
+  double threshold_px = 1.0;        ///< of pairs that an epipolar geometry explains, > 0
+  double rotation_px = 1.5;         ///< of pairs that a rotation or a plane explains, > 0
+  double sigma_px = 0.7;            ///< standard deviation of a followed corner, > 0
+  double min_flow_px = 4;           ///< median motion in the image, below which nobody has moved, >= 0
+  int min_points = 45;              ///< of the first map, >= 5
+  double min_share = 0.6;           ///< of the corners that agree with the motion, in (0, 1]
+  double max_rotation_share = 0.5;  ///< of those that a rotation explains as well, in (0, 1]
+  double max_depth_error = 0.1;     ///< median standard deviation of inverse depth over inverse depth, > 0
+  int max_samples = 120;            ///< of RANSAC, >= 1
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Corners followed through three frames of one camera, in step with each other: level-0 pixels in the first
+/// frame, in one between, and in the last.
+struct CornerViews {
+  std::vector<Vector2> first, between, last;
+};
+
+/// What the frames show of camera and scene, in a unit of its own: the median depth of the points is one.
+struct FirstStructure {
+  SE3 T_last_first;
+  std::vector<int> corners;  ///< those that have a depth
+  std::vector<Vector3> psi;  ///< inverse depth coordinates in the first frame, of `corners`
+};
+
+/// The start of a map from one moving camera: essential matrix (five points) beside the rotation and the
+/// homography that explain the same corners.
+///
+/// Most of what the essential matrix explains must be beyond any rotation: a camera that turns on the spot
+/// gives no depth, and of a standing one before which something moves, most corners stand. Where a
+/// homography explains as much, the scene may be a plane, of which two motions give the same first and last
+/// view: the frame between tells which, or the start has to wait. Depths are those of a bundle adjustment of
+/// all three frames (thesis 4.5.3). Points so far away that they may be behind infinity by noise neither vote
+/// nor veto.
+///
+/// Deterministic. Allocates; its work is bounded by the number of corners and max_samples.
+/// @return  otherwise why not: kTooFewCorners, kTooLittleParallax, kRotatingOnly, kNoCommonMotion,
+///          kPlaneUndecided
+[[nodiscard]] tl::expected<FirstStructure, LostCause> first_structure(const Rig& rig,
+                                                                      const CornerViews& views,
+                                                                      const FirstStructureOptions& options);
+
+}  // namespace twofold

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "camera/frame.hpp"
+#include "camera/rig.hpp"
+#include "imaging/image_pyramid.hpp"
+#include "tracking/corner_following.hpp"
+#include "tracking/first_structure.hpp"
+#include "tracking/options.hpp"
+#include "tracking/point_starter.hpp"
+
+namespace twofold {
+
+/// An earlier frame whose corners are still followed: it may become the first keyframe.
+struct StartCandidate {
+  std::int64_t frame_index = 0;
+  std::int64_t t_ns = 0;
+  int age = 0;  ///< frames since
+  FrameImages images;
+  std::vector<FollowedCorner> corners;  ///< those still seen
+  std::size_t corners_at_first = 0;
+  /// In step with `corners`: where they were at an age of a quarter to a half of the present one, and at the
+  /// last age that was a power of two, which is the next such place.
+  std::vector<Eigen::Vector2f> between, newer;
+};
+
+/// The start as the tracker takes it over.
+struct MonocularStartResult {
+  const StartCandidate* first = nullptr;  ///< valid until the next step
+  FirstStructure structure;               ///< of first->corners
+};
+
+/// Watches the frames of one camera until some earlier one and the newest show how it moves and how deep the
+/// scene is (first_structure). Several earlier frames are candidates, so that neither a pause nor a turn
+/// before the start matters. Buffers are made at construction; a decision allocates: until there is a map,
+/// nobody depends on the tracker's time.
+class MonocularStart {
+ public:
+  MonocularStart(const Rig& rig, const TrackerOptions& options);
+
+  /// Forgets all candidates.
+  void reset();
+  /// @return  the start, or what it waits for
+  [[nodiscard]] tl::expected<MonocularStartResult, LostCause> step(const FrameImages& images,
+                                                                   const Frame& frame);
+
+ private:
+  void follow(const FrameImages& images, StartCandidate& candidate) const;
+  [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
+  void renew_candidates(const FrameImages& images, const Frame& frame);
+  void fill(StartCandidate& candidate, const FrameImages& images, const Frame& frame);
+
+  Rig rig_;
+  TrackerOptions options_;
+  PointStarter starter_;
+  std::vector<StartCandidate> candidates_;
+  std::vector<std::size_t> order_;  ///< of candidates_ in use, oldest first
+  FrameImages last_;                ///< of the frame before
+  bool has_last_ = false;
+  std::vector<PointAppearance> appearances_;  ///< scratch
+};
+
+}  // namespace twofold

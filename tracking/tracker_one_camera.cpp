@@ -1,0 +1,79 @@
+// What one camera does otherwise: it starts when its motion shows depth, and points ripen before they are
+// used.
+#include "geometry/inverse_depth.hpp"
+#include "tracking/tracker.hpp"
+
+namespace twofold {
+
+/// An earlier frame becomes the first keyframe of a map or map part, at identity, and this frame is tracked
+/// against it.
+/// @return kNone, or what the start waits for: the result is then as it was
+LostCause Tracker::start_from_motion(FrameStep& step) {
+  const auto start = monocular_start_->step(current_, step.frame);
+  if (!start) return start.error();
+  const TrackResult before = step.result;
+  if (!confirm_start(*start, step)) {
+    const LostCause cause = step.result.cause;
+    step.result = before;
+    immature_points_.clear_points();
+    return cause;
+  }
+  const StartCandidate& first = *start->first;
+  const Placement here{step.result.reference, step.result.T_c_ref};
+  begin_proposal({kNoKeyframe, SE3()}, step);
+  KeyframeProposal& proposal = *step.free_proposal;
+  proposal.frame_index = first.frame_index;
+  proposal.t_ns = first.t_ns;
+  proposal.images.left.copy_from(first.images.left);
+  next_.first_of_part = index(proposal.id);
+  // As if the camera had moved evenly since: that is the next frame's prediction.
+  const double share = static_cast<double>(first.age - 1) / first.age;
+  last_ = {here.reference, SE3::exp(share * here.T_c_ref.log())};
+  return LostCause::kNone;
+}
+
+/// A start counts when the tracker's own search finds its points from where it says the camera is.
+bool Tracker::confirm_start(const MonocularStartResult& start, FrameStep& step) {
+  const KeyframeId id{next_.keyframe};
+  immature_points_.clear_points();
+  seeds_->clear();
+  for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
+    const auto corner = static_cast<std::size_t>(start.structure.corners[n]);
+    ImmaturePoint point;
+    point.anchor = id;
+    point.psi = start.structure.psi[n];
+    point.appearance = start.first->corners[corner].appearance;
+    const Eigen::Vector2f& uv = point.appearance.uv;
+    point.anchor_observation.z = {uv.x(), uv.y(), static_cast<float>(Rig::kNoRight)};
+    point.anchor_observation.level = point.appearance.level;
+    if (!immature_points_.add(point)) break;
+  }
+  const Placement placement{id, start.structure.T_last_first};
+  local_map_.update(step.graph, id, immature_points_, options_.neighbour_keyframes);
+  select_candidates(placement.T_c_ref, step.result);
+  search_points(placement.T_c_ref, step);
+  if (!estimate_pose(placement, step)) return false;
+  step.result.cause = LostCause::kNone;
+  last_keyframe_ = {median_depth(SE3()), occupied_regions()};
+  return true;
+}
+
+/// The depths of corners that wait for one, by what this frame saw of them.
+void Tracker::observe_seeds(const FrameStep& step) {
+  const TrackResult& result = step.result;
+  const auto T_c_anchor = [&](KeyframeId anchor) {
+    return result.T_c_ref * relative_pose(step.graph, immature_points_, result.reference, anchor);
+  };
+  seeds_->observe(current_.left, median_depth(result.T_c_ref), T_c_anchor, immature_points_);
+}
+
+/// Corners where nothing is tracked, and none waits for its depth.
+void Tracker::start_seeds(KeyframeId anchor) {
+  seeds_->drop_stale(anchor);
+  seeds_->for_places([&](const Eigen::Vector2f& uv) { starter_.occupy(uv); });
+  new_corners_.clear();
+  starter_.choose_corners(current_, new_corners_);
+  for (const PointAppearance& appearance : new_corners_) seeds_->add(anchor, appearance);
+}
+
+}  // namespace twofold
