@@ -13,7 +13,7 @@ constexpr int kFilterSteps = 5;
 constexpr double kFarthest = 1e-3;  // inverse depth of a point at infinity, in 1 / median depth
 
 double sigma_px(const Rig& rig, int level) {
-  return 1 / std::sqrt(measurement_information(rig, level, false).x());
+  return std::ldexp(rig.noise.sigma_px, level);
 }
 
 /// Least squares inverse depth of a ray of the anchor that is seen at uv.

@@ -99,7 +99,7 @@ class Tracker {
   bool start_part(FrameStep& step);
   LostCause make_first_keyframe(FrameStep& step);
   LostCause start_from_motion(FrameStep& step);
-  bool confirm_start(const MonocularStartResult& start, FrameStep& step);
+  LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
   [[nodiscard]] SearchStart search_start(const GraphSnapshot& graph);
 
   bool track(FrameStep& step);

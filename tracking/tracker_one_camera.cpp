@@ -12,8 +12,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   const auto start = monocular_start_->step(current_, step.frame);
   if (!start) return start.error();
   const TrackResult before = step.result;
-  if (!confirm_start(*start, step)) {
-    const LostCause cause = step.result.cause;
+  if (const LostCause cause = confirm_start(*start, step); cause != LostCause::kNone) {
     step.result = before;
     immature_points_.clear_points();
     return cause;
@@ -33,7 +32,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
 }
 
 /// A start counts when the tracker's own search finds its points from where it says the camera is.
-bool Tracker::confirm_start(const MonocularStartResult& start, FrameStep& step) {
+LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& step) {
   const KeyframeId id{next_.keyframe};
   immature_points_.clear_points();
   seeds_->clear();
@@ -51,11 +50,12 @@ bool Tracker::confirm_start(const MonocularStartResult& start, FrameStep& step) 
   const Placement placement{id, start.structure.T_last_first};
   local_map_.update(step.graph, id, immature_points_, options_.neighbour_keyframes);
   select_candidates(placement.T_c_ref, step.result);
-  search_points(placement.T_c_ref, step);
-  if (!estimate_pose(placement, step)) return false;
+  search_points(placement.T_c_ref, options_.lost_radius_px, step);
+  const LostCause cause = estimate_pose(placement, step);
+  if (cause != LostCause::kNone) return cause;
   step.result.cause = LostCause::kNone;
   last_keyframe_ = {median_depth(SE3()), occupied_regions()};
-  return true;
+  return LostCause::kNone;
 }
 
 /// The depths of corners that wait for one, by what this frame saw of them.
