@@ -36,7 +36,7 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
 
 /// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
 bool Tracker::search_widely(FrameStep& step) {
-  if (last_.reference == kNoKeyframe) return false;
+  if (!options_.wide_search.enabled || last_.reference == kNoKeyframe) return false;
   wide_search_.look_at(current_);
   if (!previous_is_keyframe_ && search_from_view(previous_, previous_corners_, last_, step)) return true;
   const KeyframeId part = part_of(step.graph, immature_points_, last_.reference);

@@ -1,10 +1,23 @@
 #include "tracking/wide_search.hpp"
 
 #include <cmath>
+#include <random>
 
 #include "imaging/image_buffers.hpp"
 
 namespace twofold {
+namespace {
+
+cv::Mat noise_image(int width, int height) {
+  cv::Mat image(height, width, CV_8UC1);
+  std::minstd_rand random;
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) image.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(random() >> 8);
+  }
+  return image;
+}
+
+}  // namespace
 
 WideSearch::WideSearch(const Rig& rig, const WideSearchOptions& options)
     : rig_(rig),
@@ -15,10 +28,14 @@ WideSearch::WideSearch(const Rig& rig, const WideSearchOptions& options)
   of_earlier_.reserve(corners_.capacity());
   of_corners_.reserve(corners_.capacity());
   matches_.reserve(corners_.capacity());
-  FrameImages black;
-  allocate_images(rig, black);
-  selector_.select(black.left, corners_);
-  describer_.prepare(black.left);
+  // Noise has more corners than anything that is seen: all scratch has its full size after it.
+  FrameImages noise;
+  allocate_images(rig, noise);
+  noise.left.build(noise_image(rig.camera.width, rig.camera.height));
+  selector_.select(noise.left, corners_);
+  describer_.prepare(noise.left);
+  describer_.describe(noise.left, corners_);
+  find_nearest(corners_, corners_, of_earlier_, of_corners_);
 }
 
 void WideSearch::prepare(std::vector<DescribedCorner>& corners) const {

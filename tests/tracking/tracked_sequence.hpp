@@ -45,7 +45,9 @@ inline SE3 true_T_c_w(int i) {
 class Odometry {
  public:
   explicit Odometry(SensorKind kind) : Odometry(test_rig(kind, 320, 240)) {}
-  explicit Odometry(const Rig& rig) : tracker_(rig, {}) { tracker_.prepare(proposal_); }
+  explicit Odometry(const Rig& rig, const TrackerOptions& options = {}) : tracker_(rig, options) {
+    tracker_.prepare(proposal_);
+  }
 
   TrackResult step(const Frame& frame) {
     if (pending_) map_.insert(proposal_);

