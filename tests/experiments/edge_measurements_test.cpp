@@ -72,13 +72,15 @@ class EdgeMeasurementsTest : public testing::Test {
     builder.write_back(writer_, window);
   }
 
-  /// Half the squared reprojection error of all points, held where they are, for these poses.
+  /// Half the squared reprojection error of all points, held where they are, for these poses; each by its
+  /// information.
   double point_cost(const std::vector<SE3>& poses) const {
     double cost = 0;
     for (std::uint32_t n = 0; n < kViews; ++n) {
       for (const Observation& seen : *writer_.graph().keyframe(k(n)).observations) {
         const Vector3 z = rig_.project(poses[n] * writer_.graph().position(seen.point));
-        cost += 0.5 * (seen.z.cast<double>() - z).squaredNorm() / (0.5 * 0.5);
+        const Vector3 r = seen.z.cast<double>() - z;
+        cost += 0.5 * r.dot(rig_.information(seen.z, seen.level).cast<double>().cwiseProduct(r));
       }
     }
     return cost;
