@@ -39,8 +39,9 @@ inline constexpr auto kProduct = [] {
   return table;
 }();
 
-/// Products of polynomials.
-[[nodiscard]] inline Quadratic product(const Linear& p, const Linear& q) {
+/// Products of polynomials. Functions of their own: unrolled into every sum of them, the ten constraints take a compiler
+/// most of a minute.
+[[nodiscard, gnu::noinline]] inline Quadratic product(const Linear& p, const Linear& q) {
   Quadratic r = Quadratic::Zero();
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) r[kProduct[16 + i][16 + j] - 10] += p[i] * q[j];
@@ -48,7 +49,7 @@ inline constexpr auto kProduct = [] {
   return r;
 }
 
-[[nodiscard]] inline Cubic product(const Quadratic& p, const Linear& q) {
+[[nodiscard, gnu::noinline]] inline Cubic product(const Quadratic& p, const Linear& q) {
   Cubic r = Cubic::Zero();
   for (int i = 0; i < 10; ++i) {
     for (int j = 0; j < 4; ++j) r[kProduct[10 + i][16 + j]] += p[i] * q[j];
