@@ -13,8 +13,17 @@ namespace twofold::testing {
 inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
   std::mt19937 rng(seed);
   std::uniform_real_distribution<double> number(-1, 1);
-  const auto vector = [&] { return Vector3(number(rng), number(rng), number(rng)); };
-  const auto random_pose = [&] { return SE3(SO3::exp(vector()), 10 * vector()); };
+  // One draw a statement: compilers evaluate arguments in orders of their own, and files of older formats hold this map.
+  const auto vector = [&] {
+    const double z = number(rng);
+    const double y = number(rng);
+    const double x = number(rng);
+    return Vector3(x, y, z);
+  };
+  const auto random_pose = [&] {
+    const Vector3 translation = 10 * vector();
+    return SE3(SO3::exp(vector()), translation);
+  };
   GraphWriter writer;
   for (int k = 0; k < keyframes; ++k) {
     Keyframe keyframe;
@@ -39,7 +48,8 @@ inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
     const auto anchor = static_cast<std::uint32_t>(p * keyframes / points);
     MapPoint point;
     point.anchor = KeyframeId{anchor};
-    point.psi = Vector3(number(rng), number(rng), 0.6 + 0.4 * number(rng));
+    point.psi = vector();
+    point.psi.z() = 0.6 + 0.4 * point.psi.z();
     auto appearance = std::make_shared<PointAppearance>();
     appearance->uv = {static_cast<float>(rng() % 640), static_cast<float>(rng() % 480)};
     appearance->level = static_cast<std::uint8_t>(rng() % 3);
@@ -70,7 +80,10 @@ inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
       corner.uv = {static_cast<float>(rng() % 640), static_cast<float>(rng() % 480)};
       corner.level = static_cast<std::uint8_t>(rng() % 3);
       corner.angle = 0.1F * static_cast<float>(rng() % 60);
-      for (std::uint64_t& bits : corner.descriptor.bits) bits = std::uint64_t{rng()} << 32 | rng();
+      for (std::uint64_t& bits : corner.descriptor.bits) {
+        bits = std::uint64_t{rng()} << 32;
+        bits |= rng();
+      }
       place.corners.push_back(corner);
       const float u_r = n % 3 == 0 ? std::numeric_limits<float>::quiet_NaN() : corner.uv.x() - 20;
       place.z.emplace_back(corner.uv.x(), corner.uv.y(), u_r);
