@@ -26,6 +26,11 @@ export const EVENT_COLOURS: Record<string, string> = {
   'relocalisation': '#ffb000',
   'new part': '#ff8cc6',
   'lost': '#ff3b30',
+  'map saved': '#6ac8ff',
+  'map held': '#6ac8ff',
+  'map released': '#6ac8ff',
+  'run stopped': '#6ac8ff',
+  'command failed': '#ff3b30',
 };
 
 export function eventColour(kind: string): string {
