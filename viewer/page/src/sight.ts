@@ -48,7 +48,7 @@ export class Sight {
   }
 
   private paint(bitmap: ImageBitmap, image: Image, frame: LiveFrame): void {
-    const c = this.canvas.getContext('2d')!;
+    const c = this.canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     this.canvas.width = bitmap.width;
     this.canvas.height = bitmap.height;
     c.drawImage(bitmap, 0, 0);
