@@ -15,6 +15,7 @@
 #include "engine/worker.hpp"
 #include "viewer/image_message.hpp"
 #include "viewer/server.hpp"
+#include "viewer/truth.hpp"
 
 namespace twofold {
 namespace {
@@ -43,24 +44,6 @@ struct HeldImage {
   ImageView pixels;
   std::shared_ptr<const void> owner;
 };
-
-/// The true path in the world of a tracked pose, which stands where the true pose nearest in time does; at
-/// most 4096 positions.
-ViewTruth truth_beside(const PoseEstimate& pose, const ViewerOptions& options) {
-  const auto& times = options.truth_t_ns;
-  auto nearest = std::lower_bound(times.begin(), times.end(), pose.t_ns);
-  if (nearest == times.end() ||
-      (nearest != times.begin() && pose.t_ns - *std::prev(nearest) < *nearest - pose.t_ns))
-    --nearest;
-  const Pose T_world_truth = compose(pose.T_world_camera, inverse(options.truth[nearest - times.begin()]));
-  ViewTruth truth{pose.map_part, {}};
-  for (std::size_t i = 0; i < times.size(); i += times.size() / 4096 + 1) {
-    const auto p = transform(T_world_truth, options.truth[i].t);
-    const double t = 1e-9 * static_cast<double>(times[i] - pose.t_ns);
-    truth.path.push_back({float(t), float(p[0]), float(p[1]), float(p[2])});
-  }
-  return truth;
-}
 
 ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   ViewTitle title;
@@ -207,7 +190,8 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     if (scene_.truth() || pose.state != TrackingState::kTracked || options_.truth.empty() ||
         options_.truth.size() != options_.truth_t_ns.size())
       return;
-    scene_.set_truth(truth_beside(pose, options_));
+    scene_.set_truth(
+        truth_beside({pose.t_ns, pose.T_world_camera, pose.map_part}, options_.truth, options_.truth_t_ns));
   }
 
   /// Not before the first pose: times are counted from there.

@@ -170,13 +170,12 @@ class Page {
       ['frame', count(newest?.frame ?? this.model.path.at(-1)?.frame ?? 0), false],
       ['keyframes', count(this.model.keyframes.size), false],
       ['points', count(this.stage.cloud.size), false],
-      ['map', newest ? `v${newest.mapVersion}` : '–', true],
-      ['latency', newest ? `${newest.latencyMs.toFixed(1)} ms` : '–', false],
-      ['waiting', newest ? `${newest.waiting} for the mapper` : '–', true],
-      ['effort', newest ? EFFORTS[newest.effort] : '–', true],
-      ['found', newest ? `${(100 * newest.trackedShare).toFixed(0)} %` : '–', true],
       ['lost', count(lost), true],
     ];
+    if (newest) {
+      figures.push(['latency', `${newest.latencyMs.toFixed(1)} ms`, false], ['found', `${(100 * newest.trackedShare).toFixed(0)} %`, true],
+        ['map', `v${newest.mapVersion}`, true], ['queue', String(newest.waiting), true]);
+    }
     $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
       const item = make('div', '', make('dt', name), make('dd', value));
       item.classList.toggle('minor', minor);
@@ -232,6 +231,7 @@ class Page {
 
   private makeEvents(): void {
     const newest = this.model.events.slice(-100).reverse();
+    $('no-events').hidden = newest.length > 0;
     $('events').replaceChildren(...newest.map((event) => {
       const sample = make('i');
       sample.style.background = eventColour(event.kind);
@@ -427,7 +427,7 @@ class Page {
       link: this.link, live: this.model.live.length, newest: this.model.live.at(-1)?.frame ?? -1, keyframes: this.model.keyframes.size,
       inner: this.windowSize(1), outer: this.windowSize(2), points: this.stage.cloud.size, path: this.model.path.length,
       events: this.model.events.length, lost: lostStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs,
-      edges: this.model.edges.size, mapVersion: this.model.mapVersion,
+      edges: this.model.edges.size, truth: this.model.truth?.path.length ?? 0, mapVersion: this.model.mapVersion,
     };
   }
   private windowSize(window: number): number {

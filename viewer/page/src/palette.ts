@@ -44,7 +44,7 @@ function palette(names: Record<keyof Palette, string>): Palette {
 export const PALETTES = {
   dark: palette({
     background: '#0e1116', grid: '#232a35', camera: '#ffffff', final: '#2ee6a6', causal: '#ff6b9d', truth: '#9aa4b2',
-    inner: '#ffb000', outer: '#3d9bff', keyframe: '#4b5567', selected: '#ffffff', covisible: '#56657c',
+    inner: '#ffb000', outer: '#3d9bff', keyframe: '#6b7a92', selected: '#ffffff', covisible: '#56657c',
     marginalised: '#9b7bff', back: '#ff5a5f', measure: '#fff36b',
   }),
   light: palette({

@@ -204,7 +204,7 @@ export class Stage {
     }
     if (steps.length === 0) return this.frustum;
     steps.sort((a, b) => a - b);
-    return Math.max(0.03, 0.55 * steps[steps.length >> 1], 0.008 * this.extent.size);
+    return Math.max(0.03, 0.55 * steps[steps.length >> 1], 0.011 * this.extent.size);
   }
 
   private makePaths(): void {
@@ -305,13 +305,13 @@ export class Stage {
   private makeGrid(): void {
     const {size, centre, lowest} = this.extent;
     const square = 10 ** Math.round(Math.log10(Math.max(size, 0.1) / 12));
-    const wanted = `${square} ${Math.ceil((1.6 * size) / square)}`;
+    const wanted = `${square} ${Math.ceil((2.4 * size) / square)}`;
     if (this.grid?.name !== wanted) {
       if (this.grid) {
         this.scene.remove(this.grid);
         this.grid.dispose();
       }
-      const squares = Math.min(200, Math.ceil((1.6 * size) / square));
+      const squares = Math.min(200, Math.ceil((2.4 * size) / square));
       this.grid = new THREE.GridHelper(squares * square, squares, this.palette.grid, this.palette.grid);
       this.grid.name = wanted;
       this.scene.add(this.grid);

@@ -103,6 +103,8 @@ async function finishedRun(live) {
   const address = await view.address();
   const page = await openPage(browser, address);
   await until('the path', async () => (await report(page)).path >= live.path - 2);
+  const {edges, truth} = await report(page);
+  assert.ok(edges > 20 && truth > 20, `${edges} edges, ${truth} true positions`);
   await page.keyboard.press('2');
   await has(page, 'final path', '#stage', '#2ee6a6', 200);
   await page.waitForTimeout(500);
