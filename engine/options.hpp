@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -51,6 +52,9 @@ struct EngineOptions {
   /// before the run has ended.
   std::shared_ptr<const SavedMap> map;
   bool localise_only = false;  ///< no keyframe is made: `map`, which must be there, does not change
+  /// While true no keyframe is made: the map stays as it is, until it is false again. May be null; outlives
+  /// the run. Of threaded runs.
+  const std::atomic<bool>* map_held = nullptr;
   CheckpointOptions checkpoint;
 
   /// One thread, one order: each frame is tracked against the map with every earlier keyframe optimised.

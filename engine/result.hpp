@@ -10,6 +10,7 @@
 #include "engine/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
+#include "estimation/motion_only.hpp"
 #include "graph/keyframe_database.hpp"
 #include "graph/loop_constraint.hpp"
 #include "graph/snapshot.hpp"
@@ -86,6 +87,8 @@ struct PoseReport {
   Matrix6 information;                     ///< of T_c_ref, left perturbation (v, omega); of tracked frames
   std::int64_t exposed_ns = 0;             ///< when the frame was exposed (Pacer)
   std::span<const std::int64_t> stage_ns;  ///< what each TrackerStage took
+  /// What the pose rests on, outliers included; points in the reference keyframe's frame.
+  std::span<const MotionObservation> measured;
 };
 
 /// What the mapper did in all.

@@ -114,7 +114,7 @@ void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const G
   times_.record(latency_stage_, exposed_ns, record.latency_ns);
   if (!on_pose_) return;
   const ScopedStage timed(times_, listener_stage_);
-  on_pose_({record, graph, correction_, information_, exposed_ns, stage_ns_});
+  on_pose_({record, graph, correction_, information_, exposed_ns, stage_ns_, tracker_.last_observations()});
 }
 
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)

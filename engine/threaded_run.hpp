@@ -91,6 +91,7 @@ class ThreadedRun {
   void drop(FrameSlot& slot);
   [[nodiscard]] std::optional<std::int64_t> successor_t_ns();
   void send_proposal();
+  void prepare_spare();
   void take_answers(TrackerStep& step);
   void ask_where_we_are();
   /// False when there was no request.

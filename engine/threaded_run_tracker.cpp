@@ -43,7 +43,7 @@ void ThreadedRun::drop(FrameSlot& slot) {
 }
 
 void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnapshot& graph) {
-  if (!spare_ && !options_.localise_only) spare_ = proposals_pool_.try_acquire();
+  prepare_spare();
   TrackerStep& step = slot.step;
   step = {slot.frame.index, graph.version(), TrackerStep::Fate::kTracked};
   take_answers(step);
@@ -55,6 +55,17 @@ void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnap
   effort_controller_.tracked(slot.record.latency_ns, arrival.period_ns);
   slot.correction = tracking_.correction();
   ask_where_we_are();
+}
+
+/// A buffer for a keyframe, if there may be one.
+void ThreadedRun::prepare_spare() {
+  // Relaxed: a wish, which takes effect with one frame or the next.
+  const bool held = options_.map_held != nullptr && options_.map_held->load(std::memory_order_relaxed);
+  if (held || options_.localise_only) {
+    spare_.reset();
+  } else if (!spare_) {
+    spare_ = proposals_pool_.try_acquire();
+  }
 }
 
 void ThreadedRun::take_answers(TrackerStep& step) {

@@ -1,6 +1,7 @@
 #include "viewer/client_feed.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace twofold {
 namespace {
@@ -9,26 +10,45 @@ std::shared_ptr<const std::string> shared(std::string bytes) {
   return std::make_shared<const std::string>(std::move(bytes));
 }
 
+constexpr std::array<std::pair<std::string_view, ViewCommand>, 4> kCommands{
+    {{"save map", ViewCommand::kSaveMap},
+     {"stop", ViewCommand::kStop},
+     {"hold map", ViewCommand::kHoldMap},
+     {"release map", ViewCommand::kReleaseMap}}};
+
 }  // namespace
 
-std::optional<ViewMessage> ClientFeed::next(const ViewImage& newest) {
+std::optional<ViewMessage> ClientFeed::next(const ViewSight& sight) {
+  if (greeted_ && last_words_ && !told_end_) {
+    told_end_ = true;  // whatever else is under way: the words are few, and there are no more of them
+    ++unacknowledged_;
+    return ViewMessage{shared(ended_text(*last_words_)), true};
+  }
   if (unacknowledged_ >= kUnacknowledged) return std::nullopt;
   std::optional<ViewMessage> message = next_text();
+  if (!message) message = newer(sight.measured, measured_);
   if (!message) {
     if (auto frames = next_frames()) {
       message = ViewMessage{std::move(frames)};
     } else if (auto piece = next_piece()) {
       message = ViewMessage{std::move(piece)};
-    } else if (wants_images_ && newest.message != nullptr && newest.number > image_) {
-      image_ = newest.number;
-      message = ViewMessage{newest.message};
-    } else if (last_words_ && !ended_) {
-      message = ViewMessage{shared(ended_text(*last_words_)), true};
-      ended_ = true;
+    } else {
+      message = newer(sight.image, image_);
     }
   }
   if (message) ++unacknowledged_;
   return message;
+}
+
+std::optional<ViewMessage> ClientFeed::newer(const NewestMessage& newest, std::uint64_t& sent) const {
+  if (!wants_images_ || newest.number == sent) return std::nullopt;
+  sent = newest.number;
+  return ViewMessage{newest.bytes};
+}
+
+bool ClientFeed::is_done() const {
+  return told_end_ && event_ == scene_.end_event() && live_ == scene_.end_live() && !delta_ &&
+         revision_ == scene_.revision();
 }
 
 std::optional<ViewMessage> ClientFeed::next_text() {
@@ -79,8 +99,14 @@ std::shared_ptr<const std::string> ClientFeed::next_piece() {
 
 bool ClientFeed::take(std::string_view message) {
   if (message == "ack") return --unacknowledged_ >= 0;
-  if (message != "images on" && message != "images off") return false;
-  wants_images_ = message == "images on";
+  if (message == "images on" || message == "images off") {
+    wants_images_ = message == "images on";
+    return true;
+  }
+  const auto command = std::find_if(kCommands.begin(), kCommands.end(),
+                                    [&](const auto& known) { return known.first == message; });
+  if (!title_.control || command == kCommands.end()) return false;
+  command_ = command->second;
   return true;
 }
 

@@ -5,7 +5,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "twofold/viewer.hpp"
 #include "viewer/texts.hpp"
 
 namespace twofold {
@@ -15,10 +17,20 @@ struct ViewMessage {
   bool text = false;
 };
 
-/// The image that is newest, as a whole message; null: none.
-struct ViewImage {
-  std::uint64_t number = 0;  ///< grows
-  std::shared_ptr<const std::string> message;
+/// A message of a kind of which only the newest matters; null: none yet.
+struct NewestMessage {
+  std::uint64_t number = 0;
+  std::shared_ptr<const std::string> bytes = nullptr;
+
+  void put(std::string message) {
+    bytes = std::make_shared<const std::string>(std::move(message));
+    ++number;
+  }
+};
+
+/// What the camera sees: an image, and what was measured in one.
+struct ViewSight {
+  NewestMessage image, measured;
 };
 
 /// What one client is to get next. Nothing waits in a queue: each message is made when the one before has
@@ -34,18 +46,22 @@ class ClientFeed {
   ClientFeed(const ViewScene& scene, const ViewTitle& title) : scene_(scene), title_(title) {}
 
   /// Nothing: the client is up to date, or has enough to do.
-  [[nodiscard]] std::optional<ViewMessage> next(const ViewImage& newest);
-  /// A message of the client: "ack", "images on", "images off". False: nonsense, and the client is to go.
+  [[nodiscard]] std::optional<ViewMessage> next(const ViewSight& sight);
+  /// A message of the client (wire_format.hpp). False: nonsense, or more than it may, and the client is to
+  /// go.
   [[nodiscard]] bool take(std::string_view message);
+  /// What the client asked for since the last call; of several the last.
+  [[nodiscard]] std::optional<ViewCommand> take_command() { return std::exchange(command_, std::nullopt); }
 
   [[nodiscard]] bool wants_images() const { return wants_images_; }
-  /// Nothing more will come, and why; the last message.
+  /// The scene will not change any more, and why: told at once, before what the client still lacks.
   void end(std::string message) { last_words_ = std::move(message); }
-  /// The last message was handed out.
-  [[nodiscard]] bool has_ended() const { return ended_; }
+  /// That was handed out, and everything there is.
+  [[nodiscard]] bool is_done() const;
 
  private:
   [[nodiscard]] std::optional<ViewMessage> next_text();
+  [[nodiscard]] std::optional<ViewMessage> newer(const NewestMessage& newest, std::uint64_t& sent) const;
   [[nodiscard]] std::shared_ptr<const std::string> next_frames();
   [[nodiscard]] std::shared_ptr<const std::string> next_piece();
 
@@ -57,11 +73,12 @@ class ClientFeed {
   std::uint64_t live_ = 0;
   Revision revision_ = 0, next_revision_ = 0;  // what it has, and has when the delta is through
   std::shared_ptr<const ViewScene::Delta> delta_;
-  std::size_t piece_ = 0;  // of delta_, to be sent next
-  std::uint64_t image_ = 0;
+  std::size_t piece_ = 0;                   // of delta_, to be sent next
+  std::uint64_t image_ = 0, measured_ = 0;  // numbers of those sent last
   bool wants_images_ = false;
+  std::optional<ViewCommand> command_;
   std::optional<std::string> last_words_;
-  bool ended_ = false;
+  bool told_end_ = false;
   int unacknowledged_ = 0;
 };
 

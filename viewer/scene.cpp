@@ -133,7 +133,7 @@ std::uint8_t ViewScene::reason_number(const char* reason) {
   return static_cast<std::uint8_t>(reasons_.size() - 1);
 }
 
-void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns) {
+void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns, std::size_t waiting) {
   begin(pose.t_ns);
   ViewLiveFrame live;
   live.frame = static_cast<std::uint32_t>(pose.frame);
@@ -152,6 +152,7 @@ void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stag
   live.map_version = static_cast<std::uint32_t>(pose.map_version);
   for (std::size_t s = 0; s < stage_ns.size() && s < kViewStages; ++s)
     live.stage_ms[s] = static_cast<float>(1e-6 * static_cast<double>(stage_ns[s]));
+  live.waiting = static_cast<std::uint32_t>(waiting);
   live_.push_back(live);
   if (live_.size() > kLiveFrames) live_.pop_front();
   ++end_live_;

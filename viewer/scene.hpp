@@ -72,7 +72,8 @@ class ViewScene {
   static constexpr std::size_t kLiveFrames = 512;
   static constexpr std::size_t kMaxEvents = 4096;
 
-  void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns);
+  /// @param waiting  keyframes that wait for the mapper
+  void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns, std::size_t waiting = 0);
   void add(const MapEvent& event);
   void add(ViewEvent event);
   void add(const ViewPathFrame& frame);

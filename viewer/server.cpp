@@ -47,7 +47,7 @@ struct Hall {
   const ViewTitle& title;
   ViewDoor door;
   std::size_t& connections;
-  ViewImage image = {};
+  ViewSight sight = {};
 };
 
 std::string_view field(const Request& request, http::field name) {
@@ -97,7 +97,7 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
   }
   [[nodiscard]] bool is_closed() const { return closed_; }
   [[nodiscard]] ClientFeed& feed() { return feed_; }
-  [[nodiscard]] bool is_done() const { return closed_ || (feed_.has_ended() && !writing_); }
+  [[nodiscard]] bool is_done() const { return closed_ || (feed_.is_done() && !writing_); }
 
   /// What is due, unless a message is on its way.
   void write() {
@@ -106,7 +106,7 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
       if (Clock::now() - write_began_ > kWriteTime) close();
       return;
     }
-    std::optional<ViewMessage> message = feed_.next(hall_.image);
+    std::optional<ViewMessage> message = feed_.next(hall_.sight);
     if (!message) return;
     writing_ = true;
     write_began_ = Clock::now();
@@ -320,9 +320,12 @@ class ViewServer::Impl {
   void look_around(const Tick& tick, bool is_last = false) {
     if (!accepting_) accept();
     std::erase_if(viewers_, [](const auto& viewer) { return viewer->is_closed(); });
-    Audience audience{viewers_.size(), false, is_last};
-    for (const auto& viewer : viewers_) audience.wants_images |= viewer->feed().wants_images();
-    tick(audience, hall_.image);
+    Audience audience{.viewers = viewers_.size(), .is_last = is_last};
+    for (const auto& viewer : viewers_) {
+      audience.wants_images |= viewer->feed().wants_images();
+      if (const auto command = viewer->feed().take_command()) audience.commands.push_back(*command);
+    }
+    tick(audience, hall_.sight);
     for (const auto& viewer : viewers_) viewer->write();
   }
 

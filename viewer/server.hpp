@@ -4,6 +4,7 @@
 #include <memory>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "viewer/client_feed.hpp"
 
@@ -38,12 +39,13 @@ class ViewServer {
   struct Audience {
     std::size_t viewers = 0;
     bool wants_images = false;
-    bool is_last = false;  ///< the last call
+    bool is_last = false;                    ///< the last call
+    std::vector<ViewCommand> commands = {};  ///< since the call before
   };
   /// Called every 10 ms while somebody is looking, else every 100 ms: brings the scene up to date.
-  using Tick = std::function<void(const Audience&, ViewImage& newest)>;
-  /// Until a stop is asked for; viewers then get what they still lack, for at most three seconds, and
-  /// `last_words()`.
+  using Tick = std::function<void(const Audience&, ViewSight& newest)>;
+  /// Until a stop is asked for; viewers then get `last_words()` and what they still lack, for at most three
+  /// seconds.
   void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words);
 
  private:

@@ -35,6 +35,7 @@ std::string hello_text(const ViewTitle& title) {
                     {"stages", title.stages},
                     {"live", title.live},
                     {"hasDeviations", title.has_deviations},
+                    {"control", title.control},
                     {"periodMs", title.period_ms}}}});
 }
 

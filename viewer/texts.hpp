@@ -16,6 +16,7 @@ struct ViewTitle {
   std::vector<std::string> stages = {};  ///< names of ViewLiveFrame::stage_ms
   bool live = true;                      ///< else finished: there is a time slider and nothing to come
   bool has_deviations = false;           ///< of points
+  bool control = false;                  ///< viewers may command
   double period_ms = 0;                  ///< between two frames: the budget; 0: as the frames' times say
 };
 
@@ -25,7 +26,7 @@ struct ViewTitle {
 [[nodiscard]] std::string truth_text(const ViewTruth& truth);
 /// Events from number `begin` on.
 [[nodiscard]] std::string events_text(const ViewScene& scene, std::uint64_t begin);
-/// {"status": {"ended": true, "message": ...}}: nothing is to come.
+/// {"status": {"ended": true, "message": ...}}: nothing new will happen.
 [[nodiscard]] std::string ended_text(const std::string& message);
 
 }  // namespace twofold

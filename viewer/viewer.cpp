@@ -15,6 +15,7 @@
 #include "engine/worker.hpp"
 #include "viewer/image_message.hpp"
 #include "viewer/server.hpp"
+#include "viewer/truth.hpp"
 
 namespace twofold {
 namespace {
@@ -32,29 +33,17 @@ struct ToldFrame {
   std::size_t stages = 0;
 };
 
+struct ToldPoints {
+  std::int64_t frame = 0;
+  std::uint32_t count = 0;
+  std::array<ViewedPoint, 512> points;
+};
+
 struct HeldImage {
   std::int64_t frame = 0;
   ImageView pixels;
   std::shared_ptr<const void> owner;
 };
-
-/// The true path in the world of a tracked pose, which stands where the true pose nearest in time does; at
-/// most 4096 positions.
-ViewTruth truth_beside(const PoseEstimate& pose, const ViewerOptions& options) {
-  const auto& times = options.truth_t_ns;
-  auto nearest = std::lower_bound(times.begin(), times.end(), pose.t_ns);
-  if (nearest == times.end() ||
-      (nearest != times.begin() && pose.t_ns - *std::prev(nearest) < *nearest - pose.t_ns))
-    --nearest;
-  const Pose T_world_truth = compose(pose.T_world_camera, inverse(options.truth[nearest - times.begin()]));
-  ViewTruth truth{pose.map_part, {}};
-  for (std::size_t i = 0; i < times.size(); i += times.size() / 4096 + 1) {
-    const auto p = transform(T_world_truth, options.truth[i].t);
-    const double t = 1e-9 * static_cast<double>(times[i] - pose.t_ns);
-    truth.path.push_back({float(t), float(p[0]), float(p[1]), float(p[2])});
-  }
-  return truth;
-}
 
 ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   ViewTitle title;
@@ -62,7 +51,43 @@ ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   title.rig = rig;
   title.stages = options.stages;
   title.period_ms = 1e3 * options.frame_period;
+  title.control = static_cast<bool>(options.on_command);
   return title;
+}
+
+const char* describe(ViewCommand command) {
+  switch (command) {
+    case ViewCommand::kSaveMap:
+      return "map saved";
+    case ViewCommand::kStop:
+      return "run stopped";
+    case ViewCommand::kHoldMap:
+      return "map held";
+    case ViewCommand::kReleaseMap:
+      break;
+  }
+  return "map released";
+}
+
+std::string measured_message(const ToldPoints& told) {
+  const ViewMessageHeader header{ViewMessageKind::kMeasured, static_cast<std::uint32_t>(told.frame),
+                                 told.count};
+  std::string message(reinterpret_cast<const char*>(&header), sizeof header);
+  message.append(reinterpret_cast<const char*>(told.points.data()), told.count * sizeof(ViewedPoint));
+  return message;
+}
+
+/// Done, or why it could not be.
+ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCommand)>& obey) {
+  ViewEvent event;
+  try {
+    event.text = obey(command);
+    event.kind = describe(command);
+  } catch (const std::exception& error) {
+    event.kind = "command failed";
+    event.text = error.what();
+  }
+  return event;
 }
 
 /// What the calling thread has computed: on a busy machine less than time has passed.
@@ -85,10 +110,12 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         options_(options),
         title_(title_of(rig, options)),
         server_({options.bind, options.port}, scene_, title_) {
+    for (auto& frame : shown_)
+      frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
     thread_.emplace(WorkerOptions{.name = "viewer"}, [this](const std::stop_token& stop) {
       take_lowest_priority();
       server_.run(
-          stop, [this](const ViewServer::Audience& audience, ViewImage& newest) { tick(audience, newest); },
+          stop, [this](const ViewServer::Audience& audience, ViewSight& newest) { tick(audience, newest); },
           [] { return std::string("the run is over"); });
     });
   }
@@ -104,9 +131,16 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   /// The newest image wins; the older is freed here.
   void put(HeldImage* image) {
     wants_image_.store(false, std::memory_order_relaxed);
+    shown_[images_++ % shown_.size()].store(image->frame, std::memory_order_relaxed);
     delete image_.exchange(image, std::memory_order_acq_rel);
   }
   bool wants_image() const { return wants_image_.load(std::memory_order_relaxed); }
+  bool has_shown(std::int64_t frame) const {
+    return std::any_of(shown_.begin(), shown_.end(),
+                       [frame](const auto& shown) { return shown.load(std::memory_order_relaxed) == frame; });
+  }
+  void push(ToldPoints& points) { (void)points_.try_push(std::move(points)); }  // likewise
+  void set_waiting(std::size_t keyframes) { waiting_.store(keyframes, std::memory_order_relaxed); }
   const ViewServer& server() const { return server_; }
   void finish() {
     if (!thread_) return;
@@ -116,25 +150,48 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   }
 
  private:
-  void tick(const ViewServer::Audience& audience, ViewImage& newest) {
+  void tick(const ViewServer::Audience& audience, ViewSight& newest) {
+    listen();
+    for (const ViewCommand command : audience.commands) obey(command);
+    look_at_map(audience);
+    look_at_image(audience.wants_images, newest.image);
+    ToldPoints points;
+    while (points_.try_pop(points)) newest.measured.put(measured_message(points));
+  }
+
+  /// To what was told since the last time.
+  void listen() {
     std::variant<ToldFrame, MapEvent> told;
     while (ring_.try_pop(told)) {
       if (const auto* frame = std::get_if<ToldFrame>(&told)) {
-        scene_.add(frame->pose, std::span(frame->stage_ns).first(frame->stages));
+        newest_ = frame->pose;
+        scene_.add(frame->pose, std::span(frame->stage_ns).first(frame->stages),
+                   waiting_.load(std::memory_order_relaxed));
         find_truth(frame->pose);
       } else {
         scene_.add(std::get<MapEvent>(told));
       }
     }
-    look_at_map(audience);
-    look_at_image(audience.wants_images, newest);
+  }
+
+  /// What became of a command is an event, so that all viewers know.
+  void obey(ViewCommand command) {
+    if (!options_.on_command) return;
+    ViewEvent event = outcome_of(command, options_.on_command);
+    event.frame = static_cast<std::uint32_t>(newest_.frame);
+    event.part_before = event.part = newest_.map_part;
+    event.before = event.after = newest_.T_world_camera.t;
+    if (scene_.start_ns())
+      event.t = static_cast<float>(1e-9 * static_cast<double>(newest_.t_ns - *scene_.start_ns()));
+    scene_.add(std::move(event));
   }
 
   void find_truth(const PoseEstimate& pose) {
     if (scene_.truth() || pose.state != TrackingState::kTracked || options_.truth.empty() ||
         options_.truth.size() != options_.truth_t_ns.size())
       return;
-    scene_.set_truth(truth_beside(pose, options_));
+    scene_.set_truth(
+        truth_beside({pose.t_ns, pose.T_world_camera, pose.map_part}, options_.truth, options_.truth_t_ns));
   }
 
   /// Not before the first pose: times are counted from there.
@@ -155,15 +212,14 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     keyframes_due_ns_ = now_ns + std::max(kNobodyPeriodNs, rest_ns);
   }
 
-  void look_at_image(bool wanted, ViewImage& newest) {
+  void look_at_image(bool wanted, NewestMessage& newest) {
     const std::int64_t now_ns = steady_now_ns();
     if (!wanted || now_ns < image_due_ns_) return;
     const std::unique_ptr<HeldImage> image(image_.exchange(nullptr, std::memory_order_acq_rel));
     wants_image_.store(image == nullptr, std::memory_order_relaxed);
     if (image == nullptr) return;
     image_due_ns_ = now_ns + kImagePeriodNs;
-    newest = {newest.number + 1,
-              std::make_shared<const std::string>(image_message(image->frame, image->pixels))};
+    newest.put(image_message(image->frame, image->pixels));
   }
 
   const std::function<MapSnapshot()> map_;
@@ -172,12 +228,18 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   ViewScene scene_;
   ViewServer server_;
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
+  SpscRing<ToldPoints> points_{8};
+  PoseEstimate newest_;
   std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, image_due_ns_ = 0;
   // Exchanged by both ends, each with acquire and release: pixels written before are seen by whoever takes
   // them, and whoever frees them comes after their last reader.
   std::atomic<HeldImage*> image_{nullptr};
   std::atomic<bool> wants_image_{false};  // relaxed: a wish; it publishes nothing
-  std::optional<Worker> thread_;          // last: joins before what it uses is destroyed
+  // Frames whose images were put last. Relaxed: who is late in seeing one shows it without its points.
+  std::array<std::atomic<std::int64_t>, 16> shown_;
+  std::size_t images_ = 0;               // the source's
+  std::atomic<std::size_t> waiting_{0};  // relaxed: a number to be shown
+  std::optional<Worker> thread_;         // last: joins before what it uses is destroyed
 };
 
 Viewer::Viewer(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options)
@@ -201,6 +263,22 @@ void Viewer::tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_
 
 void Viewer::tell(const MapEvent& event) {
   impl_->push(event);
+}
+
+bool Viewer::wants_points(std::int64_t frame) const {
+  return impl_->has_shown(frame);
+}
+
+void Viewer::tell(std::int64_t frame, std::span<const ViewedPoint> points) {
+  ToldPoints told;
+  told.frame = frame;
+  told.count = static_cast<std::uint32_t>(std::min(points.size(), told.points.size()));
+  std::copy_n(points.begin(), told.count, told.points.begin());
+  impl_->push(told);
+}
+
+void Viewer::tell_waiting(std::size_t keyframes) {
+  impl_->set_waiting(keyframes);
 }
 
 bool Viewer::wants_image() const {

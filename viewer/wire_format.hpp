@@ -11,15 +11,19 @@ namespace twofold {
 //
 // Binary messages begin with a header:
 //   u32 kind      ViewMessageKind
-//   u32 number    kDelta: ViewDeltaFlags; kFrames: how many; kImage: frame number
+//   u32 number    kDelta: ViewDeltaFlags; kFrames: how many; kImage, kMeasured: frame number
 //   u32 a, b      kDelta: revisions it leads from and to; kImage: width and height of the whole image [px];
 //   else 0
 // and go on with
 //   kDelta   blocks: u32 ViewBlock, u32 count, then the records, or, of what is gone, its keys
 //   kFrames  ViewLiveFrame, in the order of time
 //   kImage   a JPEG
+//   kMeasured  ViewedPoint (twofold/viewer.hpp); comes before the frame itself
 // Text messages are JSON: an object with one of the members hello, reasons, truth, events, status
 // (viewer/texts.hpp).
+//
+// The page says "ack" for each message, "images on", "images off", and, where hello.control is true, "save
+// map", "stop", "hold map", "release map".
 //
 // A revision counts changes of the scene. A delta from revision 0 is the whole of it, and makes the page
 // forget what it had. One that is large comes in several messages; the last has kLast, and until then `from`
@@ -28,10 +32,10 @@ namespace twofold {
 // Worlds are those of map parts; poses are T_world_camera [m]; times are seconds since the scene's first
 // moment.
 
-inline constexpr std::uint32_t kViewProtocol = 1;
+inline constexpr std::uint32_t kViewProtocol = 2;
 static_assert(std::endian::native == std::endian::little, "records are sent as they lie in memory");
 
-enum class ViewMessageKind : std::uint32_t { kDelta = 1, kFrames = 2, kImage = 3 };
+enum class ViewMessageKind : std::uint32_t { kDelta = 1, kFrames = 2, kImage = 3, kMeasured = 4 };
 
 enum ViewDeltaFlags : std::uint32_t { kWhole = 1, kLast = 2 };
 
@@ -133,7 +137,8 @@ struct ViewLiveFrame {
   float latency_ms = 0;
   std::uint32_t map_version = 0;
   float stage_ms[kViewStages] = {};  ///< in the order of hello.stages
+  std::uint32_t waiting = 0;         ///< keyframes that wait for the mapper
 };
-static_assert(sizeof(ViewLiveFrame) == 96 && std::is_trivially_copyable_v<ViewLiveFrame>);
+static_assert(sizeof(ViewLiveFrame) == 100 && std::is_trivially_copyable_v<ViewLiveFrame>);
 
 }  // namespace twofold

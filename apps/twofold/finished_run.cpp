@@ -14,6 +14,7 @@
 #include "io/files/trajectory_file.hpp"
 #include "slam/conversions.hpp"
 #include "slam/map_snapshot.hpp"
+#include "viewer/truth.hpp"
 
 namespace twofold {
 namespace {
@@ -50,6 +51,35 @@ std::vector<ViewPoint> points_of(const std::vector<PlyPoint>& from) {
     point.deviation = deviation_code(p.stddev);
   }
   return points;
+}
+
+/// Lines of edges.txt (graph_export.hpp).
+std::vector<ViewEdge> read_edges(const std::filesystem::path& file, std::size_t keyframes) {
+  std::vector<ViewEdge> edges;
+  std::ifstream in(file);  // runs before there were such files have none
+  ViewEdge edge;
+  std::string kind;
+  while (in >> edge.from >> edge.to >> edge.shared_points >> kind) {
+    if (edge.from >= keyframes || edge.to >= keyframes)
+      throw IoError(file.string(), "names a keyframe there is not");
+    edge.marginalised = kind == "marginalised" ? 1 : 0;
+    edges.push_back(edge);
+  }
+  std::sort(edges.begin(), edges.end(),
+            [](const ViewEdge& a, const ViewEdge& b) { return a.key() < b.key(); });
+  return edges;
+}
+
+/// The path that the source knew, if it did.
+void add_truth(const std::filesystem::path& file, const TimedPose& tracked, ViewScene& scene) {
+  if (!std::filesystem::exists(file)) return;
+  std::vector<Pose> truth;
+  std::vector<std::int64_t> t_ns;
+  for (const TimedPose& pose : read_tum_trajectory(file)) {
+    truth.push_back(to_pose(pose.T_w_c));
+    t_ns.push_back(pose.t_ns);
+  }
+  if (!truth.empty()) scene.set_truth(truth_beside({tracked.t_ns, to_pose(tracked.T_w_c), 0}, truth, t_ns));
 }
 
 /// Frames of a finished run hang on the keyframe before them.
@@ -147,8 +177,10 @@ void show_finished_run(const std::filesystem::path& folder, ViewScene& scene, Vi
   if (poses.empty()) throw IoError((folder / "trajectory.txt").string(), "holds no pose");
   const std::int64_t start_ns = poses.front().t_ns;
   scene.begin(start_ns);
-  title.title = fmt::format("{} ({})", summary.value("source", ""), folder.string());
-  scene.show({1, points_of(read_ply(folder / "map.ply")), keyframes_of(keyframes, start_ns), {}});
+  title.title = fmt::format("{} ({})", folder.filename().string(), summary.value("source", ""));
+  scene.show({1, points_of(read_ply(folder / "map.ply")), keyframes_of(keyframes, start_ns),
+              read_edges(folder / "edges.txt", keyframes.size())});
+  add_truth(folder / "groundtruth.txt", poses.front(), scene);
   const PathBuilder builder(keyframes, read_tum_trajectory(folder / "trajectory_causal.txt"), start_ns);
   add_path(poses, builder, summary, scene);
   add_events(summary, poses, start_ns, scene);

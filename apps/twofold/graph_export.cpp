@@ -48,6 +48,25 @@ std::vector<PlyPoint> map_points(const GraphSnapshot& graph, KeyframeId part) {
   return points;
 }
 
+std::string edge_list(const GraphSnapshot& graph, KeyframeId part) {
+  std::vector<std::uint32_t> place(graph.keyframe_count());
+  for (std::uint32_t k = 0, next = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (keyframe.part == part && !keyframe.culled()) place[k] = next++;
+  }
+  std::string lines;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (keyframe.part != part || keyframe.culled()) continue;
+    for (const Edge& edge : *keyframe.edges) {
+      if (edge.other < keyframe.id) continue;
+      lines += fmt::format("{} {} {} {}\n", place[k], place[index(edge.other)], edge.weight,
+                           edge.marginalised ? "marginalised" : "covisible");
+    }
+  }
+  return lines;
+}
+
 std::string g2o_text(const GraphSnapshot& graph) {
   std::string vertices, edges, fixed;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {

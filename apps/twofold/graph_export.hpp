@@ -15,6 +15,10 @@ namespace twofold {
 /// Points that are alive, in the grey of their corner, of one part of the map.
 [[nodiscard]] std::vector<PlyPoint> map_points(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
 
+/// A line for each edge of the part: two keyframes by their places in keyframe_trajectory, the points that
+/// both see, and "covisible" or "marginalised". Ascending.
+[[nodiscard]] std::string edge_list(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
+
 /// The pose graph in g2o's text form: VERTEX_SE3:QUAT with T_w_k, EDGE_SE3:QUAT with T_i_j of each edge and
 /// an information that is the edge's weight times the identity. The oldest keyframe is fixed.
 [[nodiscard]] std::string g2o_text(const GraphSnapshot& graph);

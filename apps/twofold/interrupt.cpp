@@ -19,6 +19,10 @@ const std::atomic<bool>& interrupted() {
   return flag;
 }
 
+void interrupt() {
+  on_interrupt(0);
+}
+
 void catch_interrupts() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);

@@ -1,9 +1,12 @@
 #include "apps/twofold/live_view.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 #include <fmt/format.h>
 
+#include "apps/twofold/interrupt.hpp"
+#include "graph/map_file.hpp"
 #include "io/files/io_error.hpp"
 #include "slam/conversions.hpp"
 #include "slam/map_snapshot.hpp"
@@ -11,6 +14,8 @@
 
 namespace twofold {
 namespace {
+
+constexpr std::size_t kMostMeasured = 512;  // points of a frame that are shown
 
 ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& title,
                              const FrameSource& source) {
@@ -52,6 +57,9 @@ void add_view_options(CLI::App& command, ViewArguments& arguments, const std::st
       .add_option("--view-bind", arguments.bind,
                   "Address to listen on: any but 127.0.0.1 shows camera and map to the network")
       ->capture_default_str();
+  command.add_flag(
+      "--view-control", arguments.control,
+      "Viewers may save the map (to map.tfm in the output folder), hold it as it is, and end the run");
 }
 
 void print_view_address(const std::string& address, bool is_open_to_network) {
@@ -65,15 +73,21 @@ void print_view_address(const std::string& address, bool is_open_to_network) {
   }
 }
 
-LiveView::LiveView(const ViewArguments& arguments, const std::string& title, const FrameSource& source,
-                   EngineOptions& options) {
-  if (!arguments.port) return;
-  const auto newest_map = [this, rig = source.rig()] {
-    return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig, maps_.newest()}));
+LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
+                   const std::filesystem::path& folder, const FrameSource& source, EngineOptions& options)
+    : rig_(source.rig()), map_file_(folder / "map.tfm") {
+  if (!arguments.port) {
+    if (arguments.control) throw IoError("--view-control", "needs --view");
+    return;
+  }
+  const auto newest_map = [this] {
+    return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps_.newest()}));
   };
+  ViewerOptions viewer = viewer_options(arguments, title, source);
+  if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
+  measured_.reserve(kMostMeasured);
   try {
-    viewer_ = std::make_unique<Viewer>(to_camera_rig(source.rig()), newest_map,
-                                       viewer_options(arguments, title, source));
+    viewer_ = std::make_unique<Viewer>(to_camera_rig(rig_), newest_map, viewer);
   } catch (const std::runtime_error& error) {
     throw IoError("--view", error.what());
   }
@@ -82,19 +96,54 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title, con
 }
 
 void LiveView::listen(EngineOptions& options) {
-  options.on_pose = both(options.on_pose, PoseListener([this](const PoseReport& report) {
-                           PoseReporter::Events events;
-                           const PoseEstimate pose = reporter_.next(report, events);
-                           if (events.correction) viewer_->tell(*events.correction);
-                           if (events.placing) viewer_->tell(*events.placing);
-                           viewer_->tell(pose, report.stage_ns);
-                         }));
+  options.on_pose = both(options.on_pose, PoseListener([this](const PoseReport& report) { tell(report); }));
   options.on_map =
       both(options.on_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
              maps_.publish(graph, window);
            }));
   options.on_places = both(options.on_places,
                            PlacesListener([this](const KeyframeDatabase& places) { maps_.publish(places); }));
+  options.map_held = &map_held_;
+}
+
+/// The tracker's thread: no lock, no allocation.
+void LiveView::tell(const PoseReport& report) {
+  PoseReporter::Events events;
+  const PoseEstimate pose = reporter_.next(report, events);
+  if (events.correction) viewer_->tell(*events.correction);
+  if (events.placing) viewer_->tell(*events.placing);
+  if (pose.state == TrackingState::kTracked && viewer_->wants_points(pose.frame)) {
+    measured_.clear();
+    const SE3 T_c_ref = report.record.T_c_ref.unpacked();
+    for (const MotionObservation& found :
+         report.measured.first(std::min(report.measured.size(), kMostMeasured))) {
+      const Vector2 expected = rig_.camera.project(T_c_ref * found.x_ref);
+      measured_.push_back({found.z[0], found.z[1], static_cast<float>(expected.x()),
+                           static_cast<float>(expected.y()), found.inlier ? 1U : 0U});
+    }
+    viewer_->tell(pose.frame, measured_);
+  }
+  viewer_->tell(pose, report.stage_ns);
+}
+
+std::string LiveView::obey(ViewCommand command) {
+  switch (command) {
+    case ViewCommand::kSaveMap: {
+      const auto map = maps_.newest();
+      save_map(map_file_, rig_, map->graph, map->places);
+      return fmt::format("{}, {} keyframes", map_file_.string(), map->graph.keyframe_count());
+    }
+    case ViewCommand::kStop:
+      interrupt();
+      return "the run ends as by Ctrl-C";
+    case ViewCommand::kHoldMap:
+      map_held_.store(true, std::memory_order_relaxed);
+      return "the camera is localised, no keyframe is made";
+    case ViewCommand::kReleaseMap:
+      break;
+  }
+  map_held_.store(false, std::memory_order_relaxed);
+  return "mapping goes on";
 }
 
 void LiveView::show(const Frame& frame) {
@@ -102,6 +151,10 @@ void LiveView::show(const Frame& frame) {
   const auto owner = std::make_shared<const cv::Mat>(frame.left);
   viewer_->show(frame.index,
                 {owner->data, owner->cols, owner->rows, static_cast<std::ptrdiff_t>(owner->step), {}}, owner);
+}
+
+void LiveView::show(const Progress& progress) {
+  if (viewer_) viewer_->tell_waiting(progress.queued);
 }
 
 void LiveView::finish() {

@@ -1,10 +1,14 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <atomic>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "engine/engine.hpp"
 #include "engine/options.hpp"
 #include "io/sources/frame_source.hpp"
 #include "slam/map_lender.hpp"
@@ -19,9 +23,10 @@ inline constexpr int kUsualViewPort = 8420;
 struct ViewArguments {
   std::optional<int> port;  ///< nothing: no viewer
   std::string bind = "127.0.0.1";
+  bool control = false;  ///< viewers may save the map, hold it, and end the run
 };
 
-/// --view [PORT] and --view-bind.
+/// --view [PORT], --view-bind and --view-control.
 void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description);
 /// The address and, when others can reach it, a warning.
 void print_view_address(const std::string& address, bool is_open_to_network);
@@ -31,19 +36,28 @@ class LiveView {
  public:
   /// Adds its listeners to those of `options`, which are called as before. Throws IoError when the port is
   /// not to be had or the program was built without the viewer.
-  LiveView(const ViewArguments& arguments, const std::string& title, const FrameSource& source,
-           EngineOptions& options);
+  /// @param folder  where viewers may save the map to
+  LiveView(const ViewArguments& arguments, const std::string& title, const std::filesystem::path& folder,
+           const FrameSource& source, EngineOptions& options);
 
   /// The reader's thread, with each frame it reads.
   void show(const Frame& frame);
+  /// The same thread.
+  void show(const Progress& progress);
   /// After the run, when the last map is there.
   void finish();
 
  private:
   void listen(EngineOptions& options);
+  void tell(const PoseReport& report);
+  [[nodiscard]] std::string obey(ViewCommand command);
 
-  PoseReporter reporter_;  // tracker's
+  const Rig rig_;
+  const std::filesystem::path map_file_;
+  PoseReporter reporter_;              // tracker's
+  std::vector<ViewedPoint> measured_;  // tracker's
   MapLender maps_;
+  std::atomic<bool> map_held_{false};  // relaxed: a wish
   std::unique_ptr<Viewer> viewer_;
 };
 

@@ -137,10 +137,13 @@ int run(const RunArguments& arguments) {
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   options.on_pose = poses.listener();
-  LiveView view(arguments.view, arguments.source, *source, options);
+  LiveView view(arguments.view, arguments.source, arguments.out, *source, options);
   ProgressLine line(source->frame_count(), arguments.quiet);
   const FrameFeed feed = feed_from(*source, view);
-  const ProgressSink progress = [&](const Progress& p) { line.show(p); };
+  const ProgressSink progress = [&](const Progress& p) {
+    line.show(p);
+    view.show(p);
+  };
   catch_interrupts();
   const std::vector<std::string> notes = real_time_notes(arguments);
   Engine engine(source->rig(), options);

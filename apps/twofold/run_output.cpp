@@ -87,6 +87,7 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
                          keyframe_trajectory(result.graph, parts[n].id));
     write_ply(folder / part_file("map", n, ".ply"), map_points(result.graph, parts[n].id));
   }
+  write_file(folder / "edges.txt", edge_list(result.graph, parts.front().id));
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
   const bool one_camera = source.rig().kind == SensorKind::kMono;

@@ -28,7 +28,7 @@ void serve(const ViewServerOptions& options, const ViewScene& scene, const ViewT
   print_view_address(server->address(), server->is_open_to_network());
   catch_interrupts();
   std::stop_source stop;
-  const auto watch = [&](const ViewServer::Audience&, ViewImage&) {
+  const auto watch = [&](const ViewServer::Audience&, ViewSight&) {
     if (interrupted().load(std::memory_order_relaxed))
       stop.request_stop();  // relaxed: the flag carries no other data
   };

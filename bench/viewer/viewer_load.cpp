@@ -69,7 +69,7 @@ void run(std::uint32_t points, int seconds) {
   const auto begin = Clock::now();
   std::stop_source stop;
   std::int64_t n = 0;
-  const auto tick = [&](const ViewServer::Audience&, ViewImage&) {
+  const auto tick = [&](const ViewServer::Audience&, ViewSight&) {
     const auto since = Clock::now() - begin;
     if (since > std::chrono::seconds(seconds)) stop.request_stop();
     if (since > n * std::chrono::nanoseconds(33'333'333)) scene.add(pose_now(n++), {});

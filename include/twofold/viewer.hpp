@@ -13,6 +13,22 @@
 
 namespace twofold {
 
+/// What those who look may ask for, if ViewerOptions::on_command lets them.
+enum class ViewCommand : std::uint8_t {
+  kSaveMap,
+  kStop,       ///< the run
+  kHoldMap,    ///< localise only: no more keyframes
+  kReleaseMap  ///< go on mapping
+};
+
+/// A point of the map as it was found in an image.
+struct ViewedPoint {
+  float u = 0, v = 0;        ///< measured [px]
+  float expected_u = 0;      ///< where the pose puts it [px]
+  float expected_v = 0;      ///< likewise
+  std::uint32_t inlier = 1;  ///< 0: put aside as an outlier
+};
+
 struct ViewerOptions {
   std::string title = {};  ///< shown in the page
   /// Address to listen on. Any but a loopback address shows camera and map to the network, unencrypted: from
@@ -23,6 +39,9 @@ struct ViewerOptions {
   double frame_period = 0;               ///< the budget of a frame [s]; 0: as the frames' times say
   std::vector<Pose> truth = {};          ///< T_world_camera of the true path, if it is known, in any world
   std::vector<std::int64_t> truth_t_ns = {};  ///< its times, as many, ascending
+  /// Does what a viewer asks for, on the viewer's thread, and says in a sentence what it did; what it throws
+  /// is told as a failure. Empty: viewers can only look.
+  std::function<std::string(ViewCommand)> on_command = {};
 };
 
 /// Shows a run in a browser while it runs: map, windows, path, events, times (docs/viewer.md).
@@ -55,6 +74,13 @@ class TWOFOLD_API Viewer {
   /// @param stage_ns  what its stages took, in the order of ViewerOptions::stages
   void tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns = {});
   void tell(const MapEvent& event);
+  /// Whether points of this frame would be shown: its image was.
+  [[nodiscard]] bool wants_points(std::int64_t frame) const;
+  /// The frame's measurements, before its pose is told; the first 512.
+  void tell(std::int64_t frame, std::span<const ViewedPoint> points);
+
+  /// Any thread: keyframes that wait for the mapper.
+  void tell_waiting(std::size_t keyframes);
 
   // Of one thread, that of the images' source.
 

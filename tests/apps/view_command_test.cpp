@@ -16,15 +16,15 @@ TEST(ViewCommand, SaysWhatIsMissingOrWrong) {
 TEST(ViewCommand, AFilterIsNotViewed) {
   const ScratchFolder folder;
   expect_bad_input(
-      run(folder, "run synthetic:desk?frames=2 --estimator swf --view --out '" + (folder / "out") + "'"),
+      run(folder, "run synthetic:desk?frames=2 --estimator swf --view --out '" + (folder / "run") + "'"),
       "--view: is not for --estimator swf");
 }
 
-TEST(ViewCommand, DISABLED_RunSaysWhereToLook) {
+TEST(ViewCommand, RunSaysWhereToLook) {
   const ScratchFolder folder;
   const Outcome seen =
       run(folder, "run 'synthetic:desk?frames=20&width=320&height=240' --quiet --view 0 --out '" +
-                      (folder / "out") + "'");
+                      (folder / "run") + "'");
   if (seen.err.find("without the viewer") != std::string::npos) GTEST_SKIP() << "built without the viewer";
   EXPECT_EQ(seen.exit_code, 0) << seen.err;
   EXPECT_NE(seen.err.find("view at     http://127.0.0.1:"), std::string::npos) << seen.err;
@@ -32,7 +32,7 @@ TEST(ViewCommand, DISABLED_RunSaysWhereToLook) {
   const Outcome taken = run(
       folder,
       "run 'synthetic:desk?frames=2&width=320&height=240' --quiet --view 0 --view-bind 192.0.2.1 --out '" +
-          (folder / "out") + "'");
+          (folder / "run") + "'");
   expect_bad_input(taken, "192.0.2.1");
 }
 

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
 #include <fstream>
 #include <iterator>
 
@@ -147,6 +149,29 @@ TEST_F(EngineMapTest, AThreadedRunInALoadedMapReplays) {
     EXPECT_EQ(bytes_of({small_rig(), live.graph, live.places}),
               bytes_of({small_rig(), replayed.graph, replayed.places}));
   }
+}
+
+TEST_F(EngineMapTest, AHeldMapGetsNoKeyframes) {
+  constexpr int kHeldFrom = 15;
+  std::atomic<bool> held{false};
+  EngineOptions threaded = options();
+  threaded.deterministic = false;
+  const auto keyframes_after = [](const RunResult& result) {
+    return std::count_if(result.frames.begin(), result.frames.end(), [](const FrameRecord& record) {
+      return record.keyframe && record.frame_index >= kHeldFrom;
+    });
+  };
+  EXPECT_GT(keyframes_after(run_engine(threaded, frames(0, kFrames))), 0);
+  threaded.map_held = &held;
+  const FrameFeed feed = [&, next = frames(0, kFrames)](Frame& frame) {
+    const FeedStatus status = next(frame);
+    if (frame.index == kHeldFrom) held = true;
+    return status;
+  };
+  const RunResult result = run_engine(threaded, feed);
+  ASSERT_EQ(result.error, "");
+  EXPECT_EQ(keyframes_after(result), 0);
+  (void)testing::expect_replay(threaded, frames(0, kFrames), result);
 }
 
 TEST_F(EngineMapTest, InAnotherRoomNothingIsRecognised) {

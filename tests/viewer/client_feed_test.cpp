@@ -17,7 +17,7 @@ class ClientFeedTest : public ::testing::Test {
   /// Everything the client gets, which deals with each message at once.
   std::vector<ViewMessage> drain(ClientFeed& feed) {
     std::vector<ViewMessage> messages;
-    while (auto message = feed.next(image_)) {
+    while (auto message = feed.next(sight_)) {
       messages.push_back(*message);
       EXPECT_TRUE(feed.take("ack"));
     }
@@ -31,7 +31,7 @@ class ClientFeedTest : public ::testing::Test {
 
   ViewScene scene_;
   ViewTitle title_{.title = "a \"title\" with \xff"};
-  ViewImage image_;
+  ViewSight sight_;
 };
 
 TEST_F(ClientFeedTest, GreetsThenTellsEverythingThenIsSilent) {
@@ -69,11 +69,11 @@ TEST_F(ClientFeedTest, WhoDealsWithNothingGetsNothingMore) {
   int messages = 0;
   for (std::int64_t n = 0; n < 1000; ++n) {
     scene_.add(tracked_pose(n, 0), {});
-    while (feed.next(image_)) ++messages;
+    while (feed.next(sight_)) ++messages;
   }
   EXPECT_EQ(messages, ClientFeed::kUnacknowledged);
   EXPECT_TRUE(feed.take("ack"));
-  EXPECT_TRUE(feed.next(image_));
+  EXPECT_TRUE(feed.next(sight_));
 }
 
 TEST_F(ClientFeedTest, NonsenseIsRefused) {
@@ -85,19 +85,63 @@ TEST_F(ClientFeedTest, NonsenseIsRefused) {
 }
 
 TEST_F(ClientFeedTest, ImagesGoToThoseWhoWantThem) {
-  image_ = {1, std::make_shared<const std::string>("picture")};
+  sight_.image.put("picture");
   ClientFeed with(scene_, title_), without(scene_, title_);
   EXPECT_TRUE(with.take("images on"));
-  EXPECT_EQ(drain(with).back().bytes, image_.message);
+  EXPECT_EQ(drain(with).back().bytes, sight_.image.bytes);
   EXPECT_EQ(drain(without).size(), 1U);
   EXPECT_TRUE(drain(with).empty()) << "the same image twice";
 }
 
-TEST_F(ClientFeedTest, LastWordsComeLast) {
+TEST_F(ClientFeedTest, WhatWasMeasuredComesBeforeItsFrame) {
+  ClientFeed feed(scene_, title_);
+  EXPECT_TRUE(feed.take("images on"));
+  drain(feed);
+  sight_.measured.put("points");
+  scene_.add(tracked_pose(0, 0), {});
+  const auto messages = drain(feed);
+  ASSERT_GE(messages.size(), 2U);
+  EXPECT_EQ(*messages[0].bytes, "points");
+  EXPECT_EQ(header(messages[1]).kind, ViewMessageKind::kFrames);
+}
+
+TEST_F(ClientFeedTest, CommandsAreNonsenseUnlessTheyAreAllowed) {
+  EXPECT_FALSE(ClientFeed(scene_, title_).take("stop"));
+  title_.control = true;
+  ClientFeed feed(scene_, title_);
+  EXPECT_FALSE(feed.take_command());
+  EXPECT_TRUE(feed.take("save map"));
+  EXPECT_EQ(feed.take_command(), ViewCommand::kSaveMap);
+  EXPECT_FALSE(feed.take_command()) << "once";
+  EXPECT_FALSE(feed.take("save map /etc/passwd"));
+}
+
+TEST_F(ClientFeedTest, TheEndIsToldBeforeWhatIsLacking) {
   scene_.show(small_map(3));
   ClientFeed feed(scene_, title_);
+  ASSERT_TRUE(feed.next(sight_));
   feed.end("that was all");
-  EXPECT_NE(drain(feed).back().bytes->find("that was all"), std::string::npos);
+  const auto words = feed.next(sight_);
+  ASSERT_TRUE(words);
+  EXPECT_NE(words->bytes->find("that was all"), std::string::npos);
+  EXPECT_FALSE(feed.is_done());
+  const auto rest = drain(feed);
+  ASSERT_EQ(rest.size(), 1U);
+  EXPECT_EQ(header(rest[0]).number, kWhole | kLast);
+  EXPECT_TRUE(feed.is_done());
+}
+
+TEST_F(ClientFeedTest, TheEndIsToldToWhoDealsWithNothing) {
+  ClientFeed feed(scene_, title_);
+  for (std::int64_t n = 0; n < 100; ++n) {
+    scene_.add(tracked_pose(n, 0), {});
+    while (feed.next(sight_)) continue;
+  }
+  feed.end("that was all");
+  const auto words = feed.next(sight_);
+  ASSERT_TRUE(words);
+  EXPECT_NE(words->bytes->find("that was all"), std::string::npos);
+  EXPECT_FALSE(feed.next(sight_));
 }
 
 }  // namespace

@@ -51,6 +51,17 @@ class LocalClient {
     }
     return bytes;
   }
+  /// What comes until `part` is in it, the other side closes, or nothing came for `patience`.
+  [[nodiscard]] std::string receive_until(const std::string& part,
+                                          std::chrono::milliseconds patience = std::chrono::seconds(8)) {
+    std::string bytes;
+    while (bytes.find(part) == std::string::npos) {
+      const std::string more = receive(1, patience);
+      if (more.empty()) break;
+      bytes += more;
+    }
+    return bytes;
+  }
   /// The other side has closed; after receive.
   [[nodiscard]] bool closed() const { return closed_; }
 

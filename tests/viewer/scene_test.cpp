@@ -47,7 +47,7 @@ TEST(ViewScene, MessagesAreThoseThatThePageIsTestedWith) {
   ViewScene scene;
   scene.show(small_map(3));
   const std::array<std::int64_t, 2> stages{1'000'000, 2'500'000};
-  scene.add(tracked_pose(4, 2), stages);
+  scene.add(tracked_pose(4, 2), stages, 7);
   const auto whole = scene.delta(0);
   const Revision before = scene.revision();
   ViewMap map = small_map(3, 2);

@@ -29,7 +29,7 @@ const VERTEX = `
     bool shown = info.w > 0.5 && age <= lastAge && (shownPart < 0.0 || abs(info.z * 255.0 - shownPart) < 0.5);
     vec4 p = modelViewMatrix * vec4(position, 1.0);
     gl_Position = shown ? projectionMatrix * p : vec4(2.0, 2.0, 2.0, 1.0);
-    gl_PointSize = clamp(size * sparse / max(-p.z, 0.01), 2.2, 9.0);
+    gl_PointSize = clamp(size * sparse / max(-p.z, 0.01), 2.6, 9.0);
     float x = 0.0;
     if (mode == 0) x = (-position.y - heights.x) / max(heights.y - heights.x, 1e-3);
     if (mode == 1) x = age / max(newest, 1.0);
@@ -84,7 +84,7 @@ export class Cloud {
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     uniforms: {
-      size: {value: 14}, shownPart: {value: -1}, newest: {value: 1}, lastAge: {value: 1e9}, sparse: {value: 1},
+      size: {value: 20}, shownPart: {value: -1}, newest: {value: 1}, lastAge: {value: 1e9}, sparse: {value: 1},
       heights: {value: new THREE.Vector2(0, 1)}, mode: {value: 0},
     },
   });

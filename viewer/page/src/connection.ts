@@ -1,10 +1,12 @@
 // The socket to the program: acknowledges what was dealt with, and comes back when it breaks.
-import {decode, type Delta, type Frames, type Image, type Text} from './wire.ts';
+import {decode, type Binary, type Text} from './wire.ts';
 
 export type Link = 'connecting' | 'open' | 'broken' | 'ended';
 
+export type Command = 'save map' | 'stop' | 'hold map' | 'release map';
+
 export interface Listener {
-  binary(message: Delta | Frames | Image): void;
+  binary(message: Binary): void;
   text(message: Text): void;
   link(state: Link, message: string): void;
 }
@@ -24,6 +26,10 @@ export class Connection {
   setImages(on: boolean): void {
     this.wantsImages = on;
     this.send(on ? 'images on' : 'images off');
+  }
+
+  command(text: Command): void {
+    this.send(text);
   }
 
   private send(text: string): void {

@@ -2,14 +2,14 @@
 import 'uplot/dist/uPlot.min.css';
 import './style.css';
 import {COLOURINGS, type Colouring} from './cloud.ts';
-import {Connection, type Link} from './connection.ts';
+import {Connection, type Command, type Link} from './connection.ts';
 import {Model} from './model.ts';
 import {eventColour, type Theme} from './palette.ts';
 import {Sight} from './sight.ts';
 import {Stage, type Layer, type View} from './stage.ts';
 import {Strip} from './strip.ts';
 import {Timeline, clock, describe, lostStretches, metres} from './timeline.ts';
-import {PROTOCOL, State, type Delta, type Frames, type Image, type Keyframe, type MapEvent, type Text} from './wire.ts';
+import {PROTOCOL, State, type Binary, type Keyframe, type MapEvent, type Text} from './wire.ts';
 
 const $ = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
@@ -60,9 +60,11 @@ class Page {
     setInterval(() => this.refresh(), 200);
   }
 
-  private take(message: Delta | Frames | Image): void {
+  private take(message: Binary): void {
     if (message.kind === 'image') {
       this.sight.take(message);
+    } else if (message.kind === 'measured') {
+      this.sight.takeMeasured(message);
     } else if (message.kind === 'frames') {
       this.model.addLive(message.frames);
       this.stage.redraw();
@@ -84,11 +86,13 @@ class Page {
       $('title').textContent = message.hello.title;
       document.body.classList.toggle('finished', !message.hello.live);
       this.makeStages();
+      $('commands').hidden = !message.hello.control;
     }
     if (message.reasons) this.model.reasons = message.reasons;
     if (message.truth) this.model.truth = message.truth;
     if (message.events) {
       this.model.events.push(...message.events);
+      this.showHeld();
       this.makeEvents();
     }
     this.stage.changed();
@@ -166,11 +170,12 @@ class Page {
       ['frame', count(newest?.frame ?? this.model.path.at(-1)?.frame ?? 0), false],
       ['keyframes', count(this.model.keyframes.size), false],
       ['points', count(this.stage.cloud.size), false],
-      ['map', newest ? `v${newest.mapVersion}` : '–', true],
-      ['latency', newest ? `${newest.latencyMs.toFixed(1)} ms` : '–', false],
-      ['found', newest ? `${(100 * newest.trackedShare).toFixed(0)} %` : '–', true],
       ['lost', count(lost), true],
     ];
+    if (newest) {
+      figures.push(['latency', `${newest.latencyMs.toFixed(1)} ms`, false], ['found', `${(100 * newest.trackedShare).toFixed(0)} %`, true],
+        ['map', `v${newest.mapVersion}`, true], ['queue', String(newest.waiting), true]);
+    }
     $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
       const item = make('div', '', make('dt', name), make('dd', value));
       item.classList.toggle('minor', minor);
@@ -226,6 +231,7 @@ class Page {
 
   private makeEvents(): void {
     const newest = this.model.events.slice(-100).reverse();
+    $('no-events').hidden = newest.length > 0;
     $('events').replaceChildren(...newest.map((event) => {
       const sample = make('i');
       sample.style.background = eventColour(event.kind);
@@ -252,6 +258,18 @@ class Page {
     $('theme').textContent = theme === 'dark' ? 'Light' : 'Dark';
     this.stage.setTheme(theme);
     this.stale = true;
+  }
+
+  /** Whoever held the map: events tell everybody. */
+  private get isHeld(): boolean {
+    return this.model.events.findLast((event) => event.kind === 'map held' || event.kind === 'map released')?.kind === 'map held';
+  }
+  private showHeld(): void {
+    $('hold').setAttribute('aria-pressed', String(this.isHeld));
+  }
+  private command(command: Command): void {
+    if (command === 'stop' && !confirm('End the run?')) return;
+    this.connection.command(command);
   }
 
   private showKeyframe(): void {
@@ -363,6 +381,9 @@ class Page {
     on('theme', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark'));
     on('help', () => $<HTMLDialogElement>('keys').showModal());
     on('keys', () => $<HTMLDialogElement>('keys').close());
+    on('save-map', () => this.command('save map'));
+    on('hold', () => this.command(this.isHeld ? 'release map' : 'hold map'));
+    on('stop', () => this.command('stop'));
     on('now', () => this.timeline.set(null));
     on('play', () => this.setPlaying(!this.playing));
     on('open-show', () => $('show').classList.toggle('open'));
@@ -406,7 +427,7 @@ class Page {
       link: this.link, live: this.model.live.length, newest: this.model.live.at(-1)?.frame ?? -1, keyframes: this.model.keyframes.size,
       inner: this.windowSize(1), outer: this.windowSize(2), points: this.stage.cloud.size, path: this.model.path.length,
       events: this.model.events.length, lost: lostStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs,
-      edges: this.model.edges.size, mapVersion: this.model.mapVersion,
+      edges: this.model.edges.size, truth: this.model.truth?.path.length ?? 0, mapVersion: this.model.mapVersion,
     };
   }
   private windowSize(window: number): number {

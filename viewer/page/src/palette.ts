@@ -26,6 +26,11 @@ export const EVENT_COLOURS: Record<string, string> = {
   'relocalisation': '#ffb000',
   'new part': '#ff8cc6',
   'lost': '#ff3b30',
+  'map saved': '#6ac8ff',
+  'map held': '#6ac8ff',
+  'map released': '#6ac8ff',
+  'run stopped': '#6ac8ff',
+  'command failed': '#ff3b30',
 };
 
 export function eventColour(kind: string): string {
@@ -39,7 +44,7 @@ function palette(names: Record<keyof Palette, string>): Palette {
 export const PALETTES = {
   dark: palette({
     background: '#0e1116', grid: '#232a35', camera: '#ffffff', final: '#2ee6a6', causal: '#ff6b9d', truth: '#9aa4b2',
-    inner: '#ffb000', outer: '#3d9bff', keyframe: '#4b5567', selected: '#ffffff', covisible: '#56657c',
+    inner: '#ffb000', outer: '#3d9bff', keyframe: '#6b7a92', selected: '#ffffff', covisible: '#56657c',
     marginalised: '#9b7bff', back: '#ff5a5f', measure: '#fff36b',
   }),
   light: palette({

@@ -1,14 +1,17 @@
-// The camera's image, and on it the points of the map around: those first seen in the reference keyframe or its neighbours.
+// The camera's image, and on it what was measured in it: inliers, outliers, and how far each is from where the pose puts it.
+// Dim, the points of the map around: those first seen in the reference keyframe or its neighbours.
 import type {Cloud} from './cloud.ts';
 import type {Model} from './model.ts';
-import {State, type Image, type LiveFrame} from './wire.ts';
+import {State, type Image, type LiveFrame, type Measured, type MeasuredPoint} from './wire.ts';
 
 const MOST = 100000;  // points looked at
-const KEPT = 12;      // images that wait for their pose
+const KEPT = 12;      // images that wait for their pose, and likewise measurements
+const LONGER = 8;     // residuals are drawn this many times as long as they are
 
 export class Sight {
   private readonly canvas: HTMLCanvasElement;
   private waiting: Image[] = [];
+  private measured: Measured[] = [];
   private drawing = false;
 
   constructor(private readonly place: HTMLElement, private readonly model: Model, private readonly cloud: Cloud) {
@@ -18,6 +21,11 @@ export class Sight {
   take(image: Image): void {
     this.waiting.push(image);
     if (this.waiting.length > KEPT) this.waiting.shift();
+  }
+
+  takeMeasured(measured: Measured): void {
+    this.measured.push(measured);
+    if (this.measured.length > KEPT) this.measured.shift();
   }
 
   /** Images are read ahead of the tracker: each is shown when its pose has come. */
@@ -40,26 +48,41 @@ export class Sight {
   }
 
   private paint(bitmap: ImageBitmap, image: Image, frame: LiveFrame): void {
-    const c = this.canvas.getContext('2d')!;
+    const c = this.canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     this.canvas.width = bitmap.width;
     this.canvas.height = bitmap.height;
     c.drawImage(bitmap, 0, 0);
     const scale = bitmap.width / image.width;
-    const count = frame.state === State.tracked ? this.paintPoints(c, frame, scale) : 0;
-    const state = frame.state === State.tracked ? `${frame.points} points measured, ${count} of the map around shown`
+    const isTracked = frame.state === State.tracked;
+    if (isTracked) this.paintMap(c, frame, scale);
+    const measured = this.measured.find((other) => other.frame === image.frame)?.points ?? [];
+    this.paintMeasured(c, measured, scale);
+    const outliers = measured.reduce((sum, point) => sum + (point.inlier ? 0 : 1), 0);
+    const state = isTracked ? `${frame.points} points measured, ${outliers} outliers; residuals × ${LONGER}`
       : `lost: ${this.model.reasons[frame.reason] ?? ''}`;
     this.place.querySelector('figcaption')!.textContent = `frame ${image.frame} · ${state}`;
   }
 
-  private paintPoints(c: CanvasRenderingContext2D, frame: LiveFrame, scale: number): number {
+  private paintMeasured(c: CanvasRenderingContext2D, points: MeasuredPoint[], scale: number): void {
+    for (const point of points) {
+      c.strokeStyle = c.fillStyle = point.inlier ? '#35f0a8' : '#ff5a5f';
+      const [u, v] = [(point.u + 0.5) * scale, (point.v + 0.5) * scale];
+      c.beginPath();
+      c.moveTo(u, v);
+      c.lineTo(u + LONGER * scale * (point.expectedU - point.u), v + LONGER * scale * (point.expectedV - point.v));
+      c.stroke();
+      c.fillRect(u - 1.5, v - 1.5, 3, 3);
+    }
+  }
+
+  private paintMap(c: CanvasRenderingContext2D, frame: LiveFrame, scale: number): void {
     const rig = this.model.hello?.rig;
-    if (!rig) return 0;
+    if (!rig) return;
     const near = new Set([frame.reference]);
     for (const edge of this.model.neighbours(frame.reference)) near.add(edge.from === frame.reference ? edge.to : edge.from);
     const R = rows(frame.orientation);
     const [tx, ty, tz] = frame.position;
-    let count = 0;
-    c.fillStyle = '#35f0a8';
+    c.fillStyle = 'rgba(61, 155, 255, 0.55)';
     this.cloud.visit((x, y, z, anchor) => {
       if (!near.has(anchor)) return;
       const [dx, dy, dz] = [x - tx, y - ty, z - tz];
@@ -68,10 +91,8 @@ export class Sight {
       const u = rig.cx + (rig.fx * (R[0] * dx + R[3] * dy + R[6] * dz)) / depth;
       const v = rig.cy + (rig.fy * (R[1] * dx + R[4] * dy + R[7] * dz)) / depth;
       if (u < 0 || v < 0 || u >= rig.width || v >= rig.height) return;
-      c.fillRect(u * scale - 1, v * scale - 1, 2.5, 2.5);
-      ++count;
+      c.fillRect(u * scale - 1, v * scale - 1, 2, 2);
     }, MOST);
-    return count;
   }
 }
 

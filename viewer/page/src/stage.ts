@@ -13,6 +13,7 @@ export type Picked = {keyframe: Keyframe} | {point: THREE.Vector3} | null;
 
 const SLOW_MS = 45;
 const FAST_MS = 25;
+const SOFTWARE_MS = 33;  // between frames that no graphics processor draws: the tracker may want the same processors
 const MOST_PATH = 20000;  // segments drawn of a path
 
 export class Stage {
@@ -49,15 +50,17 @@ export class Stage {
   private frustum = 0.1;
   private extent = {size: 2, centre: new THREE.Vector3(), lowest: -1};
   private share = 1;
-  private lastFrame = 0;
-  private quiet = 0;
+  private readonly leastMs: number;  // between two frames
+  private begun = 0;                 // the newest frame
+  private fence: WebGLSync | null = null;  // of the frame that is being drawn
   private readonly target = new THREE.Vector3();
   private moved = false;  // by hand
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly model: Model) {
-    const slow = drawsInSoftware();
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: !slow, preserveDrawingBuffer: true, powerPreference: 'low-power'});
-    this.renderer.setPixelRatio(slow ? 1 : Math.min(devicePixelRatio, 2));
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: false, preserveDrawingBuffer: true, powerPreference: 'low-power'});
+    const slow = drawsInSoftware(this.renderer.getContext());
+    this.leastMs = slow ? SOFTWARE_MS : 0;
+    this.renderer.setPixelRatio(slow ? 1 : Math.min(Math.max(devicePixelRatio, 1.5), 2));
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.addEventListener('change', () => this.redraw());
@@ -134,24 +137,33 @@ export class Stage {
 
   private frame(now: number): void {
     requestAnimationFrame((next) => this.frame(next));
-    if (!this.dirty) {
-      this.quiet = now;
-      return;
-    }
+    if (!this.isDrawn(now) || !this.dirty || now - this.begun < this.leastMs) return;
     this.dirty = false;
-    this.pace(now);
+    this.begun = now;
     if (this.lines) this.makeLines();
     this.lines = false;
     this.makeBody();
     this.aim();
     this.renderer.render(this.scene, this.camera);
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
     ++this.drawn;
   }
 
+  /** The frame before is through: frames that pile up would hold up whatever else the browser draws. */
+  private isDrawn(now: number): boolean {
+    if (!this.fence) return true;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    if (gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(this.fence);
+    this.fence = null;
+    this.pace(now - this.begun);
+    return true;
+  }
+
   /** A machine that cannot draw twenty frames a second draws fewer points; one at rest draws all. */
-  private pace(now: number): void {
-    const took = now - Math.max(this.lastFrame, this.quiet);
-    this.lastFrame = now;
+  private pace(took: number): void {
     if (took > 1000) return;
     this.frameMs += 0.2 * (took - this.frameMs);
     const least = Math.min(1, 50000 / Math.max(1, this.cloud.size));
@@ -192,7 +204,7 @@ export class Stage {
     }
     if (steps.length === 0) return this.frustum;
     steps.sort((a, b) => a - b);
-    return Math.max(0.03, 0.55 * steps[steps.length >> 1], 0.008 * this.extent.size);
+    return Math.max(0.03, 0.55 * steps[steps.length >> 1], 0.011 * this.extent.size);
   }
 
   private makePaths(): void {
@@ -293,13 +305,13 @@ export class Stage {
   private makeGrid(): void {
     const {size, centre, lowest} = this.extent;
     const square = 10 ** Math.round(Math.log10(Math.max(size, 0.1) / 12));
-    const wanted = `${square} ${Math.ceil((1.6 * size) / square)}`;
+    const wanted = `${square} ${Math.ceil((2.4 * size) / square)}`;
     if (this.grid?.name !== wanted) {
       if (this.grid) {
         this.scene.remove(this.grid);
         this.grid.dispose();
       }
-      const squares = Math.min(200, Math.ceil((1.6 * size) / square));
+      const squares = Math.min(200, Math.ceil((2.4 * size) / square));
       this.grid = new THREE.GridHelper(squares * square, squares, this.palette.grid, this.palette.grid);
       this.grid.name = wanted;
       this.scene.add(this.grid);
@@ -409,13 +421,10 @@ export class Stage {
   }
 }
 
-/** Smooth edges and dense pixels are for those who have a graphics processor. */
-function drawsInSoftware(): boolean {
-  const gl = document.createElement('canvas').getContext('webgl2');
-  const name = gl?.getExtension('WEBGL_debug_renderer_info');
-  const software = !gl || !name || /swiftshader|llvmpipe|software/i.test(String(gl.getParameter(name.UNMASKED_RENDERER_WEBGL)));
-  gl?.getExtension('WEBGL_lose_context')?.loseContext();
-  return software;
+/** Smooth edges, by more pixels than the screen has, are for those who have a graphics processor. */
+function drawsInSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+  const name = gl.getExtension('WEBGL_debug_renderer_info');
+  return !name || /swiftshader|llvmpipe|software/i.test(String(gl.getParameter(name.UNMASKED_RENDERER_WEBGL)));
 }
 
 function up(p: readonly [number, number, number]): THREE.Vector3 {

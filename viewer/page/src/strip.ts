@@ -9,6 +9,7 @@ const STAGES = ['#4e79a7', '#59a14f', '#edc948', '#f28e2b', '#b07aa1', '#76b7b2'
 export class Strip {
   private plot: uPlot | null = null;
   private made = '';
+  private top = 1;  // of the scale [ms]
 
   constructor(private readonly place: HTMLElement, private readonly model: Model) {
     new ResizeObserver(() => this.fit()).observe(place);
@@ -29,6 +30,7 @@ export class Strip {
       this.made = made;
     }
     const budget = this.model.periodMs();
+    this.top = Math.max(1, 1.3 * budget, 1.15 * usual(frames.map((frame) => frame.latencyMs)));
     this.plot!.setData([
       frames.map((frame) => frame.frame),
       ...this.stacked(frames, stages.length),
@@ -54,7 +56,7 @@ export class Strip {
       height: this.place.clientHeight,
       legend: {show: false},
       cursor: {show: false},
-      scales: {x: {time: false}, y: {range: (_, _min, max) => [0, Math.max(1.15 * max, 1)]}},
+      scales: {x: {time: false}, y: {range: () => [0, this.top]}},
       axes: [
         {stroke: text, grid, ticks: {show: false}, size: 22, font: '10px system-ui', gap: 2},
         {stroke: text, grid, ticks: {show: false}, size: 34, font: '10px system-ui', gap: 2, values: (_, ms) => ms.map((x) => `${x}`)},
@@ -70,4 +72,9 @@ export class Strip {
   static legend(stages: string[]): [string, string][] {
     return stages.map((name, s) => [name, STAGES[s]]);
   }
+}
+
+/** Nineteen out of twenty are less: a spike shall not flatten everything else. */
+function usual(values: number[]): number {
+  return [...values].sort((a, b) => a - b)[Math.floor(0.95 * (values.length - 1))];
 }

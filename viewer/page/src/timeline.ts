@@ -32,7 +32,7 @@ export class Timeline {
   private stretches: LostStretch[] = [];
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly tip: HTMLElement, private readonly model: Model) {
-    this.context = canvas.getContext('2d')!;
+    this.context = canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     let dragging = false;
     canvas.addEventListener('pointerdown', (event) => {
       const hit = this.eventAt(event.offsetX, event.offsetY);

@@ -1,6 +1,6 @@
 // The server's messages (viewer/wire_format.hpp), decoded. Arrays of points are views of the message.
 
-export const PROTOCOL = 1;
+export const PROTOCOL = 2;
 export const NO_ID = 0xffffffff;
 
 export interface Keyframe {
@@ -53,6 +53,8 @@ export interface LiveFrame extends Frame {
   points: number;
   mapVersion: number;
   stageMs: number[];
+  /** Keyframes that wait for the mapper. */
+  waiting: number;
 }
 
 /** Points as they came: each POINT_WORDS words, as whole numbers and as floating-point ones. */
@@ -90,8 +92,23 @@ export interface Image {
   jpeg: Uint8Array<ArrayBuffer>;
 }
 
+/** A point of the map as it was found in the image. */
+export interface MeasuredPoint {
+  u: number;
+  v: number;
+  expectedU: number;
+  expectedV: number;
+  inlier: boolean;
+}
+export interface Measured {
+  kind: 'measured';
+  frame: number;
+  points: MeasuredPoint[];
+}
+export type Binary = Delta | Frames | Image | Measured;
+
 const HEADER = 16;
-const SIZES = {keyframe: 52, edge: 12, path: 56, live: 96};
+const SIZES = {keyframe: 52, edge: 12, path: 56, live: 100, measured: 20};
 
 class Reader {
   readonly view: DataView;
@@ -144,8 +161,12 @@ function liveFrame(r: Reader): LiveFrame {
   return {
     ...frame(r, 56), position: r.xyz(20), orientation: r.xyzw(32), trackedShare: r.f32(48), points: r.u32(52),
     mapVersion: r.u32(60),
-    stageMs: Array.from({length: 8}, (_, s) => r.f32(64 + 4 * s)),
+    stageMs: Array.from({length: 8}, (_, s) => r.f32(64 + 4 * s)), waiting: r.u32(96),
   };
+}
+
+function measuredPoint(r: Reader): MeasuredPoint {
+  return {u: r.f32(0), v: r.f32(4), expectedU: r.f32(8), expectedV: r.f32(12), inlier: r.u32(16) !== 0};
 }
 
 function pointBlock(r: Reader, count: number): PointBlock {
@@ -180,7 +201,7 @@ function decodeDelta(r: Reader, flags: number, from: number, to: number): Delta 
   return delta;
 }
 
-export function decode(buffer: ArrayBuffer): Delta | Frames | Image {
+export function decode(buffer: ArrayBuffer): Binary {
   const header = new DataView(buffer);
   const [kind, number, a, b] = [0, 4, 8, 12].map((at) => header.getUint32(at, true));
   const reader = new Reader(buffer);
@@ -188,6 +209,7 @@ export function decode(buffer: ArrayBuffer): Delta | Frames | Image {
     case 1: return decodeDelta(reader, number, a, b);
     case 2: return {kind: 'frames', frames: reader.list(number, SIZES.live, () => liveFrame(reader))};
     case 3: return {kind: 'image', frame: number, width: a, height: b, jpeg: new Uint8Array(buffer, HEADER)};
+    case 4: return {kind: 'measured', frame: number, points: reader.list(a, SIZES.measured, () => measuredPoint(reader))};
     default: throw new Error(`unknown message ${kind}`);
   }
 }
@@ -209,6 +231,8 @@ export interface Hello {
   stages: string[];
   live: boolean;
   hasDeviations: boolean;
+  /** Commands are obeyed. */
+  control: boolean;
   periodMs: number;
 }
 export interface Truth {

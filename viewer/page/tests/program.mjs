@@ -1,6 +1,7 @@
 // Starts the program and a browser for tests, screenshots and measurements.
 import {spawn} from 'node:child_process';
 import {existsSync} from 'node:fs';
+import {connect, createServer} from 'node:net';
 import {chromium} from 'playwright-core';
 
 export const TWOFOLD = process.env.TWOFOLD ?? 'build/release/apps/twofold/twofold';
@@ -37,6 +38,40 @@ export class Program {
   stop(signal = 'SIGINT') {
     this.process.kill(signal);
     return this.end;
+  }
+}
+
+/** A network between browser and program that can be cut. */
+export class Network {
+  static async to(address) {
+    const network = new Network();
+    const url = new URL(address);
+    network.sockets = new Set();
+    const program = {port: Number(url.port), host: url.hostname};
+    network.server = createServer((near) => {
+      const far = connect(program);
+      for (const [socket, other] of [[near, far], [far, near]]) {
+        network.sockets.add(socket);
+        socket.on('error', () => {});
+        socket.on('close', () => network.sockets.delete(socket));
+        socket.pipe(other);
+      }
+    });
+    await network.mend();
+    url.port = String(network.port);
+    network.address = url.href;
+    return network;
+  }
+  mend() {
+    return new Promise((resolve) => this.server.listen(this.port ?? 0, '127.0.0.1', () => {
+      this.port = this.server.address().port;
+      resolve();
+    }));
+  }
+  cut() {
+    const closed = new Promise((resolve) => this.server.close(resolve));
+    for (const socket of this.sockets) socket.destroy();
+    return closed;
   }
 }
 

@@ -44,6 +44,14 @@ test('live frames', () => {
   assert.equal(frames.length, 1);
   assert.deepEqual([frames[0].frame, frames[0].points, frames[0].trackedShare, frames[0].mapVersion], [4, 90, 0.75, 1]);
   assert.deepEqual(frames[0].stageMs.slice(0, 3), [1, 2.5, 0]);
+  assert.equal(frames[0].waiting, 7);
+});
+
+test('measured points', () => {
+  const header = '04000000' + '09000000' + '01000000' + '00000000';
+  const point = '00002041' + '0000a041' + '00002841' + '00009841' + '00000000';
+  assert.deepEqual(decode(bytes(header, point)),
+    {kind: 'measured', frame: 9, points: [{u: 10, v: 20, expectedU: 10.5, expectedV: 19, inlier: false}]});
 });
 
 test('messages that end too early are refused', () => {
