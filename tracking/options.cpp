@@ -39,6 +39,8 @@ std::string TrackerOptions::invalid_reason() const {
       .share("doubted_inlier_share", doubted_inlier_share)
       .share("rough_inlier_share", rough_inlier_share)
       .share("rough_visible_share", rough_visible_share)
+      .at_least("rough_min_inliers", rough_min_inliers, 0)
+      .at_least("rough_min_mapped", rough_min_mapped, 0)
       .above("lost_radius_px", lost_radius_px, 0)
       .at_least("new_part_after", new_part_after, 0)
       .at_least("new_part_frames", new_part_frames, 0)

@@ -32,7 +32,9 @@ struct TrackerOptions {
   double doubted_inlier_share = 0.5;  ///< of the matches: with fewer a wider search may find a better pose
   /// A pose found by appearance must explain so much of the points found from it...
   double rough_inlier_share = 0.6;
-  double rough_visible_share = 0.2;  ///< ... and of those that should be visible
+  double rough_visible_share = 0.2;  ///< ... and of those that should be visible,
+  int rough_min_inliers = 40;        ///< and so many points, or
+  int rough_min_mapped = 10;         ///< so many that the map has, seen from two places
   double new_part_after = 1;      ///< lost for so long while corners are seen: a new map part is started [s]
   int new_part_frames = 5;        ///< ... and for so many frames
   int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see

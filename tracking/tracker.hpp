@@ -108,6 +108,7 @@ class Tracker {
   bool search_widely(FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                         const Placement& view, FrameStep& step);
+  [[nodiscard]] int mapped_inliers() const;
   [[nodiscard]] bool well_supported(const TrackResult& result) const;
   SE3 align_to_previous(FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;

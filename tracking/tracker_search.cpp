@@ -107,10 +107,21 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   return LostCause::kNone;
 }
 
+/// Inliers whose depths several keyframes know.
+int Tracker::mapped_inliers() const {
+  int count = 0;
+  for (std::size_t m = 0; m < matches_.size(); ++m) {
+    count += motion_[m].inlier && local_map_.points()[matches_[m].point].local < 0 ? 1 : 0;
+  }
+  return count;
+}
+
 /// A pose found by appearance is believed when the map's points are found where they should be seen from
-/// there: from a wrong one some are found as well, but few agree.
+/// there: from a wrong one some are found as well, but few agree. Few points that were measured from one
+/// place only all agree, and are all wrong by their depths' errors.
 bool Tracker::well_supported(const TrackResult& result) const {
-  return result.inliers >= options_.rough_inlier_share * result.matches &&
+  return (result.inliers >= options_.rough_min_inliers || mapped_inliers() >= options_.rough_min_mapped) &&
+         result.inliers >= options_.rough_inlier_share * result.matches &&
          result.inliers >= options_.rough_visible_share * result.searched;
 }
 
