@@ -138,4 +138,9 @@ MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> ob
   return result;
 }
 
+int classify_observations(const Rig& rig, std::span<MotionObservation> observations, const SE3& T_c_ref,
+                          const MotionOnlyOptions& options) {
+  return MotionCost(rig, observations, options.huber_px).classify(T_c_ref, options);
+}
+
 }  // namespace twofold

@@ -43,4 +43,8 @@ struct MotionOnlyResult {
 [[nodiscard]] MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> observations,
                                                const SE3& T_c_ref_start, const MotionOnlyOptions& options);
 
+/// Sets which of the observations are inliers at T_c_ref, and returns how many.
+int classify_observations(const Rig& rig, std::span<MotionObservation> observations, const SE3& T_c_ref,
+                          const MotionOnlyOptions& options);
+
 }  // namespace twofold

@@ -23,17 +23,17 @@ std::uint32_t weighted(const Pixel* p, std::ptrdiff_t stride) {
 
 void GaussianFilter::apply(const cv::Mat& image, cv::Mat& smooth) {
   smooth.create(image.rows, image.cols, CV_8UC1);
-  rows_.create(image.rows, image.cols, CV_16UC1);
+  rows_.resize(image.total());
+  const std::ptrdiff_t stride = image.cols;
   for (int v = 0; v < image.rows; ++v) {
     const auto* in = image.ptr<std::uint8_t>(v);
-    auto* out = rows_.ptr<std::uint16_t>(v);
+    std::uint16_t* out = rows_.data() + v * stride;
     for (int u = kBorder; u < image.cols - kBorder; ++u) {
       out[u] = static_cast<std::uint16_t>(weighted(in + u, 1));
     }
   }
-  const auto stride = static_cast<std::ptrdiff_t>(rows_.step1());
   for (int v = kBorder; v < image.rows - kBorder; ++v) {
-    const auto* in = rows_.ptr<std::uint16_t>(v);
+    const std::uint16_t* in = rows_.data() + v * stride;
     auto* out = smooth.ptr<std::uint8_t>(v);
     for (int u = kBorder; u < image.cols - kBorder; ++u) {
       out[u] = static_cast<std::uint8_t>((weighted(in + u, stride) + (1U << 15)) >> 16);

@@ -19,6 +19,7 @@ struct ImmaturePoint {
   PointId id = kNoPoint;                 ///< given when it is proposed to the map
   KeyframeId proposed_in = kNoKeyframe;  ///< the keyframe that found it again
   std::uint8_t failures = 0;             ///< frames in a row without a match
+  std::uint8_t agreed = 0;               ///< frames in a row in which it was where it should be
 };
 
 /// A keyframe that was proposed but is not in the snapshot yet.

@@ -41,6 +41,10 @@ class LocalMap {
   [[nodiscard]] const SE3& T_ref_a(const TrackedPoint& point) const {
     return anchors_[static_cast<std::size_t>(point.anchor)].T_ref_a;
   }
+  /// Where the point was seen first.
+  [[nodiscard]] KeyframeId anchor(const TrackedPoint& point) const {
+    return anchors_[static_cast<std::size_t>(point.anchor)].id;
+  }
   /// Positions [first, last) of the points that the reference keyframe itself sees.
   [[nodiscard]] std::pair<std::size_t, std::size_t> reference_range() const { return reference_range_; }
   /// Of the map that the points were collected from.

@@ -6,6 +6,7 @@
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/depth_seeds.hpp"
+#include "tracking/elder_vote.hpp"
 #include "tracking/first_structure.hpp"
 #include "tracking/wide_search.hpp"
 
@@ -15,6 +16,7 @@ struct TrackerOptions {
   DenseAlignmentOptions alignment;
   GuidedSearchOptions search;
   WideSearchOptions wide_search;
+  ElderVoteOptions elders;
   /// A step of 1e-5 moves no projection by a hundredth of a pixel. Outliers: beyond 99 % of chi-square,
   /// because real errors (rolling shutter, calibration, depth of a point seen from one place only) have long
   /// tails.
@@ -32,7 +34,11 @@ struct TrackerOptions {
   double doubted_inlier_share = 0.5;  ///< of the matches: with fewer a wider search may find a better pose
   /// A pose found by appearance must explain so much of the points found from it...
   double rough_inlier_share = 0.6;
-  double rough_visible_share = 0.2;  ///< ... and of those that should be visible
+  double rough_visible_share = 0.2;  ///< ... and of those that should be visible,
+  int rough_min_inliers = 40;        ///< and so many points, or
+  int rough_min_mapped = 10;         ///< so many that the map has, seen from two places
+  /// While young points are mistrusted: frames in a row in which a candidate must agree to be confirmed.
+  int trusted_after = 3;
   double new_part_after = 1;      ///< lost for so long while corners are seen: a new map part is started [s]
   int new_part_frames = 5;        ///< ... and for so many frames
   int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see

@@ -41,11 +41,13 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       quadtree_(rig.camera.width, rig.camera.height, kMaxCandidates),
       wide_search_(rig, options.wide_search),
       recent_views_(kRecentViews, room_for_view(rig, wide_search_)),
+      elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
       immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, options) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   matches_.reserve(searches);
   motion_.reserve(searches);
+  anchors_.reserve(searches);
   inlier_ids_.reserve(searches);
   depths_.reserve(std::max(searches, kMaxImmaturePoints));
   previous_points_.reserve(kMaxAlignmentPoints);

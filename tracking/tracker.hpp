@@ -108,12 +108,14 @@ class Tracker {
   bool search_widely(FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                         const Placement& view, FrameStep& step);
+  [[nodiscard]] int mapped_inliers() const;
   [[nodiscard]] bool well_supported(const TrackResult& result) const;
   SE3 align_to_previous(FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
+  void ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
   void give_up_frame(LostCause cause, TrackResult& result);
   void remember_frame(const FrameStep& step);
@@ -139,6 +141,7 @@ class Tracker {
   Quadtree quadtree_;
   WideSearch wide_search_;
   RecentViews recent_views_;
+  ElderVote elder_vote_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
   // One camera only: where its depths come from.
@@ -159,6 +162,7 @@ class Tracker {
   std::vector<Match> matches_;             ///< those of map points first
   std::vector<MotionObservation> motion_;  ///< of matches_, one each
   std::vector<AlignmentPoint> previous_points_;
+  std::vector<KeyframeId> anchors_;                ///< of the points of matches_, one each
   std::vector<DescribedCorner> previous_corners_;  ///< empty: not described yet
   bool previous_is_keyframe_ = false;              ///< then its images are among the recent views
   std::vector<PointId> inlier_ids_;                ///< scratch, as the next

@@ -101,6 +101,10 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
     PointId id = point.id;
     if (point.local >= 0) {
       ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(point.local)];
+      if (local.id == kNoPoint && elder_vote_.mistrusts_the_young() &&
+          local.agreed < options_.trusted_after) {
+        continue;  // chance finds what moves near where it was
+      }
       if (local.id == kNoPoint) confirm(local, proposal);
       id = local.id;
     }

@@ -57,6 +57,7 @@ void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& ste
     if (point.local >= 0) {
       ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(point.local)];
       local.failures = found ? 0 : static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
+      if (!found) local.agreed = 0;
     }
     if (found) matches_.push_back({static_cast<std::uint32_t>(i), *found});
   }
@@ -80,6 +81,25 @@ void Tracker::observe_matches(const SE3& T_c_ref, const RollingShutter& shutter)
   }
 }
 
+/// What was found lately must not take the camera along if it moves itself. Keeps account of which of the
+/// tracker's own points are where they should be.
+void Tracker::ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver) {
+  anchors_.clear();
+  for (const Match& match : matches_) {
+    anchors_.push_back(local_map_.anchor(local_map_.points()[match.point]));
+  }
+  const auto overruled = elder_vote_.overrule(motion_, anchors_, motion, solver);
+  if (overruled) motion = *overruled;
+  for (std::size_t m = 0; m < matches_.size(); ++m) {
+    const int local = local_map_.points()[matches_[m].point].local;
+    if (local < 0) continue;
+    ImmaturePoint& point = immature_points_.points()[static_cast<std::size_t>(local)];
+    const int agreed = motion_[m].inlier ? std::min(point.agreed + 1, 255) : 0;
+    point.agreed = static_cast<std::uint8_t>(agreed);
+    if (overruled && agreed == 0) point.failures = 255;  // found, but it is something that moves
+  }
+}
+
 /// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted. Where rows are read one
 /// after the other, how they move is known by the result only: a few rounds.
 LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
@@ -94,6 +114,7 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
     motion = optimise_motion(rig_, motion_, motion.T_c_ref, solver);
     if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step.frame);
   }
+  ask_elders(motion, solver);
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) return LostCause::kTooFewCandidates;
   if (result.matches < options_.min_inliers) return LostCause::kTooFewMatches;
@@ -107,10 +128,21 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   return LostCause::kNone;
 }
 
+/// Inliers whose depths several keyframes know.
+int Tracker::mapped_inliers() const {
+  int count = 0;
+  for (std::size_t m = 0; m < matches_.size(); ++m) {
+    count += motion_[m].inlier && local_map_.points()[matches_[m].point].local < 0 ? 1 : 0;
+  }
+  return count;
+}
+
 /// A pose found by appearance is believed when the map's points are found where they should be seen from
-/// there: from a wrong one some are found as well, but few agree.
+/// there: from a wrong one some are found as well, but few agree. Few points that were measured from one
+/// place only all agree, and are all wrong by their depths' errors.
 bool Tracker::well_supported(const TrackResult& result) const {
-  return result.inliers >= options_.rough_inlier_share * result.matches &&
+  return (result.inliers >= options_.rough_min_inliers || mapped_inliers() >= options_.rough_min_mapped) &&
+         result.inliers >= options_.rough_inlier_share * result.matches &&
          result.inliers >= options_.rough_visible_share * result.searched;
 }
 

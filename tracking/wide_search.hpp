@@ -16,8 +16,7 @@
 namespace twofold {
 
 struct WideSearchOptions {
-  /// Off: a camera that was carried elsewhere is sometimes placed by it some centimetres beside the truth.
-  bool enabled = false;
+  bool enabled = true;  ///< else a frame after a step too wide for the prediction is lost
   CornerSelectionOptions corners{.wanted = 700};
   int max_distance = 64;  ///< of a match's descriptors [bits]
   int min_agreeing = 8;   ///< matches that the motion must explain

@@ -47,6 +47,7 @@ class MapPartsTest : public testing::KidnappedCamera {
   static EngineOptions impatient() {
     EngineOptions engine = options();
     engine.tracker.new_part_after = 0.1;
+    engine.tracker.wide_search.enabled = false;  // it would find the room again before a part is started
     return engine;
   }
 };
@@ -75,6 +76,21 @@ TEST_F(MapPartsTest, ALostCameraStartsAPartThatJoinsWhenAPlaceOfBothIsRecognised
   for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k) {
     EXPECT_EQ(result.graph.part(KeyframeId{k}), result.graph.part(KeyframeId{0}));
   }
+}
+
+TEST_F(MapPartsTest, TheWiderSearchPlacesItWhereItIsOrNotAtAll) {
+  EngineOptions patient = options(false);
+  patient.tracker.new_part_after = 10;
+  const RunResult result = run_engine(patient, frames());
+  int found = 0;
+  for (const FrameRecord& record : result.frames) {
+    const int i = walked(record.frame_index);
+    if (i < 0 || record.state != FrameState::kTracked) continue;
+    found += record.frame_index >= kFirst + kCovered ? 1 : 0;
+    EXPECT_LT(position_error(record, result.graph, T_c_w(i) * T_c_w(0).inverse()), 0.03)
+        << record.frame_index;
+  }
+  EXPECT_GE(found, 20);
 }
 
 TEST_F(MapPartsTest, TwoRunsGiveTheSameBytes) {

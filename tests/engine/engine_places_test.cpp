@@ -33,8 +33,10 @@ TEST_F(EnginePlacesTest, ACameraCarriedElsewhereFindsItselfInTheMap) {
   EXPECT_GE(tracked, kAfter - 3);
 }
 
-TEST_F(EnginePlacesTest, WithoutRecognitionItStaysLost) {
-  const RunResult result = run_engine(options(false), kidnapped(false));
+TEST_F(EnginePlacesTest, WithoutRecognitionAndWiderSearchItStaysLost) {
+  EngineOptions blind = options(false);
+  blind.tracker.wide_search.enabled = false;
+  const RunResult result = run_engine(blind, kidnapped(false));
   for (const FrameRecord& record : result.frames) {
     if (after_kidnapping(record)) {
       EXPECT_EQ(record.state, FrameState::kLost) << record.frame_index;

@@ -29,7 +29,6 @@ TEST(WideSteps, AreTakenWithoutASecondPartAndTheRoundIsClosed) {
   };
   EngineOptions options;
   options.deterministic = true;
-  options.tracker.wide_search.enabled = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   const RunResult result = testing::run_engine(options, feed);
   ASSERT_EQ(result.frames.size(), frames.size());

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "tests/allocation_counter.hpp"
+
 namespace twofold {
 namespace {
 
@@ -40,6 +42,19 @@ TEST(GaussianFilter, LeavesAPlainImageAsItIs) {
     EXPECT_EQ(smooth.at<std::uint8_t>(10, 10), grey);
     EXPECT_EQ(smooth.at<std::uint8_t>(3, 16), grey);
   }
+}
+
+TEST(GaussianFilter, AllocatesNothingForAnImageNoLargerThanOneBefore) {
+  if (!testing::allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
+  const cv::Mat large(60, 80, CV_8UC1, cv::Scalar(7)), small(30, 40, CV_8UC1, cv::Scalar(7));
+  cv::Mat smooth_large, smooth_small;
+  GaussianFilter filter;
+  filter.apply(large, smooth_large);
+  filter.apply(small, smooth_small);
+  const std::uint64_t before = testing::allocations();
+  filter.apply(large, smooth_large);
+  filter.apply(small, smooth_small);
+  EXPECT_EQ(testing::allocations(), before);
 }
 
 }  // namespace

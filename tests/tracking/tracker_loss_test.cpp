@@ -18,9 +18,7 @@ Frame another_place() {
 
 TEST(Tracker, FindsOnAfterAStepTooWideForItsPrediction) {
   const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
-  TrackerOptions options;
-  options.wide_search.enabled = true;
-  Odometry odometry(test_rig(SensorKind::kStereo, 320, 240), options);
+  Odometry odometry(SensorKind::kStereo);
   for (std::size_t i = 0; i < 15; ++i) odometry.step(sequence[i]);
   const SE3 T_c_w = SE3(SO3::exp(Vector3(0.04, 0.25, 0.03)), Vector3(0.1, 0, -0.1)) * true_T_c_w(14);
   RenderedScene scene(test_rig(SensorKind::kStereo, 320, 240), {3, 2, 5}, 21);

@@ -1,0 +1,60 @@
+// Something passes before a camera that stands still: the camera must not go along.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "fixtures/passing_strip.hpp"
+#include "synthetic/synthetic_sequence.hpp"
+#include "tests/engine/run_checks.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::PassingStrip;
+
+constexpr int kFrames = 200;
+
+/// Farthest that the camera is said to have been from where it stands [m]; each frame must be tracked.
+double farthest(const PassingStrip::Look& look) {
+  synthetic::SyntheticOptions scene;
+  scene.width = 320;
+  scene.height = 240;
+  scene.f = 210;
+  scene.noise = 0;
+  const synthetic::SyntheticSequence courtyard(scene);
+  PassingStrip strip(courtyard.render(0), look);
+  const FrameFeed feed = [&, next = 0](Frame& frame) mutable {
+    if (next++ == kFrames) return FeedStatus::kEnd;
+    frame = strip.next();
+    return FeedStatus::kFrame;
+  };
+  EngineOptions options;
+  options.deterministic = true;
+  std::atomic<bool> interrupted{false};
+  const RunResult result = Engine(courtyard.rig(), options).run(feed, interrupted);
+  double farthest = 0;
+  for (const FrameRecord& record : result.frames) {
+    EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << ": " << describe(record.cause);
+    if (record.state != FrameState::kTracked) continue;
+    farthest = std::max(farthest, record.T_c_w_causal.unpacked().translation().norm());
+    farthest = std::max(farthest, final_T_c_w(record, result.graph).translation().norm());
+  }
+  EXPECT_EQ(result.frames.size(), static_cast<std::size_t>(kFrames));
+  return farthest;
+}
+
+TEST(PassingObject, DoesNotTakeTheCameraAlong) {
+  for (const double share : {0.3, 0.4, 0.5}) {
+    EXPECT_LT(farthest({.share = share}), 0.02) << share;
+  }
+}
+
+TEST(PassingObject, DoesNotTakeTheCameraAlongWhenItIsSlow) {
+  for (const double px_a_frame : {1.0, 2.5}) {
+    EXPECT_LT(farthest({.share = 0.4, .px_a_frame = px_a_frame}), 0.02) << px_a_frame;
+  }
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,74 @@
+#include "tracking/elder_vote.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "fixtures/rendered_scene.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::test_rig;
+
+/// Points before a camera that stands still; the young ones may have moved since they were found.
+class ElderVoteTest : public ::testing::Test {
+ protected:
+  void add(int count, KeyframeId anchor, const Vector3& moved) {
+    std::uniform_real_distribution<double> side(-1, 1), depth(2, 8);
+    for (int n = 0; n < count; ++n) {
+      const Vector3 x(side(random_), side(random_), depth(random_));
+      const Eigen::Vector3f z = rig_.project(x + moved).cast<float>();
+      observations_.push_back({x, z, rig_.information(z, 0)});
+      anchors_.push_back(anchor);
+    }
+  }
+  std::optional<MotionOnlyResult> ask() {
+    const MotionOnlyResult by_all = optimise_motion(rig_, observations_, SE3(), {});
+    return vote_.overrule(observations_, anchors_, by_all, {});
+  }
+
+  const Rig rig_ = test_rig(SensorKind::kStereo, 320, 240);
+  ElderVote vote_{rig_, 300, {}};
+  std::mt19937 random_{3};
+  std::vector<MotionObservation> observations_;
+  std::vector<KeyframeId> anchors_;
+};
+
+TEST_F(ElderVoteTest, TheOldestAreBelievedThoughTheYoungAreMore) {
+  add(60, KeyframeId{0}, Vector3::Zero());
+  add(100, KeyframeId{7}, Vector3(0.1, 0, 0));
+  const auto pose = ask();
+  ASSERT_TRUE(pose);
+  EXPECT_LT(pose->T_c_ref.translation().norm(), 1e-3);
+  EXPECT_LE(pose->inliers, 70);
+  EXPECT_TRUE(vote_.mistrusts_the_young());
+}
+
+TEST_F(ElderVoteTest, NobodyIsOverruledWhereAllAgree) {
+  add(60, KeyframeId{0}, Vector3(0.1, 0, 0));
+  add(100, KeyframeId{7}, Vector3(0.1, 0, 0));
+  EXPECT_FALSE(ask());
+  EXPECT_FALSE(vote_.mistrusts_the_young());
+}
+
+TEST_F(ElderVoteTest, AFewElderOnesAreNotEnough) {
+  add(20, KeyframeId{0}, Vector3::Zero());
+  add(100, KeyframeId{7}, Vector3(0.1, 0, 0));
+  EXPECT_FALSE(ask());
+}
+
+TEST_F(ElderVoteTest, TheYoungAreHeardAgainAfterAWhile) {
+  add(60, KeyframeId{0}, Vector3::Zero());
+  add(100, KeyframeId{7}, Vector3(0.1, 0, 0));
+  ASSERT_TRUE(ask());
+  observations_.clear();
+  anchors_.clear();
+  add(60, KeyframeId{0}, Vector3::Zero());
+  add(100, KeyframeId{8}, Vector3::Zero());
+  for (int frame = 0; frame < ElderVoteOptions{}.mistrusted_frames; ++frame) EXPECT_TRUE(ask()) << frame;
+  EXPECT_FALSE(ask());
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,75 @@
+#include "tracking/elder_vote.hpp"
+
+#include <algorithm>
+
+#include "geometry/option_check.hpp"
+
+namespace twofold {
+
+std::string ElderVoteOptions::invalid_reason() const {
+  return OptionCheck()
+      .share("share", share)
+      .at_least("min_elders", min_elders, 3)
+      .share("min_agreeing", min_agreeing)
+      .above("dissent", dissent, 0)
+      .share("min_loyal", min_loyal)
+      .at_least("mistrusted_frames", mistrusted_frames, 0)
+      .reason();
+}
+
+ElderVote::ElderVote(const Rig& rig, std::size_t capacity, const ElderVoteOptions& options)
+    : rig_(rig), options_(options) {
+  by_age_.reserve(capacity);
+  elders_.reserve(capacity);
+}
+
+std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation> observations,
+                                                    std::span<const KeyframeId> anchors,
+                                                    const MotionOnlyResult& by_all,
+                                                    const MotionOnlyOptions& solver) {
+  const bool mistrusted = mistrusts_the_young();
+  if (mistrusted) --mistrusted_for_;
+  if (!choose_elders(observations, anchors)) return std::nullopt;
+  MotionOnlyResult by_elders = optimise_motion(rig_, elders_, by_all.T_c_ref, solver);
+  if (by_elders.inliers < options_.min_agreeing * static_cast<double>(elders_.size())) return std::nullopt;
+
+  const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
+  const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent;
+  const int with_elders = young_inliers(observations, anchors, by_elders.T_c_ref, solver);
+  const int with_all = young_inliers(observations, anchors, by_all.T_c_ref, solver);
+  const bool misled = dissent && with_elders < options_.min_loyal * with_all;
+  if (misled) mistrusted_for_ = options_.mistrusted_frames;
+  if (!misled && !mistrusted) return std::nullopt;
+  by_elders.inliers = classify_observations(rig_, observations, by_elders.T_c_ref, solver);
+  return by_elders;
+}
+
+/// @return false when they are too few, or when nobody is younger
+bool ElderVote::choose_elders(std::span<const MotionObservation> observations,
+                              std::span<const KeyframeId> anchors) {
+  const auto share = static_cast<std::size_t>(options_.share * static_cast<double>(observations.size()));
+  const std::size_t wanted = std::max(static_cast<std::size_t>(options_.min_elders), share);
+  if (observations.size() <= wanted) return false;
+  by_age_.assign(anchors.begin(), anchors.end());
+  const auto last = by_age_.begin() + static_cast<std::ptrdiff_t>(wanted - 1);
+  std::nth_element(by_age_.begin(), last, by_age_.end());
+  youngest_elder_ = *last;
+  elders_.clear();
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (anchors[i] <= youngest_elder_) elders_.push_back(observations[i]);
+  }
+  return elders_.size() < observations.size();
+}
+
+/// How many of the young go with a pose. Sets who goes with it, old and young.
+int ElderVote::young_inliers(std::span<MotionObservation> observations, std::span<const KeyframeId> anchors,
+                             const SE3& T_c_ref, const MotionOnlyOptions& solver) const {
+  classify_observations(rig_, observations, T_c_ref, solver);
+  int count = 0;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    count += observations[i].inlier && anchors[i] > youngest_elder_ ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace twofold

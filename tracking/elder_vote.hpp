@@ -1,0 +1,65 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "estimation/motion_only.hpp"
+#include "graph/ids.hpp"
+
+namespace twofold {
+
+struct ElderVoteOptions {
+  double share = 1.0 / 3;     ///< of the observations: so many are elders at least, in (0, 1]
+  int min_elders = 40;        ///< fewer overrule nobody, >= 3
+  double min_agreeing = 0.7;  ///< share of the elders that the pose they give must explain, in (0, 1]
+  double dissent = 4;         ///< between the two poses, in standard deviations of the elders' pose, > 0
+  double min_loyal = 0.5;  ///< share of the young that go with all which must go with the elders, in (0, 1]
+  int mistrusted_frames = 30;  ///< for so long nobody asks the young again, >= 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Whose word counts when points disagree about where the camera is: that of those known for longest.
+///
+/// What passes before the camera gives ever new points, whose depths are right and which agree with each
+/// other, maybe more of them than of all others; but each of them is young. Elders are the observations of
+/// the oldest points. When nearly all young points contradict their pose, the young move: they are overruled,
+/// and for a while their votes do not count.
+///
+/// One instance a tracker: it remembers whom it mistrusts. No allocation after construction.
+class ElderVote {
+ public:
+  ElderVote(const Rig& rig, std::size_t capacity, const ElderVoteOptions& options);
+
+  /// @param observations  of one frame, at most `capacity`; they then say who agrees with the pose that
+  /// counts
+  /// @param anchors       the keyframe that each of the points was seen in first; numbers grow with time
+  /// @param by_all        the pose that all of them give
+  /// @return              the pose that the elders give, when it counts instead
+  [[nodiscard]] std::optional<MotionOnlyResult> overrule(std::span<MotionObservation> observations,
+                                                         std::span<const KeyframeId> anchors,
+                                                         const MotionOnlyResult& by_all,
+                                                         const MotionOnlyOptions& solver);
+
+  /// The young were overruled lately.
+  [[nodiscard]] bool mistrusts_the_young() const { return mistrusted_for_ > 0; }
+
+ private:
+  bool choose_elders(std::span<const MotionObservation> observations, std::span<const KeyframeId> anchors);
+  [[nodiscard]] int young_inliers(std::span<MotionObservation> observations,
+                                  std::span<const KeyframeId> anchors, const SE3& T_c_ref,
+                                  const MotionOnlyOptions& solver) const;
+
+  Rig rig_;
+  ElderVoteOptions options_;
+  int mistrusted_for_ = 0;                   ///< [frames]
+  KeyframeId youngest_elder_ = kNoKeyframe;  ///< anchor
+  std::vector<KeyframeId> by_age_;
+  std::vector<MotionObservation> elders_;
+};
+
+}  // namespace twofold
