@@ -47,6 +47,8 @@ void expect_valid(const Rig& rig, const EngineOptions& options) {
   if (options.map) {
     if (const std::string difference = rig_difference(rig, options.map->rig); !difference.empty())
       throw std::runtime_error("the map was made with another camera: " + difference);
+    if (rig.kind != options.map->rig.kind && !options.localise_only)
+      throw std::runtime_error("one camera can only be localised in the map of a stereo or RGB-D rig");
     if (!options.vocabulary)
       throw std::runtime_error("a camera finds itself in a map by recognition: a vocabulary is needed");
   }

@@ -3,11 +3,13 @@
 #include "engine/chunked_vector.hpp"
 #include "engine/result.hpp"
 #include "graph/snapshot.hpp"
+#include "mapping/similarity_loop.hpp"
 
 namespace twofold {
 
-/// What became of the keyframes culled during a run. The map forgets after some time; frames that were
-/// tracked against such keyframes do not, so that this grows with the trajectory: 64 bytes a culled keyframe.
+/// What became of the keyframes that frames were tracked against: culled during a run, or scaled by a loop of
+/// one camera. The map forgets after some time; frames do not, so that this grows with the trajectory: 64
+/// bytes a culled keyframe, 16 for each that a loop scaled.
 ///
 /// Written by the mapper's thread, round by round; read when that was joined.
 class ReplacementLog {
@@ -15,9 +17,12 @@ class ReplacementLog {
   /// Takes down the replacement of a keyframe that was culled in the newest round; to be called in the order
   /// of culling.
   void add(KeyframeId culled, const GraphSnapshot& graph);
+  /// Takes down which keyframes have another unit from version `version` of the map on; before those culled
+  /// in that version.
+  void add_scaling(std::uint64_t version, std::vector<KeyframeScaling> scaled);
 
-  /// Hangs each frame whose reference was culled on the keyframe that stands for it in the final map. Poses
-  /// in the map stay what they were.
+  /// Hangs each frame whose reference was culled on the keyframe that stands for it in the final map, in the
+  /// unit that this has. Poses in the map stay what they were. Frames are in the order of their versions.
   void hang_on_live_keyframes(ChunkedVector<FrameRecord>& frames) const;
 
  private:
@@ -26,7 +31,14 @@ class ReplacementLog {
     KeyframeId replacement = kNoKeyframe;  ///< in the map when `id` was culled
     PackedPose T_id_replacement;
   };
+  /// A loop's, between the entries of keyframes that were culled before and after it.
+  struct Scaling {
+    std::uint64_t version = 0;
+    std::size_t entries_before = 0;
+    std::vector<KeyframeScaling> keyframes;
+  };
   ChunkedVector<Entry> entries_;
+  std::vector<Scaling> scalings_;
 };
 
 }  // namespace twofold

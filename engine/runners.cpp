@@ -27,7 +27,7 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
     : tracker_(rig, options.tracker),
       times_("tracker", trace),
       on_pose_(options.on_pose),
-      can_relocalise_(options.vocabulary != nullptr && rig.kind != SensorKind::kMono) {
+      can_relocalise_(options.vocabulary != nullptr) {
   frame_stage_ = times_.add_stage("frame");
   latency_stage_ = times_.add_stage("exposure to pose");
   listener_stage_ = times_.add_stage("pose listener");
@@ -135,6 +135,8 @@ std::uint64_t MapperRunner::step(std::span<const ProposalHandle> proposals,
   for (const LoopMessage& message : messages) {
     if (const auto* loop = std::get_if<LoopConstraint>(&message)) {
       loops_.push_back(*loop);
+    } else if (const auto* similarities = std::get_if<SimilarityUpdate>(&message)) {
+      replacement_log_.add_scaling(mapper_.graph().version(), mapper_.take_similarities(*similarities));
     } else {
       (void)mapper_.take_pose_graph(std::get<PoseGraphUpdate>(message));
     }
@@ -167,8 +169,7 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
   place_stage_ = times_.add_stage("place");
   pose_graph_stage_ = times_.add_stage("pose graph");
   relocalise_stage_ = times_.add_stage("relocalisation");
-  if (options.vocabulary && rig.kind != SensorKind::kMono)
-    closer_.emplace(rig, options.vocabulary, options.loop_closer);
+  if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
   if (closer_ && options.map) closer_->continue_from(options.map->places);
   if (closer_ && on_places_) on_places_(closer_->places());
 }
@@ -178,12 +179,15 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
   if (!closer_) return messages_;
   optimise_if_due(graph);
   const ScopedStage timed(times_, place_stage_);
-  if (const auto loop = closer_->step(keyframe, graph)) {
+  const auto loop = closer_->step(keyframe, graph);
+  if (loop && !awaits_similarities(graph)) {
+    const bool one_camera = rig_.kind == SensorKind::kMono;
+    if (one_camera) messages_.emplace_back(close_over_sim3(graph, *loop, rig_, mapper_options_));
     messages_.emplace_back(*loop);
     const bool joins = graph.part(loop->from) != graph.part(loop->to);
     loops_.push_back(
         {*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins});
-    not_optimised_ = loop;
+    (one_camera ? awaited_ : not_optimised_) = loop;
   }
   if (on_places_) on_places_(closer_->places());
   return messages_;
@@ -193,6 +197,16 @@ RelocalisationAnswer LoopCloserRunner::relocalise(const RelocalisationRequest& r
                                                   const GraphSnapshot& graph) {
   const ScopedStage timed(times_, relocalise_stage_);
   return closer_ ? closer_->relocalise(request.images, graph) : std::nullopt;
+}
+
+/// A loop may be lost on its way, or its keyframes culled: it is not awaited for ever.
+bool LoopCloserRunner::awaits_similarities(const GraphSnapshot& graph) {
+  constexpr std::uint64_t kPatience = 32;  // versions
+  if (!awaited_) return false;
+  const Keyframe& from = graph.keyframe(awaited_->from);
+  const bool taken = from.culled() || find_edge(from, awaited_->to) != nullptr;
+  if (taken || graph.version() > awaited_->snapshot_version + kPatience) awaited_.reset();
+  return awaited_.has_value();
 }
 
 /// One pose graph optimisation for a run of loops: when the newest of them is in the map.

@@ -22,7 +22,7 @@ namespace twofold {
 using ProposalPool = FramePool<KeyframeProposal>;
 using ProposalHandle = ProposalPool::Handle;
 /// From the loop closer to the mapper.
-using LoopMessage = std::variant<LoopConstraint, PoseGraphUpdate>;
+using LoopMessage = std::variant<LoopConstraint, PoseGraphUpdate, SimilarityUpdate>;
 
 /// Of the tracker to the loop closer: where was this frame taken?
 struct RelocalisationRequest {
@@ -108,7 +108,8 @@ class MapperRunner {
 };
 
 /// The loop closer's step as every kind of run takes it: recognise, verify, and, once the map has taken a
-/// loop, optimise all of it beside the mapper.
+/// loop, optimise all of it beside the mapper. With one camera all of it is optimised over Sim(3) first, and
+/// the next loop waits until the map has taken that: its scale would be of a unit that is gone.
 class LoopCloserRunner {
  public:
   LoopCloserRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
@@ -127,6 +128,7 @@ class LoopCloserRunner {
 
  private:
   void optimise_if_due(const GraphSnapshot& graph);
+  [[nodiscard]] bool awaits_similarities(const GraphSnapshot& graph);
 
   Rig rig_;
   MapperOptions mapper_options_;
@@ -138,6 +140,7 @@ class LoopCloserRunner {
   std::vector<LoopMessage> messages_;
   std::vector<ClosedLoop> loops_;
   std::optional<LoopConstraint> not_optimised_;  // newest loop that no pose graph optimisation has seen
+  std::optional<LoopConstraint> awaited_;        // one camera: sent, but not seen in the map yet
 };
 
 /// After the last step of any kind of run: the final map with its places and loops, the frames hung on its

@@ -114,6 +114,14 @@ std::optional<Sim3> align(const std::vector<PosePair>& pairs, Alignment alignmen
   return Sim3(s, T_w_e->so3(), mean_w - s * (T_w_e->so3() * mean_e));
 }
 
+std::optional<std::array<double, 2>> scales_of_halves(const std::vector<PosePair>& pairs) {
+  const auto middle = pairs.begin() + static_cast<std::ptrdiff_t>(pairs.size() / 2);
+  const auto first = align({pairs.begin(), middle}, Alignment::kSim3);
+  const auto second = align({middle, pairs.end()}, Alignment::kSim3);
+  if (!first || !second) return std::nullopt;
+  return std::array{first->scale(), second->scale()};
+}
+
 SE3 aligned_pose(const Sim3& S_w_e, const SE3& T_e_c) {
   return {S_w_e.so3() * T_e_c.so3(),
           S_w_e.scale() * (S_w_e.so3() * T_e_c.translation()) + S_w_e.translation()};
@@ -152,6 +160,7 @@ tl::expected<Evaluation, std::string> evaluate(std::vector<PosePair> pairs,
   }
   Evaluation result;
   result.S_w_e = *S_w_e;
+  if (options.alignment == Alignment::kSim3) result.half_scales = scales_of_halves(pairs);
   std::vector<double> rotation_errors;
   for (PosePair& pair : pairs) {
     pair.T_e_c = aligned_pose(*S_w_e, pair.T_e_c);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <tl/expected.hpp>
@@ -29,6 +30,11 @@ enum class Alignment : std::uint8_t { kNone, kSe3, kSim3 };
 /// @return  nullopt when there are fewer than three poses or all lie on one line (the turn around it is
 /// undetermined)
 [[nodiscard]] std::optional<Sim3> align(const std::vector<PosePair>& pairs, Alignment alignment);
+
+/// Scale of each half of a run, aligned by itself (kSim3): a camera that does not know the unit of length may
+/// change its own on the way.
+/// @return  nullopt when one of them cannot be aligned
+[[nodiscard]] std::optional<std::array<double, 2>> scales_of_halves(const std::vector<PosePair>& pairs);
 
 /// Pose of the camera in the truth's world; the scale acts on the position only.
 [[nodiscard]] SE3 aligned_pose(const Sim3& S_w_e, const SE3& T_e_c);
@@ -61,11 +67,12 @@ struct EvaluationOptions {
 
 struct Evaluation {
   Sim3 S_w_e;
-  std::vector<PosePair> pairs;            ///< T_e_c already aligned: in the truth's world
-  std::vector<double> position_errors;    ///< [m] one a pair
-  ErrorStatistics absolute;               ///< ATE: |t_truth - t_aligned|  [m]
-  ErrorStatistics absolute_rotation_deg;  ///< angle between true and aligned orientation
-  RelativeError per_second;               ///< every i with the j nearest to delta_s later
+  std::optional<std::array<double, 2>> half_scales;  ///< of the estimate as it was; kSim3 only
+  std::vector<PosePair> pairs;                       ///< T_e_c already aligned: in the truth's world
+  std::vector<double> position_errors;               ///< [m] one a pair
+  ErrorStatistics absolute;                          ///< ATE: |t_truth - t_aligned|  [m]
+  ErrorStatistics absolute_rotation_deg;             ///< angle between true and aligned orientation
+  RelativeError per_second;                          ///< every i with the j nearest to delta_s later
   RelativeError per_metre;  ///< consecutive pieces of the true path of at least delta_m, as evo's
                             ///< default ("-d 1 -u m --pairs_from_reference")
   double path_length = 0;   ///< of the truth over the pairs  [m]

@@ -178,6 +178,13 @@ void GraphWriter::shorten_replacements(KeyframeId id) {
                   {live_replacement->id, replacement.anchored, PackedPose(live_replacement->T_this_live)});
 }
 
+void GraphWriter::scale_replacement(KeyframeId id, double factor) {
+  Replacement& replacement = graph_.replacements_.mutate(index(id));
+  TWOFOLD_CHECK(replacement.id != kNoKeyframe, "a replacement that is scaled is known");
+  const SE3 T = replacement.T_this_replacement.unpacked();
+  replacement.T_this_replacement = PackedPose(SE3(T.so3(), factor * T.translation()));
+}
+
 /// No replacement that is kept leads to one that is forgotten: whatever hung on a keyframe when that was
 /// culled is before it in the queue, and so is looked at, and hung on a keyframe that is not culled,
 /// before that one's own turn comes.

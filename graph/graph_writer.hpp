@@ -42,6 +42,9 @@ class GraphWriter {
   void set_pose(KeyframeId id, const SE3& T_k_w) { graph_.keyframes_.mutate(index(id)).T_k_w = T_k_w; }
   /// Moves a keyframe that is not culled to another part; its T_k_w then refers to that part's world frame.
   void set_part(KeyframeId id, KeyframeId part) { graph_.keyframes_.mutate(index(id)).part = part; }
+  /// Multiplies the relative pose that a culled keyframe has to its replacement, which must not be forgotten,
+  /// by another unit of length.
+  void scale_replacement(KeyframeId id, double factor);
   void set_median_depth(KeyframeId id, double depth) {
     graph_.keyframes_.mutate(index(id)).median_depth = depth;
   }

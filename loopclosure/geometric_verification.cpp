@@ -6,6 +6,7 @@
 
 #include "estimation/motion_only.hpp"
 #include "geometry/absolute_orientation.hpp"
+#include "geometry/essential_matrix.hpp"
 #include "geometry/ransac.hpp"
 #include "imaging/binary_descriptor.hpp"
 #include "imaging/guided_search.hpp"
@@ -25,8 +26,14 @@ bool has_depth(const Eigen::Vector3f& z, const VerificationOptions& options) {
   return z.x() - z.z() > options.min_disparity_px;  // false for NaN
 }
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 std::vector<Match> match_descriptors(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                                     const VerificationOptions& options) {
+                                     const VerificationOptions& options, bool depth_in_b) {
   std::vector<NearestDescriptor> of_a, of_b;
   find_nearest(a.corners, b.corners, of_a, of_b);
   std::vector<Match> matches;
@@ -35,7 +42,7 @@ std::vector<Match> match_descriptors(const Rig& rig, const PlaceAppearance& a, c
     if (nearest.best < 0 || nearest.distance > options.max_distance) continue;
     const auto j = static_cast<std::size_t>(nearest.best);
     if (of_b[j].best != static_cast<int>(i)) continue;
-    if (!has_depth(a.z[i], options) || !has_depth(b.z[j], options)) continue;
+    if (!has_depth(a.z[i], options) || (depth_in_b && !has_depth(b.z[j], options))) continue;
     matches.push_back({0, static_cast<int>(i), nearest.best, rig.unproject(a.z[i].cast<double>())});
   }
   return matches;
@@ -45,42 +52,53 @@ std::vector<Match> match_descriptors(const Rig& rig, const PlaceAppearance& a, c
 double squared_error(const Rig& rig, const Vector3& x, const Eigen::Vector3f& z, int level) {
   if (!in_front_of_camera(x)) return std::numeric_limits<double>::infinity();
   const Vector3 e = rig.project(x) - z.cast<double>();
-  return e.squaredNorm() * std::ldexp(1.0, -2 * level);
+  const double squared = rig.kind == SensorKind::kMono ? e.head<2>().squaredNorm() : e.squaredNorm();
+  return squared * std::ldexp(1.0, -2 * level);
 }
 
-/// For geometry/ransac.hpp: T_b_a from three points known in both frames.
-class RigidEstimator {
+/// For geometry/ransac.hpp: S_b_a from three points known in both frames, of scale 1 unless there is one
+/// camera.
+class SimilarityEstimator {
  public:
-  using Model = SE3;
+  using Model = Sim3;
   static constexpr int kSampleSize = 3;
 
-  RigidEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                 const std::vector<Match>& matches, double max_stretch)
+  SimilarityEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
+                      const std::vector<Match>& matches, double max_stretch)
       : rig_(rig), a_(a), b_(b), matches_(matches), max_stretch_(max_stretch) {
     for (const Match& match : matches) x_b_.push_back(rig.unproject(z_b(match).cast<double>()));
   }
 
   [[nodiscard]] int size() const { return static_cast<int>(matches_.size()); }
 
-  void fit(std::span<const int, 3> sample, std::vector<SE3>& models) const {
+  void fit(std::span<const int, 3> sample, std::vector<Sim3>& models) const {
+    const bool scale_known = rig_.kind != SensorKind::kMono;
     std::array<Vector3, 3> x_a, x_b;
+    double scale = 1;  // of the first side
     for (std::size_t k = 0; k < 3; ++k) {
       const auto m = static_cast<std::size_t>(sample[k]);
       const auto next = static_cast<std::size_t>(sample[(k + 1) % 3]);
       x_a[k] = matches_[m].x_a;
       x_b[k] = x_b_[m];
-      const double in_a = (x_a[k] - matches_[next].x_a).norm(), in_b = (x_b[k] - x_b_[next]).norm();
-      if (std::abs(in_a - in_b) > max_stretch_ * std::max(in_a, in_b)) return;
+      const double in_b = (x_b[k] - x_b_[next]).norm();
+      double in_a = (x_a[k] - matches_[next].x_a).norm();
+      if (!scale_known && k == 0) scale = in_b / in_a;
+      in_a *= scale;
+      if (!(std::abs(in_a - in_b) <= max_stretch_ * std::max(in_a, in_b))) return;
     }
-    if (const auto T_b_a = align_rigid(x_b, x_a)) models.push_back(*T_b_a);
+    if (scale_known) {
+      if (const auto T_b_a = align_rigid(x_b, x_a)) models.emplace_back(*T_b_a);
+    } else if (const auto S_b_a = align_similarity(x_b, x_a)) {
+      models.push_back(*S_b_a);
+    }
   }
 
   /// The larger of the errors in either view.
-  [[nodiscard]] double squared_residual(const SE3& T_b_a, int i) const {
+  [[nodiscard]] double squared_residual(const Sim3& S_b_a, int i) const {
     const auto m = static_cast<std::size_t>(i);
     const Match& match = matches_[m];
-    const double in_b = squared_error(rig_, T_b_a * match.x_a, z_b(match), level(b_, match.b));
-    const double in_a = squared_error(rig_, T_b_a.inverse() * x_b_[m], z_a(match), level(a_, match.corner));
+    const double in_b = squared_error(rig_, S_b_a * match.x_a, z_b(match), level(b_, match.b));
+    const double in_a = squared_error(rig_, S_b_a.inverse() * x_b_[m], z_a(match), level(a_, match.corner));
     return std::max(in_a, in_b);
   }
 
@@ -219,12 +237,46 @@ bool well_spread(const Rig& rig, std::span<const PlacedView> place, const PlaceA
   return std::min(in_place.least(), in_b.least()) >= min_in_half;
 }
 
+/// Pose of a camera that knows no depths at all: by the directions of the matches (five points), and by the
+/// length of the way that gives the place's points the depths they have.
+std::optional<SE3> pose_by_directions(const Rig& rig, const PlaceAppearance& b,
+                                      const std::vector<Match>& matches, const VerificationOptions& options,
+                                      VerificationReport& report) {
+  std::vector<Vector3> bearings_a, bearings_b;
+  for (const Match& match : matches) {
+    bearings_a.push_back(match.x_a / match.x_a.z());
+    bearings_b.push_back(
+        rig.camera.unproject(b.z[static_cast<std::size_t>(match.b)].head<2>().cast<double>()));
+  }
+  RansacOptions ransac;
+  ransac.threshold = options.max_error_px / rig.camera.fx;
+  const auto epipolar = estimate_relative_pose(bearings_a, bearings_b, ransac);
+  if (!epipolar) return std::nullopt;
+  report.ransac_inliers = static_cast<int>(epipolar->inliers.size());
+  if (report.ransac_inliers < options.min_hypothesis) return std::nullopt;
+  const SE3& T_b_a = epipolar->T_b_a;
+  std::vector<Match> inliers;
+  std::vector<double> lengths;
+  for (const int i : epipolar->inliers) {
+    const auto m = static_cast<std::size_t>(i);
+    inliers.push_back(matches[m]);
+    // R x_a + length t is along the bearing: least squares for the length.
+    const Vector3 across = bearings_b[m].cross(T_b_a.translation());
+    lengths.push_back(-across.dot(bearings_b[m].cross(T_b_a.so3() * matches[m].x_a)) / across.squaredNorm());
+  }
+  return refine(rig, b, inliers, SE3(T_b_a.so3(), median(std::move(lengths)) * T_b_a.translation()));
+}
+
 /// Pose that explains most of the matches between b and the place's own view.
 std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                                    const VerificationOptions& options, VerificationReport& report) {
-  const std::vector<Match> matches = match_descriptors(rig, a, b, options);
+  const bool depth_in_b =
+      rig.kind != SensorKind::kMono ||
+      std::any_of(b.z.begin(), b.z.end(), [&](const auto& z) { return has_depth(z, options); });
+  const std::vector<Match> matches = match_descriptors(rig, a, b, options, depth_in_b);
   report.matches = static_cast<int>(matches.size());
-  const RigidEstimator estimator(rig, a, b, matches, options.max_stretch);
+  if (!depth_in_b) return pose_by_directions(rig, b, matches, options, report);
+  const SimilarityEstimator estimator(rig, a, b, matches, options.max_stretch);
   const auto found = ransac(estimator, RansacOptions{.threshold = options.ransac_error_px,
                                                      .max_iterations = options.max_iterations});
   if (!found) return std::nullopt;
@@ -232,7 +284,20 @@ std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, con
   if (report.ransac_inliers < options.min_hypothesis) return std::nullopt;
   std::vector<Match> inliers;
   for (const int i : found->inliers) inliers.push_back(matches[static_cast<std::size_t>(i)]);
-  return refine(rig, b, inliers, found->model);
+  return refine(rig, b, inliers, found->model.without_scale());
+}
+
+/// Median ratio of the depths that b has to those that the place gives it; 1 unless there is one camera.
+double scale_of(const Rig& rig, const PlaceAppearance& b, const std::vector<Match>& matches, const SE3& T_b_a,
+                const VerificationOptions& options) {
+  if (rig.kind != SensorKind::kMono) return 1;
+  std::vector<double> ratios;
+  for (const Match& match : matches) {
+    const Eigen::Vector3f& z_b = b.z[static_cast<std::size_t>(match.b)];
+    if (has_depth(z_b, options))
+      ratios.push_back(rig.depth_from_disparity(z_b.x() - z_b.z()) / (T_b_a * match.x_a).z());
+  }
+  return ratios.empty() ? 1 : median(std::move(ratios));
 }
 
 bool has_positions(const PlaceAppearance& view) {
@@ -269,7 +334,7 @@ std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const Placed
   if (r.inliers < options.min_inliers || r.inliers < options.min_inlier_share * r.guided || !r.well_spread) {
     return std::nullopt;
   }
-  return VerifiedPlace{T_b_a, r.inliers};
+  return VerifiedPlace{T_b_a, scale_of(rig, b, inliers, T_b_a, options), r.inliers};
 }
 
 }  // namespace twofold

@@ -39,8 +39,9 @@ struct PlacedView {
 };
 
 struct VerifiedPlace {
-  SE3 T_b_a;        ///< p_b = T_b_a * p_a  [m]
-  int inliers = 0;  ///< corners of b within the error bound, each of a corner of the place that has depth
+  SE3 T_b_a;         ///< p_b = T_b_a * p_a, in the unit of the place  [m]
+  double scale = 1;  ///< of the unit of b's depths: they are those of p_b times this. 1 but for one camera
+  int inliers = 0;   ///< corners of b within the error bound, each of a corner of the place that has depth
 };
 
 /// What became of a pair of views; for statistics and tests.
@@ -59,6 +60,12 @@ struct VerificationReport {
 /// sample (a rigid body keeps its lengths). From the pose found on, the corners of all views of the place are
 /// looked for in b: what one view missed, its neighbours may have. At least Theta inliers, well spread.
 /// Deterministic.
+///
+/// With one camera (rig.kind) depths come from the map (DepthRegression; rig.baseline is the one they were
+/// written with), those of b in a unit that may have drifted: the three points give a similarity (eq. 5.14).
+/// Such depths propose; what counts are positions in the image, and the scale is the median of all inliers'.
+/// When nothing is known of b's depths, five points propose, and the place's depths give the length of the
+/// way.
 ///
 /// @param place  the place's own view a first, with T_v_a = identity; then, if there are, its neighbours'
 [[nodiscard]] std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const PlacedView> place,

@@ -1,5 +1,6 @@
 #include "loopclosure/loop_closer.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace twofold {
@@ -12,17 +13,25 @@ LoopCloserOptions validated(const LoopCloserOptions& options) {
   return options;
 }
 
+/// With one camera, depths are written as if there was a second one at the map's unit of length.
+Rig with_baseline(Rig rig) {
+  if (rig.kind == SensorKind::kMono) rig.baseline = 1;
+  return rig;
+}
+
 }  // namespace
 
 LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary,
                        const LoopCloserOptions& options)
-    : rig_(rig),
+    : rig_(with_baseline(rig)),
       vocabulary_(std::move(vocabulary)),
       options_(validated(options)),
       describer_(rig, options.corners),
       recogniser_(vocabulary_->word_count(), options.recogniser),
       refinement_(rig, options.refinement),
-      probation_(options.probation) {}
+      probation_(rig.kind, options.probation),
+      depths_(rig.camera),
+      place_depths_(rig.camera) {}
 
 void LoopCloser::continue_from(const KeyframeDatabase& places) {
   places_ = places;
@@ -37,6 +46,11 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   if (!graph.contains(keyframe.id) || graph.keyframe(keyframe.id).culled()) return std::nullopt;
   PlaceView view = describer_.describe(keyframe.images, *vocabulary_);
 
+  const bool one_camera = rig_.kind == SensorKind::kMono;
+  if (one_camera) {
+    depths_.learn(graph, keyframe.id);
+    depths_.fill(view, rig_.baseline);
+  }
   // How much this scene's neighbouring views look alike; 0 at the start of a map.
   const double likeness = previous_ ? bag_score(view.bag, *previous_) : 0;
   const auto candidates = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
@@ -44,17 +58,25 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   for (const PlaceCandidate& candidate : candidates) {
     const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
     if (!verified) continue;
-    const LoopConstraint seen{graph.version(), candidate.keyframe, keyframe.id, verified->T_c_k,
-                              verified->inliers};
+    const auto scale = scale_of(*verified);
+    if (!scale) continue;
+    const SE3 T_to_from(verified->T_c_k.so3(), *scale * verified->T_c_k.translation());
+    const LoopConstraint seen{graph.version(), candidate.keyframe, keyframe.id,
+                              T_to_from,       verified->inliers,  *scale};
     if (probation_.confirms(seen, graph)) loop = seen;
     break;
   }
+  if (one_camera) view.z.clear();  // the map may change
   remember(keyframe.id, std::move(view));
   return loop;
 }
 
 std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, const GraphSnapshot& graph) {
-  const PlaceView view = describer_.describe(images, *vocabulary_);
+  PlaceView view = describer_.describe(images, *vocabulary_);
+  if (rig_.kind == SensorKind::kMono) {
+    for (const DescribedCorner& corner : view.corners)
+      view.z.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(Rig::kNoRight));
+  }
   const auto candidates = recogniser_.query_anywhere(
       view.bag, static_cast<std::size_t>(options_.relocalisation_candidates), graph);
   for (const PlaceCandidate& candidate : candidates) {
@@ -74,6 +96,7 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
     case RefinementOutcome::kRefined:
       return Relocalisation{k, refined.T_c_k, refined.inliers};
     case RefinementOutcome::kTooFewPoints:
+      if (rig_.kind == SensorKind::kMono) return std::nullopt;
       return Relocalisation{k, place->T_b_a, place->inliers};
     case RefinementOutcome::kContradicted:
       break;
@@ -81,14 +104,37 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
   return std::nullopt;
 }
 
+/// The unit of the keyframe at hand over that of the place: by the depths that the points of the place have
+/// from here, and those that the map gives the same positions in the image. Their median.
+std::optional<double> LoopCloser::scale_of(const Relocalisation& seen) const {
+  if (rig_.kind != SensorKind::kMono) return 1.0;
+  constexpr std::size_t kFewest = 12;
+  std::vector<double> ratios;
+  for (const MotionObservation& found : refinement_.found()) {
+    const auto depth = found.inlier ? depths_.depth_at(found.z.head<2>().cast<double>()) : std::nullopt;
+    if (depth) ratios.push_back(*depth / (seen.T_c_k * found.x_ref).z());
+  }
+  if (ratios.size() < kFewest) return std::nullopt;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
 /// The place's own view and those of its neighbours.
 void LoopCloser::collect_views(KeyframeId k, const GraphSnapshot& graph) {
   neighbours_.clear();
   direct_neighbours(graph, k, static_cast<std::size_t>(options_.place_views), neighbours_);
   views_.clear();
+  views_with_depth_.clear();
+  views_with_depth_.reserve(neighbours_.size());
   for (const KeyframeId n : neighbours_) {
     const PlaceAppearance* view = places_.find(n);
     if (view == nullptr) continue;
+    if (rig_.kind == SensorKind::kMono) {
+      place_depths_.learn(graph, n);
+      place_depths_.fill(views_with_depth_.emplace_back(*view), rig_.baseline);
+      view = &views_with_depth_.back();
+    }
     const SE3 T_n_k = n == k ? SE3() : relative_pose(graph, k, *find_edge(graph.keyframe(k), n));
     views_.push_back({view, T_n_k});
   }

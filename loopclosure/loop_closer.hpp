@@ -7,6 +7,7 @@
 #include "graph/keyframe_database.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
+#include "loopclosure/depth_regression.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/loop_probation.hpp"
 #include "loopclosure/place_recogniser.hpp"
@@ -40,6 +41,9 @@ struct Relocalisation {
 /// Remembers how the place of every keyframe looks. Reads snapshots, changes nothing: a loop goes to the
 /// mapper as a message. Single-threaded; the same calls give the same answers. A step's cost grows with the
 /// inverted file's lists only, and memory with the keyframes that are not culled.
+///
+/// One camera has no depth of its own corners: those of a place follow from the map (DepthRegression), and a
+/// loop is a similarity. It needs points of the map around both keyframes.
 class LoopCloser {
  public:
   LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
@@ -65,6 +69,7 @@ class LoopCloser {
   [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
                                                      const FrameImages& images, const GraphSnapshot& graph);
   void collect_views(KeyframeId k, const GraphSnapshot& graph);
+  [[nodiscard]] std::optional<double> scale_of(const Relocalisation& seen) const;
   void remember(KeyframeId id, PlaceView view);
 
   Rig rig_;
@@ -77,6 +82,10 @@ class LoopCloser {
   KeyframeDatabase places_;
   std::vector<KeyframeId> neighbours_;
   std::vector<PlacedView> views_;
+  // One camera only: depths of the keyframe at hand, and the places' views with those that the map gives
+  // them.
+  DepthRegression depths_, place_depths_;
+  std::vector<PlaceAppearance> views_with_depth_;
   std::optional<BagOfWords> previous_;  // of the keyframe described last
 };
 

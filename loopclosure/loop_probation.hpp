@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "camera/rig.hpp"
 #include "graph/loop_constraint.hpp"
 #include "graph/snapshot.hpp"
 
@@ -12,7 +13,11 @@ namespace twofold {
 struct ProbationOptions {
   double max_shift = 0.15;   ///< two loops agree up to so much of the scene's median depth ...
   double max_angle_deg = 6;  ///< ... and so much rotation
+  double max_scale = 0.05;   ///< ... and so much of the logarithm of the scale
   int patience = 12;         ///< keyframe numbers after which a loop that nobody confirmed is dropped
+  // Of one camera. Distances are counted in median depths: by that much the camera drifts alike in any scene.
+  double max_drift = 0.5;         ///< shift that a loop may correct, per distance travelled since
+  double max_scale_drift = 0.02;  ///< logarithm of the scale, likewise
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -22,11 +27,15 @@ struct ProbationOptions {
 /// is, where both its keyframes are of one part, or a second keyframe whose own loop agrees along the map's
 /// poses.
 ///
-/// Loops l and m agree when  T_m.to,m.from  =  T_m.to,l.to  T_l.to,l.from  T_l.from,m.from  up to the bounds,
-/// the outer two of the map.
+/// Loops l and m agree when  S_m.to,m.from  =  S_m.to,l.to  S_l.to,l.from  S_l.from,m.from  up to the bounds,
+/// the outer two of the map, of scale 1.
+///
+/// With one camera a loop may be of any scale. What it corrects is bounded by the distance travelled: a loop
+/// that says more is taken for a place that looks alike.
 class LoopProbation {
  public:
-  explicit LoopProbation(const ProbationOptions& options) : options_(options) {}
+  LoopProbation(SensorKind sensor, const ProbationOptions& options)
+      : scale_drifts_(sensor == SensorKind::kMono), options_(options) {}
 
   /// @param loop  verified between keyframes of `graph`; to be called in the order of loop.to
   /// @return whether it may join the map now; else it is held as a witness
@@ -35,8 +44,11 @@ class LoopProbation {
  private:
   [[nodiscard]] bool agree(const LoopConstraint& held, const LoopConstraint& loop,
                            const GraphSnapshot& graph) const;
-  [[nodiscard]] bool same_pose(const SE3& T_a, const SE3& T_b, double depth) const;
+  [[nodiscard]] bool same_pose(const Sim3& S_a, const Sim3& S_b, double depth) const;
+  [[nodiscard]] bool explained_by_drift(const Sim3& as_mapped, const LoopConstraint& loop,
+                                        const GraphSnapshot& graph) const;
 
+  bool scale_drifts_;
   ProbationOptions options_;
   std::vector<LoopConstraint> held_;
 };

@@ -51,6 +51,9 @@ std::string ProbationOptions::invalid_reason() const {
   return OptionCheck()
       .above("max_shift", max_shift, 0)
       .above("max_angle_deg", max_angle_deg, 0)
+      .above("max_scale", max_scale, 0)
+      .above("max_drift", max_drift, 0)
+      .above("max_scale_drift", max_scale_drift, 0)
       .at_least("patience", patience, 1)
       .reason();
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,8 @@ class PoseRefinement {
   /// @param result  set when refined
   [[nodiscard]] RefinementOutcome refine(const GraphSnapshot& graph, KeyframeId place,
                                          const FrameImages& images, const SE3& T_c_k, RefinedPlace& result);
+  /// What it found when it last refined a place, points in the place's frame; outliers included.
+  [[nodiscard]] std::span<const MotionObservation> found() const { return found_; }
 
  private:
   void collect_points(const GraphSnapshot& graph, KeyframeId place, const SE3& T_c_k);

@@ -13,6 +13,7 @@
 #include "mapping/metric_loop.hpp"
 #include "mapping/options.hpp"
 #include "mapping/pose_graph_optimisation.hpp"
+#include "mapping/similarity_loop.hpp"
 #include "mapping/window_builder.hpp"
 
 namespace twofold {
@@ -77,6 +78,13 @@ class Mapper {
   /// the update has. To be followed by a step.
   /// @return keyframes moved
   int take_pose_graph(const PoseGraphUpdate& update);
+
+  /// Before a loop of another scale is added: keyframes move into one unit (apply_similarities). To be
+  /// followed by a step.
+  /// @return what has changed its unit
+  std::vector<KeyframeScaling> take_similarities(const SimilarityUpdate& update) {
+    return apply_similarities(writer_, update);
+  }
 
   /// Makes all poses agree globally, e.g. at the end of a run. Cost grows with the map.
   PoseGraphReport optimise_all_poses();

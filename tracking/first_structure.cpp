@@ -15,12 +15,13 @@
 namespace twofold {
 namespace {
 
-constexpr double kSignificant = 2;          // standard deviations
-constexpr double kMostBehind = 0.1;         // share of significant depths that may have the wrong sign
-constexpr double kPlaneShare = 0.9;         // explained by a homography: the scene may be a plane
-constexpr double kOutlierChi2 = 9.21;       // 99 % of chi-square with 2 degrees of freedom
+constexpr double kSignificant = 2;     // standard deviations
+constexpr double kMostBehind = 0.1;    // share of significant depths that may have the wrong sign
+constexpr double kPlaneShare = 0.6;    // explained by a homography: the scene may be a plane
+constexpr double kOutlierChi2 = 9.21;  // 99 % of chi-square with 2 degrees of freedom
+constexpr double kGrossChi2 = 50;      // beyond this before the adjustment, a corner follows something else
 constexpr double kUsableDepthError = 0.25;  // of a point that joins the first map
-constexpr double kDecisiveChi2 = 15;        // by which one motion must explain all better than another
+constexpr double kDecisiveChi2 = 32;        // by which one motion must explain all better than another
 constexpr int kAdjustmentSteps = 15;
 
 std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vector2>& pixels) {
@@ -102,26 +103,40 @@ class Attempt {
     return rotation && rotation->R_b_a.log().norm() * rig_.camera.fx > options_.min_flow_px;
   }
 
+  /// One motion tried: the frames as it explains them. Corners that it does not are put aside.
+  struct Trial {
+    AnchoredViews views;
+    std::vector<int> corners;  ///< in step with views.points, and with what each view has seen
+    double cost = std::numeric_limits<double>::infinity();
+  };
+
   /// The structure of the motion that explains all frames best, if no other one does nearly as well.
   tl::expected<FirstStructure, LostCause> best_of(const std::vector<SE3>& motions) const {
-    std::vector<AnchoredViews> adjusted;
-    std::vector<double> costs;
+    std::vector<Trial> trials;
     for (const SE3& T_last_first : motions) {
-      auto views = triangulate(T_last_first);
-      if (!views || !views->minimise(kAdjustmentSteps)) continue;
-      std::size_t support = 0;
-      costs.push_back(capped_cost(*views, support));
-      if (!enough(support)) costs.back() = std::numeric_limits<double>::infinity();
-      adjusted.push_back(*std::move(views));
+      if (auto trial = triangulate(T_last_first); trial && adjust(*trial))
+        trials.push_back(*std::move(trial));
     }
-    if (costs.empty()) return tl::unexpected(LostCause::kNoCommonMotion);
-    const auto best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-    if (!std::isfinite(costs[best])) return tl::unexpected(LostCause::kNoCommonMotion);
-    for (std::size_t m = 0; m < costs.size(); ++m) {
-      if (costs[m] < costs[best] + kDecisiveChi2 && differ(adjusted[m], adjusted[best]))
+    if (trials.empty()) return tl::unexpected(LostCause::kNoCommonMotion);
+    const Trial& best =
+        *std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) { return a.cost < b.cost; });
+    for (const Trial& other : trials) {
+      if (other.cost < best.cost + kDecisiveChi2 && differ(other.views, best.views))
         return tl::unexpected(LostCause::kPlaneUndecided);
     }
-    return collect(adjusted[best]);
+    return collect(best);
+  }
+
+  /// Bundle adjustment without the corners that follow something else.
+  /// @return false when too few are left
+  bool adjust(Trial& trial) const {
+    for (const double bound : {kGrossChi2, kOutlierChi2}) {
+      put_outliers_aside(bound, trial);
+      if (!enough(trial.corners.size()) || !trial.views.minimise(kAdjustmentSteps)) return false;
+    }
+    put_outliers_aside(kOutlierChi2, trial);
+    trial.cost = cost(trial);
+    return enough(trial.corners.size());
   }
 
   /// Two starts that came to different minima.
@@ -133,32 +148,55 @@ class Attempt {
            T_a.translation().normalized().dot(T_b.translation().normalized()) < kSameDirection;
   }
 
-  /// Squared whitened errors of all corners in all frames; an outlier counts no more than one.
-  /// @param support  corners that are none
-  [[nodiscard]] double capped_cost(const AnchoredViews& views, std::size_t& support) const {
-    double sum = 0;
-    for (std::size_t k = 0; k < views.points.size(); ++k) {
-      const AnchoredViews::Point& point = views.points[k];
-      const Vector3 moved = point.psi - point.psi_prior;
-      double chi2 = moved.dot(point.prior * moved);
-      for (const AnchoredViews::View& view : views.views) {
-        const auto p = project_inverse_depth(rig_, view.T_c_a, point.psi);
-        chi2 += p ? ((p->z_hat - view.seen[k].z).head<2>() / options_.sigma_px).squaredNorm() : kOutlierChi2;
-      }
-      sum += std::min(chi2, kOutlierChi2);
-      if (chi2 < kOutlierChi2) ++support;
-    }
-    return sum;
+  /// Squared whitened error of a point in the frame that it fits least.
+  [[nodiscard]] double worst_chi2(const AnchoredViews& views, std::size_t k) const {
+    double worst = prior_chi2(views.points[k]);
+    for (const AnchoredViews::View& view : views.views)
+      worst = std::max(worst, chi2(view, views.points[k], k));
+    return worst;
+  }
+  [[nodiscard]] static double prior_chi2(const AnchoredViews::Point& point) {
+    const Vector3 moved = point.psi - point.psi_prior;
+    return moved.dot(point.prior * moved);
+  }
+  [[nodiscard]] double chi2(const AnchoredViews::View& view, const AnchoredViews::Point& point,
+                            std::size_t k) const {
+    const auto p = project_inverse_depth(rig_, view.T_c_a, point.psi);
+    if (!p) return std::numeric_limits<double>::infinity();
+    return ((p->z_hat - view.seen[k].z).head<2>() / options_.sigma_px).squaredNorm();
   }
 
-  /// Depths of the inliers by the motion from first to last frame, and the pose of the frame between, by
+  void put_outliers_aside(double bound, Trial& trial) const {
+    AnchoredViews& views = trial.views;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < views.points.size(); ++k) {
+      if (!(worst_chi2(views, k) < bound)) continue;
+      views.points[kept] = views.points[k];
+      trial.corners[kept] = trial.corners[k];
+      for (AnchoredViews::View& view : views.views)
+        view.seen[kept] = {static_cast<int>(kept), view.seen[k].z};
+      ++kept;
+    }
+    views.points.resize(kept);
+    trial.corners.resize(kept);
+    for (AnchoredViews::View& view : views.views) view.seen.resize(kept);
+  }
+
+  /// Squared whitened errors of all inliers in all frames; one put aside counts as the worst that is not.
+  [[nodiscard]] double cost(const Trial& trial) const {
+    const auto aside = static_cast<double>(inliers_.size() - trial.corners.size());
+    return trial.views.cost() + aside * kOutlierChi2;
+  }
+
+  /// Depths of the inliers by the motion from first to last frame, and the poses of the frames between, by
   /// them.
   /// @return  nothing when they would be behind the camera
-  std::optional<AnchoredViews> triangulate(const SE3& T_last_first) const {
-    AnchoredViews views;
+  std::optional<Trial> triangulate(const SE3& T_last_first) const {
+    Trial trial{{}, inliers_};
+    AnchoredViews& views = trial.views;
     views.rig = rig_;
     views.sigma_px = options_.sigma_px;
-    std::vector<MotionObservation> seen_between;
+    std::vector<char> usable;  // of the inliers, in step: its depth is known
     int in_front = 0, behind = 0;
     for (const int i : inliers_) {
       const auto n = static_cast<std::size_t>(i);
@@ -172,47 +210,64 @@ class Attempt {
       const InverseDepthFilter own =
           InverseDepthFilter::from_mono(rig_.camera, views_.first[n], options_.sigma_px, std::max(q, 1e-3));
       views.points.push_back({own.psi, own.psi, own.information});
-      if (q <= kSignificant * sigma) continue;
-      MotionObservation o;
-      o.x_ref = from_inverse_depth(own.psi);
-      o.z << views_.between[n].cast<float>(), 0;
-      o.information.setConstant(static_cast<float>(1 / (options_.sigma_px * options_.sigma_px)));
-      o.information.z() = 0;
-      seen_between.push_back(o);
+      usable.push_back(q > kSignificant * sigma);
     }
     if (behind > kMostBehind * (in_front + behind)) return std::nullopt;
-    const MotionOnlyResult between = optimise_motion(rig_, seen_between, SE3::exp(0.5 * T_last_first.log()),
-                                                     {.inlier_chi2_mono = kOutlierChi2});
-    views.views.resize(2);
-    views.views[0].T_c_a = T_last_first;
-    views.views[1].T_c_a = between.T_c_ref;
-    for (std::size_t k = 0; k < inliers_.size(); ++k) {
-      const auto n = static_cast<std::size_t>(inliers_[k]);
-      const int point = static_cast<int>(k);
-      views.views[0].seen.push_back({point, {views_.last[n].x(), views_.last[n].y(), Rig::kNoRight}});
-      views.views[1].seen.push_back({point, {views_.between[n].x(), views_.between[n].y(), Rig::kNoRight}});
+    views.views.push_back({T_last_first, seen(views_.last)});
+    const auto pieces = static_cast<double>(views_.between.size() + 1);
+    for (std::size_t b = 0; b < views_.between.size(); ++b) {
+      const double share = static_cast<double>(b + 1) / pieces;
+      const SE3 start = SE3::exp(share * T_last_first.log());
+      views.views.push_back(
+          {pose_by(views.points, usable, views_.between[b], start), seen(views_.between[b])});
     }
-    return views;
+    return trial;
   }
 
-  /// Standard deviation of the point's inverse depth over that, given the poses; infinite for an outlier.
+  /// The inliers as a frame saw them.
+  [[nodiscard]] std::vector<SeenPoint> seen(const std::vector<Vector2>& pixels) const {
+    std::vector<SeenPoint> result;
+    for (std::size_t k = 0; k < inliers_.size(); ++k) {
+      const Vector2& uv = pixels[static_cast<std::size_t>(inliers_[k])];
+      result.push_back({static_cast<int>(k), {uv.x(), uv.y(), Rig::kNoRight}});
+    }
+    return result;
+  }
+
+  /// Pose of a frame by the points whose depth is known.
+  [[nodiscard]] SE3 pose_by(const std::vector<AnchoredViews::Point>& points, const std::vector<char>& usable,
+                            const std::vector<Vector2>& pixels, const SE3& start) const {
+    std::vector<MotionObservation> observations;
+    for (std::size_t k = 0; k < inliers_.size(); ++k) {
+      if (!usable[k]) continue;
+      MotionObservation o;
+      o.x_ref = from_inverse_depth(points[k].psi);
+      o.z << pixels[static_cast<std::size_t>(inliers_[k])].cast<float>(), 0;
+      o.information.setConstant(static_cast<float>(1 / (options_.sigma_px * options_.sigma_px)));
+      o.information.z() = 0;
+      observations.push_back(o);
+    }
+    return optimise_motion(rig_, observations, start, {.inlier_chi2_mono = kOutlierChi2}).T_c_ref;
+  }
+
+  /// Standard deviation of the point's inverse depth over that, given the poses; infinite behind infinity.
+  /// By the last frame and one half way: more of them have followed the corner with the same error.
   [[nodiscard]] double depth_error(const AnchoredViews& views, std::size_t k) const {
     InverseDepthFilter filter;
     filter.psi = views.points[k].psi;
     filter.information = views.points[k].prior;
     if (!(filter.psi.z() > 0)) return std::numeric_limits<double>::infinity();
-    for (const AnchoredViews::View& view : views.views) {
-      const auto p = project_inverse_depth(rig_, view.T_c_a, filter.psi);
+    for (const std::size_t v : {std::size_t{0}, views.views.size() / 2}) {
+      const auto p = project_inverse_depth(rig_, views.views[v].T_c_a, filter.psi);
       if (!p) return std::numeric_limits<double>::infinity();
-      const Vector2 error = (p->z_hat - view.seen[k].z).head<2>() / options_.sigma_px;
-      if (error.squaredNorm() > kOutlierChi2) return std::numeric_limits<double>::infinity();
       const Matrix23 J = p->J_psi.topRows<2>() / options_.sigma_px;
       filter.information += J.transpose() * J;
     }
     return filter.inverse_depth_sigma() / filter.psi.z();
   }
 
-  tl::expected<FirstStructure, LostCause> collect(const AnchoredViews& views) const {
+  tl::expected<FirstStructure, LostCause> collect(const Trial& trial) const {
+    const AnchoredViews& views = trial.views;
     FirstStructure structure;
     std::vector<double> errors, depths;
     for (std::size_t k = 0; k < views.points.size(); ++k) {
@@ -220,7 +275,7 @@ class Attempt {
       if (!std::isfinite(error)) continue;
       errors.push_back(error);
       if (error > kUsableDepthError) continue;
-      structure.corners.push_back(inliers_[k]);
+      structure.corners.push_back(trial.corners[k]);
       structure.psi.push_back(views.points[k].psi);
       depths.push_back(1 / views.points[k].psi.z());
     }

@@ -24,10 +24,11 @@ struct FirstStructureOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// Corners followed through three frames of one camera, in step with each other: level-0 pixels in the first
-/// frame, in one between, and in the last.
+/// Corners followed through some frames of one camera, in step with each other: level-0 pixels in the first
+/// frame, in one or more between, in their order, and in the last.
 struct CornerViews {
-  std::vector<Vector2> first, between, last;
+  std::vector<Vector2> first, last;
+  std::vector<std::vector<Vector2>> between;
 };
 
 /// What the frames show of camera and scene, in a unit of its own: the median depth of the points is one.
@@ -42,10 +43,11 @@ struct FirstStructure {
 ///
 /// Most of what the essential matrix explains must be beyond any rotation: a camera that turns on the spot
 /// gives no depth, and of a standing one before which something moves, most corners stand. Where a
-/// homography explains as much, the scene may be a plane, of which two motions give the same first and last
-/// view: the frame between tells which, or the start has to wait. Depths are those of a bundle adjustment of
-/// all three frames (thesis 4.5.3). Points so far away that they may be behind infinity by noise neither vote
-/// nor veto.
+/// homography explains about as much, the scene may be a plane, of which two motions give the same first and
+/// last view: its motions are tried beside that of the essential matrix. All frames decide, because the views
+/// of a third one from elsewhere fit only the true motion; where two fit them all, the start has to wait.
+/// Depths are those of a bundle adjustment of all frames (thesis 4.5.3). Points so far away that they may be
+/// behind infinity by noise neither vote nor veto.
 ///
 /// Deterministic. Allocates; its work is bounded by the number of corners and max_samples.
 /// @return  otherwise why not: kTooFewCorners, kTooLittleParallax, kRotatingOnly, kNoCommonMotion,

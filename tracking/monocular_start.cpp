@@ -9,6 +9,7 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kCandidates = 4;
+constexpr std::size_t kMostBetween = 4;      // frames between a candidate and now that tell motions apart
 constexpr double kNextCandidateFlow = 0.03;  // of the image's width: a new candidate is worth its place
 constexpr double kFewestLeft = 0.4;          // share of its corners below which a candidate is given up
 
@@ -32,10 +33,6 @@ TrackerOptions with_cells_for(const Rig& rig, TrackerOptions options) {
   return options;
 }
 
-bool power_of_two(int n) {
-  return (n & (n - 1)) == 0;
-}
-
 }  // namespace
 
 MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
@@ -44,8 +41,6 @@ MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
   for (StartCandidate& candidate : candidates_) {
     allocate_images(rig, candidate.images);
     candidate.corners.reserve(corners);
-    candidate.between.reserve(corners);
-    candidate.newer.reserve(corners);
   }
   allocate_images(rig, last_);
   order_.reserve(kCandidates);
@@ -76,30 +71,46 @@ tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameIm
 }
 
 void MonocularStart::follow(const FrameImages& images, StartCandidate& candidate) const {
+  remember_place(candidate);
   ++candidate.age;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidate.corners.size(); ++i) {
     if (!follow_corner(last_.left, images.left, candidate.corners[i])) continue;
     candidate.corners[kept] = candidate.corners[i];
-    candidate.between[kept] = candidate.between[i];
-    candidate.newer[kept++] = candidate.newer[i];
+    for (auto& places : candidate.between) places[kept] = places[i];
+    ++kept;
   }
   candidate.corners.resize(kept);
-  candidate.between.resize(kept);
-  candidate.newer.resize(kept);
-  if (!power_of_two(candidate.age)) return;
-  candidate.between = candidate.newer;
-  for (std::size_t i = 0; i < kept; ++i) candidate.newer[i] = candidate.corners[i].uv;
+  for (auto& places : candidate.between) places.resize(kept);
+}
+
+/// Every stride-th frame is one between. When they are too many, every second one goes.
+void MonocularStart::remember_place(StartCandidate& candidate) {
+  if (candidate.age == 0 || candidate.age % candidate.stride != 0) return;
+  auto& between = candidate.between;
+  if (between.size() == kMostBetween) {
+    for (std::size_t b = 0; 2 * b + 1 < between.size(); ++b) std::swap(between[b], between[2 * b + 1]);
+    between.resize(kMostBetween / 2);
+    candidate.stride *= 2;
+    if (candidate.age % candidate.stride != 0) return;
+  }
+  auto& places = between.emplace_back();
+  for (const FollowedCorner& corner : candidate.corners) places.push_back(corner.uv);
 }
 
 tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandidate& candidate) const {
-  if (candidate.age < 2) return tl::unexpected(LostCause::kTooLittleParallax);  // there is no frame between
+  if (candidate.between.empty()) return tl::unexpected(LostCause::kTooLittleParallax);
+  const auto as_pixels = [](const std::vector<Eigen::Vector2f>& places) {
+    std::vector<Vector2> pixels;
+    for (const Eigen::Vector2f& uv : places) pixels.push_back(uv.cast<double>());
+    return pixels;
+  };
   CornerViews views;
-  for (std::size_t i = 0; i < candidate.corners.size(); ++i) {
-    views.first.push_back(candidate.corners[i].appearance.uv.cast<double>());
-    views.between.push_back(candidate.between[i].cast<double>());
-    views.last.push_back(candidate.corners[i].uv.cast<double>());
+  for (const FollowedCorner& corner : candidate.corners) {
+    views.first.push_back(corner.appearance.uv.cast<double>());
+    views.last.push_back(corner.uv.cast<double>());
   }
+  for (const auto& places : candidate.between) views.between.push_back(as_pixels(places));
   return first_structure(rig_, views, options_.first_structure);
 }
 
@@ -131,11 +142,9 @@ void MonocularStart::fill(StartCandidate& candidate, const FrameImages& images, 
   starter_.choose_corners(images, appearances_);
   candidate.corners.clear();
   candidate.between.clear();
-  candidate.newer.clear();
+  candidate.stride = 1;
   for (const PointAppearance& appearance : appearances_) {
     candidate.corners.push_back({appearance, appearance.uv, std::nullopt});
-    candidate.between.push_back(appearance.uv);
-    candidate.newer.push_back(appearance.uv);
   }
   candidate.corners_at_first = candidate.corners.size();
 }

@@ -21,9 +21,9 @@ struct StartCandidate {
   FrameImages images;
   std::vector<FollowedCorner> corners;  ///< those still seen
   std::size_t corners_at_first = 0;
-  /// In step with `corners`: where they were at an age of a quarter to a half of the present one, and at the
-  /// last age that was a power of two, which is the next such place.
-  std::vector<Eigen::Vector2f> between, newer;
+  /// In step with `corners`: where they were at the ages stride, 2 stride, ... before the present one.
+  std::vector<std::vector<Eigen::Vector2f>> between;
+  int stride = 1;
 };
 
 /// The start as the tracker takes it over.
@@ -48,6 +48,7 @@ class MonocularStart {
 
  private:
   void follow(const FrameImages& images, StartCandidate& candidate) const;
+  static void remember_place(StartCandidate& candidate);
   [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
   void renew_candidates(const FrameImages& images, const Frame& frame);
   void fill(StartCandidate& candidate, const FrameImages& images, const Frame& frame);

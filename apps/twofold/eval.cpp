@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -72,10 +73,15 @@ void print_row(const char* name, const char* unit, const ErrorStatistics& s) {
 }
 
 void print_table(const EvalArguments& arguments, const Evaluation& e, bool has_times) {
-  fmt::print("{} against {}\n{} poses, path {:.3f} m, align {}, scale {:.6f}, ATE {:.4f} % of the path\n\n",
+  fmt::print("{} against {}\n{} poses, path {:.3f} m, align {}, scale {:.6f}, ATE {:.4f} % of the path\n",
              arguments.estimate, arguments.truth, e.pairs.size(), e.path_length, name_of(arguments.alignment),
              e.S_w_e.scale(), e.path_length > 0 ? 100 * e.absolute.rmse / e.path_length : 0.0);
-  fmt::print("{:<22} {:>4} {:>6} {:>11} {:>11} {:>11} {:>11} {:>11}\n", "", "unit", "count", "rmse", "mean",
+  if (e.half_scales) {
+    const auto& [first, second] = *e.half_scales;
+    fmt::print("scale of the halves {:.6f} and {:.6f}, {:.3f} % apart\n", first, second,
+               100 * std::abs(std::log(second / first)));
+  }
+  fmt::print("\n{:<22} {:>4} {:>6} {:>11} {:>11} {:>11} {:>11} {:>11}\n", "", "unit", "count", "rmse", "mean",
              "median", "std", "max");
   print_row("ATE", "m", e.absolute);
   print_row("ATE rotation", "deg", e.absolute_rotation_deg);
@@ -114,6 +120,7 @@ std::string json_text(const EvalArguments& arguments, const Evaluation& e, bool 
                                 {"translation_m", {t.x(), t.y(), t.z()}}}},
                               {"ate_m", to_json(e.absolute)},
                               {"ate_rotation_deg", to_json(e.absolute_rotation_deg)}};
+  if (e.half_scales) json["half_scales"] = *e.half_scales;
   if (has_times) json["rpe_1s"] = to_json(e.per_second);
   json["rpe_1m"] = to_json(e.per_metre);
   return json.dump(2) + "\n";

@@ -63,6 +63,8 @@ void expect_rig_of_map(const MapArguments& arguments, const std::string& source,
                        const EngineOptions& options) {
   if (!options.map) return;
   const std::string difference = rig_difference(rig, options.map->rig);
+  if (difference.empty() && rig.kind != options.map->rig.kind && !options.localise_only)
+    throw IoError(arguments.load, "is a stereo or RGB-D rig's: one camera needs --localise-only in it");
   if (difference.empty()) return;
   throw IoError(arguments.load, "made with another camera than that of " + source + ": " + difference);
 }

@@ -77,6 +77,7 @@ Json loops_json(const RunResult& result) {
                      {"from", index(loop.constraint.from)},
                      {"to", index(loop.constraint.to)},
                      {"inliers", loop.constraint.inliers},
+                     {"scale", loop.constraint.scale},
                      {"joins_parts", loop.joins_parts},
                      {"drift_m", loop.joins_parts ? Json() : Json(drift.head<3>().norm())},
                      {"drift_rad", loop.joins_parts ? Json() : Json(drift.tail<3>().norm())}});

@@ -29,6 +29,7 @@ TEST(EvalCommand, WritesTableJsonAndPlot) {
   EXPECT_NE(outcome.out.find("RPE over 1 s"), std::string::npos);
   const auto json = nlohmann::json::parse(content(folder / "e.json"));
   EXPECT_NEAR(json["alignment"]["scale"].get<double>(), 2.0, 1e-6);
+  EXPECT_NEAR(json["half_scales"][1].get<double>(), 2.0, 1e-5);
   EXPECT_LT(json["ate_m"]["rmse"].get<double>(), 1e-6);
   EXPECT_EQ(json["poses"], 60);
   EXPECT_EQ(cv::imread(folder / "e.png").empty(), false);

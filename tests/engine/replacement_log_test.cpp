@@ -68,6 +68,41 @@ TEST(ReplacementLog, FramesOfForgottenKeyframesKeepTheirPlace) {
   EXPECT_FALSE(forgetful.graph().live_replacement(before[0].reference));
 }
 
+/// Frames before and after a loop scaled their keyframe, one of which was culled later: each is as far from
+/// it as the final unit says.
+TEST(ReplacementLog, FramesAreScaledWithTheirKeyframes) {
+  GraphWriter writer;
+  for (std::uint32_t k = 0; k < 2; ++k) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{k};
+    keyframe.T_k_w = SE3(SO3(), Vector3(-1.0 * k, 0, 0));
+    writer.add_keyframe(keyframe);
+  }
+  ReplacementLog log;
+  ChunkedVector<FrameRecord> frames;
+  const auto track = [&](std::uint64_t version) {
+    FrameRecord frame;
+    frame.state = FrameState::kTracked;
+    frame.reference = KeyframeId{0};
+    frame.snapshot_version = version;
+    frame.T_c_ref = PackedPose(SE3(SO3(), Vector3(0, 0, 1)));
+    frames.push_back(frame);
+  };
+  track(1);
+  frames.push_back({.state = FrameState::kDropped});
+  log.add_scaling(2, {{KeyframeId{0}, 3}});
+  track(2);
+  writer.cull_keyframe(KeyframeId{0}, KeyframeId{1});  // one to the left of its replacement
+  log.add(KeyframeId{0}, writer.graph());
+  log.add_scaling(4, {{KeyframeId{1}, 2}});
+  log.hang_on_live_keyframes(frames);
+  for (const auto& [n, depth] : {std::pair{0, 6.0}, {2, 2.0}}) {
+    const FrameRecord& frame = frames[static_cast<std::size_t>(n)];
+    EXPECT_EQ(frame.reference, KeyframeId{1});
+    EXPECT_LT((frame.T_c_ref.unpacked().translation() - Vector3(2, 0, depth)).norm(), 1e-12) << n;
+  }
+}
+
 TEST(ReplacementLogDeathTest, TakesDownOnlyWhatTheMapStillKnows) {
   GraphWriter writer;
   for (std::uint32_t k = 0; k < 2; ++k) {

@@ -68,6 +68,20 @@ TEST(Evaluation, Sim3AlignmentIsTheLeastSquaresOne) {
   }
 }
 
+TEST(Evaluation, TellsTheScaleOfEachHalf) {
+  const auto truth = helix(200);
+  auto estimate = moved(truth, Sim3(0.5, SO3(), Vector3(1, 2, 3)));
+  const auto second = moved(truth, Sim3(0.4, SO3::exp(Vector3(0, 0.2, 0)), Vector3(3, 0, 1)));
+  std::copy(second.begin() + 100, second.end(), estimate.begin() + 100);
+  const auto pairs = associate(estimate, truth, 0);
+  const auto evaluation = evaluate(pairs, {.alignment = Alignment::kSim3});
+  ASSERT_TRUE(evaluation && evaluation->half_scales);
+  EXPECT_NEAR((*evaluation->half_scales)[0], 2, 1e-9);
+  EXPECT_NEAR((*evaluation->half_scales)[1], 2.5, 1e-9);
+  EXPECT_FALSE(evaluate(pairs, {.alignment = Alignment::kSe3})->half_scales);
+  EXPECT_FALSE(scales_of_halves({pairs.begin(), pairs.begin() + 5}));
+}
+
 TEST(Evaluation, RelativeErrorOfAKnownDrift) {
   // 1 m a second along x, estimate 2 % too long: 0.02 m a second and a metre, whatever the alignment.
   Trajectory truth, estimate;

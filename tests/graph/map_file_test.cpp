@@ -305,6 +305,10 @@ TEST_F(MapFileTest, RigsThatDifferAreTold) {
   other = rig;
   other.kind = SensorKind::kRgbd;
   EXPECT_EQ(rig_difference(other, rig), "sensor is RGB-D, the map's is stereo");
+  other.kind = SensorKind::kMono;
+  other.baseline = 0;
+  EXPECT_EQ(rig_difference(other, rig), "") << "the left camera alone finds itself in the map of both";
+  EXPECT_NE(rig_difference(rig, other), "");
   other = rig;
   other.camera.cx *= 1 + 1e-9;
   other.depth_max = 5;

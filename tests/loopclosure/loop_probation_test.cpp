@@ -35,7 +35,7 @@ class LoopProbationTest : public ::testing::Test {
   const SE3 wrong_{SO3(), Vector3(1, 0, 0)};  // beyond 0.15 of the depth
   GraphWriter writer_;
   GraphSnapshot graph_;
-  LoopProbation probation_{{}};
+  LoopProbation probation_{SensorKind::kStereo, {}};
 };
 
 TEST_F(LoopProbationTest, OneAloneWaitsTwoThatAgreeJoin) {
@@ -71,7 +71,7 @@ TEST_F(LoopProbationTest, TheMapItselfIsAWitness) {
 TEST_F(LoopProbationTest, PatienceEnds) {
   ProbationOptions options;
   options.patience = 3;
-  LoopProbation probation(options);
+  LoopProbation probation(SensorKind::kStereo, options);
   EXPECT_FALSE(probation.confirms(loop(1, 11), graph_));
   EXPECT_FALSE(probation.confirms(loop(1, 15), graph_));
   EXPECT_TRUE(probation.confirms(loop(1, 18), graph_));
@@ -85,6 +85,23 @@ TEST_F(LoopProbationTest, PartsAreJoinedByTwo) {
   EXPECT_FALSE(probation_.confirms(loop(1, 21), graph_));
   EXPECT_FALSE(probation_.confirms(loop(2, 22, wrong_), graph_));
   EXPECT_TRUE(probation_.confirms(loop(2, 23), graph_));
+}
+
+/// One camera's unit may have drifted, but not by more than the way explains.
+TEST_F(LoopProbationTest, OneCameraMayHaveDriftedByAsMuchAsItWent) {
+  const auto scaled = [](std::uint32_t from, std::uint32_t to, double scale) {
+    LoopConstraint constraint = loop(from, to);
+    constraint.scale = scale;
+    constraint.T_to_from.translation() *= scale;
+    return constraint;
+  };
+  for (const double scale : {1.04, 1.5}) {
+    LoopProbation probation(SensorKind::kMono, {});
+    EXPECT_FALSE(probation.confirms(scaled(1, 11, scale), graph_));
+    EXPECT_EQ(probation.confirms(scaled(3, 12, scale), graph_), scale < 1.1) << scale;
+  }
+  EXPECT_FALSE(probation_.confirms(scaled(1, 11, 1.02), graph_));
+  EXPECT_FALSE(probation_.confirms(scaled(3, 12, 1.1), graph_)) << "of different scale, they do not agree";
 }
 
 }  // namespace

@@ -1,0 +1,63 @@
+#include "loopclosure/depth_regression.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kNeighbours = 3;
+constexpr double kFarthestShare = 0.04;  // of the image's width: a farther point says nothing
+constexpr double kSteepest = 1.25;       // ratio of the neighbours' depths
+constexpr double kSamePlace = 1.0;       // [px] distances below this weigh alike
+
+}  // namespace
+
+void DepthRegression::learn(const GraphSnapshot& graph, KeyframeId k) {
+  samples_.clear();
+  const Keyframe& keyframe = graph.keyframe(k);
+  for (const Observation& observation : *keyframe.observations) {
+    const double depth = (keyframe.T_k_w * graph.position(observation.point)).z();
+    if (depth > 0) samples_.push_back({observation.z.head<2>().cast<double>(), 1 / depth});
+  }
+}
+
+std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
+  struct Neighbour {
+    double distance = std::numeric_limits<double>::infinity();
+    double inverse_depth = 0;
+  };
+  std::array<Neighbour, kNeighbours> nearest;
+  for (const Sample& sample : samples_) {
+    const double distance = (sample.uv - uv).norm();
+    if (distance >= nearest.back().distance) continue;
+    nearest.back() = {distance, sample.inverse_depth};
+    for (std::size_t n = kNeighbours - 1; n > 0 && nearest[n].distance < nearest[n - 1].distance; --n)
+      std::swap(nearest[n], nearest[n - 1]);
+  }
+  double sum = 0, weights = 0;
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  for (const Neighbour& neighbour : nearest) {
+    if (neighbour.distance > kFarthestShare * camera_.width) break;
+    const double distance = std::max(neighbour.distance, kSamePlace);
+    const double weight = 1 / (distance * distance);
+    sum += weight * neighbour.inverse_depth;
+    weights += weight;
+    least = std::min(least, neighbour.inverse_depth);
+    most = std::max(most, neighbour.inverse_depth);
+  }
+  if (!(sum > 0) || most > kSteepest * least) return std::nullopt;
+  return weights / sum;
+}
+
+void DepthRegression::fill(PlaceAppearance& view, double baseline) const {
+  view.z.clear();
+  for (const DescribedCorner& corner : view.corners) {
+    const auto depth = depth_at(corner.uv.cast<double>());
+    const double u_r = depth ? corner.uv.x() - camera_.fx * baseline / *depth : Rig::kNoRight;
+    view.z.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(u_r));
+  }
+}
+
+}  // namespace twofold
