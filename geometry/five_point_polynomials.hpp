@@ -39,8 +39,8 @@ inline constexpr auto kProduct = [] {
   return table;
 }();
 
-/// Products of polynomials. Functions of their own: unrolled into every sum of them, the ten constraints take a compiler
-/// most of a minute.
+/// Products of polynomials. Functions of their own: unrolled into every sum of them, the ten constraints take
+/// a compiler most of a minute.
 [[nodiscard, gnu::noinline]] inline Quadratic product(const Linear& p, const Linear& q) {
   Quadratic r = Quadratic::Zero();
   for (int i = 0; i < 4; ++i) {

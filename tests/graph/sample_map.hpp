@@ -13,7 +13,8 @@ namespace twofold::testing {
 inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
   std::mt19937 rng(seed);
   std::uniform_real_distribution<double> number(-1, 1);
-  // One draw a statement: compilers evaluate arguments in orders of their own, and files of older formats hold this map.
+  // One draw a statement: compilers evaluate arguments in orders of their own, and files of older formats
+  // hold this map.
   const auto vector = [&] {
     const double z = number(rng);
     const double y = number(rng);
