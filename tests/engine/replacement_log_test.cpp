@@ -89,7 +89,9 @@ TEST(ReplacementLog, FramesAreScaledWithTheirKeyframes) {
     frames.push_back(frame);
   };
   track(1);
-  frames.push_back({.state = FrameState::kDropped});
+  FrameRecord dropped;
+  dropped.state = FrameState::kDropped;
+  frames.push_back(dropped);
   log.add_scaling(2, {{KeyframeId{0}, 3}});
   track(2);
   writer.cull_keyframe(KeyframeId{0}, KeyframeId{1});  // one to the left of its replacement
