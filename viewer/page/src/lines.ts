@@ -31,7 +31,7 @@ function grown(array: Float32Array): Float32Array<ArrayBuffer> {
   return larger;
 }
 
-/** Lines of a width in pixels; of those that are drawn over each other, the one of higher order is on top. */
+/** Lines of a width in pixels: renderers without a graphics processor draw them many times faster than WebGL's own. Of those that are drawn over each other, the one of higher order is on top. */
 export class WideLines {
   readonly object: LineSegments2;
   readonly segments = new Segments();
@@ -66,35 +66,5 @@ export class WideLines {
 }
 
 export function wide(width: number, opacity = 1): LineMaterial {
-  return new LineMaterial({linewidth: width, vertexColors: true, transparent: true, opacity});
-}
-
-/** Lines one pixel wide, for many. */
-export class ThinLines {
-  readonly object: THREE.LineSegments;
-  readonly segments = new Segments();
-  private room = 0;
-
-  constructor(opacity: number) {
-    const material = new THREE.LineBasicMaterial({vertexColors: true, transparent: true, opacity, depthWrite: false});
-    this.object = new THREE.LineSegments(new THREE.BufferGeometry(), material);
-    this.object.frustumCulled = false;
-  }
-  begin(): Segments {
-    this.segments.count = 0;
-    return this.segments;
-  }
-  end(): void {
-    const {positions, colours, count} = this.segments;
-    if (this.room !== positions.length) {
-      this.object.geometry.dispose();
-      this.object.geometry = new THREE.BufferGeometry();
-      this.object.geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
-      this.object.geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3));
-      this.room = positions.length;
-    }
-    this.object.geometry.getAttribute('position').needsUpdate = true;
-    this.object.geometry.getAttribute('color').needsUpdate = true;
-    this.object.geometry.setDrawRange(0, 2 * count);
-  }
+  return new LineMaterial({linewidth: width, vertexColors: true, transparent: true, depthWrite: false, opacity});
 }

@@ -72,7 +72,10 @@ class Page {
       if (message.whole) this.stage.cloud.clear();
       this.model.take(message);
       this.stage.cloud.take(message.points, message.pointsGone);
-      this.stage.changed();
+      const isPathAlone = !message.whole && message.points.length + message.keyframes.length + message.edges.length +
+        message.pointsGone.length + message.keyframesGone.length + message.edgesGone.length === 0;
+      if (isPathAlone) this.stage.pathGrew();
+      else this.stage.changed();
     }
     this.stale = true;
   }
@@ -426,7 +429,7 @@ class Page {
     return {
       link: this.link, live: this.model.live.length, newest: this.model.live.at(-1)?.frame ?? -1, keyframes: this.model.keyframes.size,
       inner: this.windowSize(1), outer: this.windowSize(2), points: this.stage.cloud.size, path: this.model.path.length,
-      events: this.model.events.length, lost: lostStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs,
+      events: this.model.events.length, lost: lostStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs, share: this.stage.share,
       edges: this.model.edges.size, truth: this.model.truth?.path.length ?? 0, mapVersion: this.model.mapVersion,
     };
   }

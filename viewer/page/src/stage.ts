@@ -2,7 +2,7 @@
 import * as THREE from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {Cloud} from './cloud.ts';
-import {ThinLines, WideLines, wide, type Segments} from './lines.ts';
+import {WideLines, wide, type Segments} from './lines.ts';
 import type {CameraPose, Model} from './model.ts';
 import {PALETTES, type Palette, type Theme} from './palette.ts';
 import {State, type Keyframe, type PathFrame} from './wire.ts';
@@ -13,6 +13,7 @@ export type Picked = {keyframe: Keyframe} | {point: THREE.Vector3} | null;
 
 const SLOW_MS = 45;
 const FAST_MS = 25;
+const LEAST_POINTS = 30000;
 const SOFTWARE_MS = 33;  // between frames that no graphics processor draws: the tracker may want the same processors
 const MOST_PATH = 20000;  // segments drawn of a path
 
@@ -41,15 +42,16 @@ export class Stage {
   private readonly windows = new WideLines(wide(1.8), 4);
   private readonly body = new WideLines(wide(3), 6);
   private readonly tape = new WideLines(wide(3), 7);
-  private readonly keyframes = new ThinLines(0.8);
-  private readonly edges = new ThinLines(0.22);
-  private grid: THREE.GridHelper | null = null;
+  private readonly keyframes = new WideLines(wide(1, 0.8), 0);
+  private readonly edges = new WideLines(wide(1, 0.25), 0);
+  private readonly grid = new WideLines(wide(1), -1);
   private palette: Palette = PALETTES.dark;
   private dirty = true;
   private lines = true;  // to be made anew
+  private path = true;   // likewise, alone
   private frustum = 0.1;
   private extent = {size: 2, centre: new THREE.Vector3(), lowest: -1};
-  private share = 1;
+  share = 1;  // of the points that are drawn
   private readonly leastMs: number;  // between two frames
   private begun = 0;                 // the newest frame
   private fence: WebGLSync | null = null;  // of the frame that is being drawn
@@ -68,7 +70,7 @@ export class Stage {
     this.world.rotation.x = Math.PI;
     this.world.add(this.cloud.group, this.edges.object, this.keyframes.object, this.truth.object, this.causal.object,
       this.final.object, this.windows.object, this.body.object, this.tape.object);
-    this.scene.add(this.world);
+    this.scene.add(this.world, this.grid.object);
     for (const lines of [this.final, this.causal, this.truth, this.windows, this.body, this.tape]) lines.material.depthTest = false;
     this.setTheme('dark');
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -80,11 +82,6 @@ export class Stage {
   setTheme(theme: Theme): void {
     this.palette = PALETTES[theme];
     this.renderer.setClearColor(this.palette.background);
-    if (this.grid) {
-      this.scene.remove(this.grid);
-      this.grid.dispose();
-      this.grid = null;
-    }
     this.changed();
   }
 
@@ -99,6 +96,11 @@ export class Stage {
   /** The model has changed: lines are made anew with the next frame. */
   changed(): void {
     this.lines = true;
+    this.dirty = true;
+  }
+  /** Nothing but the path has. */
+  pathGrew(): void {
+    this.path = true;
     this.dirty = true;
   }
   redraw(): void {
@@ -141,7 +143,8 @@ export class Stage {
     this.dirty = false;
     this.begun = now;
     if (this.lines) this.makeLines();
-    this.lines = false;
+    else if (this.path) this.makePaths();
+    this.lines = this.path = false;
     this.makeBody();
     this.aim();
     this.renderer.render(this.scene, this.camera);
@@ -164,10 +167,10 @@ export class Stage {
 
   /** A machine that cannot draw twenty frames a second draws fewer points; one at rest draws all. */
   private pace(took: number): void {
-    if (took > 1000) return;
     this.frameMs += 0.2 * (took - this.frameMs);
-    const least = Math.min(1, 50000 / Math.max(1, this.cloud.size));
-    const share = this.frameMs > SLOW_MS ? 0.9 * this.share : this.frameMs < FAST_MS ? 1.1 * this.share : this.share;
+    const least = Math.min(1, LEAST_POINTS / Math.max(1, this.cloud.size));
+    const share = Math.min(took, this.frameMs) > SLOW_MS ? Math.max(0.5, SLOW_MS / took) * this.share
+      : this.frameMs < FAST_MS ? 1.1 * this.share : this.share;
     const bounded = Math.min(1, Math.max(least, share));
     if (bounded === this.share) return;
     this.share = bounded;
@@ -204,7 +207,7 @@ export class Stage {
     }
     if (steps.length === 0) return this.frustum;
     steps.sort((a, b) => a - b);
-    return Math.max(0.03, 0.55 * steps[steps.length >> 1], 0.011 * this.extent.size);
+    return Math.max(0.03, 0.55 * steps[steps.length >> 1], 0.006 * this.extent.size);
   }
 
   private makePaths(): void {
@@ -305,19 +308,15 @@ export class Stage {
   private makeGrid(): void {
     const {size, centre, lowest} = this.extent;
     const square = 10 ** Math.round(Math.log10(Math.max(size, 0.1) / 12));
-    const wanted = `${square} ${Math.ceil((2.4 * size) / square)}`;
-    if (this.grid?.name !== wanted) {
-      if (this.grid) {
-        this.scene.remove(this.grid);
-        this.grid.dispose();
-      }
-      const squares = Math.min(200, Math.ceil((2.4 * size) / square));
-      this.grid = new THREE.GridHelper(squares * square, squares, this.palette.grid, this.palette.grid);
-      this.grid.name = wanted;
-      this.scene.add(this.grid);
+    const half = square * Math.min(40, Math.ceil((1.2 * size) / square));
+    const [x, z] = [centre.x, centre.z].map((middle) => square * Math.round(middle / square));
+    const segments = this.grid.begin();
+    for (let at = -half; at <= half; at += square) {
+      segments.add([x + at, lowest, z - half], [x + at, lowest, z + half], this.palette.grid);
+      segments.add([x - half, lowest, z + at], [x + half, lowest, z + at], this.palette.grid);
     }
-    this.grid.visible = this.layers.grid;
-    this.grid.position.set(square * Math.round(centre.x / square), lowest, square * Math.round(centre.z / square));
+    this.grid.end();
+    this.grid.object.visible = this.layers.grid;
   }
 
   /** Of keyframes, path and most points, in the picture's frame; the lowest of the former two. */

@@ -22,7 +22,7 @@ async function liveRun() {
   const recording = new Program(['render', 'synthetic:courtyard?frames=300&rounds=1&width=320&height=240', '--out', join(out, 'recording')]);
   assert.equal(await recording.end, 0, recording.text);
   done('rendered');
-  const run = new Program(['run', join(out, 'recording'), '--preload', '--speed', '0.2', '--late', 'drop', '--windows', '8,40', '--quiet',
+  const run = new Program(['run', join(out, 'recording'), '--preload', '--speed', '0.1', '--late', 'drop', '--windows', '8,40', '--quiet',
     '--view', '0', '--view-control', '--out', join(out, 'run'), '--save-map', join(out, 'map.tfm')]);
   const network = await Network.to(await run.address());
   const page = await openPage(browser, network.address);

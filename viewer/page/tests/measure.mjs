@@ -98,7 +98,7 @@ async function maps() {
     const drawn = (1000 * (after.drawn - before.drawn)) / (performance.now() - began);
     const heap = await page.evaluate(() => performance.memory.usedJSHeapSize / 1e6);
     console.log(`${points} points: keyframes after ${first.toFixed(0)} ms, all after ${all.toFixed(0)} ms, ${drawn.toFixed(1)} pictures a second, ` +
-      `pose to picture p50 ${quantile(delays, 0.5)} p95 ${quantile(delays, 0.95)} ms, heap ${heap.toFixed(0)} MB, server ${memory(load.process.pid).toFixed(0)} MB`);
+      `${after.frameMs.toFixed(0)} ms each with ${(100 * after.share).toFixed(0)} % of the points, pose to picture p50 ${quantile(delays, 0.5)} p95 ${quantile(delays, 0.95)} ms, heap ${heap.toFixed(0)} MB, server ${memory(load.process.pid).toFixed(0)} MB`);
     await page.screenshot({path: join(out, `${points}.png`)});
     await load.stop('SIGKILL');
     await page.context().close();
