@@ -160,7 +160,7 @@ int run(const RunArguments& arguments) {
   write_run_output(arguments.out, arguments.source, *source, options, result);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, options, result);
-  if (source->rig().kind == SensorKind::kMono)
+  if (scale_is_arbitrary(source->rig(), options))
     fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");
   for (const std::string& map : maps) fmt::print("map in      {}\n", map);
   const SourceReport captured = source->report();

@@ -90,9 +90,9 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   write_file(folder / "edges.txt", edge_list(result.graph, parts.front().id));
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
-  const bool one_camera = source.rig().kind == SensorKind::kMono;
+  const bool no_scale = scale_is_arbitrary(source.rig(), options);
   nlohmann::ordered_json summary = summary_json(source_text, options, result, parts);
-  summary["scale"] = one_camera ? "arbitrary" : "metric";
+  summary["scale"] = no_scale ? "arbitrary" : "metric";
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   std::ostringstream schedule;
   if (!write_schedule(schedule, result.schedule.tracker, result.schedule.mapper,
@@ -104,7 +104,7 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",
               draw_run(source_text, final_poses, causal_poses, source.ground_truth(),
-                       one_camera ? Alignment::kSim3 : Alignment::kSe3));
+                       no_scale ? Alignment::kSim3 : Alignment::kSe3));
   }
 }
 
@@ -160,6 +160,10 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
              result.wall_seconds, result.cpu_seconds, 1e3 * result.cpu_seconds / frames, result.peak_rss_mb);
   for (const std::string& note : result.notes) fmt::print("note        {}\n", note);
   fmt::print("written to  {}\n", folder.string());
+}
+
+bool scale_is_arbitrary(const Rig& rig, const EngineOptions& options) {
+  return rig.kind == SensorKind::kMono && !(options.map && options.map->rig.kind != SensorKind::kMono);
 }
 
 }  // namespace twofold

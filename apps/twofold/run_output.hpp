@@ -23,4 +23,8 @@ void write_trace(const std::filesystem::path& file, const RunResult& result);
 void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
                    const RunResult& result);
 
+/// One camera does not show how long a metre is, unless it is localised in a map that a stereo or RGB-D rig
+/// made.
+[[nodiscard]] bool scale_is_arbitrary(const Rig& rig, const EngineOptions& options);
+
 }  // namespace twofold
