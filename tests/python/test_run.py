@@ -61,7 +61,14 @@ def record(folder: str) -> None:
 
 
 def python(script: str, *, interrupt: bool = False) -> subprocess.CompletedProcess[str]:
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # Jobs in the background of a script are started deaf to Ctrl-C, and what they start inherits that.
+    process = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     if interrupt:
         assert process.stdout is not None
         process.stdout.readline()  # the loop runs
