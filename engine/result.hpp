@@ -65,7 +65,7 @@ struct FrameRecord {
   std::int64_t t_ns = 0;
   PackedPose T_c_ref;                    ///< pose relative to the reference keyframe: survives map changes
   PackedPose T_c_w_causal;               ///< pose in the map as it was known at the frame's own time
-  double tracked_share = 0;              ///< matched points over points searched, in [0, 1]
+  double tracked_share = 0;              ///< inliers over points searched, in [0, 1]
   std::uint64_t snapshot_version = 0;    ///< version of the map it was tracked against
   std::int64_t tracking_ns = 0;          ///< time spent on it by the tracker
   std::int64_t latency_ns = 0;           ///< from its exposure (Pacer) to the moment its pose was known

@@ -144,7 +144,7 @@ class LoopCloserRunner {
 };
 
 /// After the last step of any kind of run: the final map with its places and loops, the frames hung on its
-/// keyframes, and the stages' times. Moves what it can out of the stages.
+/// keyframes, and the stages' times. Moves what it can out of the runners.
 void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserRunner& loop_closing,
                      RunResult& result);
 

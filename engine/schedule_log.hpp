@@ -19,9 +19,10 @@ struct TrackerStep {
   std::int64_t frame = 0;     ///< Frame::index, grows from record to record
   std::uint64_t version = 0;  ///< snapshot it was tracked against; 0 when dropped
   Fate fate = Fate::kTracked;
-  std::uint8_t effort_level = 0;   ///< EffortLevel, 0 = nothing left out, <= 15
-  std::uint32_t messages = 0;      ///< relocalisation answers consumed before it
-  bool keyframe_withheld = false;  ///< there was no buffer for a keyframe: the mapper is behind
+  std::uint8_t effort_level = 0;  ///< EffortLevel, 0 = nothing left out, <= 15
+  std::uint32_t messages = 0;     ///< relocalisation answers consumed before it
+  bool keyframe_withheld =
+      false;  ///< the tracker got no buffer for a keyframe: the mapper is behind, or the map does not change
   bool operator==(const TrackerStep&) const = default;
 };
 

@@ -66,8 +66,8 @@ struct PointMatch {
 /// Whether what is left of the difference [grey] between a patch and where it was found is small enough.
 [[nodiscard]] bool looks_alike(const Patch& patch, float rms, const GuidedSearchOptions& options);
 
-/// Whether a patch is much more alike where it fits best than where it fits second best, not beside that;
-/// both as zero_mean_ssd measures it.
+/// Whether a match is unambiguous: the best SSD is so much smaller than the second best, found away from the
+/// best; both as zero_mean_ssd measures it.
 [[nodiscard]] bool is_unambiguous(std::int64_t best, std::int64_t second);
 
 }  // namespace twofold

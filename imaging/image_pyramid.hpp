@@ -13,7 +13,7 @@ class ImagePyramid {
  public:
   static constexpr int kLevels = 5;
 
-  /// Refills all levels from `image` (CV_8UC1, copied) .
+  /// Refills all levels from `image` (CV_8UC1, copied).
   void build(const cv::Mat& image);
   /// Deep copy into existing buffers of the same size, if there are any.
   void copy_from(const ImagePyramid& other);

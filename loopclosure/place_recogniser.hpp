@@ -15,7 +15,8 @@ struct RecogniserOptions {
   double min_score = 0.4;       ///< of a candidate, relative to the score with the keyframe before
   double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing
   int consistency = 2;          ///< successive keyframes that must agree about the place, >= 1
-  int same_place = 6;           ///< keyframes this many edges-or-numbers apart show the same place
+  int same_place =
+      6;  ///< keyframes whose numbers differ by no more, or that an edge joins, show the same place
   /// Places looked at for each one added, in turn, whether their keyframe was culled: bounds a step's time;
   /// at most one place in so many is of a culled keyframe. >= 1
   int culled_visits = 64;

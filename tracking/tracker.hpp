@@ -34,8 +34,8 @@ namespace twofold {
 /// allocated, keyframes included if their buffers were prepared, and no reference count of a snapshot is
 /// touched. Work per frame is bounded by the options.
 ///
-/// The tracker numbers keyframes when it proposes them and points when they are found a second time. Its own
-/// pose is relative to a reference keyframe, so that it moves along when a newer snapshot moves that
+/// The tracker numbers keyframes when it proposes them and points when a later keyframe finds them again. Its
+/// own pose is relative to a reference keyframe, so that it moves along when a newer snapshot moves that
 /// keyframe.
 class Tracker {
  public:

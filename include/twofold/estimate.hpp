@@ -41,15 +41,16 @@ struct PoseEstimate {
   /// none.
   std::array<double, 6> velocity{};
 
-  std::uint64_t map_version = 0;  ///< it was tracked against
-  std::int64_t exposed_ns = 0;    ///< when the frame was due, on CLOCK_MONOTONIC
+  std::uint64_t map_version = 0;  ///< of the map that the frame was tracked against
+  std::int64_t exposed_ns = 0;    ///< when the frame was exposed, on CLOCK_MONOTONIC
   std::int64_t latency_ns = 0;    ///< from then to the moment the pose was known
 };
 static_assert(std::is_trivially_copyable_v<PoseEstimate>);
 
-/// Why poses given out before are no longer what the map says.
+/// Why poses given out before are no longer what the map says. Corrections below a centimetre and 0.2 degrees
+/// are not announced.
 enum class MapEventKind : std::uint8_t {
-  kOptimisation,    ///< the double window moved the camera's surroundings by more than a centimetre
+  kOptimisation,    ///< a round of the double window moved the camera's surroundings
   kLoopClosure,     ///< a place was recognised
   kPoseGraph,       ///< the whole pose graph was optimised
   kPartsJoined,     ///< the camera's map part joined another one, and took its world

@@ -23,9 +23,10 @@ class TWOFOLD_API MapSnapshot {
     std::int64_t frame = 0;
     std::int64_t t_ns = 0;
     Pose T_world_camera;
-    std::uint32_t points = 0;  ///< it sees
-    std::uint8_t window = 0;   ///< 1, 2: in W1, W2 of the mapper's last round; 0: in neither
-    bool has_place = false;    ///< described, so that it can be recognised
+    std::uint32_t points = 0;  ///< that it sees
+    std::uint8_t window =
+        0;                   ///< 1, 2: in the inner or outer window of the mapper's last round; 0: in neither
+    bool has_place = false;  ///< described, so that it can be recognised
   };
 
   struct Point {

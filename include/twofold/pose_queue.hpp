@@ -24,6 +24,7 @@ enum class QueueStatus : std::uint8_t {
 ///   ...
 ///   PoseOrEvent item;
 ///   while (queue.next(item) == QueueStatus::kItem) ...;  // on a thread of its own, until queue.close()
+///   slam.finish();  // before the queue is gone: until then it is filled
 ///
 /// Roles: one thread puts, one reads, one may wait for room; anyone closes and asks for what was missed.
 /// put is wait-free: it copies into a ring of `capacity` items, and makes a system call only to wake a reader

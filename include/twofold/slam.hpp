@@ -24,7 +24,7 @@ struct SlamOptions {
   /// Frames are pushed when they are taken, and their times are of CLOCK_MONOTONIC: latency counts from
   /// there, a tracker that is late leaves work out, and of the frames that wait the newest wins; frames more
   /// than 10 s from now are refused. Otherwise frames are a recording's, and tracked as fast as the map can
-  /// follow. No effect in deterministic runs.
+  /// follow. Needs RunMode::kThreaded.
   bool live = false;
 
   /// Map to go on with (.tfm); empty: start one. The camera is unplaced until a place of it is recognised,
@@ -89,7 +89,7 @@ struct SlamSummary {
 /// Versions of the map that somebody holds.
 struct HeldMaps {
   std::size_t versions = 0;
-  std::uint64_t oldest = 0;  ///< 0: none
+  std::uint64_t oldest = 0;  ///< number of the oldest of them; 0: none
 };
 
 /// Frames in, poses and a map out.
@@ -99,24 +99,28 @@ struct HeldMaps {
 ///   while (camera >> frame) slam.push(frame);
 ///   slam.finish();
 ///
-/// Threads: every function may be called by any thread, several at once; those that push take turns.
+/// Threads: every function may be called by any thread, several at once, but for what callbacks may call
+/// (on_pose); those that push take turns.
 class TWOFOLD_API Slam {
  public:
   using PoseCallback = std::function<void(const PoseEstimate&)>;
   using EventCallback = std::function<void(const MapEvent&)>;
 
   /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
-  /// when a file cannot be used, a processor or priority is not to be had, or the rig is not the map's.
+  /// when a file cannot be used, an option of the engine is out of range or the rig is not the map's. A
+  /// processor or priority that the system refuses is no error: SlamSummary::notes tells.
   Slam(const CameraRig& rig, const SlamOptions& options);
   /// Finishes.
   ~Slam();
   Slam(const Slam&) = delete;
   Slam& operator=(const Slam&) = delete;
 
-  /// Called for every frame that was looked at, on the tracker's thread, which waits for it: neither block in
-  /// it nor call push or finish. The time it takes is a stage of its own among SlamSummary::timings ("pose
-  /// listener"), and in the next frame's latency. A callback that throws is not called again; tracking goes
-  /// on, and errors() says what it threw. To be set before the first push, else std::logic_error is thrown.
+  /// Called for every frame that was looked at, on the tracker's thread, which waits for it: it must not
+  /// block, and may call latest, map, held_maps and errors only; all others take a lock that finish (and in a
+  /// deterministic run push) holds while it waits for this call. What it uses must live until finish has
+  /// returned. The time it takes is a stage of its own among SlamSummary::timings ("pose listener"), and in
+  /// the next frame's latency. A callback that throws is not called again; tracking goes on, and errors()
+  /// says what it threw. To be set before the first push, else std::logic_error is thrown.
   void on_pose(PoseCallback callback);
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
@@ -129,6 +133,7 @@ class TWOFOLD_API Slam {
   [[nodiscard]] bool has_room() const;
   /// Waits until there is room, at most for `timeout_ns`: for recordings, of which no frame should be
   /// dropped, and which the map should follow.
+  /// @return false after that time, when the run is over, or when a thread of the engine has failed
   [[nodiscard]] bool wait_for_room(std::int64_t timeout_ns);
 
   /// Of the newest frame that was processed, tracked or lost; nothing before the first. Wait-free: no lock,

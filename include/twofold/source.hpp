@@ -28,7 +28,8 @@ struct SourceSettings {
 /// video:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. One thread at a time; stop() by any.
 class TWOFOLD_API Source {
  public:
-  /// Throws std::runtime_error naming the file and what is wrong with it.
+  /// Throws std::runtime_error naming the file and what is wrong with it; one camera alone, without depth, is
+  /// refused.
   explicit Source(const std::string& name, const SourceSettings& settings = {});
   ~Source();
   Source(Source&&) noexcept;

@@ -51,6 +51,8 @@ struct ViewerOptions {
 ///   slam.on_pose([&](const PoseEstimate& pose) { viewer.tell(pose); });
 ///   slam.on_event([&](const MapEvent& event) { viewer.tell(event); });
 ///   std::puts(viewer.address().c_str());
+///   ...
+///   slam.finish();  // before the viewer is gone: until then it is called
 ///
 /// A thread of its own, of the lowest priority, does everything; nobody waits for it or for who looks.
 /// Component `viewer` of the package: find_package(Twofold COMPONENTS viewer), Twofold::viewer.
