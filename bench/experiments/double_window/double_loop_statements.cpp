@@ -23,7 +23,7 @@ class Results {
   }
 
   [[nodiscard]] const MethodRounds& operator[](LoopMethod m) const { return rounds_[m]; }
-  [[nodiscard]] double ratio(LoopMethod a, LoopMethod b, RelativeError Round::*level, std::size_t first,
+  [[nodiscard]] double ratio(LoopMethod a, LoopMethod b, EdgeErrorSum Round::*level, std::size_t first,
                              std::size_t last) const {
     return rounds_[a].error(level, first, last).rmse() / rounds_[b].error(level, first, last).rmse();
   }

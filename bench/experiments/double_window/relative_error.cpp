@@ -5,23 +5,23 @@
 
 namespace twofold::bench {
 
-void RelativeError::add(const RelativeError& other) {
+void EdgeErrorSum::add(const EdgeErrorSum& other) {
   sum += other.sum;
   scaled += other.scaled;
   edges += other.edges;
 }
 
-double RelativeError::rmse() const {
+double EdgeErrorSum::rmse() const {
   return edges > 0 ? std::sqrt(sum / edges) : 0;
 }
 
-double RelativeError::scaled_rmse() const {
+double EdgeErrorSum::scaled_rmse() const {
   return edges > 0 ? std::sqrt(scaled / edges) : 0;
 }
 
-RelativeError relative_error(const GraphSnapshot& graph, double metres_per_unit, const Scene& scene,
-                             const std::function<bool(KeyframeId)>& use) {
-  RelativeError error;
+EdgeErrorSum relative_error(const GraphSnapshot& graph, double metres_per_unit, const Scene& scene,
+                            const std::function<bool(KeyframeId)>& use) {
+  EdgeErrorSum error;
   double product = 0, estimated_squared = 0, truth_squared = 0;
   const bool mono = scene.rig.kind == SensorKind::kMono;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {

@@ -48,8 +48,8 @@ MapperOptions simulation_mapper_options(const DoubleWindowExperimentOptions& opt
   return mapper;
 }
 
-RelativeError MethodRounds::error(RelativeError Round::*level, std::size_t first, std::size_t last) const {
-  RelativeError sum;
+EdgeErrorSum MethodRounds::error(EdgeErrorSum Round::*level, std::size_t first, std::size_t last) const {
+  EdgeErrorSum sum;
   for (const Rounds& trial : trials) {
     for (std::size_t k = first; k < last; ++k) sum.add(trial[k].*level);
   }
@@ -72,7 +72,7 @@ double MethodRounds::median(double Round::*figure, std::size_t first, std::size_
   return median_of(std::move(values));
 }
 
-std::vector<double> MethodRounds::rmse_curve(RelativeError Round::*level) const {
+std::vector<double> MethodRounds::rmse_curve(EdgeErrorSum Round::*level) const {
   std::vector<double> curve;
   for (std::size_t k = 0; k < keyframes(); ++k) curve.push_back(error(level, k, k + 1).rmse());
   return curve;
@@ -114,7 +114,7 @@ void record_scale(const GraphSnapshot& graph, const Scene& scene, const DoubleWi
 
 void write_rounds(const std::string& name, const std::string& title, const std::vector<MethodRounds>& methods,
                   bool scale_free, Report& report) {
-  const std::pair<const char*, RelativeError Round::*> levels[] = {
+  const std::pair<const char*, EdgeErrorSum Round::*> levels[] = {
       {"inner window", &Round::inner}, {"both windows", &Round::both}, {"all edges", &Round::all}};
   const std::pair<const char*, double Round::*> figures[] = {
       {"CPU time [ms]", &Round::cpu_ms},

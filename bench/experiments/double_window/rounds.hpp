@@ -12,7 +12,7 @@ namespace twofold::bench {
 
 /// What a method did with one keyframe, and how good its map was then.
 struct Round {
-  RelativeError inner, both, all;     ///< edges within W1, within W1 and W2, all
+  EdgeErrorSum inner, both, all;      ///< edges within W1, within W1 and W2, all
   ScaleChange both_scale, all_scale;  ///< see record_scale
   double shape = 0;                   ///< shape_error of the whole map [m]; see record_scale
   double cpu_ms = 0;                  ///< of the mapper's round, processor time of its thread
@@ -27,11 +27,11 @@ struct MethodRounds {
 
   [[nodiscard]] std::size_t keyframes() const { return trials.front().size(); }
   /// Eq. 6.10 over all trials and the keyframes [first, last).
-  [[nodiscard]] RelativeError error(RelativeError Round::*level, std::size_t first, std::size_t last) const;
+  [[nodiscard]] EdgeErrorSum error(EdgeErrorSum Round::*level, std::size_t first, std::size_t last) const;
   [[nodiscard]] ScaleChange scale(ScaleChange Round::*level, std::size_t first, std::size_t last) const;
   /// Median of a figure over all trials and the keyframes [first, last).
   [[nodiscard]] double median(double Round::*figure, std::size_t first, std::size_t last) const;
-  [[nodiscard]] std::vector<double> rmse_curve(RelativeError Round::*level) const;
+  [[nodiscard]] std::vector<double> rmse_curve(EdgeErrorSum Round::*level) const;
   [[nodiscard]] std::vector<double> median_curve(double Round::*figure) const;
 };
 

@@ -85,10 +85,10 @@ void plot_scene(const Scene& scene, const std::string& file) {
 
 void state_accuracy(const std::vector<MethodRounds>& m, const std::string& kind, Report& report) {
   const std::size_t end = m[kBa].keyframes(), first = std::min(kSettled, end - 1);
-  const auto ratio = [&](Method a, Method b, RelativeError Round::*level, std::size_t from) {
+  const auto ratio = [&](Method a, Method b, EdgeErrorSum Round::*level, std::size_t from) {
     return m[a].error(level, from, end).rmse() / m[b].error(level, from, end).rmse();
   };
-  const auto scaled_ratio = [&](Method a, Method b, RelativeError Round::*level, std::size_t from) {
+  const auto scaled_ratio = [&](Method a, Method b, EdgeErrorSum Round::*level, std::size_t from) {
     return m[a].error(level, from, end).scaled_rmse() / m[b].error(level, from, end).scaled_rmse();
   };
   const double inner = ratio(kConstant, kBa, &Round::inner, first);
@@ -151,7 +151,7 @@ nlohmann::json trial_errors(const std::vector<MethodRounds>& methods, unsigned s
       const MethodRounds one{method.name, {method.trials[t]}};
       nlohmann::json& entry = list.emplace_back();
       entry = {{"method", method.name}, {"seed", seed + t}};
-      const auto add = [&](const char* level, const RelativeError& error) {
+      const auto add = [&](const char* level, const EdgeErrorSum& error) {
         entry[level] = {{"rmse", error.rmse()}, {"scaled", error.scaled_rmse()}, {"edges", error.edges}};
       };
       add("inner", one.error(&Round::inner, first, end));
