@@ -83,7 +83,7 @@ void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecor
   }
   const SE3 T_c_w = final_T_c_w(last_, graph);
   const SE3 T_c_w_before = last_.T_c_w_causal.unpacked();
-  const SE3 change = T_c_w.inverse() * T_c_w_before;
+  const SE3 change = T_c_w * T_c_w_before.inverse();  // of the camera itself, wherever the world's origin is
   if (change.translation().norm() < kCorrection && change.so3().log().norm() < kCorrectionAngle) return;
   const MapChange& jump = graph.last_jump();
   const bool jumped = jump.version > last_.snapshot_version;
