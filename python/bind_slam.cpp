@@ -11,6 +11,7 @@
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/frames.hpp"
+#include "python/live_view.hpp"
 #include "python/map_rows.hpp"
 #include "python/trajectory.hpp"
 #include "twofold/pose_queue.hpp"
@@ -52,18 +53,35 @@ class Updates {
   std::mutex readers_;  // never held by a thread that wants the interpreter's lock
 };
 
-/// Slam, and the queue that its tracker puts poses and events into: no Python runs on the tracker's thread.
+/// Slam, the queue that its tracker puts poses and events into, and its viewer: no Python runs on the
+/// tracker's thread.
 class SlamWithUpdates {
  public:
-  SlamWithUpdates(const CameraRig& rig, const SlamOptions& options)
-      : items_in_flight(kItemsAFrame * static_cast<std::size_t>(std::max(options.frame_buffers, 1) + 1)),
+  SlamWithUpdates(const CameraRig& camera_rig, const SlamOptions& options)
+      : rig(camera_rig),
+        items_in_flight(kItemsAFrame * static_cast<std::size_t>(std::max(options.frame_buffers, 1) + 1)),
         updates(std::make_shared<Updates>(std::bit_ceil(std::max<std::size_t>(512, 4 * items_in_flight)))),
-        slam(rig, options) {
-    slam.on_pose([queue = &updates->queue](const PoseEstimate& pose) { queue->put(pose); });
-    slam.on_event([queue = &updates->queue](const MapEvent& event) { queue->put(event); });
+        slam(camera_rig, options) {
+    slam.on_pose([queue = &updates->queue, this](const PoseEstimate& pose) {
+      queue->put(pose);
+      view.tell(pose);
+    });
+    slam.on_event([queue = &updates->queue, this](const MapEvent& event) {
+      queue->put(event);
+      view.tell(event);
+    });
   }
   /// Whoever reads comes to the end.
-  ~SlamWithUpdates() { finish(); }
+  ~SlamWithUpdates() {
+    finish();
+    view.close();
+  }
+
+  PushResult push(const FrameView& frame) {
+    PushResult pushed = slam.push(frame);
+    if (pushed.status != PushStatus::kRefused) view.show(frame);
+    return pushed;
+  }
 
   SlamSummary finish() {
     SlamSummary summary = slam.finish();
@@ -71,8 +89,10 @@ class SlamWithUpdates {
     return summary;
   }
 
+  const CameraRig rig;
   const std::size_t items_in_flight;
   const std::shared_ptr<Updates> updates;
+  LiveView view;
   Slam slam;
 };
 
@@ -98,7 +118,7 @@ void feed(Source& source, SlamWithUpdates& to) {
         if (queue.closed() || !to.slam.errors().empty()) return;
       }
     }
-    (void)to.slam.push(frame);
+    (void)to.push(frame);
   }
 }
 
@@ -181,7 +201,22 @@ std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
 PushResult push(SlamWithUpdates& self, const PythonFrame& frame) {
   release_arrays();
   const py::gil_scoped_release unlocked;
-  return self.slam.push(frame.view);
+  return self.push(frame.view);
+}
+
+/// Opens the viewer and returns its address.
+std::string view(SlamWithUpdates& self, const std::string& title, int port, const std::string& bind,
+                 const std::optional<PoseList>& truth) {
+  ViewerOptions options;
+  options.title = title;
+  options.bind = bind;
+  options.port = port;
+  for (const auto& pose : truth.value_or(PoseList{}).poses) {
+    options.truth.push_back(pose.T_world_camera);
+    options.truth_t_ns.push_back(pose.t_ns);
+  }
+  const py::gil_scoped_release unlocked;
+  return self.view.open(self.rig, self.slam, options);
 }
 
 SlamSummary finish(SlamWithUpdates& self) {
@@ -241,6 +276,20 @@ void bind_slam_class(py::module_& module) {
           "Writes the newest version to a map file, which is replaced atomically. Raises RuntimeError.")
       .def("errors", [](const SlamWithUpdates& self) { return self.slam.errors(); })
       .def("finish", &finish)
+      .def("view", &view, py::kw_only(), py::arg("title") = "Twofold", py::arg("port") = ViewerOptions{}.port,
+           py::arg("bind") = ViewerOptions{}.bind, py::arg("truth") = py::none(),
+           "Shows the run in a browser while it runs, and returns the address to open, whose token lets one "
+           "look.\n"
+           "port: 0 for any that is free; bind: any but a loopback address shows camera and map to the "
+           "network,\n"
+           "unencrypted; truth: Trajectory of the true path, in any world. Nobody waits for who looks. "
+           "Raises\n"
+           "RuntimeError when it is open already, the port is taken, or the package was built without the "
+           "viewer.")
+      .def(
+          "close_view", [](SlamWithUpdates& self) { self.view.close(); }, Unlocked(),
+          "Whoever looks gets the last map and is told that the run is over. Happens by itself when the Slam "
+          "goes.")
       .def_property_readonly("_updates", [](const SlamWithUpdates& self) { return self.updates; });
 }
 

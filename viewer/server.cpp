@@ -288,7 +288,8 @@ class ViewServer::Impl {
         timer_(context_),
         hall_{
             scene, title, {random_secret(), acceptor_.local_endpoint().port(), machine_name()}, connections_},
-        address_(printed_address(acceptor_.local_endpoint(), hall_.door.token())) {}
+        address_(printed_address(acceptor_.local_endpoint(), hall_.door.token())),
+        is_open_to_network_(!acceptor_.local_endpoint().address().is_loopback()) {}
 
   void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words) {
     accept();
@@ -304,9 +305,11 @@ class ViewServer::Impl {
       for (const auto& viewer : viewers_) viewer->write();
       serve(std::chrono::milliseconds(10));
     }
+    Error error;
+    acceptor_.close(error);  // who comes now is refused instead of waiting for an answer
   }
   const std::string& address() const { return address_; }
-  bool is_open_to_network() const { return !acceptor_.local_endpoint().address().is_loopback(); }
+  bool is_open_to_network() const { return is_open_to_network_; }
 
  private:
   void serve(std::chrono::milliseconds time) {
@@ -348,7 +351,8 @@ class ViewServer::Impl {
   asio::steady_timer timer_;
   Hall hall_;
   Viewers viewers_;
-  std::string address_;
+  const std::string address_;
+  const bool is_open_to_network_;
   bool accepting_ = false;
 };
 

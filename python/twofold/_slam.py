@@ -142,3 +142,4 @@ def _finish_all() -> None:
     # A thread that comes back from libtwofold after the interpreter's end would bring the process down.
     for slam in list(_open):
         slam.finish()
+        slam.close_view()

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "twofold/slam.hpp"
+#include "twofold/viewer.hpp"
+
+namespace twofold::python {
+
+/// The viewer of a run, which may be opened before it begins or while it goes on.
+class LiveView {
+ public:
+  /// @return the address to open. Throws std::runtime_error when it is open already, the port is not to be had, or
+  /// the package was built without the viewer.
+  std::string open(const CameraRig& rig, const Slam& slam, const ViewerOptions& options);
+
+  /// Of the tracker's thread: waits for nobody. T: PoseEstimate, MapEvent
+  template <class T>
+  void tell(const T& what) {
+    if (Viewer* viewer = shown_.load(std::memory_order_acquire)) tell(*viewer, what);
+  }
+  /// The number that poses give the frame, as Slam counts; any thread but the tracker's.
+  void show(const FrameView& frame);
+
+  /// Viewers get the last map and are told that the run is over.
+  void close();
+
+ private:
+  static void tell(Viewer& viewer, const PoseEstimate& pose);
+  static void tell(Viewer& viewer, const MapEvent& event);
+
+  std::mutex opening_, showing_;
+  std::int64_t frames_ = 0;
+  std::shared_ptr<Viewer> viewer_;  // shared: deleted by who made it, so that without a viewer nothing refers to one
+  std::atomic<Viewer*> shown_{nullptr};  // release when it is made -> acquire by who tells: it is seen whole
+};
+
+}  // namespace twofold::python
