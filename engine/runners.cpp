@@ -220,7 +220,7 @@ void LoopCloserRunner::optimise_if_due(const GraphSnapshot& graph) {
   if (find_edge(from, not_optimised_->to) == nullptr) return;  // not taken yet
   const ScopedStage timed(times_, pose_graph_stage_);
   PoseGraphReport report;
-  messages_.emplace_back(optimise_part(graph, graph.reference(), rig_, mapper_options_, report));
+  messages_.emplace_back(optimise_component(graph, graph.reference(), rig_, mapper_options_, report));
   not_optimised_.reset();
 }
 

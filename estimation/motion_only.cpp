@@ -15,10 +15,10 @@ using Observations = std::span<MotionObservation>;
 /// One pass over the observations.
 class MotionCost {
  public:
-  MotionCost(const Rig& rig, Observations observations, double huber_px)
+  MotionCost(const Rig& rig, Observations observations, double huber_sigmas)
       : model_(rig),
         observations_(observations),
-        delta_(huber_px > 0 && huber_px < kNoKernel ? huber_px : kNoKernel) {}
+        delta_(huber_sigmas > 0 && huber_sigmas < kNoKernel ? huber_sigmas : kNoKernel) {}
 
   [[nodiscard]] MotionEquations evaluate(const SE3& T, bool inliers_only) const {
     const Matrix3 R = T.rotation();
@@ -117,7 +117,7 @@ bool determines_pose(const Matrix6& information) {
 
 MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> observations,
                                  const SE3& T_c_ref_start, const MotionOnlyOptions& options) {
-  const MotionCost cost(rig, observations, options.huber_px);
+  const MotionCost cost(rig, observations, options.huber_sigmas);
   MotionOnlyResult result;
   result.T_c_ref = T_c_ref_start;
   RoundResult round;
@@ -140,7 +140,7 @@ MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> ob
 
 int classify_observations(const Rig& rig, std::span<MotionObservation> observations, const SE3& T_c_ref,
                           const MotionOnlyOptions& options) {
-  return MotionCost(rig, observations, options.huber_px).classify(T_c_ref, options);
+  return MotionCost(rig, observations, options.huber_sigmas).classify(T_c_ref, options);
 }
 
 }  // namespace twofold

@@ -18,7 +18,7 @@ struct MotionObservation {
 
 struct MotionOnlyOptions {
   int max_iterations = 10;            ///< of a round, >= 1
-  double huber_px = 1.5;              ///< on the whitened residual norm; <= 0: no kernel
+  double huber_sigmas = 1.5;          ///< on the whitened residual norm; <= 0: no kernel
   double inlier_chi2_mono = 5.991;    ///< 95 % of chi-square with 2 degrees of freedom, > 0
   double inlier_chi2_stereo = 7.815;  ///< 95 % of chi-square with 3 degrees of freedom, > 0
   int rounds = 2;           ///< outliers are put aside after each and judged again in the next, >= 1

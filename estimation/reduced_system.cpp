@@ -25,7 +25,7 @@ void ReducedSystem::build(const WindowProblem& problem, const WindowSolverOption
   cholesky_.set_zero();
   gradient_.assign(cholesky_.size(), Vector6::Zero());
   diagonal_.assign(cholesky_.size(), Vector6::Zero());
-  elimination_.eliminate(layout_, ObservationModel(problem.rig), HuberKernel{options.huber_px},
+  elimination_.eliminate(layout_, ObservationModel(problem.rig), HuberKernel{options.huber_sigmas},
                          state.relative, state.psi, lambda, cholesky_, gradient_, diagonal_);
   const HuberKernel kernel{options.constraint_huber};
   for (std::size_t n = 0; n < problem.constraints.size(); ++n) {

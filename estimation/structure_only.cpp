@@ -101,7 +101,7 @@ void optimise_point(const ObservationModel& model, const HuberKernel& kernel, co
 
 void optimise_structure(WindowProblem& problem, const WindowSolverOptions& options) {
   const ObservationModel model(problem.rig);
-  const HuberKernel kernel{options.huber_px};
+  const HuberKernel kernel{options.huber_sigmas};
   std::vector<View> views;
   for (auto& point : problem.points) {
     if (!(point.psi.z() > 0)) continue;

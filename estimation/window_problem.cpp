@@ -20,7 +20,7 @@ double observation_chi2(const WindowProblem& problem, const WindowProblem::Point
 }
 
 double window_cost(const WindowProblem& problem, const WindowSolverOptions& options) {
-  const HuberKernel kernel{options.huber_px};
+  const HuberKernel kernel{options.huber_sigmas};
   double cost = 0;
   for (const auto& point : problem.points) {
     for (int n = 0; n < point.observation_count; ++n) {

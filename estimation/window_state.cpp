@@ -71,8 +71,8 @@ void WindowState::relate(const WindowProblem& problem, const WindowLayout& layou
 double window_state_cost(const WindowProblem& problem, const WindowLayout& layout,
                          const WindowSolverOptions& options, const std::vector<Vector3>& psi_before,
                          WindowState& values) {
-  double sum =
-      points_cost(layout, ObservationModel(problem.rig), HuberKernel{options.huber_px}, psi_before, values);
+  double sum = points_cost(layout, ObservationModel(problem.rig), HuberKernel{options.huber_sigmas},
+                           psi_before, values);
   const HuberKernel kernel{options.constraint_huber};
   for (std::size_t n = 0; n < problem.constraints.size(); ++n) {
     const Vector6& v = values.constraint_errors[n];

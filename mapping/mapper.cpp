@@ -201,7 +201,7 @@ int Mapper::take_pose_graph(const PoseGraphUpdate& update) {
 }
 
 PoseGraphReport Mapper::optimise_all_poses() {
-  return optimise_all_parts(writer_, rig_, options_);
+  return optimise_all_components(writer_, rig_, options_);
 }
 
 }  // namespace twofold

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "graph/id_map.hpp"
-#include "graph/neighbourhood.hpp"
 #include "mapping/edges.hpp"
-#include "posegraph/pose_graph.hpp"
+#include "mapping/keyframe_pose_graph.hpp"
 
 namespace twofold {
 namespace {
@@ -21,34 +19,6 @@ Matrix7 similarity_information(const Keyframe& from, const Keyframe& to, const E
   const double depth = 0.5 * (from.median_depth + to.median_depth);
   information(6, 6) = depth * depth * information(0, 0);
   return information;
-}
-
-/// Pose graph of the part of tree[0], pose n that of tree[n], set along the tree  (eq. 6.3).
-Similarities similarities(const GraphSnapshot& graph, const std::vector<TreeNode>& tree, const Rig& rig,
-                          const MapperOptions& options, IdMap& position) {
-  Similarities problem;
-  problem.origin = 0;
-  for (std::size_t n = 0; n < tree.size(); ++n) {
-    position.set(tree[n].id, static_cast<int>(n));
-    if (n == 0) {
-      problem.poses.emplace_back(graph.keyframe(tree[n].id).T_k_w);
-      continue;
-    }
-    const auto parent = static_cast<std::size_t>(tree[n].parent);
-    const Edge& edge = *find_edge(graph.keyframe(tree[parent].id), tree[n].id);
-    problem.poses.push_back(Sim3(relative_pose(graph, tree[parent].id, edge)) * problem.poses[parent]);
-  }
-  for (std::size_t n = 0; n < tree.size(); ++n) {
-    const Keyframe& from = graph.keyframe(tree[n].id);
-    for (const Edge& edge : *from.edges) {
-      const int other = position.find(edge.other);
-      if (other <= static_cast<int>(n)) continue;
-      problem.constraints.push_back(
-          {static_cast<int>(n), other, Sim3(relative_pose(graph, from.id, edge)),
-           similarity_information(from, graph.keyframe(edge.other), edge, rig, options.edge)});
-    }
-  }
-  return problem;
 }
 
 /// The loop in the place of an edge: it weighs as much as all that agrees with it.
@@ -136,7 +106,10 @@ SimilarityUpdate close_over_sim3(const GraphSnapshot& graph, const LoopConstrain
   std::vector<TreeNode> tree;
   weighted_breadth_first(graph, loop.to, graph.keyframe_count(), visited, tree);
   IdMap position;
-  Similarities problem = similarities(graph, tree, rig, options, position);
+  const auto information = [&](const Keyframe& a, const Keyframe& b, const Edge& edge) {
+    return similarity_information(a, b, edge, rig, options.edge);
+  };
+  Similarities problem = keyframe_pose_graph<Sim3>(graph, tree, information, position);
   const int from = position.find(loop.from);
   if (from < 0) return update;
   problem.constraints.push_back(loop_constraint(graph, loop, from, 0, rig, options));

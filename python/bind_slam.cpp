@@ -10,8 +10,8 @@
 
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
+#include "python/browser_view.hpp"
 #include "python/frames.hpp"
-#include "python/live_view.hpp"
 #include "python/map_rows.hpp"
 #include "python/trajectory.hpp"
 #include "twofold/pose_queue.hpp"
@@ -92,7 +92,7 @@ class SlamWithUpdates {
   const CameraRig rig;
   const std::size_t items_in_flight;
   const std::shared_ptr<Updates> updates;
-  LiveView view;
+  BrowserView view;
   Slam slam;
 };
 

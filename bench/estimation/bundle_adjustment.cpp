@@ -24,13 +24,14 @@ int main(int argc, char** argv) {
   std::string path;
   double perturb = 0;
   twofold::RaceOptions options;
-  options.solver.huber_px = 0;
+  options.solver.huber_sigmas = 0;
   options.euclidean = true;
   options.repeat = 1;
   CLI::App app("Bundle adjustment: this project's solver beside Ceres");
   app.option_defaults()->always_capture_default();
   app.add_option("file", path, "Problem to solve: a file, or a folder of stereo tracks")->required();
-  app.add_option("--huber", options.solver.huber_px, "Kernel on reprojection errors [px]; 0: none");
+  app.add_option("--huber", options.solver.huber_sigmas,
+                 "Kernel on whitened reprojection errors [standard deviations]; 0: none");
   app.add_option("--iterations", options.max_iterations, "Iterations at most");
   app.add_option("--repeat", options.repeat, "Runs of which the fastest counts")->check(CLI::PositiveNumber);
   app.add_option("--perturb", perturb,

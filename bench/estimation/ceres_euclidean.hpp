@@ -18,7 +18,7 @@ class CeresEuclidean {
     owner.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     owner.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     problem_ = std::make_unique<ceres::Problem>(owner);
-    if (options.huber_px > 0) loss_ = std::make_unique<ceres::HuberLoss>(options.huber_px);
+    if (options.huber_sigmas > 0) loss_ = std::make_unique<ceres::HuberLoss>(options.huber_sigmas);
     ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       problem_->AddParameterBlock(poses_[i].data(), 7, &manifold_);

@@ -59,7 +59,7 @@ PoseElimination::Values PoseElimination::start(const WindowProblem& problem) {
 }
 
 double PoseElimination::cost(const WindowSolverOptions& options, const Values& values) const {
-  const HuberKernel kernel{options.huber_px};
+  const HuberKernel kernel{options.huber_sigmas};
   std::vector<Vector3> x_w;
   x_w.reserve(values.psi.size());
   for (std::size_t k = 0; k < values.psi.size(); ++k) {
@@ -159,7 +159,7 @@ std::optional<double> PoseElimination::advance(const WindowSolverOptions& option
   gradient_.setZero(3 * points);
   reduced_.setZero(3 * points, 3 * points);
   linearise_points(values);
-  for (int i = 0; i < poses; ++i) linearise_pose(i, HuberKernel{options.huber_px}, values);
+  for (int i = 0; i < poses; ++i) linearise_pose(i, HuberKernel{options.huber_sigmas}, values);
   reduced_gradient_ = gradient_;
   for (int i = 0; i < poses; ++i) {
     if (fixed_[i] != 0) continue;

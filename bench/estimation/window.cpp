@@ -50,7 +50,8 @@ int main(int argc, char** argv) {
   app.add_option("--pose-noise", g.start_pose_noise, "Generated: start poses [m]");
   app.add_option("--depth-noise", g.start_depth_noise, "Generated: start inverse depths, relative");
   app.add_option("--dump", arguments.dump, "Write the problem to this file");
-  app.add_option("--huber", arguments.race.solver.huber_px, "Kernel on reprojection errors [px]");
+  app.add_option("--huber", arguments.race.solver.huber_sigmas,
+                 "Kernel on whitened reprojection errors [standard deviations]");
   app.add_option("--repeat", arguments.race.repeat, "Runs of which the fastest counts")
       ->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);

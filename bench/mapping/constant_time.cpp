@@ -91,7 +91,8 @@ LoopMeasurement measure_loops(const Rig& rig, Mapper& mapper) {
   const GraphSnapshot closed = mapper.publish();
   PoseGraphReport report;
   auto start = Clock::now();
-  const PoseGraphUpdate optimised = optimise_part(closed, closed.reference(), rig, mapper.options(), report);
+  const PoseGraphUpdate optimised =
+      optimise_component(closed, closed.reference(), rig, mapper.options(), report);
   result.relax_ms = 1e-3 * us_since(start);
   start = Clock::now();
   result.moved = mapper.take_pose_graph(optimised);

@@ -26,7 +26,7 @@ WindowProblem fixed_window(unsigned seed, double constraint_noise = 0.005) {
 TEST(WindowCovariance, EqualsCeres) {
   WindowProblem problem = fixed_window(1);
   WindowSolverOptions options;
-  options.huber_px = 0;
+  options.huber_sigmas = 0;
   options.max_iterations = 50;
   WindowSolver solver;
   solver.solve(problem, options);
@@ -71,7 +71,7 @@ TEST(WindowCovariance, PredictsTheErrorOverManyDraws) {
   generator.points_per_keyframe = 12;
   generator.pixel_noise = 1;  // which is what the unit information says
   WindowSolverOptions options;
-  options.huber_px = 0;
+  options.huber_sigmas = 0;
   options.max_iterations = 20;
   WindowSolver solver;
   double sum = 0;

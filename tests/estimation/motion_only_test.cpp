@@ -86,7 +86,7 @@ TEST(MotionOnly, InformationPredictsTheError) {
   double sum = 0;
   constexpr int kDraws = 400;
   MotionOnlyOptions options;
-  options.huber_px = 0;
+  options.huber_sigmas = 0;
   options.inlier_chi2_mono = options.inlier_chi2_stereo = 1e9;
   for (unsigned seed = 1; seed <= kDraws; ++seed) {
     Scene scene = make_scene(60, 0.8, 0, 0.3, seed);
@@ -100,7 +100,7 @@ TEST(MotionOnly, InformationPredictsTheError) {
 TEST(MotionOnly, GradientVanishesAndInformationIsTheCurvature) {
   Scene scene = make_scene(100, 1, 0, 0.3);
   MotionOnlyOptions options;
-  options.huber_px = 0;
+  options.huber_sigmas = 0;
   options.rounds = 1;
   options.max_iterations = 50;
   options.inlier_chi2_mono = options.inlier_chi2_stereo = 1e9;

@@ -27,7 +27,7 @@ TEST(PoseElimination, IsEqualToCeresAndToTheWindowSolver) {
       if (fixed) problem.poses.front().fixed = problem.poses.back().fixed = true;
       const Matrix4 front = problem.poses.front().T_k_w.matrix();
       auto solver_options = to_convergence();
-      solver_options.huber_px = huber;
+      solver_options.huber_sigmas = huber;
       const double reference = ceres_cost(problem, solver_options);
       auto again = problem, points_first = problem;
       const SolverSummary summary = PoseElimination().solve(problem, solver_options);

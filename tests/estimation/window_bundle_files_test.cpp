@@ -65,7 +65,7 @@ TEST_F(BundleFiles, ReadsBalWithDistortion) {
   EXPECT_EQ(problem.points.size(), 3u);
   EXPECT_EQ(problem.observations.size(), 6u);
   WindowSolverOptions options;
-  options.huber_px = 0;
+  options.huber_sigmas = 0;
   EXPECT_LT(window_cost(problem, options), 1e-6);  // floats: 3e-5 px each
 }
 
@@ -113,7 +113,7 @@ TEST(BundleData, StereoTracksReachTheirMinimum) {
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not there";
   WindowProblem problem = read_bundle(folder);
   WindowSolverOptions options;
-  options.huber_px = 0;
+  options.huber_sigmas = 0;
   options.max_iterations = 30;
   WindowSolver solver;
   const auto summary = solver.solve(problem, options);

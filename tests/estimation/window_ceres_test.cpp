@@ -23,7 +23,7 @@ TEST_P(EqualToCeres, AtConvergence) {
   WindowProblem& problem = window.start;
   if (GetParam().fixed_rim) problem.poses.front().fixed = problem.poses.back().fixed = true;
   auto options = to_convergence();
-  options.huber_px = GetParam().huber;
+  options.huber_sigmas = GetParam().huber;
   options.constraint_huber = GetParam().constraint_huber;
   const double reference = ceres_cost(problem, options);
   const auto front = problem.poses.front().T_k_w.matrix();

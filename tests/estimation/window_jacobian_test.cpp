@@ -177,7 +177,7 @@ TEST_P(OneStep, EqualsTheDenseStepWithNumericalJacobians) {
   }
   WindowSolverOptions solver_options;
   solver_options.max_iterations = 1;
-  solver_options.huber_px = 0;
+  solver_options.huber_sigmas = 0;
   solver_options.initial_damping = 1e-3;
   const Eigen::VectorXd delta = dense_step(problem, solver_options.initial_damping);
 

@@ -51,9 +51,9 @@ TEST(WindowSolver, IsRobustToOneFifthOutliers) {
   auto robust = start, plain = start;
   WindowSolver solver;
   auto solver_options = to_convergence();
-  solver_options.huber_px = 1;
+  solver_options.huber_sigmas = 1;
   solver.solve(robust, solver_options);
-  solver_options.huber_px = 0;
+  solver_options.huber_sigmas = 0;
   solver.solve(plain, solver_options);
   EXPECT_LT(relative_pose_error(robust, truth_2), 0.03);
   EXPECT_LT(relative_pose_error(robust, truth_2), 0.2 * relative_pose_error(plain, truth_2));

@@ -69,9 +69,10 @@ TEST(OptimiseStructure, NoPointGetsWorse) {
     WindowSolverOptions few;
     optimise_structure(window.start, few);
     for (std::size_t k = 0; k < before.points.size(); ++k) {
-      const double cost_before = point_cost(before, before.points[k], few.huber_px);
+      const double cost_before = point_cost(before, before.points[k], few.huber_sigmas);
       if (!std::isfinite(cost_before)) continue;
-      EXPECT_LE(point_cost(window.start, window.start.points[k], few.huber_px), cost_before * (1 + 1e-12));
+      EXPECT_LE(point_cost(window.start, window.start.points[k], few.huber_sigmas),
+                cost_before * (1 + 1e-12));
     }
   }
 }

@@ -67,7 +67,7 @@ class EdgeMeasurementsTest : public testing::Test {
     WindowSolverOptions solver;
     solver.max_iterations = 30;
     solver.relative_decrease = 1e-14;
-    solver.huber_px = 0;
+    solver.huber_sigmas = 0;
     optimise_structure(builder.problem(), solver);
     builder.write_back(writer_, window);
   }

@@ -66,7 +66,7 @@ TEST_P(AnchoredViewsTest, ReachesTheMinimumOfTheWindowSolver) {
     Start start = make_start(GetParam(), 40, seed);
     ASSERT_TRUE(start.views.minimise(60));
     WindowSolverOptions options;
-    options.huber_px = 0;
+    options.huber_sigmas = 0;
     options.max_iterations = 200;
     options.relative_decrease = 1e-12;
     // Both from the same poses: scale is free, and the way to the minimum is not the question.

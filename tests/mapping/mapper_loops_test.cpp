@@ -114,7 +114,7 @@ TEST(Mapper, RelaxingTheWholeMapKeepsTheReferenceAndTheAccuracy) {
   while (!simulation.done()) map_next(simulation, mapper);
   const SE3 T_ref_w = mapper.graph().T_k_w(mapper.graph().reference());
   const PoseGraphReport report = mapper.optimise_all_poses();
-  EXPECT_EQ(report.parts, 1);
+  EXPECT_EQ(report.components, 1);
   EXPECT_EQ(report.keyframes, 110);
   EXPECT_LE(report.final_cost, report.initial_cost);
   EXPECT_LT((mapper.graph().T_k_w(mapper.graph().reference()) * T_ref_w.inverse()).log().norm(), 1e-9);

@@ -86,7 +86,7 @@ TEST(Mapper, IsLocallyAsAccurateAsFullBundleAdjustment) {
       Simulation simulation = spiral(110, seed);
       MapperOptions options = small_windows();
       if (sum == &ba) options.inner_window = INT_MAX / 4;
-      options.solver.huber_px = 0;
+      options.solver.huber_sigmas = 0;
       options.outlier_chi2_mono = options.outlier_chi2_stereo = 1e9;
       Mapper mapper(simulation::thesis_rig(), options);
       while (!simulation.done()) {

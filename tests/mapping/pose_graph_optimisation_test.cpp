@@ -37,8 +37,8 @@ TEST(RelaxAllPoses, MakesEveryPartAgreeWithItsEdgesAndKeepsItsRoot) {
   writer.set_reference(KeyframeId{33});
   const SE3 T_ref_w = writer.graph().T_k_w(KeyframeId{33});
   const SE3 T_0_w = writer.graph().T_k_w(KeyframeId{0});
-  const PoseGraphReport report = optimise_all_parts(writer, simulation::thesis_rig(), {});
-  EXPECT_EQ(report.parts, 2);
+  const PoseGraphReport report = optimise_all_components(writer, simulation::thesis_rig(), {});
+  EXPECT_EQ(report.components, 2);
   EXPECT_EQ(report.keyframes, 50);
   EXPECT_EQ(report.constraints, 50);
   EXPECT_LT((writer.graph().T_k_w(KeyframeId{33}) * T_ref_w.inverse()).log().norm(), 1e-12);
@@ -65,7 +65,7 @@ TEST(RelaxAllPoses, SpreadsTheErrorOfALoop) {
     link_marginalised(writer, KeyframeId{n}, KeyframeId{next}, 30, next == 0 ? T_next_n : drift * T_next_n);
   }
   writer.set_reference(KeyframeId{0});
-  const PoseGraphReport report = optimise_all_parts(writer, simulation::thesis_rig(), {});
+  const PoseGraphReport report = optimise_all_components(writer, simulation::thesis_rig(), {});
   EXPECT_LT(report.final_cost, 0.2 * report.initial_cost);
   double largest = 0, sum = 0;
   for (std::uint32_t n = 0; n < kCount; ++n) {

@@ -11,12 +11,12 @@ namespace twofold::bench {
 namespace {
 
 constexpr int kInner = 30, kOuter = 100;
-constexpr double kHuberPx = 3;      // as in the scale drift experiment: points are seen three or four times
+constexpr double kHuberSigmas = 3;  // as in the scale drift experiment: points are seen three or four times
 constexpr std::size_t kLater = 20;  // keyframes after the closure at which the map is shown again
 
 MapperOptions mapper_options(LoopMethod method, const DoubleWindowExperimentOptions& options) {
   MapperOptions mapper = simulation_mapper_options(options);
-  mapper.solver.huber_px = kHuberPx;
+  mapper.solver.huber_sigmas = kHuberSigmas;
   mapper.inner_window = method == kLoopBa ? kUnbounded : kInner;
   mapper.outer_window = kOuter;
   mapper.global_outer_window = method == kLoopGlobal || method == kLoopGlobalRigid;

@@ -42,7 +42,7 @@ MapperOptions simulation_mapper_options(const DoubleWindowExperimentOptions& opt
   mapper.edge = options.edge;
   mapper.solver.max_iterations = 3;
   // Perfect association: there are no outliers to look for, no metric loops to find, and nothing to cull.
-  mapper.solver.huber_px = 0;
+  mapper.solver.huber_sigmas = 0;
   mapper.outlier_chi2_mono = mapper.outlier_chi2_stereo = 1e9;
   mapper.loop.enabled = mapper.culling.keyframes = mapper.culling.points = false;
   return mapper;

@@ -17,7 +17,7 @@ class Explorer {
  public:
   Explorer(const Rig& rig, const ExplorationOptions& options) : rig_(rig), options_(options) {
     solver_options_.max_iterations = options.iterations;
-    solver_options_.huber_px = options.huber_px;
+    solver_options_.huber_sigmas = options.huber_sigmas;
     solver_options_.relative_decrease = 1e-5;
   }
 
@@ -84,7 +84,7 @@ class Explorer {
     }
     MotionOnlyOptions options;
     options.rounds = 1;
-    options.huber_px = 10;  // points seen twice only may be far off
+    options.huber_sigmas = 10;  // points seen twice only may be far off
     const MotionOnlyResult placed = optimise_motion(rig_, observations, T_start, options);
     const bool usable = observations.size() >= kMinPlacing && placed.T_c_ref.log().allFinite();
     pose(k) = usable ? placed.T_c_ref : T_start;

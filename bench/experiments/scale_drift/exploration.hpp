@@ -12,7 +12,7 @@ struct ExplorationOptions {
   int window = 10;             ///< keyframes adjusted together, >= 3
   int iterations = 10;         ///< of bundle adjustment a frame
   double min_parallax = 0.05;  ///< of a new point [rad]
-  double huber_px = 3;         ///< kernel of bundle adjustment (thesis 3.5)
+  double huber_sigmas = 3;     ///< kernel of bundle adjustment (thesis 3.5)
 };
 
 /// One point from its first to its last sighting without a gap. A point of the scene that comes into view

@@ -21,7 +21,7 @@ class BaPipeline {
   BaPipeline(const Rig& rig, int iterations) : mono_(rig.kind == SensorKind::kMono) {
     problem_.rig = rig;
     options_.max_iterations = iterations;
-    options_.huber_px = 0;
+    options_.huber_sigmas = 0;
     options_.relative_decrease = 1e-10;
   }
 
@@ -59,7 +59,7 @@ class BaPipeline {
       observations.push_back(m);
     }
     MotionOnlyOptions options;
-    options.huber_px = 1e6;
+    options.huber_sigmas = 1e6;
     options.inlier_chi2_mono = options.inlier_chi2_stereo = 1e12;
     options.rounds = 1;
     return optimise_motion(problem_.rig, observations, start, options).T_c_ref;

@@ -1,10 +1,10 @@
-#include "python/live_view.hpp"
+#include "python/browser_view.hpp"
 
 #include <stdexcept>
 
 namespace twofold::python {
 
-std::string LiveView::open(const CameraRig& rig, const Slam& slam, const ViewerOptions& options) {
+std::string BrowserView::open(const CameraRig& rig, const Slam& slam, const ViewerOptions& options) {
   const std::scoped_lock lock(opening_);
   if (viewer_) throw std::runtime_error("the viewer is open at " + viewer_->address());
   viewer_ = std::make_shared<Viewer>(
@@ -13,23 +13,23 @@ std::string LiveView::open(const CameraRig& rig, const Slam& slam, const ViewerO
   return viewer_->address();
 }
 
-void LiveView::show(const FrameView& frame) {
+void BrowserView::show(const FrameView& frame) {
   const std::scoped_lock lock(showing_);
   const std::int64_t number = frames_++;
   Viewer* viewer = shown_.load(std::memory_order_acquire);
   if (viewer != nullptr && viewer->wants_image()) viewer->show(number, frame.left, frame.owner);
 }
 
-void LiveView::close() {
+void BrowserView::close() {
   const std::scoped_lock lock(opening_);
   if (viewer_) viewer_->finish();
 }
 
-void LiveView::tell(Viewer& viewer, const PoseEstimate& pose) {
+void BrowserView::tell(Viewer& viewer, const PoseEstimate& pose) {
   viewer.tell(pose);
 }
 
-void LiveView::tell(Viewer& viewer, const MapEvent& event) {
+void BrowserView::tell(Viewer& viewer, const MapEvent& event) {
   viewer.tell(event);
 }
 

@@ -12,10 +12,10 @@
 namespace twofold::python {
 
 /// The viewer of a run, which may be opened before it begins or while it goes on.
-class LiveView {
+class BrowserView {
  public:
-  /// @return the address to open. Throws std::runtime_error when it is open already, the port is not to be had, or
-  /// the package was built without the viewer.
+  /// @return the address to open. Throws std::runtime_error when it is open already, the port is not to be
+  /// had, or the package was built without the viewer.
   std::string open(const CameraRig& rig, const Slam& slam, const ViewerOptions& options);
 
   /// Of the tracker's thread: waits for nobody. T: PoseEstimate, MapEvent
@@ -35,7 +35,8 @@ class LiveView {
 
   std::mutex opening_, showing_;
   std::int64_t frames_ = 0;
-  std::shared_ptr<Viewer> viewer_;  // shared: deleted by who made it, so that without a viewer nothing refers to one
+  std::shared_ptr<Viewer>
+      viewer_;  // shared: deleted by who made it, so that without a viewer nothing refers to one
   std::atomic<Viewer*> shown_{nullptr};  // release when it is made -> acquire by who tells: it is seen whole
 };
 
