@@ -34,7 +34,7 @@ void paint_wall(Canvas& canvas, Random& random) {
   scatter_specks(canvas, random, 19, 0.01, 0.06, 40);
 }
 
-void add_shell(Scene& scene, Random& random) {
+void add_shell(Scene& scene, Random& random, const PlainPanels& plain) {
   const double l = kHalfLength;
   const double w = kHalfWidth;
   const Vector3 x = Vector3::UnitX();
@@ -47,6 +47,7 @@ void add_shell(Scene& scene, Random& random) {
   for (Quad wall : walls) {
     Canvas canvas(wall.width, wall.height, kTexel, 160);
     paint_wall(canvas, random);
+    plain.paint(canvas, scene.textures.size());
     wall.texture = scene.add(canvas.finish());
     scene.quads.push_back(wall);
   }
@@ -79,10 +80,10 @@ void add_furniture(Scene& scene, Random& random) {
 
 }  // namespace
 
-Staging make_corridor(std::uint64_t seed) {
+Staging make_corridor(std::uint64_t seed, double plain) {
   Staging staging;
   Random random(mix64(seed) ^ 0x636f7272ULL);
-  add_shell(staging.scene, random);
+  add_shell(staging.scene, random, {seed, plain});
   add_furniture(staging.scene, random);
 
   // Up on one side, around, and down on the other: the ring is a narrow stadium.
@@ -103,6 +104,7 @@ Staging make_corridor(std::uint64_t seed) {
   style.look_aside_deg = 12;
   staging.path = walk(curve, style);
   staging.round_seconds = curve.length() / kSpeed;
+  staging.walking_speed = kSpeed;
 
   staging.object_size = {0.5, 0.35, 1.75};
   staging.object_texture = add_box_textures(staging.scene, staging.object_size, kTexel, [&](Canvas& c) {

@@ -58,7 +58,7 @@ void paint_facade(Canvas& canvas, Random& random, int style) {
   canvas.shade_rows(0, 0.4, 0.75f, 1.0f);
 }
 
-void add_walls(Scene& scene, Random& random) {
+void add_walls(Scene& scene, Random& random, const PlainPanels& plain) {
   struct Wall {
     Vector3 left_top;
     Vector3 along;
@@ -75,6 +75,7 @@ void add_walls(Scene& scene, Random& random) {
   for (const Wall& wall : walls) {
     Canvas canvas(wall.length, h, kTexel, 128);
     paint_facade(canvas, random, style++);
+    plain.paint(canvas, scene.textures.size());
     const int texture = scene.add(canvas.finish());
     scene.quads.push_back(
         {wall.left_top, wall.along, -Vector3::UnitZ(), wall.length, h, texture, wall.light});
@@ -120,11 +121,13 @@ void add_tree(Scene& scene, Random& random, double x, double y) {
   }
 }
 
-void add_centre(Scene& scene, Random& random) {
+void add_centre(Scene& scene, Random& random, const PlainPanels& plain) {
   // A small pavilion with four different walls, columns around it, and benches and planters on the way.
   int style = 0;
-  add_box(scene, standing(0.3, -0.2, 1.5, 0.12), {4.2, 2.6, 3.0}, kTexel,
-          [&](Canvas& canvas) { paint_facade(canvas, random, (style++ * 3 + 1) % 4); });
+  add_box(scene, standing(0.3, -0.2, 1.5, 0.12), {4.2, 2.6, 3.0}, kTexel, [&](Canvas& canvas) {
+    paint_facade(canvas, random, (style++ * 3 + 1) % 4);
+    plain.paint(canvas, scene.textures.size());
+  });
   add_column(scene, random, -4.1, 2.1, 0.28, 3.4);
   add_column(scene, random, 4.3, 2.3, 0.24, 3.1);
   add_column(scene, random, 4.2, -2.2, 0.3, 3.5);
@@ -178,12 +181,12 @@ void add_rim(Scene& scene, Random& random) {
 
 }  // namespace
 
-Staging make_courtyard(std::uint64_t seed) {
+Staging make_courtyard(std::uint64_t seed, double plain) {
   Staging staging;
   Random random(mix64(seed) ^ 0x636f757274ULL);
-  add_walls(staging.scene, random);
+  add_walls(staging.scene, random, {seed, plain});
   add_ground(staging.scene, random);
-  add_centre(staging.scene, random);
+  add_centre(staging.scene, random, {seed, plain});
   add_rim(staging.scene, random);
 
   // A rounded rectangle, anticlockwise, 3 m from the walls.
@@ -201,6 +204,7 @@ Staging make_courtyard(std::uint64_t seed) {
   style.speed = curve.length() / kRound;
   staging.path = walk(curve, style);
   staging.round_seconds = kRound;
+  staging.walking_speed = style.speed;
 
   // Somebody walks the same way some metres ahead, at a changing distance.
   staging.object_size = {0.5, 0.35, 1.75};

@@ -24,12 +24,20 @@ std::string SyntheticOptions::invalid_reason() const {
                                  outside("depth_noise", depth_noise, 0, 10),
                                  outside("blur", blur, 0, 1),
                                  outside("exposure", exposure, 0, 0.9),
+                                 outside("walkers", walkers, 0, 16),
+                                 outside("plain", plain, 0, 1),
+                                 outside("exposure_steps", exposure_steps, 0, 4),
+                                 outside("flicker", flicker, 0, 0.5),
                                  outside("drop", drop, 0, 0.9),
                                  outside("cover_at", cover_at, 0, 1e6),
                                  outside("cover", cover, 0, 1e6),
                                  outside("carried_to", carried_to, 0, 1e6)};
   for (const std::string& reason : reasons)
     if (!reason.empty()) return reason;
+  const bool has_walls = scene == "corridor" || scene == "courtyard";
+  if (walkers > 0 && !has_walls)
+    return fmt::format("walkers need ground to walk on, which {} has not", scene);
+  if (plain > 0 && !has_walls) return fmt::format("plain panels need walls, which {} has not", scene);
   return {};
 }
 

@@ -26,7 +26,12 @@ struct SyntheticOptions {
   double blur = 0;         ///< exposure time as a share of the frame interval, 0 .. 1
   double exposure = 0;     ///< amplitude of the changes of gain, 0 .. 0.9
   bool object = false;     ///< something moves through the scene
-  double drop = 0;         ///< share of frames lost, 0 .. 0.9; the first is always there
+  int walkers = 0;         ///< people around the camera (walkers.hpp), 0 .. 16; corridor and courtyard only
+  double plain = 0;   ///< share of the walls' panels without texture, 0 .. 1; corridor and courtyard only
+  bool bare = false;  ///< nothing has texture: each surface is of one grey
+  double exposure_steps = 0;  ///< every few seconds the gain changes at once, by up to so many stops, 0 .. 4
+  double flicker = 0;         ///< amplitude of the lamps' flicker, 0 .. 0.5
+  double drop = 0;            ///< share of frames lost, 0 .. 0.9; the first is always there
 
   /// A hand covers the lens at this time [s], and nothing but noise is seen for `cover` seconds; 0: never.
   double cover_at = 0;

@@ -1,6 +1,7 @@
 #include "synthetic/scene.hpp"
 
 #include <algorithm>
+#include <opencv2/core.hpp>
 
 namespace twofold::synthetic {
 
@@ -20,6 +21,10 @@ float HeightField::height_at(float x, float y) const {
 int Scene::add(const cv::Mat& canvas) {
   textures.emplace_back(canvas);
   return static_cast<int>(textures.size()) - 1;
+}
+
+void Scene::strip_textures() {
+  for (Texture& texture : textures) texture = Texture(cv::Mat(2, 2, CV_32FC1, cv::Scalar(texture.mean())));
 }
 
 std::vector<Quad> box_quads(const SE3& T_w_o, const Vector3& size, int first_texture) {

@@ -65,6 +65,8 @@ struct Scene {
 
   /// Index of a texture for the primitives.
   int add(const cv::Mat& canvas);
+  /// Each texture becomes its mean grey.
+  void strip_textures();
 };
 
 /// The six sides of a box with one texture each (texture ... texture + 5: front -y, right +x, back +y, left

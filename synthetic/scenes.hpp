@@ -4,6 +4,7 @@
 
 #include "synthetic/camera_path.hpp"
 #include "synthetic/scene.hpp"
+#include "synthetic/walkers.hpp"
 
 namespace twofold::synthetic {
 
@@ -12,6 +13,8 @@ struct Staging {
   Scene scene;
   CameraPath path;
   double round_seconds = 0;  ///< once around, back and forth, or down
+  double walking_speed = 0;  ///< of who walks there [m/s]; 0: nobody does
+  Walkers walkers;
   /// Where a moving box stands at time t [s], and its size; six textures from object_texture.
   std::function<SE3(double t)> T_w_object;
   Vector3 object_size = Vector3::Zero();
@@ -19,9 +22,12 @@ struct Staging {
 };
 
 /// seed changes every texture and small things in the layout; the walls, the path and its length stay.
-[[nodiscard]] Staging make_courtyard(std::uint64_t seed);  ///< 40 m loop between walls, columns and trees
-[[nodiscard]] Staging make_desk(std::uint64_t seed);       ///< things on a desk, looked along from 0.7 m
-[[nodiscard]] Staging make_corridor(std::uint64_t seed);   ///< up and down a corridor of 24 m
+/// plain: share of the walls' panels without texture.
+[[nodiscard]] Staging make_courtyard(std::uint64_t seed,
+                                     double plain = 0);  ///< 40 m loop between walls, columns and trees
+[[nodiscard]] Staging make_desk(std::uint64_t seed);     ///< things on a desk, looked along from 0.7 m
+[[nodiscard]] Staging make_corridor(std::uint64_t seed,
+                                    double plain = 0);  ///< up and down a corridor of 24 m
 [[nodiscard]] Staging make_descent(
     std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
 

@@ -1,7 +1,9 @@
 #include "synthetic/synthetic_sequence.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "synthetic/image_effects.hpp"
@@ -17,14 +19,36 @@ constexpr std::uint64_t kDropStream = ~std::uint64_t{0};
 
 constexpr float kHandOverLens = 12;  ///< [grey level]
 
+Staging make_place(const SyntheticOptions& options, std::uint64_t seed) {
+  if (options.scene == "courtyard") return make_courtyard(seed, options.plain);
+  if (options.scene == "desk") return make_desk(seed);
+  if (options.scene == "corridor") return make_corridor(seed, options.plain);
+  if (options.scene == "descent") return make_descent(seed);
+  throw std::invalid_argument("unknown scene '" + options.scene + "'");
+}
+
 Staging make_staging(const SyntheticOptions& options, std::uint64_t seed) {
   if (const std::string reason = options.invalid_reason(); !reason.empty())
     throw std::invalid_argument(reason);
-  if (options.scene == "courtyard") return make_courtyard(seed);
-  if (options.scene == "desk") return make_desk(seed);
-  if (options.scene == "corridor") return make_corridor(seed);
-  if (options.scene == "descent") return make_descent(seed);
-  throw std::invalid_argument("unknown scene '" + options.scene + "'");
+  Staging staging = make_place(options, seed);
+  if (options.walkers > 0)
+    staging.walkers = Walkers(staging.scene, staging.path, staging.walking_speed, options.walkers, seed);
+  if (options.bare) staging.scene.strip_textures();
+  return staging;
+}
+
+/// Gain after the changes so far, when the largest is by `stops`: half of it or all, up and down.
+double stepped_gain(double t, double stops) {
+  constexpr double kFirst = 2.5, kHeld = 4;  // [s]
+  constexpr std::array<double, 8> kStops{0, 0.5, 0, 1, 0.5, 1, 0, 0.5};
+  const double steps = std::max(0.0, std::floor((t - kFirst) / kHeld) + 1);
+  return std::exp2(-stops * kStops[static_cast<std::size_t>(steps) % kStops.size()]);
+}
+
+/// Lamps on mains of 50 Hz, whose phase each frame meets a little later.
+double flickering(double t, double amplitude) {
+  constexpr double kBeat = 7.3;  // [Hz] that a camera sees of it
+  return 1 - amplitude * 0.5 * (1 + std::sin(2 * std::numbers::pi * kBeat * t));
 }
 
 }  // namespace
@@ -75,7 +99,9 @@ SE3 SyntheticSequence::T_w_c(int i) const {
 
 double SyntheticSequence::gain(int i) const {
   const double t = seconds(i);
-  return 1 - options_.exposure * 0.5 * (1 - 0.7 * std::cos(0.9 * t) - 0.3 * std::cos(2.3 * t));
+  const double changing =
+      1 - options_.exposure * 0.5 * (1 - 0.7 * std::cos(0.9 * t) - 0.3 * std::cos(2.3 * t));
+  return changing * stepped_gain(t, options_.exposure_steps) * flickering(t, options_.flicker);
 }
 
 View SyntheticSequence::view_at(const Staging& staging, double t, double right_m) const {
@@ -83,6 +109,7 @@ View SyntheticSequence::view_at(const Staging& staging, double t, double right_m
   std::vector<Quad> moving;
   if (options_.object && staging.T_w_object)
     moving = box_quads(staging.T_w_object(t), staging.object_size, staging.object_texture);
+  staging.walkers.append(t, moving);
   return Renderer(staging.scene).render(rig_.camera, T_w_c, moving);
 }
 

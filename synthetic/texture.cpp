@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 
 #include "geometry/check.hpp"
 
@@ -98,6 +99,12 @@ float Texture::trilinear(float u, float v, int level, float blend) const {
   if (blend == 0) return fine;
   const float coarse = levels_[level + 1].bilinear(0.5f * fine_u - 0.25f, 0.5f * fine_v - 0.25f);
   return fine + blend * (coarse - fine);
+}
+
+float Texture::mean() const {
+  const std::vector<std::uint8_t>& texels = levels_.front().texels;
+  return static_cast<float>(std::accumulate(texels.begin(), texels.end(), 0.0) /
+                            static_cast<double>(texels.size()));
 }
 
 float Texture::sample(float u, float v, const TexelFootprint& footprint) const {

@@ -29,6 +29,8 @@ class Texture {
   /// rim.
   [[nodiscard]] float sample(float u, float v, const TexelFootprint& footprint) const;
 
+  [[nodiscard]] float mean() const;
+
   [[nodiscard]] int width() const { return levels_.front().width; }
   [[nodiscard]] int height() const { return levels_.front().height; }
 

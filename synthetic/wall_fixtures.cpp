@@ -1,7 +1,11 @@
 #include "synthetic/wall_fixtures.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <opencv2/core.hpp>
 #include <string>
+#include <vector>
 
 #include "synthetic/materials.hpp"
 
@@ -100,6 +104,22 @@ void draw_ivy(Canvas& canvas, Random& random, double x, double y, double radius)
     const double size = random.uniform(0.03, 0.08);
     canvas.ellipse(x + distance * std::cos(angle), y + 1.4 * distance * std::sin(angle), size, 0.6 * size,
                    random.uniform(0, 180), vary(random, 85, 50));
+  }
+}
+
+void PlainPanels::paint(Canvas& canvas, std::uint64_t wall) const {
+  const int panels = std::max(1, static_cast<int>(std::lround(canvas.width() / kWidth)));
+  std::vector<int> order(static_cast<std::size_t>(panels));
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    const auto rank = [&](int panel) { return counter_hash(seed, wall, static_cast<std::uint64_t>(panel)); };
+    return rank(a) < rank(b);
+  });
+  cv::Mat& image = canvas.image();
+  order.resize(static_cast<std::size_t>(std::lround(share * panels)));
+  for (const int panel : order) {
+    cv::Mat area = image.colRange(image.cols * panel / panels, image.cols * (panel + 1) / panels);
+    area.setTo(cv::mean(area)[0]);
   }
 }
 

@@ -11,4 +11,14 @@ void draw_door(Canvas& canvas, Random& random, double x, double y, double w, dou
 void draw_poster(Canvas& canvas, Random& random, double x, double y, double w, double h);
 void draw_ivy(Canvas& canvas, Random& random, double x, double y, double radius);
 
+/// Panels of walls that lose what is painted on them: each is then of its mean grey.
+struct PlainPanels {
+  static constexpr double kWidth = 2;  ///< [m]
+  std::uint64_t seed = 1;              ///< says which
+  double share = 0;                    ///< of a wall's panels, 0 .. 1
+
+  /// @param wall  its number; others lose other panels
+  void paint(Canvas& canvas, std::uint64_t wall) const;
+};
+
 }  // namespace twofold::synthetic

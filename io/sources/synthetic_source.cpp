@@ -50,6 +50,13 @@ void take_int(SourceParameters& parameters, const std::string& key, int* value) 
   *value = static_cast<int>(*number);
 }
 
+void take_switch(SourceParameters& parameters, const std::string& key, bool* value) {
+  int number = *value ? 1 : 0;
+  take_int(parameters, key, &number);
+  if (number > 1) throw IoError(parameters.subject(), "parameter " + key + " must be 0 or 1");
+  *value = number == 1;
+}
+
 void take(SourceParameters& parameters, const std::string& key, double* value) {
   if (const auto number = parameters.take_number(key)) *value = *number;
 }
@@ -75,6 +82,9 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
                                    {"depth_noise", &options.depth_noise},
                                    {"blur", &options.blur},
                                    {"exposure", &options.exposure},
+                                   {"exposure_steps", &options.exposure_steps},
+                                   {"flicker", &options.flicker},
+                                   {"plain", &options.plain},
                                    {"drop", &options.drop},
                                    {"cover_at", &options.cover_at},
                                    {"cover", &options.cover},
@@ -84,10 +94,9 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
   if (const auto seed = take_integer(parameters, "seed")) options.seed = static_cast<std::uint64_t>(*seed);
   if (const auto seed = take_integer(parameters, "elsewhere"))
     options.elsewhere = static_cast<std::uint64_t>(*seed);
-  int object = 0;
-  take_int(parameters, "object", &object);
-  if (object > 1) throw IoError(parameters.subject(), "parameter object must be 0 or 1");
-  options.object = object == 1;
+  take_int(parameters, "walkers", &options.walkers);
+  take_switch(parameters, "object", &options.object);
+  take_switch(parameters, "bare", &options.bare);
   parameters.expect_all_taken();
   return options;
 }

@@ -143,6 +143,13 @@ TEST(SyntheticSource, WrongParametersAreNamed) {
   EXPECT_IO_ERROR(open_synthetic("desk", {{"sensor", "lidar"}}),
                   "sensor='lidar' must be stereo, rgbd or mono");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"object", "2"}}), "object must be 0 or 1");
+  EXPECT_IO_ERROR(open_synthetic("desk", {{"bare", "2"}}), "bare must be 0 or 1");
+  EXPECT_IO_ERROR(open_synthetic("desk", {{"walkers", "1"}}),
+                  "walkers need ground to walk on, which desk has not");
+  EXPECT_IO_ERROR(open_synthetic("descent", {{"plain", "1"}}),
+                  "plain panels need walls, which descent has not");
+  EXPECT_IO_ERROR(open_synthetic("corridor", {{"walkers", "17"}}), "walkers must be between 0 and 16");
+  EXPECT_IO_ERROR(open_synthetic("corridor", {{"flicker", "1"}}), "flicker must be between");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"drop", "0.95"}}), "drop must be between");
   EXPECT_IO_ERROR(open_source("synthetic:desk?blur"), "blur");
 }
