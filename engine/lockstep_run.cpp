@@ -24,6 +24,7 @@ LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
       tracking_(rig, options, trace_.get()),
       mapping_(rig, options, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
+      logs_(options.logs, mapping_.replacement_log()),
       mapper_inbox_(std::bit_ceil(pool_size(options)), std::bit_ceil(pool_size(options))),
       checkpoints_(rig, options.checkpoint),
       snapshot_(mapping_.publish()) {}
@@ -51,8 +52,8 @@ const FrameRecord& LockstepRun::step(const Frame& frame) {
     if (const std::size_t loops = mapper_inbox_.loops_approx(); loops > 0) map(0, loops);
   }
   checkpoint_if_due(frame.t_ns);
-  count(result_.frames.back());
-  return result_.frames.back();
+  count();
+  return record_;
 }
 
 void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
@@ -79,12 +80,13 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
     }
     if (step.fate == TrackerStep::Fate::kDropped) {
       drop(frame, step);
-      count(result_.frames.back());
+      count();
       if (progress) progress(progress_);
       continue;
     }
     for (; snapshot_.version() < step.version; ++round) {
       if (round == schedule.mapper.end() || !can_map(*round)) {
+        if (!schedule.ended) return;  // the rest of what the killed run did is not known
         fail("the schedule does not fit the input: the mapper would need messages that were not sent");
         return;
       }
@@ -93,13 +95,14 @@ void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
       replay_loop_steps(schedule);
     }
     if (step.messages > 0 && !answer_) {
+      if (!schedule.ended) return;
       fail("the schedule does not fit the input: the tracker would need an answer it did not ask for");
       return;
     }
     track(frame, step);
     replay_loop_steps(schedule);
     checkpoint_if_due(frame.t_ns);
-    count(result_.frames.back());
+    count();
     if (progress) progress(progress_);
   }
   for (; round != schedule.mapper.end() && can_map(*round); ++round) {
@@ -140,7 +143,7 @@ void LockstepRun::replay_loop_steps(const Schedule& schedule) {
 void LockstepRun::answer_request(const GraphSnapshot& graph, bool refused) {
   answer_ = refused ? RelocalisationAnswer() : loop_closing_.relocalise(*request_, graph);
   request_.reset();
-  result_.schedule.loop_closer.append({graph.version(), -1, 1, refused ? 1U : 0U});
+  logs_.schedule().loop_closer.append({graph.version(), -1, 1, refused ? 1U : 0U});
 }
 
 void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph,
@@ -150,7 +153,7 @@ void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnaps
   for (LoopMessage& message : messages.first(sent)) {
     if (!mapper_inbox_.try_send(std::move(message))) fail("the schedule leaves too many loops waiting");
   }
-  result_.schedule.loop_closer.append({graph.version(), static_cast<std::int64_t>(index(keyframe.id)), 0,
+  logs_.schedule().loop_closer.append({graph.version(), static_cast<std::int64_t>(index(keyframe.id)), 0,
                                        static_cast<std::uint32_t>(messages.size() - sent)});
 }
 
@@ -160,30 +163,28 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
     tracking_.take_answer(*answer_);
     answer_.reset();
   }
-  FrameRecord record;
+  record_ = FrameRecord{};
   ProposalHandle proposal;
   if (!step.keyframe_withheld) proposal = pool_.try_acquire();
-  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record))
+  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record_))
     mapper_inbox_.send(std::move(proposal));
-  tracking_.finish(due_ns, steady_now_ns(), snapshot_, record);
-  if (tracking_.correction().reason != CorrectionReason::kNone)
-    result_.corrections.push_back(tracking_.correction());
+  tracking_.finish(due_ns, steady_now_ns(), snapshot_, record_);
+  logs_.add(record_, tracking_.correction());
   TrackerStep taken = step;
-  taken.frame = record.frame_index;
-  taken.version = record.snapshot_version;
-  result_.schedule.tracker.append(taken);
+  taken.frame = record_.frame_index;
+  taken.version = record_.snapshot_version;
+  logs_.schedule().tracker.append(taken);
   if (tracking_.wants_relocalisation()) (void)tracking_.request_relocalisation(request_.emplace());
-  result_.frames.push_back(record);
 }
 
 void LockstepRun::drop(const Frame& frame, const TrackerStep& step) {
-  FrameRecord record;
-  record.frame_index = frame.index;
-  record.t_ns = frame.t_ns;
-  record.state = FrameState::kDropped;
-  record.effort = static_cast<EffortLevel>(step.effort_level);
-  result_.schedule.tracker.append(step);
-  result_.frames.push_back(record);
+  record_ = FrameRecord{};
+  record_.frame_index = frame.index;
+  record_.t_ns = frame.t_ns;
+  record_.state = FrameState::kDropped;
+  record_.effort = static_cast<EffortLevel>(step.effort_level);
+  logs_.schedule().tracker.append(step);
+  logs_.add(record_, {});
 }
 
 void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
@@ -191,7 +192,7 @@ void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
   const std::uint64_t version = mapping_.step(mapper_inbox_.proposals(), mapper_inbox_.loops());
   for (ProposalHandle& keyframe : mapper_inbox_.proposals()) mapped_.push_back(std::move(keyframe));
   snapshot_ = mapping_.publish();
-  result_.schedule.mapper.append(
+  logs_.schedule().mapper.append(
       {version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
 }
 
@@ -203,13 +204,15 @@ void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {
   if (!first) checkpoints_.save(snapshot_, loop_closing_.places());
 }
 
-void LockstepRun::count(const FrameRecord& record) {
-  progress_.count(record);
+void LockstepRun::count() {
+  logs_.wait_for_room();
+  progress_.count(record_);
   progress_.map_version = snapshot_.version();
   progress_.queued = mapper_inbox_.proposals_approx();
 }
 
 RunResult LockstepRun::finish() {
+  logs_.close(mapping_.replacement_log(), result_);
   collect_results(tracking_, mapping_, loop_closing_, result_);
   result_.checkpoints = checkpoints_.report();
   result_.trace = std::move(trace_);

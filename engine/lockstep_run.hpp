@@ -5,6 +5,7 @@
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
+#include "engine/logs/run_logs.hpp"
 #include "engine/mapper_inbox.hpp"
 #include "engine/runners.hpp"
 
@@ -41,7 +42,8 @@ class LockstepRun {
   void drop(const Frame& frame, const TrackerStep& step);
   /// By the time of the recording: the same in every run.
   void checkpoint_if_due(std::int64_t t_ns);
-  void count(const FrameRecord& record);
+  /// The newest record.
+  void count();
   void fail(const std::string& why) { result_.error = why; }
 
   const bool localise_only_;
@@ -50,6 +52,8 @@ class LockstepRun {
   TrackerRunner tracking_;
   MapperRunner mapping_;
   LoopCloserRunner loop_closing_;
+  RunLogs logs_;
+  FrameRecord record_;  // of the newest frame
   MapperInbox mapper_inbox_;
   std::deque<ProposalHandle> mapped_;  // keyframes the loop closer has not seen
   std::size_t next_loop_step_ = 0;     // of a replay

@@ -16,6 +16,7 @@ std::string EngineOptions::invalid_reason() const {
       .nested("checkpoint", checkpoint.invalid_reason())
       .nested("pacing", pacing.invalid_reason())
       .nested("effort", effort.invalid_reason())
+      .at_least("logs.frames_in_memory", static_cast<double>(logs.frames_in_memory), 1)
       .at_least("frame_slots", static_cast<double>(frame_slots), 1)
       .at_least("proposal_slots", static_cast<double>(proposal_slots), 1);
   if (tracker_cpu) check.at_least("tracker_cpu", *tracker_cpu, 0);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,6 +42,15 @@ struct CheckpointOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
+/// Where a run takes down what it leaves behind (engine/logs/run_logs.hpp).
+struct RunLogOptions {
+  /// There must be one: trajectory_causal.txt, schedule.log and the records of frames grow in it. Empty: all
+  /// stays in memory.
+  std::filesystem::path folder;
+  /// Without a folder: at least so many of the newest frames are kept, >= 1; 176 bytes each.
+  std::size_t frames_in_memory = std::numeric_limits<std::size_t>::max();
+};
+
 struct EngineOptions {
   TrackerOptions tracker;
   MapperOptions mapper;
@@ -56,6 +66,7 @@ struct EngineOptions {
   /// the run. Of threaded runs.
   const std::atomic<bool>* map_held = nullptr;
   CheckpointOptions checkpoint;
+  RunLogOptions logs;
 
   /// One thread, one order: each frame is tracked against the map with every earlier keyframe optimised.
   bool deterministic = false;

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/chunked_vector.hpp"
-#include "engine/schedule_log.hpp"
+#include "engine/logs/record_sequence.hpp"
+#include "engine/logs/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
 #include "estimation/motion_only.hpp"
@@ -55,8 +55,8 @@ struct PoseCorrection {
   CorrectionReason reason = CorrectionReason::kNone;
   std::int64_t frame_index = 0;  ///< of the frame that saw the corrected map first
   std::int64_t t_ns = 0;
-  SE3 T_c_w_before;
-  SE3 T_c_w_after;
+  PackedPose T_c_w_before;
+  PackedPose T_c_w_after;
 };
 
 /// What is remembered of every frame: kept small, because there is one for each as long as the run goes on.
@@ -115,17 +115,23 @@ struct CheckpointReport {
   std::string error;            ///< of the newest save that failed; the file is then the one before
 };
 
-/// Who saw what when, in the form it is written to a file.
-struct ScheduleStreams {
-  ScheduleStream<TrackerStep> tracker;
-  ScheduleStream<MapperStep> mapper;
-  ScheduleStream<LoopStep> loop_closer;
+/// How many frames there were, forgotten ones included.
+struct FrameCounts {
+  std::int64_t frames = 0, tracked = 0, lost = 0, dropped = 0;
+
+  void add(FrameState state) {
+    ++frames;
+    tracked += state == FrameState::kTracked;
+    lost += state == FrameState::kLost;
+    dropped += state == FrameState::kDropped;
+  }
 };
 
 /// All a run leaves behind.
 struct RunResult {
-  ChunkedVector<FrameRecord> frames;          ///< in the order of the source, dropped ones included
-  ChunkedVector<PoseCorrection> corrections;  ///< in the order of the frames
+  FrameCounts counts;
+  RecordSequence<FrameRecord> frames;          ///< in the order of the source, dropped ones included
+  RecordSequence<PoseCorrection> corrections;  ///< in the order of the frames
   MappingTotals mapping;
   std::vector<ClosedLoop> loops;  ///< by appearance, in the order they were found
   GraphSnapshot graph;            ///< after the last round and the final pose graph optimisation
@@ -137,7 +143,8 @@ struct RunResult {
   std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted
   std::uint64_t keyframes_not_described = 0;  ///< the loop closer's queue was full
   bool interrupted = false;
-  std::string error;       ///< empty, or why the run ended early (a thread failed, the input broke)
+  /// Empty, or why the run ended early (a thread failed, the input broke), or what its logs lost.
+  std::string error;
   double cpu_seconds = 0;  ///< all threads, from start to end of the run
   double wall_seconds = 0;
   double peak_rss_mb = 0;

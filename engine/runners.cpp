@@ -88,7 +88,7 @@ void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecor
   const MapChange& jump = graph.last_jump();
   const bool jumped = jump.version > last_.snapshot_version;
   const CorrectionReason reason = jumped ? reason_of(jump.kind) : CorrectionReason::kOptimisation;
-  correction_ = {reason, record.frame_index, record.t_ns, T_c_w_before, T_c_w};
+  correction_ = {reason, record.frame_index, record.t_ns, last_.T_c_w_causal, PackedPose(T_c_w)};
 }
 
 bool TrackerRunner::wants_relocalisation() const {

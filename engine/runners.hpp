@@ -6,8 +6,8 @@
 
 #include "camera/frame.hpp"
 #include "engine/frame_pool.hpp"
+#include "engine/logs/replacement_log.hpp"
 #include "engine/options.hpp"
-#include "engine/replacement_log.hpp"
 #include "engine/result.hpp"
 #include "engine/stage_timer.hpp"
 #include "graph/keyframe_proposal.hpp"
@@ -90,7 +90,7 @@ class MapperRunner {
   /// The last version: all poses agree globally, unless the map was not to change.
   [[nodiscard]] GraphSnapshot finish();
   /// What became of the keyframes that were culled.
-  [[nodiscard]] const ReplacementLog& replacement_log() const { return replacement_log_; }
+  [[nodiscard]] ReplacementLog& replacement_log() { return replacement_log_; }
   [[nodiscard]] const MappingTotals& totals() const { return totals_; }
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }

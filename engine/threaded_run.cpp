@@ -24,6 +24,7 @@ ThreadedRun::ThreadedRun(const Rig& rig, const EngineOptions& options, PacingClo
       tracking_(rig, options, trace_.get()),
       mapping_(rig, options, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
+      logs_(options.logs, mapping_.replacement_log()),
       slots_(options.frame_slots),
       // In the rings, in the two threads' hands, and the tracker's spare one.
       proposals_pool_(2 * ring_size(options.proposal_slots) + 4,
@@ -109,10 +110,10 @@ void ThreadedRun::stop() {
   join_threads();
 }
 
-/// As fast as possible means as fast as the map can follow: without a clock to keep, frames wait for the
-/// mapper.
+/// As fast as possible means as fast as the map and the disk can follow: without a clock to keep, frames wait
+/// for them.
 bool ThreadedRun::must_hold_back() const {
-  return !options_.pacing.keeps_pace() && mapper_inbox_.proposals_approx() > 1;
+  return !options_.pacing.keeps_pace() && (mapper_inbox_.proposals_approx() > 1 || logs_.behind());
 }
 
 bool ThreadedRun::failed() const {
@@ -129,9 +130,8 @@ void ThreadedRun::collect(const FrameSink& sink) {
     progress_.count(record);
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
     progress_.queued = mapper_inbox_.proposals_approx();
-    result_.frames.push_back(record);
-    schedule_.tracker.append(slot->step);
-    if (slot->correction.reason != CorrectionReason::kNone) result_.corrections.push_back(slot->correction);
+    logs_.add(record, slot->correction);
+    logs_.schedule().tracker.append(slot->step);
     slot->frame = {};  // images are freed here, not on the tracker's thread
     if (sink) sink(record, slot->correction);
     slot.reset();
@@ -163,15 +163,15 @@ void ThreadedRun::map_late_loops() {
   if (mapper_inbox_.loops().empty()) return;
   const std::uint64_t version = mapping_.step({}, mapper_inbox_.loops());
   (void)mapping_.publish();
-  schedule_.mapper.append({version, 0, static_cast<std::uint32_t>(mapper_inbox_.loops().size())});
+  logs_.schedule().mapper.append({version, 0, static_cast<std::uint32_t>(mapper_inbox_.loops().size())});
 }
 
 RunResult ThreadedRun::finish() {
   collect({});
   map_late_loops();
+  logs_.close(mapping_.replacement_log(), result_);
   collect_results(tracking_, mapping_, loop_closing_, result_);
   result_.checkpoints = checkpoints_.report();
-  result_.schedule = std::move(schedule_);
   result_.trace = std::move(trace_);
   result_.keyframes_not_described = not_described_.load(std::memory_order_relaxed);
   return std::move(result_);

@@ -5,6 +5,7 @@
 
 #include "engine/checkpoint_writer.hpp"
 #include "engine/engine.hpp"
+#include "engine/logs/run_logs.hpp"
 #include "engine/mapper_inbox.hpp"
 #include "engine/pacing.hpp"
 #include "engine/parking.hpp"
@@ -116,7 +117,7 @@ class ThreadedRun {
   TrackerRunner tracking_;
   MapperRunner mapping_;
   LoopCloserRunner loop_closing_;
-  ScheduleStreams schedule_;
+  RunLogs logs_;
 
   SlotPool slots_;
   ProposalPool proposals_pool_;

@@ -15,7 +15,7 @@ void ThreadedRun::mapper_thread(const std::stop_token& stop) {
     const std::uint64_t version = mapping_.step(proposals, loops);
     snapshots_.publish(mapping_.publish());
     map_version_.store(version, std::memory_order_relaxed);
-    schedule_.mapper.append(
+    logs_.schedule().mapper.append(
         {version, static_cast<std::uint32_t>(proposals.size()), static_cast<std::uint32_t>(loops.size())});
     for (ProposalHandle& proposal : proposals) {
       // The loop closer may be behind by a whole ring: it then does not get to know this keyframe.
@@ -53,7 +53,7 @@ void ThreadedRun::close_loops(const std::stop_token& stop) {
     LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
     send_loops(loop_closing_.step(*keyframe, graph), step);
     publish_places();
-    schedule_.loop_closer.append(step);
+    logs_.schedule().loop_closer.append(step);
     keyframe.reset();
   }
 }
@@ -73,7 +73,7 @@ bool ThreadedRun::answer_request() {
 void ThreadedRun::send_answer(RelocalisationAnswer answer, const LoopStep& step) {
   TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
   answering_ = false;
-  schedule_.loop_closer.append(step);
+  logs_.schedule().loop_closer.append(step);
 }
 
 void ThreadedRun::answer_nothing(const std::stop_token& stop) {

@@ -189,11 +189,22 @@ std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
     const CameraRig& rig, RunMode mode, bool live, const MaybePath& map, bool localise_only, bool places,
     const MaybePath& vocabulary, int inner_window, int outer_window, int frame_buffers,
     std::optional<int> tracker_cpu, std::optional<int> mapper_cpu, std::optional<int> loop_closer_cpu,
-    std::optional<int> fifo_priority) {
-  const SlamOptions options{
-      mode,         live,         map.value_or(""), localise_only, places,     vocabulary.value_or(""),
-      inner_window, outer_window, frame_buffers,    tracker_cpu,   mapper_cpu, loop_closer_cpu,
-      fifo_priority};
+    std::optional<int> fifo_priority, const MaybePath& run_folder, std::int64_t kept_frames) {
+  const SlamOptions options{mode,
+                            live,
+                            map.value_or(""),
+                            localise_only,
+                            places,
+                            vocabulary.value_or(""),
+                            inner_window,
+                            outer_window,
+                            frame_buffers,
+                            tracker_cpu,
+                            mapper_cpu,
+                            loop_closer_cpu,
+                            fifo_priority,
+                            run_folder.value_or(""),
+                            kept_frames};
   const py::gil_scoped_release unlocked;
   return std::unique_ptr<SlamWithUpdates, DeleteUnlocked>(new SlamWithUpdates(rig, options));
 }
@@ -238,7 +249,8 @@ void bind_slam_class(py::module_& module) {
            py::arg("inner_window") = d.inner_window, py::arg("outer_window") = d.outer_window,
            py::arg("frame_buffers") = d.frame_buffers, py::arg("tracker_cpu") = d.tracker_cpu,
            py::arg("mapper_cpu") = d.mapper_cpu, py::arg("loop_closer_cpu") = d.loop_closer_cpu,
-           py::arg("fifo_priority") = d.fifo_priority)
+           py::arg("fifo_priority") = d.fifo_priority, py::arg("run_folder") = py::none(),
+           py::arg("kept_frames") = d.kept_frames)
       .def(
           "push", &push, py::arg("frame"),
           "Queued, dropped because there is no room, or refused (images that do not fit the rig, time that "

@@ -101,7 +101,8 @@ void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now
     MapEvent& event = events.correction.emplace(event_of(kind_of(report.correction.reason), now));
     event.map_part_before = index(last_.part_causal);
     if (event.map_part == kNoId) event.map_part = index(report.graph.part(last_.reference));
-    set_poses(report.correction.T_c_w_before.inverse(), report.correction.T_c_w_after.inverse(), event);
+    set_poses(report.correction.T_c_w_before.unpacked().inverse(),
+              report.correction.T_c_w_after.unpacked().inverse(), event);
   }
   if (now.state != TrackingState::kTracked || !was_lost_) return;
   // The tracker has started a part whose first keyframe the mapper has not seen yet.

@@ -12,6 +12,9 @@ void expect_sensible(const SlamOptions& options) {
     if (!rule) throw std::invalid_argument(what);
   };
   expect(options.frame_buffers >= 2, "options.frame_buffers must be >= 2");
+  expect(options.kept_frames >= 1, "options.kept_frames must be >= 1");
+  expect(options.run_folder.empty() || std::filesystem::is_directory(options.run_folder),
+         "options.run_folder must be a folder");
   expect(!options.live || options.mode == RunMode::kThreaded, "options.live needs RunMode::kThreaded");
   expect(!options.localise_only || !options.map.empty(), "options.localise_only needs options.map");
   expect(options.map.empty() || options.places,
@@ -32,6 +35,8 @@ EngineOptions engine_options(const SlamOptions& options) {
   if (const std::string why = engine.mapper.invalid_reason(); !why.empty())
     throw std::invalid_argument("options: " + why);
   engine.frame_slots = static_cast<std::size_t>(options.frame_buffers);
+  engine.logs.folder = options.run_folder;
+  engine.logs.frames_in_memory = static_cast<std::size_t>(options.kept_frames);
   engine.tracker_cpu = options.tracker_cpu;
   engine.mapper_cpu = options.mapper_cpu;
   engine.loop_closer_cpu = options.loop_closer_cpu;

@@ -19,14 +19,13 @@ void add_timings(const StageRecorder& thread, std::vector<StageTime>& timings) {
 
 SlamSummary summarise(const RunResult& result) {
   SlamSummary summary;
-  summary.frames = static_cast<std::int64_t>(result.frames.size());
+  summary.frames = result.counts.frames;
+  summary.tracked = result.counts.tracked;
+  summary.lost = result.counts.lost;
+  summary.dropped = result.counts.dropped;
   for (const FrameRecord& record : result.frames) {
-    summary.lost += record.state == FrameState::kLost;
-    summary.dropped += record.state == FrameState::kDropped;
-    if (record.state != FrameState::kTracked) continue;
-    ++summary.tracked;
     // A keyframe the mapper never got to leaves its frames without a place in the map.
-    if (!result.graph.contains(record.reference)) continue;
+    if (record.state != FrameState::kTracked || !result.graph.contains(record.reference)) continue;
     summary.trajectory.push_back({record.t_ns, index(result.graph.part(record.reference)),
                                   to_pose(final_T_c_w(record, result.graph).inverse())});
   }

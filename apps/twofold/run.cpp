@@ -110,9 +110,7 @@ void expect_success(const std::string& name, const FrameSource& source, const En
                     const RunResult& result) {
   if (!source.error().empty()) throw IoError("", source.error());
   if (!result.error.empty()) throw std::runtime_error(result.error);
-  const bool any_tracked =
-      std::any_of(result.frames.begin(), result.frames.end(),
-                  [](const FrameRecord& record) { return record.state == FrameState::kTracked; });
+  const bool any_tracked = result.counts.tracked > 0;
   if (!any_tracked && options.map)
     throw std::runtime_error(name + ": no place of the loaded map was recognised");
   if (!any_tracked) throw std::runtime_error(name + ": no frame could be tracked");
@@ -131,6 +129,8 @@ int run(const RunArguments& arguments) {
     if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
   }
   expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
+  options.logs.folder = arguments.out;
+  remove_results(arguments.out);
   if (!arguments.record.empty()) {
     source = std::make_unique<RecordingTee>(std::move(source), arguments.record);
   }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
-#include <sstream>
 
 #include <fmt/format.h>
 
@@ -94,18 +93,20 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   nlohmann::ordered_json summary = summary_json(source_text, options, result, parts);
   summary["scale"] = no_scale ? "arbitrary" : "metric";
   write_file(folder / "summary.json", summary.dump(2) + "\n");
-  std::ostringstream schedule;
-  if (!write_schedule(schedule, result.schedule.tracker, result.schedule.mapper,
-                      result.schedule.loop_closer)) {
-    throw IoError((folder / "schedule.log").string(), "cannot be written");
-  }
-  write_file(folder / "schedule.log", schedule.str());
   write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",
               draw_run(source_text, final_poses, causal_poses, source.ground_truth(),
                        no_scale ? Alignment::kSim3 : Alignment::kSe3));
   }
+}
+
+void remove_results(const std::filesystem::path& folder) {
+  std::error_code error;
+  for (const char* file : {"trajectory.txt", "keyframes.txt", "edges.txt", "map.ply", "groundtruth.txt",
+                           "timing.json", "summary.json", "loop_latency.txt", "trajectory.png"})
+    std::filesystem::remove(folder / file, error);
+  remove_part_files(folder, 1);
 }
 
 void write_trace(const std::filesystem::path& file, const RunResult& result) {
@@ -125,13 +126,9 @@ std::string durations(const LatencyHistogram& h) {
 
 void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
                    const RunResult& result) {
-  const auto count = [&](FrameState state) {
-    return std::count_if(result.frames.begin(), result.frames.end(),
-                         [&](const auto& r) { return r.state == state; });
-  };
-  fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", result.frames.size(),
-             count(FrameState::kTracked), count(FrameState::kLost), count(FrameState::kDropped),
-             result.interrupted ? ", interrupted" : "");
+  const FrameCounts& counts = result.counts;
+  fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", counts.frames, counts.tracked,
+             counts.lost, counts.dropped, result.interrupted ? ", interrupted" : "");
   fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
              result.graph.keyframe_count(), result.mapping.rounds, result.mapping.metric_loops,
              result.loops.size());

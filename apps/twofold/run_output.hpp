@@ -10,11 +10,15 @@
 namespace twofold {
 
 /// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, groundtruth.txt if
-/// known (all TUM form), map.ply, timing.json, loop_latency.txt, summary.json, schedule.log,
-/// trajectory.png; trajectory, keyframes and map of parts that never joined the first (map_parts) as
-/// trajectory-2.txt and so on. Throws IoError when it cannot.
+/// known (all TUM form), map.ply, timing.json, loop_latency.txt, summary.json, trajectory.png
+/// (schedule.log is there already: RunLogs); trajectory, keyframes and map of parts that never joined the
+/// first (map_parts) as trajectory-2.txt and so on. Throws IoError when it cannot.
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
                       const FrameSource& source, const EngineOptions& options, const RunResult& result);
+
+/// Of an earlier run into the folder, what is written at the end only: should this run be killed, its folder
+/// holds nothing of another one's.
+void remove_results(const std::filesystem::path& folder);
 
 /// Chrome/Perfetto trace; the run must have kept one.
 void write_trace(const std::filesystem::path& file, const RunResult& result);

@@ -89,7 +89,7 @@ Json loops_json(const RunResult& result) {
 Json corrections_json(const RunResult& result) {
   Json corrections = Json::array();
   for (const PoseCorrection& c : result.corrections) {
-    const SE3 T_before_after = c.T_c_w_before * c.T_c_w_after.inverse();
+    const SE3 T_before_after = c.T_c_w_before.unpacked() * c.T_c_w_after.unpacked().inverse();
     corrections.push_back({{"frame", c.frame_index},
                            {"t_ns", c.t_ns},
                            {"reason", describe(c.reason)},
@@ -139,10 +139,6 @@ Json effort_json(const RunResult& result) {
 
 Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result,
                   const std::vector<MapPart>& parts) {
-  const auto count = [&](FrameState state) {
-    return std::count_if(result.frames.begin(), result.frames.end(),
-                         [&](const auto& r) { return r.state == state; });
-  };
   std::size_t keyframes = 0;
   std::size_t points = 0;
   for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k)
@@ -154,9 +150,9 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"interrupted", result.interrupted},
             {"error", result.error},
             {"frames", result.frames.size()},
-            {"tracked", count(FrameState::kTracked)},
-            {"lost", count(FrameState::kLost)},
-            {"dropped", count(FrameState::kDropped)},
+            {"tracked", result.counts.tracked},
+            {"lost", result.counts.lost},
+            {"dropped", result.counts.dropped},
             {"keyframes", keyframes},
             {"points", points},
             {"loaded_map", loaded_map_json(options, result)},

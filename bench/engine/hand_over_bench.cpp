@@ -10,8 +10,8 @@
 
 #include "engine/frame_pool.hpp"
 #include "engine/latency_histogram.hpp"
+#include "engine/logs/schedule_log.hpp"
 #include "engine/parking.hpp"
-#include "engine/schedule_log.hpp"
 #include "engine/snapshot_mailbox.hpp"
 #include "engine/spsc_ring.hpp"
 #include "engine/stage_timer.hpp"

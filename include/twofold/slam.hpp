@@ -43,6 +43,15 @@ struct SlamOptions {
   std::optional<int> mapper_cpu = {};
   std::optional<int> loop_closer_cpu = {};
   std::optional<int> fifo_priority = {};  ///< SCHED_FIFO for the tracker, 1..99
+
+  /// A folder that exists. trajectory_causal.txt (TUM form) and schedule.log (for `twofold run
+  /// --replay-schedule`) grow in it and are whole, but for the last 0.1 s, however the process ends; what is
+  /// remembered of each frame goes to its disk, so that memory does not grow with the time. A disk that is
+  /// full or too slow is no reason to stop: SlamSummary::errors says what was lost. Empty: all in memory.
+  std::filesystem::path run_folder = {};
+  /// Without a folder: how many of the newest frames have a pose in SlamSummary::trajectory, >= 1, at 176
+  /// bytes each; older ones are forgotten. A million are nine hours at 30 Hz.
+  std::int64_t kept_frames = 1'000'000;
 };
 
 enum class PushStatus : std::uint8_t {
@@ -73,7 +82,8 @@ struct SlamSummary {
   std::int64_t tracked = 0;
   std::int64_t lost = 0;  ///< unplaced ones included
   std::int64_t dropped = 0;
-  /// Poses of the tracked frames in the final map, in the order of time. `map_part` of each tells its world.
+  /// Poses of the tracked frames in the final map, in the order of time: all, or those of the newest
+  /// SlamOptions::kept_frames (some more). `map_part` of each tells its world.
   struct FinalPose {
     std::int64_t t_ns = 0;
     std::uint32_t map_part = kNoId;

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "evaluation/tum_line.hpp"
+
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 #include "io/files/text_file.hpp"
@@ -122,14 +124,8 @@ Trajectory read_trajectory(const fs::path& file) {
 }
 
 void write_tum_trajectory(const fs::path& file, const Trajectory& trajectory) {
-  std::string text = "# time[s] tx ty tz qx qy qz qw  (T_w_c)\n";
-  for (const TimedPose& pose : trajectory) {
-    const Vector3& t = pose.T_w_c.translation();
-    Eigen::Quaterniond q = pose.T_w_c.so3().quaternion();
-    if (q.w() < 0) q.coeffs() = -q.coeffs();
-    text += fmt::format("{} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", ns_to_seconds(pose.t_ns),
-                        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
-  }
+  std::string text(kTumHeader);
+  for (const TimedPose& pose : trajectory) text += tum_line(pose);
   write_file(file, text);
 }
 

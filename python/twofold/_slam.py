@@ -69,7 +69,7 @@ class Slam(_core.Slam):
 
     Options are those of twofold/slam.hpp: mode, live (times are of time.monotonic_ns(), the newest frame wins), map (file
     to go on with), localise_only, places, vocabulary, inner_window, outer_window, frame_buffers, tracker_cpu, mapper_cpu,
-    loop_closer_cpu, fifo_priority. ValueError and RuntimeError say what is wrong with them.
+    loop_closer_cpu, fifo_priority, run_folder (in which trajectory_causal.txt and schedule.log grow), kept_frames. ValueError and RuntimeError say what is wrong with them.
 
     Any thread may call any method. The interpreter's lock is released while frames are pushed and while something is waited
     for; the tracker never waits for it: poses go through a queue, from which updates(), poses() or the callbacks read.

@@ -1,9 +1,16 @@
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include <fmt/format.h>
 
+#include "engine/logs/schedule_log.hpp"
 #include "fixtures/rendered_scene.hpp"
 #include "io/files/trajectory_file.hpp"
 #include "tests/apps/command.hpp"
@@ -148,6 +155,53 @@ TEST_F(RunCommand, InterruptedRunKeepsItsResults) {
   EXPECT_LT(summary["tracked"], kFrames);
   EXPECT_FALSE(read_trajectory(folder_ / "result/trajectory.txt").empty());
   EXPECT_FALSE(result("map.ply").empty());
+}
+
+/// Until `lines` poses are in the file; false when the program has ended before.
+bool wait_for_lines(pid_t program, const std::string& file, int lines) {
+  for (;;) {
+    const std::string text = content(file);
+    if (std::count(text.begin(), text.end(), '\n') > lines) return true;  // the first is a comment
+    if (waitpid(program, nullptr, WNOHANG) != 0) return false;
+    usleep(5000);
+  }
+}
+
+/// Killed while it runs, at several times: causal trajectory and schedule are there up to then, and the
+/// schedule repeats what was done.
+TEST_F(RunCommand, AKilledRunLeavesItsTrajectoryAndItsSchedule) {
+  for (const int tracked : {1, 7, 13}) {
+    SCOPED_TRACE(tracked);
+    const std::string out = folder_ / "killed";
+    const std::string source = "kitti:" + recording_.string();
+    const pid_t program = fork();
+    if (program == 0) {
+      execl(TWOFOLD_BINARY, TWOFOLD_BINARY, "run", source.c_str(), "--preload", "--speed", "0.2", "--quiet",
+            "--out", out.c_str(), nullptr);
+      _exit(127);
+    }
+    ASSERT_TRUE(wait_for_lines(program, out + "/trajectory_causal.txt", tracked));
+    kill(program, SIGKILL);
+    int status = 0;
+    waitpid(program, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status));
+    const Trajectory causal = read_tum_trajectory(out + "/trajectory_causal.txt");
+    ASSERT_GE(causal.size(), static_cast<std::size_t>(tracked));
+    EXPECT_FALSE(fs::exists(out + "/trajectory.txt"));
+    std::ifstream log(out + "/schedule.log", std::ios::binary);
+    const auto schedule = read_schedule(log);
+    ASSERT_TRUE(schedule) << schedule.error();
+    EXPECT_FALSE(schedule->ended);
+    EXPECT_GE(schedule->tracker.size() + 1, causal.size());  // each is written by itself
+    const Outcome replay = run_recording("--replay-schedule '" + out + "/schedule.log'");
+    ASSERT_EQ(replay.exit_code, 0) << replay.err;
+    const std::string killed = content(out + "/trajectory_causal.txt"),
+                      again = result("trajectory_causal.txt");
+    const std::size_t both = std::min(killed.size(), again.size());
+    EXPECT_EQ(killed.substr(0, both), again.substr(0, both));
+    EXPECT_GE(std::count(again.begin(), again.end(), '\n'), tracked);
+    fs::remove_all(out);
+  }
 }
 
 TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {

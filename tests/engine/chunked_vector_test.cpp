@@ -1,4 +1,4 @@
-#include "engine/chunked_vector.hpp"
+#include "engine/logs/chunked_vector.hpp"
 
 #include <gtest/gtest.h>
 

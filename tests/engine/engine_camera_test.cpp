@@ -127,7 +127,7 @@ TEST_F(EngineCameraTest, ALiveRunIsRepeatedFromItsRecordingAndSchedule) {
   }
   expect_all_tracked(live);
   std::stringstream file;
-  ASSERT_TRUE(write_schedule(file, live.schedule.tracker, live.schedule.mapper, live.schedule.loop_closer));
+  ASSERT_TRUE(write_schedule(file, live.schedule));
   const auto schedule = read_schedule(file);
   ASSERT_TRUE(schedule) << schedule.error();
 

@@ -1,4 +1,4 @@
-#include "engine/replacement_log.hpp"
+#include "engine/logs/replacement_log.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ TEST(ReplacementLog, FramesOfForgottenKeyframesKeepTheirPlace) {
   GraphWriter forgetful, faithful;
   ReplacementLog replacement_log;
   std::vector<KeyframeId> live;
-  ChunkedVector<FrameRecord> frames;
+  RecordSequence<FrameRecord> frames;
   const auto cull = [&](std::size_t n) {
     const KeyframeId id = live[n];
     live.erase(live.begin() + static_cast<std::ptrdiff_t>(n));
@@ -50,7 +50,7 @@ TEST(ReplacementLog, FramesOfForgottenKeyframesKeepTheirPlace) {
     forgetful.forget_replacements(2);
     for (const KeyframeId id : {first, second}) replacement_log.add(id, forgetful.graph());
   }
-  const ChunkedVector<FrameRecord> before = frames;
+  const std::vector<FrameRecord> before(frames.begin(), frames.end());
   replacement_log.hang_on_live_keyframes(frames);
   int hung_anew = 0;
   for (std::size_t n = 0; n < frames.size(); ++n) {
@@ -79,7 +79,7 @@ TEST(ReplacementLog, FramesAreScaledWithTheirKeyframes) {
     writer.add_keyframe(keyframe);
   }
   ReplacementLog log;
-  ChunkedVector<FrameRecord> frames;
+  RecordSequence<FrameRecord> frames;
   const auto track = [&](std::uint64_t version) {
     FrameRecord frame;
     frame.state = FrameState::kTracked;

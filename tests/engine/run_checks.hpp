@@ -26,8 +26,7 @@ inline RunResult replay_engine(const EngineOptions& options, const FrameFeed& fr
 /// Written and read again.
 inline Schedule schedule_of(const RunResult& result) {
   std::stringstream file;
-  EXPECT_TRUE(
-      write_schedule(file, result.schedule.tracker, result.schedule.mapper, result.schedule.loop_closer));
+  EXPECT_TRUE(write_schedule(file, result.schedule));
   const auto schedule = read_schedule(file);
   EXPECT_TRUE(schedule) << schedule.error();
   return schedule.value_or(Schedule());
@@ -64,8 +63,8 @@ inline void expect_same_loops(const RunResult& a, const RunResult& b) {
     const PoseCorrection &p = a.corrections[n], &q = b.corrections[n];
     EXPECT_EQ(p.reason, q.reason) << n;
     EXPECT_EQ(p.frame_index, q.frame_index) << n;
-    EXPECT_EQ(p.T_c_w_before.matrix(), q.T_c_w_before.matrix()) << n;
-    EXPECT_EQ(p.T_c_w_after.matrix(), q.T_c_w_after.matrix()) << n;
+    EXPECT_EQ(p.T_c_w_before, q.T_c_w_before) << n;
+    EXPECT_EQ(p.T_c_w_after, q.T_c_w_after) << n;
   }
 }
 

@@ -1,31 +1,30 @@
-#include "engine/schedule_log.hpp"
+#include "engine/logs/schedule_log.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <sstream>
 
+#include "tests/io/scratch_folder.hpp"
+
 namespace twofold {
 namespace {
 
-struct Streams {
-  ScheduleStream<TrackerStep> tracker;
-  ScheduleStream<MapperStep> mapper;
-  ScheduleStream<LoopStep> loop_closer;
-};
-
-void append_all(const Schedule& schedule, Streams& streams) {
+void append_all(const Schedule& schedule, ScheduleStreams& streams) {
   for (const auto& step : schedule.tracker) streams.tracker.append(step);
   for (const auto& step : schedule.mapper) streams.mapper.append(step);
   for (const auto& step : schedule.loop_closer) streams.loop_closer.append(step);
 }
 
 std::vector<std::uint8_t> bytes_of(const Schedule& schedule) {
-  Streams streams;
+  ScheduleStreams streams;
   append_all(schedule, streams);
   std::ostringstream out;
-  EXPECT_TRUE(write_schedule(out, streams.tracker, streams.mapper, streams.loop_closer));
+  EXPECT_TRUE(write_schedule(out, streams));
   const std::string text = out.str();
   return {text.begin(), text.end()};
 }
@@ -77,30 +76,51 @@ TEST(ScheduleLog, ReadsBackExtremes) {
 }
 
 TEST(ScheduleLog, TakesAFewBytesAFrame) {
-  Streams streams;
+  ScheduleStreams streams;
   append_all(plausible(10'000, 2), streams);
   EXPECT_LT(static_cast<double>(streams.tracker.bytes().size()) / 10'000, 3.5);
 }
 
-TEST(ScheduleLog, EveryTruncationAndEveryChangedByteIsRefused) {
-  const auto good = bytes_of(plausible(40, 5));
-  for (std::size_t length = 0; length < good.size(); ++length) {
-    EXPECT_FALSE(parse_schedule(std::span(good).first(length))) << "first " << length << " bytes";
-  }
+/// The steps of a thread are those of the whole schedule, up to where it ends.
+template <class Step>
+void expect_begins(const std::vector<Step>& whole, const std::vector<Step>& part) {
+  ASSERT_LE(part.size(), whole.size());
+  EXPECT_TRUE(std::equal(part.begin(), part.end(), whole.begin()));
+}
+
+/// Refused, or what there is of the schedule, known not to be all of it.
+void expect_refused_or_unended(std::span<const std::uint8_t> file, const Schedule& whole,
+                               const std::string& what) {
+  SCOPED_TRACE(what);
+  const auto parsed = parse_schedule(file);
+  if (!parsed) return;
+  EXPECT_FALSE(parsed->ended);
+  expect_begins(whole.tracker, parsed->tracker);
+  expect_begins(whole.mapper, parsed->mapper);
+  expect_begins(whole.loop_closer, parsed->loop_closer);
+}
+
+TEST(ScheduleLog, NoTruncationAndNoChangedByteIsTakenForAWholeSchedule) {
+  const Schedule whole = plausible(60, 5);
+  const auto good = bytes_of(whole);
+  for (std::size_t length = 0; length < good.size(); ++length)
+    expect_refused_or_unended(std::span(good).first(length), whole, std::to_string(length) + " bytes");
   for (std::size_t at = 0; at < good.size(); ++at) {
     for (int bit = 0; bit < 8; ++bit) {
       auto bad = good;
       bad[at] ^= static_cast<std::uint8_t>(1 << bit);
-      EXPECT_FALSE(parse_schedule(bad)) << "bit " << bit << " of byte " << at;
+      expect_refused_or_unended(bad, whole, "bit " + std::to_string(bit) + " of byte " + std::to_string(at));
     }
   }
+  EXPECT_FALSE(parse_schedule(std::span(good).first(100)));  // within a section of many records
   auto longer = good;
   longer.push_back(0);
   EXPECT_FALSE(parse_schedule(longer));
 }
 
 TEST(ScheduleLog, ErrorsNameTheSection) {
-  const Schedule schedule = plausible(40, 5);
+  constexpr int kEndBytes = 7;
+  const Schedule schedule = plausible(400, 5);
   const auto good = bytes_of(schedule);
   const auto error = [](std::vector<std::uint8_t> bytes) {
     const auto parsed = parse_schedule(bytes);
@@ -114,14 +134,14 @@ TEST(ScheduleLog, ErrorsNameTheSection) {
   damaged.at(20) ^= 1;
   EXPECT_NE(error(damaged).find("section 'tracker'"), std::string::npos) << error(damaged);
   damaged = good;
-  damaged[good.size() - 1] ^= 1;
+  damaged[good.size() - 1 - kEndBytes] ^= 1;
   EXPECT_NE(error(damaged).find("section 'loop closer' is damaged"), std::string::npos) << error(damaged);
-  const std::vector<std::uint8_t> cut(good.begin(), good.end() - 2);
+  const std::vector<std::uint8_t> cut(good.begin(), good.end() - kEndBytes - 2);
   EXPECT_NE(error(cut).find("section 'loop closer'"), std::string::npos) << error(cut);
 }
 
 TEST(ScheduleLog, OversizedCountsAreRefusedBeforeMemoryIsTaken) {
-  const std::string header("TWFSCHED\3\3\1");
+  const std::string header("TWFSCHED\4\1");
   std::vector<std::uint8_t> file(header.begin(), header.end());
   file.reserve(64);
   for (int i = 0; i < 2; ++i) {  // 2^63 - 1 records in as many bytes
@@ -142,7 +162,7 @@ TEST(ScheduleLog, FramesOutOfOrderAreRefused) {
   EXPECT_NE(parsed.error().find("frames out of order"), std::string::npos) << parsed.error();
 }
 
-/// Refused with a reason, or a log that can be written again.
+/// Refused with a reason, known to lack its end, or a log that can be written again.
 TEST(ScheduleLog, RandomBytesAreRefusedOrALog) {
   std::mt19937 rng(17);
   const auto good = bytes_of(plausible(30, 3));
@@ -156,7 +176,11 @@ TEST(ScheduleLog, RandomBytesAreRefusedOrALog) {
     }
     const auto parsed = parse_schedule(bytes);
     if (parsed) {
-      EXPECT_EQ(parse_schedule(bytes_of(*parsed)), parsed);
+      auto again = parse_schedule(bytes_of(*parsed));
+      ASSERT_TRUE(again);
+      again->ended = parsed->ended;
+      EXPECT_EQ(again, parsed);
+      refused += !parsed->ended;
       continue;
     }
     ++refused;
@@ -164,6 +188,56 @@ TEST(ScheduleLog, RandomBytesAreRefusedOrALog) {
     EXPECT_GT(parsed.error().size(), std::string("schedule log: ").size());
   }
   EXPECT_GT(refused, 19'000);
+}
+
+/// A schedule that went to a file record by record, as a run goes on.
+class GrowingScheduleLog : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::vector<std::uint8_t> bytes() const {
+    file_->write_waiting();
+    std::ifstream in(folder_ / "schedule.log", std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
+  ScratchFolder folder_;
+  std::shared_ptr<LogFile> file_ = std::make_shared<LogFile>(folder_ / "schedule.log");
+};
+
+TEST_F(GrowingScheduleLog, IsWholeUpToTheLastRecordWheneverItIsCutOff) {
+  const Schedule schedule = plausible(60, 5);
+  ScheduleStreams streams;
+  streams.keep_in(file_);
+  append_all(schedule, streams);
+  const auto grown = bytes();
+  std::size_t longest = 0;
+  for (std::size_t length = 9; length <= grown.size(); ++length) {
+    const auto parsed = parse_schedule(std::span(grown).first(length));
+    ASSERT_TRUE(parsed) << length << ": " << parsed.error();
+    EXPECT_FALSE(parsed->ended);
+    expect_begins(schedule.tracker, parsed->tracker);
+    EXPECT_GE(parsed->tracker.size(), longest);
+    longest = parsed->tracker.size();
+  }
+  EXPECT_EQ(longest, schedule.tracker.size());
+  ScheduleStreams::end(*file_);
+  const auto parsed = parse_schedule(bytes());
+  ASSERT_TRUE(parsed) << parsed.error();
+  EXPECT_EQ(*parsed, schedule);
+}
+
+TEST_F(GrowingScheduleLog, MergesToTheBytesOfOneKeptInMemory) {
+  const Schedule schedule = plausible(200, 6);
+  ScheduleStreams streams;
+  streams.keep_in(file_);
+  append_all(schedule, streams);
+  const auto unended = merge_schedule(bytes());
+  ASSERT_TRUE(unended) << unended.error();
+  EXPECT_FALSE(parse_schedule(*unended)->ended);
+  ScheduleStreams::end(*file_);
+  EXPECT_EQ(merge_schedule(bytes()), bytes_of(schedule));
+  auto damaged = bytes();
+  damaged[40] ^= 1;
+  EXPECT_FALSE(merge_schedule(damaged));
 }
 
 TEST(ScheduleLog, StreamsInAndOut) {
@@ -175,8 +249,7 @@ TEST(ScheduleLog, StreamsInAndOut) {
   EXPECT_EQ(*parsed, schedule);
   std::ostringstream broken;
   broken.setstate(std::ios::badbit);
-  const Streams none;
-  EXPECT_FALSE(write_schedule(broken, none.tracker, none.mapper, none.loop_closer));
+  EXPECT_FALSE(write_schedule(broken, ScheduleStreams()));
 }
 
 }  // namespace

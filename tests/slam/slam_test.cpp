@@ -6,8 +6,11 @@
 #include <stdexcept>
 #include <thread>
 
+#include "engine/logs/schedule_log.hpp"
 #include "loopclosure/default_vocabulary.hpp"
+#include "tests/io/scratch_folder.hpp"
 #include "tests/slam/slam_run.hpp"
+#include "twofold/evaluation.hpp"
 
 namespace twofold {
 namespace {
@@ -77,6 +80,28 @@ TEST_F(SlamTest, FramesThatCannotBeUsedAreRefusedAndNothingIsLost) {
   const SlamSummary summary = slam.finish();
   EXPECT_EQ(summary.frames, kFrames);
   EXPECT_EQ(summary.tracked, kFrames);
+}
+
+/// The trajectory of a run whose records went to disk is that of one in memory, and its files tell the same.
+TEST_F(SlamTest, ARunFolderTakesTheTrajectoryAndTheSchedule) {
+  const ScratchFolder folder;
+  SlamOptions on_disk = deterministic();
+  on_disk.run_folder = folder.path();
+  Slam slam(rig(), on_disk), in_memory(rig(), deterministic());
+  push_all(slam);
+  push_all(in_memory);
+  const SlamSummary summary = slam.finish(), expected = in_memory.finish();
+  EXPECT_TRUE(summary.errors.empty());
+  ASSERT_EQ(summary.trajectory.size(), expected.trajectory.size());
+  for (std::size_t i = 0; i < summary.trajectory.size(); ++i)
+    EXPECT_EQ(summary.trajectory[i].T_world_camera, expected.trajectory[i].T_world_camera) << i;
+  EXPECT_EQ(load_trajectory(folder.path() / "trajectory_causal.txt").size(),
+            static_cast<std::size_t>(kFrames));
+  std::ifstream file(folder / "schedule.log", std::ios::binary);
+  const auto schedule = read_schedule(file);
+  ASSERT_TRUE(schedule) << schedule.error();
+  EXPECT_TRUE(schedule->ended);
+  EXPECT_EQ(schedule->tracker.size(), static_cast<std::size_t>(kFrames));
 }
 
 TEST_F(SlamTest, AfterTheEndAnswersAreKept) {
@@ -201,6 +226,8 @@ TEST_F(SlamTest, OptionsAndRigsThatMakeNoSenseAreNamed) {
   expect(what_is_wrong(rig(), {.localise_only = true}), "options.localise_only needs options.map");
   expect(what_is_wrong(rig(), {.inner_window = 0}), "inner_window");
   expect(what_is_wrong(rig(), {.frame_buffers = 1}), "frame_buffers");
+  expect(what_is_wrong(rig(), {.run_folder = "/nowhere/at.all"}), "options.run_folder must be a folder");
+  expect(what_is_wrong(rig(), {.kept_frames = 0}), "options.kept_frames");
   expect(what_is_wrong(rig(), {.mode = RunMode::kDeterministic, .live = true}), "options.live");
   EXPECT_THROW(Slam(rig(), {.map = "/nowhere/at.all"}), std::runtime_error);
 }

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/byte_cursor.hpp"
-#include "engine/schedule_log.hpp"
+#include "engine/logs/byte_cursor.hpp"
+#include "engine/logs/schedule_log.hpp"
 
 namespace twofold {
 

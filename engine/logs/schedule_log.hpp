@@ -4,12 +4,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <iosfwd>
+#include <memory>
 #include <span>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
 
-#include "engine/chunked_vector.hpp"
+#include "engine/logs/chunked_vector.hpp"
+#include "engine/logs/log_file.hpp"
 
 namespace twofold {
 
@@ -49,39 +51,63 @@ struct Schedule {
   std::vector<TrackerStep> tracker;
   std::vector<MapperStep> mapper;
   std::vector<LoopStep> loop_closer;
+  bool ended = true;  ///< false: of a run that was killed; the threads' last steps may not fit together
   bool operator==(const Schedule&) const = default;
 };
 
-/// Bytes of one thread's records, each about three to five: differences to the record before as
+// The file. All integers little-endian or LEB128 ("varint", low seven bits first):
+//   "TWFSCHED", format version (1 byte)
+//   sections of tracker (1), mapper (2), loop closer (3), any number in any order: id (1 byte), records
+//   (varint), bytes (varint), the bytes, CRC-32 of all of the section before it (4 bytes)
+//   an end section: id 0, no records, no bytes, its CRC-32
+// While a run goes on each record is appended as a section. In the end they are merged into three.
+
+/// Records of one thread, each about three to five bytes: differences to the record before as
 /// variable-length integers. Used by one thread at a time, without locks, and read when the run is over.
 /// Appending allocates now and then, so the tracker leaves it to the thread that takes its frames back.
 template <class Step>
 class ScheduleStream {
  public:
+  /// From here on, and before the first record, to `file`.
+  void keep_in(std::shared_ptr<LogFile> file) { file_ = std::move(file); }
   void append(const Step& step);
 
   [[nodiscard]] std::uint64_t records() const { return records_; }
+  /// Of the records in memory.
   [[nodiscard]] const ChunkedVector<std::uint8_t, 65536>& bytes() const { return bytes_; }
 
  private:
   ChunkedVector<std::uint8_t, 65536> bytes_;
-  std::vector<std::uint8_t> record_;  // the one that is being appended
+  std::shared_ptr<LogFile> file_;
+  std::vector<std::uint8_t> record_, section_;  // what is being appended
   std::uint64_t records_ = 0;
   Step last_;
 };
 
-/// Writes the file. All integers little-endian or LEB128 ("varint", low seven bits first):
-///   "TWFSCHED", format version (1 byte), number of sections (1 byte)
-///   a section each for tracker (1), mapper (2), loop closer (3): id (1 byte), records (varint), bytes
-///   (varint), the bytes, CRC-32 of all of the section before it (4 bytes)
-/// False when the stream failed.
-[[nodiscard]] bool write_schedule(std::ostream& out, const ScheduleStream<TrackerStep>& tracker,
-                                  const ScheduleStream<MapperStep>& mapper,
-                                  const ScheduleStream<LoopStep>& loop_closer);
+/// Those of a run.
+struct ScheduleStreams {
+  ScheduleStream<TrackerStep> tracker;
+  ScheduleStream<MapperStep> mapper;
+  ScheduleStream<LoopStep> loop_closer;
 
-/// Parses a file's bytes, which may be anything. Error: which section is wrong, at which byte, and how.
+  /// Begins the file, to which all of them append from here on.
+  void keep_in(const std::shared_ptr<LogFile>& file);
+  /// After the last record: ends the file.
+  static void end(LogFile& file);
+};
+
+/// Writes streams that were kept in memory. False when the stream failed.
+[[nodiscard]] bool write_schedule(std::ostream& out, const ScheduleStreams& schedule);
+
+/// Parses a file's bytes, which may be anything. A file that lacks its end, up to a short section that may be
+/// torn, is a schedule that has not `ended`. Error: which section is wrong, at which byte, and how.
 [[nodiscard]] tl::expected<Schedule, std::string> parse_schedule(std::span<const std::uint8_t> file);
 /// Reads the stream to its end and parses it; a file of more than 256 MiB is refused.
 [[nodiscard]] tl::expected<Schedule, std::string> read_schedule(std::istream& in);
+
+/// The same schedule with one section a thread, whatever the threads' turns were. Errors as above; records
+/// are not looked at.
+[[nodiscard]] tl::expected<std::vector<std::uint8_t>, std::string> merge_schedule(
+    std::span<const std::uint8_t> file);
 
 }  // namespace twofold

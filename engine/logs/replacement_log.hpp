@@ -1,6 +1,9 @@
 #pragma once
 
-#include "engine/chunked_vector.hpp"
+#include <memory>
+#include <vector>
+
+#include "engine/logs/record_sequence.hpp"
 #include "engine/result.hpp"
 #include "graph/snapshot.hpp"
 #include "mapping/similarity_loop.hpp"
@@ -9,11 +12,18 @@ namespace twofold {
 
 /// What became of the keyframes that frames were tracked against: culled during a run, or scaled by a loop of
 /// one camera. The map forgets after some time; frames do not, so that this grows with the trajectory: 64
-/// bytes a culled keyframe, 16 for each that a loop scaled.
+/// bytes a culled keyframe, 16 for each that a loop scaled, in memory or on disk.
 ///
 /// Written by the mapper's thread, round by round; read when that was joined.
 class ReplacementLog {
  public:
+  /// Before the first call of the others; files that hold nothing else.
+  void keep_in(std::shared_ptr<LogFile> culled, std::shared_ptr<LogFile> scaled);
+  /// Without files: enough for so many of the newest frames, in maps of up to 100,000 keyframes.
+  void keep_newest(std::size_t frames);
+  /// When the files are written: hang_on_live_keyframes may be called.
+  void read_back();
+
   /// Takes down the replacement of a keyframe that was culled in the newest round; to be called in the order
   /// of culling.
   void add(KeyframeId culled, const GraphSnapshot& graph);
@@ -23,7 +33,7 @@ class ReplacementLog {
 
   /// Hangs each frame whose reference was culled on the keyframe that stands for it in the final map, in the
   /// unit that this has. Poses in the map stay what they were. Frames are in the order of their versions.
-  void hang_on_live_keyframes(ChunkedVector<FrameRecord>& frames) const;
+  void hang_on_live_keyframes(RecordSequence<FrameRecord>& frames) const;
 
  private:
   struct Entry {
@@ -35,9 +45,11 @@ class ReplacementLog {
   struct Scaling {
     std::uint64_t version = 0;
     std::size_t entries_before = 0;
-    std::vector<KeyframeScaling> keyframes;
+    std::size_t first = 0, last = 0;  ///< of scaled_
   };
-  ChunkedVector<Entry> entries_;
+  RecordSequence<Entry> entries_;
+  RecordSequence<KeyframeScaling> scaled_;
+  std::size_t entry_count_ = 0, scaled_count_ = 0;
   std::vector<Scaling> scalings_;
 };
 

@@ -19,6 +19,12 @@ class ChunkedVector {
     ++size_;
   }
 
+  /// The values of the first chunk; there must be one, and it must be full. The others move down.
+  void forget_first_chunk() {
+    chunks_.erase(chunks_.begin());
+    size_ -= kChunk;
+  }
+
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] const T& operator[](std::size_t i) const { return chunks_[i / kChunk][i % kChunk]; }

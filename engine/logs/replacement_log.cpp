@@ -1,20 +1,48 @@
-#include "engine/replacement_log.hpp"
+#include "engine/logs/replacement_log.hpp"
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "geometry/check.hpp"
 #include "graph/id_map.hpp"
 
 namespace twofold {
+namespace {
+
+constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+
+}  // namespace
+
+void ReplacementLog::keep_in(std::shared_ptr<LogFile> culled, std::shared_ptr<LogFile> scaled) {
+  entries_.keep_in(std::move(culled));
+  scaled_.keep_in(std::move(scaled));
+}
+
+void ReplacementLog::keep_newest(std::size_t frames) {
+  // A frame proposes one keyframe at most; before the first frame kept there was the map of then.
+  constexpr std::size_t kLargestMap = 100'000;
+  entries_.keep_newest(frames > kAll - kLargestMap ? kAll : frames + kLargestMap);
+}
+
+void ReplacementLog::read_back() {
+  entries_.read_back();
+  scaled_.read_back();
+}
 
 void ReplacementLog::add(KeyframeId culled, const GraphSnapshot& graph) {
   const Replacement& replacement = graph.replacement(culled);
   TWOFOLD_CHECK(graph.keyframe(culled).culled() && replacement.id != kNoKeyframe, "culled a moment ago");
   entries_.push_back({culled, replacement.id, replacement.T_this_replacement});
+  ++entry_count_;
 }
 
 void ReplacementLog::add_scaling(std::uint64_t version, std::vector<KeyframeScaling> scaled) {
-  if (!scaled.empty()) scalings_.push_back({version, entries_.size(), std::move(scaled)});
+  if (scaled.empty()) return;
+  const std::size_t first = scaled_count_;
+  for (const KeyframeScaling& keyframe : scaled) scaled_.push_back(keyframe);
+  scaled_count_ += scaled.size();
+  scalings_.push_back({version, entry_count_, first, scaled_count_});
 }
 
 namespace {
@@ -64,12 +92,13 @@ class FinalKeyframes {
 
 }  // namespace
 
-void ReplacementLog::hang_on_live_keyframes(ChunkedVector<FrameRecord>& frames) const {
+void ReplacementLog::hang_on_live_keyframes(RecordSequence<FrameRecord>& frames) const {
   FinalKeyframes keyframes;
-  std::size_t entry = entries_.size(), frame = frames.size();
+  const std::size_t forgotten = entries_.forgotten();
+  std::size_t entry = forgotten + entries_.size(), frame = frames.size();
   const auto take_back_culled = [&](std::size_t first) {
-    while (entry > first) {
-      const Entry& culled = entries_[--entry];
+    while (entry > std::max(first, forgotten)) {
+      const Entry& culled = entries_[--entry - forgotten];
       keyframes.was_culled(culled.id, culled.replacement, culled.T_id_replacement.unpacked());
     }
   };
@@ -88,7 +117,8 @@ void ReplacementLog::hang_on_live_keyframes(ChunkedVector<FrameRecord>& frames) 
     const Scaling& scaling = scalings_[n];
     take_back_culled(scaling.entries_before);
     hang(scaling.version);
-    for (const KeyframeScaling& keyframe : scaling.keyframes) keyframes.was_scaled(keyframe);
+    for (std::size_t k = scaling.first; k < std::min(scaling.last, scaled_.size()); ++k)
+      keyframes.was_scaled(scaled_[k]);
   }
   take_back_culled(0);
   hang(0);

@@ -1,4 +1,4 @@
-#include "engine/schedule_records.hpp"
+#include "engine/logs/schedule_records.hpp"
 
 #include "geometry/check.hpp"
 

@@ -1,0 +1,41 @@
+#include "engine/logs/log_writer.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+namespace twofold {
+namespace {
+
+constexpr auto kPeriod = std::chrono::milliseconds(100);
+
+}  // namespace
+
+LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files) : files_(std::move(files)) {
+  thread_.emplace(WorkerOptions{.name = "log writer"}, [this](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + kPeriod, [] { return false; });
+      for (const auto& file : files_) file->write_waiting();
+    }
+  });
+}
+
+bool LogWriter::behind() const {
+  return std::any_of(files_.begin(), files_.end(), [](const auto& file) { return file->behind(); });
+}
+
+void LogWriter::wait_for_room() const {
+  while (behind()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+std::string LogWriter::finish() {
+  thread_->request_stop();
+  const auto outcome = thread_->join();
+  for (const auto& file : files_) file->write_waiting();
+  for (const auto& file : files_) {
+    if (std::string lost = file->error(); !lost.empty()) return lost;
+  }
+  return outcome ? "" : outcome.error();
+}
+
+}  // namespace twofold

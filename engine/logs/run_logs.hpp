@@ -1,0 +1,55 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "engine/logs/log_writer.hpp"
+#include "engine/logs/replacement_log.hpp"
+#include "engine/logs/schedule_log.hpp"
+#include "engine/options.hpp"
+#include "engine/result.hpp"
+
+namespace twofold {
+
+/// What a run leaves behind, taken down as it arises: records of frames, corrections, the replacements of
+/// culled keyframes, the schedule. With a folder (RunLogOptions) all of it goes to disk, where
+/// trajectory_causal.txt and schedule.log are whole at any time but for the last 0.1 s; without one it stays
+/// in memory. On disk, not in reserve: what the operating system has not written yet is lost with its power.
+///
+/// Roles: add by the thread that takes frames back; each stream of the schedule and the replacement log by
+/// one thread each; close when these are joined.
+class RunLogs {
+ public:
+  /// Throws std::runtime_error when a file cannot be made.
+  RunLogs(const RunLogOptions& options, ReplacementLog& replacements);
+
+  /// A frame that is done with, and the correction that was seen first by it, if it has a reason.
+  void add(const FrameRecord& record, const PoseCorrection& correction);
+  [[nodiscard]] ScheduleStreams& schedule() { return schedule_; }
+
+  /// The disk is slower than the run; any thread.
+  [[nodiscard]] bool behind() const { return writer_ && writer_->behind(); }
+  /// Returns when it is not. For runs without a pace.
+  void wait_for_room() const {
+    if (writer_) writer_->wait_for_room();
+  }
+
+  /// Ends the files and moves the records into the result; what was lost becomes its error.
+  void close(ReplacementLog& replacements, RunResult& result);
+
+ private:
+  void open_files(ReplacementLog& replacements);
+  /// One section a thread: the bytes do not depend on the threads' turns.
+  void merge_schedule_file();
+
+  const RunLogOptions options_;
+  FrameCounts counts_;
+  RecordSequence<FrameRecord> frames_;
+  RecordSequence<PoseCorrection> corrections_;
+  ScheduleStreams schedule_;
+  KeyframeId part_ = kNoKeyframe;  // of the line before in the causal trajectory
+  std::shared_ptr<LogFile> causal_, schedule_file_;
+  std::optional<LogWriter> writer_;
+};
+
+}  // namespace twofold
