@@ -23,8 +23,9 @@ SlamSummary summarise(const RunResult& result) {
   for (const FrameRecord& record : result.frames) {
     summary.lost += record.state == FrameState::kLost;
     summary.dropped += record.state == FrameState::kDropped;
-    if (record.state != FrameState::kTracked) continue;
-    ++summary.tracked;
+    summary.tracked += record.state == FrameState::kTracked;
+    summary.placed_later += record.state == FrameState::kPlacedLater;
+    if (!has_final_pose(record)) continue;
     // A keyframe the mapper never got to leaves its frames without a place in the map.
     if (!result.graph.contains(record.reference)) continue;
     summary.trajectory.push_back({record.t_ns, index(result.graph.part(record.reference)),

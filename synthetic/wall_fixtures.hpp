@@ -11,4 +11,7 @@ void draw_door(Canvas& canvas, Random& random, double x, double y, double w, dou
 void draw_poster(Canvas& canvas, Random& random, double x, double y, double w, double h);
 void draw_ivy(Canvas& canvas, Random& random, double x, double y, double radius);
 
+/// A whole wall, in one of four styles (0 .. 3): windows above, doors, posters and ivy below.
+void paint_facade(Canvas& canvas, Random& random, int style);
+
 }  // namespace twofold::synthetic
