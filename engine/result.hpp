@@ -20,9 +20,10 @@
 namespace twofold {
 
 enum class FrameState : std::uint8_t {
-  kTracked,  ///< pose known
-  kLost,     ///< looked at, no trustworthy pose
-  kDropped   ///< never looked at: when its turn came, its successor was there (LatePolicy)
+  kTracked,     ///< pose known
+  kLost,        ///< looked at, no trustworthy pose
+  kDropped,     ///< never looked at: when its turn came, its successor was there (LatePolicy)
+  kPlacedLater  ///< before one camera's start, which says where it was: has a final pose, and no causal one
 };
 
 /// Why poses in the world changed for a reason other than motion.
@@ -77,6 +78,10 @@ struct FrameRecord {
   EffortLevel effort = EffortLevel::kEverything;  ///< what was left out for want of time
   LostCause cause = LostCause::kNone;             ///< why it was lost
 };
+/// There is a place for it in the final trajectory.
+[[nodiscard]] inline bool has_final_pose(const FrameRecord& record) {
+  return record.state == FrameState::kTracked || record.state == FrameState::kPlacedLater;
+}
 static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 
 /// A frame as soon as its pose is known; valid during the listener's call only.
@@ -105,6 +110,7 @@ struct ClosedLoop {
   SE3 T_to_from_before;      ///< as the map had it: the difference is the drift
   std::int64_t t_ns = 0;     ///< of the frame that came back
   bool joins_parts = false;  ///< there is no drift then: the keyframes had different worlds
+  double travelled = 0;      ///< along the keyframes between both, in the unit of T_to_from
 };
 
 /// What became of EngineOptions::checkpoint.
@@ -117,7 +123,7 @@ struct CheckpointReport {
 
 /// How many frames there were, forgotten ones included.
 struct FrameCounts {
-  std::int64_t frames = 0, tracked = 0, lost = 0, dropped = 0;
+  std::int64_t frames = 0, tracked = 0, placed_later = 0, lost = 0, dropped = 0;
 
   void add(FrameState state) {
     ++frames;

@@ -1,5 +1,7 @@
 #include "engine/runners.hpp"
 
+#include <algorithm>
+
 namespace twofold {
 namespace {
 
@@ -8,6 +10,21 @@ constexpr double kCorrection = 0.01;         // [m]
 constexpr double kCorrectionAngle = 0.0035;  // [rad]
 // A frame or two are lost now and then; the tracker finds on by itself.
 constexpr int kLostBeforeAsking = 2;
+
+/// Length of the way between two keyframes of one part, from one keyframe to the next.
+double distance_travelled(const GraphSnapshot& graph, KeyframeId a, KeyframeId b) {
+  const auto [first, last] = std::minmax({index(a), index(b)});
+  const KeyframeId part = graph.part(b);
+  double distance = 0;
+  const Keyframe* before = nullptr;
+  for (std::uint32_t k = first; k <= last; ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (keyframe.culled() || keyframe.part != part) continue;
+    if (before != nullptr) distance += (keyframe.T_k_w * before->T_k_w.inverse()).translation().norm();
+    before = &keyframe;
+  }
+  return distance;
+}
 
 CorrectionReason reason_of(MapChange::Kind kind) {
   switch (kind) {
@@ -53,6 +70,8 @@ bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortL
   record.snapshot_version = graph.version();
   record.reference = result.reference;
   record.T_c_ref = PackedPose(result.T_c_ref);
+  for (const EarlierFrame& earlier : tracker_.earlier_frames())
+    earlier_.push_back({result.reference, earlier});
   if (record.state == FrameState::kTracked) {
     record.T_c_w_causal = PackedPose(tracker_.T_c_w(graph));
     record.part_causal = tracker_.part(graph);
@@ -115,6 +134,21 @@ void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const G
   if (!on_pose_) return;
   const ScopedStage timed(times_, listener_stage_);
   on_pose_({record, graph, correction_, information_, exposed_ns, stage_ns_, tracker_.last_observations()});
+}
+
+void TrackerRunner::place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const {
+  std::size_t at = 0;  // both are in the order of the source
+  for (const PlacedFrame& placed : earlier_) {
+    while (at < frames.size() && frames[at].frame_index < placed.frame.frame_index) ++at;
+    if (at == frames.size()) return;
+    FrameRecord& record = frames[at];
+    if (record.frame_index != placed.frame.frame_index || record.state != FrameState::kLost) continue;
+    record.state = FrameState::kPlacedLater;
+    --counts.lost;
+    ++counts.placed_later;
+    record.reference = placed.reference;
+    record.T_c_ref = PackedPose(placed.frame.T_c_first);
+  }
 }
 
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
@@ -181,12 +215,12 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
   const ScopedStage timed(times_, place_stage_);
   const auto loop = closer_->step(keyframe, graph);
   if (loop && !awaits_similarities(graph)) {
-    const bool one_camera = rig_.kind == SensorKind::kMono;
+    const bool one_camera = rig_.kind == SensorKind::kMono && mapper_options_.scale_drifts;
     if (one_camera) messages_.emplace_back(close_over_sim3(graph, *loop, rig_, mapper_options_));
     messages_.emplace_back(*loop);
     const bool joins = graph.part(loop->from) != graph.part(loop->to);
-    loops_.push_back(
-        {*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins});
+    loops_.push_back({*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins,
+                      joins ? 0 : distance_travelled(graph, loop->from, loop->to)});
     (one_camera ? awaited_ : not_optimised_) = loop;
   }
   if (on_places_) on_places_(closer_->places());
@@ -227,6 +261,7 @@ void LoopCloserRunner::optimise_if_due(const GraphSnapshot& graph) {
 void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserRunner& loop_closing,
                      RunResult& result) {
   result.graph = mapping.finish();
+  tracking.place_earlier_frames(result.frames, result.counts);
   mapping.replacement_log().hang_on_live_keyframes(result.frames);
   result.mapping = mapping.totals();
   result.places = loop_closing.places();

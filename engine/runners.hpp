@@ -54,6 +54,8 @@ class TrackerRunner {
   /// Completes the record once the pose is known, at `now_ns` on the clock of the pace, and tells the
   /// listener. `graph` is that of the step.
   void finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph, FrameRecord& record);
+  /// At the end of a run: frames before a start of one camera get the poses that it found out.
+  void place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const;
 
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
@@ -70,6 +72,11 @@ class TrackerRunner {
   TraceName version_counter_, effort_counter_;
   PoseListener on_pose_;
   FrameRecord last_;  // the last frame that was tracked
+  struct PlacedFrame {
+    KeyframeId reference = kNoKeyframe;
+    EarlierFrame frame;
+  };
+  std::vector<PlacedFrame> earlier_;  // grows when one camera starts
   PoseCorrection correction_;
   Matrix6 information_ = Matrix6::Zero();                // of the last step's pose
   std::array<std::int64_t, kTrackerStages> stage_ns_{};  // of the last step

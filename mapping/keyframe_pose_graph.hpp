@@ -9,13 +9,15 @@
 
 namespace twofold {
 
-/// The keyframes of a spanning tree as a pose graph over `Group`, SE3 or Sim3. Pose n is that of tree[n], set along
-/// the tree from tree[0], which is the origin  (eq. 6.3); each edge between two of them is a constraint.
+/// The keyframes of a spanning tree as a pose graph over `Group`, SE3 or Sim3. Pose n is that of tree[n], set
+/// along the tree from tree[0], which is the origin  (eq. 6.3); each edge between two of them is a
+/// constraint.
 ///
 /// @param information  of (keyframe, keyframe, edge between them): that of the constraint
 /// @param position     is filled with each keyframe's place in the tree
 template <class Group, class Information>
-[[nodiscard]] PoseGraph<Group> keyframe_pose_graph(const GraphSnapshot& graph, const std::vector<TreeNode>& tree,
+[[nodiscard]] PoseGraph<Group> keyframe_pose_graph(const GraphSnapshot& graph,
+                                                   const std::vector<TreeNode>& tree,
                                                    const Information& information, IdMap& position) {
   PoseGraph<Group> problem;
   problem.origin = 0;

@@ -161,6 +161,8 @@ void bind_summary(py::module_& module) {
   py::class_<SlamSummary>(module, "Summary", "What a run came to.")
       .def_readonly("frames", &SlamSummary::frames, "Queued or dropped.")
       .def_readonly("tracked", &SlamSummary::tracked)
+      .def_readonly("placed_later", &SlamSummary::placed_later,
+                    "Before one camera's start, which said where they were.")
       .def_readonly("lost", &SlamSummary::lost)
       .def_readonly("dropped", &SlamSummary::dropped)
       .def_property_readonly(

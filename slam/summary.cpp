@@ -21,11 +21,13 @@ SlamSummary summarise(const RunResult& result) {
   SlamSummary summary;
   summary.frames = result.counts.frames;
   summary.tracked = result.counts.tracked;
+  summary.placed_later = result.counts.placed_later;
   summary.lost = result.counts.lost;
   summary.dropped = result.counts.dropped;
   for (const FrameRecord& record : result.frames) {
+    if (!has_final_pose(record)) continue;
     // A keyframe the mapper never got to leaves its frames without a place in the map.
-    if (record.state != FrameState::kTracked || !result.graph.contains(record.reference)) continue;
+    if (!result.graph.contains(record.reference)) continue;
     summary.trajectory.push_back({record.t_ns, index(result.graph.part(record.reference)),
                                   to_pose(final_T_c_w(record, result.graph).inverse())});
   }

@@ -16,6 +16,7 @@ std::string SyntheticOptions::invalid_reason() const {
   const std::string reasons[] = {outside("width", width, 32, 4096),
                                  outside("height", height, 32, 4096),
                                  outside("f", f, 10, 100000),
+                                 outside("f_error", f_error, -0.5, 0.5),
                                  outside("baseline", baseline, 1e-4, 100),
                                  outside("fps", fps, 0.01, 1000),
                                  outside("rounds", rounds, 1e-3, 1e5),
@@ -42,7 +43,8 @@ std::string SyntheticOptions::invalid_reason() const {
 }
 
 const std::vector<std::string>& scene_names() {
-  static const std::vector<std::string> kNames{"corridor", "courtyard", "descent", "desk"};
+  static const std::vector<std::string> kNames{"campus",    "cloister", "corridor",
+                                               "courtyard", "descent",  "desk"};
   return kNames;
 }
 
@@ -60,6 +62,14 @@ SyntheticOptions default_options(const std::string& scene) {
     options.fps = 10;
     options.rounds = 1;
   }
+  if (scene == "cloister" || scene == "campus") {  // 80 degrees across
+    options.width = 320;
+    options.height = 240;
+    options.f = 0.5 * 320 / std::tan(40 * 0.017453292519943295);
+    options.fps = 15;
+    options.rounds = scene == "cloister" ? 1.3 : 1;
+  }
+  if (scene == "cloister") options.f_error = 0.04;
   return options;
 }
 

@@ -16,6 +16,7 @@ struct SyntheticOptions {
   int width = 640;         ///< [px] 32 .. 4096
   int height = 480;        ///< [px] 32 .. 4096
   double f = 420;          ///< focal length [px] > 0
+  double f_error = 0;      ///< the calibration's focal length is too long by this share, -0.5 .. 0.5
   double baseline = 0.11;  ///< [m] > 0; RGB-D: of the virtual right camera
   double fps = 30;         ///< (0, 1000]
   double rounds = 2;       ///< times around, or back and forth > 0

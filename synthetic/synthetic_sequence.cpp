@@ -23,6 +23,8 @@ Staging make_place(const SyntheticOptions& options, std::uint64_t seed) {
   if (options.scene == "courtyard") return make_courtyard(seed, options.plain);
   if (options.scene == "desk") return make_desk(seed);
   if (options.scene == "corridor") return make_corridor(seed, options.plain);
+  if (options.scene == "cloister") return make_cloister(seed);
+  if (options.scene == "campus") return make_campus(seed);
   if (options.scene == "descent") return make_descent(seed);
   throw std::invalid_argument("unknown scene '" + options.scene + "'");
 }
@@ -57,8 +59,10 @@ SyntheticSequence::SyntheticSequence(const SyntheticOptions& options)
     : options_(options), staging_(make_staging(options, options.seed)) {
   if (options.elsewhere != 0) elsewhere_ = make_staging(options, options.elsewhere);
   rig_.kind = options.sensor;
-  rig_.camera = {options.f,     options.f,     0.5 * (options.width - 1), 0.5 * (options.height - 1),
-                 options.width, options.height};
+  lens_ = {options.f,     options.f,     0.5 * (options.width - 1), 0.5 * (options.height - 1),
+           options.width, options.height};
+  rig_.camera = lens_;
+  rig_.camera.fx = rig_.camera.fy = options.f * (1 + options.f_error);
   rig_.baseline = options.sensor == SensorKind::kMono ? 0 : options.baseline;
   const std::int64_t frames =
       options.frames > 0 ? options.frames
@@ -110,7 +114,7 @@ View SyntheticSequence::view_at(const Staging& staging, double t, double right_m
   if (options_.object && staging.T_w_object)
     moving = box_quads(staging.T_w_object(t), staging.object_size, staging.object_texture);
   staging.walkers.append(t, moving);
-  return Renderer(staging.scene).render(rig_.camera, T_w_c, moving);
+  return Renderer(staging.scene).render(lens_, T_w_c, moving);
 }
 
 cv::Mat SyntheticSequence::blurred(int i, double right_m) const {

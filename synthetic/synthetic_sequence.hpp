@@ -53,7 +53,8 @@ class SyntheticSequence {
   [[nodiscard]] Frame behind_hand(Frame frame, const NoiseKey& left, const NoiseKey& right) const;
 
   SyntheticOptions options_;
-  Rig rig_;
+  Rig rig_;             ///< as its calibration has it
+  PinholeCamera lens_;  ///< as it is
   Staging staging_;
   std::optional<Staging> elsewhere_;
   std::vector<std::int64_t> indices_;

@@ -123,4 +123,46 @@ void PlainPanels::paint(Canvas& canvas, std::uint64_t wall) const {
   }
 }
 
+void paint_facade(Canvas& canvas, Random& random, int style) {
+  const auto grey = static_cast<float>(random.uniform(115, 165));
+  switch (style) {
+    case 0:
+      paint_bricks(canvas, random, 0.27, 0.085, grey - 15);
+      break;
+    case 1:
+      paint_ashlar(canvas, random, 0.34, grey);
+      break;
+    case 2:
+      paint_plaster(canvas, random, grey + 15);
+      break;
+    default:
+      paint_bricks(canvas, random, 0.42, 0.16, grey);
+      break;
+  }
+  // Storeys of windows at uneven distances; the ground floor also has doors, posters and ivy.
+  for (const double top : {0.7, 2.6}) {
+    for (double x = random.uniform(0.5, 1.2); x < canvas.width() - 1.4;) {
+      const double w = random.uniform(0.7, 1.25);
+      draw_window(canvas, random, x, top + random.uniform(-0.1, 0.1), w, random.uniform(1.0, 1.45));
+      x += w + random.uniform(0.7, 1.6);
+    }
+  }
+  for (double x = random.uniform(0.4, 1.0); x < canvas.width() - 1.2;) {
+    const double kind = random.uniform(0, 1);
+    double w = random.uniform(0.5, 0.9);
+    if (kind < 0.25) {
+      w = random.uniform(0.9, 1.1);
+      draw_door(canvas, random, x, canvas.height() - 2.1, w, 2.1);
+    } else if (kind < 0.75) {
+      draw_poster(canvas, random, x, canvas.height() - random.uniform(1.9, 2.2), w,
+                  w * random.uniform(1.1, 1.45));
+    } else {
+      draw_ivy(canvas, random, x + 0.4, canvas.height() - 0.9, random.uniform(0.4, 0.8));
+    }
+    x += w + random.uniform(0.35, 1.1);
+  }
+  canvas.shade_rows(canvas.height() - 0.6, canvas.height(), 1.0f, 0.7f);
+  canvas.shade_rows(0, 0.4, 0.75f, 1.0f);
+}
+
 }  // namespace twofold::synthetic

@@ -21,4 +21,7 @@ struct PlainPanels {
   void paint(Canvas& canvas, std::uint64_t wall) const;
 };
 
+/// A whole wall, in one of four styles (0 .. 3): windows above, doors, posters and ivy below.
+void paint_facade(Canvas& canvas, Random& random, int style);
+
 }  // namespace twofold::synthetic

@@ -22,6 +22,8 @@ constexpr double kOutlierChi2 = 9.21;  // 99 % of chi-square with 2 degrees of f
 constexpr double kGrossChi2 = 50;      // beyond this before the adjustment, a corner follows something else
 constexpr double kUsableDepthError = 0.25;  // of a point that joins the first map
 constexpr double kDecisiveChi2 = 32;        // by which one motion must explain all better than another
+constexpr double kFinestSigma = 0.35;       // times sigma_px: no corner is followed more exactly
+constexpr double kNearShare = 0.3;  // of the corners that must be near enough: those far off veto nothing
 constexpr int kAdjustmentSteps = 15;
 
 std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vector2>& pixels) {
@@ -31,10 +33,15 @@ std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vec
   return result;
 }
 
+double quantile(std::vector<double> values, double share) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
 double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return quantile(std::move(values), 0.5);
 }
 
 double median_flow(const CornerViews& views) {
@@ -108,6 +115,7 @@ class Attempt {
     AnchoredViews views;
     std::vector<int> corners;  ///< in step with views.points, and with what each view has seen
     double cost = std::numeric_limits<double>::infinity();
+    double sigma_px = 0;  ///< of its corners, by their residuals
   };
 
   /// The structure of the motion that explains all frames best, if no other one does nearly as well.
@@ -118,6 +126,10 @@ class Attempt {
         trials.push_back(*std::move(trial));
     }
     if (trials.empty()) return tl::unexpected(LostCause::kNoCommonMotion);
+    const double sigma_px = std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) {
+                              return a.sigma_px < b.sigma_px;
+                            })->sigma_px;
+    for (Trial& trial : trials) trial.cost = cost(trial, sigma_px);
     const Trial& best =
         *std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) { return a.cost < b.cost; });
     for (const Trial& other : trials) {
@@ -135,7 +147,7 @@ class Attempt {
       if (!enough(trial.corners.size()) || !trial.views.minimise(kAdjustmentSteps)) return false;
     }
     put_outliers_aside(kOutlierChi2, trial);
-    trial.cost = cost(trial);
+    trial.sigma_px = measured_sigma(trial.views);
     return enough(trial.corners.size());
   }
 
@@ -182,10 +194,24 @@ class Attempt {
     for (AnchoredViews::View& view : views.views) view.seen.resize(kept);
   }
 
-  /// Squared whitened errors of all inliers in all frames; one put aside counts as the worst that is not.
-  [[nodiscard]] double cost(const Trial& trial) const {
-    const auto aside = static_cast<double>(inliers_.size() - trial.corners.size());
-    return trial.views.cost() + aside * kOutlierChi2;
+  /// Standard deviation of the corners that the adjustment's residuals show, within reason: on a sharp image
+  /// they are followed to a fraction of what must be expected of a poor one.
+  [[nodiscard]] double measured_sigma(const AnchoredViews& views) const {
+    const auto points = static_cast<double>(views.points.size());
+    const auto frames = static_cast<double>(views.views.size());
+    const double freedom = std::max(1.0, 2 * points * (frames + 1) - 3 * points - 6 * frames);
+    return std::clamp(options_.sigma_px * std::sqrt(views.cost() / freedom), kFinestSigma * options_.sigma_px,
+                      options_.sigma_px);
+  }
+
+  /// Over the inliers, the squared error of each in the frame that it fits least, whitened by sigma_px. One
+  /// that fits no better than chance counts as an outlier, whether it was put aside or not.
+  [[nodiscard]] double cost(const Trial& trial, double sigma_px) const {
+    const double finer = (options_.sigma_px / sigma_px) * (options_.sigma_px / sigma_px);
+    double sum = static_cast<double>(inliers_.size() - trial.corners.size()) * kOutlierChi2;
+    for (std::size_t k = 0; k < trial.views.points.size(); ++k)
+      sum += std::min(finer * worst_chi2(trial.views, k), kOutlierChi2);
+    return sum;
   }
 
   /// Depths of the inliers by the motion from first to last frame, and the poses of the frames between, by
@@ -252,15 +278,16 @@ class Attempt {
 
   /// Standard deviation of the point's inverse depth over that, given the poses; infinite behind infinity.
   /// By the last frame and one half way: more of them have followed the corner with the same error.
-  [[nodiscard]] double depth_error(const AnchoredViews& views, std::size_t k) const {
+  [[nodiscard]] double depth_error(const AnchoredViews& views, std::size_t k, double sigma_px) const {
+    const double finer = options_.sigma_px / sigma_px;
     InverseDepthFilter filter;
     filter.psi = views.points[k].psi;
-    filter.information = views.points[k].prior;
+    filter.information = finer * finer * views.points[k].prior;
     if (!(filter.psi.z() > 0)) return std::numeric_limits<double>::infinity();
     for (const std::size_t v : {std::size_t{0}, views.views.size() / 2}) {
       const auto p = project_inverse_depth(rig_, views.views[v].T_c_a, filter.psi);
       if (!p) return std::numeric_limits<double>::infinity();
-      const Matrix23 J = p->J_psi.topRows<2>() / options_.sigma_px;
+      const Matrix23 J = p->J_psi.topRows<2>() / sigma_px;
       filter.information += J.transpose() * J;
     }
     return filter.inverse_depth_sigma() / filter.psi.z();
@@ -271,7 +298,7 @@ class Attempt {
     FirstStructure structure;
     std::vector<double> errors, depths;
     for (std::size_t k = 0; k < views.points.size(); ++k) {
-      const double error = depth_error(views, k);
+      const double error = depth_error(views, k, trial.sigma_px);
       if (!std::isfinite(error)) continue;
       errors.push_back(error);
       if (error > kUsableDepthError) continue;
@@ -282,7 +309,7 @@ class Attempt {
     if (static_cast<int>(errors.size()) < options_.min_points)
       return tl::unexpected(LostCause::kNoCommonMotion);
     if (static_cast<int>(depths.size()) < options_.min_points ||
-        median(std::move(errors)) > options_.max_depth_error)
+        quantile(std::move(errors), kNearShare) > options_.max_depth_error)
       return tl::unexpected(LostCause::kTooLittleParallax);
     const double unit = median(std::move(depths));
     const SE3& T_last_first = views.views[0].T_c_a;

@@ -17,8 +17,9 @@ struct FirstStructureOptions {
   int min_points = 45;              ///< of the first map, >= 5
   double min_share = 0.6;           ///< of the corners that agree with the motion, in (0, 1]
   double max_rotation_share = 0.5;  ///< of those that a rotation explains as well, in (0, 1]
-  double max_depth_error = 0.1;     ///< median standard deviation of inverse depth over inverse depth, > 0
-  int max_samples = 120;            ///< of RANSAC, >= 1
+  double max_depth_error =
+      0.1;                ///< of inverse depth, as a share of it, of the nearest 30 % of the corners, > 0
+  int max_samples = 120;  ///< of RANSAC, >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

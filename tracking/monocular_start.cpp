@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimation/motion_only.hpp"
+#include "geometry/inverse_depth.hpp"
 #include "imaging/image_buffers.hpp"
 
 namespace twofold {
@@ -10,6 +12,8 @@ namespace {
 
 constexpr std::size_t kCandidates = 4;
 constexpr std::size_t kMostBetween = 4;      // frames between a candidate and now that tell motions apart
+constexpr std::size_t kLongestPath = 64;     // frames since a candidate that get their poses afterwards
+constexpr double kPlacedShare = 0.6;         // of the points of the start, that must agree on such a pose
 constexpr double kNextCandidateFlow = 0.03;  // of the image's width: a new candidate is worth its place
 constexpr double kFewestLeft = 0.4;          // share of its corners below which a candidate is given up
 
@@ -66,36 +70,86 @@ tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameIm
   }
   renew_candidates(images, frame);
   last_.left.copy_from(images.left);
+  last_index_ = frame.index;
   has_last_ = true;
   return tl::unexpected(candidates_[order_.front()].corners.empty() ? LostCause::kTooFewCorners : cause);
 }
 
 void MonocularStart::follow(const FrameImages& images, StartCandidate& candidate) const {
   remember_place(candidate);
+  remember_path(last_index_, candidate);
   ++candidate.age;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidate.corners.size(); ++i) {
     if (!follow_corner(last_.left, images.left, candidate.corners[i])) continue;
     candidate.corners[kept] = candidate.corners[i];
     for (auto& places : candidate.between) places[kept] = places[i];
+    for (PathFrame& frame : candidate.path) frame.places[kept] = frame.places[i];
     ++kept;
   }
   candidate.corners.resize(kept);
   for (auto& places : candidate.between) places.resize(kept);
+  for (PathFrame& frame : candidate.path) frame.places.resize(kept);
 }
+
+namespace {
+
+std::vector<Eigen::Vector2f> places_of(const std::vector<FollowedCorner>& corners) {
+  std::vector<Eigen::Vector2f> places;
+  places.reserve(corners.size());
+  for (const FollowedCorner& corner : corners) places.push_back(corner.uv);
+  return places;
+}
+
+/// Every second one goes.
+template <class Frames>
+void thin_out(Frames& frames) {
+  for (std::size_t b = 0; 2 * b + 1 < frames.size(); ++b) std::swap(frames[b], frames[2 * b + 1]);
+  frames.resize(frames.size() / 2);
+}
+
+}  // namespace
 
 /// Every stride-th frame is one between. When they are too many, every second one goes.
 void MonocularStart::remember_place(StartCandidate& candidate) {
   if (candidate.age == 0 || candidate.age % candidate.stride != 0) return;
   auto& between = candidate.between;
   if (between.size() == kMostBetween) {
-    for (std::size_t b = 0; 2 * b + 1 < between.size(); ++b) std::swap(between[b], between[2 * b + 1]);
-    between.resize(kMostBetween / 2);
+    thin_out(between);
     candidate.stride *= 2;
     if (candidate.age % candidate.stride != 0) return;
   }
-  auto& places = between.emplace_back();
-  for (const FollowedCorner& corner : candidate.corners) places.push_back(corner.uv);
+  between.push_back(places_of(candidate.corners));
+}
+
+void MonocularStart::remember_path(std::int64_t frame_index, StartCandidate& candidate) {
+  if (candidate.age == 0 || candidate.age % candidate.path_stride != 0) return;
+  if (candidate.path.size() == kLongestPath) {
+    thin_out(candidate.path);
+    candidate.path_stride *= 2;
+    if (candidate.age % candidate.path_stride != 0) return;
+  }
+  candidate.path.push_back({frame_index, places_of(candidate.corners)});
+}
+
+std::vector<EarlierFrame> MonocularStart::earlier_frames(const MonocularStartResult& start) const {
+  const StartCandidate& first = *start.first;
+  const double sigma_px = options_.first_structure.sigma_px;
+  std::vector<EarlierFrame> frames{{first.frame_index, SE3()}};
+  for (const PathFrame& frame : first.path) {
+    std::vector<MotionObservation> observations;
+    for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
+      MotionObservation& o = observations.emplace_back();
+      o.x_ref = from_inverse_depth(start.structure.psi[n]);
+      o.z << frame.places[static_cast<std::size_t>(start.structure.corners[n])], 0;
+      o.information.setConstant(static_cast<float>(1 / (sigma_px * sigma_px)));
+      o.information.z() = 0;
+    }
+    const MotionOnlyResult motion = optimise_motion(rig_, observations, frames.back().T_c_first, {});
+    if (motion.inliers < kPlacedShare * static_cast<double>(observations.size())) continue;
+    frames.push_back({frame.frame_index, motion.T_c_ref});
+  }
+  return frames;
 }
 
 tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandidate& candidate) const {
@@ -143,6 +197,8 @@ void MonocularStart::fill(StartCandidate& candidate, const FrameImages& images, 
   candidate.corners.clear();
   candidate.between.clear();
   candidate.stride = 1;
+  candidate.path.clear();
+  candidate.path_stride = 1;
   for (const PointAppearance& appearance : appearances_) {
     candidate.corners.push_back({appearance, appearance.uv, std::nullopt});
   }

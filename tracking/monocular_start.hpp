@@ -13,6 +13,12 @@
 
 namespace twofold {
 
+/// A frame since a candidate, and where it saw the candidate's corners, in step with those still seen.
+struct PathFrame {
+  std::int64_t frame_index = 0;
+  std::vector<Eigen::Vector2f> places;  ///< level-0 pixels
+};
+
 /// An earlier frame whose corners are still followed: it may become the first keyframe.
 struct StartCandidate {
   std::int64_t frame_index = 0;
@@ -24,6 +30,15 @@ struct StartCandidate {
   /// In step with `corners`: where they were at the ages stride, 2 stride, ... before the present one.
   std::vector<std::vector<Eigen::Vector2f>> between;
   int stride = 1;
+  /// Likewise, of as many frames since as there is room for: they get their poses when the start is found.
+  std::vector<PathFrame> path;
+  int path_stride = 1;
+};
+
+/// Where the camera was in a frame between the first keyframe and the one in which the start was found.
+struct EarlierFrame {
+  std::int64_t frame_index = 0;
+  SE3 T_c_first;
 };
 
 /// The start as the tracker takes it over.
@@ -45,10 +60,14 @@ class MonocularStart {
   /// @return  the start, or what it waits for
   [[nodiscard]] tl::expected<MonocularStartResult, LostCause> step(const FrameImages& images,
                                                                    const Frame& frame);
+  /// The first frame of a start and those since, as far as the points of the start say where they were seen
+  /// from; to be called before the next step. Allocates.
+  [[nodiscard]] std::vector<EarlierFrame> earlier_frames(const MonocularStartResult& start) const;
 
  private:
   void follow(const FrameImages& images, StartCandidate& candidate) const;
   static void remember_place(StartCandidate& candidate);
+  static void remember_path(std::int64_t frame_index, StartCandidate& candidate);
   [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
   void renew_candidates(const FrameImages& images, const Frame& frame);
   void fill(StartCandidate& candidate, const FrameImages& images, const Frame& frame);
@@ -60,6 +79,7 @@ class MonocularStart {
   std::vector<std::size_t> order_;  ///< of candidates_ in use, oldest first
   FrameImages last_;                ///< of the frame before
   bool has_last_ = false;
+  std::int64_t last_index_ = 0;
   std::vector<PointAppearance> appearances_;  ///< scratch
 };
 

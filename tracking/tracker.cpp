@@ -65,6 +65,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
                           EffortLevel effort) {
   FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_));
   ++frames_;
+  earlier_frames_.clear();
   loss_.begin_frame(frame.index, frame.t_ns);
   load_images(frame);
   step.lap(TrackerStage::kPyramid);

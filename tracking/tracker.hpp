@@ -63,6 +63,10 @@ class Tracker {
     return last_.T_c_ref * pose_in_world(graph, immature_points_, last_.reference);
   }
 
+  /// One camera: frames before that of the last step whose poses its start found out, relative to the
+  /// reference keyframe. Empty after any other step.
+  [[nodiscard]] std::span<const EarlierFrame> earlier_frames() const { return earlier_frames_; }
+
   /// Images of the last step's frame, if that was lost.
   [[nodiscard]] const FrameImages& lost_images() const { return current_; }
   /// Frames since the last one with a pose.
@@ -147,6 +151,7 @@ class Tracker {
   // One camera only: where its depths come from.
   std::optional<MonocularStart> monocular_start_;
   std::optional<DepthSeeds> seeds_;
+  std::vector<EarlierFrame> earlier_frames_;
 
   std::int64_t last_t_ns_ = 0;  ///< of the last good frame
   Placement last_;              ///< of the last good frame

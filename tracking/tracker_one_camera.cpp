@@ -17,6 +17,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
     immature_points_.clear_points();
     return cause;
   }
+  earlier_frames_ = monocular_start_->earlier_frames(*start);
   const StartCandidate& first = *start->first;
   const Placement here{step.result.reference, step.result.T_c_ref};
   begin_proposal({kNoKeyframe, SE3()}, step);

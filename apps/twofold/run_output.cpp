@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -122,16 +123,40 @@ std::string durations(const LatencyHistogram& h) {
                      ms(h.quantile_ns(0.5)), ms(h.quantile_ns(0.99)), ms(h.max_ns()));
 }
 
+/// What each loop found before it was closed, a line a loop.
+void print_loops(const RunResult& result) {
+  constexpr std::size_t kMost = 12;
+  for (std::size_t n = 0; n < std::min(kMost, result.loops.size()); ++n) {
+    const ClosedLoop& loop = result.loops[n];
+    const auto [from, to] = std::pair(index(loop.constraint.from), index(loop.constraint.to));
+    if (loop.joins_parts) {
+      fmt::print("loop        keyframes {} and {}: joins two map parts\n", from, to);
+      continue;
+    }
+    const Vector6 drift = (loop.constraint.T_to_from * loop.T_to_from_before.inverse()).log();
+    const double moved = drift.head<3>().norm();
+    fmt::print(
+        "loop        keyframes {} and {}: drift {:.4f} ({:.3f} % of {:.1f} travelled), {:.2f} degrees, "
+        "scale {:.4f}\n",
+        from, to, moved, 100 * moved / std::max(loop.travelled, 1e-9), loop.travelled,
+        drift.tail<3>().norm() * 180 / std::numbers::pi, loop.constraint.scale);
+  }
+  if (result.loops.size() > kMost) fmt::print("loop        {} more\n", result.loops.size() - kMost);
+}
+
 }  // namespace
 
 void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
                    const RunResult& result) {
   const FrameCounts& counts = result.counts;
-  fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", counts.frames, counts.tracked,
+  const std::string later =
+      counts.placed_later > 0 ? fmt::format("{} placed later, ", counts.placed_later) : "";
+  fmt::print("frames      {} ({} tracked, {}{} lost, {} dropped){}\n", counts.frames, counts.tracked, later,
              counts.lost, counts.dropped, result.interrupted ? ", interrupted" : "");
   fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
              result.graph.keyframe_count(), result.mapping.rounds, result.mapping.metric_loops,
              result.loops.size());
+  print_loops(result);
   if (options.map) {
     const auto frame = recognised_at(options, result);
     fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),

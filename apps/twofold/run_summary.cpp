@@ -73,6 +73,7 @@ Json loops_json(const RunResult& result) {
   Json loops = Json::array();
   for (const ClosedLoop& loop : result.loops) {
     const Vector6 drift = (loop.constraint.T_to_from * loop.T_to_from_before.inverse()).log();
+    const Json travelled = loop.joins_parts ? Json() : Json(loop.travelled);
     loops.push_back({{"t_ns", loop.t_ns},
                      {"from", index(loop.constraint.from)},
                      {"to", index(loop.constraint.to)},
@@ -80,7 +81,8 @@ Json loops_json(const RunResult& result) {
                      {"scale", loop.constraint.scale},
                      {"joins_parts", loop.joins_parts},
                      {"drift_m", loop.joins_parts ? Json() : Json(drift.head<3>().norm())},
-                     {"drift_rad", loop.joins_parts ? Json() : Json(drift.tail<3>().norm())}});
+                     {"drift_rad", loop.joins_parts ? Json() : Json(drift.tail<3>().norm())},
+                     {"travelled_m", travelled}});
   }
   return loops;
 }
@@ -151,6 +153,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"error", result.error},
             {"frames", result.frames.size()},
             {"tracked", result.counts.tracked},
+            {"placed_later", result.counts.placed_later},
             {"lost", result.counts.lost},
             {"dropped", result.counts.dropped},
             {"keyframes", keyframes},

@@ -75,6 +75,7 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
   take_int(parameters, "height", &options.height);
   options.f *= static_cast<double>(options.width) / usual_width;
   for (const auto& [key, value] : {std::pair<const char*, double*>{"f", &options.f},
+                                   {"f_error", &options.f_error},
                                    {"baseline", &options.baseline},
                                    {"fps", &options.fps},
                                    {"rounds", &options.rounds},

@@ -48,6 +48,30 @@ TEST(SyntheticSource, DefaultsAreThoseOfTheScenes) {
   EXPECT_NEAR(truth[1].T_w_c.translation().z(), 9.85, 1e-9);
 }
 
+TEST(SyntheticSource, LargeLoopsComeBackToWhereTheyWere) {
+  // The quadrangle of the campus: round after round, after 3 rounds and after all of it.
+  const auto campus = open_synthetic("campus", {{"fps", "2"}});
+  const Trajectory& truth = campus->ground_truth();
+  double path = 0, farthest = 0;
+  for (std::size_t i = 1; i < truth.size(); ++i) {
+    path += (truth[i].T_w_c.translation() - truth[i - 1].T_w_c.translation()).norm();
+    farthest = std::max(farthest, truth[i].T_w_c.translation().norm());
+  }
+  EXPECT_NEAR(path, 1800, 100);
+  EXPECT_GT(farthest, 100);
+  EXPECT_LT((truth.back().T_w_c.translation() - truth.front().T_w_c.translation()).norm(), 4);
+
+  // The calibration of the cloister is rough: what is rendered is not what it says.
+  const auto rough = open_synthetic("cloister", {});
+  const auto exact = open_synthetic("cloister", {{"f_error", "0"}});
+  EXPECT_NEAR(rough->rig().camera.fx / exact->rig().camera.fx, 1.04, 1e-12);
+  Frame a, b;
+  ASSERT_EQ(rough->next(a), FrameStatus::kFrame);
+  ASSERT_EQ(exact->next(b), FrameStatus::kFrame);
+  EXPECT_EQ(cv::norm(a.left, b.left, cv::NORM_INF), 0);
+  EXPECT_EQ(rough->ground_truth().size(), static_cast<std::size_t>(rough->frame_count().value_or(0)));
+}
+
 TEST(SyntheticSource, ACameraIsCoveredAndCarriedElsewhere) {
   const Parameters small{{"width", "64"}, {"height", "48"}, {"fps", "10"}, {"noise", "0"}};
   const auto with = [&](Parameters more) {
@@ -130,7 +154,7 @@ TEST(SyntheticSource, EffectsShowInTheImages) {
 
 TEST(SyntheticSource, WrongParametersAreNamed) {
   EXPECT_IO_ERROR(open_synthetic("castle", {}),
-                  "unknown scene 'castle' (known: corridor, courtyard, descent, desk)");
+                  "unknown scene 'castle' (known: campus, cloister, corridor, courtyard, descent, desk)");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"colour", "1"}}), "unknown parameter 'colour'");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"width", "many"}}), "width='many' is not a number");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"width", "10"}}), "width must be between 32 and 4096");
