@@ -13,7 +13,8 @@ namespace {
 
 int open_file(const std::filesystem::path& file) {
   const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (descriptor < 0) throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(errno));
+  if (descriptor < 0)
+    throw std::runtime_error(file.string() + ": cannot be written: " + std::strerror(errno));
   return descriptor;
 }
 
@@ -84,7 +85,8 @@ void LogFile::write_waiting() {
   const std::scoped_lock lock(lock_);
   written_ += done;
   if (done == writing_.size()) return;
-  if (failure_.empty()) failure_ = std::string("cannot be written: ") + std::strerror(error != 0 ? error : EIO);
+  if (failure_.empty())
+    failure_ = std::string("cannot be written: ") + std::strerror(error != 0 ? error : EIO);
   lost_ += writing_.size() - done + waiting_.size();
   waiting_.clear();
 }

@@ -14,8 +14,8 @@
 
 namespace twofold {
 
-/// Records that arise for as long as a run goes on, and are read when it is over. In memory; or, once there is
-/// a file, in that, and no memory grows with them; or the newest in memory only.
+/// Records that arise for as long as a run goes on, and are read when it is over. In memory; or, once there
+/// is a file, in that, and no memory grows with them; or the newest in memory only.
 template <class T>
 class RecordSequence {
   static_assert(std::is_trivially_copyable_v<T>, "records go to disk and back as bytes");

@@ -37,8 +37,8 @@ void RunLogs::add(const FrameRecord& record, const PoseCorrection& correction) {
   if (correction.reason != CorrectionReason::kNone) corrections_.push_back(correction);
   if (!causal_ || record.state != FrameState::kTracked) return;
   if (record.part_causal != part_ && part_ != kNoKeyframe)
-    causal_->append("# another map part, in a world of its own: " + std::to_string(index(record.part_causal)) +
-                    "\n");
+    causal_->append(
+        "# another map part, in a world of its own: " + std::to_string(index(record.part_causal)) + "\n");
   part_ = record.part_causal;
   causal_->append(tum_line({record.t_ns, record.T_c_w_causal.unpacked().inverse()}));
 }

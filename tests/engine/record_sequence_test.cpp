@@ -35,7 +35,8 @@ TEST(RecordSequence, ComesBackFromDiskAndCanBeChanged) {
   RecordSequence<Pair> records;
   records.keep_in(file);
   constexpr std::size_t kRecords = 100'000;
-  for (std::size_t i = 0; i < kRecords; ++i) records.push_back({static_cast<std::int64_t>(i), 0.5 * static_cast<double>(i)});
+  for (std::size_t i = 0; i < kRecords; ++i)
+    records.push_back({static_cast<std::int64_t>(i), 0.5 * static_cast<double>(i)});
   EXPECT_EQ(writer.finish(), "");
   records.read_back();
   ASSERT_EQ(records.size(), kRecords);
