@@ -75,7 +75,7 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
   command
       .add_option("SOURCE", arguments.source,
                   "Path, or scheme:ARGUMENT?key=value (kitti, euroc, tum, images, "
-                  "video, synthetic, v4l2)")
+                  "video, mcap, bag, synthetic, v4l2)")
       ->required();
   command.add_option("--calib", arguments.calibration, "Calibration file instead of the recording's own");
   command

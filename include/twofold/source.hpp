@@ -25,7 +25,8 @@ struct SourceSettings {
 /// Frames of a recording, a video, a rendered scene or a camera, rectified.
 ///
 /// Named as on the command line (docs/sources.md): a path, or euroc:DIR, kitti:DIR, tum:DIR, images:DIR,
-/// video:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. One thread at a time; stop() by any.
+/// video:FILE, mcap:FILE, bag:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. One thread at a
+/// time; stop() by any.
 class TWOFOLD_API Source {
  public:
   /// Throws std::runtime_error naming the file and what is wrong with it; one camera alone, without depth, is

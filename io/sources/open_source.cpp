@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
+#include "io/bags/bag_reader.hpp"
 #include "io/files/io_error.hpp"
+#include "io/sources/bag_source.hpp"
 #include "io/sources/left_camera_source.hpp"
 #include "io/sources/preloaded_source.hpp"
 #include "io/sources/recording.hpp"
@@ -50,6 +52,16 @@ std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOpti
   return source;
 }
 
+Opener bag_opener(std::unique_ptr<BagReader> (*open)(const fs::path&)) {
+  return [open](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
+    SourceParameters parameters(spec.text, spec.parameters);
+    auto source =
+        std::make_unique<BagSource>(open(spec.argument), spec.argument, options.calibration, parameters);
+    parameters.expect_all_taken();
+    return source;
+  };
+}
+
 const std::map<std::string, Opener>& openers() {
   static const std::map<std::string, Opener> kOpeners{
       {"kitti", recording_opener(read_kitti_recording)},
@@ -57,6 +69,8 @@ const std::map<std::string, Opener>& openers() {
       {"tum", recording_opener(read_tum_recording)},
       {"images", recording_opener(read_image_folder)},
       {"video", open_video},
+      {"mcap", bag_opener(open_mcap)},
+      {"bag", bag_opener(open_rosbag)},
       {"v4l2",
        [](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
          return std::make_unique<V4l2Source>(spec, options);
@@ -70,7 +84,8 @@ const std::map<std::string, Opener>& openers() {
 /// Scheme for a bare path, from what is in the folder.
 std::string recognise_layout(const fs::path& path) {
   std::error_code error;
-  if (fs::is_regular_file(path, error)) return "video";
+  if (fs::is_regular_file(path, error))
+    return path.extension() == ".mcap" ? "mcap" : path.extension() == ".bag" ? "bag" : "video";
   if (fs::is_character_file(path, error)) return "v4l2";
   if (!fs::exists(path, error)) throw IoError(path, "no such file or folder");
   expect_folder(path);

@@ -32,6 +32,7 @@ struct SourceOptions {
 ///   tum:DIR          RGB-D; associations.txt or rgb.txt and depth.txt; groundtruth.txt if there
 ///   images:DIR       image files in the order of their names, or left/ with right/ or depth/; times.txt
 ///   video:FILE       one image, or two side by side
+///   mcap:FILE        a recording of ROS 1 or 2; bag:FILE one of ROS 1
 ///   v4l2:DEVICE      a camera, or two paired by time
 ///   synthetic:SCENE  rendered (synthetic/)
 ///

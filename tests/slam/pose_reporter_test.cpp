@@ -65,7 +65,7 @@ TEST_F(PoseReporterTest, ACorrectionOfTheMapIsNoMotion) {
   const SE3 jump(SO3(), Vector3(0, 5, 0));
   writer_.set_pose(KeyframeId{0}, jump);
   graph_ = writer_.publish();
-  correction_ = {CorrectionReason::kLoopClosure, 1, kPeriod, SE3(), jump};
+  correction_ = {CorrectionReason::kLoopClosure, 1, kPeriod, PackedPose(), PackedPose(jump)};
   const PoseEstimate pose = report(tracked(1, jump));
   for (const double v : pose.velocity) EXPECT_NEAR(v, 0, 1e-12);
   ASSERT_TRUE(events_.correction);

@@ -1,0 +1,222 @@
+#include "io/bags/bag_cameras.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "io/bags/bag_bytes.hpp"
+
+namespace twofold {
+namespace {
+
+bool is_image(const BagTopic& topic) {
+  return topic.type == "sensor_msgs/Image" || topic.type == "sensor_msgs/CompressedImage";
+}
+
+bool contains(const std::string& text, std::string_view part) {
+  return text.find(part) != std::string::npos;
+}
+
+bool is_depth(const BagTopic& topic) {
+  return contains(topic.name, "depth");
+}
+
+/// Smaller is taken first.
+int rank(const BagTopic& topic) {
+  const bool compressed = topic.type == "sensor_msgs/CompressedImage";
+  return (compressed ? 2 : 0) + (contains(topic.name, "rect") ? 0 : 1);
+}
+
+std::string list(const std::vector<BagTopic>& topics) {
+  std::string names;
+  for (const BagTopic& topic : topics) {
+    if (is_image(topic)) names += (names.empty() ? "" : ", ") + topic.name;
+  }
+  return names.empty() ? "none" : names;
+}
+
+const BagTopic& named(const std::vector<BagTopic>& topics, const std::string& name) {
+  for (const BagTopic& topic : topics) {
+    if (topic.name == name && is_image(topic)) return topic;
+  }
+  throw MalformedBytes("no image topic '" + name + "'; there are: " + list(topics));
+}
+
+/// ROS puts a camera's info beside its images: /cam/image_raw, /cam/image_raw/compressed, /cam/camera_info.
+BagCamera camera_of(const std::vector<BagTopic>& topics, const BagTopic& images) {
+  BagCamera camera{images, {}};
+  for (std::string folder = images.name; !camera.info && !folder.empty();) {
+    const auto slash = folder.rfind('/');
+    folder.resize(slash == std::string::npos ? 0 : slash);
+    for (const BagTopic& topic : topics) {
+      if (topic.type == "sensor_msgs/CameraInfo" && topic.name == folder + "/camera_info")
+        camera.info = topic;
+    }
+    if (images.name.size() - folder.size() > 40) break;
+  }
+  return camera;
+}
+
+/// Names of the right camera that the left one's suggests.
+std::vector<std::string> partners(const std::string& left) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kPairs{{{"left", "right"},
+                                                                                 {"cam0", "cam1"},
+                                                                                 {"camera0", "camera1"},
+                                                                                 {"infra1", "infra2"},
+                                                                                 {"image_0", "image_1"},
+                                                                                 {"camera_0", "camera_1"}}};
+  std::vector<std::string> names;
+  for (const auto& [of_left, of_right] : kPairs) {
+    if (!contains(left, of_left)) continue;
+    std::string name = left;
+    for (auto at = name.find(of_left); at != std::string::npos; at = name.find(of_left, at + of_right.size()))
+      name.replace(at, of_left.size(), of_right);
+    names.push_back(name);
+  }
+  return names;
+}
+
+struct Choice {
+  std::vector<BagTopic> colour, depth;  // best first
+};
+
+Choice sorted_images(const std::vector<BagTopic>& topics) {
+  Choice choice;
+  for (const BagTopic& topic : topics) {
+    if (is_image(topic)) (is_depth(topic) ? choice.depth : choice.colour).push_back(topic);
+  }
+  for (auto* list : {&choice.colour, &choice.depth}) {
+    std::stable_sort(list->begin(), list->end(),
+                     [](const BagTopic& a, const BagTopic& b) { return rank(a) < rank(b); });
+  }
+  return choice;
+}
+
+/// The same images packed in another way, or those that ROS makes of them: /cam/image_raw, /cam/image_rect.
+bool same_camera(const BagTopic& a, const BagTopic& b) {
+  const auto plain = [](std::string name) {
+    if (name.ends_with("/compressed")) name.resize(name.size() - std::string_view("/compressed").size());
+    return name;
+  };
+  const std::string of_a = plain(a.name), of_b = plain(b.name);
+  const auto folder = of_a.rfind("/image");
+  return of_a == of_b || (folder != std::string::npos && of_a.find('/', folder + 1) == std::string::npos &&
+                          of_b.rfind("/image") == folder && of_a.substr(0, folder) == of_b.substr(0, folder));
+}
+
+std::optional<std::pair<BagTopic, BagTopic>> find_pair(const std::vector<BagTopic>& colour) {
+  for (const BagTopic& left : colour) {
+    for (const std::string& name : partners(left.name)) {
+      const auto right = std::find_if(colour.begin(), colour.end(), [&](const BagTopic& topic) {
+        return topic.name == name && topic.type == left.type;
+      });
+      if (right != colour.end()) return std::pair(left, *right);
+    }
+  }
+  return std::nullopt;
+}
+
+bool all_of_one_camera(const std::vector<BagTopic>& topics) {
+  return !topics.empty() && std::all_of(topics.begin(), topics.end(), [&](const BagTopic& topic) {
+    return same_camera(topic, topics.front());
+  });
+}
+
+/// The pinhole camera of a 3x3 or 3x4 matrix.
+PinholeCamera pinhole_of(const double* matrix, std::size_t columns, const CameraInfoMessage& info) {
+  return {matrix[0],           matrix[columns + 1],          matrix[2],
+          matrix[columns + 2], static_cast<int>(info.width), static_cast<int>(info.height)};
+}
+
+Distortion distortion_of(const CameraInfoMessage& info) {
+  Distortion distortion;
+  std::vector<double> D = info.D;
+  while (!D.empty() && D.back() == 0) D.pop_back();
+  if (D.empty()) return distortion;
+  const bool fisheye = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";
+  const bool known =
+      fisheye || info.distortion_model == "plumb_bob" || info.distortion_model == "rational_polynomial";
+  distortion.model = fisheye ? DistortionModel::kEquidistant : DistortionModel::kRadTan;
+  if (!known || D.size() > static_cast<std::size_t>(distortion.coefficient_count()))
+    throw MalformedBytes("camera_info has a distortion '" + info.distortion_model + "' of " +
+                         std::to_string(D.size()) + " coefficients, which is not known: give --calib");
+  std::copy(D.begin(), D.end(), distortion.coefficients.begin());
+  return distortion;
+}
+
+CameraModel model_of(const BagCamera& camera, const CameraInfoMessage& info) {
+  constexpr std::uint32_t kLargestSide = 1U << 16;
+  if (info.width > kLargestSide || info.height > kLargestSide)
+    throw MalformedBytes("camera_info of '" + camera.images.name + "' has an impossible size");
+  if (camera.rectified()) return {pinhole_of(info.P.data(), 4, info), {}};
+  return {pinhole_of(info.K.data(), 3, info), distortion_of(info)};
+}
+
+SO3 rotation_of(const CameraInfoMessage& info) {
+  const Matrix3 R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data());
+  constexpr double kTolerance = 1e-3;
+  if (!R.allFinite() || (R * R.transpose() - Matrix3::Identity()).norm() > kTolerance || R.determinant() < 0)
+    throw MalformedBytes(
+        "camera_info has an R that is no rotation: the images' poses are not known; give --calib");
+  return SO3(R);
+}
+
+/// The right camera's rectified image is shifted: P of it has -fx * baseline in its last column.
+double baseline_of(const CameraInfoMessage& right) {
+  const double baseline = -right.P[3] / right.P[0];
+  if (!(baseline > 0) || baseline > 100)
+    throw MalformedBytes("camera_info of the right camera states no baseline (P[3]): give --calib");
+  return baseline;
+}
+
+}  // namespace
+
+bool BagCamera::rectified() const {
+  return contains(images.name, "rect");
+}
+
+BagCameras choose_cameras(const std::vector<BagTopic>& topics, const WantedTopics& wanted) {
+  BagCameras cameras;
+  const auto camera = [&](const BagTopic& topic) { return camera_of(topics, topic); };
+  if (wanted.left) {
+    cameras.left = camera(named(topics, *wanted.left));
+    if (wanted.right) cameras.right = camera(named(topics, *wanted.right));
+    if (wanted.depth) cameras.depth = camera(named(topics, *wanted.depth));
+    return cameras;
+  }
+  if (wanted.right || wanted.depth) throw MalformedBytes("with right or depth goes left, the other images");
+  const Choice choice = sorted_images(topics);
+  if (const auto pair = find_pair(choice.colour)) {
+    cameras.left = camera(pair->first);
+    cameras.right = camera(pair->second);
+    return cameras;
+  }
+  if (!all_of_one_camera(choice.colour) || (!choice.depth.empty() && !all_of_one_camera(choice.depth)))
+    throw MalformedBytes("which images? Name topics by left, right, depth; there are: " + list(topics));
+  cameras.left = camera(choice.colour.front());
+  if (!choice.depth.empty()) cameras.depth = camera(choice.depth.front());
+  return cameras;
+}
+
+Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& left,
+                           const std::optional<CameraInfoMessage>& right) {
+  Calibration calibration;
+  calibration.kind = cameras.kind();
+  calibration.left = model_of(cameras.left, left);
+  if (!(calibration.left.pinhole.fx > 0))
+    throw MalformedBytes("camera_info of '" + cameras.left.images.name + "' is not calibrated: give --calib");
+  if (!right) return calibration;
+  calibration.right = model_of(*cameras.right, *right);
+  const SE3 T_rectified(SO3(), Vector3(-baseline_of(*right), 0, 0));
+  calibration.already_rectified = cameras.left.rectified() && cameras.right->rectified();
+  if (calibration.already_rectified) {
+    calibration.T_right_left = T_rectified;
+    return calibration;
+  }
+  const SE3 T_rect_left(rotation_of(left), Vector3::Zero()),
+      T_rect_right(rotation_of(*right), Vector3::Zero());
+  calibration.T_right_left = T_rect_right.inverse() * T_rectified * T_rect_left;
+  return calibration;
+}
+
+}  // namespace twofold

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera/calibration.hpp"
+#include "io/bags/bag_reader.hpp"
+#include "io/bags/ros_messages.hpp"
+
+namespace twofold {
+
+/// A camera's topic in a bag.
+struct BagCamera {
+  BagTopic images;  ///< sensor_msgs/Image or CompressedImage
+  std::optional<BagTopic> info;
+
+  [[nodiscard]] bool compressed() const { return images.type == "sensor_msgs/CompressedImage"; }
+  /// Images that were rectified before they were recorded, as ROS names them.
+  [[nodiscard]] bool rectified() const;
+};
+
+/// The cameras of a rig.
+struct BagCameras {
+  BagCamera left;
+  std::optional<BagCamera> right, depth;
+
+  [[nodiscard]] SensorKind kind() const {
+    return right ? SensorKind::kStereo : depth ? SensorKind::kRgbd : SensorKind::kMono;
+  }
+};
+
+/// Names of topics, where the user gave them.
+struct WantedTopics {
+  std::optional<std::string> left, right, depth;
+};
+
+/// The given ones; where none is, what types and names say: two image topics that differ in left/right,
+/// cam0/cam1, ...; one with "depth" in its name beside another; or the only one. Of the same camera rectified
+/// images are taken before raw ones, and these before compressed ones. Throws MalformedBytes listing the
+/// image topics when that does not decide, or when a given one is not there.
+[[nodiscard]] BagCameras choose_cameras(const std::vector<BagTopic>& topics, const WantedTopics& wanted);
+
+/// What the cameras' CameraInfo says; `right` for stereo. Throws MalformedBytes when it says nothing (K is
+/// zero) or names a distortion that is not known.
+[[nodiscard]] Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& left,
+                                         const std::optional<CameraInfoMessage>& right);
+
+}  // namespace twofold

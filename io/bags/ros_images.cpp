@@ -1,0 +1,134 @@
+#include "io/bags/ros_images.hpp"
+
+#include <cmath>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string_view>
+
+#include "io/bags/bag_bytes.hpp"
+#include "io/files/image_file.hpp"
+#include "io/files/image_integrity.hpp"
+
+namespace twofold {
+namespace {
+
+struct Encoding {
+  int type = 0;         ///< OpenCV's
+  int conversion = -1;  ///< to grey, OpenCV's; -1: none
+};
+
+/// OpenCV names Bayer patterns by the second row's second and third pixel: its BG is rggb.
+const std::map<std::string, Encoding, std::less<>>& encodings() {
+  static const std::map<std::string, Encoding, std::less<>> kEncodings{
+      {"mono8", {CV_8UC1}},
+      {"8UC1", {CV_8UC1}},
+      {"mono16", {CV_16UC1}},
+      {"16UC1", {CV_16UC1}},
+      {"32FC1", {CV_32FC1}},
+      {"rgb8", {CV_8UC3, cv::COLOR_RGB2GRAY}},
+      {"bgr8", {CV_8UC3, cv::COLOR_BGR2GRAY}},
+      {"8UC3", {CV_8UC3, cv::COLOR_BGR2GRAY}},
+      {"rgba8", {CV_8UC4, cv::COLOR_RGBA2GRAY}},
+      {"bgra8", {CV_8UC4, cv::COLOR_BGRA2GRAY}},
+      {"bayer_rggb8", {CV_8UC1, cv::COLOR_BayerBG2GRAY}},
+      {"bayer_bggr8", {CV_8UC1, cv::COLOR_BayerRG2GRAY}},
+      {"bayer_gbrg8", {CV_8UC1, cv::COLOR_BayerGR2GRAY}},
+      {"bayer_grbg8", {CV_8UC1, cv::COLOR_BayerGB2GRAY}},
+  };
+  return kEncodings;
+}
+
+/// The message's pixels as they are; valid as long as those.
+cv::Mat view_of(const ImageMessage& image, Encoding& encoding) {
+  const auto known = encodings().find(image.encoding);
+  if (known == encodings().end())
+    throw MalformedBytes("an image of unknown encoding '" + image.encoding + "'");
+  encoding = known->second;
+  const std::size_t pixel = CV_ELEM_SIZE(encoding.type);
+  if (image.width == 0 || image.height == 0 ||
+      std::uint64_t{image.width} * image.height > static_cast<std::uint64_t>(kMaxImagePixels))
+    throw MalformedBytes("an image of impossible size");
+  if (image.step < image.width * pixel || image.step > 4 * std::uint64_t{kMaxImagePixels})
+    throw MalformedBytes("an image whose rows are shorter than its width");
+  if (image.big_endian && CV_ELEM_SIZE1(encoding.type) > 1) throw MalformedBytes("a big-endian image");
+  // OpenCV has no view of what must not be written; nobody writes.
+  return {static_cast<int>(image.height), static_cast<int>(image.width), encoding.type,
+          const_cast<std::uint8_t*>(image.pixels.data()), image.step};
+}
+
+/// Rows may begin at any byte: a copy that OpenCV can read as wider numbers.
+cv::Mat aligned_copy(const cv::Mat& view) {
+  cv::Mat copy(view.size(), view.type());
+  for (int y = 0; y < view.rows; ++y)
+    std::memcpy(copy.ptr(y), view.ptr(y), static_cast<std::size_t>(view.cols) * view.elemSize());
+  return copy;
+}
+
+cv::Mat decode(std::span<const std::uint8_t> file, int flags) {
+  if (const std::string defect = image_defect(file); !defect.empty())
+    throw MalformedBytes("a compressed image " + defect);
+  cv::Mat image;
+  try {
+    image = cv::imdecode(
+        cv::Mat(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data())), flags);
+  } catch (const cv::Exception&) {  // empty image below
+  }
+  if (image.empty()) throw MalformedBytes("a compressed image that cannot be decoded");
+  return image;
+}
+
+/// Behind the 12 bytes of compressedDepth's parameters, if they are there.
+std::span<const std::uint8_t> without_depth_header(const CompressedImageMessage& image) {
+  constexpr std::size_t kHeader = 12;
+  const bool headed = image.format.find("compressedDepth") != std::string::npos;
+  if (headed && image.format.find("16UC1") == std::string::npos)
+    throw MalformedBytes("a compressed depth image of '" + image.format + "': 16UC1 can be read");
+  if (!headed) return image.file;
+  if (image.file.size() < kHeader) throw MalformedBytes("a compressed depth image without an image");
+  return image.file.subspan(kHeader);
+}
+
+}  // namespace
+
+cv::Mat grey_image(const ImageMessage& image) {
+  Encoding encoding;
+  const cv::Mat view = view_of(image, encoding);
+  if (encoding.type == CV_32FC1) throw MalformedBytes("an image of encoding 32FC1 where grey is wanted");
+  cv::Mat grey;
+  if (encoding.conversion >= 0) {
+    cv::cvtColor(view, grey, encoding.conversion);
+  } else if (encoding.type == CV_16UC1) {
+    aligned_copy(view).convertTo(grey, CV_8U, 1.0 / 256);
+  } else {
+    grey = aligned_copy(view);
+  }
+  return grey;
+}
+
+cv::Mat grey_image(const CompressedImageMessage& image) {
+  return decode(image.file, cv::IMREAD_GRAYSCALE);
+}
+
+cv::Mat depth_image(const ImageMessage& image) {
+  Encoding encoding;
+  const cv::Mat depth = aligned_copy(view_of(image, encoding));
+  if (encoding.type == CV_16UC1) return depth;
+  if (encoding.type != CV_32FC1) throw MalformedBytes("a depth image of encoding '" + image.encoding + "'");
+  cv::Mat units(depth.size(), CV_16UC1);
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      const double value = std::round(depth.at<float>(y, x) / kRosDepthUnit);
+      units.at<std::uint16_t>(y, x) = value > 0 && value < 65536 ? static_cast<std::uint16_t>(value) : 0;
+    }
+  }
+  return units;
+}
+
+cv::Mat depth_image(const CompressedImageMessage& image) {
+  cv::Mat depth = decode(without_depth_header(image), cv::IMREAD_UNCHANGED);
+  if (depth.type() != CV_16UC1) throw MalformedBytes("a compressed depth image without 16 bits a pixel");
+  return depth;
+}
+
+}  // namespace twofold

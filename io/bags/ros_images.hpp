@@ -1,0 +1,24 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "io/bags/ros_messages.hpp"
+
+namespace twofold {
+
+/// [m] a unit of the depth images below.
+inline constexpr double kRosDepthUnit = 0.001;
+
+// Copies: nothing of the message is kept. All throw MalformedBytes naming the encoding that is not known, or
+// what is wrong with the pixels.
+
+/// CV_8UC1 of mono8, 8UC1, mono16, 16UC1, rgb8, bgr8, rgba8, bgra8, bayer_*8 and 8UC3.
+[[nodiscard]] cv::Mat grey_image(const ImageMessage& image);
+/// Of a JPEG, PNG, ... file.
+[[nodiscard]] cv::Mat grey_image(const CompressedImageMessage& image);
+/// CV_16UC1 in units of kRosDepthUnit, 0 where there is none, of 16UC1, mono16 [mm] and 32FC1 [m].
+[[nodiscard]] cv::Mat depth_image(const ImageMessage& image);
+/// Of a PNG file with 16 bits [mm], with or without the header of ROS's compressedDepth.
+[[nodiscard]] cv::Mat depth_image(const CompressedImageMessage& image);
+
+}  // namespace twofold

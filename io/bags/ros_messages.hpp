@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/bags/bag_reader.hpp"
+
+namespace twofold {
+
+/// sensor_msgs/Image; the pixels are the message's own bytes.
+struct ImageMessage {
+  std::int64_t t_ns = 0;  ///< header.stamp
+  std::uint32_t width = 0, height = 0;
+  std::string encoding;
+  bool big_endian = false;
+  std::uint32_t step = 0;  ///< bytes of a row
+  std::span<const std::uint8_t> pixels;
+};
+
+/// sensor_msgs/CompressedImage.
+struct CompressedImageMessage {
+  std::int64_t t_ns = 0;
+  std::string format;
+  std::span<const std::uint8_t> file;
+};
+
+/// sensor_msgs/CameraInfo: raw pixel = K distorted by D; rectified axes = R * raw axes; rectified pixel = P.
+struct CameraInfoMessage {
+  std::uint32_t width = 0, height = 0;
+  std::string distortion_model;
+  std::vector<double> D;
+  std::array<double, 9> K{}, R{};  ///< row by row
+  std::array<double, 12> P{};
+};
+
+// All throw MalformedBytes when the message is cut short or its lengths make no sense.
+[[nodiscard]] ImageMessage parse_image(std::span<const std::uint8_t> message, MessageEncoding encoding);
+[[nodiscard]] CompressedImageMessage parse_compressed_image(std::span<const std::uint8_t> message,
+                                                            MessageEncoding encoding);
+[[nodiscard]] CameraInfoMessage parse_camera_info(std::span<const std::uint8_t> message,
+                                                  MessageEncoding encoding);
+
+}  // namespace twofold

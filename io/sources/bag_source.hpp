@@ -1,0 +1,66 @@
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "camera/rectifier.hpp"
+#include "io/bags/bag_cameras.hpp"
+#include "io/bags/bag_reader.hpp"
+#include "io/sources/frame_source.hpp"
+#include "io/sources/source_parameters.hpp"
+#include "io/v4l2/pairing.hpp"
+
+namespace twofold {
+
+/// One camera's image out of a bag.
+struct BagImage {
+  std::int64_t t_ns = 0;
+  cv::Mat image;
+};
+
+/// Images of a recording of ROS, in the order of the file and paired by the time in their headers.
+///
+/// Parameters: left, right, depth: names of topics (BagCameras says what is taken without); max_gap [s]
+/// between the images of a pair, 0.002 for stereo, 0.016 for depth; camera parameters (with_parameters). The
+/// calibration is the given file's, else CameraInfo's, else the parameters'.
+class BagSource final : public FrameSource {
+ public:
+  /// Throws IoError.
+  BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::path& file,
+            const std::optional<std::filesystem::path>& calibration, SourceParameters& parameters);
+
+  [[nodiscard]] SourceReport report() const override;
+
+ private:
+  using Queue = std::deque<BagImage>;
+
+  bool read(Frame& frame) override;
+  [[nodiscard]] Calibration find_calibration(const std::optional<std::filesystem::path>& calibration,
+                                             SourceParameters& parameters);
+  /// From the CameraInfo messages; nothing when a camera has none.
+  [[nodiscard]] std::optional<Calibration> recorded_calibration();
+  [[nodiscard]] std::optional<CameraInfoMessage> first_info(const BagCamera& camera);
+  [[nodiscard]] cv::Mat first_image();
+  void select_images();
+  /// Decodes the next image into its camera's queue; false at the end.
+  bool take_message();
+  /// The oldest pair, if both are there.
+  bool take_pair(Frame& raw);
+  void take_left(Frame& raw);
+  /// What is malformed is named with the file.
+  template <class Function>
+  auto named(Function function) const;
+
+  const std::filesystem::path file_;
+  const std::unique_ptr<BagReader> reader_;
+  BagCameras cameras_;
+  std::optional<FramePairer> pairer_;  // none: one camera
+  std::optional<Rectifier> rectifier_;
+  Queue left_, other_;
+  std::int64_t index_ = 0;
+  std::uint64_t alone_ = 0;  // images without a partner
+};
+
+}  // namespace twofold

@@ -1,0 +1,134 @@
+#include "io/bags/bag_cameras.hpp"
+
+#include <gtest/gtest.h>
+
+#include "io/bags/bag_bytes.hpp"
+#include "tests/io/bags/small_bag.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace testing;
+
+std::vector<BagTopic> topics(const std::vector<std::pair<std::string, std::string>>& names) {
+  std::vector<BagTopic> topics;
+  for (const auto& [name, type] : names)
+    topics.push_back(
+        {static_cast<std::uint32_t>(topics.size()), name, "sensor_msgs/" + type, MessageEncoding::kRos1});
+  return topics;
+}
+
+/// "left | right | depth" of what was chosen, or why nothing was.
+std::string chosen(const std::vector<std::pair<std::string, std::string>>& names,
+                   const WantedTopics& wanted = {}) {
+  try {
+    const BagCameras cameras = choose_cameras(topics(names), wanted);
+    const auto name = [](const std::optional<BagCamera>& camera) {
+      return camera ? camera->images.name : std::string("-");
+    };
+    return cameras.left.images.name + " | " + name(cameras.right) + " | " + name(cameras.depth);
+  } catch (const MalformedBytes& error) {
+    return error.what();
+  }
+}
+
+TEST(BagCameras, AreFoundByTypeAndName) {
+  EXPECT_EQ(chosen({{"/cam0/image_raw", "Image"}, {"/cam1/image_raw", "Image"}, {"/imu0", "Imu"}}),
+            "/cam0/image_raw | /cam1/image_raw | -");
+  EXPECT_EQ(chosen({{"/camera/rgb/image_color", "Image"}, {"/camera/depth/image", "Image"}}),
+            "/camera/rgb/image_color | - | /camera/depth/image");
+  EXPECT_EQ(chosen({{"/usb_cam/image_raw", "Image"}, {"/usb_cam/image_raw/compressed", "CompressedImage"}}),
+            "/usb_cam/image_raw | - | -");
+  EXPECT_EQ(chosen({{"/s/left/image_raw", "Image"},
+                    {"/s/left/image_rect", "Image"},
+                    {"/s/right/image_raw", "Image"},
+                    {"/s/right/image_rect", "Image"}}),
+            "/s/left/image_rect | /s/right/image_rect | -");
+  EXPECT_EQ(chosen({{"/camera/infra1/image_rect_raw/compressed", "CompressedImage"},
+                    {"/camera/infra2/image_rect_raw/compressed", "CompressedImage"}}),
+            "/camera/infra1/image_rect_raw/compressed | /camera/infra2/image_rect_raw/compressed | -");
+}
+
+TEST(BagCameras, AreThoseThatTheUserNames) {
+  const std::vector<std::pair<std::string, std::string>> names{
+      {"/front", "Image"}, {"/back", "Image"}, {"/range", "Image"}, {"/imu", "Imu"}};
+  EXPECT_EQ(chosen(names, {"/front", "/back", {}}), "/front | /back | -");
+  EXPECT_EQ(chosen(names, {"/front", {}, "/range"}), "/front | - | /range");
+  EXPECT_NE(chosen(names).find("there are: /front, /back, /range"), std::string::npos);
+  EXPECT_NE(chosen(names, {"/imu", {}, {}}).find("no image topic '/imu'"), std::string::npos);
+  EXPECT_NE(chosen(names, {{}, "/back", {}}).find("goes left"), std::string::npos);
+  EXPECT_NE(chosen({{"/imu", "Imu"}}).find("there are: none"), std::string::npos);
+}
+
+CameraInfoMessage message_of(const WrittenCameraInfo& info) {
+  return parse_camera_info(camera_info_message(MessageEncoding::kRos1, info), MessageEncoding::kRos1);
+}
+
+BagCameras stereo(const std::string& images) {
+  return choose_cameras(topics({{"/left/" + images, "Image"},
+                                {"/right/" + images, "Image"},
+                                {"/left/camera_info", "CameraInfo"},
+                                {"/right/camera_info", "CameraInfo"}}),
+                        {});
+}
+
+TEST(BagCameras, InfoStandsBesideTheImages) {
+  const BagCameras cameras = stereo("image_raw/compressed");
+  ASSERT_TRUE(cameras.left.info);
+  EXPECT_EQ(cameras.left.info->name, "/left/camera_info");
+  EXPECT_EQ(cameras.right->info->name, "/right/camera_info");
+}
+
+TEST(BagCameras, RectifiedPairsAreTakenAsTheyAre) {
+  const Calibration calibration = calibration_of(stereo("image_rect"), message_of(rectified_info(false)),
+                                                 message_of(rectified_info(true)));
+  EXPECT_EQ(calibration.invalid_reason(), "");
+  EXPECT_TRUE(calibration.already_rectified);
+  EXPECT_LT((calibration.T_right_left.translation() - Vector3(-0.2, 0, 0)).norm(), 1e-12);
+}
+
+/// The cameras are turned towards each other by what their R say.
+TEST(BagCameras, RawPairsKeepTheirLensAndTheirTurn) {
+  WrittenCameraInfo left = rectified_info(false), right = rectified_info(true);
+  left.D = right.D = {0.1, -0.05, 0.001, 0.002, 0};
+  const SO3 R_rect_left = SO3::exp(Vector3(0.01, -0.02, 0.03));
+  const SO3 R_rect_right = SO3::exp(Vector3(-0.02, 0.01, 0.01));
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(left.R.data()) = R_rect_left.matrix();
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(right.R.data()) = R_rect_right.matrix();
+  const Calibration calibration = calibration_of(stereo("image_raw"), message_of(left), message_of(right));
+  EXPECT_EQ(calibration.invalid_reason(), "");
+  EXPECT_FALSE(calibration.already_rectified);
+  EXPECT_EQ(calibration.left.distortion.model, DistortionModel::kRadTan);
+  // A point far ahead of the rectified left camera is 0.2 m further left in the rectified right one.
+  const Vector3 rectified(0.3, 0.1, 5);
+  const Vector3 of_left = R_rect_left.inverse() * rectified;
+  const Vector3 of_right = R_rect_right.inverse() * Vector3(rectified - Vector3(0.2, 0, 0));
+  EXPECT_LT((calibration.T_right_left * of_left - of_right).norm(), 1e-9);
+}
+
+TEST(BagCameras, SayWhatTheInfoLacks) {
+  const auto why = [](const WrittenCameraInfo& left, const WrittenCameraInfo& right) {
+    try {
+      (void)calibration_of(stereo("image_raw"), message_of(left), message_of(right));
+    } catch (const MalformedBytes& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const WrittenCameraInfo left = rectified_info(false), right = rectified_info(true);
+  EXPECT_EQ(why(left, right), "");
+  WrittenCameraInfo uncalibrated = left;
+  uncalibrated.K = {};
+  EXPECT_NE(why(uncalibrated, right).find("not calibrated"), std::string::npos);
+  EXPECT_NE(why(left, left).find("no baseline"), std::string::npos);
+  WrittenCameraInfo strange = left;
+  strange.model = "rational_polynomial";
+  strange.D = {1, 1, 1, 1, 1, 1, 1, 1};
+  EXPECT_NE(why(strange, right).find("'rational_polynomial' of 8 coefficients"), std::string::npos);
+  WrittenCameraInfo bent = left;
+  bent.R = {1, 1, 1, 1, 1, 1, 1, 1, 1};
+  EXPECT_NE(why(bent, right).find("no rotation"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace twofold

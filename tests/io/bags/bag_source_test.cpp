@@ -1,0 +1,131 @@
+#include "io/sources/bag_source.hpp"
+
+#include <gtest/gtest.h>
+
+#include "io/sources/open_source.hpp"
+#include "tests/io/bags/small_bag.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace testing;
+
+/// What a source ends with: its error, or how many frames it gave.
+std::string drain(FrameSource& source) {
+  Frame frame;
+  for (int count = 0;; ++count) {
+    const FrameStatus status = source.next(frame);
+    if (status == FrameStatus::kEnd) return std::to_string(count);
+    if (status == FrameStatus::kError) return source.error();
+  }
+}
+
+TEST(BagSource, GivesStereoPairsWithTheCalibrationOfTheBag) {
+  const ScratchFolder folder;
+  folder.write("ros2.mcap", text_of(mcap_file(stereo_bag(MessageEncoding::kCdr), {.compression = "zstd"})));
+  folder.write("ros1.bag", text_of(rosbag_file(stereo_bag(MessageEncoding::kRos1), {.compression = "lz4"})));
+  for (const std::string& text : {"mcap:" + (folder / "ros2.mcap"), "bag:" + (folder / "ros1.bag"),
+                                  folder / "ros2.mcap", folder / "ros1.bag"}) {
+    SCOPED_TRACE(text);
+    const auto source = open_source(text);
+    EXPECT_EQ(source->rig().kind, SensorKind::kStereo);
+    EXPECT_EQ(source->rig().camera.fx, 50);
+    EXPECT_NEAR(source->rig().baseline, 0.2, 1e-12);
+    Frame frame;
+    for (int i = 0; i < kCount; ++i) {
+      ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+      EXPECT_EQ(frame.index, i);
+      EXPECT_EQ(frame.t_ns, time_of(i));
+      EXPECT_EQ(frame.left.at<unsigned char>(0, 1), i);
+      EXPECT_EQ(frame.right.at<unsigned char>(0, 1), 100 + i);
+    }
+    EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+    EXPECT_EQ(source->report().lost, 0U);
+  }
+}
+
+TEST(BagSource, OneCameraOfAPair) {
+  const ScratchFolder folder;
+  folder.write("a.mcap", text_of(mcap_file(stereo_bag(MessageEncoding::kCdr), {})));
+  const auto source = open_source("mcap:" + (folder / "a.mcap") + "?left=/stereo/right/image_rect");
+  EXPECT_EQ(source->rig().kind, SensorKind::kMono);
+  EXPECT_EQ(drain(*source), std::to_string(kCount));
+  EXPECT_IO_ERROR(open_source("mcap:" + (folder / "a.mcap") + "?left=/nothing"),
+                  "no image topic '/nothing'; there are: /stereo/left/image_rect, /stereo/right/image_rect");
+  EXPECT_IO_ERROR(open_source("mcap:" + (folder / "a.mcap") + "?colour=1"), "colour");
+}
+
+/// Depth is 10 ms late, once 20, and once missing.
+TEST(BagSource, PairsDepthByTime) {
+  const ScratchFolder folder;
+  const MessageEncoding ros1 = MessageEncoding::kRos1;
+  WrittenBag bag;
+  bag.topics = {{"/camera/rgb/image_color", "sensor_msgs/Image"},
+                {"/camera/depth/image", "sensor_msgs/Image"},
+                {"/camera/rgb/camera_info", "sensor_msgs/CameraInfo"}};
+  bag.messages.push_back({2, time_of(0), camera_info_message(ros1, rectified_info(false))});
+  for (int i = 0; i < kCount; ++i) {
+    const std::int64_t t = time_of(i), late = t + (i == 2 ? 20'000'000 : 10'000'000);
+    bag.messages.push_back(
+        {0, t, image_message(ros1, t, numbered_image(kWidth, kHeight, i, CV_8UC3), "rgb8")});
+    if (i == 3) continue;
+    const cv::Mat depth(kHeight, kWidth, CV_32FC1, cv::Scalar(1 + 0.001 * i));
+    bag.messages.push_back({1, t, image_message(ros1, late, depth, "32FC1")});
+  }
+  folder.write("a.bag", text_of(rosbag_file(bag, {})));
+  const auto source = open_source("bag:" + (folder / "a.bag"));
+  EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
+  Frame frame;
+  for (const int i : {0, 1, 4}) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.t_ns, time_of(i));
+    EXPECT_EQ(frame.depth.at<std::uint16_t>(5, 5), 1000 + i);
+  }
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+  EXPECT_EQ(source->report().lost, 3U);  // two colour images, one depth image
+  EXPECT_EQ(drain(*open_source("bag:" + (folder / "a.bag") + "?max_gap=0.025")), "4");
+  EXPECT_NE(drain(*open_source("bag:" + (folder / "a.bag") + "?max_gap=0.001")).find("parameter max_gap"),
+            std::string::npos);
+}
+
+TEST(BagSource, WithoutCameraInfoACalibrationIsNeeded) {
+  const ScratchFolder folder;
+  WrittenBag bag = stereo_bag(MessageEncoding::kCdr);
+  std::erase_if(bag.messages, [](const WrittenMessage& m) { return m.topic == 2 || m.topic == 4; });
+  folder.write("a.mcap", text_of(mcap_file(bag, {})));
+  EXPECT_IO_ERROR(open_source(folder / "a.mcap"), "no calibration: give --calib FILE or fx, fy, cx, cy");
+  const auto source = open_source("mcap:" + (folder / "a.mcap") + "?fx=50&fy=50&cx=32&cy=24&baseline=0.2");
+  EXPECT_EQ(drain(*source), std::to_string(kCount));
+  folder.write("calib.txt", "P0: 50 0 32 0 0 50 24 0 0 0 1 0\nP1: 50 0 32 -10 0 50 24 0 0 0 1 0\n");
+  SourceOptions options;
+  options.calibration = folder / "calib.txt";
+  EXPECT_EQ(drain(*open_source(folder / "a.mcap", options)), std::to_string(kCount));
+}
+
+TEST(BagSource, AFileThatIsCutShortIsSaidToBe) {
+  const ScratchFolder folder;
+  Bytes file = mcap_file(stereo_bag(MessageEncoding::kCdr), {.chunk_messages = 1, .summary = false});
+  file.resize(file.size() * 3 / 4);
+  folder.write("a.mcap", text_of(file));
+  const auto source = open_source(folder / "a.mcap");
+  EXPECT_EQ(drain(*source), "3");
+  ASSERT_EQ(source->report().faults.size(), 1U);
+  EXPECT_NE(source->report().faults[0].find("a.mcap: is cut short at byte"), std::string::npos);
+}
+
+TEST(BagSource, BrokenImagesAreNamed) {
+  const ScratchFolder folder;
+  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
+  bag.messages[8].data.resize(200);  // the second left image
+  folder.write("short.bag", text_of(rosbag_file(bag, {})));
+  EXPECT_NE(drain(*open_source(folder / "short.bag")).find("short.bag: ends in the middle"),
+            std::string::npos);
+  bag = stereo_bag(MessageEncoding::kRos1);
+  bag.messages[8].data =
+      image_message(MessageEncoding::kRos1, time_of(1), numbered_image(32, 24, 1), "mono8");
+  folder.write("small.bag", text_of(rosbag_file(bag, {})));
+  EXPECT_NE(drain(*open_source(folder / "small.bag")).find("small.bag: "), std::string::npos);
+}
+
+}  // namespace
+}  // namespace twofold

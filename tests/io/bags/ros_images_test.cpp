@@ -1,0 +1,175 @@
+#include "io/bags/ros_images.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "io/bags/bag_bytes.hpp"
+#include "tests/io/bags/small_bag.hpp"
+
+namespace twofold {
+namespace {
+
+using namespace testing;
+
+constexpr std::array kEncodings{MessageEncoding::kRos1, MessageEncoding::kCdr};
+
+std::string malformed(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const MalformedBytes& error) {
+    return error.what();
+  }
+  return "";
+}
+
+cv::Mat colourful() {
+  cv::Mat image(kHeight, kWidth, CV_8UC3);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x)
+      image.at<cv::Vec3b>(y, x) = {static_cast<unsigned char>(2 * x), static_cast<unsigned char>(3 * y), 90};
+  }
+  return image;
+}
+
+double largest_difference(const cv::Mat& a, const cv::Mat& b) {
+  return cv::norm(a, b, cv::NORM_INF);
+}
+
+cv::Mat grey_of(MessageEncoding encoding, const cv::Mat& image, const std::string& pixels) {
+  const Bytes message = image_message(encoding, 5, image, pixels);
+  const ImageMessage parsed = parse_image(message, encoding);
+  EXPECT_EQ(parsed.t_ns, 5);
+  return grey_image(parsed);
+}
+
+TEST(RosImages, EveryEncodingIsMadeGrey) {
+  const cv::Mat bgr = colourful();
+  cv::Mat grey, rgb, rgba, bgra, wide;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  cv::cvtColor(bgr, bgra, cv::COLOR_BGR2BGRA);
+  cv::cvtColor(bgr, rgba, cv::COLOR_BGR2RGBA);
+  grey.convertTo(wide, CV_16U, 256);
+  for (const MessageEncoding encoding : kEncodings) {
+    EXPECT_EQ(largest_difference(grey_of(encoding, grey, "mono8"), grey), 0);
+    EXPECT_EQ(largest_difference(grey_of(encoding, bgr, "bgr8"), grey), 0);
+    EXPECT_EQ(largest_difference(grey_of(encoding, rgb, "rgb8"), grey), 0);
+    EXPECT_EQ(largest_difference(grey_of(encoding, bgra, "bgra8"), grey), 0);
+    EXPECT_EQ(largest_difference(grey_of(encoding, rgba, "rgba8"), grey), 0);
+    EXPECT_LE(largest_difference(grey_of(encoding, wide, "mono16"), grey), 0);
+  }
+}
+
+/// A camera with a colour filter sees one of three values a pixel, where and which the name says.
+TEST(RosImages, BayerPatternsAreNamedByTheirFirstPixels) {
+  const cv::Scalar blue_green_red(40, 120, 200);
+  cv::Mat flat(kHeight, kWidth, CV_8UC3, blue_green_red), grey;
+  cv::cvtColor(flat, grey, cv::COLOR_BGR2GRAY);
+  for (const std::string pattern : {"rggb", "bggr", "gbrg", "grbg"}) {
+    cv::Mat raw(kHeight, kWidth, CV_8UC1);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const char colour = pattern[static_cast<std::size_t>(2 * (y % 2) + x % 2)];
+        raw.at<unsigned char>(y, x) = colour == 'b' ? 40 : colour == 'g' ? 120 : 200;
+      }
+    }
+    const cv::Rect inside(2, 2, kWidth - 4, kHeight - 4);
+    EXPECT_LE(largest_difference(grey_of(MessageEncoding::kRos1, raw, "bayer_" + pattern + "8")(inside),
+                                 grey(inside)),
+              1)
+        << pattern;
+  }
+}
+
+TEST(RosImages, DepthIsInMillimetres) {
+  cv::Mat metres(2, 3, CV_32FC1), units(2, 3, CV_16UC1);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::array values{1.0F, 2.5004F, nan, 0.0F, 70.0F, -1.0F};
+  const std::array<std::uint16_t, 6> expected{1000, 2500, 0, 0, 0, 0};
+  for (int i = 0; i < 6; ++i) {
+    metres.at<float>(i / 3, i % 3) = values.at(static_cast<std::size_t>(i));
+    units.at<std::uint16_t>(i / 3, i % 3) = expected.at(static_cast<std::size_t>(i));
+  }
+  for (const MessageEncoding encoding : kEncodings) {
+    const Bytes of_metres = image_message(encoding, 0, metres, "32FC1");
+    const Bytes of_units = image_message(encoding, 0, units, "16UC1");
+    EXPECT_EQ(largest_difference(depth_image(parse_image(of_metres, encoding)), units), 0);
+    EXPECT_EQ(largest_difference(depth_image(parse_image(of_units, encoding)), units), 0);
+  }
+}
+
+TEST(RosImages, CompressedOnesAreDecoded) {
+  const cv::Mat grey = numbered_image(kWidth, kHeight, 77);
+  cv::Mat depth(kHeight, kWidth, CV_16UC1, cv::Scalar(1234));
+  Bytes png, deep;
+  cv::imencode(".png", grey, png);
+  cv::imencode(".png", depth, deep);
+  Bytes headed(12 + deep.size());
+  std::copy(deep.begin(), deep.end(), headed.begin() + 12);
+  for (const MessageEncoding encoding : kEncodings) {
+    const auto parsed = [&](const Bytes& message) { return parse_compressed_image(message, encoding); };
+    const Bytes image = compressed_image_message(encoding, 9, "mono8; png compressed ", png);
+    EXPECT_EQ(parsed(image).t_ns, 9);
+    EXPECT_EQ(largest_difference(grey_image(parsed(image)), grey), 0);
+    const Bytes plain = compressed_image_message(encoding, 0, "png", deep);
+    EXPECT_EQ(largest_difference(depth_image(parsed(plain)), depth), 0);
+    const Bytes by_ros = compressed_image_message(encoding, 0, "16UC1; compressedDepth png", headed);
+    EXPECT_EQ(largest_difference(depth_image(parsed(by_ros)), depth), 0);
+    const Bytes cut = compressed_image_message(encoding, 0, "png", Bytes(png.begin(), png.end() - 20));
+    EXPECT_NE(malformed([&] { (void)grey_image(parsed(cut)); }).find("a compressed image"),
+              std::string::npos);
+    const Bytes inverse = compressed_image_message(encoding, 0, "32FC1; compressedDepth png", headed);
+    EXPECT_NE(malformed([&] { (void)depth_image(parsed(inverse)); }).find("16UC1 can be read"),
+              std::string::npos);
+  }
+}
+
+TEST(RosImages, SizesAreNotBelieved) {
+  const cv::Mat image = numbered_image(kWidth, kHeight, 1);
+  const Bytes message = image_message(MessageEncoding::kRos1, 0, image, "mono8");
+  ImageMessage parsed = parse_image(message, MessageEncoding::kRos1);
+  parsed.width = 10'000;
+  EXPECT_NE(malformed([&] { (void)grey_image(parsed); }).find("shorter than its width"), std::string::npos);
+  parsed.width = parsed.height = 1U << 31;
+  EXPECT_NE(malformed([&] { (void)grey_image(parsed); }).find("impossible size"), std::string::npos);
+  parsed = parse_image(message, MessageEncoding::kRos1);
+  parsed.encoding = "yuv422";
+  EXPECT_NE(malformed([&] { (void)grey_image(parsed); }).find("unknown encoding 'yuv422'"),
+            std::string::npos);
+  for (std::size_t size = 0; size < message.size(); ++size) {
+    const std::span<const std::uint8_t> cut(message.data(), size);
+    EXPECT_NE(malformed([&] { (void)parse_image(cut, MessageEncoding::kRos1); }), "") << size;
+  }
+}
+
+TEST(RosMessages, CameraInfoIsReadInEitherEncoding) {
+  WrittenCameraInfo written = rectified_info(true);
+  written.D = {0.1, -0.2, 0.001, 0.002, 0.05};
+  for (const MessageEncoding encoding : kEncodings) {
+    const Bytes message = camera_info_message(encoding, written);
+    const CameraInfoMessage info = parse_camera_info(message, encoding);
+    EXPECT_EQ(info.width, static_cast<std::uint32_t>(kWidth));
+    EXPECT_EQ(info.height, static_cast<std::uint32_t>(kHeight));
+    EXPECT_EQ(info.distortion_model, "plumb_bob");
+    EXPECT_EQ(info.D, written.D);
+    EXPECT_EQ(info.K, written.K);
+    EXPECT_EQ(info.R, written.R);
+    EXPECT_EQ(info.P, written.P);
+  }
+  Bytes big_endian = camera_info_message(MessageEncoding::kCdr, written);
+  big_endian[1] = 0;
+  EXPECT_NE(malformed([&] {
+              (void)parse_camera_info(big_endian, MessageEncoding::kCdr);
+            }).find("no little-endian CDR"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace twofold
