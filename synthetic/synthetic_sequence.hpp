@@ -26,6 +26,8 @@ class SyntheticSequence {
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] std::int64_t index(int i) const { return indices_[i]; }
   [[nodiscard]] std::int64_t t_ns(int i) const;
+  /// The place that is rendered, without what moves and without the other place a camera is carried to.
+  [[nodiscard]] const Scene& scene() const { return staging_.scene; }
   /// Pose of the left camera in the middle of the exposure; elsewhere, of that place. Without meaning while
   /// the lens is covered.
   [[nodiscard]] SE3 T_w_c(int i) const;

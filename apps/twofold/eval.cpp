@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/surface/eval_surface.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -25,6 +26,9 @@ struct EvalArguments {
   Alignment alignment = Alignment::kSe3;
   double max_difference_s = 0.01;
   std::string json, plot;
+  bool surface = false;
+  std::string seen;
+  double threshold = 0.01;
 };
 
 const std::map<std::string, Alignment> kAlignments{
@@ -145,6 +149,12 @@ cv::Mat draw(const EvalArguments& arguments, const Evaluation& e) {
 }
 
 void run_eval(const EvalArguments& arguments) {
+  if (arguments.surface) {
+    eval_surface({arguments.estimate, arguments.truth, arguments.seen,
+                  arguments.alignment != Alignment::kNone, arguments.threshold, arguments.json,
+                  arguments.plot});
+    return;
+  }
   EvaluationOptions options;
   options.alignment = arguments.alignment;
   const auto evaluation = evaluate(pair_poses(arguments), options);
@@ -159,9 +169,12 @@ void run_eval(const EvalArguments& arguments) {
 
 void add_eval_command(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<EvalArguments>();
-  CLI::App* command = app.add_subcommand("eval", "Compare a trajectory with the ground truth");
-  command->add_option("ESTIMATE", arguments->estimate, "trajectory, TUM or KITTI form")->required();
-  command->add_option("GROUNDTRUTH", arguments->truth, "trajectory, TUM, KITTI or EuRoC form, or a recording")
+  CLI::App* command = app.add_subcommand("eval", "Compare a trajectory, or a surface, with the ground truth");
+  command->add_option("ESTIMATE", arguments->estimate, "trajectory, TUM or KITTI form; --surface: mesh (PLY)")
+      ->required();
+  command
+      ->add_option("GROUNDTRUTH", arguments->truth,
+                   "trajectory, TUM, KITTI or EuRoC form, or a recording; --surface: mesh (PLY)")
       ->required();
   command
       ->add_option_function<std::string>(
@@ -175,7 +188,15 @@ void add_eval_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--json", arguments->json, "write all figures to this file");
   command->add_option("--plot", arguments->plot,
-                      "draw both paths from above, coloured by error, to this PNG file");
+                      "draw both paths from above, or the surface, coloured by error, to this PNG file");
+  command->add_flag("--surface", arguments->surface,
+                    "compare meshes; moved as the estimate's trajectory.txt onto groundtruth.txt beside it, "
+                    "if they are there, unless --align none");
+  command->add_option("--seen", arguments->seen,
+                      "mesh of what a camera saw (render --seen): completeness is asked of it");
+  command->add_option("--threshold", arguments->threshold, "distance of surfaces that counts as near [m]")
+      ->check(CLI::Range(1e-4, 10.0))
+      ->capture_default_str();
   command->callback([arguments, &exit_code] {
     run_eval(*arguments);
     exit_code = kOk;

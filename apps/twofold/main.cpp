@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
   twofold::add_devices_command(app, exit_code);
   twofold::add_render_command(app, exit_code);
   twofold::add_map_command(app, exit_code);
+  twofold::add_surface_command(app, exit_code);
   twofold::add_view_command(app, exit_code);
   return twofold::run_command_line(app, argc, argv, exit_code);
 }

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/surface/true_surface.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 #include "io/files/trajectory_file.hpp"
@@ -23,6 +24,8 @@ namespace fs = std::filesystem;
 struct RenderArguments {
   std::string source;
   std::string out;
+  std::string surface;
+  std::string seen;
 };
 
 constexpr double kNsPerSecond = 1e9;
@@ -141,6 +144,9 @@ void run_render(const RenderArguments& arguments) {
   if (arguments.source.rfind("synthetic:", 0) != 0)
     throw IoError(arguments.source, "is not a rendered source (synthetic:SCENE?...)");
   const auto source = open_source(arguments.source);
+  if (!arguments.surface.empty()) write_true_surface(arguments.surface, *source);
+  if (!arguments.seen.empty()) write_seen_surface(arguments.seen, *open_source(arguments.source));
+  if (arguments.out.empty()) return;
   const Rig& rig = source->rig();
   const fs::path out = arguments.out;
   const fs::path mav = out / "mav0";
@@ -188,8 +194,16 @@ void add_render_command(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<RenderArguments>();
   CLI::App* command = app.add_subcommand("render", "Write a rendered scene as a recording in EuRoC's layout");
   command->add_option("SOURCE", arguments->source, "synthetic:SCENE?key=value&...")->required();
-  command->add_option("--out", arguments->out, "folder to write mav0 into")->required();
-  command->callback([arguments, &exit_code] {
+  auto* out = command->add_option("--out", arguments->out, "folder to write mav0 into");
+  auto* surface = command->add_option("--surface", arguments->surface,
+                                      "write the scene's true surfaces to this mesh (PLY)");
+  auto* seen =
+      command->add_option("--seen", arguments->seen,
+                          "the same, as far as the camera's depth images show them (sensor=rgbd); with "
+                          "--out or --surface or alone");
+  command->callback([arguments, out, surface, seen, &exit_code] {
+    if (out->count() + surface->count() + seen->count() == 0)
+      throw IoError("--out", "is required, or --surface or --seen");
     run_render(*arguments);
     exit_code = kOk;
   });

@@ -14,6 +14,7 @@
 #include "apps/twofold/run_arguments.hpp"
 #include "apps/twofold/run_filter.hpp"
 #include "apps/twofold/run_output.hpp"
+#include "apps/twofold/surface/live_surface.hpp"
 #include "engine/engine.hpp"
 #include "engine/worker.hpp"
 #include "io/files/io_error.hpp"
@@ -83,6 +84,7 @@ SourceOptions source_options_of(const RunArguments& arguments) {
 int run_with_filter(const RunArguments& arguments) {
   if (!arguments.poses.empty()) throw IoError("--poses", "is not for --estimator swf");
   if (arguments.view.port) throw IoError("--view", "is not for --estimator swf");
+  if (arguments.surface.voxel > 0) throw IoError("--surface", "is not for --estimator swf");
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
   catch_interrupts();
@@ -90,11 +92,12 @@ int run_with_filter(const RunArguments& arguments) {
   return kOk;
 }
 
-FrameFeed feed_from(FrameSource& source, LiveView& view) {
+FrameFeed feed_from(FrameSource& source, LiveView& view, LiveSurface& surface) {
   return [&](Frame& frame) {
     switch (source.next(frame)) {
       case FrameStatus::kFrame:
         view.show(frame);
+        surface.show(frame);
         return FeedStatus::kFrame;
       case FrameStatus::kEnd:
         return FeedStatus::kEnd;
@@ -103,6 +106,14 @@ FrameFeed feed_from(FrameSource& source, LiveView& view) {
     }
     return FeedStatus::kError;
   };
+}
+
+SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surface,
+                                  const EngineOptions& options, const RunResult& result) {
+  SurfaceFigures figures;
+  const TriangleMesh mesh = surface.finish(result.graph, map_parts(result, options).front().id, figures);
+  write_surface(folder, mesh);
+  return figures;
 }
 
 /// Throws what the run failed of: the source, a thread, or that nothing was tracked.
@@ -138,8 +149,9 @@ int run(const RunArguments& arguments) {
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   options.on_pose = poses.listener();
   LiveView view(arguments.view, arguments.source, arguments.out, *source, options);
+  LiveSurface surface(arguments.surface, *source, options, options.deterministic || schedule.has_value());
   ProgressLine line(source->frame_count(), arguments.quiet);
-  const FrameFeed feed = feed_from(*source, view);
+  const FrameFeed feed = feed_from(*source, view, surface);
   const ProgressSink progress = [&](const Progress& p) {
     line.show(p);
     view.show(p);
@@ -157,9 +169,13 @@ int run(const RunArguments& arguments) {
   if (!arguments.map.save.empty()) {
     maps = save_parts(arguments.map.save, source->rig(), result, map_parts(result, options));
   }
-  write_run_output(arguments.out, arguments.source, *source, options, result);
+  std::optional<SurfaceFigures> figures;
+  if (surface.wanted()) figures = write_live_surface(arguments.out, surface, options, result);
+  write_run_output(arguments.out, arguments.source, *source, options, result,
+                   figures ? surface_json(*figures) : nullptr);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, options, result);
+  if (figures) print_surface(*figures);
   if (scale_is_arbitrary(source->rig(), options))
     fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");
   for (const std::string& map : maps) fmt::print("map in      {}\n", map);

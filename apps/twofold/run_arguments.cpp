@@ -112,6 +112,7 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--record", arguments.record,
                      "Record the frames into this folder: the run can be repeated from it and schedule.log");
   add_view_options(command, arguments.view, "Show the run in a browser while it runs, at this port");
+  add_live_surface_options(command, arguments.surface);
   add_map_options(command, arguments.map);
   command.add_flag("--no-places", arguments.no_places, "Recognise no places: no large loops are closed");
   command.add_flag("--no-metric-loops", arguments.no_metric_loops,

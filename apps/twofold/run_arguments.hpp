@@ -6,6 +6,7 @@
 
 #include "apps/twofold/live_view.hpp"
 #include "apps/twofold/map_options.hpp"
+#include "apps/twofold/surface/live_surface.hpp"
 #include "engine/options.hpp"
 
 namespace twofold {
@@ -30,6 +31,7 @@ struct RunArguments {
   int window = 10;
   MapArguments map;
   ViewArguments view;
+  LiveSurfaceArguments surface;
   bool no_metric_loops = false;
   bool no_places = false;
   bool deterministic = false;

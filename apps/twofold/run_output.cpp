@@ -74,7 +74,8 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
 }  // namespace
 
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
-                      const FrameSource& source, const EngineOptions& options, const RunResult& result) {
+                      const FrameSource& source, const EngineOptions& options, const RunResult& result,
+                      const nlohmann::ordered_json& surface) {
   const std::vector<MapPart> parts = map_parts(result, options);
   const Trajectory& final_poses = parts.front().trajectory;
   const Trajectory causal_poses = causal_trajectory(result);
@@ -93,6 +94,7 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   const bool no_scale = scale_is_arbitrary(source.rig(), options);
   nlohmann::ordered_json summary = summary_json(source_text, options, result, parts);
   summary["scale"] = no_scale ? "arbitrary" : "metric";
+  summary["surface"] = surface;
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "engine/options.hpp"
@@ -13,8 +14,10 @@ namespace twofold {
 /// known (all TUM form), map.ply, timing.json, loop_latency.txt, summary.json, trajectory.png
 /// (schedule.log is there already: RunLogs); trajectory, keyframes and map of parts that never joined the
 /// first (map_parts) as trajectory-2.txt and so on. Throws IoError when it cannot.
+/// @param surface  what summary.json says of the surface; null: there is none
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
-                      const FrameSource& source, const EngineOptions& options, const RunResult& result);
+                      const FrameSource& source, const EngineOptions& options, const RunResult& result,
+                      const nlohmann::ordered_json& surface = nullptr);
 
 /// Of an earlier run into the folder, what is written at the end only: should this run be killed, its folder
 /// holds nothing of another one's.

@@ -54,6 +54,11 @@ cv::Mat read_grey_image(const fs::path& file) {
   return decode(file, cv::IMREAD_GRAYSCALE);
 }
 
+cv::Mat read_colour_image(const fs::path& file) {
+  const cv::Mat image = decode(file, cv::IMREAD_ANYCOLOR);  // 8 bits
+  return image.channels() == 3 ? image : cv::Mat();
+}
+
 cv::Mat read_depth_image(const fs::path& file) {
   cv::Mat image = decode(file, cv::IMREAD_UNCHANGED);
   if (image.type() != CV_16UC1) {

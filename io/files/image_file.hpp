@@ -18,7 +18,10 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 /// and go on.
 [[nodiscard]] cv::Mat read_grey_image(const std::filesystem::path& file);
 
-/// A depth image as CV_16UC1; throws as above and when the file holds anything but one channel of 16 bits.
+/// An image file as CV_8UC3 (blue, green, red); empty when it has no colour. Throws as above.
+[[nodiscard]] cv::Mat read_colour_image(const std::filesystem::path& file);
+
+/// A depth image as CV_16UC1; throws likewise and when the file holds anything but one channel of 16 bits.
 [[nodiscard]] cv::Mat read_depth_image(const std::filesystem::path& file);
 
 /// Throws IoError naming the file when the image does not have the camera's size, which its calibration or

@@ -8,6 +8,7 @@
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
 #include "evaluation/trajectory.hpp"
+#include "geometry/triangle_mesh.hpp"
 
 namespace twofold {
 
@@ -49,6 +50,13 @@ class FrameSource {
   /// Images are unrectified, because SourceOptions::raw asked for it; rig() states kind and size only.
   [[nodiscard]] virtual bool is_raw() const { return false; }
   [[nodiscard]] virtual SourceReport report() const { return {}; }
+
+  /// The left image of a frame that was delivered, in colour (CV_8UC3: blue, green, red) and of the rig's
+  /// size; empty where the input has no colour, or not any more. Decoded when it is asked for, so that frames
+  /// which nobody wants in colour cost nothing. Any thread, beside next. Throws IoError.
+  [[nodiscard]] virtual cv::Mat colour_image(std::int64_t /*index*/) const { return {}; }
+  /// The surfaces that a rendered scene has, in the frame of ground_truth; nothing for other sources.
+  [[nodiscard]] virtual std::optional<TriangleMesh> true_surface() const { return std::nullopt; }
 
   /// Fetches the next frame. Its images replace those in `frame` and are never written to again by the
   /// source; they may share memory with it, so treat them as read-only. What is delivered is checked here for

@@ -1,5 +1,7 @@
 #include "io/sources/recording.hpp"
 
+#include <opencv2/imgproc.hpp>
+
 #include <fmt/format.h>
 
 #include "io/files/calibration_file.hpp"
@@ -81,6 +83,18 @@ Frame PlaybackSource::decode(const RecordedFrame& files) const {
     expect_size(files.depth, frame.depth, calibration.left.pinhole);
   }
   return frame;
+}
+
+cv::Mat PlaybackSource::colour_image(std::int64_t index) const {
+  if (index < 0 || index >= static_cast<std::int64_t>(recording_.frames.size())) return {};
+  const std::filesystem::path& file = recording_.frames[static_cast<std::size_t>(index)].left;
+  const cv::Mat raw = read_colour_image(file);
+  if (raw.empty()) return {};
+  expect_size(file, raw, recording_.calibration.left.pinhole);
+  if (rectifier_->passes_through()) return raw;
+  cv::Mat rectified;
+  cv::remap(raw, rectified, rectifier_->left_map().x, rectifier_->left_map().y, cv::INTER_LINEAR);
+  return rectified;
 }
 
 bool PlaybackSource::read(Frame& frame) {

@@ -60,6 +60,7 @@ class PlaybackSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(recording_.frames.size());
   }
+  [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
 
  private:
   bool read(Frame& frame) override;

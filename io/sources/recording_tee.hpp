@@ -22,6 +22,10 @@ class RecordingTee final : public FrameSource {
   [[nodiscard]] bool is_raw() const override { return source_->is_raw(); }
   /// The source's, and what was recorded; faults when frames that were delivered are not in the recording.
   [[nodiscard]] SourceReport report() const override;
+  [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override {
+    return source_->colour_image(index);
+  }
+  [[nodiscard]] std::optional<TriangleMesh> true_surface() const override { return source_->true_surface(); }
 
  private:
   bool read(Frame& frame) override;

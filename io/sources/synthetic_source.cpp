@@ -5,6 +5,7 @@
 
 #include "io/files/io_error.hpp"
 #include "io/sources/source_parameters.hpp"
+#include "synthetic/scene_mesh.hpp"
 #include "synthetic/synthetic_sequence.hpp"
 
 namespace twofold {
@@ -21,6 +22,9 @@ class SyntheticSource : public FrameSource {
       if (sequence_.in_first_place(i)) ground_truth_.push_back({sequence_.t_ns(i), sequence_.T_w_c(i)});
   }
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override { return sequence_.frame_count(); }
+  [[nodiscard]] std::optional<TriangleMesh> true_surface() const override {
+    return synthetic::mesh_of(sequence_.scene());
+  }
 
  protected:
   bool read(Frame& frame) override {

@@ -1,0 +1,99 @@
+#include "apps/twofold/surface/eval_surface.hpp"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "evaluation/evaluation.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/mesh_file.hpp"
+#include "io/files/output_file.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "io/plots/plot.hpp"
+#include "surface/comparison.hpp"
+#include "surface/mesh_picture.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPictureWidth = 1400;
+constexpr std::int64_t kSameTimeNs = 10'000'000;
+
+TriangleMesh read_surface(const std::string& file) {
+  TriangleMesh mesh = read_ply_mesh(file);
+  if (mesh.triangles.empty()) throw IoError(file, "holds no triangles");
+  return mesh;
+}
+
+/// Rigid motion from the run's world to the truth's, by the trajectories that a run leaves beside its
+/// surface.
+std::optional<SE3> alignment_of(const fs::path& estimate) {
+  const fs::path own = estimate.parent_path() / "trajectory.txt";
+  const fs::path truth = estimate.parent_path() / "groundtruth.txt";
+  if (!fs::is_regular_file(own) || !fs::is_regular_file(truth)) return std::nullopt;
+  const auto pairs = associate(read_trajectory(own), read_trajectory(truth), kSameTimeNs);
+  const auto S_w_e = align(pairs, Alignment::kSe3);
+  if (!S_w_e)
+    throw IoError(own, "cannot be aligned with the ground truth: too few poses, or all on one line");
+  return SE3(S_w_e->so3(), S_w_e->translation());
+}
+
+nlohmann::ordered_json to_json(const DistanceStatistics& s) {
+  return {{"points", s.points}, {"mean_m", s.mean}, {"median_m", s.median},
+          {"p95_m", s.p95},     {"rmse_m", s.rmse}, {"within_threshold", s.near}};
+}
+
+void print_row(const char* name, const DistanceStatistics& s) {
+  fmt::print("{:<14} {:>9} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.2f} {:>9.2f} %\n", name, s.points, 1e3 * s.mean,
+             1e3 * s.median, 1e3 * s.p95, 1e3 * s.rmse, 100 * s.near);
+}
+
+cv::Mat heat_map(TriangleMesh estimate, const SE3& T_w_e, const SurfaceComparison& comparison, double most) {
+  const bool has_normals = estimate.normals.size() == estimate.positions.size();
+  if (!has_normals) throw IoError("--plot", "needs an estimate with normals");
+  for (Eigen::Vector3f& x : estimate.positions) x = (T_w_e * Vector3(x.cast<double>())).cast<float>();
+  for (Eigen::Vector3f& n : estimate.normals) n = (T_w_e.rotation() * n.cast<double>()).cast<float>();
+  const auto colours = error_colours(comparison.vertex_errors, most);
+  return draw_mesh(estimate, colours, overview_of(estimate, Vector3::UnitZ(), kPictureWidth));
+}
+
+}  // namespace
+
+void eval_surface(const SurfaceEvalArguments& arguments) {
+  const TriangleMesh estimate = read_surface(arguments.estimate);
+  const TriangleMesh truth = read_surface(arguments.truth);
+  const TriangleMesh seen = arguments.seen.empty() ? truth : read_surface(arguments.seen);
+  std::optional<SE3> T_w_e;
+  if (arguments.align) T_w_e = alignment_of(arguments.estimate);
+  SurfaceComparisonOptions options;
+  options.threshold = arguments.threshold;
+  options.spacing = 0.5 * arguments.threshold;
+  const SurfaceComparison found = compare_surfaces(estimate, T_w_e.value_or(SE3()), truth, seen, options);
+  fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
+             arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
+             T_w_e ? "moved as the run's trajectory onto the ground truth" : "not moved");
+  fmt::print("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}\n", "[mm]", "points", "mean", "median", "p95",
+             "rmse", fmt::format("<= {:g} mm", 1e3 * arguments.threshold));
+  print_row("accuracy", found.accuracy);
+  print_row("completeness", found.completeness);
+  fmt::print("F-score        {:.4f}\n", found.f_score);
+  if (!arguments.json.empty()) {
+    const nlohmann::ordered_json json{{"estimate", arguments.estimate},
+                                      {"truth", arguments.truth},
+                                      {"seen", arguments.seen},
+                                      {"aligned", T_w_e.has_value()},
+                                      {"threshold_m", arguments.threshold},
+                                      {"accuracy", to_json(found.accuracy)},
+                                      {"completeness", to_json(found.completeness)},
+                                      {"f_score", found.f_score}};
+    write_file(arguments.json, json.dump(2) + "\n");
+  }
+  if (!arguments.plot.empty())
+    write_png(arguments.plot, heat_map(estimate, T_w_e.value_or(SE3()), found, arguments.threshold));
+}
+
+}  // namespace twofold

@@ -1,0 +1,187 @@
+#include "apps/twofold/surface/live_surface.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "io/files/io_error.hpp"
+#include "surface/meshing.hpp"
+#include "surface/processor_time.hpp"
+#include "surface/stereo_depth.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kMostWaiting = 48;  // keyframes whose images wait for the surface's thread
+constexpr double kNearestStereo = 0.4;    // [m]
+constexpr auto kMapCheck = std::chrono::milliseconds(100);
+
+}  // namespace
+
+void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments) {
+  command
+      .add_option(
+          "--surface", arguments.voxel,
+          "Fuse the keyframes' depth into a mesh (surface.ply, surface.glb), with samples this far apart [m]")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--surface-memory", arguments.memory_mb, "Most memory of the surface [MB]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      .add_option("--surface-load", arguments.load,
+                  "Share of one processor's time that the surface may take while the run lasts")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
+}
+
+LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source,
+                         EngineOptions& options, bool one_thread)
+    : source_(&source), arguments_(arguments), rig_(source.rig()) {
+  if (arguments.voxel == 0) return;
+  if (rig_.kind == SensorKind::kMono)
+    throw IoError("--surface", "one camera gives no depth: a surface needs stereo or RGB-D");
+  SurfaceOptions surface;
+  surface.voxel = arguments.voxel;
+  surface.depth_noise = usual_depth_noise(rig_);
+  SubmapOptions submaps;
+  submaps.memory_mb = arguments.memory_mb;
+  if (const std::string reason = surface.invalid_reason(); !reason.empty())
+    throw IoError("--surface", reason);
+  surface_.emplace(rig_, surface, submaps);
+  listen(options);
+  if (!one_thread) {
+    worker_.emplace(WorkerOptions{.name = "surface"}, [this](const std::stop_token& stop) { work(stop); });
+  }
+}
+
+void LiveSurface::listen(EngineOptions& options) {
+  options.on_pose = [this, before = std::move(options.on_pose)](const PoseReport& report) {
+    if (before) before(report);
+    // Never full: the reader empties it before each frame it sends.
+    (void)decisions_.try_push({report.record.frame_index, report.record.keyframe});
+  };
+  options.on_map = [this, before = std::move(options.on_map)](const GraphSnapshot& graph,
+                                                              const DoubleWindow& window) {
+    if (before) before(graph, window);
+    maps_.publish(graph, window);
+  };
+}
+
+void LiveSurface::show(const Frame& frame) {
+  if (!surface_) return;
+  sort_frames();
+  if (!worker_) step();
+  under_way_.push_back(frame);
+}
+
+/// Frames that the tracker has looked at are let go of, or wait as keyframes.
+void LiveSurface::sort_frames() {
+  bool any = false;
+  for (KeyframeDecision decision; decisions_.try_pop(decision);) {
+    while (!under_way_.empty() && under_way_.front().index < decision.frame)
+      under_way_.pop_front();  // dropped
+    if (under_way_.empty() || under_way_.front().index != decision.frame) continue;
+    if (decision.keyframe) {
+      const std::scoped_lock lock(mutex_);
+      keyframes_.push_back(std::move(under_way_.front()));
+      if (keyframes_.size() > kMostWaiting) {
+        keyframes_.pop_front();
+        ++overtaken_;
+      }
+      any = true;
+    }
+    under_way_.pop_front();
+  }
+  if (any) arrived_.notify_one();
+}
+
+void LiveSurface::work(const std::stop_token& stop) {
+  yield_to_other_threads();
+  while (!stop.stop_requested()) {
+    {
+      std::unique_lock lock(mutex_);
+      (void)arrived_.wait_for(lock, stop, kMapCheck, [this] { return !keyframes_.empty(); });
+    }
+    if (stop.stop_requested()) return;  // the caller takes the rest
+    const std::int64_t begin_ns = thread_cpu_ns();
+    step();
+    const double rest_ns = static_cast<double>(thread_cpu_ns() - begin_ns) * (1 / arguments_.load - 1);
+    std::unique_lock lock(mutex_);
+    (void)arrived_.wait_for(lock, stop, std::chrono::nanoseconds(std::llround(rest_ns)),
+                            [] { return false; });
+  }
+}
+
+void LiveSurface::step() {
+  std::deque<Frame> taken;
+  {
+    const std::scoped_lock lock(mutex_);
+    taken.swap(keyframes_);
+  }
+  for (Frame& frame : taken) {
+    take(frame);
+    frame = {};
+  }
+  const auto map = maps_.newest();
+  if (map->graph.version() == version_) return;
+  version_ = map->graph.version();
+  surface_->step(map->graph);
+}
+
+void LiveSurface::take(const Frame& frame) {
+  cv::Mat depth = frame.depth;
+  if (rig_.kind == SensorKind::kStereo) depth = stereo_depth(rig_, frame.left, frame.right, kNearestStereo);
+  cv::Mat colour;
+  try {
+    colour = source_->colour_image(frame.index);
+  } catch (const IoError& error) {
+    defect_ = error.what();
+  }
+  ++taken_;
+  coloured_ += !colour.empty();
+  if (colour.empty()) colour = frame.left;
+  if (std::string defect = depth_defect(rig_, depth, colour); !defect.empty()) {
+    defect_ = std::move(defect);
+    ++unfit_;
+    return;
+  }
+  surface_->offer(pack_keyframe_depth(frame.index, depth, colour));
+}
+
+TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, SurfaceFigures& figures) {
+  worker_.reset();
+  sort_frames();
+  step();
+  surface_->step(graph);
+  const SurfaceVolume whole = surface_->whole(part);
+  const std::int64_t begin_ns = thread_cpu_ns();
+  TriangleMesh mesh = extract_mesh(whole);
+  figures.mesh_ms = static_cast<double>(thread_cpu_ns() - begin_ns) * 1e-6;
+  const SubmapReport& report = surface_->report();
+  figures.voxel = arguments_.voxel;
+  figures.submaps = surface_->submap_count();
+  figures.fused = report.fused;
+  figures.fused_anew = report.fused_anew;
+  figures.fusion_ms = static_cast<double>(report.fusion_ns) * 1e-6 / std::max(1, report.fused);
+  figures.blocks = whole.blocks().size();
+  figures.memory_mb = static_cast<double>(report.most_bytes) / (1 << 20);
+  const double block = std::pow(kBlockEdge * arguments_.voxel, 3);
+  figures.mb_a_cubic_metre = static_cast<double>(whole.bytes()) / (1 << 20) /
+                             std::max(1e-9, static_cast<double>(whole.blocks().size()) * block);
+  figures.triangles = mesh.triangles.size();
+  figures.colour = coloured_ > 0 ? "of the recording" : "grey, the images have no other";
+  const auto left_out = [&](int count, const std::string& what) {
+    if (count > 0) figures.left_out.push_back(fmt::format("{} {}", count, what));
+  };
+  left_out(report.without_readings, "depth images without any reading within range");
+  left_out(report.culled, "keyframes that the map culled: their depth is not fused anew");
+  left_out(report.submaps_dropped, "submaps all of whose keyframes the map culled");
+  left_out(report.beyond_memory, "keyframes beyond the memory that the surface may take (--surface-memory)");
+  left_out(report.overtaken + overtaken_, "keyframes, because the surface was behind (--surface-load)");
+  left_out(unfit_, "images that did not fit: " + defect_);
+  return mesh;
+}
+
+}  // namespace twofold

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "apps/twofold/surface/surface_output.hpp"
+#include "engine/engine.hpp"
+#include "engine/spsc_ring.hpp"
+#include "engine/worker.hpp"
+#include "io/sources/frame_source.hpp"
+#include "slam/map_lender.hpp"
+#include "surface/submaps.hpp"
+
+namespace twofold {
+
+/// What `twofold run` is told about surfaces.
+struct LiveSurfaceArguments {
+  double voxel = 0;         ///< [m]; 0: no surface
+  double memory_mb = 2000;  ///< of samples and depth images
+  double load = 0.5;        ///< share of one processor's time that the thread may take, in (0, 1]
+};
+
+/// --surface, --surface-memory and --surface-load.
+void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments);
+
+/// What the tracker made of a frame.
+struct KeyframeDecision {
+  std::int64_t frame = 0;
+  bool keyframe = false;  ///< it was proposed as one
+};
+
+/// The surface of `twofold run --surface`; nothing without that option.
+///
+/// A client of the engine, on a thread of its own that runs when the others leave time. The reader keeps the
+/// images of frames that are under way (they are counted, not copied), until the tracker has said which of
+/// them it wants as keyframes; those wait for the surface's thread, which gets their depth, reads snapshots
+/// of the map, and fuses. Nobody waits for it: the oldest of too many waiting frames is let go of, and
+/// counted. Runs on one thread fuse between two frames, so that the same input gives the same bytes.
+class LiveSurface {
+ public:
+  /// Adds its listeners to those of `options`, which are called as before. source must outlive the object.
+  /// Throws IoError for a source without depth or options out of their ranges.
+  /// @param one_thread  the run is deterministic, or a replay
+  LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source, EngineOptions& options,
+              bool one_thread);
+
+  /// The reader's thread, with each frame it reads.
+  void show(const Frame& frame);
+
+  /// After the run: fuses what still waits, into the final map, and extracts the mesh of its first part.
+  [[nodiscard]] TriangleMesh finish(const GraphSnapshot& graph, KeyframeId part, SurfaceFigures& figures);
+  [[nodiscard]] bool wanted() const { return surface_.has_value(); }
+
+ private:
+  void listen(EngineOptions& options);
+  void sort_frames();
+  void work(const std::stop_token& stop);
+  /// Takes the frames that wait, and the newest map.
+  void step();
+  void take(const Frame& frame);
+
+  const FrameSource* source_;
+  const LiveSurfaceArguments arguments_;
+  Rig rig_;
+  std::optional<SubmapSurface> surface_;  // the surface's thread's
+  std::uint64_t version_ = 0;             // likewise: of the map it saw last
+  int coloured_ = 0, taken_ = 0;          // likewise
+  std::string defect_;                    // likewise: of the newest image that did not fit
+  int unfit_ = 0;                         // likewise
+
+  SpscRing<KeyframeDecision> decisions_{256};  // tracker -> reader; longer than the frames under way
+  std::deque<Frame> under_way_;                // reader's
+  MapLender maps_;
+
+  std::mutex mutex_;  // guards keyframes_ and overtaken_; taken by reader and surface alone
+  std::deque<Frame> keyframes_;
+  int overtaken_ = 0;
+  std::condition_variable_any arrived_;
+  std::optional<Worker> worker_;  // last: joins before what it uses is destroyed
+};
+
+}  // namespace twofold

@@ -1,0 +1,221 @@
+// twofold surface: the depth of a recording, or of a finished run's keyframes, fused along known poses.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "apps/twofold/surface/surface_output.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/mesh_file.hpp"
+#include "io/files/output_file.hpp"
+#include "io/files/trajectory_file.hpp"
+#include "io/plots/plot.hpp"
+#include "io/sources/open_source.hpp"
+#include "surface/mesh_picture.hpp"
+#include "surface/meshing.hpp"
+#include "surface/processor_time.hpp"
+#include "surface/stereo_depth.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SurfaceArguments {
+  std::string input;
+  std::string poses;
+  std::string calibration;
+  std::string out;
+  std::string picture;
+  std::string obj;
+  int every = 1;
+  bool grey = false;
+  SurfaceOptions options;
+};
+
+constexpr std::int64_t kSameTimeNs = 1'000'000;
+constexpr double kNearestStereo = 0.4;  // [m]
+constexpr int kPictureWidth = 1600;
+
+/// The source that a run was made of.
+std::string source_of_run(const fs::path& folder) {
+  const fs::path file = folder / "summary.json";
+  const auto summary = nlohmann::json::parse(std::ifstream(file), nullptr, false);
+  if (!summary.is_object() || !summary.contains("source") || !summary["source"].is_string())
+    throw IoError(file, "does not name the source of the run");
+  return summary["source"].get<std::string>();
+}
+
+/// What to fuse, along which poses, and where to write.
+struct SurfaceJob {
+  std::unique_ptr<FrameSource> source;
+  Trajectory poses;
+  std::string poses_name;
+  fs::path out;
+};
+
+SurfaceJob surface_job(const SurfaceArguments& arguments) {
+  SurfaceJob job;
+  const bool is_run = fs::is_regular_file(fs::path(arguments.input) / "summary.json");
+  if (!is_run && arguments.poses.empty())
+    throw IoError(arguments.input,
+                  "is not the folder of a finished run: give --poses truth, or a trajectory");
+  if (!is_run && arguments.out.empty()) throw IoError(arguments.input, "needs --out FOLDER for the surface");
+  SourceOptions options;
+  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  job.source = open_source(is_run ? source_of_run(arguments.input) : arguments.input, options);
+  job.out = arguments.out.empty() ? arguments.input : arguments.out;
+  if (arguments.poses == "truth") {
+    job.poses = job.source->ground_truth();
+    job.poses_name = "the ground truth";
+    if (job.poses.empty()) throw IoError(arguments.input, "has no ground truth");
+  } else {
+    const fs::path file =
+        arguments.poses.empty() ? fs::path(arguments.input) / "keyframes.txt" : fs::path(arguments.poses);
+    job.poses = read_trajectory(file);
+    job.poses_name = file.string();
+    if (job.poses.empty()) throw IoError(file, "holds no poses");
+  }
+  if (job.source->rig().kind == SensorKind::kMono)
+    throw IoError(arguments.input, "is one camera, which gives no depth: a surface needs stereo or RGB-D");
+  return job;
+}
+
+const TimedPose* pose_at(const Trajectory& poses, std::int64_t t_ns) {
+  const auto after = std::lower_bound(poses.begin(), poses.end(), t_ns - kSameTimeNs,
+                                      [](const TimedPose& pose, std::int64_t t) { return pose.t_ns < t; });
+  return after != poses.end() && after->t_ns <= t_ns + kSameTimeNs ? &*after : nullptr;
+}
+
+class DepthFusion {
+ public:
+  DepthFusion(const SurfaceArguments& arguments, const FrameSource& source, const SurfaceOptions& options)
+      : source_(source), volume_(options), grey_(arguments.grey) {}
+
+  void fuse(const Frame& frame, const SE3& T_w_c) {
+    const Rig& rig = source_.rig();
+    cv::Mat depth = frame.depth;
+    if (rig.kind == SensorKind::kStereo) depth = stereo_depth(rig, frame.left, frame.right, kNearestStereo);
+    cv::Mat colour;
+    if (!grey_) colour = source_.colour_image(frame.index);
+    coloured_ += !colour.empty();
+    if (const std::string defect = depth_defect(rig, depth, colour); !defect.empty())
+      throw IoError(fmt::format("frame {}", frame.index), defect);
+    const std::int64_t begin_ns = thread_cpu_ns();
+    const DepthView view = make_depth_view(rig, depth, colour.empty() ? frame.left : colour);
+    if (share_of_readings(view) == 0) {
+      ++empty_;
+      return;
+    }
+    volume_.fuse(view, T_w_c.inverse());
+    fusion_ns_ += thread_cpu_ns() - begin_ns;
+    ++fused_;
+  }
+
+  [[nodiscard]] int fused() const { return fused_; }
+
+  TriangleMesh finish(SurfaceFigures& figures) const {
+    const std::int64_t begin_ns = thread_cpu_ns();
+    TriangleMesh mesh = extract_mesh(volume_);
+    figures.mesh_ms = static_cast<double>(thread_cpu_ns() - begin_ns) * 1e-6;
+    figures.voxel = volume_.options().voxel;
+    figures.fused = fused_;
+    figures.fusion_ms = static_cast<double>(fusion_ns_) * 1e-6 / std::max(1, fused_);
+    figures.blocks = volume_.blocks().size();
+    figures.memory_mb = static_cast<double>(volume_.bytes()) / (1 << 20);
+    const double block = std::pow(kBlockEdge * volume_.options().voxel, 3);
+    figures.mb_a_cubic_metre =
+        figures.memory_mb / std::max(1e-9, static_cast<double>(figures.blocks) * block);
+    figures.triangles = mesh.triangles.size();
+    figures.colour = coloured_ > 0 ? "of the recording" : "grey, the images have no other";
+    if (empty_ > 0)
+      figures.left_out.push_back(fmt::format("{} depth images without any reading within range", empty_));
+    return mesh;
+  }
+
+ private:
+  const FrameSource& source_;
+  SurfaceVolume volume_;
+  const bool grey_;
+  int fused_ = 0, empty_ = 0, coloured_ = 0;
+  std::int64_t fusion_ns_ = 0;
+};
+
+void run_surface(const SurfaceArguments& arguments) {
+  SurfaceOptions options = arguments.options;
+  if (const std::string reason = options.invalid_reason(); !reason.empty()) throw IoError("--voxel", reason);
+  SurfaceJob job = surface_job(arguments);
+  prepare_output_folder(job.out);
+  if (options.depth_noise == 0) options.depth_noise = usual_depth_noise(job.source->rig());
+  DepthFusion fusion(arguments, *job.source, options);
+  Frame frame;
+  FrameStatus status;
+  std::int64_t posed = 0;
+  while ((status = job.source->next(frame)) == FrameStatus::kFrame) {
+    const TimedPose* pose = pose_at(job.poses, frame.t_ns);
+    if (pose != nullptr && posed++ % arguments.every == 0) fusion.fuse(frame, pose->T_w_c);
+  }
+  if (status == FrameStatus::kError) throw IoError("", job.source->error());
+  if (posed == 0)
+    throw IoError(job.poses_name, "no frame of the source was taken at the time of one of its poses");
+  SurfaceFigures figures;
+  const TriangleMesh mesh = fusion.finish(figures);
+  print_surface(figures);
+  if (mesh.triangles.empty())
+    throw std::runtime_error(arguments.input + ": the depth images gave no surface");
+  write_surface(job.out, mesh);
+  if (!arguments.obj.empty()) write_obj_mesh(arguments.obj, mesh);
+  if (!arguments.picture.empty()) {
+    const Vector3 up = up_axis_of(job.poses) == 2 ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
+    write_png(arguments.picture, draw_mesh(mesh, mesh.colours, overview_of(mesh, up, kPictureWidth)));
+  }
+  fmt::print("written to  {}\n", job.out.string());
+}
+
+}  // namespace
+
+void add_surface_command(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<SurfaceArguments>();
+  CLI::App* command = app.add_subcommand("surface", "Fuse the depth of a run or a recording into a mesh");
+  command
+      ->add_option("INPUT", arguments->input,
+                   "Folder of a finished run, whose source is read again, or a source")
+      ->required();
+  command->add_option(
+      "--poses", arguments->poses,
+      "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise");
+  command->add_option("--calib", arguments->calibration, "Calibration file instead of the recording's own");
+  command->add_option("--out", arguments->out, "Folder for surface.ply and surface.glb; the run's otherwise");
+  command->add_option("--voxel", arguments->options.voxel, "Distance of two samples of the surface [m]")
+      ->capture_default_str();
+  command->add_option("--every", arguments->every, "Fuse every so many-th frame that has a pose")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--most-depth", arguments->options.most_depth,
+                   "Readings farther than this are left out [m]; 0: none")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--depth-noise", arguments->options.depth_noise,
+          "Standard deviation of a depth of 1 m [m], growing with its square; 0: the sensor's usual one")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--grey", arguments->grey, "Brightness instead of the recording's colours");
+  command->add_option("--obj", arguments->obj, "Write the mesh to this OBJ file, too");
+  command->add_option("--picture", arguments->picture, "Draw the mesh to this PNG file");
+  command->callback([arguments, &exit_code] {
+    run_surface(*arguments);
+    exit_code = kOk;
+  });
+}
+
+}  // namespace twofold

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+
+#include "io/sources/frame_source.hpp"
+
+namespace twofold {
+
+/// The surfaces of a rendered source as a mesh, in the frame of its ground truth. Throws IoError, too when
+/// the source has none.
+void write_true_surface(const std::filesystem::path& file, const FrameSource& source);
+
+/// The same, cut into triangles of a centimetre, of which those are kept that a depth image shows. Reads the
+/// source to its end. Throws IoError, too when it gives no depth images.
+void write_seen_surface(const std::filesystem::path& file, FrameSource& source);
+
+}  // namespace twofold

@@ -1,0 +1,65 @@
+#include "surface/comparison.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "geometry/check.hpp"
+#include "surface/triangle_grid.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr double kReach = 10;  // thresholds
+
+DistanceStatistics statistics(const std::vector<SurfaceSample>& samples, const TriangleGrid& surface,
+                              double threshold) {
+  std::vector<float> distances;
+  distances.reserve(samples.size());
+  DistanceStatistics s;
+  s.points = samples.size();
+  if (samples.empty()) return s;
+  double sum = 0, squares = 0;
+  std::size_t near = 0;
+  for (const SurfaceSample& sample : samples) {
+    const float d = surface.distance(sample.position);
+    distances.push_back(d);
+    sum += d;
+    squares += static_cast<double>(d) * d;
+    near += d <= threshold;
+  }
+  std::sort(distances.begin(), distances.end());
+  const auto count = static_cast<double>(samples.size());
+  s.mean = sum / count;
+  s.rmse = std::sqrt(squares / count);
+  s.median = distances[distances.size() / 2];
+  s.p95 = distances[distances.size() * 95 / 100];
+  s.near = static_cast<double>(near) / count;
+  return s;
+}
+
+}  // namespace
+
+SurfaceComparison compare_surfaces(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMesh& truth,
+                                   const TriangleMesh& seen, const SurfaceComparisonOptions& options) {
+  TWOFOLD_CHECK(options.threshold > 0 && options.spacing > 0, "valid options of the comparison");
+  TriangleMesh moved;
+  moved.triangles = estimate.triangles;
+  moved.positions.reserve(estimate.positions.size());
+  for (const Eigen::Vector3f& x : estimate.positions)
+    moved.positions.emplace_back((T_w_e * Vector3(x.cast<double>())).cast<float>());
+  const auto reach = static_cast<float>(kReach * options.threshold);
+  const auto spacing = static_cast<float>(options.spacing);
+  const TriangleGrid true_surface(truth, reach);
+  SurfaceComparison result;
+  result.accuracy = statistics(sample_surface(moved, spacing), true_surface, options.threshold);
+  result.completeness =
+      statistics(sample_surface(seen, spacing), TriangleGrid(moved, reach), options.threshold);
+  const double sum = result.accuracy.near + result.completeness.near;
+  if (sum > 0) result.f_score = 2 * result.accuracy.near * result.completeness.near / sum;
+  result.vertex_errors.reserve(moved.positions.size());
+  for (const Eigen::Vector3f& x : moved.positions) result.vertex_errors.push_back(true_surface.distance(x));
+  return result;
+}
+
+}  // namespace twofold

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <vector>
+
+#include "geometry/se3.hpp"
+#include "geometry/triangle_mesh.hpp"
+
+namespace twofold {
+
+struct SurfaceComparisonOptions {
+  double threshold = 0.01;  ///< what counts as near, for completeness, precision and F-score [m] > 0
+  double spacing = 0.005;   ///< of the points that are compared [m] > 0
+};
+
+struct DistanceStatistics {
+  std::size_t points = 0;
+  double mean = 0, median = 0, p95 = 0, rmse = 0;  ///< [m]; distances are cut at ten times the threshold
+  double near = 0;                                 ///< share of points within the threshold
+};
+
+/// How far two surfaces lie apart.
+struct SurfaceComparison {
+  DistanceStatistics accuracy;       ///< of the estimate's points to the true surface; near: precision
+  DistanceStatistics completeness;   ///< of the true surface's points to the estimate; near: recall
+  double f_score = 0;                ///< harmonic mean of precision and recall
+  std::vector<float> vertex_errors;  ///< of each vertex of the estimate, to the true surface [m]
+};
+
+/// Compares an estimate, moved by T_w_e, with the true surface. `seen` is the part of the truth that
+/// completeness asks for: what no camera saw cannot be missing. Neither mesh may be empty.
+[[nodiscard]] SurfaceComparison compare_surfaces(const TriangleMesh& estimate, const SE3& T_w_e,
+                                                 const TriangleMesh& truth, const TriangleMesh& seen,
+                                                 const SurfaceComparisonOptions& options = {});
+
+}  // namespace twofold

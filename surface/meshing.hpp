@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+
+#include "geometry/triangle_mesh.hpp"
+#include "surface/volume.hpp"
+
+namespace twofold {
+
+/// The surface of a volume by marching cubes, in the volume's frame: where the distance is 0, between samples
+/// of at least options().least_weight. Blocks share the vertices on their borders, so that the mesh is closed
+/// wherever the field is known; normals are the field's gradient, sigmas voxel / sqrt(weight). Pieces of
+/// fewer than options().least_triangles triangles are left out. Same volume, same bytes.
+[[nodiscard]] TriangleMesh extract_mesh(const SurfaceVolume& volume);
+
+/// Leaves out connected pieces of fewer than `least` triangles, then vertices that no triangle uses.
+/// @return  triangles left out
+std::size_t drop_small_pieces(TriangleMesh& mesh, int least);
+
+}  // namespace twofold

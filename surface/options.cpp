@@ -1,0 +1,25 @@
+#include "surface/options.hpp"
+
+#include "geometry/option_check.hpp"
+
+namespace twofold {
+
+std::string SurfaceOptions::invalid_reason() const {
+  return OptionCheck()
+      .within("voxel", voxel, 1e-4, 10)
+      .within("truncation", truncation, 2, 20)
+      .at_least("most_depth", most_depth, 0)
+      .within("depth_noise", depth_noise, 0, 1)
+      .above("least_weight", least_weight, 0)
+      .at_least("most_weight", most_weight, 1)
+      .at_least("least_triangles", least_triangles, 0)
+      .reason();
+}
+
+double usual_depth_noise(const Rig& rig) {
+  constexpr double kStructuredLight = 1.425e-3;
+  constexpr double kDisparity = 0.33;  // [px]
+  return rig.kind == SensorKind::kRgbd ? kStructuredLight : kDisparity / (rig.camera.fx * rig.baseline);
+}
+
+}  // namespace twofold

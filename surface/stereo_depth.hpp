@@ -1,0 +1,18 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "camera/rig.hpp"
+
+namespace twofold {
+
+/// Depth from a rectified pair by semi-global matching  (Hirschmueller, PAMI 2008; OpenCV's).
+///
+/// A disparity is kept where the match from the right image to the left agrees with it to a pixel, and where
+/// it is no speck of its own.
+/// @param left, right  CV_8UC1 of the rig's size
+/// @param nearest      disparities are searched up to that of this depth [m] > 0
+/// @return  CV_16UC1 in units of rig.depth_unit, 0: none
+[[nodiscard]] cv::Mat stereo_depth(const Rig& rig, const cv::Mat& left, const cv::Mat& right, double nearest);
+
+}  // namespace twofold

@@ -1,0 +1,179 @@
+#include "surface/submaps.hpp"
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+
+#include "geometry/check.hpp"
+#include "geometry/option_check.hpp"
+#include "surface/processor_time.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kJpegQuality = 92;
+constexpr double kBend = 0.5;  // voxels that poses inside a group may move
+
+}  // namespace
+
+std::string SubmapOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("most_keyframes", most_keyframes, 1)
+      .at_least("most_waiting", static_cast<double>(most_waiting), 1)
+      .above("memory_mb", memory_mb, 0)
+      .reason();
+}
+
+KeyframeDepth pack_keyframe_depth(std::int64_t frame_index, const cv::Mat& depth, const cv::Mat& colour) {
+  KeyframeDepth packed;
+  packed.frame_index = frame_index;
+  packed.depth = PackedDepth(depth);
+  if (!colour.empty())
+    (void)cv::imencode(".jpg", colour, packed.colour, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  return packed;
+}
+
+SubmapSurface::SubmapSurface(const Rig& rig, const SurfaceOptions& options, const SubmapOptions& submaps)
+    : rig_(rig), options_(options), limits_(submaps) {
+  TWOFOLD_CHECK(options.invalid_reason().empty() && submaps.invalid_reason().empty(), "valid options");
+}
+
+void SubmapSurface::offer(KeyframeDepth frame) {
+  waiting_.push_back(std::move(frame));
+  if (waiting_.size() <= limits_.most_waiting) return;
+  waiting_.pop_front();
+  ++report_.overtaken;
+}
+
+void SubmapSurface::step(const GraphSnapshot& graph) {
+  let_go_of_culled(graph);
+  move_submaps(graph);
+  take_new_keyframes(graph);
+  report_.most_bytes = std::max(report_.most_bytes, bytes());
+}
+
+/// A submap whose keyframe was culled hangs on another one from here on, where both stood in the last step.
+void SubmapSurface::let_go_of_culled(const GraphSnapshot& graph) {
+  for (const auto& submap : submaps_) {
+    report_.culled += static_cast<int>(std::erase_if(
+        submap->members, [&](const Member& member) { return graph.keyframe(member.id).culled(); }));
+    if (submap->members.empty() || !graph.keyframe(submap->hung_on).culled()) continue;
+    const Member& stays = submap->members.front();
+    submap->hung_on = stays.id;
+    submap->T_k_s = stays.T_k_w * submap->T_w_s;
+  }
+  report_.submaps_dropped +=
+      static_cast<int>(std::erase_if(submaps_, [](const auto& submap) { return submap->members.empty(); }));
+}
+
+void SubmapSurface::move_submaps(const GraphSnapshot& graph) {
+  for (const auto& submap : submaps_) {
+    const Keyframe& hung_on = graph.keyframe(submap->hung_on);
+    submap->T_w_s = hung_on.T_k_w.inverse() * submap->T_k_s;
+    submap->part = hung_on.part;
+    for (Member& member : submap->members) member.T_k_w = graph.keyframe(member.id).T_k_w;
+    if (!is_bent(*submap)) continue;
+    submap->volume.clear();
+    for (Member& member : submap->members) {
+      fuse(*submap, member);
+      ++report_.fused_anew;
+    }
+  }
+}
+
+/// Whether a point that one of the keyframes sees would be fused elsewhere now.
+bool SubmapSurface::is_bent(const Submap& submap) const {
+  return std::any_of(submap.members.begin(), submap.members.end(), [&](const Member& member) {
+    const SE3 T_now_then = member.T_k_w * submap.T_w_s * member.T_k_s.inverse();
+    const double moved = T_now_then.translation().norm() + T_now_then.so3().log().norm() * member.reach;
+    return moved > kBend * options_.voxel;
+  });
+}
+
+void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph) {
+  for (; next_keyframe_ < graph.keyframe_count(); ++next_keyframe_) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{next_keyframe_});
+    if (keyframe.culled()) continue;
+    while (!waiting_.empty() && waiting_.front().frame_index < keyframe.frame_index) {
+      waiting_.pop_front();
+      ++report_.not_in_map;
+    }
+    if (waiting_.empty() || waiting_.front().frame_index != keyframe.frame_index) continue;
+    KeyframeDepth images = std::move(waiting_.front());
+    waiting_.pop_front();
+    add_keyframe(graph, keyframe, std::move(images));
+  }
+}
+
+void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, KeyframeDepth images) {
+  if (static_cast<double>(bytes()) > limits_.memory_mb * (1 << 20)) {
+    ++report_.beyond_memory;
+    return;
+  }
+  Submap& submap = submap_for(graph, keyframe);
+  Member member;
+  member.id = keyframe.id;
+  member.images = std::move(images);
+  member.reach = std::max(keyframe.median_depth, rig_.depth_min);
+  member.T_k_w = keyframe.T_k_w;
+  fuse(submap, member);
+  submap.members.push_back(std::move(member));
+}
+
+/// The submap of those keyframes that see most of the same points, if it has room.
+SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, const Keyframe& keyframe) {
+  Submap* best = nullptr;
+  int most = 0;
+  for (const auto& submap : submaps_) {
+    if (static_cast<int>(submap->members.size()) >= limits_.most_keyframes || submap->part != keyframe.part)
+      continue;
+    int shared = 0;
+    for (const Member& member : submap->members) {
+      const Edge* edge = find_edge(keyframe, member.id);
+      if (edge != nullptr) shared += edge->weight;
+    }
+    if (shared > most) {
+      most = shared;
+      best = submap.get();
+    }
+  }
+  if (best != nullptr) return *best;
+  submaps_.push_back(std::make_unique<Submap>(Submap{
+      keyframe.id, SE3(), graph.T_k_w(keyframe.id).inverse(), keyframe.part, {}, SurfaceVolume(options_)}));
+  return *submaps_.back();
+}
+
+void SubmapSurface::fuse(Submap& submap, Member& member) {
+  const std::int64_t begin_ns = thread_cpu_ns();
+  cv::Mat colour;
+  if (!member.images.colour.empty()) colour = cv::imdecode(member.images.colour, cv::IMREAD_UNCHANGED);
+  const DepthView view = make_depth_view(rig_, member.images.depth.unpacked(), colour);
+  member.T_k_s = member.T_k_w * submap.T_w_s;
+  submap.volume.fuse(view, member.T_k_s);
+  report_.without_readings += share_of_readings(view) == 0;
+  ++report_.fused;
+  report_.fusion_ns += thread_cpu_ns() - begin_ns;
+}
+
+bool SubmapSurface::has(KeyframeId part) const {
+  return std::any_of(submaps_.begin(), submaps_.end(), [&](const auto& s) { return s->part == part; });
+}
+
+SurfaceVolume SubmapSurface::whole(KeyframeId part) const {
+  SurfaceVolume all(options_);
+  for (const auto& submap : submaps_)
+    if (submap->part == part) all.add(submap->volume, submap->T_w_s);
+  return all;
+}
+
+std::size_t SubmapSurface::bytes() const {
+  std::size_t sum = 0;
+  for (const KeyframeDepth& frame : waiting_) sum += frame.depth.bytes() + frame.colour.size();
+  for (const auto& submap : submaps_) {
+    sum += submap->volume.bytes();
+    for (const Member& member : submap->members)
+      sum += member.images.depth.bytes() + member.images.colour.size();
+  }
+  return sum;
+}
+
+}  // namespace twofold

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "graph/snapshot.hpp"
+#include "surface/packed_depth.hpp"
+#include "surface/volume.hpp"
+
+namespace twofold {
+
+struct SubmapOptions {
+  int most_keyframes = 10;        ///< of a submap >= 1
+  std::size_t most_waiting = 64;  ///< depth images of frames that no map has as keyframes yet >= 1
+  double memory_mb = 2000;        ///< of samples and depth images > 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// What a frame that is to become a keyframe gives to the surface.
+struct KeyframeDepth {
+  std::int64_t frame_index = 0;
+  PackedDepth depth;
+  std::vector<std::uint8_t> colour;  ///< JPEG; may be empty
+};
+
+/// Packs the images of a frame, which must have no depth_defect. depth: CV_16UC1.
+[[nodiscard]] KeyframeDepth pack_keyframe_depth(std::int64_t frame_index, const cv::Mat& depth,
+                                                const cv::Mat& colour);
+
+struct SubmapReport {
+  int fused = 0;               ///< depth images, each time
+  int fused_anew = 0;          ///< of these, because their submap's poses had changed
+  std::int64_t fusion_ns = 0;  ///< processor time of all, unpacking included
+  int without_readings = 0;    ///< depth images that are all holes
+  int not_in_map = 0;          ///< frames that were proposed as keyframes, but never entered the map
+  int culled = 0;              ///< keyframes whose depth was let go of when the map culled them
+  int submaps_dropped = 0;     ///< when all their keyframes were culled
+  int beyond_memory = 0;       ///< keyframes that were not fused for want of memory
+  int overtaken = 0;           ///< frames that were let go of unseen, because too many waited
+  std::size_t most_bytes = 0;  ///< of samples and depth images at one time
+};
+
+/// The surface of a growing map, in submaps that hang on groups of keyframes  (after Reijgwart et al.,
+/// Voxgraph, RA-L 2020).
+///
+/// Each keyframe's depth is fused into the submap that it shares most points with, or begins one. A submap
+/// stands still relative to one of its keyframes: a loop moves it as a whole. When poses inside a group moved
+/// against each other by more than half a voxel, at the depth that is seen, the group is fused anew. Culled
+/// keyframes give up their depth, and what they had added remains until then; a submap that has none left
+/// goes. So memory follows the place. Same calls, same bytes; one thread at a time.
+class SubmapSurface {
+ public:
+  /// Options must be valid.
+  SubmapSurface(const Rig& rig, const SurfaceOptions& options, const SubmapOptions& submaps);
+
+  /// A frame that is proposed as a keyframe; frame_index grows.
+  void offer(KeyframeDepth frame);
+  /// Takes the map as it is now. Versions grow.
+  void step(const GraphSnapshot& graph);
+
+  /// All submaps of a map part in its world frame, as it was in the last step, melted into one.
+  [[nodiscard]] SurfaceVolume whole(KeyframeId part) const;
+  [[nodiscard]] bool has(KeyframeId part) const;
+
+  [[nodiscard]] const SubmapReport& report() const { return report_; }
+  [[nodiscard]] std::size_t submap_count() const { return submaps_.size(); }
+  [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  struct Member {
+    KeyframeId id = kNoKeyframe;
+    KeyframeDepth images;
+    double reach = 1;  ///< depth that is seen [m]
+    SE3 T_k_w;         ///< in the last step
+    SE3 T_k_s;         ///< along which it was fused
+  };
+  struct Submap {
+    KeyframeId hung_on = kNoKeyframe;  ///< one of its members
+    SE3 T_k_s;                         ///< of that keyframe: constant
+    SE3 T_w_s;                         ///< in the last step
+    KeyframeId part{0};
+    std::vector<Member> members;
+    SurfaceVolume volume;
+  };
+
+  void let_go_of_culled(const GraphSnapshot& graph);
+  void move_submaps(const GraphSnapshot& graph);
+  void take_new_keyframes(const GraphSnapshot& graph);
+  void add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, KeyframeDepth images);
+  [[nodiscard]] Submap& submap_for(const GraphSnapshot& graph, const Keyframe& keyframe);
+  [[nodiscard]] bool is_bent(const Submap& submap) const;
+  void fuse(Submap& submap, Member& member);
+
+  Rig rig_;
+  SurfaceOptions options_;
+  SubmapOptions limits_;
+  std::deque<KeyframeDepth> waiting_;  ///< ascending by frame
+  std::uint32_t next_keyframe_ = 0;    ///< the first that no step has seen
+  std::vector<std::unique_ptr<Submap>> submaps_;
+  SubmapReport report_;
+};
+
+}  // namespace twofold

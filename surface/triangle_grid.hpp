@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "geometry/triangle_mesh.hpp"
+
+namespace twofold {
+
+/// Splits triangles at the middle of their longest side until no side is longer than `longest` [m] > 0; keeps
+/// positions only.
+[[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh, float longest);
+
+/// Points spread evenly over a mesh, one for each `spacing`^2 of area; the same for the same mesh.
+struct SurfaceSample {
+  Eigen::Vector3f position{0, 0, 0};
+  std::uint32_t triangle = 0;
+};
+[[nodiscard]] std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, float spacing);
+
+/// Finds the distance of points to a mesh: its triangles sorted into the cells of a grid.
+class TriangleGrid {
+ public:
+  /// reach: distances beyond it are not looked for [m] > 0
+  TriangleGrid(const TriangleMesh& mesh, float reach);
+
+  /// Distance to the nearest triangle [m], at most reach().
+  [[nodiscard]] float distance(const Eigen::Vector3f& x) const;
+  [[nodiscard]] float reach() const { return reach_; }
+
+ private:
+  static constexpr int kCellsToReach = 4;
+  using CellKey = std::uint64_t;
+  [[nodiscard]] Eigen::Vector3i cell_of(const Eigen::Vector3f& x) const;
+  [[nodiscard]] static CellKey key_of(const Eigen::Vector3i& cell);
+
+  float reach_;
+  float cell_;
+  TriangleMesh mesh_;
+  std::unordered_map<CellKey, std::vector<std::uint32_t>> cells_;
+};
+
+/// Distance of a point to a triangle [m]  (Ericson, Real-Time Collision Detection, 5.1.5).
+[[nodiscard]] float distance_to_triangle(const Eigen::Vector3f& x, const Eigen::Vector3f& a,
+                                         const Eigen::Vector3f& b, const Eigen::Vector3f& c);
+
+}  // namespace twofold

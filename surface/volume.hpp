@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "geometry/se3.hpp"
+#include "surface/depth_view.hpp"
+#include "surface/options.hpp"
+#include "surface/voxel_block.hpp"
+
+namespace twofold {
+
+/// What is known of one position of space.
+enum class Occupancy : std::uint8_t {
+  kUnknown,  ///< never seen, or too far inside a surface
+  kFree,     ///< outside of every surface
+  kOccupied  ///< inside
+};
+
+/// The signed distance at one position, linear between the eight samples around it.
+struct SurfaceDistance {
+  double distance = 0;        ///< [m], positive outside; along the rays it was measured on, truncated
+  Vector3 gradient{0, 0, 0};  ///< d distance / d position
+  double weight = 0;          ///< the least of the eight
+};
+
+/// A truncated signed distance field in sparse blocks  (Curless and Levoy, SIGGRAPH 1996; blocks found by
+/// hash: Niessner et al., SIGGRAPH Asia 2013). Sample g stands at g * voxel in the volume's frame v.
+///
+/// A sample's weight is the information of its distance in units of 1 / voxel^2, of each reading
+/// voxel^2 / sigma(z)^2, so that its standard deviation is voxel / sqrt(weight). Same calls, same bytes. One
+/// thread at a time.
+class SurfaceVolume {
+ public:
+  /// options must be valid; depth_noise above 0.
+  explicit SurfaceVolume(const SurfaceOptions& options);
+
+  /// Adds a depth image, taken from T_c_v. Samples up to the truncation behind a reading get its distance
+  /// along the ray; those farther in front are free: what stood there before is carved away.
+  void fuse(const DepthView& view, const SE3& T_c_v);
+  /// Adds another volume of the same options, whose frame lies at T_v_o in this one: resampled linearly.
+  void add(const SurfaceVolume& other, const SE3& T_v_o);
+  void clear() { blocks_.clear(); }
+
+  /// Nothing where one of the eight samples around it was never seen.
+  [[nodiscard]] std::optional<SurfaceDistance> distance(const Vector3& x_v) const;
+  [[nodiscard]] Occupancy occupancy(const Vector3& x_v) const;
+
+  [[nodiscard]] const SurfaceOptions& options() const { return options_; }
+  [[nodiscard]] const BlockTable& blocks() const { return blocks_; }
+  [[nodiscard]] std::size_t bytes() const { return blocks_.bytes(); }
+
+ private:
+  /// Blocks that the view has something to say about, each once.
+  void collect_blocks(const DepthView& view, const SE3& T_c_v);
+  void touch(const BlockPosition& at);
+  void add_blocks_to_carve(const DepthView& view, const SE3& T_c_v);
+  void touch_overlapped(const VoxelBlock& block, const SE3& T_v_o);
+
+  SurfaceOptions options_;
+  BlockTable blocks_;
+  std::vector<VoxelBlock*> touched_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,66 @@
+#include "surface/voxel_block.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kFirstSlots = 1024;
+
+/// Primes of Teschner et al., Optimized Spatial Hashing (VMV 2003), then mixed, since the table takes low
+/// bits.
+std::size_t hash_of(const BlockPosition& at) {
+  const auto part = [](std::int32_t c, std::uint64_t prime) {
+    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(c)) * prime;
+  };
+  const std::uint64_t h = part(at.x, 73856093) ^ part(at.y, 19349669) ^ part(at.z, 83492791);
+  return static_cast<std::size_t>((h * 0x9e3779b97f4a7c15ULL) >> 24);
+}
+
+}  // namespace
+
+std::size_t BlockTable::slot_of(const BlockPosition& at) const {
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t slot = hash_of(at) & mask;
+  while (slots_[slot] != kFree && blocks_[slots_[slot]]->at != at) slot = (slot + 1) & mask;
+  return slot;
+}
+
+const VoxelBlock* BlockTable::find(const BlockPosition& at) const {
+  if (slots_.empty()) return nullptr;
+  const std::uint32_t block = slots_[slot_of(at)];
+  return block == kFree ? nullptr : blocks_[block].get();
+}
+
+VoxelBlock& BlockTable::find_or_add(const BlockPosition& at) {
+  if (2 * blocks_.size() >= slots_.size()) grow();
+  std::uint32_t& slot = slots_[slot_of(at)];
+  if (slot == kFree) {
+    slot = static_cast<std::uint32_t>(blocks_.size());
+    blocks_.push_back(std::make_unique<VoxelBlock>());
+    blocks_.back()->at = at;
+  }
+  return *blocks_[slot];
+}
+
+void BlockTable::grow() {
+  slots_.assign(std::max(kFirstSlots, 2 * slots_.size()), kFree);
+  for (std::size_t b = 0; b < blocks_.size(); ++b)
+    slots_[slot_of(blocks_[b]->at)] = static_cast<std::uint32_t>(b);
+}
+
+std::vector<const VoxelBlock*> BlockTable::sorted() const {
+  std::vector<const VoxelBlock*> all;
+  all.reserve(blocks_.size());
+  for (const auto& block : blocks_) all.push_back(block.get());
+  std::sort(all.begin(), all.end(), [](const auto* a, const auto* b) { return a->at < b->at; });
+  return all;
+}
+
+void BlockTable::clear() {
+  blocks_.clear();
+  slots_.clear();
+}
+
+}  // namespace twofold

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "geometry/types.hpp"
+
+namespace twofold {
+
+inline constexpr int kBlockEdge = 8;  ///< samples along an edge of a block
+inline constexpr int kBlockSamples = kBlockEdge * kBlockEdge * kBlockEdge;
+
+/// Which block of a volume: it holds the samples (8 x .. 8 x + 7, 8 y .. , 8 z .. ).
+struct BlockPosition {
+  std::int32_t x = 0, y = 0, z = 0;
+  friend auto operator<=>(const BlockPosition&, const BlockPosition&) = default;
+};
+
+/// 8^3 samples of a truncated signed distance; sample (x, y, z) of it is entry (z * 8 + y) * 8 + x.
+struct VoxelBlock {
+  BlockPosition at;
+  bool touched = false;                                     ///< scratch of one fusion
+  bool all_free = false;                                    ///< every sample is well known to be free
+  alignas(32) std::array<float, kBlockSamples> distance{};  ///< [m], positive outside the surface
+  alignas(32) std::array<float, kBlockSamples> weight{};    ///< 0: never seen
+  alignas(
+      32) std::array<std::array<std::uint16_t, kBlockSamples>, 3> colour{};  ///< red, green, blue in 1/256
+};
+
+/// Red, green and blue of sample i in 1/256.
+[[nodiscard]] inline std::array<std::uint16_t, 3> colour_of(const VoxelBlock& block, std::size_t i) {
+  return {block.colour[0][i], block.colour[1][i], block.colour[2][i]};
+}
+
+/// The blocks there are, found by position: a hash table with open addresses. Blocks are never taken out one
+/// by one. References stay valid until clear.
+class BlockTable {
+ public:
+  [[nodiscard]] const VoxelBlock* find(const BlockPosition& at) const;
+  [[nodiscard]] VoxelBlock* find(const BlockPosition& at) {
+    return const_cast<VoxelBlock*>(std::as_const(*this).find(at));
+  }
+  VoxelBlock& find_or_add(const BlockPosition& at);
+
+  [[nodiscard]] std::size_t size() const { return blocks_.size(); }
+  /// In the order they were added.
+  [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return *blocks_[i]; }
+  [[nodiscard]] const VoxelBlock& operator[](std::size_t i) const { return *blocks_[i]; }
+  /// In the order of their positions.
+  [[nodiscard]] std::vector<const VoxelBlock*> sorted() const;
+  void clear();
+  [[nodiscard]] std::size_t bytes() const {
+    return blocks_.size() * (sizeof(VoxelBlock) + sizeof(blocks_[0])) + slots_.size() * sizeof(slots_[0]);
+  }
+
+ private:
+  static constexpr std::uint32_t kFree = 0xffffffff;
+  /// Slot of the block, or the free one where it would go; there are slots.
+  [[nodiscard]] std::size_t slot_of(const BlockPosition& at) const;
+  void grow();
+
+  std::vector<std::unique_ptr<VoxelBlock>> blocks_;
+  std::vector<std::uint32_t> slots_;  ///< a power of two, at most half of them taken
+};
+
+}  // namespace twofold

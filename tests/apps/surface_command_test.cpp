@@ -1,0 +1,103 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/files/mesh_file.hpp"
+#include "tests/apps/command.hpp"
+
+namespace twofold {
+namespace {
+
+const std::string kScene = "'synthetic:desk?sensor=rgbd&width=320&height=240&frames=60&noise=1'";
+
+TEST(SurfaceCommand, DeterministicRunsGiveEqualBytes) {
+  const ScratchFolder folder;
+  for (const char* to : {"a", "b"}) {
+    const Outcome outcome = run(
+        folder, "run " + kScene + " --deterministic --surface 0.02 --quiet --out '" + (folder / to) + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  const std::string mesh = content(folder / "a/surface.ply");
+  ASSERT_FALSE(mesh.empty());
+  EXPECT_EQ(mesh, content(folder / "b/surface.ply"));
+  EXPECT_EQ(content(folder / "a/surface.glb"), content(folder / "b/surface.glb"));
+  const auto summary = nlohmann::json::parse(content(folder / "a/summary.json"));
+  EXPECT_GT(summary["surface"]["depth_images_fused"], 0);
+  EXPECT_GT(summary["surface"]["triangles"], 1000);
+}
+
+TEST(SurfaceCommand, AlongTruePosesTheSurfaceIsTheTrueOne) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run(folder, "surface " + kScene + " --poses truth --every 5 --voxel 0.01 --out '" +
+                            (folder / "result") + "'")
+                .exit_code,
+            0);
+  ASSERT_EQ(run(folder, "render " + kScene + " --surface '" + (folder / "truth.ply") + "' --seen '" +
+                            (folder / "seen.ply") + "'")
+                .exit_code,
+            0);
+  const Outcome compared =
+      run(folder, "eval --surface '" + (folder / "result/surface.ply") + "' '" + (folder / "truth.ply") +
+                      "' --seen '" + (folder / "seen.ply") + "' --json '" + (folder / "eval.json") +
+                      "' --plot '" + (folder / "heat.png") + "'");
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  const auto figures = nlohmann::json::parse(content(folder / "eval.json"));
+  EXPECT_LT(figures["accuracy"]["mean_m"], 0.002);
+  EXPECT_GT(figures["completeness"]["within_threshold"], 0.85);
+  EXPECT_FALSE(content(folder / "heat.png").empty());
+}
+
+TEST(SurfaceCommand, ThreadedRunsAndFinishedRunsGiveSurfacesToo) {
+  const ScratchFolder folder;
+  const Outcome live =
+      run(folder, "run " + kScene + " --surface 0.02 --quiet --out '" + (folder / "live") + "'");
+  ASSERT_EQ(live.exit_code, 0) << live.err;
+  EXPECT_NE(live.out.find("depth images fused"), std::string::npos);
+  EXPECT_GT(read_ply_mesh(folder / "live/surface.ply").triangles.size(), 500u);
+  const Outcome after = run(folder, "surface '" + (folder / "live") + "' --voxel 0.02 --out '" +
+                                        (folder / "after") + "' --picture '" + (folder / "after/p.png") +
+                                        "' --obj '" + (folder / "after/s.obj") + "'");
+  ASSERT_EQ(after.exit_code, 0) << after.err;
+  const TriangleMesh mesh = read_ply_mesh(folder / "after/surface.ply");
+  EXPECT_GT(mesh.triangles.size(), 500u);
+  EXPECT_EQ(mesh.normals.size(), mesh.positions.size());
+  EXPECT_FALSE(content(folder / "after/p.png").empty());
+  EXPECT_EQ(content(folder / "after/s.obj").rfind("# metres\nv ", 0), 0u);
+}
+
+TEST(SurfaceCommand, StereoGivesASurface) {
+  const ScratchFolder folder;
+  const std::string scene = "'synthetic:desk?width=320&height=240&frames=20'";
+  const Outcome outcome = run(folder, "surface " + scene + " --poses truth --every 5 --voxel 0.02 --out '" +
+                                          (folder / "result") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_GT(read_ply_mesh(folder / "result/surface.ply").triangles.size(), 500u);
+}
+
+TEST(SurfaceCommand, SaysWhatCannotBe) {
+  const ScratchFolder folder;
+  const std::string to = " --out '" + (folder / "result") + "'";
+  expect_bad_input(run(folder, "run 'synthetic:desk?sensor=mono&frames=5' --surface 0.01 --quiet" + to),
+                   "one camera gives no depth");
+  expect_bad_input(run(folder, "run " + kScene + " --surface 0.00001 --quiet" + to), "voxel must be");
+  expect_bad_input(run(folder, "surface '" + (folder / "nothing") + "'"), "not the folder of a finished run");
+  expect_bad_input(run(folder, "surface 'synthetic:desk?sensor=mono&frames=5' --poses truth" + to),
+                   "no depth");
+  expect_bad_input(run(folder, "render 'synthetic:desk?frames=5' --seen '" + (folder / "seen.ply") + "'"),
+                   "sensor=rgbd");
+  std::ofstream(folder / "bad.ply")
+      << "ply\nformat ascii 1.0\nelement vertex 99\nproperty float x\nend_header\n1";
+  expect_bad_input(
+      run(folder, "eval --surface '" + (folder / "bad.ply") + "' '" + (folder / "bad.ply") + "'"),
+      "too short for 99");
+  // Nothing within range: the near end of the desk is half a metre away.
+  const Outcome empty = run(folder,
+                            "surface 'synthetic:desk?sensor=rgbd&frames=3&width=160&height=120' --poses "
+                            "truth --most-depth 0.31" +
+                                to);
+  EXPECT_EQ(empty.exit_code, 1);
+  EXPECT_NE(empty.err.find("gave no surface"), std::string::npos) << empty.err;
+}
+
+}  // namespace
+}  // namespace twofold

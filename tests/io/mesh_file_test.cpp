@@ -1,0 +1,136 @@
+#include "io/files/mesh_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+#include "io/files/io_error.hpp"
+#include "tests/io/scratch_folder.hpp"
+
+namespace twofold {
+namespace {
+
+TriangleMesh sample_mesh() {
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0.5f}, {0, 1, 0}, {-1.25f, 1, 2}};
+  mesh.normals.assign(4, Eigen::Vector3f::UnitZ());
+  mesh.colours = {{1, 2, 3}, {4, 5, 6}, {255, 0, 9}, {7, 8, 200}};
+  mesh.sigmas.assign(4, 0.001f);
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+std::string bytes_of(const std::string& file) {
+  std::stringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+std::string refusal(const std::string& file) {
+  try {
+    (void)read_ply_mesh(file);
+  } catch (const IoError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(MeshFile, PlyIsReadBack) {
+  const ScratchFolder folder;
+  write_ply_mesh(folder / "a.ply", sample_mesh());
+  TriangleMesh expected = sample_mesh();
+  expected.sigmas.clear();  // not read
+  EXPECT_EQ(read_ply_mesh(folder / "a.ply"), expected);
+}
+
+TEST(MeshFile, PlyOfOthersIsRead) {
+  const ScratchFolder folder;
+  std::ofstream(folder / "a.ply")
+      << "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nelement vertex 4\r\n"
+         "property double x\r\nproperty double y\r\nproperty double z\r\n"
+         "property float quality\r\nelement face 1\r\n"
+         "property uchar flags\r\nproperty list uchar int vertex_index\r\nend_header\r\n"
+         "0 0 0 1\r\n1 0 0 1\r\n1 1 0 1\r\n0 1 0 1\r\n7 4 0 1 2 3\r\n";
+  const TriangleMesh mesh = read_ply_mesh(folder / "a.ply");
+  ASSERT_EQ(mesh.positions.size(), 4u);
+  ASSERT_EQ(mesh.triangles.size(), 2u);
+  EXPECT_EQ(mesh.triangles[1], (std::array<std::uint32_t, 3>{0, 2, 3}));
+}
+
+TEST(MeshFile, DamagedPlyIsRefused) {
+  const ScratchFolder folder;
+  write_ply_mesh(folder / "a.ply", sample_mesh());
+  const std::string whole = bytes_of(folder / "a.ply");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = whole;
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(folder / "b.ply", std::ios::binary) << text;
+    return refusal(folder / "b.ply");
+  };
+  EXPECT_NE(with("vertex 4", "vertex 4000000000000").find("too short"), std::string::npos);
+  EXPECT_NE(with("vertex 4", "vertex -4").find("no count"), std::string::npos);
+  EXPECT_NE(with("face 2", "face 3").find("ends in the middle"), std::string::npos);
+  EXPECT_NE(with("property float x", "property float q").find("no finite position"), std::string::npos);
+  EXPECT_NE(with("binary_little", "binary_big").find("not read here"), std::string::npos);
+  EXPECT_NE(with("end_header", "the_end").find("not understood"), std::string::npos);
+  std::string text = whole;
+  text[text.size() - 2] = 1;  // the last corner is now a far one
+  std::ofstream(folder / "b.ply", std::ios::binary) << text;
+  EXPECT_NE(refusal(folder / "b.ply").find("names vertex"), std::string::npos);
+}
+
+TEST(MeshFile, AnyDamageIsRefusedOrRead) {
+  const ScratchFolder folder;
+  write_ply_mesh(folder / "a.ply", sample_mesh());
+  const std::string whole = bytes_of(folder / "a.ply");
+  std::mt19937 random(1);
+  for (int n = 0; n < 3000; ++n) {
+    std::string text = whole.substr(0, n % 3 == 0 ? random() % whole.size() : whole.size());
+    for (unsigned k = 0; k < 1 + random() % 4 && !text.empty(); ++k)
+      text[random() % text.size()] = static_cast<char>(random());
+    std::ofstream(folder / "b.ply", std::ios::binary) << text;
+    try {
+      const TriangleMesh mesh = read_ply_mesh(folder / "b.ply");
+      for (const auto& t : mesh.triangles)
+        for (const std::uint32_t v : t) ASSERT_LT(v, mesh.positions.size());
+    } catch (const IoError&) {  // as good
+    }
+  }
+}
+
+TEST(MeshFile, GlbHoldsTheMesh) {
+  const ScratchFolder folder;
+  const TriangleMesh mesh = sample_mesh();
+  write_glb_mesh(folder / "a.glb", mesh);
+  const std::string bytes = bytes_of(folder / "a.glb");
+  const auto word = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes.data() + at, 4);
+    return value;
+  };
+  ASSERT_EQ(bytes.substr(0, 4), "glTF");
+  EXPECT_EQ(word(4), 2u);
+  EXPECT_EQ(word(8), bytes.size());
+  const std::size_t json_size = word(12);
+  EXPECT_EQ(json_size % 4, 0u);
+  const auto json = nlohmann::json::parse(bytes.substr(20, json_size));
+  const std::size_t binary = 20 + json_size + 8;
+  EXPECT_EQ(word(20 + json_size), bytes.size() - binary);
+  EXPECT_EQ(json["buffers"][0]["byteLength"], bytes.size() - binary);
+  EXPECT_EQ(json["accessors"][0]["count"], 4);
+  EXPECT_EQ(json["accessors"][0]["min"][0], -1.25);
+  const std::size_t indices = json["meshes"][0]["primitives"][0]["indices"];
+  const std::size_t view = json["accessors"][indices]["bufferView"];
+  const std::size_t offset = json["bufferViews"][view]["byteOffset"];
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(word(binary + offset + 4 * i), mesh.triangles[i / 3][i % 3]);
+  TriangleMesh none = mesh;
+  none.triangles.clear();
+  EXPECT_THROW(write_glb_mesh(folder / "b.glb", none), IoError);
+}
+
+}  // namespace
+}  // namespace twofold

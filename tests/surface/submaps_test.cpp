@@ -1,0 +1,135 @@
+#include "surface/submaps.hpp"
+
+#include <gtest/gtest.h>
+
+#include "surface/meshing.hpp"
+#include "tests/graph/graph_pieces.hpp"
+#include "tests/surface/ball_views.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::Ball;
+
+/// A camera around a ball: the map's keyframes and what they see.
+class SubmapSurfaceTest : public ::testing::Test {
+ protected:
+  static constexpr int kKeyframes = 12;
+
+  explicit SubmapSurfaceTest() : rig_(testing::depth_rig()) {}
+
+  void add_keyframe(SubmapSurface& surface) {
+    const auto n = static_cast<int>(writer_.graph().keyframe_count());
+    const SE3 T_k_w = testing::camera_around(n, kKeyframes);
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{static_cast<std::uint32_t>(n)};
+    keyframe.frame_index = 10 * n;
+    keyframe.T_k_w = T_k_w;
+    keyframe.median_depth = 0.7;
+    writer_.add_keyframe(keyframe);
+    if (n > 0) {
+      writer_.set_edge(keyframe.id, testing::edge_to(KeyframeId{static_cast<std::uint32_t>(n - 1)}, 50));
+      writer_.set_reference(keyframe.id);
+    }
+    cv::Mat depth;
+    testing::depth_of(rig_, T_k_w, ball_).convertTo(depth, CV_16U, 1 / rig_.depth_unit);
+    surface.offer(pack_keyframe_depth(keyframe.frame_index, depth, {}));
+  }
+  void add_all(SubmapSurface& surface) {
+    for (int n = 0; n < kKeyframes; ++n) {
+      add_keyframe(surface);
+      surface.step(writer_.publish());
+    }
+  }
+  /// Mean distance of the mesh from the ball, moved by T.
+  [[nodiscard]] double error(const SubmapSurface& surface, const SE3& T_w_moved = SE3()) const {
+    const TriangleMesh mesh = extract_mesh(surface.whole(KeyframeId{0}));
+    EXPECT_GT(mesh.positions.size(), 500u);
+    double sum = 0;
+    for (const auto& x : mesh.positions)
+      sum += std::abs((x.cast<double>() - T_w_moved * ball_.centre).norm() - ball_.radius);
+    return sum / std::max<double>(1, static_cast<double>(mesh.positions.size()));
+  }
+
+  Rig rig_;
+  Ball ball_{{0.02, -0.01, 0.03}, 0.15};
+  GraphWriter writer_;
+  SubmapOptions limits_{.most_keyframes = 5, .most_waiting = 64, .memory_mb = 500};
+};
+
+TEST_F(SubmapSurfaceTest, KeyframesShareSubmapsAndMakeOneSurface) {
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  EXPECT_EQ(surface.submap_count(), 3u);
+  EXPECT_EQ(surface.report().fused, kKeyframes);
+  EXPECT_EQ(surface.report().fused_anew, 0);
+  EXPECT_LT(error(surface), 0.002);
+}
+
+TEST_F(SubmapSurfaceTest, ALoopMovesSubmapsWithoutFusingAnew) {
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  const SE3 T_new_old(SO3::exp(Vector3(0.1, 0.2, -0.1)), Vector3(0.3, -0.2, 0.5));
+  for (std::uint32_t k = 0; k < kKeyframes; ++k)
+    writer_.set_pose(KeyframeId{k}, writer_.graph().keyframe(KeyframeId{k}).T_k_w * T_new_old.inverse());
+  surface.step(writer_.publish());
+  EXPECT_EQ(surface.report().fused_anew, 0);
+  EXPECT_LT(error(surface, T_new_old), 0.002);
+}
+
+TEST_F(SubmapSurfaceTest, OnlyABentGroupIsFusedAnew) {
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  // The second keyframe of the first submap moves by more than half a voxel, one of the second by less.
+  const auto shift = [&](std::uint32_t k, double by) {
+    const SE3 T_k_w = writer_.graph().keyframe(KeyframeId{k}).T_k_w;
+    writer_.set_pose(KeyframeId{k}, SE3(SO3(), Vector3(by, 0, 0)) * T_k_w);
+  };
+  shift(1, 0.008);
+  shift(6, 0.002);
+  surface.step(writer_.publish());
+  EXPECT_EQ(surface.report().fused_anew, limits_.most_keyframes);
+  surface.step(writer_.publish());
+  EXPECT_EQ(surface.report().fused_anew, limits_.most_keyframes);
+}
+
+TEST_F(SubmapSurfaceTest, CulledKeyframesLeaveWhatTheyAdded) {
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  const std::size_t before = surface.bytes();
+  writer_.cull_keyframe(KeyframeId{0}, KeyframeId{1});  // the first submap hangs on it
+  writer_.cull_keyframe(KeyframeId{2}, KeyframeId{1});
+  surface.step(writer_.publish());
+  EXPECT_EQ(surface.report().culled, 2);
+  EXPECT_LT(surface.bytes(), before);
+  EXPECT_LT(error(surface), 0.002);
+  for (const std::uint32_t k : {1U, 3U, 4U}) writer_.cull_keyframe(KeyframeId{k}, KeyframeId{5});
+  surface.step(writer_.publish());
+  EXPECT_EQ(surface.report().submaps_dropped, 1);
+  EXPECT_EQ(surface.submap_count(), 2u);
+}
+
+TEST_F(SubmapSurfaceTest, MemoryIsBounded) {
+  limits_.memory_mb = 1.5;
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  EXPECT_GT(surface.report().beyond_memory, 0);
+  EXPECT_LT(static_cast<double>(surface.report().most_bytes), 4e6);
+}
+
+TEST_F(SubmapSurfaceTest, FramesThatNeverBecomeKeyframesAreLetGoOf) {
+  limits_.most_waiting = 3;
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  const cv::Mat depth(240, 320, CV_16UC1, cv::Scalar(1000));
+  for (int n = 0; n < 8; ++n) surface.offer(pack_keyframe_depth(-100 + n, depth, {}));
+  EXPECT_EQ(surface.waiting(), 3u);
+  EXPECT_EQ(surface.report().overtaken, 5);
+  add_keyframe(surface);
+  surface.step(writer_.publish());
+  EXPECT_EQ(surface.waiting(), 0u);
+  EXPECT_EQ(surface.report().not_in_map, 2);
+  EXPECT_EQ(surface.report().fused, 1);
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,186 @@
+#include "surface/volume.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+#include <random>
+
+#include "surface/meshing.hpp"
+#include "surface/packed_depth.hpp"
+#include "surface/stereo_depth.hpp"
+#include "tests/surface/ball_views.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::Ball;
+using testing::camera_around;
+using testing::depth_of;
+using testing::depth_rig;
+using testing::fine_options;
+
+TEST(SurfaceVolume, KnowsFreeOccupiedAndUnknown) {
+  const Ball ball;
+  const SurfaceVolume volume = testing::volume_of(ball);
+  EXPECT_EQ(volume.occupancy({0.165, 0, 0}), Occupancy::kFree);
+  EXPECT_EQ(volume.occupancy({0.14, 0, 0}), Occupancy::kOccupied);
+  EXPECT_EQ(volume.occupancy({0, 0, 0}), Occupancy::kUnknown);  // deeper than the truncation
+  EXPECT_EQ(volume.occupancy({3, 0, 0}), Occupancy::kUnknown);
+}
+
+TEST(SurfaceVolume, DistanceAndGradientAreThoseOfTheSurface) {
+  const Ball ball;
+  const SurfaceVolume volume = testing::volume_of(ball);
+  for (const double angle : {0.1, 1.3, 2.9, 4.4}) {
+    const Vector3 out(std::cos(angle), std::sin(angle), 0.2);
+    const Vector3 x = (ball.radius + 0.004) * out.normalized();
+    const auto found = volume.distance(x);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->distance, 0.004, 0.002);
+    EXPECT_GT(found->gradient.normalized().dot(out.normalized()), 0.95);
+    const double step = 1e-4;
+    const auto beside = volume.distance(x + Vector3(step, 0, 0));
+    ASSERT_TRUE(beside);
+    EXPECT_NEAR((beside->distance - found->distance) / step, found->gradient.x(), 0.05);
+  }
+}
+
+TEST(SurfaceVolume, WhatWentAwayIsCarvedAway) {
+  const Rig rig = depth_rig();
+  const Ball ball{{0, 0, 0}, 0.1};
+  SurfaceVolume volume(fine_options());
+  const SE3 T_c_w = camera_around(0, 1);
+  for (int n = 0; n < 12; ++n) volume.fuse(make_depth_view(rig, depth_of(rig, T_c_w, ball, 1.5), {}), T_c_w);
+  const Vector3 inside = T_c_w.inverse() * Vector3(0, 0, 0.8 - 0.1 + 0.005);
+  ASSERT_EQ(volume.occupancy(inside), Occupancy::kOccupied);
+  const Ball away{{50, 0, 0}, 0.1};
+  for (int n = 0; n < 12; ++n) volume.fuse(make_depth_view(rig, depth_of(rig, T_c_w, away, 1.5), {}), T_c_w);
+  EXPECT_EQ(volume.occupancy(inside), Occupancy::kFree);
+  // Nothing of the ball is left, only the wall behind it.
+  for (const Eigen::Vector3f& x : extract_mesh(volume).positions)
+    EXPECT_GT((T_c_w * Vector3(x.cast<double>())).z(), 1.4);
+}
+
+TEST(SurfaceVolume, NoiseIsAveragedOut) {
+  const Rig rig = depth_rig();
+  const SE3 T_c_w;
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0, 0.006f);
+  SurfaceVolume volume(fine_options());
+  double one = 0, many = 0;
+  const auto error = [&] {
+    double sum = 0;
+    const TriangleMesh mesh = extract_mesh(volume);
+    for (const auto& x : mesh.positions) sum += std::abs(x.z() - 1.5f);
+    return sum / static_cast<double>(mesh.positions.size());
+  };
+  for (int n = 0; n < 30; ++n) {
+    cv::Mat depth(rig.camera.height, rig.camera.width, CV_32FC1);
+    for (int i = 0; i < static_cast<int>(depth.total()); ++i) depth.at<float>(i) = 1.5f + noise(random);
+    volume.fuse(make_depth_view(rig, depth, {}), T_c_w);
+    if (n == 0) one = error();
+  }
+  many = error();
+  EXPECT_LT(many, 0.35 * one);
+  EXPECT_LT(many, 0.0015);
+}
+
+TEST(SurfaceVolume, AddedVolumesKeepTheirShape) {
+  const Ball ball{{0.02, 0.01, 0}, 0.15};
+  const SurfaceVolume part = testing::volume_of(ball);
+  const SE3 T_v_o(SO3::exp(Vector3(0.3, -0.2, 0.4)), Vector3(1.003, 0.207, -0.4));
+  SurfaceVolume whole(part.options());
+  whole.add(part, T_v_o);
+  const TriangleMesh mesh = extract_mesh(whole);
+  ASSERT_GT(mesh.positions.size(), 1000u);
+  double sum = 0;
+  for (const auto& x : mesh.positions)
+    sum += std::abs((x.cast<double>() - T_v_o * ball.centre).norm() - ball.radius);
+  EXPECT_LT(sum / static_cast<double>(mesh.positions.size()), 0.002);
+}
+
+TEST(SurfaceVolume, ColoursComeFromTheImage) {
+  const Rig rig = depth_rig();
+  const SE3 T_c_w;
+  const cv::Mat depth(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.0));
+  const cv::Mat blue_green_red(depth.size(), CV_8UC3, cv::Scalar(10, 120, 250));
+  SurfaceVolume volume(fine_options());
+  for (int n = 0; n < 3; ++n) volume.fuse(make_depth_view(rig, depth, blue_green_red), T_c_w);
+  const TriangleMesh mesh = extract_mesh(volume);
+  ASSERT_FALSE(mesh.colours.empty());
+  for (const auto& c : mesh.colours) {
+    EXPECT_NEAR(c[0], 250, 1);
+    EXPECT_NEAR(c[1], 120, 1);
+    EXPECT_NEAR(c[2], 10, 1);
+  }
+}
+
+TEST(DepthView, SaysWhatIsWrong) {
+  const Rig rig = depth_rig();
+  EXPECT_NE(depth_defect(rig, {}, {}).find("no depth"), std::string::npos);
+  EXPECT_NE(depth_defect(rig, cv::Mat(240, 320, CV_8UC1), {}).find("16 bits"), std::string::npos);
+  EXPECT_NE(depth_defect(rig, cv::Mat(120, 320, CV_16UC1), {}).find("320x120"), std::string::npos);
+  EXPECT_NE(depth_defect(rig, cv::Mat(240, 320, CV_16UC1), cv::Mat(24, 32, CV_8UC3)).find("32x24"),
+            std::string::npos);
+  EXPECT_EQ(depth_defect(rig, cv::Mat(240, 320, CV_16UC1), {}), "");
+}
+
+TEST(DepthView, BadReadingsAreLeftOut) {
+  const Rig rig = depth_rig();
+  cv::Mat depth(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.0));
+  depth.at<float>(5, 5) = std::numeric_limits<float>::quiet_NaN();
+  depth.at<float>(15, 5) = std::numeric_limits<float>::infinity();
+  depth.at<float>(25, 5) = -1;
+  depth.at<float>(35, 5) = 0.01f;
+  depth.colRange(200, 320).setTo(2.0);
+  const DepthView view = make_depth_view(rig, depth, {});
+  for (const int y : {5, 15, 25, 35}) EXPECT_EQ(view.depth.at<float>(y, 5), 0);
+  EXPECT_EQ(view.depth.at<float>(5, 6), 1);
+  EXPECT_EQ(view.depth.at<float>(100, 199), 0);  // beside the jump
+  EXPECT_EQ(view.depth.at<float>(100, 200), 0);
+  EXPECT_EQ(view.depth.at<float>(100, 202), 2);
+  EXPECT_EQ(view.nearest.at<float>(100, 200), 1);
+  EXPECT_EQ(view.nearest.at<float>(6, 6), 0);  // a hole beside it
+}
+
+TEST(DepthView, NothingButHolesLeavesTheVolumeEmpty) {
+  const Rig rig = depth_rig();
+  for (const double z : {0.0, 60.0, std::numeric_limits<double>::quiet_NaN()}) {
+    SurfaceVolume volume(fine_options());
+    volume.fuse(make_depth_view(rig, cv::Mat(240, 320, CV_32FC1, cv::Scalar(z)), {}), SE3());
+    EXPECT_EQ(volume.blocks().size(), 0u);
+    EXPECT_TRUE(extract_mesh(volume).triangles.empty());
+  }
+}
+
+TEST(PackedDepth, GivesBackWhatItWasGiven) {
+  cv::Mat depth(48, 64, CV_16UC1);
+  std::mt19937 random(3);
+  for (int i = 0; i < static_cast<int>(depth.total()); ++i)
+    depth.at<std::uint16_t>(i) =
+        static_cast<std::uint16_t>(i % 7 == 0    ? 0
+                                   : i % 97 == 0 ? 65535
+                                                 : 1500 + static_cast<int>(random() % 9));
+  const PackedDepth packed(depth);
+  EXPECT_EQ(cv::norm(packed.unpacked(), depth, cv::NORM_INF), 0);
+  EXPECT_LT(packed.bytes(), 2 * depth.total());
+}
+
+TEST(StereoDepth, FindsTheDistanceOfAWall) {
+  Rig rig = depth_rig();
+  rig.kind = SensorKind::kStereo;
+  std::mt19937 random(4);
+  cv::Mat left(240, 320, CV_8UC1);
+  for (int i = 0; i < static_cast<int>(left.total()); ++i) left.at<std::uint8_t>(i) = random() % 256;
+  const int disparity = 16;  // z = 256 * 0.1 / 16 = 1.6 m
+  cv::Mat right(left.size(), CV_8UC1, cv::Scalar(0));
+  left.colRange(disparity, 320).copyTo(right.colRange(0, 320 - disparity));
+  const cv::Mat depth = stereo_depth(rig, left, right, 0.5);
+  int found = 0;
+  for (int y = 40; y < 200; ++y)
+    for (int x = 100; x < 280; ++x) found += std::abs(depth.at<std::uint16_t>(y, x) - 1600) < 20;
+  EXPECT_GT(found, 0.95 * 160 * 180);
+}
+
+}  // namespace
+}  // namespace twofold
