@@ -48,110 +48,127 @@ std::vector<Match> match_descriptors(const Rig& rig, const PlaceAppearance& a, c
   return matches;
 }
 
-/// Error of a measurement in units of the pixels of its level; infinite behind the camera.
-double squared_error(const Rig& rig, const Vector3& x, const Eigen::Vector3f& z, int level) {
+/// Error of a measurement in units of the pixels of its level, squared; infinite behind the camera.
+/// @param per_pixel  2^(-2 level)
+double squared_error(const Rig& rig, const Vector3& x, const Eigen::Vector3f& z, double per_pixel) {
   if (!in_front_of_camera(x)) return std::numeric_limits<double>::infinity();
   const Vector3 e = rig.project(x) - z.cast<double>();
   const double squared = rig.kind == SensorKind::kMono ? e.head<2>().squaredNorm() : e.squaredNorm();
-  return squared * std::ldexp(1.0, -2 * level);
+  return squared * per_pixel;
 }
+
+double per_squared_pixel(int level) {
+  return std::ldexp(1.0, -2 * level);
+}
+
+/// A similarity and its inverse, which each residual needs.
+struct TwoWaySimilarity {
+  explicit TwoWaySimilarity(const Sim3& S) : S_b_a(S), S_a_b(S.inverse()) {}
+  Sim3 S_b_a, S_a_b;
+};
 
 /// For geometry/ransac.hpp: S_b_a from three points known in both frames, of scale 1 unless there is one
 /// camera.
 class SimilarityEstimator {
  public:
-  using Model = Sim3;
+  using Model = TwoWaySimilarity;
   static constexpr int kSampleSize = 3;
 
   SimilarityEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                      const std::vector<Match>& matches, double max_stretch)
-      : rig_(rig), a_(a), b_(b), matches_(matches), max_stretch_(max_stretch) {
-    for (const Match& match : matches) x_b_.push_back(rig.unproject(z_b(match).cast<double>()));
+                      const std::vector<Match>& matches, const VerificationOptions& options)
+      : rig_(rig),
+        max_stretch_(options.max_stretch),
+        outlier_(options.ransac_error_px * options.ransac_error_px) {
+    for (const Match& match : matches) {
+      const auto i = static_cast<std::size_t>(match.corner);
+      const auto j = static_cast<std::size_t>(match.b);
+      pairs_.push_back({match.x_a, rig.unproject(b.z[j].cast<double>()), a.z[i], b.z[j],
+                        per_squared_pixel(a.corners[i].level), per_squared_pixel(b.corners[j].level)});
+    }
   }
 
-  [[nodiscard]] int size() const { return static_cast<int>(matches_.size()); }
+  [[nodiscard]] int size() const { return static_cast<int>(pairs_.size()); }
 
-  void fit(std::span<const int, 3> sample, std::vector<Sim3>& models) const {
+  void fit(std::span<const int, 3> sample, std::vector<Model>& models) const {
     const bool scale_known = rig_.kind != SensorKind::kMono;
     std::array<Vector3, 3> x_a, x_b;
     double scale = 1;  // of the first side
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto m = static_cast<std::size_t>(sample[k]);
-      const auto next = static_cast<std::size_t>(sample[(k + 1) % 3]);
-      x_a[k] = matches_[m].x_a;
-      x_b[k] = x_b_[m];
-      const double in_b = (x_b[k] - x_b_[next]).norm();
-      double in_a = (x_a[k] - matches_[next].x_a).norm();
+      const Pair& pair = pairs_[static_cast<std::size_t>(sample[k])];
+      const Pair& next = pairs_[static_cast<std::size_t>(sample[(k + 1) % 3])];
+      x_a[k] = pair.x_a;
+      x_b[k] = pair.x_b;
+      const double in_b = (pair.x_b - next.x_b).norm();
+      double in_a = (pair.x_a - next.x_a).norm();
       if (!scale_known && k == 0) scale = in_b / in_a;
       in_a *= scale;
       if (!(std::abs(in_a - in_b) <= max_stretch_ * std::max(in_a, in_b))) return;
     }
     if (scale_known) {
-      if (const auto T_b_a = align_rigid(x_b, x_a)) models.emplace_back(*T_b_a);
+      if (const auto T_b_a = align_rigid(x_b, x_a)) models.emplace_back(Sim3(*T_b_a));
     } else if (const auto S_b_a = align_similarity(x_b, x_a)) {
-      models.push_back(*S_b_a);
+      models.emplace_back(*S_b_a);
     }
   }
 
-  /// The larger of the errors in either view.
-  [[nodiscard]] double squared_residual(const Sim3& S_b_a, int i) const {
-    const auto m = static_cast<std::size_t>(i);
-    const Match& match = matches_[m];
-    const double in_b = squared_error(rig_, S_b_a * match.x_a, z_b(match), level(b_, match.b));
-    const double in_a = squared_error(rig_, S_b_a.inverse() * x_b_[m], z_a(match), level(a_, match.corner));
-    return std::max(in_a, in_b);
+  /// The larger of the errors in either view; of outliers, one that makes them such.
+  [[nodiscard]] double squared_residual(const Model& model, int i) const {
+    const Pair& pair = pairs_[static_cast<std::size_t>(i)];
+    const double in_b = squared_error(rig_, model.S_b_a * pair.x_a, pair.z_b, pair.per_pixel_b);
+    if (in_b > outlier_) return in_b;
+    return std::max(squared_error(rig_, model.S_a_b * pair.x_b, pair.z_a, pair.per_pixel_a), in_b);
   }
 
  private:
-  [[nodiscard]] const Eigen::Vector3f& z_a(const Match& m) const {
-    return a_.z[static_cast<std::size_t>(m.corner)];
-  }
-  [[nodiscard]] const Eigen::Vector3f& z_b(const Match& m) const {
-    return b_.z[static_cast<std::size_t>(m.b)];
-  }
-  static int level(const PlaceAppearance& view, int corner) {
-    return view.corners[static_cast<std::size_t>(corner)].level;
-  }
+  /// Of a match, both points, each in the frame of its own view, and both measurements.
+  struct Pair {
+    Vector3 x_a, x_b;
+    Eigen::Vector3f z_a, z_b;
+    double per_pixel_a = 1, per_pixel_b = 1;
+  };
 
   const Rig& rig_;
-  const PlaceAppearance& a_;
-  const PlaceAppearance& b_;
-  const std::vector<Match>& matches_;
   double max_stretch_;
-  std::vector<Vector3> x_b_;
+  double outlier_;
+  std::vector<Pair> pairs_;
 };
 
 /// The corners of a view from top to bottom, so that a search looks at a few rows only.
 class CornersByRow {
  public:
-  explicit CornersByRow(const std::vector<DescribedCorner>& corners) : corners_(corners) {
-    for (std::size_t j = 0; j < corners.size(); ++j) order_.push_back(static_cast<int>(j));
-    std::stable_sort(order_.begin(), order_.end(), [&](int i, int j) { return row(i) < row(j); });
-    for (const DescribedCorner& corner : corners) top_level_ = std::max(top_level_, int{corner.level});
+  explicit CornersByRow(const std::vector<DescribedCorner>& corners) {
+    for (std::size_t j = 0; j < corners.size(); ++j) {
+      const double pixel = std::ldexp(1.0, corners[j].level);
+      entries_.push_back({corners[j].uv.cast<double>(), pixel, static_cast<int>(j), &corners[j].descriptor});
+      largest_pixel_ = std::max(largest_pixel_, pixel);
+    }
+    std::stable_sort(entries_.begin(), entries_.end(),
+                     [](const Entry& a, const Entry& b) { return a.uv.y() < b.uv.y(); });
   }
 
   /// The corner most like `descriptor` within `radius_px` pixels of its own level around uv.
   [[nodiscard]] NearestDescriptor nearest(const Vector2& uv, const BinaryDescriptor& descriptor,
                                           double radius_px) const {
-    const double widest = std::ldexp(radius_px, top_level_);
-    const auto from =
-        std::partition_point(order_.begin(), order_.end(), [&](int j) { return row(j) < uv.y() - widest; });
+    const double widest = radius_px * largest_pixel_;
+    auto entry = std::partition_point(entries_.begin(), entries_.end(),
+                                      [&](const Entry& e) { return e.uv.y() < uv.y() - widest; });
     NearestDescriptor nearest;
-    for (auto it = from; it != order_.end() && row(*it) <= uv.y() + widest; ++it) {
-      const DescribedCorner& corner = corners_[static_cast<std::size_t>(*it)];
-      const double radius = std::ldexp(radius_px, corner.level);
-      if ((corner.uv.cast<double>() - uv).cwiseAbs().maxCoeff() > radius) continue;
-      nearest.offer(*it, hamming_distance(descriptor, corner.descriptor));
+    for (; entry != entries_.end() && entry->uv.y() <= uv.y() + widest; ++entry) {
+      if ((entry->uv - uv).cwiseAbs().maxCoeff() > radius_px * entry->pixel) continue;
+      nearest.offer(entry->corner, hamming_distance(descriptor, *entry->descriptor));
     }
     return nearest;
   }
 
  private:
-  [[nodiscard]] double row(int j) const { return corners_[static_cast<std::size_t>(j)].uv.y(); }
-
-  const std::vector<DescribedCorner>& corners_;
-  std::vector<int> order_;
-  int top_level_ = 0;
+  struct Entry {
+    Vector2 uv;
+    double pixel = 1;  ///< of its level, in those of level 0
+    int corner = 0;
+    const BinaryDescriptor* descriptor = nullptr;
+  };
+  std::vector<Entry> entries_;
+  double largest_pixel_ = 1;
 };
 
 /// Best partner in b, near to where T_b_a says, of each corner of the place that has depth; a corner of b
@@ -206,7 +223,7 @@ std::vector<Match> keep_inliers(const Rig& rig, const PlaceAppearance& b, const 
     if (!std::isfinite(z_b.z()) && in_front_of_camera(x_b))
       z_b.z() = static_cast<float>(rig.project(x_b).z());
     const double bound = options.max_error_px * options.max_error_px;
-    if (squared_error(rig, x_b, z_b, b.corners[j].level) <= bound) kept.push_back(match);
+    if (squared_error(rig, x_b, z_b, per_squared_pixel(b.corners[j].level)) <= bound) kept.push_back(match);
   }
   return kept;
 }
@@ -276,7 +293,7 @@ std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, con
   const std::vector<Match> matches = match_descriptors(rig, a, b, options, depth_in_b);
   report.matches = static_cast<int>(matches.size());
   if (!depth_in_b) return pose_by_directions(rig, b, matches, options, report);
-  const SimilarityEstimator estimator(rig, a, b, matches, options.max_stretch);
+  const SimilarityEstimator estimator(rig, a, b, matches, options);
   const auto found = ransac(estimator, RansacOptions{.threshold = options.ransac_error_px,
                                                      .max_iterations = options.max_iterations});
   if (!found) return std::nullopt;
@@ -284,7 +301,7 @@ std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, con
   if (report.ransac_inliers < options.min_hypothesis) return std::nullopt;
   std::vector<Match> inliers;
   for (const int i : found->inliers) inliers.push_back(matches[static_cast<std::size_t>(i)]);
-  return refine(rig, b, inliers, found->model.without_scale());
+  return refine(rig, b, inliers, found->model.S_b_a.without_scale());
 }
 
 /// Median ratio of the depths that b has to those that the place gives it; 1 unless there is one camera.
