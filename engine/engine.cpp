@@ -45,8 +45,9 @@ LatencyHistogram exposure_to_pose(const RunResult& result) {
 void expect_valid(const Rig& rig, const EngineOptions& options) {
   if (const std::string reason = options.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
   if (options.map) {
-    if (const std::string difference = rig_difference(rig, options.map->rig); !difference.empty())
-      throw std::runtime_error("the map was made with another camera: " + difference);
+    const std::string difference = options.localise_only ? localisation_difference(rig, options.map->rig)
+                                                         : rig_difference(rig, options.map->rig);
+    if (!difference.empty()) throw std::runtime_error("the map was made with another camera: " + difference);
     if (rig.kind != options.map->rig.kind && !options.localise_only)
       throw std::runtime_error("one camera can only be localised in the map of a stereo or RGB-D rig");
     if (!options.vocabulary)

@@ -204,7 +204,10 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
   pose_graph_stage_ = times_.add_stage("pose graph");
   relocalise_stage_ = times_.add_stage("relocalisation");
   if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
-  if (closer_ && options.map) closer_->continue_from(options.map->places);
+  if (closer_ && options.map) {
+    const bool same_pixels = rig_difference(rig, options.map->rig).empty();
+    closer_->continue_from(same_pixels ? options.map->places : places_seen_by(rig.camera, *options.map));
+  }
   if (closer_ && on_places_) on_places_(closer_->places());
 }
 

@@ -62,4 +62,13 @@ inline void save_map(const std::filesystem::path& file, const SavedMap& map) {
 /// is 0.12, the map's is 0.11". Depth unit and range are the source's own affair: the map is in metres.
 [[nodiscard]] std::string rig_difference(const Rig& rig, const Rig& map_rig);
 
+/// The same for a camera that is only localised in the map. One camera may have another centre and another
+/// field of view then: what it takes is that a pixel covers the same angle, to a few per cent, because points
+/// are found by how they looked. (ResampledSource makes it so.)
+[[nodiscard]] std::string localisation_difference(const Rig& rig, const Rig& map_rig);
+
+/// The places of a map as another camera would have seen them: the same corners at its pixels, depths of
+/// stereo rigs left out.
+[[nodiscard]] KeyframeDatabase places_seen_by(const PinholeCamera& camera, const SavedMap& map);
+
 }  // namespace twofold

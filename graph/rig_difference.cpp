@@ -9,6 +9,7 @@ namespace {
 
 // The same calibration, read twice or through a text file.
 constexpr double kSame = 1e-6;
+constexpr double kSameScale = 0.03;  // of the focal lengths: patches are found at that
 
 const char* name_of(SensorKind kind) {
   return kind == SensorKind::kStereo ? "stereo" : kind == SensorKind::kRgbd ? "RGB-D" : "a single camera";
@@ -45,6 +46,29 @@ std::string rig_difference(const Rig& rig, const Rig& map_rig) {
     return text.data();
   }
   return "";
+}
+
+std::string localisation_difference(const Rig& rig, const Rig& map_rig) {
+  if (rig.kind != SensorKind::kMono) return rig_difference(rig, map_rig);
+  const PinholeCamera &a = rig.camera, &b = map_rig.camera;
+  if (std::abs(a.fx / b.fx - 1) <= kSameScale && std::abs(a.fy / b.fy - 1) <= kSameScale) return "";
+  std::array<char, 128> text;
+  std::snprintf(text.data(), text.size(), "focal lengths are %.5g and %.5g, the map's are %.5g and %.5g",
+                a.fx, a.fy, b.fx, b.fy);
+  return text.data();
+}
+
+KeyframeDatabase places_seen_by(const PinholeCamera& camera, const SavedMap& map) {
+  KeyframeDatabase places;
+  for (std::uint32_t k = 0; k < map.places.size(); ++k) {
+    const PlaceAppearance* place = map.places.find(KeyframeId{k});
+    if (place == nullptr) continue;
+    PlaceAppearance seen{place->corners, {}};
+    for (DescribedCorner& corner : seen.corners)
+      corner.uv = camera.project(map.rig.camera.unproject(corner.uv.cast<double>())).cast<float>();
+    places.set(KeyframeId{k}, std::move(seen));
+  }
+  return places;
 }
 
 }  // namespace twofold

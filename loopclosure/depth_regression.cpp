@@ -18,8 +18,9 @@ void DepthRegression::learn(const GraphSnapshot& graph, KeyframeId k) {
   samples_.clear();
   const Keyframe& keyframe = graph.keyframe(k);
   for (const Observation& observation : *keyframe.observations) {
-    const double depth = (keyframe.T_k_w * graph.position(observation.point)).z();
-    if (depth > 0) samples_.push_back({observation.z.head<2>().cast<double>(), 1 / depth});
+    // Where it should be, not where it was measured: a map may have been made with another camera.
+    const Vector3 x_k = keyframe.T_k_w * graph.position(observation.point);
+    if (x_k.z() > 0) samples_.push_back({camera_.project(x_k), 1 / x_k.z()});
   }
 }
 

@@ -9,7 +9,7 @@
 namespace twofold::synthetic {
 namespace {
 
-constexpr double kSpeed = 3;     ///< [m/s], a bicycle's
+constexpr double kSpeed = 2;     ///< [m/s]
 constexpr double kTexel = 0.03;  ///< of houses
 constexpr double kSpacing = 5;   ///< of the way's control points [m]
 constexpr double kAside = 7;     ///< of houses and trees from the way [m]
@@ -96,7 +96,8 @@ Staging make_campus(std::uint64_t seed) {
   const std::vector<Vector2> way = whole_way();
   line_the_way(staging.scene, random, way);
   Canvas ground(2 * kGround, 2 * kGround, 0.06, 125);
-  ground.add_noise(random.word(), 45, 2.4, 0.12, 0.9f);
+  ground.add_noise(random.word(), 40, 2.4, 0.12, 0.9f);
+  scatter_specks(ground, random, 1.2, 0.07, 0.3, 60);
   staging.scene.quads.push_back({{-kGround, kGround, 0},
                                  Vector3::UnitX(),
                                  -Vector3::UnitY(),

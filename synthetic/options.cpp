@@ -69,7 +69,7 @@ SyntheticOptions default_options(const std::string& scene) {
     options.fps = 15;
     options.rounds = scene == "cloister" ? 1.3 : 1;
   }
-  if (scene == "cloister") options.f_error = 0.04;
+  if (scene == "cloister") options.f_error = -0.1;
   return options;
 }
 

@@ -6,6 +6,7 @@
 
 #include "graph/part_extraction.hpp"
 #include "io/files/io_error.hpp"
+#include "io/sources/resampled_source.hpp"
 
 namespace twofold {
 namespace {
@@ -59,10 +60,18 @@ void apply_map_options(const MapArguments& arguments, EngineOptions& options) {
   options.map = std::move(map);
 }
 
+std::unique_ptr<FrameSource> resampled_for_map(std::unique_ptr<FrameSource> source,
+                                               const EngineOptions& options) {
+  if (!options.map || !options.localise_only || source->rig().kind != SensorKind::kMono) return source;
+  if (rig_difference(source->rig(), options.map->rig).empty()) return source;
+  return std::make_unique<ResampledSource>(std::move(source), options.map->rig.camera);
+}
+
 void expect_rig_of_map(const MapArguments& arguments, const std::string& source, const Rig& rig,
                        const EngineOptions& options) {
   if (!options.map) return;
-  const std::string difference = rig_difference(rig, options.map->rig);
+  const std::string difference = options.localise_only ? localisation_difference(rig, options.map->rig)
+                                                       : rig_difference(rig, options.map->rig);
   if (difference.empty() && rig.kind != options.map->rig.kind && !options.localise_only)
     throw IoError(arguments.load, "is a stereo or RGB-D rig's: one camera needs --localise-only in it");
   if (difference.empty()) return;

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "engine/options.hpp"
 #include "engine/result.hpp"
 #include "graph/map_file.hpp"
+#include "io/sources/frame_source.hpp"
 
 namespace twofold {
 
@@ -26,6 +28,11 @@ void add_map_options(CLI::App& command, MapArguments& arguments);
 /// Loads the map and sets what the engine must know. Throws IoError for options that make no sense together,
 /// files that are no maps, and maps in which no camera can find itself.
 void apply_map_options(const MapArguments& arguments, EngineOptions& options);
+
+/// The source itself, or, when its one camera is to be localised in a map of another one, its images at the
+/// angular resolution of that.
+[[nodiscard]] std::unique_ptr<FrameSource> resampled_for_map(std::unique_ptr<FrameSource> source,
+                                                             const EngineOptions& options);
 
 /// Throws IoError when `rig`, that of `source`, cannot be used in the loaded map.
 void expect_rig_of_map(const MapArguments& arguments, const std::string& source, const Rig& rig,

@@ -139,6 +139,7 @@ int run(const RunArguments& arguments) {
     options.pacing.live = true;
     if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
   }
+  source = resampled_for_map(std::move(source), options);
   expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
   options.logs.folder = arguments.out;
   remove_results(arguments.out);

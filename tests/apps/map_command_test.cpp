@@ -71,6 +71,26 @@ TEST_F(MapCommand, LocalisingLeavesTheMapAndSaysWhereItBegan) {
   EXPECT_EQ(json["mapper_rounds"], 0);
 }
 
+/// Another lens and another number of pixels; poses in metres, because the map is.
+TEST_F(MapCommand, AnotherCameraIsLocalisedInIt) {
+  for (const char* lens : {"width=480&height=300&f=300", "width=288&height=216&f=170"}) {
+    const Outcome outcome = run_in_map("--deterministic --localise-only --camera mono",
+                                       "'synthetic:desk?frames=60&" + std::string(lens) + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_GE(summary()["tracked"], 57) << lens;
+    EXPECT_EQ(summary()["scale"], "metric");
+    const Outcome eval =
+        run(folder_, "eval '" + (folder_ / "result/trajectory.txt") + "' '" +
+                         (folder_ / "result/groundtruth.txt") + "' --json '" + (folder_ / "eval.json") + "'");
+    ASSERT_EQ(eval.exit_code, 0) << eval.err;
+    const auto json = nlohmann::json::parse(content(folder_ / "eval.json"));
+    EXPECT_LT(json["ate_m"]["rmse"], 0.01) << lens;
+  }
+  expect_bad_input(run_in_map("--localise-only", "'synthetic:desk?frames=6'"), "images are 640x480");
+  expect_bad_input(run_in_map("--localise-only --camera mono", "'synthetic:desk?frames=6&f=2000'"),
+                   "focal length");
+}
+
 TEST_F(MapCommand, GoingOnTwiceGivesTheSameBytes) {
   std::string maps[2];
   for (int i = 0; i < 2; ++i) {

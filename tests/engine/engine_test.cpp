@@ -106,13 +106,19 @@ TEST(Engine, OneCameraIsFollowedUpToScale) {
     EngineOptions options;
     options.deterministic = deterministic;
     const std::atomic<bool> interrupted{false};
-    const FrameFeed feed = [&, next = std::size_t{0}](Frame& frame) mutable {
-      if (next == frames.size()) return FeedStatus::kEnd;
-      frame = frames[next++];
-      return FeedStatus::kFrame;
+    const auto feed = [&]() -> FrameFeed {
+      return [&, next = std::size_t{0}](Frame& frame) mutable {
+        if (next == frames.size()) return FeedStatus::kEnd;
+        frame = frames[next++];
+        return FeedStatus::kFrame;
+      };
     };
-    const RunResult result = Engine(rig, options).run(feed, interrupted);
+    const RunResult result = Engine(rig, options).run(feed(), interrupted);
     EXPECT_EQ(result.error, "");
+    if (!deterministic) {
+      const Schedule schedule = testing::schedule_of(result);
+      testing::expect_same(result, Engine(rig, options).replay(feed(), schedule, interrupted));
+    }
     std::vector<Vector3> estimated, truth;
     int placed_later = 0;
     for (const FrameRecord& record : result.frames) {

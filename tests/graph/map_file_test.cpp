@@ -315,6 +315,31 @@ TEST_F(MapFileTest, RigsThatDifferAreTold) {
   EXPECT_EQ(rig_difference(other, rig), "");
 }
 
+TEST_F(MapFileTest, OneCameraOfAnotherSensorIsLocalisedAtTheSameAngularResolution) {
+  const SavedMap map = sample_map(6, 40, 3);
+  Rig other = map.rig;
+  other.kind = SensorKind::kMono;
+  other.camera.width = 500;
+  other.camera.cx += 31;
+  other.camera.fx *= 1.01;
+  EXPECT_EQ(localisation_difference(other, map.rig), "");
+  EXPECT_NE(rig_difference(other, map.rig), "");
+  const KeyframeDatabase seen = places_seen_by(other.camera, map);
+  ASSERT_EQ(seen.size(), map.places.size());
+  for (std::uint32_t k = 0; k < seen.size(); ++k) {
+    const PlaceAppearance *a = map.places.find(KeyframeId{k}), *b = seen.find(KeyframeId{k});
+    ASSERT_EQ(a == nullptr, b == nullptr);
+    for (std::size_t n = 0; a != nullptr && n < a->corners.size(); ++n) {
+      const Vector3 ray = map.rig.camera.unproject(a->corners[n].uv.cast<double>());
+      EXPECT_LT((other.camera.unproject(b->corners[n].uv.cast<double>()) - ray).norm(), 1e-5);
+    }
+  }
+  other.camera.fx *= 1.05;
+  EXPECT_NE(localisation_difference(other, map.rig), "");
+  other.kind = map.rig.kind;
+  EXPECT_EQ(localisation_difference(other, map.rig), rig_difference(other, map.rig));
+}
+
 TEST_F(MapFileTest, AFullDiskLeavesTheOldMap) {
   const SavedMap old = sample_map(10, 40, 8);
   save_map(file_, old);

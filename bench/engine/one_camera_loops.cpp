@@ -1,0 +1,130 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/core.h>
+#include <opencv2/core.hpp>
+
+#include "engine/engine.hpp"
+#include "evaluation/evaluation.hpp"
+#include "io/plots/plot.hpp"
+#include "io/sources/open_source.hpp"
+#include "loopclosure/default_vocabulary.hpp"
+
+// One camera round a loop, its scale drift corrected over Sim(3), and the same run with its loops closed over
+// SE(3): a table, and both paths from above side by side  (thesis 5.4, fig. 5.3).
+
+namespace twofold {
+namespace {
+
+struct ClosedRun {
+  RunResult result;
+  Trajectory poses, causal;
+};
+
+FrameFeed feed_from(FrameSource& source) {
+  return [&](Frame& frame) {
+    const FrameStatus status = source.next(frame);
+    if (status == FrameStatus::kFrame) return FeedStatus::kFrame;
+    return status == FrameStatus::kEnd ? FeedStatus::kEnd : FeedStatus::kError;
+  };
+}
+
+ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
+  SourceOptions source_options;
+  source_options.left_only = true;
+  const auto source = open_source(text, source_options);
+  truth = source->ground_truth();
+  EngineOptions options;
+  options.deterministic = true;
+  options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  options.mapper.scale_drifts = over_sim3;
+  const std::atomic<bool> interrupted{false};
+  ClosedRun run{Engine(source->rig(), options).run(feed_from(*source), interrupted), {}, {}};
+  if (!run.result.error.empty()) throw std::runtime_error(run.result.error);
+  for (const FrameRecord& record : run.result.frames) {
+    if (!has_final_pose(record) || !run.result.graph.contains(record.reference)) continue;
+    run.poses.push_back({record.t_ns, final_T_c_w(record, run.result.graph).inverse()});
+    if (record.state == FrameState::kTracked)
+      run.causal.push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
+  }
+  return run;
+}
+
+std::optional<Evaluation> line(const char* name, const Trajectory& poses, const Trajectory& truth) {
+  auto evaluation = evaluate(associate(poses, truth, 10'000'000), {.alignment = Alignment::kSim3});
+  if (!evaluation) {
+    fmt::print("{:<22} {}\n", name, evaluation.error());
+    return std::nullopt;
+  }
+  const auto halves = evaluation->half_scales.value_or(std::array<double, 2>{0, 0});
+  fmt::print("{:<22} {:9.4f} {:9.4f} {:9.2f} {:9.2f}\n", name, evaluation->absolute.rmse,
+             100 * evaluation->absolute.rmse / evaluation->path_length,
+             evaluation->absolute_rotation_deg.rmse, 100 * std::abs(halves[0] / halves[1] - 1));
+  return *std::move(evaluation);
+}
+
+void print_loops(const RunResult& result) {
+  for (const ClosedLoop& loop : result.loops) {
+    const SE3 drift = loop.constraint.T_to_from * loop.T_to_from_before.inverse();
+    fmt::print("  loop of keyframes {} and {}: scale {:.4f}, drift {:.2f} % of the way, {:.2f} degrees\n",
+               index(loop.constraint.from), index(loop.constraint.to), loop.constraint.scale,
+               100 * drift.translation().norm() / std::max(loop.travelled, 1e-9),
+               drift.so3().log().norm() * 57.29578);
+  }
+}
+
+cv::Mat picture(const char* name, const Evaluation& evaluation, const Trajectory& truth) {
+  PlotOptions plot;
+  plot.title = fmt::format("loops closed over {}", name);
+  plot.subtitle = fmt::format("ATE {:.3f} m", evaluation.absolute.rmse);
+  plot.up_axis = up_axis_of(truth);
+  Trajectory poses;
+  for (const PosePair& pair : evaluation.pairs) poses.push_back({pair.t_ns, pair.T_e_c});
+  return draw_top_down({{"ground truth", positions(truth), plot_colours::kTruth, 4, {}},
+                        {name, positions(poses), plot_colours::kFinal, 2, {}}},
+                       plot);
+}
+
+void compare(const std::string& source, const std::string& file) {
+  Trajectory truth;
+  const ClosedRun over_sim3 = run(source, true, truth), over_se3 = run(source, false, truth);
+  print_loops(over_sim3.result);
+  fmt::print("{:<22} {:>9} {:>9} {:>9} {:>9}\n", source.substr(0, 22), "ATE m", "% of path", "degrees",
+             "halves %");
+  (void)line("as it was known", over_sim3.causal, truth);
+  const auto sim3 = line("closed over Sim(3)", over_sim3.poses, truth);
+  const auto se3 = line("closed over SE(3)", over_se3.poses, truth);
+  if (!sim3 || !se3) return;
+  fmt::print("SE(3) / Sim(3): {:.2f}\n", se3->absolute.rmse / sim3->absolute.rmse);
+  if (file.empty()) return;
+  cv::Mat both;
+  cv::Mat left = picture("SE(3)", *se3, truth), right = picture("Sim(3)", *sim3, truth);
+  const int rows = std::max(left.rows, right.rows);
+  for (cv::Mat* image : {&left, &right})
+    cv::copyMakeBorder(*image, *image, 0, rows - image->rows, 0, 0, cv::BORDER_CONSTANT, {255, 255, 255});
+  cv::hconcat(left, right, both);
+  write_png(file, both);
+}
+
+}  // namespace
+}  // namespace twofold
+
+int main(int argc, char** argv) {
+  std::string source = "synthetic:cloister", picture;
+  CLI::App app("One camera's loops closed over Sim(3) and over SE(3)");
+  app.add_option("source", source, "a source with ground truth");
+  app.add_option("--picture", picture, "PNG file: both paths side by side");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    twofold::compare(source, picture);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 1;
+  }
+  return 0;
+}
