@@ -153,13 +153,14 @@ int run(const RunArguments& arguments) {
   poses.finish();
   view.finish();
   result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+  const std::vector<MapPart> parts = map_parts(result, options);
   std::vector<std::string> maps;
   if (!arguments.map.save.empty()) {
-    maps = save_parts(arguments.map.save, source->rig(), result, map_parts(result, options));
+    maps = save_parts(arguments.map.save, source->rig(), result, parts);
   }
-  write_run_output(arguments.out, arguments.source, *source, options, result);
+  write_run_output(arguments.out, arguments.source, *source, options, result, parts);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
-  print_summary(arguments.out, options, result);
+  print_summary(arguments.out, options, result, parts);
   if (scale_is_arbitrary(source->rig(), options))
     fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");
   for (const std::string& map : maps) fmt::print("map in      {}\n", map);

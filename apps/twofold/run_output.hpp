@@ -2,7 +2,9 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include "apps/twofold/map_parts.hpp"
 #include "engine/options.hpp"
 #include "engine/result.hpp"
 #include "io/sources/frame_source.hpp"
@@ -14,7 +16,8 @@ namespace twofold {
 /// (schedule.log is there already: RunLogs); trajectory, keyframes and map of parts that never joined the
 /// first (map_parts) as trajectory-2.txt and so on. Throws IoError when it cannot.
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
-                      const FrameSource& source, const EngineOptions& options, const RunResult& result);
+                      const FrameSource& source, const EngineOptions& options, const RunResult& result,
+                      const std::vector<MapPart>& parts);
 
 /// Of an earlier run into the folder, what is written at the end only: should this run be killed, its folder
 /// holds nothing of another one's.
@@ -25,7 +28,7 @@ void write_trace(const std::filesystem::path& file, const RunResult& result);
 
 /// What a person wants to know, on standard output.
 void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
-                   const RunResult& result);
+                   const RunResult& result, const std::vector<MapPart>& parts);
 
 /// One camera does not show how long a metre is, unless it is localised in a map that a stereo or RGB-D rig
 /// made.
