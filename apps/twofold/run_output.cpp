@@ -132,8 +132,8 @@ std::string durations(const LatencyHistogram& h) {
 
 }  // namespace
 
-void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
-                   const RunResult& result, const std::vector<MapPart>& parts) {
+void print_summary(const std::filesystem::path& folder, const EngineOptions& options, const RunResult& result,
+                   const std::vector<MapPart>& parts) {
   const FrameCounts& counts = result.counts;
   fmt::print("frames      {} ({} tracked, {} lost, {} dropped){}\n", counts.frames, counts.tracked,
              counts.lost, counts.dropped, result.interrupted ? ", interrupted" : "");
