@@ -108,10 +108,10 @@ FrameFeed feed_from(FrameSource& source, LiveView& view, LiveSurface& surface) {
   };
 }
 
-SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surface,
-                                  const EngineOptions& options, const RunResult& result) {
+SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surface, const GraphSnapshot& graph,
+                                  KeyframeId part) {
   SurfaceFigures figures;
-  const TriangleMesh mesh = surface.finish(result.graph, map_parts(result, options).front().id, figures);
+  const TriangleMesh mesh = surface.finish(graph, part, figures);
   write_surface(folder, mesh);
   return figures;
 }
@@ -166,16 +166,17 @@ int run(const RunArguments& arguments) {
   poses.finish();
   view.finish();
   result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+  const std::vector<MapPart> parts = map_parts(result, options);
   std::vector<std::string> maps;
   if (!arguments.map.save.empty()) {
-    maps = save_parts(arguments.map.save, source->rig(), result, map_parts(result, options));
+    maps = save_parts(arguments.map.save, source->rig(), result, parts);
   }
   std::optional<SurfaceFigures> figures;
-  if (surface.wanted()) figures = write_live_surface(arguments.out, surface, options, result);
-  write_run_output(arguments.out, arguments.source, *source, options, result,
+  if (surface.wanted()) figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id);
+  write_run_output(arguments.out, arguments.source, *source, options, result, parts,
                    figures ? surface_json(*figures) : nullptr);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
-  print_summary(arguments.out, options, result);
+  print_summary(arguments.out, options, result, parts);
   if (figures) print_surface(*figures);
   if (scale_is_arbitrary(source->rig(), options))
     fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");

@@ -10,7 +10,6 @@
 #include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
-#include "apps/twofold/map_parts.hpp"
 #include "apps/twofold/run_summary.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
@@ -48,14 +47,23 @@ void remove_part_files(const std::filesystem::path& folder, std::size_t parts) {
   }
 }
 
+/// At most so many poses as a picture can show, from all over the trajectory.
+Trajectory thinned(const Trajectory& poses) {
+  constexpr std::size_t kMost = 100'000;
+  const std::size_t step = 1 + poses.size() / kMost;
+  Trajectory some;
+  for (std::size_t i = 0; i < poses.size(); i += step) some.push_back(poses[i]);
+  return some;
+}
+
 /// The run and the truth from above; without truth, the run alone.
 cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
                  const Trajectory& causal_poses, const Trajectory& truth, Alignment alignment) {
   PlotOptions plot;
   plot.title = source_text;
   plot.subtitle = fmt::format("{} poses", final_poses.size());
-  Trajectory shown = final_poses;
-  Trajectory shown_causal = causal_poses;
+  Trajectory shown = thinned(final_poses);
+  Trajectory shown_causal = thinned(causal_poses);
   const auto pairs = associate(final_poses, truth, 10'000'000);
   if (const auto evaluation = evaluate(pairs, {.alignment = alignment})) {
     for (auto& pose : shown) pose.T_w_c = aligned_pose(evaluation->S_w_e, pose.T_w_c);
@@ -75,8 +83,7 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
 
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
                       const FrameSource& source, const EngineOptions& options, const RunResult& result,
-                      const nlohmann::ordered_json& surface) {
-  const std::vector<MapPart> parts = map_parts(result, options);
+                      const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface) {
   const Trajectory& final_poses = parts.front().trajectory;
   const Trajectory causal_poses = causal_trajectory(result);
   write_tum_trajectory(folder / "trajectory.txt", final_poses);
@@ -106,8 +113,9 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
 
 void remove_results(const std::filesystem::path& folder) {
   std::error_code error;
-  for (const char* file : {"trajectory.txt", "keyframes.txt", "edges.txt", "map.ply", "groundtruth.txt",
-                           "timing.json", "summary.json", "loop_latency.txt", "trajectory.png"})
+  for (const char* file :
+       {"trajectory.txt", "keyframes.txt", "edges.txt", "map.ply", "groundtruth.txt", "timing.json",
+        "summary.json", "loop_latency.txt", "trajectory.png", "surface.ply", "surface.glb"})
     std::filesystem::remove(folder / file, error);
   remove_part_files(folder, 1);
 }
@@ -148,8 +156,8 @@ void print_loops(const RunResult& result) {
 
 }  // namespace
 
-void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
-                   const RunResult& result) {
+void print_summary(const std::filesystem::path& folder, const EngineOptions& options, const RunResult& result,
+                   const std::vector<MapPart>& parts) {
   const FrameCounts& counts = result.counts;
   const std::string later =
       counts.placed_later > 0 ? fmt::format("{} placed later, ", counts.placed_later) : "";
@@ -169,7 +177,7 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
     fmt::print("checkpoints {} saved, the slowest in {:.0f} ms{}{}\n", c.saved,
                static_cast<double>(c.longest_ns) * 1e-6, c.error.empty() ? "" : "; one failed: ", c.error);
   }
-  for (const std::vector<MapPart> parts = map_parts(result, options); const MapPart& part : parts) {
+  for (const MapPart& part : parts) {
     if (parts.size() == 1) break;
     fmt::print("map part    {} keyframes, {} frames, first keyframe {}\n", part.keyframes,
                part.trajectory.size(), index(part.id));

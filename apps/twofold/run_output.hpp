@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
+#include "apps/twofold/map_parts.hpp"
 #include "engine/options.hpp"
 #include "engine/result.hpp"
 #include "io/sources/frame_source.hpp"
@@ -17,7 +19,7 @@ namespace twofold {
 /// @param surface  what summary.json says of the surface; null: there is none
 void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
                       const FrameSource& source, const EngineOptions& options, const RunResult& result,
-                      const nlohmann::ordered_json& surface = nullptr);
+                      const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface = nullptr);
 
 /// Of an earlier run into the folder, what is written at the end only: should this run be killed, its folder
 /// holds nothing of another one's.
@@ -27,8 +29,8 @@ void remove_results(const std::filesystem::path& folder);
 void write_trace(const std::filesystem::path& file, const RunResult& result);
 
 /// What a person wants to know, on standard output.
-void print_summary(const std::filesystem::path& folder, const EngineOptions& options,
-                   const RunResult& result);
+void print_summary(const std::filesystem::path& folder, const EngineOptions& options, const RunResult& result,
+                   const std::vector<MapPart>& parts);
 
 /// One camera does not show how long a metre is, unless it is localised in a map that a stereo or RGB-D rig
 /// made.

@@ -2,20 +2,29 @@
 
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <string>
+#include <utility>
 
 #include "io/files/io_error.hpp"
 
 namespace twofold {
 
-void write_file(const std::filesystem::path& file, std::string_view content) {
+OutputFile::OutputFile(std::filesystem::path file) : file_(std::move(file)) {
   errno = 0;
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  stream.write(content.data(), static_cast<std::streamsize>(content.size()));
-  stream.close();  // a full disk may only show when the last buffer is flushed
-  if (!stream)
-    throw IoError(file, std::string("cannot be written: ") + std::strerror(errno != 0 ? errno : EIO));
+  stream_.open(file_, std::ios::binary | std::ios::trunc);
+  if (!stream_) close();
+}
+
+void OutputFile::close() {
+  stream_.close();  // a full disk may only show when the last buffer is flushed
+  if (!stream_)
+    throw IoError(file_, std::string("cannot be written: ") + std::strerror(errno != 0 ? errno : EIO));
+}
+
+void write_file(const std::filesystem::path& file, std::string_view content) {
+  OutputFile output(file);
+  output.write(content);
+  output.close();
 }
 
 void prepare_output_folder(const std::filesystem::path& folder) {

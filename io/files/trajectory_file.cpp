@@ -124,9 +124,10 @@ Trajectory read_trajectory(const fs::path& file) {
 }
 
 void write_tum_trajectory(const fs::path& file, const Trajectory& trajectory) {
-  std::string text(kTumHeader);
-  for (const TimedPose& pose : trajectory) text += tum_line(pose);
-  write_file(file, text);
+  OutputFile output(file);
+  output.write(kTumHeader);
+  for (const TimedPose& pose : trajectory) output.write(tum_line(pose));
+  output.close();
 }
 
 void write_kitti_trajectory(const fs::path& file, const Trajectory& trajectory) {
