@@ -35,6 +35,15 @@ Trajectory causal_trajectory(const RunResult& result) {
   return most == parts.end() ? Trajectory() : std::move(most->second);
 }
 
+/// The run has written the file as it went: at no time is there none.
+void replace_causal_trajectory(const std::filesystem::path& file, const Trajectory& poses) {
+  const std::filesystem::path beside = file.string() + ".new";
+  write_tum_trajectory(beside, poses);
+  std::error_code error;
+  std::filesystem::rename(beside, file, error);
+  if (error) throw IoError(file, "cannot be written: " + error.message());
+}
+
 /// Of an earlier run into the same folder, which had more parts.
 void remove_part_files(const std::filesystem::path& folder, std::size_t parts) {
   const auto remove = [&](const char* stem, std::size_t n, const char* extension) {
@@ -87,7 +96,7 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   const Trajectory& final_poses = parts.front().trajectory;
   const Trajectory causal_poses = causal_trajectory(result);
   write_tum_trajectory(folder / "trajectory.txt", final_poses);
-  write_tum_trajectory(folder / "trajectory_causal.txt", causal_poses);
+  replace_causal_trajectory(folder / "trajectory_causal.txt", causal_poses);
   remove_part_files(folder, parts.size());
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (n > 0) write_tum_trajectory(folder / part_file("trajectory", n, ".txt"), parts[n].trajectory);
