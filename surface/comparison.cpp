@@ -4,6 +4,8 @@
 #include <cmath>
 #include <span>
 
+#include <Eigen/Cholesky>
+
 #include "geometry/check.hpp"
 #include "surface/triangle_grid.hpp"
 
@@ -39,6 +41,34 @@ DistanceStatistics statistics(const std::vector<SurfaceSample>& samples, const T
 }
 
 }  // namespace
+
+SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMesh& truth, double reach) {
+  constexpr int kSteps = 30;
+  constexpr float kSpacing = 0.03f;     // of the points [m]
+  constexpr double kLeastReach = 0.02;  // in the end [m]
+  const TriangleGrid surface(truth, static_cast<float>(reach));
+  const std::vector<SurfaceSample> samples = sample_surface(estimate, kSpacing);
+  SE3 T = T_w_e;
+  double within = reach;
+  for (int step = 0; step < kSteps; ++step) {
+    Matrix6 H = 1e-9 * Matrix6::Identity();
+    Vector6 g = Vector6::Zero();
+    for (const SurfaceSample& sample : samples) {
+      const Vector3 x = T * Vector3(sample.position.cast<double>());
+      const auto plane = surface.nearest_plane(x.cast<float>());
+      if (!plane || plane->distance > within) continue;
+      const Vector3 n = plane->normal.cast<double>();
+      Vector6 J;  // of n . x by (v, omega), left perturbation
+      J << n, x.cross(n);
+      H += J * J.transpose();
+      g += J * (n.dot(x) - plane->offset);
+    }
+    const Vector6 delta = -H.ldlt().solve(g);
+    T = SE3::exp(delta) * T;
+    within = std::max(kLeastReach, 0.85 * within);
+  }
+  return T;
+}
 
 SurfaceComparison compare_surfaces(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMesh& truth,
                                    const TriangleMesh& seen, const SurfaceComparisonOptions& options) {

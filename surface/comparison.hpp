@@ -26,6 +26,13 @@ struct SurfaceComparison {
   std::vector<float> vertex_errors;  ///< of each vertex of the estimate, to the true surface [m]
 };
 
+/// Rigid motion T_w_e that brings an estimate onto the true surface, from a first one that is off by less
+/// than `reach` [m]: least squares over the distances of points to the planes of the triangles nearest to
+/// them, those far off left out more and more  (iterated closest points, Chen and Medioni, 1992). Neither
+/// mesh may be empty.
+[[nodiscard]] SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMesh& truth,
+                              double reach = 0.25);
+
 /// Compares an estimate, moved by T_w_e, with the true surface. `seen` is the part of the truth that
 /// completeness asks for: what no camera saw cannot be missing. Neither mesh may be empty.
 [[nodiscard]] SurfaceComparison compare_surfaces(const TriangleMesh& estimate, const SE3& T_w_e,

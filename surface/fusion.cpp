@@ -75,6 +75,41 @@ std::vector<PixelReading> pixel_readings(const FusionView& view, const DepthView
   return pixels;
 }
 
+template <class Vector>
+inline Vector load(const void* from) {
+  Vector lanes;
+  std::memcpy(&lanes, from, sizeof(Vector));
+  return lanes;
+}
+
+/// Eight readings, each kind together.
+struct PixelLanes {
+  Lane depth, nearest, slant, weight;
+};
+
+/// Whole readings are loaded, and turned by shuffling: a load a number would take most of fusion's time.
+inline PixelLanes read_pixels(const PixelReading* pixels, const LaneIndex& index) {
+  using Four = float __attribute__((vector_size(sizeof(PixelReading))));
+  std::array<Four, kLanes> r;
+  for (int i = 0; i < kLanes; ++i) r[static_cast<std::size_t>(i)] = load<Four>(&pixels[index[i]]);
+  std::array<std::array<Four, 4>, 2> turned;
+  for (std::size_t half = 0; half < 2; ++half) {
+    const Four* q = &r[4 * half];
+    const Four low01 = __builtin_shufflevector(q[0], q[1], 0, 4, 1, 5);
+    const Four high01 = __builtin_shufflevector(q[0], q[1], 2, 6, 3, 7);
+    const Four low23 = __builtin_shufflevector(q[2], q[3], 0, 4, 1, 5);
+    const Four high23 = __builtin_shufflevector(q[2], q[3], 2, 6, 3, 7);
+    turned[half] = {__builtin_shufflevector(low01, low23, 0, 1, 4, 5),
+                    __builtin_shufflevector(low01, low23, 2, 3, 6, 7),
+                    __builtin_shufflevector(high01, high23, 0, 1, 4, 5),
+                    __builtin_shufflevector(high01, high23, 2, 3, 6, 7)};
+  }
+  const auto joined = [&](std::size_t kind) {
+    return __builtin_shufflevector(turned[0][kind], turned[1][kind], 0, 1, 2, 3, 4, 5, 6, 7);
+  };
+  return {joined(0), joined(1), joined(2), joined(3)};
+}
+
 struct RowUpdate {
   Lane distance;  ///< new value for the average
   Lane weight;    ///< 0: the view says nothing
@@ -91,23 +126,16 @@ inline void measure_row(const FusionView& view, const PixelReading* pixels, cons
   const LaneIndex seen = (z > kLeastDepth) & (u >= 0) & (v >= 0) & (u < view.width) & (v < view.height);
   row.pixel = __builtin_convertvector(seen ? v : kZero, LaneIndex) * view.stride +
               __builtin_convertvector(seen ? u : kZero, LaneIndex);
-  Lane depth, nearest, slant, weight;
-  for (int i = 0; i < kLanes; ++i) {
-    const PixelReading& pixel = pixels[row.pixel[i]];
-    depth[i] = pixel.depth;
-    nearest[i] = pixel.nearest;
-    slant[i] = pixel.slant;
-    weight[i] = pixel.weight;
-  }
-  const Lane truncation = larger(kZero + view.truncation, 3 * view.noise * depth * depth);
-  const Lane in_depth = depth - z;
-  const Lane s = in_depth * slant;
-  const LaneIndex in_band = (depth > 0) & (in_depth >= -truncation) & (s <= truncation);
+  const PixelLanes at = read_pixels(pixels, row.pixel);
+  const Lane truncation = larger(kZero + view.truncation, 3 * view.noise * at.depth * at.depth);
+  const Lane in_depth = at.depth - z;
+  const Lane s = in_depth * at.slant;
+  const LaneIndex in_band = (at.depth > 0) & (in_depth >= -truncation) & (s <= truncation);
   // Free: all pixels around see farther than this, so that the rim of a thing is not worn away.
-  const LaneIndex is_free = (nearest - z) * slant > truncation;
+  const LaneIndex is_free = (at.nearest - z) * at.slant > truncation;
   // Behind the surface readings count less and less, or thin things would be carved from the other side.
   const Lane behind = smaller(kOne, (in_depth + truncation) / (truncation - view.voxel));
-  const Lane banded = in_band ? behind * weight : kZero;
+  const Lane banded = in_band ? behind * at.weight : kZero;
   row.distance = is_free ? truncation : s;
   row.weight = seen ? (is_free ? kZero + kFreeShare * view.most_weight : banded) : kZero;
 }
@@ -116,13 +144,6 @@ inline bool any(const LaneIndex& lanes) {
   std::int32_t sum = 0;
   for (int i = 0; i < kLanes; ++i) sum |= lanes[i];
   return sum != 0;
-}
-
-template <class Vector>
-inline Vector load(const void* from) {
-  Vector lanes;
-  std::memcpy(&lanes, from, sizeof(Vector));
-  return lanes;
 }
 
 inline void update_row(const RowUpdate& row, float most, float* distances, float* weights) {

@@ -19,6 +19,7 @@ class Sampler {
   /// Nothing where one of the eight samples around x_v [m] was never seen.
   [[nodiscard]] std::optional<SurfaceDistance> at(const Vector3& x_v) {
     const Vector3 grid = x_v / voxel_;
+    if (!(grid.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
     const Eigen::Vector3i base = grid.array().floor().cast<int>();
     const Vector3 f = grid - base.cast<double>();
     std::array<double, 8> d{};
@@ -47,6 +48,8 @@ class Sampler {
   }
 
  private:
+  static constexpr double kFarthest = 1e9;  // samples from the origin: farther, whole numbers end
+
   const VoxelBlock* block_at(const BlockPosition& at) {
     if (!any_ || last_at_ != at) {
       any_ = true;

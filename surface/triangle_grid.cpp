@@ -105,25 +105,43 @@ TriangleGrid::CellKey TriangleGrid::key_of(const Eigen::Vector3i& cell) {
   return part(cell.x()) << 42 | part(cell.y()) << 21 | part(cell.z());
 }
 
-float TriangleGrid::distance(const Vector3f& x) const {
+TriangleGrid::Nearest TriangleGrid::nearest(const Vector3f& x) const {
   const Eigen::Vector3i home = cell_of(x);
-  float nearest = reach_;
+  Nearest nearest{reach_, kNone};
+  const auto look_into = [&](const Eigen::Vector3i& cell) {
+    const auto found = cells_.find(key_of(cell));
+    if (found == cells_.end()) return;
+    for (const std::uint32_t n : found->second) {
+      const auto& t = mesh_.triangles[n];
+      const float d =
+          distance_to_triangle(x, mesh_.positions[t[0]], mesh_.positions[t[1]], mesh_.positions[t[2]]);
+      if (d < nearest.distance) nearest = {d, n};
+    }
+  };
   // What lies in shell k of the cells around is at least k - 1 cells away.
-  for (int k = 0; k <= kCellsToReach && nearest > static_cast<float>(k - 1) * cell_; ++k)
+  for (int k = 0; k <= kCellsToReach && nearest.distance > static_cast<float>(k - 1) * cell_; ++k)
     for (int dz = -k; dz <= k; ++dz)
       for (int dy = -k; dy <= k; ++dy) {
         const bool whole_row = std::abs(dz) == k || std::abs(dy) == k;
-        for (int dx = -k; dx <= k; dx += whole_row || k == 0 ? 1 : 2 * k) {
-          const auto found = cells_.find(key_of(home + Eigen::Vector3i(dx, dy, dz)));
-          if (found == cells_.end()) continue;
-          for (const std::uint32_t n : found->second) {
-            const auto& t = mesh_.triangles[n];
-            nearest = std::min(nearest, distance_to_triangle(x, mesh_.positions[t[0]], mesh_.positions[t[1]],
-                                                             mesh_.positions[t[2]]));
-          }
-        }
+        for (int dx = -k; dx <= k; dx += whole_row || k == 0 ? 1 : 2 * k)
+          look_into(home + Eigen::Vector3i(dx, dy, dz));
       }
   return nearest;
+}
+
+float TriangleGrid::distance(const Vector3f& x) const {
+  return nearest(x).distance;
+}
+
+std::optional<TriangleGrid::Plane> TriangleGrid::nearest_plane(const Vector3f& x) const {
+  const Nearest found = nearest(x);
+  if (found.triangle == kNone) return std::nullopt;
+  const auto& t = mesh_.triangles[found.triangle];
+  const Vector3f a = mesh_.positions[t[0]];
+  const Vector3f normal = (mesh_.positions[t[1]] - a).cross(mesh_.positions[t[2]] - a);
+  if (!(normal.norm() > 0)) return std::nullopt;
+  const Vector3f unit = normal.normalized();
+  return Plane{unit, unit.dot(a), found.distance};
 }
 
 }  // namespace twofold

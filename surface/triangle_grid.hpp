@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -27,6 +28,13 @@ class TriangleGrid {
 
   /// Distance to the nearest triangle [m], at most reach().
   [[nodiscard]] float distance(const Eigen::Vector3f& x) const;
+  /// The plane of the nearest triangle within reach.
+  struct Plane {
+    Eigen::Vector3f normal{0, 0, 1};  ///< unit
+    float offset = 0;                 ///< normal . x of its points
+    float distance = 0;               ///< of the triangle [m]
+  };
+  [[nodiscard]] std::optional<Plane> nearest_plane(const Eigen::Vector3f& x) const;
   [[nodiscard]] float reach() const { return reach_; }
 
  private:
@@ -34,6 +42,12 @@ class TriangleGrid {
   using CellKey = std::uint64_t;
   [[nodiscard]] Eigen::Vector3i cell_of(const Eigen::Vector3f& x) const;
   [[nodiscard]] static CellKey key_of(const Eigen::Vector3i& cell);
+  struct Nearest {
+    float distance = 0;
+    std::uint32_t triangle = kNone;
+  };
+  static constexpr std::uint32_t kNone = 0xffffffff;
+  [[nodiscard]] Nearest nearest(const Eigen::Vector3f& x) const;
 
   float reach_;
   float cell_;

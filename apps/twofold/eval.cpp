@@ -27,6 +27,7 @@ struct EvalArguments {
   double max_difference_s = 0.01;
   std::string json, plot;
   bool surface = false;
+  bool fit = false;
   std::string seen;
   double threshold = 0.01;
 };
@@ -151,7 +152,7 @@ cv::Mat draw(const EvalArguments& arguments, const Evaluation& e) {
 void run_eval(const EvalArguments& arguments) {
   if (arguments.surface) {
     eval_surface({arguments.estimate, arguments.truth, arguments.seen,
-                  arguments.alignment != Alignment::kNone, arguments.threshold, arguments.json,
+                  arguments.alignment != Alignment::kNone, arguments.fit, arguments.threshold, arguments.json,
                   arguments.plot});
     return;
   }
@@ -192,6 +193,9 @@ void add_eval_command(CLI::App& app, int& exit_code) {
   command->add_flag("--surface", arguments->surface,
                     "compare meshes; moved as the estimate's trajectory.txt onto groundtruth.txt beside it, "
                     "if they are there, unless --align none");
+  command->add_flag(
+      "--fit", arguments->fit,
+      "--surface: then moves the estimate so that the surfaces fit best (iterated closest points)");
   command->add_option("--seen", arguments->seen,
                       "mesh of what a camera saw (render --seen): completeness is asked of it");
   command->add_option("--threshold", arguments->threshold, "distance of surfaces that counts as near [m]")

@@ -13,13 +13,14 @@ std::size_t bytes_of(const cv::Mat& image) {
 
 }  // namespace
 
-PreloadedSource::PreloadedSource(std::unique_ptr<FrameSource> source, std::size_t max_bytes) {
-  rig_ = source->rig();
-  ground_truth_ = source->ground_truth();
+PreloadedSource::PreloadedSource(std::unique_ptr<FrameSource> source, std::size_t max_bytes)
+    : source_(std::move(source)) {
+  rig_ = source_->rig();
+  ground_truth_ = source_->ground_truth();
   Frame frame;
   FrameStatus status;
   std::size_t image_bytes = 0;
-  while ((status = source->next(frame)) == FrameStatus::kFrame) {
+  while ((status = source_->next(frame)) == FrameStatus::kFrame) {
     image_bytes += bytes_of(frame.left) + bytes_of(frame.right) + bytes_of(frame.depth);
     if (image_bytes > max_bytes) {
       throw IoError("preload",
@@ -28,7 +29,7 @@ PreloadedSource::PreloadedSource(std::unique_ptr<FrameSource> source, std::size_
     frames_.push_back(frame);
     frame = Frame();
   }
-  if (status == FrameStatus::kError) throw IoError(source->error());
+  if (status == FrameStatus::kError) throw IoError(source_->error());
 }
 
 bool PreloadedSource::read(Frame& frame) {

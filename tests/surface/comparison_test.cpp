@@ -46,5 +46,16 @@ TEST(CompareSurfaces, ShiftAndHalfAreFound) {
   EXPECT_NEAR(compare_surfaces(half, T_w_e, truth, half).accuracy.mean, 0, 1e-5);
 }
 
+TEST(FitSurface, FindsTheRigidMotion) {
+  TriangleMesh corner = square(1, 0);  // three walls that meet
+  corner.positions.insert(corner.positions.end(), {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}});
+  corner.triangles.insert(corner.triangles.end(), {{0, 1, 5}, {0, 5, 4}, {0, 4, 6}, {0, 6, 3}});
+  const SE3 T_w_e(SO3::exp(Vector3(0.02, -0.03, 0.05)), Vector3(0.04, -0.06, 0.05));
+  TriangleMesh moved = corner;
+  for (auto& x : moved.positions) x = (T_w_e.inverse() * Vector3(x.cast<double>())).cast<float>();
+  const SE3 found = fit_surface(moved, SE3(), corner);
+  EXPECT_LT((found * T_w_e.inverse()).log().norm(), 1e-4);
+}
+
 }  // namespace
 }  // namespace twofold

@@ -69,13 +69,16 @@ void eval_surface(const SurfaceEvalArguments& arguments) {
   const TriangleMesh seen = arguments.seen.empty() ? truth : read_surface(arguments.seen);
   std::optional<SE3> T_w_e;
   if (arguments.align) T_w_e = alignment_of(arguments.estimate);
+  if (arguments.fit) T_w_e = fit_surface(estimate, T_w_e.value_or(SE3()), truth);
   SurfaceComparisonOptions options;
   options.threshold = arguments.threshold;
   options.spacing = 0.5 * arguments.threshold;
   const SurfaceComparison found = compare_surfaces(estimate, T_w_e.value_or(SE3()), truth, seen, options);
   fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
              arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
-             T_w_e ? "moved as the run's trajectory onto the ground truth" : "not moved");
+             arguments.fit ? "moved so that the surfaces fit best"
+             : T_w_e       ? "moved as the run's trajectory onto the ground truth"
+                           : "not moved");
   fmt::print("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}\n", "[mm]", "points", "mean", "median", "p95",
              "rmse", fmt::format("<= {:g} mm", 1e3 * arguments.threshold));
   print_row("accuracy", found.accuracy);
@@ -86,6 +89,7 @@ void eval_surface(const SurfaceEvalArguments& arguments) {
                                       {"truth", arguments.truth},
                                       {"seen", arguments.seen},
                                       {"aligned", T_w_e.has_value()},
+                                      {"fitted", arguments.fit},
                                       {"threshold_m", arguments.threshold},
                                       {"accuracy", to_json(found.accuracy)},
                                       {"completeness", to_json(found.completeness)},

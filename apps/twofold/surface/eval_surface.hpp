@@ -9,6 +9,7 @@ struct SurfaceEvalArguments {
   std::string estimate, truth;  ///< meshes, PLY
   std::string seen;             ///< mesh that completeness is asked of; empty: the truth
   bool align = true;            ///< by the trajectories beside the estimate, if they are there
+  bool fit = false;             ///< then move it further, so that the surfaces fit best
   double threshold = 0.01;      ///< [m]
   std::string json, plot;       ///< files; empty: none
 };

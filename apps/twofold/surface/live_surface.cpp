@@ -171,7 +171,7 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   figures.mb_a_cubic_metre = static_cast<double>(whole.bytes()) / (1 << 20) /
                              std::max(1e-9, static_cast<double>(whole.blocks().size()) * block);
   figures.triangles = mesh.triangles.size();
-  figures.colour = coloured_ > 0 ? "of the recording" : "grey, the images have no other";
+  figures.colour = coloured_ > 0 ? "of the recording" : "grey: the source gives no other";
   const auto left_out = [&](int count, const std::string& what) {
     if (count > 0) figures.left_out.push_back(fmt::format("{} {}", count, what));
   };

@@ -134,7 +134,7 @@ class DepthFusion {
     figures.mb_a_cubic_metre =
         figures.memory_mb / std::max(1e-9, static_cast<double>(figures.blocks) * block);
     figures.triangles = mesh.triangles.size();
-    figures.colour = coloured_ > 0 ? "of the recording" : "grey, the images have no other";
+    figures.colour = coloured_ > 0 ? "of the recording" : "grey: the source gives no other";
     if (empty_ > 0)
       figures.left_out.push_back(fmt::format("{} depth images without any reading within range", empty_));
     return mesh;

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "twofold/types.hpp"
+
+namespace twofold {
+
+struct SurfaceModelOptions {
+  double voxel = 0.05;          ///< distance of two samples [m], 1e-4 .. 10
+  double most_depth = 0;        ///< readings farther than this make no surface [m] >= 0; 0: all do
+  double nearest_stereo = 0.4;  ///< stereo: disparities are searched up to that of this depth [m] > 0
+};
+
+enum class SpaceState : std::uint8_t {
+  kUnknown,  ///< never seen, or too far inside a surface
+  kFree,
+  kOccupied
+};
+
+/// What is known of one position.
+struct SpacePoint {
+  SpaceState state = SpaceState::kUnknown;
+  double distance = 0;  ///< from the surface [m], positive outside, at most about four voxels
+  std::array<double, 3> gradient{0, 0, 0};  ///< d distance / d position: away from the surface
+};
+
+/// Triangles go round anticlockwise seen from outside.
+struct SurfaceMesh {
+  std::vector<std::array<float, 3>> positions;       ///< in the world [m]
+  std::vector<std::array<float, 3>> normals;         ///< unit, pointing outside
+  std::vector<std::array<std::uint8_t, 3>> colours;  ///< red, green, blue
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// A dense surface from frames with poses, for planners and models: where is free space, how far is the next
+/// obstacle, and what does it look like. Memory follows the surface that was seen, not the time.
+///
+///   SurfaceModel model(rig, {.voxel = 0.05});
+///   model.add(frame, estimate.T_world_camera);
+///   if (model.at({x, y, z}).state == SpaceState::kFree) ...
+///
+/// What moves away is carved away by later frames. A model stays where its poses put it: after a loop
+/// closure, clear it and add keyframes anew. Same calls, same answers. Threads: at and mesh by several at
+/// once, add and clear by one while nobody else does anything.
+class TWOFOLD_API SurfaceModel {
+ public:
+  /// Throws std::invalid_argument naming the field of rig or options, the rule and the value.
+  explicit SurfaceModel(const CameraRig& rig, const SurfaceModelOptions& options = {});
+  ~SurfaceModel();
+  SurfaceModel(SurfaceModel&&) noexcept;
+  SurfaceModel& operator=(SurfaceModel&&) noexcept;
+
+  /// Adds the depth of a rectified frame: its depth image, or, for stereo, by semi-global matching. The left
+  /// image gives the brightness, or the colours if it has them.
+  /// @return  pixels with depth within range; a frame with none changes nothing
+  ///
+  /// Throws std::invalid_argument saying what is wrong with the images or the pose.
+  int add(const FrameView& frame, const Pose& T_world_camera);
+  void clear();
+
+  /// p_world [m].
+  [[nodiscard]] SpacePoint at(const std::array<double, 3>& p_world) const;
+  [[nodiscard]] SurfaceMesh mesh() const;
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,119 @@
+#include "twofold/surface.hpp"
+
+#include <opencv2/core.hpp>
+#include <stdexcept>
+
+#include "slam/conversions.hpp"
+#include "slam/frame_pixels.hpp"
+#include "surface/meshing.hpp"
+#include "surface/stereo_depth.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr double kFarthest = 1e5;  // [m]
+
+SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& options) {
+  SurfaceOptions surface;
+  surface.voxel = options.voxel;
+  surface.most_depth = options.most_depth;
+  surface.depth_noise = usual_depth_noise(rig);
+  if (const std::string reason = surface.invalid_reason(); !reason.empty())
+    throw std::invalid_argument("options: " + reason);
+  if (!(options.nearest_stereo > 0)) throw std::invalid_argument("options: nearest_stereo must be above 0");
+  return surface;
+}
+
+void expect_pixels(const char* name, const ImageView& view, bool depth) {
+  if (const std::string refusal = pixels_refusal(name, view, depth); !refusal.empty())
+    throw std::invalid_argument(refusal);
+}
+
+/// As fusion takes it; red and blue change places where they must.
+cv::Mat colour_of(const ImageView& view) {
+  if (view.data == nullptr || view.format == ImageFormat::kGrey8) return pixels_of(view, nullptr);
+  const cv::Mat pixels(view.height, view.width, CV_8UC3, const_cast<void*>(view.data),
+                       static_cast<std::size_t>(view.stride));
+  cv::Mat image = pixels.clone();
+  if (view.format == ImageFormat::kRgb8) {
+    const int swap[] = {0, 2, 1, 1, 2, 0};
+    cv::mixChannels(&pixels, 1, &image, 1, swap, 3);
+  }
+  return image;
+}
+
+std::array<float, 3> plain(const Eigen::Vector3f& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+}  // namespace
+
+struct SurfaceModel::Impl {
+  Rig rig;
+  SurfaceModelOptions options;
+  SurfaceVolume volume;
+};
+
+SurfaceModel::SurfaceModel(const CameraRig& rig, const SurfaceModelOptions& options)
+    : impl_(new Impl{to_rig(rig), options, SurfaceVolume(surface_options(to_rig(rig), options))}) {}
+SurfaceModel::~SurfaceModel() = default;
+SurfaceModel::SurfaceModel(SurfaceModel&&) noexcept = default;
+SurfaceModel& SurfaceModel::operator=(SurfaceModel&&) noexcept = default;
+
+int SurfaceModel::add(const FrameView& frame, const Pose& T_world_camera) {
+  const Rig& rig = impl_->rig;
+  const SE3 T_w_c = to_se3(T_world_camera);
+  if (!(T_w_c.translation().norm() < kFarthest) || !T_w_c.matrix().allFinite())
+    throw std::invalid_argument("T_world_camera is not finite, or farther than 100 km from the origin");
+  expect_pixels("left", frame.left, false);
+  cv::Mat depth;
+  if (rig.kind == SensorKind::kStereo) {
+    expect_pixels("right", frame.right, false);
+    const cv::Mat left = pixels_of(frame.left, nullptr);
+    const cv::Mat right = pixels_of(frame.right, nullptr);
+    const cv::Size size(rig.camera.width, rig.camera.height);
+    if (left.size() != size || right.size() != size)
+      throw std::invalid_argument("left and right image must both be of the rig's size");
+    depth = stereo_depth(rig, left, right, impl_->options.nearest_stereo);
+  } else {
+    expect_pixels("depth", frame.depth, true);
+    depth = pixels_of(frame.depth, frame.owner);
+  }
+  const cv::Mat colour = colour_of(frame.left);
+  if (const std::string defect = depth_defect(rig, depth, colour); !defect.empty())
+    throw std::invalid_argument(defect);
+  const DepthView view = make_depth_view(rig, depth, colour);
+  const int readings = cv::countNonZero(view.depth);
+  if (readings > 0) impl_->volume.fuse(view, T_w_c.inverse());
+  return readings;
+}
+
+void SurfaceModel::clear() {
+  impl_->volume.clear();
+}
+
+SpacePoint SurfaceModel::at(const std::array<double, 3>& p_world) const {
+  SpacePoint point;
+  const auto found = impl_->volume.distance({p_world[0], p_world[1], p_world[2]});
+  if (!found) return point;
+  point.state = found->distance > 0 ? SpaceState::kFree : SpaceState::kOccupied;
+  point.distance = found->distance;
+  point.gradient = {found->gradient.x(), found->gradient.y(), found->gradient.z()};
+  return point;
+}
+
+SurfaceMesh SurfaceModel::mesh() const {
+  const TriangleMesh inside = extract_mesh(impl_->volume);
+  SurfaceMesh mesh;
+  for (const Eigen::Vector3f& x : inside.positions) mesh.positions.push_back(plain(x));
+  for (const Eigen::Vector3f& n : inside.normals) mesh.normals.push_back(plain(n));
+  mesh.colours = inside.colours;
+  mesh.triangles = inside.triangles;
+  return mesh;
+}
+
+std::size_t SurfaceModel::memory_bytes() const {
+  return impl_->volume.bytes();
+}
+
+}  // namespace twofold
