@@ -94,7 +94,8 @@ void compare(const std::string& source, const std::string& file) {
   Trajectory truth;
   const ClosedRun over_sim3 = run(source, true, truth), over_se3 = run(source, false, truth);
   print_loops(over_sim3.result);
-  fmt::print("{:<22} {:>9} {:>9} {:>9} {:>9}\n", source.substr(0, 22), "ATE m", "% of path", "degrees", "halves %");
+  fmt::print("{:<22} {:>9} {:>9} {:>9} {:>9}\n", source.substr(0, 22), "ATE m", "% of path", "degrees",
+             "halves %");
   (void)line("as it was known", over_sim3.causal, truth);
   const auto sim3 = line("closed over Sim(3)", over_sim3.poses, truth);
   const auto se3 = line("closed over SE(3)", over_se3.poses, truth);

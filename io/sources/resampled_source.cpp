@@ -37,15 +37,16 @@ ResampledSource::ResampledSource(std::unique_ptr<FrameSource> source, const Pinh
   PinholeCamera& camera = rig_.camera;
   for (const auto& [own, wanted] : {std::pair{camera.fx, like.fx}, {camera.fy, like.fy}}) {
     if (wanted > kMostChange * own || own > kMostChange * wanted)
-      throw IoError(fmt::format("the camera's focal length, {:.1f} px, is more than {} times another one than the "
-                                    "map's, {:.1f} px",
-                                    own, kMostChange, wanted));
+      throw IoError(
+          fmt::format("the camera's focal length, {:.1f} px, is more than {} times another one than the "
+                      "map's, {:.1f} px",
+                      own, kMostChange, wanted));
   }
   const Side x = resampled(camera.width, camera.fx, camera.cx, like.fx);
   const Side y = resampled(camera.height, camera.fy, camera.cy, like.fy);
   if (std::min(x.size, y.size) < kSmallest)
-    throw IoError(fmt::format("at the map's angular resolution the images have {}x{} pixels: too few", x.size,
-                                  y.size));
+    throw IoError(
+        fmt::format("at the map's angular resolution the images have {}x{} pixels: too few", x.size, y.size));
   camera = {x.f, y.f, x.centre, y.centre, x.size, y.size};
 }
 
