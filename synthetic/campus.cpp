@@ -88,7 +88,7 @@ void line_the_way(Scene& scene, Random& random, const std::vector<Vector2>& way)
 
 }  // namespace
 
-/// Five rounds of a quadrangle and two loops of some 600 m through streets, 1.8 km in all, as in thesis
+/// Five rounds of a quadrangle and two loops of some 600 m through streets, 1.7 km in all, as in thesis
 /// 6.5.2. One round of the staging is the whole way.
 Staging make_campus(std::uint64_t seed) {
   Staging staging;

@@ -29,7 +29,7 @@ struct Staging {
 [[nodiscard]] Staging make_corridor(std::uint64_t seed,
                                     double plain = 0);    ///< up and down a corridor of 24 m
 [[nodiscard]] Staging make_cloister(std::uint64_t seed);  ///< sideways round a square of 16 m
-[[nodiscard]] Staging make_campus(std::uint64_t seed);    ///< a quadrangle and two large loops, 1.8 km
+[[nodiscard]] Staging make_campus(std::uint64_t seed);    ///< a quadrangle and two large loops, 1.7 km
 [[nodiscard]] Staging make_descent(
     std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
 
