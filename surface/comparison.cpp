@@ -43,8 +43,8 @@ DistanceStatistics statistics(const std::vector<SurfaceSample>& samples, const T
 }  // namespace
 
 SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMesh& truth, double reach) {
-  constexpr int kSteps = 30;
-  constexpr float kSpacing = 0.03f;     // of the points [m]
+  constexpr int kSteps = 15;
+  constexpr float kSpacing = 0.05f;     // of the points [m]
   constexpr double kLeastReach = 0.02;  // in the end [m]
   const TriangleGrid surface(truth, static_cast<float>(reach));
   const std::vector<SurfaceSample> samples = sample_surface(estimate, kSpacing);
@@ -65,7 +65,7 @@ SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMe
     }
     const Vector6 delta = -H.ldlt().solve(g);
     T = SE3::exp(delta) * T;
-    within = std::max(kLeastReach, 0.85 * within);
+    within = std::max(kLeastReach, 0.8 * within);
   }
   return T;
 }
