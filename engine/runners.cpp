@@ -1,5 +1,8 @@
 #include "engine/runners.hpp"
 
+#include <algorithm>
+#include <limits>
+
 namespace twofold {
 namespace {
 
@@ -8,6 +11,10 @@ constexpr double kCorrection = 0.01;         // [m]
 constexpr double kCorrectionAngle = 0.0035;  // [rad]
 // A frame or two are lost now and then; the tracker finds on by itself.
 constexpr int kLostBeforeAsking = 2;
+
+std::int16_t narrow(int count) {
+  return static_cast<std::int16_t>(std::min<int>(count, std::numeric_limits<std::int16_t>::max()));
+}
 
 CorrectionReason reason_of(MapChange::Kind kind) {
   switch (kind) {
@@ -60,7 +67,8 @@ bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortL
   find_correction(graph, record);
   if (record.state == FrameState::kTracked) last_ = record;
   record.tracked_share = result.tracked_share();
-  record.inliers = result.inliers;
+  record.inliers = narrow(result.inliers);
+  record.moving = narrow(result.moving);
   record.keyframe = result.proposed;
   record.tracking_ns = steady_now_ns() - begin_ns;
   times_.record(frame_stage_, begin_ns, record.tracking_ns);

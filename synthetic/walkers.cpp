@@ -111,7 +111,8 @@ void Walkers::append_figure(const SE3& T_w_feet, double step, int first_texture,
     const Vector3 hinge = part.centre + Vector3(0, 0, 0.5 * part.size.z());
     const SE3 T_feet_part = SE3(SO3(), hinge) * SE3(SO3::exp(Vector3(0, angle, 0)), Vector3::Zero()) *
                             SE3(SO3(), Vector3(0, 0, -0.5 * part.size.z()));
-    for (const Quad& quad : box_quads(T_w_feet * T_feet_part, part.size, first_texture)) quads.push_back(quad);
+    for (const Quad& quad : box_quads(T_w_feet * T_feet_part, part.size, first_texture))
+      quads.push_back(quad);
     first_texture += 6;
   }
 }
