@@ -72,7 +72,8 @@ struct FrameRecord {
   std::int64_t latency_ns = 0;           ///< from its exposure (Pacer) to the moment its pose was known
   KeyframeId reference = kNoKeyframe;    ///< after the run: the keyframe that stands for it in the final map
   KeyframeId part_causal = kNoKeyframe;  ///< map part of T_c_w_causal's world, under its name of then
-  int inliers = 0;                       ///< measurements the pose rests on
+  std::int16_t inliers = 0;              ///< measurements the pose rests on
+  std::int16_t moving = 0;               ///< points seen that move themselves (TrackResult::moving)
   FrameState state = FrameState::kLost;
   bool keyframe = false;                          ///< it was proposed as a keyframe
   EffortLevel effort = EffortLevel::kEverything;  ///< what was left out for want of time

@@ -1,6 +1,7 @@
 #include "engine/runners.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace twofold {
 namespace {
@@ -24,6 +25,10 @@ double distance_travelled(const GraphSnapshot& graph, KeyframeId a, KeyframeId b
     before = &keyframe;
   }
   return distance;
+}
+
+std::int16_t narrow(int count) {
+  return static_cast<std::int16_t>(std::min<int>(count, std::numeric_limits<std::int16_t>::max()));
 }
 
 CorrectionReason reason_of(MapChange::Kind kind) {
@@ -79,7 +84,8 @@ bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortL
   find_correction(graph, record);
   if (record.state == FrameState::kTracked) last_ = record;
   record.tracked_share = result.tracked_share();
-  record.inliers = result.inliers;
+  record.inliers = narrow(result.inliers);
+  record.moving = narrow(result.moving);
   record.keyframe = result.proposed;
   record.tracking_ns = steady_now_ns() - begin_ns;
   times_.record(frame_stage_, begin_ns, record.tracking_ns);

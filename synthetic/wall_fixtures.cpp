@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <opencv2/core.hpp>
 #include <string>
-#include <vector>
 
 #include "synthetic/materials.hpp"
 
@@ -109,15 +107,11 @@ void draw_ivy(Canvas& canvas, Random& random, double x, double y, double radius)
 
 void PlainPanels::paint(Canvas& canvas, std::uint64_t wall) const {
   const int panels = std::max(1, static_cast<int>(std::lround(canvas.width() / kWidth)));
-  std::vector<int> order(static_cast<std::size_t>(panels));
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int a, int b) {
-    const auto rank = [&](int panel) { return counter_hash(seed, wall, static_cast<std::uint64_t>(panel)); };
-    return rank(a) < rank(b);
-  });
+  const double first = unit_interval(counter_hash(seed, wall, 0));
+  const auto plain_before = [&](int panel) { return std::floor(panel * share + first); };
   cv::Mat& image = canvas.image();
-  order.resize(static_cast<std::size_t>(std::lround(share * panels)));
-  for (const int panel : order) {
+  for (int panel = 0; panel < panels; ++panel) {
+    if (plain_before(panel + 1) == plain_before(panel)) continue;
     cv::Mat area = image.colRange(image.cols * panel / panels, image.cols * (panel + 1) / panels);
     area.setTo(cv::mean(area)[0]);
   }

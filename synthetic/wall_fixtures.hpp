@@ -11,13 +11,14 @@ void draw_door(Canvas& canvas, Random& random, double x, double y, double w, dou
 void draw_poster(Canvas& canvas, Random& random, double x, double y, double w, double h);
 void draw_ivy(Canvas& canvas, Random& random, double x, double y, double radius);
 
-/// Panels of walls that lose what is painted on them: each is then of its mean grey.
+/// Panels of walls that lose what is painted on them: each is then of its mean grey. They are spread evenly,
+/// so that a camera near a wall sees a painted one beside them.
 struct PlainPanels {
-  static constexpr double kWidth = 2;  ///< [m]
-  std::uint64_t seed = 1;              ///< says which
-  double share = 0;                    ///< of a wall's panels, 0 .. 1
+  static constexpr double kWidth = 1.2;  ///< [m]
+  std::uint64_t seed = 1;                ///< says where they begin
+  double share = 0;                      ///< of a wall's panels, 0 .. 1
 
-  /// @param wall  its number; others lose other panels
+  /// @param wall  its number; others begin elsewhere
   void paint(Canvas& canvas, std::uint64_t wall) const;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <opencv2/core.hpp>
 
 namespace twofold {
 namespace {
@@ -54,6 +55,13 @@ void sample_4x4(const Bilinear& w, Pixels& samples) {
                          w.w11 * load_4x2(p + w.stride + 1, w.stride) - kMidGrey;
     std::memcpy(samples.data() + 4 * r, &rows, sizeof rows);
   }
+}
+
+/// What the later image is brighter by, when that is too much to be left to the solver; else 1.
+float brightness_ratio(const cv::Mat& earlier, const cv::Mat& later) {
+  constexpr double kMuch = 1.5;
+  const double ratio = std::max(cv::mean(later)[0], 1.0) / std::max(cv::mean(earlier)[0], 1.0);
+  return ratio > kMuch || ratio < 1 / kMuch ? static_cast<float>(ratio) : 1.0F;
 }
 
 }  // namespace
@@ -194,6 +202,9 @@ DenseAlignmentResult DenseAlignment::align(const PinholeCamera& camera, const Im
   points = points.first(std::min(points.size(), samples_.size()));
   DenseAlignmentResult state;
   state.T_cur_prev = T_cur_prev_start;
+  state.gain =
+      brightness_ratio(previous.level(options_.coarsest_level), current.level(options_.coarsest_level));
+  state.offset = kMidGrey * (state.gain - 1);
   for (int level = options_.coarsest_level; level >= std::max(finest_level, options_.finest_level); --level) {
     const PinholeCamera level_camera = camera.at_level(level);
     prepare(level_camera, previous.level(level), level, points);

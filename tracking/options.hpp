@@ -39,6 +39,7 @@ struct TrackerOptions {
   int rough_min_mapped = 10;         ///< so many that the map has, seen from two places
   /// While young points are mistrusted: frames in a row in which a candidate must agree to be confirmed.
   int trusted_after = 3;
+  int moving_after = 2;           ///< times in a row that a candidate is found elsewhere: it is said to move
   double new_part_after = 1;      ///< lost for so long while corners are seen: a new map part is started [s]
   int new_part_frames = 5;        ///< ... and for so many frames
   int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see
@@ -57,8 +58,11 @@ struct TrackerOptions {
   int cell_px = 28;             ///< at most one new point a cell and only where no point is tracked
   int max_new_points = 220;     ///< started in one keyframe
   float min_corner_score = 12;  ///< Shi-Tomasi [grey^2/px^2]
-  int max_failures = 4;         ///< candidates not found so many frames in a row are given up
-  int max_candidate_age = 3;    ///< keyframes after which an unconfirmed candidate is given up
+  /// In the dark, with fewer points in view, tracked and started, faint corners will do: half the threshold,
+  /// a quarter of the score, where the pyramid has averaged the noise away.
+  int scarce_points = 90;
+  int max_failures = 4;       ///< candidates not found so many frames in a row are given up
+  int max_candidate_age = 3;  ///< keyframes after which an unconfirmed candidate is given up
 
   // One camera only.
   FirstStructureOptions first_structure;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "geometry/inverse_depth.hpp"
 
@@ -13,6 +14,12 @@ constexpr int kBorder = 12;                 // of a level: room for the patch an
 constexpr int kMaxRowShift = 4;             // between left and right image, looked for [px]
 constexpr int kClearly = 3;                 // times as many corners with depth: that was the mistake
 constexpr double kFarthestDisparity = 0.3;  // [px] below it the depth is as good as infinite
+
+/// Low contrast is for want of light, not of texture.
+bool is_dark(const FrameImages& images) {
+  constexpr double kDark = 60;  // [grey]
+  return cv::mean(images.left.level(4))[0] < kDark;
+}
 
 Eigen::Vector2f at_level_zero(const Corner& corner) {
   const float s = std::ldexp(1.0F, corner.level);
@@ -31,6 +38,7 @@ PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options)
 
 void PointStarter::clear() {
   std::fill(occupied_.begin(), occupied_.end(), 0);
+  tracked_ = 0;
 }
 
 std::size_t PointStarter::cell_of(const Eigen::Vector2f& uv) const {
@@ -41,15 +49,25 @@ std::size_t PointStarter::cell_of(const Eigen::Vector2f& uv) const {
 
 void PointStarter::occupy(const Eigen::Vector2f& uv) {
   occupied_[cell_of(uv)] = 1;
+  ++tracked_;
+}
+
+PointStarter::CornerBounds PointStarter::usual_corners() const {
+  return {0, options_.corner_threshold, options_.min_corner_score};
+}
+
+/// For the dark: contrast is low there, and noise is not.
+PointStarter::CornerBounds PointStarter::faint_corners() const {
+  return {1, std::max(options_.corner_threshold / 2, 1), options_.min_corner_score / 4};
 }
 
 /// Corners of the free cells, into the quadtree.
-void PointStarter::spread_corners(const FrameImages& images) {
+void PointStarter::spread_corners(const FrameImages& images, const CornerBounds& bounds) {
   corners_.clear();
   const CellGrid grid{options_.cell_px, columns_, rows_, occupied_};
-  for (int level = 0; level < options_.corner_levels; ++level) {
-    detect_corners(images.left.level(level), level, options_.corner_threshold, options_.min_corner_score,
-                   kBorder, grid, corners_);
+  for (int level = bounds.first_level; level < options_.corner_levels; ++level) {
+    detect_corners(images.left.level(level), level, bounds.threshold, bounds.min_score, kBorder, grid,
+                   corners_);
   }
   quadtree_.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
@@ -59,9 +77,17 @@ void PointStarter::spread_corners(const FrameImages& images) {
 
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                         ImmaturePoints& local) {
-  spread_corners(images);
+  int started = start_at(usual_corners(), options_.max_new_points, images, anchor, shutter, local);
+  if (tracked_ < options_.scarce_points && is_dark(images))
+    started += start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, local);
+  return started;
+}
+
+int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameImages& images,
+                           KeyframeId anchor, const RollingShutter& shutter, ImmaturePoints& local) {
+  spread_corners(images, bounds);
   int started = 0;
-  for (std::int64_t i = quadtree_.next(); i >= 0 && started < options_.max_new_points; i = quadtree_.next()) {
+  for (std::int64_t i = quadtree_.next(); i >= 0 && started < wanted; i = quadtree_.next()) {
     const Corner& corner = corners_[static_cast<std::size_t>(i)];
     const Eigen::Vector2f uv = at_level_zero(corner);
     ImmaturePoint point;
@@ -76,7 +102,7 @@ int PointStarter::start(const FrameImages& images, KeyframeId anchor, const Roll
 }
 
 void PointStarter::choose_corners(const FrameImages& images, std::vector<PointAppearance>& appearances) {
-  spread_corners(images);
+  spread_corners(images, usual_corners());
   const std::size_t room = appearances.capacity() - appearances.size();
   const std::size_t full =
       appearances.size() + std::min(room, static_cast<std::size_t>(options_.max_new_points));

@@ -23,7 +23,8 @@ class PointStarter {
 
   /// Marks the whole image as empty.
   void clear();
-  /// A point is tracked at this level-0 pixel: none is needed near it.
+  /// A point is tracked at this level-0 pixel: none is needed near it. Told of each tracked point, it knows
+  /// how many there are.
   void occupy(const Eigen::Vector2f& uv);
   /// Starts points anchored in keyframe `anchor` where nothing is tracked, evenly over the image; returns how
   /// many. The anchor's pose is that at mid-exposure.
@@ -42,7 +43,17 @@ class PointStarter {
  private:
   [[nodiscard]] int count_depths(const cv::Mat& left, const cv::Mat& right);
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;
-  void spread_corners(const FrameImages& images);
+  /// Which corners are good enough.
+  struct CornerBounds {
+    int first_level = 0;
+    int threshold = 0;
+    float min_score = 0;
+  };
+  [[nodiscard]] CornerBounds usual_corners() const;
+  [[nodiscard]] CornerBounds faint_corners() const;
+  int start_at(const CornerBounds& bounds, int wanted, const FrameImages& images, KeyframeId anchor,
+               const RollingShutter& shutter, ImmaturePoints& local);
+  void spread_corners(const FrameImages& images, const CornerBounds& bounds);
   [[nodiscard]] bool measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const;
   void move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const;
 
@@ -51,6 +62,7 @@ class PointStarter {
   int columns_ = 0;
   int rows_ = 0;
   std::vector<std::uint8_t> occupied_;
+  int tracked_ = 0;  ///< points that `occupy` was told of
   std::vector<Corner> corners_;
   Quadtree quadtree_;
 };

@@ -34,6 +34,7 @@ struct TrackResult {
   int searched = 0;
   int matches = 0;
   int inliers = 0;
+  int moving = 0;           ///< points found again and again where nothing that stands still would be
   float alignment_rms = 0;  ///< [grey]
   bool proposed = false;    ///< the free proposal was filled
   std::array<std::int64_t, kTrackerStages> stage_ns{};

@@ -119,7 +119,7 @@ class Tracker {
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
-  void ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
+  int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
   void give_up_frame(LostCause cause, TrackResult& result);
   void remember_frame(const FrameStep& step);

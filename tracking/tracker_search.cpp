@@ -83,21 +83,27 @@ void Tracker::observe_matches(const SE3& T_c_ref, const RollingShutter& shutter)
 
 /// What was found lately must not take the camera along if it moves itself. Keeps account of which of the
 /// tracker's own points are where they should be.
-void Tracker::ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver) {
+/// @return how many of them move
+int Tracker::ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver) {
   anchors_.clear();
   for (const Match& match : matches_) {
     anchors_.push_back(local_map_.anchor(local_map_.points()[match.point]));
   }
   const auto overruled = elder_vote_.overrule(motion_, anchors_, motion, solver);
   if (overruled) motion = *overruled;
+  int moving = 0;
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     const int local = local_map_.points()[matches_[m].point].local;
     if (local < 0) continue;
     ImmaturePoint& point = immature_points_.points()[static_cast<std::size_t>(local)];
     const int agreed = motion_[m].inlier ? std::min(point.agreed + 1, 255) : 0;
     point.agreed = static_cast<std::uint8_t>(agreed);
-    if (overruled && agreed == 0) point.failures = 255;  // found, but it is something that moves
+    point.moved = static_cast<std::uint8_t>(motion_[m].inlier ? 0 : std::min(point.moved + 1, 255));
+    const bool expelled = overruled && agreed == 0;  // found, but it is something that moves
+    if (expelled) point.failures = 255;
+    moving += expelled || point.moved >= options_.moving_after ? 1 : 0;
   }
+  return moving;
 }
 
 /// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted. Where rows are read one
@@ -114,7 +120,7 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
     motion = optimise_motion(rig_, motion_, motion.T_c_ref, solver);
     if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step.frame);
   }
-  ask_elders(motion, solver);
+  result.moving = ask_elders(motion, solver);
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) return LostCause::kTooFewCandidates;
   if (result.matches < options_.min_inliers) return LostCause::kTooFewMatches;

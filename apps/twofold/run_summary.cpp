@@ -137,6 +137,18 @@ Json effort_json(const RunResult& result) {
   return {{"frames", on}, {"changes", changes}};
 }
 
+/// Of the points found in a frame, those that move themselves.
+Json moving_points_json(const RunResult& result) {
+  constexpr int kSomebody = 5;  // fewer are mistakes of the search
+  int most = 0;
+  std::int64_t frames = 0;
+  for (const FrameRecord& record : result.frames) {
+    most = std::max<int>(most, record.moving);
+    frames += record.moving >= kSomebody ? 1 : 0;
+  }
+  return {{"frames", frames}, {"most_in_a_frame", most}};
+}
+
 }  // namespace
 
 Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result,
@@ -161,6 +173,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"loaded_map", loaded_map_json(options, result)},
             {"checkpoints", checkpoints_json(result.checkpoints)},
             {"map_parts", parts_json(parts)},
+            {"moving_points", moving_points_json(result)},
             {"mapper_rounds", result.mapping.rounds},
             {"metric_loop_edges", result.mapping.metric_loops},
             {"closed_loops", loops_json(result)},
