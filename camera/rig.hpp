@@ -29,8 +29,8 @@ struct Rig {
   PinholeCamera camera;       ///< both cameras of a rectified pair
   double baseline = 0;        ///< [m] > 0 for stereo and RGB-D
   double depth_unit = 0.001;  ///< RGB-D: metres per unit of the 16-bit depth image
-  double depth_min = 0.3;     ///< RGB-D: nearer readings are holes [m]
-  double depth_max = 8.0;     ///< RGB-D: farther readings are holes [m]
+  double depth_min = 0.3;     ///< nearer readings are holes [m]; stereo: of surfaces only
+  double depth_max = 8.0;     ///< farther ones likewise
   double readout = 0;         ///< rolling shutter: from the exposure of the first row to that of the last [s]
 
   MeasurementNoise noise;

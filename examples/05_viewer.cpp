@@ -21,10 +21,11 @@ void run(const char* name, int seconds_to_stay) {
   std::printf("open %s\n", viewer.address().c_str());
 
   twofold::FrameView frame;
-  for (std::int64_t n = 0; source.next(frame); ++n) {
+  for (std::int64_t n = 0; source.next(frame);) {
     if (!source.is_live()) (void)slam.wait_for_room(1'000'000'000);
-    slam.push(frame);
+    if (slam.push(frame).status == twofold::PushStatus::kRefused) continue;  // has no number
     if (viewer.wants_image()) viewer.show(n, frame.left, frame.owner);
+    ++n;
   }
   const twofold::SlamSummary summary = slam.finish();
   std::printf("%lld of %lld frames tracked\n", static_cast<long long>(summary.tracked),

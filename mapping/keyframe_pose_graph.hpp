@@ -9,20 +9,20 @@
 
 namespace twofold {
 
-/// The keyframes of a spanning tree as a pose graph over `Group`, SE3 or Sim3. Pose n is that of tree[n], set
-/// along the tree from tree[0], which is the origin  (eq. 6.3); each edge between two of them is a
-/// constraint.
+/// The keyframes of a spanning tree as a pose graph over `Group`, SE3 or Sim3. Pose n is T_k_w of tree[n],
+/// set along the tree from tree[0], which is fixed  (eq. 6.3); each edge between two of them is a constraint,
+/// the pose of the one later in the tree relative to the other.
 ///
-/// @param information  of (keyframe, keyframe, edge between them): that of the constraint
-/// @param position     is filled with each keyframe's place in the tree
+/// @param information    of (keyframe, keyframe, edge between them): that of the constraint
+/// @param index_in_tree  is filled with that of each keyframe
 template <class Group, class Information>
 [[nodiscard]] PoseGraph<Group> keyframe_pose_graph(const GraphSnapshot& graph,
                                                    const std::vector<TreeNode>& tree,
-                                                   const Information& information, IdMap& position) {
+                                                   const Information& information, IdMap& index_in_tree) {
   PoseGraph<Group> problem;
   problem.origin = 0;
   for (std::size_t n = 0; n < tree.size(); ++n) {
-    position.set(tree[n].id, static_cast<int>(n));
+    index_in_tree.set(tree[n].id, static_cast<int>(n));
     if (n == 0) {
       problem.poses.emplace_back(graph.keyframe(tree[n].id).T_k_w);
       continue;
@@ -34,7 +34,7 @@ template <class Group, class Information>
   for (std::size_t n = 0; n < tree.size(); ++n) {
     const Keyframe& from = graph.keyframe(tree[n].id);
     for (const Edge& edge : *from.edges) {
-      const int other = position.find(edge.other);
+      const int other = index_in_tree.find(edge.other);
       if (other <= static_cast<int>(n)) continue;  // each edge once
       problem.constraints.push_back({static_cast<int>(n), other, Group(relative_pose(graph, from.id, edge)),
                                      information(from, graph.keyframe(edge.other), edge)});

@@ -28,7 +28,7 @@ struct SurfaceComparison {
 
 /// Rigid motion T_w_e that brings an estimate onto the true surface, from a first one that is off by less
 /// than `reach` [m]: least squares over the distances of points to the planes of the triangles nearest to
-/// them, those far off left out more and more  (iterated closest points, Chen and Medioni, 1992). Neither
+/// them, outliers weighted down step by step (iterated closest points, Chen and Medioni, 1992). Neither
 /// mesh may be empty.
 [[nodiscard]] SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMesh& truth,
                               double reach = 0.25);

@@ -10,19 +10,20 @@ namespace twofold {
 /// How depth images become a surface.
 struct SurfaceOptions {
   double voxel = 0.01;     ///< distance of two samples of the signed distance [m] > 0
-  double truncation = 4;   ///< distances are kept up to so many voxels, and up to three standard deviations
-  double most_depth = 0;   ///< readings farther than this are left out [m]; 0: all
+  double truncation = 4;   ///< distances are kept up to so many voxels or three standard deviations of the
+                           ///< reading, whichever is more
+  double most_depth = 0;   ///< readings farther than this begin no surface [m]; 0: no limit
   double depth_noise = 0;  ///< standard deviation of a depth z is depth_noise z^2 [1/m]; 0: the sensor's
   double least_weight =
       0.2;  ///< of a sample that the mesh rests on; at 1, one voxel is its standard deviation
-  double most_weight = 100;  ///< more is forgotten, so that what has changed is learnt anew
+  double most_weight = 100;  ///< weights end here, so that what has changed is learnt anew
   int least_triangles = 60;  ///< smaller pieces of the mesh are left out: specks of noise
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// Standard deviation of a depth of 1 m [m]; it grows with the square of the depth. RGB-D: a structured-light
+/// SurfaceOptions::depth_noise of a sensor [1/m]. RGB-D: a structured-light
 /// camera's (Khoshelham and Oude Elberink, Sensors 2012); stereo: a third of a pixel of disparity.
 [[nodiscard]] double usual_depth_noise(const Rig& rig);
 

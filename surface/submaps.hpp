@@ -63,7 +63,7 @@ class SubmapSurface {
   /// Takes the map as it is now. Versions grow.
   void step(const GraphSnapshot& graph);
 
-  /// All submaps of a map part in its world frame, as it was in the last step, melted into one.
+  /// All submaps of a map part in its world frame, as it was in the last step, added into one.
   [[nodiscard]] SurfaceVolume whole(KeyframeId part) const;
   [[nodiscard]] bool has(KeyframeId part) const;
 

@@ -15,12 +15,12 @@ namespace twofold {
 enum class Occupancy : std::uint8_t {
   kUnknown,  ///< never seen, or too far inside a surface
   kFree,     ///< outside of every surface
-  kOccupied  ///< inside
+  kOccupied  ///< inside, as far as the truncation
 };
 
 /// The signed distance at one position, linear between the eight samples around it.
 struct SurfaceDistance {
-  double distance = 0;        ///< [m], positive outside; along the rays it was measured on, truncated
+  double distance = 0;        ///< [m], positive outside, truncated
   Vector3 gradient{0, 0, 0};  ///< d distance / d position
   double weight = 0;          ///< the least of the eight
 };
@@ -37,7 +37,8 @@ class SurfaceVolume {
   explicit SurfaceVolume(const SurfaceOptions& options);
 
   /// Adds a depth image, taken from T_c_v. Samples up to the truncation behind a reading get its distance
-  /// along the ray; those farther in front are free: what stood there before is carved away.
+  /// along the ray, times the cosine between ray and normal; those farther in front are free: what stood
+  /// there before is carved away.
   void fuse(const DepthView& view, const SE3& T_c_v);
   /// Adds another volume of the same options, whose frame lies at T_v_o in this one: resampled linearly.
   void add(const SurfaceVolume& other, const SE3& T_v_o);

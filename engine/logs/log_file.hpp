@@ -17,7 +17,7 @@ namespace twofold {
 ///
 /// Roles: any thread but the tracker's appends, under a lock that is held for a copy; one thread (LogWriter)
 /// writes what waits, without the lock. What waits is bounded. After an append beyond the bound, or a write
-/// that failed, nothing is taken any more but counted: the file holds all up to there, and nothing after it.
+/// that failed, further bytes are only counted as lost: the file holds all up to there, and nothing after it.
 class LogFile {
  public:
   static constexpr std::size_t kMostWaiting = std::size_t{16} << 20;  ///< [bytes]

@@ -11,8 +11,9 @@
 namespace twofold {
 
 struct SurfaceModelOptions {
-  double voxel = 0.05;          ///< distance of two samples [m], 1e-4 .. 10
-  double most_depth = 0;        ///< readings farther than this make no surface [m] >= 0; 0: all do
+  double voxel = 0.05;  ///< distance of two samples [m], 1e-4 .. 10
+  double most_depth =
+      0;  ///< readings farther than this begin no surface [m] >= 0; 0: CameraRig's bounds alone
   double nearest_stereo = 0.4;  ///< stereo: disparities are searched up to that of this depth [m] > 0
 };
 
@@ -25,7 +26,9 @@ enum class SpaceState : std::uint8_t {
 /// What is known of one position.
 struct SpacePoint {
   SpaceState state = SpaceState::kUnknown;
-  double distance = 0;  ///< from the surface [m], positive outside, at most about four voxels
+  /// From the surface [m], positive outside; truncated at four voxels or at three standard deviations of the
+  /// depth, whichever is more.
+  double distance = 0;
   std::array<double, 3> gradient{0, 0, 0};  ///< d distance / d position: away from the surface
 };
 
@@ -41,12 +44,13 @@ struct SurfaceMesh {
 /// obstacle, and what does it look like. Memory follows the surface that was seen, not the time.
 ///
 ///   SurfaceModel model(rig, {.voxel = 0.05});
-///   model.add(frame, estimate.T_world_camera);
+///   if (estimate.state == TrackingState::kTracked) model.add(frame, estimate.T_world_camera);
 ///   if (model.at({x, y, z}).state == SpaceState::kFree) ...
 ///
 /// What moves away is carved away by later frames. A model stays where its poses put it: after a loop
-/// closure, clear it and add keyframes anew. Same calls, same answers. Threads: at and mesh by several at
-/// once, add and clear by one while nobody else does anything.
+/// closure, clear it and add the frames of keyframes anew, which the caller keeps (PoseEstimate::keyframe).
+/// One model holds one map part: poses of another have another world. Same calls, same answers. Threads: at
+/// and mesh by several at once, add and clear by one while nobody else does anything.
 class TWOFOLD_API SurfaceModel {
  public:
   /// Throws std::invalid_argument naming the field of rig or options, the rule and the value.

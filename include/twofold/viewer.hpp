@@ -38,7 +38,7 @@ struct ViewerOptions {
   std::vector<std::string> stages = {};  ///< names of what `tell` is given times of, at most 8
   double frame_period = 0;               ///< the budget of a frame [s]; 0: as the frames' times say
   std::vector<Pose> truth = {};          ///< T_world_camera of the true path, if it is known, in any world
-  std::vector<std::int64_t> truth_t_ns = {};  ///< its times, as many, ascending
+  std::vector<std::int64_t> truth_t_ns = {};  ///< its times, ascending, as many; else nothing is shown
   /// Does what a viewer asks for, on the viewer's thread, and says in a sentence what it did; what it throws
   /// is told as a failure. Empty: viewers can only look.
   std::function<std::string(ViewCommand)> on_command = {};

@@ -22,12 +22,12 @@ struct ImageMessage {
 
 /// sensor_msgs/CompressedImage.
 struct CompressedImageMessage {
-  std::int64_t t_ns = 0;
-  std::string format;
+  std::int64_t t_ns = 0;  ///< header.stamp
+  std::string format;     ///< "jpeg", "png", "16UC1; compressedDepth" and the like
   std::span<const std::uint8_t> file;
 };
 
-/// sensor_msgs/CameraInfo: raw pixel = K distorted by D; rectified axes = R * raw axes; rectified pixel = P.
+/// sensor_msgs/CameraInfo: raw pixel = K distort(ray, D); rectified pixel = P [R ray; 1].
 struct CameraInfoMessage {
   std::uint32_t width = 0, height = 0;
   std::string distortion_model;

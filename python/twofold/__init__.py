@@ -1,7 +1,8 @@
 """Real-time visual SLAM: where the camera is, and what the place looks like.
 
     for pose in twofold.run("euroc:recordings/room"):
-        print(pose.t_ns, pose.T_world_camera.t)
+        if pose.tracked:
+            print(pose.t_ns, pose.T_world_camera.t)
 
 Everywhere: metres, radians, nanoseconds; T_a_b takes points of frame b to frame a; camera axes x right, y down, z
 forward; quaternions x y z w.

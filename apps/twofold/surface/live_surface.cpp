@@ -26,7 +26,10 @@ void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments
           "--surface", arguments.voxel,
           "Fuse the keyframes' depth into a mesh (surface.ply, surface.glb), with samples this far apart [m]")
       ->check(CLI::PositiveNumber);
-  command.add_option("--surface-memory", arguments.memory_mb, "Most memory of the surface [MB]")
+  command
+      .add_option("--surface-memory", arguments.memory_mb,
+                  "No more keyframes are fused once samples and depth images take this much [MiB]; the mesh "
+                  "takes as much again")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command

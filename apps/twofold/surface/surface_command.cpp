@@ -50,6 +50,8 @@ std::string source_of_run(const fs::path& folder) {
   const auto summary = nlohmann::json::parse(std::ifstream(file), nullptr, false);
   if (!summary.is_object() || !summary.contains("source") || !summary["source"].is_string())
     throw IoError(file, "does not name the source of the run");
+  if (summary.value("scale", "") == "arbitrary")
+    throw IoError(file, "says that the scale is arbitrary (one camera): no depth fits its poses");
   return summary["source"].get<std::string>();
 }
 
@@ -200,13 +202,12 @@ void add_surface_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command
       ->add_option("--most-depth", arguments->options.most_depth,
-                   "Readings farther than this are left out [m]; 0: none")
+                   "Readings farther than this begin no surface [m]; 0: no limit")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
-      ->add_option(
-          "--depth-noise", arguments->options.depth_noise,
-          "Standard deviation of a depth of 1 m [m], growing with its square; 0: the sensor's usual one")
+      ->add_option("--depth-noise", arguments->options.depth_noise,
+                   "Standard deviation of a depth z over z^2 [1/m]; 0: the sensor's usual one")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_flag("--grey", arguments->grey, "Brightness instead of the recording's colours");
