@@ -59,6 +59,12 @@ class Photometry : public testing::TestWithParam<std::string> {
   static SyntheticOptions options() {
     SyntheticOptions o = default_options(GetParam());
     o.noise = 0;
+    o.f_error = 0;
+    if (o.width < 640) {  // enough pixels to judge by
+      o.f *= 640.0 / o.width;
+      o.height = o.height * 640 / o.width;
+      o.width = 640;
+    }
     return o;
   }
 };
@@ -70,7 +76,9 @@ TEST_P(Photometry, DisparityMeasuredByCorrelationIsThatOfTheGeometry) {
   const Rig& rig = sequence.rig();
   constexpr int kHalf = 7;
   std::vector<double> errors;
-  for (const int frame_index : {0, sequence.frame_count() / 3, 2 * sequence.frame_count() / 3}) {
+  const int frames = GetParam() == "campus" ? 9 : 3;  // few of its houses are near enough
+  for (int n = 0; n < frames; ++n) {
+    const int frame_index = n * sequence.frame_count() / frames;
     const Frame frame = sequence.render(frame_index);
     const cv::Mat inverse_depth = sequence.exact_view(frame_index).inverse_depth;
     const cv::Mat left = smoothed(frame.left);
