@@ -1,8 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <iterator>
 #include <vector>
+
+#include "engine/logs/index_iterator.hpp"
 
 namespace twofold {
 
@@ -34,33 +35,7 @@ class ChunkedVector {
   /// The chunks in their order; all but the last are full.
   [[nodiscard]] const std::vector<std::vector<T>>& chunks() const { return chunks_; }
 
-  class const_iterator {
-   public:
-    using iterator_category = std::forward_iterator_tag;
-    using value_type = T;
-    using difference_type = std::ptrdiff_t;
-    using pointer = const T*;
-    using reference = const T&;
-
-    const_iterator() = default;
-    const_iterator(const ChunkedVector& vector, std::size_t i) : vector_(&vector), i_(i) {}
-    reference operator*() const { return (*vector_)[i_]; }
-    pointer operator->() const { return &(*vector_)[i_]; }
-    const_iterator& operator++() {
-      ++i_;
-      return *this;
-    }
-    const_iterator operator++(int) {
-      const const_iterator before = *this;
-      ++i_;
-      return before;
-    }
-    bool operator==(const const_iterator&) const = default;
-
-   private:
-    const ChunkedVector* vector_ = nullptr;
-    std::size_t i_ = 0;
-  };
+  using const_iterator = IndexIterator<ChunkedVector, T>;
   [[nodiscard]] const_iterator begin() const { return {*this, 0}; }
   [[nodiscard]] const_iterator end() const { return {*this, size_}; }
 

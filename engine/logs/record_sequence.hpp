@@ -2,12 +2,12 @@
 
 #include <cstddef>
 #include <cstring>
-#include <iterator>
 #include <memory>
 #include <span>
 #include <type_traits>
 
 #include "engine/logs/chunked_vector.hpp"
+#include "engine/logs/index_iterator.hpp"
 #include "engine/logs/log_file.hpp"
 #include "engine/logs/mapped_file.hpp"
 #include "geometry/check.hpp"
@@ -60,33 +60,7 @@ class RecordSequence {
   /// Records older than the first one here.
   [[nodiscard]] std::size_t forgotten() const { return forgotten_; }
 
-  class const_iterator {
-   public:
-    using iterator_category = std::forward_iterator_tag;
-    using value_type = T;
-    using difference_type = std::ptrdiff_t;
-    using pointer = const T*;
-    using reference = const T&;
-
-    const_iterator() = default;
-    const_iterator(const RecordSequence& records, std::size_t i) : records_(&records), i_(i) {}
-    reference operator*() const { return (*records_)[i_]; }
-    pointer operator->() const { return &(*records_)[i_]; }
-    const_iterator& operator++() {
-      ++i_;
-      return *this;
-    }
-    const_iterator operator++(int) {
-      const const_iterator before = *this;
-      ++i_;
-      return before;
-    }
-    bool operator==(const const_iterator&) const = default;
-
-   private:
-    const RecordSequence* records_ = nullptr;
-    std::size_t i_ = 0;
-  };
+  using const_iterator = IndexIterator<RecordSequence, T>;
   [[nodiscard]] const_iterator begin() const { return {*this, 0}; }
   [[nodiscard]] const_iterator end() const { return {*this, size()}; }
 
