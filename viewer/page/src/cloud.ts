@@ -94,7 +94,8 @@ export class Cloud {
   private used = 0;  // slots ever taken
   private parts: number[] = [];
   private share = 1;
-  private boxOf = 0;  // number of points when `box` was found
+  private newest = 1;  // age
+  private boxOf = 0;   // number of points when `box` was found
   size = 0;
   /** Holds nine tenths of the points in each direction, in the picture's frame: y up. */
   readonly box = new THREE.Box3();
@@ -118,6 +119,7 @@ export class Cloud {
       for (let i = 0; i < block.count; ++i) this.put(block, i * POINT_WORDS, touched);
     }
     for (const chunk of touched) chunk.touch();
+    this.material.uniforms.newest.value = this.newest;
     if (this.size > 1.3 * this.boxOf) this.findBox();
   }
 
@@ -130,9 +132,13 @@ export class Cloud {
     for (let k = 0; k < 3; ++k) p[3 * i + k] = floats[at + 1 + k];
     chunk.box.expandByPoint(scratch.fromArray(p, 3 * i));
     chunk.age.array[i] = words[at + 5];
-    this.material.uniforms.newest.value = Math.max(this.material.uniforms.newest.value, words[at + 5]);
+    this.newest = Math.max(this.newest, words[at + 5]);
     const packed = words[at + 6];
-    chunk.info.array.set([packed & 0xff, (packed >> 8) & 0xff, this.partNumber(words[at + 4]), 255], 4 * i);
+    const info = chunk.info.array;  // written singly: an array for each of millions of points costs seconds
+    info[4 * i] = packed & 0xff;
+    info[4 * i + 1] = (packed >> 8) & 0xff;
+    info[4 * i + 2] = this.partNumber(words[at + 4]);
+    info[4 * i + 3] = 255;
     touched.add(chunk);
   }
 

@@ -35,12 +35,17 @@ const KEYS: [string, string][] = [
 const EFFORTS = ['everything', 'fewer points', 'coarse alignment', 'fewer iterations', 'drop frames'];
 
 class Page {
+  // First, so that the server answers while WebGL is being set up. Nothing is heard before the page has been made.
+  private readonly connection = new Connection({
+    binary: (message) => this.take(message),
+    text: (message) => this.read(message),
+    link: (state, message) => this.showLink(state, message),
+  });
   readonly model = new Model();
   readonly stage = new Stage($('stage'), this.model);
   readonly strip = new Strip($('strip'), this.model);
   readonly timeline = new Timeline($('timeline'), $('tip'), this.model);
   readonly sight = new Sight($('sight'), this.model, this.stage.cloud);
-  private readonly connection: Connection;
   private link: Link = 'connecting';
   private measuring = false;
   private playing = 0;
@@ -49,11 +54,6 @@ class Page {
 
   constructor() {
     history.replaceState(null, '', '/');  // the token is in a cookie by now, and needs no second place
-    this.connection = new Connection({
-      binary: (message) => this.take(message),
-      text: (message) => this.read(message),
-      link: (state, message) => this.showLink(state, message),
-    });
     this.makePanels();
     this.listen();
     this.setTheme((localStorage.getItem('theme') as Theme | null) ?? 'dark');

@@ -2,7 +2,7 @@
 import * as THREE from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {Cloud} from './cloud.ts';
-import {WideLines, wide, type Segments} from './lines.ts';
+import {WideLines, type Segments} from './lines.ts';
 import type {CameraPose, Model} from './model.ts';
 import {PALETTES, type Palette, type Theme} from './palette.ts';
 import {State, type Keyframe, type PathFrame} from './wire.ts';
@@ -36,15 +36,15 @@ export class Stage {
   private readonly camera = new THREE.PerspectiveCamera(50, 1, 0.02, 5000);
   private readonly controls: OrbitControls;
   private readonly world = new THREE.Group();  // the map's frame: y down, z forward
-  private readonly final = new WideLines(wide(3), 3);
-  private readonly causal = new WideLines(wide(1.6), 2);
-  private readonly truth = new WideLines(wide(1.5, 0.7), 1);
-  private readonly windows = new WideLines(wide(1.8), 4);
-  private readonly body = new WideLines(wide(3), 6);
-  private readonly tape = new WideLines(wide(3), 7);
-  private readonly keyframes = new WideLines(wide(1, 0.8), 0);
-  private readonly edges = new WideLines(wide(1, 0.25), 0);
-  private readonly grid = new WideLines(wide(1), -1);
+  private readonly final = new WideLines(3, 3);
+  private readonly causal = new WideLines(1.6, 2);
+  private readonly truth = new WideLines(1.5, 1, 0.7);
+  private readonly windows = new WideLines(1.8, 4);
+  private readonly body = new WideLines(3, 6);
+  private readonly tape = new WideLines(3, 7);
+  private readonly keyframes = new WideLines(1, 0, 0.8);
+  private readonly edges = new WideLines(1, 0, 0.25);
+  private readonly grid = new WideLines(1, -1);
   private palette: Palette = PALETTES.dark;
   private dirty = true;
   private lines = true;  // to be made anew
@@ -71,7 +71,7 @@ export class Stage {
     this.world.add(this.cloud.group, this.edges.object, this.keyframes.object, this.truth.object, this.causal.object,
       this.final.object, this.windows.object, this.body.object, this.tape.object);
     this.scene.add(this.world, this.grid.object);
-    for (const lines of [this.final, this.causal, this.truth, this.windows, this.body, this.tape]) lines.material.depthTest = false;
+    for (const lines of [this.final, this.causal, this.truth, this.windows, this.body, this.tape]) lines.object.material.depthTest = false;
     this.setTheme('dark');
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
