@@ -128,13 +128,20 @@ MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> ob
     if (result.inliers < kMinObservations) round = {};
     if (!round.usable) break;
   }
-  if (round.usable) round.usable = determines_pose(cost.evaluate(result.T_c_ref, true).hessian());
-  if (!round.usable) result.T_c_ref = T_c_ref_start;
+  // The last round's flags are those of its pose.
+  const auto judge = [&] {
+    const MotionEquations equations = cost.evaluate(result.T_c_ref, true);
+    result.information = equations.hessian();
+    result.chi2 = equations.cost.sum();
+  };
+  if (round.usable) judge();
+  round.usable = round.usable && determines_pose(result.information);
+  if (!round.usable) {
+    result.T_c_ref = T_c_ref_start;
+    result.inliers = cost.classify(result.T_c_ref, options);
+    judge();
+  }
   result.converged = round.usable && round.converged;
-  result.inliers = cost.classify(result.T_c_ref, options);
-  const MotionEquations final_equations = cost.evaluate(result.T_c_ref, true);
-  result.information = final_equations.hessian();
-  result.chi2 = final_equations.cost.sum();
   return result;
 }
 

@@ -107,21 +107,25 @@ double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v
   const int u0 = static_cast<int>(std::lround(u));
   const int v0 = static_cast<int>(std::lround(v));
   if (u0 < 1 || v0 < 1 || u0 >= depth.cols - 1 || v0 >= depth.rows - 1) return Rig::kNoRight;
-  std::array<double, 9> readings;
+  std::array<std::uint16_t, 9> readings;
   std::size_t count = 0;
   for (int dv = -1; dv <= 1; ++dv) {
+    const auto* row = depth.ptr<std::uint16_t>(v0 + dv) + u0;
     for (int du = -1; du <= 1; ++du) {
-      const double metres = depth.at<std::uint16_t>(v0 + dv, u0 + du) * rig.depth_unit;
-      if (metres >= rig.depth_min && metres <= rig.depth_max) readings[count++] = metres;
+      const double metres = row[du] * rig.depth_unit;
+      if (metres >= rig.depth_min && metres <= rig.depth_max) readings[count++] = row[du];
     }
   }
   if (count < 5) return Rig::kNoRight;
   std::sort(readings.begin(), readings.begin() + static_cast<std::ptrdiff_t>(count));
-  const double near = rig.disparity_from_depth(readings[0]);
-  const double far = rig.disparity_from_depth(readings[count - 1]);
+  const auto disparity = [&](std::size_t i) {
+    return rig.disparity_from_depth(readings[i] * rig.depth_unit);
+  };
+  const double near = disparity(0);
+  const double far = disparity(count - 1);
   constexpr double kDepthEdge = 2.0;  // [px] more than noise and any slanted surface show over three pixels
   if (near - far > kDepthEdge) return Rig::kNoRight;
-  return u - rig.disparity_from_depth(readings[count / 2]);
+  return u - disparity(count / 2);
 }
 
 namespace {

@@ -5,6 +5,7 @@
 #endif
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -20,17 +21,77 @@ constexpr int kHighestSearchLevel = 3;  // above it patches cover too much of th
 constexpr int kAppearance = PointAppearance::kSize;
 constexpr float kLast = kAppearance - 1.001F;  // last position with a pixel after it
 
-float sample(const std::uint8_t* pixels, float u, float v) {
-  const int u0 = static_cast<int>(u);
-  const int v0 = static_cast<int>(v);
-  const float a = u - static_cast<float>(u0);
-  const float b = v - static_cast<float>(v0);
-  const std::uint8_t* p = pixels + v0 * kAppearance + u0;
-  const auto p00 = static_cast<float>(p[0]);
-  const auto p10 = static_cast<float>(p[kAppearance]);
-  const float top = p00 + a * (static_cast<float>(p[1]) - p00);
-  const float bottom = p10 + a * (static_cast<float>(p[kAppearance + 1]) - p10);
-  return top + b * (bottom - top);
+/// What is computed for eight samples at once.
+constexpr std::size_t kLanes = 8;
+using Floats = float __attribute__((vector_size(kLanes * sizeof(float))));
+using Ints = std::int32_t __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
+
+constexpr std::size_t kSamples = (kBordered * kBordered + kLanes - 1) / kLanes * kLanes;
+
+/// Column and row of each pixel of a bordered patch, row by row; then some that nobody looks at.
+struct SampleGrid {
+  alignas(32) std::array<float, kSamples> column{};
+  alignas(32) std::array<float, kSamples> row{};
+
+  constexpr SampleGrid() {
+    for (std::size_t i = 0; i < kSamples; ++i) {
+      column[i] = static_cast<float>(i % kBordered);
+      row[i] = static_cast<float>(i / kBordered);
+    }
+  }
+};
+constexpr SampleGrid kGrid;
+
+Floats clamped(Floats x) {
+  const Floats at_most = x < kLast ? x : Floats{} + kLast;
+  return at_most > 0.0F ? at_most : Floats{};
+}
+
+/// Bilinear samples of an appearance at first + column * along_u + row * along_v. A strong warp reaches past
+/// what was kept: its rim is repeated.
+void sample_grid(const PointAppearance& appearance, const Eigen::Vector2f& first,
+                 const Eigen::Vector2f& along_u, const Eigen::Vector2f& along_v,
+                 std::span<float, kSamples> samples) {
+  alignas(32) std::array<float, kSamples> a, b;  // weights of the right and of the lower neighbour
+  alignas(32) std::array<std::int32_t, kSamples> upper,
+      lower;  // first the pixel's number, then two pixels' bytes
+  for (std::size_t i = 0; i < kSamples; i += kLanes) {
+    Floats column, row;
+    std::memcpy(&column, &kGrid.column[i], sizeof column);
+    std::memcpy(&row, &kGrid.row[i], sizeof row);
+    const Floats u = clamped((first.x() + row * along_v.x()) + column * along_u.x());
+    const Floats v = clamped((first.y() + row * along_v.y()) + column * along_u.y());
+    const Ints u0 = __builtin_convertvector(u, Ints), v0 = __builtin_convertvector(v, Ints);
+    const Floats weight_u = u - __builtin_convertvector(u0, Floats),
+                 weight_v = v - __builtin_convertvector(v0, Floats);
+    const Ints number = v0 * kAppearance + u0;
+    std::memcpy(&a[i], &weight_u, sizeof weight_u);
+    std::memcpy(&b[i], &weight_v, sizeof weight_v);
+    std::memcpy(&upper[i], &number, sizeof number);
+  }
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    const std::uint8_t* p = appearance.pixels.data() + upper[i];
+    std::uint16_t two = 0;
+    std::memcpy(&two, p, sizeof two);
+    upper[i] = two;
+    std::memcpy(&two, p + kAppearance, sizeof two);
+    lower[i] = two;
+  }
+  for (std::size_t i = 0; i < kSamples; i += kLanes) {
+    Floats weight_u, weight_v;
+    Ints above, below;
+    std::memcpy(&weight_u, &a[i], sizeof weight_u);
+    std::memcpy(&weight_v, &b[i], sizeof weight_v);
+    std::memcpy(&above, &upper[i], sizeof above);
+    std::memcpy(&below, &lower[i], sizeof below);
+    const auto between = [&](const Ints& pair) {  // the first pixel is the lower byte
+      const Floats left = __builtin_convertvector(pair & 255, Floats);
+      return left + weight_u * (__builtin_convertvector(pair >> 8, Floats) - left);
+    };
+    const Floats top = between(above);
+    const Floats value = top + weight_v * (between(below) - top);
+    std::memcpy(&samples[i], &value, sizeof value);
+  }
 }
 
 /// Fills the patch from its pixels and a border of one around them, rows `stride` apart.
@@ -89,18 +150,9 @@ void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a,
   constexpr float kBefore = Patch::kCentre + 1;
   const Eigen::Vector2f first =
       Eigen::Vector2f::Constant(PointAppearance::kCentre) - kBefore * (A_a_c.col(0) + A_a_c.col(1));
-  float bordered[kBordered * kBordered];
-  for (int r = 0; r < kBordered; ++r) {
-    const Eigen::Vector2f row = first + static_cast<float>(r) * A_a_c.col(1);
-    for (int c = 0; c < kBordered; ++c) {
-      const float u = row.x() + static_cast<float>(c) * A_a_c(0, 0);
-      const float v = row.y() + static_cast<float>(c) * A_a_c(1, 0);
-      // A strong warp reaches past what was kept: its rim is repeated.
-      bordered[r * kBordered + c] =
-          sample(appearance.pixels.data(), std::clamp(u, 0.0F, kLast), std::clamp(v, 0.0F, kLast));
-    }
-  }
-  fill_patch(bordered, kBordered, patch);
+  alignas(32) std::array<float, kSamples> bordered;
+  sample_grid(appearance, first, A_a_c.col(0), A_a_c.col(1), bordered);
+  fill_patch(bordered.data(), kBordered, patch);
 }
 
 bool cut_patch(const cv::Mat& level_image, int u, int v, Patch& patch) {

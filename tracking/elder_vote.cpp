@@ -35,6 +35,7 @@ std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation>
 
   const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
   const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent;
+  if (!dissent && !mistrusted) return std::nullopt;  // nearly always
   const int with_elders = young_inliers(observations, anchors, by_elders.T_c_ref, solver);
   const int with_all = young_inliers(observations, anchors, by_all.T_c_ref, solver);
   const bool misled = dissent && with_elders < options_.min_loyal * with_all;

@@ -35,8 +35,8 @@ class ElderVote {
  public:
   ElderVote(const Rig& rig, std::size_t capacity, const ElderVoteOptions& options);
 
-  /// @param observations  of one frame, at most `capacity`; they then say who agrees with the pose that
-  /// counts
+  /// @param observations  of one frame, at most `capacity`, which say who agrees with by_all; they then say
+  /// who agrees with the pose that counts
   /// @param anchors       the keyframe that each of the points was seen in first; numbers grow with time
   /// @param by_all        the pose that all of them give
   /// @return              the pose that the elders give, when it counts instead

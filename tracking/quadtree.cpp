@@ -46,11 +46,25 @@ bool Quadtree::insert(const Eigen::Vector2f& uv, std::uint32_t number) {
 }
 
 void Quadtree::build() {
-  std::sort(leaves_.begin(), leaves_.end(), [](const Leaf& a, const Leaf& b) {
-    return a.morton != b.morton ? a.morton < b.morton : a.number < b.number;
-  });
+  std::sort(leaves_.begin(), leaves_.end(), [](const Leaf& a, const Leaf& b) { return a.key() < b.key(); });
   if (!leaves_.empty()) level_.push_back({0, static_cast<std::uint32_t>(leaves_.size()), 0});
   built_ = true;
+}
+
+/// First leaf in [begin, end) that is not in the quadrant of the first. Few leaves are looked at one by one;
+/// many are halved.
+std::uint32_t Quadtree::end_of_quadrant(std::uint32_t begin, std::uint32_t end, int shift) const {
+  constexpr std::uint32_t kFew = 12;
+  const std::uint32_t quadrant = leaves_[begin].morton >> shift;
+  const auto is_inside = [&](std::uint32_t i) { return leaves_[i].morton >> shift == quadrant; };
+  if (is_inside(end - 1)) return end;
+  std::uint32_t inside = begin;
+  while (end - inside > kFew) {
+    const std::uint32_t middle = inside + (end - inside) / 2;
+    (is_inside(middle) ? inside : end) = middle;
+  }
+  while (is_inside(inside)) ++inside;  // the last one is not
+  return inside;
 }
 
 int Quadtree::children(const Node& node, Node (&result)[4]) {
@@ -58,9 +72,7 @@ int Quadtree::children(const Node& node, Node (&result)[4]) {
   int count = 0;
   std::uint32_t begin = node.begin;
   while (begin < node.end) {
-    const std::uint32_t quadrant = leaves_[begin].morton >> shift;
-    std::uint32_t end = begin + 1;
-    while (end < node.end && leaves_[end].morton >> shift == quadrant) ++end;
+    const std::uint32_t end = end_of_quadrant(begin, node.end, shift);
     result[count++] = {begin, end, node.depth + 1};
     begin = end;
   }

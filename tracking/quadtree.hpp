@@ -35,6 +35,9 @@ class Quadtree {
     std::uint32_t morton;
     std::uint32_t number;
     bool visited;
+
+    /// Orders leaves along the curve, and by number where they share a place.
+    [[nodiscard]] std::uint64_t key() const { return std::uint64_t{morton} << 32 | number; }
   };
   /// Points [begin, end) share the first `depth` quadrants.
   struct Node {
@@ -43,6 +46,7 @@ class Quadtree {
   };
 
   void build();
+  [[nodiscard]] std::uint32_t end_of_quadrant(std::uint32_t begin, std::uint32_t end, int shift) const;
   /// Non-empty children of a node, in random order; returns how many.
   int children(const Node& node, Node (&result)[4]);
   std::int64_t take_leaf_below(const Node& node);
