@@ -64,7 +64,7 @@ struct EngineOptions {
   bool localise_only = false;  ///< no keyframe is made: `map`, which must be there, does not change
   /// While true no keyframe is made: the map stays as it is, until it is false again. May be null; outlives
   /// the run. Of threaded runs.
-  const std::atomic<bool>* map_held = nullptr;
+  const std::atomic<bool>* mapping_paused = nullptr;
   CheckpointOptions checkpoint;
   RunLogOptions logs;
 

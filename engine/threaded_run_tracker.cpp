@@ -60,8 +60,9 @@ void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnap
 /// A buffer for a keyframe, if there may be one.
 void ThreadedRun::prepare_spare() {
   // Relaxed: a wish, which takes effect with one frame or the next.
-  const bool held = options_.map_held != nullptr && options_.map_held->load(std::memory_order_relaxed);
-  if (held || options_.localise_only) {
+  const bool paused =
+      options_.mapping_paused != nullptr && options_.mapping_paused->load(std::memory_order_relaxed);
+  if (paused || options_.localise_only) {
     spare_.reset();
   } else if (!spare_) {
     spare_ = proposals_pool_.try_acquire();

@@ -13,8 +13,8 @@ std::shared_ptr<const std::string> shared(std::string bytes) {
 constexpr std::array<std::pair<std::string_view, ViewCommand>, 4> kCommands{
     {{"save map", ViewCommand::kSaveMap},
      {"stop", ViewCommand::kStop},
-     {"hold map", ViewCommand::kHoldMap},
-     {"release map", ViewCommand::kReleaseMap}}};
+     {"pause mapping", ViewCommand::kPauseMapping},
+     {"resume mapping", ViewCommand::kResumeMapping}}};
 
 }  // namespace
 

@@ -61,12 +61,12 @@ const char* describe(ViewCommand command) {
       return "map saved";
     case ViewCommand::kStop:
       return "run stopped";
-    case ViewCommand::kHoldMap:
-      return "map held";
-    case ViewCommand::kReleaseMap:
+    case ViewCommand::kPauseMapping:
+      return "mapping paused";
+    case ViewCommand::kResumeMapping:
       break;
   }
-  return "map released";
+  return "mapping resumed";
 }
 
 std::string measured_message(const ToldPoints& told) {

@@ -23,7 +23,7 @@ namespace twofold {
 // (viewer/texts.hpp).
 //
 // The page says "ack" for each message, "images on", "images off", and, where hello.control is true, "save
-// map", "stop", "hold map", "release map".
+// map", "stop", "pause mapping", "resume mapping".
 //
 // A revision counts changes of the scene. A delta from revision 0 is the whole of it, and makes the page
 // forget what it had. One that is large comes in several messages; the last has kLast, and until then `from`

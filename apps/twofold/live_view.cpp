@@ -59,7 +59,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments, const std::st
       ->capture_default_str();
   command.add_flag(
       "--view-control", arguments.control,
-      "Viewers may save the map (to map.tfm in the output folder), hold it as it is, and end the run");
+      "Viewers may save the map (to map.tfm in the output folder), pause mapping, and end the run");
 }
 
 void print_view_address(const std::string& address, bool is_open_to_network) {
@@ -103,7 +103,7 @@ void LiveView::listen(EngineOptions& options) {
            }));
   options.on_places = both(options.on_places,
                            PlacesListener([this](const KeyframeDatabase& places) { maps_.publish(places); }));
-  options.map_held = &map_held_;
+  options.mapping_paused = &mapping_paused_;
 }
 
 /// The tracker's thread: no lock, no allocation.
@@ -136,13 +136,13 @@ std::string LiveView::obey(ViewCommand command) {
     case ViewCommand::kStop:
       interrupt();
       return "the run ends as by Ctrl-C";
-    case ViewCommand::kHoldMap:
-      map_held_.store(true, std::memory_order_relaxed);
+    case ViewCommand::kPauseMapping:
+      mapping_paused_.store(true, std::memory_order_relaxed);
       return "the camera is localised, no keyframe is made";
-    case ViewCommand::kReleaseMap:
+    case ViewCommand::kResumeMapping:
       break;
   }
-  map_held_.store(false, std::memory_order_relaxed);
+  mapping_paused_.store(false, std::memory_order_relaxed);
   return "mapping goes on";
 }
 

@@ -57,7 +57,7 @@ class LiveView {
   PoseReporter reporter_;              // tracker's
   std::vector<ViewedPoint> measured_;  // tracker's
   MapLender maps_;
-  std::atomic<bool> map_held_{false};  // relaxed: a wish
+  std::atomic<bool> mapping_paused_{false};  // relaxed: a wish
   std::unique_ptr<Viewer> viewer_;
 };
 

@@ -16,9 +16,9 @@ namespace twofold {
 /// What those who look may ask for, if ViewerOptions::on_command lets them.
 enum class ViewCommand : std::uint8_t {
   kSaveMap,
-  kStop,       ///< the run
-  kHoldMap,    ///< localise only: no more keyframes
-  kReleaseMap  ///< go on mapping
+  kStop,          ///< the run
+  kPauseMapping,  ///< localise only: no more keyframes
+  kResumeMapping
 };
 
 /// A point of the map as it was found in an image.

@@ -152,20 +152,20 @@ TEST_F(EngineMapTest, AThreadedRunInALoadedMapReplays) {
 }
 
 TEST_F(EngineMapTest, AHeldMapGetsNoKeyframes) {
-  constexpr int kHeldFrom = 15;
-  std::atomic<bool> held{false};
+  constexpr int kPausedFrom = 15;
+  std::atomic<bool> paused{false};
   EngineOptions threaded = options();
   threaded.deterministic = false;
   const auto keyframes_after = [](const RunResult& result) {
     return std::count_if(result.frames.begin(), result.frames.end(), [](const FrameRecord& record) {
-      return record.keyframe && record.frame_index >= kHeldFrom;
+      return record.keyframe && record.frame_index >= kPausedFrom;
     });
   };
   EXPECT_GT(keyframes_after(run_engine(threaded, frames(0, kFrames))), 0);
-  threaded.map_held = &held;
+  threaded.mapping_paused = &paused;
   const FrameFeed feed = [&, next = frames(0, kFrames)](Frame& frame) {
     const FeedStatus status = next(frame);
-    if (frame.index == kHeldFrom) held = true;
+    if (frame.index == kPausedFrom) paused = true;
     return status;
   };
   const RunResult result = run_engine(threaded, feed);

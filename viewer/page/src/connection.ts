@@ -3,7 +3,7 @@ import {decode, type Binary, type Text} from './wire.ts';
 
 export type Link = 'connecting' | 'open' | 'broken' | 'ended';
 
-export type Command = 'save map' | 'stop' | 'hold map' | 'release map';
+export type Command = 'save map' | 'stop' | 'pause mapping' | 'resume mapping';
 
 export interface Listener {
   binary(message: Binary): void;

@@ -95,7 +95,7 @@ class Page {
     if (message.truth) this.model.truth = message.truth;
     if (message.events) {
       this.model.events.push(...message.events);
-      this.showHeld();
+      this.showPaused();
       this.makeEvents();
     }
     this.stage.changed();
@@ -263,12 +263,12 @@ class Page {
     this.stale = true;
   }
 
-  /** Whoever held the map: events tell everybody. */
-  private get isHeld(): boolean {
-    return this.model.events.findLast((event) => event.kind === 'map held' || event.kind === 'map released')?.kind === 'map held';
+  /** Whoever paused mapping: events tell everybody. */
+  private get isPaused(): boolean {
+    return this.model.events.findLast((event) => event.kind === 'mapping paused' || event.kind === 'mapping resumed')?.kind === 'mapping paused';
   }
-  private showHeld(): void {
-    $('hold').setAttribute('aria-pressed', String(this.isHeld));
+  private showPaused(): void {
+    $('pause-mapping').setAttribute('aria-pressed', String(this.isPaused));
   }
   private command(command: Command): void {
     if (command === 'stop' && !confirm('End the run?')) return;
@@ -385,7 +385,7 @@ class Page {
     on('help', () => $<HTMLDialogElement>('keys').showModal());
     on('keys', () => $<HTMLDialogElement>('keys').close());
     on('save-map', () => this.command('save map'));
-    on('hold', () => this.command(this.isHeld ? 'release map' : 'hold map'));
+    on('pause-mapping', () => this.command(this.isPaused ? 'resume mapping' : 'pause mapping'));
     on('stop', () => this.command('stop'));
     on('now', () => this.timeline.set(null));
     on('play', () => this.setPlaying(!this.playing));

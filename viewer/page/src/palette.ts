@@ -27,8 +27,8 @@ export const EVENT_COLOURS: Record<string, string> = {
   'new part': '#ff8cc6',
   'lost': '#ff3b30',
   'map saved': '#6ac8ff',
-  'map held': '#6ac8ff',
-  'map released': '#6ac8ff',
+  'mapping paused': '#6ac8ff',
+  'mapping resumed': '#6ac8ff',
   'run stopped': '#6ac8ff',
   'command failed': '#ff3b30',
 };

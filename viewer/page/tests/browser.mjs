@@ -82,10 +82,10 @@ async function command(page, run) {
   await page.click('#save-map');
   await says(page, '#events', /map saved.*map\.tfm/);
   await has(page, 'an event on the time line', '#timeline', '#6ac8ff', 20);
-  await page.click('#hold');
-  await until('the map is held', () => page.evaluate(() => document.querySelector('#hold').getAttribute('aria-pressed') === 'true'));
-  await page.click('#hold');
-  await says(page, '#events', /map released/);
+  await page.click('#pause-mapping');
+  await until('mapping is paused', () => page.evaluate(() => document.querySelector('#pause-mapping').getAttribute('aria-pressed') === 'true'));
+  await page.click('#pause-mapping');
+  await says(page, '#events', /mapping resumed/);
   page.once('dialog', (dialog) => void dialog.accept());
   await page.click('#stop');
   await says(page, '#message', /over/);

@@ -10,11 +10,11 @@ const map = join(scratch, 'map.tfm');
 const browser = await openBrowser();
 const picture = (page, name) => page.screenshot({path: join(folder, name), type: 'jpeg', quality: 72});
 try {
-  const run = new Program(['run', source, '--preload', '--speed', '0.4', '--late', 'drop', '--quiet', '--view', '0', '--save-map', map, '--out', join(scratch, 'run')]);
+  const run = new Program(['run', source, '--preload', '--speed', '1', '--late', 'drop', '--quiet', '--view', '0', '--save-map', map, '--out', join(scratch, 'run')]);
   const page = await openPage(browser, await run.address());
   await until('keyframes', async () => (await report(page)).keyframes > 5);
   await page.keyboard.press('i');
-  await until('most of the run', async () => run.ended || (await page.evaluate(() => window.twofold.model.endTime())) > 8, 240000);
+  await until('most of the run', async () => run.ended || (await page.evaluate(() => window.twofold.model.endTime())) > 24, 240000);
   await picture(page, 'viewer_live.jpg');
   await run.end;
   const view = new Program(['view', map, '--port', '0']);
