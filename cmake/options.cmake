@@ -19,6 +19,12 @@ if(TWOFOLD_SHARED)
   # a program.
   target_compile_options(twofold_options INTERFACE -fPIC -fvisibility=hidden -fvisibility-inlines-hidden)
 endif()
+# Sums in another order, and products rounded before they are added or not, differ in their last bits.
+option(TWOFOLD_SAME_BYTES "Compute alike on x86 and ARM, slower: deterministic runs then give the same bytes" OFF)
+if(TWOFOLD_SAME_BYTES)
+  target_compile_options(twofold_options INTERFACE -ffp-contract=off)
+  target_compile_definitions(twofold_options INTERFACE EIGEN_DONT_VECTORIZE)
+endif()
 if(TWOFOLD_WERROR)
   target_compile_options(twofold_options INTERFACE -Werror)
 endif()
@@ -76,6 +82,20 @@ function(twofold_sanitizer_environment name)
     set_tests_properties(${name} PROPERTIES
       ENVIRONMENT "OMP_THREAD_LIMIT=1;OPENBLAS_NUM_THREADS=1;TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/tsan.supp")
   endif()
+endfunction()
+
+# twofold_command(target variable): the file that runs this program on this machine: the program, or a script that has the
+# emulator run it.
+function(twofold_command target variable)
+  set(command $<TARGET_FILE:${target}>)
+  if(CMAKE_CROSSCOMPILING_EMULATOR)
+    list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
+    set(script ${CMAKE_BINARY_DIR}/emulated/${target})
+    file(GENERATE OUTPUT ${script} CONTENT "#!/bin/sh\nexec ${emulator} ${command} \"$@\"\n"
+      FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+    set(command ${script})
+  endif()
+  set(${variable} ${command} PARENT_SCOPE)
 endfunction()
 
 # twofold_test(name SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case.

@@ -80,15 +80,22 @@ Finding check_cores(const fs::path& root) {
           "give it two cores (taskset, docker --cpuset-cpus)"};
 }
 
-Finding check_features(const fs::path& root) {
-  const auto flags = value_of(root / "proc/cpuinfo", "flags");
-  if (!flags)
-    return {Health::kWarn, "processor", "features unknown", "mount /proc; the program needs " TWOFOLD_ARCH};
+/// What /proc/cpuinfo calls the instructions that this build may use.
+std::vector<std::string> wanted_features(const std::string& arch) {
+  if (arch.starts_with("armv8")) return {"fp", "asimd"};
   std::vector<std::string> wanted{"sse4_2", "popcnt"};
-  const std::string arch = TWOFOLD_ARCH;
   if (arch == "x86-64-v3" || arch == "x86-64-v4")
     wanted.insert(wanted.end(), {"avx2", "fma", "bmi2", "f16c"});
   if (arch == "x86-64-v4") wanted.insert(wanted.end(), {"avx512f", "avx512bw", "avx512vl"});
+  return wanted;
+}
+
+Finding check_features(const fs::path& root) {
+  const std::string arch = TWOFOLD_ARCH;
+  const auto flags = value_of(root / "proc/cpuinfo", arch.starts_with("armv") ? "Features" : "flags");
+  if (!flags)
+    return {Health::kWarn, "processor", "features unknown", "mount /proc; the program needs " + arch};
+  const std::vector<std::string> wanted = wanted_features(arch);
   const std::set<std::string> present = words(*flags);
   std::string missing;
   for (const std::string& flag : wanted) {

@@ -1,15 +1,11 @@
 #include "imaging/fast_corners.hpp"
 
-#ifdef __AVX2__
-#include <immintrin.h>
-#endif
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
 #include "geometry/check.hpp"
+#include "imaging/byte_run.hpp"
 #include "imaging/structure_tensor.hpp"
 
 namespace twofold {
@@ -39,47 +35,20 @@ Circle circle_offsets(std::ptrdiff_t stride) {
   return offsets;
 }
 
-constexpr int kRun = 32;    // pixels looked at together
-constexpr int kStrong = 3;  // thresholds that a strong corner stands out by
-
-/// One byte a pixel; comparisons give 255 or 0.
-using Bytes = std::uint8_t __attribute__((vector_size(kRun)));
-
-Bytes load(const std::uint8_t* p) {
-  Bytes bytes;
-  std::memcpy(&bytes, p, sizeof bytes);
-  return bytes;
-}
-Bytes larger(Bytes a, Bytes b) {
-  return a > b ? a : b;
-}
-Bytes smaller(Bytes a, Bytes b) {
-  return a < b ? a : b;
-}
-/// Bit k set where byte k is not zero; marks are 255 or 0.
-std::uint32_t mask_of(const Bytes& marks) {
-#ifdef __AVX2__
-  __m256i bytes;
-  std::memcpy(&bytes, &marks, sizeof bytes);
-  return static_cast<std::uint32_t>(_mm256_movemask_epi8(bytes));
-#else
-  std::uint32_t mask = 0;
-  for (int k = 0; k < kRun; ++k) mask |= (marks[k] != 0 ? 1U : 0U) << k;
-  return mask;
-#endif
-}
+constexpr int kRun = kByteRun;  // pixels looked at together
+constexpr int kStrong = 3;      // thresholds that a strong corner stands out by
 
 /// Over the sixteen arcs of nine neighbours on the circle: the largest of their smallest pixels. `inner` and
 /// `outer` are smaller and larger; the other way round, the smallest of their largest. Arcs k and k + 1 share
 /// eight pixels.
-template <Bytes (*inner)(Bytes, Bytes), Bytes (*outer)(Bytes, Bytes)>
-Bytes best_arc(const std::array<Bytes, 16>& q) {
-  std::array<Bytes, 8> two, four;
+template <ByteRun (*inner)(ByteRun, ByteRun), ByteRun (*outer)(ByteRun, ByteRun)>
+ByteRun best_arc(const std::array<ByteRun, 16>& q) {
+  std::array<ByteRun, 8> two, four;
   for (std::size_t i = 0; i < 8; ++i) two[i] = inner(q[2 * i + 1], q[(2 * i + 2) % 16]);
   for (std::size_t i = 0; i < 8; ++i) four[i] = inner(two[i], two[(i + 1) % 8]);
-  Bytes best = inner(inner(four[0], four[2]), outer(q[0], q[9]));
+  ByteRun best = inner(inner(four[0], four[2]), outer(q[0], q[9]));
   for (std::size_t i = 1; i < 8; ++i) {
-    const Bytes shared = inner(four[i], four[(i + 2) % 8]);
+    const ByteRun shared = inner(four[i], four[(i + 2) % 8]);
     best = outer(best, inner(shared, outer(q[2 * i], q[(2 * i + 9) % 16])));
   }
   return best;
@@ -87,24 +56,24 @@ Bytes best_arc(const std::array<Bytes, 16>& q) {
 
 /// How far each pixel of the run stands out as a corner, by the weakest pixel of the arc that does most; 0
 /// for those that are none.
-Bytes strength_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
-  const Bytes centre = load(p);
-  const Bytes t = Bytes{} + static_cast<std::uint8_t>(threshold);
-  const auto brighter = [&](Bytes q) { return larger(q, centre) - centre; };
-  const auto darker = [&](Bytes q) { return centre - smaller(q, centre); };
+ByteRun strength_in_run(const std::uint8_t* p, const Circle& circle, int threshold) {
+  const ByteRun centre = load_run(p);
+  const ByteRun t = run_of(static_cast<std::uint8_t>(threshold));
+  const auto brighter = [&](ByteRun q) { return larger(q, centre) - centre; };
+  const auto darker = [&](ByteRun q) { return centre - smaller(q, centre); };
   // An arc of nine covers two neighbouring compass points at least: most runs end here.
-  const Bytes n = load(p + circle[0]), e = load(p + circle[4]);
-  const Bytes s = load(p + circle[8]), w = load(p + circle[12]);
-  const bool may_be_bright = mask_of(brighter(smaller(larger(n, s), larger(e, w))) > t) != 0;
-  const bool may_be_dark = mask_of(darker(larger(smaller(n, s), smaller(e, w))) > t) != 0;
+  const ByteRun n = load_run(p + circle[0]), e = load_run(p + circle[4]);
+  const ByteRun s = load_run(p + circle[8]), w = load_run(p + circle[12]);
+  const bool may_be_bright = any_of(above(brighter(smaller(larger(n, s), larger(e, w))), t));
+  const bool may_be_dark = any_of(above(darker(larger(smaller(n, s), smaller(e, w))), t));
 
-  Bytes strength{};
+  ByteRun strength = run_of(0);
   if (!may_be_bright && !may_be_dark) return strength;
-  std::array<Bytes, 16> q;
-  for (std::size_t k = 0; k < 16; ++k) q[k] = load(p + circle[k]);
+  std::array<ByteRun, 16> q;
+  for (std::size_t k = 0; k < 16; ++k) q[k] = load_run(p + circle[k]);
   if (may_be_bright) strength = brighter(best_arc<smaller, larger>(q));
   if (may_be_dark) strength = larger(strength, darker(best_arc<larger, smaller>(q)));
-  return strength & static_cast<Bytes>(strength > t);
+  return strength & above(strength, t);
 }
 
 constexpr double kPerPixel = 1.0 / (4 * 64);  // from a StructureTensor's eigenvalue to a score
@@ -168,14 +137,14 @@ struct Strip {
 
   /// Finds all corners; judges those that stand out by more than `strong` and keeps the others for later.
   void scan(int threshold, int strong) {
-    const Bytes far = Bytes{} + static_cast<std::uint8_t>(std::min(strong, 255));
+    const ByteRun far = run_of(static_cast<std::uint8_t>(std::min(strong, 255)));
     for (int first = u0; first < u1; first += kRun) {
       const Run run = run_at(first);
       if (run.wanted == 0) continue;
       for (int v = v0; v < v1; ++v) {
-        const Bytes found = strength_in_run(image.ptr<std::uint8_t>(v) + run.begin, circle, threshold);
-        const std::uint32_t strong_ones = mask_of(static_cast<Bytes>(found > far));
-        weak_at(first, v) = mask_of(static_cast<Bytes>(found > Bytes{})) & ~strong_ones;
+        const ByteRun found = strength_in_run(image.ptr<std::uint8_t>(v) + run.begin, circle, threshold);
+        const std::uint32_t strong_ones = mask_of(above(found, far));
+        weak_at(first, v) = mask_of(above(found, run_of(0))) & ~strong_ones;
         judge(strong_ones & run.wanted, run, v);
       }
     }

@@ -1,7 +1,9 @@
 #include "imaging/image_pyramid.hpp"
 
-#ifdef __AVX2__
+#if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
 #endif
 
 #include <cstdint>
@@ -19,7 +21,7 @@ void halve(const cv::Mat& image, cv::Mat& half) {
     const std::uint8_t* lower = image.ptr<std::uint8_t>(2 * v + 1);
     std::uint8_t* out = half.ptr<std::uint8_t>(v);
     int u = 0;
-#ifdef __AVX2__
+#if defined(__AVX2__)
     const __m256i ones = _mm256_set1_epi8(1);
     const auto block_sums = [&](int at) {
       const auto pairs = [&](const std::uint8_t* row) {
@@ -32,6 +34,11 @@ void halve(const cv::Mat& image, cv::Mat& half) {
       // Packing works within halves of a register; the permutation puts the quarters in order again.
       const __m256i packed = _mm256_packus_epi16(block_sums(2 * u), block_sums(2 * u + 32));
       _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + u), _mm256_permute4x64_epi64(packed, 0xd8));
+    }
+#elif defined(__ARM_NEON)
+    for (; u + 8 <= half.cols; u += 8) {
+      const uint16x8_t sums = vpadalq_u8(vpaddlq_u8(vld1q_u8(upper + 2 * u)), vld1q_u8(lower + 2 * u));
+      vst1_u8(out + u, vrshrn_n_u16(sums, 2));
     }
 #endif
     for (; u < half.cols; ++u) {

@@ -1,7 +1,9 @@
 #include "imaging/patch.hpp"
 
-#ifdef __AVX2__
+#if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
 #endif
 
 #include <algorithm>
@@ -11,6 +13,7 @@
 
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_pyramid.hpp"
+#include "imaging/pixel_row.hpp"
 
 namespace twofold {
 namespace {
@@ -97,19 +100,13 @@ void sample_grid(const PointAppearance& appearance, const Eigen::Vector2f& first
 /// Fills the patch from its pixels and a border of one around them, rows `stride` apart.
 template <class Pixel>
 void fill_patch(const Pixel* bordered, std::ptrdiff_t stride, Patch& patch) {
-  using Row = float __attribute__((vector_size(Patch::kSize * sizeof(float))));
-  using Rounded = std::int16_t __attribute__((vector_size(Patch::kSize * sizeof(std::int16_t))));
-  const auto row_at = [](const Pixel* first) {
-    Pixel __attribute__((vector_size(Patch::kSize * sizeof(Pixel)))) pixels;
-    std::memcpy(&pixels, first, sizeof pixels);
-    return __builtin_convertvector(pixels, Row);
-  };
+  static_assert(Patch::kSize == 8);
   for (int r = 0; r < Patch::kSize; ++r) {
     const Pixel* p = bordered + (r + 1) * stride + 1;
-    const Row value = row_at(p);
-    const Row gradient_u = 0.5F * (row_at(p + 1) - row_at(p - 1));
-    const Row gradient_v = 0.5F * (row_at(p + stride) - row_at(p - stride));
-    const Rounded rounded = __builtin_convertvector(value + 0.5F, Rounded);
+    const Floats8 value = load_floats(p);
+    const Floats8 gradient_u = 0.5F * (load_floats(p + 1) - load_floats(p - 1));
+    const Floats8 gradient_v = 0.5F * (load_floats(p + stride) - load_floats(p - stride));
+    const Shorts8 rounded = truncate(value + 0.5F);
     std::memcpy(patch.value + r * Patch::kSize, &value, sizeof value);
     std::memcpy(patch.gradient_u + r * Patch::kSize, &gradient_u, sizeof gradient_u);
     std::memcpy(patch.gradient_v + r * Patch::kSize, &gradient_v, sizeof gradient_v);
@@ -186,8 +183,8 @@ int zero_mean_ssd(const Patch& patch, const cv::Mat& image, int u, int v) {
   const auto stride = static_cast<std::ptrdiff_t>(image.step);
   const std::uint8_t* row = image.data + (v - Patch::kCentre) * stride + (u - Patch::kCentre);
   const std::int16_t* t = patch.rounded;
-#ifdef __AVX2__
   static_assert(Patch::kSize == 8);
+#if defined(__AVX2__)
   __m256i sums = _mm256_setzero_si256();     // 16 sums of 4 differences
   __m256i squares = _mm256_setzero_si256();  // 8 sums of 8 squares
   for (int r = 0; r < Patch::kSize; r += 2, row += 2 * stride, t += 2 * Patch::kSize) {
@@ -204,6 +201,16 @@ int zero_mean_ssd(const Patch& patch, const cv::Mat& image, int u, int v) {
   const __m128i halves = _mm_add_epi32(_mm256_castsi256_si128(both), _mm256_extracti128_si256(both, 1));
   const int sum = _mm_cvtsi128_si32(halves);
   const int sum2 = _mm_extract_epi32(halves, 1);
+#elif defined(__ARM_NEON)
+  int16x8_t sums = vdupq_n_s16(0);     // of the differences, by columns
+  int32x4_t squares = vdupq_n_s32(0);  // of columns c and c + 4
+  for (int r = 0; r < Patch::kSize; ++r, row += stride, t += Patch::kSize) {
+    const int16x8_t d = vsubq_s16(vreinterpretq_s16_u16(vmovl_u8(vld1_u8(row))), vld1q_s16(t));
+    sums = vaddq_s16(sums, d);
+    squares = vmlal_high_s16(vmlal_s16(squares, vget_low_s16(d), vget_low_s16(d)), d, d);
+  }
+  const int sum = vaddlvq_s16(sums);
+  const int sum2 = vaddvq_s32(squares);
 #else
   int sum = 0;
   int sum2 = 0;

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "imaging/patch.hpp"
+#include "imaging/pixel_row.hpp"
 
 namespace twofold {
 namespace {
@@ -10,14 +11,6 @@ namespace {
 constexpr float kMaxMove = 2.5F;      // farther from the start is another corner
 constexpr float kSettled = 0.01F;     // [px] no more steps needed
 constexpr float kGoodEnough = 0.05F;  // [px] last step when iterations ran out
-
-using Row = float __attribute__((vector_size(Patch::kSize * sizeof(float))));
-
-Row load_row(const std::uint8_t* first) {
-  std::uint8_t __attribute__((vector_size(Patch::kSize))) bytes;
-  std::memcpy(&bytes, first, sizeof bytes);
-  return __builtin_convertvector(bytes, Row);
-}
 
 /// Bilinear samples of an 8x8 window whose corner is at uv; false when it leaves the image.
 bool sample_window(const cv::Mat& image, const Eigen::Vector2f& uv, float* samples) {
@@ -30,12 +23,13 @@ bool sample_window(const cv::Mat& image, const Eigen::Vector2f& uv, float* sampl
   const float b = uv.y() - static_cast<float>(v0);
   const auto stride = static_cast<std::ptrdiff_t>(image.step);
   const std::uint8_t* pixels = image.data + (v0 - kBefore) * stride + (u0 - kBefore);
-  const auto between_columns = [&] { return (1 - a) * load_row(pixels) + a * load_row(pixels + 1); };
-  Row above = between_columns();
+  const auto between_columns = [&] { return (1 - a) * load_floats(pixels) + a * load_floats(pixels + 1); };
+  static_assert(Patch::kSize == 8);
+  Floats8 above = between_columns();
   for (int r = 0; r < Patch::kSize; ++r, samples += Patch::kSize) {
     pixels += stride;
-    const Row below = between_columns();
-    const Row between_rows = (1 - b) * above + b * below;
+    const Floats8 below = between_columns();
+    const Floats8 between_rows = (1 - b) * above + b * below;
     std::memcpy(samples, &between_rows, sizeof between_rows);
     above = below;
   }

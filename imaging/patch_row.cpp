@@ -1,9 +1,12 @@
-#ifdef __AVX2__
+#if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
 #endif
 
 #include <array>
 #include <cstring>
+#include <utility>
 
 #include "geometry/check.hpp"
 #include "imaging/patch.hpp"
@@ -59,7 +62,7 @@ struct BoxSums {
 
 /// Correlation of the patch with the image at eight neighbouring positions; `first` is the pixel under the
 /// patch's first entry at the first of them.
-#ifdef __AVX2__
+#if defined(__AVX2__)
 struct Correlator {
   __m256i pairs[kSize / 2];  // pick the pixels (c, c+1), (c+1, c+2), ... of a row as 16-bit values
   std::array<std::int32_t, Patch::kArea / 2> weights;  // two neighbouring entries of the patch each
@@ -89,6 +92,41 @@ struct Correlator {
     }
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(correlation), total);
   }
+};
+#elif defined(__ARM_NEON)
+class Correlator {
+ public:
+  explicit Correlator(const Patch& patch) : rows_(patch.rounded) {}
+
+  void operator()(const std::uint8_t* first, std::ptrdiff_t stride, int* correlation) const {
+    Totals totals{vdupq_n_s32(0), vdupq_n_s32(0)};
+    for (int r = 0; r < kSize; ++r, first += stride) {
+      const uint8x16_t row = vld1q_u8(first);
+      add_row(totals, vreinterpretq_s16_u16(vmovl_u8(vget_low_u8(row))),
+              vreinterpretq_s16_u16(vmovl_high_u8(row)), vld1q_s16(rows_ + r * kSize),
+              std::make_integer_sequence<int, kSize>());
+    }
+    vst1q_s32(correlation, totals.low);
+    vst1q_s32(correlation + 4, totals.high);
+  }
+
+ private:
+  struct Totals {
+    int32x4_t low, high;  // of positions 0 to 3 and 4 to 7
+  };
+  /// Sixteen pixels of a row in two halves, and the patch's row; which lane is taken has to be a constant.
+  template <int... columns>
+  static void add_row(Totals& totals, int16x8_t left, int16x8_t right, int16x8_t weights,
+                      std::integer_sequence<int, columns...>) {
+    (add_column<columns>(totals, vextq_s16(left, right, columns), weights), ...);
+  }
+  template <int column>
+  static void add_column(Totals& totals, int16x8_t pixels, int16x8_t weights) {
+    totals.low = vmlal_laneq_s16(totals.low, vget_low_s16(pixels), weights, column);
+    totals.high = vmlal_high_laneq_s16(totals.high, pixels, weights, column);
+  }
+
+  const std::int16_t* rows_;
 };
 #else
 struct Correlator {

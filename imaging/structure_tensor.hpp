@@ -1,7 +1,9 @@
 #pragma once
 
-#ifdef __AVX2__
+#if defined(__AVX2__)
 #include <immintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
 #endif
 
 #include <cmath>
@@ -31,7 +33,7 @@ struct StructureTensor {
 inline StructureTensor structure_tensor(const cv::Mat& image, int u, int v) {
   const auto stride = static_cast<std::ptrdiff_t>(image.step);
   const std::uint8_t* p = image.data + (v - 4) * stride + u - 4;
-#ifdef __AVX2__
+#if defined(__AVX2__)
   const auto eight = [](const std::uint8_t* at) {
     return _mm_cvtepu8_epi16(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(at)));
   };
@@ -48,6 +50,22 @@ inline StructureTensor structure_tensor(const cv::Mat& image, int u, int v) {
   const __m128i pairs = _mm_hadd_epi32(sums_uu, sums_uv);
   const __m128i total = _mm_hadd_epi32(pairs, _mm_hadd_epi32(sums_vv, sums_vv));
   return {_mm_extract_epi32(total, 0), _mm_extract_epi32(total, 1), _mm_extract_epi32(total, 2)};
+#elif defined(__ARM_NEON)
+  const auto difference = [](const std::uint8_t* a, const std::uint8_t* b) {
+    return vreinterpretq_s16_u16(vsubl_u8(vld1_u8(a), vld1_u8(b)));
+  };
+  const auto add_products = [](int32x4_t sums, int16x8_t a, int16x8_t b) {
+    return vmlal_high_s16(vmlal_s16(sums, vget_low_s16(a), vget_low_s16(b)), a, b);
+  };
+  int32x4_t sums_uu = vdupq_n_s32(0), sums_uv = sums_uu, sums_vv = sums_uu;
+  for (int r = 0; r < 8; ++r, p += stride) {
+    const int16x8_t gu = difference(p + 1, p - 1);
+    const int16x8_t gv = difference(p + stride, p - stride);
+    sums_uu = add_products(sums_uu, gu, gu);
+    sums_uv = add_products(sums_uv, gu, gv);
+    sums_vv = add_products(sums_vv, gv, gv);
+  }
+  return {vaddvq_s32(sums_uu), vaddvq_s32(sums_uv), vaddvq_s32(sums_vv)};
 #else
   StructureTensor sum{};
   for (int r = 0; r < 8; ++r, p += stride) {

@@ -1,8 +1,11 @@
 #include "loopclosure/default_vocabulary.hpp"
 
-// The file's bytes, put between two labels by the assembler.
+// The file's bytes, put between two labels by the assembler. They are global, if hidden: local ones of a
+// section share one entry of the table that position-independent code for ARM looks addresses up in.
 __asm__(
     ".section .rodata\n"
+    ".globl twofold_vocabulary_begin, twofold_vocabulary_end\n"
+    ".hidden twofold_vocabulary_begin, twofold_vocabulary_end\n"
     ".balign 16\n"
     "twofold_vocabulary_begin:\n"
     ".incbin \"" TWOFOLD_VOCABULARY_FILE
@@ -12,8 +15,8 @@ __asm__(
     ".text\n");
 
 extern "C" {
-extern const std::uint8_t twofold_vocabulary_begin[];
-extern const std::uint8_t twofold_vocabulary_end[];
+[[gnu::visibility("hidden")]] extern const std::uint8_t twofold_vocabulary_begin[];
+[[gnu::visibility("hidden")]] extern const std::uint8_t twofold_vocabulary_end[];
 }
 
 namespace twofold {

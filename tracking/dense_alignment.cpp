@@ -6,6 +6,8 @@
 #include <cstring>
 #include <opencv2/core.hpp>
 
+#include "imaging/pixel_row.hpp"
+
 namespace twofold {
 namespace {
 
@@ -32,9 +34,6 @@ bool window_at(const cv::Mat& image, float u, float v, int before, int size, Bil
   return true;
 }
 
-using Bytes8 = std::uint8_t __attribute__((vector_size(8)));
-using Floats8 = float __attribute__((vector_size(32)));
-
 /// Four pixels of a row and four of the next one.
 Floats8 load_4x2(const std::uint8_t* p, std::ptrdiff_t stride) {
   std::uint8_t bytes[8];
@@ -42,7 +41,7 @@ Floats8 load_4x2(const std::uint8_t* p, std::ptrdiff_t stride) {
   std::memcpy(bytes + 4, p + stride, 4);
   Bytes8 packed;
   std::memcpy(&packed, bytes, 8);
-  return __builtin_convertvector(packed, Floats8);
+  return to_floats(packed);
 }
 
 /// The 4x4 samples of a window, row by row.
