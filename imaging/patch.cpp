@@ -24,10 +24,8 @@ constexpr int kHighestSearchLevel = 3;  // above it patches cover too much of th
 constexpr int kAppearance = PointAppearance::kSize;
 constexpr float kLast = kAppearance - 1.001F;  // last position with a pixel after it
 
-/// What is computed for eight samples at once.
-constexpr std::size_t kLanes = 8;
-using Floats = float __attribute__((vector_size(kLanes * sizeof(float))));
-using Ints = std::int32_t __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
+constexpr std::size_t kLanes = 8;  // samples computed at once
+using Ints8 = std::int32_t __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
 
 constexpr std::size_t kSamples = (kBordered * kBordered + kLanes - 1) / kLanes * kLanes;
 
@@ -38,42 +36,61 @@ struct SampleGrid {
 
   constexpr SampleGrid() {
     for (std::size_t i = 0; i < kSamples; ++i) {
+      const std::size_t r = i / kBordered;
       column[i] = static_cast<float>(i % kBordered);
-      row[i] = static_cast<float>(i / kBordered);
+      row[i] = static_cast<float>(r);
     }
   }
 };
 constexpr SampleGrid kGrid;
 
-Floats clamped(Floats x) {
-  const Floats at_most = x < kLast ? x : Floats{} + kLast;
-  return at_most > 0.0F ? at_most : Floats{};
+/// The pixels before samples, and the weights of their right and lower neighbours.
+struct SamplePlaces {
+  alignas(32) std::array<std::int32_t, kSamples> pixel;
+  alignas(32) std::array<float, kSamples> a;
+  alignas(32) std::array<float, kSamples> b;
+};
+
+Floats8 clamped(Floats8 x) {
+  const Floats8 at_most = x < kLast ? x : Floats8{} + kLast;
+  return at_most > 0.0F ? at_most : Floats8{};
 }
 
-/// Bilinear samples of an appearance at first + column * along_u + row * along_v. A strong warp reaches past
-/// what was kept: its rim is repeated.
-void sample_grid(const PointAppearance& appearance, const Eigen::Vector2f& first,
-                 const Eigen::Vector2f& along_u, const Eigen::Vector2f& along_v,
-                 std::span<float, kSamples> samples) {
-  alignas(32) std::array<float, kSamples> a, b;  // weights of the right and of the lower neighbour
-  alignas(32) std::array<std::int32_t, kSamples> upper,
-      lower;  // first the pixel's number, then two pixels' bytes
+/// Samples at first + column * along_u + row * along_v. A strong warp reaches past what was kept: its rim is
+/// repeated.
+void place_samples(const Eigen::Vector2f& first, const Eigen::Vector2f& along_u,
+                   const Eigen::Vector2f& along_v, SamplePlaces& places) {
   for (std::size_t i = 0; i < kSamples; i += kLanes) {
-    Floats column, row;
-    std::memcpy(&column, &kGrid.column[i], sizeof column);
-    std::memcpy(&row, &kGrid.row[i], sizeof row);
-    const Floats u = clamped((first.x() + row * along_v.x()) + column * along_u.x());
-    const Floats v = clamped((first.y() + row * along_v.y()) + column * along_u.y());
-    const Ints u0 = __builtin_convertvector(u, Ints), v0 = __builtin_convertvector(v, Ints);
-    const Floats weight_u = u - __builtin_convertvector(u0, Floats),
-                 weight_v = v - __builtin_convertvector(v0, Floats);
-    const Ints number = v0 * kAppearance + u0;
-    std::memcpy(&a[i], &weight_u, sizeof weight_u);
-    std::memcpy(&b[i], &weight_v, sizeof weight_v);
-    std::memcpy(&upper[i], &number, sizeof number);
+    const Floats8 column = load_floats(&kGrid.column[i]);
+    const Floats8 row = load_floats(&kGrid.row[i]);
+    const Floats8 u = clamped((first.x() + row * along_v.x()) + column * along_u.x());
+    const Floats8 v = clamped((first.y() + row * along_v.y()) + column * along_u.y());
+    const Ints8 u0 = __builtin_convertvector(u, Ints8);
+    const Ints8 v0 = __builtin_convertvector(v, Ints8);
+    const Floats8 a = u - __builtin_convertvector(u0, Floats8);
+    const Floats8 b = v - __builtin_convertvector(v0, Floats8);
+    const Ints8 pixel = v0 * kAppearance + u0;
+    std::memcpy(&places.pixel[i], &pixel, sizeof pixel);
+    std::memcpy(&places.a[i], &a, sizeof a);
+    std::memcpy(&places.b[i], &b, sizeof b);
   }
+}
+
+/// Between the two pixels of each pair, whose first is the lower byte.
+Floats8 between(const std::int32_t* pairs, const Floats8& weight) {
+  Ints8 pair;
+  std::memcpy(&pair, pairs, sizeof pair);
+  const Floats8 left = __builtin_convertvector(pair & 255, Floats8);
+  return left + weight * (__builtin_convertvector(pair >> 8, Floats8) - left);
+}
+
+/// Bilinear samples of an appearance.
+void sample(const PointAppearance& appearance, const SamplePlaces& places,
+            std::span<float, kSamples> samples) {
+  alignas(32) std::array<std::int32_t, kSamples> upper;  // two pixels' bytes
+  alignas(32) std::array<std::int32_t, kSamples> lower;
   for (std::size_t i = 0; i < kSamples; ++i) {
-    const std::uint8_t* p = appearance.pixels.data() + upper[i];
+    const std::uint8_t* p = appearance.pixels.data() + places.pixel[i];
     std::uint16_t two = 0;
     std::memcpy(&two, p, sizeof two);
     upper[i] = two;
@@ -81,18 +98,9 @@ void sample_grid(const PointAppearance& appearance, const Eigen::Vector2f& first
     lower[i] = two;
   }
   for (std::size_t i = 0; i < kSamples; i += kLanes) {
-    Floats weight_u, weight_v;
-    Ints above, below;
-    std::memcpy(&weight_u, &a[i], sizeof weight_u);
-    std::memcpy(&weight_v, &b[i], sizeof weight_v);
-    std::memcpy(&above, &upper[i], sizeof above);
-    std::memcpy(&below, &lower[i], sizeof below);
-    const auto between = [&](const Ints& pair) {  // the first pixel is the lower byte
-      const Floats left = __builtin_convertvector(pair & 255, Floats);
-      return left + weight_u * (__builtin_convertvector(pair >> 8, Floats) - left);
-    };
-    const Floats top = between(above);
-    const Floats value = top + weight_v * (between(below) - top);
+    const Floats8 a = load_floats(&places.a[i]);
+    const Floats8 top = between(&upper[i], a);
+    const Floats8 value = top + load_floats(&places.b[i]) * (between(&lower[i], a) - top);
     std::memcpy(&samples[i], &value, sizeof value);
   }
 }
@@ -148,7 +156,9 @@ void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a,
   const Eigen::Vector2f first =
       Eigen::Vector2f::Constant(PointAppearance::kCentre) - kBefore * (A_a_c.col(0) + A_a_c.col(1));
   alignas(32) std::array<float, kSamples> bordered;
-  sample_grid(appearance, first, A_a_c.col(0), A_a_c.col(1), bordered);
+  SamplePlaces places;
+  place_samples(first, A_a_c.col(0), A_a_c.col(1), places);
+  sample(appearance, places, bordered);
   fill_patch(bordered.data(), kBordered, patch);
 }
 

@@ -68,7 +68,7 @@ std::uint64_t load_seven(const std::uint8_t* p) {
 Floats8 bytes_as_floats(std::uint64_t bytes) {
   Bytes8 packed;
   std::memcpy(&packed, &bytes, sizeof packed);
-  return __builtin_convertvector(packed, Floats8);
+  return to_floats(packed);
 }
 
 /// The 6x6 samples of a window, in rows of eight whose last two are worth nothing. The same operations in the

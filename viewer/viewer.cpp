@@ -125,8 +125,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   }
 
   void push(const std::variant<ToldFrame, MapEvent>& told) {
-    auto copy = told;
-    (void)ring_.try_push(std::move(copy));  // full: the page does without
+    (void)ring_.try_push(std::variant<ToldFrame, MapEvent>(told));  // full: the page does without
   }
   /// The newest image wins; the older is freed here.
   void put(HeldImage* image) {
@@ -139,7 +138,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     return std::any_of(shown_.begin(), shown_.end(),
                        [frame](const auto& shown) { return shown.load(std::memory_order_relaxed) == frame; });
   }
-  void push(ToldPoints& points) { (void)points_.try_push(std::move(points)); }  // likewise
+  void push(const ToldPoints& points) { (void)points_.try_push(ToldPoints(points)); }  // likewise
   void set_waiting(std::size_t keyframes) { waiting_.store(keyframes, std::memory_order_relaxed); }
   const ViewServer& server() const { return server_; }
   void finish() {

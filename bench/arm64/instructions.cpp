@@ -1,6 +1,7 @@
-// A plugin for qemu's user mode that counts the instructions a program executes, in all and by function: qemu knows no
-// cycles, but what the compiler made of a loop it can tell. Built and used by scripts/arm64 count; QEMU's plugin
-// interface, version 1, is declared here as far as it is used, as Debian has no package of its header.
+// A plugin for qemu's user mode that counts the instructions a program executes, in all and by function: qemu
+// knows no cycles, but what the compiler made of a loop it can tell. Built and used by scripts/arm64 count;
+// QEMU's plugin interface, version 1, is declared here as far as it is used, as Debian has no package of its
+// header.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -51,7 +52,8 @@ void report(qemu_plugin_id_t, void*) {
   constexpr std::size_t kMost = 60;
   std::fprintf(stderr, "%12.3f million instructions\n", static_cast<double>(total) * 1e-6);
   for (std::size_t i = 0; i < std::min(kMost, sorted.size()); ++i)
-    std::fprintf(stderr, "%12.3f %s\n", static_cast<double>(sorted[i].first) * 1e-6, sorted[i].second.c_str());
+    std::fprintf(stderr, "%12.3f %s\n", static_cast<double>(sorted[i].first) * 1e-6,
+                 sorted[i].second.c_str());
 }
 
 }  // namespace
