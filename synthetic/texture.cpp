@@ -90,6 +90,42 @@ float Texture::Level::bilinear(float u, float v) const {
   return top + b * (bottom - top);
 }
 
+Texture::Probes Texture::Level::bilinear(Probes u, Probes v, int count) const {
+  using Ints = std::int32_t __attribute__((vector_size(sizeof(Probes))));
+  const Probes last_u = Probes{} + static_cast<float>(width - 1),
+               last_v = Probes{} + static_cast<float>(height - 1);
+  u = u > 0.0f ? u : Probes{};
+  v = v > 0.0f ? v : Probes{};
+  u = u < last_u ? u : last_u;
+  v = v < last_v ? v : last_v;
+  Ints x = __builtin_convertvector(u, Ints), y = __builtin_convertvector(v, Ints);
+  x = x < width - 2 ? x : Ints{} + (width - 2);
+  y = y < height - 2 ? y : Ints{} + (height - 2);
+  const Probes a = u - __builtin_convertvector(x, Probes);
+  const Probes b = v - __builtin_convertvector(y, Probes);
+  const Ints at = y * width + x;
+  Ints p0{}, p1{}, q0{}, q1{};
+  for (int i = 0; i < count; ++i) {
+    const auto* p = texels.data() + at[i];
+    const auto* q = p + width;
+    p0[i] = p[0], p1[i] = p[1];
+    q0[i] = q[0], q1[i] = q[1];
+  }
+  const Probes top = __builtin_convertvector(p0, Probes) + a * __builtin_convertvector(p1 - p0, Probes);
+  const Probes bottom = __builtin_convertvector(q0, Probes) + a * __builtin_convertvector(q1 - q0, Probes);
+  return top + b * (bottom - top);
+}
+
+Texture::Probes Texture::trilinear(Probes u, Probes v, int level, float blend, int count) const {
+  const float scale = std::bit_cast<float>(static_cast<std::uint32_t>(127 - level) << 23);
+  const Probes fine_u = (u + 0.5f) * scale - 0.5f;
+  const Probes fine_v = (v + 0.5f) * scale - 0.5f;
+  const Probes fine = levels_[level].bilinear(fine_u, fine_v, count);
+  if (blend == 0) return fine;
+  const Probes coarse = levels_[level + 1].bilinear(0.5f * fine_u - 0.25f, 0.5f * fine_v - 0.25f, count);
+  return fine + blend * (coarse - fine);
+}
+
 float Texture::trilinear(float u, float v, int level, float blend) const {
   // Texel i of level l covers base texels [2^l (i + 0.5) - 0.5 -+ 2^l / 2].
   const float scale = std::bit_cast<float>(static_cast<std::uint32_t>(127 - level) << 23);
@@ -126,12 +162,13 @@ float Texture::sample(float u, float v, const TexelFootprint& footprint) const {
     }
   }
   if (probes == 1) return trilinear(u, v, level, blend);
-  float sum = 0;
+  constexpr Probes kNumbers{0, 1, 2, 3, 4, 5, 6, 7};
+  static_assert(kMaxProbes == 8);
   const float step = 1.0f / static_cast<float>(probes);
-  for (int i = 0; i < probes; ++i) {
-    const float offset = (static_cast<float>(i) + 0.5f) * step - 0.5f;
-    sum += trilinear(u + offset * e.major_u, v + offset * e.major_v, level, blend);
-  }
+  const Probes offset = (kNumbers + 0.5f) * step - 0.5f;
+  const Probes grey = trilinear(u + offset * e.major_u, v + offset * e.major_v, level, blend, probes);
+  float sum = 0;
+  for (int i = 0; i < probes; ++i) sum += grey[i];
   return sum * step;
 }
 

@@ -35,14 +35,20 @@ class Texture {
   [[nodiscard]] int height() const { return levels_.front().height; }
 
  private:
+  /// All probes of a footprint side by side; of those after the first `count` nobody looks at the value. Each
+  /// is computed as a single one is, to the last bit.
+  using Probes = float __attribute__((vector_size(kMaxProbes * sizeof(float))));
+
   struct Level {
     int width = 0;
     int height = 0;
     std::vector<std::uint8_t> texels;
 
     [[nodiscard]] float bilinear(float u, float v) const;
+    [[nodiscard]] Probes bilinear(Probes u, Probes v, int count) const;
   };
   [[nodiscard]] float trilinear(float u, float v, int level, float blend) const;
+  [[nodiscard]] Probes trilinear(Probes u, Probes v, int level, float blend, int count) const;
 
   std::vector<Level> levels_;
 };
