@@ -1,15 +1,22 @@
 #include "surface/depth_view.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
+#include <vector>
 
 #include <fmt/format.h>
+#include <Eigen/Core>
 
 #include "geometry/check.hpp"
 
 namespace twofold {
 namespace {
+
+// Rows are worked on whole, in buffers that stay in the cache: images between the steps would cost more than
+// the arithmetic.
+using Row = Eigen::ArrayXf;
 
 constexpr float kJumpRatio = 0.05f;  // of the depth, across two pixels; a slope of 75 degrees stays below it
 constexpr float kNone = 1e9f;
@@ -27,52 +34,161 @@ cv::Mat readings(const Rig& rig, const cv::Mat& depth) {
   for (int y = 0; y < metres.rows; ++y) {
     auto* row = metres.ptr<float>(y);
     // NaN keeps no comparison.
-    for (int x = 0; x < metres.cols; ++x) row[x] = row[x] >= low && row[x] <= high ? row[x] : kNone;
+    for (int x = 0; x < metres.cols; ++x) row[x] = (row[x] >= low) & (row[x] <= high) ? row[x] : kNone;
   }
   return metres;
 }
 
+/// Depths of three rows, and then of three columns, at their extremes.
+class Neighbourhood {
+ public:
+  explicit Neighbourhood(const cv::Mat& raw)
+      : raw_(raw), low_(raw.cols + 2), high_(raw.cols + 2), farthest_(raw.cols + 2) {
+    low_.fill(kNone);
+    high_.fill(0);
+    farthest_.fill(0);
+  }
+  void at_row(int y) {
+    const auto* above = raw_.ptr<float>(std::max(y - 1, 0));
+    const auto* here = raw_.ptr<float>(y);
+    const auto* below = raw_.ptr<float>(std::min(y + 1, raw_.rows - 1));
+    const auto seen = [](float z) { return z < kNone ? z : 0.0f; };
+    for (int x = 0; x < raw_.cols; ++x) {
+      low_[x + 1] = std::min(above[x], std::min(here[x], below[x]));
+      high_[x + 1] = std::max(above[x], std::max(here[x], below[x]));
+      farthest_[x + 1] = std::max(seen(above[x]), std::max(seen(here[x]), seen(below[x])));
+    }
+  }
+  /// Without a reading: kNone.
+  [[nodiscard]] float nearest(int x) const { return std::min(low_[x], std::min(low_[x + 1], low_[x + 2])); }
+  /// Without a reading: 0.
+  [[nodiscard]] float farthest(int x) const {
+    return std::max(farthest_[x], std::max(farthest_[x + 1], farthest_[x + 2]));
+  }
+  [[nodiscard]] bool has_hole(int x) const {
+    return std::max(high_[x], std::max(high_[x + 1], high_[x + 2])) >= kNone;
+  }
+
+ private:
+  const cv::Mat& raw_;
+  Row low_, high_, farthest_;  // of a column, which stands one to the right
+};
+
+/// Leaves readings beside a jump out of view.depth, and gives the pixels their neighbourhood.
+void find_jumps(const cv::Mat& raw, DepthView& view) {
+  Neighbourhood around(raw);
+  for (int y = 0; y < raw.rows; ++y) {
+    around.at_row(y);
+    const auto* z = raw.ptr<float>(y);
+    auto* depth = view.depth.ptr<float>(y);
+    auto* pixel = view.pixels.ptr<PixelReading>(y);
+    for (int x = 0; x < raw.cols; ++x) {
+      const float low = around.nearest(x);
+      depth[x] = (z[x] < kNone) & (around.farthest(x) - low <= kJumpRatio * low) ? z[x] : 0.0f;
+      pixel[x].depth = depth[x];
+      pixel[x].nearest = around.has_hole(x) ? 0.0f : low;
+    }
+  }
+}
+
+/// Inverse depths, averaged over squares of five pixels a side as far as these have readings.
+class SmoothedInverse {
+ public:
+  explicit SmoothedInverse(const cv::Mat& depth) : depth_(depth) {
+    for (Row* row : {&inverse_, &count_}) row->setZero(depth.cols + 4);
+    for (Row& row : smooth_) row.setZero(depth.cols);
+  }
+  /// Rows are asked for with growing y, from two rows above on to two below.
+  [[nodiscard]] const Row& row(int y) const { return smooth_[static_cast<std::size_t>(y + 5) % 5]; }
+  void add_row(int y) {
+    constexpr int kHalf = 2;
+    const int width = depth_.cols;
+    inverse_.setZero();
+    count_.setZero();
+    for (int r = std::max(y - kHalf, 0); r <= std::min(y + kHalf, depth_.rows - 1); ++r) {
+      const auto* z = depth_.ptr<float>(r);
+      for (int x = 0; x < width; ++x) {
+        const float seen = z[x] > 0 ? 1.0f : 0.0f;
+        count_[x + kHalf] += seen;
+        inverse_[x + kHalf] += seen / std::max(z[x], 1e-3f);
+      }
+    }
+    const auto five = [width](const Row& of) {
+      return of.segment(0, width) + of.segment(1, width) + of.segment(2, width) + of.segment(3, width) +
+             of.segment(4, width);
+    };
+    smooth_[static_cast<std::size_t>(y + 5) % 5] = five(inverse_) / five(count_).max(0.5f);
+  }
+
+ private:
+  const cv::Mat& depth_;
+  Row inverse_, count_;
+  std::array<Row, 5> smooth_;
+};
+
 /// Inverse depth of a plane is linear in the image: w = n . (x, y, 1) on rays (x, y, 1), where n is the
 /// plane's normal over its distance. So the cosine is w over the lengths of n and of the ray. The slope is
 /// taken across seven pixels of a smoothed image, because that of two neighbours is mostly noise.
-cv::Mat facing_of(const PinholeCamera& camera, const cv::Mat& depth) {
+void find_slopes(DepthView& view) {
   constexpr int kHalf = 2;
-  cv::Mat inverse(depth.size(), CV_32FC1), count(depth.size(), CV_32FC1);
-  for (int y = 0; y < depth.rows; ++y) {
-    const auto* z = depth.ptr<float>(y);
-    auto* w = inverse.ptr<float>(y);
-    auto* n = count.ptr<float>(y);
-    for (int x = 0; x < depth.cols; ++x) {
-      n[x] = z[x] > 0 ? 1.0f : 0.0f;
-      w[x] = n[x] / std::max(z[x], 1e-3f);
-    }
-  }
-  cv::blur(inverse, inverse, {5, 5});
-  cv::blur(count, count, {5, 5});
-  for (int y = 0; y < depth.rows; ++y) {
-    auto* w = inverse.ptr<float>(y);
-    const auto* n = count.ptr<float>(y);
-    for (int x = 0; x < depth.cols; ++x) w[x] /= std::max(n[x], 0.02f);
-  }
-  cv::Mat facing(depth.size(), CV_32FC1, cv::Scalar(1));
+  const PinholeCamera& camera = view.camera;
+  const int width = view.depth.cols, height = view.depth.rows, inner = std::max(0, width - 2 * kHalf);
   const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
-  const auto cx = static_cast<float>(camera.cx), cy = static_cast<float>(camera.cy);
-  for (int y = kHalf; y < depth.rows - kHalf; ++y) {
-    const auto* w = inverse.ptr<float>(y);
-    const auto* above = inverse.ptr<float>(y - kHalf);
-    const auto* below = inverse.ptr<float>(y + kHalf);
-    auto* f = facing.ptr<float>(y);
-    const float ry = (static_cast<float>(y) - cy) / fy;
-    for (int x = kHalf; x < depth.cols - kHalf; ++x) {
-      const float rx = (static_cast<float>(x) - cx) / fx;
-      const float nx = fx * (w[x + kHalf] - w[x - kHalf]) / (2 * kHalf);
-      const float ny = fy * (below[x] - above[x]) / (2 * kHalf);
-      const float nz = w[x] - nx * rx - ny * ry;
-      const float lengths = (nx * nx + ny * ny + nz * nz) * (rx * rx + ry * ry + 1);
-      f[x] = std::max(0.1f, std::min(1.0f, w[x] / std::sqrt(std::max(lengths, 1e-12f))));
+  const Row rx =
+      (Row::LinSpaced(width, 0, static_cast<float>(width - 1)) - static_cast<float>(camera.cx)) / fx;
+  const Row rx_inner = rx.segment(inner > 0 ? kHalf : 0, inner);
+  SmoothedInverse smooth(view.depth);
+  Row facing(width), nx(inner), ny(inner), nz(inner), ray(width);
+  for (int y = 0; y < std::min(kHalf, height); ++y) smooth.add_row(y);
+  for (int y = 0; y < height; ++y) {
+    if (y + kHalf < height) smooth.add_row(y + kHalf);
+    const float ry = (static_cast<float>(y) - static_cast<float>(camera.cy)) / fy;
+    ray = (rx.square() + (ry * ry + 1)).sqrt();
+    facing.setOnes();
+    if (y >= kHalf && y + kHalf < height && inner > 0) {
+      const Row& w = smooth.row(y);
+      nx = fx / (2 * kHalf) * (w.tail(inner) - w.head(inner));
+      ny = fy / (2 * kHalf) *
+           (smooth.row(y + kHalf).segment(kHalf, inner) - smooth.row(y - kHalf).segment(kHalf, inner));
+      nz = w.segment(kHalf, inner) - nx * rx_inner - ny * ry;
+      nx = (nx.square() + ny.square() + nz.square()).max(1e-12f).sqrt() * ray.segment(kHalf, inner);
+      facing.segment(kHalf, inner) = (w.segment(kHalf, inner) / nx).min(1.0f).max(0.1f);
+    }
+    ray *= facing;
+    facing = 255 * facing + 0.5f;
+    auto* pixel = view.pixels.ptr<PixelReading>(y);
+    for (int x = 0; x < width; ++x) {
+      pixel[x].slant = ray[x];
+      pixel[x].colour_and_facing = static_cast<std::uint32_t>(static_cast<std::int32_t>(facing[x])) << 24;
     }
   }
-  return facing;
+}
+
+void add_colours(DepthView& view) {
+  for (int y = 0; y < view.colour.rows; ++y) {
+    const auto* colour = view.colour.ptr<std::uint8_t>(y);
+    auto* pixel = view.pixels.ptr<PixelReading>(y);
+    if (view.colour.channels() == 3) {
+      for (int x = 0; x < view.colour.cols; ++x, colour += 3)
+        pixel[x].colour_and_facing |=
+            static_cast<std::uint32_t>(colour[2] | colour[1] << 8 | colour[0] << 16);
+    } else {
+      for (int x = 0; x < view.colour.cols; ++x) pixel[x].colour_and_facing |= colour[x] * 0x010101U;
+    }
+  }
+}
+
+void find_tiles(DepthView& view) {
+  for (int y = 0; y < view.depth.rows; ++y) {
+    auto* tiles = view.tiles.ptr<DepthTile>(y / kDepthTile);
+    const auto* pixel = view.pixels.ptr<PixelReading>(y);
+    for (int x = 0; x < view.depth.cols; ++x) {
+      DepthTile& tile = tiles[x / kDepthTile];
+      tile.farthest = std::max(tile.farthest, std::max(pixel[x].depth, pixel[x].nearest));
+      tile.nearest = std::min(tile.nearest, pixel[x].nearest);
+      tile.least_slant = std::min(tile.least_slant, pixel[x].slant);
+    }
+  }
 }
 
 }  // namespace
@@ -102,24 +218,15 @@ DepthView make_depth_view(const Rig& rig, const cv::Mat& depth, const cv::Mat& c
   DepthView view;
   view.camera = rig.camera;
   view.colour = colour;
-  view.depth = readings(rig, depth);
-  cv::Mat farthest, holes_are_near = view.depth.clone();
-  for (int y = 0; y < depth.rows; ++y) {
-    auto* row = holes_are_near.ptr<float>(y);
-    for (int x = 0; x < depth.cols; ++x) row[x] = row[x] < kNone ? row[x] : 0;
-  }
-  cv::Mat lowest;
-  cv::erode(view.depth, lowest, {});
-  cv::dilate(holes_are_near, farthest, {});
-  cv::erode(holes_are_near, view.nearest, {});
-  for (int y = 0; y < depth.rows; ++y) {
-    auto* row = view.depth.ptr<float>(y);
-    const auto* low = lowest.ptr<float>(y);
-    const auto* high = farthest.ptr<float>(y);
-    for (int x = 0; x < depth.cols; ++x)
-      row[x] = row[x] < kNone && high[x] - low[x] <= kJumpRatio * low[x] ? row[x] : 0;
-  }
-  view.facing = facing_of(rig.camera, view.depth);
+  view.depth.create(depth.size(), CV_32FC1);
+  view.pixels.create(depth.size(), CV_32FC4);
+  view.tiles.create((depth.rows + kDepthTile - 1) / kDepthTile, (depth.cols + kDepthTile - 1) / kDepthTile,
+                    CV_32FC3);
+  view.tiles.setTo(cv::Scalar(0, kNone, kNone));
+  find_jumps(readings(rig, depth), view);
+  find_slopes(view);
+  add_colours(view);
+  find_tiles(view);
   return view;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
@@ -7,14 +8,34 @@
 
 namespace twofold {
 
+/// What a pixel says, together in memory, because samples of the surface ask for it all.
+struct PixelReading {
+  float depth = 0;    ///< [m]; 0: no reading
+  float nearest = 0;  ///< the smallest depth of the pixel and its eight neighbours [m]; 0 if one has none
+  float slant = 0;    ///< distance from the surface over difference of depths: facing times the ray's length
+  /// From the lowest byte on: red, green, blue (0 without an image), and the cosine of the angle between ray
+  /// and surface normal in 1/255, at least a tenth.
+  std::uint32_t colour_and_facing = 0;
+};
+
+inline constexpr int kDepthTile = 8;  ///< pixels along an edge of a DepthTile
+
+/// Bounds of the readings in a square of pixels.
+struct DepthTile {
+  float farthest = 0;     ///< no reading, nor any neighbour's, is farther [m]
+  float nearest = 0;      ///< no reading, nor any neighbour's, is nearer [m]; 0 if one of them is missing
+  float least_slant = 0;  ///< of PixelReading::slant
+};
+
 /// A depth image as fusion reads it.
 struct DepthView {
   PinholeCamera camera;
-  cv::Mat depth;  ///< CV_32FC1 [m]; 0: no reading
-  cv::Mat
-      nearest;  ///< CV_32FC1 [m]: the smallest depth of a pixel and its eight neighbours; 0 if one has none
-  cv::Mat facing;  ///< CV_32FC1: cosine of the angle between ray and surface normal, in [0.1, 1]
+  cv::Mat depth;   ///< CV_32FC1 [m]; 0: no reading
+  cv::Mat pixels;  ///< CV_32FC4, a PixelReading each
+  cv::Mat tiles;   ///< CV_32FC3, a DepthTile each
   cv::Mat colour;  ///< CV_8UC3 (blue, green, red) or CV_8UC1; may be empty
+
+  [[nodiscard]] const PixelReading& pixel(int y, int x) const { return pixels.ptr<PixelReading>(y)[x]; }
 };
 
 /// Why a depth image, and a colour image beside it if it is not empty, do not fit the rig; empty when they

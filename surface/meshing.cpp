@@ -25,10 +25,10 @@ struct PaddedBlock {
   std::array<float, kPaddedSamples> distance;
   std::array<float, kPaddedSamples> weight;
 
-  void fill(const BlockTable& blocks, const BlockPosition& at);
+  void fill(const BlockTable& blocks, const SampleUnits& units, const BlockPosition& at);
 };
 
-void PaddedBlock::fill(const BlockTable& blocks, const BlockPosition& at) {
+void PaddedBlock::fill(const BlockTable& blocks, const SampleUnits& units, const BlockPosition& at) {
   std::array<const VoxelBlock*, 27> around;
   for (int n = 0; n < 27; ++n)
     around[static_cast<std::size_t>(n)] =
@@ -40,8 +40,8 @@ void PaddedBlock::fill(const BlockTable& blocks, const BlockPosition& at) {
         const int n = ((z + 8) / 8 * 3 + (y + 8) / 8) * 3 + (x + 8) / 8;
         const VoxelBlock* block = around[static_cast<std::size_t>(n)];
         const auto s = static_cast<std::size_t>(((z & 7) * 8 + (y & 7)) * 8 + (x & 7));
-        distance[to] = block != nullptr ? block->distance[s] : 0;
-        weight[to] = block != nullptr ? block->weight[s] : 0;
+        distance[to] = block != nullptr ? units.distance * block->distance[s] : 0;
+        weight[to] = block != nullptr ? units.weight * block->weight[s] : 0;
       }
 }
 
@@ -103,11 +103,11 @@ class MeshExtraction {
 
   TriangleMesh run() {
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      field_.fill(volume_.blocks(), blocks_[b]->at);
+      field_.fill(volume_.blocks(), volume_.units(), blocks_[b]->at);
       add_vertices(b);
     }
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      field_.fill(volume_.blocks(), blocks_[b]->at);
+      field_.fill(volume_.blocks(), volume_.units(), blocks_[b]->at);
       add_triangles(b);
     }
     drop_small_pieces(mesh_, volume_.options().least_triangles);

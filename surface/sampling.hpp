@@ -14,7 +14,8 @@ namespace twofold {
 class Sampler {
  public:
   /// blocks must outlive the sampler, and not change.
-  Sampler(const BlockTable& blocks, double voxel) : blocks_(&blocks), voxel_(voxel) {}
+  Sampler(const BlockTable& blocks, const SampleUnits& units, double voxel)
+      : blocks_(&blocks), units_(units), voxel_(voxel) {}
 
   /// Nothing where one of the eight samples around x_v [m] was never seen.
   [[nodiscard]] std::optional<SurfaceDistance> at(const Vector3& x_v) {
@@ -29,9 +30,9 @@ class Sampler {
       const int x = base.x() + (c & 1), y = base.y() + (c >> 1 & 1), z = base.z() + (c >> 2);
       const VoxelBlock* block = block_at({x >> 3, y >> 3, z >> 3});
       const auto s = static_cast<std::size_t>(((z & 7) * 8 + (y & 7)) * 8 + (x & 7));
-      if (block == nullptr || block->weight[s] <= 0) return std::nullopt;
-      d[static_cast<std::size_t>(c)] = block->distance[s];
-      result.weight = std::min<double>(result.weight, block->weight[s]);
+      if (block == nullptr || block->weight[s] == 0) return std::nullopt;
+      d[static_cast<std::size_t>(c)] = units_.distance * static_cast<double>(block->distance[s]);
+      result.weight = std::min<double>(result.weight, units_.weight * static_cast<double>(block->weight[s]));
     }
     interpolate(d, f, result);
     nearest_ = {base.x() + (f.x() > 0.5), base.y() + (f.y() > 0.5), base.z() + (f.z() > 0.5)};
@@ -71,6 +72,7 @@ class Sampler {
   }
 
   const BlockTable* blocks_;
+  SampleUnits units_;
   double voxel_;
   bool any_ = false;
   BlockPosition last_at_;

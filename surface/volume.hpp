@@ -50,18 +50,22 @@ class SurfaceVolume {
 
   [[nodiscard]] const SurfaceOptions& options() const { return options_; }
   [[nodiscard]] const BlockTable& blocks() const { return blocks_; }
+  [[nodiscard]] const SampleUnits& units() const { return units_; }
   [[nodiscard]] std::size_t bytes() const { return blocks_.bytes(); }
 
  private:
   /// Blocks that the view has something to say about, each once.
   void collect_blocks(const DepthView& view, const SE3& T_c_v);
   void touch(const BlockPosition& at);
+  void touch_none();
   void add_blocks_to_carve(const DepthView& view, const SE3& T_c_v);
   void touch_overlapped(const VoxelBlock& block, const SE3& T_v_o);
 
   SurfaceOptions options_;
+  SampleUnits units_;
   BlockTable blocks_;
-  std::vector<VoxelBlock*> touched_;
+  std::vector<std::uint32_t> touched_;    ///< blocks that one fusion changes
+  std::vector<std::uint8_t> is_touched_;  ///< of every block, whether it is among these
 };
 
 }  // namespace twofold

@@ -23,31 +23,31 @@ std::size_t hash_of(const BlockPosition& at) {
 std::size_t BlockTable::slot_of(const BlockPosition& at) const {
   const std::size_t mask = slots_.size() - 1;
   std::size_t slot = hash_of(at) & mask;
-  while (slots_[slot] != kFree && blocks_[slots_[slot]]->at != at) slot = (slot + 1) & mask;
+  while (slots_[slot].block != kFree && slots_[slot].at != at) slot = (slot + 1) & mask;
   return slot;
 }
 
 const VoxelBlock* BlockTable::find(const BlockPosition& at) const {
   if (slots_.empty()) return nullptr;
-  const std::uint32_t block = slots_[slot_of(at)];
+  const std::uint32_t block = slots_[slot_of(at)].block;
   return block == kFree ? nullptr : blocks_[block].get();
 }
 
-VoxelBlock& BlockTable::find_or_add(const BlockPosition& at) {
+std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {
   if (2 * blocks_.size() >= slots_.size()) grow();
-  std::uint32_t& slot = slots_[slot_of(at)];
-  if (slot == kFree) {
-    slot = static_cast<std::uint32_t>(blocks_.size());
+  Slot& slot = slots_[slot_of(at)];
+  if (slot.block == kFree) {
+    slot = {at, static_cast<std::uint32_t>(blocks_.size())};
     blocks_.push_back(std::make_unique<VoxelBlock>());
     blocks_.back()->at = at;
   }
-  return *blocks_[slot];
+  return slot.block;
 }
 
 void BlockTable::grow() {
-  slots_.assign(std::max(kFirstSlots, 2 * slots_.size()), kFree);
+  slots_.assign(std::max(kFirstSlots, 2 * slots_.size()), Slot{});
   for (std::size_t b = 0; b < blocks_.size(); ++b)
-    slots_[slot_of(blocks_[b]->at)] = static_cast<std::uint32_t>(b);
+    slots_[slot_of(blocks_[b]->at)] = {blocks_[b]->at, static_cast<std::uint32_t>(b)};
 }
 
 std::vector<const VoxelBlock*> BlockTable::sorted() const {

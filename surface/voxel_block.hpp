@@ -20,15 +20,27 @@ struct BlockPosition {
   friend auto operator<=>(const BlockPosition&, const BlockPosition&) = default;
 };
 
-/// 8^3 samples of a truncated signed distance; sample (x, y, z) of it is entry (z * 8 + y) * 8 + x.
+/// What one step of a sample's whole numbers is worth.
+struct SampleUnits {
+  float distance = 1;  ///< [m]
+  float weight = 1;
+};
+
+/// Distances reach 64 voxels either way, in steps far below what any sensor tells apart.
+inline constexpr int kDistanceSteps = 512;  ///< a voxel
+inline constexpr int kMostDistanceVoxels = 60;
+/// Weights end at this number of steps.
+inline constexpr int kMostWeightSteps = 65535;
+
+/// 8^3 samples of a truncated signed distance; sample (x, y, z) of it is entry (z * 8 + y) * 8 + x. Whole
+/// numbers of SampleUnits: what a volume costs is mostly the way of its samples to and from memory.
 struct VoxelBlock {
   BlockPosition at;
-  bool touched = false;                                     ///< scratch of one fusion
-  bool all_free = false;                                    ///< every sample is well known to be free
-  alignas(32) std::array<float, kBlockSamples> distance{};  ///< [m], positive outside the surface
-  alignas(32) std::array<float, kBlockSamples> weight{};    ///< 0: never seen
+  bool all_free = false;                                           ///< every sample is well known to be free
+  alignas(64) std::array<std::int16_t, kBlockSamples> distance{};  ///< positive outside the surface
+  alignas(64) std::array<std::uint16_t, kBlockSamples> weight{};   ///< 0: never seen
   alignas(
-      32) std::array<std::array<std::uint16_t, kBlockSamples>, 3> colour{};  ///< red, green, blue in 1/256
+      64) std::array<std::array<std::uint16_t, kBlockSamples>, 3> colour{};  ///< red, green, blue in 1/256
 };
 
 /// Red, green and blue of sample i in 1/256.
@@ -44,10 +56,10 @@ class BlockTable {
   [[nodiscard]] VoxelBlock* find(const BlockPosition& at) {
     return const_cast<VoxelBlock*>(std::as_const(*this).find(at));
   }
-  VoxelBlock& find_or_add(const BlockPosition& at);
+  /// Its number: blocks are counted from 0 in the order they were added.
+  std::uint32_t find_or_add(const BlockPosition& at);
 
   [[nodiscard]] std::size_t size() const { return blocks_.size(); }
-  /// In the order they were added.
   [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return *blocks_[i]; }
   [[nodiscard]] const VoxelBlock& operator[](std::size_t i) const { return *blocks_[i]; }
   /// In the order of their positions.
@@ -59,12 +71,17 @@ class BlockTable {
 
  private:
   static constexpr std::uint32_t kFree = 0xffffffff;
+  /// Positions stand here too, so that they are compared without fetching blocks.
+  struct Slot {
+    BlockPosition at;
+    std::uint32_t block = kFree;
+  };
   /// Slot of the block, or the free one where it would go; there are slots.
   [[nodiscard]] std::size_t slot_of(const BlockPosition& at) const;
   void grow();
 
   std::vector<std::unique_ptr<VoxelBlock>> blocks_;
-  std::vector<std::uint32_t> slots_;  ///< a power of two, at most half of them taken
+  std::vector<Slot> slots_;  ///< a power of two, at most half of them taken
 };
 
 }  // namespace twofold

@@ -2,41 +2,13 @@
 // distance.
 #include <benchmark/benchmark.h>
 
-#include "fixtures/rendered_scene.hpp"
+#include "bench/surface/depth_views.hpp"
 #include "surface/meshing.hpp"
 #include "surface/packed_depth.hpp"
 #include "surface/volume.hpp"
 
 namespace twofold {
 namespace {
-
-constexpr int kViews = 8;
-
-/// A camera that moves by 5 cm a view and turns, before a wall and a floor 1 to 2 m away.
-struct DepthViews {
-  DepthViews() {
-    testing::RenderedScene scene(rig, {1.2, 0.9, 1.4}, 5);
-    for (int n = 0; n < kViews; ++n) {
-      T_c_w.push_back(SE3(SO3::exp(Vector3(0.1, 0.04 * n, 0)), Vector3(0.05 * n, 0, 0)));
-      depth.push_back(scene.render_depth(T_c_w.back()));
-      colour.emplace_back(depth.back().size(), CV_8UC3, cv::Scalar(30, 90, 200));
-      views.push_back(make_depth_view(rig, depth.back(), colour.back()));
-    }
-  }
-  Rig rig = [] {
-    Rig depth_rig = testing::test_rig(SensorKind::kRgbd);
-    depth_rig.camera.fx = depth_rig.camera.fy = 420;
-    return depth_rig;
-  }();
-  std::vector<SE3> T_c_w;
-  std::vector<cv::Mat> depth, colour;
-  std::vector<DepthView> views;
-};
-
-const DepthViews& depth_views() {
-  static const DepthViews kAll;
-  return kAll;
-}
 
 SurfaceOptions options_of(const benchmark::State& state) {
   SurfaceOptions options;
@@ -68,6 +40,19 @@ void fuse_depth(benchmark::State& state) {
   state.counters["blocks"] = static_cast<double>(volume.blocks().size());
 }
 BENCHMARK(fuse_depth)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
+
+/// As fuse_depth, from the image that the sensor gives on.
+void prepare_and_fuse_depth(benchmark::State& state) {
+  const DepthViews& all = depth_views();
+  SurfaceVolume volume(options_of(state));
+  for (std::size_t n = 0; n < kViews; ++n) volume.fuse(all.views[n], all.T_c_w[n]);
+  std::size_t n = 0;
+  for (auto _ : state) {
+    const std::size_t v = n++ % kViews;
+    volume.fuse(make_depth_view(all.rig, all.depth[v], all.colour[v]), all.T_c_w[v]);
+  }
+}
+BENCHMARK(prepare_and_fuse_depth)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
 
 void mesh_of_volume(benchmark::State& state) {
   const DepthViews& all = depth_views();

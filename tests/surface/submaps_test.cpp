@@ -110,7 +110,7 @@ TEST_F(SubmapSurfaceTest, CulledKeyframesLeaveWhatTheyAdded) {
 }
 
 TEST_F(SubmapSurfaceTest, MemoryIsBounded) {
-  limits_.memory_mb = 1.5;
+  limits_.memory_mb = 1;
   SubmapSurface surface(rig_, testing::fine_options(), limits_);
   add_all(surface);
   EXPECT_GT(surface.report().beyond_memory, 0);

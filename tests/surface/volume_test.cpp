@@ -139,8 +139,8 @@ TEST(DepthView, BadReadingsAreLeftOut) {
   EXPECT_EQ(view.depth.at<float>(100, 199), 0);  // beside the jump
   EXPECT_EQ(view.depth.at<float>(100, 200), 0);
   EXPECT_EQ(view.depth.at<float>(100, 202), 2);
-  EXPECT_EQ(view.nearest.at<float>(100, 200), 1);
-  EXPECT_EQ(view.nearest.at<float>(6, 6), 0);  // a hole beside it
+  EXPECT_EQ(view.pixel(100, 200).nearest, 1);
+  EXPECT_EQ(view.pixel(6, 6).nearest, 0);  // a hole beside it
 }
 
 TEST(DepthView, NothingButHolesLeavesTheVolumeEmpty) {
