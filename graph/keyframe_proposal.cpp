@@ -7,6 +7,7 @@ void KeyframeProposal::clear() {
   frame_index = t_ns = 0;
   snapshot_version = 0;
   T_k_ref = SE3();
+  pose_information.setZero();
   median_depth = 0;
   observations.clear();
   new_points.clear();

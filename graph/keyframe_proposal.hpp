@@ -26,9 +26,12 @@ struct KeyframeProposal {
   std::int64_t t_ns = 0;
   std::uint64_t snapshot_version = 0;  ///< version it was tracked against
   KeyframeId reference =
-      kNoKeyframe;          ///< kNoKeyframe for the first keyframe of a map (part): T_k_ref is then T_k_w
-  SE3 T_k_ref;              ///< pose relative to the reference keyframe, or to an earlier proposal
-  double median_depth = 0;  ///< [m]
+      kNoKeyframe;  ///< kNoKeyframe for the first keyframe of a map (part): T_k_ref is then T_k_w
+  SE3 T_k_ref;      ///< pose relative to the reference keyframe, or to an earlier proposal
+  /// Of T_k_ref, left perturbation (v, omega), when that was measured as a whole and does not rest on the
+  /// observations alone (a depth camera before bare walls); else zero.
+  Matrix6 pose_information = Matrix6::Zero();
+  double median_depth = 0;           ///< [m]
   ObservationList observations;      ///< of map points and of `new_points`, ascending by point
   std::vector<NewPoint> new_points;  ///< ascending by id
   FrameImages images;

@@ -1,5 +1,6 @@
 #include "mapping/edges.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -64,6 +65,19 @@ Matrix6 edge_information(const Keyframe& from, const Keyframe& to, const Edge& e
   diagonal.head<3>().setConstant(lambda_trans * lambda_trans);
   diagonal.tail<3>().setConstant(lambda_rot * lambda_rot);
   return Matrix6((std::max(1, edge.weight) * diagonal).asDiagonal());
+}
+
+int weight_of_measured_pose(const Matrix6& information, const Keyframe& from, const Keyframe& to,
+                            const Rig& rig, const EdgeInformationOptions& options) {
+  constexpr double kAtMost = 1000;
+  Edge one_point;
+  one_point.weight = 1;
+  const Vector6 unit =
+      edge_information(from, to, one_point, rig, options).diagonal().cwiseSqrt().cwiseInverse();
+  const Matrix6 in_points = unit.asDiagonal() * information * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(in_points, Eigen::EigenvaluesOnly);
+  const double points = eigen.eigenvalues().minCoeff();
+  return points > 1 ? static_cast<int>(std::min(points, kAtMost)) : 1;
 }
 
 }  // namespace twofold

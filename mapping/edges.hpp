@@ -55,4 +55,10 @@ void link_marginalised(GraphWriter& writer, KeyframeId from, KeyframeId to, int 
 [[nodiscard]] Matrix6 edge_information(const Keyframe& from, const Keyframe& to, const Edge& edge,
                                        const Rig& rig, const EdgeInformationOptions& options);
 
+/// Weight of an edge whose relative pose is known with `information` (left perturbation): of the points that
+/// would tell as much in every direction, which means in the one it tells least about.
+[[nodiscard]] int weight_of_measured_pose(const Matrix6& information, const Keyframe& from,
+                                          const Keyframe& to, const Rig& rig,
+                                          const EdgeInformationOptions& options);
+
 }  // namespace twofold

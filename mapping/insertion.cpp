@@ -136,6 +136,18 @@ InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& pro
   return report;
 }
 
+bool keep_measured_pose(GraphWriter& writer, const KeyframeProposal& proposal, const Rig& rig,
+                        const MapperOptions& options) {
+  if (proposal.reference == kNoKeyframe || proposal.pose_information.isZero(0)) return false;
+  const GraphSnapshot& graph = writer.graph();
+  const auto [reference, T_k_ref] = present_reference(graph, proposal);
+  const Keyframe &keyframe = graph.keyframe(proposal.id), &other = graph.keyframe(reference);
+  if (shared_points(keyframe, other) >= options.min_covisible) return false;
+  const int weight = weight_of_measured_pose(proposal.pose_information, keyframe, other, rig, options.edge);
+  link_marginalised(writer, proposal.id, reference, weight, T_k_ref.inverse());
+  return true;
+}
+
 int register_in_window(GraphWriter& writer, KeyframeId id, const DoubleWindow& window, int min_covisible,
                        IdMap& counts) {
   if (!window.contains(id)) return 0;

@@ -27,6 +27,13 @@ struct InsertionReport {
 InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, int min_covisible,
                                 IdMap& consistent, IdMap& counts);
 
+/// Keeps a pose that was measured as a whole (KeyframeProposal::pose_information) as an edge with a
+/// constraint of its own, unless points enough tie the keyframe to its reference. To be called after
+/// insert_keyframe.
+/// @return whether there is such an edge
+bool keep_measured_pose(GraphWriter& writer, const KeyframeProposal& proposal, const Rig& rig,
+                        const MapperOptions& options);
+
 /// Second half of local registration, once all poses of the window agree: edges to keyframes of the double
 /// window that share at least min_covisible points with `id` but were not in `consistent` when it was
 /// inserted. Returns the number of edges added.

@@ -74,6 +74,7 @@ void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
   const StageTime time(report.ms.insert);
   const InsertionReport insertion =
       insert_keyframe(writer_, proposal, options_.min_covisible, consistent_, counts_);
+  keep_measured_pose(writer_, proposal, rig_, options_);
   inserted_.push_back(proposal.id);
   ++report.inserted;
   report.new_points += insertion.new_points;

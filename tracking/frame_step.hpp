@@ -36,7 +36,8 @@ class FrameStep {
   const GraphSnapshot& graph;
   KeyframeProposal* const free_proposal;  ///< null: no keyframe can be made
   const EffortBounds bounds;
-  RollingShutter shutter;  ///< as the camera moves in this frame, as far as known
+  bool surfaces_read = false;  ///< of the frame's depth image
+  RollingShutter shutter;      ///< as the camera moves in this frame, as far as known
   TrackResult result;
 
   /// Attributes the time since the last lap to a stage.

@@ -19,4 +19,12 @@ bool keyframe_due(const TrackResult& result, const KeyframeView& last, int occup
          first_needs_second;
 }
 
+bool keyframe_due_by_motion(const SE3& T_c_ref, const KeyframeView& last, const KeyframeBacklog& backlog,
+                            const TrackerOptions& options) {
+  constexpr double kTurned = 0.2;  // [rad]
+  if (!backlog.room || backlog.pending >= options.max_pending) return false;
+  const double parallax = T_c_ref.translation().norm() / std::max(last.median_depth, kNearestDepth);
+  return parallax > options.keyframe_parallax || T_c_ref.so3().log().norm() > kTurned;
+}
+
 }  // namespace twofold

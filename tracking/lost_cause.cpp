@@ -137,6 +137,8 @@ const char* describe(LostCause cause) {
       return "corners do not move as one moving camera sees them";
     case LostCause::kPlaneUndecided:
       return "a plane: two motions explain how it looks";
+    case LostCause::kNoStructure:
+      return "no structure: few corners, and the surfaces in view leave open how the camera moved along them";
   }
   return "";
 }

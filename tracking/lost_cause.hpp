@@ -26,7 +26,8 @@ enum class LostCause : std::uint8_t {
   kTooLittleParallax,  ///< it has not moved enough to see depth
   kRotatingOnly,       ///< it turns on the spot
   kNoCommonMotion,     ///< corners do not move as one moving camera sees them
-  kPlaneUndecided      ///< a plane, and two motions explain how it looks
+  kPlaneUndecided,     ///< a plane, and two motions explain how it looks
+  kNoStructure         ///< a depth camera: few corners, and surfaces along which it could have slid
 };
 [[nodiscard]] const char* describe(LostCause cause);
 

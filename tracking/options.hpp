@@ -5,6 +5,7 @@
 #include "estimation/motion_only.hpp"
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
+#include "tracking/depth_alignment.hpp"
 #include "tracking/depth_seeds.hpp"
 #include "tracking/elder_vote.hpp"
 #include "tracking/first_structure.hpp"
@@ -17,6 +18,7 @@ struct TrackerOptions {
   GuidedSearchOptions search;
   WideSearchOptions wide_search;
   ElderVoteOptions elders;
+  DepthAlignmentOptions depth;
   /// A step of 1e-5 moves no projection by a hundredth of a pixel. Outliers: beyond 99 % of chi-square,
   /// because real errors (rolling shutter, calibration, depth of a point seen from one place only) have long
   /// tails.
@@ -29,6 +31,7 @@ struct TrackerOptions {
   double border_px = 8;               ///< points predicted closer to the image's edge are not searched, >= 0
   double min_view_cosine = 0.7;       ///< of the angle between a point's first ray and today's, in [-1, 1]
   int min_inliers = 18;               ///< fewer: lost
+  int scarce_inliers = 40;            ///< a depth camera with fewer is placed by surfaces as well, >= 0
   double min_inlier_share = 0.25;     ///< of the matches found: fewer: lost
   double lost_radius_px = 8;          ///< search radius while lost
   double doubted_inlier_share = 0.5;  ///< of the matches: with fewer a wider search may find a better pose

@@ -51,6 +51,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   inlier_ids_.reserve(searches);
   depths_.reserve(std::max(searches, kMaxImmaturePoints));
   previous_points_.reserve(kMaxAlignmentPoints);
+  if (rig.kind == SensorKind::kRgbd) depth_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) {
     monocular_start_.emplace(rig, options);
     seeds_.emplace(rig, options.search, options.seeds, kMaxSeeds);
@@ -75,7 +76,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   if (tracked && seeds_) observe_seeds(step);
   if (tracked) propose_keyframe_if_due(step);
   if (tracked || (map_exists ? start_part(step) : start_map(step))) remember_frame(step);
-  if (tracked && !step.result.proposed) revisit_reference(graph);
+  if (tracked && !step.result.proposed && !step.result.by_depth) revisit_reference(graph);
   step.lap(TrackerStage::kKeyframe);
   return step.result;
 }
@@ -89,15 +90,18 @@ bool Tracker::track(FrameStep& step) {
   }
   local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  if (!start.rough) start.placement.T_c_ref = align_to_previous(step);
+  const bool by_surfaces = corners_scarce_ && !start.rough;
+  if (!start.rough) start.placement.T_c_ref = by_surfaces ? align_to_surfaces(step) : align_to_previous(step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = search_from(start, step);
+  if (!start.rough && add_surfaces(start.placement.T_c_ref, cause, step)) return true;
   const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
   if ((cause == LostCause::kNone && !doubted) || search_widely(step)) return true;
   if (doubted) {  // nothing better
     local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
     cause = search_from(start, step);
   }
+  if (cause != LostCause::kNone) cause = place_without_points(cause, step);
   if (cause != LostCause::kNone) give_up_frame(cause, step.result);
   return cause == LostCause::kNone;
 }
@@ -193,6 +197,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   }
   previous_corners_.clear();
   previous_is_keyframe_ = result.proposed;
+  corners_scarce_ = result.by_depth;
   std::swap(current_, previous_);
   if (monocular_start_) monocular_start_->reset();
 }

@@ -10,6 +10,7 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/dense_alignment.hpp"
+#include "tracking/depth_alignment.hpp"
 #include "tracking/depth_seeds.hpp"
 #include "tracking/effort.hpp"
 #include "tracking/frame_step.hpp"
@@ -110,6 +111,12 @@ class Tracker {
   LostCause search_from(SearchStart start, FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
   bool search_widely(FrameStep& step);
+  void look_at_surfaces(FrameStep& step);
+  [[nodiscard]] SE3 predicted_pose() const;
+  SE3 align_to_surfaces(FrameStep& step);
+  bool add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step);
+  LostCause place_without_points(LostCause found, FrameStep& step);
+  LostCause place_by_surfaces(const SE3& T_c_ref, FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                         const Placement& view, FrameStep& step);
   [[nodiscard]] int mapped_inliers() const;
@@ -148,6 +155,8 @@ class Tracker {
   ElderVote elder_vote_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
+  std::optional<DepthAlignment> depth_;  ///< RGB-D only
+  bool corners_scarce_ = false;          ///< the last good frame was placed by surfaces
   // One camera only: where its depths come from.
   std::optional<MonocularStart> monocular_start_;
   std::optional<DepthSeeds> seeds_;

@@ -54,17 +54,21 @@ void Tracker::propose_keyframe_if_due(FrameStep& step) {
   const KeyframeBacklog backlog{immature_points_.room_for_keyframe(),
                                 static_cast<int>(immature_points_.pending().size()),
                                 next_.keyframe == next_.first_of_part + 1};
-  if (step.free_proposal != nullptr &&
-      keyframe_due(step.result, last_keyframe_, occupied_regions(), backlog, options_, step.bounds)) {
-    propose_keyframe(step);
-  }
+  if (step.free_proposal == nullptr) return;
+  const bool due =
+      step.result.by_depth
+          ? keyframe_due_by_motion(step.result.T_c_ref, last_keyframe_, backlog, options_)
+          : keyframe_due(step.result, last_keyframe_, occupied_regions(), backlog, options_, step.bounds);
+  if (due) propose_keyframe(step);
 }
 
 void Tracker::propose_keyframe(FrameStep& step) {
   KeyframeProposal& proposal = *step.free_proposal;
-  last_keyframe_.median_depth = median_depth(step.result.T_c_ref);
+  last_keyframe_.median_depth =
+      step.result.by_depth ? depth_->typical_depth() : median_depth(step.result.T_c_ref);
   begin_proposal({step.result.reference, step.result.T_c_ref}, step);
-  collect_observations(proposal);
+  // Where corners are few, most lie on bare edges, along which they slide: the map takes none of them.
+  if (!step.result.by_depth) collect_observations(proposal);
   start_points(proposal.id, step.shutter);
   last_keyframe_.occupied_regions = occupied_regions();
   hand_over_images(proposal);
@@ -81,6 +85,7 @@ void Tracker::begin_proposal(const Placement& placement, FrameStep& step) {
   proposal.snapshot_version = step.graph.version();
   proposal.reference = placement.reference;
   proposal.T_k_ref = placement.T_c_ref;
+  if (step.result.by_depth) proposal.pose_information = step.result.information;
   proposal.median_depth = last_keyframe_.median_depth;
   immature_points_.add_pending({proposal.id, placement.reference, placement.T_c_ref});
   step.result.proposed = true;

@@ -92,12 +92,17 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   immature_points_.clear_points();
   starter_.clear();
   if (starter_.start(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
-    immature_points_.clear_points();  // there were none but these
-    return LostCause::kNoTexture;
+    if (depth_) depth_->look_at(current_.depth);
+    const LostCause open = depth_ ? depth_->judge_structure() : LostCause::kTooFewMatches;
+    if (open != LostCause::kNone) {
+      immature_points_.clear_points();  // there were none but these
+      return open == LostCause::kNoStructure ? open : LostCause::kNoTexture;
+    }
+    step.result.by_depth = true;
   }
   matches_.clear();
   motion_.clear();
-  last_keyframe_ = {median_depth(SE3()), 0};
+  last_keyframe_ = {step.result.by_depth ? depth_->typical_depth() : median_depth(SE3()), 0};
   begin_proposal({kNoKeyframe, SE3()}, step);
   hand_over_images(*step.free_proposal);
   next_.first_of_part = index(id);

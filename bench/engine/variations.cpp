@@ -9,6 +9,7 @@
 #include <exception>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,16 +42,19 @@ cv::Mat with_noise(const cv::Mat& image, double sigma, std::uint64_t stream) {
   return synthetic::expose(intensity, 1, sigma, {17, stream});
 }
 
-const TimedPose* true_pose(const Trajectory& truth, std::int64_t t_ns) {
-  constexpr std::int64_t kNear = 20'000'000;
-  const auto after = std::lower_bound(truth.begin(), truth.end(), t_ns,
+/// Between the true poses before and after; none where these are farther apart than a frame.
+std::optional<SE3> true_T_w_c(const Trajectory& truth, std::int64_t t_ns) {
+  constexpr std::int64_t kSameTime = 1'000;
+  constexpr std::int64_t kFarApart = 60'000'000;
+  const auto after = std::lower_bound(truth.begin(), truth.end(), t_ns - kSameTime,
                                       [](const TimedPose& pose, std::int64_t t) { return pose.t_ns < t; });
-  const TimedPose* best = nullptr;
-  for (auto it = after == truth.begin() ? after : after - 1; it != truth.end() && it <= after; ++it) {
-    if (std::abs(it->t_ns - t_ns) > kNear) continue;
-    if (best == nullptr || std::abs(it->t_ns - t_ns) < std::abs(best->t_ns - t_ns)) best = &*it;
-  }
-  return best;
+  if (after == truth.end()) return std::nullopt;
+  if (after->t_ns <= t_ns + kSameTime) return after->T_w_c;
+  if (after == truth.begin()) return std::nullopt;
+  const TimedPose &a = *(after - 1), &b = *after;
+  if (b.t_ns - a.t_ns > kFarApart) return std::nullopt;
+  const double share = static_cast<double>(t_ns - a.t_ns) / static_cast<double>(b.t_ns - a.t_ns);
+  return a.T_w_c * SE3::exp(share * (a.T_w_c.inverse() * b.T_w_c).log());
 }
 
 double ate(const Trajectory& estimate, const Trajectory& truth) {
@@ -68,10 +72,11 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   options.on_pose = [&](const PoseReport& report) {
     const FrameRecord& record = report.record;
     if (record.state != FrameState::kTracked || !report.graph.contains(record.reference)) return;
-    const TimedPose* now = true_pose(truth, record.t_ns);
-    const TimedPose* then = true_pose(truth, report.graph.keyframe(record.reference).t_ns);
-    if (now == nullptr || then == nullptr || now == then) return;
-    const SE3 T_c_ref = now->T_w_c.inverse() * then->T_w_c;
+    if (report.graph.keyframe(record.reference).t_ns == record.t_ns) return;
+    const auto T_w_now = true_T_w_c(truth, record.t_ns);
+    const auto T_w_then = true_T_w_c(truth, report.graph.keyframe(record.reference).t_ns);
+    if (!T_w_now || !T_w_then) return;
+    const SE3 T_c_ref = T_w_now->inverse() * *T_w_then;
     const Vector6 error = (record.T_c_ref.unpacked() * T_c_ref.inverse()).log();
     outcome.nees.push_back(error.dot(report.information * error) / 6);
   };

@@ -52,6 +52,8 @@ Walk walk(const SyntheticOptions& scene) {
   const auto evaluation = evaluate(associate(estimate, truth, 1'000'000), {});
   EXPECT_TRUE(evaluation);
   if (evaluation) walk.ate = evaluation->absolute.rmse;
+  for (std::size_t i = 1; i < truth.size(); ++i)
+    walk.path += (truth[i].T_w_c.translation() - truth[i - 1].T_w_c.translation()).norm();
   return walk;
 }
 
@@ -88,6 +90,17 @@ TEST(HardPlaces, PeopleInTheCourtyardDoNotTakeTheCameraAlong) {
 
 TEST(HardPlaces, PeopleInTheCorridorDoNotTakeTheCameraAlong) {
   expect_not_taken_along("corridor");
+}
+
+TEST(HardPlaces, ABareCorridorIsTrackedByItsDepth) {
+  SyntheticOptions scene = small("corridor", 160);
+  scene.sensor = SensorKind::kRgbd;
+  scene.bare = true;
+  const Walk bare = walk(scene);
+  std::printf("bare corridor: ATE %.4f m of %.1f m, %d of %d frames\n", bare.ate, bare.path, bare.tracked,
+              bare.frames);
+  EXPECT_EQ(bare.tracked, bare.frames);
+  EXPECT_LT(bare.ate, 0.01 * bare.path);
 }
 
 }  // namespace

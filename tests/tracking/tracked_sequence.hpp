@@ -53,9 +53,9 @@ class Odometry {
     if (pending_) map_.insert(proposal_);
     if (pending_) snapshot_ = map_.publish();
     pending_ = false;
-    const std::uint64_t before = allocations();
+    const std::uint64_t before = testing::allocations();  // not the member of that name
     const TrackResult result = tracker_.step(frame, snapshot_, &proposal_, effort_);
-    allocations_ = allocations() - before;
+    allocations_ = testing::allocations() - before;
     pending_ = result.proposed;
     return result;
   }

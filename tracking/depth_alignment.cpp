@@ -1,0 +1,200 @@
+#include "tracking/depth_alignment.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/option_check.hpp"
+#include "geometry/so3.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr double kFarApart = 0.1;  // two surfaces, not one [share of the depth]
+constexpr double kFacing = 0.8;    // cosine between the planes of one surface
+constexpr double kNearlySettled = 1e-3;
+constexpr double kSettled = 2e-5;  // a step [m, rad]
+constexpr std::size_t kFirstStride = 4;
+constexpr double kWidestKernel = 30;  // [standard deviations]
+constexpr double kFarDeviation = 30;  // counts as no farther [standard deviations]
+constexpr double kCornerHuber = 1.5;  // [standard deviations]
+constexpr double kCornerChi2 = 30;    // farther ones are mistakes
+
+}  // namespace
+
+std::string DepthAlignmentOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_iterations", max_iterations, 1)
+      .at_least("min_planes", min_planes, 6)
+      .share("min_met", min_met)
+      .above("kernel", kernel, 0)
+      .at_least("normal_sigma", normal_sigma, 0)
+      .at_least("depth_sigma", depth_sigma, 0)
+      .share("max_chance", max_chance)
+      .above("max_sigma_m", max_sigma_m, 0)
+      .above("max_sigma_rad", max_sigma_rad, 0)
+      .at_least("min_corners", min_corners, 3)
+      .reason();
+}
+
+DepthAlignment::DepthAlignment(const Rig& rig, const DepthAlignmentOptions& options)
+    : rig_(rig), options_(options), current_(rig) {
+  slots_.reserve(kViews);
+  for (std::size_t v = 0; v < kViews; ++v) slots_.emplace_back(rig);  // a copy would lack room
+}
+
+void DepthAlignment::add_view(KeyframeId id, const cv::Mat& depth, const SE3& T_view_ref) {
+  if (views_ == kViews) return;
+  const auto has = [&](const View& view) { return view.id == id; };
+  auto slot = std::find_if(slots_.begin(), slots_.end(), has);
+  if (slot == slots_.end()) {  // in place of the oldest
+    slot = std::min_element(slots_.begin(), slots_.end(), [](const View& a, const View& b) {
+      return a.id != b.id && (a.id == kNoKeyframe || (b.id != kNoKeyframe && a.id < b.id));
+    });
+    slot->id = id;
+    slot->planes.read(depth);
+  }
+  slot->T_view_ref = T_view_ref;
+  order_[views_++] = static_cast<std::size_t>(slot - slots_.begin());
+}
+
+/// Residual m . x - 1: of depth, in shares of it.
+void DepthAlignment::add_pair(const DepthPlanes::Plane& seen, const DepthPlanes::Plane& plane,
+                              const SE3& T_view_c, const Pass& pass, Equations& equations) const {
+  const Matrix3 R = T_view_c.rotation();
+  const Vector3 x = R * seen.x + T_view_c.translation();
+  const double residual = plane.m.dot(x) - 1;
+  const Vector3 m_c = R.transpose() * plane.m;
+  const double length = plane.m.norm();
+  if (std::abs(residual) > kFarApart * length * x.norm()) return;
+  if (m_c.dot(seen.m) < kFacing * length * seen.m.norm()) return;
+  // Planes of neighbouring cells share readings: together they are known as well as each cell's own mean.
+  const double of_point = seen.sigma * seen.x.z(), of_plane = plane.sigma * x.z();
+  const double variance =
+      of_point * of_point + of_plane * of_plane + options_.depth_sigma * options_.depth_sigma;
+  const double deviation = std::abs(residual) / std::sqrt(variance);
+  const double robust = 1 / (1 + deviation * deviation / (pass.kernel * pass.kernel));
+  const double weight = robust / variance;
+  Vector6 J;
+  J << m_c, seen.x.cross(m_c);  // of minus the residual
+  equations.H.noalias() += weight * J * J.transpose();
+  equations.g.noalias() -= weight * residual * J;
+  equations.deviations += std::min(deviation, kFarDeviation);
+  equations.squares += robust * deviation * deviation;
+  equations.weights += robust;
+  ++equations.pairs;
+  if (!pass.with_chance) return;
+  const double bent = options_.normal_sigma * options_.normal_sigma;
+  const Matrix3 of_normal = R.transpose() * plane.covariance * R +
+                            bent * (length * length * Matrix3::Identity() - m_c * m_c.transpose());
+  Eigen::Matrix<double, 6, 3> A;
+  A << Matrix3::Identity(), hat(seen.x);
+  equations.chance.noalias() += weight * A * of_normal * A.transpose();
+}
+
+DepthAlignment::Equations DepthAlignment::linearise(const SE3& T_c_ref, const Pass& pass) const {
+  Equations equations;
+  std::array<SE3, kViews> T_view_c;
+  for (std::size_t v = 0; v < views_; ++v) {
+    T_view_c[v] = slots_[order_[v]].T_view_ref * T_c_ref.inverse();
+  }
+  const std::vector<DepthPlanes::Plane>& planes = current_.planes();
+  for (std::size_t i = 0; i < planes.size(); i += pass.stride) {
+    const DepthPlanes::Plane& seen = planes[i];
+    const int before = equations.pairs;
+    for (std::size_t v = 0; v < views_; ++v) {
+      const Vector3 x = T_view_c[v] * seen.x;
+      if (!in_front_of_camera(x)) continue;
+      const DepthPlanes::Plane* plane = slots_[order_[v]].planes.at(rig_.camera.project(x));
+      if (plane != nullptr) add_pair(seen, *plane, T_view_c[v], pass, equations);
+    }
+    equations.met += equations.pairs > before ? 1 : 0;
+  }
+  return equations;
+}
+
+void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObservation> corners,
+                                 bool settling, Equations& equations) const {
+  for (const MotionObservation& corner : corners) {
+    const Vector3 x = T_c_ref * corner.x_ref;
+    if (!in_front_of_camera(x)) continue;
+    Vector3 residual = rig_.project(x) - corner.z.cast<double>();
+    const Vector3 information = corner.information.cast<double>();
+    if (information.z() == 0) residual.z() = 0;  // there is no third component
+    const double chi2 = residual.dot(information.cwiseProduct(residual));
+    if (settling && chi2 > kCornerChi2) continue;
+    const double robust = std::min(1.0, kCornerHuber / std::sqrt(std::max(chi2, 1e-12)));
+    Eigen::Matrix<double, 3, 6> J;
+    J << Matrix3::Identity(), -hat(x);
+    J = rig_.project_jacobian(x) * J;
+    const Eigen::Matrix<double, 6, 3> weighted = robust * J.transpose() * information.asDiagonal();
+    equations.H.noalias() += weighted * J;
+    equations.g.noalias() += weighted * residual;
+  }
+}
+
+/// What is known of the pose: the information without what is owed to chance; none when that leaves a
+/// direction open.
+std::optional<Matrix6> DepthAlignment::determined(const Equations& equations,
+                                                  const Matrix6& of_corners) const {
+  // Residuals larger than they should be: of the frame as a whole, the sensor errs by as much.
+  const double scale = std::max(1.0, equations.squares / std::max(equations.weights, 1.0));
+  const Matrix6 all = equations.H / scale + of_corners;
+  const Matrix6 chance = equations.chance / scale;
+  const Eigen::LLT<Matrix6> llt(all);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Matrix6 L_inverse = llt.matrixL().solve(Matrix6::Identity());
+  const Matrix6 share = L_inverse * chance * L_inverse.transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix6> shares(share, Eigen::EigenvaluesOnly);
+  if (shares.info() != Eigen::Success || !(shares.eigenvalues().maxCoeff() < options_.max_chance))
+    return std::nullopt;
+  const Matrix6 information = all - chance;
+  const Vector6 variances = information.inverse().diagonal();
+  const double sigma_m = std::sqrt(variances.head<3>().maxCoeff());
+  const double sigma_rad = std::sqrt(variances.tail<3>().maxCoeff());
+  if (!(sigma_m < options_.max_sigma_m) || !(sigma_rad < options_.max_sigma_rad)) return std::nullopt;
+  return information;
+}
+
+tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
+    const SE3& T_c_ref, std::span<const MotionObservation> corners) const {
+  if (static_cast<int>(current_.planes().size()) < options_.min_planes || views_ == 0)
+    return tl::unexpected(LostCause::kTooFewMatches);
+  Result result{T_c_ref, Matrix6::Zero(), 0};
+  Pass pass{kWidestKernel, kFirstStride, false};
+  if (static_cast<int>(corners.size()) < options_.min_corners) corners = {};
+  for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
+    Equations equations = linearise(result.T_c_ref, pass);
+    if (equations.pairs < 6) return tl::unexpected(LostCause::kTooFewMatches);
+    add_corners(result.T_c_ref, corners, pass.stride == 1, equations);
+    equations.H.diagonal() *= 1 + 1e-9;  // a wall leaves directions open: they are judged in the end
+    const Vector6 step = -equations.H.ldlt().solve(equations.g);
+    if (!step.allFinite() || !(step.norm() < 1)) return tl::unexpected(LostCause::kNoStructure);
+    result.T_c_ref = SE3::exp(step) * result.T_c_ref;
+    if (pass.stride == 1 && step.norm() < kSettled) break;
+    if (step.norm() < kNearlySettled) pass.stride = 1;
+    pass.kernel = std::clamp(2 * equations.deviations / equations.pairs, options_.kernel, kWidestKernel);
+  }
+  const Equations depth = linearise(result.T_c_ref, {options_.kernel, 1, true});
+  result.met = static_cast<double>(depth.met) / static_cast<double>(current_.planes().size());
+  if (result.met < options_.min_met) return tl::unexpected(LostCause::kTooFewMatches);
+  Equations of_corners;
+  add_corners(result.T_c_ref, corners, true, of_corners);
+  const auto information = determined(depth, of_corners.H);
+  if (!information) return tl::unexpected(LostCause::kNoStructure);
+  result.information = *information;
+  return result;
+}
+
+LostCause DepthAlignment::judge_structure() const {
+  if (static_cast<int>(current_.planes().size()) < options_.min_planes) return LostCause::kTooFewMatches;
+  Equations equations;
+  for (const DepthPlanes::Plane& plane : current_.planes()) {
+    add_pair(plane, plane, SE3(), {options_.kernel, 1, true}, equations);
+  }
+  return determined(equations, Matrix6::Zero()) ? LostCause::kNone : LostCause::kNoStructure;
+}
+
+}  // namespace twofold

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "camera/rig.hpp"
+#include "estimation/motion_only.hpp"
+#include "graph/ids.hpp"
+#include "tracking/depth_planes.hpp"
+#include "tracking/lost_cause.hpp"
+
+namespace twofold {
+
+struct DepthAlignmentOptions {
+  int max_iterations = 12;
+  int min_planes = 100;  ///< in the depth image
+  double min_met = 0.4;  ///< share of them that must be met in some view, in (0, 1]
+  double kernel = 2;     ///< scale of the robust kernel (Cauchy) [standard deviations]
+  // By what measured surfaces are bent, beyond noise: lenses, and what the sensor assumes.
+  double normal_sigma = 0.01;   ///< [rad]
+  double depth_sigma = 0.0005;  ///< [share of the depth]
+  /// Share of the information about any direction that may be owed to noise, in (0, 1].
+  double max_chance = 0.5;
+  double max_sigma_m = 0.02;    ///< the pose is refused when it is known worse than this in some direction
+  double max_sigma_rad = 0.01;  ///< likewise
+  int min_corners = 8;          ///< with fewer they are left out
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Places a depth camera where there are hardly any corners: aligns what it measures to what keyframes
+/// measured.
+///
+/// Minimises, over the frame's pose, the distances of its surface points from the planes of several keyframes
+/// (Chen and Medioni, 1992; projective association) together with the reprojection errors of what corners
+/// there are. Planes from noisy readings seem to differ in direction even when they are one: of the
+/// information J^T W J a part is owed to that, which is known from the planes' covariance, and taken off
+/// (errors in variables). A direction that mostly chance determines, along a bare wall or a corridor without
+/// ends, is refused and not guessed.
+///
+/// Bounded work, no allocation after construction.
+class DepthAlignment {
+ public:
+  static constexpr std::size_t kViews = 4;
+
+  DepthAlignment(const Rig& rig, const DepthAlignmentOptions& options);
+
+  /// The keyframes to align to, at most kViews: each is read once only, as long as it is added every time.
+  void clear_views() { views_ = 0; }
+  void add_view(KeyframeId id, const cv::Mat& depth, const SE3& T_view_ref);
+
+  /// Reads the frame to be placed.
+  void look_at(const cv::Mat& depth) { current_.read(depth); }
+
+  struct Result {
+    SE3 T_c_ref;
+    Matrix6 information;  ///< of T_c_ref, left perturbation (v, omega), what is owed to chance taken off
+    double met = 0;       ///< share of the frame's planes that were met
+  };
+  /// @param T_c_ref  prediction
+  /// @param corners  found in the frame, in the reference's frame; may be none
+  /// @return  the pose; kTooFewMatches when too little is common to frame and views, kNoStructure when
+  ///          something of the pose is left open
+  [[nodiscard]] tl::expected<Result, LostCause> align(const SE3& T_c_ref,
+                                                      std::span<const MotionObservation> corners) const;
+
+  /// Whether the frame looked at would be placed relative to itself: kNone, kNoStructure or kTooFewMatches.
+  [[nodiscard]] LostCause judge_structure() const;
+
+  /// Of the frame looked at [m].
+  [[nodiscard]] double typical_depth() const { return current_.typical_depth(); }
+
+ private:
+  struct View {
+    explicit View(const Rig& rig) : planes(rig) {}
+    KeyframeId id = kNoKeyframe;
+    SE3 T_view_ref;
+    DepthPlanes planes;
+  };
+  /// Normal equations over a left perturbation of T_c_ref.
+  struct Equations {
+    Matrix6 H = Matrix6::Zero();
+    Matrix6 chance = Matrix6::Zero();  ///< expected part of H that noise in the planes makes
+    Vector6 g = Vector6::Zero();
+    double deviations = 0;  ///< sum of |residual| / sigma
+    double squares = 0;     ///< weighted, likewise
+    double weights = 0;
+    int pairs = 0;
+    int met = 0;  ///< planes of the frame
+  };
+  struct Pass {
+    double kernel;
+    std::size_t stride;  ///< every so many planes of the frame
+    bool with_chance;
+  };
+  [[nodiscard]] Equations linearise(const SE3& T_c_ref, const Pass& pass) const;
+  void add_pair(const DepthPlanes::Plane& seen, const DepthPlanes::Plane& plane, const SE3& T_view_c,
+                const Pass& pass, Equations& equations) const;
+  void add_corners(const SE3& T_c_ref, std::span<const MotionObservation> corners, bool settling,
+                   Equations& equations) const;
+  [[nodiscard]] std::optional<Matrix6> determined(const Equations& equations,
+                                                  const Matrix6& of_corners) const;
+
+  Rig rig_;
+  DepthAlignmentOptions options_;
+  std::vector<View> slots_;
+  std::size_t views_ = 0;                    ///< in use
+  std::array<std::size_t, kViews> order_{};  ///< slots of those
+  DepthPlanes current_;
+};
+
+}  // namespace twofold
