@@ -174,9 +174,19 @@ void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stag
 
 void ViewScene::add(const ViewPathFrame& frame) {
   path_.append(frame, ++revision_);
-  if (path_.size() > kMaxPath) {
-    path_.drop(revision_, [](std::size_t i) { return i < kMaxPath / 2 && i % 2 == 1; });
+  if (path_.size() > kMaxPath) thin_path();
+}
+
+void ViewScene::thin_path() {
+  if (thinned_ > kMaxPath / 2) {
+    path_.drop(revision_, [this](std::size_t i) { return i < thinned_ && i % 2 == 1; });
+    thinned_ = (thinned_ + 1) / 2;
+    path_stride_ *= 2;
   }
+  const std::size_t end = path_.size() - kMaxPath / 4;
+  path_.drop(revision_,
+             [&](std::size_t i) { return i >= thinned_ && i < end && (i - thinned_) % path_stride_ != 0; });
+  thinned_ += (end - thinned_ + path_stride_ - 1) / path_stride_;
 }
 
 void ViewScene::add(const MapEvent& event) {

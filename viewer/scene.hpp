@@ -64,11 +64,11 @@ void set_pose_in_reference(const Pose& T_reference_camera, ViewPathFrame& frame)
 
 /// Everything that is shown: the map, the path, the newest frames, events; as deltas between revisions.
 ///
-/// One thread. Memory: the map, at most kMaxPath frames (of older ones every second is left out, again and
-/// again), and the newest frames and events.
+/// One thread. Memory: the map, at most kMaxPath frames (all of the newest; of older ones every 2nd, 4th, 8th
+/// ..., evenly), and the newest frames and events.
 class ViewScene {
  public:
-  static constexpr std::size_t kMaxPath = 1U << 17;  // 73 minutes at 30 frames a second
+  static constexpr std::size_t kMaxPath = 1U << 15;  // what a picture of it can show
   static constexpr std::size_t kLiveFrames = 512;
   static constexpr std::size_t kMaxEvents = 4096;
 
@@ -117,6 +117,8 @@ class ViewScene {
   [[nodiscard]] float seconds(std::int64_t t_ns) const {
     return static_cast<float>(1e-9 * static_cast<double>(t_ns - *start_ns_));
   }
+  /// Leaves out older frames of a path that has become too long.
+  void thin_path();
   /// Hangs frames of the path on keyframes that stay.
   void rebind_path(const std::vector<ViewKeyframe>& next, Revision revision);
   [[nodiscard]] std::shared_ptr<const Delta> encode(Revision since) const;
@@ -127,6 +129,8 @@ class ViewScene {
   ChangeSet<ViewKeyframe> keyframes_;
   ChangeSet<ViewEdge> edges_;
   ChangeSet<ViewPathFrame> path_;
+  std::size_t thinned_ = 0;  // first frames of path_, of which every path_stride_-th was kept
+  std::size_t path_stride_ = 2;
   std::deque<ViewLiveFrame> live_;
   std::deque<ViewEvent> events_;
   std::uint64_t end_live_ = 0, end_event_ = 0;

@@ -1,7 +1,8 @@
-// A generated map in the viewer, for measurements in a browser: viewer_load POINTS [SECONDS]
-// Rooms along a corridor, seen by keyframes every metre; a camera walks through it at 30 frames a second. The
-// number of each frame is the time of day it became known at [ms, 31 bits], so that the page can tell how
-// long ago that was.
+// A generated map in the viewer, for measurements in a browser: viewer_load POINTS [SECONDS [SPEED]]
+// Rooms along a corridor, seen by keyframes every metre; a camera walks through it and back at SPEED
+// (default: 1) times 30 frames a second. The number of each frame is the time of day it became known at [ms,
+// 31 bits], so that the page can tell how long ago that was.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -45,20 +46,23 @@ ViewMap generated_map(std::uint32_t points) {
   return map;
 }
 
-PoseEstimate pose_now(std::int64_t n) {
+/// Frame n of a walk of a metre a second, along the corridor and back, and so on.
+PoseEstimate pose_now(std::int64_t n, double length) {
   const auto now = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::system_clock::now().time_since_epoch());
+  const double walked = std::fmod(static_cast<double>(n) / 30, 2 * length);
+  const double along = std::min(walked, 2 * length - walked);
   PoseEstimate pose;
   pose.frame = now.count() & 0x7fffffff;
   pose.t_ns = n * 33'333'333;
   pose.state = TrackingState::kTracked;
   pose.map_part = 0;
-  pose.reference_keyframe = static_cast<std::uint32_t>(n / 30);
-  pose.T_world_camera.t = {40 * std::sin(static_cast<double>(n) / 30 / 90), 0, static_cast<double>(n) / 30};
+  pose.reference_keyframe = static_cast<std::uint32_t>(along);
+  pose.T_world_camera.t = {40 * std::sin(along / 90), 0, along};
   return pose;
 }
 
-void run(std::uint32_t points, int seconds) {
+void run(std::uint32_t points, int seconds, int speed) {
   ViewScene scene;
   scene.begin(0);
   scene.show(generated_map(points));
@@ -69,10 +73,15 @@ void run(std::uint32_t points, int seconds) {
   const auto begin = Clock::now();
   std::stop_source stop;
   std::int64_t n = 0;
+  std::int64_t last_frame = -1;
   const auto tick = [&](const ViewServer::Audience&, ViewSight&) {
     const auto since = Clock::now() - begin;
     if (since > std::chrono::seconds(seconds)) stop.request_stop();
-    if (since > n * std::chrono::nanoseconds(33'333'333)) scene.add(pose_now(n++), {});
+    for (; since * speed > n * std::chrono::nanoseconds(33'333'333); ++n) {
+      PoseEstimate pose = pose_now(n, points / kPointsAKeyframe - 1);
+      pose.frame = last_frame = std::max(pose.frame, last_frame + 1);
+      scene.add(pose, {});
+    }
   };
   server.run(stop.get_token(), tick, [] { return std::string("that was all"); });
 }
@@ -82,6 +91,6 @@ void run(std::uint32_t points, int seconds) {
 
 int main(int argc, char** argv) {
   twofold::run(static_cast<std::uint32_t>(argc > 1 ? std::atoi(argv[1]) : 2'000'000),
-               argc > 2 ? std::atoi(argv[2]) : 60);
+               argc > 2 ? std::atoi(argv[2]) : 60, argc > 3 ? std::atoi(argv[3]) : 1);
   return 0;
 }

@@ -1,4 +1,4 @@
-// The figures of docs/results.md: node measure.mjs run|map OUTPUT_FOLDER
+// The figures of docs/results.md: node measure.mjs run|map|hour OUTPUT_FOLDER
 import {mkdirSync, readFileSync, readdirSync} from 'node:fs';
 import {join} from 'node:path';
 import {Program, openBrowser, openPage, report, until} from './program.mjs';
@@ -106,5 +106,22 @@ async function maps() {
   await browser.close();
 }
 
+/** What the browser holds while an hour of frames goes by, sixty times as fast. */
+async function hour() {
+  const browser = await openBrowser();
+  const load = new Program(['20000', '90', '60']);
+  const page = await openPage(browser, await load.address());
+  const client = await page.context().newCDPSession(page);
+  for (let minute = 10; minute <= 60; minute += 10) {
+    await page.waitForTimeout(10000);
+    await client.send('HeapProfiler.collectGarbage');
+    const held = await page.evaluate(() => [performance.memory.usedJSHeapSize / 1e6, window.twofold.model.endTime() / 60, window.twofold.model.path.length]);
+    console.log(`minute ${held[1].toFixed(0)}: heap ${held[0].toFixed(1)} MB, ${held[2]} frames of the path, server ${memory(load.process.pid).toFixed(1)} MB`);
+  }
+  await load.stop('SIGKILL');
+  await browser.close();
+}
+
 if (what === 'run') await runs();
+else if (what === 'hour') await hour();
 else await maps();
