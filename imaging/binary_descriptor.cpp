@@ -23,7 +23,10 @@ double gaussian(std::mt19937& rng) {
 
 Vector2 draw_in_disc(std::mt19937& rng) {
   for (;;) {
-    Vector2 p(kPatternSigma * gaussian(rng), kPatternSigma * gaussian(rng));
+    // One after the other: compilers evaluate the arguments of a call in any order.
+    Vector2 p;
+    p.y() = kPatternSigma * gaussian(rng);
+    p.x() = kPatternSigma * gaussian(rng);
     if (p.norm() <= kPatternRadius) return p;
   }
 }

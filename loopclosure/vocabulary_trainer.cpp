@@ -44,7 +44,8 @@ std::vector<BinaryDescriptor> seed_centres(const Members& members, int count, st
       total += nearest[m];
     }
     if (total == 0) break;  // fewer different descriptors than centres
-    const std::uint64_t draw = (static_cast<std::uint64_t>(rng()) << 32 | rng()) % total;
+    const auto upper = static_cast<std::uint64_t>(rng());
+    const std::uint64_t draw = (upper << 32 | rng()) % total;
     std::uint64_t sum = 0;
     std::size_t chosen = 0;
     while ((sum += nearest[chosen]) <= draw) ++chosen;

@@ -45,7 +45,7 @@ double distance_to(const std::vector<Vector2>& way, const Vector2& p) {
 }
 
 void add_house(Scene& scene, Random& random, const Vector2& at, double yaw) {
-  const Vector3 size(random.uniform(5, 6.6), random.uniform(2.5, 4), random.uniform(3.5, 6.5));
+  const Vector3 size = random_size(random, {5, 2.5, 3.5}, {6.6, 4, 6.5});
   const int style = random.below(4);
   add_box(scene, standing(at.x(), at.y(), 0.5 * size.z(), yaw), size, kTexel, [&](Canvas& c) {
     if (c.height() < 3.45) return;  // roof and floor

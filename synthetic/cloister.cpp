@@ -28,7 +28,8 @@ void add_side(Scene& scene, Random& random, int side) {
                          0.85 + 0.05 * side});
   for (double x = -kHalf + 2; x < kHalf - 1; x += random.uniform(2.6, 3.8)) {
     const Vector3 foot = R * Vector3(x, kHalf - kArcade, 0);
-    add_cylinder(scene, foot, random.uniform(0.12, 0.2), random.uniform(2.6, 3.4), kTexel, [&](Canvas& c) {
+    const double height = random.uniform(2.6, 3.4);
+    add_cylinder(scene, foot, random.uniform(0.12, 0.2), height, kTexel, [&](Canvas& c) {
       paint_ashlar(c, random, 0.3, static_cast<float>(random.uniform(110, 190)));
     });
   }

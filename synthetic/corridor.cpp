@@ -26,7 +26,8 @@ void paint_wall(Canvas& canvas, Random& random) {
       w = random.uniform(0.85, 1.0);
       draw_door(canvas, random, x, canvas.height() - 2.05, w, 2.05);
     } else {
-      draw_poster(canvas, random, x, 0.7 + random.uniform(0, 0.3), w, w * random.uniform(0.8, 1.3));
+      const double h = w * random.uniform(0.8, 1.3);
+      draw_poster(canvas, random, x, 0.7 + random.uniform(0, 0.3), w, h);
       if (kind > 0.6) draw_poster(canvas, random, x + 0.1, 1.95, 0.45 * w, 0.5 * w);
     }
     x += w + random.uniform(0.2, 0.7);
@@ -64,7 +65,7 @@ void add_shell(Scene& scene, Random& random, const PlainPanels& plain) {
 void add_furniture(Scene& scene, Random& random) {
   for (double x = -10.8; x < 10.8; x += random.uniform(1.6, 2.6)) {
     const double side = random.chance(0.5) ? 1 : -1;
-    const Vector3 size(random.uniform(0.35, 0.8), random.uniform(0.25, 0.35), random.uniform(0.4, 1.7));
+    const Vector3 size = random_size(random, {0.35, 0.25, 0.4}, {0.8, 0.35, 1.7});
     const auto tone = static_cast<float>(random.uniform(80, 190));
     const bool wooden = random.chance(0.5);
     add_box(scene, standing(x, side * (kHalfWidth - 0.5 * size.y() - 0.02), 0.5 * size.z(), 0), size, 0.003,

@@ -43,10 +43,14 @@ void add_walls(Scene& scene, Random& random, const PlainPanels& plain) {
 void add_ground(Scene& scene, Random& random) {
   Canvas canvas(2 * kHalfX, 2 * kHalfY, 0.006, 128);
   paint_paving(canvas, random, 0.5, 132);
-  for (int i = 0; i < 40; ++i)  // puddles, drains, leaves swept together
-    canvas.ellipse(random.uniform(0, canvas.width()), random.uniform(0, canvas.height()),
-                   random.uniform(0.1, 0.4), random.uniform(0.05, 0.25), random.uniform(0, 180),
-                   static_cast<float>(random.uniform(50, 200)));
+  for (int i = 0; i < 40; ++i) {  // puddles, drains, leaves swept together
+    const auto grey = static_cast<float>(random.uniform(50, 200));
+    const double angle = random.uniform(0, 180);
+    const double b = random.uniform(0.05, 0.25);
+    const double a = random.uniform(0.1, 0.4);
+    const double y = random.uniform(0, canvas.height());
+    canvas.ellipse(random.uniform(0, canvas.width()), y, a, b, angle, grey);
+  }
   canvas.add_noise(random.word(), 8, 0.4, 0.02, 0.9f);
   scatter_specks(canvas, random, 22, 0.01, 0.05, 45);
   const int texture = scene.add(canvas.finish());
@@ -119,7 +123,7 @@ void add_rim(Scene& scene, Random& random) {
                                                          {-4.4, -6.6},
                                                          {-8.7, 0.5}}};
   for (const auto& [x, y] : spots) {
-    const Vector3 size(random.uniform(0.6, 1.2), random.uniform(0.45, 0.8), random.uniform(0.45, 1.1));
+    const Vector3 size = random_size(random, {0.6, 0.45, 0.45}, {1.2, 0.8, 1.1});
     const auto grey = static_cast<float>(random.uniform(90, 170));
     const int kind = random.below(4);
     add_box(scene, standing(x, y, 0.5 * size.z(), random.uniform(-0.5, 0.5)), size, 0.004, [&](Canvas& c) {

@@ -38,7 +38,8 @@ cv::Mat make_heights(Random& random) {
   cv::Mat heights = relief.image();
   for (int i = 0; i < 240; ++i) {
     const double radius = 0.03 * std::pow(0.45 / 0.03, std::pow(random.uniform(0, 1), 2.5));
-    dig_crater(heights, random.uniform(0, kWidth), random.uniform(0, kDepth), radius);
+    const double y = random.uniform(0, kDepth);
+    dig_crater(heights, random.uniform(0, kWidth), y, radius);
   }
   return heights;
 }

@@ -43,7 +43,8 @@ void add_room(Scene& scene, Random& random) {
   paint_plaster(wall, random, 165);
   for (double x = 0.2; x < 5.5;) {
     const double w = random.uniform(0.3, 0.6);
-    draw_poster(wall, random, x, 3.2 - random.uniform(1.75, 2.1), w, w * random.uniform(0.9, 1.3));
+    const double h = w * random.uniform(0.9, 1.3);
+    draw_poster(wall, random, x, 3.2 - random.uniform(1.75, 2.1), w, h);
     draw_poster(wall, random, x + 0.03, 3.2 - random.uniform(1.2, 1.3), 0.8 * w, 0.35);
     x += w + random.uniform(0.05, 0.25);
   }
@@ -70,8 +71,10 @@ void add_things(Scene& scene, Random& random) {
           double z = kTop;
           for (int i = 0; i < 1 + row + random.below(2); ++i) {
             const double h = random.uniform(0.02, 0.045);
-            add_box(scene, standing(x, y, z + 0.5 * h, yaw + random.uniform(-0.3, 0.3)),
-                    {random.uniform(0.13, 0.19), random.uniform(0.1, 0.14), h}, kTexel, cover);
+            const double width = random.uniform(0.13, 0.19);
+            const double depth = random.uniform(0.1, 0.14);
+            const double turn = random.uniform(-0.3, 0.3);
+            add_box(scene, standing(x, y, z + 0.5 * h, yaw + turn), {width, depth, h}, kTexel, cover);
             z += h;
           }
           break;
@@ -89,8 +92,8 @@ void add_things(Scene& scene, Random& random) {
           break;
         }
         default: {
-          const Vector3 size(random.uniform(0.07, 0.15), random.uniform(0.05, 0.11),
-                             random.uniform(0.7, 1.5) * tall);
+          Vector3 size = random_size(random, {0.07, 0.05, 0.7}, {0.15, 0.11, 1.5});
+          size.z() *= tall;
           add_box(scene, standing(x, y, kTop + 0.5 * size.z(), yaw), size, kTexel, cover);
         }
       }

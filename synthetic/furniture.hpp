@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "synthetic/canvas.hpp"
+#include "synthetic/random.hpp"
 #include "synthetic/scene.hpp"
 
 namespace twofold::synthetic {
@@ -12,6 +13,13 @@ namespace twofold::synthetic {
 /// Pose of a thing that stands upright at (x, y, z), turned by yaw [rad] about the vertical.
 [[nodiscard]] inline SE3 standing(double x, double y, double z, double yaw) {
   return {SO3::exp(Vector3(0, 0, yaw)), Vector3(x, y, z)};
+}
+
+/// Sides of a thing, each between both [m].
+[[nodiscard]] inline Vector3 random_size(Random& random, const Vector3& least, const Vector3& most) {
+  Vector3 size;
+  for (int k = 2; k >= 0; --k) size[k] = random.uniform(least[k], most[k]);
+  return size;
 }
 
 /// Paints the six sides of a box in the order of box_quads; gives the index of the first texture.

@@ -18,8 +18,9 @@ void scatter_specks(Canvas& canvas, Random& random, double per_square_metre, dou
     const int v = std::clamp(static_cast<int>(y / canvas.texel()), 0, image.rows - 1);
     const float sign = random.chance(0.6) ? -1.0f : 1.0f;
     const float grey = image.at<float>(v, u) + sign * contrast * static_cast<float>(random.uniform(0.2, 1.0));
-    canvas.ellipse(x, y, r, r * random.uniform(0.4, 1.0), random.uniform(0, 180),
-                   std::clamp(grey, 8.0f, 250.0f));
+    const double angle = random.uniform(0, 180);
+    const double minor = r * random.uniform(0.4, 1.0);
+    canvas.ellipse(x, y, r, minor, angle, std::clamp(grey, 8.0f, 250.0f));
   }
 }
 
@@ -47,12 +48,13 @@ void paint_ashlar(Canvas& canvas, Random& random, double stone, float grey) {
     for (double x = -random.uniform(0, stone); x < canvas.width();) {
       const double w = stone * random.uniform(0.8, 2.4);
       const double gap = 0.018;
+      const float tone = vary(random, grey, 38);
       const auto jitter = [&] { return random.uniform(0, 0.03); };
       canvas.polygon({{x + jitter(), y + jitter()},
                       {x + w - gap - jitter(), y + jitter()},
                       {x + w - gap - jitter(), y + h - gap - jitter()},
                       {x + jitter(), y + h - gap - jitter()}},
-                     vary(random, grey, 38));
+                     tone);
       x += w;
     }
     y += h;
@@ -69,12 +71,13 @@ void paint_plaster(Canvas& canvas, Random& random, float grey) {
     const double h = random.uniform(0.15, 0.7);
     const double x = random.uniform(-0.2, canvas.width());
     const double y = random.uniform(-0.2, canvas.height());
+    const float tone = vary(random, grey, 32);
     canvas.polygon({{x, y + random.uniform(0, 0.1)},
                     {x + w, y},
                     {x + w + random.uniform(-0.1, 0.1), y + h},
                     {x + 0.4 * w, y + h + random.uniform(-0.1, 0.1)},
                     {x + random.uniform(0, 0.1), y + h}},
-                   vary(random, grey, 32));
+                   tone);
   }
   canvas.add_noise(random.word(), 16, 2.4, 0.012, 0.82f);
   for (int i = 0; i < static_cast<int>(0.8 * area); ++i) {  // cracks
@@ -108,8 +111,9 @@ void paint_planks(Canvas& canvas, Random& random, double plank_width, float grey
   for (int i = 0; i < grain; ++i) {
     const double x = random.uniform(0, canvas.width());
     const double y = random.uniform(0, canvas.height());
-    canvas.line(x, y, x + random.uniform(-0.01, 0.01), y + random.uniform(0.1, 0.5), canvas.texel(),
-                vary(random, grey - 25, 25));
+    const float tone = vary(random, grey - 25, 25);
+    const double y1 = y + random.uniform(0.1, 0.5);
+    canvas.line(x, y, x + random.uniform(-0.01, 0.01), y1, canvas.texel(), tone);
   }
   canvas.add_noise(random.word(), 10, 0.6, 0.006, 0.8f);
   scatter_specks(canvas, random, 3.0 / (plank_width * plank_width), 0.05 * plank_width, 0.25 * plank_width,
@@ -147,8 +151,11 @@ void paint_foliage(Canvas& canvas, Random& random, double leaf, float grey) {
     const double size = leaf * random.uniform(0.4, 1.1);
     // Later leaves lie on top and catch more light.
     const float light = -40 + 75 * static_cast<float>(i) / static_cast<float>(count);
-    canvas.ellipse(random.uniform(0, canvas.width()), random.uniform(0, canvas.height()), size,
-                   size * random.uniform(0.3, 0.6), random.uniform(0, 180), vary(random, grey + light, 28));
+    const float tone = vary(random, grey + light, 28);
+    const double angle = random.uniform(0, 180);
+    const double minor = size * random.uniform(0.3, 0.6);
+    const double y = random.uniform(0, canvas.height());
+    canvas.ellipse(random.uniform(0, canvas.width()), y, size, minor, angle, tone);
   }
   canvas.add_noise(random.word(), 14, 0.8, 0.1);
 }
@@ -159,8 +166,10 @@ void paint_bark(Canvas& canvas, Random& random, float grey) {
   for (int i = 0; i < ridges; ++i) {
     const double x = random.uniform(0, canvas.width());
     const double y = random.uniform(0, canvas.height());
-    canvas.line(x, y, x + random.uniform(-0.03, 0.03), y + random.uniform(0.05, 0.3),
-                random.uniform(0.008, 0.03), vary(random, grey, 50));
+    const float tone = vary(random, grey, 50);
+    const double width = random.uniform(0.008, 0.03);
+    const double y1 = y + random.uniform(0.05, 0.3);
+    canvas.line(x, y, x + random.uniform(-0.03, 0.03), y1, width, tone);
   }
   canvas.add_noise(random.word(), 14, 0.4, 0.012, 0.85f);
   scatter_specks(canvas, random, 33, 0.01, 0.04, 45);

@@ -25,6 +25,7 @@ namespace twofold::synthetic {
 }
 
 /// Sequential generator for laying out scenes. Its numbers are the same with every standard library.
+/// At most one is drawn among the arguments of a call: compilers evaluate these in any order.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : seed_(mix64(seed)) {}

@@ -46,8 +46,10 @@ double ease(double x) {
 
 void paint_clothes(Canvas& canvas, Random& random, float grey) {
   paint_plaster(canvas, random, grey);
-  for (double y = random.uniform(0, 0.1); y < canvas.height(); y += random.uniform(0.05, 0.15))
-    canvas.rectangle(0, y, canvas.width(), random.uniform(0.01, 0.05), vary(random, grey, 70));
+  for (double y = random.uniform(0, 0.1); y < canvas.height(); y += random.uniform(0.05, 0.15)) {
+    const float tone = vary(random, grey, 70);
+    canvas.rectangle(0, y, canvas.width(), random.uniform(0.01, 0.05), tone);
+  }
   scatter_specks(canvas, random, 300, 0.006, 0.03, 60);
 }
 

@@ -39,8 +39,10 @@ void draw_window(Canvas& canvas, Random& random, double x, double y, double w, d
         for (double s = 0; s < 0.6 * pane_w; s += 0.06)
           canvas.rectangle(c == 0 ? px + s : px + pane_w - s - 0.04, py, 0.04, pane_h, vary(random, 165, 35));
       } else if (random.chance(0.4)) {
-        canvas.disc(px + random.uniform(0.2, 0.8) * pane_w, py + random.uniform(0.5, 0.9) * pane_h,
-                    random.uniform(0.05, 0.3) * pane_w, vary(random, 120, 60));
+        const float tone = vary(random, 120, 60);
+        const double radius = random.uniform(0.05, 0.3) * pane_w;
+        const double cy = py + random.uniform(0.5, 0.9) * pane_h;
+        canvas.disc(px + random.uniform(0.2, 0.8) * pane_w, cy, radius, tone);
       }
     }
   }
@@ -98,10 +100,12 @@ void draw_ivy(Canvas& canvas, Random& random, double x, double y, double radius)
   const int leaves = static_cast<int>(500 * radius * radius);
   for (int i = 0; i < leaves; ++i) {
     const double angle = random.uniform(0, 6.2832);
-    const double distance = radius * std::sqrt(random.uniform(0, 1)) * random.uniform(0.6, 1.0);
+    const double spread = radius * std::sqrt(random.uniform(0, 1));
+    const double distance = spread * random.uniform(0.6, 1.0);
     const double size = random.uniform(0.03, 0.08);
+    const float tone = vary(random, 85, 50);
     canvas.ellipse(x + distance * std::cos(angle), y + 1.4 * distance * std::sin(angle), size, 0.6 * size,
-                   random.uniform(0, 180), vary(random, 85, 50));
+                   random.uniform(0, 180), tone);
   }
 }
 
@@ -137,7 +141,8 @@ void paint_facade(Canvas& canvas, Random& random, int style) {
   for (const double top : {0.7, 2.6}) {
     for (double x = random.uniform(0.5, 1.2); x < canvas.width() - 1.4;) {
       const double w = random.uniform(0.7, 1.25);
-      draw_window(canvas, random, x, top + random.uniform(-0.1, 0.1), w, random.uniform(1.0, 1.45));
+      const double h = random.uniform(1.0, 1.45);
+      draw_window(canvas, random, x, top + random.uniform(-0.1, 0.1), w, h);
       x += w + random.uniform(0.7, 1.6);
     }
   }
@@ -148,8 +153,8 @@ void paint_facade(Canvas& canvas, Random& random, int style) {
       w = random.uniform(0.9, 1.1);
       draw_door(canvas, random, x, canvas.height() - 2.1, w, 2.1);
     } else if (kind < 0.75) {
-      draw_poster(canvas, random, x, canvas.height() - random.uniform(1.9, 2.2), w,
-                  w * random.uniform(1.1, 1.45));
+      const double h = w * random.uniform(1.1, 1.45);
+      draw_poster(canvas, random, x, canvas.height() - random.uniform(1.9, 2.2), w, h);
     } else {
       draw_ivy(canvas, random, x + 0.4, canvas.height() - 0.9, random.uniform(0.4, 0.8));
     }
