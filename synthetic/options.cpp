@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "synthetic/scenes.hpp"
+
 namespace twofold::synthetic {
 
 std::string SyntheticOptions::invalid_reason() const {
@@ -27,6 +29,8 @@ std::string SyntheticOptions::invalid_reason() const {
                                  outside("exposure", exposure, 0, 0.9),
                                  outside("walkers", walkers, 0, 16),
                                  outside("plain", plain, 0, 1),
+                                 outside("shape", shape, 0, kTurntableShapes - 1),
+                                 outside("texture", texture, 0, kTurntableTextures - 1),
                                  outside("exposure_steps", exposure_steps, 0, 4),
                                  outside("flicker", flicker, 0, 0.5),
                                  outside("drop", drop, 0, 0.9),
@@ -39,12 +43,14 @@ std::string SyntheticOptions::invalid_reason() const {
   if (walkers > 0 && !has_walls)
     return fmt::format("walkers need ground to walk on, which {} has not", scene);
   if (plain > 0 && !has_walls) return fmt::format("plain panels need walls, which {} has not", scene);
+  if ((shape > 0 || texture > 0) && scene != "turntable")
+    return fmt::format("shape and texture are the turntable's, not of {}", scene);
   return {};
 }
 
 const std::vector<std::string>& scene_names() {
-  static const std::vector<std::string> kNames{"campus",    "cloister", "corridor",
-                                               "courtyard", "descent",  "desk"};
+  static const std::vector<std::string> kNames{"campus",  "cloister", "corridor", "courtyard",
+                                               "descent", "desk",     "turntable"};
   return kNames;
 }
 
@@ -68,6 +74,10 @@ SyntheticOptions default_options(const std::string& scene) {
     options.f = 0.5 * 320 / std::tan(40 * 0.017453292519943295);
     options.fps = 15;
     options.rounds = scene == "cloister" ? 1.3 : 1;
+  }
+  if (scene == "turntable") {
+    options.f = 700;
+    options.baseline = 0.06;
   }
   if (scene == "cloister") options.f_error = -0.1;
   return options;

@@ -30,6 +30,8 @@ struct SyntheticOptions {
   int walkers = 0;         ///< people around the camera (walkers.hpp), 0 .. 16; corridor and courtyard only
   double plain = 0;   ///< share of the walls' panels without texture, 0 .. 1; corridor and courtyard only
   bool bare = false;  ///< nothing has texture: each surface is of one grey
+  int shape = 0;      ///< turntable: 0 a carton, 1 a jar with a round lid
+  int texture = 0;    ///< turntable: 0 prints, 1 wood, 2 stone
   double exposure_steps = 0;  ///< every few seconds the gain changes at once, by up to so many stops, 0 .. 4
   double flicker = 0;         ///< amplitude of the lamps' flicker, 0 .. 0.5
   double drop = 0;            ///< share of frames lost, 0 .. 0.9; the first is always there

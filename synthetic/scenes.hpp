@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "synthetic/camera_path.hpp"
 #include "synthetic/scene.hpp"
@@ -19,7 +20,12 @@ struct Staging {
   std::function<SE3(double t)> T_w_object;
   Vector3 object_size = Vector3::Zero();
   int object_texture = 0;
+  /// What is there at time t [s] beside the scene, and no part of its true surface; nothing when empty.
+  std::function<void(double t, std::vector<Quad>& quads)> surroundings;
 };
+
+inline constexpr int kTurntableShapes = 2;    ///< a carton, a jar with a round lid
+inline constexpr int kTurntableTextures = 3;  ///< prints, wood, stone
 
 /// seed changes every texture and small things in the layout; the walls, the path and its length stay.
 /// plain: share of the walls' panels without texture.
@@ -32,5 +38,8 @@ struct Staging {
 [[nodiscard]] Staging make_campus(std::uint64_t seed);    ///< a quadrangle and two large loops, 1.7 km
 [[nodiscard]] Staging make_descent(
     std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
+/// A thing of 15 cm on a plate that turns before a camera, table and wall which stand still; the world is the
+/// thing's.
+[[nodiscard]] Staging make_turntable(std::uint64_t seed, int shape, int texture);
 
 }  // namespace twofold::synthetic

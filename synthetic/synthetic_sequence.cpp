@@ -26,6 +26,7 @@ Staging make_place(const SyntheticOptions& options, std::uint64_t seed) {
   if (options.scene == "cloister") return make_cloister(seed);
   if (options.scene == "campus") return make_campus(seed);
   if (options.scene == "descent") return make_descent(seed);
+  if (options.scene == "turntable") return make_turntable(seed, options.shape, options.texture);
   throw std::invalid_argument("unknown scene '" + options.scene + "'");
 }
 
@@ -114,6 +115,7 @@ View SyntheticSequence::view_at(const Staging& staging, double t, double right_m
   if (options_.object && staging.T_w_object)
     moving = box_quads(staging.T_w_object(t), staging.object_size, staging.object_texture);
   staging.walkers.append(t, moving);
+  if (staging.surroundings) staging.surroundings(t, moving);
   return Renderer(staging.scene).render(lens_, T_w_c, moving);
 }
 

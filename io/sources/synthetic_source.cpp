@@ -100,6 +100,8 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
   if (const auto seed = take_integer(parameters, "elsewhere"))
     options.elsewhere = static_cast<std::uint64_t>(*seed);
   take_int(parameters, "walkers", &options.walkers);
+  take_int(parameters, "shape", &options.shape);
+  take_int(parameters, "texture", &options.texture);
   take_switch(parameters, "object", &options.object);
   take_switch(parameters, "bare", &options.bare);
   parameters.expect_all_taken();

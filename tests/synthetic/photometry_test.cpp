@@ -129,6 +129,7 @@ TEST_P(Photometry, DisparityMeasuredByCorrelationIsThatOfTheGeometry) {
 
 /// The same surface has the same grey level from another place, through the exact warp.
 TEST_P(Photometry, SurfacesLookTheSameFromTwoPlaces) {
+  if (GetParam() == "turntable") GTEST_SKIP() << "table and wall stand still before its camera";
   const SyntheticSequence sequence(options());
   const PinholeCamera& camera = sequence.rig().camera;
   const int gap = GetParam() == "descent" ? 4 : 12;  // 15 cm a frame there, 4.5 cm in the courtyard
