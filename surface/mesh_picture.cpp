@@ -86,11 +86,15 @@ cv::Mat draw_mesh(const TriangleMesh& mesh, std::span<const Rgb> colours, const 
 
 PictureView overview_of(const TriangleMesh& mesh, const Vector3& up, int width) {
   Vector3 facing = 0.3 * up;  // a little from above, whatever the surface faces
+  for (const Eigen::Vector3f& normal : mesh.normals)
+    facing += normal.cast<double>() / static_cast<double>(mesh.normals.size());
+  return view_from(mesh, facing, up, width);
+}
+
+PictureView view_from(const TriangleMesh& mesh, const Vector3& facing, const Vector3& up, int width) {
   Vector3 centre = Vector3::Zero();
-  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    facing += mesh.normals[v].cast<double>() / static_cast<double>(mesh.normals.size());
-    centre += mesh.positions[v].cast<double>() / static_cast<double>(mesh.positions.size());
-  }
+  for (const Eigen::Vector3f& p : mesh.positions)
+    centre += p.cast<double>() / static_cast<double>(mesh.positions.size());
   Matrix3 R_c_w;
   const Vector3 z = -facing.normalized();
   const Vector3 x = z.cross(Vector3(up + 1e-6 * Vector3(1, 2, 3))).normalized();

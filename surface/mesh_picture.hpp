@@ -30,6 +30,10 @@ struct PictureView {
 /// up: direction that is up in the picture, in the mesh's frame.
 [[nodiscard]] PictureView overview_of(const TriangleMesh& mesh, const Vector3& up, int width);
 
+/// From far away in the direction `facing`, filling a picture of this width [px].
+[[nodiscard]] PictureView view_from(const TriangleMesh& mesh, const Vector3& facing, const Vector3& up,
+                                    int width);
+
 /// Blue, green, yellow, red from 0 to `most` [m].
 [[nodiscard]] std::vector<Rgb> error_colours(std::span<const float> errors, double most);
 

@@ -85,6 +85,37 @@ TEST(SurfaceVolume, NoiseIsAveragedOut) {
   EXPECT_LT(many, 0.0015);
 }
 
+/// Tiles, groups of pixels and rows of samples end elsewhere than such an image.
+TEST(SurfaceVolume, ImagesOfOddSizesAreSeenToTheirRims) {
+  Rig rig = depth_rig(323, 241);
+  SurfaceVolume volume(fine_options());
+  const cv::Mat depth(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.5));
+  for (int n = 0; n < 3; ++n) volume.fuse(make_depth_view(rig, depth, {}), SE3());
+  for (const Vector2& uv : {Vector2(3, 3), Vector2(319, 3), Vector2(3, 237), Vector2(319, 237)}) {
+    const Vector3 ray = rig.camera.unproject(uv);
+    const auto before = volume.distance(ray * 1.47);
+    ASSERT_TRUE(before) << uv.transpose();
+    EXPECT_NEAR(before->distance, 0.03, 0.002) << uv.transpose();
+    EXPECT_EQ(volume.occupancy(ray * 1.52), Occupancy::kOccupied) << uv.transpose();
+    EXPECT_EQ(volume.occupancy(ray * 1.7), Occupancy::kUnknown) << uv.transpose();
+  }
+}
+
+/// Whole numbers hold what far readings, which weigh next to nothing, say.
+TEST(SurfaceVolume, FarReadingsCountToo) {
+  Rig rig = depth_rig();
+  SurfaceOptions options = fine_options(0.005);
+  options.depth_noise = 0.01;
+  SurfaceVolume volume(options);
+  const cv::Mat depth(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(7));
+  volume.fuse(make_depth_view(rig, depth, {}), SE3());
+  const auto behind = volume.distance({0.01, 0.01, 7.05});
+  const auto before = volume.distance({0.01, 0.01, 6.9});
+  ASSERT_TRUE(before && behind);
+  EXPECT_NEAR(behind->distance, -0.05, 0.005);
+  EXPECT_NEAR(before->distance, 0.1, 0.005);
+}
+
 TEST(SurfaceVolume, AddedVolumesKeepTheirShape) {
   const Ball ball{{0.02, 0.01, 0}, 0.15};
   const SurfaceVolume part = testing::volume_of(ball);
