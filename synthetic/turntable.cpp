@@ -21,8 +21,10 @@ constexpr double kDown = 0.55;        // the camera looks down [rad]
 void paint_prints(Canvas& canvas, Random& random) {
   canvas.rectangle(0, 0, canvas.width(), canvas.height(), static_cast<float>(random.uniform(120, 200)));
   for (double y = 0.004; y < canvas.height() - 0.02; y += random.uniform(0.026, 0.036))
-    for (double x = 0.003; x < canvas.width() - 0.015; x += random.uniform(0.026, 0.04))
-      draw_poster(canvas, random, x, y, random.uniform(0.018, 0.026), random.uniform(0.018, 0.026));
+    for (double x = 0.003; x < canvas.width() - 0.015; x += random.uniform(0.026, 0.04)) {
+      const double height = random.uniform(0.018, 0.026);
+      draw_poster(canvas, random, x, y, random.uniform(0.018, 0.026), height);
+    }
   scatter_specks(canvas, random, 12000, 0.0006, 0.002, 60);
 }
 
