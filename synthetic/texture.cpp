@@ -1,5 +1,9 @@
 #include "synthetic/texture.hpp"
 
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -19,30 +23,67 @@ float coarse_log2(float x) {
   return static_cast<float>(exponent) + (mantissa - 1.0f);
 }
 
+using Floats = TexturePoints::Floats;
+using Ints = std::int32_t __attribute__((vector_size(sizeof(Floats))));
+
+float larger(float a, float b) {
+  return std::max(a, b);
+}
+Floats larger(Floats a, Floats b) {
+  return a < b ? b : a;
+}
+float magnitude(float x) {
+  return std::abs(x);
+}
+Floats magnitude(Floats x) {
+  return x < 0.0f ? -x : x;
+}
+float root(float x) {
+  return std::sqrt(x);
+}
+Floats root(Floats x) {
+#ifdef __AVX__
+  return _mm256_sqrt_ps(x);
+#else
+  for (int k = 0; k < TexturePoints::kSize; ++k) x[k] = std::sqrt(x[k]);
+  return x;
+#endif
+}
+
+/// One number or eight.
+template <class Number>
 struct Ellipse {
-  float major = 0, minor = 0;      ///< lengths of the axes [texel/px]
-  float major_u = 0, major_v = 0;  ///< the major axis itself [texel/px]
+  Number major{}, minor{};      ///< lengths of the axes [texel/px]
+  Number major_u{}, major_v{};  ///< the major axis itself [texel/px]
 };
 
 /// Image of the unit circle of a pixel: singular values and first left singular vector of the 2x2 footprint.
-Ellipse ellipse_of(const TexelFootprint& f) {
-  const float uu = f.u_x * f.u_x + f.u_y * f.u_y;
-  const float vv = f.v_x * f.v_x + f.v_y * f.v_y;
-  const float uv = f.u_x * f.v_x + f.u_y * f.v_y;
-  const float difference = uu - vv;
-  const float largest = 0.5f * (uu + vv + std::sqrt(difference * difference + 4 * uv * uv));
-  const float determinant = std::abs(f.u_x * f.v_y - f.u_y * f.v_x);
-  Ellipse e;
-  e.major = std::sqrt(largest) + 1e-6f;
+template <class Number>
+Ellipse<Number> ellipse_of(const Number& u_x, const Number& u_y, const Number& v_x, const Number& v_y) {
+  const Number uu = u_x * u_x + u_y * u_y;
+  const Number vv = v_x * v_x + v_y * v_y;
+  const Number uv = u_x * v_x + u_y * v_y;
+  const Number difference = uu - vv;
+  const Number largest = 0.5f * (uu + vv + root(difference * difference + 4 * uv * uv));
+  const Number determinant = magnitude(u_x * v_y - u_y * v_x);
+  Ellipse<Number> e;
+  e.major = root(largest) + 1e-6f;
   e.minor = determinant / e.major;
   // Of the two equivalent eigenvector formulas, the one without cancellation.
-  const float a_u = difference >= 0 ? largest - vv : uv;
-  const float a_v = difference >= 0 ? uv : largest - uu;
-  const float norm = std::sqrt(a_u * a_u + a_v * a_v);
-  const float scale = norm > 1e-12f ? e.major / norm : 0.0f;
+  const Number a_u = difference >= 0 ? largest - vv : uv;
+  const Number a_v = difference >= 0 ? uv : largest - uu;
+  const Number norm = root(a_u * a_u + a_v * a_v);
+  const Number scale = norm > 1e-12f ? e.major / norm : Number{};
   e.major_u = a_u * scale;
   e.major_v = a_v * scale;
   return e;
+}
+
+/// How much longer the ellipse is than a probe may be wide.
+template <class Number>
+Number probes_wanted(const Ellipse<Number>& e) {
+  return e.major /
+         larger(larger(e.minor, Number{} + 1.0f), e.major / static_cast<float>(Texture::kMaxProbes));
 }
 
 }  // namespace
@@ -91,7 +132,6 @@ float Texture::Level::bilinear(float u, float v) const {
 }
 
 Texture::Probes Texture::Level::bilinear(Probes u, Probes v, int count) const {
-  using Ints = std::int32_t __attribute__((vector_size(sizeof(Probes))));
   const Probes last_u = Probes{} + static_cast<float>(width - 1),
                last_v = Probes{} + static_cast<float>(height - 1);
   u = u > 0.0f ? u : Probes{};
@@ -144,11 +184,24 @@ float Texture::mean() const {
 }
 
 float Texture::sample(float u, float v, const TexelFootprint& footprint) const {
-  const Ellipse e = ellipse_of(footprint);
-  const float ratio = e.major / std::max(std::max(e.minor, 1.0f), e.major / kMaxProbes);
-  const int probes = std::clamp(static_cast<int>(ratio + 0.7f), 1, kMaxProbes);
+  const Ellipse<float> e = ellipse_of(footprint.u_x, footprint.u_y, footprint.v_x, footprint.v_y);
+  const int probes = std::clamp(static_cast<int>(probes_wanted(e) + 0.7f), 1, kMaxProbes);
   const float width = std::max(e.minor, e.major / static_cast<float>(probes));
+  return probe(u, v, probes, width, e.major_u, e.major_v);
+}
 
+void Texture::sample(const TexturePoints& points, std::span<float, TexturePoints::kSize> grey) const {
+  const Ellipse<Floats> e = ellipse_of(points.u_x, points.u_y, points.v_x, points.v_y);
+  Ints probes = __builtin_convertvector(probes_wanted(e) + 0.7f, Ints);
+  probes = probes < 1 ? Ints{} + 1 : probes;
+  probes = probes > kMaxProbes ? Ints{} + kMaxProbes : probes;
+  const Floats width = larger(e.minor, e.major / __builtin_convertvector(probes, Floats));
+  for (int k = 0; k < TexturePoints::kSize; ++k)
+    grey[static_cast<std::size_t>(k)] =
+        probe(points.u[k], points.v[k], probes[k], width[k], e.major_u[k], e.major_v[k]);
+}
+
+float Texture::probe(float u, float v, int count, float width, float along_u, float along_v) const {
   int level = 0;
   float blend = 0;
   if (width > 1) {
@@ -161,14 +214,14 @@ float Texture::sample(float u, float v, const TexelFootprint& footprint) const {
       blend = 0;
     }
   }
-  if (probes == 1) return trilinear(u, v, level, blend);
+  if (count == 1) return trilinear(u, v, level, blend);
   constexpr Probes kNumbers{0, 1, 2, 3, 4, 5, 6, 7};
   static_assert(kMaxProbes == 8);
-  const float step = 1.0f / static_cast<float>(probes);
+  const float step = 1.0f / static_cast<float>(count);
   const Probes offset = (kNumbers + 0.5f) * step - 0.5f;
-  const Probes grey = trilinear(u + offset * e.major_u, v + offset * e.major_v, level, blend, probes);
+  const Probes grey = trilinear(u + offset * along_u, v + offset * along_v, level, blend, count);
   float sum = 0;
-  for (int i = 0; i < probes; ++i) sum += grey[i];
+  for (int i = 0; i < count; ++i) sum += grey[i];
   return sum * step;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <span>
 #include <vector>
 
 namespace twofold::synthetic {
@@ -10,6 +11,14 @@ namespace twofold::synthetic {
 struct TexelFootprint {
   float u_x = 0, u_y = 0;
   float v_x = 0, v_y = 0;
+};
+
+/// Eight places on a texture, and the footprint of each.
+struct TexturePoints {
+  static constexpr int kSize = 8;
+  using Floats = float __attribute__((vector_size(kSize * sizeof(float))));
+  Floats u, v;
+  Floats u_x, u_y, v_x, v_y;  ///< TexelFootprint
 };
 
 /// Grey-level texture with its pyramid of 2x2 means, read through an elliptical footprint.
@@ -29,6 +38,9 @@ class Texture {
   /// rim.
   [[nodiscard]] float sample(float u, float v, const TexelFootprint& footprint) const;
 
+  /// The same at eight places, to the last bit.
+  void sample(const TexturePoints& points, std::span<float, TexturePoints::kSize> grey) const;
+
   [[nodiscard]] float mean() const;
 
   [[nodiscard]] int width() const { return levels_.front().width; }
@@ -47,6 +59,8 @@ class Texture {
     [[nodiscard]] float bilinear(float u, float v) const;
     [[nodiscard]] Probes bilinear(Probes u, Probes v, int count) const;
   };
+  /// Mean over `count` probes that lie along (along_u, along_v), each `width` texels wide.
+  [[nodiscard]] float probe(float u, float v, int count, float width, float along_u, float along_v) const;
   [[nodiscard]] float trilinear(float u, float v, int level, float blend) const;
   [[nodiscard]] Probes trilinear(Probes u, Probes v, int level, float blend, int count) const;
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "camera/pinhole.hpp"
@@ -51,6 +52,10 @@ class ViewGeometry {
 
   /// Grey level at the hit of ray (x, y, 1). footprint: edge of the area to average over [px].
   [[nodiscard]] float shade(std::int32_t id, float x, float y, float inverse_depth, float footprint) const;
+
+  /// The same at eight hits of one quad, to the last bit; footprint: one pixel.
+  void shade_quad(std::int32_t id, const RayPacket& rays, std::span<float, RayPacket::kSize> grey) const;
+  [[nodiscard]] static bool is_quad(std::int32_t id) { return id >> kKindShift == kQuad; }
 
  private:
   /// Kind in the upper bits of an id, index below.

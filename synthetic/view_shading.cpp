@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "synthetic/view_geometry.hpp"
@@ -97,6 +98,31 @@ float ViewGeometry::shade(std::int32_t id, float x, float y, float inverse_depth
   const TexelFootprint& r = point.per_ray;
   return point.brightness *
          point.texture->sample(point.u, point.v, {r.u_x * sx, r.u_y * sy, r.v_x * sx, r.v_y * sy});
+}
+
+void ViewGeometry::shade_quad(std::int32_t id, const RayPacket& rays,
+                              std::span<float, RayPacket::kSize> grey) const {
+  static_assert(RayPacket::kSize == TexturePoints::kSize);
+  const QuadForm& f = quads_[id & kIndexMask];
+  TexturePoints::Floats x, y, inverse_depth;
+  std::memcpy(&x, rays.x.data(), sizeof x);
+  std::memcpy(&y, rays.y.data(), sizeof y);
+  std::memcpy(&inverse_depth, rays.inverse_depth.data(), sizeof inverse_depth);
+  const auto t = 1 / inverse_depth;
+  const auto s = t * (f.s.x * x + f.s.y * y + f.s.one);
+  const auto q = t * (f.q.x * x + f.q.y * y + f.q.one);
+  const float ku = static_cast<float>(f.texture->width()) / f.width;
+  const float kv = static_cast<float>(f.texture->height()) / f.height;
+  const float sx = 1.0f / static_cast<float>(camera_.fx);
+  const float sy = 1.0f / static_cast<float>(camera_.fy);
+  const TexturePoints points{ku * (s - f.s0) - 0.5f,
+                             kv * (q - f.q0) - 0.5f,
+                             ku * t * (f.s.x - s * f.w.x) * sx,
+                             ku * t * (f.s.y - s * f.w.y) * sy,
+                             kv * t * (f.q.x - q * f.w.x) * sx,
+                             kv * t * (f.q.y - q * f.w.y) * sy};
+  f.texture->sample(points, grey);
+  for (float& value : grey) value *= f.brightness;
 }
 
 float ViewGeometry::sky(float x, float y) const {
