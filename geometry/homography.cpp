@@ -59,6 +59,7 @@ std::optional<Homography> estimate_homography(std::span<const Vector3> bearings_
 std::vector<SE3> decompose_homography(const Matrix3& H_b_a, const Vector3& bearing_a,
                                       const Vector3& bearing_b) {
   const Eigen::JacobiSVD<Matrix3> svd(H_b_a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  if (svd.info() != Eigen::Success) return {};  // not of finite numbers
   const Vector3 s = svd.singularValues() / svd.singularValues()[1];
   constexpr double kTurnedOnTheSpot = 1e-9;
   if (!s.allFinite() || !(s[0] - s[2] > kTurnedOnTheSpot)) return {};
