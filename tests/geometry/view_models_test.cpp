@@ -1,6 +1,7 @@
 // What else explains two views: a rotation on the spot, a plane.
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 
 #include "geometry/homography.hpp"
@@ -79,6 +80,11 @@ TEST(Homography, ExplainsAPlaneAndHoldsItsMotion) {
 
 TEST(Homography, OfARotationHoldsNoMotion) {
   EXPECT_TRUE(decompose_homography(SO3::exp(Vector3(0.1, 0.2, 0)).matrix(), {0, 0, 1}, {0, 0, 1}).empty());
+}
+
+TEST(Homography, OfInfiniteNumbersHoldsNoMotion) {
+  const Matrix3 H = Matrix3::Constant(std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(decompose_homography(H, {0, 0, 1}, {0, 0, 1}).empty());
 }
 
 TEST(Homography, DoesNotExplainDepth) {

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <random>
 
 #include "synthetic/camera_path.hpp"
 #include "synthetic/furniture.hpp"
@@ -136,6 +138,30 @@ TEST(Texture, PyramidKeepsTheMeanAndHidesWhatIsTooFine) {
     for (const float squeeze : {1.0f, 3.0f, 6.0f}) {
       const TexelFootprint footprint{4 * squeeze * c, -4 * s, 4 * squeeze * s, 4 * c};
       for (float u = 100; u < 110; u += 0.37f) EXPECT_NEAR(texture.sample(u, 90.3f, footprint), 110, 1.0);
+    }
+  }
+}
+
+TEST(Texture, EightPlacesAreSampledAsEachIsAlone) {
+  std::mt19937 rng(4);
+  std::uniform_real_distribution<float> grey(0, 255), place(-20, 150), width(-6, 6);
+  cv::Mat noise(96, 128, CV_32FC1);
+  for (int y = 0; y < noise.rows; ++y)
+    for (int x = 0; x < noise.cols; ++x) noise.at<float>(y, x) = grey(rng);
+  const Texture texture(noise);
+  for (int trial = 0; trial < 500; ++trial) {
+    TexturePoints points;
+    for (int k = 0; k < TexturePoints::kSize; ++k) {
+      points.u[k] = place(rng), points.v[k] = place(rng);
+      points.u_x[k] = width(rng), points.u_y[k] = width(rng);
+      points.v_x[k] = width(rng), points.v_y[k] = width(rng);
+    }
+    std::array<float, TexturePoints::kSize> together;
+    texture.sample(points, together);
+    for (int k = 0; k < TexturePoints::kSize; ++k) {
+      const TexelFootprint footprint{points.u_x[k], points.u_y[k], points.v_x[k], points.v_y[k]};
+      ASSERT_EQ(together[static_cast<std::size_t>(k)], texture.sample(points.u[k], points.v[k], footprint))
+          << trial;
     }
   }
 }
