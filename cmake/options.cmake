@@ -19,12 +19,6 @@ if(TWOFOLD_SHARED)
   # a program.
   target_compile_options(twofold_options INTERFACE -fPIC -fvisibility=hidden -fvisibility-inlines-hidden)
 endif()
-# Sums in another order, and products rounded before they are added or not, differ in their last bits.
-option(TWOFOLD_SAME_BYTES "Compute alike on x86 and ARM, slower: deterministic runs then give the same bytes" OFF)
-if(TWOFOLD_SAME_BYTES)
-  target_compile_options(twofold_options INTERFACE -ffp-contract=off)
-  target_compile_definitions(twofold_options INTERFACE EIGEN_DONT_VECTORIZE)
-endif()
 if(TWOFOLD_WERROR)
   target_compile_options(twofold_options INTERFACE -Werror)
 endif()
