@@ -34,7 +34,8 @@ SE3 Tracker::align_to_surfaces(FrameStep& step) {
 /// After the search for points: few of them say less than they and the surfaces together.
 /// @param found  what the search came to
 bool Tracker::add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step) {
-  const bool few = found != LostCause::kNone ? corners_scarce_ : step.result.inliers < options_.scarce_inliers;
+  const bool few =
+      found != LostCause::kNone ? corners_scarce_ : step.result.inliers < options_.scarce_inliers;
   if (!depth_ || !few) return false;
   const SE3& start = found == LostCause::kNone ? step.result.T_c_ref : T_c_ref;
   return place_by_surfaces(start, step) == LostCause::kNone;

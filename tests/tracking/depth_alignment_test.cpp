@@ -30,7 +30,8 @@ class DepthAlignmentTest : public ::testing::Test {
       for (int u = 0; u < image.cols; ++u) {
         std::uint16_t& reading = image.at<std::uint16_t>(v, u);
         const double metres = reading * rig_.depth_unit;
-        reading = static_cast<std::uint16_t>((metres + metres * metres * noise(random_)) / rig_.depth_unit + 0.5);
+        reading =
+            static_cast<std::uint16_t>((metres + metres * metres * noise(random_)) / rig_.depth_unit + 0.5);
       }
     }
     return image;
@@ -90,7 +91,8 @@ TEST_F(DepthAlignmentTest, SeveralKeyframesSayMoreThanOne) {
     alignment_.clear_views();
     for (int k = 0; k < views; ++k) {
       const SE3 T_view_ref(SO3::exp(Vector3(0, 0.01 * k, 0)), Vector3(0.01 * k, 0, 0));
-      alignment_.add_view(KeyframeId{static_cast<std::uint32_t>(10 * views + k)}, depth(T_view_ref * T_ref_w), T_view_ref);
+      alignment_.add_view(KeyframeId{static_cast<std::uint32_t>(10 * views + k)}, depth(T_view_ref * T_ref_w),
+                          T_view_ref);
     }
     const auto placed = alignment_.align(SE3(), {});
     return placed ? placed->information.trace() : 0;
@@ -102,7 +104,8 @@ TEST_F(DepthAlignmentTest, SeveralKeyframesSayMoreThanOne) {
 
 TEST_F(DepthAlignmentTest, NeverGuessesAlongABareWall) {
   for (int trial = 0; trial < 20; ++trial) {
-    const SE3 T_wall_w = SE3(SO3::exp(Vector3(0, 0, 0.1 * trial)), Vector3(0, 0, -1.5));  // one wall fills the view
+    const SE3 T_wall_w =
+        SE3(SO3::exp(Vector3(0, 0, 0.1 * trial)), Vector3(0, 0, -1.5));  // one wall fills the view
     const cv::Mat first = depth(T_wall_w);
     alignment_.look_at(first);
     EXPECT_EQ(alignment_.judge_structure(), LostCause::kNoStructure) << trial;
