@@ -14,14 +14,14 @@
 namespace twofold {
 namespace {
 
-constexpr int kStep = 4;                  // pixels between the points that the plane is found with
-constexpr int kTrials = 300;              // random triples
-constexpr double kLeastShare = 0.15;      // of the near points: on the plane
-constexpr double kUpperShare = 0.25;      // of the plane's points: on another one above it
+constexpr int kStep = 4;                   // pixels between the points that the plane is found with
+constexpr int kTrials = 300;               // random triples
+constexpr double kLeastShare = 0.15;       // of the near points: on the plane
+constexpr double kUpperShare = 0.25;       // of the plane's points: on another one above it
 constexpr std::size_t kLeastPoints = 200;  // near enough, to say anything
-constexpr double kLeastObject = 0.002;    // of the image: a mask smaller than this is nothing
-constexpr double kPieceShare = 0.1;       // of the largest piece: smaller ones are specks
-constexpr double kLeastWithin = 0.002;    // [m] a point of the plane may be from it
+constexpr double kLeastObject = 0.002;     // of the image: a mask smaller than this is nothing
+constexpr double kPieceShare = 0.1;        // of the largest piece: smaller ones are specks
+constexpr double kLeastWithin = 0.002;     // [m] a point of the plane may be from it
 
 }  // namespace
 
@@ -135,18 +135,21 @@ cv::Mat ObjectMasker::above_plane(const cv::Mat& depth) const {
       const double z = rig_.depth_unit * row[x];
       if (z < rig_.depth_min || z > options_.farthest) continue;
       const double height = plane_.height(rig_.camera.unproject(Vector2(x, y)) * z);
-      if (height > std::max(options_.above, 4 * options_.depth_noise * z * z)) mask.at<std::uint8_t>(y, x) = 255;
+      if (height > std::max(options_.above, 4 * options_.depth_noise * z * z))
+        mask.at<std::uint8_t>(y, x) = 255;
     }
   }
   return mask;
 }
 
 tl::expected<cv::Mat, std::string> ObjectMasker::mask(const cv::Mat& depth) {
-  TWOFOLD_CHECK(depth.type() == CV_16UC1 && depth.cols == rig_.camera.width && depth.rows == rig_.camera.height,
-                "a depth image of the rig");
+  TWOFOLD_CHECK(
+      depth.type() == CV_16UC1 && depth.cols == rig_.camera.width && depth.rows == rig_.camera.height,
+      "a depth image of the rig");
   const std::vector<Vector3> points = near_points(depth);
   if (points.size() < kLeastPoints)
-    return tl::unexpected(fmt::format("hardly any depth between {:g} and {:g} m", rig_.depth_min, options_.farthest));
+    return tl::unexpected(
+        fmt::format("hardly any depth between {:g} and {:g} m", rig_.depth_min, options_.farthest));
   SupportPlane plane = plane_;
   if (!has_plane_ || !refine(points, plane)) {
     if (!search(points, plane)) return tl::unexpected(std::string("no plane that an object could stand on"));

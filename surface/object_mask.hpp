@@ -51,7 +51,8 @@ class ObjectMasker {
  private:
   [[nodiscard]] std::vector<Vector3> near_points(const cv::Mat& depth) const;
   [[nodiscard]] double within(double z) const;
-  [[nodiscard]] std::vector<Vector3> on_plane(const std::vector<Vector3>& points, const SupportPlane& plane) const;
+  [[nodiscard]] std::vector<Vector3> on_plane(const std::vector<Vector3>& points,
+                                              const SupportPlane& plane) const;
   [[nodiscard]] bool refine(const std::vector<Vector3>& points, SupportPlane& plane) const;
   [[nodiscard]] bool search(const std::vector<Vector3>& points, SupportPlane& plane) const;
   void raise(const std::vector<Vector3>& points, SupportPlane& plane) const;

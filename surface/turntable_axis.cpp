@@ -8,7 +8,7 @@ namespace twofold {
 namespace {
 
 constexpr double kLeastTurn = 0.17;  // [rad]
-constexpr double kStride = 0.35;     // [rad] between the two poses of a pair: enough to tell where the axis is
+constexpr double kStride = 0.35;  // [rad] between the two poses of a pair: enough to tell where the axis is
 
 struct Pair {
   std::size_t from, to;

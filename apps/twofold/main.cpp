@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   twofold::add_timing_command(app, exit_code);
   twofold::add_calibrate_command(app, exit_code);
   twofold::add_doctor_command(app, exit_code);
+  twofold::add_object_command(app, exit_code);
   twofold::add_record_command(app, exit_code);
   twofold::add_devices_command(app, exit_code);
   twofold::add_render_command(app, exit_code);

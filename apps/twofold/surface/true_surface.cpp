@@ -12,9 +12,8 @@
 namespace twofold {
 namespace {
 
-constexpr float kPiece = 0.01f;          // longest side of a triangle that is seen or not [m]
-constexpr double kReadingWithin = 0.01;  // of a triangle's depth, and 1 % of it [m]
-constexpr int kEvery = 5;                // frames
+constexpr float kPiece = 0.01f;  // longest side of a triangle that is seen or not [m]
+constexpr int kEvery = 5;        // frames
 
 TriangleMesh expect_surface(const FrameSource& source) {
   auto mesh = source.true_surface();
@@ -22,25 +21,35 @@ TriangleMesh expect_surface(const FrameSource& source) {
   return *std::move(mesh);
 }
 
+/// How far a reading may be from the depth z of what it shows [m]: four times a structured-light camera's
+/// noise.
+double reading_within(double z) {
+  return 0.003 + 0.006 * z * z;
+}
+
 /// Marks the pieces of a mesh that frames show.
 class SeenPieces {
  public:
   SeenPieces(const TriangleMesh& mesh, const PinholeCamera& camera)
       : camera_(camera), seen_(mesh.triangles.size(), 0) {
-    for (const auto& t : mesh.triangles)
-      centres_.emplace_back(
-          (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]).cast<double>() / 3);
+    for (const auto& t : mesh.triangles) {
+      const Vector3 a = mesh.positions[t[0]].cast<double>(), b = mesh.positions[t[1]].cast<double>(),
+                    c = mesh.positions[t[2]].cast<double>();
+      centres_.emplace_back((a + b + c) / 3);
+      normals_.emplace_back((b - a).cross(c - a));
+    }
   }
 
   void look(const cv::Mat& depth, double unit, const SE3& T_c_w) {
+    const Vector3 eye = T_c_w.inverse().translation();
     for (std::size_t n = 0; n < seen_.size(); ++n) {
-      if (seen_[n] != 0) continue;
+      if (seen_[n] != 0 || normals_[n].dot(eye - centres_[n]) <= 0) continue;
       const Vector3 x_c = T_c_w * centres_[n];
       const auto uv = camera_.find_in_view(x_c);
       if (!uv) continue;
       const double read =
           unit * depth.at<std::uint16_t>(static_cast<int>(uv->y() + 0.5), static_cast<int>(uv->x() + 0.5));
-      seen_[n] = read > 0 && std::abs(read - x_c.z()) < kReadingWithin * (1 + x_c.z());
+      seen_[n] = read > 0 && std::abs(read - x_c.z()) < reading_within(x_c.z());
     }
   }
   [[nodiscard]] const std::vector<char>& seen() const { return seen_; }
@@ -48,6 +57,7 @@ class SeenPieces {
  private:
   PinholeCamera camera_;
   std::vector<Vector3> centres_;
+  std::vector<Vector3> normals_;  // of any length: a piece is seen from its outer side only
   std::vector<char> seen_;
 };
 

@@ -1,0 +1,196 @@
+// twofold object: the model of a thing on a turntable, or of one that a camera is carried around.
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "apps/twofold/commands.hpp"
+#include "apps/twofold/interrupt.hpp"
+#include "apps/twofold/map_parts.hpp"
+#include "apps/twofold/run_output.hpp"
+#include "apps/twofold/surface/object_model.hpp"
+#include "apps/twofold/surface/object_source.hpp"
+#include "engine/engine.hpp"
+#include "io/files/io_error.hpp"
+#include "io/files/mesh_file.hpp"
+#include "io/files/output_file.hpp"
+#include "io/plots/plot.hpp"
+#include "io/sources/open_source.hpp"
+#include "loopclosure/default_vocabulary.hpp"
+
+namespace twofold {
+namespace {
+
+struct ObjectArguments {
+  std::string source;
+  std::string calibration;
+  std::string out = "out/object";
+  std::string picture;
+  bool deterministic = false;
+  ObjectSourceOptions frames;
+  SurfaceOptions surface;
+};
+
+constexpr double kTurntable = 0.01;  // [m] that the camera's way may deviate from turning about an axis
+constexpr double kDegree = std::numbers::pi / 180;
+
+std::unique_ptr<ObjectSource> object_source(ObjectArguments& arguments) {
+  SourceOptions options;
+  options.stop = &interrupted();
+  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  std::unique_ptr<FrameSource> source = open_source(arguments.source, options);
+  if (source->rig().kind == SensorKind::kMono)
+    throw IoError(arguments.source, "is one camera, which gives no depth: an object needs stereo or RGB-D");
+  if (arguments.surface.depth_noise == 0) arguments.surface.depth_noise = usual_depth_noise(source->rig());
+  arguments.frames.mask.depth_noise = arguments.surface.depth_noise;
+  for (const std::string& reason :
+       {arguments.frames.mask.invalid_reason(), arguments.surface.invalid_reason()})
+    if (!reason.empty()) throw IoError("twofold object", reason);
+  return std::make_unique<ObjectSource>(std::move(source), arguments.frames);
+}
+
+bool is_turntable(const ObjectModel& model) {
+  return model.axis && model.axis->deviation < kTurntable;
+}
+
+nlohmann::ordered_json vector_json(const Vector3& x) {
+  return {x.x(), x.y(), x.z()};
+}
+
+nlohmann::ordered_json object_json(const ObjectModel& model, const RunResult& result) {
+  nlohmann::ordered_json json;
+  json["box"] = {{"centre", vector_json(model.box.centre)}, {"size_m", vector_json(model.box.size)}};
+  for (const Vector3& axis : model.box.axes) json["box"]["axes"].push_back(vector_json(axis));
+  json["up"] = vector_json(model.up);
+  json["axis"] = nullptr;
+  if (is_turntable(model)) {
+    json["axis"] = {{"direction", vector_json(model.axis->direction)},
+                    {"point", vector_json(model.axis->point)},
+                    {"rate_deg_s", model.axis->rate / kDegree},
+                    {"turned_deg", model.axis->turned / kDegree},
+                    {"deviation_m", model.axis->deviation}};
+  }
+  json["metric_loops"] = result.mapping.metric_loops;
+  json["loops"] = result.loops.size();
+  json["surface"] = surface_json(model.figures);
+  return json;
+}
+
+void print_object(const ObjectModel& model, const RunResult& result) {
+  const Vector3 mm = 1000 * model.box.size;
+  fmt::print("object      box {:.1f} x {:.1f} x {:.1f} mm (the last upright)\n", mm.x(), mm.y(), mm.z());
+  if (is_turntable(model)) {
+    const TurntableAxis& axis = *model.axis;
+    fmt::print(
+        "turntable   {:.2f} degrees a second, {:.1f} degrees in all, the way deviates by {:.2f} mm from it\n",
+        axis.rate / kDegree, axis.turned / kDegree, 1000 * axis.deviation);
+    fmt::print("            axis ({:.4f} {:.4f} {:.4f}) through ({:.4f} {:.4f} {:.4f}) m of the map\n",
+               axis.direction.x(), axis.direction.y(), axis.direction.z(), axis.point.x(), axis.point.y(),
+               axis.point.z());
+  } else {
+    fmt::print("turntable   none: the camera did not turn about one axis\n");
+  }
+  fmt::print("closed by   {} edges of metric loops, {} loops by appearance\n", result.mapping.metric_loops,
+             result.loops.size());
+}
+
+void write_object(const ObjectArguments& arguments, const ObjectModel& model, const RunResult& result) {
+  const std::filesystem::path out = arguments.out;
+  write_surface(out, model.mesh);
+  TriangleMesh cloud = model.mesh;
+  cloud.triangles.clear();
+  write_ply_mesh(out / "cloud.ply", cloud);
+  write_file(out / "object.json", object_json(model, result).dump(2) + "\n");
+  if (!arguments.picture.empty())
+    write_png(arguments.picture, draw_object(model));
+}
+
+void run_object(ObjectArguments& arguments) {
+  prepare_output_folder(arguments.out);
+  const std::unique_ptr<ObjectSource> source = object_source(arguments);
+  remove_results(arguments.out);
+  EngineOptions options;
+  options.deterministic = arguments.deterministic;
+  options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  options.logs.folder = arguments.out;
+  options.pacing.live = source->is_live();
+  catch_interrupts();
+  Engine engine(source->rig(), options);
+  const FrameFeed feed = [&](Frame& frame) {
+    const FrameStatus status = source->next(frame);
+    return status == FrameStatus::kFrame ? FeedStatus::kFrame
+           : status == FrameStatus::kEnd ? FeedStatus::kEnd
+                                         : FeedStatus::kError;
+  };
+  const RunResult result = engine.run(feed, interrupted(), [](const Progress&) {});
+  if (!source->error().empty()) throw IoError(arguments.source, source->error());
+  if (!result.error.empty()) throw std::runtime_error(result.error);
+  if (const std::string reason = source->nothing_shown(); !reason.empty())
+    throw IoError(arguments.source, reason);
+  if (result.counts.tracked == 0)
+    throw std::runtime_error(arguments.source +
+                             ": the object could not be tracked: it is too small in the images, or without texture");
+  const std::vector<MapPart> parts = map_parts(result, options);
+  const ObjectModel model = build_object(*source, parts.front().trajectory, arguments.surface);
+  write_run_output(arguments.out, arguments.source, *source, options, result, parts,
+                   surface_json(model.figures));
+  print_summary(arguments.out, options, result, parts);
+  print_surface(model.figures);
+  if (model.mesh.triangles.empty())
+    throw std::runtime_error(arguments.source + ": the object's frames gave no surface");
+  write_object(arguments, model, result);
+  print_object(model, result);
+}
+
+void add_mask_options(CLI::App& command, ObjectArguments& arguments) {
+  ObjectMaskOptions& mask = arguments.frames.mask;
+  command.add_option("--depth-cut", mask.farthest, "Nothing farther than this belongs to the object [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      .add_option("--above", mask.above,
+                  "The object begins this far above the plane that it stands on, or four standard deviations "
+                  "of the depth [m]")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command.add_option("--erode", mask.erode, "Pixels taken away from the rim of what is left")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  command
+      .add_option("--depth-noise", arguments.surface.depth_noise,
+                  "Standard deviation of a depth z over z^2 [1/m]; 0: the sensor's usual one")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_object_command(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<ObjectArguments>();
+  arguments->surface.voxel = 0.002;
+  CLI::App* command =
+      app.add_subcommand("object", "Model a thing on a turntable, or one that a camera is carried around");
+  command->add_option("SOURCE", arguments->source, "RGB-D or stereo, as for run")->required();
+  command->add_option("--calib", arguments->calibration, "Calibration file instead of the recording's own");
+  command
+      ->add_option("--out", arguments->out,
+                   "Folder for surface.ply, surface.glb, cloud.ply, object.json and the run's files")
+      ->capture_default_str();
+  command->add_option("--voxel", arguments->surface.voxel, "Distance of two samples of the surface [m]")
+      ->capture_default_str();
+  command->add_option("--every", arguments->frames.keep_every, "Fuse every so many-th frame")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  add_mask_options(*command, *arguments);
+  command->add_flag("--deterministic", arguments->deterministic, "One thread: equal input, equal bytes");
+  command->add_option("--picture", arguments->picture, "Draw the object from four sides to this PNG file");
+  command->callback([arguments, &exit_code] {
+    run_object(*arguments);
+    exit_code = kOk;
+  });
+}
+
+}  // namespace twofold

@@ -1,0 +1,83 @@
+#include "apps/twofold/surface/object_source.hpp"
+
+#include <fmt/format.h>
+
+#include "io/files/io_error.hpp"
+#include "surface/stereo_depth.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kPatience = 150;  // frames of a source that may show no object before the first that does
+
+}  // namespace
+
+ObjectSource::ObjectSource(std::unique_ptr<FrameSource> source, const ObjectSourceOptions& options)
+    : source_(std::move(source)), options_(options), masker_(source_->rig(), options.mask) {
+  rig_ = source_->rig();
+  ground_truth_ = source_->ground_truth();
+}
+
+bool ObjectSource::read(Frame& frame) {
+  for (;;) {
+    switch (source_->next(frame)) {
+      case FrameStatus::kFrame:
+        break;
+      case FrameStatus::kEnd:
+        return false;
+      case FrameStatus::kError:
+        throw IoError("", source_->error());
+    }
+    if (mask(frame)) return true;
+    if (shown_ == 0 && without_object_ == kPatience) throw IoError("", nothing_shown());
+  }
+}
+
+bool ObjectSource::mask(Frame& frame) {
+  cv::Mat depth = frame.depth;
+  if (rig_.kind == SensorKind::kStereo)
+    depth = stereo_depth(rig_, frame.left, frame.right, options_.nearest_stereo);
+  const auto found = masker_.mask(depth);
+  if (!found) {
+    ++without_object_;
+    reason_ = found.error();
+    return false;
+  }
+  cv::Mat object(depth.size(), CV_16UC1, cv::Scalar(0));
+  depth.copyTo(object, *found);
+  if (shown_++ % options_.keep_every == 0) keep(frame, object, frame.left);
+  frame.left = fill_outside(frame.left, *found);
+  if (rig_.kind == SensorKind::kStereo) {
+    frame.right = fill_outside(frame.right, mask_in_right(rig_, *found, depth));
+  } else {
+    frame.depth = object;
+  }
+  return true;
+}
+
+void ObjectSource::keep(const Frame& frame, const cv::Mat& depth, const cv::Mat& grey) {
+  if (kept_bytes_ > options_.most_bytes) {
+    ++not_kept_;
+    return;
+  }
+  const cv::Mat colour = source_->colour_image(frame.index);
+  coloured_ = !colour.empty();
+  Kept kept{frame.t_ns, masker_.plane().normal, masker_.plane().offset,
+            pack_keyframe_depth(frame.index, depth, colour.empty() ? grey : colour)};
+  kept_bytes_ += kept.images.depth.bytes() + kept.images.colour.size();
+  kept_.push_back(std::move(kept));
+}
+
+std::vector<std::string> ObjectSource::left_out() const {
+  std::vector<std::string> all;
+  if (without_object_ > 0) all.push_back(fmt::format("{} frames: {}", without_object_, reason_));
+  if (not_kept_ > 0) all.push_back(fmt::format("the depth of {} frames, for want of memory", not_kept_));
+  return all;
+}
+
+std::string ObjectSource::nothing_shown() const {
+  if (shown_ > 0) return {};
+  return "no frame shows an object: " + (reason_.empty() ? "there is none" : reason_);
+}
+
+}  // namespace twofold

@@ -1,0 +1,50 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/files/mesh_file.hpp"
+#include "tests/apps/command.hpp"
+
+namespace twofold {
+namespace {
+
+/// The first 71 degrees.
+const std::string kScene = "'synthetic:turntable?sensor=rgbd&frames=60'";
+const std::string kFew = "'synthetic:turntable?sensor=rgbd&frames=5'";
+
+TEST(ObjectCommand, ModelsWhatTurnsBeforeAStaticCamera) {
+  const ScratchFolder folder;
+  for (const char* to : {"a", "b"}) {
+    const Outcome outcome =
+        run(folder, "object " + kScene + " --deterministic --out '" + (folder / to) + "' --picture '" +
+                        (folder / "picture.png") + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("turntable   "), std::string::npos);
+  }
+  EXPECT_EQ(content(folder / "a/surface.ply"), content(folder / "b/surface.ply"));
+  EXPECT_FALSE(content(folder / "picture.png").empty());
+  EXPECT_EQ(read_ply_mesh(folder / "a/cloud.ply").positions.size(),
+            read_ply_mesh(folder / "a/surface.ply").positions.size());
+  const auto object = nlohmann::json::parse(content(folder / "a/object.json"));
+  EXPECT_NEAR(object["axis"]["rate_deg_s"], 36, 1);
+  EXPECT_NEAR(object["axis"]["turned_deg"], 59 * 1.2, 2);
+  EXPECT_NEAR(object["box"]["size_m"][0], 0.1, 0.01);
+  EXPECT_NEAR(object["box"]["size_m"][1], 0.08, 0.01);
+  EXPECT_NEAR(object["box"]["size_m"][2], 0.147, 0.006);  // its foot is left on the plate
+}
+
+TEST(ObjectCommand, SaysWhatIsMissing) {
+  const ScratchFolder folder;
+  const std::string out = " --out '" + (folder / "model") + "'";
+  expect_bad_input(run(folder, "object 'synthetic:turntable?sensor=mono&frames=3'" + out), "stereo or RGB-D");
+  expect_bad_input(run(folder, "object " + kFew + " --depth-cut 0.31" + out), "hardly any depth");
+  expect_bad_input(run(folder, "object " + kFew + " --above 0.3" + out), "nothing is left above");
+  expect_bad_input(run(folder, "object " + kFew + " --voxel 0" + out), "voxel");
+  const Outcome small =
+      run(folder, "object 'synthetic:turntable?sensor=rgbd&width=160&height=120&frames=20'" + out);
+  EXPECT_EQ(small.exit_code, 1);
+  EXPECT_NE(small.err.find("too small in the images"), std::string::npos) << small.err;
+}
+
+}  // namespace
+}  // namespace twofold
