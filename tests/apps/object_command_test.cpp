@@ -15,9 +15,8 @@ const std::string kFew = "'synthetic:turntable?sensor=rgbd&frames=5'";
 TEST(ObjectCommand, ModelsWhatTurnsBeforeAStaticCamera) {
   const ScratchFolder folder;
   for (const char* to : {"a", "b"}) {
-    const Outcome outcome =
-        run(folder, "object " + kScene + " --deterministic --out '" + (folder / to) + "' --picture '" +
-                        (folder / "picture.png") + "'");
+    const Outcome outcome = run(folder, "object " + kScene + " --deterministic --out '" + (folder / to) +
+                                            "' --picture '" + (folder / "picture.png") + "'");
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     EXPECT_NE(outcome.out.find("turntable   "), std::string::npos);
   }

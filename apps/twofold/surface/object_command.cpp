@@ -104,8 +104,7 @@ void write_object(const ObjectArguments& arguments, const ObjectModel& model, co
   cloud.triangles.clear();
   write_ply_mesh(out / "cloud.ply", cloud);
   write_file(out / "object.json", object_json(model, result).dump(2) + "\n");
-  if (!arguments.picture.empty())
-    write_png(arguments.picture, draw_object(model));
+  if (!arguments.picture.empty()) write_png(arguments.picture, draw_object(model));
 }
 
 void run_object(ObjectArguments& arguments) {
@@ -131,8 +130,9 @@ void run_object(ObjectArguments& arguments) {
   if (const std::string reason = source->nothing_shown(); !reason.empty())
     throw IoError(arguments.source, reason);
   if (result.counts.tracked == 0)
-    throw std::runtime_error(arguments.source +
-                             ": the object could not be tracked: it is too small in the images, or without texture");
+    throw std::runtime_error(
+        arguments.source +
+        ": the object could not be tracked: it is too small in the images, or without texture");
   const std::vector<MapPart> parts = map_parts(result, options);
   const ObjectModel model = build_object(*source, parts.front().trajectory, arguments.surface);
   write_run_output(arguments.out, arguments.source, *source, options, result, parts,

@@ -68,10 +68,12 @@ cv::Mat draw_object(const ObjectModel& model) {
   cv::Mat all(kHeight, 4 * kWidth, CV_8UC3, cv::Scalar(255, 255, 255));
   for (int view = 0; view < 4; ++view) {
     const double angle = 0.5 * std::numbers::pi * view + kAside;
-    const Vector3 facing = std::cos(angle) * model.box.axes[0] + std::sin(angle) * model.box.axes[1] + kAbove * model.up;
+    const Vector3 facing =
+        std::cos(angle) * model.box.axes[0] + std::sin(angle) * model.box.axes[1] + kAbove * model.up;
     cv::Mat picture =
         draw_mesh(model.mesh, model.mesh.colours, view_from(model.mesh, facing, model.up, kWidth));
-    if (picture.rows > kHeight) cv::resize(picture, picture, {picture.cols * kHeight / picture.rows, kHeight}, 0, 0, cv::INTER_AREA);
+    if (picture.rows > kHeight)
+      cv::resize(picture, picture, {picture.cols * kHeight / picture.rows, kHeight}, 0, 0, cv::INTER_AREA);
     const int left = view * kWidth + (kWidth - picture.cols) / 2, top = (kHeight - picture.rows) / 2;
     picture.copyTo(all(cv::Rect(left, top, picture.cols, picture.rows)));
   }
@@ -106,8 +108,8 @@ ObjectModel build_object(const ObjectSource& source, const Trajectory& poses, co
   f.fusion_ms = static_cast<double>(fusion_ns) * 1e-6 / f.fused;
   f.blocks = volume.blocks().size();
   f.memory_mb = static_cast<double>(volume.bytes()) / (1 << 20);
-  f.mb_a_cubic_metre = f.memory_mb / std::max(1e-9, static_cast<double>(f.blocks) *
-                                                        std::pow(kBlockEdge * options.voxel, 3));
+  f.mb_a_cubic_metre =
+      f.memory_mb / std::max(1e-9, static_cast<double>(f.blocks) * std::pow(kBlockEdge * options.voxel, 3));
   f.triangles = model.mesh.triangles.size();
   f.left_out = source.left_out();
   f.colour = source.coloured() ? "of the recording" : "grey: the source gives no other";

@@ -13,8 +13,8 @@ namespace twofold {
 
 struct ObjectSourceOptions {
   ObjectMaskOptions mask;
-  double nearest_stereo = 0.3;     ///< disparities are searched for up to that of this depth [m] > 0
-  int keep_every = 5;              ///< frames whose depth is kept for the surface >= 1
+  double nearest_stereo = 0.3;       ///< disparities are searched for up to that of this depth [m] > 0
+  int keep_every = 5;                ///< frames whose depth is kept for the surface >= 1
   std::size_t most_bytes = 1 << 30;  ///< of kept depth and colour
 };
 
