@@ -76,7 +76,8 @@ TEST_P(Photometry, DisparityMeasuredByCorrelationIsThatOfTheGeometry) {
   const Rig& rig = sequence.rig();
   constexpr int kHalf = 7;
   std::vector<double> errors;
-  const int frames = GetParam() == "campus" ? 9 : 3;  // few of its houses are near enough
+  // Few of the houses are near enough; little beside the carton has texture.
+  const int frames = GetParam() == "campus" ? 9 : GetParam() == "turntable" ? 12 : 3;
   for (int n = 0; n < frames; ++n) {
     const int frame_index = n * sequence.frame_count() / frames;
     const Frame frame = sequence.render(frame_index);
