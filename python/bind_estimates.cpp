@@ -88,7 +88,10 @@ void bind_pose(py::module_& module) {
 }
 
 void bind_rig(py::module_& module) {
-  py::enum_<Sensor>(module, "Sensor").value("STEREO", Sensor::kStereo).value("RGBD", Sensor::kRgbd);
+  py::enum_<Sensor>(module, "Sensor")
+      .value("STEREO", Sensor::kStereo)
+      .value("RGBD", Sensor::kRgbd)
+      .value("MONO", Sensor::kMono);
   const CameraRig d;
   py::class_<CameraRig>(
       module, "CameraRig",

@@ -17,6 +17,30 @@ bool positive(double value) {
   return std::isfinite(value) && value > 0;
 }
 
+Sensor sensor_of(SensorKind kind) {
+  switch (kind) {
+    case SensorKind::kStereo:
+      return Sensor::kStereo;
+    case SensorKind::kRgbd:
+      return Sensor::kRgbd;
+    case SensorKind::kMono:
+      break;
+  }
+  return Sensor::kMono;
+}
+
+SensorKind kind_of(Sensor sensor) {
+  switch (sensor) {
+    case Sensor::kStereo:
+      return SensorKind::kStereo;
+    case Sensor::kRgbd:
+      return SensorKind::kRgbd;
+    case Sensor::kMono:
+      return SensorKind::kMono;
+  }
+  throw std::invalid_argument("rig.sensor must be one of Sensor's values");
+}
+
 }  // namespace
 
 Pose to_pose(const SE3& T_a_b) {
@@ -32,18 +56,8 @@ SE3 to_se3(const Pose& T_a_b) {
 
 CameraRig to_camera_rig(const Rig& rig) {
   const PinholeCamera& c = rig.camera;
-  return {rig.kind == SensorKind::kRgbd ? Sensor::kRgbd : Sensor::kStereo,
-          c.width,
-          c.height,
-          c.fx,
-          c.fy,
-          c.cx,
-          c.cy,
-          rig.baseline,
-          rig.depth_unit,
-          rig.depth_min,
-          rig.depth_max,
-          rig.readout};
+  return {sensor_of(rig.kind), c.width,        c.height,      c.fx,          c.fy,       c.cx, c.cy,
+          rig.baseline,        rig.depth_unit, rig.depth_min, rig.depth_max, rig.readout};
 }
 
 Rig to_rig(const CameraRig& rig) {
@@ -53,11 +67,13 @@ Rig to_rig(const CameraRig& rig) {
   expect(positive(rig.fy), "fy", "> 0", rig.fy);
   expect(std::isfinite(rig.cx), "cx", "a number", rig.cx);
   expect(std::isfinite(rig.cy), "cy", "a number", rig.cy);
-  expect(positive(rig.baseline), "baseline", "> 0", rig.baseline);
   Rig inside;
-  inside.kind = rig.sensor == Sensor::kRgbd ? SensorKind::kRgbd : SensorKind::kStereo;
+  inside.kind = kind_of(rig.sensor);
   inside.camera = {rig.fx, rig.fy, rig.cx, rig.cy, rig.width, rig.height};
-  inside.baseline = rig.baseline;
+  if (rig.sensor != Sensor::kMono) {
+    expect(positive(rig.baseline), "baseline", "> 0", rig.baseline);
+    inside.baseline = rig.baseline;
+  }
   expect(rig.readout >= 0, "readout", ">= 0", rig.readout);
   inside.readout = rig.readout;
   if (rig.sensor != Sensor::kRgbd) return inside;

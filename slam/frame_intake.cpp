@@ -21,8 +21,16 @@ std::string FrameIntake::refusal(const FrameView& view) const {
     return fmt::format("time does not grow: the frame was taken at {} ns, the one before at {} ns", view.t_ns,
                        last_t_ns_);
   if (std::string why = image_refusal("left", view.left, rig_.camera, false); !why.empty()) return why;
-  if (rig_.kind == SensorKind::kRgbd) return image_refusal("depth", view.depth, rig_.camera, true);
-  return image_refusal("right", view.right, rig_.camera, false);
+  switch (rig_.kind) {
+    case SensorKind::kStereo:
+      return image_refusal("right", view.right, rig_.camera, false);
+    case SensorKind::kRgbd:
+      return image_refusal("depth", view.depth, rig_.camera, true);
+    case SensorKind::kMono:
+      break;
+  }
+  const bool alone = view.right.data == nullptr && view.depth.data == nullptr;
+  return alone ? "" : "the rig is one camera (Sensor::kMono): the frame must have a left image only";
 }
 
 Frame FrameIntake::take(const FrameView& view) {
@@ -30,11 +38,8 @@ Frame FrameIntake::take(const FrameView& view) {
   frame.index = next_index_;
   frame.t_ns = view.t_ns;
   frame.left = pixels_of(view.left, view.owner);
-  if (rig_.kind == SensorKind::kRgbd) {
-    frame.depth = pixels_of(view.depth, view.owner);
-  } else {
-    frame.right = pixels_of(view.right, view.owner);
-  }
+  if (rig_.kind == SensorKind::kRgbd) frame.depth = pixels_of(view.depth, view.owner);
+  if (rig_.kind == SensorKind::kStereo) frame.right = pixels_of(view.right, view.owner);
   skip(view);
   return frame;
 }

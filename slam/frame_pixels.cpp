@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "twofold/opencv.hpp"
+
 namespace twofold {
 namespace {
 
@@ -86,6 +88,18 @@ cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owne
     theirs.copyTo(ours);
   }
   return ours;
+}
+
+FrameView view_of(Sensor sensor, const Frame& frame) {
+  switch (sensor) {
+    case Sensor::kStereo:
+      return stereo_frame(frame.t_ns, frame.left, frame.right);
+    case Sensor::kRgbd:
+      return rgbd_frame(frame.t_ns, frame.left, frame.depth);
+    case Sensor::kMono:
+      break;
+  }
+  return mono_frame(frame.t_ns, frame.left);
 }
 
 }  // namespace twofold

@@ -4,6 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "camera/frame.hpp"
 #include "twofold/types.hpp"
 
 namespace twofold {
@@ -17,5 +18,8 @@ namespace twofold {
 /// With an owner, grey images and depth stay where they are, and the image keeps the owner; else they are
 /// copied. Colour is turned to grey.
 [[nodiscard]] cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owner);
+
+/// The other way round: a frame's images, which the view keeps.
+[[nodiscard]] FrameView view_of(Sensor sensor, const Frame& frame);
 
 }  // namespace twofold

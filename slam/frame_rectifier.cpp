@@ -4,7 +4,6 @@
 #include "io/files/calibration_file.hpp"
 #include "slam/conversions.hpp"
 #include "slam/frame_pixels.hpp"
-#include "twofold/opencv.hpp"
 #include "twofold/rectifier.hpp"
 
 namespace twofold {
@@ -14,9 +13,6 @@ Calibration usable_calibration(const std::filesystem::path& file, int width, int
   Calibration calibration = read_calibration(file);
   if (width > 0 && height > 0) set_missing_size(width, height, &calibration);
   expect_valid(file, calibration);
-  if (calibration.kind == SensorKind::kMono)
-    throw std::runtime_error(file.string() +
-                             ": has a single camera without depth; stereo or RGB-D is needed");
   return calibration;
 }
 
@@ -47,18 +43,17 @@ const CameraRig& FrameRectifier::rig() const {
 }
 
 FrameView FrameRectifier::rectify(const FrameView& view) const {
-  const bool rgbd = impl_->rig.sensor == Sensor::kRgbd;
+  const Sensor sensor = impl_->rig.sensor;
   Frame raw;
   raw.t_ns = view.t_ns;
   raw.left = usable_image("left", view, view.left, false);
-  (rgbd ? raw.depth : raw.right) =
-      rgbd ? usable_image("depth", view, view.depth, true) : usable_image("right", view, view.right, false);
+  if (sensor == Sensor::kRgbd) raw.depth = usable_image("depth", view, view.depth, true);
+  if (sensor == Sensor::kStereo) raw.right = usable_image("right", view, view.right, false);
   if (const std::string why = impl_->rectifier.mismatch_reason(raw); !why.empty())
     throw std::invalid_argument(why);
   Frame frame;
   impl_->rectifier.rectify(raw, frame);
-  return rgbd ? rgbd_frame(frame.t_ns, frame.left, frame.depth)
-              : stereo_frame(frame.t_ns, frame.left, frame.right);
+  return view_of(sensor, frame);
 }
 
 }  // namespace twofold

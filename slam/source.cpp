@@ -6,7 +6,7 @@
 
 #include "io/sources/open_source.hpp"
 #include "slam/conversions.hpp"
-#include "twofold/opencv.hpp"
+#include "slam/frame_pixels.hpp"
 
 namespace twofold {
 
@@ -14,11 +14,10 @@ struct TWOFOLD_HIDDEN Source::Impl {
   Impl(const std::string& name, const SourceSettings& settings) {
     SourceOptions options;
     options.preload = settings.preload;
+    options.left_only = settings.left_only;
     options.stop = &stop;
     if (!settings.calibration.empty()) options.calibration = settings.calibration;
     source = open_source(name, options);
-    if (source->rig().kind == SensorKind::kMono)
-      throw std::runtime_error(name + ": has a single camera without depth; stereo or RGB-D is needed");
     rig = to_camera_rig(source->rig());
     for (const TimedPose& pose : source->ground_truth()) truth.push_back({pose.t_ns, to_pose(pose.T_w_c)});
   }
@@ -62,8 +61,7 @@ bool Source::next(FrameView& view) {
     case FrameStatus::kError:
       throw std::runtime_error(impl_->source->error());
   }
-  view = impl_->rig.sensor == Sensor::kRgbd ? rgbd_frame(frame.t_ns, frame.left, frame.depth)
-                                            : stereo_frame(frame.t_ns, frame.left, frame.right);
+  view = view_of(impl_->rig.sensor, frame);
   return true;
 }
 

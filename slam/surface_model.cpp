@@ -13,6 +13,12 @@ namespace {
 
 constexpr double kFarthest = 1e5;  // [m]
 
+Rig depth_rig(const CameraRig& rig) {
+  if (rig.sensor == Sensor::kMono)
+    throw std::invalid_argument("rig.sensor is one camera: a surface needs a stereo or RGB-D rig");
+  return to_rig(rig);
+}
+
 SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& options) {
   SurfaceOptions surface;
   surface.voxel = options.voxel;
@@ -55,7 +61,7 @@ struct SurfaceModel::Impl {
 };
 
 SurfaceModel::SurfaceModel(const CameraRig& rig, const SurfaceModelOptions& options)
-    : impl_(new Impl{to_rig(rig), options, SurfaceVolume(surface_options(to_rig(rig), options))}) {}
+    : impl_(new Impl{depth_rig(rig), options, SurfaceVolume(surface_options(depth_rig(rig), options))}) {}
 SurfaceModel::~SurfaceModel() = default;
 SurfaceModel::SurfaceModel(SurfaceModel&&) noexcept = default;
 SurfaceModel& SurfaceModel::operator=(SurfaceModel&&) noexcept = default;

@@ -39,5 +39,9 @@ namespace twofold {
   auto owner = std::make_shared<const std::array<cv::Mat, 2>>(std::array<cv::Mat, 2>{image, depth});
   return {t_ns, view(image), {}, view(depth), std::move(owner)};
 }
+/// The same of the image of one camera.
+[[nodiscard]] inline FrameView mono_frame(std::int64_t t_ns, const cv::Mat& image) {
+  return {t_ns, view(image), {}, {}, std::make_shared<const cv::Mat>(image)};
+}
 
 }  // namespace twofold

@@ -16,7 +16,7 @@ class TWOFOLD_API FrameRectifier {
   /// @param calibration    file of any form that docs/calibration.md has, as `twofold calibrate` writes
   /// @param width, height  of the raw images [px], of calibrations that do not state it; 0: it does
   ///
-  /// Throws std::runtime_error naming the file and what is wrong, a single camera without depth included.
+  /// Throws std::runtime_error naming the file and what is wrong.
   explicit FrameRectifier(const std::filesystem::path& calibration, int width = 0, int height = 0);
   ~FrameRectifier();
   FrameRectifier(FrameRectifier&&) noexcept;

@@ -80,7 +80,7 @@ struct StageTime {
 struct SlamSummary {
   std::int64_t frames = 0;  ///< queued or dropped
   std::int64_t tracked = 0;
-  std::int64_t placed_later = 0;  ///< before one camera's start; 0 for all rigs that Slam takes
+  std::int64_t placed_later = 0;  ///< before one camera's start, which said where they were
   std::int64_t lost = 0;          ///< unplaced ones included
   std::int64_t dropped = 0;
   /// Poses of the frames tracked or placed later in the final map, in the order of time: all, or those of the

@@ -20,6 +20,7 @@ struct StampedPose {
 struct SourceSettings {
   std::filesystem::path calibration = {};  ///< instead of the recording's own; empty: its own
   bool preload = false;                    ///< decode everything into memory before the constructor returns
+  bool left_only = false;                  ///< the left camera alone, as Sensor::kMono
 };
 
 /// Frames of a recording, a video, a rendered scene or a camera, rectified.
@@ -29,8 +30,7 @@ struct SourceSettings {
 /// time; stop() by any.
 class TWOFOLD_API Source {
  public:
-  /// Throws std::runtime_error naming the file and what is wrong with it; one camera alone, without depth, is
-  /// refused.
+  /// Throws std::runtime_error naming the file and what is wrong with it.
   explicit Source(const std::string& name, const SourceSettings& settings = {});
   ~Source();
   Source(Source&&) noexcept;

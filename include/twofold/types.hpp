@@ -32,20 +32,24 @@ struct Pose {
 [[nodiscard]] TWOFOLD_API std::array<double, 3> transform(const Pose& T_a_b,
                                                           const std::array<double, 3>& p_b);
 
-enum class Sensor : std::uint8_t { kStereo, kRgbd };
+/// kMono: one camera. It is placed once it has moved enough to see depth (until then it is lost, and
+/// PoseEstimate::reason says what is waited for). Its map and poses are right up to their scale, in which the
+/// median depth of the first map is about one. In a map that a rig made (SlamOptions::map with localise_only)
+/// its poses are in metres.
+enum class Sensor : std::uint8_t { kStereo, kRgbd, kMono };
 
 /// A rectified sensor: pinhole cameras without distortion; for stereo the right one is shifted by `baseline`
 /// along x, so that corresponding points lie in the same row.
 struct CameraRig {
   Sensor sensor = Sensor::kStereo;
-  int width = 0;   ///< [px] > 0
-  int height = 0;  ///< [px] > 0
-  double fx = 0;   ///< [px] > 0
-  double fy = 0;   ///< [px] > 0
-  double cx = 0;   ///< [px]
-  double cy = 0;   ///< [px]
-  double baseline =
-      0;  ///< [m] > 0; RGB-D: of the virtual right camera that turns depth into disparity, say 0.08
+  int width = 0;        ///< [px] > 0
+  int height = 0;       ///< [px] > 0
+  double fx = 0;        ///< [px] > 0
+  double fy = 0;        ///< [px] > 0
+  double cx = 0;        ///< [px]
+  double cy = 0;        ///< [px]
+  double baseline = 0;  ///< [m] > 0; RGB-D: of the virtual right camera that turns depth into disparity, say
+                        ///< 0.08; kMono: unused
   double depth_unit = 0.001;  ///< RGB-D: metres per unit of the depth image, > 0
   double depth_min = 0.3;     ///< nearer readings are holes [m]; stereo: of surfaces only
   double depth_max = 8.0;     ///< farther ones likewise

@@ -37,6 +37,7 @@ class Pose:
 class Sensor(_Enum):
     STEREO: ClassVar[Sensor]
     RGBD: ClassVar[Sensor]
+    MONO: ClassVar[Sensor]
 
 class CameraRig:
     sensor: Sensor
@@ -208,7 +209,7 @@ class Frame:
     def copied(self) -> tuple[str, ...]: ...
 
 class Source:
-    def __init__(self, name: str, *, calibration: str | PathLike[str] | None = None, preload: bool = False) -> None: ...
+    def __init__(self, name: str, *, calibration: str | PathLike[str] | None = None, preload: bool = False, left_only: bool = False) -> None: ...
     @property
     def rig(self) -> CameraRig: ...
     @property

@@ -29,6 +29,17 @@ def test_deterministic_runs_repeat_themselves(frames: list[twofold.Frame], rig: 
     np.testing.assert_array_equal(positions[0], positions[1])
 
 
+def test_one_camera_is_placed_once_it_has_moved() -> None:
+    source = twofold.Source(SCENE, left_only=True)
+    assert source.rig.sensor == twofold.Sensor.MONO
+    slam = twofold.Slam(source.rig, mode=twofold.RunMode.DETERMINISTIC)
+    push_all(slam, list(source))
+    summary = slam.finish()
+    first = next(iter(slam.poses()))
+    assert not first.tracked and first.reason
+    assert summary.tracked > 0
+
+
 def test_poses_come_from_the_queue_in_order(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
     slam = twofold.Slam(rig)
     push_all(slam, frames)

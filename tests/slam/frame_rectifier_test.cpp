@@ -65,14 +65,23 @@ TEST(FrameRectifier, ATurnedCameraIsTurnedBack) {
 TEST(FrameRectifier, SaysWhatIsWrong) {
   const ScratchFolder folder;
   folder.write("stereo.yaml", kRectifiedPair);
-  folder.write("one.yaml",
-               "sensor: mono\ncameras:\n  - size: [64, 48]\n    intrinsics: [50, 50, 31.5, 23.5]\n");
   EXPECT_THROW(FrameRectifier(folder / "none.yaml"), std::runtime_error);
-  EXPECT_THROW(FrameRectifier(folder / "one.yaml"), std::runtime_error);
   const FrameRectifier rectifier(folder / "stereo.yaml");
   const cv::Mat image = ramp();
   EXPECT_THROW((void)rectifier.rectify(stereo_frame(0, image, {})), std::invalid_argument);
   EXPECT_THROW((void)rectifier.rectify(stereo_frame(0, image, image.rowRange(0, 20))), std::invalid_argument);
+}
+
+TEST(FrameRectifier, TakesOneCameraAlone) {
+  const ScratchFolder folder;
+  folder.write("one.yaml",
+               "sensor: mono\ncameras:\n  - size: [64, 48]\n    intrinsics: [50, 50, 31.5, 23.5]\n");
+  const FrameRectifier rectifier(folder / "one.yaml");
+  EXPECT_EQ(rectifier.rig().sensor, Sensor::kMono);
+  const FrameView frame = rectifier.rectify(mono_frame(5, ramp()));
+  EXPECT_EQ(frame.t_ns, 5);
+  EXPECT_NE(frame.left.data, nullptr);
+  EXPECT_EQ(frame.right.data, nullptr);
 }
 
 }  // namespace

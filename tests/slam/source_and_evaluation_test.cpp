@@ -51,7 +51,18 @@ TEST(PublicSource, SaysWhatIsWrong) {
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("/nowhere"), std::string::npos) << error.what();
   }
-  EXPECT_THROW(Source("synthetic:courtyard?sensor=mono"), std::runtime_error);
+}
+
+TEST(PublicSource, GivesOneCameraAlone) {
+  Source source("synthetic:courtyard?frames=2&width=160&height=120", {.left_only = true});
+  EXPECT_EQ(source.rig().sensor, Sensor::kMono);
+  FrameView frame;
+  ASSERT_TRUE(source.next(frame));
+  EXPECT_EQ(frame.left.width, 160);
+  EXPECT_EQ(frame.right.data, nullptr);
+  EXPECT_EQ(frame.depth.data, nullptr);
+  EXPECT_EQ(Source("synthetic:courtyard?frames=2&width=160&height=120&sensor=mono").rig().sensor,
+            Sensor::kMono);
 }
 
 std::vector<StampedPose> walk(double wobble) {

@@ -1,0 +1,87 @@
+#include "tests/io/scratch_folder.hpp"
+#include "tests/slam/slam_run.hpp"
+#include "twofold/evaluation.hpp"
+
+namespace twofold {
+namespace {
+
+/// The rig's left camera alone.
+class SlamMonoTest : public testing::SlamRun {
+ protected:
+  static CameraRig left_camera() {
+    CameraRig camera = rig();
+    camera.sensor = Sensor::kMono;
+    camera.baseline = 0;
+    return camera;
+  }
+  static FrameView left_view(std::size_t i) {
+    FrameView view = SlamRun::view(i);
+    view.right = {};
+    return view;
+  }
+  void push_all_left(Slam& slam) {
+    slam.on_pose([&](const PoseEstimate& pose) { poses_.push_back(pose); });
+    for (std::size_t i = 0; i < kFrames; ++i) {
+      const PushResult pushed = slam.push(left_view(i));
+      EXPECT_TRUE(pushed) << pushed.reason;
+    }
+  }
+  static TrajectoryError error_of(const SlamSummary& summary, AlignBy align) {
+    std::vector<StampedPose> estimate, truth;
+    for (const auto& pose : summary.trajectory) estimate.push_back({pose.t_ns, pose.T_world_camera});
+    for (int i = 0; i < kFrames; ++i)
+      truth.push_back({frames_->at(static_cast<std::size_t>(i)).t_ns, to_pose(T_c_w(i).inverse())});
+    return compare(estimate, truth, {.align = align});
+  }
+
+  std::vector<PoseEstimate> poses_;
+};
+
+TEST_F(SlamMonoTest, IsPlacedOnceItHasMovedAndKnowsItsPathUpToScale) {
+  Slam slam(left_camera(), deterministic());
+  push_all_left(slam);
+  const SlamSummary summary = slam.finish();
+  EXPECT_EQ(poses_.front().state, TrackingState::kLost);
+  EXPECT_STRNE(poses_.front().reason, "");
+  EXPECT_EQ(poses_.back().state, TrackingState::kTracked);
+  EXPECT_GT(summary.placed_later, 0);
+  EXPECT_EQ(summary.placed_later + summary.tracked + summary.lost, kFrames);
+  EXPECT_GT(summary.tracked, kFrames / 2);
+  const TrajectoryError error = error_of(summary, AlignBy::kSimilarity);
+  EXPECT_LT(error.ate_rmse, 0.02);
+  EXPECT_GT(std::abs(error.scale - 1), 1e-6) << "nothing says what a metre is";
+}
+
+TEST_F(SlamMonoTest, InTheMapOfARigItsPosesAreInMetres) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "rig.tfm";
+  {
+    Slam mapping(rig(), deterministic());
+    push_all(mapping);
+    (void)mapping.finish();
+    mapping.save_map(file);
+  }
+  Slam slam(left_camera(), {.mode = RunMode::kDeterministic, .map = file, .localise_only = true});
+  push_all_left(slam);
+  const SlamSummary summary = slam.finish();
+  EXPECT_GT(summary.tracked, kFrames / 2);
+  EXPECT_LT(error_of(summary, AlignBy::kRigidMotion).ate_rmse, 0.02);
+  EXPECT_THROW(Slam(left_camera(), {.mode = RunMode::kDeterministic, .map = file}), std::exception)
+      << "it cannot go on with a rig's map";
+  CameraRig other_lens = left_camera();
+  other_lens.fx *= 1.5;
+  EXPECT_THROW(Slam(other_lens, {.mode = RunMode::kDeterministic, .map = file, .localise_only = true}),
+               std::exception);
+}
+
+TEST_F(SlamMonoTest, TakesOneImageAFrame) {
+  Slam slam(left_camera(), deterministic());
+  const PushResult refused = slam.push(SlamRun::view(0));
+  EXPECT_EQ(refused.status, PushStatus::kRefused);
+  EXPECT_NE(refused.reason.find("left image only"), std::string::npos) << refused.reason;
+  EXPECT_TRUE(slam.push(left_view(0)));
+  (void)slam.finish();
+}
+
+}  // namespace
+}  // namespace twofold
