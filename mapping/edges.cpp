@@ -1,6 +1,6 @@
 #include "mapping/edges.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -69,15 +69,23 @@ Matrix6 edge_information(const Keyframe& from, const Keyframe& to, const Edge& e
 
 int weight_of_measured_pose(const Matrix6& information, const Keyframe& from, const Keyframe& to,
                             const Rig& rig, const EdgeInformationOptions& options) {
-  constexpr double kAtMost = 1000;
   Edge one_point;
   one_point.weight = 1;
-  const Vector6 unit =
-      edge_information(from, to, one_point, rig, options).diagonal().cwiseSqrt().cwiseInverse();
-  const Matrix6 in_points = unit.asDiagonal() * information * unit.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(in_points, Eigen::EigenvaluesOnly);
-  const double points = eigen.eigenvalues().minCoeff();
-  return points > 1 ? static_cast<int>(std::min(points, kAtMost)) : 1;
+  const Matrix6 of_one = edge_information(from, to, one_point, rig, options);
+  // The most points that tell less than the measurement does in every direction.
+  const auto tell_less = [&](int points) {
+    return Eigen::LLT<Matrix6>(information - points * of_one).info() == Eigen::Success;
+  };
+  int fewest = 1, most = 1000;
+  while (fewest < most) {
+    const int middle = (fewest + most + 1) / 2;
+    if (tell_less(middle)) {
+      fewest = middle;
+    } else {
+      most = middle - 1;
+    }
+  }
+  return fewest;
 }
 
 }  // namespace twofold

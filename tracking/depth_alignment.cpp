@@ -1,8 +1,6 @@
 #include "tracking/depth_alignment.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -143,15 +141,12 @@ std::optional<Matrix6> DepthAlignment::determined(const Equations& equations,
   const double scale = std::max(1.0, equations.squares / std::max(equations.weights, 1.0));
   const Matrix6 all = equations.H / scale + of_corners;
   const Matrix6 chance = equations.chance / scale;
-  const Eigen::LLT<Matrix6> llt(all);
-  if (llt.info() != Eigen::Success) return std::nullopt;
-  const Matrix6 L_inverse = llt.matrixL().solve(Matrix6::Identity());
-  const Matrix6 share = L_inverse * chance * L_inverse.transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6> shares(share, Eigen::EigenvaluesOnly);
-  if (shares.info() != Eigen::Success || !(shares.eigenvalues().maxCoeff() < options_.max_chance))
-    return std::nullopt;
+  // In no direction x is x' chance x more than this share of x' all x: the difference is positive definite.
+  if (Eigen::LLT<Matrix6>(options_.max_chance * all - chance).info() != Eigen::Success) return std::nullopt;
   const Matrix6 information = all - chance;
-  const Vector6 variances = information.inverse().diagonal();
+  const Eigen::LLT<Matrix6> llt(information);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Vector6 variances = llt.solve(Matrix6::Identity()).diagonal();
   const double sigma_m = std::sqrt(variances.head<3>().maxCoeff());
   const double sigma_rad = std::sqrt(variances.tail<3>().maxCoeff());
   if (!(sigma_m < options_.max_sigma_m) || !(sigma_rad < options_.max_sigma_rad)) return std::nullopt;

@@ -122,9 +122,9 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
 
 void remove_results(const std::filesystem::path& folder) {
   std::error_code error;
-  for (const char* file :
-       {"trajectory.txt", "keyframes.txt", "edges.txt", "map.ply", "groundtruth.txt", "timing.json",
-        "summary.json", "loop_latency.txt", "trajectory.png", "surface.ply", "surface.glb"})
+  for (const char* file : {"trajectory.txt", "keyframes.txt", "edges.txt", "map.ply", "groundtruth.txt",
+                           "timing.json", "summary.json", "loop_latency.txt", "trajectory.png", "surface.ply",
+                           "surface.glb", "cloud.ply", "object.json"})
     std::filesystem::remove(folder / file, error);
   remove_part_files(folder, 1);
 }

@@ -26,7 +26,6 @@ class ObjectSource final : public FrameSource {
   struct Kept {
     std::int64_t t_ns = 0;
     Vector3 up_c{0, 0, 0};  ///< normal of the support plane, in the camera's frame
-    double base_c = 0;      ///< its offset (SupportPlane)
     KeyframeDepth images;
   };
 
