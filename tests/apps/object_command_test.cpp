@@ -40,7 +40,7 @@ TEST(ObjectCommand, SaysWhatIsMissing) {
   expect_bad_input(run(folder, "object " + kFew + " --above 0.3" + out), "nothing is left above");
   expect_bad_input(run(folder, "object " + kFew + " --voxel 0" + out), "voxel");
   const Outcome small =
-      run(folder, "object 'synthetic:turntable?sensor=rgbd&width=160&height=120&frames=20'" + out);
+      run(folder, "object 'synthetic:turntable?sensor=stereo&width=160&height=120&frames=8'" + out);
   EXPECT_EQ(small.exit_code, 1);
   EXPECT_NE(small.err.find("too small in the images"), std::string::npos) << small.err;
 }
