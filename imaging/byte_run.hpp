@@ -2,7 +2,7 @@
 
 #if defined(__AVX2__)
 #include <immintrin.h>
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
 #include <arm_neon.h>
 #endif
 
@@ -14,7 +14,7 @@ namespace twofold {
 inline constexpr int kByteRun = 32;
 
 /// 32 pixels of a row side by side. Comparisons give 255 or 0.
-#if defined(__ARM_NEON)
+#if defined(__aarch64__)
 
 /// Two registers; a vector of 32 bytes is one that compilers take apart byte by byte where they compare.
 struct ByteRun {

@@ -2,7 +2,7 @@
 
 #if defined(__AVX2__)
 #include <immintrin.h>
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
 #include <arm_neon.h>
 #endif
 
@@ -35,7 +35,7 @@ void halve(const cv::Mat& image, cv::Mat& half) {
       const __m256i packed = _mm256_packus_epi16(block_sums(2 * u), block_sums(2 * u + 32));
       _mm256_storeu_si256(reinterpret_cast<__m256i*>(out + u), _mm256_permute4x64_epi64(packed, 0xd8));
     }
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
     for (; u + 8 <= half.cols; u += 8) {
       const uint16x8_t sums = vpadalq_u8(vpaddlq_u8(vld1q_u8(upper + 2 * u)), vld1q_u8(lower + 2 * u));
       vst1_u8(out + u, vrshrn_n_u16(sums, 2));

@@ -2,7 +2,7 @@
 
 #if defined(__AVX2__)
 #include <immintrin.h>
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
 #include <arm_neon.h>
 #endif
 
@@ -211,7 +211,7 @@ int zero_mean_ssd(const Patch& patch, const cv::Mat& image, int u, int v) {
   const __m128i halves = _mm_add_epi32(_mm256_castsi256_si128(both), _mm256_extracti128_si256(both, 1));
   const int sum = _mm_cvtsi128_si32(halves);
   const int sum2 = _mm_extract_epi32(halves, 1);
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
   int16x8_t sums = vdupq_n_s16(0);     // of the differences, by columns
   int32x4_t squares = vdupq_n_s32(0);  // of columns c and c + 4
   for (int r = 0; r < Patch::kSize; ++r, row += stride, t += Patch::kSize) {

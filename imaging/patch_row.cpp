@@ -1,6 +1,6 @@
 #if defined(__AVX2__)
 #include <immintrin.h>
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
 #include <arm_neon.h>
 #endif
 
@@ -93,7 +93,7 @@ struct Correlator {
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(correlation), total);
   }
 };
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
 class Correlator {
  public:
   explicit Correlator(const Patch& patch) : rows_(patch.rounded) {}

@@ -1,6 +1,6 @@
 #pragma once
 
-#ifdef __ARM_NEON
+#ifdef __aarch64__
 #include <arm_neon.h>
 #endif
 
@@ -17,7 +17,7 @@ using Floats8 = float __attribute__((vector_size(32)));
 
 /// Eight pixels as numbers.
 inline Floats8 to_floats(Bytes8 pixels) {
-#ifdef __ARM_NEON
+#ifdef __aarch64__
   const uint16x8_t wide = vmovl_u8((uint8x8_t)pixels);
   const float32x4_t low = vcvtq_f32_u32(vmovl_u16(vget_low_u16(wide)));
   const float32x4_t high = vcvtq_f32_u32(vmovl_high_u16(wide));
@@ -39,7 +39,7 @@ inline Floats8 load_floats(const float* first) {
 
 /// Eight numbers, each within the range of the integers, without what follows the point.
 inline Shorts8 truncate(const Floats8& numbers) {
-#ifdef __ARM_NEON
+#ifdef __aarch64__
   const float32x4_t low = __builtin_shufflevector(numbers, numbers, 0, 1, 2, 3);
   const float32x4_t high = __builtin_shufflevector(numbers, numbers, 4, 5, 6, 7);
   return (Shorts8)vcombine_s16(vmovn_s32(vcvtq_s32_f32(low)), vmovn_s32(vcvtq_s32_f32(high)));

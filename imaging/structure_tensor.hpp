@@ -2,7 +2,7 @@
 
 #if defined(__AVX2__)
 #include <immintrin.h>
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
 #include <arm_neon.h>
 #endif
 
@@ -50,7 +50,7 @@ inline StructureTensor structure_tensor(const cv::Mat& image, int u, int v) {
   const __m128i pairs = _mm_hadd_epi32(sums_uu, sums_uv);
   const __m128i total = _mm_hadd_epi32(pairs, _mm_hadd_epi32(sums_vv, sums_vv));
   return {_mm_extract_epi32(total, 0), _mm_extract_epi32(total, 1), _mm_extract_epi32(total, 2)};
-#elif defined(__ARM_NEON)
+#elif defined(__aarch64__)
   const auto difference = [](const std::uint8_t* a, const std::uint8_t* b) {
     return vreinterpretq_s16_u16(vsubl_u8(vld1_u8(a), vld1_u8(b)));
   };

@@ -16,7 +16,7 @@ struct ObjectMaskOptions {
   double above = 0.003;      ///< the support plane begins the object, or four sigmas of the depth above it,
                              ///< whichever is more [m] >= 0
   int erode = 2;             ///< pixels taken from the mask's rim, where depths mix, 0 .. 20
-  double depth_noise = 0.0;  ///< standard deviation of a depth z is depth_noise z^2 [1/m] > 0
+  double depth_noise = 0.0;  ///< to be set: standard deviation of a depth z is depth_noise z^2 [1/m] > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -42,7 +42,7 @@ class ObjectMasker {
   ObjectMasker(const Rig& rig, const ObjectMaskOptions& options);
 
   /// 255 on the object, else 0 (CV_8UC1); or in words what was not found.
-  /// @param depth  CV_16UC1 of the rig's size, in units of Rig::depth_unit; 0: no reading
+  /// @param depth  CV_16UC1 of the rig's size (checked), in units of Rig::depth_unit; 0: no reading
   [[nodiscard]] tl::expected<cv::Mat, std::string> mask(const cv::Mat& depth);
 
   /// Of the last image that had one.

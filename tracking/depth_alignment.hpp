@@ -49,7 +49,10 @@ class DepthAlignment {
 
   DepthAlignment(const Rig& rig, const DepthAlignmentOptions& options);
 
-  /// The keyframes to align to, at most kViews: each is read once only, as long as it is added every time.
+  /// The keyframes to align to, at most kViews. Planes of one that is added after every clear_views() are
+  /// kept and not made anew.
+  /// @param depth       as Frame::depth, of the rig
+  /// @param T_view_ref  pose of the frame that `align` says the pose relative to, in the view's frame
   void clear_views() { views_ = 0; }
   void add_view(KeyframeId id, const cv::Mat& depth, const SE3& T_view_ref);
 

@@ -34,9 +34,9 @@ struct PoseEstimate {
   std::uint32_t reference_keyframe = kNoId;
   Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
   /// 6x6 row by row, of delta in T_world_camera * exp(delta), delta = (translation [m], rotation [rad]) in
-  /// the camera's axes: from the frame's own measurements with the map taken as true, and so too small by a
-  /// factor of four to six in standard deviations (docs/results.md). Zero for the frame
-  /// that starts a map part: that frame defines the world.
+  /// the camera's axes: from the frame's own measurements with the map taken as true. Not calibrated: on real
+  /// recordings too small by a factor of four to six in standard deviations, on a rendered one too large by
+  /// four (docs/results.md). Zero for the frame that starts a map part: that frame defines the world.
   std::array<double, 36> covariance{};
   /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
   /// none.

@@ -80,8 +80,9 @@ struct StageTime {
 struct SlamSummary {
   std::int64_t frames = 0;  ///< queued or dropped
   std::int64_t tracked = 0;
-  std::int64_t placed_later = 0;  ///< before one camera's start, which said where they were
-  std::int64_t lost = 0;          ///< unplaced ones included
+  std::int64_t placed_later =
+      0;  ///< before one camera's start, which said where they were; not in `tracked` or `lost`
+  std::int64_t lost = 0;  ///< unplaced ones included
   std::int64_t dropped = 0;
   /// Poses of the frames tracked or placed later in the final map, in the order of time: all, or those of the
   /// newest SlamOptions::kept_frames (some more). `map_part` of each tells its world.

@@ -53,7 +53,8 @@ struct SurfaceMesh {
 /// and mesh by several at once, add and clear by one while nobody else does anything.
 class TWOFOLD_API SurfaceModel {
  public:
-  /// Throws std::invalid_argument naming the field of rig or options, the rule and the value.
+  /// Throws std::invalid_argument naming the field of rig or options, the rule and the value; one camera has
+  /// no depth.
   explicit SurfaceModel(const CameraRig& rig, const SurfaceModelOptions& options = {});
   ~SurfaceModel();
   SurfaceModel(SurfaceModel&&) noexcept;
