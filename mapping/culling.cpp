@@ -103,13 +103,16 @@ int remove_keyframe(GraphWriter& writer, KeyframeId id) {
 }
 
 std::vector<KeyframeId> cull_redundant_keyframes(GraphWriter& writer, const DoubleWindow& window,
-                                                 const CullingOptions& options, int& culled_points) {
+                                                 const CullingOptions& options, std::size_t inserted,
+                                                 int& culled_points) {
+  const std::size_t limit =
+      static_cast<std::size_t>(options.max_keyframes) * std::max<std::size_t>(1, inserted);
   std::vector<KeyframeId> candidates, culled;
   const GraphSnapshot& graph = writer.graph();
   for (std::size_t n = 0; n < window.inner; ++n) candidates.push_back(window.nodes[n].id);
   std::sort(candidates.rbegin(), candidates.rend());
   for (const KeyframeId id : candidates) {
-    if (static_cast<int>(culled.size()) == options.max_keyframes) break;
+    if (culled.size() == limit) break;
     if (index(id) + static_cast<std::size_t>(options.keep_recent) >= graph.keyframe_count()) continue;
     if (id == graph.reference() || graph.keyframe(id).culled() || graph.keyframe(id).edges->empty()) continue;
     if (!is_redundant(graph, id, options)) continue;

@@ -26,9 +26,13 @@ int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuild
 int remove_keyframe(GraphWriter& writer, KeyframeId id);
 
 /// Culls redundant keyframes of the inner window, newest first, so that what is already mapped stays and
-/// moving in a mapped place does not grow the map. Returns the keyframes culled.
+/// moving in a mapped place does not grow the map.
+/// @param inserted  keyframes that this round inserted: a mapper that is behind inserts several, and must not
+///                  fall behind with culling as well
+/// @return the keyframes culled
 std::vector<KeyframeId> cull_redundant_keyframes(GraphWriter& writer, const DoubleWindow& window,
-                                                 const CullingOptions& options, int& culled_points);
+                                                 const CullingOptions& options, std::size_t inserted,
+                                                 int& culled_points);
 
 /// Culls points that add nothing: seen from two keyframes only, and not seen again although keyframe after
 /// keyframe had them well in view.

@@ -171,7 +171,7 @@ void Mapper::cull(MapperReport& report) {
   }
   if (options_.culling.keyframes) {
     report.culled_keyframes =
-        cull_redundant_keyframes(writer_, window_, options_.culling, report.culled_points);
+        cull_redundant_keyframes(writer_, window_, options_.culling, inserted_.size(), report.culled_points);
     writer_.forget_replacements(static_cast<std::size_t>(options_.culling.keep_replacements));
     if (options_.hook) {
       for (const KeyframeId id : report.culled_keyframes) options_.hook->keyframe_culled(id);

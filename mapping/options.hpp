@@ -43,10 +43,10 @@ struct CullingOptions {
   double redundant_share = 0.9;  ///< of a keyframe's points that others see as well, in (0, 1]
   int redundant_observers = 3;   ///< other keyframes that must see such a point, as finely, >= 2
   int keep_recent = 8;           ///< newest keyframes are never culled, >= 0
-  int max_keyframes = 2;         ///< culled in one round, >= 0
+  int max_keyframes = 2;         ///< culled in one round for each that it inserted, >= 0
   /// Keyframes culled last whose replacements stay known, >= max_keyframes. Tracker and loop closer may refer
-  /// to a keyframe for as long as a message is under way between the threads: some tens of rounds, each of
-  /// which culls max_keyframes at most.
+  /// to a keyframe for as long as a message is under way between the threads: the time in which some tens of
+  /// keyframes are inserted, for each of which max_keyframes are culled at most.
   int keep_replacements = 128;
   int max_misses =
       8;  ///< keyframes in a row a weak point should have been seen from and was not, in [1, 255]

@@ -1,6 +1,6 @@
-// What hours of browsing do to memory: a rendered desk, looked at forwards and backwards again and again at
-// 30 Hz by its time stamps, as fast as the engine can; resident memory and the folder's files every ten
-// minutes.
+// What hours in one place do to memory: a rendered scene again and again at 30 Hz by its time stamps, as fast
+// as the engine can; resident memory and the folder's files every so many minutes. Of a desk the images are
+// shown forwards and backwards, of a closed path (--closed) round by round.
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <exception>
@@ -23,8 +23,10 @@ constexpr std::int64_t kFramesAnHour = 30 * 3600;
 
 struct Arguments {
   double hours = 24;
-  std::string folder;
+  std::string folder, scene = "desk";
+  bool closed = false, deterministic = false;
   int width = 320, height = 240, frames = 300;
+  int minutes = 10;  ///< between two lines
 };
 
 struct Scene {
@@ -33,16 +35,17 @@ struct Scene {
 };
 
 Scene render(const Arguments& arguments) {
-  const auto source = open_synthetic("desk", {{"width", std::to_string(arguments.width)},
-                                              {"height", std::to_string(arguments.height)},
-                                              {"frames", std::to_string(arguments.frames)}});
+  const auto source = open_synthetic(arguments.scene, {{"width", std::to_string(arguments.width)},
+                                                       {"height", std::to_string(arguments.height)},
+                                                       {"frames", std::to_string(arguments.frames)}});
   Scene scene{source->rig(), {}};
   for (Frame frame; source->next(frame) == FrameStatus::kFrame;) scene.frames.push_back(frame);
   return scene;
 }
 
-/// Of a camera that goes to and fro.
-std::size_t place_of(std::int64_t index, std::size_t frames) {
+/// Of a camera that goes round, or to and fro.
+std::size_t place_of(std::int64_t index, std::size_t frames, bool closed) {
+  if (closed) return static_cast<std::size_t>(index) % frames;
   const auto lap = static_cast<std::int64_t>(2 * (frames - 1));
   const auto at = static_cast<std::size_t>(index % lap);
   return at < frames ? at : static_cast<std::size_t>(lap) - at;
@@ -60,11 +63,12 @@ void run(const Arguments& arguments) {
   EngineOptions options;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   options.logs.folder = arguments.folder;
+  options.deterministic = arguments.deterministic;
   const auto end = static_cast<std::int64_t>(arguments.hours * static_cast<double>(kFramesAnHour));
   std::int64_t index = 0;
   const FrameFeed feed = [&](Frame& frame) {
     if (index == end) return FeedStatus::kEnd;
-    frame = scene.frames[place_of(index, scene.frames.size())];
+    frame = scene.frames[place_of(index, scene.frames.size(), arguments.closed)];
     frame.index = index;
     frame.t_ns = ++index * kPeriodNs;
     return FeedStatus::kFrame;
@@ -72,7 +76,7 @@ void run(const Arguments& arguments) {
   fmt::print("{:>7} {:>9} {:>9} {:>7} {:>9} {:>11}\n", "hours", "frames", "keyframes", "lost", "RSS MiB",
              "files MiB");
   const ProgressSink progress = [&](const Progress& p) {
-    if (p.frames % (kFramesAnHour / 6) != 0) return;
+    if (p.frames % (arguments.minutes * kFramesAnHour / 60) != 0) return;
     fmt::print("{:7.2f} {:9} {:9} {:7} {:9.2f} {:11.2f}\n",
                static_cast<double>(p.frames) / static_cast<double>(kFramesAnHour), p.frames, p.keyframes,
                p.lost, static_cast<double>(process_usage().rss_bytes) / (1 << 20),
@@ -82,21 +86,38 @@ void run(const Arguments& arguments) {
   const std::atomic<bool> interrupted{false};
   const RunResult result = Engine(scene.rig, options).run(feed, interrupted, progress);
   if (!result.error.empty()) throw std::runtime_error(result.error);
+  const GraphSnapshot& map = result.graph;
+  std::size_t live = 0, observations = 0;
+  for (std::size_t k = 0; k < map.keyframe_count(); ++k) {
+    const Keyframe& keyframe = map.keyframe(KeyframeId(k));
+    if (keyframe.culled()) continue;
+    ++live;
+    observations += keyframe.observations->size();
+  }
   fmt::print(
-      "in the end {} keyframes in the map, {} loops, {} frames on record, {:.0f} s, RSS {:.0f} MiB at most\n",
-      result.graph.keyframe_count(), result.loops.size(), result.frames.size(), result.wall_seconds,
-      result.peak_rss_mb);
+      "in the end {} of {} keyframes in the map with {} observations, {} loops, {} frames on record, {:.0f} "
+      "s, "
+      "RSS {:.0f} MiB at most\n",
+      live, map.keyframe_count(), observations, result.loops.size(), result.frames.size(),
+      result.wall_seconds, result.peak_rss_mb);
 }
 
 }  // namespace
 }  // namespace twofold
 
 int main(int argc, char** argv) {
-  CLI::App app{"What hours of browsing do to memory"};
+  CLI::App app{"What hours in one place do to memory"};
   twofold::Arguments arguments;
   app.add_option("--hours", arguments.hours, "of 30 frames a second")->capture_default_str();
   app.add_option("--out", arguments.folder,
                  "folder that exists, for the run's logs; without, all is in memory");
+  app.add_option("--scene", arguments.scene)->capture_default_str();
+  app.add_flag("--closed", arguments.closed, "its path is closed: round by round instead of to and fro");
+  app.add_flag("--deterministic", arguments.deterministic,
+               "one thread: the mapper is never behind, as at the recording's own pace");
+  app.add_option("--minutes", arguments.minutes, "of the recording between two lines")
+      ->check(CLI::Range(1, 60))
+      ->capture_default_str();
   app.add_option("--width", arguments.width)->capture_default_str();
   app.add_option("--height", arguments.height)->capture_default_str();
   app.add_option("--frames", arguments.frames, "rendered")->capture_default_str();

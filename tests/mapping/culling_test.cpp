@@ -85,6 +85,26 @@ TEST(PointCuller, CullsWeakPointsThatAreInViewAndNeverSeenAgain) {
   EXPECT_FALSE(writer.graph().point(again).alive()) << "three misses since it was last seen";
 }
 
+TEST(CullRedundantKeyframes, KeepsUpWithAMapperThatInsertsSeveralAtATime) {
+  for (const std::size_t inserted : {0U, 1U, 3U}) {
+    const Rig rig = simulation::thesis_rig();
+    GraphWriter writer = chain(20);
+    std::vector<KeyframeId> all;
+    for (std::uint32_t i = 0; i < 20; ++i) all.push_back(k(i));
+    for (int n = 0; n < 20; ++n) add_point(writer, rig, {0.2, 0.01 * n, 1}, all);
+    DoubleWindow window;
+    for (const KeyframeId id : all) window.nodes.push_back({.id = id});
+    window.inner = window.nodes.size();
+    const CullingOptions options;
+    int points = 0;
+    const std::vector<KeyframeId> culled =
+        cull_redundant_keyframes(writer, window, options, inserted, points);
+    EXPECT_EQ(culled.size(), 2 * std::max<std::size_t>(1, inserted));
+    EXPECT_EQ(culled.front(), k(11)) << "newest first, but for the eight that are too new";
+    EXPECT_EQ(points, 0);
+  }
+}
+
 struct Size {
   std::size_t keyframes = 0, points = 0, observations = 0, edges = 0;
 };
