@@ -27,20 +27,13 @@ double median_flow(const StartCandidate& candidate) {
   return *middle;
 }
 
-/// Cells so small that an image of any size has enough of them: while nothing is known, corners stand close.
-TrackerOptions with_cells_for(const Rig& rig, TrackerOptions options) {
-  constexpr double kCellsPerCorner = 2;
-  constexpr int kUnit = 4;  // CellGrid
-  const double area = static_cast<double>(rig.camera.width) * rig.camera.height;
-  const double side = std::sqrt(area / (kCellsPerCorner * options.max_new_points));
-  options.cell_px = std::clamp(static_cast<int>(side) / kUnit * kUnit, 2 * kUnit, options.cell_px);
-  return options;
-}
-
 }  // namespace
 
 MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
-    : rig_(rig), options_(options), starter_(rig, with_cells_for(rig, options)), candidates_(kCandidates) {
+    : rig_(rig),
+      options_(options),
+      starter_(rig, with_cells_of_one_camera(rig, options)),
+      candidates_(kCandidates) {
   const auto corners = static_cast<std::size_t>(options.max_new_points);
   for (StartCandidate& candidate : candidates_) {
     allocate_images(rig, candidate.images);

@@ -28,6 +28,15 @@ Eigen::Vector2f at_level_zero(const Corner& corner) {
 
 }  // namespace
 
+TrackerOptions with_cells_of_one_camera(const Rig& rig, TrackerOptions options) {
+  constexpr double kCellsPerCorner = 2;
+  constexpr int kUnit = 4;  // CellGrid
+  const double area = static_cast<double>(rig.camera.width) * rig.camera.height;
+  const double side = std::sqrt(area / (kCellsPerCorner * options.max_new_points));
+  options.cell_px = std::min(options.cell_px, std::max(static_cast<int>(side) / kUnit * kUnit, 2 * kUnit));
+  return options;
+}
+
 PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options)
     : rig_(rig), options_(options), quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
   columns_ = rig.camera.width / options.cell_px + 1;

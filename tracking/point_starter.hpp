@@ -15,6 +15,11 @@
 
 namespace twofold {
 
+/// One camera's options: cells so small that an image of any size has enough of them. A corner of one camera
+/// says where it is only after some frames, and many never do; where all there is to see stands in a narrow
+/// band of a small image, a corner for each usual cell is too few to live on.
+[[nodiscard]] TrackerOptions with_cells_of_one_camera(const Rig& rig, TrackerOptions options);
+
 /// Decides where a keyframe needs new points, and starts them with the depth of the stereo pair or depth
 /// image (thesis 3.4.3, 6.3). Buffers are reserved at construction.
 class PointStarter {

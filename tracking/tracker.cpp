@@ -43,7 +43,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       recent_views_(kRecentViews, room_for_view(rig, wide_search_)),
       elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
       immature_points_(kMaxImmaturePoints, kMaxPending),
-      starter_(rig, options) {
+      starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   matches_.reserve(searches);
   motion_.reserve(searches);
