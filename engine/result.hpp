@@ -152,6 +152,8 @@ struct RunResult {
   bool interrupted = false;
   /// Empty, or why the run ended early (a thread failed, the input broke), or what its logs lost.
   std::string error;
+  /// Stereo: rows that right images lie lower than left ones, taken back while tracking [px]; 0: none.
+  double row_offset = 0;
   double cpu_seconds = 0;  ///< all threads, from start to end of the run
   double wall_seconds = 0;
   double peak_rss_mb = 0;

@@ -272,6 +272,7 @@ void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserR
   result.graph = mapping.finish();
   tracking.place_earlier_frames(result.frames, result.counts);
   mapping.replacement_log().hang_on_live_keyframes(result.frames);
+  result.row_offset = tracking.row_offset();
   result.mapping = mapping.totals();
   result.places = loop_closing.places();
   result.times.push_back(std::move(tracking.times()));

@@ -54,6 +54,8 @@ class TrackerRunner {
   /// Completes the record once the pose is known, at `now_ns` on the clock of the pace, and tells the
   /// listener. `graph` is that of the step.
   void finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph, FrameRecord& record);
+  /// Tracker::row_offset.
+  [[nodiscard]] double row_offset() const { return tracker_.row_offset(); }
   /// At the end of a run: frames before a start of one camera get the poses that it found out.
   void place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const;
 

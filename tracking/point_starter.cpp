@@ -5,13 +5,14 @@
 #include <opencv2/core.hpp>
 
 #include "geometry/inverse_depth.hpp"
+#include "imaging/row_offset.hpp"
 
 namespace twofold {
 namespace {
 
 constexpr std::size_t kMaxCorners = 4096;
 constexpr int kBorder = 12;                 // of a level: room for the patch and its search
-constexpr int kMaxRowShift = 4;             // between left and right image, looked for [px]
+constexpr int kMaxRowShift = 8;             // between left and right image, looked for [px]
 constexpr int kClearly = 3;                 // times as many corners with depth: that was the mistake
 constexpr double kFarthestDisparity = 0.3;  // [px] below it the depth is as good as infinite
 
@@ -141,7 +142,7 @@ LostCause PointStarter::explain_missing_depth(const FrameImages& images, int wan
   const cv::Mat& right = images.right.level(0);
   const int enough = std::max(wanted, kClearly * count_depths(left, right));
   if (count_depths(right, left) >= enough) return LostCause::kImagesSwapped;
-  for (int shift = 1; shift <= kMaxRowShift; ++shift) {
+  for (int shift = RowOffsetMeter::kMost; shift <= kMaxRowShift; ++shift) {
     const cv::Range upper(0, left.rows - shift), lower(shift, left.rows);
     if (count_depths(left.rowRange(upper), right.rowRange(lower)) >= enough ||
         count_depths(left.rowRange(lower), right.rowRange(upper)) >= enough) {

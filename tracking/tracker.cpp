@@ -51,6 +51,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   inlier_ids_.reserve(searches);
   depths_.reserve(std::max(searches, kMaxImmaturePoints));
   previous_points_.reserve(kMaxAlignmentPoints);
+  if (rig.kind == SensorKind::kStereo) right_rows_.emplace(rig);
   if (rig.kind == SensorKind::kRgbd) depth_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) {
     monocular_start_.emplace(rig, options);
@@ -129,7 +130,11 @@ LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
 
 void Tracker::load_images(const Frame& frame) {
   current_.left.build(frame.left);
-  if (rig_.kind == SensorKind::kStereo) current_.right.build(frame.right);
+  if (right_rows_) {
+    current_.right.build(right_rows_->aligned(frame.right));
+    if (right_rows_->look_at_start(frame.left, current_.right.level(0)))
+      current_.right.build(right_rows_->aligned(frame.right));
+  }
   if (rig_.kind == SensorKind::kRgbd) frame.depth.copyTo(current_.depth);
 }
 

@@ -23,6 +23,7 @@
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
 #include "tracking/recent_views.hpp"
+#include "tracking/right_rows.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
@@ -80,6 +81,9 @@ class Tracker {
   /// Hint of the loop closer: the camera was recognised at T_c_k relative to keyframe `id`. The next step, if
   /// its graph has the keyframe, looks for points around there, and forgets the hint. Ignored while tracking.
   void relocalise(KeyframeId id, const SE3& T_c_k) { hint_ = Placement{id, T_c_k}; }
+
+  /// Rows that a stereo pair's right images lie lower than its left ones, taken back by the tracker [px].
+  [[nodiscard]] double row_offset() const { return right_rows_ ? right_rows_->offset() : 0; }
 
   /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
   /// and diagnosis. Valid until the next step.
@@ -155,6 +159,7 @@ class Tracker {
   ElderVote elder_vote_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
+  std::optional<RightRows> right_rows_;  ///< stereo only
   std::optional<DepthAlignment> depth_;  ///< RGB-D only
   bool corners_scarce_ = false;          ///< the last good frame was placed by surfaces
   // One camera only: where its depths come from.

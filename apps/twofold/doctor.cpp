@@ -8,14 +8,16 @@
 #include "doctor/camera.hpp"
 #include "doctor/disk.hpp"
 #include "doctor/machine.hpp"
+#include "doctor/stereo_rows.hpp"
 #include "io/files/io_error.hpp"
+#include "io/sources/open_source.hpp"
 #include "io/sources/v4l2_frames.hpp"
 
 namespace twofold {
 namespace {
 
 struct DoctorArguments {
-  std::string source, folder;
+  std::string source, folder, calibration;
   std::string root = "/";
 };
 
@@ -31,13 +33,15 @@ CaptureFormat with_defaults(CaptureFormat format) {
   return format;
 }
 
+bool is_camera(const SourceSpec& spec) {
+  return spec.scheme == "v4l2" || (spec.scheme.empty() && spec.argument.starts_with("/dev/"));
+}
+
 Wanted wanted_of(const std::string& text) {
   Wanted wanted;
   if (text.empty()) return wanted;
   const SourceSpec spec = parse_source_spec(text);
-  const bool device = spec.scheme.empty() && spec.argument.starts_with("/dev/");
-  if (!device && spec.scheme != "v4l2")
-    throw IoError(text, "is no camera: v4l2:/dev/video0?size=640x480&fps=30");
+  if (!is_camera(spec)) return wanted;
   SourceParameters parameters(text, spec.parameters);
   const V4l2FramesOptions options = take_v4l2_options(spec.argument, parameters);
   wanted.cameras.push_back(options.first);
@@ -58,6 +62,27 @@ void print(const Finding& finding) {
   if (!finding.remedy.empty()) fmt::print("      {:<15} -> {}\n", "", finding.remedy);
 }
 
+/// Looks at some pairs of a recording, or of a camera whose calibration is known.
+std::vector<Finding> look_at_pairs(const DoctorArguments& arguments) {
+  constexpr int kPairs = 5;
+  constexpr int kApart = 5;  // frames
+  constexpr int kCorners = 160;
+  if (arguments.source.empty()) return {};
+  if (arguments.calibration.empty() && is_camera(parse_source_spec(arguments.source))) return {};
+  SourceOptions options;
+  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  const auto source = open_source(arguments.source, options);
+  if (source->rig().kind != SensorKind::kStereo) return {};
+  RowOffsetMeter meter(source->rig(), kCorners);
+  std::vector<RowOffset> offsets;
+  Frame frame;
+  for (int i = 0; i < kPairs * kApart && source->next(frame) == FrameStatus::kFrame; ++i) {
+    if (i % kApart != 0) continue;
+    if (const auto offset = meter.search(frame.left, frame.right)) offsets.push_back(*offset);
+  }
+  return {check_rows(offsets)};
+}
+
 int examine(const DoctorArguments& arguments) {
   const Wanted wanted = wanted_of(arguments.source);
   std::vector<Finding> findings = check_machine(arguments.root);
@@ -66,6 +91,7 @@ int examine(const DoctorArguments& arguments) {
     for (Finding& finding : check_camera(calls, arguments.root, camera.path, camera.format))
       findings.push_back(std::move(finding));
   }
+  for (Finding& finding : look_at_pairs(arguments)) findings.push_back(std::move(finding));
   if (!arguments.folder.empty()) findings.push_back(check_disk(arguments.folder, wanted.bytes_per_second));
   int exit_code = kOk;
   for (const Finding& finding : findings) {
@@ -81,7 +107,9 @@ void add_doctor_command(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<DoctorArguments>();
   CLI::App* command = app.add_subcommand("doctor", "Say what on this machine will hurt real time");
   command->add_option("SOURCE", arguments->source,
-                      "Camera to run, e.g. v4l2:/dev/video0?size=640x480&fps=30");
+                      "Camera to run, e.g. v4l2:/dev/video0?size=640x480&fps=30, or a recording");
+  command->add_option("--calib", arguments->calibration,
+                      "Calibration of a stereo camera: says whether it still holds");
   command->add_option("--record-to", arguments->folder,
                       "Folder of recordings: measures how fast it can be written");
   command->add_option("--root", arguments->root, "Where proc and sys are (a tree to examine instead)")

@@ -1,6 +1,7 @@
 #include "apps/twofold/run_output.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <numbers>
@@ -199,6 +200,11 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
   const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
   fmt::print("cost        {:.1f} s wall, {:.1f} s CPU ({:.1f} CPU-ms a frame), {:.0f} MB at most\n",
              result.wall_seconds, result.cpu_seconds, 1e3 * result.cpu_seconds / frames, result.peak_rss_mb);
+  if (result.row_offset != 0)
+    fmt::print(
+        "rows        right images lie {:.1f} rows {} than left ones: calibrate the pair again; went on with "
+        "the rows shifted\n",
+        std::abs(result.row_offset), result.row_offset > 0 ? "lower" : "higher");
   for (const std::string& note : result.notes) fmt::print("note        {}\n", note);
   fmt::print("written to  {}\n", folder.string());
 }

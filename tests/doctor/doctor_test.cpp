@@ -5,6 +5,7 @@
 #include "doctor/camera.hpp"
 #include "doctor/disk.hpp"
 #include "doctor/machine.hpp"
+#include "doctor/stereo_rows.hpp"
 #include "fixtures/fake_device.hpp"
 #include "tests/io/scratch_folder.hpp"
 
@@ -160,6 +161,16 @@ TEST(Doctor, DiskIsMeasured) {
   EXPECT_EQ(check_disk(folder.path(), 1e15, 1U << 20U).health, Health::kBad);
   EXPECT_EQ(check_disk(folder.path() / "none", 1, 1U << 20U).health, Health::kBad);
   EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(Doctor, SlippedRowsAreNamed) {
+  const std::vector<RowOffset> slipped{{1.8, 90}, {1.7, 80}, {-3, 20}, {1.9, 100}};
+  const Finding finding = check_rows(slipped);
+  EXPECT_EQ(finding.health, Health::kWarn);
+  EXPECT_EQ(finding.state, "right images lie 1.80 rows lower than left ones");
+  EXPECT_NE(finding.remedy.find("calibrate"), std::string::npos);
+  EXPECT_EQ(check_rows(std::vector<RowOffset>{{-0.1, 90}}).health, Health::kOk);
+  EXPECT_EQ(check_rows({}).health, Health::kWarn);
 }
 
 }  // namespace

@@ -16,6 +16,15 @@ Frame another_place() {
   return {0, 0, images.left.level(0).clone(), images.right.level(0).clone(), {}};
 }
 
+/// The right image so many rows lower.
+Frame with_rows_shifted(const Frame& frame, int rows) {
+  Frame shifted = frame;
+  shifted.right = frame.right.clone();
+  for (int v = 0; v < frame.right.rows; ++v)
+    frame.right.row(std::clamp(v - rows, 0, frame.right.rows - 1)).copyTo(shifted.right.row(v));
+  return shifted;
+}
+
 TEST(Tracker, FindsOnAfterAStepTooWideForItsPrediction) {
   const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
   Odometry odometry(SensorKind::kStereo);
@@ -109,13 +118,22 @@ TEST(Tracker, SaysWhatIsWrongWithThePair) {
   Frame swapped = good;
   std::swap(swapped.left, swapped.right);
   EXPECT_EQ(cause_of(swapped), LostCause::kImagesSwapped);
-  for (const int shift : {-4, -3, 3, 4}) {
-    Frame shifted = good;
-    shifted.right = good.right.clone();
-    for (int v = 0; v < good.right.rows; ++v) {
-      good.right.row(std::clamp(v + shift, 0, good.right.rows - 1)).copyTo(shifted.right.row(v));
+  for (const int shift : {-8, -6, 6, 8})
+    EXPECT_EQ(cause_of(with_rows_shifted(good, shift)), LostCause::kRowsMisaligned) << shift;
+}
+
+TEST(Tracker, TakesBackRowsThatAreSomeApart) {
+  for (const int shift : {-4, -2, -1, 0, 1, 2, 3}) {
+    Odometry odometry(SensorKind::kStereo);
+    for (std::size_t i = 0; i < 20; ++i) {
+      const TrackResult result = odometry.step(with_rows_shifted(frames(SensorKind::kStereo)[i], shift));
+      EXPECT_EQ(odometry.allocations(), 0u) << shift << ", frame " << i;
+      ASSERT_EQ(result.status, TrackStatus::kTracking) << shift << ", frame " << i;
+      EXPECT_LT((odometry.T_c_w(result) * true_T_c_w(static_cast<int>(i)).inverse()).translation().norm(),
+                0.02)
+          << shift << ", frame " << i;
     }
-    EXPECT_EQ(cause_of(shifted), LostCause::kRowsMisaligned) << shift;
+    EXPECT_NEAR(odometry.tracker().row_offset(), shift, 0.13);
   }
 }
 

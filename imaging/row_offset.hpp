@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "imaging/fast_corners.hpp"
+#include "imaging/guided_search.hpp"
+
+namespace twofold {
+
+/// How many rows lower than in the left image a point lies in the right one. None in a rectified pair; a
+/// mount that was bent, or a calibration of another day, makes some.
+struct RowOffset {
+  double rows = 0;
+  int matches = 0;  ///< corners it was measured at
+};
+
+/// Measures it, at corners spread over the image. Buffers are reserved at construction; bounded work.
+class RowOffsetMeter {
+ public:
+  /// Beyond this no offset is looked for [px].
+  static constexpr int kMost = 4;
+
+  /// @param corners  about so many are looked at, 40 to 200
+  RowOffsetMeter(const Rig& rig, int corners);
+
+  /// If the rows are at most about one apart: corners are found along their row, and then aligned across it.
+  /// @return nothing when few corners are found, or where they are found differs too much
+  [[nodiscard]] std::optional<RowOffset> measure(const cv::Mat& left, const cv::Mat& right);
+  /// The same for up to kMost rows: of all whole offsets that with which most corners are found.
+  [[nodiscard]] std::optional<RowOffset> search(const cv::Mat& left, const cv::Mat& right);
+
+ private:
+  std::optional<RowOffset> measure_at(const cv::Mat& left, const cv::Mat& right, int offset);
+
+  Rig rig_;
+  GuidedSearchOptions search_;
+  int cell_px_ = 0, columns_ = 0, rows_ = 0;
+  std::vector<std::uint8_t> occupied_;  ///< nothing is
+  std::vector<Corner> corners_;
+  std::vector<double> offsets_;  ///< of each corner found [px]
+};
+
+/// Moves a right image's rows up by `offset` rows, between whole ones by linear interpolation; beyond the edge
+/// its last row goes on. `out` keeps its memory.
+void take_back_row_offset(const cv::Mat& right, double offset, cv::Mat& out);
+
+}  // namespace twofold
