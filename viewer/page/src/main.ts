@@ -112,6 +112,7 @@ class Page {
 
   /** Whatever is text, a few times a second. */
   private refresh(): void {
+    if (this.stage.drawn === 0) return;  // the picture comes first
     this.sight.draw();
     if (this.playing) this.play();
     if (!this.stale) return;

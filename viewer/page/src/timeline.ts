@@ -28,11 +28,10 @@ export class Timeline {
   onTime: (time: number | null) => void = () => {};
   onEvent: (event: MapEvent) => void = () => {};
   time: number | null = null;
-  private readonly context: CanvasRenderingContext2D;
+  private context: CanvasRenderingContext2D | null = null;  // from the first draw on: the big picture comes first
   private stretches: LostStretch[] = [];
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly tip: HTMLElement, private readonly model: Model) {
-    this.context = canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     let dragging = false;
     canvas.addEventListener('pointerdown', (event) => {
       const hit = this.eventAt(event.offsetX, event.offsetY);
@@ -49,7 +48,7 @@ export class Timeline {
     });
     canvas.addEventListener('pointerup', () => (dragging = false));
     canvas.addEventListener('pointerleave', () => (tip.hidden = true));
-    new ResizeObserver(() => this.draw()).observe(canvas);
+    new ResizeObserver(() => this.context && this.draw()).observe(canvas);
   }
 
   /** Time by `step` seconds; beyond the end is now. */
@@ -103,7 +102,8 @@ export class Timeline {
   }
 
   draw(): void {
-    const {canvas, context: c} = this;
+    const {canvas} = this;
+    const c = (this.context ??= canvas.getContext('2d', {willReadFrequently: true})!);  // not to wait for the big picture
     const scale = Math.min(devicePixelRatio, 2);
     const [w, h] = [canvas.clientWidth, canvas.clientHeight];
     if (canvas.width !== Math.round(w * scale) || canvas.height !== Math.round(h * scale)) {
@@ -122,8 +122,8 @@ export class Timeline {
     c.fillRect(8, line - 2, this.x(this.time ?? end) - 8, 4);
     c.fillStyle = eventColour('lost');
     for (const lost of this.stretches) c.fillRect(this.x(lost.begin), line - 4, Math.max(2, this.x(lost.end) - this.x(lost.begin)), 8);
-    for (const event of this.model.events) this.mark(event);
-    this.ticks(end, line, h, style);
+    for (const event of this.model.events) this.mark(c, event);
+    this.ticks(c, end, line, h, style);
     c.fillStyle = style.getPropertyValue('--text');
     c.beginPath();
     c.arc(this.x(this.time ?? end), line, 6, 0, 2 * Math.PI);
@@ -131,8 +131,7 @@ export class Timeline {
   }
 
   /** What moved the camera far stands high. */
-  private mark(event: MapEvent): void {
-    const c = this.context;
+  private mark(c: CanvasRenderingContext2D, event: MapEvent): void {
     const small = event.kind === 'optimisation';
     c.fillStyle = eventColour(event.kind);
     c.beginPath();
@@ -140,8 +139,7 @@ export class Timeline {
     c.fill();
   }
 
-  private ticks(end: number, line: number, height: number, style: CSSStyleDeclaration): void {
-    const c = this.context;
+  private ticks(c: CanvasRenderingContext2D, end: number, line: number, height: number, style: CSSStyleDeclaration): void {
     const most = Math.max(2, this.width / 90);
     const step = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600].find((s) => end / s <= most) ?? 7200;
     c.fillStyle = style.getPropertyValue('--faint');
