@@ -107,6 +107,21 @@ MapSnapshot map_of_three() {
   return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{{}, version}));
 }
 
+TEST_F(ViewerTest, TellsTheLoopsOfTheMap) {
+  const auto map = [] {
+    auto version = std::make_shared<MapVersion>();
+    ClosedLoop loop;
+    loop.constraint.scale = 1.0625;
+    loop.t_ns = 3'000'000'000;
+    version->loops.loops = std::make_shared<const std::vector<ClosedLoop>>(1, loop);
+    return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{{}, version}));
+  };
+  Viewer viewer(kRig, map, {.port = 0});
+  LocalClient client = watch(viewer);
+  viewer.tell(tracked_pose(0, 0));
+  EXPECT_NE(client.receive_until("\"scale\":1.0625").find("\"kind\":\"loop\""), std::string::npos);
+}
+
 TEST_F(ViewerTest, ShowsTheImageOfAKeyframe) {
   std::vector<std::int64_t> asked;
   const auto recorded = [&asked](std::int64_t t_ns) {

@@ -7,7 +7,7 @@ import {Program, openBrowser, openPage, places, report, until} from './program.m
 
 const [source, folder] = process.argv.slice(2);
 const scratch = mkdtempSync(join(tmpdir(), 'viewer-'));
-const [recording, out, map] = ['recording', 'run', 'courtyard.tfm'].map((name) => join(scratch, name));
+const [recording, out, map] = ['recording', 'run', 'courtyard.tfm'];  // in that folder: their names are in the pictures
 const browser = await openBrowser();
 const picture = (page, name) => page.screenshot({path: join(folder, name), type: 'jpeg', quality: 75});
 
@@ -21,7 +21,7 @@ async function clickKeyframe(page) {
 }
 
 async function live() {
-  const run = new Program(['run', recording, '--speed', '1', '--late', 'drop', '--quiet', '--view', '0', '--save-map', map, '--out', out]);
+  const run = new Program(['run', recording, '--speed', '0.5', '--late', 'drop', '--quiet', '--view', '0', '--save-map', map, '--out', out], scratch);
   const page = await openPage(browser, await run.address());
   await until('keyframes', async () => (await report(page)).keyframes > 5);
   await page.keyboard.press('i');
@@ -31,7 +31,7 @@ async function live() {
 }
 
 async function finished() {
-  const view = new Program(['view', out, '--port', '0']);
+  const view = new Program(['view', out, '--port', '0'], scratch);
   const page = await openPage(browser, await view.address());
   await until('the path', async () => (await report(page)).path > 100);
   await page.keyboard.press('2');
@@ -43,7 +43,7 @@ async function finished() {
 }
 
 async function mapFile() {
-  const view = new Program(['view', map, '--port', '0']);
+  const view = new Program(['view', map, '--port', '0'], scratch);
   const page = await openPage(browser, await view.address());
   await until('the map', async () => (await report(page)).points > 100);
   await page.keyboard.press('t');
@@ -54,7 +54,7 @@ async function mapFile() {
 }
 
 try {
-  const rendering = new Program(['render', source, '--out', recording]);
+  const rendering = new Program(['render', source, '--out', recording], scratch);
   assert.equal(await rendering.end, 0, rendering.text);
   await live();
   await finished();

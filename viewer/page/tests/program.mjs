@@ -19,10 +19,10 @@ export async function until(what, check, ms = 40000) {
 
 /** A running `twofold` that shows itself; `address` when it has said where. */
 export class Program {
-  constructor(args) {
+  constructor(args, cwd = '.') {
     this.text = '';
     this.ended = false;
-    this.process = spawn(TWOFOLD, args, {env: {...process.env, OPENBLAS_NUM_THREADS: '1'}});
+    this.process = spawn(TWOFOLD, args, {cwd, env: {...process.env, OPENBLAS_NUM_THREADS: '1'}});
     for (const stream of [this.process.stdout, this.process.stderr]) stream.on('data', (data) => (this.text += data));
     this.end = new Promise((resolve) => this.process.on('exit', (code) => {
       this.ended = true;
