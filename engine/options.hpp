@@ -20,6 +20,7 @@
 namespace twofold {
 
 struct PoseReport;
+struct ClosedLoop;
 
 /// Told of each frame that was looked at, tracked or lost, as soon as its pose is known. Called on the thread
 /// of the tracker, which goes on when it returns: it must not block, allocate or throw. Its time is a stage
@@ -32,6 +33,8 @@ using PoseListener = std::function<void(const PoseReport&)>;
 using MapListener = std::function<void(const GraphSnapshot& graph, const DoubleWindow& window)>;
 /// The same for how places look, on the loop closer's thread.
 using PlacesListener = std::function<void(const KeyframeDatabase& places)>;
+/// Told of each loop that was recognised, when the mapper is: on the loop closer's thread, too.
+using LoopListener = std::function<void(const ClosedLoop& loop)>;
 
 /// The map as it stands, saved again and again during a run.
 struct CheckpointOptions {
@@ -84,6 +87,7 @@ struct EngineOptions {
   PoseListener on_pose;      ///< may be empty
   MapListener on_map;        ///< likewise
   PlacesListener on_places;  ///< likewise
+  LoopListener on_loop;      ///< likewise
 
   /// For tests of failures: called by the thread of that name ("tracker", "mapper", "loop closer",
   /// "checkpoints") of a threaded run before each of its steps, which fails with what this throws.

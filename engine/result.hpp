@@ -85,6 +85,13 @@ struct FrameRecord {
 }
 static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
 
+/// Where a frame's points were searched: around where this pose, relative to the reference keyframe, puts
+/// them.
+struct SearchRegions {
+  SE3 T_c_ref;
+  double radius_px = 0;  ///< in pixels of each point's pyramid level
+};
+
 /// A frame as soon as its pose is known; valid during the listener's call only.
 struct PoseReport {
   const FrameRecord& record;
@@ -95,6 +102,7 @@ struct PoseReport {
   std::span<const std::int64_t> stage_ns;  ///< what each TrackerStage took
   /// What the pose rests on, outliers included; points in the reference keyframe's frame.
   std::span<const MotionObservation> measured;
+  SearchRegions searched;  ///< for these
 };
 
 /// What the mapper did in all.
@@ -112,6 +120,9 @@ struct ClosedLoop {
   std::int64_t t_ns = 0;     ///< of the frame that came back
   bool joins_parts = false;  ///< there is no drift then: the keyframes had different worlds
   double travelled = 0;      ///< along the keyframes between both, in the unit of T_to_from
+
+  /// (translation, rotation) by which the map was wrong; of loops within a part.
+  [[nodiscard]] Vector6 drift() const { return (constraint.T_to_from * T_to_from_before.inverse()).log(); }
 };
 
 /// What became of EngineOptions::checkpoint.

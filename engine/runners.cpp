@@ -71,6 +71,7 @@ bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortL
   record.effort = effort;
   record.cause = result.cause;
   information_ = result.information;
+  searched_ = {result.T_c_ref_predicted, result.search_radius_px};
   stage_ns_ = result.stage_ns;
   record.snapshot_version = graph.version();
   record.reference = result.reference;
@@ -139,7 +140,8 @@ void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const G
   times_.record(latency_stage_, exposed_ns, record.latency_ns);
   if (!on_pose_) return;
   const ScopedStage timed(times_, listener_stage_);
-  on_pose_({record, graph, correction_, information_, exposed_ns, stage_ns_, tracker_.last_observations()});
+  on_pose_({record, graph, correction_, information_, exposed_ns, stage_ns_, tracker_.last_observations(),
+            searched_});
 }
 
 void TrackerRunner::place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const {
@@ -205,6 +207,7 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
     : rig_(rig),
       mapper_options_(options.mapper),
       on_places_(options.on_places),
+      on_loop_(options.on_loop),
       times_("loop closer", trace) {
   place_stage_ = times_.add_stage("place");
   pose_graph_stage_ = times_.add_stage("pose graph");
@@ -230,6 +233,7 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
     const bool joins = graph.part(loop->from) != graph.part(loop->to);
     loops_.push_back({*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins,
                       joins ? 0 : distance_travelled(graph, loop->from, loop->to)});
+    if (on_loop_) on_loop_(loops_.back());
     (one_camera ? awaited_ : not_optimised_) = loop;
   }
   if (on_places_) on_places_(closer_->places());

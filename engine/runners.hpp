@@ -81,6 +81,7 @@ class TrackerRunner {
   std::vector<PlacedFrame> earlier_;  // grows when one camera starts
   PoseCorrection correction_;
   Matrix6 information_ = Matrix6::Zero();                // of the last step's pose
+  SearchRegions searched_;                               // of the last step
   std::array<std::int64_t, kTrackerStages> stage_ns_{};  // of the last step
   bool answer_awaited_ = false;
   const bool can_relocalise_;
@@ -142,6 +143,7 @@ class LoopCloserRunner {
   Rig rig_;
   MapperOptions mapper_options_;
   PlacesListener on_places_;
+  LoopListener on_loop_;
   std::optional<LoopCloser> closer_;
   const KeyframeDatabase no_places_;
   StageRecorder times_;

@@ -13,17 +13,28 @@ void MapLender::publish(const GraphSnapshot& graph, const DoubleWindow& window) 
   maps_.publish(std::move(map));
 }
 
+void MapLender::publish(const ClosedLoop& loop) {
+  std::vector<ClosedLoop> all = *all_loops_.loops;
+  all.push_back(loop);
+  all_loops_.loops = std::make_shared<const std::vector<ClosedLoop>>(std::move(all));
+  loops_.publish(all_loops_);
+}
+
 std::shared_ptr<const MapVersion> MapLender::newest() {
   const std::scoped_lock lock(borrowers_);
   const MapVersion& map = maps_.mailbox(0).latest();
   const KeyframeDatabase& places = places_.mailbox(0).latest();
+  const LoopList& loops = loops_.mailbox(0).latest();
   std::erase_if(loans_, [](const auto& loan) { return loan.expired(); });
   if (!loans_.empty()) {
     const auto last = loans_.back().lock();
-    if (last && last->version() == map.version() && last->places.version() == places.version()) return last;
+    if (last && last->version() == map.version() && last->places.version() == places.version() &&
+        last->loops.version() == loops.version())
+      return last;
   }
   auto loan = std::make_shared<MapVersion>(map);
   loan->places = places;
+  loan->loops = loops;
   loans_.push_back(loan);
   return loan;
 }

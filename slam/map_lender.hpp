@@ -6,6 +6,7 @@
 #include <mutex>
 #include <vector>
 
+#include "engine/result.hpp"
 #include "engine/snapshot_mailbox.hpp"
 #include "graph/keyframe_database.hpp"
 #include "graph/snapshot.hpp"
@@ -13,12 +14,20 @@
 
 namespace twofold {
 
+/// The loops of a run, in the order they were found. A handle: copies share the list, which never changes.
+struct LoopList {
+  std::shared_ptr<const std::vector<ClosedLoop>> loops = std::make_shared<std::vector<ClosedLoop>>();
+
+  [[nodiscard]] std::uint64_t version() const { return loops->size() + 1; }
+};
+
 /// A map as it is lent out: handles of the versions that were newest then. Never changes.
 struct MapVersion {
   GraphSnapshot graph;
   std::vector<KeyframeId> inner_window;  ///< W1 of the round that made the graph
   std::vector<KeyframeId> outer_window;  ///< W2
   KeyframeDatabase places;
+  LoopList loops;
 
   /// Counts from 1: a map before the first is empty and has graph version 0.
   [[nodiscard]] std::uint64_t version() const { return graph.version() + 1; }
@@ -39,6 +48,8 @@ class MapLender {
   void publish(const KeyframeDatabase& places) {
     if (places.version() > places_.newest()) places_.publish(places);
   }
+  /// Loop closer. O(loops).
+  void publish(const ClosedLoop& loop);
 
   /// Borrowers. O(1). The same object as before, while that is held and nothing newer was published.
   [[nodiscard]] std::shared_ptr<const MapVersion> newest();
@@ -53,6 +64,8 @@ class MapLender {
  private:
   SnapshotPublisher<MapVersion> maps_{1, {}};  // whose places are empty
   SnapshotPublisher<KeyframeDatabase> places_{1, {}};
+  SnapshotPublisher<LoopList> loops_{1, {}};
+  LoopList all_loops_;    // loop closer's
   std::mutex borrowers_;  // guards the readers' ends of both publishers, and loans_
   std::vector<std::weak_ptr<const MapVersion>> loans_;
 };

@@ -121,6 +121,25 @@ std::vector<MapSnapshot::Edge> MapSnapshot::edges() const {
   return edges;
 }
 
+std::vector<MapSnapshot::Loop> MapSnapshot::loops() const {
+  std::vector<Loop> loops;
+  for (const ClosedLoop& from : *impl_->map->loops.loops) {
+    Loop& loop = loops.emplace_back();
+    loop.from = index(from.constraint.from);
+    loop.to = index(from.constraint.to);
+    loop.t_ns = from.t_ns;
+    loop.inliers = from.constraint.inliers;
+    loop.scale = from.constraint.scale;
+    loop.joins_parts = from.joins_parts;
+    if (from.joins_parts) continue;
+    const Vector6 drift = from.drift();
+    loop.drift = drift.head<3>().norm();
+    loop.turned = drift.tail<3>().norm();
+    loop.travelled = from.travelled;
+  }
+  return loops;
+}
+
 std::vector<MapSnapshot::Part> MapSnapshot::parts() const {
   const GraphSnapshot& graph = impl_->map->graph;
   std::vector<Part> parts;

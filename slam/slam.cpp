@@ -35,6 +35,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
       maps.publish(graph, window);
     };
     engine.on_places = [this](const KeyframeDatabase& places) { maps.publish(places); };
+    engine.on_loop = [this](const ClosedLoop& loop) { maps.publish(loop); };
     pipeline_ = make_pipeline(rig_, engine);
   }
 

@@ -31,6 +31,8 @@ struct TrackResult {
   Matrix6 information = Matrix6::Zero();  ///< of T_c_ref, left perturbation (v, omega)
   int candidates = 0;                     ///< points that should be visible
   double reference_in_view = 0;           ///< share of the reference keyframe's points that should be visible
+  SE3 T_c_ref_predicted;                  ///< where points were searched from last
+  double search_radius_px = 0;            ///< around the predictions, in pixels of each point's pyramid level
   int searched = 0;
   int matches = 0;
   int inliers = 0;

@@ -42,6 +42,8 @@ void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& ste
   TrackResult& result = step.result;
   matches_.clear();
   result.searched = 0;
+  result.T_c_ref_predicted = T_c_ref;
+  result.search_radius_px = radius_px;
   GuidedSearchOptions search = options_.search;
   search.refine_iterations = step.bounds.refine_iterations;
   search.radius_px = radius_px;

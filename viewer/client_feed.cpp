@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 
 namespace twofold {
 namespace {
@@ -16,6 +17,17 @@ constexpr std::array<std::pair<std::string_view, ViewCommand>, 4> kCommands{
      {"pause mapping", ViewCommand::kPauseMapping},
      {"resume mapping", ViewCommand::kResumeMapping}}};
 
+/// Of "keyframe 17": digits and nothing else.
+std::optional<std::uint32_t> keyframe_of(std::string_view message) {
+  constexpr std::string_view kWord = "keyframe ";
+  if (!message.starts_with(kWord)) return std::nullopt;
+  message.remove_prefix(kWord.size());
+  std::uint32_t id = 0;
+  const auto [end, error] = std::from_chars(message.data(), message.data() + message.size(), id);
+  if (error != std::errc() || end != message.data() + message.size()) return std::nullopt;
+  return id;
+}
+
 }  // namespace
 
 std::optional<ViewMessage> ClientFeed::next(const ViewSight& sight) {
@@ -26,6 +38,10 @@ std::optional<ViewMessage> ClientFeed::next(const ViewSight& sight) {
   }
   if (unacknowledged_ >= kUnacknowledged) return std::nullopt;
   std::optional<ViewMessage> message = next_text();
+  if (!message && wanted_keyframe_ && sight.keyframe == *wanted_keyframe_) {
+    wanted_keyframe_.reset();
+    message = ViewMessage{sight.keyframe_image.bytes};
+  }
   if (!message) message = newer(sight.measured, measured_);
   if (!message) {
     if (auto frames = next_frames()) {
@@ -101,6 +117,10 @@ bool ClientFeed::take(std::string_view message) {
   if (message == "ack") return --unacknowledged_ >= 0;
   if (message == "images on" || message == "images off") {
     wants_images_ = message == "images on";
+    return true;
+  }
+  if (const auto keyframe = keyframe_of(message); keyframe && title_.keyframe_images) {
+    wanted_keyframe_ = keyframe;
     return true;
   }
   const auto command = std::find_if(kCommands.begin(), kCommands.end(),

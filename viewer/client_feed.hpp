@@ -28,9 +28,12 @@ struct NewestMessage {
   }
 };
 
-/// What the camera sees: an image, and what was measured in one.
+/// What the camera sees: an image, and what was measured in one; and what it saw at the keyframe that
+/// somebody asked for last.
 struct ViewSight {
   NewestMessage image, measured;
+  std::uint32_t keyframe = kNoId;
+  NewestMessage keyframe_image = {};
 };
 
 /// What one client is to get next. Nothing waits in a queue: each message is made when the one before has
@@ -54,6 +57,8 @@ class ClientFeed {
   [[nodiscard]] std::optional<ViewCommand> take_command() { return std::exchange(command_, std::nullopt); }
 
   [[nodiscard]] bool wants_images() const { return wants_images_; }
+  /// The keyframe whose image the client waits for; it waits for one at a time.
+  [[nodiscard]] std::optional<std::uint32_t> wanted_keyframe() const { return wanted_keyframe_; }
   /// The scene will not change any more, and why: told at once, before what the client still lacks.
   void end(std::string message) { last_words_ = std::move(message); }
   /// That was handed out, and everything there is.
@@ -76,6 +81,7 @@ class ClientFeed {
   std::size_t piece_ = 0;                   // of delta_, to be sent next
   std::uint64_t image_ = 0, measured_ = 0;  // numbers of those sent last
   bool wants_images_ = false;
+  std::optional<std::uint32_t> wanted_keyframe_;
   std::optional<ViewCommand> command_;
   std::optional<std::string> last_words_;
   bool told_end_ = false;

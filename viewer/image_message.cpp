@@ -4,8 +4,6 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "viewer/wire_format.hpp"
-
 namespace twofold {
 namespace {
 
@@ -19,16 +17,22 @@ cv::Mat mat_of(const ImageView& image) {
           static_cast<std::size_t>(image.stride)};
 }
 
-}  // namespace
-
-std::string image_message(std::int64_t frame, const ImageView& image) {
+std::vector<std::uint8_t> jpeg_of(const ImageView& image) {
   cv::Mat shown = mat_of(image);
   if (image.width > kWidth)
     cv::resize(shown, shown, {kWidth, image.height * kWidth / image.width}, 0, 0, cv::INTER_AREA);
   if (image.format == ImageFormat::kRgb8) cv::cvtColor(shown, shown, cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> jpeg;
   cv::imencode(".jpg", shown, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
-  const ViewMessageHeader header{ViewMessageKind::kImage, static_cast<std::uint32_t>(frame),
+  return jpeg;
+}
+
+}  // namespace
+
+std::string image_message(ViewMessageKind kind, std::int64_t number, const ImageView& image) {
+  std::vector<std::uint8_t> jpeg;
+  if (image.data != nullptr) jpeg = jpeg_of(image);
+  const ViewMessageHeader header{kind, static_cast<std::uint32_t>(number),
                                  static_cast<std::uint32_t>(image.width),
                                  static_cast<std::uint32_t>(image.height)};
   std::string message(reinterpret_cast<const char*>(&header), sizeof header);

@@ -4,10 +4,13 @@
 #include <string>
 
 #include "twofold/types.hpp"
+#include "viewer/wire_format.hpp"
 
 namespace twofold {
 
-/// The image as a message of the protocol (wire_format.hpp): a JPEG, 480 pixels wide at most.
-[[nodiscard]] std::string image_message(std::int64_t frame, const ImageView& image);
+/// The image as a message of the protocol (wire_format.hpp): a JPEG, 480 pixels wide at most; without pixels,
+/// nothing.
+/// @param number  frame, or keyframe, as `kind` has it
+[[nodiscard]] std::string image_message(ViewMessageKind kind, std::int64_t number, const ImageView& image);
 
 }  // namespace twofold

@@ -211,6 +211,26 @@ void ViewScene::add(ViewEvent event) {
   ++end_event_;
 }
 
+void ViewScene::add_loops(const std::vector<MapSnapshot::Loop>& loops) {
+  for (; loops_ < loops.size(); ++loops_) {
+    const MapSnapshot::Loop& loop = loops[loops_];
+    begin(loop.t_ns);
+    ViewEvent event;
+    event.kind = "loop";
+    event.t = seconds(loop.t_ns);
+    event.keyframe = loop.to;
+    event.moved = loop.drift;
+    event.turned = loop.turned;
+    event.loop = loop;
+    if (const ViewKeyframe* came_back = keyframes_.find(loop.to)) {
+      event.frame = came_back->frame;
+      event.part = event.part_before = came_back->part;
+      for (std::size_t k = 0; k < 3; ++k) event.before[k] = event.after[k] = came_back->position[k];
+    }
+    add(std::move(event));
+  }
+}
+
 void ViewScene::show(const ViewMap& map) {
   const Revision next = revision_ + 1;
   rebind_path(map.keyframes, next);

@@ -57,6 +57,9 @@ struct ViewEvent {
   double moved = 0;                         ///< [m]
   double turned = 0;                        ///< [rad]
   std::array<double, 3> before{}, after{};  ///< the camera's positions [m]
+  /// Of loops: `keyframe` came back to what the map has there; `moved` and `turned` are by how much the map
+  /// was wrong.
+  std::optional<MapSnapshot::Loop> loop = {};
 };
 
 /// Sets `in_reference` and `turned`.
@@ -76,6 +79,8 @@ class ViewScene {
   void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns, std::size_t waiting = 0);
   void add(const MapEvent& event);
   void add(ViewEvent event);
+  /// Loops of a map that were not told yet become events. Those of one map begin as those of the one before.
+  void add_loops(const std::vector<MapSnapshot::Loop>& loops);
   void add(const ViewPathFrame& frame);
   void set_truth(ViewTruth truth) { truth_ = std::move(truth); }
   /// The map is now this.
@@ -134,6 +139,7 @@ class ViewScene {
   std::deque<ViewLiveFrame> live_;
   std::deque<ViewEvent> events_;
   std::uint64_t end_live_ = 0, end_event_ = 0;
+  std::size_t loops_ = 0;  // told
   std::vector<std::string> reasons_{""};
   std::optional<std::int64_t> start_ns_;
   std::optional<ViewTruth> truth_;

@@ -327,6 +327,7 @@ class ViewServer::Impl {
     for (const auto& viewer : viewers_) {
       audience.wants_images |= viewer->feed().wants_images();
       if (const auto command = viewer->feed().take_command()) audience.commands.push_back(*command);
+      if (const auto keyframe = viewer->feed().wanted_keyframe()) audience.keyframes.push_back(*keyframe);
     }
     tick(audience, hall_.sight);
     for (const auto& viewer : viewers_) viewer->write();

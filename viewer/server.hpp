@@ -39,8 +39,9 @@ class ViewServer {
   struct Audience {
     std::size_t viewers = 0;
     bool wants_images = false;
-    bool is_last = false;                    ///< the last call
-    std::vector<ViewCommand> commands = {};  ///< since the call before
+    bool is_last = false;                       ///< the last call
+    std::vector<ViewCommand> commands = {};     ///< since the call before
+    std::vector<std::uint32_t> keyframes = {};  ///< whose images viewers wait for
   };
   /// Called every 10 ms while somebody is looking, else every 100 ms: brings the scene up to date.
   using Tick = std::function<void(const Audience&, ViewSight& newest)>;

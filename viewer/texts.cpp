@@ -12,11 +12,18 @@ Json json_of(const CameraRig& rig) {
           {"fy", rig.fy},       {"cx", rig.cx},         {"cy", rig.cy}};
 }
 
+Json json_of(const MapSnapshot::Loop& loop) {
+  return {{"from", loop.from},   {"to", loop.to},           {"joinsParts", loop.joins_parts},
+          {"scale", loop.scale}, {"inliers", loop.inliers}, {"travelled", loop.travelled}};
+}
+
 Json json_of(const ViewEvent& event) {
-  return {{"kind", event.kind},     {"text", event.text},         {"frame", event.frame},
-          {"t", event.t},           {"keyframe", event.keyframe}, {"partBefore", event.part_before},
-          {"part", event.part},     {"moved", event.moved},       {"turned", event.turned},
-          {"before", event.before}, {"after", event.after}};
+  return {{"kind", event.kind},         {"text", event.text},
+          {"frame", event.frame},       {"t", event.t},
+          {"keyframe", event.keyframe}, {"partBefore", event.part_before},
+          {"part", event.part},         {"moved", event.moved},
+          {"turned", event.turned},     {"before", event.before},
+          {"after", event.after},       {"loop", event.loop ? json_of(*event.loop) : Json()}};
 }
 
 /// Names of files may hold bytes that are no UTF-8.
@@ -36,6 +43,7 @@ std::string hello_text(const ViewTitle& title) {
                     {"live", title.live},
                     {"hasDeviations", title.has_deviations},
                     {"control", title.control},
+                    {"keyframeImages", title.keyframe_images},
                     {"periodMs", title.period_ms}}}});
 }
 

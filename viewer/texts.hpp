@@ -17,6 +17,7 @@ struct ViewTitle {
   bool live = true;                      ///< else finished: there is a time slider and nothing to come
   bool has_deviations = false;           ///< of points
   bool control = false;                  ///< viewers may command
+  bool keyframe_images = false;          ///< viewers may ask for images of keyframes
   double period_ms = 0;                  ///< between two frames: the budget; 0: as the frames' times say
 };
 

@@ -14,6 +14,7 @@
 #include "engine/spsc_ring.hpp"
 #include "engine/worker.hpp"
 #include "viewer/image_message.hpp"
+#include "viewer/keyframe_images.hpp"
 #include "viewer/server.hpp"
 #include "viewer/truth.hpp"
 
@@ -52,6 +53,7 @@ ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   title.stages = options.stages;
   title.period_ms = 1e3 * options.frame_period;
   title.control = static_cast<bool>(options.on_command);
+  title.keyframe_images = static_cast<bool>(options.recorded_image);
   return title;
 }
 
@@ -75,6 +77,18 @@ std::string measured_message(const ToldPoints& told) {
   std::string message(reinterpret_cast<const char*>(&header), sizeof header);
   message.append(reinterpret_cast<const char*>(told.points.data()), told.count * sizeof(ViewedPoint));
   return message;
+}
+
+/// Images of keyframes by their time stamps; empty when there are none.
+KeyframeImages::Find find_images(const std::function<MapSnapshot()>& map, const ViewerOptions& options) {
+  if (!map || !options.recorded_image) return {};
+  return [map, recorded = options.recorded_image](std::uint32_t id) {
+    const auto keyframes = map().keyframes();
+    const auto at = std::lower_bound(
+        keyframes.begin(), keyframes.end(), id,
+        [](const MapSnapshot::Keyframe& keyframe, std::uint32_t wanted) { return keyframe.id < wanted; });
+    return at != keyframes.end() && at->id == id ? recorded(at->t_ns) : ViewedImage();
+  };
 }
 
 /// Done, or why it could not be.
@@ -109,6 +123,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
       : map_(std::move(map)),
         options_(options),
         title_(title_of(rig, options)),
+        keyframe_images_(find_images(map_, options_)),
         server_({options.bind, options.port}, scene_, title_) {
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
@@ -129,11 +144,13 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   }
   /// The newest image wins; the older is freed here.
   void put(HeldImage* image) {
-    wants_image_.store(false, std::memory_order_relaxed);
     shown_[images_++ % shown_.size()].store(image->frame, std::memory_order_relaxed);
     delete image_.exchange(image, std::memory_order_acq_rel);
   }
-  bool wants_image() const { return wants_image_.load(std::memory_order_relaxed); }
+  bool wants_image() const {
+    const bool taken = image_.load(std::memory_order_acquire) == nullptr;
+    return taken && wants_image_.load(std::memory_order_relaxed);
+  }
   bool has_shown(std::int64_t frame) const {
     return std::any_of(shown_.begin(), shown_.end(),
                        [frame](const auto& shown) { return shown.load(std::memory_order_relaxed) == frame; });
@@ -154,6 +171,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     for (const ViewCommand command : audience.commands) obey(command);
     look_at_map(audience);
     look_at_image(audience.wants_images, newest.image);
+    keyframe_images_.answer(audience.keyframes, steady_now_ns(), newest);
     ToldPoints points;
     while (points_.try_pop(points)) newest.measured.put(measured_message(points));
   }
@@ -205,6 +223,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     } else if (map.version() != scene_.map_version()) {
       scene_.show(view_of(map, *scene_.start_ns(), false));
     }
+    scene_.add_loops(map.loops());
     const std::int64_t now_ns = steady_now_ns();
     const std::int64_t rest_ns = kMapShare * (thread_cpu_ns() - begin_cpu_ns);
     map_due_ns_ = now_ns + std::max(kMapPeriodNs, rest_ns);
@@ -214,16 +233,17 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   void look_at_image(bool wanted, NewestMessage& newest) {
     const std::int64_t now_ns = steady_now_ns();
     if (!wanted || now_ns < image_due_ns_) return;
+    wants_image_.store(false, std::memory_order_relaxed);
     const std::unique_ptr<HeldImage> image(image_.exchange(nullptr, std::memory_order_acq_rel));
-    wants_image_.store(image == nullptr, std::memory_order_relaxed);
-    if (image == nullptr) return;
+    if (image == nullptr) return wants_image_.store(true, std::memory_order_relaxed);
     image_due_ns_ = now_ns + kImagePeriodNs;
-    newest.put(image_message(image->frame, image->pixels));
+    newest.put(image_message(ViewMessageKind::kImage, image->frame, image->pixels));
   }
 
   const std::function<MapSnapshot()> map_;
   const ViewerOptions options_;
   const ViewTitle title_;
+  KeyframeImages keyframe_images_;
   ViewScene scene_;
   ViewServer server_;
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
@@ -233,7 +253,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   // Exchanged by both ends, each with acquire and release: pixels written before are seen by whoever takes
   // them, and whoever frees them comes after their last reader.
   std::atomic<HeldImage*> image_{nullptr};
-  std::atomic<bool> wants_image_{false};  // relaxed: a wish; it publishes nothing
+  // The viewer's thread alone writes it. Relaxed: that the wish has ended is seen by whoever sees, by
+  // acquire, that image_ was taken; that it has begun publishes nothing.
+  std::atomic<bool> wants_image_{false};
   // Frames whose images were put last. Relaxed: who is late in seeing one shows it without its points.
   std::array<std::atomic<std::int64_t>, 16> shown_;
   std::size_t images_ = 0;               // the source's

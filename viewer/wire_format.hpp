@@ -11,19 +11,21 @@ namespace twofold {
 //
 // Binary messages begin with a header:
 //   u32 kind      ViewMessageKind
-//   u32 number    kDelta: ViewDeltaFlags; kFrames: how many; kImage, kMeasured: frame number
-//   u32 a, b      kDelta: revisions it leads from and to; kImage: width and height of the whole image [px];
-//   else 0
+//   u32 number    kDelta: ViewDeltaFlags; kFrames: how many; kImage, kMeasured: frame number;
+//                 kKeyframeImage: keyframe
+//   u32 a, b      kDelta: revisions it leads from and to; kImage, kKeyframeImage: width and height of the
+//                 whole image [px]; else 0
 // and go on with
 //   kDelta   blocks: u32 ViewBlock, u32 count, then the records, or, of what is gone, its keys
 //   kFrames  ViewLiveFrame, in the order of time
 //   kImage   a JPEG
+//   kKeyframeImage  likewise; nothing: it has none
 //   kMeasured  ViewedPoint (twofold/viewer.hpp); comes before the frame itself
 // Text messages are JSON: an object with one of the members hello, reasons, truth, events, status
 // (viewer/texts.hpp).
 //
-// The page says "ack" for each message, "images on", "images off", and, where hello.control is true, "save
-// map", "stop", "pause mapping", "resume mapping".
+// The page says "ack" for each message, "images on", "images off", where hello.keyframeImages is true
+// "keyframe ID", and, where hello.control is true, "save map", "stop", "pause mapping", "resume mapping".
 //
 // A revision counts changes of the scene. A delta from revision 0 is the whole of it, and makes the page
 // forget what it had. One that is large comes in several messages; the last has kLast, and until then `from`
@@ -32,10 +34,16 @@ namespace twofold {
 // Worlds are those of map parts; poses are T_world_camera [m]; times are seconds since the scene's first
 // moment.
 
-inline constexpr std::uint32_t kViewProtocol = 2;
+inline constexpr std::uint32_t kViewProtocol = 3;
 static_assert(std::endian::native == std::endian::little, "records are sent as they lie in memory");
 
-enum class ViewMessageKind : std::uint32_t { kDelta = 1, kFrames = 2, kImage = 3, kMeasured = 4 };
+enum class ViewMessageKind : std::uint32_t {
+  kDelta = 1,
+  kFrames = 2,
+  kImage = 3,
+  kMeasured = 4,
+  kKeyframeImage = 5
+};
 
 enum ViewDeltaFlags : std::uint32_t { kWhole = 1, kLast = 2 };
 
@@ -106,7 +114,7 @@ struct ViewPathFrame {
   std::uint32_t reference = 0;  ///< keyframe; none: final is causal
   std::uint32_t part = 0;
   std::uint8_t state = 0;   ///< TrackingState
-  std::uint8_t reason = 0;  ///< why it is lost: index into the newest "reasons"
+  std::uint8_t reason = 0;  ///< why it is lost, or late in a finished run: index into the newest "reasons"
   std::uint8_t keyframe = 0;
   std::uint8_t effort = 0;
   float latency_ms = 0;

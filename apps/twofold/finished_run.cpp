@@ -8,10 +8,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "apps/twofold/live_view.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/ply.hpp"
 #include "io/files/trajectory_file.hpp"
+#include "io/sources/recorded_images.hpp"
 #include "slam/conversions.hpp"
 #include "slam/map_snapshot.hpp"
 #include "viewer/truth.hpp"
@@ -121,16 +123,31 @@ Json read_json(const std::filesystem::path& file) {
   return json;
 }
 
+/// Entries of one of the summary's lists by the numbers of their frames.
+std::map<std::int64_t, Json> by_frame(const Json& summary, const char* list) {
+  std::map<std::int64_t, Json> entries;
+  for (const Json& entry : summary.value(list, Json::array()))
+    entries.emplace(entry.value("frame", -1), entry);
+  return entries;
+}
+
 /// Frames in the order of their numbers: the summary says which were lost, why, and how long after the one
-/// before.
-void add_path(const Trajectory& poses, const PathBuilder& builder, const Json& summary, ViewScene& scene) {
-  std::map<std::int64_t, Json> lost;
-  for (const Json& entry : summary.value("why_lost", Json::array()))
-    lost.emplace(entry.value("frame", -1), entry);
+/// before; and which were late, or dropped. Keyframes get their frames' numbers.
+void add_path(const Trajectory& poses, const PathBuilder& builder, const Json& summary,
+              std::vector<ViewKeyframe>& keyframes, ViewScene& scene) {
+  const auto lost = by_frame(summary, "why_lost");
+  const auto late = by_frame(summary, "why_late");
+  const auto was_dropped = [&late](std::uint32_t number) {
+    const auto entry = late.find(number);
+    return entry != late.end() && !entry->second.contains("latency_ms");
+  };
   std::uint32_t number = 0;
   float t = 0;
   for (const TimedPose& pose : poses) {
-    for (auto entry = lost.find(number); entry != lost.end(); entry = lost.find(++number)) {
+    for (;; ++number) {
+      if (was_dropped(number)) continue;
+      const auto entry = lost.find(number);
+      if (entry == lost.end()) break;
       ViewPathFrame frame;
       frame.frame = number;
       frame.t = t += static_cast<float>(1e-3 * entry->second.value("ms_since_previous", 0.0));
@@ -139,8 +156,13 @@ void add_path(const Trajectory& poses, const PathBuilder& builder, const Json& s
       frame.reason = scene.reason_number(entry->second.value("cause", "").c_str());
       scene.add(frame);
     }
-    const ViewPathFrame frame = builder.tracked(number++, pose);
+    ViewPathFrame frame = builder.tracked(number++, pose);
+    if (const auto entry = late.find(frame.frame); entry != late.end()) {
+      frame.latency_ms = entry->second.value("latency_ms", 0.0F);
+      frame.reason = scene.reason_number(entry->second.value("cause", "").c_str());
+    }
     t = frame.t;
+    if (frame.keyframe != 0) keyframes[frame.reference].frame = frame.frame;
     scene.add(frame);
   }
 }
@@ -168,7 +190,51 @@ void add_events(const Json& summary, const Trajectory& poses, std::int64_t start
   }
 }
 
+void add_loops(const Json& summary, const Trajectory& keyframes, std::int64_t start_ns, ViewScene& scene) {
+  std::vector<MapSnapshot::Loop> loops;
+  for (const Json& from : summary.value("closed_loops", Json::array())) {
+    MapSnapshot::Loop& loop = loops.emplace_back();
+    loop.t_ns = from.value("t_ns", start_ns);
+    const auto number = [&from](const char* key) {  // null where there is none
+      const auto value = from.find(key);
+      return value != from.end() && value->is_number() ? value->get<double>() : 0.0;
+    };
+    loop.inliers = from.value("inliers", 0);
+    loop.scale = from.value("scale", 1.0);
+    loop.joins_parts = from.value("joins_parts", false);
+    loop.drift = number("drift_m");
+    loop.turned = number("drift_rad");
+    loop.travelled = number("travelled_m");
+    // The page numbers the keyframes that are left, the run numbered all.
+    const auto to = std::lower_bound(keyframes.begin(), keyframes.end(), loop.t_ns,
+                                     [](const TimedPose& k, std::int64_t t_ns) { return k.t_ns < t_ns; });
+    if (to != keyframes.end() && to->t_ns == loop.t_ns)
+      loop.to = static_cast<std::uint32_t>(to - keyframes.begin());
+  }
+  scene.add_loops(loops);
+}
+
+/// Of the run's recording, or of the one that it was made of.
+RecordedImages recorded_images(const Json& summary) {
+  const Json recording = summary.value("recording", Json());
+  if (recording.is_string()) return images_of_recording("euroc:" + recording.get<std::string>(), {});
+  return images_of_recording(summary.value("source", ""), {});
+}
+
 }  // namespace
+
+KeyframeImages::Find images_of_run(const std::filesystem::path& folder) {
+  try {
+    const RecordedImages images = recorded_images(read_json(folder / "summary.json"));
+    if (!images) return {};
+    return [images, keyframes = read_tum_trajectory(folder / "keyframes.txt")](std::uint32_t keyframe) {
+      return keyframe < keyframes.size() ? viewed_image(images(keyframes[keyframe].t_ns)) : ViewedImage();
+    };
+  } catch (
+      const std::runtime_error&) {  // moved, deleted, or in need of a calibration that only the run was given
+    return {};
+  }
+}
 
 void show_finished_run(const std::filesystem::path& folder, ViewScene& scene, ViewTitle& title) {
   const Json summary = read_json(folder / "summary.json");
@@ -178,12 +244,14 @@ void show_finished_run(const std::filesystem::path& folder, ViewScene& scene, Vi
   const std::int64_t start_ns = poses.front().t_ns;
   scene.begin(start_ns);
   title.title = fmt::format("{} ({})", folder.filename().string(), summary.value("source", ""));
-  scene.show({1, points_of(read_ply(folder / "map.ply")), keyframes_of(keyframes, start_ns),
-              read_edges(folder / "edges.txt", keyframes.size())});
   add_truth(folder / "groundtruth.txt", poses.front(), scene);
   const PathBuilder builder(keyframes, read_tum_trajectory(folder / "trajectory_causal.txt"), start_ns);
-  add_path(poses, builder, summary, scene);
+  std::vector<ViewKeyframe> shown = keyframes_of(keyframes, start_ns);
+  add_path(poses, builder, summary, shown, scene);
+  scene.show({1, points_of(read_ply(folder / "map.ply")), std::move(shown),
+              read_edges(folder / "edges.txt", keyframes.size())});
   add_events(summary, poses, start_ns, scene);
+  add_loops(summary, keyframes, start_ns, scene);
 }
 
 void show_map_file(const std::filesystem::path& file, ViewScene& scene, ViewTitle& title) {

@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
 
@@ -73,8 +75,19 @@ void print_view_address(const std::string& address, bool is_open_to_network) {
   }
 }
 
+ViewedImage viewed_image(const cv::Mat& image) {
+  if (image.empty()) return {};
+  cv::Mat shown = image;
+  if (image.channels() == 3) cv::cvtColor(image, shown, cv::COLOR_BGR2RGB);
+  const auto owner = std::make_shared<const cv::Mat>(shown);
+  return {{owner->data, owner->cols, owner->rows, static_cast<std::ptrdiff_t>(owner->step),
+           image.channels() == 3 ? ImageFormat::kRgb8 : ImageFormat::kGrey8},
+          owner};
+}
+
 LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
-                   const std::filesystem::path& folder, const FrameSource& source, EngineOptions& options)
+                   const std::filesystem::path& folder, const FrameSource& source,
+                   const RecordedImages& images, EngineOptions& options)
     : rig_(source.rig()), map_file_(folder / "map.tfm") {
   if (!arguments.port) {
     if (arguments.control) throw IoError("--view-control", "needs --view");
@@ -85,6 +98,7 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
   };
   ViewerOptions viewer = viewer_options(arguments, title, source);
   if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
+  if (images) viewer.recorded_image = [images](std::int64_t t_ns) { return viewed_image(images(t_ns)); };
   measured_.reserve(kMostMeasured);
   try {
     viewer_ = std::make_unique<Viewer>(to_camera_rig(rig_), newest_map, viewer);
@@ -103,6 +117,8 @@ void LiveView::listen(EngineOptions& options) {
            }));
   options.on_places = both(options.on_places,
                            PlacesListener([this](const KeyframeDatabase& places) { maps_.publish(places); }));
+  options.on_loop =
+      both(options.on_loop, LoopListener([this](const ClosedLoop& loop) { maps_.publish(loop); }));
   options.mapping_paused = &mapping_paused_;
 }
 
@@ -115,11 +131,16 @@ void LiveView::tell(const PoseReport& report) {
   if (pose.state == TrackingState::kTracked && viewer_->wants_points(pose.frame)) {
     measured_.clear();
     const SE3 T_c_ref = report.record.T_c_ref.unpacked();
+    const double level_0 = rig_.information(Eigen::Vector3f::Zero(), 0)[0];
     for (const MotionObservation& found :
          report.measured.first(std::min(report.measured.size(), kMostMeasured))) {
       const Vector2 expected = rig_.camera.project(T_c_ref * found.x_ref);
+      const Vector2 predicted = rig_.camera.project(report.searched.T_c_ref * found.x_ref);
+      const double level_size = std::sqrt(level_0 / found.information[0]);  // a pixel of its pyramid level
       measured_.push_back({found.z[0], found.z[1], static_cast<float>(expected.x()),
-                           static_cast<float>(expected.y()), found.inlier ? 1U : 0U});
+                           static_cast<float>(expected.y()), found.inlier ? 1U : 0U,
+                           static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
+                           static_cast<float>(report.searched.radius_px * level_size)});
     }
     viewer_->tell(pose.frame, measured_);
   }
@@ -148,9 +169,8 @@ std::string LiveView::obey(ViewCommand command) {
 
 void LiveView::show(const Frame& frame) {
   if (!viewer_ || !viewer_->wants_image()) return;
-  const auto owner = std::make_shared<const cv::Mat>(frame.left);
-  viewer_->show(frame.index,
-                {owner->data, owner->cols, owner->rows, static_cast<std::ptrdiff_t>(owner->step), {}}, owner);
+  ViewedImage image = viewed_image(frame.left);
+  viewer_->show(frame.index, image.pixels, std::move(image.owner));
 }
 
 void LiveView::show(const Progress& progress) {

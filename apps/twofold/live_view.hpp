@@ -11,6 +11,7 @@
 #include "engine/engine.hpp"
 #include "engine/options.hpp"
 #include "io/sources/frame_source.hpp"
+#include "io/sources/recorded_images.hpp"
 #include "slam/map_lender.hpp"
 #include "slam/pose_reporter.hpp"
 #include "twofold/viewer.hpp"
@@ -28,6 +29,8 @@ struct ViewArguments {
 
 /// --view [PORT], --view-bind and --view-control.
 void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description);
+/// For those who look at it.
+[[nodiscard]] ViewedImage viewed_image(const cv::Mat& image);
 /// The address and, when others can reach it, a warning.
 void print_view_address(const std::string& address, bool is_open_to_network);
 
@@ -37,8 +40,9 @@ class LiveView {
   /// Adds its listeners to those of `options`, which are called as before. Throws IoError when the port is
   /// not to be had or the program was built without the viewer.
   /// @param folder  where viewers may save the map to
+  /// @param images  of frames that were played; may be empty
   LiveView(const ViewArguments& arguments, const std::string& title, const std::filesystem::path& folder,
-           const FrameSource& source, EngineOptions& options);
+           const FrameSource& source, const RecordedImages& images, EngineOptions& options);
 
   /// The reader's thread, with each frame it reads.
   void show(const Frame& frame);

@@ -92,6 +92,13 @@ int run_with_filter(const RunArguments& arguments) {
   return kOk;
 }
 
+/// Of keyframes that a viewer clicks.
+RecordedImages images_to_look_at(const RunArguments& arguments) {
+  if (!arguments.view.port) return {};
+  if (!arguments.record.empty()) return images_being_recorded(arguments.record);
+  return images_of_recording(arguments.source, source_options_of(arguments).calibration);
+}
+
 FrameFeed feed_from(FrameSource& source, LiveView& view, LiveSurface& surface) {
   return [&](Frame& frame) {
     switch (source.next(frame)) {
@@ -149,7 +156,8 @@ int run(const RunArguments& arguments) {
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   options.on_pose = poses.listener();
-  LiveView view(arguments.view, arguments.source, arguments.out, *source, options);
+  LiveView view(arguments.view, arguments.source, arguments.out, *source, images_to_look_at(arguments),
+                options);
   LiveSurface surface(arguments.surface, *source, options, options.deterministic || schedule.has_value());
   ProgressLine line(source->frame_count(), arguments.quiet);
   const FrameFeed feed = feed_from(*source, view, surface);
@@ -173,7 +181,7 @@ int run(const RunArguments& arguments) {
   }
   std::optional<SurfaceFigures> figures;
   if (surface.wanted()) figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id);
-  write_run_output(arguments.out, arguments.source, *source, options, result, parts,
+  write_run_output(arguments.out, {arguments.source, arguments.record}, *source, options, result, parts,
                    figures ? surface_json(*figures) : nullptr);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, options, result, parts);

@@ -91,8 +91,8 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
 
 }  // namespace
 
-void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
-                      const FrameSource& source, const EngineOptions& options, const RunResult& result,
+void write_run_output(const std::filesystem::path& folder, const RunFrames& frames, const FrameSource& source,
+                      const EngineOptions& options, const RunResult& result,
                       const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface) {
   const Trajectory& final_poses = parts.front().trajectory;
   const Trajectory causal_poses = causal_trajectory(result);
@@ -109,14 +109,16 @@ void write_run_output(const std::filesystem::path& folder, const std::string& so
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
   const bool no_scale = scale_is_arbitrary(source.rig(), options);
-  nlohmann::ordered_json summary = summary_json(source_text, options, result, parts);
+  nlohmann::ordered_json summary = summary_json(frames.source, options, result, parts);
   summary["scale"] = no_scale ? "arbitrary" : "metric";
   summary["surface"] = surface;
+  summary["recording"] = nullptr;
+  if (!frames.recording.empty()) summary["recording"] = std::filesystem::absolute(frames.recording).string();
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",
-              draw_run(source_text, final_poses, causal_poses, source.ground_truth(),
+              draw_run(frames.source, final_poses, causal_poses, source.ground_truth(),
                        no_scale ? Alignment::kSim3 : Alignment::kSe3));
   }
 }
@@ -153,7 +155,7 @@ void print_loops(const RunResult& result) {
       fmt::print("loop        keyframes {} and {}: joins two map parts\n", from, to);
       continue;
     }
-    const Vector6 drift = (loop.constraint.T_to_from * loop.T_to_from_before.inverse()).log();
+    const Vector6 drift = loop.drift();
     const double moved = drift.head<3>().norm();
     fmt::print(
         "loop        keyframes {} and {}: drift {:.4f} ({:.3f} % of {:.1f} travelled), {:.2f} degrees, "

@@ -12,13 +12,19 @@
 
 namespace twofold {
 
+/// Where a run's frames came from, and went to.
+struct RunFrames {
+  std::string source;     ///< as given
+  std::string recording;  ///< folder; empty: they were not recorded
+};
+
 /// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, groundtruth.txt if
 /// known (all TUM form), map.ply, timing.json, loop_latency.txt, summary.json, trajectory.png
 /// (schedule.log is there already: RunLogs); trajectory, keyframes and map of parts that never joined the
 /// first (map_parts) as trajectory-2.txt and so on. Throws IoError when it cannot.
 /// @param surface  what summary.json says of the surface; null: there is none
-void write_run_output(const std::filesystem::path& folder, const std::string& source_text,
-                      const FrameSource& source, const EngineOptions& options, const RunResult& result,
+void write_run_output(const std::filesystem::path& folder, const RunFrames& frames, const FrameSource& source,
+                      const EngineOptions& options, const RunResult& result,
                       const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface = nullptr);
 
 /// Of an earlier run into the folder, what is written at the end only: should this run be killed, its folder

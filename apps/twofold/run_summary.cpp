@@ -72,7 +72,7 @@ Json late_and_lost(const PacingOptions& pacing, const RunResult& result) {
 Json loops_json(const RunResult& result) {
   Json loops = Json::array();
   for (const ClosedLoop& loop : result.loops) {
-    const Vector6 drift = (loop.constraint.T_to_from * loop.T_to_from_before.inverse()).log();
+    const Vector6 drift = loop.drift();
     const Json travelled = loop.joins_parts ? Json() : Json(loop.travelled);
     loops.push_back({{"t_ns", loop.t_ns},
                      {"from", index(loop.constraint.from)},

@@ -6,6 +6,7 @@
 #include "apps/twofold/finished_run.hpp"
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/live_view.hpp"
+#include "engine/clock.hpp"
 #include "io/files/io_error.hpp"
 #include "viewer/server.hpp"
 
@@ -18,7 +19,8 @@ struct FileViewArguments {
 };
 
 /// Until the program is interrupted.
-void serve(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title) {
+void serve(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title,
+           KeyframeImages images) {
   std::unique_ptr<ViewServer> server;
   try {
     server = std::make_unique<ViewServer>(options, scene, title);
@@ -28,7 +30,8 @@ void serve(const ViewServerOptions& options, const ViewScene& scene, const ViewT
   print_view_address(server->address(), server->is_open_to_network());
   catch_interrupts();
   std::stop_source stop;
-  const auto watch = [&](const ViewServer::Audience&, ViewSight&) {
+  const auto watch = [&](const ViewServer::Audience& audience, ViewSight& newest) {
+    images.answer(audience.keyframes, steady_now_ns(), newest);
     if (interrupted().load(std::memory_order_relaxed))
       stop.request_stop();  // relaxed: the flag carries no other data
   };
@@ -38,13 +41,16 @@ void serve(const ViewServerOptions& options, const ViewScene& scene, const ViewT
 void view(const FileViewArguments& arguments) {
   ViewScene scene;
   ViewTitle title;
+  KeyframeImages::Find images;
   title.live = false;
   if (std::filesystem::is_directory(arguments.path)) {
     show_finished_run(arguments.path, scene, title);
+    images = images_of_run(arguments.path);
+    title.keyframe_images = static_cast<bool>(images);
   } else {
     show_map_file(arguments.path, scene, title);
   }
-  serve(arguments.server, scene, title);
+  serve(arguments.server, scene, title, KeyframeImages(std::move(images)));
 }
 
 }  // namespace

@@ -52,6 +52,21 @@ class TWOFOLD_API MapSnapshot {
     Pose T_to_from;
   };
 
+  /// A place that was recognised: the camera came back to what an older keyframe saw.
+  struct Loop {
+    std::uint32_t from = kNoId;  ///< the older keyframe; may be gone by now
+    std::uint32_t to = kNoId;    ///< the keyframe that came back
+    std::int64_t t_ns = 0;       ///< of that one
+    std::int32_t inliers = 0;    ///< matches that agree
+    /// Lengths around `to` over the same around `from`: how far the unit of one camera has drifted. 1 for
+    /// others.
+    double scale = 1;
+    bool joins_parts = false;  ///< the two had different worlds: there is no drift, and no way between them
+    double drift = 0;          ///< what the map had the second wrong by, relative to the first [m]
+    double turned = 0;         ///< likewise [rad]
+    double travelled = 0;      ///< along the keyframes from one to the other [m]
+  };
+
   struct Part {
     std::uint32_t id = kNoId;
     std::uint32_t keyframes = 0;
@@ -74,6 +89,8 @@ class TWOFOLD_API MapSnapshot {
   /// @param with_covariance  false leaves the covariances zero, at a tenth of the time
   [[nodiscard]] std::vector<Point> points(bool with_covariance = true) const;
   [[nodiscard]] std::vector<Edge> edges() const;
+  /// Loops that this run has closed by appearance, in the order they were found; none in a loaded map.
+  [[nodiscard]] std::vector<Loop> loops() const;
   /// All map parts, ascending by id; one when everything is connected.
   [[nodiscard]] std::vector<Part> parts() const;
 

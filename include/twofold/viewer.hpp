@@ -27,6 +27,16 @@ struct ViewedPoint {
   float expected_u = 0;      ///< where the pose puts it [px]
   float expected_v = 0;      ///< likewise
   std::uint32_t inlier = 1;  ///< 0: put aside as an outlier
+  // Where it was searched: a square around the prediction.
+  float predicted_u = 0;  ///< [px]
+  float predicted_v = 0;  ///< [px]
+  float radius = 0;       ///< half of its side [px]; 0: not known
+};
+
+/// An image, and what keeps its pixels alive; without pixels: none.
+struct ViewedImage {
+  ImageView pixels = {};
+  std::shared_ptr<const void> owner = nullptr;
 };
 
 struct ViewerOptions {
@@ -42,6 +52,10 @@ struct ViewerOptions {
   /// Does what a viewer asks for, on the viewer's thread, and says in a sentence what it did; what it throws
   /// is told as a failure. Empty: viewers can only look.
   std::function<std::string(ViewCommand)> on_command = {};
+  /// The left image of the frame with that time stamp, grey or colour, for those who click its keyframe:
+  /// asked on the viewer's thread, four times a second at most. What it throws means that there is none.
+  /// Empty: no keyframe has one.
+  std::function<ViewedImage(std::int64_t t_ns)> recorded_image = {};
 };
 
 /// Shows a run in a browser while it runs: map, windows, path, events, times (docs/viewer.md).

@@ -33,13 +33,28 @@ void expect_folder(const fs::path& folder) {
     throw IoError(folder, error ? "cannot be read" : "the folder is empty");
 }
 
-Opener recording_opener(RecordingReader read) {
-  return [read](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
-    expect_folder(spec.argument);
-    SourceParameters parameters(spec.text, spec.parameters);
-    Recording recording = read(spec.argument, options.calibration, parameters);
-    parameters.expect_all_taken();
-    return std::make_unique<PlaybackSource>(std::move(recording));
+/// Readers of folders of image files.
+const std::map<std::string, RecordingReader>& readers() {
+  static const std::map<std::string, RecordingReader> kReaders{{"kitti", read_kitti_recording},
+                                                               {"euroc", read_euroc_recording},
+                                                               {"tum", read_tum_recording},
+                                                               {"images", read_image_folder}};
+  return kReaders;
+}
+
+std::unique_ptr<PlaybackSource> open_folder(RecordingReader read, const SourceSpec& spec,
+                                            const std::optional<fs::path>& calibration) {
+  expect_folder(spec.argument);
+  SourceParameters parameters(spec.text, spec.parameters);
+  Recording recording = read(spec.argument, calibration, parameters);
+  parameters.expect_all_taken();
+  return std::make_unique<PlaybackSource>(std::move(recording));
+}
+
+Opener recording_opener(const std::string& scheme) {
+  return [read = readers().at(scheme)](const SourceSpec& spec,
+                                       const SourceOptions& options) -> std::unique_ptr<FrameSource> {
+    return open_folder(read, spec, options.calibration);
   };
 }
 
@@ -64,10 +79,10 @@ Opener bag_opener(std::unique_ptr<BagReader> (*open)(const fs::path&)) {
 
 const std::map<std::string, Opener>& openers() {
   static const std::map<std::string, Opener> kOpeners{
-      {"kitti", recording_opener(read_kitti_recording)},
-      {"euroc", recording_opener(read_euroc_recording)},
-      {"tum", recording_opener(read_tum_recording)},
-      {"images", recording_opener(read_image_folder)},
+      {"kitti", recording_opener("kitti")},
+      {"euroc", recording_opener("euroc")},
+      {"tum", recording_opener("tum")},
+      {"images", recording_opener("images")},
       {"video", open_video},
       {"mcap", bag_opener(open_mcap)},
       {"bag", bag_opener(open_rosbag)},
@@ -106,6 +121,15 @@ std::string known_schemes() {
 }
 
 }  // namespace
+
+std::unique_ptr<PlaybackSource> open_recording(const std::string& text,
+                                               const std::optional<fs::path>& calibration) {
+  const SourceSpec spec = parse_source_spec(text);
+  std::error_code error;
+  if (spec.scheme.empty() && !fs::is_directory(spec.argument, error)) return nullptr;
+  const auto reader = readers().find(spec.scheme.empty() ? recognise_layout(spec.argument) : spec.scheme);
+  return reader == readers().end() ? nullptr : open_folder(reader->second, spec, calibration);
+}
 
 std::unique_ptr<FrameSource> open_source(const std::string& text, const SourceOptions& options) {
   const SourceSpec spec = parse_source_spec(text);

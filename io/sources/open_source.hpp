@@ -40,4 +40,11 @@ struct SourceOptions {
 [[nodiscard]] std::unique_ptr<FrameSource> open_source(const std::string& text,
                                                        const SourceOptions& options = {});
 
+class PlaybackSource;
+
+/// Of these only those that are folders of image files: kitti, euroc, tum, images. Null for all others, of
+/// which nothing is opened.
+[[nodiscard]] std::unique_ptr<PlaybackSource> open_recording(
+    const std::string& text, const std::optional<std::filesystem::path>& calibration);
+
 }  // namespace twofold

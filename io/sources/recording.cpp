@@ -1,5 +1,6 @@
 #include "io/sources/recording.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
@@ -89,7 +90,19 @@ cv::Mat PlaybackSource::colour_image(std::int64_t index) const {
   if (index < 0 || index >= static_cast<std::int64_t>(recording_.frames.size())) return {};
   const std::filesystem::path& file = recording_.frames[static_cast<std::size_t>(index)].left;
   const cv::Mat raw = read_colour_image(file);
-  if (raw.empty()) return {};
+  return raw.empty() ? raw : rectified_left(file, raw);
+}
+
+cv::Mat PlaybackSource::left_image(std::int64_t t_ns) const {
+  const auto at = std::lower_bound(recording_.frames.begin(), recording_.frames.end(), t_ns,
+                                   [](const RecordedFrame& frame, std::int64_t t) { return frame.t_ns < t; });
+  if (at == recording_.frames.end() || at->t_ns != t_ns) return {};
+  cv::Mat raw = read_colour_image(at->left);
+  if (raw.empty()) raw = read_grey_image(at->left);
+  return rectified_left(at->left, raw);
+}
+
+cv::Mat PlaybackSource::rectified_left(const std::filesystem::path& file, const cv::Mat& raw) const {
   expect_size(file, raw, recording_.calibration.left.pinhole);
   if (rectifier_->passes_through()) return raw;
   cv::Mat rectified;

@@ -61,10 +61,14 @@ class PlaybackSource final : public FrameSource {
     return static_cast<std::int64_t>(recording_.frames.size());
   }
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
+  /// The rectified left image of the frame with that time stamp, in colour if it has any, else grey; empty
+  /// when there is no such frame. Any thread. Throws IoError.
+  [[nodiscard]] cv::Mat left_image(std::int64_t t_ns) const;
 
  private:
   bool read(Frame& frame) override;
   [[nodiscard]] Frame decode(const RecordedFrame& files) const;
+  [[nodiscard]] cv::Mat rectified_left(const std::filesystem::path& file, const cv::Mat& raw) const;
 
   Recording recording_;
   std::optional<Rectifier> rectifier_;

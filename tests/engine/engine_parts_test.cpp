@@ -53,8 +53,12 @@ class MapPartsTest : public testing::KidnappedCamera {
 };
 
 TEST_F(MapPartsTest, ALostCameraStartsAPartThatJoinsWhenAPlaceOfBothIsRecognised) {
-  const RunResult result = run_engine(impatient(), frames());
+  EngineOptions engine = impatient();
+  std::size_t loops_told = 0;
+  engine.on_loop = [&loops_told](const ClosedLoop&) { ++loops_told; };
+  const RunResult result = run_engine(engine, frames());
   EXPECT_EQ(result.error, "");
+  EXPECT_EQ(loops_told, result.loops.size());
   std::vector<KeyframeId> parts;
   const bool announced = std::any_of(
       result.corrections.begin(), result.corrections.end(),

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "io/sources/open_source.hpp"
+#include "io/sources/recorded_images.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {
@@ -179,6 +180,40 @@ TEST(FrameSource, ImageFolderAndItsTimes) {
   const auto source = open_source(spec + "&fps=10");
   EXPECT_EQ(source->rig().kind, SensorKind::kMono);
   EXPECT_EQ(drain(*source), "3");
+}
+
+TEST(RecordedImages, ShowAnyFrameOfAFolderByItsTime) {
+  const ScratchFolder folder;
+  for (int i = 0; i < 3; ++i)
+    folder.write_image(fmt::format("{}.png", i), numbered_image(kWidth, kHeight, i));
+  const std::string spec = "images:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24&fps=10";
+  const RecordedImages images = images_of_recording(spec, {});
+  ASSERT_TRUE(images);
+  const auto source = open_source(spec);
+  std::vector<Frame> frames(3);
+  for (Frame& frame : frames) ASSERT_EQ(source->next(frame), FrameStatus::kFrame);
+  for (const std::size_t n : {2U, 0U, 1U})
+    EXPECT_EQ(cv::norm(images(frames[n].t_ns), frames[n].left, cv::NORM_INF), 0) << n;
+  EXPECT_TRUE(images(frames[1].t_ns + 1).empty());
+  EXPECT_TRUE(images(frames[0].t_ns - 1).empty());
+  EXPECT_TRUE(images(frames[2].t_ns + 1).empty());
+}
+
+TEST(RecordedImages, NothingButFoldersIsOpened) {
+  const ScratchFolder folder;
+  for (const std::string source :
+       {"v4l2:/dev/video99", "synthetic:desk?frames=2", "video:none.mp4", "mcap:none.mcap", "none"})
+    EXPECT_FALSE(images_of_recording(source, {})) << source;
+  EXPECT_IO_ERROR(images_of_recording("euroc:" + (folder / "gone"), {}), "no such folder");
+}
+
+TEST(RecordedImages, OfARecordingThatIsBeingMade) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder.path() / "mav0" / "cam0" / "data");
+  folder.write_image("mav0/cam0/data/123.png", numbered_image(kWidth, kHeight, 7));
+  const RecordedImages images = images_being_recorded(folder.path());
+  EXPECT_EQ(images(123).at<unsigned char>(0, 5), 7);
+  EXPECT_TRUE(images(124).empty());
 }
 
 TEST(FrameSource, VideoSideBySide) {

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "graph/graph_writer.hpp"
+#include "slam/map_snapshot.hpp"
 
 namespace twofold {
 namespace {
@@ -102,6 +103,32 @@ TEST(MapLender, VersionsStayWholeWhileTheWriterGoesOn) {
   for (std::thread& borrower : borrowers) borrower.join();
   EXPECT_EQ(broken, 0);
   EXPECT_EQ(number_of(*lender.newest()), kVersions);
+}
+
+TEST(MapLender, LendsTheLoopsThatWereClosedSoFar) {
+  MapLender lender;
+  const auto before = lender.newest();
+  ClosedLoop loop;
+  loop.constraint.from = KeyframeId{3};
+  loop.constraint.to = KeyframeId{60};
+  loop.constraint.T_to_from = SE3(SO3(), Vector3(0, 0, 2));
+  loop.constraint.scale = 1.25;
+  loop.T_to_from_before = SE3(SO3(), Vector3(0, 0, 1.5));
+  loop.travelled = 40;
+  lender.publish(loop);
+  loop.joins_parts = true;
+  lender.publish(loop);
+  EXPECT_TRUE(before->loops.loops->empty());
+  const MapSnapshot map(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{{}, lender.newest()}));
+  const auto loops = map.loops();
+  ASSERT_EQ(loops.size(), 2U);
+  EXPECT_EQ(loops[0].from, 3U);
+  EXPECT_EQ(loops[0].to, 60U);
+  EXPECT_EQ(loops[0].scale, 1.25);
+  EXPECT_NEAR(loops[0].drift, 0.5, 1e-12);
+  EXPECT_EQ(loops[0].travelled, 40);
+  EXPECT_TRUE(loops[1].joins_parts);
+  EXPECT_EQ(loops[1].drift, 0) << "two worlds have nothing to do with each other";
 }
 
 }  // namespace

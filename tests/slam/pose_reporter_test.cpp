@@ -41,7 +41,7 @@ class PoseReporterTest : public ::testing::Test {
   }
   PoseEstimate report(const FrameRecord& record, const Matrix6& information = Matrix6::Identity()) {
     events_ = {};
-    return reporter_.next({record, graph_, correction_, information, 7, {}, {}}, events_);
+    return reporter_.next({record, graph_, correction_, information, 7, {}, {}, {}}, events_);
   }
 
   GraphWriter writer_;

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "tests/viewer/small_map.hpp"
+#include "viewer/keyframe_images.hpp"
 
 namespace twofold {
 namespace {
@@ -114,6 +115,30 @@ TEST_F(ClientFeedTest, CommandsAreNonsenseUnlessTheyAreAllowed) {
   EXPECT_EQ(feed.take_command(), ViewCommand::kSaveMap);
   EXPECT_FALSE(feed.take_command()) << "once";
   EXPECT_FALSE(feed.take("save map /etc/passwd"));
+}
+
+TEST_F(ClientFeedTest, AKeyframesImageGoesToWhoAskedForIt) {
+  EXPECT_FALSE(ClientFeed(scene_, title_).take("keyframe 3")) << "there are no images";
+  title_.keyframe_images = true;
+  for (const std::string_view nonsense :
+       {"keyframe", "keyframe ", "keyframe -1", "keyframe +1", "keyframe 3 ", "keyframe 0x3",
+        "keyframe 4294967296", "keyframe ../3", "keyframe  3"})
+    EXPECT_FALSE(ClientFeed(scene_, title_).take(nonsense)) << nonsense;
+  ClientFeed feed(scene_, title_), other(scene_, title_);
+  EXPECT_TRUE(feed.take("keyframe 4294967294"));
+  EXPECT_TRUE(feed.take("keyframe 3"));
+  EXPECT_EQ(feed.wanted_keyframe(), 3U) << "the last one";
+  drain(feed);
+  sight_.keyframe = 2;
+  sight_.keyframe_image.put("another's");
+  EXPECT_TRUE(drain(feed).empty());
+  sight_.keyframe = 3;
+  sight_.keyframe_image.put("picture");
+  const auto messages = drain(feed);
+  ASSERT_EQ(messages.size(), 1U);
+  EXPECT_EQ(*messages[0].bytes, "picture");
+  EXPECT_FALSE(feed.wanted_keyframe());
+  EXPECT_EQ(drain(other).size(), 1U) << "the greeting, and nothing that it did not ask for";
 }
 
 TEST_F(ClientFeedTest, TheEndIsToldBeforeWhatIsLacking) {

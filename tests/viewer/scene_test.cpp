@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/viewer/small_map.hpp"
+#include "viewer/texts.hpp"
 
 namespace twofold {
 namespace {
@@ -150,6 +151,33 @@ TEST(ViewScene, DeviationsAreCodedWithinATenth) {
   for (double deviation = 1e-4; deviation < 100; deviation *= 1.3)
     EXPECT_NEAR(std::exp2((deviation_code(deviation) - 128) / 8.0) / deviation, 1, 0.1);
   EXPECT_EQ(deviation_code(0), 0);
+}
+
+TEST(ViewScene, ALoopIsAnEventOnceAndSaysItsScale) {
+  ViewScene scene;
+  scene.begin(1'000'000'000);
+  scene.show(small_map(3));
+  MapSnapshot::Loop loop{
+      .from = 0, .to = 2, .t_ns = 3'000'000'000, .inliers = 41, .scale = 1.0625, .drift = 0.5};
+  loop.travelled = 53;
+  scene.add_loops({loop});
+  scene.add_loops({loop});
+  ASSERT_EQ(scene.end_event(), 1U);
+  loop.to = 77;  // not in the picture any more
+  scene.add_loops({loop, loop});
+  ASSERT_EQ(scene.end_event(), 2U) << "the second, which is new";
+  const ViewEvent& first = scene.event(0);
+  EXPECT_EQ(first.kind, "loop");
+  EXPECT_EQ(first.t, 2);
+  EXPECT_EQ(first.frame, 20U);
+  EXPECT_EQ(first.after[0], 2) << "where the camera came back";
+  const auto told = nlohmann::json::parse(events_text(scene, 0)).at("events");
+  EXPECT_EQ(told[0].at("loop").at("scale"), 1.0625);
+  EXPECT_EQ(told[0].at("loop").at("from"), 0);
+  EXPECT_EQ(told[0].at("loop").at("travelled"), 53);
+  EXPECT_EQ(told[0].at("moved"), 0.5);
+  scene.add(MapEvent{});
+  EXPECT_TRUE(nlohmann::json::parse(events_text(scene, 2)).at("events")[0].at("loop").is_null());
 }
 
 }  // namespace

@@ -177,6 +177,11 @@ export class Cloud {
     return Math.min(at >= 0 ? at : this.parts.push(part) - 1, 255);
   }
 
+  /** All points are there: what was found on the way is found anew. */
+  settle(): void {
+    if (this.size > 0) this.findBox();
+  }
+
   /** Leaves out the twentieth part of the points that is farthest out on each side. */
   private findBox(): void {
     this.boxOf = this.size;

@@ -28,6 +28,10 @@ export class Connection {
     this.send(on ? 'images on' : 'images off');
   }
 
+  askForKeyframe(id: number): void {
+    this.send(`keyframe ${id}`);
+  }
+
   command(text: Command): void {
     this.send(text);
   }

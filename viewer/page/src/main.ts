@@ -8,8 +8,8 @@ import {eventColour, type Theme} from './palette.ts';
 import {Sight} from './sight.ts';
 import {Stage, type Layer, type View} from './stage.ts';
 import {Strip} from './strip.ts';
-import {Timeline, clock, describe, lostStretches, metres} from './timeline.ts';
-import {PROTOCOL, State, type Binary, type Keyframe, type MapEvent, type Text} from './wire.ts';
+import {Timeline, clock, describe, lateStretches, lostStretches, metres} from './timeline.ts';
+import {PROTOCOL, State, type Binary, type Keyframe, type KeyframeImage, type MapEvent, type Text} from './wire.ts';
 
 const $ = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
@@ -61,7 +61,9 @@ class Page {
   }
 
   private take(message: Binary): void {
-    if (message.kind === 'image') {
+    if (message.kind === 'keyframe image') {
+      this.showKeyframeImage(message);
+    } else if (message.kind === 'image') {
       this.sight.take(message);
     } else if (message.kind === 'measured') {
       this.sight.takeMeasured(message);
@@ -104,6 +106,10 @@ class Page {
 
   private showLink(state: Link, message: string): void {
     this.link = state;
+    if (state === 'ended') {
+      this.stage.cloud.settle();
+      this.stage.changed();
+    }
     $('message').textContent = message;
     $('message').hidden = state === 'open';
     $('message').classList.toggle('calm', state === 'ended');
@@ -112,6 +118,7 @@ class Page {
 
   /** Whatever is text, a few times a second. */
   private refresh(): void {
+    if (this.stage.drawn === 0) return;  // the picture comes first
     this.sight.draw();
     if (this.playing) this.play();
     if (!this.stale) return;
@@ -174,6 +181,7 @@ class Page {
       ['keyframes', count(this.model.keyframes.size), false],
       ['points', count(this.stage.cloud.size), false],
       ['lost', count(lost), true],
+      ['late', count(lateStretches(this.model).reduce((sum, stretch) => sum + stretch.frames, 0)), true],
     ];
     if (newest) {
       figures.push(['latency', `${newest.latencyMs.toFixed(1)} ms`, false], ['found', `${(100 * newest.trackedShare).toFixed(0)} %`, true],
@@ -182,6 +190,7 @@ class Page {
     $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
       const item = make('div', '', make('dt', name), make('dd', value));
       item.classList.toggle('minor', minor);
+      item.dataset.name = name;
       return item;
     }));
   }
@@ -288,17 +297,31 @@ class Page {
       button.addEventListener('click', () => this.select(other));
       return button;
     });
-    $('keyframe').replaceChildren(
+    const isLive = this.model.hello?.live ?? true;  // others may not know all of it
+    const rows = [row('frame', `${keyframe.frame}, ${clock(keyframe.t)}`), row('position', keyframe.position.map((x) => x.toFixed(2)).join(', ')),
+      row('map part', String(keyframe.part)), row('neighbours', String(neighbours.length))];
+    if (isLive) rows.push(row('window', ['neither', 'inner', 'outer'][keyframe.window]));
+    if (isLive || keyframe.points > 0) rows.push(row('points it sees', String(keyframe.points)), row('can be recognised', keyframe.hasPlace ? 'yes' : 'no'));
+    $('keyframe-text').replaceChildren(
       make('h2', `Keyframe ${keyframe.id}`),
-      make('table', '', row('frame', `${keyframe.frame}, ${clock(keyframe.t)}`), row('window', ['neither', 'inner', 'outer'][keyframe.window]),
-        row('points it sees', String(keyframe.points)), row('position', keyframe.position.map((x) => x.toFixed(2)).join(', ')),
-        row('map part', String(keyframe.part)), row('can be recognised', keyframe.hasPlace ? 'yes' : 'no'), row('neighbours', String(neighbours.length))),
+      make('table', '', ...rows),
       make('p', '', ...jump));
   }
   private select(id: number | null): void {
+    $('keyframe-image').hidden = true;
+    if (id !== null && id !== this.stage.selected && this.model.hello?.keyframeImages) this.connection.askForKeyframe(id);
     this.stage.selected = id;
     this.stage.changed();
     this.stale = true;
+  }
+
+  /** If that keyframe is still the one that is selected. */
+  private showKeyframeImage(image: KeyframeImage): void {
+    if (image.keyframe !== this.stage.selected || image.jpeg.length === 0) return;
+    const place = $<HTMLImageElement>('keyframe-image');
+    URL.revokeObjectURL(place.src);
+    place.src = URL.createObjectURL(new Blob([image.jpeg], {type: 'image/jpeg'}));
+    place.hidden = false;
   }
 
   private showTape(): void {
@@ -429,7 +452,7 @@ class Page {
     return {
       link: this.link, live: this.model.live.length, newest: this.model.live.at(-1)?.frame ?? -1, keyframes: this.model.keyframes.size,
       inner: this.windowSize(1), outer: this.windowSize(2), points: this.stage.cloud.size, path: this.model.path.length,
-      events: this.model.events.length, lost: lostStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs, share: this.stage.share,
+      events: this.model.events.length, lost: lostStretches(this.model), late: lateStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs, share: this.stage.share,
       edges: this.model.edges.size, truth: this.model.truth?.path.length ?? 0, mapVersion: this.model.mapVersion,
     };
   }

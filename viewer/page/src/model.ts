@@ -2,6 +2,7 @@
 import {NO_ID, State, type Delta, type Edge, type Hello, type Keyframe, type LiveFrame, type MapEvent, type PathFrame, type Truth} from './wire.ts';
 
 const LIVE_KEPT = 600;
+const LATE_KEPT = 4096;
 
 /** Position and orientation of a camera in the world of its part. */
 export interface CameraPose {
@@ -36,6 +37,8 @@ export class Model {
   edges = new Map<string, Edge>();
   path: PathFrame[] = [];
   live: LiveFrame[] = [];
+  /** Of late frames, by their number: what held them up. */
+  readonly whyLate = new Map<number, string>();
   mapVersion = 0;
 
   clear(): void {
@@ -49,6 +52,7 @@ export class Model {
     this.events = [];
     this.live = [];
     this.truth = null;
+    this.whyLate.clear();
   }
 
   take(delta: Delta): void {
@@ -92,6 +96,15 @@ export class Model {
     if (this.live.length > LIVE_KEPT) this.live.splice(0, this.live.length - LIVE_KEPT);
     const newest = frames.at(-1);
     if (newest) this.mapVersion = newest.mapVersion;
+    const budget = this.periodMs();
+    for (const frame of frames) if (budget > 0 && frame.latencyMs > budget) this.explainLate(frame, budget);
+  }
+
+  /** As summary.json does: its own work, or whatever it waited for. */
+  private explainLate(frame: LiveFrame, budget: number): void {
+    const tracking = frame.stageMs.reduce((sum, ms) => sum + ms, 0);
+    this.whyLate.set(frame.frame, tracking > budget / 2 ? `tracking it took ${tracking.toFixed(0)} ms` : 'it waited: earlier frames, decoding, or no CPU');
+    if (this.whyLate.size > LATE_KEPT) this.whyLate.delete(this.whyLate.keys().next().value!);
   }
 
   /** Where the frame was as the map has it now. */
@@ -147,6 +160,8 @@ export class Model {
     const steps: number[] = [];
     for (let i = Math.max(1, this.live.length - 60); i < this.live.length; ++i)
       steps.push((1000 * (this.live[i].t - this.live[i - 1].t)) / Math.max(1, this.live[i].frame - this.live[i - 1].frame));
+    for (let i = Math.max(1, this.path.length - 60); steps.length < 30 && i < this.path.length; ++i)
+      steps.push((1000 * (this.path[i].t - this.path[i - 1].t)) / Math.max(1, this.path[i].frame - this.path[i - 1].frame));
     steps.sort((a, b) => a - b);
     return steps[steps.length >> 1] ?? 0;
   }

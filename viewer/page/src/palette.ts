@@ -20,12 +20,14 @@ export interface Palette {
 
 export const EVENT_COLOURS: Record<string, string> = {
   'optimisation': '#8f9bb3',
+  'loop': '#ffd166',
   'loop closure': '#ff5a5f',
   'pose graph': '#b388ff',
   'parts joined': '#00c2a8',
   'relocalisation': '#ffb000',
   'new part': '#ff8cc6',
   'lost': '#ff3b30',
+  'late': '#f28e2b',
   'map saved': '#6ac8ff',
   'mapping paused': '#6ac8ff',
   'mapping resumed': '#6ac8ff',

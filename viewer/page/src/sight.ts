@@ -1,5 +1,5 @@
 // The camera's image, and on it what was measured in it: inliers, outliers, and how far each is from where the pose puts it.
-// Dim, the points of the map around: those first seen in the reference keyframe or its neighbours.
+// Around them, the squares in which they were searched. Dim, the points of the map around: those first seen in the reference keyframe or its neighbours.
 import type {Cloud} from './cloud.ts';
 import type {Model} from './model.ts';
 import {State, type Image, type LiveFrame, type Measured, type MeasuredPoint} from './wire.ts';
@@ -58,12 +58,19 @@ export class Sight {
     const measured = this.measured.find((other) => other.frame === image.frame)?.points ?? [];
     this.paintMeasured(c, measured, scale);
     const outliers = measured.reduce((sum, point) => sum + (point.inlier ? 0 : 1), 0);
-    const state = isTracked ? `${frame.points} points measured, ${outliers} outliers; residuals × ${LONGER}`
+    const state = isTracked ? `${frame.points} points measured, ${outliers} outliers; residuals × ${LONGER}; squares: searched`
       : `lost: ${this.model.reasons[frame.reason] ?? ''}`;
     this.place.querySelector('figcaption')!.textContent = `frame ${image.frame} · ${state}`;
   }
 
   private paintMeasured(c: CanvasRenderingContext2D, points: MeasuredPoint[], scale: number): void {
+    c.lineWidth = 1;
+    c.strokeStyle = '#ffd666';
+    for (const point of points) {
+      if (point.radius === 0) continue;
+      const side = 2 * scale * point.radius;
+      c.strokeRect((point.predictedU + 0.5) * scale - side / 2, (point.predictedV + 0.5) * scale - side / 2, side, side);
+    }
     for (const point of points) {
       c.strokeStyle = c.fillStyle = point.inlier ? '#35f0a8' : '#ff5a5f';
       const [u, v] = [(point.u + 0.5) * scale, (point.v + 0.5) * scale];

@@ -60,6 +60,7 @@ export class Stage {
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly model: Model) {
     this.renderer = new THREE.WebGLRenderer({canvas, antialias: false, preserveDrawingBuffer: true, powerPreference: 'low-power'});
+    this.renderer.debug.checkShaderErrors = false;  // each question waits for the compiler
     const slow = drawsInSoftware(this.renderer.getContext());
     this.leastMs = slow ? SOFTWARE_MS : 0;
     this.renderer.setPixelRatio(slow ? 1 : Math.min(Math.max(devicePixelRatio, 1.5), 2));
@@ -72,6 +73,7 @@ export class Stage {
       this.final.object, this.windows.object, this.body.object, this.tape.object);
     this.scene.add(this.world, this.grid.object);
     for (const lines of [this.final, this.causal, this.truth, this.windows, this.body, this.tape]) lines.object.material.depthTest = false;
+    this.renderer.compile(this.scene, this.camera);  // goes on while the page is made
     this.setTheme('dark');
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();

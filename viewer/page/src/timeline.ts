@@ -1,38 +1,48 @@
 // The time line: events, stretches in which the camera was lost, and the time that is shown.
 import type {Model} from './model.ts';
 import {eventColour} from './palette.ts';
-import {State, type MapEvent} from './wire.ts';
+import {State, type Loop, type MapEvent, type PathFrame} from './wire.ts';
 
-export interface LostStretch {
+/** Frames in a row that were lost, or late, for the same reason. */
+export interface Stretch {
   begin: number;
-  end: number;
+  end: number;  // until the next frame
   frames: number;
   reason: string;
 }
 
-/** Frames lost in a row for the same reason; times are until the next frame. */
-export function lostStretches(model: Model): LostStretch[] {
-  const stretches: LostStretch[] = [];
-  let open: LostStretch | null = null;
+/** `why` gives nothing for frames that are no part of any. */
+function stretches(model: Model, why: (frame: PathFrame) => string | null): Stretch[] {
+  const found: Stretch[] = [];
+  let open: Stretch | null = null;
   for (const frame of model.path) {
-    const reason = model.reasons[frame.reason] ?? '';
+    const reason = why(frame);
     if (open) open.end = frame.t;
-    if (frame.state === State.tracked) open = null;
+    if (reason === null) open = null;
     else if (open && open.reason === reason) ++open.frames;
-    else stretches.push((open = {begin: frame.t, end: frame.t, frames: 1, reason}));
+    else found.push((open = {begin: frame.t, end: frame.t, frames: 1, reason}));
   }
-  return stretches;
+  return found;
+}
+export function lostStretches(model: Model): Stretch[] {
+  return stretches(model, (frame) => (frame.state === State.tracked ? null : model.reasons[frame.reason] ?? ''));
+}
+/** Poses that came when the next frame was there already. */
+export function lateStretches(model: Model): Stretch[] {
+  const budget = model.periodMs();
+  return stretches(model, (frame) => frame.state !== State.tracked || !(budget > 0 && frame.latencyMs > budget) ? null
+    : model.whyLate.get(frame.frame) ?? model.reasons[frame.reason] ?? '');
 }
 
 export class Timeline {
   onTime: (time: number | null) => void = () => {};
   onEvent: (event: MapEvent) => void = () => {};
   time: number | null = null;
-  private readonly context: CanvasRenderingContext2D;
-  private stretches: LostStretch[] = [];
+  private context: CanvasRenderingContext2D | null = null;  // from the first draw on: the big picture comes first
+  private lost: Stretch[] = [];
+  private late: Stretch[] = [];
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly tip: HTMLElement, private readonly model: Model) {
-    this.context = canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     let dragging = false;
     canvas.addEventListener('pointerdown', (event) => {
       const hit = this.eventAt(event.offsetX, event.offsetY);
@@ -49,7 +59,7 @@ export class Timeline {
     });
     canvas.addEventListener('pointerup', () => (dragging = false));
     canvas.addEventListener('pointerleave', () => (tip.hidden = true));
-    new ResizeObserver(() => this.draw()).observe(canvas);
+    new ResizeObserver(() => this.context && this.draw()).observe(canvas);
   }
 
   /** Time by `step` seconds; beyond the end is now. */
@@ -94,8 +104,11 @@ export class Timeline {
   private explain(pointer: PointerEvent): void {
     const event = this.eventAt(pointer.offsetX, pointer.offsetY);
     const t = this.timeAt(pointer.offsetX);
-    const lost = this.stretches.find((stretch) => this.x(stretch.begin) - 2 <= pointer.offsetX && pointer.offsetX <= this.x(stretch.end) + 2);
-    const text = event ? describe(event) : lost ? `lost for ${lost.frames} frame${lost.frames > 1 ? 's' : ''}: ${lost.reason}` : clock(t);
+    const under = (stretch: Stretch) => this.x(stretch.begin) - 2 <= pointer.offsetX && pointer.offsetX <= this.x(stretch.end) + 2;
+    const say = (what: string, stretch: Stretch) => `${what} for ${stretch.frames} frame${stretch.frames > 1 ? 's' : ''}: ${stretch.reason}`;
+    const lost = this.lost.find(under);
+    const late = this.late.find(under);
+    const text = event ? describe(event) : lost ? say('lost', lost) : late ? say('late', late) : clock(t);
     this.tip.textContent = text;
     this.tip.hidden = false;
     const room = this.tip.parentElement!.clientWidth - this.tip.offsetWidth - 8;
@@ -103,14 +116,16 @@ export class Timeline {
   }
 
   draw(): void {
-    const {canvas, context: c} = this;
+    const {canvas} = this;
+    const c = (this.context ??= canvas.getContext('2d', {willReadFrequently: true})!);  // not to wait for the big picture
     const scale = Math.min(devicePixelRatio, 2);
     const [w, h] = [canvas.clientWidth, canvas.clientHeight];
     if (canvas.width !== Math.round(w * scale) || canvas.height !== Math.round(h * scale)) {
       canvas.width = Math.round(w * scale);
       canvas.height = Math.round(h * scale);
     }
-    this.stretches = lostStretches(this.model);
+    this.lost = lostStretches(this.model);
+    this.late = lateStretches(this.model);
     const style = getComputedStyle(canvas);
     c.setTransform(scale, 0, 0, scale, 0, 0);
     c.clearRect(0, 0, w, h);
@@ -120,19 +135,23 @@ export class Timeline {
     const end = this.model.endTime();
     c.fillStyle = style.getPropertyValue('--final');
     c.fillRect(8, line - 2, this.x(this.time ?? end) - 8, 4);
-    c.fillStyle = eventColour('lost');
-    for (const lost of this.stretches) c.fillRect(this.x(lost.begin), line - 4, Math.max(2, this.x(lost.end) - this.x(lost.begin)), 8);
-    for (const event of this.model.events) this.mark(event);
-    this.ticks(end, line, h, style);
+    this.markStretches(c, this.late, line, 'late');
+    this.markStretches(c, this.lost, line, 'lost');
+    for (const event of this.model.events) this.mark(c, event);
+    this.ticks(c, end, line, h, style);
     c.fillStyle = style.getPropertyValue('--text');
     c.beginPath();
     c.arc(this.x(this.time ?? end), line, 6, 0, 2 * Math.PI);
     c.fill();
   }
 
+  private markStretches(c: CanvasRenderingContext2D, stretches: Stretch[], line: number, kind: string): void {
+    c.fillStyle = eventColour(kind);
+    for (const {begin, end} of stretches) c.fillRect(this.x(begin), line - 4, Math.max(2, this.x(end) - this.x(begin)), 8);
+  }
+
   /** What moved the camera far stands high. */
-  private mark(event: MapEvent): void {
-    const c = this.context;
+  private mark(c: CanvasRenderingContext2D, event: MapEvent): void {
     const small = event.kind === 'optimisation';
     c.fillStyle = eventColour(event.kind);
     c.beginPath();
@@ -140,8 +159,7 @@ export class Timeline {
     c.fill();
   }
 
-  private ticks(end: number, line: number, height: number, style: CSSStyleDeclaration): void {
-    const c = this.context;
+  private ticks(c: CanvasRenderingContext2D, end: number, line: number, height: number, style: CSSStyleDeclaration): void {
     const most = Math.max(2, this.width / 90);
     const step = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800, 3600].find((s) => end / s <= most) ?? 7200;
     c.fillStyle = style.getPropertyValue('--faint');
@@ -165,9 +183,20 @@ export function metres(d: number): string {
   return d < 1 ? `${(100 * d).toFixed(d < 0.1 ? 1 : 0)} cm` : `${d.toFixed(2)} m`;
 }
 
+const degrees = (angle: number) => `${((180 / Math.PI) * angle).toFixed(2)}°`;
+
 export function describe(event: MapEvent): string {
   if (event.text) return `${event.kind} · ${event.text}`;
-  const moved = event.partBefore === event.part ? `moved ${metres(event.moved)}, turned ${((180 / Math.PI) * event.turned).toFixed(2)}°`
+  if (event.loop) return `${event.kind} · ${describeLoop(event, event.loop)}`;
+  const moved = event.partBefore === event.part ? `moved ${metres(event.moved)}, turned ${degrees(event.turned)}`
     : `part ${event.partBefore === 0xffffffff ? '–' : event.partBefore} → ${event.part}`;
   return `${event.kind} · frame ${event.frame} · ${moved}`;
+}
+
+/** How far the map was off when the camera came back, and, for one camera, by how much its unit of length. */
+function describeLoop(event: MapEvent, loop: Loop): string {
+  const scale = loop.scale === 1 ? '' : ` · scale ${loop.scale.toFixed(4)}`;
+  const agree = `${loop.inliers} matches`;
+  if (loop.joinsParts) return `joins two map parts · ${agree}${scale}`;
+  return `off by ${metres(event.moved)}, ${degrees(event.turned)} after ${metres(loop.travelled)} · ${agree}${scale}`;
 }

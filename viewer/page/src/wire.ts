@@ -1,6 +1,6 @@
 // The server's messages (viewer/wire_format.hpp), decoded. Arrays of points are views of the message.
 
-export const PROTOCOL = 2;
+export const PROTOCOL = 3;
 export const NO_ID = 0xffffffff;
 
 export interface Keyframe {
@@ -92,6 +92,13 @@ export interface Image {
   jpeg: Uint8Array<ArrayBuffer>;
 }
 
+/** What the camera saw at a keyframe; no bytes: nobody knows. */
+export interface KeyframeImage {
+  kind: 'keyframe image';
+  keyframe: number;
+  jpeg: Uint8Array<ArrayBuffer>;
+}
+
 /** A point of the map as it was found in the image. */
 export interface MeasuredPoint {
   u: number;
@@ -99,16 +106,20 @@ export interface MeasuredPoint {
   expectedU: number;
   expectedV: number;
   inlier: boolean;
+  /** Where it was searched: a square around this, half of whose side is the radius; 0: not known. */
+  predictedU: number;
+  predictedV: number;
+  radius: number;
 }
 export interface Measured {
   kind: 'measured';
   frame: number;
   points: MeasuredPoint[];
 }
-export type Binary = Delta | Frames | Image | Measured;
+export type Binary = Delta | Frames | Image | KeyframeImage | Measured;
 
 const HEADER = 16;
-const SIZES = {keyframe: 52, edge: 12, path: 56, live: 100, measured: 20};
+const SIZES = {keyframe: 52, edge: 12, path: 56, live: 100, measured: 32};
 
 class Reader {
   readonly view: DataView;
@@ -166,7 +177,8 @@ function liveFrame(r: Reader): LiveFrame {
 }
 
 function measuredPoint(r: Reader): MeasuredPoint {
-  return {u: r.f32(0), v: r.f32(4), expectedU: r.f32(8), expectedV: r.f32(12), inlier: r.u32(16) !== 0};
+  return {u: r.f32(0), v: r.f32(4), expectedU: r.f32(8), expectedV: r.f32(12), inlier: r.u32(16) !== 0,
+    predictedU: r.f32(20), predictedV: r.f32(24), radius: r.f32(28)};
 }
 
 function pointBlock(r: Reader, count: number): PointBlock {
@@ -210,6 +222,7 @@ export function decode(buffer: ArrayBuffer): Binary {
     case 2: return {kind: 'frames', frames: reader.list(number, SIZES.live, () => liveFrame(reader))};
     case 3: return {kind: 'image', frame: number, width: a, height: b, jpeg: new Uint8Array(buffer, HEADER)};
     case 4: return {kind: 'measured', frame: number, points: reader.list(a, SIZES.measured, () => measuredPoint(reader))};
+    case 5: return {kind: 'keyframe image', keyframe: number, jpeg: new Uint8Array(buffer, HEADER)};
     default: throw new Error(`unknown message ${kind}`);
   }
 }
@@ -233,12 +246,24 @@ export interface Hello {
   hasDeviations: boolean;
   /** Commands are obeyed. */
   control: boolean;
+  /** Images of keyframes can be asked for. */
+  keyframeImages: boolean;
   periodMs: number;
 }
 export interface Truth {
   part: number;
   /** t, x, y, z */
   path: [number, number, number, number][];
+}
+/** A place that was recognised: keyframe `to` came back to what `from` saw. */
+export interface Loop {
+  from: number;
+  to: number;
+  joinsParts: boolean;
+  /** Lengths now over lengths then: how far the unit of one camera has drifted. 1 for others. */
+  scale: number;
+  inliers: number;
+  travelled: number;
 }
 export interface MapEvent {
   kind: string;
@@ -252,6 +277,7 @@ export interface MapEvent {
   turned: number;
   before: [number, number, number];
   after: [number, number, number];
+  loop: Loop | null;
 }
 export interface Text {
   hello?: Hello;

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import {mkdirSync} from 'node:fs';
 import {join} from 'node:path';
-import {Network, Program, countPixels, openBrowser, openPage, report, until} from './program.mjs';
+import {Network, Program, countPixels, openBrowser, openPage, places, report, until} from './program.mjs';
 
 const out = process.argv[2];
 mkdirSync(out, {recursive: true});
@@ -38,8 +38,10 @@ async function liveRun() {
   await has(page, 'the camera', '#stage', '#ffffff', 20);
   await page.keyboard.press('i');
   await has(page, 'points measured in the image', '#sight canvas', '#35f0a8', 60);
+  await has(page, 'search regions in the image', '#sight canvas', '#ffd666', 60);
   assert.match(await page.textContent('#sight figcaption'), /points measured/);
 
+  await keyframeImage(page);
   await lateJoiner(page, network.address);
   await page.keyboard.press('1');
   await page.waitForTimeout(1500);
@@ -51,6 +53,22 @@ async function liveRun() {
   const live = await command(page, run);
   await network.cut();
   return live;
+}
+
+/** A click at a keyframe shows what the camera saw there; another one something else. */
+async function keyframeImage(page) {
+  const stage = await page.locator('#stage').boundingBox();
+  const shown = [];
+  for (const [x, y] of await places(page, 'keyframe', 60)) {
+    await page.mouse.click(stage.x + x, stage.y + y);
+    await until('the keyframe\'s image', () => page.evaluate((before) => {
+      const image = document.querySelector('#keyframe-image');
+      return !image.hidden && image.complete && image.naturalWidth === 320 && image.src !== before && image.src;
+    }, shown.at(-1) ?? ''));
+    shown.push(await page.getAttribute('#keyframe-image', 'src'));
+  }
+  assert.equal(shown.length, 2, 'keyframes to click at');
+  done('images of two keyframes');
 }
 
 async function lateJoiner(page, address) {
@@ -91,12 +109,61 @@ async function command(page, run) {
   await says(page, '#message', /over/);
   assert.equal(await run.end, 0, run.text);
   const now = await report(page);
+  now.picture = await mapPicture(page);
   assert.ok(now.path >= 60 && now.keyframes >= 15 && now.inner > 0, JSON.stringify(now));
   done(`commands obeyed; the end is told: ${now.path} frames, ${now.keyframes} keyframes, ${now.events} events`);
   expectNoFaults(page);
   await page.context().close();
   return now;
 }
+
+/** What is left of the map when the run is over, from above, without what only a live run has. */
+async function mapPicture(page) {
+  await page.evaluate(() => {
+    document.body.classList.add('finished');
+    document.querySelector('#commands').hidden = true;
+    for (const layer of ['keyframes', 'covisible', 'marginalised', 'returns', 'causal']) window.twofold.setLayer(layer, false);
+  });
+  await page.keyboard.press('2');
+  await page.waitForTimeout(2000);
+  const picture = await page.evaluate(() => document.querySelector('#stage').toDataURL());
+  await page.evaluate(() => {
+    for (const layer of ['keyframes', 'covisible', 'marginalised', 'returns', 'causal']) window.twofold.setLayer(layer, true);
+  });
+  return picture;
+}
+
+/** Share of what either picture shows that the other one does not have within two pixels. */
+const difference = (page, pictures) => page.evaluate(async (pictures) => {
+  const [a, b] = await Promise.all(pictures.map(async (source) => {
+    const image = new Image();
+    image.src = source;
+    await image.decode();
+    const canvas = document.createElement('canvas');
+    [canvas.width, canvas.height] = [image.width, image.height];
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    const {data} = context.getImageData(0, 0, image.width, image.height);
+    const isShown = (u, v) => u >= 0 && v >= 0 && u < image.width && v < image.height &&
+      Math.max(...data.subarray(4 * (v * image.width + u), 4 * (v * image.width + u) + 3)) > 96;
+    return {width: image.width, height: image.height, isShown};
+  }));
+  if (a.width !== b.width || a.height !== b.height) return `${a.width}x${a.height} and ${b.width}x${b.height}`;
+  let shown = 0;
+  let missing = 0;
+  for (const [one, other] of [[a, b], [b, a]]) {
+    for (let v = 0; v < a.height; ++v) {
+      for (let u = 0; u < a.width; ++u) {
+        if (!one.isShown(u, v)) continue;
+        ++shown;
+        let near = false;
+        for (let dv = -2; dv <= 2 && !near; ++dv) for (let du = -2; du <= 2 && !near; ++du) near = other.isShown(u + du, v + dv);
+        if (!near) ++missing;
+      }
+    }
+  }
+  return missing / shown;
+}, pictures);
 
 async function finishedRun(live) {
   const view = new Program(['view', join(out, 'run'), '--port', '0']);
@@ -105,6 +172,9 @@ async function finishedRun(live) {
   await until('the path', async () => (await report(page)).path >= live.path - 2);
   const {edges, truth} = await report(page);
   assert.ok(edges > 20 && truth > 20, `${edges} edges, ${truth} true positions`);
+  const different = await difference(page, [live.picture, await mapPicture(page)]);
+  assert.ok(different < 0.02, `the run's last picture and that of the finished run: ${different}`);
+  done(`the same picture as at the run's end, but for ${(100 * different).toFixed(2)} %`);
   await page.keyboard.press('2');
   await has(page, 'final path', '#stage', '#2ee6a6', 200);
   await page.waitForTimeout(500);
@@ -115,6 +185,7 @@ async function finishedRun(live) {
   done('time slider');
   await page.keyboard.press('End');
   await until('all of the path', async () => (await countPixels(page, '#stage', '#2ee6a6')) > 0.9 * whole);
+  await keyframeImage(page);
   await page.screenshot({path: join(out, 'finished.png')});
   await page.keyboard.press('t');
   await has(page, 'light theme', '#stage', '#00895e', 100);
@@ -140,20 +211,6 @@ async function telephone(port) {
   return view;
 }
 
-/** Places of the picture, in pixels, at which something can be picked. */
-const places = (page, what, apart) => page.evaluate(([what, apart]) => {
-  const found = [];
-  const {width, height} = document.querySelector('#stage').getBoundingClientRect();
-  for (let x = 230; x < width - 300; x += 8) {
-    for (let y = 30; y < height - 30; y += 8) {
-      if (found.some(([u, v]) => Math.hypot(x - u, y - v) <= apart) || !window.twofold.stage.pick(x, y, what)) continue;
-      found.push([x, y]);
-      if (found.length === 2) return found;
-    }
-  }
-  return found;
-}, [what, apart]);
-
 async function keyframesAndTape(view) {
   const page = await openPage(browser, await view.address());
   await until('the map', async () => (await report(page)).points > 500);
@@ -165,6 +222,7 @@ async function keyframesAndTape(view) {
   await page.mouse.click(stage.x + keyframe[0], stage.y + keyframe[1]);
   await says(page, '#keyframe', /Keyframe \d+/);
   done('keyframe clicked');
+  assert.ok(!(await page.locator('#keyframe-image').isVisible()), 'a map file has no images');
   await page.selectOption('#colouring', 'deviation');
   await page.keyboard.press('m');
   const points = await places(page, 'point', 120);

@@ -19,10 +19,10 @@ export async function until(what, check, ms = 40000) {
 
 /** A running `twofold` that shows itself; `address` when it has said where. */
 export class Program {
-  constructor(args) {
+  constructor(args, cwd = '.') {
     this.text = '';
     this.ended = false;
-    this.process = spawn(TWOFOLD, args, {env: {...process.env, OPENBLAS_NUM_THREADS: '1'}});
+    this.process = spawn(TWOFOLD, args, {cwd, env: {...process.env, OPENBLAS_NUM_THREADS: '1'}});
     for (const stream of [this.process.stdout, this.process.stderr]) stream.on('data', (data) => (this.text += data));
     this.end = new Promise((resolve) => this.process.on('exit', (code) => {
       this.ended = true;
@@ -115,3 +115,17 @@ export function countPixels(page, selector, colour, within = 24) {
     return count;
   }, [selector, colour, within]);
 }
+
+/** Places of the picture, in pixels, at which something can be picked. */
+export const places = (page, what, apart) => page.evaluate(([what, apart]) => {
+  const found = [];
+  const {width, height} = document.querySelector('#stage').getBoundingClientRect();
+  for (let x = 230; x < width - 300; x += 8) {
+    for (let y = 30; y < height - 30; y += 8) {
+      if (found.some(([u, v]) => Math.hypot(x - u, y - v) <= apart) || !window.twofold.stage.pick(x, y, what)) continue;
+      found.push([x, y]);
+      if (found.length === 2) return found;
+    }
+  }
+  return found;
+}, [what, apart]);

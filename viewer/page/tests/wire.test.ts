@@ -3,7 +3,8 @@ import assert from 'node:assert/strict';
 import {readFileSync} from 'node:fs';
 import {test} from 'node:test';
 import {Model} from '../src/model.ts';
-import {decode, type Delta, type Frames} from '../src/wire.ts';
+import {describe, lateStretches, lostStretches} from '../src/timeline.ts';
+import {State, decode, type Delta, type Frames, type LiveFrame, type MapEvent} from '../src/wire.ts';
 
 const messages = JSON.parse(readFileSync(process.env.MESSAGES!, 'utf8')) as Record<string, string>;
 
@@ -49,9 +50,42 @@ test('live frames', () => {
 
 test('measured points', () => {
   const header = '04000000' + '09000000' + '01000000' + '00000000';
-  const point = '00002041' + '0000a041' + '00002841' + '00009841' + '00000000';
-  assert.deepEqual(decode(bytes(header, point)),
-    {kind: 'measured', frame: 9, points: [{u: 10, v: 20, expectedU: 10.5, expectedV: 19, inlier: false}]});
+  const point = '00002041' + '0000a041' + '00002841' + '00009841' + '00000000' + '00001041' + '0000a841' + '0000c040';
+  assert.deepEqual(decode(bytes(header, point)), {kind: 'measured', frame: 9, points: [
+    {u: 10, v: 20, expectedU: 10.5, expectedV: 19, inlier: false, predictedU: 9, predictedV: 21, radius: 6}]});
+});
+
+test('the image of a keyframe', () => {
+  const header = '05000000' + '11000000' + '08000000' + '06000000';
+  assert.deepEqual(decode(bytes(header, 'ffd8')), {kind: 'keyframe image', keyframe: 17, jpeg: new Uint8Array([0xff, 0xd8])});
+});
+
+const nowhere: [number, number, number] = [0, 0, 0];
+const correction: MapEvent = {kind: 'pose graph', text: '', frame: 7, t: 1, keyframe: 2, partBefore: 0, part: 0, moved: 0.42,
+  turned: Math.PI / 180, before: nowhere, after: nowhere, loop: null};
+
+test('events say what moved and by how much, loops of one camera the scale', () => {
+  assert.equal(describe(correction), 'pose graph · frame 7 · moved 42 cm, turned 1.00°');
+  assert.equal(describe({...correction, partBefore: 3}), 'pose graph · frame 7 · part 3 → 0');
+  const loop = {from: 0, to: 2, joinsParts: false, scale: 1, inliers: 41, travelled: 53.2};
+  const closed = {...correction, kind: 'loop', loop};
+  assert.equal(describe(closed), 'loop · off by 42 cm, 1.00° after 53.20 m · 41 matches');
+  assert.equal(describe({...closed, loop: {...loop, scale: 1.0625}}), 'loop · off by 42 cm, 1.00° after 53.20 m · 41 matches · scale 1.0625');
+  assert.equal(describe({...closed, loop: {...loop, joinsParts: true, scale: 0.5}}), 'loop · joins two map parts · 41 matches · scale 0.5000');
+});
+
+test('late frames say what held them up', () => {
+  const model = new Model();
+  const frame = (n: number, latencyMs: number, stageMs: number[]): LiveFrame => ({frame: n, t: 0.05 * n, reference: 0, part: 0,
+    state: State.tracked, reason: 0, keyframe: false, effort: 0, latencyMs, position: nowhere, orientation: [0, 0, 0, 1],
+    trackedShare: 1, points: 9, mapVersion: 1, stageMs, waiting: 0});
+  const frames = [frame(0, 10, [5]), frame(1, 12, [5]), frame(2, 70, [60, 4]), frame(3, 80, [61, 3]), frame(4, 90, [4]), frame(5, 9, [4])];
+  for (const live of frames) model.take({kind: 'delta', whole: false, last: true, from: 1, to: 2, points: [], pointsGone: [], keyframes: [],
+    keyframesGone: [], edges: [], edgesGone: [], pathGone: [], path: [{...live, causal: nowhere, inReference: nowhere, turned: [0, 0, 0, 1]}]});
+  model.addLive(frames);
+  assert.deepEqual(lateStretches(model).map((late) => [late.frames, late.reason]),
+    [[2, 'tracking it took 64 ms'], [1, 'it waited: earlier frames, decoding, or no CPU']]);
+  assert.deepEqual(lostStretches(model), []);
 });
 
 test('messages that end too early are refused', () => {
