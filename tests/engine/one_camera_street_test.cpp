@@ -28,8 +28,8 @@ TEST(OneCameraStreet, NoFrameIsLostThoughOnlyABandOfTheImageHasCorners) {
     if (has_final_pose(record))
       estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
   }
-  const auto evaluation = evaluate(associate(estimate, source->ground_truth(), 10'000'000),
-                                   {.alignment = Alignment::kSim3});
+  const auto evaluation =
+      evaluate(associate(estimate, source->ground_truth(), 10'000'000), {.alignment = Alignment::kSim3});
   ASSERT_TRUE(evaluation);
   EXPECT_LT(evaluation->absolute.rmse, 0.005 * evaluation->path_length);
 }
