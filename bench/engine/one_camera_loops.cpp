@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/core.h>
 #include <opencv2/core.hpp>
@@ -14,9 +15,15 @@
 #include "io/plots/plot.hpp"
 #include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
+#include "mapping/edges.hpp"
+#include "mapping/keyframe_pose_graph.hpp"
+#include "mapping/similarity_loop.hpp"
 
 // One camera round a loop, its scale drift corrected over Sim(3), and the same run with its loops closed over
 // SE(3): a table, and both paths from above side by side  (thesis 5.4, fig. 5.3).
+//
+// Twice: with the pose graph alone, as the thesis compares them, on one and the same map as it was when its
+// first large loop was found; and at the end of either run, when the double windows have gone on adjusting.
 
 namespace twofold {
 namespace {
@@ -24,6 +31,9 @@ namespace {
 struct ClosedRun {
   RunResult result;
   Trajectory poses, causal;
+  GraphSnapshot before_loop;  ///< the map before the first large loop was taken in
+  Rig rig;
+  MapperOptions mapper;
 };
 
 FrameFeed feed_from(FrameSource& source) {
@@ -43,8 +53,18 @@ ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   options.mapper.scale_drifts = over_sim3;
+  GraphSnapshot newest, before_loop;
+  options.on_map = [&](const GraphSnapshot& graph, const DoubleWindow&) {
+    if (graph.last_jump().version != 0 && before_loop.keyframe_count() == 0) before_loop = newest;
+    newest = graph;
+  };
   const std::atomic<bool> interrupted{false};
-  ClosedRun run{Engine(source->rig(), options).run(feed_from(*source), interrupted), {}, {}};
+  ClosedRun run{Engine(source->rig(), options).run(feed_from(*source), interrupted),
+                {},
+                {},
+                before_loop,
+                source->rig(),
+                options.mapper};
   if (!run.result.error.empty()) throw std::runtime_error(run.result.error);
   for (const FrameRecord& record : run.result.frames) {
     if (!has_final_pose(record) || !run.result.graph.contains(record.reference)) continue;
@@ -66,6 +86,58 @@ std::optional<Evaluation> line(const char* name, const Trajectory& poses, const 
              100 * evaluation->absolute.rmse / evaluation->path_length,
              evaluation->absolute_rotation_deg.rmse, 100 * std::abs(halves[0] / halves[1] - 1));
   return *std::move(evaluation);
+}
+
+/// Centres of keyframes after a pose graph.
+Trajectory centres(const GraphSnapshot& graph, const std::vector<KeyframePose>& poses) {
+  Trajectory result;
+  for (const KeyframePose& pose : poses)
+    result.push_back({graph.keyframe(pose.id).t_ns, pose.T_k_w.inverse()});
+  std::sort(result.begin(), result.end(), [](auto& a, auto& b) { return a.t_ns < b.t_ns; });
+  return result;
+}
+
+/// The pose graph that close_over_sim3 solves, over SE(3): the loop is one edge more, its scale is left out.
+std::vector<KeyframePose> close_over_se3(const ClosedRun& run, const LoopConstraint& loop) {
+  const GraphSnapshot& graph = run.before_loop;
+  VisitedSet visited;
+  std::vector<TreeNode> tree;
+  weighted_breadth_first(graph, loop.to, graph.keyframe_count(), visited, tree);
+  IdMap position;
+  const auto information = [&](const Keyframe& from, const Keyframe& to, const Edge& edge) {
+    return edge_information(from, to, edge, run.rig, run.mapper.edge);
+  };
+  PoseGraph<SE3> problem = keyframe_pose_graph<SE3>(graph, tree, information, position);
+  Edge edge;
+  edge.other = loop.to;
+  edge.weight = std::max(1, loop.inliers);
+  problem.constraints.push_back({position.find(loop.from), 0, loop.T_to_from,
+                                 information(graph.keyframe(loop.from), graph.keyframe(loop.to), edge)});
+  PoseGraphSolver<SE3> solver;
+  solver.solve(problem, {});
+  std::vector<KeyframePose> poses;
+  for (std::size_t n = 0; n < tree.size(); ++n) poses.push_back({tree[n].id, problem.poses[n]});
+  return poses;
+}
+
+/// The first large loop, closed by a pose graph over either group, and nothing after it.
+void compare_pose_graphs(const ClosedRun& run, const Trajectory& truth) {
+  const GraphSnapshot& graph = run.before_loop;
+  if (run.result.loops.empty()) return;
+  const LoopConstraint& loop = run.result.loops.front().constraint;
+  for (const KeyframeId id : {loop.from, loop.to})
+    if (!graph.contains(id) || graph.keyframe(id).culled()) return;
+  if (graph.part(loop.from) != graph.part(loop.to)) return;
+  std::vector<KeyframePose> over_sim3, as_it_was;
+  for (const KeyframeSimilarity& pose : close_over_sim3(graph, loop, run.rig, run.mapper).poses) {
+    over_sim3.push_back({pose.id, pose.S_k_w.without_scale()});
+    as_it_was.push_back({pose.id, graph.T_k_w(pose.id)});
+  }
+  fmt::print("pose graph alone, {} keyframes, first loop\n", over_sim3.size());
+  (void)line("before", centres(graph, as_it_was), truth);
+  const auto sim3 = line("over Sim(3)", centres(graph, over_sim3), truth);
+  const auto se3 = line("over SE(3)", centres(graph, close_over_se3(run, loop)), truth);
+  if (sim3 && se3) fmt::print("SE(3) / Sim(3): {:.2f}\n", se3->absolute.rmse / sim3->absolute.rmse);
 }
 
 void print_loops(const RunResult& result) {
@@ -96,6 +168,8 @@ void compare(const std::string& source, const std::string& file) {
   print_loops(over_sim3.result);
   fmt::print("{:<22} {:>9} {:>9} {:>9} {:>9}\n", source.substr(0, 22), "ATE m", "% of path", "degrees",
              "halves %");
+  compare_pose_graphs(over_sim3, truth);
+  fmt::print("at the end of the run\n");
   (void)line("as it was known", over_sim3.causal, truth);
   const auto sim3 = line("closed over Sim(3)", over_sim3.poses, truth);
   const auto se3 = line("closed over SE(3)", over_se3.poses, truth);

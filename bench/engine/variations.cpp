@@ -57,8 +57,8 @@ std::optional<SE3> true_T_w_c(const Trajectory& truth, std::int64_t t_ns) {
   return a.T_w_c * SE3::exp(share * (a.T_w_c.inverse() * b.T_w_c).log());
 }
 
-double ate(const Trajectory& estimate, const Trajectory& truth) {
-  const auto evaluation = evaluate(associate(estimate, truth, 20'000'000), {});
+double ate(const Trajectory& estimate, const Trajectory& truth, Alignment alignment) {
+  const auto evaluation = evaluate(associate(estimate, truth, 20'000'000), {.alignment = alignment});
   return evaluation ? evaluation->absolute.rmse : -1;
 }
 
@@ -69,8 +69,10 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   EngineOptions options;
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  const bool to_scale = source->rig().kind != SensorKind::kMono;  // lengths are comparable with the truth's
   options.on_pose = [&](const PoseReport& report) {
     const FrameRecord& record = report.record;
+    if (!to_scale) return;
     if (record.state != FrameState::kTracked || !report.graph.contains(record.reference)) return;
     if (report.graph.keyframe(record.reference).t_ns == record.t_ns) return;
     const auto T_w_now = true_T_w_c(truth, record.t_ns);
@@ -97,13 +99,18 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   Trajectory estimate, causal;
   for (const FrameRecord& record : result.frames) {
     ++outcome.frames;
-    if (record.state != FrameState::kTracked) continue;
+    if (!has_final_pose(record) || !result.graph.contains(record.reference)) continue;
+    if (record.state == FrameState::kPlacedLater) {
+      estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
+      continue;
+    }
     ++outcome.tracked;
     estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
     causal.push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
   }
-  outcome.ate = ate(estimate, truth);
-  outcome.ate_causal = ate(causal, truth);
+  const Alignment alignment = to_scale ? Alignment::kSe3 : Alignment::kSim3;
+  outcome.ate = ate(estimate, truth, alignment);
+  outcome.ate_causal = ate(causal, truth, alignment);
   return outcome;
 }
 
@@ -118,9 +125,12 @@ double quantile(std::vector<double> values, double share) {
 void print_row(const Variation& variation, const Outcome& outcome) {
   double mean = 0;
   for (const double nees : outcome.nees) mean += nees / static_cast<double>(outcome.nees.size());
-  fmt::print("| {} | {}/{} | {:.5f} | {:.5f} | {:.2f} / {:.2f} / {:.2f} |\n", variation.name, outcome.tracked,
-             outcome.frames, outcome.ate, outcome.ate_causal, quantile(outcome.nees, 0.5), mean,
-             quantile(outcome.nees, 0.95));
+  const std::string nees = outcome.nees.empty()
+                               ? "-"
+                               : fmt::format("{:.2f} / {:.2f} / {:.2f}", quantile(outcome.nees, 0.5), mean,
+                                             quantile(outcome.nees, 0.95));
+  fmt::print("| {} | {}/{} | {:.5f} | {:.5f} | {} |\n", variation.name, outcome.tracked, outcome.frames,
+             outcome.ate, outcome.ate_causal, nees);
   std::fflush(stdout);
 }
 
@@ -132,12 +142,16 @@ int main(int argc, char** argv) {
   twofold::SourceOptions options;
   std::string calibration;
   bool as_it_is_only = false;
+  std::string camera = "all";
   CLI::App app("Runs of one recording that should differ by little");
   app.add_option("source", sources, "as of 'twofold run'")->required();
   app.add_option("--calib", calibration, "calibration file for all of them");
+  app.add_option("--camera", camera, "mono: the left camera alone, errors after alignment with scale")
+      ->check(CLI::IsMember({"all", "mono"}));
   app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
   CLI11_PARSE(app, argc, argv);
   if (!calibration.empty()) options.calibration = calibration;
+  options.left_only = camera == "mono";
   const twofold::Variation variations[] = {{"as it is"},
                                            {"first frame left out", 1},
                                            {"first two left out", 2},
