@@ -274,6 +274,7 @@ void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserR
   mapping.replacement_log().hang_on_live_keyframes(result.frames);
   result.mapping = mapping.totals();
   result.places = loop_closing.places();
+  result.readout = tracking.readout();
   result.times.push_back(std::move(tracking.times()));
   result.times.push_back(std::move(mapping.times()));
   result.times.push_back(std::move(loop_closing.times()));

@@ -22,6 +22,7 @@
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
+#include "tracking/readout_estimator.hpp"
 #include "tracking/recent_views.hpp"
 #include "tracking/track_result.hpp"
 
@@ -81,6 +82,12 @@ class Tracker {
   /// its graph has the keyframe, looks for points around there, and forgets the hint. Ignored while tracking.
   void relocalise(KeyframeId id, const SE3& T_c_k) { hint_ = Placement{id, T_c_k}; }
 
+  /// The readout of a rolling shutter as far as it is known by now; once it is significant, later frames are
+  /// tracked with it. Nothing if the rig has it.
+  [[nodiscard]] std::optional<ReadoutEstimate> readout() const {
+    return readout_ ? std::optional(readout_->estimate()) : std::nullopt;
+  }
+
   /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
   /// and diagnosis. Valid until the next step.
   [[nodiscard]] std::span<const MotionObservation> last_observations() const { return motion_; }
@@ -125,6 +132,7 @@ class Tracker {
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
+  void learn_readout(const FrameStep& step, bool goes_on);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
@@ -144,7 +152,7 @@ class Tracker {
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
 
-  const Rig rig_;
+  Rig rig_;  ///< constant but for the readout, once that is found
   const TrackerOptions options_;
   FrameImages current_, previous_;  ///< of the frame at hand, and of the last good one
   DenseAlignment alignment_;
@@ -155,8 +163,9 @@ class Tracker {
   ElderVote elder_vote_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
-  std::optional<DepthAlignment> depth_;  ///< RGB-D only
-  bool corners_scarce_ = false;          ///< the last good frame was placed by surfaces
+  std::optional<DepthAlignment> depth_;      ///< RGB-D only
+  std::optional<ReadoutEstimator> readout_;  ///< if the calibration leaves it open
+  bool corners_scarce_ = false;              ///< the last good frame was placed by surfaces
   // One camera only: where its depths come from.
   std::optional<MonocularStart> monocular_start_;
   std::optional<DepthSeeds> seeds_;
