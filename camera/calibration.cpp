@@ -50,8 +50,8 @@ std::string Calibration::invalid_reason() const {
     if (auto reason = invalid_rectified(*this); !reason.empty()) return reason;
   }
   if (!(fps >= 0) || !std::isfinite(fps)) return "fps must not be negative, is " + std::to_string(fps);
-  if (!(readout >= 0) || !std::isfinite(readout)) {
-    return "readout must not be negative, is " + std::to_string(readout);
+  if (readout && (!(*readout >= 0) || !std::isfinite(*readout))) {
+    return "readout must not be negative, is " + std::to_string(*readout);
   }
   if (kind == SensorKind::kRgbd) {
     if (!(depth_unit > 0)) return "depth_unit must be positive, is " + std::to_string(depth_unit);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "camera/camera_model.hpp"
@@ -19,8 +20,10 @@ struct Calibration {
   /// Images are undistorted and, for stereo, row-aligned already: both cameras must be equal pinholes without
   /// distortion and T_right_left a pure shift along -x.
   bool already_rectified = false;
-  double fps = 0;      ///< nominal frame rate [Hz]; 0 = unknown
-  double readout = 0;  ///< rolling shutter: from the exposure of the first row to that of the last [s], >= 0
+  double fps = 0;  ///< nominal frame rate [Hz]; 0 = unknown
+  /// Rolling shutter: from the exposure of the first row to that of the last [s], >= 0; 0: all rows at once.
+  /// Nothing: nobody knows, and the tracker finds out.
+  std::optional<double> readout;
 
   double depth_unit = 0.001;       ///< RGB-D: metres per unit of the 16-bit depth image, > 0
   double depth_min = 0.3;          ///< RGB-D: nearer readings are holes [m]

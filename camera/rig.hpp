@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "camera/pinhole.hpp"
 
@@ -31,7 +32,9 @@ struct Rig {
   double depth_unit = 0.001;  ///< RGB-D: metres per unit of the 16-bit depth image
   double depth_min = 0.3;     ///< nearer readings are holes [m]; stereo: of surfaces only
   double depth_max = 8.0;     ///< farther ones likewise
-  double readout = 0;         ///< rolling shutter: from the exposure of the first row to that of the last [s]
+  /// Rolling shutter: from the exposure of the first row to that of the last [s]; 0: all rows at once.
+  /// Nothing: nobody knows, and the tracker finds out.
+  std::optional<double> readout;
 
   MeasurementNoise noise;
 

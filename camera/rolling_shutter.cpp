@@ -3,10 +3,10 @@
 namespace twofold {
 
 RollingShutter::RollingShutter(const Rig& rig, const Vector6& velocity)
-    : at_rest_(rig.readout == 0 || velocity.isZero(0)),
+    : at_rest_(rig.readout.value_or(0) == 0 || velocity.isZero(0)),
       velocity_(velocity),
-      seconds_per_row_(rig.readout / rig.camera.height),
-      half_readout_(0.5 * rig.readout) {}
+      seconds_per_row_(rig.readout.value_or(0) / rig.camera.height),
+      half_readout_(0.5 * rig.readout.value_or(0)) {}
 
 Vector3 RollingShutter::at_mid_exposure(const Rig& rig, const Vector3& z, const Vector3& x_c) const {
   if (at_rest_) return z;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "graph/snapshot.hpp"
 #include "tracking/effort.hpp"
 #include "tracking/lost_cause.hpp"
+#include "tracking/readout_estimator.hpp"
 
 namespace twofold {
 
@@ -155,7 +157,8 @@ struct RunResult {
   GraphSnapshot graph;            ///< after the last round and the final pose graph optimisation
   KeyframeDatabase places;        ///< how the places of its keyframes look
   CheckpointReport checkpoints;
-  std::vector<StageRecorder> times;  ///< one a thread
+  std::optional<ReadoutEstimate> readout;  ///< of a rolling shutter, if the rig left it open
+  std::vector<StageRecorder> times;        ///< one a thread
   ScheduleStreams schedule;
   std::unique_ptr<Trace> trace;               ///< null unless asked for
   std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted

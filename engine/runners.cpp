@@ -279,6 +279,7 @@ void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserR
   result.row_offset = tracking.row_offset();
   result.mapping = mapping.totals();
   result.places = loop_closing.places();
+  result.readout = tracking.readout();
   result.times.push_back(std::move(tracking.times()));
   result.times.push_back(std::move(mapping.times()));
   result.times.push_back(std::move(loop_closing.times()));

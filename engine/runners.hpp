@@ -59,6 +59,7 @@ class TrackerRunner {
   /// At the end of a run: frames before a start of one camera get the poses that it found out.
   void place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const;
 
+  [[nodiscard]] std::optional<ReadoutEstimate> readout() const { return tracker_.readout(); }
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -99,7 +100,7 @@ void bind_rig(py::module_& module) {
       "shifted by `baseline` along x.")
       .def(py::init([](Sensor sensor, int width, int height, double fx, double fy, double cx, double cy,
                        double baseline, double depth_unit, double depth_min, double depth_max,
-                       double readout) {
+                       std::optional<double> readout) {
              return CameraRig{sensor, width,    height,     fx,        fy,        cx,
                               cy,     baseline, depth_unit, depth_min, depth_max, readout};
            }),
@@ -111,7 +112,9 @@ void bind_rig(py::module_& module) {
            "virtual right\n"
            "camera (0.08); depth_unit: metres per unit of the depth image; readings outside depth_min to "
            "depth_max [m]\n"
-           "are holes; readout of a rolling shutter [s].")
+           "are holes; readout of a rolling shutter [s], 0 when all rows are exposed at once, None when it "
+           "is\n"
+           "to be found out.")
       .def_readwrite("sensor", &CameraRig::sensor)
       .def_readwrite("width", &CameraRig::width)
       .def_readwrite("height", &CameraRig::height)

@@ -74,7 +74,7 @@ Rig to_rig(const CameraRig& rig) {
     expect(positive(rig.baseline), "baseline", "> 0", rig.baseline);
     inside.baseline = rig.baseline;
   }
-  expect(rig.readout >= 0, "readout", ">= 0", rig.readout);
+  if (rig.readout) expect(*rig.readout >= 0, "readout", ">= 0", *rig.readout);
   inside.readout = rig.readout;
   if (rig.sensor != Sensor::kRgbd) return inside;
   expect(positive(rig.depth_unit), "depth_unit", "> 0", rig.depth_unit);

@@ -52,6 +52,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   depths_.reserve(std::max(searches, kMaxImmaturePoints));
   previous_points_.reserve(kMaxAlignmentPoints);
   if (rig.kind == SensorKind::kStereo) right_rows_.emplace(rig);
+  if (!rig.readout) readout_.emplace(rig, searches);
   if (rig.kind == SensorKind::kRgbd) depth_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) {
     monocular_start_.emplace(rig, options);
@@ -183,6 +184,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   T_cur_prev_ = goes_on ? result.T_c_ref * last_.T_c_ref.inverse() : SE3();
   last_ = {result.reference, result.T_c_ref};
   last_t_ns_ = step.frame.t_ns;
+  if (readout_) learn_readout(step, goes_on);
   loss_.placed();
   unplaced_ = false;
   previous_points_.clear();

@@ -23,6 +23,7 @@
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
+#include "tracking/readout_estimator.hpp"
 #include "tracking/recent_views.hpp"
 #include "tracking/track_result.hpp"
 
@@ -84,6 +85,11 @@ class Tracker {
 
   /// Rows that a stereo pair's right images lie lower than its left ones, taken back by the tracker [px].
   [[nodiscard]] double row_offset() const { return right_rows_ ? right_rows_->offset() : 0; }
+  /// The readout of a rolling shutter as far as it is known by now; once it is significant, later frames are
+  /// tracked with it. Nothing if the rig has it.
+  [[nodiscard]] std::optional<ReadoutEstimate> readout() const {
+    return readout_ ? std::optional(readout_->estimate()) : std::nullopt;
+  }
 
   /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
   /// and diagnosis. Valid until the next step.
@@ -129,6 +135,7 @@ class Tracker {
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
+  void learn_readout(const FrameStep& step, bool goes_on);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
@@ -148,7 +155,7 @@ class Tracker {
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
 
-  const Rig rig_;
+  Rig rig_;  ///< constant but for the readout, once that is found
   const TrackerOptions options_;
   FrameImages current_, previous_;  ///< of the frame at hand, and of the last good one
   DenseAlignment alignment_;
@@ -159,9 +166,10 @@ class Tracker {
   ElderVote elder_vote_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
-  std::optional<RightRows> right_rows_;  ///< stereo only
-  std::optional<DepthAlignment> depth_;  ///< RGB-D only
-  bool corners_scarce_ = false;          ///< the last good frame was placed by surfaces
+  std::optional<RightRows> right_rows_;      ///< stereo only
+  std::optional<DepthAlignment> depth_;      ///< RGB-D only
+  std::optional<ReadoutEstimator> readout_;  ///< if the calibration leaves it open
+  bool corners_scarce_ = false;              ///< the last good frame was placed by surfaces
   // One camera only: where its depths come from.
   std::optional<MonocularStart> monocular_start_;
   std::optional<DepthSeeds> seeds_;

@@ -69,8 +69,29 @@ void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& ste
 /// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on.
 RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const {
   const double seconds = static_cast<double>(frame.t_ns - last_t_ns_) * 1e-9;
-  if (rig_.readout == 0 || loss_.lost_frames() > 0 || !(seconds > 0)) return {};
+  if (rig_.readout.value_or(0) == 0 || loss_.lost_frames() > 0 || !(seconds > 0)) return {};
   return {rig_, (T_c_ref * last_.T_c_ref.inverse()).log() / seconds};
+}
+
+/// From what was found in this frame and the ones before, whether it fitted the map or not.
+void Tracker::learn_readout(const FrameStep& step, bool goes_on) {
+  if (!goes_on) readout_->interrupt();
+  std::vector<SeenPoint>* seen = readout_->begin_frame(step.frame.t_ns, T_cur_prev_);
+  if (seen == nullptr) return;
+  for (const Match& match : matches_) {
+    const TrackedPoint& point = local_map_.points()[match.point];
+    const Vector3& z = match.found.z;
+    const bool measured = rig_.kind != SensorKind::kMono && z.x() > z.z();
+    const double depth =
+        measured ? rig_.depth_from_disparity(z.x() - z.z()) : (step.result.T_c_ref * point.x_ref).z();
+    // By where it was seen first, which it keeps when the map takes it over.
+    const Eigen::Vector2f& uv = point.appearance->uv;
+    const std::uint64_t key = std::uint64_t{index(local_map_.anchor(point))} << 32U |
+                              std::uint64_t(2 * uv.x() + 1) << 16U | std::uint64_t(2 * uv.y() + 1);
+    seen->push_back({key, z.head<2>(), depth, std::ldexp(rig_.noise.sigma_px, match.found.level)});
+  }
+  readout_->end_frame();
+  if (readout_->estimate().significant) rig_.readout = readout_->estimate().seconds;
 }
 
 /// What was found, as a global shutter would have seen it.

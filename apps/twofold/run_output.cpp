@@ -179,6 +179,10 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
              result.graph.keyframe_count(), result.mapping.rounds, result.mapping.metric_loops,
              result.loops.size());
   print_loops(result);
+  if (result.readout && result.readout->significant) {
+    fmt::print("readout     {:.1f} +- {:.1f} ms: a rolling shutter, found from {} pairs of frames\n",
+               1e3 * result.readout->seconds, 1e3 * result.readout->sigma, result.readout->pairs);
+  }
   if (options.map) {
     const auto frame = recognised_at(options, result);
     fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),

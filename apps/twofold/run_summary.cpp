@@ -149,6 +149,16 @@ Json moving_points_json(const RunResult& result) {
   return {{"frames", frames}, {"most_in_a_frame", most}};
 }
 
+/// Null if the calibration gives it.
+Json readout_json(const std::optional<ReadoutEstimate>& readout) {
+  if (!readout) return nullptr;
+  const bool measured = readout->pairs > 1;
+  return {{"found", readout->significant},
+          {"readout_ms", measured ? Json(1e3 * readout->seconds) : Json(nullptr)},
+          {"sigma_ms", measured ? Json(1e3 * readout->sigma) : Json(nullptr)},
+          {"pairs", readout->pairs}};
+}
+
 }  // namespace
 
 Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result,
@@ -175,6 +185,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"map_parts", parts_json(parts)},
             {"moving_points", moving_points_json(result)},
             {"row_offset_px", result.row_offset},
+            {"rolling_shutter", readout_json(result.readout)},
             {"mapper_rounds", result.mapping.rounds},
             {"metric_loop_edges", result.mapping.metric_loops},
             {"closed_loops", loops_json(result)},

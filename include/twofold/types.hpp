@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 /// Marks what the shared library exports; everything else in it is hidden.
 #define TWOFOLD_API __attribute__((visibility("default")))
@@ -53,7 +54,9 @@ struct CameraRig {
   double depth_unit = 0.001;  ///< RGB-D: metres per unit of the depth image, > 0
   double depth_min = 0.3;     ///< nearer readings are holes [m]; stereo: of surfaces only
   double depth_max = 8.0;     ///< farther ones likewise
-  double readout = 0;         ///< rolling shutter: from the exposure of the first row to that of the last [s]
+  /// Rolling shutter: from the exposure of the first row to that of the last [s], >= 0; 0: all rows at once.
+  /// Nothing: not known, and found out while a camera turns to and fro.
+  std::optional<double> readout;
 };
 
 enum class ImageFormat : std::uint8_t {

@@ -35,7 +35,7 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   if (const auto scale = take_positive("depth_scale")) calibration.depth_unit = 1.0 / *scale;
   if (const auto depth = take_positive("depth_min")) calibration.depth_min = *depth;
   if (const auto depth = take_positive("depth_max")) calibration.depth_max = *depth;
-  if (const auto readout = take_positive("readout")) calibration.readout = *readout;
+  if (const auto readout = parameters.take_number("readout")) calibration.readout = *readout;
   const auto baseline = take_positive("baseline");
   if (kind == SensorKind::kRgbd && baseline) calibration.virtual_baseline = *baseline;
   if (kind == SensorKind::kStereo && baseline) {

@@ -51,7 +51,7 @@ class CameraRig:
     depth_unit: float
     depth_min: float
     depth_max: float
-    readout: float
+    readout: float | None
     def __init__(
         self,
         *,
@@ -66,7 +66,7 @@ class CameraRig:
         depth_unit: float = ...,
         depth_min: float = ...,
         depth_max: float = ...,
-        readout: float = ...,
+        readout: float | None = ...,
     ) -> None: ...
 
 class TrackingState(_Enum):

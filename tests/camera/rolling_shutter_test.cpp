@@ -23,7 +23,7 @@ const Vector6 kVelocity = (Vector6() << 0.5, -0.3, 0.8, 0.4, 1.2, -0.5).finished
 Vector3 measured(const Rig& rig, const Vector3& x_c) {
   Vector3 z = rig.project(x_c);
   for (int i = 0; i < 20; ++i) {
-    const double tau = ((z.y() + 0.5) / rig.camera.height - 0.5) * rig.readout;
+    const double tau = ((z.y() + 0.5) / rig.camera.height - 0.5) * *rig.readout;
     z = rig.project(SE3::exp(tau * kVelocity) * x_c);
   }
   return z;

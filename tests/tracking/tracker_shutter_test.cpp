@@ -36,18 +36,22 @@ const std::vector<Frame>& shaken_frames() {
   return result;
 }
 
+ReadoutEstimate found;  // by the tracker that was asked for its error
+
 /// Root mean square of the camera's distance from where it is [m].
-double error_with(double readout) {
+double error_with(std::optional<double> readout) {
   Rig rig = test_rig(SensorKind::kStereo, 320, 240);
   rig.readout = readout;
   Odometry odometry(rig);
   double squares = 0;
+  found = {};
   for (int i = 0; i < kFrames; ++i) {
     const TrackResult result = odometry.step(shaken_frames()[static_cast<std::size_t>(i)]);
     EXPECT_EQ(result.status, TrackStatus::kTracking) << i;
     const SE3 truth = shaken_T_c_w(i * kInterval) * shaken_T_c_w(0).inverse();
     squares += (odometry.T_c_w(result).inverse() * truth).translation().squaredNorm();
   }
+  if (odometry.tracker().readout()) found = *odometry.tracker().readout();
   return std::sqrt(squares / kFrames);
 }
 
@@ -56,6 +60,15 @@ TEST(TrackerShutter, KnowsWhereTheCameraWasWhenEachRowWasExposed) {
   const double ignored = error_with(0);
   EXPECT_LT(known, 0.006);
   EXPECT_GT(ignored, 3 * known);
+}
+
+TEST(TrackerShutter, FindsTheReadoutThatNobodyGave) {
+  error_with(0);
+  EXPECT_EQ(found.pairs, 0);  // 0 says that there is none
+  error_with(std::nullopt);
+  EXPECT_TRUE(found.significant);
+  EXPECT_NEAR(found.seconds, kReadout, 4 * found.sigma);
+  EXPECT_LT(found.sigma, 0.003);
 }
 
 }  // namespace

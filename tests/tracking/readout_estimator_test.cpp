@@ -1,0 +1,141 @@
+// A camera that shakes its head before points that are known exactly, each row seen at its own time.
+#include "tracking/readout_estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/allocation_counter.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr double kPeriod = 1.0 / 30;
+constexpr double kNoisePx = 0.3;
+
+Rig camera_rig() {
+  Rig rig;
+  rig.camera = {500, 500, 320, 240, 640, 480};
+  return rig;
+}
+
+/// About all axes, to and fro or, not `shaken`, ever on.
+SE3 T_c_w_at(double seconds, bool shaken) {
+  const Vector3 turn = shaken ? Vector3(0.10 * std::sin(7 * seconds), 0.25 * std::sin(5 * seconds),
+                                        0.08 * std::sin(9 * seconds))
+                              : Vector3(0.02, 0.5, 0.01) * seconds;
+  const SE3 T_w_c(SO3::exp(turn), Vector3(0.1 * std::sin(3 * seconds), 0, 0.05 * seconds));
+  return T_w_c.inverse();
+}
+
+class ShakenCamera {
+ public:
+  explicit ShakenCamera(double readout) : readout_(readout) {
+    std::uniform_real_distribution<double> angle(-M_PI, M_PI), height(-2, 2), distance(1.5, 5);
+    for (int i = 0; i < 1500; ++i) {
+      const double a = angle(random_), d = distance(random_);
+      points_.emplace_back(d * std::sin(a), height(random_), d * std::cos(a));
+    }
+  }
+  double stamp_jitter = 0;  ///< share of the period by which time stamps are wrong
+  bool shaken = true;
+
+  void show(int frame, ReadoutEstimator& estimator) {
+    const double t = frame * kPeriod;
+    std::uniform_real_distribution<double> jitter(-stamp_jitter, stamp_jitter);
+    const SE3 T_cur_prev = T_c_w_at(t, shaken) * T_c_w_at(t - kPeriod, shaken).inverse();
+    const auto t_ns = static_cast<std::int64_t>((t + jitter(random_) * kPeriod + 1) * 1e9);
+    std::vector<SeenPoint>* seen = estimator.begin_frame(t_ns, T_cur_prev);
+    if (seen == nullptr) return;
+    for (std::size_t p = 0; p < points_.size() && seen->size() < seen->capacity(); ++p) see(p, t, *seen);
+    estimator.end_frame();
+  }
+  [[nodiscard]] ReadoutEstimate after(int frames) {
+    ReadoutEstimator estimator(rig_, 150);
+    for (int i = 0; i < frames; ++i) show(i, estimator);
+    return estimator.estimate();
+  }
+
+ private:
+  void see(std::size_t p, double t, std::vector<SeenPoint>& seen) {
+    Vector3 x = T_c_w_at(t, shaken) * points_[p];
+    for (int round = 0; round < 4; ++round) {
+      if (!(x.z() > 0.3)) return;
+      const double v = rig_.camera.project(x).y();
+      x = T_c_w_at(t + ((v + 0.5) / rig_.camera.height - 0.5) * readout_, shaken) * points_[p];
+    }
+    if (!(x.z() > 0.3) || !rig_.camera.find_in_view(x, 8)) return;
+    std::normal_distribution<double> noise(0, 1);
+    const Vector2 uv = rig_.camera.project(x) + kNoisePx * Vector2(noise(random_), noise(random_));
+    seen.push_back({p + 1, uv, x.z() * (1 + 0.01 * noise(random_)), 0.5});
+  }
+
+  const Rig rig_ = camera_rig();
+  double readout_;
+  std::mt19937 random_{5};
+  std::vector<Vector3> points_;
+};
+
+class ReadoutOfACamera : public ::testing::TestWithParam<double> {};
+
+TEST_P(ReadoutOfACamera, IsFound) {
+  const double readout = GetParam();
+  const ReadoutEstimate found = ShakenCamera(readout).after(60);
+  EXPECT_GE(found.pairs, 20);
+  EXPECT_LT(found.sigma, 0.0015);
+  EXPECT_NEAR(found.seconds, readout, 4 * found.sigma);
+  EXPECT_EQ(found.significant, readout > 0);
+}
+
+TEST_P(ReadoutOfACamera, IsFoundThoughTimeStampsJitter) {
+  const double readout = GetParam();
+  ShakenCamera camera(readout);
+  camera.stamp_jitter = 0.1;
+  const ReadoutEstimate found = camera.after(60);
+  EXPECT_NEAR(found.seconds, readout, 0.1 * readout + 0.002);
+  EXPECT_EQ(found.significant, readout > 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Readouts, ReadoutOfACamera, ::testing::Values(0, 0.010, 0.026, 0.033));
+
+TEST(ReadoutEstimator, LearnsNothingFromATurnThatStaysTheSame) {
+  ShakenCamera camera(0.026);
+  camera.shaken = false;
+  const ReadoutEstimate found = camera.after(60);
+  EXPECT_EQ(found.pairs, 0);
+  EXPECT_FALSE(found.significant);
+}
+
+TEST(ReadoutEstimator, NeedsFramesThatFollowEachOther) {
+  ShakenCamera camera(0.026);
+  ReadoutEstimator lost(camera_rig(), 150), dropped(camera_rig(), 150);
+  for (int i = 0; i < 60; ++i) {
+    if (i % 3 == 0) lost.interrupt();
+    camera.show(i, lost);
+    if (i < 12 || i % 4 != 0) camera.show(i, dropped);  // at first, all: it learns the period
+  }
+  EXPECT_EQ(lost.estimate().pairs, 0);
+  EXPECT_LT(dropped.estimate().pairs, 12);
+}
+
+TEST(ReadoutEstimator, IsDoneWhenItKnows) {
+  ShakenCamera camera(0.026);
+  ReadoutEstimator estimator(camera_rig(), 150);
+  for (int i = 0; i < 150; ++i) camera.show(i, estimator);
+  ASSERT_TRUE(estimator.estimate().significant);
+  EXPECT_EQ(estimator.begin_frame(std::int64_t{100'000'000'000}, SE3()), nullptr);
+}
+
+TEST(ReadoutEstimator, AllocatesNothing) {
+  ShakenCamera camera(0.001);
+  ReadoutEstimator estimator(camera_rig(), 150);
+  camera.show(0, estimator);
+  const std::uint64_t before = testing::allocations();
+  for (int i = 1; i < 40; ++i) camera.show(i, estimator);
+  EXPECT_EQ(testing::allocations(), before);
+  EXPECT_GT(estimator.estimate().pairs, 10);
+}
+
+}  // namespace
+}  // namespace twofold

@@ -1,0 +1,200 @@
+#include "tracking/readout_estimator.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kPairPoints = 160;  // of those that both frames see
+constexpr std::size_t kFewestPairPoints = 20;
+constexpr int kPoseIterations = 3;
+constexpr double kHuberSigmas = 1.5;
+constexpr double kGrossSigmas = 15;     // found somewhere else
+constexpr double kChangeOfTurn = 0.05;  // between frames [rad/s]: less is no pair to learn from
+constexpr double kPairSigma = 0.003;    // of one pair's answer beside its points' noise [s]
+constexpr double kPairHuber = 2;        // standard deviations beyond which a pair counts less
+constexpr int kFirstGuess = 8;          // pairs after which pairs are linearised at the estimate
+constexpr int kFewestPairs = 20;
+constexpr double kFloor = 0.001;         // [s] no camera is known better than that
+constexpr double kSigmas = 5;            // beyond which the readout is not zero
+constexpr double kExactEnough = 0.0015;  // [s]
+constexpr int kEnoughPairs = 600;        // without finding anything
+constexpr int kMeanIntervals = 32;
+constexpr double kIrregular = 0.35;  // share of the period
+
+/// exp(s xi) x to second order: a frame's time is short.
+Vector3 moved(const Vector6& xi, double s, const Vector3& x) {
+  const Vector3 omega = xi.tail<3>();
+  const Vector3 d = s * (xi.head<3>() + omega.cross(x));
+  return x + d + (0.5 * s) * omega.cross(d);
+}
+
+}  // namespace
+
+/// Normal equations of pose and readout, r = measured minus expected.
+struct ReadoutEstimator::PairEquations {
+  Matrix6 H = Matrix6::Zero();
+  Vector6 g = Vector6::Zero();
+  Vector6 H_r = Vector6::Zero();
+  double h = 0, g_r = 0;
+
+  void add(const Eigen::Matrix<double, 2, 6>& J, const Vector2& J_r, const Vector2& r, double weight) {
+    const Eigen::Matrix<double, 2, 6> WJ = weight * J;
+    H.noalias() += WJ.transpose() * J;
+    g.noalias() += WJ.transpose() * r;
+    H_r.noalias() += WJ.transpose() * J_r;
+    h += weight * J_r.squaredNorm();
+    g_r += weight * J_r.dot(r);
+  }
+};
+
+ReadoutEstimator::ReadoutEstimator(const Rig& rig, std::size_t max_points) : rig_(rig) {
+  for (SeenFrame& seen : frames_) seen.points.reserve(max_points);
+  pair_.reserve(max_points);
+}
+
+/// Whether frames follow each other as they usually do; learns what is usual.
+bool ReadoutEstimator::regular(std::int64_t interval_ns) {
+  const double interval = 1e-9 * static_cast<double>(interval_ns);
+  if (!(interval > 0)) return false;
+  const bool usual = intervals_ == 0 || std::abs(interval - period_) < kIrregular * period_;
+  // The first interval may have been the unusual one.
+  if (!usual && intervals_ < kMeanIntervals / 4) intervals_ = 0;
+  if (!usual && intervals_ > 0) return false;
+  intervals_ = std::min(intervals_ + 1, kMeanIntervals);
+  period_ += (interval - period_) / intervals_;
+  return usual;
+}
+
+std::vector<SeenPoint>* ReadoutEstimator::begin_frame(std::int64_t t_ns, const SE3& T_cur_prev) {
+  const bool known = estimate_.significant && estimate_.sigma < kExactEnough;
+  if (known || estimate_.pairs >= kEnoughPairs) return nullptr;
+  const bool follows = linked_ > 0 && regular(t_ns - frame(0).t_ns);
+  linked_ = follows ? std::min(linked_ + 1, kFrames) : 1;
+  newest_ = (newest_ + 1) % kFrames;
+  SeenFrame& seen = frame(0);
+  seen.t_ns = t_ns;
+  seen.T_cur_prev = T_cur_prev;
+  seen.solved = seen.usable = seen.sorted = false;
+  seen.points.clear();
+  return &seen.points;
+}
+
+void ReadoutEstimator::end_frame() {
+  if (linked_ < kFrames || !turn_changes()) return;
+  for (std::size_t age = kFrames - 1; age-- > 0;) {
+    if (!frame(age).solved) solve_pair(age);
+    if (!frame(age).usable) return;
+  }
+  if (turn_changes()) add_pair();
+}
+
+/// At the frame of that age, 1 or 2: from the one before to the one after.
+ReadoutEstimator::Velocity ReadoutEstimator::velocity(std::size_t age) {
+  return (frame(age).T_cur_prev.log() + frame(age - 1).T_cur_prev.log()) / (2 * period_);
+}
+
+bool ReadoutEstimator::turn_changes() {
+  return (velocity(1) - velocity(2)).tail<3>().norm() > kChangeOfTurn;
+}
+
+/// What a frame and the one before both see.
+void ReadoutEstimator::join_points(std::size_t age) {
+  const auto by_key = [](const SeenPoint& a, const SeenPoint& b) { return a.key < b.key; };
+  for (SeenFrame* seen : {&frame(age), &frame(age + 1)}) {
+    if (!seen->sorted) std::sort(seen->points.begin(), seen->points.end(), by_key);
+    seen->sorted = true;
+  }
+  pair_.clear();
+  const auto row = [this](const SeenPoint& p) { return (p.uv.y() + 0.5) / rig_.camera.height - 0.5; };
+  const auto& before = frame(age + 1).points;
+  auto p = before.begin();
+  for (const SeenPoint& now : frame(age).points) {
+    while (p != before.end() && p->key < now.key) ++p;
+    if (p == before.end()) break;
+    if (p->key != now.key) continue;
+    const double sigma = std::max(p->sigma_px, now.sigma_px);
+    pair_.push_back(
+        {rig_.camera.unproject(p->uv) * p->depth, now.uv, row(*p), row(now), 1 / (sigma * sigma)});
+  }
+  // Keys go with the keyframes that points come from: every second, third, ... point is of all of them.
+  const std::size_t stride = (pair_.size() + kPairPoints - 1) / kPairPoints;
+  for (std::size_t n = 0; n * stride < pair_.size(); ++n) pair_[n] = pair_[n * stride];
+  if (stride > 1) pair_.resize((pair_.size() + stride - 1) / stride);
+}
+
+ReadoutEstimator::PairEquations ReadoutEstimator::equations(const SE3& T_cur_prev, const Velocity& before,
+                                                            const Velocity& now) const {
+  const PinholeCamera& camera = rig_.camera;
+  const Matrix3 R = T_cur_prev.rotation();
+  PairEquations sum;
+  for (const PairPoint& point : pair_) {
+    const Vector3 x_prev = moved(before, -point.row_prev * readout_, point.x_prev);
+    const Vector3 x = moved(now, point.row * readout_, R * x_prev + T_cur_prev.translation());
+    if (!(x.z() > 0.05)) continue;
+    const double inv_z = 1 / x.z(), a = camera.fx * inv_z, c = camera.fy * inv_z;
+    const double u = x.x() * inv_z, v = x.y() * inv_z;
+    const Vector2 r = point.uv - Vector2(camera.fx * u + camera.cx, camera.fy * v + camera.cy);
+    Eigen::Matrix<double, 2, 6> J;  // of r: minus d project / d x [I, -[x]x]
+    J << -a, 0, a * u, a * u * x.y(), -a * (x.z() + u * x.x()), a * x.y(),  //
+        0, -c, c * v, c * (x.z() + v * x.y()), -c * v * x.x(), -c * x.x();
+    const Vector3 late = point.row * (now.head<3>() + now.tail<3>().cross(x));
+    const Vector3 early = point.row_prev * (before.head<3>() + before.tail<3>().cross(x_prev));
+    const Vector2 J_r = J.leftCols<3>() * (late - R * early);
+    const double sigmas = r.norm() * std::sqrt(point.weight);
+    if (sigmas > kGrossSigmas) continue;
+    sum.add(J, J_r, r, point.weight * std::min(1.0, kHuberSigmas / std::max(sigmas, 1e-9)));
+  }
+  return sum;
+}
+
+/// The pose of a frame relative to the one before, from the points of both, at the readout known so far and
+/// as the camera moved between the two before.
+void ReadoutEstimator::solve_pair(std::size_t age) {
+  SeenFrame& seen = frame(age);
+  seen.solved = true;
+  join_points(age);
+  if (pair_.size() < kFewestPairPoints) return;
+  const Velocity xi = frame(age + 1).T_cur_prev.log() / period_;
+  for (int i = 0; i < kPoseIterations; ++i) {
+    const PairEquations sum = equations(seen.T_cur_prev, xi, xi);
+    const Eigen::LLT<Matrix6> llt(sum.H);
+    const Vector6 step = llt.solve(-sum.g);
+    if (llt.info() != Eigen::Success || !step.allFinite()) return;
+    seen.T_cur_prev = SE3::exp(step) * seen.T_cur_prev;
+    if (step.norm() < 1e-5) break;
+  }
+  seen.usable = true;
+}
+
+/// Frames 2 and 1 with their velocities.
+void ReadoutEstimator::add_pair() {
+  join_points(1);
+  const Velocity before = velocity(2), now = velocity(1);
+  SE3 T_cur_prev = frame(1).T_cur_prev;
+  PairEquations sum = equations(T_cur_prev, before, now);
+  const Eigen::LLT<Matrix6> llt(sum.H);
+  if (llt.info() != Eigen::Success) return;
+  const Vector6 solved = llt.solve(sum.H_r);
+  double h = sum.h - solved.dot(sum.H_r);
+  const double gradient = sum.g_r - solved.dot(sum.g);
+  if (!(h > 0) || !std::isfinite(h) || !std::isfinite(gradient)) return;
+  const double readout = readout_ - gradient / h;
+  h /= 1 + h * kPairSigma * kPairSigma;
+  if (estimate_.pairs >= kFirstGuess) {
+    h *= std::min(1.0, kPairHuber / (1e-9 + std::abs(readout - estimate_.seconds) * std::sqrt(h)));
+  }
+  const double b = h * readout;
+  h_ += h, b_ += b, hh_ += h * h, hb_ += h * b, bb_ += b * b;
+  ++estimate_.pairs;
+  estimate_.seconds = b_ / h_;
+  const double scatter = bb_ + estimate_.seconds * (estimate_.seconds * hh_ - 2 * hb_);
+  estimate_.sigma = std::max(std::sqrt(std::max(scatter, 0.0)) / h_, 1 / std::sqrt(h_));
+  estimate_.significant = estimate_.pairs >= kFewestPairs && estimate_.seconds < (1 + kIrregular) * period_ &&
+                          estimate_.seconds > kSigmas * std::hypot(estimate_.sigma, kFloor);
+  if (estimate_.pairs >= kFirstGuess) readout_ = std::clamp(estimate_.seconds, 0.0, period_);
+}
+
+}  // namespace twofold

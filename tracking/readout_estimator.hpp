@@ -1,0 +1,112 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+
+namespace twofold {
+
+/// A point as one frame saw it.
+struct SeenPoint {
+  std::uint64_t key = 0;  ///< the same in every frame that sees the point
+  Vector2 uv{0, 0};       ///< where it was found, on level 0 [px]
+  double depth = 0;       ///< [m] measured, or as good as known
+  double sigma_px = 0.5;  ///< of uv
+};
+
+struct ReadoutEstimate {
+  double seconds = 0;  ///< from the exposure of the first row to that of the last
+  double sigma = std::numeric_limits<double>::infinity();  ///< its standard deviation [s]
+  int pairs = 0;                                           ///< of frames that it rests on
+  bool significant = false;                                ///< beyond doubt that it is not zero
+};
+
+/// How long a rolling shutter takes to read a frame out, from pairs of consecutive frames and without the
+/// map, which bends along with the poses that were estimated as if all rows were exposed at once.
+///
+/// A point seen at x in frame k-1, on a row tau' after mid-exposure, is expected in frame k at
+///
+///   z = project(exp(tau xi_k) T_k,k-1 exp(-tau' xi_k-1) x),   tau = ((v + 0.5) / height - 0.5) readout.
+///
+/// Per pair the pose T_k,k-1 is eliminated (Schur complement), which leaves one equation h readout = b; these
+/// are summed. While the velocity xi stays the same the readout hides in the pose; where a rotation speeds up
+/// or turns back, it shears one image against the other by readout f (omega_k - omega_k-1). So only pairs
+/// count in which it does. Where translation dominates, errors of depth look like a readout.
+///
+/// Velocities are central differences of the pairs' poses. Time stamps jitter by more than a camera's clock
+/// does, and that would look like a change of velocity: frames are taken to follow each other regularly.
+///
+/// The standard deviation is that of the scatter of pairs about the common estimate, not of the pixels: what
+/// is wrong in a pair (velocity, depth) is wrong for all of its points.
+///
+/// No allocation after construction; per frame at most three poses from kPairPoints points each. Once the
+/// estimate is exact enough nothing more is done.
+class ReadoutEstimator {
+ public:
+  /// @param max_points  that a frame sees at most
+  ReadoutEstimator(const Rig& rig, std::size_t max_points);
+
+  /// The next frame, which the last one's successor is.
+  /// @param T_cur_prev  its pose relative to the last one, roughly
+  /// @return room for at most max_points points that it sees, empty; null: nothing is wanted of it
+  [[nodiscard]] std::vector<SeenPoint>* begin_frame(std::int64_t t_ns, const SE3& T_cur_prev);
+  /// After the points were filled in.
+  void end_frame();
+  /// The next frame does not follow the last one: a frame was lost.
+  void interrupt() { linked_ = 0; }
+
+  [[nodiscard]] const ReadoutEstimate& estimate() const { return estimate_; }
+
+ private:
+  static constexpr std::size_t kFrames = 4;
+  using Velocity = Vector6;  ///< left perturbation a second
+
+  struct SeenFrame {
+    std::int64_t t_ns = 0;
+    SE3 T_cur_prev;       ///< as the tracker has it, then from the pair itself
+    bool solved = false;  ///< the latter
+    bool usable = false;
+    bool sorted = false;
+    std::vector<SeenPoint> points;
+  };
+  /// A point of frame k-1 and where it is in frame k.
+  struct PairPoint {
+    Vector3 x_prev{0, 0, 1};
+    Vector2 uv{0, 0};
+    double row_prev = 0, row = 0;  ///< (v + 0.5) / height - 0.5
+    double weight = 0;
+  };
+  struct PairEquations;
+
+  /// `age` 0 is the newest frame.
+  [[nodiscard]] SeenFrame& frame(std::size_t age) { return frames_[(newest_ + kFrames - age) % kFrames]; }
+  [[nodiscard]] bool regular(std::int64_t interval_ns);
+  [[nodiscard]] Velocity velocity(std::size_t age);
+  [[nodiscard]] bool turn_changes();
+  void join_points(std::size_t age);
+  void solve_pair(std::size_t age);
+  [[nodiscard]] PairEquations equations(const SE3& T_cur_prev, const Velocity& before,
+                                        const Velocity& now) const;
+  void add_pair();
+
+  const Rig rig_;
+  std::array<SeenFrame, kFrames> frames_;
+  std::size_t newest_ = 0;
+  std::size_t linked_ = 0;  ///< newest frames that follow each other
+  double period_ = 0;       ///< of the frames [s]
+  int intervals_ = 0;       ///< that it is the mean of
+  std::vector<PairPoint> pair_;
+
+  double readout_ = 0;  ///< that the next pair is linearised at [s]
+  // Sums over the pairs' equations h readout = b.
+  double h_ = 0, b_ = 0, hh_ = 0, hb_ = 0, bb_ = 0;
+  ReadoutEstimate estimate_;
+};
+
+}  // namespace twofold
