@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "camera/readout_estimator.hpp"
 #include "engine/logs/record_sequence.hpp"
 #include "engine/logs/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
@@ -17,7 +18,6 @@
 #include "graph/snapshot.hpp"
 #include "tracking/effort.hpp"
 #include "tracking/lost_cause.hpp"
-#include "tracking/readout_estimator.hpp"
 
 namespace twofold {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera/frame.hpp"
+#include "camera/readout_estimator.hpp"
 #include "camera/rig.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
@@ -23,7 +24,6 @@
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
-#include "tracking/readout_estimator.hpp"
 #include "tracking/recent_views.hpp"
 #include "tracking/track_result.hpp"
 

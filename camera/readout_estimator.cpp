@@ -1,4 +1,4 @@
-#include "tracking/readout_estimator.hpp"
+#include "camera/readout_estimator.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

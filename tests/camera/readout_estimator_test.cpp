@@ -1,5 +1,5 @@
 // A camera that shakes its head before points that are known exactly, each row seen at its own time.
-#include "tracking/readout_estimator.hpp"
+#include "camera/readout_estimator.hpp"
 
 #include <gtest/gtest.h>
 
