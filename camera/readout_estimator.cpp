@@ -68,7 +68,7 @@ bool ReadoutEstimator::regular(std::int64_t interval_ns) {
   return usual;
 }
 
-std::vector<SeenPoint>* ReadoutEstimator::begin_frame(std::int64_t t_ns, const SE3& T_cur_prev) {
+std::vector<ReadoutPoint>* ReadoutEstimator::begin_frame(std::int64_t t_ns, const SE3& T_cur_prev) {
   const bool known = estimate_.significant && estimate_.sigma < kExactEnough;
   if (known || estimate_.pairs >= kEnoughPairs) return nullptr;
   const bool follows = linked_ > 0 && regular(t_ns - frame(0).t_ns);
@@ -102,16 +102,16 @@ bool ReadoutEstimator::turn_changes() {
 
 /// What a frame and the one before both see.
 void ReadoutEstimator::join_points(std::size_t age) {
-  const auto by_key = [](const SeenPoint& a, const SeenPoint& b) { return a.key < b.key; };
+  const auto by_key = [](const ReadoutPoint& a, const ReadoutPoint& b) { return a.key < b.key; };
   for (SeenFrame* seen : {&frame(age), &frame(age + 1)}) {
     if (!seen->sorted) std::sort(seen->points.begin(), seen->points.end(), by_key);
     seen->sorted = true;
   }
   pair_.clear();
-  const auto row = [this](const SeenPoint& p) { return (p.uv.y() + 0.5) / rig_.camera.height - 0.5; };
+  const auto row = [this](const ReadoutPoint& p) { return (p.uv.y() + 0.5) / rig_.camera.height - 0.5; };
   const auto& before = frame(age + 1).points;
   auto p = before.begin();
-  for (const SeenPoint& now : frame(age).points) {
+  for (const ReadoutPoint& now : frame(age).points) {
     while (p != before.end() && p->key < now.key) ++p;
     if (p == before.end()) break;
     if (p->key != now.key) continue;

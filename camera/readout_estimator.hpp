@@ -13,7 +13,7 @@
 namespace twofold {
 
 /// A point as one frame saw it.
-struct SeenPoint {
+struct ReadoutPoint {
   std::uint64_t key = 0;  ///< the same in every frame that sees the point
   Vector2 uv{0, 0};       ///< where it was found, on level 0 [px]
   double depth = 0;       ///< [m] measured, or as good as known
@@ -55,7 +55,7 @@ class ReadoutEstimator {
   /// The next frame, which the last one's successor is.
   /// @param T_cur_prev  its pose relative to the last one, roughly
   /// @return room for at most max_points points that it sees, empty; null: nothing is wanted of it
-  [[nodiscard]] std::vector<SeenPoint>* begin_frame(std::int64_t t_ns, const SE3& T_cur_prev);
+  [[nodiscard]] std::vector<ReadoutPoint>* begin_frame(std::int64_t t_ns, const SE3& T_cur_prev);
   /// After the points were filled in.
   void end_frame();
   /// The next frame does not follow the last one: a frame was lost.
@@ -73,7 +73,7 @@ class ReadoutEstimator {
     bool solved = false;  ///< the latter
     bool usable = false;
     bool sorted = false;
-    std::vector<SeenPoint> points;
+    std::vector<ReadoutPoint> points;
   };
   /// A point of frame k-1 and where it is in frame k.
   struct PairPoint {

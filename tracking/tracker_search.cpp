@@ -76,7 +76,7 @@ RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const
 /// From what was found in this frame and the ones before, whether it fitted the map or not.
 void Tracker::learn_readout(const FrameStep& step, bool goes_on) {
   if (!goes_on) readout_->interrupt();
-  std::vector<SeenPoint>* seen = readout_->begin_frame(step.frame.t_ns, T_cur_prev_);
+  std::vector<ReadoutPoint>* seen = readout_->begin_frame(step.frame.t_ns, T_cur_prev_);
   if (seen == nullptr) return;
   for (const Match& match : matches_) {
     const TrackedPoint& point = local_map_.points()[match.point];

@@ -46,7 +46,7 @@ class ShakenCamera {
     std::uniform_real_distribution<double> jitter(-stamp_jitter, stamp_jitter);
     const SE3 T_cur_prev = T_c_w_at(t, shaken) * T_c_w_at(t - kPeriod, shaken).inverse();
     const auto t_ns = static_cast<std::int64_t>((t + jitter(random_) * kPeriod + 1) * 1e9);
-    std::vector<SeenPoint>* seen = estimator.begin_frame(t_ns, T_cur_prev);
+    std::vector<ReadoutPoint>* seen = estimator.begin_frame(t_ns, T_cur_prev);
     if (seen == nullptr) return;
     for (std::size_t p = 0; p < points_.size() && seen->size() < seen->capacity(); ++p) see(p, t, *seen);
     estimator.end_frame();
@@ -58,7 +58,7 @@ class ShakenCamera {
   }
 
  private:
-  void see(std::size_t p, double t, std::vector<SeenPoint>& seen) {
+  void see(std::size_t p, double t, std::vector<ReadoutPoint>& seen) {
     Vector3 x = T_c_w_at(t, shaken) * points_[p];
     for (int round = 0; round < 4; ++round) {
       if (!(x.z() > 0.3)) return;
