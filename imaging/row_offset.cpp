@@ -8,15 +8,16 @@
 namespace twofold {
 namespace {
 
-constexpr int kBorder = 12;              // [px] room for the patch and its search
-constexpr int kThreshold = 10;           // FAST [grey]
-constexpr float kMinScore = 12;          // Shi-Tomasi [grey^2/px^2]
-constexpr std::size_t kFewest = 16;      // corners found in both images
-constexpr double kWidestSpread = 0.6;    // [px] half the distance between quartiles: more is no common offset
-constexpr double kNearWholeOffset = 0.7; // [px] where most corners are found, they are found about there
+constexpr int kBorder = 12;            // [px] room for the patch and its search
+constexpr int kThreshold = 10;         // FAST [grey]
+constexpr float kMinScore = 12;        // Shi-Tomasi [grey^2/px^2]
+constexpr std::size_t kFewest = 16;    // corners found in both images
+constexpr double kWidestSpread = 0.6;  // [px] half the distance between quartiles: more is no common offset
+constexpr double kNearWholeOffset = 0.7;  // [px] where most corners are found, they are found about there
 
 double quantile(std::vector<double>& values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }

@@ -44,8 +44,8 @@ class RowOffsetMeter {
   std::vector<double> offsets_;  ///< of each corner found [px]
 };
 
-/// Moves a right image's rows up by `offset` rows, between whole ones by linear interpolation; beyond the edge
-/// its last row goes on. `out` keeps its memory.
+/// Moves a right image's rows up by `offset` rows, between whole ones by linear interpolation; beyond the
+/// edge its last row goes on. `out` keeps its memory.
 void take_back_row_offset(const cv::Mat& right, double offset, cv::Mat& out);
 
 }  // namespace twofold

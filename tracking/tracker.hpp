@@ -9,6 +9,7 @@
 #include "camera/rig.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
+#include "imaging/right_rows.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/depth_alignment.hpp"
 #include "tracking/depth_seeds.hpp"
@@ -23,7 +24,6 @@
 #include "tracking/point_starter.hpp"
 #include "tracking/quadtree.hpp"
 #include "tracking/recent_views.hpp"
-#include "tracking/right_rows.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {

@@ -1,4 +1,4 @@
-#include "tracking/right_rows.hpp"
+#include "imaging/right_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@ namespace {
 
 constexpr int kCorners = 160;
 constexpr int kQuickCorners = 60;
-constexpr double kSignificant = 0.35;          // [px] real rigs that are well show up to 0.15
-constexpr double kSteps = 8;                   // parts of a row that the offset is rounded to
-constexpr int kLooksAtStart = 30;              // frames, at most
-constexpr std::uint32_t kLookEvery = 8;        // keyframes
+constexpr double kSignificant = 0.35;            // [px] real rigs that are well show up to 0.15
+constexpr double kSteps = 8;                     // parts of a row that the offset is rounded to
+constexpr int kLooksAtStart = 30;                // frames, at most
+constexpr std::uint32_t kLookEvery = 8;          // keyframes
 constexpr std::uint32_t kSearchAgainAfter = 64;  // keyframes: a search costs several milliseconds
 
 bool is_apart(const std::optional<RowOffset>& rest) {
@@ -21,7 +21,9 @@ bool is_apart(const std::optional<RowOffset>& rest) {
 }  // namespace
 
 RightRows::RightRows(const Rig& rig)
-    : thorough_(rig, kCorners), quick_(rig, kQuickCorners), moved_(rig.camera.height, rig.camera.width, CV_8UC1) {}
+    : thorough_(rig, kCorners),
+      quick_(rig, kQuickCorners),
+      moved_(rig.camera.height, rig.camera.width, CV_8UC1) {}
 
 const cv::Mat& RightRows::aligned(const cv::Mat& right) {
   if (offset_ == 0) return right;

@@ -36,10 +36,10 @@ class RightRows {
   cv::Mat moved_;
   double offset_ = 0;
   int looks_at_start_ = 0;
-  bool known_ = false;        ///< the start has seen enough
+  bool known_ = false;  ///< the start has seen enough
   std::uint32_t keyframes_ = 0;
-  int apart_ = 0;             ///< looks in a row that found the rows apart, or hardly anything
-  std::uint32_t pause_ = 0;   ///< keyframes until the next thorough search
+  int apart_ = 0;            ///< looks in a row that found the rows apart, or hardly anything
+  std::uint32_t pause_ = 0;  ///< keyframes until the next thorough search
 };
 
 }  // namespace twofold
