@@ -1,5 +1,6 @@
 // Whether a result is luck: the same recording with its first one, two, three frames left out and with noise
-// of one grey level added; and whether the tracker knows how well it knows the pose (NEES).
+// of one grey level added, darker, cropped, smaller, seen in a mirror; and whether the tracker knows how well
+// it knows the pose (NEES).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -9,8 +10,10 @@
 #include <exception>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/engine.hpp"
@@ -24,8 +27,12 @@ namespace {
 
 struct Variation {
   const char* name;
-  int left_out = 0;  ///< frames at the beginning
-  double noise = 0;  ///< [grey]
+  int left_out = 0;       ///< frames at the beginning
+  double noise = 0;       ///< [grey]
+  double gain = 1;        ///< of grey levels
+  double crop = 1;        ///< share of width and height that is left, around the middle
+  double scale = 1;       ///< of width and height
+  bool mirrored = false;  ///< left and right exchanged, the cameras of a pair too
 };
 
 /// One variation's outcome.
@@ -35,11 +42,82 @@ struct Outcome {
   std::vector<double> nees;        ///< of each frame's pose relative to its reference keyframe, over 6
 };
 
-cv::Mat with_noise(const cv::Mat& image, double sigma, std::uint64_t stream) {
-  if (image.empty() || sigma == 0) return image;
+/// The middle of an image of this size.
+cv::Rect middle(const cv::Size& size, double share) {
+  const int x = static_cast<int>(size.width * (1 - share) / 2),
+            y = static_cast<int>(size.height * (1 - share) / 2);
+  return {x, y, size.width - 2 * x, size.height - 2 * y};
+}
+
+cv::Size scaled(const cv::Size& size, double scale) {
+  return {static_cast<int>(size.width * scale), static_cast<int>(size.height * scale)};
+}
+
+/// Another shape of the image; depth is never mixed with its neighbour's.
+cv::Mat reshaped(const cv::Mat& image, const Variation& variation) {
+  if (image.empty()) return image;
+  cv::Mat out = variation.crop == 1 ? image : image(middle(image.size(), variation.crop)).clone();
+  const bool is_depth = out.type() == CV_16UC1;
+  if (variation.scale != 1)
+    cv::resize(out.clone(), out, scaled(out.size(), variation.scale), 0, 0,
+               is_depth ? cv::INTER_NEAREST : cv::INTER_AREA);
+  if (variation.mirrored) {
+    cv::Mat flipped;
+    cv::flip(out, flipped, 1);
+    out = flipped;
+  }
+  return out;
+}
+
+cv::Mat exposed(const cv::Mat& image, const Variation& variation, std::uint64_t stream) {
+  if (image.empty() || (variation.noise == 0 && variation.gain == 1)) return image;
   cv::Mat intensity;
   image.convertTo(intensity, CV_32FC1);
-  return synthetic::expose(intensity, 1, sigma, {17, stream});
+  return synthetic::expose(intensity, variation.gain, variation.noise, {17, stream});
+}
+
+void vary(Frame& frame, const Variation& variation) {
+  frame.left = reshaped(frame.left, variation);
+  frame.right = reshaped(frame.right, variation);
+  frame.depth = reshaped(frame.depth, variation);
+  if (variation.mirrored && !frame.right.empty()) std::swap(frame.left, frame.right);
+  const auto stream = static_cast<std::uint64_t>(2 * frame.index);
+  frame.left = exposed(frame.left, variation, stream);
+  frame.right = exposed(frame.right, variation, stream + 1);
+}
+
+/// The rig that takes such images.
+Rig varied(Rig rig, const Variation& variation) {
+  PinholeCamera& camera = rig.camera;
+  const cv::Rect kept = middle({camera.width, camera.height}, variation.crop);
+  rig.readout *= static_cast<double>(kept.height) / camera.height;
+  camera.cx -= kept.x;
+  camera.cy -= kept.y;
+  const cv::Size size = scaled(kept.size(), variation.scale);
+  const double scale_x = static_cast<double>(size.width) / kept.width;
+  const double scale_y = static_cast<double>(size.height) / kept.height;
+  camera.fx *= scale_x;
+  camera.fy *= scale_y;
+  camera.cx = (camera.cx + 0.5) * scale_x - 0.5;
+  camera.cy = (camera.cy + 0.5) * scale_y - 0.5;
+  camera.width = size.width;
+  camera.height = size.height;
+  if (variation.mirrored) camera.cx = camera.width - 1 - camera.cx;
+  return rig;
+}
+
+/// A path as seen in the mirror x -> -x of world and camera. The right camera of a pair becomes the left one:
+/// `baseline` to the right of where the pose was.
+Trajectory varied(Trajectory truth, const Rig& rig, const Variation& variation) {
+  if (!variation.mirrored) return truth;
+  const Eigen::DiagonalMatrix<double, 3> mirror(-1, 1, 1);
+  const double shift = rig.kind == SensorKind::kStereo ? rig.baseline : 0;
+  for (TimedPose& pose : truth) {
+    const Vector3 left = pose.T_w_c * Vector3(shift, 0, 0);
+    const Matrix3 R = mirror * pose.T_w_c.rotation().matrix() * mirror;
+    pose.T_w_c = SE3(Matrix3(R), mirror * left);
+  }
+  return truth;
 }
 
 /// Between the true poses before and after; none where these are farther apart than a frame.
@@ -64,7 +142,7 @@ double ate(const Trajectory& estimate, const Trajectory& truth, Alignment alignm
 
 Outcome run(const std::string& text, const SourceOptions& source_options, const Variation& variation) {
   const std::unique_ptr<FrameSource> source = open_source(text, source_options);
-  const Trajectory& truth = source->ground_truth();
+  const Trajectory truth = varied(source->ground_truth(), source->rig(), variation);
   Outcome outcome;
   EngineOptions options;
   options.deterministic = true;
@@ -88,13 +166,11 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
     for (; status == FrameStatus::kFrame && read < variation.left_out; ++read) status = source->next(frame);
     if (status != FrameStatus::kFrame)
       return status == FrameStatus::kEnd ? FeedStatus::kEnd : FeedStatus::kError;
-    const auto stream = static_cast<std::uint64_t>(2 * frame.index);
-    frame.left = with_noise(frame.left, variation.noise, stream);
-    frame.right = with_noise(frame.right, variation.noise, stream + 1);
+    vary(frame, variation);
     return FeedStatus::kFrame;
   };
   const std::atomic<bool> interrupted{false};
-  const RunResult result = Engine(source->rig(), options).run(feed, interrupted);
+  const RunResult result = Engine(varied(source->rig(), variation), options).run(feed, interrupted);
   if (!result.error.empty()) throw std::runtime_error(text + ": " + result.error);
   Trajectory estimate, causal;
   for (const FrameRecord& record : result.frames) {
@@ -143,12 +219,14 @@ int main(int argc, char** argv) {
   std::string calibration;
   bool as_it_is_only = false;
   std::string camera = "all";
+  int only = -1;
   CLI::App app("Runs of one recording that should differ by little");
   app.add_option("source", sources, "as of 'twofold run'")->required();
   app.add_option("--calib", calibration, "calibration file for all of them");
   app.add_option("--camera", camera, "mono: the left camera alone, errors after alignment with scale")
       ->check(CLI::IsMember({"all", "mono"}));
   app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
+  app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
   CLI11_PARSE(app, argc, argv);
   if (!calibration.empty()) options.calibration = calibration;
   options.left_only = camera == "mono";
@@ -156,13 +234,18 @@ int main(int argc, char** argv) {
                                            {"first frame left out", 1},
                                            {"first two left out", 2},
                                            {"first three left out", 3},
-                                           {"noise of one grey level", 0, 1}};
+                                           {"noise of one grey level", 0, 1},
+                                           {"gain 0.9", 0, 0, 0.9},
+                                           {"the middle 90 %", 0, 0, 1, 0.9},
+                                           {"three quarters of the size", 0, 0, 1, 1, 0.75},
+                                           {"in a mirror", 0, 0, 1, 1, 1, true}};
   try {
     for (const std::string& source : sources) {
       fmt::print(
           "\n| {} | tracked | ATE m | causal m | NEES / 6: median / mean / p95 |\n|---|---|---|---|---|\n",
           source);
       for (const twofold::Variation& variation : variations) {
+        if (only >= 0 && &variation != &variations[only]) continue;
         print_row(variation, twofold::run(source, options, variation));
         if (as_it_is_only) break;
       }
