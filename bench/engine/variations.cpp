@@ -90,7 +90,7 @@ void vary(Frame& frame, const Variation& variation) {
 Rig varied(Rig rig, const Variation& variation) {
   PinholeCamera& camera = rig.camera;
   const cv::Rect kept = middle({camera.width, camera.height}, variation.crop);
-  rig.readout *= static_cast<double>(kept.height) / camera.height;
+  if (rig.readout) *rig.readout *= static_cast<double>(kept.height) / camera.height;
   camera.cx -= kept.x;
   camera.cy -= kept.y;
   const cv::Size size = scaled(kept.size(), variation.scale);

@@ -56,7 +56,7 @@ struct CameraRig {
   double depth_max = 8.0;     ///< farther ones likewise
   /// Rolling shutter: from the exposure of the first row to that of the last [s], >= 0; 0: all rows at once.
   /// Nothing: not known, and found out while a camera turns to and fro.
-  std::optional<double> readout;
+  std::optional<double> readout = std::nullopt;
 };
 
 enum class ImageFormat : std::uint8_t {
