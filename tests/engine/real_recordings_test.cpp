@@ -1,0 +1,79 @@
+// The whole engine on real recordings, as it comes: every frame with a pose, and errors that have not grown
+// by more than a third. On fr1_rpy, newtsukuba and mh01's left images the bounds are the errors of ORB-SLAM3.
+// TWOFOLD_DATA names the folder.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <string>
+
+#include "engine/engine.hpp"
+#include "evaluation/evaluation.hpp"
+#include "io/sources/open_source.hpp"
+#include "loopclosure/default_vocabulary.hpp"
+
+namespace twofold {
+namespace {
+
+struct Recording {
+  const char* name;
+  const char* scheme;
+  const char* folder;  ///< in TWOFOLD_DATA, with parameters
+  int tracked;         ///< frames, at least
+  double ate;          ///< [m], at most; of one camera after alignment with scale
+  bool one_camera;
+};
+
+std::ostream& operator<<(std::ostream& out, const Recording& recording) {
+  return out << recording.name;
+}
+
+class RealRecording : public testing::TestWithParam<Recording> {};
+
+TEST_P(RealRecording, IsTrackedAsWellAsBefore) {
+  const char* data = std::getenv("TWOFOLD_DATA");
+  if (data == nullptr) GTEST_SKIP() << "TWOFOLD_DATA is not set";
+  const Recording& recording = GetParam();
+  SourceOptions source_options;
+  source_options.left_only = recording.one_camera;
+  const auto source =
+      open_source(std::string(recording.scheme) + ":" + data + "/" + recording.folder, source_options);
+  EngineOptions options;
+  options.deterministic = true;
+  options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  const FrameFeed feed = [&](Frame& frame) {
+    return source->next(frame) == FrameStatus::kFrame ? FeedStatus::kFrame : FeedStatus::kEnd;
+  };
+  const std::atomic<bool> interrupted{false};
+  const RunResult result = Engine(source->rig(), options).run(feed, interrupted);
+  ASSERT_EQ(result.error, "");
+  Trajectory estimate;
+  for (const FrameRecord& record : result.frames) {
+    if (has_final_pose(record))
+      estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
+  }
+  EXPECT_GE(static_cast<int>(estimate.size()), recording.tracked);
+  const auto evaluation = evaluate(associate(estimate, source->ground_truth(), 20'000'000),
+                                   {.alignment = recording.one_camera ? Alignment::kSim3 : Alignment::kSe3});
+  ASSERT_TRUE(evaluation);
+  EXPECT_LT(evaluation->absolute.rmse, recording.ate);
+  RecordProperty("ate_mm", std::to_string(1e3 * evaluation->absolute.rmse));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RealRecording,
+    testing::Values(
+        Recording{"kitti06", "kitti", "stereo_kitti06_51", 51, 0.039, false},
+        Recording{"mh01", "euroc", "stereo_euroc_mh01_300", 300, 0.0046, false},
+        Recording{"redkitchen", "tum", "rgbd_7scenes_redkitchen_334", 334, 0.048, false},
+        // Neither the lens nor the readout are given: the latter is found.
+        Recording{
+            "fr1_rpy", "tum",
+            "rgbd_tum_fr1_rpy_200?fx=517.306408&fy=516.469215&cx=318.643040&cy=255.313989&depth_scale=5000",
+            200, 0.0246, false},
+        Recording{"newtsukuba", "kitti", "mono_newtsukuba_150", 150, 0.0047, true},
+        Recording{"mh01_left", "euroc", "stereo_euroc_mh01_300", 300, 0.0049, true}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+}  // namespace
+}  // namespace twofold
