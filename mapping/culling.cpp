@@ -71,6 +71,7 @@ int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuild
 
 bool is_redundant(const GraphSnapshot& graph, KeyframeId id, const CullingOptions& options) {
   const auto& observations = *graph.keyframe(id).observations;
+  if (observations.empty()) return false;
   const auto total = static_cast<double>(observations.size());
   const int allowed = static_cast<int>(std::floor((1 - options.redundant_share) * total + 1e-9));
   int own = 0;  // points that others do not see well enough

@@ -16,7 +16,8 @@ namespace twofold {
 int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuilder::Outlier> outliers);
 
 /// A keyframe is redundant when `redundant_share` of its points are seen by at least `redundant_observers`
-/// other keyframes on the same or a finer pyramid level.
+/// other keyframes on the same or a finer pyramid level. One without points, as a depth camera makes them
+/// before bare walls, is not: nothing says that others see the same.
 [[nodiscard]] bool is_redundant(const GraphSnapshot& graph, KeyframeId id, const CullingOptions& options);
 
 /// Takes a keyframe out of the graph. Its strongest neighbour becomes its replacement. Neighbours that would

@@ -71,6 +71,8 @@ std::string pixels_refusal(const char* name, const ImageView& view, bool depth) 
   const auto row = static_cast<std::ptrdiff_t>(CV_ELEM_SIZE(type_of(view.format))) * view.width;
   if (view.stride < row)
     return fmt::format("the {} image's stride is {} bytes, but a row takes {}", name, view.stride, row);
+  if (depth && (view.stride % 2 != 0 || reinterpret_cast<std::uintptr_t>(view.data) % 2 != 0))
+    return fmt::format("the {} image's rows must begin at even addresses: a pixel takes two bytes", name);
   return "";
 }
 

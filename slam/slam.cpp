@@ -106,10 +106,10 @@ std::string Slam::Impl::refusal(const FrameView& frame) {
   if (failed()) return kEndedEarly;
   if (std::string why = intake_.refusal(frame); !why.empty()) return why;
   constexpr std::int64_t kPlausible = 10'000'000'000;  // what a live frame may be late [ns]
-  const std::int64_t late_ns = steady_now_ns() - frame.t_ns;
-  if (live_ && std::abs(late_ns) > kPlausible)
+  const std::int64_t now_ns = steady_now_ns();
+  if (live_ && (frame.t_ns < now_ns - kPlausible || frame.t_ns > now_ns + kPlausible))
     return fmt::format("a live frame's time must be of CLOCK_MONOTONIC; this one's is {:.3f} s from now",
-                       static_cast<double>(-late_ns) * 1e-9);
+                       (static_cast<double>(frame.t_ns) - static_cast<double>(now_ns)) * 1e-9);
   return "";
 }
 

@@ -63,6 +63,7 @@ void SurfaceVolume::add(const SurfaceVolume& other, const SE3& T_v_o) {
   Sampler sampler(other.blocks_, other.units_, options_.voxel);
   for (const std::uint32_t touched : touched_) {
     VoxelBlock* block = &blocks_[touched];
+    block->all_free = false;
     for (int i = 0; i < kBlockSamples; ++i) {
       const auto s = static_cast<std::size_t>(i);
       const Vector3 grid(kBlockEdge * block->at.x + i % 8, kBlockEdge * block->at.y + i / 8 % 8,

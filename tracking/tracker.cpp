@@ -92,7 +92,7 @@ bool Tracker::track(FrameStep& step) {
   }
   local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  const bool by_surfaces = corners_scarce_ && !start.rough;
+  const bool by_surfaces = corners_scarce_ && !start.rough && surfaces_can_place();
   if (!start.rough) start.placement.T_c_ref = by_surfaces ? align_to_surfaces(step) : align_to_previous(step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = search_from(start, step);

@@ -123,6 +123,7 @@ class Tracker {
   bool search_widely(FrameStep& step);
   void look_at_surfaces(FrameStep& step);
   [[nodiscard]] SE3 predicted_pose() const;
+  [[nodiscard]] bool surfaces_can_place() const;
   SE3 align_to_surfaces(FrameStep& step);
   bool add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step);
   LostCause place_without_points(LostCause found, FrameStep& step);

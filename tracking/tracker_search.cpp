@@ -194,6 +194,13 @@ void Tracker::look_at_surfaces(FrameStep& step) {
   }
 }
 
+/// From shape alone the camera is placed only beside where it was: after some frames the last good one shows
+/// something else, and one corner of a room looks like the next.
+bool Tracker::surfaces_can_place() const {
+  constexpr int kPatience = 5;  // lost frames
+  return depth_ && last_.reference != kNoKeyframe && loss_.lost_frames() <= kPatience;
+}
+
 SE3 Tracker::predicted_pose() const {
   return (loss_.lost_frames() > 0 ? SE3() : T_cur_prev_) * last_.T_c_ref;
 }
@@ -210,7 +217,7 @@ SE3 Tracker::align_to_surfaces(FrameStep& step) {
 bool Tracker::add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step) {
   const bool few =
       found != LostCause::kNone ? corners_scarce_ : step.result.inliers < options_.scarce_inliers;
-  if (!depth_ || !few) return false;
+  if (!few || !surfaces_can_place()) return false;
   const SE3& start = found == LostCause::kNone ? step.result.T_c_ref : T_c_ref;
   return place_by_surfaces(start, step) == LostCause::kNone;
 }
@@ -218,8 +225,7 @@ bool Tracker::add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step)
 /// Before the frame is given up: what it measures, and no points.
 /// @return kNone, or why that is not enough
 LostCause Tracker::place_without_points(LostCause found, FrameStep& step) {
-  constexpr int kPatience = 5;  // lost frames after which the last good one shows something else
-  if (!depth_ || last_.reference == kNoKeyframe || loss_.lost_frames() > kPatience) return found;
+  if (!surfaces_can_place()) return found;
   matches_.clear();
   motion_.clear();
   const LostCause open = place_by_surfaces(predicted_pose(), step);

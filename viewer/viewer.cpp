@@ -100,6 +100,8 @@ ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCo
   } catch (const std::exception& error) {
     event.kind = "command failed";
     event.text = error.what();
+  } catch (...) {
+    event.kind = "command failed";
   }
   return event;
 }

@@ -36,6 +36,10 @@ TEST(IsRedundant, NeedsEnoughPointsSeenByEnoughOthersAsFinely) {
   EXPECT_TRUE(is_redundant(writer.graph(), k(0), options));
 }
 
+TEST(IsRedundant, NothingSaysSoOfAKeyframeWithoutPoints) {
+  EXPECT_FALSE(is_redundant(chain(5).graph(), k(1), CullingOptions{}));
+}
+
 TEST(RemoveKeyframe, KeepsTheGraphConnectedAndRelativePosesKnown) {
   std::mt19937 rng(1);
   for (int trial = 0; trial < 20; ++trial) {

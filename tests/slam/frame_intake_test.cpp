@@ -63,6 +63,8 @@ TEST_F(FrameIntakeTest, RgbdNeedsDepth) {
   const FrameIntake intake(rig_of(SensorKind::kRgbd));
   FrameView frame{1, image(), {}, image(ImageFormat::kDepth16), nullptr};
   EXPECT_EQ(intake.refusal(frame), "");
+  frame.depth.stride = 41;
+  expect_refused(intake, frame, "the depth image's rows must begin at even addresses");
   frame.depth.format = ImageFormat::kGrey8;
   expect_refused(intake, frame, "the depth image is grey8, but must be depth16");
   frame.depth = {};

@@ -170,6 +170,21 @@ TEST_F(BareRoomTest, IsTrackedAndAllocatesNothing) {
   }
 }
 
+TEST_F(BareRoomTest, IsNotPlacedByShapeAloneAfterALongLoss) {
+  ASSERT_EQ(odometry_.step(frame(0, T_corner_w_)).status, TrackStatus::kTracking);
+  ASSERT_TRUE(odometry_.step(frame(1, T_corner_w_)).by_depth);
+  Frame dark = frame(2, T_corner_w_);
+  dark.depth.setTo(0);
+  int lost = 0;
+  for (; lost < 10; ++lost) {
+    dark.index = 2 + lost;
+    dark.t_ns = dark.index * std::int64_t{33'000'000};
+    ASSERT_NE(odometry_.step(dark).status, TrackStatus::kTracking) << lost;
+  }
+  // The room is a box: another corner would fit as well.
+  EXPECT_NE(odometry_.step(frame(2 + lost, T_corner_w_)).status, TrackStatus::kTracking);
+}
+
 TEST_F(BareRoomTest, IsLostHonestlyBeforeOneWall) {
   const SE3 T_wall_w(SO3(), Vector3(0, 0, -1.5));
   const TrackResult at_start = odometry_.step(frame(0, T_wall_w));
