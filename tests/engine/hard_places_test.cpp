@@ -2,12 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstdio>
 
-#include "engine/engine.hpp"
-#include "evaluation/evaluation.hpp"
-#include "synthetic/synthetic_sequence.hpp"
+#include "tests/engine/whole_run.hpp"
 
 namespace twofold {
 namespace {
@@ -24,20 +21,9 @@ struct Walk {
 
 Walk walk(const SyntheticOptions& scene) {
   const SyntheticSequence sequence(scene);
-  Trajectory truth;
-  for (int i = 0; i < sequence.frame_count(); ++i) truth.push_back({sequence.t_ns(i), sequence.T_w_c(i)});
-  const FrameFeed feed = [&, next = 0](Frame& frame) mutable {
-    if (next == sequence.frame_count()) return FeedStatus::kEnd;
-    frame = sequence.render(next++);
-    return FeedStatus::kFrame;
-  };
-  EngineOptions options;
-  options.deterministic = true;
-  std::atomic<bool> interrupted{false};
-  const RunResult result = Engine(sequence.rig(), options).run(feed, interrupted);
-  EXPECT_EQ(result.error, "");
+  const Trajectory truth = testing::true_path(sequence);
+  const auto [result, path] = testing::run_whole(sequence.rig(), testing::frames_of(sequence));
   Walk walk;
-  Trajectory estimate;
   for (const FrameRecord& record : result.frames) {
     ++walk.frames;
     walk.with_moving += record.moving >= 5 ? 1 : 0;
@@ -47,9 +33,8 @@ Walk walk(const SyntheticOptions& scene) {
     }
     ++walk.tracked;
     EXPECT_EQ(result.graph.part(record.reference), KeyframeId{0}) << record.frame_index;
-    estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
   }
-  const auto evaluation = evaluate(associate(estimate, truth, 1'000'000), {});
+  const auto evaluation = evaluate(associate(path, truth, 1'000'000), {});
   EXPECT_TRUE(evaluation);
   if (evaluation) walk.ate = evaluation->absolute.rmse;
   for (std::size_t i = 1; i < truth.size(); ++i)

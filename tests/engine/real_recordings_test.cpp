@@ -3,14 +3,12 @@
 // TWOFOLD_DATA names the folder.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cstdlib>
 #include <string>
 
-#include "engine/engine.hpp"
-#include "evaluation/evaluation.hpp"
 #include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
+#include "tests/engine/whole_run.hpp"
 
 namespace twofold {
 namespace {
@@ -28,7 +26,7 @@ std::ostream& operator<<(std::ostream& out, const Recording& recording) {
   return out << recording.name;
 }
 
-class RealRecording : public testing::TestWithParam<Recording> {};
+class RealRecording : public ::testing::TestWithParam<Recording> {};
 
 TEST_P(RealRecording, IsTrackedAsWellAsBefore) {
   const char* data = std::getenv("TWOFOLD_DATA");
@@ -39,21 +37,10 @@ TEST_P(RealRecording, IsTrackedAsWellAsBefore) {
   const auto source =
       open_source(std::string(recording.scheme) + ":" + data + "/" + recording.folder, source_options);
   EngineOptions options;
-  options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  const FrameFeed feed = [&](Frame& frame) {
-    return source->next(frame) == FrameStatus::kFrame ? FeedStatus::kFrame : FeedStatus::kEnd;
-  };
-  const std::atomic<bool> interrupted{false};
-  const RunResult result = Engine(source->rig(), options).run(feed, interrupted);
-  ASSERT_EQ(result.error, "");
-  Trajectory estimate;
-  for (const FrameRecord& record : result.frames) {
-    if (has_final_pose(record))
-      estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
-  }
-  EXPECT_GE(static_cast<int>(estimate.size()), recording.tracked);
-  const auto evaluation = evaluate(associate(estimate, source->ground_truth(), 20'000'000),
+  const auto [result, path] = testing::run_whole(source->rig(), testing::frames_of(*source), options);
+  EXPECT_GE(static_cast<int>(path.size()), recording.tracked);
+  const auto evaluation = evaluate(associate(path, source->ground_truth(), 20'000'000),
                                    {.alignment = recording.one_camera ? Alignment::kSim3 : Alignment::kSe3});
   ASSERT_TRUE(evaluation);
   EXPECT_LT(evaluation->absolute.rmse, recording.ate);
@@ -62,7 +49,7 @@ TEST_P(RealRecording, IsTrackedAsWellAsBefore) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, RealRecording,
-    testing::Values(
+    ::testing::Values(
         Recording{"kitti06", "kitti", "stereo_kitti06_51", 51, 0.039, false},
         Recording{"mh01", "euroc", "stereo_euroc_mh01_300", 300, 0.0046, false},
         Recording{"redkitchen", "tum", "rgbd_7scenes_redkitchen_334", 334, 0.048, false},

@@ -1,13 +1,10 @@
 // A stereo pair whose calibration has slipped: rows of left and right images do not belong together any more.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cstdio>
 
-#include "engine/engine.hpp"
-#include "evaluation/evaluation.hpp"
 #include "imaging/row_offset.hpp"
-#include "synthetic/synthetic_sequence.hpp"
+#include "tests/engine/whole_run.hpp"
 
 namespace twofold {
 namespace {
@@ -35,28 +32,18 @@ SyntheticOptions small_courtyard() {
 /// @param rows  right images lie lower, from frame `from` on
 Walk walk(double rows, int from = 0) {
   static const SyntheticSequence sequence(small_courtyard());
-  Trajectory truth;
-  for (int i = 0; i < sequence.frame_count(); ++i) truth.push_back({sequence.t_ns(i), sequence.T_w_c(i)});
-  const FrameFeed feed = [&, next = 0](Frame& frame) mutable {
-    if (next == sequence.frame_count()) return FeedStatus::kEnd;
-    frame = sequence.render(next++);
+  const FrameFeed slipped = [&, frames = testing::frames_of(sequence)](Frame& frame) {
+    const FeedStatus status = frames(frame);
     cv::Mat moved;
-    if (frame.index >= from) take_back_row_offset(frame.right, -rows, moved);
+    if (status == FeedStatus::kFrame && frame.index >= from) take_back_row_offset(frame.right, -rows, moved);
     if (!moved.empty()) frame.right = moved;
-    return FeedStatus::kFrame;
+    return status;
   };
-  EngineOptions options;
-  options.deterministic = true;
-  std::atomic<bool> interrupted{false};
-  const RunResult result = Engine(sequence.rig(), options).run(feed, interrupted);
-  EXPECT_EQ(result.error, "");
-  Trajectory estimate;
+  const auto [result, path] = testing::run_whole(sequence.rig(), slipped);
   for (const FrameRecord& record : result.frames) {
     EXPECT_EQ(record.state, FrameState::kTracked) << rows << ", frame " << record.frame_index;
-    if (record.state == FrameState::kTracked)
-      estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
   }
-  const auto evaluation = evaluate(associate(estimate, truth, 1'000'000), {});
+  const auto evaluation = evaluate(associate(path, testing::true_path(sequence), 1'000'000), {});
   EXPECT_TRUE(evaluation);
   std::printf("%.1f rows from frame %d: ATE %.4f m, named as %.3f\n", rows, from,
               evaluation ? evaluation->absolute.rmse : -1, result.row_offset);
