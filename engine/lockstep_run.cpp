@@ -191,7 +191,10 @@ void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
   (void)mapper_inbox_.take(proposals, loop_messages);
   const std::uint64_t version = mapping_.step(mapper_inbox_.proposals(), mapper_inbox_.loops());
   for (ProposalHandle& keyframe : mapper_inbox_.proposals()) mapped_.push_back(std::move(keyframe));
-  snapshot_ = mapping_.publish();
+  {
+    const ScopedStage timed = mapping_.timed_publication();
+    snapshot_ = mapping_.publish();
+  }
   logs_.schedule().mapper.append(
       {version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
 }

@@ -165,6 +165,7 @@ MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* 
       may_change_(!options.localise_only),
       times_("mapper", trace) {
   round_stage_ = times_.add_stage("round");
+  publish_stage_ = times_.add_stage("publish");
   if (options.map) mapper_.continue_from(options.map->graph);
 }
 

@@ -98,6 +98,9 @@ class MapperRunner {
   std::uint64_t step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
   /// The listener is told.
   [[nodiscard]] GraphSnapshot publish();
+  /// Times, until it is destroyed, the stage in which a version is made, handed out, and older ones are let
+  /// go of.
+  [[nodiscard]] ScopedStage timed_publication() { return {times_, publish_stage_}; }
   /// The last version: all poses agree globally, unless the map was not to change.
   [[nodiscard]] GraphSnapshot finish();
   /// What became of the keyframes that were culled.
@@ -113,7 +116,7 @@ class MapperRunner {
   const bool may_change_;
   MappingTotals totals_;
   StageRecorder times_;
-  StageId round_stage_;
+  StageId round_stage_, publish_stage_;
   std::vector<KeyframeProposal*> proposals_;
   std::vector<LoopConstraint> loops_;
 };

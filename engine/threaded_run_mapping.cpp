@@ -13,7 +13,10 @@ void ThreadedRun::mapper_thread(const std::stop_token& stop) {
     const std::span<ProposalHandle> proposals = mapper_inbox_.proposals();
     const std::span<const LoopMessage> loops = mapper_inbox_.loops();
     const std::uint64_t version = mapping_.step(proposals, loops);
-    snapshots_.publish(mapping_.publish());
+    {
+      const ScopedStage timed = mapping_.timed_publication();
+      snapshots_.publish(mapping_.publish());
+    }
     map_version_.store(version, std::memory_order_relaxed);
     logs_.schedule().mapper.append(
         {version, static_cast<std::uint32_t>(proposals.size()), static_cast<std::uint32_t>(loops.size())});
