@@ -33,6 +33,7 @@ void register_rows() {
   PYBIND11_NUMPY_DTYPE(Map::Keyframe, id, part, frame, t_ns, T_world_camera, points, window, has_place);
   PYBIND11_NUMPY_DTYPE(Map::Point, id, anchor, observers, position, covariance);
   PYBIND11_NUMPY_DTYPE(Map::Edge, from, to, kind, shared_points, T_to_from);
+  PYBIND11_NUMPY_DTYPE(Map::Loop, from, to, t_ns, inliers, scale, joins_parts, drift, turned, travelled);
   PYBIND11_NUMPY_DTYPE(Map::Part, id, keyframes);
 }
 
@@ -75,6 +76,17 @@ void bind_map(py::module_& module) {
           },
           "(N,) with fields from, to (> from), kind (0: covisible, 1: marginalised), shared_points, "
           "T_to_from (q, t).")
+      .def(
+          "loops",
+          [](const py::object& self) {
+            return lazily(self, &MapRows::loops, [](const MapSnapshot& map) { return map.loops(); });
+          },
+          "(N,) loops that this run has closed by appearance, in the order they were found, with fields from "
+          "(the older\n"
+          "keyframe; may be gone by now), to (that came back), t_ns (of it), inliers, scale (lengths around "
+          "to "
+          "over those around\n"
+          "from; 1 but for one camera), joins_parts, drift [m], turned [rad], travelled [m].")
       .def(
           "parts",
           [](const py::object& self) {

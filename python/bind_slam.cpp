@@ -228,6 +228,7 @@ std::string view(SlamWithUpdates& self, const std::string& title, int port, cons
     options.truth.push_back(pose.T_world_camera);
     options.truth_t_ns.push_back(pose.t_ns);
   }
+  options.scale_truth = self.rig.sensor == Sensor::kMono;
   const py::gil_scoped_release unlocked;
   return self.view.open(self.rig, self.slam, options);
 }
@@ -296,8 +297,10 @@ void bind_slam_class(py::module_& module) {
            "look.\n"
            "port: 0 for any that is free; bind: any but a loopback address shows camera and map to the "
            "network,\n"
-           "unencrypted; truth: Trajectory of the true path, in any world. Nobody waits for who looks. "
-           "Raises\n"
+           "unencrypted; truth: Trajectory of the true path, in any world, scaled where one camera has a "
+           "unit of "
+           "its own.\n"
+           "Nobody waits for who looks. Raises\n"
            "RuntimeError when it is open already, the port is taken, or the package was built without the "
            "viewer.")
       .def(

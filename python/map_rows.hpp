@@ -22,6 +22,7 @@ struct MapRows {
   Lazy<MapSnapshot::Keyframe> keyframes;
   Lazy<MapSnapshot::Point> points, bare_points;
   Lazy<MapSnapshot::Edge> edges;
+  Lazy<MapSnapshot::Loop> loops;
   Lazy<MapSnapshot::Part> parts;
 };
 

@@ -76,8 +76,8 @@ std::optional<ViewMessage> ClientFeed::next_text() {
     reasons_ = scene_.reasons().size();
     return ViewMessage{shared(reasons_text(scene_.reasons())), true};
   }
-  if (!has_truth_ && scene_.truth()) {
-    has_truth_ = true;
+  if (truths_ < scene_.truths()) {
+    truths_ = scene_.truths();
     return ViewMessage{shared(truth_text(*scene_.truth())), true};
   }
   if (event_ < scene_.end_event()) {

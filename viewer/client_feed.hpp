@@ -72,8 +72,9 @@ class ClientFeed {
 
   const ViewScene& scene_;
   const ViewTitle& title_;
-  bool greeted_ = false, has_truth_ = false;
-  std::size_t reasons_ = 1;  // known to the client
+  bool greeted_ = false;
+  std::uint32_t truths_ = 0;  // known to the client
+  std::size_t reasons_ = 1;   // known to the client
   std::uint64_t event_ = 0;
   std::uint64_t live_ = 0;
   Revision revision_ = 0, next_revision_ = 0;  // what it has, and has when the delta is through

@@ -42,6 +42,7 @@ struct ViewMap {
 /// Where the camera truly was, in the world of a map part.
 struct ViewTruth {
   std::uint32_t part = 0;
+  double scale = 1;                        ///< its lengths as they are shown over the true ones
   std::vector<std::array<float, 4>> path;  ///< t [s], x, y, z [m]
 };
 
@@ -82,7 +83,11 @@ class ViewScene {
   /// Loops of a map that were not told yet become events. Those of one map begin as those of the one before.
   void add_loops(const std::vector<MapSnapshot::Loop>& loops);
   void add(const ViewPathFrame& frame);
-  void set_truth(ViewTruth truth) { truth_ = std::move(truth); }
+  /// Replaces what was told of it before.
+  void set_truth(ViewTruth truth) {
+    truth_ = std::move(truth);
+    ++truths_;
+  }
   /// The map is now this.
   void show(const ViewMap& map);
   /// Its keyframes alone, which the path hangs on.
@@ -109,6 +114,8 @@ class ViewScene {
   /// Number of a reason in reasons(), which grows when it is new; 0 when there are too many.
   [[nodiscard]] std::uint8_t reason_number(const char* reason);
   [[nodiscard]] const std::optional<ViewTruth>& truth() const { return truth_; }
+  /// How often it was set.
+  [[nodiscard]] std::uint32_t truths() const { return truths_; }
   [[nodiscard]] const std::vector<std::string>& reasons() const { return reasons_; }
   /// Time stamp of the scene's first moment: that of the first pose or event, or what it was told to be.
   [[nodiscard]] std::optional<std::int64_t> start_ns() const { return start_ns_; }
@@ -143,6 +150,7 @@ class ViewScene {
   std::vector<std::string> reasons_{""};
   std::optional<std::int64_t> start_ns_;
   std::optional<ViewTruth> truth_;
+  std::uint32_t truths_ = 0;
   struct Encoded {
     Revision since = 0, to = 0;
     std::weak_ptr<const Delta> delta;

@@ -52,7 +52,7 @@ std::string reasons_text(const std::vector<std::string>& reasons) {
 }
 
 std::string truth_text(const ViewTruth& truth) {
-  return text_of({{"truth", {{"part", truth.part}, {"path", truth.path}}}});
+  return text_of({{"truth", {{"part", truth.part}, {"scale", truth.scale}, {"path", truth.path}}}});
 }
 
 std::string events_text(const ViewScene& scene, std::uint64_t begin) {

@@ -126,6 +126,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         options_(options),
         title_(title_of(rig, options)),
         keyframe_images_(find_images(map_, options_)),
+        truth_(options.truth, options.truth_t_ns, options.scale_truth),
         server_({options.bind, options.port}, scene_, title_) {
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
@@ -206,11 +207,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   }
 
   void find_truth(const PoseEstimate& pose) {
-    if (scene_.truth() || pose.state != TrackingState::kTracked || options_.truth.empty() ||
-        options_.truth.size() != options_.truth_t_ns.size())
-      return;
-    scene_.set_truth(
-        truth_beside({pose.t_ns, pose.T_world_camera, pose.map_part}, options_.truth, options_.truth_t_ns));
+    if (pose.state != TrackingState::kTracked) return;
+    if (auto truth = truth_.add({pose.t_ns, pose.T_world_camera, pose.map_part}))
+      scene_.set_truth(std::move(*truth));
   }
 
   /// Not before the first pose: times are counted from there.
@@ -246,6 +245,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   const ViewerOptions options_;
   const ViewTitle title_;
   KeyframeImages keyframe_images_;
+  TruthBeside truth_;
   ViewScene scene_;
   ViewServer server_;
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};

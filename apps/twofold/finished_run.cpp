@@ -73,7 +73,7 @@ std::vector<ViewEdge> read_edges(const std::filesystem::path& file, std::size_t 
 }
 
 /// The path that the source knew, if it did.
-void add_truth(const std::filesystem::path& file, const TimedPose& tracked, ViewScene& scene) {
+void add_truth(const std::filesystem::path& file, const Trajectory& poses, bool scaled, ViewScene& scene) {
   if (!std::filesystem::exists(file)) return;
   std::vector<Pose> truth;
   std::vector<std::int64_t> t_ns;
@@ -81,7 +81,9 @@ void add_truth(const std::filesystem::path& file, const TimedPose& tracked, View
     truth.push_back(to_pose(pose.T_w_c));
     t_ns.push_back(pose.t_ns);
   }
-  if (!truth.empty()) scene.set_truth(truth_beside({tracked.t_ns, to_pose(tracked.T_w_c), 0}, truth, t_ns));
+  TruthBeside beside(std::move(truth), std::move(t_ns), scaled);
+  for (const TimedPose& tracked : poses)
+    if (auto path = beside.add({tracked.t_ns, to_pose(tracked.T_w_c), 0})) scene.set_truth(std::move(*path));
 }
 
 /// Frames of a finished run hang on the keyframe before them.
@@ -244,7 +246,7 @@ void show_finished_run(const std::filesystem::path& folder, ViewScene& scene, Vi
   const std::int64_t start_ns = poses.front().t_ns;
   scene.begin(start_ns);
   title.title = fmt::format("{} ({})", folder.filename().string(), summary.value("source", ""));
-  add_truth(folder / "groundtruth.txt", poses.front(), scene);
+  add_truth(folder / "groundtruth.txt", poses, summary.value("scale", "") == "arbitrary", scene);
   const PathBuilder builder(keyframes, read_tum_trajectory(folder / "trajectory_causal.txt"), start_ns);
   std::vector<ViewKeyframe> shown = keyframes_of(keyframes, start_ns);
   add_path(poses, builder, summary, shown, scene);

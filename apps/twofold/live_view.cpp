@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/interrupt.hpp"
+#include "apps/twofold/run_output.hpp"
 #include "graph/map_file.hpp"
 #include "io/files/io_error.hpp"
 #include "slam/conversions.hpp"
@@ -97,6 +98,7 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
     return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps_.newest()}));
   };
   ViewerOptions viewer = viewer_options(arguments, title, source);
+  viewer.scale_truth = scale_is_arbitrary(rig_, options);
   if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
   if (images) viewer.recorded_image = [images](std::int64_t t_ns) { return viewed_image(images(t_ns)); };
   measured_.reserve(kMostMeasured);

@@ -49,6 +49,9 @@ struct ViewerOptions {
   double frame_period = 0;               ///< the budget of a frame [s]; 0: as the frames' times say
   std::vector<Pose> truth = {};          ///< T_world_camera of the true path, if it is known, in any world
   std::vector<std::int64_t> truth_t_ns = {};  ///< its times, ascending, as many; else nothing is shown
+  /// The map has a unit of length of its own, as that of one camera (Sensor::kMono): the true path is scaled
+  /// to the tracked one, and the page says so.
+  bool scale_truth = false;
   /// Does what a viewer asks for, on the viewer's thread, and says in a sentence what it did; what it throws
   /// is told as a failure. Empty: viewers can only look.
   std::function<std::string(ViewCommand)> on_command = {};

@@ -136,6 +136,7 @@ def test_maps_are_read_only_views_that_hold_their_version(finished: twofold.Run)
     assert held[0] >= 1
     version = map_now.version
     keyframes, edges, parts = map_now.keyframes(), map_now.edges(), map_now.parts()
+    loops = map_now.loops()
     del map_now
     assert version > 0
     assert len(keyframes) > 1 and keyframes["T_world_camera"]["t"].shape == (len(keyframes), 3)
@@ -144,6 +145,9 @@ def test_maps_are_read_only_views_that_hold_their_version(finished: twofold.Run)
     assert set(edges["from"]) <= set(keyframes["id"])
     assert (edges["from"] < edges["to"]).all()
     assert parts["keyframes"].sum() == len(keyframes)
+    assert len(loops) == 0  # a desk, seen once
+    columns = {"from", "to", "t_ns", "inliers", "scale", "joins_parts", "drift", "turned", "travelled"}
+    assert set(loops.dtype.names or ()) == columns
 
 
 def test_a_map_survives_its_file(finished: twofold.Run, tmp_path: Path) -> None:

@@ -4,11 +4,14 @@
 
 #include <cstdlib>
 #include <random>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
+#include "engine/clock.hpp"
 #include "tests/viewer/local_client.hpp"
 #include "tests/viewer/small_map.hpp"
+#include "viewer/keyframe_images.hpp"
 
 namespace twofold {
 namespace {
@@ -29,7 +32,11 @@ class ViewServerTest : public ::testing::Test {
     port_ = std::stoi(address.substr(address.rfind(':') + 1));
     thread_ = std::jthread([this](const std::stop_token& stop) {
       server_.run(
-          stop, [](const ViewServer::Audience&, ViewSight&) {}, [] { return std::string("over"); });
+          stop,
+          [this](const ViewServer::Audience& audience, ViewSight& newest) {
+            images_.answer(audience.keyframes, steady_now_ns(), newest);
+          },
+          [] { return std::string("over"); });
     });
   }
 
@@ -55,7 +62,15 @@ class ViewServerTest : public ::testing::Test {
   }
 
   ViewScene scene_;
-  ViewTitle title_{.title = "test"};
+  /// A hundred keyframes have images.
+  static ViewedImage image_of(std::uint32_t keyframe) {
+    if (keyframe >= 100) throw std::runtime_error("there is none");
+    static const std::vector<std::uint8_t> pixels(48, 99);
+    return {{pixels.data(), 8, 6, 8}, nullptr};
+  }
+
+  ViewTitle title_{.title = "test", .keyframe_images = true};
+  KeyframeImages images_{image_of};
   ViewServer server_{{.bind = "127.0.0.1", .port = 0}, scene_, title_};
   std::string token_;
   int port_ = 0;
@@ -184,8 +199,8 @@ TEST_F(ViewServerTest, SurvivesDamagedConversations) {
     LocalClient client(port_);
     ASSERT_TRUE(client.connected());
     const std::string opening = upgrade_request(port_, token_);
-    const std::string talk =
-        text_frame("images on") + text_frame("ack") + frame(0x89, "ping") + frame(0x88, "\x03\xe8");
+    const std::string talk = text_frame("images on") + text_frame("keyframe 17") + text_frame("ack") +
+                             frame(0x89, "ping") + frame(0x88, "\x03\xe8");
     if (rng() % 3 == 0) {
       client.send(damaged(opening + talk, rng));
     } else {

@@ -94,9 +94,11 @@ TEST_F(ViewerTest, AsksForFiveImagesASecond) {
 }
 
 /// A map of three keyframes, a second apart.
+/// Keyframes 0, 1 and 3; number 2 was culled.
 MapSnapshot map_of_three() {
   GraphWriter writer;
-  for (std::uint32_t k = 0; k < 3; ++k) {
+  for (const std::uint32_t k : {0U, 1U, 3U}) {
+    if (k == 3) writer.add_forgotten_keyframes(1);
     twofold::Keyframe keyframe;
     keyframe.id = KeyframeId{k};
     keyframe.t_ns = (k + 1) * 1'000'000'000LL;
@@ -132,8 +134,12 @@ TEST_F(ViewerTest, ShowsTheImageOfAKeyframe) {
   Viewer viewer(kRig, map_of_three, {.port = 0, .recorded_image = recorded});
   LocalClient client = watch(viewer);
   EXPECT_NE(client.receive_until("\"keyframeImages\":true").find("keyframeImages"), std::string::npos);
-  client.send(testing::text_frame("keyframe 17"));  // there is none
-  client.send(testing::text_frame("keyframe 1"));   // the last wish counts
+  client.send(testing::text_frame("keyframe 2"));  // there is none any more
+  const std::string answer("\x05\0\0\0\x02\0\0\0", 8);
+  EXPECT_NE(client.receive_until(answer).find(answer), std::string::npos) << "and that is said";
+  EXPECT_TRUE(asked.empty()) << "nobody is asked for images of keyframes there are not";
+  client.send(testing::text_frame("ack") + testing::text_frame("keyframe 3") +
+              testing::text_frame("keyframe 1"));  // the last wish counts
   EXPECT_NE(client.receive_until("JFIF").find("JFIF"), std::string::npos);
   viewer.finish();
   EXPECT_EQ(asked, std::vector<std::int64_t>{2'000'000'000})

@@ -94,7 +94,11 @@ class Page {
       $('commands').hidden = !message.hello.control;
     }
     if (message.reasons) this.model.reasons = message.reasons;
-    if (message.truth) this.model.truth = message.truth;
+    if (message.truth) {
+      this.model.truth = message.truth;
+      const {scale} = message.truth;
+      $('name-truth').textContent = scale === 1 ? 'True path' : `True path × ${scale.toPrecision(3)}`;
+    }
     if (message.events) {
       this.model.events.push(...message.events);
       this.showPaused();
@@ -205,8 +209,9 @@ class Page {
       box.id = `layer-${layer}`;
       box.checked = layer !== 'image';
       box.addEventListener('change', () => this.setLayer(layer, box.checked));
-      const label = make('label', '', sample, make('span', name), box);
-      return label;
+      const words = make('span', name);
+      words.id = `name-${layer}`;
+      return make('label', '', sample, words, box);
     }));
     $('colouring').replaceChildren(...COLOURINGS.map((name) => new Option(name === 'observers' ? 'times seen' : name, name)));
     $('keys').replaceChildren(make('table', '', ...KEYS.map(([key, what]) => make('tr', '', make('td', '', make('kbd', key)), make('td', what)))));

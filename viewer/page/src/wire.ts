@@ -252,6 +252,8 @@ export interface Hello {
 }
 export interface Truth {
   part: number;
+  /** Lengths as they are shown over the true ones; one camera has a unit of its own. */
+  scale: number;
   /** t, x, y, z */
   path: [number, number, number, number][];
 }

@@ -86,13 +86,13 @@ async function cutNetwork(page, network) {
   await network.cut();
   await says(page, '#message', /connection lost|reached/);
   const before = await report(page);
-  await page.waitForTimeout(3000);
+  await page.waitForTimeout(10000);
   await network.mend();
   await until('the page recovers', async () => {
     const now = await report(page);
     return now.link === 'open' && now.newest > before.newest && now.path > before.path;
   });
-  done('network cut and mended');
+  done('network cut for ten seconds and mended');
 }
 
 /** Saves the map, holds it, lets go of it, ends the run. */
