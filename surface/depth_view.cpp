@@ -34,7 +34,7 @@ cv::Mat readings(const Rig& rig, const cv::Mat& depth) {
   for (int y = 0; y < metres.rows; ++y) {
     auto* row = metres.ptr<float>(y);
     // NaN keeps no comparison.
-    for (int x = 0; x < metres.cols; ++x) row[x] = (row[x] >= low) & (row[x] <= high) ? row[x] : kNone;
+    for (int x = 0; x < metres.cols; ++x) row[x] = ((row[x] >= low) & (row[x] <= high)) ? row[x] : kNone;
   }
   return metres;
 }
@@ -84,7 +84,7 @@ void find_jumps(const cv::Mat& raw, DepthView& view) {
     auto* pixel = view.pixels.ptr<PixelReading>(y);
     for (int x = 0; x < raw.cols; ++x) {
       const float low = around.nearest(x);
-      depth[x] = (z[x] < kNone) & (around.farthest(x) - low <= kJumpRatio * low) ? z[x] : 0.0f;
+      depth[x] = ((z[x] < kNone) & (around.farthest(x) - low <= kJumpRatio * low)) ? z[x] : 0.0f;
       pixel[x].depth = depth[x];
       pixel[x].nearest = around.has_hole(x) ? 0.0f : low;
     }
