@@ -6,9 +6,9 @@
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/depth_alignment.hpp"
-#include "tracking/depth_seeds.hpp"
 #include "tracking/elder_vote.hpp"
-#include "tracking/first_structure.hpp"
+#include "tracking/monocular/depth_seeds.hpp"
+#include "tracking/monocular/first_structure.hpp"
 #include "tracking/wide_search.hpp"
 
 namespace twofold {

@@ -6,8 +6,8 @@
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
 #include "imaging/image_pyramid.hpp"
-#include "tracking/corner_following.hpp"
-#include "tracking/first_structure.hpp"
+#include "tracking/monocular/corner_following.hpp"
+#include "tracking/monocular/first_structure.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 

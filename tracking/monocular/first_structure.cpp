@@ -1,4 +1,4 @@
-#include "tracking/first_structure.hpp"
+#include "tracking/monocular/first_structure.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tracking/depth_seeds.hpp"
+#include "tracking/monocular/depth_seeds.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tracking/corner_following.hpp"
+#include "tracking/monocular/corner_following.hpp"
 
 #include <cmath>
 #include <limits>
