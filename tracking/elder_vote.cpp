@@ -27,6 +27,7 @@ std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation>
                                                     std::span<const KeyframeId> anchors,
                                                     const MotionOnlyResult& by_all,
                                                     const MotionOnlyOptions& solver) {
+  difference_.reset();
   const bool mistrusted = mistrusts_the_young();
   if (mistrusted) --mistrusted_for_;
   if (!choose_elders(observations, anchors)) return std::nullopt;
@@ -34,6 +35,7 @@ std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation>
   if (by_elders.inliers < options_.min_agreeing * static_cast<double>(elders_.size())) return std::nullopt;
 
   const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
+  difference_ = split_factor(by_all.information, by_elders.information, apart);
   const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent;
   if (!dissent && !mistrusted) return std::nullopt;  // nearly always
   const int with_elders = young_inliers(observations, anchors, by_elders.T_c_ref, solver);

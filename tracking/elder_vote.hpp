@@ -7,6 +7,7 @@
 
 #include "camera/rig.hpp"
 #include "estimation/motion_only.hpp"
+#include "estimation/pose_uncertainty.hpp"
 #include "graph/ids.hpp"
 
 namespace twofold {
@@ -45,6 +46,11 @@ class ElderVote {
                                                          const MotionOnlyResult& by_all,
                                                          const MotionOnlyOptions& solver);
 
+  /// By how much the elders' pose and that of all differed last, over what independent errors of the rig's
+  /// noise let expect: a variance factor (VarianceFactor::add_split). Nothing when nobody was asked, or
+  /// nobody could say.
+  [[nodiscard]] std::optional<double> difference() const { return difference_; }
+
   /// The young were overruled lately.
   [[nodiscard]] bool mistrusts_the_young() const { return mistrusted_for_ > 0; }
 
@@ -56,7 +62,8 @@ class ElderVote {
 
   Rig rig_;
   ElderVoteOptions options_;
-  int mistrusted_for_ = 0;                   ///< [frames]
+  int mistrusted_for_ = 0;  ///< [frames]
+  std::optional<double> difference_;
   KeyframeId youngest_elder_ = kNoKeyframe;  ///< anchor
   std::vector<KeyframeId> by_age_;
   std::vector<MotionObservation> elders_;
