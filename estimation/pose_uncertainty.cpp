@@ -65,7 +65,9 @@ void VarianceFactor::update(const Rig& rig, std::span<const MotionObservation> o
   smooth(regions_, trace / kPoseDimensions * regions / (regions - kPoseDimensions), kNewestRegions);
 }
 
-void VarianceFactor::add_split(double factor) { smooth(split_, factor, kNewestSplit); }
+void VarianceFactor::add_split(double factor) {
+  smooth(split_, factor, kNewestSplit);
+}
 
 std::optional<double> split_factor(const Matrix6& information_of_all, const Matrix6& information_of_some,
                                    const Vector6& apart) {

@@ -44,8 +44,9 @@ std::optional<RelativeTruth::Comparison> RelativeTruth::compare(const SE3& estim
   const auto truth = T_c_ref(t_c_ns, t_ref_ns);
   if (!truth) return std::nullopt;
   Comparison comparison{(estimate * truth->inverse()).log(), Matrix6::Zero()};
-  // Both poses err. Turning the world's axes or the camera's does not change what errs alike in all directions;
-  // the turn of the earlier pose moves the later one by at most the way between them, which is short.
+  // Both poses err. Turning the world's axes or the camera's does not change what errs alike in all
+  // directions; the turn of the earlier pose moves the later one by at most the way between them, which is
+  // short.
   Matrix6& of_truth = comparison.of_truth;
   of_truth.diagonal().head<3>().setConstant(2 * noise_.position * noise_.position);
   of_truth.diagonal().tail<3>().setConstant(2 * noise_.rotation * noise_.rotation);

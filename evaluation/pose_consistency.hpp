@@ -26,7 +26,8 @@ class RelativeTruth {
   struct Comparison {
     Vector6 error;
     Matrix6 of_truth;
-    /// Squared error over its covariance and the six dimensions: 1 on average where that is honest (NEES / 6).
+    /// Squared error over its covariance and the six dimensions: 1 on average where that is honest (NEES /
+    /// 6).
     /// @param covariance  of T_c_ref, left perturbation
     [[nodiscard]] double normalised(const Matrix6& covariance) const;
   };

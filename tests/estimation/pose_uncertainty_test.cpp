@@ -119,7 +119,8 @@ TEST_F(PoseUncertaintyTest, InformationUnderAForceIsTheInverseOfTheSum) {
   push << 0.02, -0.01, 0.03, 0.01, 0.02, -0.01;
   const Matrix6 covariance = 3 * information.inverse() + push * push.transpose();
   const Matrix6 expected = covariance.inverse();
-  EXPECT_LT((information_under(information, 3, information * push) - expected).norm(), 1e-6 * expected.norm());
+  EXPECT_LT((information_under(information, 3, information * push) - expected).norm(),
+            1e-6 * expected.norm());
 }
 
 /// A camera that turns and drives on while its rows are read, tracked as if it did not.

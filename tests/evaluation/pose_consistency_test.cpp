@@ -26,7 +26,8 @@ class PoseConsistencyTest : public ::testing::Test {
     };
     Trajectory truth;
     for (int i = 0; i < 400; ++i)
-      truth.push_back({i * 10'000'000LL, T_w_c_at(0.01 * i) * noise(truth_noise.position, truth_noise.rotation)});
+      truth.push_back(
+          {i * 10'000'000LL, T_w_c_at(0.01 * i) * noise(truth_noise.position, truth_noise.rotation)});
     const RelativeTruth relative(truth, known);
     double sum = 0;
     int count = 0;
