@@ -97,9 +97,10 @@ struct SearchRegions {
 /// A frame as soon as its pose is known; valid during the listener's call only.
 struct PoseReport {
   const FrameRecord& record;
-  const GraphSnapshot& graph;              ///< the map it was tracked against
-  const PoseCorrection& correction;        ///< of the map, seen first by this frame, if there is a reason
-  Matrix6 information;                     ///< of T_c_ref, left perturbation (v, omega); of tracked frames
+  const GraphSnapshot& graph;        ///< the map it was tracked against
+  const PoseCorrection& correction;  ///< of the map, seen first by this frame, if there is a reason
+  /// Of T_c_ref, left perturbation (v, omega), as large as residuals say; of tracked frames.
+  Matrix6 information;
   std::int64_t exposed_ns = 0;             ///< when the frame was exposed (Pacer)
   std::span<const std::int64_t> stage_ns;  ///< what each TrackerStage took
   /// What the pose rests on, outliers included; points in the reference keyframe's frame.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "estimation/observation_model.hpp"
 #include "geometry/option_check.hpp"
 
 namespace twofold {
@@ -12,6 +13,7 @@ std::string ElderVoteOptions::invalid_reason() const {
       .at_least("min_elders", min_elders, 3)
       .share("min_agreeing", min_agreeing)
       .above("dissent", dissent, 0)
+      .share("min_convinced", min_convinced)
       .share("min_loyal", min_loyal)
       .at_least("mistrusted_frames", mistrusted_frames, 0)
       .reason();
@@ -27,6 +29,7 @@ std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation>
                                                     std::span<const KeyframeId> anchors,
                                                     const MotionOnlyResult& by_all,
                                                     const MotionOnlyOptions& solver) {
+  difference_.reset();
   const bool mistrusted = mistrusts_the_young();
   if (mistrusted) --mistrusted_for_;
   if (!choose_elders(observations, anchors)) return std::nullopt;
@@ -34,7 +37,9 @@ std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation>
   if (by_elders.inliers < options_.min_agreeing * static_cast<double>(elders_.size())) return std::nullopt;
 
   const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
-  const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent;
+  difference_ = split_factor(by_all.information, by_elders.information, apart);
+  const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent &&
+                       elders_nearer_to(by_elders.T_c_ref, by_all.T_c_ref) >= options_.min_convinced;
   if (!dissent && !mistrusted) return std::nullopt;  // nearly always
   const int with_elders = young_inliers(observations, anchors, by_elders.T_c_ref, solver);
   const int with_all = young_inliers(observations, anchors, by_all.T_c_ref, solver);
@@ -60,6 +65,19 @@ bool ElderVote::choose_elders(std::span<const MotionObservation> observations,
     if (anchors[i] <= youngest_elder_) elders_.push_back(observations[i]);
   }
   return elders_.size() < observations.size();
+}
+
+/// Share of the elders that lie nearer to where the first pose says than to where the second does. Few far
+/// points leave a pose nearly free, and two mistakes among them carry it off, which the most of them show:
+/// what they gain in all, the sum, does not.
+double ElderVote::elders_nearer_to(const SE3& T_c_ref, const SE3& T_other) const {
+  const ObservationModel model(rig_);
+  int count = 0;
+  for (const MotionObservation& o : elders_) {
+    count +=
+        model.chi2(T_c_ref * o.x_ref, o.z, o.information) < model.chi2(T_other * o.x_ref, o.z, o.information);
+  }
+  return static_cast<double>(count) / static_cast<double>(elders_.size());
 }
 
 /// How many of the young go with a pose. Sets who goes with it, old and young.

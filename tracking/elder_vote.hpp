@@ -7,6 +7,7 @@
 
 #include "camera/rig.hpp"
 #include "estimation/motion_only.hpp"
+#include "estimation/pose_uncertainty.hpp"
 #include "graph/ids.hpp"
 
 namespace twofold {
@@ -16,6 +17,9 @@ struct ElderVoteOptions {
   int min_elders = 40;        ///< fewer overrule nobody, >= 3
   double min_agreeing = 0.7;  ///< share of the elders that the pose they give must explain, in (0, 1]
   double dissent = 4;         ///< between the two poses, in standard deviations of the elders' pose, > 0
+  /// Share of the elders that must lie nearer to where their pose says than to where that of all does, in (0,
+  /// 1].
+  double min_convinced = 2.0 / 3;
   double min_loyal = 0.5;  ///< share of the young that go with all which must go with the elders, in (0, 1]
   int mistrusted_frames = 30;  ///< for so long nobody asks the young again, >= 0
 
@@ -27,8 +31,8 @@ struct ElderVoteOptions {
 ///
 /// What passes before the camera gives ever new points, whose depths are right and which agree with each
 /// other, maybe more of them than of all others; but each of them is young. Elders are the observations of
-/// the oldest points. When nearly all young points contradict their pose, the young move: they are overruled,
-/// and for a while their votes do not count.
+/// the oldest points. When most elders fit their own pose better and nearly all young points contradict it,
+/// the young move: they are overruled, and for a while their votes do not count.
 ///
 /// One instance a tracker: it remembers whom it mistrusts. No allocation after construction.
 class ElderVote {
@@ -45,18 +49,25 @@ class ElderVote {
                                                          const MotionOnlyResult& by_all,
                                                          const MotionOnlyOptions& solver);
 
+  /// By how much the elders' pose and that of all differed last, over what independent errors of the rig's
+  /// noise let expect: a variance factor (VarianceFactor::add_split). Nothing when nobody was asked, or
+  /// nobody could say.
+  [[nodiscard]] std::optional<double> difference() const { return difference_; }
+
   /// The young were overruled lately.
   [[nodiscard]] bool mistrusts_the_young() const { return mistrusted_for_ > 0; }
 
  private:
   bool choose_elders(std::span<const MotionObservation> observations, std::span<const KeyframeId> anchors);
+  [[nodiscard]] double elders_nearer_to(const SE3& T_c_ref, const SE3& T_other) const;
   [[nodiscard]] int young_inliers(std::span<MotionObservation> observations,
                                   std::span<const KeyframeId> anchors, const SE3& T_c_ref,
                                   const MotionOnlyOptions& solver) const;
 
   Rig rig_;
   ElderVoteOptions options_;
-  int mistrusted_for_ = 0;                   ///< [frames]
+  int mistrusted_for_ = 0;  ///< [frames]
+  std::optional<double> difference_;
   KeyframeId youngest_elder_ = kNoKeyframe;  ///< anchor
   std::vector<KeyframeId> by_age_;
   std::vector<MotionObservation> elders_;

@@ -28,11 +28,12 @@ struct TrackResult {
   LostCause cause = LostCause::kNone;
   KeyframeId reference = kNoKeyframe;
   SE3 T_c_ref;  ///< pose relative to the reference keyframe; meaningful while kTracking
-  Matrix6 information = Matrix6::Zero();  ///< of T_c_ref, left perturbation (v, omega)
-  int candidates = 0;                     ///< points that should be visible
-  double reference_in_view = 0;           ///< share of the reference keyframe's points that should be visible
-  SE3 T_c_ref_predicted;                  ///< where points were searched from last
-  double search_radius_px = 0;            ///< around the predictions, in pixels of each point's pyramid level
+  /// Of T_c_ref, left perturbation (v, omega): with the noise that residuals show, not the rig's.
+  Matrix6 information = Matrix6::Zero();
+  int candidates = 0;            ///< points that should be visible
+  double reference_in_view = 0;  ///< share of the reference keyframe's points that should be visible
+  SE3 T_c_ref_predicted;         ///< where points were searched from last
+  double search_radius_px = 0;   ///< around the predictions, in pixels of each point's pyramid level
   int searched = 0;
   int matches = 0;
   int inliers = 0;

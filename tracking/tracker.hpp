@@ -8,6 +8,7 @@
 #include "camera/frame.hpp"
 #include "camera/readout_estimator.hpp"
 #include "camera/rig.hpp"
+#include "estimation/pose_uncertainty.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "imaging/right_rows.hpp"
@@ -140,6 +141,10 @@ class Tracker {
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
+  [[nodiscard]] Matrix6 honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
+                                           const Frame& frame);
+  [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, const Frame& frame) const;
+  [[nodiscard]] double readout_sigma() const;
   void give_up_frame(LostCause cause, TrackResult& result);
   void remember_frame(const FrameStep& step);
 
@@ -165,6 +170,7 @@ class Tracker {
   WideSearch wide_search_;
   RecentViews recent_views_;
   ElderVote elder_vote_;
+  VarianceFactor variance_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
   std::optional<RightRows> right_rows_;      ///< stereo only

@@ -10,6 +10,8 @@ namespace twofold {
 namespace {
 
 constexpr int kShutterRounds = 3;
+/// Cameras either read all rows at once or take up to a frame's period: while nobody knows [s].
+constexpr double kUnknownReadout = 0.015;
 
 }  // namespace
 
@@ -66,11 +68,18 @@ void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& ste
   result.matches = static_cast<int>(matches_.size());
 }
 
-/// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on.
-RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const {
+/// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on. None after a
+/// loss.
+std::optional<Vector6> Tracker::velocity_at(const SE3& T_c_ref, const Frame& frame) const {
   const double seconds = static_cast<double>(frame.t_ns - last_t_ns_) * 1e-9;
-  if (rig_.readout.value_or(0) == 0 || loss_.lost_frames() > 0 || !(seconds > 0)) return {};
-  return {rig_, (T_c_ref * last_.T_c_ref.inverse()).log() / seconds};
+  if (loss_.lost_frames() > 0 || !(seconds > 0)) return std::nullopt;
+  return (T_c_ref * last_.T_c_ref.inverse()).log() / seconds;
+}
+
+RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const {
+  if (rig_.readout.value_or(0) == 0) return {};
+  const auto velocity = velocity_at(T_c_ref, frame);
+  return velocity ? RollingShutter(rig_, *velocity) : RollingShutter();
 }
 
 /// From what was found in this frame and the ones before, whether it fitted the map or not.
@@ -153,8 +162,36 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   result.status = TrackStatus::kTracking;
   result.reference = start.reference;
   result.T_c_ref = motion.T_c_ref;
-  result.information = motion.information;
+  result.information = honest_information(motion, solver, step.frame);
   return LostCause::kNone;
+}
+
+/// By how much the readout that frames are tracked with may be wrong [s]; 0 where the calibration has it.
+double Tracker::readout_sigma() const {
+  if (!readout_) return 0;
+  const ReadoutEstimate& estimate = readout_->estimate();
+  const double prior = kUnknownReadout * kUnknownReadout;
+  const double trust = prior / (prior + estimate.sigma * estimate.sigma);  // 0 before the first pair
+  const double unused = rig_.readout ? 0 : trust * estimate.seconds;
+  return std::hypot(std::sqrt(prior * (1 - trust)), unused);
+}
+
+/// What is known of the pose relative to the reference keyframe, as the residuals say.
+Matrix6 Tracker::honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
+                                    const Frame& frame) {
+  // A pose that elders alone give is not the one that all points agree on.
+  if (!elder_vote_.mistrusts_the_young()) {
+    variance_.update(rig_, motion_, motion, solver);
+    if (const auto difference = elder_vote_.difference()) variance_.add_split(*difference);
+  }
+  Vector6 force = Vector6::Zero();
+  const auto velocity = velocity_at(motion.T_c_ref, frame);
+  const double sigma = readout_sigma();
+  if (velocity && sigma > 0) {
+    // The reference keyframe moved as well, and as fast.
+    force = std::sqrt(2.0) * sigma * readout_force(rig_, motion_, motion, *velocity, solver);
+  }
+  return information_under(motion.information, variance_.value(), force);
 }
 
 /// Inliers whose depths several keyframes know.

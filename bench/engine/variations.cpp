@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -18,6 +19,7 @@
 
 #include "engine/engine.hpp"
 #include "evaluation/evaluation.hpp"
+#include "evaluation/pose_consistency.hpp"
 #include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "synthetic/image_effects.hpp"
@@ -35,12 +37,28 @@ struct Variation {
   bool mirrored = false;  ///< left and right exchanged, the cameras of a pair too
 };
 
+/// Of one frame, with what the tracker said of it.
+struct RelativePose {
+  SE3 T_c_ref;
+  std::int64_t t_c_ns = 0, t_ref_ns = 0;
+  Matrix6 covariance;
+};
+
 /// One variation's outcome.
 struct Outcome {
   std::size_t frames = 0, tracked = 0;
   double ate = 0, ate_causal = 0;  ///< [m]
+  double clock = 0;                ///< scatter of time stamps [s]
   std::vector<double> nees;        ///< of each frame's pose relative to its reference keyframe, over 6
 };
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return -1;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
 
 /// The middle of an image of this size.
 cv::Rect middle(const cv::Size& size, double share) {
@@ -120,29 +138,43 @@ Trajectory varied(Trajectory truth, const Rig& rig, const Variation& variation) 
   return truth;
 }
 
-/// Between the true poses before and after; none where these are farther apart than a frame.
-std::optional<SE3> true_T_w_c(const Trajectory& truth, std::int64_t t_ns) {
-  constexpr std::int64_t kSameTime = 1'000;
-  constexpr std::int64_t kFarApart = 60'000'000;
-  const auto after = std::lower_bound(truth.begin(), truth.end(), t_ns - kSameTime,
-                                      [](const TimedPose& pose, std::int64_t t) { return pose.t_ns < t; });
-  if (after == truth.end()) return std::nullopt;
-  if (after->t_ns <= t_ns + kSameTime) return after->T_w_c;
-  if (after == truth.begin()) return std::nullopt;
-  const TimedPose &a = *(after - 1), &b = *after;
-  if (b.t_ns - a.t_ns > kFarApart) return std::nullopt;
-  const double share = static_cast<double>(t_ns - a.t_ns) / static_cast<double>(b.t_ns - a.t_ns);
-  return a.T_w_c * SE3::exp(share * (a.T_w_c.inverse() * b.T_w_c).log());
-}
+/// How far the time stamps of frames scatter about regular ones, which the camera's clock gives [s];
+/// intervals that a frame is missing in are left out.
+class ClockJitter {
+ public:
+  void add(std::int64_t t_ns) {
+    if (last_ns_) intervals_.push_back(1e-9 * static_cast<double>(t_ns - *last_ns_));
+    last_ns_ = t_ns;
+  }
+  [[nodiscard]] double sigma() const {
+    if (intervals_.size() < 2) return 0;
+    const double usual = quantile(intervals_, 0.5);
+    double squares = 0, sum = 0, count = 0;
+    for (const double interval : intervals_) {
+      if (std::abs(interval - usual) > 0.35 * usual) continue;
+      squares += interval * interval, sum += interval, ++count;
+    }
+    const double variance = squares / count - (sum / count) * (sum / count);
+    return std::sqrt(std::max(0.0, variance) / 2);  // both ends of an interval err
+  }
+
+ private:
+  std::optional<std::int64_t> last_ns_;
+  std::vector<double> intervals_;
+};
 
 double ate(const Trajectory& estimate, const Trajectory& truth, Alignment alignment) {
   const auto evaluation = evaluate(associate(estimate, truth, 20'000'000), {.alignment = alignment});
   return evaluation ? evaluation->absolute.rmse : -1;
 }
 
-Outcome run(const std::string& text, const SourceOptions& source_options, const Variation& variation) {
+/// @param noise  of the truth; its clock is how far the recording's time stamps scatter
+Outcome run(const std::string& text, const SourceOptions& source_options, const Variation& variation,
+            TruthNoise noise) {
   const std::unique_ptr<FrameSource> source = open_source(text, source_options);
   const Trajectory truth = varied(source->ground_truth(), source->rig(), variation);
+  std::vector<RelativePose> relative_poses;
+  ClockJitter jitter;
   Outcome outcome;
   EngineOptions options;
   options.deterministic = true;
@@ -150,15 +182,13 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   const bool to_scale = source->rig().kind != SensorKind::kMono;  // lengths are comparable with the truth's
   options.on_pose = [&](const PoseReport& report) {
     const FrameRecord& record = report.record;
+    jitter.add(record.t_ns);
     if (!to_scale) return;
     if (record.state != FrameState::kTracked || !report.graph.contains(record.reference)) return;
-    if (report.graph.keyframe(record.reference).t_ns == record.t_ns) return;
-    const auto T_w_now = true_T_w_c(truth, record.t_ns);
-    const auto T_w_then = true_T_w_c(truth, report.graph.keyframe(record.reference).t_ns);
-    if (!T_w_now || !T_w_then) return;
-    const SE3 T_c_ref = T_w_now->inverse() * *T_w_then;
-    const Vector6 error = (record.T_c_ref.unpacked() * T_c_ref.inverse()).log();
-    outcome.nees.push_back(error.dot(report.information * error) / 6);
+    const std::int64_t t_ref_ns = report.graph.keyframe(record.reference).t_ns;
+    if (t_ref_ns == record.t_ns) return;
+    relative_poses.push_back(
+        {record.T_c_ref.unpacked(), record.t_ns, t_ref_ns, report.information.inverse()});
   };
   int read = 0;
   const FrameFeed feed = [&](Frame& frame) {
@@ -184,18 +214,17 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
     estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
     causal.push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
   }
+  noise.clock = jitter.sigma();
+  outcome.clock = noise.clock;
+  const RelativeTruth relative(truth, noise);
+  for (const RelativePose& pose : relative_poses) {
+    if (const auto comparison = relative.compare(pose.T_c_ref, pose.t_c_ns, pose.t_ref_ns))
+      outcome.nees.push_back(comparison->normalised(pose.covariance));
+  }
   const Alignment alignment = to_scale ? Alignment::kSe3 : Alignment::kSim3;
   outcome.ate = ate(estimate, truth, alignment);
   outcome.ate_causal = ate(causal, truth, alignment);
   return outcome;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return -1;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 void print_row(const Variation& variation, const Outcome& outcome) {
@@ -220,6 +249,7 @@ int main(int argc, char** argv) {
   bool as_it_is_only = false;
   std::string camera = "all";
   int only = -1;
+  std::vector<double> truth{0, 0};
   CLI::App app("Runs of one recording that should differ by little");
   app.add_option("source", sources, "as of 'twofold run'")->required();
   app.add_option("--calib", calibration, "calibration file for all of them");
@@ -227,6 +257,8 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"all", "mono"}));
   app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
   app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
+  app.add_option("--truth", truth, "standard deviations of the truth's own poses: METRES RADIANS")
+      ->expected(2);
   CLI11_PARSE(app, argc, argv);
   if (!calibration.empty()) options.calibration = calibration;
   options.left_only = camera == "mono";
@@ -246,7 +278,7 @@ int main(int argc, char** argv) {
           source);
       for (const twofold::Variation& variation : variations) {
         if (only >= 0 && &variation != &variations[only]) continue;
-        print_row(variation, twofold::run(source, options, variation));
+        print_row(variation, twofold::run(source, options, variation, {truth[0], truth[1]}));
         if (as_it_is_only) break;
       }
     }

@@ -33,10 +33,12 @@ struct PoseEstimate {
   std::uint32_t map_part = kNoId;  ///< first keyframe of the part; parts have worlds of their own
   std::uint32_t reference_keyframe = kNoId;
   Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
-  /// 6x6 row by row, of delta in T_world_camera * exp(delta), delta = (translation [m], rotation [rad]) in
-  /// the camera's axes: from the frame's own measurements with the map taken as true. Not calibrated: on real
-  /// recordings too small by a factor of four to six in standard deviations, on a rendered one too large by
-  /// four (docs/results.md). Zero for the frame that starts a map part: that frame defines the world.
+  /// 6x6 row by row, of delta in T_reference_camera * exp(delta), delta = (translation [m], rotation [rad])
+  /// in the camera's axes: how well the camera is known relative to the reference keyframe. Where that
+  /// keyframe is in the world, and the drift on the way there, is not in it. As large as the residuals of the
+  /// last frames say, and a readout that nobody knows; what no residual shows, a wrong focal length or clock,
+  /// is not in it. Honest within a factor of two in standard deviations where that was measured
+  /// (docs/results.md). Zero for the frame that starts a map part: that frame defines the world.
   std::array<double, 36> covariance{};
   /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
   /// none.
