@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/twofold/auto_calibration.hpp"
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/live_view.hpp"
@@ -72,12 +73,17 @@ Schedule load_schedule(const std::string& file) {
   return *std::move(schedule);
 }
 
+bool calibrates_itself(const RunArguments& arguments) {
+  return arguments.calibration == "auto";
+}
+
 SourceOptions source_options_of(const RunArguments& arguments) {
   SourceOptions options;
   options.preload = arguments.preload;
   options.left_only = arguments.camera == "mono";
   options.stop = &interrupted();
-  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  if (!arguments.calibration.empty() && !calibrates_itself(arguments))
+    options.calibration = arguments.calibration;
   return options;
 }
 
@@ -85,11 +91,22 @@ int run_with_filter(const RunArguments& arguments) {
   if (!arguments.poses.empty()) throw IoError("--poses", "is not for --estimator swf");
   if (arguments.view.port) throw IoError("--view", "is not for --estimator swf");
   if (arguments.surface.voxel > 0) throw IoError("--surface", "is not for --estimator swf");
+  if (calibrates_itself(arguments)) throw IoError("--calib auto", "is not for --estimator swf");
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
   catch_interrupts();
   run_filter(*source, arguments.source, arguments.window, arguments.out, interrupted());
   return kOk;
+}
+
+std::unique_ptr<FrameSource> open_frames(const RunArguments& arguments,
+                                         std::optional<AutoCalibration>& calibration) {
+  const SourceOptions options = source_options_of(arguments);
+  if (!calibrates_itself(arguments)) return open_source(arguments.source, options);
+  catch_interrupts();  // a camera may be watched for long
+  auto source = open_with_auto_calibration(arguments.source, options, arguments.out, calibration.emplace());
+  if (!arguments.quiet) print_auto_calibration(*calibration);
+  return source;
 }
 
 /// Of keyframes that a viewer clicks.
@@ -141,7 +158,8 @@ int run(const RunArguments& arguments) {
   std::optional<Schedule> schedule;
   if (!arguments.replay_schedule.empty()) schedule = load_schedule(arguments.replay_schedule);
   prepare_output_folder(arguments.out);
-  std::unique_ptr<FrameSource> source = open_source(arguments.source, source_options_of(arguments));
+  std::optional<AutoCalibration> calibration;
+  std::unique_ptr<FrameSource> source = open_frames(arguments, calibration);
   if (source->is_live()) {
     options.pacing.live = true;
     if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
@@ -181,8 +199,10 @@ int run(const RunArguments& arguments) {
   }
   std::optional<SurfaceFigures> figures;
   if (surface.wanted()) figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id);
-  write_run_output(arguments.out, {arguments.source, arguments.record}, *source, options, result, parts,
-                   figures ? surface_json(*figures) : nullptr);
+  write_run_output(
+      arguments.out,
+      {arguments.source, arguments.record, calibration ? auto_calibration_json(*calibration) : nullptr},
+      *source, options, result, parts, figures ? surface_json(*figures) : nullptr);
   if (!arguments.trace.empty()) write_trace(arguments.trace, result);
   print_summary(arguments.out, options, result, parts);
   if (figures) print_surface(*figures);

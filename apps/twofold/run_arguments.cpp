@@ -77,7 +77,9 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
                   "Path, or scheme:ARGUMENT?key=value (kitti, euroc, tum, images, "
                   "video, mcap, bag, synthetic, v4l2)")
       ->required();
-  command.add_option("--calib", arguments.calibration, "Calibration file instead of the recording's own");
+  command.add_option("--calib", arguments.calibration,
+                     "Calibration file instead of the recording's own; auto: found from the video "
+                     "of one camera itself");
   command
       .add_option("--camera", arguments.camera,
                   "all: what the source has; mono: its left camera alone, whose scale is arbitrary")

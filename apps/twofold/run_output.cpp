@@ -111,6 +111,7 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   const bool no_scale = scale_is_arbitrary(source.rig(), options);
   nlohmann::ordered_json summary = summary_json(frames.source, options, result, parts);
   summary["scale"] = no_scale ? "arbitrary" : "metric";
+  summary["self_calibration"] = frames.calibration;
   summary["surface"] = surface;
   summary["recording"] = nullptr;
   if (!frames.recording.empty()) summary["recording"] = std::filesystem::absolute(frames.recording).string();

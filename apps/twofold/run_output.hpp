@@ -16,6 +16,8 @@ namespace twofold {
 struct RunFrames {
   std::string source;     ///< as given
   std::string recording;  ///< folder; empty: they were not recorded
+  nlohmann::ordered_json calibration =
+      nullptr;  ///< what was found from the video itself, if it was asked for
 };
 
 /// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, groundtruth.txt if

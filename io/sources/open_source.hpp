@@ -17,6 +17,9 @@ struct SourceOptions {
   bool raw = false;
   /// Cameras only: when it becomes true, the source ends. Outlives the source.
   const std::atomic<bool>* stop = nullptr;
+  /// Where neither a file nor the recording has a calibration, some pinhole is supposed: images come as they
+  /// are, and rig() means their size only.
+  bool suppose_camera = false;
   bool left_only = false;  ///< one camera: right and depth images are left out
   bool preload = false;    ///< decode everything into memory before returning
 };

@@ -12,14 +12,20 @@
 namespace twofold {
 namespace fs = std::filesystem;
 
+namespace {
+constexpr double kSupposedFocalLength = 1000;  // [px]
+}  // namespace
+
 Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, SourceParameters& parameters) {
   Calibration calibration = std::move(base);
   calibration.kind = kind;
   PinholeCamera& camera = calibration.left.pinhole;
+  const bool supposed = !from_file && parameters.suppose_camera();
+  if (supposed) camera.fx = camera.fy = kSupposedFocalLength;
   for (const auto& [key, value] :
        {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}}) {
     const auto given = parameters.take_number(key);
-    if (!given && !from_file) {
+    if (!given && !from_file && !supposed) {
       throw IoError(
           parameters.subject(),
           fmt::format("no calibration: give --calib FILE or fx, fy, cx, cy ('{}' is missing)", key));

@@ -24,8 +24,10 @@ struct SourceSpec {
 class SourceParameters {
  public:
   /// subject names the source in messages.
-  SourceParameters(std::string subject, std::map<std::string, std::string> values)
-      : subject_(std::move(subject)), values_(std::move(values)) {}
+  /// @param suppose_camera  SourceOptions::suppose_camera
+  SourceParameters(std::string subject, std::map<std::string, std::string> values,
+                   bool suppose_camera = false)
+      : subject_(std::move(subject)), values_(std::move(values)), suppose_camera_(suppose_camera) {}
 
   /// Value of the key, if given; throws IoError when it is not a finite number.
   [[nodiscard]] std::optional<double> take_number(const std::string& key);
@@ -34,10 +36,12 @@ class SourceParameters {
   void expect_all_taken() const;
 
   [[nodiscard]] const std::string& subject() const { return subject_; }
+  [[nodiscard]] bool suppose_camera() const { return suppose_camera_; }
 
  private:
   std::string subject_;
   std::map<std::string, std::string> values_;
+  bool suppose_camera_ = false;
 };
 
 }  // namespace twofold

@@ -9,7 +9,8 @@
 namespace twofold {
 
 V4l2Source::V4l2Source(const SourceSpec& spec, const SourceOptions& options, std::unique_ptr<V4l2Calls> calls)
-    : V4l2Source(SourceParameters(spec.text, spec.parameters), spec, options, std::move(calls)) {}
+    : V4l2Source(SourceParameters(spec.text, spec.parameters, options.suppose_camera), spec, options,
+                 std::move(calls)) {}
 
 V4l2Source::V4l2Source(SourceParameters parameters, const SourceSpec& spec, const SourceOptions& options,
                        std::unique_ptr<V4l2Calls> calls)

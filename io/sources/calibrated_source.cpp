@@ -1,0 +1,33 @@
+#include "io/sources/calibrated_source.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include "io/files/io_error.hpp"
+
+namespace twofold {
+
+CalibratedSource::CalibratedSource(std::unique_ptr<FrameSource> source, const Calibration& calibration)
+    : source_(std::move(source)), rectifier_(calibration) {
+  rig_ = rectifier_.rig();
+  ground_truth_ = source_->ground_truth();
+}
+
+cv::Mat CalibratedSource::colour_image(std::int64_t index) const {
+  const cv::Mat raw = source_->colour_image(index);
+  if (raw.empty() || rectifier_.passes_through()) return raw;
+  cv::Mat rectified;
+  cv::remap(raw, rectified, rectifier_.left_map().x, rectifier_.left_map().y, cv::INTER_LINEAR);
+  return rectified;
+}
+
+bool CalibratedSource::read(Frame& frame) {
+  Frame raw;
+  const FrameStatus status = source_->next(raw);
+  if (status == FrameStatus::kError) throw IoError(source_->error());
+  if (status == FrameStatus::kEnd) return false;
+  frame = Frame();  // its old images may still be held elsewhere: never write into them
+  rectifier_.rectify(raw, frame);
+  return true;
+}
+
+}  // namespace twofold

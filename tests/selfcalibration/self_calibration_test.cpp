@@ -1,0 +1,138 @@
+#include "selfcalibration/self_calibration.hpp"
+
+#include <gtest/gtest.h>
+
+#include "selfcalibration/affine_alignment.hpp"
+#include "selfcalibration/clip_collector.hpp"
+#include "tests/selfcalibration/simulated_clips.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::ClipWorld;
+using testing::simulate_clips;
+
+constexpr int kWidth = 640, kHeight = 480;
+
+ClipWorld world_of(double f) {
+  ClipWorld world;
+  world.lens.log_f = std::log(f);
+  world.clips = 8;
+  return world;
+}
+
+class SelfCalibrationOf : public ::testing::TestWithParam<double> {};
+
+TEST_P(SelfCalibrationOf, FindsTheFocalLengthWithinItsStandardDeviation) {
+  const double f = GetParam() * kWidth;
+  const auto found = self_calibrate(simulate_clips(world_of(f)), kWidth, kHeight);
+  ASSERT_TRUE(found) << found.error();
+  const double deviation = (found->lens.log_f - std::log(f)) / found->sigma[0];
+  EXPECT_LT(std::abs(deviation), 3);
+  EXPECT_LT(found->sigma[0], 0.01);
+}
+
+INSTANTIATE_TEST_SUITE_P(FocalLengthsOverWidth, SelfCalibrationOf, ::testing::Values(0.45, 0.5, 0.8, 1.2, 2.0));
+
+TEST(SelfCalibration, RotationAloneIsEnough) {
+  ClipWorld world = world_of(500);
+  world.way.setZero();
+  const auto found = self_calibrate(simulate_clips(world), kWidth, kHeight);
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_LT(std::abs(found->lens.log_f - world.lens.log_f), 3 * found->sigma[0]);
+}
+
+TEST(SelfCalibration, FindsTheLens) {
+  ClipWorld world = world_of(460);
+  world.lens.k1 = -0.28;
+  world.lens.k2 = 0.07;
+  world.lens.centre += Vector2(8, -6);
+  const auto found = self_calibrate(simulate_clips(world), kWidth, kHeight);
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_NEAR(found->lens.f(), 460, 5);
+  EXPECT_NEAR(found->lens.k1, -0.28, 0.03);
+  EXPECT_LT(std::abs(found->lens.centre.x() - world.lens.centre.x()), 3 * found->sigma[3]);
+  EXPECT_LT(std::abs(found->lens.centre.y() - world.lens.centre.y()), 3 * found->sigma[4]);
+  EXPECT_LT(found->sigma.segment<2>(3).maxCoeff(), 5);
+}
+
+TEST(SelfCalibration, ARollingShutterDoesNotMoveTheFocalLength) {
+  ClipWorld world = world_of(500);
+  world.lens.readout = 0.03;
+  const auto found = self_calibrate(simulate_clips(world), kWidth, kHeight);
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_LT(std::abs(found->lens.log_f - world.lens.log_f), 3 * found->sigma[0]);
+  EXPECT_LT(std::abs(found->lens.readout - 0.03), 3 * found->sigma[5]);
+  EXPECT_LT(found->sigma[5], 0.006);
+}
+
+TEST(SelfCalibration, ClipsOfAnotherMindAreOutvoted) {
+  std::vector<Clip> clips = simulate_clips(world_of(500));
+  ClipWorld other = world_of(800);
+  other.seed = 2;
+  other.clips = 2;
+  for (Clip& clip : simulate_clips(other)) clips.push_back(std::move(clip));
+  const auto found = self_calibrate(clips, kWidth, kHeight);
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_LT(std::abs(found->lens.log_f - std::log(500.0)), 3 * found->sigma[0]);
+}
+
+TEST(SelfCalibration, TranslationAloneIsRefused) {
+  for (const Vector3& way : {Vector3(0, 0, 0.6), Vector3(0.4, 0, 0), Vector3(0.3, 0.1, 0.3)}) {
+    ClipWorld world = world_of(500);
+    world.turn = 0;
+    world.way = way;
+    const auto found = self_calibrate(simulate_clips(world), kWidth, kHeight);
+    ASSERT_FALSE(found) << way.transpose() << ": " << found->lens.f() << " +- " << found->sigma[0];
+    EXPECT_NE(found.error().find("does not show its focal length"), std::string::npos) << found.error();
+  }
+}
+
+TEST(SelfCalibration, TooFewClipsAreRefused) {
+  ClipWorld world = world_of(500);
+  world.clips = 3;
+  const auto found = self_calibrate(simulate_clips(world), kWidth, kHeight);
+  ASSERT_FALSE(found);
+  EXPECT_NE(found.error().find("moved too little"), std::string::npos) << found.error();
+}
+
+TEST(SelfCalibration, AStandingCameraGivesNoClips) {
+  ClipCollector collector(160, 120);
+  cv::Mat image(120, 160, CV_8UC1);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) image.at<std::uint8_t>(y, x) = (x / 7 + y / 5) % 2 == 0 ? 60 : 180;
+  for (int i = 0; i < 40; ++i) collector.add_frame(image, i * 33'000'000LL);
+  collector.finish();
+  EXPECT_TRUE(collector.clips().empty());
+}
+
+/// Smooth, so that bilinear samples are nearly exact.
+double bumps(double x, double y) {
+  return 128 + 50 * std::sin(0.7 * x + 0.2 * y) + 40 * std::sin(0.6 * y - 0.15 * x + 1);
+}
+
+TEST(AffineAlignment, FindsAPatchThatWasTurnedAndStretched) {
+  Eigen::Matrix2f A;
+  A << 1.15F, -0.2F, 0.18F, 0.95F;
+  const Eigen::Vector2f centre(40.3F, 31.7F);
+  PointAppearance appearance;
+  for (int r = 0; r < PointAppearance::kSize; ++r)
+    for (int c = 0; c < PointAppearance::kSize; ++c)
+      appearance.pixels[static_cast<std::size_t>(r * PointAppearance::kSize + c)] = static_cast<std::uint8_t>(
+          bumps(c - PointAppearance::kCentre, r - PointAppearance::kCentre));
+  cv::Mat image(64, 80, CV_8UC1);
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const Eigen::Vector2f p = A.inverse() * (Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y)) - centre);
+      image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(0.8 * bumps(p.x(), p.y()) + 10);
+    }
+  }
+  AffineMatch match;
+  match.centre = centre + Eigen::Vector2f(0.8F, -0.7F);
+  ASSERT_TRUE(align_affine(appearance, image, match));
+  EXPECT_LT((match.centre - centre).norm(), 0.03F);
+  EXPECT_LT((match.A - A).norm(), 0.02F);
+}
+
+}  // namespace
+}  // namespace twofold
