@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kRadius = 6;  // of the part of a patch that is compared
 constexpr int kAlignmentSteps = 20;
-constexpr float kSettledStep = 0.005F;       // [px]
-constexpr float kFarthestMove = 3;            // [px] from where the search began
+constexpr float kSettledStep = 0.005F;   // [px]
+constexpr float kFarthestMove = 3;       // [px] from where the search began
 constexpr double kMinCorrelation = 0.9;  // of what is compared
 constexpr float kMinScale = 0.4F, kMaxScale = 2.5F;
 
@@ -53,15 +53,16 @@ struct AffineEquations {
   }
 };
 
-AffineEquations equations_at(const PointAppearance& appearance, const cv::Mat& image, const AffineMatch& match,
-                             double gain, double offset) {
+AffineEquations equations_at(const PointAppearance& appearance, const cv::Mat& image,
+                             const AffineMatch& match, double gain, double offset) {
   AffineEquations sums;
   for (int y = -kRadius; y <= kRadius; ++y) {
     for (int x = -kRadius; x <= kRadius; ++x) {
       const auto at = static_cast<std::size_t>((y + PointAppearance::kCentre) * PointAppearance::kSize + x +
                                                PointAppearance::kCentre);
       const double t = appearance.pixels[at];
-      const Eigen::Vector2f place = match.A * Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y)) + match.centre;
+      const Eigen::Vector2f place =
+          match.A * Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y)) + match.centre;
       const Sample s = sample(image, place);
       const Vector8 J = (Vector8() << s.du * x, s.du * y, s.dv * x, s.dv * y, s.du, s.dv, -t, -1).finished();
       sums.H.selfadjointView<Eigen::Lower>().rankUpdate(J);
@@ -96,7 +97,8 @@ bool align_affine(const PointAppearance& appearance, const cv::Mat& image, Affin
     gain += step[6];
     offset += step[7];
     const float scale = now.A.determinant();
-    if (!((now.centre - match.centre).norm() < kFarthestMove) || !(scale > kMinScale) || !(scale < kMaxScale)) return false;
+    if (!((now.centre - match.centre).norm() < kFarthestMove) || !(scale > kMinScale) || !(scale < kMaxScale))
+      return false;
     if (step.segment<2>(4).norm() > kSettledStep) continue;
     if (sums.correlation() < kMinCorrelation) return false;
     match = now;

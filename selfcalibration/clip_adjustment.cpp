@@ -10,20 +10,21 @@
 namespace twofold {
 namespace {
 
-constexpr double kKernel = 20;        // of a corner's mean squared error [variances]; two are expected
-constexpr double kRhoSigma = 3;      // of inverse depth about one: where nothing is seen of it, and the unit of length
-constexpr double kNearest = 0.05;    // depth in a view over that in the first one
-constexpr double kBehind = 1e4;      // squared error of a corner behind the camera [variances]
+constexpr double kKernel = 20;  // of a corner's mean squared error [variances]; two are expected
+constexpr double kRhoSigma =
+    3;  // of inverse depth about one: where nothing is seen of it, and the unit of length
+constexpr double kNearest = 0.05;  // depth in a view over that in the first one
+constexpr double kBehind = 1e4;    // squared error of a corner behind the camera [variances]
 
 struct Projection {
   Vector2 uv{0, 0};
-  Matrix23 d_point = Matrix23::Zero();                      ///< by the point before projection
+  Matrix23 d_point = Matrix23::Zero();  ///< by the point before projection
   Eigen::Matrix<double, 2, kLensParameters> d_lens;
 };
 
 /// False behind the camera.
-bool project(const SharedLens& lens, const Vector3& p, const Vector2& seen, const Vector2& velocity, Projection& out,
-             bool jacobians) {
+bool project(const SharedLens& lens, const Vector3& p, const Vector2& seen, const Vector2& velocity,
+             Projection& out, bool jacobians) {
   if (p.z() < kNearest) return false;
   const double inv_z = 1 / p.z();
   const Vector2 q = p.head<2>() * inv_z;
@@ -32,7 +33,8 @@ bool project(const SharedLens& lens, const Vector3& p, const Vector2& seen, cons
   const double s = (seen.y() + 0.5) / lens.height - 0.5;
   out.uv = f * d * q + lens.centre + s * lens.readout * velocity;
   if (!jacobians) return true;
-  const Eigen::Matrix2d d_q = f * (d * Eigen::Matrix2d::Identity() + (2 * lens.k1 + 4 * lens.k2 * r2) * q * q.transpose());
+  const Eigen::Matrix2d d_q =
+      f * (d * Eigen::Matrix2d::Identity() + (2 * lens.k1 + 4 * lens.k2 * r2) * q * q.transpose());
   Matrix23 q_p;
   q_p << inv_z, 0, -q.x() * inv_z, 0, inv_z, -q.y() * inv_z;
   out.d_point = d_q * q_p;
@@ -71,8 +73,8 @@ double ClipAdjustment::cost(const SharedLens& lens, const ClipMotion& of) const 
       const ClipView& view = clip_->views[k];
       if (!view.sees(i)) continue;
       ++n;
-      const bool in_front =
-          project(lens, ray_at(of.T_view_first[k], of.psi[i]), view.uv[i], view.velocity[i], projection, false);
+      const bool in_front = project(lens, ray_at(of.T_view_first[k], of.psi[i]), view.uv[i], view.velocity[i],
+                                    projection, false);
       sum += in_front ? (view.uv[i] - projection.uv).squaredNorm() / (sigma_ * sigma_) : kBehind;
     }
     const double rho = (of.psi[i].z() - 1) / kRhoSigma;
@@ -92,8 +94,8 @@ double ClipAdjustment::estimated_sigma(const SharedLens& lens) const {
       const ClipView& view = clip_->views[k];
       if (!view.sees(i)) continue;
       ++n;
-      const bool in_front =
-          project(lens, ray_at(motion.T_view_first[k], motion.psi[i]), view.uv[i], view.velocity[i], projection, false);
+      const bool in_front = project(lens, ray_at(motion.T_view_first[k], motion.psi[i]), view.uv[i],
+                                    view.velocity[i], projection, false);
       sum += in_front ? (view.uv[i] - projection.uv).squaredNorm() : kBehind;
     }
     const double dof = std::max(1.0, 2 * n - 3 - pose_size() / corners);
@@ -115,7 +117,8 @@ bool ClipAdjustment::add_point(const SharedLens& lens, std::size_t corner, Point
     const ClipView& view = clip_->views[k];
     if (!view.sees(corner)) continue;
     ++seen;
-    if (!project(lens, ray_at(motion.T_view_first[k], psi), view.uv[corner], view.velocity[corner], projections[k], true)) {
+    if (!project(lens, ray_at(motion.T_view_first[k], psi), view.uv[corner], view.velocity[corner],
+                 projections[k], true)) {
       block.V_inverse.setZero();
       return false;
     }

@@ -15,11 +15,11 @@ using LensMatrix = Eigen::Matrix<double, kLensParameters, kLensParameters>;
 
 /// What the frames of one camera have in common, as self-calibration estimates it.
 struct SharedLens {
-  double log_f = 0;           ///< log of the focal length [px], fx = fy
-  double k1 = 0, k2 = 0;      ///< radial distortion on the plane z = 1
-  Vector2 centre{0, 0};       ///< principal point [px]
-  double readout = 0;         ///< of a rolling shutter [s]
-  double height = 1;          ///< of the image [px]; not estimated
+  double log_f = 0;       ///< log of the focal length [px], fx = fy
+  double k1 = 0, k2 = 0;  ///< radial distortion on the plane z = 1
+  Vector2 centre{0, 0};   ///< principal point [px]
+  double readout = 0;     ///< of a rolling shutter [s]
+  double height = 1;      ///< of the image [px]; not estimated
 
   [[nodiscard]] double f() const;
   /// In the order of the fields.
@@ -44,9 +44,9 @@ struct LensEquations {
 ///
 ///   z = f d(|q|^2) q + c + s (v) readout velocity,  q = project(R_k (x, y, 1) + rho t_k),
 ///
-/// d(r2) = 1 + k1 r2 + k2 r2^2, s = (v + 0.5) / height - 0.5: the velocity of the corner in the image, taken from
-/// the frames before and after, says where it would have been at mid-exposure. A corner of which all views
-/// disagree counts less (Cauchy's kernel on the mean of its squared errors).
+/// d(r2) = 1 + k1 r2 + k2 r2^2, s = (v + 0.5) / height - 0.5: the velocity of the corner in the image, taken
+/// from the frames before and after, says where it would have been at mid-exposure. A corner of which all
+/// views disagree counts less (Cauchy's kernel on the mean of its squared errors).
 class ClipAdjustment {
  public:
   ClipAdjustment(const Clip& clip, double sigma_px);

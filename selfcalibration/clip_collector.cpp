@@ -33,9 +33,11 @@ double median_distance(const std::vector<Eigen::Vector2f>& a, const std::vector<
 }
 
 /// By the two neighbours in time [px/s]; of a clip's first frame by the two that follow.
-Vector2 velocity_at(const std::vector<std::vector<Eigen::Vector2f>>& places, const std::vector<std::int64_t>& t_ns,
-                    std::size_t frame, std::size_t corner) {
-  const auto seconds = [&](std::size_t a, std::size_t b) { return static_cast<double>(t_ns[b] - t_ns[a]) * 1e-9; };
+Vector2 velocity_at(const std::vector<std::vector<Eigen::Vector2f>>& places,
+                    const std::vector<std::int64_t>& t_ns, std::size_t frame, std::size_t corner) {
+  const auto seconds = [&](std::size_t a, std::size_t b) {
+    return static_cast<double>(t_ns[b] - t_ns[a]) * 1e-9;
+  };
   const auto mean = [&](std::size_t a, std::size_t b) -> Vector2 {
     return (places[b][corner] - places[a][corner]).cast<double>() / seconds(a, b);
   };
@@ -47,7 +49,8 @@ Vector2 velocity_at(const std::vector<std::vector<Eigen::Vector2f>>& places, con
 void remove_rare_corners(Clip& clip) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < clip.corners(); ++i) {
-    const auto seen = std::count_if(clip.views.begin(), clip.views.end(), [&](const ClipView& view) { return view.sees(i); });
+    const auto seen = std::count_if(clip.views.begin(), clip.views.end(),
+                                    [&](const ClipView& view) { return view.sees(i); });
     if (static_cast<double>(seen) < kSeenShare * static_cast<double>(clip.views.size())) continue;
     for (ClipView& view : clip.views) {
       view.uv[kept] = view.uv[i];
@@ -71,12 +74,16 @@ void ClipCollector::add_frame(const cv::Mat& image, std::int64_t t_ns) {
   current_ = std::move(pyramid);
   for (ActiveClip& clip : active_) follow(t_ns, clip);
   std::erase_if(active_, [&](const ActiveClip& clip) {
-    const bool over = clip.corners.size() < std::max(kFewest, static_cast<std::size_t>(kSurvivors * static_cast<double>(clip.corners_at_first))) ||
-                      clip.places.size() >= kMostFrames;
+    const bool over =
+        clip.corners.size() <
+            std::max(kFewest,
+                     static_cast<std::size_t>(kSurvivors * static_cast<double>(clip.corners_at_first))) ||
+        clip.places.size() >= kMostFrames;
     if (over) end_clip(clip);
     return over;
   });
-  if (active_.empty() || (active_.size() < kMostActive && flow(active_.back()) > kNextFlow * width_)) begin_clip(t_ns);
+  if (active_.empty() || (active_.size() < kMostActive && flow(active_.back()) > kNextFlow * width_))
+    begin_clip(t_ns);
   last_ = current_;
 }
 
@@ -92,13 +99,16 @@ void ClipCollector::begin_clip(std::int64_t t_ns) {
   std::vector<Corner> found;
   found.reserve(4 * occupied.size());
   for (int level = 0; level < kLevels; ++level)
-    detect_corners(current_->level(level), level, kThreshold, kMinScore, kBorder, {cell, columns, rows, occupied}, found);
-  std::stable_sort(found.begin(), found.end(), [](const Corner& a, const Corner& b) { return a.score > b.score; });
+    detect_corners(current_->level(level), level, kThreshold, kMinScore, kBorder,
+                   {cell, columns, rows, occupied}, found);
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Corner& a, const Corner& b) { return a.score > b.score; });
   ActiveClip clip;
   std::vector<std::uint8_t> taken(occupied.size(), 0);
   for (const Corner& corner : found) {
     FollowedCorner followed;
-    if (!cut_appearance(current_->level(corner.level), corner.u, corner.v, corner.level, followed.appearance)) continue;
+    if (!cut_appearance(current_->level(corner.level), corner.u, corner.v, corner.level, followed.appearance))
+      continue;
     followed.uv = followed.appearance.uv;
     const auto at = static_cast<std::size_t>(static_cast<int>(followed.uv.y()) / cell * columns +
                                              static_cast<int>(followed.uv.x()) / cell);

@@ -7,7 +7,7 @@
 
 #include "imaging/image_pyramid.hpp"
 #include "selfcalibration/clip.hpp"
-#include "tracking/corner_following.hpp"
+#include "tracking/monocular/corner_following.hpp"
 
 namespace twofold {
 

@@ -58,7 +58,8 @@ ClipMotion start_by_rotation(const Clip& clip, const SharedLens& lens) {
   for (const ClipView& view : clip.views) {
     SE3 T = motion.T_view_first.empty() ? SE3() : motion.T_view_first.back();
     if (!motion.T_view_first.empty()) {
-      if (const auto rotation = estimate_view_rotation(rays(first, view, lens), rays(view, view, lens), options))
+      if (const auto rotation =
+              estimate_view_rotation(rays(first, view, lens), rays(view, view, lens), options))
         T = SE3(rotation->R_b_a, Vector3::Zero());
     }
     motion.T_view_first.push_back(T);
@@ -79,8 +80,8 @@ ClipMotion start_by_essential_matrix(const Clip& clip, const SharedLens& lens) {
   std::size_t pair = 0;
   for (std::size_t i = 0; i < motion.psi.size(); ++i) {
     if (!back.sees(i)) continue;
-    const auto x =
-        triangulate_midpoint(first[pair].normalized(), last[pair].normalized(), pose->T_b_a.inverse(), kMinParallax);
+    const auto x = triangulate_midpoint(first[pair].normalized(), last[pair].normalized(),
+                                        pose->T_b_a.inverse(), kMinParallax);
     motion.psi[i].z() = x && x->z() > 0 ? 1 / x->z() : 0.01;
     ++pair;
   }

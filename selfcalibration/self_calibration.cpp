@@ -18,11 +18,11 @@ namespace twofold {
 namespace {
 
 constexpr std::array<double, 7> kTrials{0.4, 0.55, 0.75, 1.0, 1.4, 1.9, 2.6};  // focal lengths over the width
-constexpr double kSupposedSigma = 0.7;                                        // [px]
+constexpr double kSupposedSigma = 0.7;                                         // [px]
 constexpr double kShortest = 0.3, kLongest = 4;  // focal length over the width that is believed
-constexpr double kClipKernel = 3;  // [standard deviations] of a clip's own focal length
-constexpr double kLeastSigma = 0.02;  // of a corner [px]: nobody is better
-constexpr int kSharpenings = 4;       // of the weights
+constexpr double kClipKernel = 3;                // [standard deviations] of a clip's own focal length
+constexpr double kLeastSigma = 0.02;             // of a corner [px]: nobody is better
+constexpr int kSharpenings = 4;                  // of the weights
 constexpr int kTrialIterations = 12;
 constexpr int kJointIterations = 60;
 
@@ -73,21 +73,22 @@ double solve_motion(const Clip& clip, const SharedLens& lens, ClipAdjustment& ad
 }
 
 /// Motions of all clips with this lens; returns the sum of their costs.
-double solve_motions(const std::vector<Clip>& clips, const SharedLens& lens, std::vector<ClipAdjustment>& adjustments) {
+double solve_motions(const std::vector<Clip>& clips, const SharedLens& lens,
+                     std::vector<ClipAdjustment>& adjustments) {
   double sum = 0;
   for (std::size_t c = 0; c < clips.size(); ++c) sum += solve_motion(clips[c], lens, adjustments[c]);
   return sum;
 }
 
-double cost_of(const std::vector<ClipAdjustment>& clips, const std::vector<ClipMotion>& motions, const SharedLens& lens,
-               const std::vector<double>& weights, const LensPrior& prior) {
+double cost_of(const std::vector<ClipAdjustment>& clips, const std::vector<ClipMotion>& motions,
+               const SharedLens& lens, const std::vector<double>& weights, const LensPrior& prior) {
   double cost = prior_cost(prior, lens);
   for (std::size_t c = 0; c < clips.size(); ++c) cost += weights[c] * clips[c].cost(lens, motions[c]);
   return cost;
 }
 
 void solve_all(std::vector<ClipAdjustment>& clips, const std::vector<double>& weights, const LensPrior& prior,
-                 SharedLens& lens) {
+               SharedLens& lens) {
   LevenbergMarquardtDamping damping(1e-3);
   double cost = cost_of(clips, motions_of(clips), lens, weights, prior);
   for (int i = 0; i < kJointIterations && !damping.exhausted(); ++i) {
@@ -118,8 +119,8 @@ void solve_all(std::vector<ClipAdjustment>& clips, const std::vector<double>& we
   }
 }
 
-/// A clip that sees another focal length than the others do (a moving object, motion that was misunderstood) counts
-/// less.
+/// A clip that sees another focal length than the others do (a moving object, motion that was misunderstood)
+/// counts less.
 ClipWeights weigh_clips(std::vector<ClipAdjustment>& clips, const LensPrior& prior, const SharedLens& lens) {
   std::vector<double> deviations;
   for (ClipAdjustment& clip : clips) {
@@ -132,7 +133,8 @@ ClipWeights weigh_clips(std::vector<ClipAdjustment>& clips, const LensPrior& pri
   std::vector<double> sizes;
   for (const double d : deviations) sizes.push_back(std::abs(d));
   ClipWeights weights;
-  weights.spread = std::max(1.0, 1.4826 * median_of(sizes));  // of a normal distribution's median to its deviation
+  weights.spread =
+      std::max(1.0, 1.4826 * median_of(sizes));  // of a normal distribution's median to its deviation
   for (const double deviation : deviations) {
     const double d = deviation / (kClipKernel * weights.spread);
     weights.of_clip.push_back(1 / ((1 + d * d) * (1 + d * d)));
@@ -140,11 +142,15 @@ ClipWeights weigh_clips(std::vector<ClipAdjustment>& clips, const LensPrior& pri
   return weights;
 }
 
-/// Sums of the clips' gradients over clips that overlap in time: what is wrong at a time is wrong in all of them.
-std::vector<LensVector> grouped_gradients(const std::vector<Clip>& clips, const std::vector<LensVector>& gradients) {
+/// Sums of the clips' gradients over clips that overlap in time: what is wrong at a time is wrong in all of
+/// them.
+std::vector<LensVector> grouped_gradients(const std::vector<Clip>& clips,
+                                          const std::vector<LensVector>& gradients) {
   std::vector<std::size_t> order(clips.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return clips[a].views.front().t_ns < clips[b].views.front().t_ns; });
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return clips[a].views.front().t_ns < clips[b].views.front().t_ns;
+  });
   std::vector<LensVector> groups;
   std::int64_t group_end = std::numeric_limits<std::int64_t>::min();
   for (const std::size_t c : order) {
@@ -223,7 +229,8 @@ std::string refusal_of(const SelfCalibration& found, int width, const SelfCalibr
   if (!std::isfinite(f) || !std::isfinite(found.sigma[0]) || f < kShortest * width || f > kLongest * width ||
       found.sigma[0] > options.max_sigma) {
     return fmt::format(
-        "the camera's motion does not show its focal length ({:.0f} px +- {:.0f} %, at most {:.0f} % are of use): turn it "
+        "the camera's motion does not show its focal length ({:.0f} px +- {:.0f} %, at most {:.0f} % are of "
+        "use): turn it "
         "to the sides, up and down, and about its optical axis",
         f, 100 * found.sigma[0], 100 * options.max_sigma);
   }
@@ -240,13 +247,13 @@ std::string SelfCalibrationOptions::invalid_reason() const {
       .reason();
 }
 
-tl::expected<SelfCalibration, std::string> self_calibrate(const std::vector<Clip>& clips, int width, int height,
-                                                          const SelfCalibrationOptions& options) {
+tl::expected<SelfCalibration, std::string> self_calibrate(const std::vector<Clip>& clips, int width,
+                                                          int height, const SelfCalibrationOptions& options) {
   if (clips.size() < options.min_clips) {
-    return tl::unexpected(
-        fmt::format("the camera moved too little, or too few corners could be followed: {} short stretches of video are "
-                    "of use, at least {} are needed",
-                    clips.size(), options.min_clips));
+    return tl::unexpected(fmt::format(
+        "the camera moved too little, or too few corners could be followed: {} short stretches of video are "
+        "of use, at least {} are needed",
+        clips.size(), options.min_clips));
   }
   const LensPrior prior = prior_of(width, height);
   std::vector<ClipAdjustment> adjustments;
@@ -272,7 +279,8 @@ tl::expected<SelfCalibration, std::string> self_calibrate(const std::vector<Clip
   std::vector<double> corner_sigmas;
   for (const ClipAdjustment& clip : adjustments) corner_sigmas.push_back(clip.sigma());
   found.corner_sigma_px = median_of(corner_sigmas);
-  if (std::string refusal = refusal_of(found, width, options); !refusal.empty()) return tl::unexpected(std::move(refusal));
+  if (std::string refusal = refusal_of(found, width, options); !refusal.empty())
+    return tl::unexpected(std::move(refusal));
   return found;
 }
 

@@ -15,7 +15,8 @@ struct SelfCalibrationOptions {
   /// where tracking begins to suffer.
   double max_sigma = 0.04;
   /// What no statistics see, as a share of the focal length: lenses are no polynomials of two terms, and real
-  /// corners do not stay where they are on their surface. Found on recordings whose calibration is known, >= 0.
+  /// corners do not stay where they are on their surface. Found on recordings whose calibration is known, >=
+  /// 0.
   double systematic_sigma = 0.01;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
@@ -24,29 +25,30 @@ struct SelfCalibrationOptions {
 
 struct SelfCalibration {
   SharedLens lens;
-  LensVector sigma = LensVector::Zero();  ///< standard deviations of the lens; [0] as a share of f, without systematics
-  double f_sigma = 0;                     ///< of the focal length, systematics included [px]
-  std::size_t clips = 0;                  ///< that it rests on
-  double corner_sigma_px = 0;             ///< of a corner, median over the clips
+  LensVector sigma =
+      LensVector::Zero();      ///< standard deviations of the lens; [0] as a share of f, without systematics
+  double f_sigma = 0;          ///< of the focal length, systematics included [px]
+  std::size_t clips = 0;       ///< that it rests on
+  double corner_sigma_px = 0;  ///< of a corner, median over the clips
 };
 
-/// Focal length, principal point, two radial terms and readout of a camera from clips of its video, with nothing
-/// known beforehand but that pixels are square and the principal point is near the centre (1.5 % of the width).
+/// Focal length, principal point, two radial terms and readout of a camera from clips of its video, with
+/// nothing known beforehand but that pixels are square and the principal point is near the centre (1.5 % of
+/// the width).
 ///
-/// Seven focal lengths from 0.4 to 2.6 widths are tried, the motion of each clip solved from two starts, and all
-/// of it adjusted together from the best one, the motion eliminated clip by clip (bundle adjustment; Triggs et
-/// al. 2000, section 6). Corners that disagree with their clip, and clips that disagree with the others, lose
-/// their weight. The standard deviation is the larger one of two: from the corners, widened by how far the
-/// clips' own focal lengths scatter, and from the scatter of gradients over parts of the video that do not
-/// overlap (White's estimate), which sees what is wrong for all corners of a time.
+/// Seven focal lengths from 0.4 to 2.6 widths are tried, the motion of each clip solved from two starts, and
+/// all of it adjusted together from the best one, the motion eliminated clip by clip (bundle adjustment;
+/// Triggs et al. 2000, section 6). Corners that disagree with their clip, and clips that disagree with the
+/// others, lose their weight. The standard deviation is the larger one of two: from the corners, widened by
+/// how far the clips' own focal lengths scatter, and from the scatter of gradients over parts of the video
+/// that do not overlap (White's estimate), which sees what is wrong for all corners of a time.
 ///
-/// Turning shows the focal length, about any axis, with or without translation. Translation alone does not, in
-/// whatever direction: then the standard deviation is large.
+/// Turning shows the focal length, about any axis, with or without translation. Translation alone does not,
+/// in whatever direction: then the standard deviation is large.
 ///
 /// @return  otherwise why not, in words for the person who holds the camera
-[[nodiscard]] tl::expected<SelfCalibration, std::string> self_calibrate(const std::vector<Clip>& clips, int width,
-                                                                        int height,
-                                                                        const SelfCalibrationOptions& options = {});
+[[nodiscard]] tl::expected<SelfCalibration, std::string> self_calibrate(
+    const std::vector<Clip>& clips, int width, int height, const SelfCalibrationOptions& options = {});
 
 /// As a calibration of one camera (radial-tangential distortion). The readout stays open: the tracker's own
 /// estimate of it is better.

@@ -10,15 +10,15 @@
 namespace twofold {
 namespace {
 
-constexpr double kAttemptEvery = 5;  // [s] of video
-constexpr double kLongest = 30;      // [s] of video
+constexpr double kAttemptEvery = 5;   // [s] of video
+constexpr double kLongest = 30;       // [s] of video
 constexpr double kGoodEnough = 0.01;  // share of the focal length: no more of the video is needed
 
 using Found = tl::expected<SelfCalibration, std::string>;
 
 /// Reads on for `seconds` from the first frame; false when the source ends before.
-bool collect(FrameSource& source, double seconds, std::optional<std::int64_t>& first_ns, std::int64_t& last_ns,
-             ClipCollector& collector) {
+bool collect(FrameSource& source, double seconds, std::optional<std::int64_t>& first_ns,
+             std::int64_t& last_ns, ClipCollector& collector) {
   Frame frame;
   for (;;) {
     const FrameStatus status = source.next(frame);
@@ -43,7 +43,9 @@ Found calibrate(FrameSource& source, double& seconds) {
     seconds = first_ns ? static_cast<double>(last_ns - *first_ns) * 1e-9 : 0;
     if (!goes_on || (found && found->sigma[0] <= kGoodEnough)) return found;
     if (source.is_live())
-      fmt::print(stderr, "calibrating: {}\n", found ? fmt::format("{:.0f} px +- {:.0f}, going on", found->lens.f(), found->f_sigma) : found.error());
+      fmt::print(stderr, "calibrating: {}\n",
+                 found ? fmt::format("{:.0f} px +- {:.0f}, going on", found->lens.f(), found->f_sigma)
+                       : found.error());
   }
 }
 
@@ -59,7 +61,8 @@ std::unique_ptr<FrameSource> open_with_auto_calibration(const std::string& text,
   if (source->rig().kind != SensorKind::kMono)
     throw IoError("--calib auto", "is for one camera: add --camera mono");
   if (source->is_live())
-    fmt::print(stderr, "calibrating: turn the camera slowly to the sides, up and down, and about its optical axis\n");
+    fmt::print(stderr,
+               "calibrating: turn the camera slowly to the sides, up and down, and about its optical axis\n");
   const Found found = calibrate(*source, result.seconds);
   if (!found) throw IoError(text, found.error());
   const PinholeCamera& camera = source->rig().camera;
@@ -75,8 +78,9 @@ std::unique_ptr<FrameSource> open_with_auto_calibration(const std::string& text,
   } catch (const std::runtime_error& e) {
     throw IoError(text, std::string("the calibration found from the video cannot be used: ") + e.what());
   }
-  write_calibration(result.file, result.calibration,
-                    {"none, the video itself", static_cast<int>(found->clips), found->corner_sigma_px, found->f_sigma, {}});
+  write_calibration(
+      result.file, result.calibration,
+      {"none, the video itself", static_cast<int>(found->clips), found->corner_sigma_px, found->f_sigma, {}});
   return source;
 }
 
@@ -92,8 +96,8 @@ nlohmann::ordered_json auto_calibration_json(const AutoCalibration& result) {
 }
 
 void print_auto_calibration(const AutoCalibration& result) {
-  fmt::print("calibration f {:.1f} +- {:.1f} px, from {:.0f} s of the video itself; in {}\n", result.found.lens.f(),
-             result.found.f_sigma, result.seconds, result.file.string());
+  fmt::print("calibration f {:.1f} +- {:.1f} px, from {:.0f} s of the video itself; in {}\n",
+             result.found.lens.f(), result.found.f_sigma, result.seconds, result.file.string());
 }
 
 }  // namespace twofold

@@ -19,12 +19,13 @@ struct AutoCalibration {
   std::filesystem::path file;  ///< where it was written to
 };
 
-/// A source of one camera whose calibration is found from its own first frames, at most half a minute of them.
-/// A recording is then read from its beginning again; a camera's frames until then are gone. Writes
+/// A source of one camera whose calibration is found from its own first frames, at most half a minute of
+/// them. A recording is then read from its beginning again; a camera's frames until then are gone. Writes
 /// FOLDER/calibration.yaml, which `--calib` takes.
 ///
 /// Throws IoError when the source has more than one camera, or does not show the calibration.
-[[nodiscard]] std::unique_ptr<FrameSource> open_with_auto_calibration(const std::string& text, SourceOptions options,
+[[nodiscard]] std::unique_ptr<FrameSource> open_with_auto_calibration(const std::string& text,
+                                                                      SourceOptions options,
                                                                       const std::filesystem::path& folder,
                                                                       AutoCalibration& result);
 

@@ -47,11 +47,16 @@ int main(int argc, char** argv) {
   }
   const auto& l = result->lens;
   const auto& s = result->sigma;
-  fmt::print("{}\n  {} clips, corners {:.2f} px, f {:.1f} +- {:.1f} px (statistics {:.2f} %, {:.3f} widths)", text, result->clips,
-             result->corner_sigma_px, l.f(), result->f_sigma, 100 * s[0], l.f() / camera.width);
+  fmt::print("{}\n  {} clips, corners {:.2f} px, f {:.1f} +- {:.1f} px (statistics {:.2f} %, {:.3f} widths)",
+             text, result->clips, result->corner_sigma_px, l.f(), result->f_sigma, 100 * s[0],
+             l.f() / camera.width);
   if (truth > 0)
-    fmt::print("  truth {:.1f} error {:.2f} % z {:.2f}", truth, 100 * (l.f() / truth - 1), (l.f() - truth) / result->f_sigma);
-  fmt::print("\n  k1 {:.3f}+-{:.3f} k2 {:.3f}+-{:.3f} c {:.1f},{:.1f}+-{:.1f},{:.1f} readout {:.1f}+-{:.1f} ms; {:.0f} + {:.0f} ms\n",
-             l.k1, s[1], l.k2, s[2], l.centre.x(), l.centre.y(), s[3], s[4], 1e3 * l.readout, 1e3 * s[5], ms(t1 - t0), ms(t2 - t1));
+    fmt::print("  truth {:.1f} error {:.2f} % z {:.2f}", truth, 100 * (l.f() / truth - 1),
+               (l.f() - truth) / result->f_sigma);
+  fmt::print(
+      "\n  k1 {:.3f}+-{:.3f} k2 {:.3f}+-{:.3f} c {:.1f},{:.1f}+-{:.1f},{:.1f} readout {:.1f}+-{:.1f} ms; "
+      "{:.0f} + {:.0f} ms\n",
+      l.k1, s[1], l.k2, s[2], l.centre.x(), l.centre.y(), s[3], s[4], 1e3 * l.readout, 1e3 * s[5],
+      ms(t1 - t0), ms(t2 - t1));
   return 0;
 }

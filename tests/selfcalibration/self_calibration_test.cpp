@@ -32,7 +32,8 @@ TEST_P(SelfCalibrationOf, FindsTheFocalLengthWithinItsStandardDeviation) {
   EXPECT_LT(found->sigma[0], 0.01);
 }
 
-INSTANTIATE_TEST_SUITE_P(FocalLengthsOverWidth, SelfCalibrationOf, ::testing::Values(0.45, 0.5, 0.8, 1.2, 2.0));
+INSTANTIATE_TEST_SUITE_P(FocalLengthsOverWidth, SelfCalibrationOf,
+                         ::testing::Values(0.45, 0.5, 0.8, 1.2, 2.0));
 
 TEST(SelfCalibration, RotationAloneIsEnough) {
   ClipWorld world = world_of(500);
@@ -118,12 +119,13 @@ TEST(AffineAlignment, FindsAPatchThatWasTurnedAndStretched) {
   PointAppearance appearance;
   for (int r = 0; r < PointAppearance::kSize; ++r)
     for (int c = 0; c < PointAppearance::kSize; ++c)
-      appearance.pixels[static_cast<std::size_t>(r * PointAppearance::kSize + c)] = static_cast<std::uint8_t>(
-          bumps(c - PointAppearance::kCentre, r - PointAppearance::kCentre));
+      appearance.pixels[static_cast<std::size_t>(r * PointAppearance::kSize + c)] =
+          static_cast<std::uint8_t>(bumps(c - PointAppearance::kCentre, r - PointAppearance::kCentre));
   cv::Mat image(64, 80, CV_8UC1);
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
-      const Eigen::Vector2f p = A.inverse() * (Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y)) - centre);
+      const Eigen::Vector2f p =
+          A.inverse() * (Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y)) - centre);
       image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(0.8 * bumps(p.x(), p.y()) + 10);
     }
   }

@@ -11,10 +11,13 @@ namespace twofold::testing {
 
 /// A camera of which clips are made up, and how it moves.
 struct ClipWorld {
-  SharedLens lens{.log_f = std::log(500.0), .k1 = 0, .k2 = 0, .centre = {319.5, 239.5}, .readout = 0, .height = 480};
+  SharedLens lens{
+      .log_f = std::log(500.0), .k1 = 0, .k2 = 0, .centre = {319.5, 239.5}, .readout = 0, .height = 480};
   double noise_px = 0.2;
-  double turn = 0.25;   ///< of a clip, about an axis in the image plane and half as much about the optical one [rad]
-  Vector3 way{0.1, 0.05, 0.05};  ///< of a clip, in depths of the nearest corners; its first part may change sign
+  double turn =
+      0.25;  ///< of a clip, about an axis in the image plane and half as much about the optical one [rad]
+  Vector3 way{0.1, 0.05,
+              0.05};  ///< of a clip, in depths of the nearest corners; its first part may change sign
   int clips = 12;
   int corners = 60;
   int views = 8;
@@ -30,7 +33,8 @@ struct ClipWorld {
   std::vector<Clip> clips;
   for (int c = 0; c < world.clips; ++c) {
     const double direction = std::numbers::pi * uniform(random);
-    const Vector3 turn = world.turn * Vector3(std::cos(direction), std::sin(direction), 0.5 * uniform(random));
+    const Vector3 turn =
+        world.turn * Vector3(std::cos(direction), std::sin(direction), 0.5 * uniform(random));
     Vector3 way = world.way;
     way.x() *= uniform(random);
     const auto pose = [&](double s) {  // s in [-0.5, 0.5]; T_view_middle
@@ -55,10 +59,12 @@ struct ClipWorld {
       view.t_ns = std::llround((c * world.views + k) * period * 1e9);
       for (const Vector3& x : points) {
         const double s = -0.5 + k * step;
-        const Vector2 velocity = (see(pose(s + 0.1 * step), x) - see(pose(s - 0.1 * step), x)) / (0.2 * period);
+        const Vector2 velocity =
+            (see(pose(s + 0.1 * step), x) - see(pose(s - 0.1 * step), x)) / (0.2 * period);
         const Vector2 uv = see(pose(s), x);
         const double row = (uv.y() + 0.5) / world.lens.height - 0.5;
-        view.uv.emplace_back(uv + row * world.lens.readout * velocity + Vector2(normal(random), normal(random)));
+        view.uv.emplace_back(uv + row * world.lens.readout * velocity +
+                             Vector2(normal(random), normal(random)));
         view.velocity.push_back(velocity);
       }
       clip.views.push_back(std::move(view));
