@@ -27,18 +27,20 @@ if(TWOFOLD_SANITIZE)
   target_link_options(twofold_options INTERFACE -fsanitize=${TWOFOLD_SANITIZE})
 endif()
 
-# Most of a compiler's time goes into reading the same few headers. Three sets of them are read once each: what the
-# libraries use, what programs add, what tests add. A file still includes what it uses: the preset dev builds without.
+# Most of a compiler's time goes into reading the same few headers. Two sets of them are read once each: what libraries
+# and programs use, and what tests add. A file still includes what it uses: the preset dev builds without. CLI11 is left
+# out: its objects and virtual functions are compiled in every file that sees it, five seconds each.
 option(TWOFOLD_PCH "Precompile the headers that most files include" ON)
 set(twofold_core_headers
   <algorithm> <array> <atomic> <cmath> <cstdint> <filesystem> <functional> <limits> <map> <memory> <optional> <span> <string>
-  <utility> <vector> <Eigen/Core> <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <fmt/format.h>)
+  <utility> <vector> <Eigen/Core> <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <fmt/format.h>
+  <opencv2/core.hpp>)
 # twofold_headers(name HEADERS ... LIBS ...): those above and more; twofold_use_headers(target name) then takes them.
 function(twofold_headers name)
   cmake_parse_arguments(ARG "" "" "HEADERS;LIBS" ${ARGN})
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/precompiled/${name}.cpp CONTENT "// carries precompiled headers\n")
   add_library(twofold_headers_${name} OBJECT ${CMAKE_BINARY_DIR}/precompiled/${name}.cpp)
-  target_link_libraries(twofold_headers_${name} PRIVATE twofold::options Eigen3::Eigen ${ARG_LIBS})
+  target_link_libraries(twofold_headers_${name} PRIVATE twofold::options Eigen3::Eigen opencv_core ${ARG_LIBS})
   target_precompile_headers(twofold_headers_${name} PRIVATE ${twofold_core_headers} ${ARG_HEADERS})
 endfunction()
 function(twofold_use_headers target name)
@@ -66,7 +68,7 @@ function(twofold_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE twofold::options ${ARG_LIBS})
-  twofold_use_headers(${name} programs)
+  twofold_use_headers(${name} core)
 endfunction()
 
 # What a registered test needs around it under a sanitizer; nothing without one.

@@ -1,12 +1,60 @@
 #include "filters/sliding_window_filter_prior.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "geometry/cbh.hpp"
 #include "geometry/check.hpp"
 
 namespace twofold {
+namespace {
+
+/// Whether a Cholesky factor can be solved with: its pivots' ratio bounds the condition from below, cheaply.
+template <class Factor>
+bool is_regular(const Factor& llt) {
+  constexpr double kLeastRatio = 1e-14;
+  if (llt.info() != Eigen::Success || llt.matrixLLT().rows() == 0) return llt.info() == Eigen::Success;
+  double least = std::numeric_limits<double>::infinity();
+  double most = 0;
+  for (Eigen::Index i = 0; i < llt.matrixLLT().rows(); ++i) {
+    const double pivot = llt.matrixLLT()(i, i) * llt.matrixLLT()(i, i);
+    least = std::min(least, pivot);
+    most = std::max(most, pivot);
+  }
+  return least > kLeastRatio * most;
+}
+
+/// Y = D^-1/2 L^-1 P B for A = P^T L D L^T P, without the directions that A says nothing about. Y^T Y is then
+/// B^T A^+ B where the columns of B lie in the range of A, as they do in any sum of squares.
+void whiten_singular(const MatrixX& A, MatrixX& Y, VectorX& y) {
+  const Eigen::LDLT<MatrixX> ldlt(A);
+  const VectorX D = ldlt.vectorD();
+  const double floor = 1e-12 * std::max(1.0, D.cwiseAbs().maxCoeff());
+  const VectorX scale = D.unaryExpr([floor](double d) { return d > floor ? 1.0 / std::sqrt(d) : 0.0; });
+  const MatrixX L = ldlt.matrixL();
+  Y = ldlt.transpositionsP() * Y;
+  y = ldlt.transpositionsP() * y;
+  // Row by row: a direction without information must not reach the rows below it.
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    if (scale[i] == 0) {
+      Y.row(i).setZero();
+      y[i] = 0;
+      continue;
+    }
+    for (Eigen::Index k = 0; k < i; ++k) {
+      Y.row(i) -= L(i, k) * Y.row(k);
+      y[i] -= L(i, k) * y[k];
+    }
+  }
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    Y.row(i) *= scale[i];
+    y[i] *= scale[i];
+  }
+}
+
+}  // namespace
 
 VectorX FilterPrior::difference(const std::vector<Vector3>& landmarks, const SE3& T_c_w,
                                 const Vector6& shift) const {
@@ -42,7 +90,7 @@ void FilterPrior::fit_frame() {
   }
   follow.rightCols<6>() = N.bottomRows<6>().transpose() * information.bottomRightCorner<6, 6>();
   const Eigen::LLT<Matrix6> llt(Matrix6(follow * N));
-  if (llt.info() == Eigen::Success && llt.rcond() > 1e-14) {
+  if (is_regular(llt)) {
     llt.solveInPlace(follow);
   } else {
     follow.resize(6, 0);  // too few parameters to carry a frame
@@ -88,17 +136,11 @@ void schur_marginalise(MatrixX& Lambda, VectorX& g, int eliminated, FillIn fill_
   MatrixX Y = B;
   VectorX y = g.head(eliminated);
   const Eigen::LLT<MatrixX> llt(A);
-  if (llt.info() == Eigen::Success && llt.rcond() > 1e-14) {
+  if (is_regular(llt)) {
     llt.matrixL().solveInPlace(Y);
     llt.matrixL().solveInPlace(y);
   } else {
-    const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(A);
-    const double floor = 1e-12 * std::max(1.0, eigen.eigenvalues().cwiseAbs().maxCoeff());
-    const VectorX scale =
-        eigen.eigenvalues().unaryExpr([floor](double v) { return v > floor ? 1.0 / std::sqrt(v) : 0.0; });
-    const MatrixX half = scale.asDiagonal() * eigen.eigenvectors().transpose();
-    Y = half * B;
-    y = half * y.eval();
+    whiten_singular(A, Y, y);
   }
   g_kept.noalias() -= Y.transpose() * y;
   if (fill_in == FillIn::kFull) {

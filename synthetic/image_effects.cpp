@@ -15,26 +15,31 @@ constexpr double kSteepest = 3.73;          ///< tan(75 degrees)
 constexpr double kSpotProbability = 0.004;  ///< of a 4x4 block without reading
 constexpr int kTableBits = 12;
 
-/// Quantiles of the normal distribution at (i + 1/2) / 4096, scaled so that the sum of two has variance 1.
-const std::array<float, 1 << kTableBits>& half_normal_table() {
-  static const auto kTable = [] {
-    std::array<float, 1 << kTableBits> table{};
-    double square_sum = 0;
-    for (std::size_t i = 0; i < table.size(); ++i) {
-      const double p = (static_cast<double>(i) + 0.5) / static_cast<double>(table.size());
-      double low = -6;
-      double high = 6;
-      for (int k = 0; k < 60; ++k) {
-        const double middle = 0.5 * (low + high);
-        (0.5 * std::erfc(-middle * std::sqrt(0.5)) < p ? low : high) = middle;
-      }
-      table[i] = static_cast<float>(low);
-      square_sum += low * low;
+using HalfNormalTable = std::array<float, 1 << kTableBits>;
+
+HalfNormalTable make_half_normal_table() {
+  HalfNormalTable table{};
+  double square_sum = 0;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const double p = (static_cast<double>(i) + 0.5) / static_cast<double>(table.size());
+    double low = -6;
+    double high = 6;
+    for (int k = 0; k < 60; ++k) {
+      const double middle = 0.5 * (low + high);
+      (0.5 * std::erfc(-middle * std::sqrt(0.5)) < p ? low : high) = middle;
     }
-    const auto scale = static_cast<float>(std::sqrt(0.5 * static_cast<double>(table.size()) / square_sum));
-    for (float& value : table) value *= scale;
-    return table;
-  }();
+    table[i] = static_cast<float>(low);
+    square_sum += low * low;
+  }
+  const auto scale = static_cast<float>(std::sqrt(0.5 * static_cast<double>(table.size()) / square_sum));
+  for (float& value : table) value *= scale;
+  return table;
+}
+
+/// Quantiles of the normal distribution at (i + 1/2) / 4096, scaled so that the sum of two has variance 1. A
+/// function makes them: the compiler would take seconds to evaluate a lambda, which is constexpr by itself.
+const HalfNormalTable& half_normal_table() {
+  static const HalfNormalTable kTable = make_half_normal_table();
   return kTable;
 }
 

@@ -55,6 +55,26 @@ TEST(SwfMarginalisation, AgreesWithTheSquareRootFormWhenIllConditioned) {
     EXPECT_NEAR(x_rest[i], x[eliminated + i], 1e-7 * std::abs(x.tail(1)[0]) + 1e-7);
 }
 
+TEST(SwfMarginalisation, LeavesOutDirectionsWithoutInformation) {
+  // Two of the eliminated unknowns only ever appear as their sum, and one not at all.
+  std::mt19937 rng(14);
+  const int eliminated = 6, n = 18;
+  MatrixX J = random_matrix(2 * n, n, rng);
+  J.col(4) = J.col(1);
+  J.col(2).setZero();
+  MatrixX Lambda = J.transpose() * J;
+  VectorX g = J.transpose() * random_matrix(2 * n, 1, rng);
+  const MatrixX A_inv =
+      Lambda.topLeftCorner(eliminated, eliminated).completeOrthogonalDecomposition().pseudoInverse();
+  const MatrixX B = Lambda.topRightCorner(eliminated, n - eliminated);
+  const MatrixX expected =
+      Lambda.bottomRightCorner(n - eliminated, n - eliminated) - B.transpose() * A_inv * B;
+  const VectorX g_expected = g.tail(n - eliminated) - B.transpose() * A_inv * g.head(eliminated);
+  schur_marginalise(Lambda, g, eliminated, FillIn::kFull);
+  EXPECT_LT((Lambda - expected).norm(), 1e-9 * expected.norm());
+  EXPECT_LT((g - g_expected).norm(), 1e-9 * g_expected.norm());
+}
+
 TEST(SwfMarginalisation, BlockDiagonalFillInStaysPositiveAndDropsCrossTerms) {
   std::mt19937 rng(13);
   const int eliminated = 6, n = 18;
