@@ -2,10 +2,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "filters/gauss_newton_filter.hpp"
+#include "geometry/processor_time.hpp"
 
 namespace twofold {
 namespace {
@@ -13,9 +13,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double thread_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  return 1e-9 * static_cast<double>(thread_cpu_ns());
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 
 #include "geometry/check.hpp"
 #include "geometry/option_check.hpp"
-#include "surface/processor_time.hpp"
+#include "geometry/processor_time.hpp"
 
 namespace twofold {
 namespace {

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <ctime>
 #include <optional>
 #include <variant>
 
 #include "engine/clock.hpp"
 #include "engine/spsc_ring.hpp"
 #include "engine/worker.hpp"
+#include "geometry/processor_time.hpp"
 #include "viewer/image_message.hpp"
 #include "viewer/keyframe_images.hpp"
 #include "viewer/server.hpp"
@@ -104,13 +104,6 @@ ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCo
     event.kind = "command failed";
   }
   return event;
-}
-
-/// What the calling thread has computed: on a busy machine less than time has passed.
-std::int64_t thread_cpu_ns() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return time.tv_sec * 1'000'000'000 + time.tv_nsec;
 }
 
 void take_lowest_priority() {

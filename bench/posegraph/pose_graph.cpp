@@ -11,6 +11,7 @@
 
 #include "bench/posegraph/ceres_pose_graph.hpp"
 #include "fixtures/g2o_file.hpp"
+#include "geometry/processor_time.hpp"
 #include "posegraph/pose_graph_equations.hpp"
 #include "posegraph/pose_graph_initialisation.hpp"
 
@@ -25,9 +26,7 @@ double milliseconds_since(Clock::time_point start) {
 
 /// Of this thread: on a busy machine the better measure.
 double cpu_milliseconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+  return 1e-6 * static_cast<double>(thread_cpu_ns());
 }
 
 double peak_memory_mib() {

@@ -1,4 +1,3 @@
-#include <time.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -13,6 +12,7 @@
 
 #include "evaluation/evaluation.hpp"
 #include "fixtures/plain_map.hpp"
+#include "geometry/processor_time.hpp"
 #include "io/files/trajectory_file.hpp"
 #include "io/sources/open_source.hpp"
 #include "mapping/mapper.hpp"
@@ -33,12 +33,6 @@ struct Arguments {
   bool mapper = false;  ///< the real back-end instead of the plain map
   TrackerOptions tracker;
 };
-
-std::int64_t thread_cpu_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
-}
 
 struct TrackedFrame {
   std::int64_t t_ns = 0;

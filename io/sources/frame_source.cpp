@@ -45,4 +45,16 @@ FrameStatus FrameSource::next(Frame& frame) {
   return status_;
 }
 
+bool next_or_throw(FrameSource& source, Frame& frame) {
+  switch (source.next(frame)) {
+    case FrameStatus::kFrame:
+      return true;
+    case FrameStatus::kEnd:
+      return false;
+    case FrameStatus::kError:
+      break;
+  }
+  throw IoError(source.error());
+}
+
 }  // namespace twofold

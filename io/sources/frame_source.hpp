@@ -81,4 +81,7 @@ class FrameSource {
   std::string error_;
 };
 
+/// The next frame of a source that another one wraps; false at its end. Throws IoError with its error.
+[[nodiscard]] bool next_or_throw(FrameSource& source, Frame& frame);
+
 }  // namespace twofold

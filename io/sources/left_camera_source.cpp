@@ -1,7 +1,5 @@
 #include "io/sources/left_camera_source.hpp"
 
-#include "io/files/io_error.hpp"
-
 namespace twofold {
 
 LeftCameraSource::LeftCameraSource(std::unique_ptr<FrameSource> source) : source_(std::move(source)) {
@@ -12,11 +10,10 @@ LeftCameraSource::LeftCameraSource(std::unique_ptr<FrameSource> source) : source
 }
 
 bool LeftCameraSource::read(Frame& frame) {
-  const FrameStatus status = source_->next(frame);
-  if (status == FrameStatus::kError) throw IoError(source_->error());
+  if (!next_or_throw(*source_, frame)) return false;
   frame.right = cv::Mat();
   frame.depth = cv::Mat();
-  return status == FrameStatus::kFrame;
+  return true;
 }
 
 }  // namespace twofold

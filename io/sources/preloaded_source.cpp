@@ -18,9 +18,8 @@ PreloadedSource::PreloadedSource(std::unique_ptr<FrameSource> source, std::size_
   rig_ = source_->rig();
   ground_truth_ = source_->ground_truth();
   Frame frame;
-  FrameStatus status;
   std::size_t image_bytes = 0;
-  while ((status = source_->next(frame)) == FrameStatus::kFrame) {
+  while (next_or_throw(*source_, frame)) {
     image_bytes += bytes_of(frame.left) + bytes_of(frame.right) + bytes_of(frame.depth);
     if (image_bytes > max_bytes) {
       throw IoError("preload",
@@ -29,7 +28,6 @@ PreloadedSource::PreloadedSource(std::unique_ptr<FrameSource> source, std::size_
     frames_.push_back(frame);
     frame = Frame();
   }
-  if (status == FrameStatus::kError) throw IoError(source_->error());
 }
 
 bool PreloadedSource::read(Frame& frame) {

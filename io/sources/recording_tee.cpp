@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "io/files/io_error.hpp"
-
 namespace twofold {
 
 RecordingTee::RecordingTee(std::unique_ptr<FrameSource> source, const std::filesystem::path& folder,
@@ -16,14 +14,7 @@ RecordingTee::RecordingTee(std::unique_ptr<FrameSource> source, const std::files
 }
 
 bool RecordingTee::read(Frame& frame) {
-  switch (source_->next(frame)) {
-    case FrameStatus::kFrame:
-      break;
-    case FrameStatus::kEnd:
-      return false;
-    case FrameStatus::kError:
-      throw IoError(source_->error());
-  }
+  if (!next_or_throw(*source_, frame)) return false;
   frame.index = next_index_++;
   // A camera does not wait for the disk; what it refused is counted there.
   (void)recorder_.offer(frame, !source_->is_live());

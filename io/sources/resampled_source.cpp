@@ -51,14 +51,7 @@ ResampledSource::ResampledSource(std::unique_ptr<FrameSource> source, const Pinh
 }
 
 bool ResampledSource::read(Frame& frame) {
-  switch (source_->next(own_)) {
-    case FrameStatus::kFrame:
-      break;
-    case FrameStatus::kEnd:
-      return false;
-    case FrameStatus::kError:
-      throw IoError(source_->error());
-  }
+  if (!next_or_throw(*source_, own_)) return false;
   frame.index = own_.index;
   frame.t_ns = own_.t_ns;
   const cv::Size size(rig_.camera.width, rig_.camera.height);

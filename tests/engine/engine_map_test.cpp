@@ -151,7 +151,7 @@ TEST_F(EngineMapTest, AThreadedRunInALoadedMapReplays) {
   }
 }
 
-TEST_F(EngineMapTest, AHeldMapGetsNoKeyframes) {
+TEST_F(EngineMapTest, WhileMappingIsPausedTheMapGetsNoKeyframes) {
   constexpr int kPausedFrom = 15;
   std::atomic<bool> paused{false};
   EngineOptions threaded = options();

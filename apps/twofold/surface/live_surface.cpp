@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "geometry/processor_time.hpp"
 #include "io/files/io_error.hpp"
 #include "surface/meshing.hpp"
-#include "surface/processor_time.hpp"
 #include "surface/stereo_depth.hpp"
 
 namespace twofold {

@@ -6,9 +6,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/processor_time.hpp"
 #include "surface/mesh_picture.hpp"
 #include "surface/meshing.hpp"
-#include "surface/processor_time.hpp"
 
 namespace twofold {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
+#include "geometry/processor_time.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/mesh_file.hpp"
 #include "io/files/output_file.hpp"
@@ -20,7 +21,6 @@
 #include "io/sources/open_source.hpp"
 #include "surface/mesh_picture.hpp"
 #include "surface/meshing.hpp"
-#include "surface/processor_time.hpp"
 #include "surface/stereo_depth.hpp"
 
 namespace twofold {

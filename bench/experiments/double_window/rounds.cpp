@@ -1,11 +1,11 @@
 #include "experiments/double_window/rounds.hpp"
 
 #include <algorithm>
-#include <ctime>
 #include <functional>
 
 #include "experiments/double_window/experiments.hpp"
 #include "experiments/plot.hpp"
+#include "geometry/processor_time.hpp"
 
 namespace twofold::bench {
 namespace {
@@ -85,9 +85,7 @@ std::vector<double> MethodRounds::median_curve(double Round::*figure) const {
 }
 
 double thread_cpu_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+  return 1e-6 * static_cast<double>(thread_cpu_ns());
 }
 
 void record_cost(const MapperReport& report, double cpu_ms, Round& round) {

@@ -1,12 +1,12 @@
 // Run time and state size (fig. 14), uncertainty about the focus of expansion (fig. 2b).
 #include <Eigen/LU>
 #include <cmath>
-#include <ctime>
 #include <numeric>
 
 #include "experiments/plot.hpp"
 #include "experiments/sliding_window/experiments.hpp"
 #include "experiments/sliding_window/simulation.hpp"
+#include "geometry/processor_time.hpp"
 
 namespace twofold::bench {
 namespace {
@@ -17,9 +17,7 @@ struct Timing {
 
 /// Processor time of this thread: what else runs on the machine is not counted.
 double thread_ms() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+  return 1e-6 * static_cast<double>(thread_cpu_ns());
 }
 
 Timing time_once(const Rig& rig, const Run& run, const SlidingWindowOptions& options) {

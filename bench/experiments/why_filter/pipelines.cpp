@@ -3,11 +3,11 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <map>
 
 #include "estimation/motion_only.hpp"
 #include "estimation/window_solver.hpp"
+#include "geometry/processor_time.hpp"
 
 namespace twofold::bench {
 namespace {
@@ -116,9 +116,7 @@ GaussNewtonFilterOptions filter_options(int iterations, MotionEstimate motion) {
 }  // namespace
 
 double thread_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  return 1e-9 * static_cast<double>(thread_cpu_ns());
 }
 
 PipelineResult run_bundle_adjustment(const Block& block, int iterations) {

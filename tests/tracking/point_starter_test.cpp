@@ -1,0 +1,114 @@
+#include "tracking/point_starter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+#include <set>
+#include <utility>
+
+#include "camera/rolling_shutter.hpp"
+#include "fixtures/rendered_scene.hpp"
+#include "geometry/inverse_depth.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr KeyframeId kAnchor{5};
+
+/// A stereo pair of a textured room, and what a starter makes of it.
+class PointStarterTest : public ::testing::Test {
+ protected:
+  PointStarterTest() : rig_(testing::test_rig(SensorKind::kStereo, 320, 240)) {
+    testing::RenderedScene scene(rig_, {3, 2, 5}, 21);
+    scene.render(SE3(), 2, images_);
+    options_.max_new_points = 60;
+  }
+
+  ImmaturePoints started(PointStarter& starter) {
+    ImmaturePoints points(200, 1);
+    const int count = starter.start(images_, kAnchor, RollingShutter(), points);
+    EXPECT_EQ(count, static_cast<int>(points.points().size()));
+    return points;
+  }
+  [[nodiscard]] std::pair<int, int> cell_of(const Eigen::Vector2f& uv) const {
+    return {static_cast<int>(uv.x()) / options_.cell_px, static_cast<int>(uv.y()) / options_.cell_px};
+  }
+
+  Rig rig_;
+  TrackerOptions options_;
+  FrameImages images_;
+};
+
+TEST_F(PointStarterTest, StartsOnePointACellWithTheDepthOfThePair) {
+  PointStarter starter(rig_, options_);
+  const ImmaturePoints points = started(starter);
+  EXPECT_GT(points.points().size(), 30U);
+  EXPECT_LE(points.points().size(), 60U);
+  std::set<std::pair<int, int>> cells;
+  for (const ImmaturePoint& point : points.points()) {
+    EXPECT_EQ(point.anchor, kAnchor);
+    EXPECT_TRUE(cells.insert(cell_of(point.appearance.uv)).second);
+    const Vector3 z = rig_.project(from_inverse_depth(point.psi));
+    EXPECT_NEAR(z.x(), point.appearance.uv.x(), 0.01);
+    EXPECT_NEAR(z.y(), point.appearance.uv.y(), 0.01);
+    EXPECT_NEAR(z.z(), point.anchor_observation.z.z(), 0.01);
+  }
+}
+
+TEST_F(PointStarterTest, StartsNothingWhereAPointIsTracked) {
+  PointStarter starter(rig_, options_);
+  const ImmaturePoints before = started(starter);
+  starter.clear();
+  std::set<std::pair<int, int>> tracked;
+  for (const ImmaturePoint& point : before.points()) {
+    starter.occupy(point.appearance.uv);
+    tracked.insert(cell_of(point.appearance.uv));
+  }
+  const ImmaturePoints after = started(starter);
+  for (const ImmaturePoint& point : after.points())
+    EXPECT_FALSE(tracked.contains(cell_of(point.appearance.uv)));
+}
+
+TEST_F(PointStarterTest, ClearsWhatWasTracked) {
+  PointStarter starter(rig_, options_);
+  const std::size_t all = started(starter).points().size();
+  starter.clear();
+  EXPECT_EQ(started(starter).points().size(), all);
+}
+
+TEST_F(PointStarterTest, EndsWhenThereIsNoRoom) {
+  PointStarter starter(rig_, options_);
+  ImmaturePoints points(7, 1);
+  EXPECT_EQ(starter.start(images_, kAnchor, RollingShutter(), points), 7);
+}
+
+TEST_F(PointStarterTest, ChoosesCornersUpToTheRoomThereIs) {
+  PointStarter starter(rig_, options_);
+  std::vector<PointAppearance> appearances;
+  appearances.reserve(20);
+  starter.choose_corners(images_, appearances);
+  EXPECT_EQ(appearances.size(), 20U);
+  std::set<std::pair<int, int>> cells;
+  for (const PointAppearance& appearance : appearances)
+    EXPECT_TRUE(cells.insert(cell_of(appearance.uv)).second);
+}
+
+TEST_F(PointStarterTest, SeesCornersOnlyWhereThereAreSome) {
+  PointStarter starter(rig_, options_);
+  EXPECT_TRUE(starter.sees_corners(images_, 20));
+  FrameImages grey;
+  grey.left.build(cv::Mat(240, 320, CV_8UC1, cv::Scalar(120)));
+  EXPECT_FALSE(starter.sees_corners(grey, 1));
+}
+
+TEST_F(PointStarterTest, SaysThatThePairIsSwapped) {
+  PointStarter starter(rig_, options_);
+  FrameImages swapped;
+  swapped.left.build(images_.right.level(0));
+  swapped.right.build(images_.left.level(0));
+  EXPECT_EQ(starter.explain_missing_depth(swapped, 20), LostCause::kImagesSwapped);
+  EXPECT_NE(starter.explain_missing_depth(images_, 20), LostCause::kImagesSwapped);
+}
+
+}  // namespace
+}  // namespace twofold
