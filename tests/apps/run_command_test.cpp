@@ -224,6 +224,31 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
                    "/proc/nothing");
 }
 
+/// A walk that turns shows the focal length, and the file that is written gives the next run the same camera.
+TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
+  constexpr double kFocalLength = 256;
+  const std::string source =
+      "run 'synthetic:courtyard?frames=160&width=320&height=240&f=256&noise=2' --camera mono "
+      "--deterministic --out '";
+  const Outcome outcome = run(folder_, source + (folder_ / "auto") + "' --calib auto");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("calibration f "), std::string::npos) << outcome.out;
+  const auto summary = nlohmann::json::parse(content(folder_ / "auto/summary.json"));
+  const auto& found = summary["self_calibration"];
+  const double sigma = found["focal_sigma_px"];
+  EXPECT_LT(sigma, 0.04 * kFocalLength);
+  EXPECT_NEAR(found["focal_px"].get<double>(), kFocalLength, 3 * sigma);
+  EXPECT_EQ(found["file"], folder_ / "auto/calibration.yaml");
+  const Outcome again =
+      run(folder_, source + (folder_ / "again") + "' --calib '" + (folder_ / "auto/calibration.yaml") + "'");
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+}
+
+TEST_F(RunCommand, WhatDoesNotShowTheCalibrationIsRefused) {
+  expect_bad_input(run_recording("--calib auto"), "add --camera mono");
+  expect_bad_input(run_recording("--camera mono --calib auto"), "the camera moved too little");
+}
+
 TEST_F(RunCommand, FullDiskIsOneLineAndExitCodeTwo) {
   // No file may grow beyond 8 KiB: writing fails as it does on a full disk.
   const std::string full_disk = "trap '' XFSZ; ulimit -f 16;";

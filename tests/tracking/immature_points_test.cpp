@@ -21,14 +21,14 @@ TEST(ImmaturePoints, NeverGrowBeyondTheirCapacity) {
   EXPECT_FALSE(points.add(point_of(kFirst)));
   EXPECT_EQ(points.points().size(), 3U);
   EXPECT_TRUE(points.room_for_keyframe());
-  points.add_pending({.id = kFirst});
-  points.add_pending({.id = kSecond, .reference = kFirst});
+  points.add_pending({.id = kFirst, .reference = kNoKeyframe, .T_k_ref = SE3()});
+  points.add_pending({.id = kSecond, .reference = kFirst, .T_k_ref = SE3()});
   EXPECT_FALSE(points.room_for_keyframe());
 }
 
 TEST(ImmaturePoints, FindProposedKeyframes) {
   ImmaturePoints points(1, 2);
-  points.add_pending({.id = kSecond, .reference = kFirst});
+  points.add_pending({.id = kSecond, .reference = kFirst, .T_k_ref = SE3()});
   ASSERT_NE(points.find_pending(kSecond), nullptr);
   EXPECT_EQ(points.find_pending(kSecond)->reference, kFirst);
   EXPECT_EQ(points.find_pending(kFirst), nullptr);
@@ -42,7 +42,7 @@ TEST(ImmaturePoints, SayWhenTheyChanged) {
   EXPECT_TRUE(changed());
   EXPECT_FALSE(points.add(point_of(kFirst)));  // full: nothing happened
   EXPECT_FALSE(changed());
-  points.add_pending({.id = kFirst});
+  points.add_pending({.id = kFirst, .reference = kNoKeyframe, .T_k_ref = SE3()});
   EXPECT_TRUE(changed());
   points.drop_stale(kFirst, 1, 1);
   EXPECT_TRUE(changed());

@@ -26,8 +26,8 @@ class PointStarterTest : public ::testing::Test {
 
   ImmaturePoints started(PointStarter& starter) {
     ImmaturePoints points(200, 1);
-    EXPECT_EQ(starter.start(images_, kAnchor, RollingShutter(), points),
-              static_cast<int>(points.points().size()));
+    const int count = starter.start(images_, kAnchor, RollingShutter(), points);
+    EXPECT_EQ(count, static_cast<int>(points.points().size()));
     return points;
   }
   [[nodiscard]] std::pair<int, int> cell_of(const Eigen::Vector2f& uv) const {
