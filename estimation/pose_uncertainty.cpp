@@ -43,7 +43,7 @@ void VarianceFactor::update(const Rig& rig, std::span<const MotionObservation> o
                             const MotionOnlyResult& motion, const MotionOnlyOptions& options) {
   if (regions_ && frames_++ % kEvery != 0) return;
   const ObservationModel model(rig);
-  const HuberKernel kernel(options.huber_sigmas);
+  const HuberKernel kernel{options.huber_sigmas};
   const Matrix3 R = motion.T_c_ref.rotation();
   std::array<Vector6, kColumns * kRows> gradients;
   gradients.fill(Vector6::Zero());
@@ -82,7 +82,7 @@ Vector6 readout_force(const Rig& rig, std::span<const MotionObservation> observa
                       const MotionOnlyResult& motion, const Vector6& velocity,
                       const MotionOnlyOptions& options) {
   const ObservationModel model(rig);
-  const HuberKernel kernel(options.huber_sigmas);
+  const HuberKernel kernel{options.huber_sigmas};
   const Matrix3 R = motion.T_c_ref.rotation();
   Vector6 sum = Vector6::Zero();
   for (const MotionObservation& o : observations) {
