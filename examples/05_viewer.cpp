@@ -12,10 +12,17 @@
 
 namespace {
 
+/// The viewer is called until the run is finished, which therefore comes first, whatever is thrown.
+struct FinishFirst {
+  twofold::Slam& slam;
+  ~FinishFirst() { (void)slam.finish(); }
+};
+
 void run(const char* name, int seconds_to_stay) {
   twofold::Source source(name);
   twofold::Slam slam(source.rig(), {.live = source.is_live()});
   twofold::Viewer viewer(source.rig(), [&] { return slam.map(); }, {.title = name, .port = 0});
+  const FinishFirst finish_first{slam};
   slam.on_pose([&](const twofold::PoseEstimate& pose) { viewer.tell(pose); });
   slam.on_event([&](const twofold::MapEvent& event) { viewer.tell(event); });
   std::printf("open %s\n", viewer.address().c_str());

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <memory>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "engine/clock.hpp"
 #include "engine/spsc_ring.hpp"
@@ -45,6 +47,20 @@ struct HeldImage {
   ImageView pixels;
   std::shared_ptr<const void> owner;
 };
+
+/// Pixels without an owner are the caller's again when `show` returns.
+HeldImage own_copy(std::int64_t frame, const ImageView& image) {
+  const std::size_t row_bytes =
+      static_cast<std::size_t>(image.width) * (image.format == ImageFormat::kGrey8 ? 1 : 3);
+  const auto pixels =
+      std::make_shared<std::vector<std::uint8_t>>(row_bytes * static_cast<std::size_t>(image.height));
+  const auto* from = static_cast<const std::uint8_t*>(image.data);
+  for (int v = 0; v < image.height; ++v)
+    std::copy_n(from + v * image.stride, row_bytes, pixels->data() + static_cast<std::size_t>(v) * row_bytes);
+  return {frame,
+          {pixels->data(), image.width, image.height, static_cast<std::ptrdiff_t>(row_bytes), image.format},
+          pixels};
+}
 
 ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   ViewTitle title;
@@ -302,8 +318,9 @@ bool Viewer::wants_image() const {
 }
 
 void Viewer::show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner) {
-  if (left.data == nullptr || left.format == ImageFormat::kDepth16) return;
-  impl_->put(new HeldImage{frame, left, std::move(owner)});
+  if (left.data == nullptr || left.width <= 0 || left.height <= 0 || left.format == ImageFormat::kDepth16)
+    return;
+  impl_->put(new HeldImage(owner ? HeldImage{frame, left, std::move(owner)} : own_copy(frame, left)));
 }
 
 void Viewer::finish() {

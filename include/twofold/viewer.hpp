@@ -69,7 +69,8 @@ struct ViewerOptions {
 ///   slam.on_event([&](const MapEvent& event) { viewer.tell(event); });
 ///   std::puts(viewer.address().c_str());
 ///   ...
-///   slam.finish();  // before the viewer is gone: until then it is called
+///   slam.finish();  // before the viewer is gone, whatever is thrown (examples/05_viewer.cpp): until then it
+///   is called
 ///
 /// A thread of its own, of the lowest priority, does everything; nobody waits for it or for who looks.
 /// Component `viewer` of the package: find_package(Twofold COMPONENTS viewer), Twofold::viewer.
@@ -105,7 +106,9 @@ class TWOFOLD_API Viewer {
 
   /// Whether an image would be shown if it came now: at most five a second are, while somebody looks.
   [[nodiscard]] bool wants_image() const;
-  /// @param left   grey or colour; `owner` keeps its pixels alive and unchanged until the viewer is done
+  /// @param left   grey or colour; `owner` keeps its pixels alive and unchanged until the viewer is done;
+  /// null: they
+  ///               are copied
   void show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner);
 
   /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most three

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <thread>
 
 #include "graph/graph_writer.hpp"
@@ -73,6 +74,25 @@ TEST_F(ViewerTest, AsksForImagesWhileSomebodyWantsThem) {
   viewer.show(7, {pixels->data(), 64, 48, 64}, pixels);
   EXPECT_NE(client.receive_until("JFIF").find("JFIF"), std::string::npos);
   EXPECT_TRUE(becomes([&] { return pixels.use_count() == 1; })) << "let go of when it was encoded";
+}
+
+/// What a page gets of an image that is overwritten as soon as `show` has returned.
+TEST_F(ViewerTest, CopiesPixelsThatNobodyOwns) {
+  const auto told = [this](bool owned) {
+    Viewer viewer(kRig, {}, {.port = 0});
+    LocalClient client = watch(viewer);
+    (void)client.receive(300);
+    client.send(testing::text_frame("images on"));
+    EXPECT_TRUE(becomes([&] { return viewer.wants_image(); }));
+    const auto pixels = std::make_shared<std::vector<std::uint8_t>>(64 * 48, 200);
+    viewer.show(7, {pixels->data(), 64, 48, 64}, owned ? pixels : nullptr);
+    if (!owned) std::fill(pixels->begin(), pixels->end(), std::uint8_t{10});
+    const std::string text = client.receive_until("\xff\xd9");
+    const std::size_t begin = text.find("\xff\xd8"), end = text.find("\xff\xd9");
+    EXPECT_TRUE(begin < end && end != std::string::npos);
+    return text.substr(begin, end - begin);
+  };
+  EXPECT_EQ(told(false), told(true));
 }
 
 /// However slow the machine: the bound grows with the time that has passed.
