@@ -64,19 +64,25 @@ SharedLens SharedLens::plus(const LensVector& step) const {
 
 ClipAdjustment::ClipAdjustment(const Clip& clip, double sigma_px) : clip_(&clip), sigma_(sigma_px) {}
 
+ClipAdjustment::CornerError ClipAdjustment::corner_error(const SharedLens& lens, const ClipMotion& of,
+                                                         std::size_t corner, double sigma_px) const {
+  CornerError error;
+  Projection projection;
+  for (std::size_t k = 0; k < clip_->views.size(); ++k) {
+    const ClipView& view = clip_->views[k];
+    if (!view.sees(corner)) continue;
+    ++error.views;
+    const bool in_front = project(lens, ray_at(of.T_view_first[k], of.psi[corner]), view.uv[corner],
+                                  view.velocity[corner], projection, false);
+    error.sum += in_front ? (view.uv[corner] - projection.uv).squaredNorm() / (sigma_px * sigma_px) : kBehind;
+  }
+  return error;
+}
+
 double ClipAdjustment::cost(const SharedLens& lens, const ClipMotion& of) const {
   double cost = 0;
-  Projection projection;
   for (std::size_t i = 0; i < clip_->corners(); ++i) {
-    double sum = 0, n = 0;
-    for (std::size_t k = 0; k < clip_->views.size(); ++k) {
-      const ClipView& view = clip_->views[k];
-      if (!view.sees(i)) continue;
-      ++n;
-      const bool in_front = project(lens, ray_at(of.T_view_first[k], of.psi[i]), view.uv[i], view.velocity[i],
-                                    projection, false);
-      sum += in_front ? (view.uv[i] - projection.uv).squaredNorm() / (sigma_ * sigma_) : kBehind;
-    }
+    const auto [sum, n] = corner_error(lens, of, i, sigma_);
     const double rho = (of.psi[i].z() - 1) / kRhoSigma;
     const double excess = sum / n / kKernel;
     cost += n * kKernel * (redescending_ ? excess / (1 + excess) : std::log1p(excess)) + rho * rho;
@@ -87,17 +93,8 @@ double ClipAdjustment::cost(const SharedLens& lens, const ClipMotion& of) const 
 double ClipAdjustment::estimated_sigma(const SharedLens& lens) const {
   const auto corners = static_cast<double>(clip_->corners());
   std::vector<double> sums;
-  Projection projection;
   for (std::size_t i = 0; i < clip_->corners(); ++i) {
-    double sum = 0, n = 0;
-    for (std::size_t k = 0; k < clip_->views.size(); ++k) {
-      const ClipView& view = clip_->views[k];
-      if (!view.sees(i)) continue;
-      ++n;
-      const bool in_front = project(lens, ray_at(motion.T_view_first[k], motion.psi[i]), view.uv[i],
-                                    view.velocity[i], projection, false);
-      sum += in_front ? (view.uv[i] - projection.uv).squaredNorm() : kBehind;
-    }
+    const auto [sum, n] = corner_error(lens, motion, i, 1);
     const double dof = std::max(1.0, 2 * n - 3 - pose_size() / corners);
     sums.push_back(sum / (dof * std::pow(1 - 2 / (9 * dof), 3)));  // median of chi2, Wilson and Hilferty
   }

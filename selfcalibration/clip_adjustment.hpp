@@ -74,6 +74,12 @@ class ClipAdjustment {
     Vector3 g;
     Eigen::Matrix<double, Eigen::Dynamic, 3> W;  ///< by poses and lens
   };
+  struct CornerError {
+    double sum = 0;    ///< of squared errors over the views that see it [variances]
+    double views = 0;  ///< how many
+  };
+  [[nodiscard]] CornerError corner_error(const SharedLens& lens, const ClipMotion& of, std::size_t corner,
+                                         double sigma_px) const;
   [[nodiscard]] int pose_size() const { return 6 * (static_cast<int>(clip_->views.size()) - 1); }
   bool add_point(const SharedLens& lens, std::size_t corner, PointBlock& block);
 
