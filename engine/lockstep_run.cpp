@@ -166,9 +166,9 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
   record_ = FrameRecord{};
   ProposalHandle proposal;
   if (!step.keyframe_withheld) proposal = pool_.try_acquire();
-  if (tracking_.step(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record_))
-    mapper_inbox_.send(std::move(proposal));
-  tracking_.finish(due_ns, steady_now_ns(), snapshot_, record_);
+  tracking_.locate(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record_);
+  tracking_.tell(due_ns, steady_now_ns(), record_);
+  if (tracking_.prepare_next(record_)) mapper_inbox_.send(std::move(proposal));
   logs_.add(record_, tracking_.correction());
   TrackerStep taken = step;
   taken.frame = record_.frame_index;

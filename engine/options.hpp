@@ -22,9 +22,9 @@ namespace twofold {
 struct PoseReport;
 struct ClosedLoop;
 
-/// Told of each frame that was looked at, tracked or lost, as soon as its pose is known. Called on the thread
-/// of the tracker, which goes on when it returns: it must not block, allocate or throw. Its time is a stage
-/// of its own ("pose listener").
+/// Told of each frame that was looked at, tracked or lost. Called on the thread of the tracker, which goes on
+/// when it returns: it must not block, allocate or throw. Its time is a stage of its own ("pose listener",
+/// "frame listener").
 using PoseListener = std::function<void(const PoseReport&)>;
 
 /// Told of each version of the map when it is published, and of the windows it was made in; valid during the
@@ -84,7 +84,8 @@ struct EngineOptions {
   std::optional<int> loop_closer_cpu;
   std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
 
-  PoseListener on_pose;      ///< may be empty
+  PoseListener on_pose;      ///< as soon as the pose is known; may be empty
+  PoseListener on_frame;     ///< once the tracker is done with the frame, all stages timed; likewise
   MapListener on_map;        ///< likewise
   PlacesListener on_places;  ///< likewise
   LoopListener on_loop;      ///< likewise

@@ -49,10 +49,12 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
     : tracker_(rig, options.tracker),
       times_("tracker", trace),
       on_pose_(options.on_pose),
+      on_frame_(options.on_frame),
       can_relocalise_(options.vocabulary != nullptr) {
   frame_stage_ = times_.add_stage("frame");
   latency_stage_ = times_.add_stage("exposure to pose");
   listener_stage_ = times_.add_stage("pose listener");
+  frame_listener_stage_ = times_.add_stage("frame listener");
   for (std::size_t s = 0; s < kTrackerStages; ++s) {
     stages_.push_back(times_.add_stage(describe(static_cast<TrackerStage>(s))));
   }
@@ -61,26 +63,24 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
   if (options.map) tracker_.continue_from(options.map->graph);
 }
 
-bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort,
-                         ProposalHandle& proposal, FrameRecord& record) {
-  const std::int64_t begin_ns = steady_now_ns();
-  const TrackResult result = tracker_.step(frame, graph, proposal ? &*proposal : nullptr, effort);
+void TrackerRunner::locate(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort,
+                           ProposalHandle& proposal, FrameRecord& record) {
+  begin_ns_ = steady_now_ns();
+  const TrackResult& result =
+      step_.emplace(tracker_.locate(frame, graph, proposal ? &*proposal : nullptr, effort)).result;
   record.frame_index = frame.index;
   record.t_ns = frame.t_ns;
   record.state = result.status == TrackStatus::kTracking ? FrameState::kTracked : FrameState::kLost;
   record.effort = effort;
   record.cause = result.cause;
-  information_ = result.information;
-  searched_ = {result.T_c_ref_predicted, result.search_radius_px};
-  stage_ns_ = result.stage_ns;
   record.snapshot_version = graph.version();
   record.reference = result.reference;
   record.T_c_ref = PackedPose(result.T_c_ref);
   for (const EarlierFrame& earlier : tracker_.earlier_frames())
     earlier_.push_back({result.reference, earlier});
   if (record.state == FrameState::kTracked) {
-    record.T_c_w_causal = PackedPose(tracker_.T_c_w(graph));
-    record.part_causal = tracker_.part(graph);
+    record.T_c_w_causal = PackedPose(tracker_.T_c_w(*step_));
+    record.part_causal = tracker_.part(*step_);
   }
   find_correction(graph, record);
   if (record.state == FrameState::kTracked) last_ = record;
@@ -88,16 +88,47 @@ bool TrackerRunner::step(const Frame& frame, const GraphSnapshot& graph, EffortL
   record.inliers = narrow(result.inliers);
   record.moving = narrow(result.moving);
   record.keyframe = result.proposed;
-  record.tracking_ns = steady_now_ns() - begin_ns;
-  times_.record(frame_stage_, begin_ns, record.tracking_ns);
-  std::int64_t at_ns = begin_ns;
-  for (std::size_t s = 0; s < kTrackerStages; ++s) {
-    times_.record(stages_[s], at_ns, result.stage_ns[s]);
-    at_ns += result.stage_ns[s];
-  }
+  record.tracking_ns = steady_now_ns() - begin_ns_;
   times_.counter(version_counter_, static_cast<std::int64_t>(graph.version()));
   times_.counter(effort_counter_, static_cast<std::int64_t>(effort));
-  return result.proposed;
+}
+
+void TrackerRunner::tell(std::int64_t exposed_ns, std::int64_t now_ns, FrameRecord& record) {
+  record.latency_ns = now_ns - exposed_ns;
+  exposed_ns_ = exposed_ns;
+  times_.record(latency_stage_, exposed_ns, record.latency_ns);
+  if (!on_pose_) return;
+  const ScopedStage timed(times_, listener_stage_);
+  on_pose_(report(record));
+}
+
+bool TrackerRunner::prepare_next(FrameRecord& record) {
+  const std::int64_t resumed_ns = steady_now_ns();
+  tracker_.prepare_next(*step_);
+  record.tracking_ns += steady_now_ns() - resumed_ns;
+  times_.record(frame_stage_, begin_ns_, record.tracking_ns);
+  std::int64_t at_ns = begin_ns_;
+  for (std::size_t s = 0; s < kTrackerStages; ++s) {
+    times_.record(stages_[s], at_ns, step_->result.stage_ns[s]);
+    at_ns += step_->result.stage_ns[s];
+  }
+  if (on_frame_) {
+    const ScopedStage timed(times_, frame_listener_stage_);
+    on_frame_(report(record));
+  }
+  return step_->result.proposed;
+}
+
+PoseReport TrackerRunner::report(const FrameRecord& record) const {
+  const TrackResult& result = step_->result;
+  return {record,
+          step_->graph,
+          correction_,
+          result.information,
+          exposed_ns_,
+          result.stage_ns,
+          tracker_.last_observations(),
+          {result.T_c_ref_predicted, result.search_radius_px}};
 }
 
 /// Where the last tracked frame is in the map of this one, if that is elsewhere than it was said to be.
@@ -132,16 +163,6 @@ bool TrackerRunner::request_relocalisation(RelocalisationRequest& request) {
 void TrackerRunner::take_answer(const RelocalisationAnswer& answer) {
   answer_awaited_ = false;
   if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
-}
-
-void TrackerRunner::finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph,
-                           FrameRecord& record) {
-  record.latency_ns = now_ns - exposed_ns;
-  times_.record(latency_stage_, exposed_ns, record.latency_ns);
-  if (!on_pose_) return;
-  const ScopedStage timed(times_, listener_stage_);
-  on_pose_({record, graph, correction_, information_, exposed_ns, stage_ns_, tracker_.last_observations(),
-            searched_});
 }
 
 void TrackerRunner::place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const {

@@ -33,17 +33,24 @@ using RequestHandle = RequestPool::Handle;
 /// The answer, which always comes; nothing when no place was recognised.
 using RelocalisationAnswer = std::optional<Relocalisation>;
 
-/// The tracker's step as every kind of run takes it: track, record, time.
+/// The tracker's step as every kind of run takes it: locate the camera, tell the pose, prepare the next
+/// frame.
 class TrackerRunner {
  public:
   TrackerRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
 
   /// Makes room in a pooled buffer before the tracker thread starts, so that it allocates nothing.
   void prepare(KeyframeProposal& proposal) const { tracker_.prepare(proposal); }
+  /// First of three parts of a step: where the camera is. `frame`, `graph` and `proposal` stay as they are
+  /// until the last.
   /// @param proposal  free buffer or empty; stays with the caller
+  void locate(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort, ProposalHandle& proposal,
+              FrameRecord& record);
+  /// Second part: the pose is known, at `now_ns` on the clock of the pace, and the listener is told.
+  void tell(std::int64_t exposed_ns, std::int64_t now_ns, FrameRecord& record);
+  /// Third part: all that nobody waits for who wants the pose. Completes the record.
   /// @return whether `proposal` was filled and should be sent
-  bool step(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort, ProposalHandle& proposal,
-            FrameRecord& record);
+  bool prepare_next(FrameRecord& record);
   /// Of the map, seen first by the frame of the last step; of reason kNone when there was none.
   [[nodiscard]] const PoseCorrection& correction() const { return correction_; }
   /// True when the camera has been lost for some frames and no answer is awaited: `request` is then filled.
@@ -51,9 +58,6 @@ class TrackerRunner {
   /// Before the next step.
   void take_answer(const RelocalisationAnswer& answer);
   [[nodiscard]] bool wants_relocalisation() const;
-  /// Completes the record once the pose is known, at `now_ns` on the clock of the pace, and tells the
-  /// listener. `graph` is that of the step.
-  void finish(std::int64_t exposed_ns, std::int64_t now_ns, const GraphSnapshot& graph, FrameRecord& record);
   /// Tracker::row_offset.
   [[nodiscard]] double row_offset() const { return tracker_.row_offset(); }
   /// At the end of a run: frames before a start of one camera get the poses that it found out.
@@ -65,15 +69,16 @@ class TrackerRunner {
 
  private:
   void find_correction(const GraphSnapshot& graph, const FrameRecord& record);
+  [[nodiscard]] PoseReport report(const FrameRecord& record) const;
 
   Tracker tracker_;
   StageRecorder times_;
   StageId frame_stage_;
   StageId latency_stage_;
-  StageId listener_stage_;
+  StageId listener_stage_, frame_listener_stage_;
   std::vector<StageId> stages_;
   TraceName version_counter_, effort_counter_;
-  PoseListener on_pose_;
+  PoseListener on_pose_, on_frame_;
   FrameRecord last_;  // the last frame that was tracked
   struct PlacedFrame {
     KeyframeId reference = kNoKeyframe;
@@ -81,9 +86,10 @@ class TrackerRunner {
   };
   std::vector<PlacedFrame> earlier_;  // grows when one camera starts
   PoseCorrection correction_;
-  Matrix6 information_ = Matrix6::Zero();                // of the last step's pose
-  SearchRegions searched_;                               // of the last step
-  std::array<std::int64_t, kTrackerStages> stage_ns_{};  // of the last step
+  // Of the last step.
+  std::optional<FrameStep> step_;
+  std::int64_t begin_ns_ = 0;
+  std::int64_t exposed_ns_ = 0;
   bool answer_awaited_ = false;
   const bool can_relocalise_;
 };

@@ -49,10 +49,10 @@ void ThreadedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnap
   take_answers(step);
   step.effort_level = static_cast<std::uint8_t>(effort_controller_.effort());
   step.keyframe_withheld = !spare_;
-  const bool proposed = tracking_.step(slot.frame, graph, effort_controller_.effort(), spare_, slot.record);
-  tracking_.finish(arrival.exposed_ns, pacer_.now_ns(), graph, slot.record);
-  if (proposed) send_proposal();
-  effort_controller_.tracked(slot.record.latency_ns, arrival.period_ns);
+  tracking_.locate(slot.frame, graph, effort_controller_.effort(), spare_, slot.record);
+  tracking_.tell(arrival.exposed_ns, pacer_.now_ns(), slot.record);
+  if (tracking_.prepare_next(slot.record)) send_proposal();
+  effort_controller_.tracked(pacer_.now_ns() - arrival.exposed_ns, arrival.period_ns);
   slot.correction = tracking_.correction();
   ask_where_we_are();
 }

@@ -37,6 +37,8 @@ class FrameStep {
   KeyframeProposal* const free_proposal;  ///< null: no keyframe can be made
   const EffortBounds bounds;
   bool surfaces_read = false;  ///< of the frame's depth image
+  bool tracked = false;        ///< in the map that there was
+  bool started = false;        ///< a map or map part, with this frame
   RollingShutter shutter;      ///< as the camera moves in this frame, as far as known
   TrackResult result;
 
@@ -46,6 +48,8 @@ class FrameStep {
     result.stage_ns[static_cast<std::size_t>(stage)] += (now - last_lap_).count();
     last_lap_ = now;
   }
+  /// The time since the last lap was not the tracker's.
+  void resume() { last_lap_ = std::chrono::steady_clock::now(); }
 
  private:
   std::chrono::steady_clock::time_point last_lap_ = std::chrono::steady_clock::now();

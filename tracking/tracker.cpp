@@ -66,6 +66,13 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
 
 TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
                           EffortLevel effort) {
+  FrameStep step = locate(frame, graph, free_proposal, effort);
+  prepare_next(step);
+  return step.result;
+}
+
+FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
+                          EffortLevel effort) {
   FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_));
   ++frames_;
   earlier_frames_.clear();
@@ -74,13 +81,20 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
   step.lap(TrackerStage::kPyramid);
   const bool map_exists = last_.reference != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
-  const bool tracked = map_exists && track(step);
-  if (tracked && seeds_) observe_seeds(step);
-  if (tracked) propose_keyframe_if_due(step);
-  if (tracked || (map_exists ? start_part(step) : start_map(step))) remember_frame(step);
-  if (tracked && !step.result.proposed && !step.result.by_depth) revisit_reference(graph);
+  step.tracked = map_exists && track(step);
+  if (step.tracked && seeds_) observe_seeds(step);
+  if (step.tracked) step.result.proposed = keyframe_is_due(step);
+  step.started = !step.tracked && (map_exists ? start_part(step) : start_map(step));
   step.lap(TrackerStage::kKeyframe);
-  return step.result;
+  return step;
+}
+
+void Tracker::prepare_next(FrameStep& step) {
+  step.resume();
+  if (step.tracked && step.result.proposed) propose_keyframe(step);
+  if (step.tracked || step.started) remember_frame(step);
+  if (step.tracked && !step.result.proposed && !step.result.by_depth) revisit_reference(step.graph);
+  step.lap(TrackerStage::kKeyframe);
 }
 
 /// Pose of the frame relative to a reference keyframe, from the points of the map around that.

@@ -48,10 +48,17 @@ class Tracker {
   /// Makes room in a buffer for the largest keyframe proposal that this tracker can fill it with.
   void prepare(KeyframeProposal& proposal) const;
 
-  /// Tracks one frame against `graph`, which must stay alive while later calls get the same version.
+  /// Where the camera is in a frame, which is tracked against `graph`: that must stay alive while later calls
+  /// get the same version. Each call is followed by one of `prepare_next`.
   /// @param free_proposal  buffer for a keyframe proposal, or null: no keyframe can be made in this frame.
-  ///                       Filled if and only if the result says `proposed`.
+  ///                       Filled by the end of `prepare_next` if and only if the result says `proposed`.
   /// @param effort           what to leave out
+  FrameStep locate(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
+                   EffortLevel effort = EffortLevel::kEverything);
+  /// What the next frame needs and nobody who waits for this one's pose: the keyframe proposal if one is due,
+  /// new points, what is remembered of the frame.
+  void prepare_next(FrameStep& step);
+  /// Both.
   TrackResult step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
                    EffortLevel effort = EffortLevel::kEverything);
 
@@ -62,9 +69,9 @@ class Tracker {
   /// The camera was not placed yet in the map it was to continue in, nor in a new part.
   [[nodiscard]] bool unplaced() const { return unplaced_; }
 
-  /// Pose of the last tracked frame in the map as `graph`, that of the last step, has it.
-  [[nodiscard]] SE3 T_c_w(const GraphSnapshot& graph) const {
-    return last_.T_c_ref * pose_in_world(graph, immature_points_, last_.reference);
+  /// Pose of a frame that was just located, in the map that it was tracked against.
+  [[nodiscard]] SE3 T_c_w(const FrameStep& step) const {
+    return step.result.T_c_ref * pose_in_world(step.graph, immature_points_, step.result.reference);
   }
 
   /// One camera: frames before that of the last step whose poses its start found out, relative to the
@@ -75,9 +82,9 @@ class Tracker {
   [[nodiscard]] const FrameImages& lost_images() const { return current_; }
   /// Frames since the last one with a pose.
   [[nodiscard]] int lost_frames() const { return loss_.lost_frames(); }
-  /// Map part of the last tracked frame, as `graph`, that of the last step, has it.
-  [[nodiscard]] KeyframeId part(const GraphSnapshot& graph) const {
-    return part_of(graph, immature_points_, last_.reference);
+  /// Map part of a frame that was just located, as the map has it that it was tracked against.
+  [[nodiscard]] KeyframeId part(const FrameStep& step) const {
+    return part_of(step.graph, immature_points_, step.result.reference);
   }
 
   /// Hint of the loop closer: the camera was recognised at T_c_k relative to keyframe `id`. The next step, if
@@ -148,7 +155,7 @@ class Tracker {
   void give_up_frame(LostCause cause, TrackResult& result);
   void remember_frame(const FrameStep& step);
 
-  void propose_keyframe_if_due(FrameStep& step);
+  [[nodiscard]] bool keyframe_is_due(const FrameStep& step) const;
   void propose_keyframe(FrameStep& step);
   void begin_proposal(const Placement& placement, FrameStep& step);
   void hand_over_images(KeyframeProposal& proposal);

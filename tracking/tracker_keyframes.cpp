@@ -50,16 +50,14 @@ double Tracker::median_depth(const SE3& T_c_ref) {
   return *middle;
 }
 
-void Tracker::propose_keyframe_if_due(FrameStep& step) {
+bool Tracker::keyframe_is_due(const FrameStep& step) const {
+  if (step.free_proposal == nullptr) return false;
   const KeyframeBacklog backlog{immature_points_.room_for_keyframe(),
                                 static_cast<int>(immature_points_.pending().size()),
                                 next_.keyframe == next_.first_of_part + 1};
-  if (step.free_proposal == nullptr) return;
-  const bool due =
-      step.result.by_depth
-          ? keyframe_due_by_motion(step.result.T_c_ref, last_keyframe_, backlog, options_)
-          : keyframe_due(step.result, last_keyframe_, occupied_regions(), backlog, options_, step.bounds);
-  if (due) propose_keyframe(step);
+  return step.result.by_depth
+             ? keyframe_due_by_motion(step.result.T_c_ref, last_keyframe_, backlog, options_)
+             : keyframe_due(step.result, last_keyframe_, occupied_regions(), backlog, options_, step.bounds);
 }
 
 void Tracker::propose_keyframe(FrameStep& step) {

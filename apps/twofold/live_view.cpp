@@ -112,7 +112,7 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
 }
 
 void LiveView::listen(EngineOptions& options) {
-  options.on_pose = both(options.on_pose, PoseListener([this](const PoseReport& report) { tell(report); }));
+  options.on_frame = both(options.on_frame, PoseListener([this](const PoseReport& report) { tell(report); }));
   options.on_map =
       both(options.on_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
              maps_.publish(graph, window);

@@ -39,7 +39,8 @@ double tracking_ns() {
     std::vector<ProposalHandle> proposal;
     proposal.push_back(pool.try_acquire());
     FrameRecord record;
-    const bool proposed = tracking.step(frame, graph, EffortLevel::kEverything, proposal.front(), record);
+    tracking.locate(frame, graph, EffortLevel::kEverything, proposal.front(), record);
+    const bool proposed = tracking.prepare_next(record);
     sum += record.tracking_ns;
     if (!proposed) continue;
     (void)mapping.step(proposal);

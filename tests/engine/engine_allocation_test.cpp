@@ -52,8 +52,9 @@ TEST(TrackerThread, NeverAllocates) {
     const std::uint64_t before = allocations();
     FrameRecord record;
     if (answer) tracking.take_answer(*answer);
-    const bool proposed = tracking.step(frame, graph, controller.effort(), proposal, record);
-    tracking.finish(0, 40'000'000, graph, record);
+    tracking.locate(frame, graph, controller.effort(), proposal, record);
+    tracking.tell(0, 40'000'000, record);
+    const bool proposed = tracking.prepare_next(record);
     controller.tracked(i < 4 ? 40'000'000 : 5'000'000, 33'000'000);
     RequestHandle request;
     if (tracking.wants_relocalisation()) {

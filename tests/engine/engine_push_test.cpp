@@ -110,6 +110,29 @@ TEST_F(EnginePushTest, TheListenerHearsOfEveryPoseOnTheTrackersThread) {
   }
 }
 
+TEST_F(EnginePushTest, PosesAreToldBeforeTheFrameIsDone) {
+  for (const bool deterministic : {true, false}) {
+    std::vector<FrameRecord> poses, done;
+    std::int64_t later_ns = 0;
+    EngineOptions options;
+    options.deterministic = deterministic;
+    options.on_pose = [&](const PoseReport& report) { poses.push_back(report.record); };
+    options.on_frame = [&](const PoseReport& report) {
+      ASSERT_EQ(poses.size(), done.size() + 1);
+      done.push_back(report.record);
+      EXPECT_EQ(done.back().frame_index, poses.back().frame_index);
+      EXPECT_EQ(done.back().keyframe, poses.back().keyframe);
+      EXPECT_EQ(done.back().T_c_w_causal, poses.back().T_c_w_causal);
+      const std::int64_t rest_ns = done.back().tracking_ns - poses.back().tracking_ns;
+      EXPECT_GE(rest_ns, 0);
+      if (report.record.keyframe && report.record.frame_index > 0) later_ns += rest_ns;
+    };
+    (void)testing::run_engine(options, feed());
+    EXPECT_EQ(done.size(), kFrames);
+    EXPECT_GT(later_ns, 0) << "nothing is left to be done after the pose, not even in keyframes";
+  }
+}
+
 TEST_F(EnginePushTest, TheListenerHearsWherePointsWereSearched) {
   const Rig rig = small_rig();
   int points = 0;

@@ -53,6 +53,34 @@ INSTANTIATE_TEST_SUITE_P(Sensors, TrackerTest, ::testing::Values(SensorKind::kSt
                            return sensor.param == SensorKind::kStereo ? "Stereo" : "Rgbd";
                          });
 
+TEST(Tracker, KnowsThePoseBeforeItFillsAKeyframe) {
+  Tracker tracker(test_rig(SensorKind::kStereo, 320, 240), {});
+  PlainMap map;
+  GraphSnapshot graph = map.publish();
+  KeyframeProposal proposal;
+  tracker.prepare(proposal);
+  int filled = 0;
+  for (const Frame& frame : frames(SensorKind::kStereo)) {
+    proposal.clear();
+    proposal.frame_index = -1;
+    FrameStep step = tracker.locate(frame, graph, &proposal);
+    ASSERT_EQ(step.result.status, TrackStatus::kTracking);
+    const SE3 error = tracker.T_c_w(step) * true_T_c_w(static_cast<int>(frame.index)).inverse();
+    EXPECT_LT(error.translation().norm(), 0.02);
+    const bool first = frame.index == 0;  // which is a keyframe, and has no pose before
+    EXPECT_TRUE(first || proposal.frame_index == -1) << "filled before anybody could be told the pose";
+    const bool announced = step.result.proposed;
+    tracker.prepare_next(step);
+    EXPECT_EQ(step.result.proposed, announced);
+    EXPECT_EQ(proposal.frame_index, announced ? frame.index : -1);
+    if (!announced) continue;
+    ++filled;
+    map.insert(proposal);
+    graph = map.publish();
+  }
+  EXPECT_GT(filled, 3);
+}
+
 TEST(Tracker, NeverAllocatesNotEvenForKeyframes) {
   if (!allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
   const std::uint64_t before = allocations();

@@ -50,7 +50,7 @@ async function oneRun(viewers, name) {
   const took = (performance.now() - begin) / 1000;
   const timing = JSON.parse(readFileSync(join(out, name, 'timing.json'), 'utf8'));
   const frame = timing.tracker.frame;
-  const listener = timing.tracker['pose listener'];
+  const listener = timing.tracker['frame listener'];
   const told = readers.map((reader) => `${reader.messages} messages, ${(reader.bytes / 1e6).toFixed(1)} MB`).join('; ');
   console.log(`${name}: tracker p50 ${frame.p50_ms.toFixed(2)} p99 ${frame.p99_ms.toFixed(2)} max ${frame.max_ms.toFixed(2)} ms, listener p99 ` +
     `${listener ? (1000 * listener.p99_ms).toFixed(0) : 0} us, viewer ${(100 * seconds / took).toFixed(1)} % of a core, ${megabytes.toFixed(0)} MB; ${told}`);
