@@ -326,7 +326,7 @@ class ViewServer::Impl {
     Audience audience{.viewers = viewers_.size(), .is_last = is_last};
     for (const auto& viewer : viewers_) {
       audience.wants_images |= viewer->feed().wants_images();
-      if (const auto command = viewer->feed().take_command()) audience.commands.push_back(*command);
+      for (const ViewCommand command : viewer->feed().take_commands()) audience.commands.push_back(command);
       if (const auto keyframe = viewer->feed().wanted_keyframe()) audience.keyframes.push_back(*keyframe);
     }
     tick(audience, hall_.sight);

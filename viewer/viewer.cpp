@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <variant>
@@ -27,6 +28,8 @@ constexpr std::int64_t kMapPeriodNs = 200'000'000;  // between two looks at the 
 constexpr std::int64_t kNobodyPeriodNs =
     1'000'000'000;                      // likewise, of the keyframes alone, while nobody does
 constexpr std::int64_t kMapShare = 60;  // the next look waits this many times what one cost
+constexpr std::size_t kFewPoints =
+    300'000;  // of more, standard deviations would hold up viewers for a second
 constexpr std::int64_t kImagePeriodNs = 200'000'000;
 constexpr std::size_t kRing = 1024;
 
@@ -68,6 +71,9 @@ ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   title.rig = rig;
   title.stages = options.stages;
   title.period_ms = 1e3 * options.frame_period;
+  title.metres = options.metric.value_or(rig.sensor != Sensor::kMono);
+  title.efforts = options.efforts;
+  title.has_deviations = true;
   title.control = static_cast<bool>(options.on_command);
   title.keyframe_images = static_cast<bool>(options.recorded_image);
   return title;
@@ -108,11 +114,14 @@ KeyframeImages::Find find_images(const std::function<MapSnapshot()>& map, const 
 }
 
 /// Done, or why it could not be.
-ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCommand)>& obey) {
+ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCommand)>& obey,
+                     ViewScene& scene) {
   ViewEvent event;
   try {
     event.text = obey(command);
     event.kind = describe(command);
+    if (command == ViewCommand::kPauseMapping) scene.set_mapping_paused(true);
+    if (command == ViewCommand::kResumeMapping) scene.set_mapping_paused(false);
   } catch (const std::exception& error) {
     event.kind = "command failed";
     event.text = error.what();
@@ -135,8 +144,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         options_(options),
         title_(title_of(rig, options)),
         keyframe_images_(find_images(map_, options_)),
-        truth_(options.truth, options.truth_t_ns, options.scale_truth),
+        truth_(options.truth, options.truth_t_ns, !title_.metres),
         server_({options.bind, options.port}, scene_, title_) {
+    if (map_ && !title_.metres) scene_.find_scales();
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
     thread_.emplace(WorkerOptions{.name = "viewer"}, [this](const std::stop_token& stop) {
@@ -168,7 +178,11 @@ class TWOFOLD_HIDDEN Viewer::Impl {
                        [frame](const auto& shown) { return shown.load(std::memory_order_relaxed) == frame; });
   }
   void push(const ToldPoints& points) { (void)points_.try_push(ToldPoints(points)); }  // likewise
-  void set_waiting(std::size_t keyframes) { waiting_.store(keyframes, std::memory_order_relaxed); }
+  void set_waiting(const QueueLengths& waiting) {
+    frames_waiting_.store(waiting.frames, std::memory_order_relaxed);
+    keyframes_waiting_.store(waiting.keyframes, std::memory_order_relaxed);
+    places_waiting_.store(waiting.places, std::memory_order_relaxed);
+  }
   const ViewServer& server() const { return server_; }
   void finish() {
     if (!thread_) return;
@@ -195,7 +209,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
       if (const auto* frame = std::get_if<ToldFrame>(&told)) {
         newest_ = frame->pose;
         scene_.add(frame->pose, std::span(frame->stage_ns).first(frame->stages),
-                   waiting_.load(std::memory_order_relaxed));
+                   {frames_waiting_.load(std::memory_order_relaxed),
+                    keyframes_waiting_.load(std::memory_order_relaxed),
+                    places_waiting_.load(std::memory_order_relaxed)});
         find_truth(frame->pose);
       } else {
         scene_.add(std::get<MapEvent>(told));
@@ -206,7 +222,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   /// What became of a command is an event, so that all viewers know.
   void obey(ViewCommand command) {
     if (!options_.on_command) return;
-    ViewEvent event = outcome_of(command, options_.on_command);
+    ViewEvent event = outcome_of(command, options_.on_command, scene_);
     event.frame = static_cast<std::uint32_t>(newest_.frame);
     event.part_before = event.part = newest_.map_part;
     event.before = event.after = newest_.T_world_camera.t;
@@ -229,15 +245,27 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     if (!map_ || !scene_.start_ns() || !due) return;
     const MapSnapshot map = map_();
     if (!watched) {
-      scene_.show_keyframes(keyframes_of(map, *scene_.start_ns()));
+      scene_.show_keyframes(keyframes_of(map, *scene_.start_ns()), map.version());
     } else if (map.version() != scene_.map_version()) {
-      scene_.show(view_of(map, *scene_.start_ns(), false));
+      ViewMap view = view_of(map, *scene_.start_ns(), false);
+      deviations_.put_into(view.points);
+      scene_.show(view);
     }
+    if (audience.is_last) scene_.release_events(std::numeric_limits<std::uint64_t>::max());
     scene_.add_loops(map.loops());
     const std::int64_t now_ns = steady_now_ns();
     const std::int64_t rest_ns = kMapShare * (thread_cpu_ns() - begin_cpu_ns);
     map_due_ns_ = now_ns + std::max(kMapPeriodNs, rest_ns);
     keyframes_due_ns_ = now_ns + std::max(kNobodyPeriodNs, rest_ns);
+    if (watched && now_ns >= deviations_due_ns_ && scene_.point_count() <= kFewPoints) find_deviations(map);
+  }
+
+  /// Apart from the map, which then is told as often as without them; seen with the map's next version.
+  void find_deviations(const MapSnapshot& map) {
+    const std::int64_t begin_cpu_ns = thread_cpu_ns();
+    deviations_.find(map);
+    deviations_due_ns_ =
+        steady_now_ns() + std::max(kNobodyPeriodNs, kMapShare * (thread_cpu_ns() - begin_cpu_ns));
   }
 
   void look_at_image(bool wanted, NewestMessage& newest) {
@@ -260,7 +288,8 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
   SpscRing<ToldPoints> points_{8};
   PoseEstimate newest_;
-  std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, image_due_ns_ = 0;
+  PointDeviations deviations_;
+  std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, deviations_due_ns_ = 0, image_due_ns_ = 0;
   // Exchanged by both ends, each with acquire and release: pixels written before are seen by whoever takes
   // them, and whoever frees them comes after their last reader.
   std::atomic<HeldImage*> image_{nullptr};
@@ -269,9 +298,10 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   std::atomic<bool> wants_image_{false};
   // Frames whose images were put last. Relaxed: who is late in seeing one shows it without its points.
   std::array<std::atomic<std::int64_t>, 16> shown_;
-  std::size_t images_ = 0;               // the source's
-  std::atomic<std::size_t> waiting_{0};  // relaxed: a number to be shown
-  std::optional<Worker> thread_;         // last: joins before what it uses is destroyed
+  std::size_t images_ = 0;  // the source's
+  // Relaxed: numbers to be shown; they need not be of one moment.
+  std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1};
+  std::optional<Worker> thread_;  // last: joins before what it uses is destroyed
 };
 
 Viewer::Viewer(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options)
@@ -309,8 +339,8 @@ void Viewer::tell(std::int64_t frame, std::span<const ViewedPoint> points) {
   impl_->push(told);
 }
 
-void Viewer::tell_waiting(std::size_t keyframes) {
-  impl_->set_waiting(keyframes);
+void Viewer::tell_waiting(const QueueLengths& waiting) {
+  impl_->set_waiting(waiting);
 }
 
 bool Viewer::wants_image() const {

@@ -245,6 +245,7 @@ void show_finished_run(const std::filesystem::path& folder, ViewScene& scene, Vi
   if (poses.empty()) throw IoError((folder / "trajectory.txt").string(), "holds no pose");
   const std::int64_t start_ns = poses.front().t_ns;
   scene.begin(start_ns);
+  title.kind = ViewKind::kFinished;
   title.title = fmt::format("{} ({})", folder.filename().string(), summary.value("source", ""));
   add_truth(folder / "groundtruth.txt", poses, summary.value("scale", "") == "arbitrary", scene);
   const PathBuilder builder(keyframes, read_tum_trajectory(folder / "trajectory_causal.txt"), start_ns);
@@ -263,6 +264,7 @@ void show_map_file(const std::filesystem::path& file, ViewScene& scene, ViewTitl
   version->graph = std::move(saved.graph);
   version->places = std::move(saved.places);
   title.rig = to_camera_rig(saved.rig);
+  title.kind = ViewKind::kMap;
   title.title = file.filename().string();
   title.has_deviations = version->graph.point_count() < kFewPoints;
   const MapSnapshot map(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{saved.rig, version}));

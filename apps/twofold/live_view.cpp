@@ -13,6 +13,7 @@
 #include "io/files/io_error.hpp"
 #include "slam/conversions.hpp"
 #include "slam/map_snapshot.hpp"
+#include "tracking/effort.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
@@ -28,6 +29,7 @@ ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& 
   options.port = *arguments.port;
   for (std::size_t s = 0; s < kTrackerStages; ++s)
     options.stages.emplace_back(describe(static_cast<TrackerStage>(s)));
+  options.efforts = effort_words();
   for (const TimedPose& pose : source.ground_truth()) {
     options.truth.push_back(to_pose(pose.T_w_c));
     options.truth_t_ns.push_back(pose.t_ns);
@@ -65,6 +67,13 @@ void add_view_options(CLI::App& command, ViewArguments& arguments, const std::st
       "Viewers may save the map (to map.tfm in the output folder), pause mapping, and end the run");
 }
 
+std::vector<std::string> effort_words() {
+  std::vector<std::string> words;
+  for (int level = 0; level < kEffortLevels; ++level)
+    words.emplace_back(describe(static_cast<EffortLevel>(level)));
+  return words;
+}
+
 void print_view_address(const std::string& address, bool is_open_to_network) {
   fmt::print(stderr, "view at     {}\n", address);
   if (is_open_to_network) {
@@ -98,7 +107,7 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
     return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps_.newest()}));
   };
   ViewerOptions viewer = viewer_options(arguments, title, source);
-  viewer.scale_truth = scale_is_arbitrary(rig_, options);
+  viewer.metric = !scale_is_arbitrary(rig_, options);
   if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
   if (images) viewer.recorded_image = [images](std::int64_t t_ns) { return viewed_image(images(t_ns)); };
   measured_.reserve(kMostMeasured);
@@ -176,7 +185,10 @@ void LiveView::show(const Frame& frame) {
 }
 
 void LiveView::show(const Progress& progress) {
-  if (viewer_) viewer_->tell_waiting(progress.queued);
+  const auto length = [](std::size_t waiting) { return static_cast<std::int64_t>(waiting); };
+  if (viewer_)
+    viewer_->tell_waiting(
+        {length(progress.frames_waiting), length(progress.queued), length(progress.places_waiting)});
 }
 
 void LiveView::finish() {

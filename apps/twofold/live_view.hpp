@@ -31,6 +31,8 @@ struct ViewArguments {
 void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description);
 /// For those who look at it.
 [[nodiscard]] ViewedImage viewed_image(const cv::Mat& image);
+/// Words of the effort levels.
+[[nodiscard]] std::vector<std::string> effort_words();
 /// The address and, when others can reach it, a warning.
 void print_view_address(const std::string& address, bool is_open_to_network);
 

@@ -42,7 +42,6 @@ void view(const FileViewArguments& arguments) {
   ViewScene scene;
   ViewTitle title;
   KeyframeImages::Find images;
-  title.live = false;
   if (std::filesystem::is_directory(arguments.path)) {
     show_finished_run(arguments.path, scene, title);
     images = images_of_run(arguments.path);
