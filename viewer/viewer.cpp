@@ -1,14 +1,15 @@
 #include "twofold/viewer.hpp"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
+#include <stdexcept>
+#include <thread>
 #include <variant>
 #include <vector>
 
@@ -32,6 +33,7 @@ constexpr std::size_t kFewPoints =
     300'000;  // of more, standard deviations would hold up viewers for a second
 constexpr std::int64_t kImagePeriodNs = 200'000'000;
 constexpr std::size_t kRing = 1024;
+constexpr std::size_t kMostFailures = 16;
 
 struct ToldFrame {
   PoseEstimate pose;
@@ -131,10 +133,6 @@ ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCo
   return event;
 }
 
-void take_lowest_priority() {
-  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 19);  // never refused
-}
-
 }  // namespace
 
 class TWOFOLD_HIDDEN Viewer::Impl {
@@ -150,7 +148,8 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
     thread_.emplace(WorkerOptions{.name = "viewer"}, [this](const std::stop_token& stop) {
-      take_lowest_priority();
+      self_.store(std::this_thread::get_id(),
+                  std::memory_order_relaxed);  // relaxed: read by this thread, or not equal
       server_.run(
           stop, [this](const ViewServer::Audience& audience, ViewSight& newest) { tick(audience, newest); },
           [] { return std::string("the run is over"); });
@@ -185,6 +184,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   }
   const ViewServer& server() const { return server_; }
   void finish() {
+    if (self_.load(std::memory_order_relaxed) == std::this_thread::get_id())
+      throw std::logic_error("a viewer is not finished by what it calls");
+    const std::scoped_lock lock(finishing_);
     if (!thread_) return;
     thread_->request_stop();
     (void)thread_->join();
@@ -195,11 +197,37 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   void tick(const ViewServer::Audience& audience, ViewSight& newest) {
     listen();
     for (const ViewCommand command : audience.commands) obey(command);
-    look_at_map(audience);
-    look_at_image(audience.wants_images, newest.image);
-    keyframe_images_.answer(audience.keyframes, steady_now_ns(), newest);
+    attempt("the map cannot be shown", [&] { look_at_map(audience); });
+    attempt("the camera's image cannot be shown",
+            [&] { look_at_image(audience.wants_images, newest.image); });
+    attempt("a keyframe's image cannot be shown",
+            [&] { keyframe_images_.answer(audience.keyframes, steady_now_ns(), newest); });
     ToldPoints points;
     while (points_.try_pop(points)) newest.measured.put(measured_message(points));
+  }
+
+  /// What a callback or a library throws ends nothing but this attempt; each failure is told once.
+  template <class Attempt>
+  void attempt(const char* failure, const Attempt& attempt) {
+    std::string why;
+    try {
+      return attempt();
+    } catch (const std::exception& error) {
+      why = std::string(": ") + error.what();
+    } catch (...) {  // only that it failed is known
+    }
+    if (failures_.size() >= kMostFailures || !failures_.insert(failure + why).second) return;
+    add_here({.kind = "viewer", .text = failure + why});
+  }
+
+  /// Something that happened where the camera is now.
+  void add_here(ViewEvent event) {
+    event.frame = static_cast<std::uint32_t>(newest_.frame);
+    event.part_before = event.part = newest_.map_part;
+    event.before = event.after = newest_.T_world_camera.t;
+    if (scene_.start_ns())
+      event.t = static_cast<float>(1e-9 * static_cast<double>(newest_.t_ns - *scene_.start_ns()));
+    scene_.add(std::move(event));
   }
 
   /// To what was told since the last time.
@@ -223,12 +251,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   void obey(ViewCommand command) {
     if (!options_.on_command) return;
     ViewEvent event = outcome_of(command, options_.on_command, scene_);
-    event.frame = static_cast<std::uint32_t>(newest_.frame);
-    event.part_before = event.part = newest_.map_part;
-    event.before = event.after = newest_.T_world_camera.t;
-    if (scene_.start_ns())
-      event.t = static_cast<float>(1e-9 * static_cast<double>(newest_.t_ns - *scene_.start_ns()));
-    scene_.add(std::move(event));
+    add_here(std::move(event));
   }
 
   void find_truth(const PoseEstimate& pose) {
@@ -237,13 +260,19 @@ class TWOFOLD_HIDDEN Viewer::Impl {
       scene_.set_truth(std::move(*truth));
   }
 
-  /// Not before the first pose: times are counted from there.
+  /// Times are counted from the first pose, or, before there is one, from the map's first keyframe.
   void look_at_map(const ViewServer::Audience& audience) {
     const std::int64_t begin_cpu_ns = thread_cpu_ns();
     const bool watched = audience.viewers > 0;
     const bool due = audience.is_last || steady_now_ns() >= (watched ? map_due_ns_ : keyframes_due_ns_);
-    if (!map_ || !scene_.start_ns() || !due) return;
+    if (!map_ || !due) return;
+    map_due_ns_ = keyframes_due_ns_ = steady_now_ns() + kNobodyPeriodNs;  // should it be thrown
     const MapSnapshot map = map_();
+    if (!scene_.start_ns()) {
+      const auto keyframes = map.keyframes();
+      if (keyframes.empty()) return;
+      scene_.begin(keyframes.front().t_ns);
+    }
     if (!watched) {
       scene_.show_keyframes(keyframes_of(map, *scene_.start_ns()), map.version());
     } else if (map.version() != scene_.map_version()) {
@@ -270,7 +299,12 @@ class TWOFOLD_HIDDEN Viewer::Impl {
 
   void look_at_image(bool wanted, NewestMessage& newest) {
     const std::int64_t now_ns = steady_now_ns();
-    if (!wanted || now_ns < image_due_ns_) return;
+    if (!wanted) {
+      wants_image_.store(false, std::memory_order_relaxed);
+      delete image_.exchange(nullptr, std::memory_order_acq_rel);  // whose pixels may be a camera's
+      return;
+    }
+    if (now_ns < image_due_ns_) return;
     wants_image_.store(false, std::memory_order_relaxed);
     const std::unique_ptr<HeldImage> image(image_.exchange(nullptr, std::memory_order_acq_rel));
     if (image == nullptr) return wants_image_.store(true, std::memory_order_relaxed);
@@ -288,6 +322,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
   SpscRing<ToldPoints> points_{8};
   PoseEstimate newest_;
+  std::set<std::string> failures_;  // told
   PointDeviations deviations_;
   std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, deviations_due_ns_ = 0, image_due_ns_ = 0;
   // Exchanged by both ends, each with acquire and release: pixels written before are seen by whoever takes
@@ -301,6 +336,8 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   std::size_t images_ = 0;  // the source's
   // Relaxed: numbers to be shown; they need not be of one moment.
   std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1};
+  std::atomic<std::thread::id> self_{};
+  std::mutex finishing_;          // guards thread_ from there on
   std::optional<Worker> thread_;  // last: joins before what it uses is destroyed
 };
 
@@ -310,6 +347,14 @@ Viewer::~Viewer() = default;
 
 std::string Viewer::address() const {
   return impl_->server().address();
+}
+
+std::vector<std::string> Viewer::addresses() const {
+  return impl_->server().addresses();
+}
+
+int Viewer::port() const {
+  return impl_->server().port();
 }
 
 bool Viewer::is_open_to_network() const {
@@ -348,8 +393,7 @@ bool Viewer::wants_image() const {
 }
 
 void Viewer::show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner) {
-  if (left.data == nullptr || left.width <= 0 || left.height <= 0 || left.format == ImageFormat::kDepth16)
-    return;
+  if (!can_be_shown(left)) return;
   impl_->put(new HeldImage(owner ? HeldImage{frame, left, std::move(owner)} : own_copy(frame, left)));
 }
 

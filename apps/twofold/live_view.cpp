@@ -60,7 +60,8 @@ void add_view_options(CLI::App& command, ViewArguments& arguments, const std::st
       ->type_name("[PORT]");
   command
       .add_option("--view-bind", arguments.bind,
-                  "Address to listen on: any but 127.0.0.1 shows camera and map to the network")
+                  "Address to listen on: any but a loopback address shows camera and map to the network; "
+                  "0.0.0.0: all of the machine's")
       ->capture_default_str();
   command.add_flag(
       "--view-control", arguments.control,
@@ -74,15 +75,14 @@ std::vector<std::string> effort_words() {
   return words;
 }
 
-void print_view_address(const std::string& address, bool is_open_to_network) {
-  fmt::print(stderr, "view at     {}\n", address);
-  if (is_open_to_network) {
-    fmt::print(
-        stderr,
-        "note        whoever reaches this machine and sees this address sees the camera, unencrypted; safer: "
-        "no --view-bind, and `ssh -L {0}:localhost:{0} THIS_MACHINE` from there\n",
-        kUsualViewPort);
-  }
+void print_view_addresses(const ViewAddresses& viewer) {
+  for (const std::string& address : viewer.addresses) fmt::print(stderr, "view at     {}\n", address);
+  if (!viewer.is_open_to_network) return;
+  fmt::print(
+      stderr,
+      "note        whoever reaches this machine and sees this address sees the camera{0}, unencrypted; "
+      "safer: no {1}, and `ssh -L {2}:localhost:{2} THIS_MACHINE` from there\n",
+      viewer.control ? " and may end the run" : "", viewer.bind_option, viewer.port);
 }
 
 ViewedImage viewed_image(const cv::Mat& image) {
@@ -117,7 +117,10 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
     throw IoError("--view", error.what());
   }
   listen(options);
-  print_view_address(viewer_->address(), viewer_->is_open_to_network());
+  print_view_addresses({.addresses = viewer_->addresses(),
+                        .port = viewer_->port(),
+                        .is_open_to_network = viewer_->is_open_to_network(),
+                        .control = arguments.control});
 }
 
 void LiveView::listen(EngineOptions& options) {

@@ -90,6 +90,9 @@ class TWOFOLD_API Viewer {
 
   /// With its token: who knows it may look.
   [[nodiscard]] std::string address() const;
+  /// Where it listens at all addresses of the machine (bind = "0.0.0.0"), each of them; else the one.
+  [[nodiscard]] std::vector<std::string> addresses() const;
+  [[nodiscard]] int port() const;
   [[nodiscard]] bool is_open_to_network() const;
 
   // Of one thread, the tracker's: copies into a ring, and nothing else; no lock, no allocation, no system
