@@ -21,8 +21,10 @@ struct Progress {
   std::int64_t dropped = 0;
   double tracked_share = 0;  ///< of the last frame
   std::uint64_t map_version = 0;
-  std::int64_t keyframes = 0;  ///< accepted so far
-  std::size_t queued = 0;      ///< proposals waiting for the mapper
+  std::int64_t keyframes = 0;      ///< accepted so far
+  std::size_t queued = 0;          ///< proposals waiting for the mapper
+  std::size_t frames_waiting = 0;  ///< for the tracker
+  std::size_t places_waiting = 0;  ///< keyframes, for the loop closer
 
   /// Another frame is done with.
   void count(const FrameRecord& record);

@@ -228,7 +228,6 @@ std::string view(SlamWithUpdates& self, const std::string& title, int port, cons
     options.truth.push_back(pose.T_world_camera);
     options.truth_t_ns.push_back(pose.t_ns);
   }
-  options.scale_truth = self.rig.sensor == Sensor::kMono;
   const py::gil_scoped_release unlocked;
   return self.view.open(self.rig, self.slam, options);
 }

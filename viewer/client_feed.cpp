@@ -72,6 +72,10 @@ std::optional<ViewMessage> ClientFeed::next_text() {
     greeted_ = true;
     return ViewMessage{shared(hello_text(title_)), true};
   }
+  if (states_ < scene_.states()) {
+    states_ = scene_.states();
+    return ViewMessage{shared(state_text(scene_)), true};
+  }
   if (reasons_ < scene_.reasons().size()) {
     reasons_ = scene_.reasons().size();
     return ViewMessage{shared(reasons_text(scene_.reasons())), true};
@@ -126,7 +130,9 @@ bool ClientFeed::take(std::string_view message) {
   const auto command = std::find_if(kCommands.begin(), kCommands.end(),
                                     [&](const auto& known) { return known.first == message; });
   if (!title_.control || command == kCommands.end()) return false;
-  command_ = command->second;
+  // Of two that undo each other the later one counts, in its turn.
+  std::erase(commands_, command->second);
+  commands_.push_back(command->second);
   return true;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "twofold/viewer.hpp"
 #include "viewer/texts.hpp"
@@ -53,8 +54,8 @@ class ClientFeed {
   /// A message of the client (wire_format.hpp). False: nonsense, or more than it may, and the client is to
   /// go.
   [[nodiscard]] bool take(std::string_view message);
-  /// What the client asked for since the last call; of several the last.
-  [[nodiscard]] std::optional<ViewCommand> take_command() { return std::exchange(command_, std::nullopt); }
+  /// What the client asked for since the last call, each command once, in the order of the last wishes.
+  [[nodiscard]] std::vector<ViewCommand> take_commands() { return std::exchange(commands_, {}); }
 
   [[nodiscard]] bool wants_images() const { return wants_images_; }
   /// The keyframe whose image the client waits for; it waits for one at a time.
@@ -74,6 +75,7 @@ class ClientFeed {
   const ViewTitle& title_;
   bool greeted_ = false;
   std::uint32_t truths_ = 0;  // known to the client
+  std::uint32_t states_ = 0;  // likewise
   std::size_t reasons_ = 1;   // known to the client
   std::uint64_t event_ = 0;
   std::uint64_t live_ = 0;
@@ -83,7 +85,7 @@ class ClientFeed {
   std::uint64_t image_ = 0, measured_ = 0;  // numbers of those sent last
   bool wants_images_ = false;
   std::optional<std::uint32_t> wanted_keyframe_;
-  std::optional<ViewCommand> command_;
+  std::vector<ViewCommand> commands_;  // at most one of a kind
   std::optional<std::string> last_words_;
   bool told_end_ = false;
   int unacknowledged_ = 0;

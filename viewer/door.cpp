@@ -45,41 +45,55 @@ std::string_view value_of(std::string_view list, std::string_view name, char sep
   return {};
 }
 
+/// Takes as long for a near miss as for any other.
+bool is_same_secret(std::string_view text, std::string_view secret) {
+  if (secret.empty() || text.size() != secret.size()) return false;
+  unsigned different = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) different |= static_cast<unsigned char>(text[i] ^ secret[i]);
+  return different == 0;
+}
+
+std::string in_lower_case(std::string_view name) {
+  std::string lower(name);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return lower;
+}
+
 }  // namespace
 
-ViewDoor::ViewDoor(std::string secret, int port, std::string machine_name)
-    : secret_(std::move(secret)),
+ViewDoor::ViewDoor(Secrets secrets, int port, std::string_view machine_name)
+    : secrets_(std::move(secrets)),
       cookie_name_(fmt::format("twofold-{}", port)),
-      machine_name_(std::move(machine_name)) {}
+      machine_name_(in_lower_case(machine_name)) {}
 
 Admission ViewDoor::judge(const DoorRequest& request) const {
   if (request.method != "GET") return Admission::kBadMethod;
   if (!is_this_machine(host_name(request.host))) return Admission::kBadHost;
   const bool must_say = request.is_upgrade;
-  if ((must_say || !request.origin.empty()) && request.origin != fmt::format("http://{}", request.host))
+  if ((must_say || !request.origin.empty()) &&
+      in_lower_case(request.origin) != in_lower_case(fmt::format("http://{}", request.host)))
     return Admission::kBadOrigin;
-  if (is_secret(value_of(request.cookie, cookie_name_, ';'))) return Admission::kByCookie;
+  if (is_same_secret(value_of(request.cookie, cookie_name_, ';'), secrets_.cookie))
+    return Admission::kByCookie;
   const std::size_t query = std::min(request.target.find('?'), request.target.size());
   const std::string_view parameters = request.target.substr(std::min(query + 1, request.target.size()));
-  if (!request.is_upgrade && is_secret(value_of(parameters, "token", '&'))) return Admission::kByToken;
+  if (!request.is_upgrade && is_same_secret(value_of(parameters, "token", '&'), secrets_.token))
+    return Admission::kByToken;
   return Admission::kNoToken;
 }
 
 std::string ViewDoor::set_cookie() const {
-  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict", cookie_name_, secret_);
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict", cookie_name_, secrets_.cookie);
 }
 
 /// Addresses are safe: a page of another site can only come here by a name of its own.
 bool ViewDoor::is_this_machine(std::string_view name) const {
-  return name == "localhost" || (!name.empty() && name == machine_name_) || is_address(name);
-}
-
-/// Takes as long for a near miss as for any other.
-bool ViewDoor::is_secret(std::string_view text) const {
-  if (text.size() != secret_.size()) return false;
-  unsigned different = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) different |= static_cast<unsigned char>(text[i] ^ secret_[i]);
-  return different == 0;
+  const std::string asked = in_lower_case(name);  // as browsers write names
+  const std::string_view first_label = std::string_view(machine_name_).substr(0, machine_name_.find('.'));
+  const bool is_its_name = !first_label.empty() && (asked == machine_name_ || asked == first_label ||
+                                                    asked == fmt::format("{}.local", first_label));
+  return asked == "localhost" || is_its_name || is_address(name);
 }
 
 std::string_view path_of(std::string_view target) {

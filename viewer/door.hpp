@@ -24,19 +24,27 @@ enum class Admission : std::uint8_t {
 /// Who may look: those who know the token, with a browser that speaks to this very server.
 class ViewDoor {
  public:
-  /// @param secret  32 hexadecimal digits; @param port  names the cookie, as browsers share them among ports
-  ViewDoor(std::string secret, int port, std::string machine_name);
+  /// What those bring who may enter; 32 hexadecimal digits each.
+  struct Secrets {
+    std::string token;  ///< in the address that is printed
+    /// Another one: browsers send cookies to all ports of a host, and whoever listens there need not learn
+    /// the address.
+    std::string cookie;
+  };
+  /// @param port  names the cookie, as browsers share them among ports
+  /// @param machine_name  with or without its domain
+  ViewDoor(Secrets secrets, int port, std::string_view machine_name);
 
   [[nodiscard]] Admission judge(const DoorRequest& request) const;
-  [[nodiscard]] const std::string& token() const { return secret_; }
+  [[nodiscard]] const std::string& token() const { return secrets_.token; }
   /// Value of Set-Cookie.
   [[nodiscard]] std::string set_cookie() const;
 
  private:
   [[nodiscard]] bool is_this_machine(std::string_view host) const;
-  [[nodiscard]] bool is_secret(std::string_view text) const;
 
-  std::string secret_, cookie_name_, machine_name_;
+  Secrets secrets_;
+  std::string cookie_name_, machine_name_;
 };
 
 /// Target without its query.

@@ -23,6 +23,7 @@ class KeyframeImages {
  private:
   const Find find_;
   std::int64_t due_ns_ = 0;
+  bool is_empty_ = false;  // the newest answer: it is not given to those who ask later
 };
 
 }  // namespace twofold

@@ -46,11 +46,48 @@ ViewEdge view_of(const MapSnapshot::Edge& edge) {
   return view;
 }
 
+/// The one with the greatest id up to `id`, which stands for it when it is gone; else the first. Keyframes
+/// are not none.
+std::uint32_t standing_for(std::uint32_t id, const std::vector<ViewKeyframe>& keyframes) {
+  const auto after =
+      std::upper_bound(keyframes.begin(), keyframes.end(), id,
+                       [](std::uint32_t k, const ViewKeyframe& keyframe) { return k < keyframe.id; });
+  return (after == keyframes.begin() ? after : std::prev(after))->id;
+}
+
 }  // namespace
+
+void mark_loops(const std::vector<MapSnapshot::Loop>& loops, ViewMap& view) {
+  if (view.keyframes.empty()) return;
+  for (const MapSnapshot::Loop& loop : loops) {
+    const auto [from, to] =
+        std::minmax({standing_for(loop.from, view.keyframes), standing_for(loop.to, view.keyframes)});
+    if (from == to) continue;
+    ViewEdge edge{.from = from, .to = to};
+    const auto at = std::lower_bound(view.edges.begin(), view.edges.end(), edge,
+                                     [](const ViewEdge& a, const ViewEdge& b) { return a.key() < b.key(); });
+    const bool known = at != view.edges.end() && at->key() == edge.key();
+    // The graph need not keep an edge for each of its loops.
+    (known ? *at : *view.edges.insert(at, edge)).loop = loop.joins_parts ? kJoinsParts : kClosesLoop;
+  }
+}
 
 std::uint8_t deviation_code(double deviation) {
   if (!(deviation > 0)) return 0;
   return static_cast<std::uint8_t>(std::clamp(std::lround(8 * std::log2(deviation)) + 128L, 1L, 255L));
+}
+
+void PointDeviations::find(const MapSnapshot& map) {
+  codes_.clear();
+  for (const MapSnapshot::Point& point : map.points()) {
+    codes_.resize(point.id + 1, 0);  // ids ascend
+    codes_.back() = code_of(point.covariance);
+  }
+}
+
+void PointDeviations::put_into(std::vector<ViewPoint>& points) const {
+  for (ViewPoint& point : points)
+    if (point.id < codes_.size()) point.deviation = codes_[point.id];
 }
 
 std::vector<ViewKeyframe> keyframes_of(const MapSnapshot& map, std::int64_t start_ns) {
@@ -65,6 +102,7 @@ ViewMap view_of(const MapSnapshot& map, std::int64_t start_ns, bool with_covaria
   view.keyframes = keyframes_of(map, start_ns);
   for (const auto& point : map.points(with_covariance)) view.points.push_back(view_of(point));
   for (const auto& edge : map.edges()) view.edges.push_back(view_of(edge));
+  mark_loops(map.loops(), view);
   return view;
 }
 

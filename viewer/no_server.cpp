@@ -14,9 +14,12 @@ ViewServer::ViewServer(const ViewServerOptions&, const ViewScene&, const ViewTit
 }
 ViewServer::~ViewServer() = default;
 
-const std::string& ViewServer::address() const {
-  static const std::string kNone;
+const std::vector<std::string>& ViewServer::addresses() const {
+  static const std::vector<std::string> kNone(1);
   return kNone;
+}
+int ViewServer::port() const {
+  return 0;
 }
 bool ViewServer::is_open_to_network() const {
   return false;

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <type_traits>
 
 namespace twofold {
 namespace {
 
 constexpr float kMoved = 0.002F;   // what moves less is not told again [m]
+constexpr int kHalved = 8;         // or doubled: standard deviations [codes]
 constexpr float kTurned = 0.001F;  // likewise [components of a unit quaternion]
 
 bool moved(const float (&a)[3], const float (&b)[3], float limit = kMoved) {
@@ -32,6 +34,11 @@ std::int16_t packed(float component) {
   return static_cast<std::int16_t>(std::lround(32767 * std::clamp(component, -1.0F, 1.0F)));
 }
 
+/// -1 is kViewNotKnown.
+std::uint32_t number_of(std::int64_t length) {
+  return length < 0 ? kViewNotKnown : static_cast<std::uint32_t>(length);
+}
+
 /// Of a pose in the old reference keyframe to one in the new.
 void move(const Eigen::Isometry3f& T_new_old, ViewPathFrame& frame) {
   Eigen::Map<Eigen::Vector3f> p(frame.in_reference);
@@ -50,6 +57,37 @@ const ViewKeyframe& nearest(const std::vector<ViewKeyframe>& keyframes, std::uin
       std::upper_bound(keyframes.begin(), keyframes.end(), id,
                        [](std::uint32_t k, const ViewKeyframe& keyframe) { return k < keyframe.id; });
   return after == keyframes.begin() ? *after : *std::prev(after);
+}
+
+bool changes_scale(MapEventKind kind) {
+  return kind != MapEventKind::kRelocalisation && kind != MapEventKind::kNewPart;
+}
+
+using Moved = std::pair<const ViewKeyframe*, const ViewKeyframe*>;  // before, now
+
+/// Spread of the positions about their mean; of the first or second of each pair.
+double spread(std::span<const Moved> pairs, const ViewKeyframe* Moved::*which) {
+  const auto position = [&](const Moved& pair) {
+    return Eigen::Map<const Eigen::Vector3f>((pair.*which)->position).cast<double>().eval();
+  };
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Moved& pair : pairs) mean += position(pair) / static_cast<double>(pairs.size());
+  double sum = 0;
+  for (const Moved& pair : pairs) sum += (position(pair) - mean).squaredNorm();
+  return std::sqrt(sum);
+}
+
+/// Of the newest keyframes up to this one, or the first ones after it; pairs ascend by id.
+std::optional<double> scale_around(std::uint32_t keyframe, std::span<const Moved> pairs) {
+  constexpr std::size_t kAround = 10;
+  const auto after =
+      std::upper_bound(pairs.begin(), pairs.end(), keyframe,
+                       [](std::uint32_t id, const Moved& pair) { return id < pair.first->id; });
+  const auto end = std::max(static_cast<std::size_t>(after - pairs.begin()), std::min(kAround, pairs.size()));
+  const auto around = pairs.subspan(end - std::min(end, kAround), std::min(end, kAround));
+  const double before = spread(around, &Moved::first);
+  if (around.size() < 2 || !(before > 1e-9)) return std::nullopt;
+  return spread(around, &Moved::second) / before;
 }
 
 template <class T>
@@ -110,7 +148,7 @@ void set_pose_in_reference(const Pose& T_reference_camera, ViewPathFrame& frame)
 
 bool differs(const ViewPoint& shown, const ViewPoint& now) {
   return moved(shown.position, now.position) || shown.part != now.part || shown.anchor != now.anchor ||
-         shown.observers / 4 != now.observers / 4;
+         shown.observers / 4 != now.observers / 4 || std::abs(shown.deviation - now.deviation) >= kHalved;
 }
 
 bool differs(const ViewKeyframe& shown, const ViewKeyframe& now) {
@@ -122,7 +160,8 @@ bool differs(const ViewKeyframe& shown, const ViewKeyframe& now) {
 }
 
 bool differs(const ViewEdge& shown, const ViewEdge& now) {
-  return shown.marginalised != now.marginalised || shown.shared_points / 8 != now.shared_points / 8;
+  return shown.marginalised != now.marginalised || shown.loop != now.loop ||
+         shown.shared_points / 8 != now.shared_points / 8;
 }
 
 std::uint8_t ViewScene::reason_number(const char* reason) {
@@ -133,7 +172,8 @@ std::uint8_t ViewScene::reason_number(const char* reason) {
   return static_cast<std::uint8_t>(reasons_.size() - 1);
 }
 
-void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns, std::size_t waiting) {
+void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns,
+                    const QueueLengths& waiting) {
   begin(pose.t_ns);
   ViewLiveFrame live;
   live.frame = static_cast<std::uint32_t>(pose.frame);
@@ -152,7 +192,9 @@ void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stag
   live.map_version = static_cast<std::uint32_t>(pose.map_version);
   for (std::size_t s = 0; s < stage_ns.size() && s < kViewStages; ++s)
     live.stage_ms[s] = static_cast<float>(1e-6 * static_cast<double>(stage_ns[s]));
-  live.waiting = static_cast<std::uint32_t>(waiting);
+  live.frames_waiting = number_of(waiting.frames);
+  live.keyframes_waiting = number_of(waiting.keyframes);
+  live.places_waiting = number_of(waiting.places);
   live_.push_back(live);
   if (live_.size() > kLiveFrames) live_.pop_front();
   ++end_live_;
@@ -167,6 +209,7 @@ void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stag
   frame.keyframe = live.keyframe;
   frame.effort = live.effort;
   frame.latency_ms = live.latency_ms;
+  frame.tracking_ms = std::accumulate(std::begin(live.stage_ms), std::end(live.stage_ms), 0.0F);
   std::copy_n(live.position, 3, frame.causal);
   set_pose_in_reference(pose.T_reference_camera, frame);
   add(frame);
@@ -202,7 +245,29 @@ void ViewScene::add(const MapEvent& event) {
   view.turned = event.turned;
   view.before = event.T_world_camera_before.t;
   view.after = event.T_world_camera_after.t;
-  add(std::move(view));
+  if (!find_scales_ && waiting_events_.empty()) return add(std::move(view));
+  const bool waits = find_scales_ && changes_scale(event.kind) && event.map_version > map_version_;
+  waiting_events_.push_back({std::move(view), waits ? event.map_version : 0});
+  release_events(0);
+}
+
+void ViewScene::release_events(std::uint64_t version) {
+  for (; !waiting_events_.empty() && waiting_events_.front().version <= version; waiting_events_.pop_front())
+    add(std::move(waiting_events_.front().event));
+}
+
+void ViewScene::find_scales(const std::vector<ViewKeyframe>& next, std::uint64_t version) {
+  for (WaitingEvent& waiting : waiting_events_) {
+    if (waiting.version == 0 || waiting.version > version) continue;
+    std::vector<std::pair<const ViewKeyframe*, const ViewKeyframe*>> pairs;
+    for (const ViewKeyframe& now : next) {
+      const ViewKeyframe* before = keyframes_.find(now.id);
+      if (before != nullptr && now.part == waiting.event.part && before->part == waiting.event.part_before)
+        pairs.emplace_back(before, &now);
+    }
+    waiting.event.scale = scale_around(waiting.event.keyframe, pairs);
+  }
+  release_events(version);
 }
 
 void ViewScene::add(ViewEvent event) {
@@ -232,6 +297,7 @@ void ViewScene::add_loops(const std::vector<MapSnapshot::Loop>& loops) {
 }
 
 void ViewScene::show(const ViewMap& map) {
+  find_scales(map.keyframes, map.version);
   const Revision next = revision_ + 1;
   rebind_path(map.keyframes, next);
   keyframes_.replace(map.keyframes, next);
@@ -241,7 +307,8 @@ void ViewScene::show(const ViewMap& map) {
   revision_ = next;
 }
 
-void ViewScene::show_keyframes(const std::vector<ViewKeyframe>& keyframes) {
+void ViewScene::show_keyframes(const std::vector<ViewKeyframe>& keyframes, std::uint64_t version) {
+  find_scales(keyframes, version);
   const Revision next = revision_ + 1;
   rebind_path(keyframes, next);
   keyframes_.replace(keyframes, next);

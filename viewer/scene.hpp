@@ -11,6 +11,7 @@
 
 #include "twofold/estimate.hpp"
 #include "twofold/map.hpp"
+#include "twofold/queue_lengths.hpp"
 #include "viewer/change_set.hpp"
 #include "viewer/wire_format.hpp"
 
@@ -30,9 +31,26 @@ struct ViewMap {
   std::vector<ViewEdge> edges;
 };
 
+/// Marks the edges that close loops, and adds those that the map does not have. Where a loop's keyframe is
+/// gone, the one before it stands for it.
+void mark_loops(const std::vector<MapSnapshot::Loop>& loops, ViewMap& view);
+
 /// Times of `t_ns` are counted from `start_ns`. O(size of the map); covariances take ten times as long as the
 /// rest.
 [[nodiscard]] ViewMap view_of(const MapSnapshot& map, std::int64_t start_ns, bool with_covariance);
+
+/// Codes of the points' standard deviations by their ids; 0: not known. They are found by and by, as they
+/// take so much longer than the rest.
+class PointDeviations {
+ public:
+  /// All of them anew.
+  void find(const MapSnapshot& map);
+  /// What was found is put into points that have none.
+  void put_into(std::vector<ViewPoint>& points) const;
+
+ private:
+  std::vector<std::uint8_t> codes_;
+};
 
 [[nodiscard]] std::vector<ViewKeyframe> keyframes_of(const MapSnapshot& map, std::int64_t start_ns);
 
@@ -61,6 +79,8 @@ struct ViewEvent {
   /// Of loops: `keyframe` came back to what the map has there; `moved` and `turned` are by how much the map
   /// was wrong.
   std::optional<MapSnapshot::Loop> loop = {};
+  /// Of corrections of a map whose unit is arbitrary: lengths around the camera now over lengths before.
+  std::optional<double> scale = {};
 };
 
 /// Sets `in_reference` and `turned`.
@@ -76,9 +96,14 @@ class ViewScene {
   static constexpr std::size_t kLiveFrames = 512;
   static constexpr std::size_t kMaxEvents = 4096;
 
-  /// @param waiting  keyframes that wait for the mapper
-  void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns, std::size_t waiting = 0);
+  void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns,
+           const QueueLengths& waiting = {});
   void add(const MapEvent& event);
+  /// Corrections wait from here on for the map that they tell of, which says how far they changed its scale:
+  /// of maps whose unit is arbitrary.
+  void find_scales() { find_scales_ = true; }
+  /// Events that wait for a map of this version or an older one need not wait any longer.
+  void release_events(std::uint64_t version);
   void add(ViewEvent event);
   /// Loops of a map that were not told yet become events. Those of one map begin as those of the one before.
   void add_loops(const std::vector<MapSnapshot::Loop>& loops);
@@ -88,10 +113,15 @@ class ViewScene {
     truth_ = std::move(truth);
     ++truths_;
   }
+  /// No keyframe is made, until it is told otherwise.
+  void set_mapping_paused(bool paused) {
+    states_ += paused != mapping_paused_ ? 1 : 0;
+    mapping_paused_ = paused;
+  }
   /// The map is now this.
   void show(const ViewMap& map);
   /// Its keyframes alone, which the path hangs on.
-  void show_keyframes(const std::vector<ViewKeyframe>& keyframes);
+  void show_keyframes(const std::vector<ViewKeyframe>& keyframes, std::uint64_t version = 0);
 
   [[nodiscard]] Revision revision() const { return revision_; }
   [[nodiscard]] std::uint64_t map_version() const { return map_version_; }
@@ -116,6 +146,9 @@ class ViewScene {
   [[nodiscard]] const std::optional<ViewTruth>& truth() const { return truth_; }
   /// How often it was set.
   [[nodiscard]] std::uint32_t truths() const { return truths_; }
+  [[nodiscard]] bool mapping_paused() const { return mapping_paused_; }
+  /// How often the state changed, counted from 1: nobody knows the first.
+  [[nodiscard]] std::uint32_t states() const { return states_; }
   [[nodiscard]] const std::vector<std::string>& reasons() const { return reasons_; }
   /// Time stamp of the scene's first moment: that of the first pose or event, or what it was told to be.
   [[nodiscard]] std::optional<std::int64_t> start_ns() const { return start_ns_; }
@@ -131,6 +164,8 @@ class ViewScene {
   }
   /// Leaves out older frames of a path that has become too long.
   void thin_path();
+  /// Those that the map of this version, which has these keyframes, was waited for by.
+  void find_scales(const std::vector<ViewKeyframe>& next, std::uint64_t version);
   /// Hangs frames of the path on keyframes that stay.
   void rebind_path(const std::vector<ViewKeyframe>& next, Revision revision);
   [[nodiscard]] std::shared_ptr<const Delta> encode(Revision since) const;
@@ -146,11 +181,19 @@ class ViewScene {
   std::deque<ViewLiveFrame> live_;
   std::deque<ViewEvent> events_;
   std::uint64_t end_live_ = 0, end_event_ = 0;
+  struct WaitingEvent {
+    ViewEvent event;
+    std::uint64_t version = 0;  // of the map that it tells of
+  };
+  std::deque<WaitingEvent> waiting_events_;
+  bool find_scales_ = false;
   std::size_t loops_ = 0;  // told
   std::vector<std::string> reasons_{""};
   std::optional<std::int64_t> start_ns_;
   std::optional<ViewTruth> truth_;
   std::uint32_t truths_ = 0;
+  bool mapping_paused_ = false;
+  std::uint32_t states_ = 1;
   struct Encoded {
     Revision since = 0, to = 0;
     std::weak_ptr<const Delta> delta;

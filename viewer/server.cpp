@@ -1,11 +1,16 @@
 // The one file that includes Boost.Beast, which takes long to compile.
 #include "viewer/server.hpp"
 
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstring>
+#include <exception>
 #include <stdexcept>
 #include <vector>
 
@@ -35,9 +40,12 @@ using Request = http::request<http::empty_body>;
 constexpr std::size_t kConnections = 32;
 constexpr std::size_t kViewers = 8;
 constexpr std::size_t kHeaderBytes = 8U << 10;
+constexpr std::string_view kLivePath = "/live";
+constexpr const char* kNoRoom = "as many viewers as there may be are watching";
 constexpr std::size_t kMessageBytes = 64;
 constexpr int kMessagesASecond = 500;
 constexpr auto kRequestTime = std::chrono::seconds(5);
+constexpr auto kAnswerTime = std::chrono::seconds(30);  // 200 KB through a slow tunnel
 constexpr auto kWriteTime = std::chrono::seconds(10);
 constexpr auto kLastCall = std::chrono::seconds(3);
 
@@ -118,6 +126,8 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
       self->write();
     });
   }
+  /// Nobody was served for so long.
+  void excuse(Clock::duration time) { write_began_ += time; }
   void close() {
     closed_ = true;
     Error ignored;
@@ -139,8 +149,10 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
       messages_ = 0;
     }
     const auto bytes = buffer_.data();
-    const bool sensible =
-        ++messages_ <= kMessagesASecond && feed_.take({static_cast<const char*>(bytes.data()), bytes.size()});
+    const std::string_view message(static_cast<const char*>(bytes.data()), bytes.size());
+    // Of acknowledgements there are no more than messages to acknowledge, however fast those go.
+    messages_ += message == "ack" ? 0 : 1;
+    const bool sensible = messages_ <= kMessagesASecond && feed_.take(message);
     buffer_.consume(buffer_.size());
     return sensible;
   }
@@ -190,13 +202,20 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
       case Admission::kByToken:
         break;
     }
-    if (websocket::is_upgrade(request)) return let_view();
+    const std::string_view target(request.target().data(), request.target().size());
+    if (path_of(target) == kLivePath)
+      return websocket::is_upgrade(request) ? let_view() : say_whether_there_is_room();
+    if (websocket::is_upgrade(request)) return refuse(http::status::not_found, "there is no such socket");
     send_file(admission == Admission::kByToken);
   }
 
+  /// For pages whose socket was refused: a browser does not tell them why.
+  void say_whether_there_is_room() {
+    if (viewers_.size() >= kViewers) return refuse(http::status::service_unavailable, kNoRoom);
+    refuse(http::status::ok, "there is room for a viewer");
+  }
   void let_view() {
-    if (viewers_.size() >= kViewers)
-      return refuse(http::status::service_unavailable, "as many viewers as there may be are watching");
+    if (viewers_.size() >= kViewers) return refuse(http::status::service_unavailable, kNoRoom);
     viewers_.push_back(std::make_shared<ViewerConnection>(hall_, std::move(seat_), std::move(stream_)));
     viewers_.back()->accept(parser_.get());
   }
@@ -235,7 +254,7 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
   }
   void send() {
     response_.prepare_payload();
-    stream_.expires_after(kRequestTime);
+    stream_.expires_after(kAnswerTime);
     http::async_write(stream_, response_, [self = shared_from_this()](Error, std::size_t) {
       Error ignored;
       self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
@@ -262,7 +281,12 @@ tcp::acceptor listen(asio::io_context& context, const ViewServerOptions& options
   };
   Error error;
   const auto address = asio::ip::make_address(options.bind, error);
-  if (error) fail(error);
+  if (error)
+    throw std::runtime_error(
+        fmt::format("{}: an address of this machine is needed, such as 127.0.0.1, or 0.0.0.0 for all of them",
+                    options.bind));
+  if (options.port < 0 || options.port > 65535)
+    throw std::runtime_error(fmt::format("port {}: ports are 0 to 65535", options.port));
   const tcp::endpoint endpoint(address, static_cast<std::uint16_t>(options.port));
   tcp::acceptor acceptor(context);
   acceptor.open(endpoint.protocol(), error);
@@ -273,10 +297,51 @@ tcp::acceptor listen(asio::io_context& context, const ViewServerOptions& options
   return acceptor;
 }
 
-std::string printed_address(const tcp::endpoint& at, const std::string& token) {
-  const std::string text = at.address().to_string();
-  const std::string host = at.address().is_v6() ? "[" + text + "]" : text;
-  return fmt::format("http://{}:{}/?token={}", host, at.port(), token);
+/// Addresses by which others reach the machine, of the family of `any`; link-local ones, which browsers do
+/// not take, left out.
+std::vector<asio::ip::address> network_addresses(const asio::ip::address& any) {
+  std::vector<asio::ip::address> addresses;
+  ifaddrs* first = nullptr;
+  if (getifaddrs(&first) != 0) return addresses;
+  for (const ifaddrs* at = first; at != nullptr; at = at->ifa_next) {
+    if (at->ifa_addr == nullptr || (at->ifa_flags & IFF_UP) == 0 || (at->ifa_flags & IFF_LOOPBACK) != 0)
+      continue;
+    if (at->ifa_addr->sa_family == AF_INET) {
+      const auto* ipv4 = reinterpret_cast<const sockaddr_in*>(at->ifa_addr);
+      addresses.emplace_back(asio::ip::address_v4(ntohl(ipv4->sin_addr.s_addr)));
+    } else if (at->ifa_addr->sa_family == AF_INET6 && any.is_v6()) {
+      asio::ip::address_v6::bytes_type bytes;
+      std::memcpy(bytes.data(), &reinterpret_cast<const sockaddr_in6*>(at->ifa_addr)->sin6_addr,
+                  bytes.size());
+      if (const asio::ip::address_v6 ipv6(bytes); !ipv6.is_link_local()) addresses.emplace_back(ipv6);
+    }
+  }
+  freeifaddrs(first);
+  return addresses;
+}
+
+/// For people: where it listens at all addresses, each of them, and the machine's name in the local network.
+std::vector<std::string> printed_addresses(const tcp::endpoint& at, const std::string& token) {
+  std::vector<std::string> addresses;
+  const auto add = [&](const std::string& host) {
+    addresses.push_back(fmt::format("http://{}:{}/?token={}", host, at.port(), token));
+  };
+  const auto add_address = [&](const asio::ip::address& address) {
+    add(address.is_v6() ? "[" + address.to_string() + "]" : address.to_string());
+  };
+  if (!at.address().is_unspecified()) {
+    add_address(at.address());
+    return addresses;
+  }
+  for (const auto& address : network_addresses(at.address())) add_address(address);
+  const std::string name = machine_name();
+  if (!addresses.empty() && !name.empty()) add(name.substr(0, name.find('.')) + ".local");
+  if (addresses.empty()) add_address(asio::ip::address_v4::loopback());
+  return addresses;
+}
+
+void take_lowest_priority() {
+  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 19);  // never refused
 }
 
 }  // namespace
@@ -286,12 +351,16 @@ class ViewServer::Impl {
   Impl(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title)
       : acceptor_(listen(context_, options)),
         timer_(context_),
-        hall_{
-            scene, title, {random_secret(), acceptor_.local_endpoint().port(), machine_name()}, connections_},
-        address_(printed_address(acceptor_.local_endpoint(), hall_.door.token())),
+        hall_{scene,
+              title,
+              {{random_secret(), random_secret()}, acceptor_.local_endpoint().port(), machine_name()},
+              connections_},
+        addresses_(printed_addresses(acceptor_.local_endpoint(), hall_.door.token())),
         is_open_to_network_(!acceptor_.local_endpoint().address().is_loopback()) {}
 
   void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words) {
+    take_lowest_priority();
+    const Closing closing(*this);
     accept();
     while (!stop.stop_requested()) {
       serve(viewers_.empty() ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10));
@@ -305,13 +374,29 @@ class ViewServer::Impl {
       for (const auto& viewer : viewers_) viewer->write();
       serve(std::chrono::milliseconds(10));
     }
-    Error error;
-    acceptor_.close(error);  // who comes now is refused instead of waiting for an answer
   }
-  const std::string& address() const { return address_; }
+  const std::vector<std::string>& addresses() const { return addresses_; }
+  int port() const { return port_; }
   bool is_open_to_network() const { return is_open_to_network_; }
 
  private:
+  /// When nobody serves any more, because the run is over or something was thrown: who comes is refused
+  /// instead of waiting for an answer, who watched sees the end.
+  class Closing {
+   public:
+    explicit Closing(Impl& impl) : impl_(impl) {}
+    Closing(const Closing&) = delete;
+    ~Closing() {
+      Error error;
+      impl_.acceptor_.close(error);
+      if (std::uncaught_exceptions() == 0) return;  // they have been told, and may still be reading it
+      for (const auto& viewer : impl_.viewers_) viewer->close();
+    }
+
+   private:
+    Impl& impl_;
+  };
+
   void serve(std::chrono::milliseconds time) {
     bool over = false;
     timer_.expires_after(time);
@@ -326,10 +411,12 @@ class ViewServer::Impl {
     Audience audience{.viewers = viewers_.size(), .is_last = is_last};
     for (const auto& viewer : viewers_) {
       audience.wants_images |= viewer->feed().wants_images();
-      if (const auto command = viewer->feed().take_command()) audience.commands.push_back(*command);
+      for (const ViewCommand command : viewer->feed().take_commands()) audience.commands.push_back(command);
       if (const auto keyframe = viewer->feed().wanted_keyframe()) audience.keyframes.push_back(*keyframe);
     }
+    const auto begin = Clock::now();
     tick(audience, hall_.sight);
+    for (const auto& viewer : viewers_) viewer->excuse(Clock::now() - begin);
     for (const auto& viewer : viewers_) viewer->write();
   }
 
@@ -352,7 +439,8 @@ class ViewServer::Impl {
   asio::steady_timer timer_;
   Hall hall_;
   Viewers viewers_;
-  const std::string address_;
+  const std::vector<std::string> addresses_;
+  const int port_ = acceptor_.local_endpoint().port();
   const bool is_open_to_network_;
   bool accepting_ = false;
 };
@@ -361,8 +449,12 @@ ViewServer::ViewServer(const ViewServerOptions& options, const ViewScene& scene,
     : impl_(std::make_unique<Impl>(options, scene, title)) {}
 ViewServer::~ViewServer() = default;
 
-const std::string& ViewServer::address() const {
-  return impl_->address();
+const std::vector<std::string>& ViewServer::addresses() const {
+  return impl_->addresses();
+}
+
+int ViewServer::port() const {
+  return impl_->port();
 }
 
 bool ViewServer::is_open_to_network() const {

@@ -20,8 +20,9 @@ struct ViewServerOptions {
 /// that of `run`.
 ///
 /// Bounds: 32 connections, 8 of them viewers; requests of 8 KiB and without a body; 5 s for a request to come
-/// in; messages of a viewer of 64 bytes, and 500 of them a second; 10 s for a message to a viewer to go out.
-/// What exceeds a bound is refused, or its connection closed.
+/// in, 30 s for the answer to go out; messages of a viewer of 64 bytes, and 500 of them a second beside
+/// acknowledgements, of which there are no more than messages to it; 10 s for a message to a viewer to go
+/// out. What exceeds a bound is refused, or its connection closed.
 class ViewServer {
  public:
   /// Listens from here on. Throws std::runtime_error when the address cannot be had, or the program was built
@@ -32,7 +33,10 @@ class ViewServer {
   ViewServer& operator=(const ViewServer&) = delete;
 
   /// For people: http://127.0.0.1:8420/?token=...
-  [[nodiscard]] const std::string& address() const;
+  [[nodiscard]] const std::string& address() const { return addresses().front(); }
+  /// All of them, where it listens at every address of the machine.
+  [[nodiscard]] const std::vector<std::string>& addresses() const;
+  [[nodiscard]] int port() const;
   /// Somebody can be reached who is not at this machine.
   [[nodiscard]] bool is_open_to_network() const;
 
@@ -45,8 +49,8 @@ class ViewServer {
   };
   /// Called every 10 ms while somebody is looking, else every 100 ms: brings the scene up to date.
   using Tick = std::function<void(const Audience&, ViewSight& newest)>;
-  /// Until a stop is asked for; viewers then get `last_words()` and what they still lack, for at most three
-  /// seconds.
+  /// At the system's lowest priority, which this thread then keeps. Until a stop is asked for; viewers then
+  /// get `last_words()` and what they still lack, for at most three seconds.
   void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words);
 
  private:

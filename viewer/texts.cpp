@@ -18,12 +18,31 @@ Json json_of(const MapSnapshot::Loop& loop) {
 }
 
 Json json_of(const ViewEvent& event) {
-  return {{"kind", event.kind},         {"text", event.text},
-          {"frame", event.frame},       {"t", event.t},
-          {"keyframe", event.keyframe}, {"partBefore", event.part_before},
-          {"part", event.part},         {"moved", event.moved},
-          {"turned", event.turned},     {"before", event.before},
-          {"after", event.after},       {"loop", event.loop ? json_of(*event.loop) : Json()}};
+  return {{"kind", event.kind},
+          {"text", event.text},
+          {"frame", event.frame},
+          {"t", event.t},
+          {"keyframe", event.keyframe},
+          {"partBefore", event.part_before},
+          {"part", event.part},
+          {"moved", event.moved},
+          {"turned", event.turned},
+          {"before", event.before},
+          {"after", event.after},
+          {"loop", event.loop ? json_of(*event.loop) : Json()},
+          {"scale", event.scale ? Json(*event.scale) : Json()}};
+}
+
+const char* word_of(ViewKind kind) {
+  switch (kind) {
+    case ViewKind::kLive:
+      return "live";
+    case ViewKind::kFinished:
+      return "finished";
+    case ViewKind::kMap:
+      break;
+  }
+  return "map";
 }
 
 /// Names of files may hold bytes that are no UTF-8.
@@ -40,11 +59,22 @@ std::string hello_text(const ViewTitle& title) {
                     {"title", title.title},
                     {"rig", rig},
                     {"stages", title.stages},
-                    {"live", title.live},
+                    {"live", title.kind == ViewKind::kLive},
+                    {"kind", word_of(title.kind)},
+                    {"metres", title.metres},
                     {"hasDeviations", title.has_deviations},
+                    {"hasFirstSeen", title.has_first_seen},
+                    {"hasObservers", title.has_observers},
+                    {"hasTimes", title.has_times},
+                    {"hasQueues", title.kind == ViewKind::kLive},
+                    {"efforts", title.efforts},
                     {"control", title.control},
                     {"keyframeImages", title.keyframe_images},
                     {"periodMs", title.period_ms}}}});
+}
+
+std::string state_text(const ViewScene& scene) {
+  return text_of({{"state", {{"mappingPaused", scene.mapping_paused()}}}});
 }
 
 std::string reasons_text(const std::vector<std::string>& reasons) {

@@ -1,13 +1,15 @@
 #include "twofold/viewer.hpp"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
+#include <stdexcept>
+#include <thread>
 #include <variant>
 #include <vector>
 
@@ -27,8 +29,11 @@ constexpr std::int64_t kMapPeriodNs = 200'000'000;  // between two looks at the 
 constexpr std::int64_t kNobodyPeriodNs =
     1'000'000'000;                      // likewise, of the keyframes alone, while nobody does
 constexpr std::int64_t kMapShare = 60;  // the next look waits this many times what one cost
+constexpr std::size_t kFewPoints =
+    300'000;  // of more, standard deviations would hold up viewers for a second
 constexpr std::int64_t kImagePeriodNs = 200'000'000;
 constexpr std::size_t kRing = 1024;
+constexpr std::size_t kMostFailures = 16;
 
 struct ToldFrame {
   PoseEstimate pose;
@@ -68,6 +73,9 @@ ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   title.rig = rig;
   title.stages = options.stages;
   title.period_ms = 1e3 * options.frame_period;
+  title.metres = options.metric.value_or(rig.sensor != Sensor::kMono);
+  title.efforts = options.efforts;
+  title.has_deviations = true;
   title.control = static_cast<bool>(options.on_command);
   title.keyframe_images = static_cast<bool>(options.recorded_image);
   return title;
@@ -108,11 +116,14 @@ KeyframeImages::Find find_images(const std::function<MapSnapshot()>& map, const 
 }
 
 /// Done, or why it could not be.
-ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCommand)>& obey) {
+ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCommand)>& obey,
+                     ViewScene& scene) {
   ViewEvent event;
   try {
     event.text = obey(command);
     event.kind = describe(command);
+    if (command == ViewCommand::kPauseMapping) scene.set_mapping_paused(true);
+    if (command == ViewCommand::kResumeMapping) scene.set_mapping_paused(false);
   } catch (const std::exception& error) {
     event.kind = "command failed";
     event.text = error.what();
@@ -120,10 +131,6 @@ ViewEvent outcome_of(ViewCommand command, const std::function<std::string(ViewCo
     event.kind = "command failed";
   }
   return event;
-}
-
-void take_lowest_priority() {
-  (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 19);  // never refused
 }
 
 }  // namespace
@@ -135,12 +142,14 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         options_(options),
         title_(title_of(rig, options)),
         keyframe_images_(find_images(map_, options_)),
-        truth_(options.truth, options.truth_t_ns, options.scale_truth),
+        truth_(options.truth, options.truth_t_ns, !title_.metres),
         server_({options.bind, options.port}, scene_, title_) {
+    if (map_ && !title_.metres) scene_.find_scales();
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
     thread_.emplace(WorkerOptions{.name = "viewer"}, [this](const std::stop_token& stop) {
-      take_lowest_priority();
+      self_.store(std::this_thread::get_id(),
+                  std::memory_order_relaxed);  // relaxed: read by this thread, or not equal
       server_.run(
           stop, [this](const ViewServer::Audience& audience, ViewSight& newest) { tick(audience, newest); },
           [] { return std::string("the run is over"); });
@@ -168,9 +177,16 @@ class TWOFOLD_HIDDEN Viewer::Impl {
                        [frame](const auto& shown) { return shown.load(std::memory_order_relaxed) == frame; });
   }
   void push(const ToldPoints& points) { (void)points_.try_push(ToldPoints(points)); }  // likewise
-  void set_waiting(std::size_t keyframes) { waiting_.store(keyframes, std::memory_order_relaxed); }
+  void set_waiting(const QueueLengths& waiting) {
+    frames_waiting_.store(waiting.frames, std::memory_order_relaxed);
+    keyframes_waiting_.store(waiting.keyframes, std::memory_order_relaxed);
+    places_waiting_.store(waiting.places, std::memory_order_relaxed);
+  }
   const ViewServer& server() const { return server_; }
   void finish() {
+    if (self_.load(std::memory_order_relaxed) == std::this_thread::get_id())
+      throw std::logic_error("a viewer is not finished by what it calls");
+    const std::scoped_lock lock(finishing_);
     if (!thread_) return;
     thread_->request_stop();
     (void)thread_->join();
@@ -181,11 +197,37 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   void tick(const ViewServer::Audience& audience, ViewSight& newest) {
     listen();
     for (const ViewCommand command : audience.commands) obey(command);
-    look_at_map(audience);
-    look_at_image(audience.wants_images, newest.image);
-    keyframe_images_.answer(audience.keyframes, steady_now_ns(), newest);
+    attempt("the map cannot be shown", [&] { look_at_map(audience); });
+    attempt("the camera's image cannot be shown",
+            [&] { look_at_image(audience.wants_images, newest.image); });
+    attempt("a keyframe's image cannot be shown",
+            [&] { keyframe_images_.answer(audience.keyframes, steady_now_ns(), newest); });
     ToldPoints points;
     while (points_.try_pop(points)) newest.measured.put(measured_message(points));
+  }
+
+  /// What a callback or a library throws ends nothing but this attempt; each failure is told once.
+  template <class Attempt>
+  void attempt(const char* failure, const Attempt& attempt) {
+    std::string why;
+    try {
+      return attempt();
+    } catch (const std::exception& error) {
+      why = std::string(": ") + error.what();
+    } catch (...) {  // only that it failed is known
+    }
+    if (failures_.size() >= kMostFailures || !failures_.insert(failure + why).second) return;
+    add_here({.kind = "viewer", .text = failure + why});
+  }
+
+  /// Something that happened where the camera is now.
+  void add_here(ViewEvent event) {
+    event.frame = static_cast<std::uint32_t>(newest_.frame);
+    event.part_before = event.part = newest_.map_part;
+    event.before = event.after = newest_.T_world_camera.t;
+    if (scene_.start_ns())
+      event.t = static_cast<float>(1e-9 * static_cast<double>(newest_.t_ns - *scene_.start_ns()));
+    scene_.add(std::move(event));
   }
 
   /// To what was told since the last time.
@@ -195,7 +237,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
       if (const auto* frame = std::get_if<ToldFrame>(&told)) {
         newest_ = frame->pose;
         scene_.add(frame->pose, std::span(frame->stage_ns).first(frame->stages),
-                   waiting_.load(std::memory_order_relaxed));
+                   {frames_waiting_.load(std::memory_order_relaxed),
+                    keyframes_waiting_.load(std::memory_order_relaxed),
+                    places_waiting_.load(std::memory_order_relaxed)});
         find_truth(frame->pose);
       } else {
         scene_.add(std::get<MapEvent>(told));
@@ -206,13 +250,8 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   /// What became of a command is an event, so that all viewers know.
   void obey(ViewCommand command) {
     if (!options_.on_command) return;
-    ViewEvent event = outcome_of(command, options_.on_command);
-    event.frame = static_cast<std::uint32_t>(newest_.frame);
-    event.part_before = event.part = newest_.map_part;
-    event.before = event.after = newest_.T_world_camera.t;
-    if (scene_.start_ns())
-      event.t = static_cast<float>(1e-9 * static_cast<double>(newest_.t_ns - *scene_.start_ns()));
-    scene_.add(std::move(event));
+    ViewEvent event = outcome_of(command, options_.on_command, scene_);
+    add_here(std::move(event));
   }
 
   void find_truth(const PoseEstimate& pose) {
@@ -221,28 +260,51 @@ class TWOFOLD_HIDDEN Viewer::Impl {
       scene_.set_truth(std::move(*truth));
   }
 
-  /// Not before the first pose: times are counted from there.
+  /// Times are counted from the first pose, or, before there is one, from the map's first keyframe.
   void look_at_map(const ViewServer::Audience& audience) {
     const std::int64_t begin_cpu_ns = thread_cpu_ns();
     const bool watched = audience.viewers > 0;
     const bool due = audience.is_last || steady_now_ns() >= (watched ? map_due_ns_ : keyframes_due_ns_);
-    if (!map_ || !scene_.start_ns() || !due) return;
+    if (!map_ || !due) return;
+    map_due_ns_ = keyframes_due_ns_ = steady_now_ns() + kNobodyPeriodNs;  // should it be thrown
     const MapSnapshot map = map_();
-    if (!watched) {
-      scene_.show_keyframes(keyframes_of(map, *scene_.start_ns()));
-    } else if (map.version() != scene_.map_version()) {
-      scene_.show(view_of(map, *scene_.start_ns(), false));
+    if (!scene_.start_ns()) {
+      const auto keyframes = map.keyframes();
+      if (keyframes.empty()) return;
+      scene_.begin(keyframes.front().t_ns);
     }
+    if (!watched) {
+      scene_.show_keyframes(keyframes_of(map, *scene_.start_ns()), map.version());
+    } else if (map.version() != scene_.map_version()) {
+      ViewMap view = view_of(map, *scene_.start_ns(), false);
+      deviations_.put_into(view.points);
+      scene_.show(view);
+    }
+    if (audience.is_last) scene_.release_events(std::numeric_limits<std::uint64_t>::max());
     scene_.add_loops(map.loops());
     const std::int64_t now_ns = steady_now_ns();
     const std::int64_t rest_ns = kMapShare * (thread_cpu_ns() - begin_cpu_ns);
     map_due_ns_ = now_ns + std::max(kMapPeriodNs, rest_ns);
     keyframes_due_ns_ = now_ns + std::max(kNobodyPeriodNs, rest_ns);
+    if (watched && now_ns >= deviations_due_ns_ && scene_.point_count() <= kFewPoints) find_deviations(map);
+  }
+
+  /// Apart from the map, which then is told as often as without them; seen with the map's next version.
+  void find_deviations(const MapSnapshot& map) {
+    const std::int64_t begin_cpu_ns = thread_cpu_ns();
+    deviations_.find(map);
+    deviations_due_ns_ =
+        steady_now_ns() + std::max(kNobodyPeriodNs, kMapShare * (thread_cpu_ns() - begin_cpu_ns));
   }
 
   void look_at_image(bool wanted, NewestMessage& newest) {
     const std::int64_t now_ns = steady_now_ns();
-    if (!wanted || now_ns < image_due_ns_) return;
+    if (!wanted) {
+      wants_image_.store(false, std::memory_order_relaxed);
+      delete image_.exchange(nullptr, std::memory_order_acq_rel);  // whose pixels may be a camera's
+      return;
+    }
+    if (now_ns < image_due_ns_) return;
     wants_image_.store(false, std::memory_order_relaxed);
     const std::unique_ptr<HeldImage> image(image_.exchange(nullptr, std::memory_order_acq_rel));
     if (image == nullptr) return wants_image_.store(true, std::memory_order_relaxed);
@@ -260,7 +322,9 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
   SpscRing<ToldPoints> points_{8};
   PoseEstimate newest_;
-  std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, image_due_ns_ = 0;
+  std::set<std::string> failures_;  // told
+  PointDeviations deviations_;
+  std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, deviations_due_ns_ = 0, image_due_ns_ = 0;
   // Exchanged by both ends, each with acquire and release: pixels written before are seen by whoever takes
   // them, and whoever frees them comes after their last reader.
   std::atomic<HeldImage*> image_{nullptr};
@@ -269,9 +333,12 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   std::atomic<bool> wants_image_{false};
   // Frames whose images were put last. Relaxed: who is late in seeing one shows it without its points.
   std::array<std::atomic<std::int64_t>, 16> shown_;
-  std::size_t images_ = 0;               // the source's
-  std::atomic<std::size_t> waiting_{0};  // relaxed: a number to be shown
-  std::optional<Worker> thread_;         // last: joins before what it uses is destroyed
+  std::size_t images_ = 0;  // the source's
+  // Relaxed: numbers to be shown; they need not be of one moment.
+  std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1};
+  std::atomic<std::thread::id> self_{};
+  std::mutex finishing_;          // guards thread_ from there on
+  std::optional<Worker> thread_;  // last: joins before what it uses is destroyed
 };
 
 Viewer::Viewer(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options)
@@ -280,6 +347,14 @@ Viewer::~Viewer() = default;
 
 std::string Viewer::address() const {
   return impl_->server().address();
+}
+
+std::vector<std::string> Viewer::addresses() const {
+  return impl_->server().addresses();
+}
+
+int Viewer::port() const {
+  return impl_->server().port();
 }
 
 bool Viewer::is_open_to_network() const {
@@ -309,8 +384,8 @@ void Viewer::tell(std::int64_t frame, std::span<const ViewedPoint> points) {
   impl_->push(told);
 }
 
-void Viewer::tell_waiting(std::size_t keyframes) {
-  impl_->set_waiting(keyframes);
+void Viewer::tell_waiting(const QueueLengths& waiting) {
+  impl_->set_waiting(waiting);
 }
 
 bool Viewer::wants_image() const {
@@ -318,8 +393,7 @@ bool Viewer::wants_image() const {
 }
 
 void Viewer::show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner) {
-  if (left.data == nullptr || left.width <= 0 || left.height <= 0 || left.format == ImageFormat::kDepth16)
-    return;
+  if (!can_be_shown(left)) return;
   impl_->put(new HeldImage(owner ? HeldImage{frame, left, std::move(owner)} : own_copy(frame, left)));
 }
 

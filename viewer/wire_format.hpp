@@ -6,22 +6,23 @@
 
 namespace twofold {
 
-// What the viewer's server sends to the page (viewer/page/src/wire.ts reads it). Little-endian; every
-// message, block and record is a multiple of four bytes long, so that the page reads arrays where they lie.
+// What the viewer's server sends to the page (viewer/page/src/wire.ts reads it). Little-endian; blocks and
+// records are multiples of four bytes long, so that the page reads arrays where they lie. Messages are, too,
+// but for images, which end with a JPEG.
 //
 // Binary messages begin with a header:
 //   u32 kind      ViewMessageKind
 //   u32 number    kDelta: ViewDeltaFlags; kFrames: how many; kImage, kMeasured: frame number;
 //                 kKeyframeImage: keyframe
 //   u32 a, b      kDelta: revisions it leads from and to; kImage, kKeyframeImage: width and height of the
-//                 whole image [px]; else 0
+//                 whole image [px]; kMeasured: a is how many points; else 0
 // and go on with
 //   kDelta   blocks: u32 ViewBlock, u32 count, then the records, or, of what is gone, its keys
 //   kFrames  ViewLiveFrame, in the order of time
 //   kImage   a JPEG
 //   kKeyframeImage  likewise; nothing: it has none
 //   kMeasured  ViewedPoint (twofold/viewer.hpp); comes before the frame itself
-// Text messages are JSON: an object with one of the members hello, reasons, truth, events, status
+// Text messages are JSON: an object with one of the members hello, state, reasons, truth, events, status
 // (viewer/texts.hpp).
 //
 // The page says "ack" for each message, "images on", "images off", where hello.keyframeImages is true
@@ -31,11 +32,13 @@ namespace twofold {
 // forget what it had. One that is large comes in several messages; the last has kLast, and until then `from`
 // stays the same.
 //
-// Worlds are those of map parts; poses are T_world_camera [m]; times are seconds since the scene's first
-// moment.
+// Worlds are those of map parts; poses are T_world_camera; lengths are metres, or, where hello.metres is
+// false, of the one camera's own unit; times are seconds since the scene's first moment.
 
-inline constexpr std::uint32_t kViewProtocol = 3;
+inline constexpr std::uint32_t kViewProtocol = 4;
 static_assert(std::endian::native == std::endian::little, "records are sent as they lie in memory");
+
+inline constexpr std::uint32_t kViewNotKnown = 0xffffffffU;  ///< of numbers that may not be known
 
 enum class ViewMessageKind : std::uint32_t {
   kDelta = 1,
@@ -95,16 +98,25 @@ struct ViewKeyframe {
 };
 static_assert(sizeof(ViewKeyframe) == 52);
 
+enum ViewLoop : std::uint8_t {
+  kNoLoop = 0,
+  kClosesLoop = 1,
+  kJoinsParts = 2,  ///< its ends were in two map parts
+};
+
 struct ViewEdge {
   std::uint32_t from = 0;
   std::uint32_t to = 0;
   std::uint16_t shared_points = 0;
   std::uint8_t marginalised = 0;
-  std::uint8_t unused = 0;
+  std::uint8_t loop = 0;  ///< ViewLoop: of MapSnapshot::loops, not of its length in time
 
   [[nodiscard]] std::uint64_t key() const { return std::uint64_t{from} << 32 | to; }
 };
 static_assert(sizeof(ViewEdge) == 12);
+
+/// ViewPathFrame::state, beside those of TrackingState: never looked at, because its successor was there.
+inline constexpr std::uint8_t kViewDropped = 3;
 
 /// A frame of the path. Its final pose is that of its reference keyframe, as it is now, times its pose in
 /// that.
@@ -113,7 +125,7 @@ struct ViewPathFrame {
   float t = 0;                  ///< [s]
   std::uint32_t reference = 0;  ///< keyframe; none: final is causal
   std::uint32_t part = 0;
-  std::uint8_t state = 0;   ///< TrackingState
+  std::uint8_t state = 0;   ///< TrackingState or kViewDropped
   std::uint8_t reason = 0;  ///< why it is lost, or late in a finished run: index into the newest "reasons"
   std::uint8_t keyframe = 0;
   std::uint8_t effort = 0;
@@ -121,10 +133,11 @@ struct ViewPathFrame {
   float causal[3] = {};                       ///< position when the pose was given out
   float in_reference[3] = {};                 ///< position in the reference keyframe's camera
   std::int16_t turned[4] = {0, 0, 0, 32767};  ///< orientation in it: quaternion (x, y, z, w) times 32767
+  float tracking_ms = 0;                      ///< that the tracker worked on it; 0: not known
 
   [[nodiscard]] std::uint32_t key() const { return frame; }
 };
-static_assert(sizeof(ViewPathFrame) == 56);
+static_assert(sizeof(ViewPathFrame) == 60);
 
 inline constexpr int kViewStages = 8;
 
@@ -145,8 +158,11 @@ struct ViewLiveFrame {
   float latency_ms = 0;
   std::uint32_t map_version = 0;
   float stage_ms[kViewStages] = {};  ///< in the order of hello.stages
-  std::uint32_t waiting = 0;         ///< keyframes that wait for the mapper
+  // Or kViewNotKnown.
+  std::uint32_t keyframes_waiting = kViewNotKnown;  ///< for the mapper
+  std::uint32_t frames_waiting = kViewNotKnown;     ///< for the tracker
+  std::uint32_t places_waiting = kViewNotKnown;     ///< keyframes, for the loop closer
 };
-static_assert(sizeof(ViewLiveFrame) == 100 && std::is_trivially_copyable_v<ViewLiveFrame>);
+static_assert(sizeof(ViewLiveFrame) == 108 && std::is_trivially_copyable_v<ViewLiveFrame>);
 
 }  // namespace twofold

@@ -1,9 +1,14 @@
 #include "apps/twofold/graph_export.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <memory>
 
 #include <fmt/format.h>
+
+#include "slam/map_snapshot.hpp"
 
 namespace twofold {
 namespace {
@@ -13,6 +18,13 @@ std::string pose_text(const SE3& T) {
   const Vector3& t = T.translation();
   return fmt::format("{:.12g} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g} {:.12g}", t.x(), t.y(), t.z(), q.x(),
                      q.y(), q.z(), q.w());
+}
+
+/// Along the worst axis [m]; 0: not known.
+float worst_deviation(const MapSnapshot::Point& point) {
+  Eigen::SelfAdjointEigenSolver<Matrix3> solver;
+  solver.computeDirect(Eigen::Map<const Matrix3>(point.covariance.data()), Eigen::EigenvaluesOnly);
+  return static_cast<float>(std::sqrt(std::max(0.0, solver.eigenvalues().maxCoeff())));
 }
 
 /// Upper triangle of weight * identity.
@@ -36,16 +48,34 @@ Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part) {
   return trajectory;
 }
 
-std::vector<PlyPoint> map_points(const GraphSnapshot& graph, KeyframeId part) {
-  std::vector<PlyPoint> points;
-  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
-    const MapPoint& point = graph.point(PointId{p});
-    if (!point.alive() || graph.part(point.anchor) != part) continue;
-    const std::uint8_t grey =
-        point.appearance->pixels[PointAppearance::kCentre * (PointAppearance::kSize + 1)];
-    points.push_back({graph.position(PointId{p}), {grey, grey, grey}});
+std::vector<MapSnapshot::Point> points_with_covariance(const Rig& rig, const GraphSnapshot& graph) {
+  auto version = std::make_shared<MapVersion>();
+  version->graph = graph;
+  return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig, version})).points();
+}
+
+std::vector<PlyPoint> map_points(const std::vector<MapSnapshot::Point>& points, const GraphSnapshot& graph,
+                                 KeyframeId part) {
+  std::vector<std::uint32_t> lines;  // of keyframe_trajectory: the keyframes' ids
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
+    if (keyframe.part == part && !keyframe.culled()) lines.push_back(k);
   }
-  return points;
+  std::vector<PlyPoint> some;
+  for (const MapSnapshot::Point& point : points) {
+    if (point.part != index(part)) continue;
+    const std::uint8_t grey =
+        graph.point(PointId{point.id})
+            .appearance->pixels[PointAppearance::kCentre * (PointAppearance::kSize + 1)];
+    PlyPoint& ply = some.emplace_back(
+        PlyPoint{Vector3(point.position[0], point.position[1], point.position[2]), {grey, grey, grey}});
+    ply.stddev = worst_deviation(point);
+    ply.observers = point.observers;
+    const auto after = std::upper_bound(lines.begin(), lines.end(), point.anchor);
+    if (!lines.empty())
+      ply.first_keyframe = static_cast<std::uint32_t>(std::max<std::ptrdiff_t>(after - lines.begin(), 1) - 1);
+  }
+  return some;
 }
 
 std::string edge_list(const GraphSnapshot& graph, KeyframeId part) {

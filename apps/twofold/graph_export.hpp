@@ -3,17 +3,24 @@
 #include <string>
 #include <vector>
 
+#include "camera/rig.hpp"
 #include "evaluation/trajectory.hpp"
 #include "graph/snapshot.hpp"
 #include "io/files/ply.hpp"
+#include "twofold/map.hpp"
 
 namespace twofold {
 
 /// Poses of the keyframes that were not culled, of one part of the map.
 [[nodiscard]] Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
 
-/// Points that are alive, in the grey of their corner, of one part of the map.
-[[nodiscard]] std::vector<PlyPoint> map_points(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
+/// All that is known of the points. O(their observations).
+[[nodiscard]] std::vector<MapSnapshot::Point> points_with_covariance(const Rig& rig,
+                                                                     const GraphSnapshot& graph);
+
+/// Those of one part of the map, in the grey of their corner; they name lines of keyframe_trajectory.
+[[nodiscard]] std::vector<PlyPoint> map_points(const std::vector<MapSnapshot::Point>& points,
+                                               const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
 
 /// A line for each edge of the part: two keyframes by their places in keyframe_trajectory, the points that
 /// both see, and "covisible" or "marginalised". Ascending.

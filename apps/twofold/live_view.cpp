@@ -13,6 +13,7 @@
 #include "io/files/io_error.hpp"
 #include "slam/conversions.hpp"
 #include "slam/map_snapshot.hpp"
+#include "tracking/effort.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
@@ -28,6 +29,7 @@ ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& 
   options.port = *arguments.port;
   for (std::size_t s = 0; s < kTrackerStages; ++s)
     options.stages.emplace_back(describe(static_cast<TrackerStage>(s)));
+  options.efforts = effort_words();
   for (const TimedPose& pose : source.ground_truth()) {
     options.truth.push_back(to_pose(pose.T_w_c));
     options.truth_t_ns.push_back(pose.t_ns);
@@ -58,22 +60,29 @@ void add_view_options(CLI::App& command, ViewArguments& arguments, const std::st
       ->type_name("[PORT]");
   command
       .add_option("--view-bind", arguments.bind,
-                  "Address to listen on: any but 127.0.0.1 shows camera and map to the network")
+                  "Address to listen on: any but a loopback address shows camera and map to the network; "
+                  "0.0.0.0: all of the machine's")
       ->capture_default_str();
   command.add_flag(
       "--view-control", arguments.control,
       "Viewers may save the map (to map.tfm in the output folder), pause mapping, and end the run");
 }
 
-void print_view_address(const std::string& address, bool is_open_to_network) {
-  fmt::print(stderr, "view at     {}\n", address);
-  if (is_open_to_network) {
-    fmt::print(
-        stderr,
-        "note        whoever reaches this machine and sees this address sees the camera, unencrypted; safer: "
-        "no --view-bind, and `ssh -L {0}:localhost:{0} THIS_MACHINE` from there\n",
-        kUsualViewPort);
-  }
+std::vector<std::string> effort_words() {
+  std::vector<std::string> words;
+  for (int level = 0; level < kEffortLevels; ++level)
+    words.emplace_back(describe(static_cast<EffortLevel>(level)));
+  return words;
+}
+
+void print_view_addresses(const ViewAddresses& viewer) {
+  for (const std::string& address : viewer.addresses) fmt::print(stderr, "view at     {}\n", address);
+  if (!viewer.is_open_to_network) return;
+  fmt::print(
+      stderr,
+      "note        whoever reaches this machine and sees this address sees the camera{0}, unencrypted; "
+      "safer: no {1}, and `ssh -L {2}:localhost:{2} THIS_MACHINE` from there\n",
+      viewer.control ? " and may end the run" : "", viewer.bind_option, viewer.port);
 }
 
 ViewedImage viewed_image(const cv::Mat& image) {
@@ -98,7 +107,7 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
     return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps_.newest()}));
   };
   ViewerOptions viewer = viewer_options(arguments, title, source);
-  viewer.scale_truth = scale_is_arbitrary(rig_, options);
+  viewer.metric = !scale_is_arbitrary(rig_, options);
   if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
   if (images) viewer.recorded_image = [images](std::int64_t t_ns) { return viewed_image(images(t_ns)); };
   measured_.reserve(kMostMeasured);
@@ -108,7 +117,10 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
     throw IoError("--view", error.what());
   }
   listen(options);
-  print_view_address(viewer_->address(), viewer_->is_open_to_network());
+  print_view_addresses({.addresses = viewer_->addresses(),
+                        .port = viewer_->port(),
+                        .is_open_to_network = viewer_->is_open_to_network(),
+                        .control = arguments.control});
 }
 
 void LiveView::listen(EngineOptions& options) {
@@ -176,7 +188,10 @@ void LiveView::show(const Frame& frame) {
 }
 
 void LiveView::show(const Progress& progress) {
-  if (viewer_) viewer_->tell_waiting(progress.queued);
+  const auto length = [](std::size_t waiting) { return static_cast<std::int64_t>(waiting); };
+  if (viewer_)
+    viewer_->tell_waiting(
+        {length(progress.frames_waiting), length(progress.queued), length(progress.places_waiting)});
 }
 
 void LiveView::finish() {

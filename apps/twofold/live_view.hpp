@@ -31,8 +31,18 @@ struct ViewArguments {
 void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description);
 /// For those who look at it.
 [[nodiscard]] ViewedImage viewed_image(const cv::Mat& image);
-/// The address and, when others can reach it, a warning.
-void print_view_address(const std::string& address, bool is_open_to_network);
+/// Words of the effort levels.
+[[nodiscard]] std::vector<std::string> effort_words();
+/// Where a viewer can be reached.
+struct ViewAddresses {
+  std::vector<std::string> addresses;
+  int port = 0;
+  bool is_open_to_network = false;
+  const char* bind_option = "--view-bind";  ///< that opened it
+  bool control = false;                     ///< who looks may command
+};
+/// Addresses and, when others can reach them, a warning.
+void print_view_addresses(const ViewAddresses& viewer);
 
 /// The viewer of `twofold run --view`; nothing without that option.
 class LiveView {

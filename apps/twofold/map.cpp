@@ -63,7 +63,8 @@ void export_map(const ExportArguments& arguments) {
     throw IoError("map export", "name at least one of --ply, --g2o, --tum");
   }
   const SavedMap map = open_map(arguments.file);
-  if (!arguments.ply.empty()) write_ply(arguments.ply, map_points(map.graph));
+  if (!arguments.ply.empty())
+    write_ply(arguments.ply, map_points(points_with_covariance(map.rig, map.graph), map.graph));
   if (!arguments.tum.empty()) write_tum_trajectory(arguments.tum, keyframe_trajectory(map.graph));
   if (!arguments.g2o.empty()) write_file(arguments.g2o, g2o_text(map.graph));
 }

@@ -12,6 +12,7 @@
 #include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "apps/twofold/run_summary.hpp"
+#include "apps/twofold/view/run_frames.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -54,6 +55,7 @@ void remove_part_files(const std::filesystem::path& folder, std::size_t parts) {
   for (std::size_t n = parts; remove("trajectory", n, ".txt"); ++n) {
     remove("keyframes", n, ".txt");
     remove("map", n, ".ply");
+    remove("edges", n, ".txt");
   }
 }
 
@@ -99,13 +101,15 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   write_tum_trajectory(folder / "trajectory.txt", final_poses);
   replace_causal_trajectory(folder / "trajectory_causal.txt", causal_poses);
   remove_part_files(folder, parts.size());
+  const auto points = points_with_covariance(source.rig(), result.graph);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (n > 0) write_tum_trajectory(folder / part_file("trajectory", n, ".txt"), parts[n].trajectory);
     write_tum_trajectory(folder / part_file("keyframes", n, ".txt"),
                          keyframe_trajectory(result.graph, parts[n].id));
-    write_ply(folder / part_file("map", n, ".ply"), map_points(result.graph, parts[n].id));
+    write_ply(folder / part_file("map", n, ".ply"), map_points(points, result.graph, parts[n].id));
+    write_file(folder / part_file("edges", n, ".txt"), edge_list(result.graph, parts[n].id));
   }
-  write_file(folder / "edges.txt", edge_list(result.graph, parts.front().id));
+  write_run_frames(folder / "frames.txt", result, options.pacing.keeps_pace());
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
   const bool no_scale = scale_is_arbitrary(source.rig(), options);
@@ -126,9 +130,9 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
 
 void remove_results(const std::filesystem::path& folder) {
   std::error_code error;
-  for (const char* file : {"trajectory.txt", "keyframes.txt", "edges.txt", "map.ply", "groundtruth.txt",
-                           "timing.json", "summary.json", "loop_latency.txt", "trajectory.png", "surface.ply",
-                           "surface.glb", "cloud.ply", "object.json"})
+  for (const char* file : {"trajectory.txt", "keyframes.txt", "frames.txt", "edges.txt", "map.ply",
+                           "groundtruth.txt", "timing.json", "summary.json", "loop_latency.txt",
+                           "trajectory.png", "surface.ply", "surface.glb", "cloud.ply", "object.json"})
     std::filesystem::remove(folder / file, error);
   remove_part_files(folder, 1);
 }

@@ -74,8 +74,10 @@ Json loops_json(const RunResult& result) {
   for (const ClosedLoop& loop : result.loops) {
     const Vector6 drift = loop.drift();
     const Json travelled = loop.joins_parts ? Json() : Json(loop.travelled);
+    const auto older = result.graph.live_replacement(loop.constraint.from);
     loops.push_back({{"t_ns", loop.t_ns},
                      {"from", index(loop.constraint.from)},
+                     {"from_t_ns", older ? Json(result.graph.keyframe(older->id).t_ns) : Json()},
                      {"to", index(loop.constraint.to)},
                      {"inliers", loop.constraint.inliers},
                      {"scale", loop.constraint.scale},

@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "twofold/estimate.hpp"
 #include "twofold/map.hpp"
+#include "twofold/queue_lengths.hpp"
 #include "twofold/types.hpp"
 
 namespace twofold {
@@ -44,14 +46,16 @@ struct ViewerOptions {
   /// Address to listen on. Any but a loopback address shows camera and map to the network, unencrypted: from
   /// another machine, `ssh -L 8420:localhost:8420 ROBOT` is the better way.
   std::string bind = "127.0.0.1";
-  int port = 8420;                       ///< 0: any that is free
-  std::vector<std::string> stages = {};  ///< names of what `tell` is given times of, at most 8
-  double frame_period = 0;               ///< the budget of a frame [s]; 0: as the frames' times say
-  std::vector<Pose> truth = {};          ///< T_world_camera of the true path, if it is known, in any world
+  int port = 8420;                        ///< 0: any that is free
+  std::vector<std::string> stages = {};   ///< names of what `tell` is given times of, at most 8
+  std::vector<std::string> efforts = {};  ///< words of PoseEstimate::effort, from 0 on; may be none
+  double frame_period = 0;                ///< the budget of a frame [s]; 0: as the frames' times say
+  std::vector<Pose> truth = {};           ///< T_world_camera of the true path, if it is known, in any world
   std::vector<std::int64_t> truth_t_ns = {};  ///< its times, ascending, as many; else nothing is shown
-  /// The map has a unit of length of its own, as that of one camera (Sensor::kMono): the true path is scaled
-  /// to the tracked one, and the page says so.
-  bool scale_truth = false;
+  /// Whether lengths are metres; else the map has a unit of its own: the page writes lengths without one,
+  /// says by how much corrections changed the scale, and lays the true path scaled upon the tracked one.
+  /// Nothing: as the rig says, false for Sensor::kMono.
+  std::optional<bool> metric = {};
   /// Does what a viewer asks for, on the viewer's thread, and says in a sentence what it did; what it throws
   /// is told as a failure. Empty: viewers can only look.
   std::function<std::string(ViewCommand)> on_command = {};
@@ -86,6 +90,9 @@ class TWOFOLD_API Viewer {
 
   /// With its token: who knows it may look.
   [[nodiscard]] std::string address() const;
+  /// Where it listens at all addresses of the machine (bind = "0.0.0.0"), each of them; else the one.
+  [[nodiscard]] std::vector<std::string> addresses() const;
+  [[nodiscard]] int port() const;
   [[nodiscard]] bool is_open_to_network() const;
 
   // Of one thread, the tracker's: copies into a ring, and nothing else; no lock, no allocation, no system
@@ -99,8 +106,8 @@ class TWOFOLD_API Viewer {
   /// The frame's measurements, before its pose is told; the first 512.
   void tell(std::int64_t frame, std::span<const ViewedPoint> points);
 
-  /// Any thread: keyframes that wait for the mapper.
-  void tell_waiting(std::size_t keyframes);
+  /// Any thread, one at a time: what waits for the engine's threads.
+  void tell_waiting(const QueueLengths& waiting);
 
   // Of one thread, that of the images' source.
 

@@ -28,25 +28,29 @@ void take(const char*& bytes, T& value) {
   bytes += sizeof(T);
 }
 
-constexpr std::size_t kPointBytes = 3 * sizeof(double) + 3 + sizeof(float);
+constexpr std::size_t kShortBytes =
+    3 * sizeof(double) + 3 + sizeof(float);  // without the last two properties
+constexpr std::size_t kPointBytes = kShortBytes + 2 * sizeof(std::uint32_t);
 
-std::string header(std::size_t points) {
+std::string header(std::size_t points, bool is_short) {
   return fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex {}\n"
       "property double x\nproperty double y\nproperty double z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float stddev\nend_header\n",
-      points);
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float stddev\n{}end_header\n",
+      points, is_short ? "" : "property uint first_keyframe\nproperty uint observers\n");
 }
 
 }  // namespace
 
 void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> points) {
-  std::string bytes = header(points.size());
+  std::string bytes = header(points.size(), false);
   bytes.reserve(bytes.size() + points.size() * kPointBytes);
   for (const PlyPoint& point : points) {
     for (const double x : point.x_w) append(x, &bytes);
     for (const std::uint8_t c : point.rgb) append(c, &bytes);
     append(point.stddev, &bytes);
+    append(point.first_keyframe, &bytes);
+    append(point.observers, &bytes);
   }
   write_file(file, bytes);
 }
@@ -58,8 +62,10 @@ std::vector<PlyPoint> read_ply(const std::filesystem::path& file) {
   // The file's size tells the number of points, and so what its header must be.
   const std::size_t end = bytes.find("end_header\n");
   const std::size_t begin = end == std::string::npos ? bytes.size() : end + std::strlen("end_header\n");
-  const std::size_t count = (bytes.size() - begin) / kPointBytes;
-  if (bytes.size() != begin + count * kPointBytes || bytes.compare(0, begin, header(count)) != 0)
+  const bool is_short = std::string_view(bytes).substr(0, begin).find("first_keyframe") == std::string::npos;
+  const std::size_t point_bytes = is_short ? kShortBytes : kPointBytes;
+  const std::size_t count = (bytes.size() - begin) / point_bytes;
+  if (bytes.size() != begin + count * point_bytes || bytes.compare(0, begin, header(count, is_short)) != 0)
     throw IoError(file.string(), "is no PLY file of this program, or damaged");
   std::vector<PlyPoint> points(count);
   const char* at = bytes.data() + begin;
@@ -67,6 +73,9 @@ std::vector<PlyPoint> read_ply(const std::filesystem::path& file) {
     for (double& x : point.x_w) take(at, x);
     for (std::uint8_t& c : point.rgb) take(at, c);
     take(at, point.stddev);
+    if (is_short) continue;
+    take(at, point.first_keyframe);
+    take(at, point.observers);
   }
   return points;
 }

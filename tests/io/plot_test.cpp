@@ -37,7 +37,7 @@ TEST(Ply, WritesHeaderAndPoints) {
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   EXPECT_NE(bytes.find("element vertex 2\n"), std::string::npos);
   const auto body = bytes.find("end_header\n") + 11;
-  ASSERT_EQ(bytes.size() - body, 2 * (24 + 3 + 4u));
+  ASSERT_EQ(bytes.size() - body, 2 * (24 + 3 + 4 + 8u));
   double xyz[3];
   std::memcpy(xyz, &bytes[body], sizeof(xyz));
   EXPECT_EQ(xyz[2], 3.0);
@@ -45,16 +45,32 @@ TEST(Ply, WritesHeaderAndPoints) {
   EXPECT_IO_ERROR(write_ply("/nonexistent/m.ply", points), "cannot be written");
 }
 
+TEST(Ply, ReadsFilesOfTheTimeBeforePointsHadFirstKeyframes) {
+  const ScratchFolder folder;
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex 1\n"
+      "property double x\nproperty double y\nproperty double z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float stddev\nend_header\n";
+  bytes += std::string(24 + 3 + 4, '\0');
+  folder.write("m.ply", bytes);
+  const auto read = read_ply(folder.path() / "m.ply");
+  ASSERT_EQ(read.size(), 1U);
+  EXPECT_EQ(read[0].first_keyframe, PlyPoint::kUnknown);
+}
+
 TEST(Ply, ReadsWhatWasWrittenAndNothingElse) {
   const ScratchFolder folder;
-  const PlyPoint points[] = {{Vector3(1, 2, 3), {10, 20, 30}, 0.5f}, {Vector3(-4, 0, 0), {}, 0}};
+  const PlyPoint points[] = {{Vector3(1, 2, 3), {10, 20, 30}, 0.5f, 7, 3}, {Vector3(-4, 0, 0), {}, 0}};
   write_ply(folder.path() / "m.ply", points);
   const auto read = read_ply(folder.path() / "m.ply");
   ASSERT_EQ(read.size(), 2U);
   EXPECT_EQ(read[0].x_w, points[0].x_w);
   EXPECT_EQ(read[0].rgb, points[0].rgb);
   EXPECT_EQ(read[0].stddev, 0.5F);
+  EXPECT_EQ(read[0].first_keyframe, 7U);
+  EXPECT_EQ(read[0].observers, 3U);
   EXPECT_EQ(read[1].x_w, points[1].x_w);
+  EXPECT_EQ(read[1].first_keyframe, PlyPoint::kUnknown);
   std::filesystem::resize_file(folder.path() / "m.ply",
                                std::filesystem::file_size(folder.path() / "m.ply") - 1);
   EXPECT_IO_ERROR((void)read_ply(folder.path() / "m.ply"), "damaged");

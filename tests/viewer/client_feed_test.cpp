@@ -43,13 +43,14 @@ TEST_F(ClientFeedTest, GreetsThenTellsEverythingThenIsSilent) {
   scene_.add(closed);
   ClientFeed feed(scene_, title_);
   const auto messages = drain(feed);
-  ASSERT_EQ(messages.size(), 4U);
+  ASSERT_EQ(messages.size(), 5U);
   EXPECT_TRUE(messages[0].text);
   EXPECT_NE(messages[0].bytes->find("\"hello\""), std::string::npos);
-  EXPECT_NE(messages[1].bytes->find("loop closure"), std::string::npos);
-  EXPECT_EQ(header(messages[2]).kind, ViewMessageKind::kFrames);
-  EXPECT_EQ(header(messages[3]).kind, ViewMessageKind::kDelta);
-  EXPECT_EQ(header(messages[3]).number, kWhole | kLast);
+  EXPECT_NE(messages[1].bytes->find("\"mappingPaused\":false"), std::string::npos);
+  EXPECT_NE(messages[2].bytes->find("loop closure"), std::string::npos);
+  EXPECT_EQ(header(messages[3]).kind, ViewMessageKind::kFrames);
+  EXPECT_EQ(header(messages[4]).kind, ViewMessageKind::kDelta);
+  EXPECT_EQ(header(messages[4]).number, kWhole | kLast);
   EXPECT_TRUE(drain(feed).empty());
 }
 
@@ -90,7 +91,7 @@ TEST_F(ClientFeedTest, ImagesGoToThoseWhoWantThem) {
   ClientFeed with(scene_, title_), without(scene_, title_);
   EXPECT_TRUE(with.take("images on"));
   EXPECT_EQ(drain(with).back().bytes, sight_.image.bytes);
-  EXPECT_EQ(drain(without).size(), 1U);
+  EXPECT_EQ(drain(without).size(), 2U) << "greeting and state";
   EXPECT_TRUE(drain(with).empty()) << "the same image twice";
 }
 
@@ -110,11 +111,27 @@ TEST_F(ClientFeedTest, CommandsAreNonsenseUnlessTheyAreAllowed) {
   EXPECT_FALSE(ClientFeed(scene_, title_).take("stop"));
   title_.control = true;
   ClientFeed feed(scene_, title_);
-  EXPECT_FALSE(feed.take_command());
-  EXPECT_TRUE(feed.take("save map"));
-  EXPECT_EQ(feed.take_command(), ViewCommand::kSaveMap);
-  EXPECT_FALSE(feed.take_command()) << "once";
+  EXPECT_TRUE(feed.take_commands().empty());
+  for (const char* wish : {"pause mapping", "save map", "stop", "pause mapping"})
+    EXPECT_TRUE(feed.take(wish));
+  EXPECT_EQ(feed.take_commands(),
+            (std::vector{ViewCommand::kSaveMap, ViewCommand::kStop, ViewCommand::kPauseMapping}))
+      << "none is lost, each comes once";
+  EXPECT_TRUE(feed.take_commands().empty()) << "once";
   EXPECT_FALSE(feed.take("save map /etc/passwd"));
+}
+
+TEST_F(ClientFeedTest, StateIsWhatHoldsNowHoweverLongAgoItBegan) {
+  ClientFeed feed(scene_, title_);
+  drain(feed);
+  scene_.set_mapping_paused(true);
+  scene_.set_mapping_paused(true);
+  const auto told = drain(feed);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_NE(told[0].bytes->find("\"mappingPaused\":true"), std::string::npos);
+  for (std::size_t n = 0; n <= ViewScene::kMaxEvents; ++n) scene_.add(MapEvent{});  // pausing is forgotten
+  ClientFeed late(scene_, title_);
+  EXPECT_NE(drain(late)[1].bytes->find("\"mappingPaused\":true"), std::string::npos);
 }
 
 TEST_F(ClientFeedTest, AKeyframesImageGoesToWhoAskedForIt) {
@@ -138,7 +155,7 @@ TEST_F(ClientFeedTest, AKeyframesImageGoesToWhoAskedForIt) {
   ASSERT_EQ(messages.size(), 1U);
   EXPECT_EQ(*messages[0].bytes, "picture");
   EXPECT_FALSE(feed.wanted_keyframe());
-  EXPECT_EQ(drain(other).size(), 1U) << "the greeting, and nothing that it did not ask for";
+  EXPECT_EQ(drain(other).size(), 2U) << "greeting and state, and nothing that it did not ask for";
 }
 
 TEST_F(ClientFeedTest, TheEndIsToldBeforeWhatIsLacking) {
@@ -151,8 +168,8 @@ TEST_F(ClientFeedTest, TheEndIsToldBeforeWhatIsLacking) {
   EXPECT_NE(words->bytes->find("that was all"), std::string::npos);
   EXPECT_FALSE(feed.is_done());
   const auto rest = drain(feed);
-  ASSERT_EQ(rest.size(), 1U);
-  EXPECT_EQ(header(rest[0]).number, kWhole | kLast);
+  ASSERT_EQ(rest.size(), 2U);
+  EXPECT_EQ(header(rest[1]).number, kWhole | kLast);
   EXPECT_TRUE(feed.is_done());
 }
 

@@ -6,6 +6,7 @@ namespace twofold {
 namespace {
 
 const std::string kSecret = "00112233445566778899aabbccddeeff";
+const std::string kCookie = "ffeeddccbbaa99887766554433221100";
 
 class ViewDoorTest : public ::testing::Test {
  protected:
@@ -18,8 +19,8 @@ class ViewDoorTest : public ::testing::Test {
     return door_.judge({"GET", "/live?token=" + kSecret, host, origin, cookie, true});
   }
 
-  ViewDoor door_{kSecret, 8420, "robot"};
-  const std::string cookie_ = "twofold-8420=" + kSecret;
+  ViewDoor door_{{kSecret, kCookie}, 8420, "Robot.lab.example"};
+  const std::string cookie_ = "twofold-8420=" + kCookie;
 };
 
 TEST_F(ViewDoorTest, TokenOpensThePageAndCookieTheRest) {
@@ -35,17 +36,21 @@ TEST_F(ViewDoorTest, WithoutTokenOrWithAnotherNobodyEnters) {
   EXPECT_EQ(page("/?token=" + kSecret.substr(1) + "0"), Admission::kNoToken);
   EXPECT_EQ(page("/?token=" + kSecret + "0"), Admission::kNoToken);
   EXPECT_EQ(page("/?nottoken=" + kSecret), Admission::kNoToken);
-  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8421=" + kSecret), Admission::kNoToken);
+  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8421=" + kCookie), Admission::kNoToken);
   EXPECT_EQ(socket("http://127.0.0.1:8420", ""), Admission::kNoToken) << "a token in a socket's address";
+  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8420=" + kSecret), Admission::kNoToken);
+  EXPECT_EQ(page("/?token=" + kCookie), Admission::kNoToken)
+      << "who saw the cookie does not know the address";
 }
 
 TEST_F(ViewDoorTest, NamesOfOthersAreRefused) {
-  for (const char* host :
-       {"", "evil.example", "evil.example:8420", "127.0.0.1.evil.example", "localhost.evil.example:8420",
-        "127.0.0.1:", "127.0.0.1:84200000", "127.0.0.1:84a", "[::1", "robot.example", "127.0.0.1 "})
+  for (const char* host : {"", "evil.example", "evil.example:8420", "127.0.0.1.evil.example",
+                           "localhost.evil.example:8420", "127.0.0.1:", "127.0.0.1:84200000", "127.0.0.1:84a",
+                           "[::1", "robot.example", "robot.lab", "robot.local.evil.example", "127.0.0.1 "})
     EXPECT_EQ(page("/?token=" + kSecret, host), Admission::kBadHost) << host;
   for (const char* host :
-       {"localhost", "localhost:9000", "127.0.0.1:8420", "[::1]:8420", "192.168.1.7:8420", "robot:8420"})
+       {"localhost", "localhost:9000", "127.0.0.1:8420", "[::1]:8420", "192.168.1.7:8420", "robot:8420",
+        "ROBOT:8420", "robot.local:8420", "Robot.Local", "robot.lab.example:8420"})
     EXPECT_EQ(page("/?token=" + kSecret, host), Admission::kByToken) << host;
 }
 
@@ -55,6 +60,11 @@ TEST_F(ViewDoorTest, PagesOfOthersAreRefused) {
         "http://127.0.0.1:8420.evil.example", "http://localhost:8420"})
     EXPECT_EQ(socket(origin, cookie_), Admission::kBadOrigin) << origin;
   EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "http://evil.example", cookie_), Admission::kBadOrigin);
+}
+
+TEST_F(ViewDoorTest, NamesAreTheSameInUpperAndLowerCase) {
+  EXPECT_EQ(socket("http://robot.local:8420", cookie_, "robot.local:8420"), Admission::kByCookie);
+  EXPECT_EQ(socket("http://robot.local:8420", cookie_, "Robot.local:8420"), Admission::kByCookie);
 }
 
 TEST_F(ViewDoorTest, AnswersGetAlone) {

@@ -1,5 +1,7 @@
 #include "viewer/keyframe_images.hpp"
 
+#include "viewer/image_message.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -54,6 +56,38 @@ TEST_F(KeyframeImagesTest, WhatCannotBeReadIsAnswered) {
     EXPECT_EQ(sight_.keyframe, keyframe);
     EXPECT_EQ(sight_.keyframe_image.bytes->size(), sizeof(ViewMessageHeader)) << "and nothing behind it";
   }
+}
+
+TEST(KeyframeImages, ThatThereWasNoneIsNotRemembered) {
+  bool there = false;
+  const std::vector<std::uint8_t> pixels(48, 99);
+  KeyframeImages images([&](std::uint32_t) {
+    return there ? ViewedImage{{pixels.data(), 8, 6, 8}, nullptr} : ViewedImage();
+  });
+  ViewSight sight;
+  images.answer(std::vector<std::uint32_t>{3}, 0, sight);
+  EXPECT_EQ(sight.keyframe, 3U);
+  EXPECT_EQ(sight.keyframe_image.bytes->size(), sizeof(ViewMessageHeader));
+  there = true;
+  images.answer(std::vector<std::uint32_t>{}, 1'000'000'000, sight);
+  EXPECT_EQ(sight.keyframe, kNoId) << "who clicks now does not get the old answer";
+  images.answer(std::vector<std::uint32_t>{3}, 1'000'000'001, sight);
+  EXPECT_EQ(sight.keyframe, 3U);
+  EXPECT_GT(sight.keyframe_image.bytes->size(), sizeof(ViewMessageHeader));
+}
+
+TEST(ViewedImages, OddImagesAreNone) {
+  const std::vector<std::uint16_t> pixels(4096, 9);
+  const auto shown = [&](int width, int height, std::ptrdiff_t stride, ImageFormat format) {
+    const ImageView image{pixels.data(), width, height, stride, format};
+    return image_message(ViewMessageKind::kImage, 0, image).size() > sizeof(ViewMessageHeader);
+  };
+  EXPECT_TRUE(shown(8, 8, 8, ImageFormat::kGrey8));
+  EXPECT_TRUE(shown(2000, 1, 2000, ImageFormat::kGrey8)) << "its height must not be rounded to none";
+  EXPECT_FALSE(shown(0, 8, 8, ImageFormat::kGrey8));
+  EXPECT_FALSE(shown(8, -1, 8, ImageFormat::kGrey8));
+  EXPECT_FALSE(shown(8, 8, 8, ImageFormat::kRgb8)) << "rows that overlap";
+  EXPECT_FALSE(shown(8, 8, 16, ImageFormat::kDepth16));
 }
 
 }  // namespace

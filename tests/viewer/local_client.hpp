@@ -78,13 +78,29 @@ inline std::string http_request(const std::string& target, const std::string& mo
   return request.append("\r\n");
 }
 
-inline std::string upgrade_request(int port, const std::string& token, const std::string& origin = "") {
+/// Cookie that the token is worth; the token itself, if it is worth none.
+inline std::string cookie_for(int port, const std::string& token) {
+  LocalClient client(port);
+  client.send(http_request("/?token=" + token));
+  const std::string answer = client.receive();
+  const std::string name = "Set-Cookie: twofold-" + std::to_string(port) + "=";
+  const std::size_t at = answer.find(name);
+  return at == std::string::npos ? token : answer.substr(at + name.size(), 32);
+}
+
+/// What asks for the WebSocket.
+inline std::string upgrade_headers() {
+  return "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+         "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
+}
+
+inline std::string upgrade_request(int port, const std::string& token, const std::string& origin = "",
+                                   const std::string& target = "/live") {
   const std::string host = "127.0.0.1:" + std::to_string(port);
-  return http_request("/live",
-                      "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-                      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nOrigin: " +
-                          (origin.empty() ? "http://" + host : origin) + "\r\nCookie: twofold-" +
-                          std::to_string(port) + "=" + token + "\r\n",
+  return http_request(target,
+                      upgrade_headers() + "Origin: " + (origin.empty() ? "http://" + host : origin) +
+                          "\r\nCookie: twofold-" + std::to_string(port) + "=" + cookie_for(port, token) +
+                          "\r\n",
                       host);
 }
 

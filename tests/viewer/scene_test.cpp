@@ -32,7 +32,7 @@ std::vector<Record> records(const ViewScene::Delta& delta, ViewBlock kind) {
     for (std::size_t at = sizeof(ViewMessageHeader); at < message->size();) {
       std::uint32_t block[2];
       std::memcpy(block, message->data() + at, sizeof block);
-      const std::size_t sizes[] = {0, 28, 4, 52, 4, 12, 8, 56, 4};
+      const std::size_t sizes[] = {0, 28, 4, 52, 4, 12, 8, 60, 4};
       at += sizeof block;
       if (block[0] == static_cast<std::uint32_t>(kind)) {
         const std::size_t before = found.size();
@@ -47,9 +47,11 @@ std::vector<Record> records(const ViewScene::Delta& delta, ViewBlock kind) {
 
 TEST(ViewScene, MessagesAreThoseThatThePageIsTestedWith) {
   ViewScene scene;
-  scene.show(small_map(3));
+  ViewMap first = small_map(3);
+  first.edges[1].loop = kClosesLoop;
+  scene.show(first);
   const std::array<std::int64_t, 2> stages{1'000'000, 2'500'000};
-  scene.add(tracked_pose(4, 2), stages, 7);
+  scene.add(tracked_pose(4, 2), stages, {.frames = 2, .keyframes = 7});
   const auto whole = scene.delta(0);
   const Revision before = scene.revision();
   ViewMap map = small_map(3, 2);
@@ -178,6 +180,65 @@ TEST(ViewScene, ALoopIsAnEventOnceAndSaysItsScale) {
   EXPECT_EQ(told[0].at("moved"), 0.5);
   scene.add(MapEvent{});
   EXPECT_TRUE(nlohmann::json::parse(events_text(scene, 2)).at("events")[0].at("loop").is_null());
+}
+
+TEST(ViewScene, EdgesThatCloseLoopsAreThoseOfTheLoops) {
+  ViewMap map = small_map(5);
+  map.keyframes.erase(map.keyframes.begin() + 3);  // keyframe 2 stands for it
+  MapSnapshot::Loop closes, joins, along;
+  closes.from = 0, closes.to = 3;
+  joins.from = 1, joins.to = 4, joins.joins_parts = true;
+  along.from = 1, along.to = 2;  // an edge there is already
+  mark_loops({closes, joins, along}, map);
+  std::vector<std::array<int, 3>> marked;
+  for (const ViewEdge& edge : map.edges)
+    if (edge.loop != kNoLoop)
+      marked.push_back({static_cast<int>(edge.from), static_cast<int>(edge.to), edge.loop});
+  EXPECT_EQ(marked, (std::vector<std::array<int, 3>>{{0, 2, 1}, {1, 2, 1}, {1, 4, 2}}));
+  EXPECT_EQ(map.edges.size(), 6U) << "two were added";
+  EXPECT_TRUE(std::is_sorted(map.edges.begin(), map.edges.end(),
+                             [](const ViewEdge& a, const ViewEdge& b) { return a.key() < b.key(); }));
+}
+
+/// A correction that version 2 of the map made, seen by a frame before the viewer has that map.
+MapEvent correction_of(std::uint64_t version) {
+  MapEvent event;
+  event.kind = MapEventKind::kPoseGraph;
+  event.t_ns = 2'000'000'000;
+  event.map_version = version;
+  event.keyframe = 2;
+  event.map_part = event.map_part_before = 0;
+  return event;
+}
+
+TEST(ViewScene, ACorrectionSaysTheScaleWhereTheUnitIsArbitrary) {
+  ViewScene scene;
+  scene.find_scales();
+  scene.show(small_map(3));
+  scene.add(correction_of(2));
+  MapEvent found;
+  found.kind = MapEventKind::kRelocalisation;
+  scene.add(found);
+  EXPECT_EQ(scene.end_event(), 0U) << "waits for the map that it tells of, and the next for its turn";
+  ViewMap map = small_map(3, 2);
+  for (ViewKeyframe& keyframe : map.keyframes) keyframe.position[0] = 5 + 1.25F * keyframe.position[0];
+  scene.show(map);
+  ASSERT_EQ(scene.end_event(), 2U);
+  ASSERT_TRUE(scene.event(0).scale);
+  EXPECT_NEAR(*scene.event(0).scale, 1.25, 1e-6);
+  EXPECT_FALSE(scene.event(1).scale);
+  EXPECT_EQ(nlohmann::json::parse(events_text(scene, 0)).at("events")[0].at("scale"), *scene.event(0).scale);
+  scene.add(correction_of(9));
+  scene.release_events(9);
+  EXPECT_EQ(scene.end_event(), 3U) << "not for ever";
+}
+
+TEST(ViewScene, ACorrectionInMetresIsToldAtOnce) {
+  ViewScene scene;
+  scene.show(small_map(3));
+  scene.add(correction_of(2));
+  ASSERT_EQ(scene.end_event(), 1U);
+  EXPECT_FALSE(scene.event(0).scale);
 }
 
 }  // namespace

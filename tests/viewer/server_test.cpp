@@ -84,7 +84,8 @@ TEST_F(ViewServerTest, ShowsThePageToWhoKnowsTheToken) {
   EXPECT_NE(page.find("Content-Security-Policy: default-src 'none'; script-src 'self'"), std::string::npos);
   EXPECT_NE(page.find("frame-ancestors 'none'"), std::string::npos);
   EXPECT_EQ(page.find("Access-Control"), std::string::npos);
-  const std::string cookie = "Cookie: twofold-" + std::to_string(port_) + "=" + token_ + "\r\n";
+  const std::string cookie =
+      "Cookie: twofold-" + std::to_string(port_) + "=" + testing::cookie_for(port_, token_) + "\r\n";
   EXPECT_GT(answer(http_request("/page.js", cookie)).size(), 50000U);
   EXPECT_TRUE(answer(http_request("/../etc/passwd", cookie)).starts_with("HTTP/1.1 404"));
 }
@@ -136,6 +137,10 @@ TEST_F(ViewServerTest, DropsWhoSaysTooMuch) {
   EXPECT_TRUE(is_dropped(client));
 }
 
+TEST_F(ViewServerTest, SocketsAreOpenedAtOnePathAlone) {
+  EXPECT_TRUE(answer(upgrade_request(port_, token_, "", "/page.js")).starts_with("HTTP/1.1 404"));
+}
+
 TEST_F(ViewServerTest, DropsWhoTakesTooLong) {
   LocalClient client(port_);
   client.send("GET / HTTP/1.1\r\n");
@@ -161,9 +166,14 @@ TEST_F(ViewServerTest, SurvivesAThousandConnections) {
 TEST_F(ViewServerTest, EightViewersAtMost) {
   std::vector<LocalClient> viewers;
   for (int n = 0; n < 8; ++n) viewers.push_back(viewer());
+  const std::string asks = http_request("/live", "Cookie: twofold-" + std::to_string(port_) + "=" +
+                                                     testing::cookie_for(port_, token_) + "\r\n");
   EXPECT_TRUE(answer(upgrade_request(port_, token_)).starts_with("HTTP/1.1 503"));
+  EXPECT_NE(answer(asks).find("as many viewers as there may be are watching"), std::string::npos)
+      << "in words, which a page cannot read in a socket's answer";
   viewers.clear();
   std::this_thread::sleep_for(milliseconds(300));
+  EXPECT_NE(answer(asks).find("there is room"), std::string::npos);
   (void)viewer();
 }
 
@@ -194,11 +204,11 @@ TEST_F(ViewServerTest, SurvivesDamagedConversations) {
   const auto end =
       std::chrono::steady_clock::now() + std::chrono::seconds(wanted != nullptr ? std::atoi(wanted) : 3);
   std::mt19937 rng(7);
+  const std::string opening = upgrade_request(port_, token_);
   int conversations = 0;
   for (; std::chrono::steady_clock::now() < end; ++conversations) {
     LocalClient client(port_);
     ASSERT_TRUE(client.connected());
-    const std::string opening = upgrade_request(port_, token_);
     const std::string talk = text_frame("images on") + text_frame("keyframe 17") + text_frame("ack") +
                              frame(0x89, "ping") + frame(0x88, "\x03\xe8");
     if (rng() % 3 == 0) {

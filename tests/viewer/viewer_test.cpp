@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <thread>
+
+#include <fmt/format.h>
 
 #include "graph/graph_writer.hpp"
 #include "slam/map_snapshot.hpp"
@@ -164,6 +167,84 @@ TEST_F(ViewerTest, ShowsTheImageOfAKeyframe) {
   viewer.finish();
   EXPECT_EQ(asked, std::vector<std::int64_t>{2'000'000'000})
       << "of keyframes that there are, at their own times";
+}
+
+TEST_F(ViewerTest, AMapThatThrowsIsToldAndTheRestGoesOn) {
+  std::atomic<int> asked{0};  // relaxed throughout: one number
+  const auto map = [&asked]() -> MapSnapshot {
+    asked.fetch_add(1, std::memory_order_relaxed);
+    throw std::runtime_error("no map today");
+  };
+  Viewer viewer(kRig, map, {.port = 0});
+  LocalClient client = watch(viewer);
+  EXPECT_NE(client.receive_until("the map cannot be shown: no map today").find("\"kind\":\"viewer\""),
+            std::string::npos);
+  EXPECT_TRUE(becomes([&] { return asked.load(std::memory_order_relaxed) > 1; })) << "it is asked again";
+  viewer.tell(tracked_pose(0, 0));
+  viewer.finish();
+  const std::string told = client.receive_until("the run is over");
+  EXPECT_NE(told.find("the run is over"), std::string::npos) << "its thread is still there";
+  EXPECT_EQ(told.find("no map today"), std::string::npos) << "told once";
+}
+
+TEST_F(ViewerTest, AnImageThatNobodyWantsAnyMoreIsLetGoOf) {
+  Viewer viewer(kRig, {}, {.port = 0});
+  const auto pixels = std::make_shared<std::vector<std::uint8_t>>(64 * 48, 128);
+  viewer.show(7, {pixels->data(), 64, 48, 64}, pixels);
+  EXPECT_TRUE(becomes([&] { return pixels.use_count() == 1; }));
+}
+
+TEST_F(ViewerTest, FinishesOnceAndNotFromItsOwnCallbacks) {
+  std::atomic<Viewer*> own{nullptr};  // relaxed: set before anybody can watch
+  Viewer viewer(kRig, {}, {.port = 0, .on_command = [&own](ViewCommand) -> std::string {
+                             own.load(std::memory_order_relaxed)->finish();
+                             return "finished";
+                           }});
+  own.store(&viewer, std::memory_order_relaxed);
+  LocalClient client = watch(viewer);
+  (void)client.receive(300);
+  client.send(testing::text_frame("stop"));
+  EXPECT_NE(client.receive_until("not finished by what it calls").find("command failed"), std::string::npos);
+  const std::jthread other([&viewer] { viewer.finish(); });
+  viewer.finish();
+  viewer.finish();
+}
+
+TEST_F(ViewerTest, PausingIsAStateThatLateViewersGet) {
+  Viewer viewer(kRig, {}, {.port = 0, .on_command = [](ViewCommand) { return std::string("done"); }});
+  LocalClient client = watch(viewer);
+  (void)client.receive_until("\"mappingPaused\":false");
+  client.send(testing::text_frame("ack") + testing::text_frame("pause mapping") +
+              testing::text_frame("save map"));
+  const std::string told = client.receive_until("map saved");
+  EXPECT_NE(told.find("mapping paused"), std::string::npos) << "none of two commands is lost";
+  LocalClient late = watch(viewer);
+  EXPECT_NE(late.receive_until("\"mappingPaused\":true").find("\"mappingPaused\":true"), std::string::npos);
+}
+
+TEST_F(ViewerTest, RefusesPortsThatThereAreNotAndNames) {
+  const auto refusal = [](const ViewerOptions& options) {
+    try {
+      const Viewer viewer(kRig, {}, options);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refusal({.port = 70000}).find("port 70000: ports are 0 to 65535"), std::string::npos);
+  EXPECT_NE(refusal({.bind = "localhost", .port = 0}).find("such as 127.0.0.1"), std::string::npos);
+}
+
+TEST_F(ViewerTest, LoopbackAddressesAreNotTheNetwork) {
+  const Viewer other(kRig, {}, {.bind = "127.0.0.2", .port = 0});
+  EXPECT_FALSE(other.is_open_to_network());
+  EXPECT_EQ(other.addresses(), std::vector<std::string>{other.address()});
+  const Viewer everywhere(kRig, {}, {.bind = "0.0.0.0", .port = 0});
+  EXPECT_TRUE(everywhere.is_open_to_network());
+  for (const std::string& address : everywhere.addresses()) {
+    EXPECT_EQ(address.find("0.0.0.0"), std::string::npos) << "nobody can open that";
+    EXPECT_NE(address.find(fmt::format(":{}/?token=", everywhere.port())), std::string::npos);
+  }
 }
 
 TEST_F(ViewerTest, SaysThatAPortIsTaken) {

@@ -189,7 +189,7 @@ class Page {
     ];
     if (newest) {
       figures.push(['latency', `${newest.latencyMs.toFixed(1)} ms`, false], ['found', `${(100 * newest.trackedShare).toFixed(0)} %`, true],
-        ['map', `v${newest.mapVersion}`, true], ['queue', String(newest.waiting), true]);
+        ['map', `v${newest.mapVersion}`, true], ['queue', String(newest.keyframesWaiting ?? 'not known'), true]);
     }
     $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
       const item = make('div', '', make('dt', name), make('dd', value));

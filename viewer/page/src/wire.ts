@@ -1,6 +1,6 @@
 // The server's messages (viewer/wire_format.hpp), decoded. Arrays of points are views of the message.
 
-export const PROTOCOL = 3;
+export const PROTOCOL = 4;
 export const NO_ID = 0xffffffff;
 
 export interface Keyframe {
@@ -20,12 +20,16 @@ export interface Edge {
   to: number;
   sharedPoints: number;
   marginalised: boolean;
+  /** 0: none, 1: closes a loop that was recognised, 2: and joined two map parts. */
+  loop: number;
 }
 
 export const enum State {
   tracked = 0,
   lost = 1,
   unplaced = 2,
+  /** Never looked at: its successor was there. */
+  dropped = 3,
 }
 
 interface Frame {
@@ -44,6 +48,8 @@ export interface PathFrame extends Frame {
   causal: [number, number, number];
   inReference: [number, number, number];
   turned: [number, number, number, number];
+  /** That the tracker worked on it; 0: not known. */
+  trackingMs: number;
 }
 
 export interface LiveFrame extends Frame {
@@ -53,8 +59,12 @@ export interface LiveFrame extends Frame {
   points: number;
   mapVersion: number;
   stageMs: number[];
-  /** Keyframes that wait for the mapper. */
-  waiting: number;
+  /** For the mapper; null, as of the others: not known. */
+  keyframesWaiting: number | null;
+  /** For the tracker. */
+  framesWaiting: number | null;
+  /** Keyframes that wait for the loop closer. */
+  placesWaiting: number | null;
 }
 
 /** Points as they came: each POINT_WORDS words, as whole numbers and as floating-point ones. */
@@ -119,7 +129,7 @@ export interface Measured {
 export type Binary = Delta | Frames | Image | KeyframeImage | Measured;
 
 const HEADER = 16;
-const SIZES = {keyframe: 52, edge: 12, path: 56, live: 100, measured: 32};
+const SIZES = {keyframe: 52, edge: 12, path: 60, live: 108, measured: 32};
 
 class Reader {
   readonly view: DataView;
@@ -131,6 +141,8 @@ class Reader {
   u16 = (offset: number) => this.view.getUint16(this.at + offset, true);
   i16 = (offset: number) => this.view.getInt16(this.at + offset, true);
   u32 = (offset: number) => this.view.getUint32(this.at + offset, true);
+  /** Null: not known. */
+  known = (offset: number) => (this.u32(offset) === NO_ID ? null : this.u32(offset));
   f32 = (offset: number) => this.view.getFloat32(this.at + offset, true);
   xyz = (o: number): [number, number, number] => [this.f32(o), this.f32(o + 4), this.f32(o + 8)];
   xyzw = (o: number): [number, number, number, number] => [this.f32(o), this.f32(o + 4), this.f32(o + 8), this.f32(o + 12)];
@@ -151,7 +163,7 @@ function keyframe(r: Reader): Keyframe {
 }
 
 function edge(r: Reader): Edge {
-  return {from: r.u32(0), to: r.u32(4), sharedPoints: r.u16(8), marginalised: r.u8(10) !== 0};
+  return {from: r.u32(0), to: r.u32(4), sharedPoints: r.u16(8), marginalised: r.u8(10) !== 0, loop: r.u8(11)};
 }
 
 function frame(r: Reader, latencyAt: number): Frame {
@@ -164,7 +176,7 @@ function frame(r: Reader, latencyAt: number): Frame {
 function pathFrame(r: Reader): PathFrame {
   return {
     ...frame(r, 20), causal: r.xyz(24), inReference: r.xyz(36),
-    turned: [r.i16(48) / 32767, r.i16(50) / 32767, r.i16(52) / 32767, r.i16(54) / 32767],
+    turned: [r.i16(48) / 32767, r.i16(50) / 32767, r.i16(52) / 32767, r.i16(54) / 32767], trackingMs: r.f32(56),
   };
 }
 
@@ -172,7 +184,8 @@ function liveFrame(r: Reader): LiveFrame {
   return {
     ...frame(r, 56), position: r.xyz(20), orientation: r.xyzw(32), trackedShare: r.f32(48), points: r.u32(52),
     mapVersion: r.u32(60),
-    stageMs: Array.from({length: 8}, (_, s) => r.f32(64 + 4 * s)), waiting: r.u32(96),
+    stageMs: Array.from({length: 8}, (_, s) => r.f32(64 + 4 * s)), keyframesWaiting: r.known(96),
+    framesWaiting: r.known(100), placesWaiting: r.known(104),
   };
 }
 
@@ -243,7 +256,18 @@ export interface Hello {
   rig: Rig | null;
   stages: string[];
   live: boolean;
+  kind: 'live' | 'finished' | 'map';
+  /** Lengths are metres, not of one camera's own unit. */
+  metres: boolean;
   hasDeviations: boolean;
+  /** Points' anchors say when they were first seen. */
+  hasFirstSeen: boolean;
+  hasObservers: boolean;
+  /** Frames say how long they took. */
+  hasTimes: boolean;
+  hasQueues: boolean;
+  /** Words of the effort levels. */
+  efforts: string[];
   /** Commands are obeyed. */
   control: boolean;
   /** Images of keyframes can be asked for. */
@@ -280,9 +304,12 @@ export interface MapEvent {
   before: [number, number, number];
   after: [number, number, number];
   loop: Loop | null;
+  /** Of corrections of one camera's map: lengths around the camera now over lengths before. */
+  scale: number | null;
 }
 export interface Text {
   hello?: Hello;
+  state?: {mappingPaused: boolean};
   reasons?: string[];
   truth?: Truth;
   events?: MapEvent[];

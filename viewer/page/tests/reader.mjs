@@ -7,16 +7,19 @@ function textFrame(text) {
 
 export class Reader {
   constructor(address, reads) {
-    const {hostname, port, searchParams} = new URL(address);
+    const {hostname, port} = new URL(address);
     this.messages = 0;
     this.bytes = 0;
     this.pending = Buffer.alloc(0);
     this.open = false;
+    void fetch(address).then((page) => this.watch(hostname, port, page.headers.get('set-cookie').split(';')[0], reads));
+  }
+  watch(hostname, port, cookie, reads) {
     this.socket = connect(Number(port), hostname);
     this.socket.on('error', () => {});
     this.socket.write(`GET /live HTTP/1.1\r\nHost: ${hostname}:${port}\r\nOrigin: http://${hostname}:${port}\r\nUpgrade: websocket\r\n` +
       `Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n` +
-      `Cookie: twofold-${port}=${searchParams.get('token')}\r\n\r\n`);
+      `Cookie: ${cookie}\r\n\r\n`);
     if (reads) this.socket.on('data', (data) => this.take(data));
     else this.socket.pause();
   }

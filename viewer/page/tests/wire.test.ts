@@ -18,11 +18,11 @@ test('a whole map', () => {
   assert.ok(delta.whole && delta.last);
   assert.deepEqual([delta.from, delta.to], [0, 2]);
   assert.deepEqual(delta.keyframes.map((k) => [k.id, k.frame, k.t, k.position[0], k.window, k.points]), [[0, 0, 0, 0, 2, 7], [1, 10, 0.5, 1, 2, 7], [2, 20, 1, 2, 1, 7]]);
-  assert.deepEqual(delta.edges, [{from: 0, to: 1, sharedPoints: 12, marginalised: false}, {from: 1, to: 2, sharedPoints: 12, marginalised: true}]);
+  assert.deepEqual(delta.edges, [{from: 0, to: 1, sharedPoints: 12, marginalised: false, loop: 0}, {from: 1, to: 2, sharedPoints: 12, marginalised: true, loop: 1}]);
   assert.equal(delta.points[0].count, 3);
   assert.deepEqual([...delta.points[0].floats.slice(8, 11)], [1, 0.25, 4]);
   const [frame] = delta.path;
-  assert.deepEqual([frame.frame, frame.reference, frame.latencyMs], [4, 2, 12.5]);
+  assert.deepEqual([frame.frame, frame.reference, frame.latencyMs, frame.trackingMs], [4, 2, 12.5, 3.5]);
   assert.deepEqual(frame.inReference, [0, 0, 0.125]);
   assert.deepEqual(frame.turned, [0, 0, 0, 1]);
 });
@@ -45,7 +45,7 @@ test('live frames', () => {
   assert.equal(frames.length, 1);
   assert.deepEqual([frames[0].frame, frames[0].points, frames[0].trackedShare, frames[0].mapVersion], [4, 90, 0.75, 1]);
   assert.deepEqual(frames[0].stageMs.slice(0, 3), [1, 2.5, 0]);
-  assert.equal(frames[0].waiting, 7);
+  assert.deepEqual([frames[0].framesWaiting, frames[0].keyframesWaiting, frames[0].placesWaiting], [2, 7, null]);
 });
 
 test('measured points', () => {
@@ -62,7 +62,7 @@ test('the image of a keyframe', () => {
 
 const nowhere: [number, number, number] = [0, 0, 0];
 const correction: MapEvent = {kind: 'pose graph', text: '', frame: 7, t: 1, keyframe: 2, partBefore: 0, part: 0, moved: 0.42,
-  turned: Math.PI / 180, before: nowhere, after: nowhere, loop: null};
+  turned: Math.PI / 180, before: nowhere, after: nowhere, loop: null, scale: null};
 
 test('events say what moved and by how much, loops of one camera the scale', () => {
   assert.equal(describe(correction), 'pose graph · frame 7 · moved 42 cm, turned 1.00°');
@@ -78,10 +78,10 @@ test('late frames say what held them up', () => {
   const model = new Model();
   const frame = (n: number, latencyMs: number, stageMs: number[]): LiveFrame => ({frame: n, t: 0.05 * n, reference: 0, part: 0,
     state: State.tracked, reason: 0, keyframe: false, effort: 0, latencyMs, position: nowhere, orientation: [0, 0, 0, 1],
-    trackedShare: 1, points: 9, mapVersion: 1, stageMs, waiting: 0});
+    trackedShare: 1, points: 9, mapVersion: 1, stageMs, keyframesWaiting: 0, framesWaiting: 0, placesWaiting: 0});
   const frames = [frame(0, 10, [5]), frame(1, 12, [5]), frame(2, 70, [60, 4]), frame(3, 80, [61, 3]), frame(4, 90, [4]), frame(5, 9, [4])];
   for (const live of frames) model.take({kind: 'delta', whole: false, last: true, from: 1, to: 2, points: [], pointsGone: [], keyframes: [],
-    keyframesGone: [], edges: [], edgesGone: [], pathGone: [], path: [{...live, causal: nowhere, inReference: nowhere, turned: [0, 0, 0, 1]}]});
+    keyframesGone: [], edges: [], edgesGone: [], pathGone: [], path: [{...live, causal: nowhere, inReference: nowhere, turned: [0, 0, 0, 1], trackingMs: 0}]});
   model.addLive(frames);
   assert.deepEqual(lateStretches(model).map((late) => [late.frames, late.reason]),
     [[2, 'tracking it took 64 ms'], [1, 'it waited: earlier frames, decoding, or no CPU']]);
