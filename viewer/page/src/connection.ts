@@ -9,6 +9,8 @@ export interface Listener {
   binary(message: Binary): void;
   text(message: Text): void;
   link(state: Link, message: string): void;
+  /** A message that could not be dealt with. */
+  fault(error: unknown): void;
 }
 
 const RETRY_MS = [500, 1000, 2000, 4000];
@@ -51,9 +53,13 @@ export class Connection {
       this.listener.link('open', '');
     };
     socket.onmessage = (event) => {
-      if (typeof event.data === 'string') this.takeText(JSON.parse(event.data) as Text);
-      else this.listener.binary(decode(event.data as ArrayBuffer));
-      this.send('ack');
+      try {
+        if (typeof event.data === 'string') this.takeText(JSON.parse(event.data) as Text);
+        else this.listener.binary(decode(event.data as ArrayBuffer));
+      } catch (error) {
+        this.listener.fault(error);
+      }
+      this.send('ack');  // else nothing more would come
     };
     socket.onclose = () => this.retry();
   }
@@ -70,9 +76,20 @@ export class Connection {
   private retry(): void {
     const wait = RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)];
     if (!this.ended) {
-      const message = this.tries < 3 ? 'connection lost' : 'the program cannot be reached: it has ended, or the network is down';
-      this.listener.link('broken', message);
+      this.listener.link('broken', 'connection lost');
+      void this.askWhy();
     }
     setTimeout(() => this.open(), this.ended ? 5000 : wait);
+  }
+
+  /** A refused socket does not say why; the same address, asked as a page, does. */
+  private async askWhy(): Promise<void> {
+    const socket = this.socket;
+    let why = 'the program cannot be reached: it has ended, or the network is down';
+    try {
+      const answer = await fetch('/live', {cache: 'no-store', signal: AbortSignal.timeout(4000)});
+      why = answer.ok ? '' : (await answer.text()).trim();
+    } catch { /* nobody there */ }
+    if (why && this.socket === socket && socket?.readyState === WebSocket.CLOSED) this.listener.link('broken', why);
   }
 }

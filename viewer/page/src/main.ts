@@ -1,14 +1,14 @@
 // The page: joins connection, model and picture, and what the user does with them.
 import 'uplot/dist/uPlot.min.css';
 import './style.css';
-import {COLOURINGS, type Colouring} from './cloud.ts';
+import {COLOURINGS, colourBar, type Colouring} from './cloud.ts';
 import {Connection, type Command, type Link} from './connection.ts';
 import {Model} from './model.ts';
 import {eventColour, type Theme} from './palette.ts';
 import {Sight} from './sight.ts';
 import {Stage, type Layer, type View} from './stage.ts';
 import {Strip} from './strip.ts';
-import {Timeline, clock, describe, lateStretches, lostStretches, metres} from './timeline.ts';
+import {Timeline, clock, describe, isLost, lateStretches, length, lostStretches} from './timeline.ts';
 import {PROTOCOL, State, type Binary, type Keyframe, type KeyframeImage, type MapEvent, type Text} from './wire.ts';
 
 const $ = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
@@ -24,7 +24,7 @@ function make(tag: string, text = '', ...children: Node[]): HTMLElement {
 const LAYERS: [Layer | 'image', string, string][] = [
   ['points', 'Points', ''], ['keyframes', 'Keyframes', 'two'], ['final', 'Final path', '--final'],
   ['causal', 'Causal path', '--causal'], ['truth', 'True path', '--truth'], ['covisible', 'Covisibility', '--covisible'],
-  ['marginalised', 'Marginalised', '--marginalised'], ['returns', 'Returns, over 10 s', '--back'], ['grid', 'Grid', ''],
+  ['marginalised', 'Marginalised', '--marginalised'], ['returns', 'Closed loops', '--back'], ['grid', 'Grid', ''],
   ['image', 'Camera image', ''],
 ];
 const KEYS: [string, string][] = [
@@ -32,7 +32,7 @@ const KEYS: [string, string][] = [
   ['M', 'measure between two points'], ['P K C E', 'points, keyframes, causal path, edges'], ['I', 'camera image'],
   ['S', 'save a picture'], ['F', 'full screen'], ['T', 'dark or light'], ['esc', 'let go of what is selected'], ['H', 'these keys'],
 ];
-const EFFORTS = ['everything', 'fewer points', 'coarse alignment', 'fewer iterations', 'drop frames'];
+const PERIODIC_MS = 200;
 
 class Page {
   // First, so that the server answers while WebGL is being set up. Nothing is heard before the page has been made.
@@ -40,6 +40,7 @@ class Page {
     binary: (message) => this.take(message),
     text: (message) => this.read(message),
     link: (state, message) => this.showLink(state, message),
+    fault: (error) => showFault(error),
   });
   readonly model = new Model();
   readonly stage = new Stage($('stage'), this.model);
@@ -56,8 +57,9 @@ class Page {
     history.replaceState(null, '', '/');  // the token is in a cookie by now, and needs no second place
     this.makePanels();
     this.listen();
-    this.setTheme((localStorage.getItem('theme') as Theme | null) ?? 'dark');
-    setInterval(() => this.refresh(), 200);
+    const wish = matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark';
+    this.setTheme((localStorage.getItem('theme') as Theme | null) ?? wish);
+    setInterval(() => this.refresh(), PERIODIC_MS);
   }
 
   private take(message: Binary): void {
@@ -86,22 +88,29 @@ class Page {
     if (message.hello) {
       this.model.forget();
       this.model.hello = message.hello;
-      if (message.hello.protocol !== PROTOCOL) location.reload();
+      if (!speaksTheSame(message.hello.protocol)) return;
       document.title = `${message.hello.title} – Twofold`;
       $('title').textContent = message.hello.title;
-      document.body.classList.toggle('finished', !message.hello.live);
+      document.body.classList.toggle('finished', !message.hello.hasTimes);
       this.makeStages();
+      this.makeColours();
+      this.hideWhatIsNot();
       $('commands').hidden = !message.hello.control;
+    }
+    if (message.state) {
+      this.model.mappingPaused = message.state.mappingPaused;
+      $('pause-mapping').setAttribute('aria-pressed', String(this.model.mappingPaused));
+      $('pause-mapping').textContent = this.model.mappingPaused ? 'Resume mapping' : 'Pause mapping';
     }
     if (message.reasons) this.model.reasons = message.reasons;
     if (message.truth) {
       this.model.truth = message.truth;
       const {scale} = message.truth;
       $('name-truth').textContent = scale === 1 ? 'True path' : `True path × ${scale.toPrecision(3)}`;
+      this.hideWhatIsNot();
     }
     if (message.events) {
-      this.model.events.push(...message.events);
-      this.showPaused();
+      this.model.addEvents(message.events);
       this.makeEvents();
     }
     this.stage.changed();
@@ -130,10 +139,12 @@ class Page {
     this.choosePart();
     this.showState();
     this.showFigures();
-    if ($('strip').clientWidth > 0) this.strip.draw();
+    if ($('strip').clientWidth > 0) this.strip.draw(this.stage.time);
     this.timeline.draw();
     this.showKeyframe();
     this.showTape();
+    this.showBar();
+    this.hideWhatIsNot();
     document.body.dataset.ready = String(this.model.keyframes.size > 0);
   }
 
@@ -164,8 +175,10 @@ class Page {
     };
     if (this.link === 'connecting') return set('connecting', '');
     if (this.link === 'broken') return set('no connection', 'bad');
-    if (this.stage.time !== null) return set(`at ${clock(this.stage.time)}`, 'middling');
-    if (this.model.hello && !this.model.hello.live) return set('finished', '');
+    const kind = this.model.hello?.kind ?? 'live';
+    if (this.stage.time !== null) return set(`at ${clock(this.stage.time)}: back to ${kind === 'live' ? 'now' : 'the end'}`, 'middling');
+    if (kind === 'map') return set('map file', '');
+    if (kind === 'finished') return set('finished', '');
     if (this.link === 'ended') return set('ended', '');
     if (!newest) return set('waiting for frames', '');
     if (newest.state !== State.tracked) {
@@ -173,28 +186,33 @@ class Page {
       const reason = this.model.reasons[newest.reason];
       return set(reason ? `${name}: ${reason}` : name, 'bad');
     }
-    return newest.effort > 0 ? set(`tracked, ${EFFORTS[newest.effort]}`, 'middling') : set('tracked', 'good');
+    const effort = this.model.hello?.efforts[newest.effort] ?? `effort level ${newest.effort}`;
+    return newest.effort > 0 ? set(`tracked, ${newest.effort}: ${effort}`, 'middling') : set('tracked', 'good');
   }
 
   private showFigures(): void {
     const newest = this.model.live.at(-1);
-    const lost = this.model.path.reduce((sum, frame) => sum + (frame.state === State.tracked ? 0 : 1), 0);
+    const hello = this.model.hello;
+    const isRun = hello?.kind !== 'map';
     const count = (n: number) => n.toLocaleString('en');
-    const figures: [string, string, boolean][] = [
-      ['frame', count(newest?.frame ?? this.model.path.at(-1)?.frame ?? 0), false],
-      ['keyframes', count(this.model.keyframes.size), false],
-      ['points', count(this.stage.cloud.size), false],
-      ['lost', count(lost), true],
-      ['late', count(lateStretches(this.model).reduce((sum, stretch) => sum + stretch.frames, 0)), true],
-    ];
+    const figures: [string, string, boolean][] = [['keyframes', count(this.model.keyframes.size), false], ['points', count(this.stage.cloud.size), false]];
+    if (isRun) {
+      const lost = this.model.path.reduce((sum, frame) => sum + (isLost(frame) ? 1 : 0), 0);
+      const late = lateStretches(this.model).reduce((sum, stretch) => sum + stretch.frames, 0);
+      figures.unshift(['frame', count(newest?.frame ?? this.model.path.at(-1)?.frame ?? 0), false]);
+      figures.push(['lost', count(lost), true], ['late', count(late), true]);
+    }
     if (newest) {
       figures.push(['latency', `${newest.latencyMs.toFixed(1)} ms`, false], ['found', `${(100 * newest.trackedShare).toFixed(0)} %`, true],
-        ['map', `v${newest.mapVersion}`, true], ['queue', String(newest.keyframesWaiting ?? 'not known'), true]);
+        ['map', `v${newest.mapVersion}`, true]);
+      const queues = [newest.framesWaiting, newest.keyframesWaiting, newest.placesWaiting].map((n) => n ?? '–');
+      if (hello?.hasQueues) figures.push(['queues', queues.join(' · '), true]);
     }
     $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
       const item = make('div', '', make('dt', name), make('dd', value));
       item.classList.toggle('minor', minor);
       item.dataset.name = name;
+      if (name === 'queues') item.title = 'waiting: frames for the tracker · keyframes for the mapper · keyframes for the loop closer';
       return item;
     }));
   }
@@ -207,7 +225,7 @@ class Page {
       const box = document.createElement('input');
       box.type = 'checkbox';
       box.id = `layer-${layer}`;
-      box.checked = layer !== 'image';
+      box.checked = true;
       box.addEventListener('change', () => this.setLayer(layer, box.checked));
       const words = make('span', name);
       words.id = `name-${layer}`;
@@ -215,14 +233,16 @@ class Page {
     }));
     $('colouring').replaceChildren(...COLOURINGS.map((name) => new Option(name === 'observers' ? 'times seen' : name, name)));
     $('keys').replaceChildren(make('table', '', ...KEYS.map(([key, what]) => make('tr', '', make('td', '', make('kbd', key)), make('td', what)))));
+    $('bar-colours').style.background = colourBar();
+    this.setLayer('image', true);
     this.setView('follow');
   }
 
   private setLayer(layer: Layer | 'image', on: boolean): void {
     $<HTMLInputElement>(`layer-${layer}`).checked = on;
     if (layer === 'image') {
-      $('sight').hidden = !on;
       this.connection.setImages(on);
+      this.sight.setOn(on);
       return;
     }
     this.stage.layers[layer] = on;
@@ -241,9 +261,47 @@ class Page {
     $('stages').replaceChildren(
       entry('exposure to pose', (i) => ((i.className = 'line'), (i.style.background = 'var(--text)'))),
       entry('budget', (i) => (i.className = 'dash')),
-      ...Strip.legend(this.model.hello!.stages).map(([name, colour]) => entry(name, (i) => (i.style.background = colour))));
-    const deviation = [...$<HTMLSelectElement>('colouring').options].find((option) => option.value === 'deviation');
-    if (deviation) deviation.disabled = !this.model.hello!.hasDeviations;
+      ...Strip.legend(this.model.hello!.kind === 'live' ? this.model.hello!.stages : ['tracker']).map(([name, colour]) => entry(name, (i) => (i.style.background = colour))));
+  }
+
+  /** Colours that there is something for. */
+  private makeColours(): void {
+    const {hasDeviations, hasFirstSeen, hasObservers} = this.model.hello!;
+    const known: Record<Colouring, boolean> = {height: true, part: true, age: hasFirstSeen, observers: hasObservers, deviation: hasDeviations};
+    const select = $<HTMLSelectElement>('colouring');
+    for (const option of select.options) option.disabled = option.hidden = !known[option.value as Colouring];
+    if (!known[select.value as Colouring]) {
+      select.value = 'height';
+      this.stage.cloud.setColouring('height');
+    }
+  }
+
+  /** Layers of which there is nothing are not offered. */
+  private hideWhatIsNot(): void {
+    const hello = this.model.hello;
+    const edges = [...this.model.edges.values()];
+    const has: Partial<Record<Layer | 'image', boolean>> = {
+      causal: hello?.kind !== 'map', truth: this.model.truth !== null, image: hello?.kind === 'live',
+      marginalised: edges.some((edge) => edge.marginalised), returns: edges.some((edge) => edge.loop > 0),
+    };
+    for (const [layer, there] of Object.entries(has)) $(`layer-${layer}`).parentElement!.hidden = !there;
+  }
+
+  /** What the lowest and the highest colour stand for. */
+  private showBar(): void {
+    const unit = this.model.isMetric ? ' m' : '';
+    const [low, high] = this.stage.cloud.heights;
+    const times = [...this.model.keyframes.values()].map((keyframe) => keyframe.t);
+    const ends: Record<Colouring, [string, string] | null> = {
+      height: [`${low.toFixed(1)}${unit}`, `${high.toFixed(1)}${unit} up`], part: null, observers: ['0', '20 times'],
+      age: [clock(Math.min(...times, Infinity) || 0), clock(Math.max(...times, 0))],
+      deviation: [this.model.isMetric ? '4 mm' : '0.004', this.model.isMetric ? '4 m' : '4'],
+    };
+    const shown = ends[$<HTMLSelectElement>('colouring').value as Colouring];
+    $('bar').hidden = shown === null || this.stage.cloud.size === 0 || !this.stage.layers.points;
+    if (!shown) return;
+    $('bar-low').textContent = shown[0];
+    $('bar-high').textContent = shown[1];
   }
 
   private makeEvents(): void {
@@ -252,7 +310,7 @@ class Page {
     $('events').replaceChildren(...newest.map((event) => {
       const sample = make('i');
       sample.style.background = eventColour(event.kind);
-      const [kind, ...rest] = describe(event).split(' · ');
+      const [kind, ...rest] = describe(event, this.model.isMetric).split(' · ');
       const item = make('li', '', sample, make('div', kind, make('small', rest.join(' · '))), make('time', clock(event.t)));
       item.addEventListener('click', () => this.goTo(event));
       return item;
@@ -277,13 +335,6 @@ class Page {
     this.stale = true;
   }
 
-  /** Whoever paused mapping: events tell everybody. */
-  private get isPaused(): boolean {
-    return this.model.events.findLast((event) => event.kind === 'mapping paused' || event.kind === 'mapping resumed')?.kind === 'mapping paused';
-  }
-  private showPaused(): void {
-    $('pause-mapping').setAttribute('aria-pressed', String(this.isPaused));
-  }
   private command(command: Command): void {
     if (command === 'stop' && !confirm('End the run?')) return;
     this.connection.command(command);
@@ -302,7 +353,7 @@ class Page {
       button.addEventListener('click', () => this.select(other));
       return button;
     });
-    const isLive = this.model.hello?.live ?? true;  // others may not know all of it
+    const isLive = this.model.hello?.kind === 'live';  // others may not know all of it
     const rows = [row('frame', `${keyframe.frame}, ${clock(keyframe.t)}`), row('position', keyframe.position.map((x) => x.toFixed(2)).join(', ')),
       row('map part', String(keyframe.part)), row('neighbours', String(neighbours.length))];
     if (isLive) rows.push(row('window', ['neither', 'inner', 'outer'][keyframe.window]));
@@ -313,7 +364,7 @@ class Page {
       make('p', '', ...jump));
   }
   private select(id: number | null): void {
-    $('keyframe-image').hidden = true;
+    $('keyframe-image').hidden = $('no-keyframe-image').hidden = true;
     if (id !== null && id !== this.stage.selected && this.model.hello?.keyframeImages) this.connection.askForKeyframe(id);
     this.stage.selected = id;
     this.stage.changed();
@@ -322,8 +373,10 @@ class Page {
 
   /** If that keyframe is still the one that is selected. */
   private showKeyframeImage(image: KeyframeImage): void {
-    if (image.keyframe !== this.stage.selected || image.jpeg.length === 0) return;
+    if (image.keyframe !== this.stage.selected) return;
     const place = $<HTMLImageElement>('keyframe-image');
+    $('no-keyframe-image').hidden = image.jpeg.length > 0;
+    if (image.jpeg.length === 0) return;
     URL.revokeObjectURL(place.src);
     place.src = URL.createObjectURL(new Blob([image.jpeg], {type: 'image/jpeg'}));
     place.hidden = false;
@@ -332,7 +385,7 @@ class Page {
   private showTape(): void {
     const [from, to] = this.stage.measured;
     $('tape').hidden = !this.measuring;
-    $('tape').textContent = !from ? 'click the first point' : !to ? 'click the second point' : metres(from.distanceTo(to));
+    $('tape').textContent = !from ? 'click the first point' : !to ? 'click the second point' : length(from.distanceTo(to), this.model.isMetric);
   }
   private setMeasuring(on: boolean): void {
     this.measuring = on;
@@ -356,6 +409,13 @@ class Page {
     this.stage.measured.push(picked.point);
     this.stage.changed();
     this.stale = true;
+  }
+
+  /** From an earlier moment, and from where an event was looked at. */
+  private backToNow(): void {
+    if (this.stage.time === null) return;
+    this.timeline.set(null);
+    this.setView('follow');
   }
 
   private savePicture(): void {
@@ -413,9 +473,10 @@ class Page {
     on('help', () => $<HTMLDialogElement>('keys').showModal());
     on('keys', () => $<HTMLDialogElement>('keys').close());
     on('save-map', () => this.command('save map'));
-    on('pause-mapping', () => this.command(this.isPaused ? 'resume mapping' : 'pause mapping'));
+    on('pause-mapping', () => this.command(this.model.mappingPaused ? 'resume mapping' : 'pause mapping'));
     on('stop', () => this.command('stop'));
     on('now', () => this.timeline.set(null));
+    on('state', () => this.backToNow());
     on('play', () => this.setPlaying(!this.playing));
     on('open-show', () => $('show').classList.toggle('open'));
     on('open-side', () => $('side').classList.toggle('open'));
@@ -457,8 +518,8 @@ class Page {
     return {
       link: this.link, live: this.model.live.length, newest: this.model.live.at(-1)?.frame ?? -1, keyframes: this.model.keyframes.size,
       inner: this.windowSize(1), outer: this.windowSize(2), points: this.stage.cloud.size, path: this.model.path.length,
-      events: this.model.events.length, lost: lostStretches(this.model), late: lateStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs, share: this.stage.share,
-      edges: this.model.edges.size, truth: this.model.truth?.path.length ?? 0, mapVersion: this.model.mapVersion,
+      events: this.model.events.length, lost: lostStretches(this.model), late: lateStretches(this.model), drawn: this.stage.drawn, frameMs: this.stage.frameMs, share: this.stage.drawnPoints / Math.max(1, this.stage.cloud.size),
+      edges: this.model.edges.size, loops: [...this.model.edges.values()].filter((edge) => edge.loop > 0).length, truth: this.model.truth?.path.length ?? 0, mapVersion: this.model.mapVersion,
     };
   }
   private windowSize(window: number): number {
@@ -466,9 +527,43 @@ class Page {
   }
 }
 
+/** What went wrong in the page itself, once. */
+function showFault(error: unknown): void {
+  console.error(error);
+  if (!$('fault').hidden) return;
+  $('fault').textContent = `this page has a fault, and what it shows may be wrong: ${error instanceof Error ? error.message : String(error)}`;
+  $('fault').hidden = false;
+}
+
+/** A page of another version of the program is loaded anew, but not again and again. */
+function speaksTheSame(protocol: number): boolean {
+  if (protocol === PROTOCOL) {
+    sessionStorage.removeItem('reloaded');
+    return true;
+  }
+  if (sessionStorage.getItem('reloaded')) {
+    showFault(new Error(`the program speaks version ${protocol}, the page ${PROTOCOL}`));
+  } else {
+    sessionStorage.setItem('reloaded', 'yes');
+    location.reload();
+  }
+  return false;
+}
+
+function start(): void {
+  if (!document.createElement('canvas').getContext('webgl2')) {
+    $('message').textContent = 'this browser has no WebGL 2, which the picture is drawn with: see its settings for hardware acceleration, or try another one';
+    $('message').hidden = false;
+    $('state').textContent = 'no picture';
+    return;
+  }
+  window.twofold = new Page();
+}
+
 declare global {
   interface Window {
     twofold: Page;
   }
 }
-window.twofold = new Page();
+addEventListener('error', (event) => showFault(event.error ?? event.message));
+start();

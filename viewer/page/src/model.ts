@@ -3,6 +3,7 @@ import {NO_ID, State, type Delta, type Edge, type Hello, type Keyframe, type Liv
 
 const LIVE_KEPT = 600;
 const LATE_KEPT = 4096;
+const EVENTS_KEPT = 4096;
 
 /** Position and orientation of a camera in the world of its part. */
 export interface CameraPose {
@@ -40,6 +41,11 @@ export class Model {
   /** Of late frames, by their number: what held them up. */
   readonly whyLate = new Map<number, string>();
   mapVersion = 0;
+  mappingPaused = false;
+
+  get isMetric(): boolean {
+    return this.hello?.metres ?? true;
+  }
 
   clear(): void {
     this.keyframes.clear();
@@ -53,6 +59,11 @@ export class Model {
     this.live = [];
     this.truth = null;
     this.whyLate.clear();
+  }
+
+  addEvents(events: MapEvent[]): void {
+    this.events.push(...events);
+    if (this.events.length > EVENTS_KEPT) this.events.splice(0, this.events.length - EVENTS_KEPT);
   }
 
   take(delta: Delta): void {
@@ -164,13 +175,6 @@ export class Model {
       steps.push((1000 * (this.path[i].t - this.path[i - 1].t)) / Math.max(1, this.path[i].frame - this.path[i - 1].frame));
     steps.sort((a, b) => a - b);
     return steps[steps.length >> 1] ?? 0;
-  }
-
-  /** Edges that say the camera came back: their ends lie more than ten seconds apart. */
-  isReturn(edge: Edge): boolean {
-    const from = this.keyframes.get(edge.from);
-    const to = this.keyframes.get(edge.to);
-    return from !== undefined && to !== undefined && Math.abs(to.t - from.t) > 10;
   }
 
   static isKnown(id: number): boolean {

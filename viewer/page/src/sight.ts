@@ -13,9 +13,16 @@ export class Sight {
   private waiting: Image[] = [];
   private measured: Measured[] = [];
   private drawing = false;
+  private isOn = true;
 
   constructor(private readonly place: HTMLElement, private readonly model: Model, private readonly cloud: Cloud) {
     this.canvas = place.querySelector('canvas')!;
+  }
+
+  /** The panel opens with the first image. */
+  setOn(on: boolean): void {
+    this.isOn = on;
+    if (!on) this.place.hidden = true;
   }
 
   take(image: Image): void {
@@ -48,6 +55,7 @@ export class Sight {
   }
 
   private paint(bitmap: ImageBitmap, image: Image, frame: LiveFrame): void {
+    this.place.hidden = !this.isOn;
     const c = this.canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     this.canvas.width = bitmap.width;
     this.canvas.height = bitmap.height;
@@ -58,8 +66,9 @@ export class Sight {
     const measured = this.measured.find((other) => other.frame === image.frame)?.points ?? [];
     this.paintMeasured(c, measured, scale);
     const outliers = measured.reduce((sum, point) => sum + (point.inlier ? 0 : 1), 0);
-    const state = isTracked ? `${frame.points} points measured, ${outliers} outliers; residuals × ${LONGER}; squares: searched`
-      : `lost: ${this.model.reasons[frame.reason] ?? ''}`;
+    const found = measured.length === 0 ? `${frame.points} points found`
+      : `${measured.length - outliers} points measured, ${outliers} outlier${outliers === 1 ? '' : 's'}; residuals × ${LONGER}; squares: searched`;
+    const state = isTracked ? found : `lost: ${this.model.reasons[frame.reason] ?? ''}`;
     this.place.querySelector('figcaption')!.textContent = `frame ${image.frame} · ${state}`;
   }
 

@@ -13,7 +13,8 @@ export type Picked = {keyframe: Keyframe} | {point: THREE.Vector3} | null;
 
 const SLOW_MS = 45;
 const FAST_MS = 25;
-const LEAST_POINTS = 30000;
+const FIRST_BUDGET = 200000;  // points
+const LEAST_BUDGET = 2000;
 const SOFTWARE_MS = 33;  // between frames that no graphics processor draws: the tracker may want the same processors
 const MOST_PATH = 20000;  // segments drawn of a path
 
@@ -51,7 +52,8 @@ export class Stage {
   private path = true;   // likewise, alone
   private frustum = 0.1;
   private extent = {size: 2, centre: new THREE.Vector3(), lowest: -1};
-  share = 1;  // of the points that are drawn
+  drawnPoints = 0;
+  private budget = FIRST_BUDGET;  // points that can be drawn in time
   private readonly leastMs: number;  // between two frames
   private begun = 0;                 // the newest frame
   private fence: WebGLSync | null = null;  // of the frame that is being drawn
@@ -149,6 +151,7 @@ export class Stage {
     this.lines = this.path = false;
     this.makeBody();
     this.aim();
+    this.chooseDetail();
     this.renderer.render(this.scene, this.camera);
     const gl = this.renderer.getContext() as WebGL2RenderingContext;
     this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -170,13 +173,19 @@ export class Stage {
   /** A machine that cannot draw twenty frames a second draws fewer points; one at rest draws all. */
   private pace(took: number): void {
     this.frameMs += 0.2 * (took - this.frameMs);
-    const least = Math.min(1, LEAST_POINTS / Math.max(1, this.cloud.size));
-    const share = Math.min(took, this.frameMs) > SLOW_MS ? Math.max(0.5, SLOW_MS / took) * this.share
-      : this.frameMs < FAST_MS ? 1.1 * this.share : this.share;
-    const bounded = Math.min(1, Math.max(least, share));
-    if (bounded === this.share) return;
-    this.share = bounded;
-    this.cloud.setShare(bounded);
+    if (Math.min(took, this.frameMs) > SLOW_MS) this.budget = Math.max(LEAST_BUDGET, Math.max(0.5, SLOW_MS / took) * Math.min(this.budget, this.drawnPoints));
+    else if (this.frameMs < FAST_MS) this.budget = Math.min(1.1 * this.budget, Math.max(FIRST_BUDGET, this.cloud.size));
+  }
+
+  /** Of the points in view, those that can be drawn in time. */
+  private chooseDetail(): void {
+    this.camera.updateMatrixWorld();
+    this.world.updateMatrixWorld();
+    const {clientHeight: height} = this.canvas;
+    const scale = (0.5 * height) / Math.tan((this.camera.fov * Math.PI) / 360);
+    const frustum = new THREE.Frustum().setFromProjectionMatrix(
+      new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse));
+    this.drawnPoints = this.cloud.chooseDetail(this.camera, frustum, scale, height * height * this.camera.aspect, this.budget);
   }
 
   private makeLines(): void {
@@ -253,11 +262,15 @@ export class Stage {
     }
   }
 
+  private isDrawnKeyframe(keyframe: Keyframe): boolean {
+    return this.isShown(keyframe.part) && (this.time === null || keyframe.t <= this.time);
+  }
+
   private makeKeyframes(): void {
     const windows = this.windows.begin();
     const others = this.keyframes.begin();
     for (const keyframe of this.model.keyframes.values()) {
-      if (!this.isShown(keyframe.part) || (this.time !== null && keyframe.t > this.time)) continue;
+      if (!this.isDrawnKeyframe(keyframe)) continue;
       const isSelected = keyframe.id === this.selected;
       const colour = [this.palette.keyframe, this.palette.inner, this.palette.outer][keyframe.window];
       if (isSelected) this.addFrustum(windows, keyframe, 1.3 * this.frustum, this.palette.selected);
@@ -275,7 +288,7 @@ export class Stage {
       const to = this.model.keyframes.get(edge.to);
       if (!from || !to || !this.isShown(from.part) || from.part !== to.part) continue;
       if (this.time !== null && Math.max(from.t, to.t) > this.time) continue;
-      const layer = this.model.isReturn(edge) ? 'returns' : edge.marginalised ? 'marginalised' : 'covisible';
+      const layer = edge.loop > 0 ? 'returns' : edge.marginalised ? 'marginalised' : 'covisible';
       if (!this.layers[layer]) continue;
       const colour = layer === 'returns' ? this.palette.back : this.palette[layer];
       segments.add(from.position, to.position, colour);
@@ -397,12 +410,13 @@ export class Stage {
       return true;
     };
     if (what === 'point') {
-      this.cloud.visit((px, py, pz) => {
+      this.cloud.visitShown((px, py, pz) => {
         if (offer(px, py, pz)) picked = {point: new THREE.Vector3(px, py, pz)};
       });
     } else {
+      if (!this.layers.keyframes) return null;
       for (const keyframe of this.model.keyframes.values())
-        if (this.isShown(keyframe.part) && offer(...keyframe.position)) picked = {keyframe};
+        if (this.isDrawnKeyframe(keyframe) && offer(...keyframe.position)) picked = {keyframe};
     }
     return picked;
   }

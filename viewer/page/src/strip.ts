@@ -1,7 +1,7 @@
 // What each stage of the tracker took, frame by frame, with the budget line.
 import uPlot from 'uplot';
 import type {Model} from './model.ts';
-import type {LiveFrame} from './wire.ts';
+import type {LiveFrame, PathFrame} from './wire.ts';
 
 const SHOWN = 240;
 const STAGES = ['#4e79a7', '#59a14f', '#edc948', '#f28e2b', '#b07aa1', '#76b7b2', '#ff9da7', '#9c755f'];
@@ -19,10 +19,12 @@ export class Strip {
     this.plot?.setSize({width: this.place.clientWidth, height: this.place.clientHeight});
   }
 
-  draw(): void {
-    const frames = this.model.live.slice(-SHOWN);
+  /** Up to `time`, or to the newest: of frames that came live their stages, of others what the tracker took in all. */
+  draw(time: number | null): void {
+    const isLive = this.model.live.length > 0;
+    const frames = isLive ? this.model.live.slice(-SHOWN) : this.timed(time);
     if (this.place.clientWidth === 0 || frames.length < 2) return;
-    const stages = this.model.hello?.stages ?? [];
+    const stages = isLive ? this.model.hello?.stages ?? [] : ['tracker'];
     const made = `${stages.join()} ${document.documentElement.dataset.theme}`;
     if (this.made !== made) {
       this.plot?.destroy();
@@ -39,8 +41,13 @@ export class Strip {
     ]);
   }
 
+  private timed(time: number | null): (PathFrame & {stageMs: number[]})[] {
+    const end = time === null ? this.model.path.length : this.model.indexOf((frame) => frame.t > time);
+    return this.model.path.slice(Math.max(0, end - SHOWN), end).map((frame) => ({...frame, stageMs: [frame.trackingMs]}));
+  }
+
   /** Sums of the stages, the largest first, so that each area covers the upper part of the one before. */
-  private stacked(frames: LiveFrame[], stages: number): number[][] {
+  private stacked(frames: Pick<LiveFrame, 'stageMs'>[], stages: number): number[][] {
     const sums: number[][] = [];
     for (let s = stages; s > 0; --s) sums.push(frames.map((frame) => frame.stageMs.slice(0, s).reduce((sum, ms) => sum + ms, 0)));
     return sums;

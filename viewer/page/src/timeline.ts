@@ -1,7 +1,7 @@
 // The time line: events, stretches in which the camera was lost, and the time that is shown.
 import type {Model} from './model.ts';
 import {eventColour} from './palette.ts';
-import {State, type Loop, type MapEvent, type PathFrame} from './wire.ts';
+import {NO_ID, State, type Loop, type MapEvent, type PathFrame} from './wire.ts';
 
 /** Frames in a row that were lost, or late, for the same reason. */
 export interface Stretch {
@@ -9,6 +9,11 @@ export interface Stretch {
   end: number;  // until the next frame
   frames: number;
   reason: string;
+}
+
+/** Looked at, and not placed. */
+export function isLost(frame: PathFrame): boolean {
+  return frame.state === State.lost || frame.state === State.unplaced;
 }
 
 /** `why` gives nothing for frames that are no part of any. */
@@ -25,13 +30,13 @@ function stretches(model: Model, why: (frame: PathFrame) => string | null): Stre
   return found;
 }
 export function lostStretches(model: Model): Stretch[] {
-  return stretches(model, (frame) => (frame.state === State.tracked ? null : model.reasons[frame.reason] ?? ''));
+  return stretches(model, (frame) => (isLost(frame) ? model.reasons[frame.reason] ?? '' : null));
 }
 /** Poses that came when the next frame was there already. */
 export function lateStretches(model: Model): Stretch[] {
   const budget = model.periodMs();
-  return stretches(model, (frame) => frame.state !== State.tracked || !(budget > 0 && frame.latencyMs > budget) ? null
-    : model.whyLate.get(frame.frame) ?? model.reasons[frame.reason] ?? '');
+  const isLate = (frame: PathFrame) => frame.state === State.dropped || (frame.state === State.tracked && budget > 0 && frame.latencyMs > budget);
+  return stretches(model, (frame) => (isLate(frame) ? model.whyLate.get(frame.frame) ?? model.reasons[frame.reason] ?? '' : null));
 }
 
 export class Timeline {
@@ -108,7 +113,7 @@ export class Timeline {
     const say = (what: string, stretch: Stretch) => `${what} for ${stretch.frames} frame${stretch.frames > 1 ? 's' : ''}: ${stretch.reason}`;
     const lost = this.lost.find(under);
     const late = this.late.find(under);
-    const text = event ? describe(event) : lost ? say('lost', lost) : late ? say('late', late) : clock(t);
+    const text = event ? describe(event, this.model.isMetric) : lost ? say('lost', lost) : late ? say('late', late) : clock(t);
     this.tip.textContent = text;
     this.tip.hidden = false;
     const room = this.tip.parentElement!.clientWidth - this.tip.offsetWidth - 8;
@@ -179,24 +184,28 @@ export function clock(t: number): string {
   return minutes > 0 ? `${minutes}:${rest.padStart(2, '0')}` : `${rest} s`;
 }
 
-export function metres(d: number): string {
+/** One camera's unit is its own, and has no name. */
+export function length(d: number, isMetric: boolean): string {
+  if (!isMetric) return `${d.toPrecision(3)} units`;
   return d < 1 ? `${(100 * d).toFixed(d < 0.1 ? 1 : 0)} cm` : `${d.toFixed(2)} m`;
 }
 
 const degrees = (angle: number) => `${((180 / Math.PI) * angle).toFixed(2)}°`;
 
-export function describe(event: MapEvent): string {
+export function describe(event: MapEvent, isMetric = true): string {
   if (event.text) return `${event.kind} · ${event.text}`;
-  if (event.loop) return `${event.kind} · ${describeLoop(event, event.loop)}`;
-  const moved = event.partBefore === event.part ? `moved ${metres(event.moved)}, turned ${degrees(event.turned)}`
-    : `part ${event.partBefore === 0xffffffff ? '–' : event.partBefore} → ${event.part}`;
-  return `${event.kind} · frame ${event.frame} · ${moved}`;
+  if (event.loop) return `${event.kind} · ${describeLoop(event, event.loop, isMetric)}`;
+  const moved = event.partBefore === event.part ? `moved ${length(event.moved, isMetric)}, turned ${degrees(event.turned)}`
+    : `part ${event.partBefore === NO_ID ? '–' : event.partBefore} → ${event.part}`;
+  return `${event.kind} · frame ${event.frame} · ${moved}${scaled(event.scale)}`;
 }
 
+const scaled = (scale: number | null) => (scale === null || scale === 1 ? '' : ` · scale ${scale.toFixed(4)}`);
+
 /** How far the map was off when the camera came back, and, for one camera, by how much its unit of length. */
-function describeLoop(event: MapEvent, loop: Loop): string {
-  const scale = loop.scale === 1 ? '' : ` · scale ${loop.scale.toFixed(4)}`;
+function describeLoop(event: MapEvent, loop: Loop, isMetric: boolean): string {
+  const scale = scaled(loop.scale);
   const agree = `${loop.inliers} matches`;
   if (loop.joinsParts) return `joins two map parts · ${agree}${scale}`;
-  return `off by ${metres(event.moved)}, ${degrees(event.turned)} after ${metres(loop.travelled)} · ${agree}${scale}`;
+  return `off by ${length(event.moved, isMetric)}, ${degrees(event.turned)} after ${length(loop.travelled, isMetric)} · ${agree}${scale}`;
 }

@@ -52,17 +52,33 @@ async function oneRun(viewers, name) {
   const frame = timing.tracker.frame;
   const listener = timing.tracker['frame listener'];
   const told = readers.map((reader) => `${reader.messages} messages, ${(reader.bytes / 1e6).toFixed(1)} MB`).join('; ');
+  const share = (100 * seconds) / took;
   console.log(`${name}: tracker p50 ${frame.p50_ms.toFixed(2)} p99 ${frame.p99_ms.toFixed(2)} max ${frame.max_ms.toFixed(2)} ms, listener p99 ` +
-    `${listener ? (1000 * listener.p99_ms).toFixed(0) : 0} us, viewer ${(100 * seconds / took).toFixed(1)} % of a core, ${megabytes.toFixed(0)} MB; ${told}`);
+    `${listener ? (1000 * listener.p99_ms).toFixed(0) : 0} us, viewer ${share.toFixed(1)} % of a core, ${megabytes.toFixed(0)} MB; ${told}`);
+  return {p99: frame.p99_ms, share, megabytes};
 }
 
 async function runs() {
+  const kinds = [[null, 'no viewer'], [0, 'nobody looks'], [1, '1 viewer'], [4, '4 viewers, one reads nothing']];
+  const found = new Map(kinds.map(([, name]) => [name, []]));
   for (let round = 0; round < Number(process.env.ROUNDS ?? 2); ++round) {
-    await oneRun(null, `no viewer ${round}`);
-    await oneRun(0, `nobody looks ${round}`);
-    await oneRun(1, `1 viewer ${round}`);
-    await oneRun(4, `4 viewers, one reads nothing ${round}`);
+    for (const [viewers, name] of kinds) found.get(name).push(await oneRun(viewers, `${name} ${round}`));
   }
+  const median = (name, figure) => quantile(found.get(name).map((run) => run[figure]), 0.5);
+  const without = median('no viewer', 'p99');
+  for (const [, name] of kinds.slice(1)) {
+    const more = 100 * (median(name, 'p99') / without - 1);
+    verdict(`tracker p99, ${name}`, 'at most 5 % more than without', `${more.toFixed(1)} %`, more <= 5);
+  }
+  const spread = found.get('no viewer').map((run) => run.p99);
+  const share = median('1 viewer', 'share');
+  console.log(`  runs without viewer differ by ${(100 * (Math.max(...spread) / Math.min(...spread) - 1)).toFixed(1)} % among themselves`);
+  verdict('viewer\'s thread with one viewer', 'at most 3 % of a core', `${share.toFixed(1)} %`, share <= 3);
+}
+
+/** What was wanted, what there is, and whether that is enough. */
+function verdict(what, wanted, got, isEnough) {
+  console.log(`  ${what}: wanted ${wanted}, got ${got}: ${isEnough ? 'met' : 'MISSED'}`);
 }
 
 const quantile = (values, q) => values.sort((a, b) => a - b)[Math.floor(q * (values.length - 1))];
@@ -99,6 +115,11 @@ async function maps() {
     const heap = await page.evaluate(() => performance.memory.usedJSHeapSize / 1e6);
     console.log(`${points} points: keyframes after ${first.toFixed(0)} ms, all after ${all.toFixed(0)} ms, ${drawn.toFixed(1)} pictures a second, ` +
       `${after.frameMs.toFixed(0)} ms each with ${(100 * after.share).toFixed(0)} % of the points, pose to picture p50 ${quantile(delays, 0.5)} p95 ${quantile(delays, 0.95)} ms, heap ${heap.toFixed(0)} MB, server ${memory(load.process.pid).toFixed(0)} MB`);
+    const delay = quantile(delays, 0.5);
+    if (points <= 100000) verdict('first picture', '<= 1000 ms', `${first.toFixed(0)} ms`, first <= 1000);
+    else verdict('load', '<= 5000 ms', `${all.toFixed(0)} ms`, all <= 5000);
+    verdict('pictures a second', '>= 20', drawn.toFixed(1), drawn >= 20);
+    verdict('pose to picture, median', '<= 100 ms', `${delay} ms`, delay <= 100);
     await page.screenshot({path: join(out, `${points}.png`)});
     await load.stop('SIGKILL');
     await page.context().close();
@@ -112,12 +133,16 @@ async function hour() {
   const load = new Program(['20000', '90', '60']);
   const page = await openPage(browser, await load.address());
   const client = await page.context().newCDPSession(page);
+  const heaps = [];
   for (let minute = 10; minute <= 60; minute += 10) {
     await page.waitForTimeout(10000);
     await client.send('HeapProfiler.collectGarbage');
     const held = await page.evaluate(() => [performance.memory.usedJSHeapSize / 1e6, window.twofold.model.endTime() / 60, window.twofold.model.path.length]);
+    heaps.push(held[0]);
     console.log(`minute ${held[1].toFixed(0)}: heap ${held[0].toFixed(1)} MB, ${held[2]} frames of the path, server ${memory(load.process.pid).toFixed(1)} MB`);
   }
+  const growth = heaps.at(-1) / heaps[0];  // the first ten minutes fill what is bounded
+  verdict('heap of an hour', 'the last at most 1.25 times the first', growth.toFixed(2), growth <= 1.25);
   await load.stop('SIGKILL');
   await browser.close();
 }
