@@ -28,6 +28,7 @@ const LAYERS: [Layer | 'image', string, string][] = [
   ['image', 'Camera image', ''],
 ];
 const KEYS: [string, string][] = [
+  ['drag', 'turn; right button or two fingers: move; wheel or pinch: zoom'],
   ['1 2 3', 'follow, from above, free'], ['space', 'play or stop'], ['← →', 'a second back, on'], ['end', 'now'],
   ['M', 'measure between two points'], ['P K C E', 'points, keyframes, causal path, edges'], ['I', 'camera image'],
   ['S', 'save a picture'], ['F', 'full screen'], ['T', 'dark or light'], ['esc', 'let go of what is selected'], ['H', 'these keys'],

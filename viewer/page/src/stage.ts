@@ -45,6 +45,7 @@ export class Stage {
   private readonly tape = new WideLines(3, 7);
   private readonly keyframes = new WideLines(1, 0, 0.8);
   private readonly edges = new WideLines(1, 0, 0.25);
+  private readonly returns = new WideLines(2.2, 5);
   private readonly grid = new WideLines(1, -1);
   private palette: Palette = PALETTES.dark;
   private dirty = true;
@@ -72,9 +73,9 @@ export class Stage {
     this.controls.addEventListener('start', () => (this.moved = true));
     this.world.rotation.x = Math.PI;
     this.world.add(this.cloud.group, this.edges.object, this.keyframes.object, this.truth.object, this.causal.object,
-      this.final.object, this.windows.object, this.body.object, this.tape.object);
+      this.final.object, this.windows.object, this.returns.object, this.body.object, this.tape.object);
     this.scene.add(this.world, this.grid.object);
-    for (const lines of [this.final, this.causal, this.truth, this.windows, this.body, this.tape]) lines.object.material.depthTest = false;
+    for (const lines of [this.final, this.causal, this.truth, this.windows, this.returns, this.body, this.tape]) lines.object.material.depthTest = false;
     this.renderer.compile(this.scene, this.camera);  // goes on while the page is made
     this.setTheme('dark');
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -283,6 +284,7 @@ export class Stage {
 
   private makeEdges(): void {
     const segments = this.edges.begin();
+    const returns = this.returns.begin();
     for (const edge of this.model.edges.values()) {
       const from = this.model.keyframes.get(edge.from);
       const to = this.model.keyframes.get(edge.to);
@@ -291,9 +293,10 @@ export class Stage {
       const layer = edge.loop > 0 ? 'returns' : edge.marginalised ? 'marginalised' : 'covisible';
       if (!this.layers[layer]) continue;
       const colour = layer === 'returns' ? this.palette.back : this.palette[layer];
-      segments.add(from.position, to.position, colour);
+      (layer === 'returns' ? returns : segments).add(from.position, to.position, colour);
     }
     this.edges.end();
+    this.returns.end();
   }
 
   private makeTruth(): void {

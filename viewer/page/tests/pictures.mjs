@@ -7,7 +7,7 @@ import {Program, openBrowser, openPage, places, report, until} from './program.m
 
 const [source, folder] = process.argv.slice(2);
 const scratch = mkdtempSync(join(tmpdir(), 'viewer-'));
-const [recording, out, map] = ['recording', 'run', 'courtyard.tfm'];  // in that folder: their names are in the pictures
+const [recording, out, map] = ['recording', 'run', 'cloister.tfm'];  // in that folder: their names are in the pictures
 const browser = await openBrowser();
 const picture = (page, name) => page.screenshot({path: join(folder, name), type: 'jpeg', quality: 75});
 
@@ -20,13 +20,23 @@ async function clickKeyframe(page) {
   await page.locator('#keyframe-image').waitFor({state: 'visible'});
 }
 
+/** The way round the cloister ends where it began, with a loop: the newest event that says so, and the edges it left, in red. */
+async function loop(page, run) {
+  await until('a loop', async () => run.ended || (await report(page)).loops > 2, 240000);
+  await page.waitForTimeout(3000);
+  await page.locator('#events li', {hasText: /^loop/}).first().click();
+  await page.keyboard.press('2');
+  await page.waitForTimeout(3000);
+  await picture(page, 'viewer_loop.jpg');
+}
+
 async function live() {
   const run = new Program(['run', recording, '--speed', '0.5', '--late', 'drop', '--quiet', '--view', '0', '--save-map', map, '--out', out], scratch);
   const page = await openPage(browser, await run.address());
   await until('keyframes', async () => (await report(page)).keyframes > 5);
-  await page.keyboard.press('i');
   await until('most of the run', async () => run.ended || (await page.evaluate(() => window.twofold.model.endTime())) > 16, 240000);
   await picture(page, 'viewer_live.jpg');
+  await loop(page, run);
   await run.end;
 }
 
@@ -44,9 +54,8 @@ async function finished() {
 
 async function mapFile() {
   const view = new Program(['view', map, '--port', '0'], scratch);
-  const page = await openPage(browser, await view.address());
+  const page = await openPage(browser, await view.address(), {colorScheme: 'light'});
   await until('the map', async () => (await report(page)).points > 100);
-  await page.keyboard.press('t');
   await page.selectOption('#colouring', 'deviation');
   await page.waitForTimeout(2000);
   await picture(page, 'viewer_map.jpg');

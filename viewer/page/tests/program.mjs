@@ -86,7 +86,7 @@ export async function openBrowser() {
 
 /** A page that collects what goes wrong in it. */
 export async function openPage(browser, address, options = {}) {
-  const context = await browser.newContext({viewport: {width: 1280, height: 800}, ...options});
+  const context = await browser.newContext({viewport: {width: 1280, height: 800}, colorScheme: 'dark', ...options});
   const page = await context.newPage();
   page.faults = [];
   page.on('console', (message) => message.type() === 'error' && page.faults.push(message.text()));
