@@ -92,7 +92,8 @@ class Page {
       if (!speaksTheSame(message.hello.protocol)) return;
       document.title = `${message.hello.title} – Twofold`;
       $('title').textContent = message.hello.title;
-      document.body.classList.toggle('finished', !message.hello.hasTimes);
+      document.body.classList.toggle('finished', message.hello.kind === 'map' || !message.hello.hasTimes);
+      $('no-events').textContent = message.hello.kind === 'live' ? 'none yet' : 'none';
       this.makeStages();
       this.makeColours();
       this.hideWhatIsNot();
@@ -456,6 +457,7 @@ class Page {
     $('colouring').addEventListener('change', () => {
       this.stage.cloud.setColouring($<HTMLSelectElement>('colouring').value as Colouring);
       this.stage.redraw();
+      this.stale = true;
     });
     $('size').addEventListener('input', () => {
       this.stage.cloud.setPointSize(Number($<HTMLInputElement>('size').value));
