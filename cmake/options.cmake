@@ -94,9 +94,10 @@ function(twofold_command target variable)
   set(${variable} ${command} PARENT_SCOPE)
 endfunction()
 
-# twofold_test(name SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case.
+# twofold_test(name [ALONE] SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case. ALONE: cameras play
+# in real time in it; no other test runs beside it.
 function(twofold_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -108,5 +109,5 @@ function(twofold_test name)
     math(EXPR ARG_TIMEOUT "5 * ${ARG_TIMEOUT}")
   endif()
   twofold_sanitizer_environment(${name})
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} RUN_SERIAL ${ARG_ALONE})
 endfunction()
