@@ -1,8 +1,15 @@
 #include "filters/process_model.hpp"
 
+#include <Eigen/LU>
+
 #include "geometry/cbh.hpp"
 
 namespace twofold {
+
+Matrix6 MotionInput::information() const {
+  return covariance.inverse();
+}
+
 MotionError motion_error(const MotionInput& input, const SE3& T_prev_w, const SE3& T_cur_w) {
   const SE3 T_cur_prev = T_cur_w * T_prev_w.inverse();
   MotionError error;

@@ -8,7 +8,8 @@ namespace twofold {
 /// compound operation T_cur_w = exp(w) * T_cur_prev * T_prev_w with w ~ N(0, covariance).
 struct MotionInput {
   SE3 T_cur_prev;
-  Matrix6 covariance = Matrix6::Identity();  ///< of w, tangent order (v, omega) [m, rad], positive definite
+  Matrix6 covariance = Matrix6::Identity();   ///< of w, tangent order (v, omega) [m, rad], positive definite
+  [[nodiscard]] Matrix6 information() const;  ///< covariance^-1
 };
 
 /// Error e = log(T_cur_w * T_prev_w^-1 * T_cur_prev^-1) and its derivatives by left perturbations of the

@@ -1,9 +1,10 @@
 // The two elimination orders of FilterFactor.
-#include "filters/sliding_window_filter_factor.hpp"
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <utility>
+
+#include "filters/dense_algebra.hpp"
+#include "filters/sliding_window_filter_factor.hpp"
 
 namespace twofold {
 namespace {
@@ -17,9 +18,8 @@ bool cholesky(MatrixX& S) {
 
 /// Solves L L^T x = b in place.
 void solve_with(const MatrixX& L, VectorX& x) {
-  if (x.size() == 0) return;
-  L.triangularView<Eigen::Lower>().solveInPlace(x);
-  L.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
+  solve_lower(L, x);
+  solve_lower_transposed(L, x);
 }
 
 /// L^-1, block column by block column: above the diagonal nothing is solved for.
@@ -28,8 +28,7 @@ MatrixX inverse_factor(const MatrixX& L) {
   const Eigen::Index n = L.rows();
   MatrixX Y = MatrixX::Identity(n, n);
   for (Eigen::Index at = 0; at < n; at += kColumns) {
-    auto below = Y.block(at, at, n - at, std::min(kColumns, n - at));
-    L.bottomRightCorner(n - at, n - at).triangularView<Eigen::Lower>().solveInPlace(below);
+    solve_lower(L.bottomRightCorner(n - at, n - at), Y.block(at, at, n - at, std::min(kColumns, n - at)));
   }
   return Y;
 }
@@ -129,7 +128,8 @@ FilterCovariances FilterFactor::covariances_map_onto_path() const {
   const int p0 = 3 * n_prior_;
   const MatrixX Y = inverse_factor(S_);
   const auto Y_poses = Y.bottomRightCorner(6 * m_, 6 * m_);
-  const MatrixX poses = Y_poses.transpose() * Y_poses;
+  MatrixX poses = MatrixX::Zero(6 * m_, 6 * m_);
+  add_product(poses, 1.0, Y_poses.transpose(), Y_poses);
   FilterCovariances result;
   for (int j = 0; j < m_; ++j) result.poses.push_back(poses.block<6, 6>(6 * j, 6 * j));
   for (int l = 0; l < n_prior_; ++l) {
@@ -171,13 +171,14 @@ bool FilterFactor::factorise_path_onto_map(const FilterEquations& eq, double dam
     if (llt.info() != Eigen::Success) return false;
     L_[i] = llt.matrixL();
     auto row = Y_W_.middleRows<6>(6 * j);
-    L_[i].triangularView<Eigen::Lower>().solveInPlace(row);
+    solve_lower(L_[i], row);
     if (j + 1 == m_) break;
     passed_on.setZero();
     if (!has_motion_) continue;
-    Y_E_[i] = L_[i].triangularView<Eigen::Lower>().solve(eq.E[i]);
+    Y_E_[i] = eq.E[i];
+    solve_lower(L_[i], Y_E_[i]);
     passed_on.noalias() = -Y_E_[i].transpose() * Y_E_[i];
-    Y_W_.middleRows<6>(6 * (j + 1)).noalias() -= Y_E_[i].transpose() * row;
+    add_product(Y_W_.middleRows<6>(6 * (j + 1)), -1.0, Y_E_[i].transpose(), row);
   }
   if (n_ > 0) S_.selfadjointView<Eigen::Lower>().rankUpdate(Y_W_.transpose(), -1.0);
   return cholesky(S_);
@@ -190,13 +191,14 @@ void FilterFactor::solve_path_onto_map(const std::vector<Vector6>& gp, const std
     const auto i = static_cast<std::size_t>(j);
     Vector6 g = gp[i];
     if (j > 0) g -= Y_E_[i - 1].transpose() * y.segment<6>(6 * (j - 1));
-    y.segment<6>(6 * j) = L_[i].triangularView<Eigen::Lower>().solve(g);
+    solve_lower(L_[i], g);
+    y.segment<6>(6 * j) = g;
   }
   VectorX x(3 * n_);
   for (int l = 0; l < n_; ++l) x.segment<3>(3 * l) = gm[static_cast<std::size_t>(l)];
-  x.noalias() -= Y_W_.transpose() * y;
+  add_product(x, -1.0, Y_W_.transpose(), y);
   solve_with(S_, x);
-  y.noalias() -= Y_W_ * x;
+  add_product(y, -1.0, Y_W_, x);
   step.poses.resize(static_cast<std::size_t>(m_));
   step.landmarks.resize(static_cast<std::size_t>(n_));
   for (int l = 0; l < n_; ++l) step.landmarks[static_cast<std::size_t>(l)] = x.segment<3>(3 * l);
@@ -204,7 +206,8 @@ void FilterFactor::solve_path_onto_map(const std::vector<Vector6>& gp, const std
     const auto i = static_cast<std::size_t>(j);
     Vector6 r = y.segment<6>(6 * j);
     if (j + 1 < m_) r -= Y_E_[i] * step.poses[i + 1];
-    step.poses[i] = L_[i].transpose().triangularView<Eigen::Upper>().solve(r);
+    solve_lower_transposed(L_[i], r);
+    step.poses[i] = r;
   }
 }
 
@@ -218,17 +221,22 @@ FilterCovariances FilterFactor::covariances_path_onto_map() const {
   for (int j = m_ - 1; j >= 0; --j) {
     const auto i = static_cast<std::size_t>(j);
     const auto Y_W = Y_W_.middleRows<6>(6 * j);
-    MatrixX cross = -(Y_W * map);
-    Matrix6 inner = Matrix6::Identity() - cross * Y_W.transpose();
+    const MatrixX Y_W_t = Y_W.transpose();
+    MatrixX cross = MatrixX::Zero(6, 3 * n_);
+    add_product(cross, -1.0, Y_W, map);
+    Matrix6 inner = Matrix6::Identity();
+    add_product(inner, -1.0, cross, Y_W_t);
     if (j + 1 < m_) {
-      const Matrix6 mixed = Y_E_[i] * cross_next * Y_W.transpose();
+      Matrix6 next = Matrix6::Zero();
+      add_product(next, 1.0, cross_next, Y_W_t);
+      const Matrix6 mixed = Y_E_[i] * next;
       inner += Y_E_[i] * result.poses[i + 1] * Y_E_[i].transpose() + mixed + mixed.transpose();
-      cross.noalias() -= Y_E_[i] * cross_next;
+      add_product(cross, -1.0, Y_E_[i], cross_next);
     }
-    const auto Lt = L_[i].transpose().triangularView<Eigen::Upper>();
-    Lt.solveInPlace(cross);
-    const Matrix6 half = Lt.solve(inner);
-    result.poses[i] = Lt.solve(Matrix6(half.transpose()));
+    solve_lower_transposed(L_[i], cross);
+    solve_lower_transposed(L_[i], inner);
+    result.poses[i] = inner.transpose();
+    solve_lower_transposed(L_[i], result.poses[i]);
     cross_next = std::move(cross);
   }
   return result;

@@ -1,5 +1,4 @@
 // Removal of parameters from the sliding window filter  (SWF 3.1.2, 3.2, 4.2.4, 4.2.7).
-#include <Eigen/LU>
 #include <algorithm>
 
 #include "filters/sliding_window_filter.hpp"
@@ -131,7 +130,7 @@ void SlidingWindowFilter::add_motion(Blanket& blanket) const {
   const MotionError error = linearise_motion(1);
   Eigen::Matrix<double, 6, 12> J;
   J << error.J_prev, error.J_cur;
-  const Matrix6 Q_inv = poses_[1].motion->covariance.inverse();
+  const Matrix6 Q_inv = poses_[1].motion->information();
   const Eigen::Matrix<double, 12, 12> H = J.transpose() * Q_inv * J;
   const Eigen::Matrix<double, 12, 1> h =
       -J.transpose() * (Q_inv * (error.e - error.J_prev * blanket.d.head<6>()));

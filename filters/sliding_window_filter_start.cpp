@@ -1,6 +1,5 @@
 // Start value of a new pose in the sliding window filter: fitted to the landmarks that are known already.
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -93,7 +92,7 @@ void SlidingWindowFilter::fit_newest_pose(const FilterFrame& frame) {
   if (known.size() < 3 && !frame.motion) return;
   Pose& pose = poses_.back();
   const double huber = options_.robust ? options_.huber_sigmas * std::sqrt(3.0) : 0.0;
-  const Matrix6 prior = frame.motion ? Matrix6(frame.motion->covariance.inverse()) : Matrix6::Zero();
+  const Matrix6 prior = frame.motion ? frame.motion->information() : Matrix6::Zero();
   pose.T_c_l = minimise(PoseCost(rig_, huber, known, pose.T_c_l, prior), pose.T_c_l);
 }
 

@@ -1,6 +1,4 @@
 // Linearisation of the sliding window filter: the measurement, process and prior parts of SWF eq. 5-7.
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -142,7 +140,7 @@ void SlidingWindowFilter::add_motion(int pose) {
   FilterEquations& eq = equations_;
   const auto p = static_cast<std::size_t>(pose);
   const MotionError error = linearise_motion(pose);
-  const Matrix6 Q_inv = poses_[p].motion->covariance.inverse();
+  const Matrix6 Q_inv = poses_[p].motion->information();
   eq.has_motion = true;
   eq.U[p - 1] += error.J_prev.transpose() * Q_inv * error.J_prev;
   eq.U[p] += error.J_cur.transpose() * Q_inv * error.J_cur;
@@ -167,7 +165,7 @@ double SlidingWindowFilter::cost() const {
     }
     if (j == 0 || !pose.motion) continue;
     const Vector6 e = motion_error(*pose.motion, poses_[static_cast<std::size_t>(j) - 1].T_c_l, pose.T_c_l).e;
-    sum += 0.5 * e.dot(pose.motion->covariance.ldlt().solve(e));
+    sum += 0.5 * e.dot(pose.motion->information() * e);
   }
   return sum;
 }
