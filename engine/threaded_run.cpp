@@ -129,9 +129,9 @@ void ThreadedRun::collect(const FrameSink& sink) {
     const FrameRecord& record = slot->record;
     progress_.count(record);
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
-    progress_.queued = mapper_inbox_.proposals_approx();
-    progress_.frames_waiting = frames_.size_approx();
-    progress_.places_waiting = keyframes_.size_approx();
+    progress_.queued = keyframes_waiting();
+    progress_.frames_waiting = frames_waiting();
+    progress_.places_waiting = places_waiting();
     logs_.add(record, slot->correction);
     logs_.schedule().tracker.append(slot->step);
     slot->frame = {};  // images are freed here, not on the tracker's thread

@@ -56,6 +56,10 @@ class ThreadedRun {
   [[nodiscard]] bool failed() const;
   /// Counts of what was collected.
   [[nodiscard]] const Progress& progress() const { return progress_; }
+  /// What waits for tracker, mapper and loop closer. Any thread, wait-free: no more than a look at the rings.
+  [[nodiscard]] std::size_t frames_waiting() const { return frames_.size_approx(); }
+  [[nodiscard]] std::size_t keyframes_waiting() const { return mapper_inbox_.proposals_approx(); }
+  [[nodiscard]] std::size_t places_waiting() const { return keyframes_.size_approx(); }
   /// No more frames: returns when all that were pushed have been tracked and mapped. They can still be
   /// collected.
   void stop();

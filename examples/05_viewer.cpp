@@ -21,18 +21,21 @@ struct FinishFirst {
 void run(const char* name, int seconds_to_stay) {
   twofold::Source source(name);
   twofold::Slam slam(source.rig(), {.live = source.is_live()});
-  twofold::Viewer viewer(source.rig(), [&] { return slam.map(); }, {.title = name, .port = 0});
+  twofold::Viewer viewer(
+      source.rig(), [&] { return slam.map(); },
+      {.title = name, .port = 0, .stages = twofold::tracker_stages(), .efforts = twofold::effort_levels()});
   const FinishFirst finish_first{slam};
-  slam.on_pose([&](const twofold::PoseEstimate& pose) { viewer.tell(pose); });
+  slam.on_frame([&](const twofold::PoseEstimate& pose, const twofold::FrameDetails& details) {
+    viewer.tell(pose, details);
+  });
   slam.on_event([&](const twofold::MapEvent& event) { viewer.tell(event); });
   std::printf("open %s\n", viewer.address().c_str());
 
   twofold::FrameView frame;
-  for (std::int64_t n = 0; source.next(frame);) {
+  while (source.next(frame)) {
     if (!source.is_live()) (void)slam.wait_for_room(1'000'000'000);
-    if (slam.push(frame).status == twofold::PushStatus::kRefused) continue;  // has no number
-    if (viewer.wants_image()) viewer.show(n, frame.left, frame.owner);
-    ++n;
+    const twofold::PushResult pushed = slam.push(frame);
+    if (pushed && viewer.wants_image()) viewer.show(pushed.frame, frame.left, frame.owner);
   }
   const twofold::SlamSummary summary = slam.finish();
   std::printf("%lld of %lld frames tracked\n", static_cast<long long>(summary.tracked),

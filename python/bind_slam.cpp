@@ -62,10 +62,9 @@ class SlamWithUpdates {
         items_in_flight(kItemsAFrame * static_cast<std::size_t>(std::max(options.frame_buffers, 1) + 1)),
         updates(std::make_shared<Updates>(std::bit_ceil(std::max<std::size_t>(512, 4 * items_in_flight)))),
         slam(camera_rig, options) {
-    slam.on_pose([queue = &updates->queue, this](const PoseEstimate& pose) {
-      queue->put(pose);
-      view.tell(pose);
-    });
+    slam.on_pose([queue = &updates->queue](const PoseEstimate& pose) { queue->put(pose); });
+    slam.on_frame(
+        [this](const PoseEstimate& pose, const FrameDetails& details) { view.tell(pose, details); });
     slam.on_event([queue = &updates->queue, this](const MapEvent& event) {
       queue->put(event);
       view.tell(event);
@@ -79,7 +78,7 @@ class SlamWithUpdates {
 
   PushResult push(const FrameView& frame) {
     PushResult pushed = slam.push(frame);
-    if (pushed.status != PushStatus::kRefused) view.show(frame);
+    if (pushed) view.show(pushed.frame, frame);
     return pushed;
   }
 
@@ -131,6 +130,8 @@ void bind_push(py::module_& module) {
                          "Whether a frame was queued, dropped or refused; true when queued.")
       .def_readonly("status", &PushResult::status)
       .def_readonly("reason", &PushResult::reason, "Of dropped and refused frames: what is wrong.")
+      .def_readonly("frame", &PushResult::frame,
+                    "The number that its pose has; -1: it was refused, and has none.")
       .def("__bool__", [](const PushResult& self) { return static_cast<bool>(self); })
       .def("__repr__", [](const PushResult& self) {
         return self ? std::string("<PushResult: queued>") : "<PushResult: " + self.reason + ">";
@@ -224,6 +225,8 @@ std::string view(SlamWithUpdates& self, const std::string& title, int port, cons
   options.title = title;
   options.bind = bind;
   options.port = port;
+  options.stages = tracker_stages();
+  options.efforts = effort_levels();
   for (const auto& pose : truth.value_or(PoseList{}).poses) {
     options.truth.push_back(pose.T_world_camera);
     options.truth_t_ns.push_back(pose.t_ns);
@@ -305,7 +308,8 @@ void bind_slam_class(py::module_& module) {
       .def(
           "close_view", [](SlamWithUpdates& self) { self.view.close(); }, Unlocked(),
           "Whoever looks gets the last map and is told that the run is over. Happens by itself when the Slam "
-          "goes.")
+          "goes.\n"
+          "view() can open another one then, which shows the map, and what comes from there on.")
       .def_property_readonly("_updates", [](const SlamWithUpdates& self) { return self.updates; });
 }
 

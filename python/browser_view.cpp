@@ -13,20 +13,22 @@ std::string BrowserView::open(const CameraRig& rig, const Slam& slam, const View
   return viewer_->address();
 }
 
-void BrowserView::show(const FrameView& frame) {
+void BrowserView::show(std::int64_t number, const FrameView& frame) {
   const std::scoped_lock lock(showing_);
-  const std::int64_t number = frames_++;
   Viewer* viewer = shown_.load(std::memory_order_acquire);
   if (viewer != nullptr && viewer->wants_image()) viewer->show(number, frame.left, frame.owner);
 }
 
 void BrowserView::close() {
   const std::scoped_lock lock(opening_);
-  if (viewer_) viewer_->finish();
+  if (!viewer_) return;
+  viewer_->finish();
+  shown_.store(nullptr, std::memory_order_release);
+  closed_.push_back(std::move(viewer_));
 }
 
-void BrowserView::tell(Viewer& viewer, const PoseEstimate& pose) {
-  viewer.tell(pose);
+void BrowserView::tell(Viewer& viewer, const PoseEstimate& pose, const FrameDetails& details) {
+  viewer.tell(pose, details);
 }
 
 void BrowserView::tell(Viewer& viewer, const MapEvent& event) {

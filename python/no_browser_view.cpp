@@ -8,9 +8,9 @@ namespace twofold::python {
 std::string BrowserView::open(const CameraRig&, const Slam&, const ViewerOptions&) {
   throw std::runtime_error("this package was built without the viewer, which needs Node.js and Boost");
 }
-void BrowserView::show(const FrameView&) {}
+void BrowserView::show(std::int64_t, const FrameView&) {}
 void BrowserView::close() {}
-void BrowserView::tell(Viewer&, const PoseEstimate&) {}
+void BrowserView::tell(Viewer&, const PoseEstimate&, const FrameDetails&) {}
 void BrowserView::tell(Viewer&, const MapEvent&) {}
 
 }  // namespace twofold::python

@@ -12,19 +12,19 @@ namespace twofold {
 ///
 /// Roles: `set` before the first call; one thread calls; anyone asks for the error.
 /// Ordering: failed_ release -> acquire publishes what_, which is written once.
-template <class Argument>
+template <class... Arguments>
 class GuardedCallback {
  public:
-  using Function = std::function<void(const Argument&)>;
+  using Function = std::function<void(const Arguments&...)>;
 
   explicit GuardedCallback(std::string name) : name_(std::move(name)) {}
 
   void set(Function function) { function_ = std::move(function); }
 
-  void operator()(const Argument& argument) {
+  void operator()(const Arguments&... arguments) {
     if (!function_ || failed_.load(std::memory_order_relaxed)) return;  // relaxed: raised by this thread
     try {
-      function_(argument);
+      function_(arguments...);
     } catch (const std::exception& error) {
       fail(error.what());
     } catch (...) {

@@ -16,6 +16,11 @@ class ThreadedPipeline final : public Pipeline {
   void push(Frame frame) override { run_.push(std::move(frame)); }
   void wait(std::chrono::steady_clock::time_point deadline) override { run_.wait(deadline); }
   [[nodiscard]] bool failed() override { return run_.failed(); }
+  [[nodiscard]] QueueLengths waiting() const override {
+    return {static_cast<std::int64_t>(run_.frames_waiting()),
+            static_cast<std::int64_t>(run_.keyframes_waiting()),
+            static_cast<std::int64_t>(run_.places_waiting())};
+  }
   [[nodiscard]] RunResult finish() override {
     run_.stop();
     run_.collect({});
@@ -34,6 +39,7 @@ class DeterministicPipeline final : public Pipeline {
   void push(Frame frame) override { (void)run_.step(frame); }
   void wait(std::chrono::steady_clock::time_point) override {}
   [[nodiscard]] bool failed() override { return false; }
+  [[nodiscard]] QueueLengths waiting() const override { return {0, 0, 0}; }
   [[nodiscard]] RunResult finish() override { return run_.finish(); }
 
  private:

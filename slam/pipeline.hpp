@@ -6,6 +6,7 @@
 
 #include "engine/lockstep_run.hpp"
 #include "engine/threaded_run.hpp"
+#include "twofold/queue_lengths.hpp"
 
 namespace twofold {
 
@@ -22,6 +23,8 @@ class Pipeline {
   virtual void wait(std::chrono::steady_clock::time_point deadline) = 0;
   /// A thread has ended early: what is pushed now is not tracked, and the result says why.
   [[nodiscard]] virtual bool failed() = 0;
+  /// Any thread, wait-free, until finish has returned.
+  [[nodiscard]] virtual QueueLengths waiting() const = 0;
   /// The last call.
   [[nodiscard]] virtual RunResult finish() = 0;
 };

@@ -8,6 +8,7 @@
 #include "engine/clock.hpp"
 #include "graph/map_file.hpp"
 #include "slam/conversions.hpp"
+#include "slam/frame_details.hpp"
 #include "slam/frame_intake.hpp"
 #include "slam/guarded_callback.hpp"
 #include "slam/latest_value.hpp"
@@ -59,6 +60,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
 
   GuardedCallback<PoseEstimate> on_pose{"on_pose"};
   GuardedCallback<MapEvent> on_event{"on_event"};
+  GuardedCallback<PoseEstimate, FrameDetails> on_frame{"on_frame"};
   LatestValue<PoseEstimate> latest;
   MapLender maps;
   [[nodiscard]] const Rig& rig() const { return rig_; }
@@ -76,6 +78,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
   std::mutex pushing_;  // guards what follows: whoever pushes or finishes has his turn
   FrameIntake intake_;
   bool pushed_ = false;
+  std::int64_t frames_ = 0;   // that have a number, dropped ones included
   std::int64_t no_room_ = 0;  // frames dropped on the way in
   std::optional<SlamSummary> summary_;
 
@@ -92,6 +95,8 @@ void Slam::Impl::tell(const PoseReport& report) {
   if (events.placing) on_event(*events.placing);
   latest.put(estimate);
   on_pose(estimate);
+  const FrameDetails::Impl details{rig_, report, pipeline_->waiting()};
+  on_frame(estimate, FrameDetails(details));
 }
 
 bool Slam::Impl::failed() {
@@ -121,10 +126,11 @@ PushResult Slam::Impl::push(const FrameView& frame) {
     intake_.skip(frame);
     ++no_room_;
     return {PushStatus::kDropped,
-            fmt::format("the tracker is behind: {} frames are waiting for it already", frame_buffers_)};
+            fmt::format("the tracker is behind: {} frames are waiting for it already", frame_buffers_),
+            frames_++};
   }
   pipeline_->push(intake_.take(frame));
-  return {};
+  return {PushStatus::kQueued, "", frames_++};
 }
 
 bool Slam::Impl::wait_for_room(std::int64_t timeout_ns) {
@@ -144,6 +150,7 @@ std::vector<std::string> Slam::Impl::errors() const {
   std::vector<std::string> errors;
   if (const auto error = on_event.error()) errors.push_back(*error);
   if (const auto error = on_pose.error()) errors.push_back(*error);
+  if (const auto error = on_frame.error()) errors.push_back(*error);
   const std::scoped_lock lock(errors_);
   if (!engine_error_.empty()) errors.push_back(engine_error_);
   return errors;
@@ -176,6 +183,10 @@ Slam::~Slam() {
 
 void Slam::on_pose(PoseCallback callback) {
   impl_->set(impl_->on_pose, std::move(callback));
+}
+
+void Slam::on_frame(FrameCallback callback) {
+  impl_->set(impl_->on_frame, std::move(callback));
 }
 
 void Slam::on_event(EventCallback callback) {

@@ -117,8 +117,13 @@ std::shared_ptr<const std::string> ClientFeed::next_piece() {
   return piece;
 }
 
-bool ClientFeed::take(std::string_view message) {
+bool ClientFeed::take(std::string_view message, Time now) {
   if (message == "ack") return --unacknowledged_ >= 0;
+  if (now - second_began_ > std::chrono::seconds(1)) {
+    second_began_ = now;
+    messages_ = 0;
+  }
+  if (++messages_ > kMessagesASecond) return false;
   if (message == "images on" || message == "images off") {
     wants_images_ = message == "images on";
     return true;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -51,9 +52,12 @@ class ClientFeed {
 
   /// Nothing: the client is up to date, or has enough to do.
   [[nodiscard]] std::optional<ViewMessage> next(const ViewSight& sight);
+  using Time = std::chrono::steady_clock::time_point;
+  static constexpr int kMessagesASecond =
+      500;  // beside acknowledgements, of which there are no more than messages
   /// A message of the client (wire_format.hpp). False: nonsense, or more than it may, and the client is to
   /// go.
-  [[nodiscard]] bool take(std::string_view message);
+  [[nodiscard]] bool take(std::string_view message, Time now = {});
   /// What the client asked for since the last call, each command once, in the order of the last wishes.
   [[nodiscard]] std::vector<ViewCommand> take_commands() { return std::exchange(commands_, {}); }
 
@@ -89,6 +93,8 @@ class ClientFeed {
   std::optional<std::string> last_words_;
   bool told_end_ = false;
   int unacknowledged_ = 0;
+  Time second_began_;
+  int messages_ = 0;  // in this second
 };
 
 }  // namespace twofold

@@ -44,7 +44,7 @@ struct ToldFrame {
 struct ToldPoints {
   std::int64_t frame = 0;
   std::uint32_t count = 0;
-  std::array<ViewedPoint, 512> points;
+  std::array<MeasuredPoint, 512> points;
 };
 
 struct HeldImage {
@@ -99,7 +99,7 @@ std::string measured_message(const ToldPoints& told) {
   const ViewMessageHeader header{ViewMessageKind::kMeasured, static_cast<std::uint32_t>(told.frame),
                                  told.count};
   std::string message(reinterpret_cast<const char*>(&header), sizeof header);
-  message.append(reinterpret_cast<const char*>(told.points.data()), told.count * sizeof(ViewedPoint));
+  message.append(reinterpret_cast<const char*>(told.points.data()), told.count * sizeof(MeasuredPoint));
   return message;
 }
 
@@ -368,6 +368,17 @@ void Viewer::tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_
   impl_->push(frame);
 }
 
+void Viewer::tell(const PoseEstimate& pose, const FrameDetails& details) {
+  if (pose.state == TrackingState::kTracked && impl_->has_shown(pose.frame)) {
+    ToldPoints told;
+    told.frame = pose.frame;
+    told.count = static_cast<std::uint32_t>(details.points(told.points));
+    impl_->push(told);
+  }
+  impl_->set_waiting(details.waiting());
+  tell(pose, details.stage_ns());
+}
+
 void Viewer::tell(const MapEvent& event) {
   impl_->push(event);
 }
@@ -376,7 +387,7 @@ bool Viewer::wants_points(std::int64_t frame) const {
   return impl_->has_shown(frame);
 }
 
-void Viewer::tell(std::int64_t frame, std::span<const ViewedPoint> points) {
+void Viewer::tell(std::int64_t frame, std::span<const MeasuredPoint> points) {
   ToldPoints told;
   told.frame = frame;
   told.count = static_cast<std::uint32_t>(std::min(points.size(), told.points.size()));

@@ -21,7 +21,7 @@ namespace twofold {
 //   kFrames  ViewLiveFrame, in the order of time
 //   kImage   a JPEG
 //   kKeyframeImage  likewise; nothing: it has none
-//   kMeasured  ViewedPoint (twofold/viewer.hpp); comes before the frame itself
+//   kMeasured  MeasuredPoint (twofold/frame_details.hpp); comes before the frame itself
 // Text messages are JSON: an object with one of the members hello, state, reasons, truth, events, status
 // (viewer/texts.hpp).
 //

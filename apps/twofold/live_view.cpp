@@ -1,8 +1,6 @@
 #include "apps/twofold/live_view.hpp"
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
@@ -12,14 +10,11 @@
 #include "graph/map_file.hpp"
 #include "io/files/io_error.hpp"
 #include "slam/conversions.hpp"
+#include "slam/frame_details.hpp"
 #include "slam/map_snapshot.hpp"
-#include "tracking/effort.hpp"
-#include "tracking/track_result.hpp"
 
 namespace twofold {
 namespace {
-
-constexpr std::size_t kMostMeasured = 512;  // points of a frame that are shown
 
 ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& title,
                              const FrameSource& source) {
@@ -27,9 +22,8 @@ ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& 
   options.title = title;
   options.bind = arguments.bind;
   options.port = *arguments.port;
-  for (std::size_t s = 0; s < kTrackerStages; ++s)
-    options.stages.emplace_back(describe(static_cast<TrackerStage>(s)));
-  options.efforts = effort_words();
+  options.stages = tracker_stages();
+  options.efforts = effort_levels();
   for (const TimedPose& pose : source.ground_truth()) {
     options.truth.push_back(to_pose(pose.T_w_c));
     options.truth_t_ns.push_back(pose.t_ns);
@@ -68,13 +62,6 @@ void add_view_options(CLI::App& command, ViewArguments& arguments, const std::st
       "Viewers may save the map (to map.tfm in the output folder), pause mapping, and end the run");
 }
 
-std::vector<std::string> effort_words() {
-  std::vector<std::string> words;
-  for (int level = 0; level < kEffortLevels; ++level)
-    words.emplace_back(describe(static_cast<EffortLevel>(level)));
-  return words;
-}
-
 void print_view_addresses(const ViewAddresses& viewer) {
   for (const std::string& address : viewer.addresses) fmt::print(stderr, "view at     {}\n", address);
   if (!viewer.is_open_to_network) return;
@@ -110,7 +97,6 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
   viewer.metric = !scale_is_arbitrary(rig_, options);
   if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
   if (images) viewer.recorded_image = [images](std::int64_t t_ns) { return viewed_image(images(t_ns)); };
-  measured_.reserve(kMostMeasured);
   try {
     viewer_ = std::make_unique<Viewer>(to_camera_rig(rig_), newest_map, viewer);
   } catch (const std::runtime_error& error) {
@@ -142,23 +128,8 @@ void LiveView::tell(const PoseReport& report) {
   const PoseEstimate pose = reporter_.next(report, events);
   if (events.correction) viewer_->tell(*events.correction);
   if (events.placing) viewer_->tell(*events.placing);
-  if (pose.state == TrackingState::kTracked && viewer_->wants_points(pose.frame)) {
-    measured_.clear();
-    const SE3 T_c_ref = report.record.T_c_ref.unpacked();
-    const double level_0 = rig_.information(Eigen::Vector3f::Zero(), 0)[0];
-    for (const MotionObservation& found :
-         report.measured.first(std::min(report.measured.size(), kMostMeasured))) {
-      const Vector2 expected = rig_.camera.project(T_c_ref * found.x_ref);
-      const Vector2 predicted = rig_.camera.project(report.searched.T_c_ref * found.x_ref);
-      const double level_size = std::sqrt(level_0 / found.information[0]);  // a pixel of its pyramid level
-      measured_.push_back({found.z[0], found.z[1], static_cast<float>(expected.x()),
-                           static_cast<float>(expected.y()), found.inlier ? 1U : 0U,
-                           static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
-                           static_cast<float>(report.searched.radius_px * level_size)});
-    }
-    viewer_->tell(pose.frame, measured_);
-  }
-  viewer_->tell(pose, report.stage_ns);
+  const FrameDetails::Impl details{rig_, report, waiting()};
+  viewer_->tell(pose, FrameDetails(details));
 }
 
 std::string LiveView::obey(ViewCommand command) {
@@ -188,10 +159,15 @@ void LiveView::show(const Frame& frame) {
 }
 
 void LiveView::show(const Progress& progress) {
-  const auto length = [](std::size_t waiting) { return static_cast<std::int64_t>(waiting); };
-  if (viewer_)
-    viewer_->tell_waiting(
-        {length(progress.frames_waiting), length(progress.queued), length(progress.places_waiting)});
+  const auto length = [](std::size_t number) { return static_cast<std::int64_t>(number); };
+  frames_waiting_.store(length(progress.frames_waiting), std::memory_order_relaxed);
+  keyframes_waiting_.store(length(progress.queued), std::memory_order_relaxed);
+  places_waiting_.store(length(progress.places_waiting), std::memory_order_relaxed);
+}
+
+QueueLengths LiveView::waiting() const {
+  return {frames_waiting_.load(std::memory_order_relaxed), keyframes_waiting_.load(std::memory_order_relaxed),
+          places_waiting_.load(std::memory_order_relaxed)};
 }
 
 void LiveView::finish() {

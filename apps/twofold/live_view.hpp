@@ -31,8 +31,6 @@ struct ViewArguments {
 void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description);
 /// For those who look at it.
 [[nodiscard]] ViewedImage viewed_image(const cv::Mat& image);
-/// Words of the effort levels.
-[[nodiscard]] std::vector<std::string> effort_words();
 /// Where a viewer can be reached.
 struct ViewAddresses {
   std::vector<std::string> addresses;
@@ -64,12 +62,14 @@ class LiveView {
  private:
   void listen(EngineOptions& options);
   void tell(const PoseReport& report);
+  [[nodiscard]] QueueLengths waiting() const;
   [[nodiscard]] std::string obey(ViewCommand command);
 
   const Rig rig_;
   const std::filesystem::path map_file_;
-  PoseReporter reporter_;              // tracker's
-  std::vector<ViewedPoint> measured_;  // tracker's
+  PoseReporter reporter_;  // tracker's
+  // As the reader saw them last; relaxed: numbers to be shown.
+  std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1};
   MapLender maps_;
   std::atomic<bool> mapping_paused_{false};  // relaxed: a wish
   std::unique_ptr<Viewer> viewer_;

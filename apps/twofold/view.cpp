@@ -14,6 +14,7 @@
 #include "io/sources/recorded_images.hpp"
 #include "slam/conversions.hpp"
 #include "slam/map_snapshot.hpp"
+#include "twofold/frame_details.hpp"
 #include "viewer/keyframe_images.hpp"
 #include "viewer/server.hpp"
 
@@ -113,7 +114,7 @@ void view(const FileViewArguments& arguments) {
     show_finished_run(arguments.path, scene, title);
     images = images_of_run(arguments.path);
     title.keyframe_images = static_cast<bool>(images);
-    title.efforts = effort_words();
+    title.efforts = effort_levels();
   } else {
     show_map_file(arguments.path, scene, title);
   }

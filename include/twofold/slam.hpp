@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "twofold/estimate.hpp"
+#include "twofold/frame_details.hpp"
 #include "twofold/map.hpp"
 #include "twofold/types.hpp"
 
@@ -63,7 +64,8 @@ enum class PushStatus : std::uint8_t {
 };
 struct PushResult {
   PushStatus status = PushStatus::kQueued;
-  std::string reason;  ///< of kDropped and kRefused: one sentence that names what is wrong
+  std::string reason;       ///< of kDropped and kRefused: one sentence that names what is wrong
+  std::int64_t frame = -1;  ///< its PoseEstimate::frame; -1: it was refused, and has none
 
   explicit operator bool() const { return status == PushStatus::kQueued; }
 };
@@ -117,6 +119,7 @@ class TWOFOLD_API Slam {
  public:
   using PoseCallback = std::function<void(const PoseEstimate&)>;
   using EventCallback = std::function<void(const MapEvent&)>;
+  using FrameCallback = std::function<void(const PoseEstimate&, const FrameDetails&)>;
 
   /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
   /// when a file cannot be used, an option of the engine is out of range or the rig is not the map's. A
@@ -136,6 +139,8 @@ class TWOFOLD_API Slam {
   void on_pose(PoseCallback callback);
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
+  /// The same with what the tracker did for the frame; called after that of on_pose.
+  void on_frame(FrameCallback callback);
 
   /// In a threaded run it waits for no thread of the engine, only for another caller inside push, has_room,
   /// wait_for_room or finish; in a deterministic one it returns when the frame is tracked and mapped. Refused

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "twofold/estimate.hpp"
+#include "twofold/frame_details.hpp"
 #include "twofold/map.hpp"
 #include "twofold/queue_lengths.hpp"
 #include "twofold/types.hpp"
@@ -21,18 +22,6 @@ enum class ViewCommand : std::uint8_t {
   kStop,          ///< the run
   kPauseMapping,  ///< localise only: no more keyframes
   kResumeMapping
-};
-
-/// A point of the map as it was found in an image.
-struct ViewedPoint {
-  float u = 0, v = 0;        ///< measured [px]
-  float expected_u = 0;      ///< where the pose puts it [px]
-  float expected_v = 0;      ///< likewise
-  std::uint32_t inlier = 1;  ///< 0: put aside as an outlier
-  // Where it was searched: a square around the prediction.
-  float predicted_u = 0;  ///< [px]
-  float predicted_v = 0;  ///< [px]
-  float radius = 0;       ///< half of its side [px]; 0: not known
 };
 
 /// An image, and what keeps its pixels alive; without pixels: none.
@@ -68,9 +57,10 @@ struct ViewerOptions {
 /// Shows a run in a browser while it runs: map, windows, path, events, times (docs/viewer.md).
 ///
 ///   Slam slam(rig, {});
-///   Viewer viewer(rig, [&] { return slam.map(); }, {.title = "my robot"});
-///   slam.on_pose([&](const PoseEstimate& pose) { viewer.tell(pose); });
-///   slam.on_event([&](const MapEvent& event) { viewer.tell(event); });
+///   Viewer viewer(rig, [&] { return slam.map(); },
+///                 {.title = "my robot", .stages = tracker_stages(), .efforts = effort_levels()});
+///   slam.on_frame([&](const PoseEstimate& pose, const FrameDetails& details) { viewer.tell(pose, details);
+///   }); slam.on_event([&](const MapEvent& event) { viewer.tell(event); });
 ///   std::puts(viewer.address().c_str());
 ///   ...
 ///   slam.finish();  // before the viewer is gone, whatever is thrown (examples/05_viewer.cpp): until then it
@@ -78,6 +68,20 @@ struct ViewerOptions {
 ///
 /// A thread of its own, of the lowest priority, does everything; nobody waits for it or for who looks.
 /// Component `viewer` of the package: find_package(Twofold COMPONENTS viewer), Twofold::viewer.
+///
+/// Threads:
+///   address, addresses, port, is_open_to_network   any, always
+///   tell (all four), wants_points                  one, the tracker's: a copy into a ring and no more, no
+///   lock, no
+///                                                  allocation, no system call; a viewer that falls behind by
+///                                                  the whole ring (1024 frames) leaves frames out
+///   tell_waiting                                   any, one at a time
+///   show, wants_image                              one, that of the images' source
+///   finish                                         any but the viewer's own
+///   map, on_command, recorded_image                called by the viewer's, one at a time; while they take,
+///   nobody
+///                                                  is served. What they throw becomes an event.
+/// After finish, tell and show do nothing that anybody sees.
 class TWOFOLD_API Viewer {
  public:
   /// @param map  asked for the newest map now and then, by the viewer's thread; may be empty
@@ -95,31 +99,33 @@ class TWOFOLD_API Viewer {
   [[nodiscard]] int port() const;
   [[nodiscard]] bool is_open_to_network() const;
 
-  // Of one thread, the tracker's: copies into a ring, and nothing else; no lock, no allocation, no system
-  // call. If the viewer falls behind by the whole ring (1024 frames), frames are left out.
-
+  /// Of Slam::on_frame: the pose, what the frame took and what waits; and what was measured, if the frame's
+  /// image is shown.
+  void tell(const PoseEstimate& pose, const FrameDetails& details);
+  /// The same of other engines.
   /// @param stage_ns  what its stages took, in the order of ViewerOptions::stages
   void tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns = {});
   void tell(const MapEvent& event);
   /// Whether points of this frame would be shown: its image was.
   [[nodiscard]] bool wants_points(std::int64_t frame) const;
   /// The frame's measurements, before its pose is told; the first 512.
-  void tell(std::int64_t frame, std::span<const ViewedPoint> points);
+  void tell(std::int64_t frame, std::span<const MeasuredPoint> points);
 
-  /// Any thread, one at a time: what waits for the engine's threads.
+  /// What waits for the engine's threads; until it is told, it is not known.
   void tell_waiting(const QueueLengths& waiting);
-
-  // Of one thread, that of the images' source.
 
   /// Whether an image would be shown if it came now: at most five a second are, while somebody looks.
   [[nodiscard]] bool wants_image() const;
-  /// @param left   grey or colour; `owner` keeps its pixels alive and unchanged until the viewer is done;
-  /// null: they
-  ///               are copied
+  /// @param frame  PoseEstimate::frame, as PushResult says
+  /// @param left   grey or colour, else it is not shown
+  /// @param owner  keeps its pixels alive and unchanged until the viewer is done with them, and is let go of
+  /// on this
+  ///               thread or the viewer's; null: they are copied
   void show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner);
 
   /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most three
-  /// seconds.
+  /// seconds beyond what a callback takes. A second call does nothing. Throws std::logic_error when one of
+  /// the viewer's callbacks calls it.
   void finish();
 
  private:
@@ -127,7 +133,7 @@ class TWOFOLD_API Viewer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether viewers can be made: false when the library was built without Node.js.
+/// Whether viewers can be made: false when the library was built without Node.js or Boost.
 [[nodiscard]] TWOFOLD_API bool has_viewer();
 
 }  // namespace twofold

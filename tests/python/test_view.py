@@ -47,6 +47,17 @@ def test_a_second_view_is_refused_and_names_the_first(rig: twofold.CameraRig) ->
         assert address in str(refused.value)
 
 
+def test_a_view_may_be_opened_again_after_it_was_closed(rig: twofold.CameraRig) -> None:
+    with twofold.Slam(rig) as slam:
+        first = open_view(slam)
+        slam.close_view()
+        slam.close_view()
+        second = slam.view(port=0)
+        assert second != first
+        with pytest.raises(RuntimeError, match="port 70000"):
+            twofold.Slam(rig).view(port=70000)
+
+
 def test_an_open_view_does_not_keep_its_slam(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
     """Images it was shown are given back, and a port it listened at is free again."""
     slam = twofold.Slam(rig)

@@ -1,8 +1,11 @@
 #include "twofold/slam.hpp"
 
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <fstream>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <thread>
 
@@ -40,6 +43,38 @@ TEST_F(SlamTest, DeterministicRunsGiveTheEnginesBytes) {
   }
   EXPECT_EQ(summary.frames, kFrames);
   EXPECT_EQ(summary.tracked, kFrames);
+}
+
+TEST_F(SlamTest, TellsWhatTheTrackerDidForAFrame) {
+  Slam slam(rig(), deterministic());
+  std::vector<std::int64_t> numbers;
+  std::array<MeasuredPoint, 64> points;
+  std::size_t most = 0;
+  double error = 0, told = 0, spent = 0;
+  slam.on_frame([&](const PoseEstimate& pose, const FrameDetails& details) {
+    numbers.push_back(pose.frame);
+    ASSERT_EQ(details.stage_ns().size(), tracker_stages().size());
+    spent += static_cast<double>(
+        std::accumulate(details.stage_ns().begin(), details.stage_ns().end(), std::int64_t{0}));
+    EXPECT_EQ(details.waiting().frames, 0);
+    const std::size_t count = details.points(points);
+    EXPECT_EQ(count, std::min<std::size_t>(points.size(), details.points(std::vector<MeasuredPoint>(5000))));
+    most = std::max(most, count);
+    for (const MeasuredPoint& point : std::span(points).first(count)) {
+      if (point.inlier == 0) continue;
+      error += std::hypot(point.u - point.expected_u, point.v - point.expected_v);
+      ++told;
+      EXPECT_GT(point.radius, 0);
+    }
+  });
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(slam.push(view(static_cast<std::size_t>(i))).frame, i) << "as its pose is numbered";
+  EXPECT_EQ(slam.push(view(2)).frame, -1) << "refused";
+  (void)slam.finish();
+  EXPECT_EQ(numbers, (std::vector<std::int64_t>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(most, points.size()) << "as far as there is room";
+  EXPECT_LT(error / told, 1.5) << "found where the pose puts them [px]";
+  EXPECT_GT(spent, 0);
 }
 
 TEST_F(SlamTest, ThreadedRunsFollowTheCamera) {

@@ -86,6 +86,21 @@ TEST_F(ClientFeedTest, NonsenseIsRefused) {
   EXPECT_TRUE(feed.wants_images());
 }
 
+TEST_F(ClientFeedTest, AcksAreNotTooMuchHoweverFastTheyCome) {
+  ClientFeed feed(scene_, title_);
+  const ClientFeed::Time now{std::chrono::hours(1)};
+  int acks = 0;
+  for (std::int64_t n = 0; n < 2000; ++n) {
+    scene_.add(tracked_pose(n, 0), {});
+    for (; feed.next(sight_); ++acks) EXPECT_TRUE(feed.take("ack", now));
+  }
+  EXPECT_GT(acks, 2 * ClientFeed::kMessagesASecond) << "of a large map, all within a second";
+  int said = 0;
+  while (said < 5000 && feed.take("images on", now)) ++said;
+  EXPECT_EQ(said, ClientFeed::kMessagesASecond);
+  EXPECT_TRUE(feed.take("images on", now + std::chrono::seconds(2)));
+}
+
 TEST_F(ClientFeedTest, ImagesGoToThoseWhoWantThem) {
   sight_.image.put("picture");
   ClientFeed with(scene_, title_), without(scene_, title_);
