@@ -32,6 +32,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
       : rig_(to_rig(camera_rig)), live_(options.live), frame_buffers_(options.frame_buffers), intake_(rig_) {
     EngineOptions engine = engine_options(options);
     engine.on_pose = [this](const PoseReport& report) { tell(report); };
+    engine.on_frame = [this](const PoseReport& report) { tell_details(report); };
     engine.on_map = [this](const GraphSnapshot& graph, const DoubleWindow& window) {
       maps.publish(graph, window);
     };
@@ -67,6 +68,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
 
  private:
   void tell(const PoseReport& report);
+  void tell_details(const PoseReport& report);
   /// A thread of the engine has ended early; errors() says so from now on.
   [[nodiscard]] bool failed();
 
@@ -74,6 +76,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
   const bool live_;
   const int frame_buffers_;
   PoseReporter reporter_;  // tracker's
+  PoseEstimate estimate_;  // likewise: of the frame in hand
 
   std::mutex pushing_;  // guards what follows: whoever pushes or finishes has his turn
   FrameIntake intake_;
@@ -90,13 +93,17 @@ class TWOFOLD_HIDDEN Slam::Impl {
 /// On the tracker's thread.
 void Slam::Impl::tell(const PoseReport& report) {
   PoseReporter::Events events;
-  const PoseEstimate estimate = reporter_.next(report, events);
+  estimate_ = reporter_.next(report, events);
   if (events.correction) on_event(*events.correction);
   if (events.placing) on_event(*events.placing);
-  latest.put(estimate);
-  on_pose(estimate);
+  latest.put(estimate_);
+  on_pose(estimate_);
+}
+
+/// Likewise, once the tracker is done with the frame.
+void Slam::Impl::tell_details(const PoseReport& report) {
   const FrameDetails::Impl details{rig_, report, pipeline_->waiting()};
-  on_frame(estimate, FrameDetails(details));
+  on_frame(estimate_, FrameDetails(details));
 }
 
 bool Slam::Impl::failed() {
