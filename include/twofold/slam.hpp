@@ -139,8 +139,8 @@ class TWOFOLD_API Slam {
   void on_pose(PoseCallback callback);
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
-  /// The same with what the tracker did for the frame, called once it is done with that: for those who draw or
-  /// record, and do not wait for the pose ("frame listener").
+  /// The same with what the tracker did for the frame, called once it is done with that: for those who draw
+  /// or record, and do not wait for the pose ("frame listener").
   void on_frame(FrameCallback callback);
 
   /// In a threaded run it waits for no thread of the engine, only for another caller inside push, has_room,

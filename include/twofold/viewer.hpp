@@ -59,28 +59,25 @@ struct ViewerOptions {
 ///   Slam slam(rig, {});
 ///   Viewer viewer(rig, [&] { return slam.map(); },
 ///                 {.title = "my robot", .stages = tracker_stages(), .efforts = effort_levels()});
-///   slam.on_frame([&](const PoseEstimate& pose, const FrameDetails& details) { viewer.tell(pose, details);
-///   }); slam.on_event([&](const MapEvent& event) { viewer.tell(event); });
+///   slam.on_frame([&](const PoseEstimate& p, const FrameDetails& details) { viewer.tell(p, details); });
+///   slam.on_event([&](const MapEvent& event) { viewer.tell(event); });
 ///   std::puts(viewer.address().c_str());
 ///   ...
-///   slam.finish();  // before the viewer is gone, whatever is thrown (examples/05_viewer.cpp): until then it
-///   is called
+///   slam.finish();  // before the viewer is gone, whatever is thrown: until then it is called
 ///
 /// A thread of its own, of the lowest priority, does everything; nobody waits for it or for who looks.
 /// Component `viewer` of the package: find_package(Twofold COMPONENTS viewer), Twofold::viewer.
 ///
 /// Threads:
-///   address, addresses, port, is_open_to_network   any, always
-///   tell (all four), wants_points                  one, the tracker's: a copy into a ring and no more, no
-///   lock, no
-///                                                  allocation, no system call; a viewer that falls behind by
-///                                                  the whole ring (1024 frames) leaves frames out
-///   tell_waiting                                   any, one at a time
-///   show, wants_image                              one, that of the images' source
-///   finish                                         any but the viewer's own
-///   map, on_command, recorded_image                called by the viewer's, one at a time; while they take,
-///   nobody
-///                                                  is served. What they throw becomes an event.
+/// - address, addresses, port, is_open_to_network: any, always.
+/// - tell (all four), wants_points: one, the tracker's. A copy into a ring and no more: no lock, no
+/// allocation,
+///   no system call. A viewer that falls behind by the whole ring (1024 frames) leaves frames out.
+/// - tell_waiting: any, one at a time.
+/// - show, wants_image: one, that of the images' source.
+/// - finish: any but the viewer's own.
+/// - map, on_command, recorded_image are called by the viewer's, one at a time; while they take, nobody is
+///   served. What they throw becomes an event.
 /// After finish, tell and show do nothing that anybody sees.
 class TWOFOLD_API Viewer {
  public:
@@ -119,8 +116,7 @@ class TWOFOLD_API Viewer {
   /// @param frame  PoseEstimate::frame, as PushResult says
   /// @param left   grey or colour, else it is not shown
   /// @param owner  keeps its pixels alive and unchanged until the viewer is done with them, and is let go of
-  /// on this
-  ///               thread or the viewer's; null: they are copied
+  ///               on this thread or the viewer's; null: they are copied
   void show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner);
 
   /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most three

@@ -58,7 +58,8 @@ TEST_F(SlamTest, TellsWhatTheTrackerDidForAFrame) {
         std::accumulate(details.stage_ns().begin(), details.stage_ns().end(), std::int64_t{0}));
     EXPECT_EQ(details.waiting().frames, 0);
     const std::size_t count = details.points(points);
-    EXPECT_EQ(count, std::min<std::size_t>(points.size(), details.points(std::vector<MeasuredPoint>(5000))));
+    std::vector<MeasuredPoint> all(5000);
+    EXPECT_EQ(count, std::min(points.size(), details.points(all)));
     most = std::max(most, count);
     for (const MeasuredPoint& point : std::span(points).first(count)) {
       if (point.inlier == 0) continue;
