@@ -12,11 +12,13 @@ export type Layer = 'points' | 'keyframes' | 'covisible' | 'marginalised' | 'ret
 export type Picked = {keyframe: Keyframe} | {point: THREE.Vector3} | null;
 
 const SLOW_MS = 45;
-const FAST_MS = 25;
+const FAST_MS = 38;
 const FIRST_BUDGET = 200000;  // points
-const LEAST_BUDGET = 2000;
+const LEAST_BUDGET = 10000;
 const SOFTWARE_MS = 33;  // between frames that no graphics processor draws: the tracker may want the same processors
 const MOST_PATH = 20000;  // segments drawn of a path
+const MOST_FRUSTA = 1200;  // outside of the windows: of more, an even sample is drawn
+const MOST_EDGES = 4000;   // likewise, but for closed loops
 
 export class Stage {
   readonly cloud = new Cloud();
@@ -54,6 +56,7 @@ export class Stage {
   private frustum = 0.1;
   private extent = {size: 2, centre: new THREE.Vector3(), lowest: -1};
   drawnPoints = 0;
+  private keyframeStep = 1;
   private budget = FIRST_BUDGET;  // points that can be drawn in time
   private readonly leastMs: number;  // between two frames
   private begun = 0;                 // the newest frame
@@ -264,10 +267,12 @@ export class Stage {
   }
 
   private isDrawnKeyframe(keyframe: Keyframe): boolean {
-    return this.isShown(keyframe.part) && (this.time === null || keyframe.t <= this.time);
+    const isOneOfMany = keyframe.window === 0 && keyframe.id !== this.selected && keyframe.id % this.keyframeStep !== 0;
+    return !isOneOfMany && this.isShown(keyframe.part) && (this.time === null || keyframe.t <= this.time);
   }
 
   private makeKeyframes(): void {
+    this.keyframeStep = Math.max(1, Math.ceil(this.model.keyframes.size / MOST_FRUSTA));
     const windows = this.windows.begin();
     const others = this.keyframes.begin();
     for (const keyframe of this.model.keyframes.values()) {
@@ -285,7 +290,10 @@ export class Stage {
   private makeEdges(): void {
     const segments = this.edges.begin();
     const returns = this.returns.begin();
+    const step = Math.max(1, Math.ceil(this.model.edges.size / MOST_EDGES));
+    let n = 0;
     for (const edge of this.model.edges.values()) {
+      if (n++ % step !== 0 && edge.loop === 0) continue;
       const from = this.model.keyframes.get(edge.from);
       const to = this.model.keyframes.get(edge.to);
       if (!from || !to || !this.isShown(from.part) || from.part !== to.part) continue;
