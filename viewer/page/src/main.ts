@@ -207,8 +207,9 @@ class Page {
     if (newest) {
       figures.push(['latency', `${newest.latencyMs.toFixed(1)} ms`, false], ['found', `${(100 * newest.trackedShare).toFixed(0)} %`, true],
         ['map', `v${newest.mapVersion}`, true]);
-      const queues = [newest.framesWaiting, newest.keyframesWaiting, newest.placesWaiting].map((n) => n ?? '–');
-      if (hello?.hasQueues) figures.push(['queues', queues.join(' · '), true]);
+      const waiting = [newest.framesWaiting, newest.keyframesWaiting, newest.placesWaiting];
+      const queues = waiting.map((n) => n ?? '–');
+      if (hello?.hasQueues && waiting.some((n) => n !== null)) figures.push(['queues', queues.join(' · '), true]);
     }
     $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
       const item = make('div', '', make('dt', name), make('dd', value));
