@@ -76,13 +76,17 @@ void ThreadedRun::start() {
   }
 }
 
-bool ThreadedRun::has_room() {
+bool ThreadedRun::has_buffer() {
   if (!free_slot_) free_slot_ = slots_.try_acquire();
-  return free_slot_ && !must_hold_back();
+  return static_cast<bool>(free_slot_);
+}
+
+bool ThreadedRun::has_room() {
+  return has_buffer() && !must_hold_back();
 }
 
 void ThreadedRun::push(Frame frame) {
-  TWOFOLD_CHECK(free_slot_, "there is room for the frame");
+  TWOFOLD_CHECK(free_slot_, "there is a buffer for the frame");
   free_slot_->frame = std::move(frame);
   TWOFOLD_CHECK(frames_.try_push(std::move(free_slot_)), "the ring holds every slot of the pool");
   tracker_parking_.wake();

@@ -44,6 +44,8 @@ class ThreadedRun {
 
   void start();
   /// Whether a frame can be pushed now. Room is made by collect.
+  [[nodiscard]] bool has_buffer();  ///< for a frame
+  /// Likewise, and map and disk follow if there is no clock to keep.
   [[nodiscard]] bool has_room();
   /// Hands a frame to the tracker; there must be room. Frame::index and time stamps grow.
   void push(Frame frame);

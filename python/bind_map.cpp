@@ -31,7 +31,7 @@ py::array lazily(const py::object& self, MapRows::Lazy<Row> MapRows::*member, co
 void register_rows() {
   using Map = MapSnapshot;
   PYBIND11_NUMPY_DTYPE(Map::Keyframe, id, part, frame, t_ns, T_world_camera, points, window, has_place);
-  PYBIND11_NUMPY_DTYPE(Map::Point, id, anchor, observers, position, covariance);
+  PYBIND11_NUMPY_DTYPE(Map::Point, id, anchor, observers, part, position, covariance);
   PYBIND11_NUMPY_DTYPE(Map::Edge, from, to, kind, shared_points, T_to_from);
   PYBIND11_NUMPY_DTYPE(Map::Loop, from, to, t_ns, inliers, scale, joins_parts, drift, turned, travelled);
   PYBIND11_NUMPY_DTYPE(Map::Part, id, keyframes);
@@ -67,8 +67,10 @@ void bind_map(py::module_& module) {
           },
           py::arg("covariance") = true,
           "(N,) with fields id, anchor (keyframe it was first seen in), observers (keyframes that see it), "
-          "position (3,)\n"
-          "[m], covariance (9,): 3x3 row by row [m^2]; without covariance zeros, at a tenth of the time.")
+          "part "
+          "(whose world it is in),\n"
+          "position (3,) [m], covariance (9,): 3x3 row by row [m^2]; without covariance zeros, at a tenth of "
+          "the time.")
       .def(
           "edges",
           [](const py::object& self) {

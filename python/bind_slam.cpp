@@ -25,7 +25,8 @@ using Unlocked = py::call_guard<py::gil_scoped_release>;
 constexpr std::size_t kItemsAFrame = 3;  // a pose, and at most two events before it
 
 std::int64_t to_ns(double seconds) {
-  return static_cast<std::int64_t>(seconds * 1e9);
+  constexpr double kForEver = 9e9;  // longer than what 64 bits of nanoseconds hold
+  return seconds >= 0 && seconds < kForEver ? static_cast<std::int64_t>(seconds * 1e9) : -1;
 }
 
 /// Python's end of a queue: who asks takes turns.

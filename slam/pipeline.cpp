@@ -9,10 +9,15 @@ class ThreadedPipeline final : public Pipeline {
  public:
   ThreadedPipeline(const Rig& rig, const EngineOptions& options) : run_(rig, options) { run_.start(); }
 
+  [[nodiscard]] bool has_buffer() override {
+    collect();
+    return run_.has_buffer();
+  }
   [[nodiscard]] bool has_room() override {
-    run_.collect({});
+    collect();
     return run_.has_room();
   }
+  void collect() override { run_.collect({}); }
   void push(Frame frame) override { run_.push(std::move(frame)); }
   void wait(std::chrono::steady_clock::time_point deadline) override { run_.wait(deadline); }
   [[nodiscard]] bool failed() override { return run_.failed(); }
@@ -35,7 +40,9 @@ class DeterministicPipeline final : public Pipeline {
  public:
   DeterministicPipeline(const Rig& rig, const EngineOptions& options) : run_(rig, options) {}
 
+  [[nodiscard]] bool has_buffer() override { return true; }
   [[nodiscard]] bool has_room() override { return true; }
+  void collect() override {}
   void push(Frame frame) override { (void)run_.step(frame); }
   void wait(std::chrono::steady_clock::time_point) override {}
   [[nodiscard]] bool failed() override { return false; }

@@ -17,7 +17,11 @@ class Pipeline {
   virtual ~Pipeline() = default;
 
   /// Whether a frame can be pushed now.
+  [[nodiscard]] virtual bool has_buffer() = 0;
+  /// Likewise, and whether map and disk follow a run that has no clock to keep.
   [[nodiscard]] virtual bool has_room() = 0;
+  /// Records of frames that are done go to the run's logs; has_buffer and has_room see to it, too.
+  virtual void collect() = 0;
   virtual void push(Frame frame) = 0;
   /// Sleeps until something may have changed; not beyond `deadline`.
   virtual void wait(std::chrono::steady_clock::time_point deadline) = 0;

@@ -1,7 +1,9 @@
 #include "twofold/pose_queue.hpp"
 
 #include <atomic>
+#include <bit>
 #include <chrono>
+#include <stdexcept>
 #include <stop_token>
 
 #include "engine/parking.hpp"
@@ -20,16 +22,25 @@ struct TWOFOLD_HIDDEN PoseQueue::Impl {
 
 namespace {
 
+constexpr std::size_t kMostItems = std::size_t{1} << 24;
+
 template <class Ready>
 bool wait(Parking& parking, const std::stop_source& closed, std::int64_t timeout_ns, Ready&& ready) {
-  if (timeout_ns < 0) return parking.wait(closed.get_token(), ready);
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::nanoseconds(timeout_ns);
-  return parking.wait_until(closed.get_token(), deadline, ready);
+  using Clock = std::chrono::steady_clock;
+  const auto now = Clock::now();
+  const std::chrono::nanoseconds timeout(timeout_ns);
+  if (timeout_ns < 0 || timeout > Clock::time_point::max() - now)
+    return parking.wait(closed.get_token(), ready);
+  return parking.wait_until(closed.get_token(), now + timeout, ready);
 }
 
 }  // namespace
 
-PoseQueue::PoseQueue(std::size_t capacity) : impl_(std::make_unique<Impl>(capacity)) {}
+PoseQueue::PoseQueue(std::size_t capacity) {
+  if (capacity < 1 || capacity > kMostItems)
+    throw std::invalid_argument("a pose queue holds 1 to 16777216 items");
+  impl_ = std::make_unique<Impl>(std::bit_ceil(capacity));
+}
 PoseQueue::~PoseQueue() = default;
 
 void PoseQueue::put(const PoseOrEvent& item) {

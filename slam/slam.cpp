@@ -2,8 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <mutex>
 #include <stdexcept>
+#include <stop_token>
+#include <thread>
 
 #include "engine/clock.hpp"
 #include "graph/map_file.hpp"
@@ -26,6 +31,32 @@ constexpr const char* kEndedEarly = "a thread of the engine has ended early: fin
 
 }  // namespace
 
+namespace {
+
+/// Says which thread is in a callback, while it is.
+class Telling {
+ public:
+  explicit Telling(std::atomic<std::thread::id>& by) : by_(by) {
+    by_.store(std::this_thread::get_id(), std::memory_order_relaxed);
+  }
+  Telling(const Telling&) = delete;
+  ~Telling() { by_.store({}, std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::thread::id>& by_;
+};
+
+/// Negative: never.
+std::chrono::steady_clock::time_point deadline_of(std::int64_t timeout_ns) {
+  using Clock = std::chrono::steady_clock;
+  const auto now = Clock::now();
+  const std::chrono::nanoseconds timeout(timeout_ns);
+  return timeout_ns < 0 || timeout > Clock::time_point::max() - now ? Clock::time_point::max()
+                                                                    : now + timeout;
+}
+
+}  // namespace
+
 class TWOFOLD_HIDDEN Slam::Impl {
  public:
   Impl(const CameraRig& camera_rig, const SlamOptions& options)
@@ -39,6 +70,8 @@ class TWOFOLD_HIDDEN Slam::Impl {
     engine.on_places = [this](const KeyframeDatabase& places) { maps.publish(places); };
     engine.on_loop = [this](const ClosedLoop& loop) { maps.publish(loop); };
     pipeline_ = make_pipeline(rig_, engine);
+    if (!options.run_folder.empty())
+      collector_ = std::jthread([this](const std::stop_token& stop) { collect_now_and_then(stop); });
   }
 
   template <class Callback, class Function>
@@ -53,6 +86,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
   [[nodiscard]] std::string refusal(const FrameView& frame);
   bool wait_for_room(std::int64_t timeout_ns);
   [[nodiscard]] bool has_room() {
+    expect_no_callback("has_room");
     const std::scoped_lock turn(pushing_);
     return !summary_ && pipeline_->has_room();
   }
@@ -69,6 +103,8 @@ class TWOFOLD_HIDDEN Slam::Impl {
  private:
   void tell(const PoseReport& report);
   void tell_details(const PoseReport& report);
+  void expect_no_callback(const char* function) const;
+  void collect_now_and_then(const std::stop_token& stop);
   /// A thread of the engine has ended early; errors() says so from now on.
   [[nodiscard]] bool failed();
 
@@ -77,6 +113,8 @@ class TWOFOLD_HIDDEN Slam::Impl {
   const int frame_buffers_;
   PoseReporter reporter_;  // tracker's
   PoseEstimate estimate_;  // likewise: of the frame in hand
+  std::atomic<std::thread::id>
+      told_by_{};  // the thread that is in a callback. Relaxed: read by itself, or unequal
 
   std::mutex pushing_;  // guards what follows: whoever pushes or finishes has his turn
   FrameIntake intake_;
@@ -87,11 +125,13 @@ class TWOFOLD_HIDDEN Slam::Impl {
 
   mutable std::mutex errors_;  // guards engine_error_
   std::string engine_error_;
-  std::unique_ptr<Pipeline> pipeline_;  // last: its threads end before what they use is destroyed
+  std::unique_ptr<Pipeline> pipeline_;  // late: its threads end before what they use is destroyed
+  std::jthread collector_;              // of runs with a folder
 };
 
 /// On the tracker's thread.
 void Slam::Impl::tell(const PoseReport& report) {
+  const Telling telling(told_by_);
   PoseReporter::Events events;
   estimate_ = reporter_.next(report, events);
   if (events.correction) on_event(*events.correction);
@@ -102,8 +142,27 @@ void Slam::Impl::tell(const PoseReport& report) {
 
 /// Likewise, once the tracker is done with the frame.
 void Slam::Impl::tell_details(const PoseReport& report) {
+  const Telling telling(told_by_);
   const FrameDetails::Impl details{rig_, report, pipeline_->waiting()};
   on_frame(estimate_, FrameDetails(details));
+}
+
+/// From a callback it would wait for itself.
+void Slam::Impl::expect_no_callback(const char* function) const {
+  if (told_by_.load(std::memory_order_relaxed) == std::this_thread::get_id())  // relaxed: its own, or another
+    throw std::logic_error(fmt::format("{} was called from a callback", function));
+}
+
+/// A run folder is whole however the process ends, also when no frame comes for a while.
+void Slam::Impl::collect_now_and_then(const std::stop_token& stop) {
+  constexpr auto kPause = std::chrono::milliseconds(50);
+  std::mutex sleeping;
+  std::condition_variable_any woken;
+  for (std::unique_lock lock(sleeping);
+       !woken.wait_for(lock, stop, kPause, [&] { return stop.stop_requested(); });) {
+    const std::unique_lock turn(pushing_, std::try_to_lock);  // who has it, collects
+    if (turn && pipeline_) pipeline_->collect();
+  }
 }
 
 bool Slam::Impl::failed() {
@@ -126,22 +185,23 @@ std::string Slam::Impl::refusal(const FrameView& frame) {
 }
 
 PushResult Slam::Impl::push(const FrameView& frame) {
+  expect_no_callback("push");
   const std::scoped_lock turn(pushing_);
   if (std::string why = refusal(frame); !why.empty()) return {PushStatus::kRefused, std::move(why)};
   pushed_ = true;
-  if (!pipeline_->has_room()) {
+  if (!pipeline_->has_buffer()) {
     intake_.skip(frame);
     ++no_room_;
     return {PushStatus::kDropped,
-            fmt::format("the tracker is behind: {} frames are waiting for it already", frame_buffers_),
-            frames_++};
+            fmt::format("the tracker is behind: all {} frame buffers are in use", frame_buffers_), frames_++};
   }
   pipeline_->push(intake_.take(frame));
   return {PushStatus::kQueued, "", frames_++};
 }
 
 bool Slam::Impl::wait_for_room(std::int64_t timeout_ns) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::nanoseconds(timeout_ns);
+  expect_no_callback("wait_for_room");
+  const auto deadline = deadline_of(timeout_ns);
   constexpr auto kFailureCheck = std::chrono::milliseconds(50);
   for (;;) {
     const std::scoped_lock turn(pushing_);
@@ -164,6 +224,7 @@ std::vector<std::string> Slam::Impl::errors() const {
 }
 
 const SlamSummary& Slam::Impl::finish() {
+  expect_no_callback("finish");
   const std::scoped_lock turn(pushing_);
   if (summary_) return *summary_;
   RunResult result = pipeline_->finish();

@@ -4,9 +4,12 @@
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
+#include <string_view>
 
 namespace twofold {
 namespace {
@@ -21,11 +24,26 @@ LineReader::LineReader(FileDescriptor fd, PoseForm form) : fd_(std::move(fd)), f
   struct stat kind {};
   (void)::fstat(fd_.get(), &kind);
   socket_ = S_ISSOCK(kind.st_mode);
+  file_ = S_ISREG(kind.st_mode);
   chunk_ = S_ISFIFO(kind.st_mode) ? PIPE_BUF : S_ISCHR(kind.st_mode) ? kTerminalRoom : kFileChunk;
 }
 
+LineReader::~LineReader() {
+  if (!fd_ || !file_ || begun_ == 0) return;
+  const off_t end = ::lseek(fd_.get(), 0, SEEK_CUR);
+  const auto whole = static_cast<off_t>(end - static_cast<off_t>(begun_));
+  if (end >= 0 && ::ftruncate(fd_.get(), whole) == 0) (void)::lseek(fd_.get(), whole, SEEK_SET);
+}
+
+std::string LineReader::problem() const {
+  const auto lines = missed_ + static_cast<std::uint64_t>(std::count(pending_.begin(), pending_.end(), '\n'));
+  if (error_ == 0 || error_ == EPIPE || error_ == ECONNRESET || lines == 0) return "";
+  return std::string(std::strerror(error_)) + ": the last " + std::to_string(lines) + " lines are missing";
+}
+
 void LineReader::offer(const std::string& lines) {
-  if (lines.empty() || gone_) return;
+  if (lines.empty()) return;
+  if (gone_) return miss(1);
   if (!flush()) {
     ++missed_;
     return;
@@ -44,6 +62,8 @@ bool LineReader::send_pending() {
   while (sent < pending_.size() && !gone_) {
     const std::size_t now = write_some(pending_.data() + sent, pending_.size() - sent);
     if (now == 0) break;
+    const std::size_t line = std::string_view(pending_).substr(sent, now).rfind('\n');
+    begun_ = line == std::string_view::npos ? begun_ + now : now - line - 1;
     sent += now;
   }
   pending_.erase(0, sent);
@@ -60,8 +80,12 @@ std::size_t LineReader::write_some(const char* bytes, std::size_t count) {
     if (::poll(&room, 1, 0) != 1) return 0;
     result = ::write(fd_.get(), bytes, std::min(count, chunk_));
   }
+  if (result > 0) error_ = 0;
   if (result >= 0) return static_cast<std::size_t>(result);
-  gone_ = errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR;
+  const int error = errno;
+  if (error == EAGAIN || error == EWOULDBLOCK || error == EINTR) return 0;
+  error_ = error;
+  gone_ = error != ENOSPC && error != EDQUOT && error != EFBIG;  // there may be room again
   return 0;
 }
 

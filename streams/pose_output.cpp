@@ -16,13 +16,19 @@ namespace {
 /// A file, a pipe or a terminal: one reader.
 class FileOutput final : public PoseOutput {
  public:
-  FileOutput(FileDescriptor fd, PoseForm form) : reader_(std::move(fd), form) {}
+  FileOutput(std::string name, FileDescriptor fd, PoseForm form)
+      : name_(std::move(name)), reader_(std::move(fd), form) {}
 
   void offer(const std::string& lines) override { reader_.offer(lines); }
   void miss(std::uint64_t lines) override { reader_.miss(lines); }
   bool flush() override { return reader_.flush() || reader_.gone(); }
+  [[nodiscard]] std::string problem() const override {
+    const std::string why = reader_.problem();
+    return why.empty() ? "" : name_ + ": " + why;
+  }
 
  private:
+  const std::string name_;
   LineReader reader_;
 };
 
@@ -35,7 +41,7 @@ std::unique_ptr<PoseOutput> open_file(const std::string& path, PoseForm form) {
     const char* why = errno == ENXIO ? "nobody reads this pipe" : std::strerror(errno);
     throw std::runtime_error(path + ": " + why);
   }
-  return std::make_unique<FileOutput>(std::move(fd), form);
+  return std::make_unique<FileOutput>(path == "-" ? "standard output" : path, std::move(fd), form);
 }
 
 }  // namespace

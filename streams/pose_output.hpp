@@ -18,6 +18,8 @@ class PoseOutput {
   virtual void miss(std::uint64_t lines) = 0;
   /// Tries to hand over what is under way. True when nothing is left, or nobody who could take it.
   virtual bool flush() { return true; }
+  /// What readers will never know by themselves, as that a disk is full: one sentence, or nothing.
+  [[nodiscard]] virtual std::string problem() const { return ""; }
 };
 
 /// @param target  "-": standard output; udp:HOST:PORT; unix:PATH, a socket that any number of readers may

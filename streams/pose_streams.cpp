@@ -62,4 +62,12 @@ void PoseStreams::finish() {
   writer_.reset();
 }
 
+std::vector<std::string> PoseStreams::problems() const {
+  std::vector<std::string> problems;
+  for (const auto& output : outputs_) {
+    if (std::string problem = output->problem(); !problem.empty()) problems.push_back(std::move(problem));
+  }
+  return problems;
+}
+
 }  // namespace twofold

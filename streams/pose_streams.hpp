@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "engine/worker.hpp"
@@ -29,6 +30,8 @@ class PoseStreams {
   /// The last call of the telling thread, or any after its end: what was told goes out, as far as readers
   /// take it within half a second.
   void finish();
+  /// After that: of each output, what its reader cannot know.
+  [[nodiscard]] std::vector<std::string> problems() const;
 
  private:
   void write_all();

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "io/files/io_error.hpp"
 
 namespace twofold {
@@ -35,6 +37,12 @@ PoseListener PoseStreaming::listener() {
 
 void PoseStreaming::finish() {
   if (streams_) streams_->finish();
+}
+
+void PoseStreaming::expect_success() const {
+  if (!streams_) return;
+  const std::vector<std::string> problems = streams_->problems();
+  if (!problems.empty()) throw IoError("--poses", fmt::format("{}", fmt::join(problems, "; ")));
 }
 
 }  // namespace twofold

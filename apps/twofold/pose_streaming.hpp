@@ -20,6 +20,8 @@ class PoseStreaming {
   [[nodiscard]] PoseListener listener();
   /// After the run.
   void finish();
+  /// After that. Throws IoError when lines could not be written, as to a disk that is full.
+  void expect_success() const;
 
  private:
   PoseReporter reporter_;  // tracker's

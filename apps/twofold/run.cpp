@@ -213,6 +213,7 @@ int run(const RunArguments& arguments) {
   for (const std::string& text : captured.summary) fmt::print("{}\n", text);
   for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
   expect_success(arguments.source, *source, options, result);
+  poses.expect_success();
   return kOk;
 }
 

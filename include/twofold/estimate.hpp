@@ -29,7 +29,9 @@ struct PoseEstimate {
   double tracked_share = 0;  ///< those over the points looked for, in [0, 1]
 
   // Of tracked frames only:
-  Pose T_world_camera;             ///< in the world of `map_part`, as the map has it now
+  /// Of the left camera as the frames show it: rectified ones are turned against the lens that took them, by
+  /// the calibration's rectifying rotation. In the world of `map_part`, as the map has it now.
+  Pose T_world_camera;
   std::uint32_t map_part = kNoId;  ///< first keyframe of the part; parts have worlds of their own
   std::uint32_t reference_keyframe = kNoId;
   Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
@@ -45,8 +47,10 @@ struct PoseEstimate {
   std::array<double, 6> velocity{};
 
   std::uint64_t map_version = 0;  ///< of the map that the frame was tracked against
-  std::int64_t exposed_ns = 0;    ///< when the frame was exposed, on CLOCK_MONOTONIC
-  std::int64_t latency_ns = 0;    ///< from then to the moment the pose was known
+  /// When the frame was exposed, on CLOCK_MONOTONIC; without a clock to keep (SlamOptions::live), when the
+  /// tracker took it.
+  std::int64_t exposed_ns = 0;
+  std::int64_t latency_ns = 0;  ///< from then to the moment the pose was known
 };
 static_assert(std::is_trivially_copyable_v<PoseEstimate>);
 

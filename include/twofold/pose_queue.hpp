@@ -33,7 +33,8 @@ class TWOFOLD_API PoseQueue {
  public:
   static constexpr std::int64_t kForEver = -1;
 
-  /// @param capacity  a power of two; 512 are 17 s at 30 frames a second
+  /// @param capacity  rounded up to a power of two; 512 are 17 s at 30 frames a second. Throws
+  ///                  std::invalid_argument for none and for more than 2^24
   explicit PoseQueue(std::size_t capacity = 512);
   ~PoseQueue();
   PoseQueue(const PoseQueue&) = delete;

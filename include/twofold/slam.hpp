@@ -38,7 +38,7 @@ struct SlamOptions {
 
   int inner_window = 25;   ///< keyframes optimised with their points, >= 1
   int outer_window = 175;  ///< keyframes around them optimised by relative poses, >= 0
-  int frame_buffers = 8;   ///< frames waiting for the tracker at most, >= 2; a push beyond them is dropped
+  int frame_buffers = 8;   ///< frames on their way at most, >= 2; a push beyond them is dropped
 
   std::optional<int> tracker_cpu = {};  ///< pin the threads to these, >= 0
   std::optional<int> mapper_cpu = {};
@@ -59,7 +59,7 @@ enum class PushStatus : std::uint8_t {
   /// On its way to the tracker, or, in a deterministic run, tracked. With `live` a newer frame may still
   /// take its turn: it then counts as dropped, and nobody is called.
   kQueued,
-  kDropped,  ///< in order, but there was no room: the tracker is behind
+  kDropped,  ///< in order, but all frame buffers were in use: the tracker is behind
   kRefused   ///< not to be used, and not counted as a frame
 };
 struct PushResult {
@@ -131,11 +131,11 @@ class TWOFOLD_API Slam {
   Slam& operator=(const Slam&) = delete;
 
   /// Called for every frame that was looked at, on the tracker's thread, which waits for it: it must not
-  /// block, and may call latest, map, held_maps and errors only; all others take a lock that finish (and in a
-  /// deterministic run push) holds while it waits for this call. What it uses must live until finish has
-  /// returned. The time it takes is a stage of its own among SlamSummary::timings ("pose listener"), and in
-  /// the next frame's latency. A callback that throws is not called again; tracking goes on, and errors()
-  /// says what it threw. To be set before the first push, else std::logic_error is thrown.
+  /// block, and may call latest, map, held_maps and errors only; push, has_room, wait_for_room and finish
+  /// would wait for it, and throw std::logic_error there. What it uses must live until finish has returned.
+  /// The time it takes is a stage of its own among SlamSummary::timings ("pose listener"), and in the next
+  /// frame's latency. A callback that throws is not called again; tracking goes on, and errors() says what it
+  /// threw. To be set before the first push, else std::logic_error is thrown.
   void on_pose(PoseCallback callback);
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
@@ -147,10 +147,11 @@ class TWOFOLD_API Slam {
   /// wait_for_room or finish; in a deterministic one it returns when the frame is tracked and mapped. Refused
   /// are images that do not fit the rig, time stamps that do not increase, and frames after finish().
   PushResult push(const FrameView& frame);
-  /// Whether a push would find room now; without another pushing thread, it will.
+  /// Whether a push would find room now; without another pushing thread, it will. Not `live`, also whether
+  /// map and disk follow: a push is not dropped for their sake.
   [[nodiscard]] bool has_room() const;
-  /// Waits until there is room, at most for `timeout_ns`: for recordings, of which no frame should be
-  /// dropped, and which the map should follow.
+  /// Waits until has_room, at most for `timeout_ns` (negative: for ever): for recordings, of which no frame
+  /// should be dropped, and which the map should follow.
   /// @return false after that time, when the run is over, or when a thread of the engine has failed
   [[nodiscard]] bool wait_for_room(std::int64_t timeout_ns);
 

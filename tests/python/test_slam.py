@@ -129,6 +129,7 @@ def test_what_cannot_be_used_is_refused_with_a_reason(frames: list[twofold.Frame
 def test_maps_are_read_only_views_that_hold_their_version(finished: twofold.Run) -> None:
     map_now = finished.slam.map()
     points = map_now.points()
+    assert set(points.dtype.names or ()) == {"id", "anchor", "observers", "part", "position", "covariance"}
     assert points.base is map_now
     assert np.shares_memory(points, map_now.points())
     assert not points.flags.writeable

@@ -63,6 +63,27 @@ TEST(PoseQueue, NothingIsMissedByWhoWaitsForRoom) {
   EXPECT_EQ(queue.take_missed(), 0U);
 }
 
+TEST(PoseQueue, AnyCapacityIsRoundedUpButNoneAndTooMany) {
+  PoseQueue queue(500);
+  for (int i = 0; i < 512; ++i) queue.put(PoseEstimate{});
+  EXPECT_EQ(queue.take_missed(), 0U);
+  queue.put(PoseEstimate{});
+  EXPECT_EQ(queue.take_missed(), 1U);
+  EXPECT_THROW(PoseQueue(0), std::invalid_argument);
+  EXPECT_THROW(PoseQueue(std::size_t{1} << 40), std::invalid_argument);
+}
+
+TEST(PoseQueue, TheLongestTimeIsForEver) {
+  PoseQueue queue;
+  std::thread closer([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    queue.close();
+  });
+  PoseOrEvent item;
+  EXPECT_EQ(queue.next(item, std::numeric_limits<std::int64_t>::max()), QueueStatus::kEnd);
+  closer.join();
+}
+
 TEST(PoseQueue, ClosingWakesWhoWaits) {
   PoseQueue queue(2);
   queue.put(numbered(0));

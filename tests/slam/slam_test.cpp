@@ -3,11 +3,14 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <thread>
+
+#include <unistd.h>
 
 #include "engine/logs/schedule_log.hpp"
 #include "loopclosure/default_vocabulary.hpp"
@@ -173,6 +176,47 @@ TEST_F(SlamTest, ACallbackThatThrowsIsReportedAndTrackingGoesOn) {
     EXPECT_EQ(slam.errors(), summary.errors);
     EXPECT_EQ(slam.latest()->frame, kFrames - 1);
   }
+}
+
+TEST_F(SlamTest, ACallbackThatWouldWaitForItselfIsTold) {
+  for (const RunMode mode : {RunMode::kThreaded, RunMode::kDeterministic}) {
+    Slam slam(rig(), {.mode = mode});
+    slam.on_pose([&](const PoseEstimate&) { (void)slam.finish(); });
+    slam.on_frame([&](const PoseEstimate&, const FrameDetails&) { (void)slam.push(view(3)); });
+    push_all(slam);
+    const SlamSummary summary = slam.finish();
+    EXPECT_EQ(summary.tracked, kFrames);
+    ASSERT_EQ(summary.errors.size(), 2U);
+    EXPECT_NE(summary.errors[0].find("finish was called from a callback"), std::string::npos);
+    EXPECT_NE(summary.errors[1].find("push was called from a callback"), std::string::npos);
+  }
+}
+
+TEST_F(SlamTest, NoPushIsDroppedForTheMapsSake) {
+  Slam slam(rig(), {.frame_buffers = 2 * kFrames});
+  for (std::size_t i = 0; i < kFrames; ++i) {
+    const PushResult pushed = slam.push(view(i));
+    EXPECT_TRUE(pushed) << i << ": " << pushed.reason;
+  }
+  EXPECT_EQ(slam.finish().tracked, kFrames);
+}
+
+TEST_F(SlamTest, TheRunsFolderIsWholeThoughNoFrameComes) {
+  const auto folder = std::filesystem::temp_directory_path() / ("slam_quiet_" + std::to_string(::getpid()));
+  std::filesystem::create_directory(folder);
+  Slam slam(rig(), {.run_folder = folder});
+  constexpr std::size_t kPushed = 5;
+  push_all(slam, 0, kPushed);
+  std::size_t poses = 0;
+  for (int wait = 0; wait < 500 && poses < kPushed; ++wait) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::ifstream in(folder / "trajectory_causal.txt");
+    poses = 0;
+    for (std::string line; std::getline(in, line);) poses += !line.starts_with('#');
+  }
+  EXPECT_EQ(poses, kPushed) << "without another push";
+  (void)slam.finish();
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(SlamTest, ASlowCallbackIsAStageOfItsOwn) {

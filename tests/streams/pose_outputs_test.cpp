@@ -1,8 +1,11 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <csignal>
+#include <fstream>
 
 #include <cstring>
 
@@ -58,6 +61,63 @@ TEST(PoseOutputs, AFileHasEveryLine) {
   Heard heard;
   heard.take(text.str());
   EXPECT_EQ(heard.frames.size(), 100U);
+}
+
+TEST(PoseOutputs, ADiskThatIsFullIsSaid) {
+  const auto output = open_pose_output("/dev/full", PoseForm::kJson);
+  for (int i = 0; i < 3; ++i) output->offer("{}\n");
+  EXPECT_FALSE(output->flush());
+  EXPECT_EQ(output->problem(), "/dev/full: No space left on device: the last 3 lines are missing");
+}
+
+/// A file may not grow beyond some bytes, while this is there.
+class SmallFiles {
+ public:
+  explicit SmallFiles(rlim_t bytes) : before_(::signal(SIGXFSZ, SIG_IGN)) {
+    (void)::getrlimit(RLIMIT_FSIZE, &limit_);
+    const rlimit small{bytes, limit_.rlim_max};
+    (void)::setrlimit(RLIMIT_FSIZE, &small);
+  }
+  SmallFiles(const SmallFiles&) = delete;
+  ~SmallFiles() {
+    (void)::setrlimit(RLIMIT_FSIZE, &limit_);
+    (void)::signal(SIGXFSZ, before_);
+  }
+
+ private:
+  rlimit limit_{};
+  sighandler_t before_;
+};
+
+TEST(PoseOutputs, AFileGoesOnWhenThereIsRoomAgainAndEndsWithAWholeLine) {
+  const std::string path = ::testing::TempDir() + "full_" + std::to_string(::getpid());
+  const std::string line = "{\"frame\": 12345678}\n";
+  const auto lines_of = [&] {
+    std::ifstream in(path);
+    std::vector<std::string> lines;
+    for (std::string text; std::getline(in, text);) lines.push_back(text + (in.eof() ? "" : "\n"));
+    return lines;
+  };
+  auto output = open_pose_output(path, PoseForm::kJson);
+  {
+    const SmallFiles small(3 * line.size() + 5);
+    for (int i = 0; i < 6; ++i) output->offer(line);
+  }
+  EXPECT_EQ(lines_of().size(), 4U) << "the last one is not whole";
+  EXPECT_NE(output->problem(), "");
+  output->offer(line);
+  EXPECT_EQ(output->problem(), "");
+  const std::vector<std::string> after = lines_of();
+  ASSERT_EQ(after.size(), 6U) << "four, how many were missed, and one more";
+  EXPECT_EQ(after[3], line);
+  EXPECT_EQ(after[4], missed_line(2, PoseForm::kJson));
+  {
+    const SmallFiles small(7 * line.size());
+    for (int i = 0; i < 6; ++i) output->offer(line);
+    output.reset();
+  }
+  for (const std::string& text : lines_of()) EXPECT_EQ(text.back(), '\n') << text;
+  ::unlink(path.c_str());
 }
 
 TEST(PoseOutputs, UnixReadersComeAndGo) {
