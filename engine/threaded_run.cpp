@@ -63,15 +63,17 @@ void ThreadedRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupte
 
 void ThreadedRun::start() {
   loop_closer_.emplace(
-      WorkerOptions{.name = "loop closer", .cpu = options_.loop_closer_cpu, .fifo_priority = {}},
+      WorkerOptions{.name = "loop closer", .cpu = options_.loop_closer_cpu, .time_slice = kPatientSlice},
       [this](const std::stop_token& stop) { loop_closer_thread(stop); });
-  mapper_.emplace(WorkerOptions{.name = "mapper", .cpu = options_.mapper_cpu, .fifo_priority = {}},
+  mapper_.emplace(WorkerOptions{.name = "mapper", .cpu = options_.mapper_cpu, .time_slice = kPatientSlice},
                   [this](const std::stop_token& stop) { mapper_thread(stop); });
-  tracker_.emplace(
-      WorkerOptions{.name = "tracker", .cpu = options_.tracker_cpu, .fifo_priority = options_.fifo_priority},
-      [this](const std::stop_token& stop) { tracker_thread(stop); });
+  tracker_.emplace(WorkerOptions{.name = "tracker",
+                                 .cpu = options_.tracker_cpu,
+                                 .fifo_priority = options_.fifo_priority,
+                                 .time_slice = kPromptSlice},
+                   [this](const std::stop_token& stop) { tracker_thread(stop); });
   if (checkpoints_.enabled()) {
-    checkpointer_.emplace(WorkerOptions{.name = "checkpoints", .cpu = {}, .fifo_priority = {}},
+    checkpointer_.emplace(WorkerOptions{.name = "checkpoints", .time_slice = kPatientSlice},
                           [this](const std::stop_token& stop) { checkpoint_thread(stop); });
   }
 }

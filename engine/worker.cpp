@@ -9,11 +9,37 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <utility>
 
 namespace twofold {
+namespace {
+
+/// The kernel's struct sched_attr in its first form, which every kernel takes.
+struct SchedulingAttributes {
+  std::uint32_t size = sizeof(SchedulingAttributes);
+  std::uint32_t policy = 0;
+  std::uint64_t flags = 0;
+  std::int32_t nice = 0;
+  std::uint32_t priority = 0;
+  std::uint64_t runtime_ns = 0;  // of an ordinary thread: its slice
+  std::uint64_t deadline_ns = 0;
+  std::uint64_t period_ns = 0;
+};
+static_assert(sizeof(SchedulingAttributes) == 48);
+
+/// A wish: kernels that know no slices leave it out, and a thread under SCHED_FIFO has none.
+void take_time_slice(std::chrono::nanoseconds slice) {
+  SchedulingAttributes attributes;
+  if (syscall(SYS_sched_getattr, 0, &attributes, sizeof attributes, 0) != 0) return;
+  if (attributes.policy != SCHED_OTHER) return;
+  attributes.runtime_ns = static_cast<std::uint64_t>(slice.count());
+  (void)syscall(SYS_sched_setattr, 0, &attributes, 0);
+}
+
+}  // namespace
 
 std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
   std::vector<std::string> notes;
@@ -30,6 +56,7 @@ std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
       refuse(what, error, "name a CPU that `taskset -p 1` lists");
     }
   }
+  if (options.time_slice) take_time_slice(*options.time_slice);
   if (options.fifo_priority) {
     const std::string what = "SCHED_FIFO priority " + std::to_string(*options.fifo_priority);
     sched_param parameters{};

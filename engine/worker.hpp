@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <stop_token>
@@ -15,7 +16,15 @@ struct WorkerOptions {
   std::string name = "worker";            ///< shown by top and debuggers, where cut to 15 characters
   std::optional<int> cpu = std::nullopt;  ///< run on this CPU only, >= 0
   std::optional<int> fifo_priority = std::nullopt;  ///< run under SCHED_FIFO with this priority, 1..99
+  /// How long the thread runs before the scheduler looks for another; 100 us to 100 ms. One that wakes takes
+  /// the place of one with a longer slice at once, and shares stay as they are (EEVDF, Linux 6.12). Older
+  /// kernels give all threads the same slice, about 3 ms: that long a frame may wait behind the mapper.
+  std::optional<std::chrono::microseconds> time_slice = std::nullopt;
 };
+
+constexpr std::chrono::microseconds kPromptSlice{
+    500};  ///< for threads somebody waits for: tracker, pose writer
+constexpr std::chrono::microseconds kPatientSlice{20000};  ///< for threads that work in the background
 
 /// Applies the options to the calling thread. Returns one line for each wish that was not granted, saying why
 /// and what to do; the thread runs on without it.

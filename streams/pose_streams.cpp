@@ -24,7 +24,8 @@ void block_sigpipe() {
 
 PoseStreams::PoseStreams(std::vector<std::unique_ptr<PoseOutput>> outputs, PoseForm form)
     : outputs_(std::move(outputs)), form_(form) {
-  writer_.emplace(WorkerOptions{.name = "pose writer"}, [this](const std::stop_token&) { write_all(); });
+  writer_.emplace(WorkerOptions{.name = "pose writer", .time_slice = kPromptSlice},
+                  [this](const std::stop_token&) { write_all(); });
 }
 
 void PoseStreams::write_all() {

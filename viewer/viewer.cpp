@@ -147,13 +147,15 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     if (map_ && !title_.metres) scene_.find_scales();
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
-    thread_.emplace(WorkerOptions{.name = "viewer"}, [this](const std::stop_token& stop) {
-      self_.store(std::this_thread::get_id(),
-                  std::memory_order_relaxed);  // relaxed: read by this thread, or not equal
-      server_.run(
-          stop, [this](const ViewServer::Audience& audience, ViewSight& newest) { tick(audience, newest); },
-          [] { return std::string("the run is over"); });
-    });
+    thread_.emplace(
+        WorkerOptions{.name = "viewer", .time_slice = kPatientSlice}, [this](const std::stop_token& stop) {
+          self_.store(std::this_thread::get_id(),
+                      std::memory_order_relaxed);  // relaxed: read by this thread, or not equal
+          server_.run(
+              stop,
+              [this](const ViewServer::Audience& audience, ViewSight& newest) { tick(audience, newest); },
+              [] { return std::string("the run is over"); });
+        });
   }
   ~Impl() {
     finish();

@@ -12,12 +12,13 @@ constexpr auto kPeriod = std::chrono::milliseconds(100);
 }  // namespace
 
 LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files) : files_(std::move(files)) {
-  thread_.emplace(WorkerOptions{.name = "log writer"}, [this](const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + kPeriod, [] { return false; });
-      for (const auto& file : files_) file->write_waiting();
-    }
-  });
+  thread_.emplace(
+      WorkerOptions{.name = "log writer", .time_slice = kPatientSlice}, [this](const std::stop_token& stop) {
+        while (!stop.stop_requested()) {
+          (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + kPeriod, [] { return false; });
+          for (const auto& file : files_) file->write_waiting();
+        }
+      });
 }
 
 bool LogWriter::behind() const {

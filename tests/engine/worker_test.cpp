@@ -3,9 +3,14 @@
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <array>
 #include <atomic>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -80,6 +85,33 @@ TEST(Worker, PinsToACpuItMayUse) {
   EXPECT_TRUE(worker.join());
   EXPECT_TRUE(worker.notes().empty());
   EXPECT_EQ(used, cpu);
+}
+
+/// What the kernel says of the calling thread: 48 bytes, the slice in ns at 24 (sched_setattr(2)).
+std::optional<std::uint64_t> slice_ns() {
+  std::array<std::uint64_t, 6> attributes{};
+  if (syscall(SYS_sched_getattr, 0, attributes.data(), sizeof attributes, 0) != 0) return std::nullopt;
+  return attributes[3];
+}
+
+TEST(Worker, TakesItsTimeSlice) {
+  const std::optional<std::uint64_t> usual = slice_ns();
+  if (!usual || *usual == 0) GTEST_SKIP() << "this kernel has one slice for all threads (before Linux 6.12)";
+  std::optional<std::uint64_t> prompt;
+  std::optional<std::uint64_t> patient;
+  int nice = -1;
+  EXPECT_TRUE(Worker({.name = "prompt", .time_slice = kPromptSlice}, [&](const std::stop_token&) {
+                prompt = slice_ns();
+              }).join());
+  EXPECT_TRUE(Worker({.name = "patient", .time_slice = kPatientSlice}, [&](const std::stop_token&) {
+                patient = slice_ns();
+                yield_to_other_threads();
+                nice = getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
+              }).join());
+  EXPECT_EQ(prompt, 500'000u);
+  EXPECT_EQ(patient, 20'000'000u);
+  EXPECT_EQ(nice, 10);
+  EXPECT_EQ(slice_ns(), usual);  // of its own thread only
 }
 
 TEST(Health, CpuTimeAndMemoryGrowWithUse) {

@@ -55,7 +55,8 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
   surface_.emplace(rig_, surface, submaps);
   listen(options);
   if (!one_thread) {
-    worker_.emplace(WorkerOptions{.name = "surface"}, [this](const std::stop_token& stop) { work(stop); });
+    worker_.emplace(WorkerOptions{.name = "surface", .time_slice = kPatientSlice},
+                    [this](const std::stop_token& stop) { work(stop); });
   }
 }
 
