@@ -52,7 +52,7 @@ struct AnchoredViews::Equations {
 };
 
 double AnchoredViews::cost() const {
-  const double weight = 1 / (sigma_px * sigma_px);
+  const double weight = 1 / (rig.noise.sigma_px * rig.noise.sigma_px);
   const int rows = rig.kind == SensorKind::kMono ? 2 : 3;
   double chi2 = 0;
   for (const Point& point : points) {
@@ -70,7 +70,7 @@ double AnchoredViews::cost() const {
 }
 
 bool AnchoredViews::linearise(Equations& equations) const {
-  const double weight = 1 / (sigma_px * sigma_px);
+  const double weight = 1 / (rig.noise.sigma_px * rig.noise.sigma_px);
   const int rows = rig.kind == SensorKind::kMono ? 2 : 3;
   const auto size = static_cast<Eigen::Index>(6 * views.size());
   equations.C.setZero(size, size);

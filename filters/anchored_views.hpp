@@ -29,8 +29,7 @@ struct AnchoredViews {
     std::vector<SeenPoint> seen;
   };
 
-  Rig rig;
-  double sigma_px = 0.5;  ///< of every measurement component
+  Rig rig;  ///< its noise.sigma_px is that of every measurement component
   std::vector<Point> points;
   std::vector<View> views;
 

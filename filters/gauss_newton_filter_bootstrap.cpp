@@ -54,7 +54,8 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   std::copy_if(b0.begin(), b0.end(), std::back_inserter(in_all),
                [&](const PointObservation& o) { return contains(b1, o.point) && contains(first, o.point); });
   add_points(in_all, 0);
-  AnchoredViews views{rig_, options_.sigma_px, {}, {}};
+  AnchoredViews views{rig_, {}, {}};
+  views.rig.noise.sigma_px = options_.sigma_px;
   for (int j = 0; j < point_count(); ++j) {
     const Vector3& psi = points_[static_cast<std::size_t>(j)].psi;
     views.points.push_back({psi, psi, Lambda_.block<3, 3>(point_at(j), point_at(j))});

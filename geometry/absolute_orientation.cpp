@@ -1,7 +1,7 @@
 #include "geometry/absolute_orientation.hpp"
 
-#include <Eigen/SVD>
 #include <cmath>
+#include "geometry/nearest_rotation.hpp"
 
 namespace twofold {
 namespace {
@@ -30,12 +30,10 @@ std::optional<Alignment> align(std::span<const Vector3> x_a, std::span<const Vec
     result.spread_a += y_a.squaredNorm();
     result.spread_b += y_b.squaredNorm();
   }
-  const Eigen::JacobiSVD<Matrix3> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Vector3& s = svd.singularValues();
+  Vector3 s;
+  const Matrix3 R_a_b = nearest_rotation(H, &s);
   if (!(s[1] > kCollinear * s[0])) return std::nullopt;  // also catches H = 0 and NaN
-  Vector3 sign(1, 1, 1);
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign.z() = -1;
-  result.R_a_b = SO3(Matrix3(svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose()));
+  result.R_a_b = SO3(R_a_b);
   return result;
 }
 

@@ -1,6 +1,6 @@
 #include "geometry/view_rotation.hpp"
 
-#include <Eigen/SVD>
+#include "geometry/nearest_rotation.hpp"
 
 namespace twofold {
 namespace {
@@ -10,10 +10,7 @@ namespace {
 SO3 fit_rotation(std::span<const Vector3> a, std::span<const Vector3> b, std::span<const int> indices) {
   Matrix3 H = Matrix3::Zero();
   for (const int i : indices) H += b[i].normalized() * a[i].normalized().transpose();
-  const Eigen::JacobiSVD<Matrix3> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vector3 sign(1, 1, 1);
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign.z() = -1;
-  return SO3(Matrix3(svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose()));
+  return SO3(nearest_rotation(H));
 }
 
 struct RotationEstimator {

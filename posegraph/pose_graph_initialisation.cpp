@@ -1,7 +1,8 @@
 #include "posegraph/pose_graph_initialisation.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
+
+#include "geometry/nearest_rotation.hpp"
 
 namespace twofold {
 namespace {
@@ -21,25 +22,6 @@ SE2 from_rotation(const Square<2>& R, const Vector2& t) {
 }
 SE3 from_rotation(const Square<3>& R, const Vector3& t) {
   return {R, t};
-}
-
-/// Nearest rotation in the Frobenius norm: Newton's iteration for the polar factor (Higham 1986), which stays
-/// on the side of determinant +1; SVD for the rest.
-template <int D>
-Square<D> nearest_rotation(const Square<D>& M) {
-  Square<D> X = M;
-  if (M.determinant() > 1e-6 * std::pow(M.norm(), D)) {
-    for (int i = 0; i < 30; ++i) {
-      const Square<D> next = 0.5 * (X + X.inverse().transpose());
-      const bool done = (next - X).squaredNorm() < 1e-28;
-      X = next;
-      if (done) return X;
-    }
-  }
-  const Eigen::JacobiSVD<Square<D>> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix<double, D, 1> sign = Eigen::Matrix<double, D, 1>::Ones();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign[D - 1] = -1;
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
 }
 
 /// Row j of the normal equations: k R_j - k R_ji R_i; the known origin moves to the right-hand side.
@@ -71,7 +53,7 @@ std::vector<Square<D>> relaxed_rotations(const PoseGraph<Group>& graph, const Bl
   const Eigen::MatrixXd relaxed = system.solve(rhs);
   if (!relaxed.allFinite()) return rotations;
   for (int i = 0; i < structure.nodes(); ++i) {
-    rotations.push_back(nearest_rotation<D>(relaxed.middleRows<D>(D * i)));
+    rotations.push_back(nearest_rotation(Square<D>(relaxed.middleRows<D>(D * i))));
   }
   return rotations;
 }

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/twofold/auto_calibration.hpp"
+#include "apps/twofold/calibration/auto_calibration.hpp"
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/live_view.hpp"

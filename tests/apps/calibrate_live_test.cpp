@@ -8,7 +8,7 @@
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 
-#include "apps/twofold/calibration_session.hpp"
+#include "apps/twofold/calibration/calibration_session.hpp"
 #include "fixtures/fake_device.hpp"
 #include "io/files/calibration_file.hpp"
 #include "io/sources/v4l2_source.hpp"

@@ -27,7 +27,7 @@ Start make_start(SensorKind kind, int points, unsigned seed) {
   rig.kind = kind;
   rig.camera = {500, 500, 319.5, 239.5, 640, 480};
   rig.baseline = 0.1;
-  start.views.sigma_px = kSigma;
+  rig.noise.sigma_px = kSigma;
   start.problem.rig = rig;
   start.problem.poses.resize(3);
   start.problem.poses[0].fixed = true;

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "fixtures/plain_map.hpp"
+
 namespace twofold {
 namespace {
 
@@ -67,6 +69,41 @@ TEST(ImmaturePoints, GiveUpWhatIsOldOrOftenMissed) {
   EXPECT_EQ(points.points()[0].failures, 3);
   EXPECT_EQ(points.points()[1].proposed_in, KeyframeId{8});
   EXPECT_EQ(points.points()[2].anchor, KeyframeId{7});
+}
+
+/// A map with these keyframes, each the reference of the next.
+GraphSnapshot map_with(int keyframes) {
+  PlainMap map;
+  for (int i = 0; i < keyframes; ++i) {
+    KeyframeProposal proposal;
+    proposal.id = KeyframeId{static_cast<std::uint32_t>(i)};
+    proposal.reference = i > 0 ? KeyframeId{static_cast<std::uint32_t>(i - 1)} : kNoKeyframe;
+    map.insert(proposal);
+  }
+  return map.publish();
+}
+
+TEST(ImmaturePoints, AreForgottenWhenTheMapHasTakenThemOver) {
+  ImmaturePoints points(4, 2);
+  points.add_pending({.id = KeyframeId{1}, .reference = KeyframeId{0}, .T_k_ref = SE3()});
+  points.add_pending({.id = KeyframeId{2}, .reference = KeyframeId{1}, .T_k_ref = SE3()});
+  ImmaturePoint taken = point_of(KeyframeId{0});
+  taken.proposed_in = KeyframeId{1};
+  ImmaturePoint under_way = point_of(KeyframeId{0});
+  under_way.proposed_in = KeyframeId{2};
+  const ImmaturePoint unproposed = point_of(KeyframeId{1});  // its anchor is in the map, the point is not
+  for (const ImmaturePoint& point : {taken, under_way, unproposed}) ASSERT_TRUE(points.add(point));
+  const std::uint64_t before = points.revision();
+
+  points.adopt(map_with(2));
+
+  EXPECT_GT(points.revision(), before);
+  ASSERT_EQ(points.pending().size(), 1U);
+  EXPECT_EQ(points.pending()[0].id, KeyframeId{2});
+  ASSERT_EQ(points.points().size(), 2U);
+  EXPECT_EQ(points.points()[0].proposed_in, KeyframeId{2});
+  EXPECT_EQ(points.points()[1].anchor, KeyframeId{1});
+  EXPECT_EQ(points.points()[1].proposed_in, kNoKeyframe);
 }
 
 }  // namespace

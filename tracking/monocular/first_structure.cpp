@@ -221,7 +221,7 @@ class Attempt {
     Trial trial{{}, inliers_};
     AnchoredViews& views = trial.views;
     views.rig = rig_;
-    views.sigma_px = options_.sigma_px;
+    views.rig.noise.sigma_px = options_.sigma_px;
     std::vector<char> usable;  // of the inliers, in step: its depth is known
     int in_front = 0, behind = 0;
     for (const int i : inliers_) {

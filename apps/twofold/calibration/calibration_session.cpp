@@ -1,4 +1,4 @@
-#include "apps/twofold/calibration_session.hpp"
+#include "apps/twofold/calibration/calibration_session.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "apps/twofold/auto_calibration.hpp"
+#include "apps/twofold/calibration/auto_calibration.hpp"
 
 #include <fmt/format.h>
 

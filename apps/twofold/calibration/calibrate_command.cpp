@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/twofold/calibration_session.hpp"
+#include "apps/twofold/calibration/calibration_session.hpp"
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
 #include "io/files/io_error.hpp"
