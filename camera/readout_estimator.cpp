@@ -16,9 +16,13 @@ constexpr double kChangeOfTurn = 0.05;  // between frames [rad/s]: less is no pa
 constexpr double kPairSigma = 0.003;    // of one pair's answer beside its points' noise [s]
 constexpr double kPairHuber = 2;        // standard deviations beyond which a pair counts less
 constexpr int kFirstGuess = 8;          // pairs after which pairs are linearised at the estimate
-constexpr int kFewestPairs = 20;
-constexpr double kFloor = 0.001;         // [s] no camera is known better than that
-constexpr double kSigmas = 5;            // beyond which the readout is not zero
+constexpr int kFewestPairs = 8;         // for a belief: what is mapped before is bent and stays so
+constexpr int kFewestToKnow = 20;       // for the last word
+constexpr double kFloor = 0.001;        // [s] no camera is known better than that
+/// Beyond which the readout is not zero. A camera has a global shutter or one that takes a share of the
+/// period T, and neither is the likelier before: at 3.5 sigma the odds are sqrt(2 pi) sigma / T exp(3.5^2 /
+/// 2), 300 to one at sigma = T / 4.
+constexpr double kSigmas = 3.5;
 constexpr double kExactEnough = 0.0015;  // [s]
 constexpr int kEnoughPairs = 600;        // without finding anything
 constexpr int kMeanIntervals = 32;
@@ -69,7 +73,8 @@ bool ReadoutEstimator::regular(std::int64_t interval_ns) {
 }
 
 std::vector<ReadoutPoint>* ReadoutEstimator::begin_frame(std::int64_t t_ns, const SE3& T_cur_prev) {
-  const bool known = estimate_.significant && estimate_.sigma < kExactEnough;
+  const bool known =
+      estimate_.significant && estimate_.sigma < kExactEnough && estimate_.pairs >= kFewestToKnow;
   if (known || estimate_.pairs >= kEnoughPairs) return nullptr;
   const bool follows = linked_ > 0 && regular(t_ns - frame(0).t_ns);
   linked_ = follows ? std::min(linked_ + 1, kFrames) : 1;

@@ -1,6 +1,6 @@
 // Whether a result is luck: the same recording with its first one, two, three frames left out and with noise
-// of one grey level added, darker, cropped, smaller, seen in a mirror; and whether the tracker knows how well
-// it knows the pose (NEES).
+// of one grey level added, darker, cropped, smaller, seen in a mirror; how far apart its frames may be; and
+// whether the tracker knows how well it knows the pose (NEES).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -28,13 +28,14 @@ namespace twofold {
 namespace {
 
 struct Variation {
-  const char* name;
+  std::string name;
   int left_out = 0;       ///< frames at the beginning
   double noise = 0;       ///< [grey]
   double gain = 1;        ///< of grey levels
   double crop = 1;        ///< share of width and height that is left, around the middle
   double scale = 1;       ///< of width and height
   bool mirrored = false;  ///< left and right exchanged, the cameras of a pair too
+  int every = 1;          ///< frames from one that is taken to the next
 };
 
 /// Of one frame, with what the tracker said of it.
@@ -190,10 +191,11 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
     relative_poses.push_back(
         {record.T_c_ref.unpacked(), record.t_ns, t_ref_ns, report.information.inverse()});
   };
-  int read = 0;
+  int unused = variation.left_out;
   const FrameFeed feed = [&](Frame& frame) {
     FrameStatus status = source->next(frame);
-    for (; status == FrameStatus::kFrame && read < variation.left_out; ++read) status = source->next(frame);
+    for (; status == FrameStatus::kFrame && unused > 0; --unused) status = source->next(frame);
+    unused = variation.every - 1;
     if (status != FrameStatus::kFrame)
       return status == FrameStatus::kEnd ? FeedStatus::kEnd : FeedStatus::kError;
     vary(frame, variation);
@@ -249,6 +251,7 @@ int main(int argc, char** argv) {
   bool as_it_is_only = false;
   std::string camera = "all";
   int only = -1;
+  std::vector<int> every;
   std::vector<double> truth{0, 0};
   CLI::App app("Runs of one recording that should differ by little");
   app.add_option("source", sources, "as of 'twofold run'")->required();
@@ -257,27 +260,33 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"all", "mono"}));
   app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
   app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
+  app.add_option("--every", every,
+                 "instead of the variations: every first, second, .. frame, as many as given")
+      ->check(CLI::PositiveNumber);
   app.add_option("--truth", truth, "standard deviations of the truth's own poses: METRES RADIANS")
       ->expected(2);
   CLI11_PARSE(app, argc, argv);
   if (!calibration.empty()) options.calibration = calibration;
   options.left_only = camera == "mono";
-  const twofold::Variation variations[] = {{"as it is"},
-                                           {"first frame left out", 1},
-                                           {"first two left out", 2},
-                                           {"first three left out", 3},
-                                           {"noise of one grey level", 0, 1},
-                                           {"gain 0.9", 0, 0, 0.9},
-                                           {"the middle 90 %", 0, 0, 1, 0.9},
-                                           {"three quarters of the size", 0, 0, 1, 1, 0.75},
-                                           {"in a mirror", 0, 0, 1, 1, 1, true}};
+  std::vector<twofold::Variation> variations = {{"as it is"},
+                                                {"first frame left out", 1},
+                                                {"first two left out", 2},
+                                                {"first three left out", 3},
+                                                {"noise of one grey level", 0, 1},
+                                                {"gain 0.9", 0, 0, 0.9},
+                                                {"the middle 90 %", 0, 0, 1, 0.9},
+                                                {"three quarters of the size", 0, 0, 1, 1, 0.75},
+                                                {"in a mirror", 0, 0, 1, 1, 1, true}};
+  if (!every.empty()) variations.clear();
+  for (const int n : every)
+    variations.push_back({.name = fmt::format("frames 0, {}, {}, ..", n, 2 * n), .every = n});
   try {
     for (const std::string& source : sources) {
       fmt::print(
           "\n| {} | tracked | ATE m | causal m | NEES / 6: median / mean / p95 |\n|---|---|---|---|---|\n",
           source);
       for (const twofold::Variation& variation : variations) {
-        if (only >= 0 && &variation != &variations[only]) continue;
+        if (only >= 0 && every.empty() && &variation != &variations[static_cast<std::size_t>(only)]) continue;
         print_row(variation, twofold::run(source, options, variation, {truth[0], truth[1]}));
         if (as_it_is_only) break;
       }

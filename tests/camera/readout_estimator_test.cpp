@@ -31,7 +31,7 @@ SE3 T_c_w_at(double seconds, bool shaken) {
 
 class ShakenCamera {
  public:
-  explicit ShakenCamera(double readout) : readout_(readout) {
+  explicit ShakenCamera(double readout, unsigned seed = 5) : readout_(readout), random_(seed) {
     std::uniform_real_distribution<double> angle(-M_PI, M_PI), height(-2, 2), distance(1.5, 5);
     for (int i = 0; i < 1500; ++i) {
       const double a = angle(random_), d = distance(random_);
@@ -73,7 +73,7 @@ class ShakenCamera {
 
   const Rig rig_ = camera_rig();
   double readout_;
-  std::mt19937 random_{5};
+  std::mt19937 random_;
   std::vector<Vector3> points_;
 };
 
@@ -98,6 +98,30 @@ TEST_P(ReadoutOfACamera, IsFoundThoughTimeStampsJitter) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Readouts, ReadoutOfACamera, ::testing::Values(0, 0.010, 0.026, 0.033));
+
+/// What is mapped before stays bent.
+TEST(ReadoutEstimator, IsBelievedSoon) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    ShakenCamera camera(0.026, seed);
+    camera.stamp_jitter = 0.17;
+    const ReadoutEstimate found = camera.after(20);
+    EXPECT_TRUE(found.significant) << seed;
+    EXPECT_NEAR(found.seconds, 0.026, 0.005) << seed;
+  }
+}
+
+/// At no time, and time stamps that jitter look like turns that change.
+TEST(ReadoutEstimator, DoesNotBelieveAnythingOfAGlobalShutter) {
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    ShakenCamera camera(0, seed);
+    camera.stamp_jitter = 0.17;
+    ReadoutEstimator estimator(camera_rig(), 150);
+    for (int i = 0; i < 90; ++i) {
+      camera.show(i, estimator);
+      ASSERT_FALSE(estimator.estimate().significant) << "seed " << seed << ", frame " << i;
+    }
+  }
+}
 
 TEST(ReadoutEstimator, LearnsNothingFromATurnThatStaysTheSame) {
   ShakenCamera camera(0.026);
