@@ -25,6 +25,10 @@ export class Sight {
     if (!on) this.place.hidden = true;
   }
 
+  toggleSize(): void {
+    this.place.classList.toggle('large');
+  }
+
   take(image: Image): void {
     this.waiting.push(image);
     if (this.waiting.length > KEPT) this.waiting.shift();
@@ -61,10 +65,11 @@ export class Sight {
     this.canvas.height = bitmap.height;
     c.drawImage(bitmap, 0, 0);
     const scale = bitmap.width / image.width;
+    const pixel = Math.max(1, bitmap.width / Math.max(1, this.canvas.clientWidth));  // of the screen
     const isTracked = frame.state === State.tracked;
-    if (isTracked) this.paintMap(c, frame, scale);
+    if (isTracked) this.paintMap(c, frame, scale, pixel);
     const measured = this.measured.find((other) => other.frame === image.frame)?.points ?? [];
-    this.paintMeasured(c, measured, scale);
+    this.paintMeasured(c, measured, scale, pixel);
     const outliers = measured.reduce((sum, point) => sum + (point.inlier ? 0 : 1), 0);
     const found = measured.length === 0 ? `${frame.points} points found`
       : `${measured.length - outliers} points measured, ${outliers} outlier${outliers === 1 ? '' : 's'}; residuals × ${LONGER}; squares: searched`;
@@ -72,8 +77,8 @@ export class Sight {
     this.place.querySelector('figcaption')!.textContent = `frame ${image.frame} · ${state}`;
   }
 
-  private paintMeasured(c: CanvasRenderingContext2D, points: MeasuredPoint[], scale: number): void {
-    c.lineWidth = 1;
+  private paintMeasured(c: CanvasRenderingContext2D, points: MeasuredPoint[], scale: number, pixel: number): void {
+    c.lineWidth = pixel;
     c.strokeStyle = '#ffd666';
     for (const point of points) {
       if (point.radius === 0) continue;
@@ -87,11 +92,11 @@ export class Sight {
       c.moveTo(u, v);
       c.lineTo(u + LONGER * scale * (point.expectedU - point.u), v + LONGER * scale * (point.expectedV - point.v));
       c.stroke();
-      c.fillRect(u - 1.5, v - 1.5, 3, 3);
+      c.fillRect(u - 1.5 * pixel, v - 1.5 * pixel, 3 * pixel, 3 * pixel);
     }
   }
 
-  private paintMap(c: CanvasRenderingContext2D, frame: LiveFrame, scale: number): void {
+  private paintMap(c: CanvasRenderingContext2D, frame: LiveFrame, scale: number, pixel: number): void {
     const rig = this.model.hello?.rig;
     if (!rig) return;
     const near = new Set([frame.reference]);
@@ -107,7 +112,7 @@ export class Sight {
       const u = rig.cx + (rig.fx * (R[0] * dx + R[3] * dy + R[6] * dz)) / depth;
       const v = rig.cy + (rig.fy * (R[1] * dx + R[4] * dy + R[7] * dz)) / depth;
       if (u < 0 || v < 0 || u >= rig.width || v >= rig.height) return;
-      c.fillRect(u * scale - 1, v * scale - 1, 2, 2);
+      c.fillRect(u * scale - pixel, v * scale - pixel, 2 * pixel, 2 * pixel);
     }, MOST);
   }
 }
