@@ -126,6 +126,7 @@ class Page {
       this.stage.cloud.settle();
       this.stage.changed();
     }
+    if (state === 'ended') $('commands').hidden = true;
     $('message').textContent = message;
     $('message').hidden = state === 'open';
     $('message').classList.toggle('calm', state === 'ended');

@@ -63,6 +63,7 @@ export class Sight {
     const c = this.canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     this.canvas.width = bitmap.width;
     this.canvas.height = bitmap.height;
+    this.place.style.setProperty('--aspect', String(bitmap.width / bitmap.height));
     c.drawImage(bitmap, 0, 0);
     const scale = bitmap.width / image.width;
     const pixel = Math.max(1, bitmap.width / Math.max(1, this.canvas.clientWidth));  // of the screen
@@ -78,13 +79,14 @@ export class Sight {
   }
 
   private paintMeasured(c: CanvasRenderingContext2D, points: MeasuredPoint[], scale: number, pixel: number): void {
-    c.lineWidth = pixel;
+    c.lineWidth = 1;
     c.strokeStyle = '#ffd666';
     for (const point of points) {
       if (point.radius === 0) continue;
       const side = 2 * scale * point.radius;
       c.strokeRect((point.predictedU + 0.5) * scale - side / 2, (point.predictedV + 0.5) * scale - side / 2, side, side);
     }
+    c.lineWidth = pixel;
     for (const point of points) {
       c.strokeStyle = c.fillStyle = point.inlier ? '#35f0a8' : '#ff5a5f';
       const [u, v] = [(point.u + 0.5) * scale, (point.v + 0.5) * scale];
