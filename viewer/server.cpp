@@ -43,7 +43,7 @@ constexpr std::size_t kHeaderBytes = 8U << 10;
 constexpr std::string_view kLivePath = "/live";
 constexpr const char* kNoRoom = "as many viewers as there may be are watching";
 constexpr std::size_t kMessageBytes = 64;
-constexpr auto kRequestTime = std::chrono::seconds(5);
+constexpr auto kUpgradeTime = std::chrono::seconds(5);
 constexpr auto kAnswerTime = std::chrono::seconds(30);  // 200 KB through a slow tunnel
 constexpr auto kWriteTime = std::chrono::seconds(10);
 constexpr auto kLastCall = std::chrono::seconds(3);
@@ -54,6 +54,7 @@ struct Hall {
   const ViewTitle& title;
   ViewDoor door;
   std::size_t& connections;
+  std::chrono::milliseconds request_time;
   ViewSight sight = {};
 };
 
@@ -92,7 +93,7 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
 
   void accept(const Request& request) {
     beast::get_lowest_layer(socket_).expires_never();
-    socket_.set_option(websocket::stream_base::timeout{kRequestTime, std::chrono::seconds(60), true});
+    socket_.set_option(websocket::stream_base::timeout{kUpgradeTime, std::chrono::seconds(60), true});
     socket_.read_message_max(kMessageBytes);
     socket_.binary(true);
     socket_.async_accept(request, [self = shared_from_this()](Error error) {
@@ -170,7 +171,7 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
   }
 
   void read() {
-    stream_.expires_after(kRequestTime);
+    stream_.expires_after(hall_.request_time);
     http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](Error error, std::size_t) {
       if (!error) self->answer();
     });
@@ -345,7 +346,8 @@ class ViewServer::Impl {
         hall_{scene,
               title,
               {{random_secret(), random_secret()}, acceptor_.local_endpoint().port(), machine_name()},
-              connections_},
+              connections_,
+              options.request_time},
         addresses_(printed_addresses(acceptor_.local_endpoint(), hall_.door.token())),
         is_open_to_network_(!acceptor_.local_endpoint().address().is_loopback()) {}
 

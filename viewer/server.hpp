@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <stop_token>
@@ -14,13 +15,14 @@ struct ViewServerOptions {
   std::string bind =
       "127.0.0.1";  ///< address to listen on; others than loopback show the scene to the network
   int port = 0;     ///< 0: any that is free
+  std::chrono::milliseconds request_time = std::chrono::seconds(5);  ///< for a request to come in
 };
 
 /// Serves page and scene over HTTP and WebSocket to those who know the token. One thread does everything,
 /// that of `run`.
 ///
-/// Bounds: 32 connections, 8 of them viewers; requests of 8 KiB and without a body; 5 s for a request to come
-/// in, 30 s for the answer to go out; messages of a viewer of 64 bytes, and 500 of them a second beside
+/// Bounds: 32 connections, 8 of them viewers; requests of 8 KiB and without a body; request_time for one to
+/// come in, 30 s for the answer to go out; messages of a viewer of 64 bytes, and 500 of them a second beside
 /// acknowledgements, of which there are no more than messages to it; 10 s for a message to a viewer to go
 /// out. What exceeds a bound is refused, or its connection closed.
 class ViewServer {

@@ -27,8 +27,9 @@ namespace {
 
 constexpr std::int64_t kMapPeriodNs = 200'000'000;  // between two looks at the map while somebody watches
 constexpr std::int64_t kNobodyPeriodNs =
-    1'000'000'000;                      // likewise, of the keyframes alone, while nobody does
-constexpr std::int64_t kMapShare = 60;  // the next look waits this many times what one cost
+    1'000'000'000;                             // likewise, of the keyframes alone, while nobody does
+constexpr std::int64_t kMapShare = 60;         // the next look waits this many times what one cost
+constexpr std::int64_t kDeviationShare = 120;  // likewise, of the points' standard deviations
 constexpr std::size_t kFewPoints =
     300'000;  // of more, standard deviations would hold up viewers for a second
 constexpr std::int64_t kImagePeriodNs = 200'000'000;
@@ -296,7 +297,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     const std::int64_t begin_cpu_ns = thread_cpu_ns();
     deviations_.find(map);
     deviations_due_ns_ =
-        steady_now_ns() + std::max(kNobodyPeriodNs, kMapShare * (thread_cpu_ns() - begin_cpu_ns));
+        steady_now_ns() + std::max(kNobodyPeriodNs, kDeviationShare * (thread_cpu_ns() - begin_cpu_ns));
   }
 
   void look_at_image(bool wanted, NewestMessage& newest) {

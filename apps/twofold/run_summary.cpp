@@ -6,6 +6,7 @@
 
 #include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
+#include "apps/twofold/recoveries.hpp"
 
 namespace twofold {
 namespace {
@@ -103,6 +104,20 @@ Json corrections_json(const RunResult& result) {
   return corrections;
 }
 
+/// Where the lost camera was placed again; null where there is no way between the two places.
+Json relocalisations_json(const EngineOptions& options, const RunResult& result) {
+  Json json = Json::array();
+  for (const Recovery& r : recoveries(result, options.map ? options.map->graph.keyframe_count() : 0)) {
+    json.push_back({{"frame", r.frame},
+                    {"t_ns", r.t_ns},
+                    {"lost_frames", r.lost_frames},
+                    {"new_part", r.new_part},
+                    {"moved_m", r.T_last_now ? Json(r.T_last_now->translation().norm()) : Json()},
+                    {"turned_rad", r.T_last_now ? Json(r.T_last_now->so3().log().norm()) : Json()}});
+  }
+  return json;
+}
+
 /// What became of the map the run started with.
 Json loaded_map_json(const EngineOptions& options, const RunResult& result) {
   if (!options.map) return nullptr;
@@ -193,6 +208,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"closed_loops", loops_json(result)},
             {"loops_too_late", result.mapping.late_loops},
             {"pose_corrections", corrections_json(result)},
+            {"relocalisations", relocalisations_json(options, result)},
             {"wall_seconds", result.wall_seconds},
             {"cpu_seconds", result.cpu_seconds},
             {"exposure_to_pose", exposure_to_pose_json(options.pacing, result)},

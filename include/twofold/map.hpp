@@ -10,7 +10,12 @@
 namespace twofold {
 
 /// One version of the map. It never changes and may be held as long as one likes, by any thread: the mapper
-/// goes on meanwhile and waits for nobody. A copy is another handle of the same version.
+/// goes on meanwhile and waits for nobody. A copy is another handle of the same version; one that was moved
+/// from is an empty map.
+///
+/// Lengths are metres; those of a run with one camera (Sensor::kMono) that began with no map are of a unit of
+/// its own, wherever [m] is said here.
+/// Poses and positions are in the world of their map part, whose points x_world = T_world_camera x_camera.
 ///
 /// Memory: versions share what they have in common. One that is held keeps what the map has replaced since;
 /// memory_bytes() bounds that from above. Slam::held_maps() counts the handles' versions.
@@ -62,9 +67,11 @@ class TWOFOLD_API MapSnapshot {
     /// others.
     double scale = 1;
     bool joins_parts = false;  ///< the two had different worlds: there is no drift, and no way between them
-    double drift = 0;          ///< what the map had the second wrong by, relative to the first [m]
-    double turned = 0;         ///< likewise [rad]
-    double travelled = 0;      ///< along the keyframes from one to the other [m]
+    /// By how much the map had the second keyframe's position wrong, relative to the first, before the loop
+    /// was closed [m].
+    double drift = 0;
+    double turned = 0;     ///< likewise, its orientation [rad]
+    double travelled = 0;  ///< along the keyframes from one to the other [m]
   };
 
   struct Part {

@@ -70,9 +70,8 @@ struct ViewerOptions {
 ///
 /// Threads:
 /// - address, addresses, port, is_open_to_network: any, always.
-/// - tell (all four), wants_points: one, the tracker's. A copy into a ring and no more: no lock, no
-/// allocation,
-///   no system call. A viewer that falls behind by the whole ring (1024 frames) leaves frames out.
+/// - tell (all four), wants_points: one, the tracker's. A copy into a ring: no lock, no allocation, no system
+///   call. A viewer that falls behind by the whole ring (1024 frames) leaves frames out.
 /// - tell_waiting: any, one at a time.
 /// - show, wants_image: one, that of the images' source.
 /// - finish: any but the viewer's own.

@@ -62,7 +62,9 @@ class FinishedRunTest : public ::testing::Test {
                    {"frame": 7, "cause": "too fast", "ms_since_previous": 50}, {"frame": 11, "cause": "too fast", "ms_since_previous": 50}],
       "why_late": [{"frame": 4, "latency_ms": 80, "cause": "tracking it took long"}, {"frame": 6, "cause": "dropped"}],
       "closed_loops": [{"t_ns": 1500000000, "from": 1, "from_t_ns": 1100000000, "to": 9, "inliers": 30, "scale": 1.5, "joins_parts": true}],
-      "pose_corrections": [{"frame": 9, "t_ns": 1450000000, "reason": "optimisation", "moved_m": 0.5}]})");
+      "pose_corrections": [{"frame": 9, "t_ns": 1450000000, "reason": "optimisation", "moved_m": 0.5}],
+      "relocalisations": [{"frame": 8, "t_ns": 1400000000, "lost_frames": 1, "new_part": true, "moved_m": null, "turned_rad": null},
+                          {"frame": 10, "t_ns": 1500000000, "lost_frames": 1, "new_part": false, "moved_m": 0.25, "turned_rad": 0.5}]})");
   }
   void write_part(const std::string& suffix, const std::vector<int>& frames,
                   const std::vector<int>& keyframes, const std::vector<PlyPoint>& points) const {
@@ -127,7 +129,7 @@ TEST_F(FinishedRunTest, PartsAreParts) {
   }
   EXPECT_EQ(path()[9].part, 2U);
   EXPECT_EQ(path()[9].reference, 2U);
-  ASSERT_EQ(scene_.end_event(), 2U);
+  ASSERT_EQ(scene_.end_event(), 4U);
   EXPECT_EQ(scene_.event(0).part, 2U) << "where the camera was then";
   const auto edges = records<ViewEdge>(scene_, ViewBlock::kEdges);
   ASSERT_EQ(edges.size(), 3U);
@@ -135,6 +137,26 @@ TEST_F(FinishedRunTest, PartsAreParts) {
   EXPECT_EQ(edges[1].loop, kJoinsParts);
   EXPECT_EQ(edges[2].key(), (ViewEdge{.from = 2, .to = 3}.key()));
   EXPECT_EQ(edges[2].marginalised, 1);
+}
+
+TEST_F(FinishedRunTest, RelocalisationsAndNewPartsAreEvents) {
+  show();
+  ASSERT_EQ(scene_.end_event(), 4U);
+  const ViewEvent& part = scene_.event(1);
+  EXPECT_EQ(part.kind, "new part");
+  EXPECT_EQ(part.frame, 8U);
+  EXPECT_NEAR(part.t, 0.4, 1e-5);
+  EXPECT_EQ(part.part_before, 0U) << "that of the pose before";
+  EXPECT_EQ(part.part, 2U);
+  EXPECT_EQ(part.after[0], 8);
+  EXPECT_EQ(part.before, part.after) << "there is no way between the worlds of two parts";
+  const ViewEvent& found = scene_.event(2);
+  EXPECT_EQ(found.kind, "relocalisation");
+  EXPECT_EQ(found.part_before, found.part);
+  EXPECT_EQ(found.moved, 0.25);
+  EXPECT_EQ(found.turned, 0.5);
+  EXPECT_EQ(found.before[0], 9) << "where it was last";
+  EXPECT_EQ(found.after[0], 10);
 }
 
 TEST_F(FinishedRunTest, PointsKnowWhenTheyWereFirstSeenAndHowWellTheyAreKnown) {
@@ -170,6 +192,11 @@ TEST_F(FinishedRunTest, FilesThatMakeNoSenseAreNamed) {
   std::filesystem::remove(folder_.path() / "frames.txt");
   folder_.write("edges-2.txt", "0 2 12 covisible\n");
   EXPECT_IO_ERROR(show(), "edges-2.txt");
+  folder_.write("edges-2.txt", "0 1 12 covisible\n0 one 12 covisible\n");
+  EXPECT_IO_ERROR(show(), "edges-2.txt: line 2 makes no sense");
+  folder_.write("edges-2.txt", "");
+  folder_.write("summary.json", R"({"source": 7})");
+  EXPECT_IO_ERROR(show(), "summary.json: makes no sense");
 }
 
 }  // namespace

@@ -69,9 +69,9 @@ class ViewServerTest : public ::testing::Test {
     return {{pixels.data(), 8, 6, 8}, nullptr};
   }
 
-  ViewTitle title_{.title = "test", .keyframe_images = true};
+  ViewTitle title_{.title = "test", .control = true, .keyframe_images = true};
   KeyframeImages images_{image_of};
-  ViewServer server_{{.bind = "127.0.0.1", .port = 0}, scene_, title_};
+  ViewServer server_{{.bind = "127.0.0.1", .port = 0, .request_time = milliseconds(1200)}, scene_, title_};
   std::string token_;
   int port_ = 0;
   std::jthread thread_;
@@ -107,7 +107,8 @@ TEST_F(ViewServerTest, GreetsAViewerAndTellsTheEnd) {
   EXPECT_NE(begin.find("\"hello\""), std::string::npos);
   for (int n = 0; n < 2; ++n) client.send(text_frame("ack"));
   thread_.request_stop();
-  EXPECT_NE(client.receive().find("\"message\":\"over\""), std::string::npos);
+  const std::string words = "\"message\":\"over\"";
+  EXPECT_NE(client.receive_until(words).find(words), std::string::npos);
 }
 
 TEST_F(ViewServerTest, DropsWhatIsTooLargeOrBroken) {
@@ -144,8 +145,8 @@ TEST_F(ViewServerTest, SocketsAreOpenedAtOnePathAlone) {
 TEST_F(ViewServerTest, DropsWhoTakesTooLong) {
   LocalClient client(port_);
   client.send("GET / HTTP/1.1\r\n");
-  for (int n = 0; n < 5; ++n) {
-    std::this_thread::sleep_for(milliseconds(1000));
+  for (int n = 0; n < 15; ++n) {
+    std::this_thread::sleep_for(milliseconds(100));
     client.send("X: y\r\n");  // a little at a time
   }
   EXPECT_TRUE(is_dropped(client));
@@ -205,13 +206,17 @@ TEST_F(ViewServerTest, SurvivesDamagedConversations) {
       std::chrono::steady_clock::now() + std::chrono::seconds(wanted != nullptr ? std::atoi(wanted) : 3);
   std::mt19937 rng(7);
   const std::string opening = upgrade_request(port_, token_);
+  const std::string page = http_request("/?token=" + token_, "Cookie: twofold-1=0; a=\"b\"\r\n");
   int conversations = 0;
   for (; std::chrono::steady_clock::now() < end; ++conversations) {
     LocalClient client(port_);
     ASSERT_TRUE(client.connected());
     const std::string talk = text_frame("images on") + text_frame("keyframe 17") + text_frame("ack") +
-                             frame(0x89, "ping") + frame(0x88, "\x03\xe8");
-    if (rng() % 3 == 0) {
+                             text_frame("save map") + frame(0x89, "ping") + frame(0x88, "\x03\xe8");
+    const auto kind = rng() % 8;
+    if (kind == 0) {
+      client.send(damaged(page, rng));
+    } else if (kind < 3) {
       client.send(damaged(opening + talk, rng));
     } else {
       client.send(opening);

@@ -59,6 +59,8 @@ class FinishedRun {
   void add_path(ViewScene& scene) const;
   void add_truth(const std::filesystem::path& file, ViewScene& scene) const;
   void add_events(ViewScene& scene) const;
+  [[nodiscard]] ViewEvent correction_of(const RunJson& correction) const;
+  [[nodiscard]] ViewEvent relocalisation_of(const RunJson& placed) const;
 
   RunJson summary_;
   std::vector<RunPart> parts_;
@@ -67,6 +69,12 @@ class FinishedRun {
   std::vector<RunFrame> frames_;
   std::int64_t start_ns_ = 0;
 };
+
+/// 0 where the summary has none, or null.
+double number(const RunJson& entry, const char* key) {
+  const auto value = entry.find(key);
+  return value != entry.end() && value->is_number() ? value->get<double>() : 0.0;
+}
 
 /// Entries of one of the summary's lists by the numbers of their frames.
 std::map<std::uint32_t, RunJson> by_frame(const RunJson& summary, const char* list) {
@@ -153,19 +161,15 @@ std::vector<MapSnapshot::Loop> FinishedRun::loops() const {
   for (const RunJson& from : summary_.value("closed_loops", RunJson::array())) {
     MapSnapshot::Loop& loop = loops.emplace_back();
     loop.t_ns = from.value("t_ns", start_ns_);
-    const auto number = [&from](const char* key) {  // null where there is none
-      const auto value = from.find(key);
-      return value != from.end() && value->is_number() ? value->get<double>() : 0.0;
-    };
     // The page numbers the keyframes that are left, the run numbered all.
     loop.from = keyframe_at(from, "from_t_ns");
     loop.to = keyframe_at(from, "t_ns");
     loop.inliers = from.value("inliers", 0);
     loop.scale = from.value("scale", 1.0);
     loop.joins_parts = from.value("joins_parts", false);
-    loop.drift = number("drift_m");
-    loop.turned = number("drift_rad");
-    loop.travelled = number("travelled_m");
+    loop.drift = number(from, "drift_m");
+    loop.turned = number(from, "drift_rad");
+    loop.travelled = number(from, "travelled_m");
   }
   return loops;
 }
@@ -234,21 +238,47 @@ std::string kind_of(const std::string& reason) {
   return reason;
 }
 
-void FinishedRun::add_events(ViewScene& scene) const {
-  for (const RunJson& correction : summary_.value("pose_corrections", RunJson::array())) {
-    ViewEvent event;
-    event.kind = kind_of(correction.value("reason", ""));
-    const std::int64_t t_ns = correction.value("t_ns", std::int64_t{0});
-    event.t = seconds(t_ns);
-    event.frame = correction.value("frame", 0U);
-    event.moved = correction.value("moved_m", 0.0);
-    event.turned = correction.value("turned_rad", 0.0);
-    if (const auto at = poses_.lower_bound(t_ns); at != poses_.end()) {
-      event.before = event.after = to_pose(at->second.pose.T_w_c).t;
-      event.part = event.part_before = at->second.part->name();
-    }
-    scene.add(std::move(event));
+ViewEvent FinishedRun::correction_of(const RunJson& correction) const {
+  ViewEvent event;
+  event.kind = kind_of(correction.value("reason", ""));
+  const std::int64_t t_ns = correction.value("t_ns", std::int64_t{0});
+  event.t = seconds(t_ns);
+  event.frame = correction.value("frame", 0U);
+  event.moved = number(correction, "moved_m");
+  event.turned = number(correction, "turned_rad");
+  if (const auto at = poses_.lower_bound(t_ns); at != poses_.end()) {
+    event.before = event.after = to_pose(at->second.pose.T_w_c).t;
+    event.part = event.part_before = at->second.part->name();
   }
+  return event;
+}
+
+/// Parts are those of the final map: one that was new may have joined another since.
+ViewEvent FinishedRun::relocalisation_of(const RunJson& placed) const {
+  ViewEvent event;
+  const bool new_part = placed.value("new_part", false);
+  event.kind = to_string(new_part ? MapEventKind::kNewPart : MapEventKind::kRelocalisation);
+  const std::int64_t t_ns = placed.value("t_ns", std::int64_t{0});
+  event.t = seconds(t_ns);
+  event.frame = placed.value("frame", 0U);
+  event.moved = number(placed, "moved_m");
+  event.turned = number(placed, "turned_rad");
+  const auto at = poses_.lower_bound(t_ns);
+  if (at == poses_.end()) return event;
+  event.before = event.after = to_pose(at->second.pose.T_w_c).t;
+  event.part = at->second.part->name();
+  if (at == poses_.begin()) return event;
+  event.part_before = std::prev(at)->second.part->name();
+  if (event.part == event.part_before) event.before = to_pose(std::prev(at)->second.pose.T_w_c).t;
+  if (event.part == event.part_before && new_part) event.text = "a part that has joined this one since";
+  return event;
+}
+
+void FinishedRun::add_events(ViewScene& scene) const {
+  for (const RunJson& correction : summary_.value("pose_corrections", RunJson::array()))
+    scene.add(correction_of(correction));
+  for (const RunJson& placed : summary_.value("relocalisations", RunJson::array()))
+    scene.add(relocalisation_of(placed));
   scene.add_loops(loops());
 }
 
@@ -275,9 +305,13 @@ void FinishedRun::show(const std::filesystem::path& folder, ViewScene& scene, Vi
 }  // namespace
 
 void show_finished_run(const std::filesystem::path& folder, ViewScene& scene, ViewTitle& title) {
-  const FinishedRun run(folder);
-  title.title = fmt::format("{} ({})", folder.filename().string(), run.summary().value("source", ""));
-  run.show(folder, scene, title);
+  try {
+    const FinishedRun run(folder);
+    title.title = fmt::format("{} ({})", folder.filename().string(), run.summary().value("source", ""));
+    run.show(folder, scene, title);
+  } catch (const RunJson::exception& error) {  // a number where a word should be
+    throw IoError((folder / "summary.json").string(), std::string("makes no sense: ") + error.what());
+  }
 }
 
 }  // namespace twofold

@@ -5,6 +5,8 @@
 #include <map>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "apps/twofold/map_parts.hpp"
 
 namespace twofold {
@@ -25,6 +27,8 @@ std::vector<ViewEdge> read_edges(const std::filesystem::path& file, const std::v
     edge.marginalised = kind == "marginalised" ? 1 : 0;
     edges.push_back(edge);
   }
+  if (in.is_open() && !in.eof())
+    throw IoError(file.string(), fmt::format("line {} makes no sense", edges.size() + 1));
   return edges;
 }
 

@@ -34,6 +34,7 @@ const KEYS: [string, string][] = [
   ['S', 'save a picture'], ['F', 'full screen'], ['T', 'dark or light'], ['esc', 'let go of what is selected'], ['H', 'these keys'],
 ];
 const PERIODIC_MS = 200;
+const MOST_LISTED = 100;  // events
 
 class Page {
   // First, so that the server answers while WebGL is being set up. Nothing is heard before the page has been made.
@@ -91,7 +92,7 @@ class Page {
       this.model.hello = message.hello;
       if (!speaksTheSame(message.hello.protocol)) return;
       document.title = `${message.hello.title} – Twofold`;
-      $('title').textContent = message.hello.title;
+      $('title').textContent = $('title').title = message.hello.title;
       document.body.classList.toggle('finished', message.hello.kind === 'map' || !message.hello.hasTimes);
       $('no-events').textContent = message.hello.kind === 'live' ? 'none yet' : 'none';
       this.makeStages();
@@ -125,6 +126,7 @@ class Page {
       this.stage.cloud.settle();
       this.stage.changed();
     }
+    if (state === 'ended') $('commands').hidden = true;
     $('message').textContent = message;
     $('message').hidden = state === 'open';
     $('message').classList.toggle('calm', state === 'ended');
@@ -172,7 +174,7 @@ class Page {
     const pill = $('state');
     const newest = this.model.live.at(-1);
     const set = (text: string, kind: string) => {
-      pill.textContent = text;
+      pill.textContent = pill.title = text;
       pill.className = `pill ${kind}`;
     };
     if (this.link === 'connecting') return set('connecting', '');
@@ -308,9 +310,11 @@ class Page {
   }
 
   private makeEvents(): void {
-    const newest = this.model.events.slice(-100).reverse();
-    $('no-events').hidden = newest.length > 0;
-    $('events').replaceChildren(...newest.map((event) => {
+    const listed = mostTelling(this.model.events, MOST_LISTED);
+    $('no-events').hidden = listed.length > 0;
+    $('more-events').hidden = listed.length === this.model.events.length;
+    $('more-events').textContent = `and ${(this.model.events.length - listed.length).toLocaleString('en')} smaller ones, on the time line`;
+    $('events').replaceChildren(...listed.map((event) => {
       const sample = make('i');
       sample.style.background = eventColour(event.kind);
       const [kind, ...rest] = describe(event, this.model.isMetric).split(' · ');
@@ -323,6 +327,7 @@ class Page {
   private goTo(event: MapEvent): void {
     this.timeline.set(event.t);
     this.setView('free');
+    this.stage.event = event;
     this.stage.lookAt(event.after);
   }
 
@@ -449,6 +454,7 @@ class Page {
   private listen(): void {
     this.timeline.onTime = (time) => {
       this.stage.time = time;
+      this.stage.event = null;
       this.stage.changed();
       this.stale = true;
     };
@@ -470,6 +476,7 @@ class Page {
       this.stale = true;
     });
     const on = (id: string, act: () => void) => $(id).addEventListener('click', act);
+    on('sight', () => this.sight.toggleSize());
     on('measure', () => this.setMeasuring(!this.measuring));
     on('shot', () => this.savePicture());
     on('full', () => void (document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen()));
@@ -529,6 +536,13 @@ class Page {
   private windowSize(window: number): number {
     return [...this.model.keyframes.values()].filter((keyframe: Keyframe) => keyframe.window === window).length;
   }
+}
+
+/** Newest first; of more than there is room for, those that moved the camera least are left out. */
+function mostTelling(events: readonly MapEvent[], most: number): MapEvent[] {
+  const weight = (event: MapEvent) => (event.kind === 'optimisation' ? event.moved : Infinity);
+  const heaviest = [...events].sort((a, b) => (weight(b) > weight(a) ? 1 : weight(b) < weight(a) ? -1 : b.t - a.t)).slice(0, most);
+  return heaviest.sort((a, b) => b.t - a.t);
 }
 
 /** What went wrong in the page itself, once. */

@@ -25,6 +25,10 @@ export class Sight {
     if (!on) this.place.hidden = true;
   }
 
+  toggleSize(): void {
+    this.place.classList.toggle('large');
+  }
+
   take(image: Image): void {
     this.waiting.push(image);
     if (this.waiting.length > KEPT) this.waiting.shift();
@@ -59,12 +63,14 @@ export class Sight {
     const c = this.canvas.getContext('2d', {willReadFrequently: true})!;  // it shall not wait for the big picture
     this.canvas.width = bitmap.width;
     this.canvas.height = bitmap.height;
+    this.place.style.setProperty('--aspect', String(bitmap.width / bitmap.height));
     c.drawImage(bitmap, 0, 0);
     const scale = bitmap.width / image.width;
+    const pixel = Math.max(1, bitmap.width / Math.max(1, this.canvas.clientWidth));  // of the screen
     const isTracked = frame.state === State.tracked;
-    if (isTracked) this.paintMap(c, frame, scale);
+    if (isTracked) this.paintMap(c, frame, scale, pixel);
     const measured = this.measured.find((other) => other.frame === image.frame)?.points ?? [];
-    this.paintMeasured(c, measured, scale);
+    this.paintMeasured(c, measured, scale, pixel);
     const outliers = measured.reduce((sum, point) => sum + (point.inlier ? 0 : 1), 0);
     const found = measured.length === 0 ? `${frame.points} points found`
       : `${measured.length - outliers} points measured, ${outliers} outlier${outliers === 1 ? '' : 's'}; residuals × ${LONGER}; squares: searched`;
@@ -72,7 +78,7 @@ export class Sight {
     this.place.querySelector('figcaption')!.textContent = `frame ${image.frame} · ${state}`;
   }
 
-  private paintMeasured(c: CanvasRenderingContext2D, points: MeasuredPoint[], scale: number): void {
+  private paintMeasured(c: CanvasRenderingContext2D, points: MeasuredPoint[], scale: number, pixel: number): void {
     c.lineWidth = 1;
     c.strokeStyle = '#ffd666';
     for (const point of points) {
@@ -80,6 +86,7 @@ export class Sight {
       const side = 2 * scale * point.radius;
       c.strokeRect((point.predictedU + 0.5) * scale - side / 2, (point.predictedV + 0.5) * scale - side / 2, side, side);
     }
+    c.lineWidth = pixel;
     for (const point of points) {
       c.strokeStyle = c.fillStyle = point.inlier ? '#35f0a8' : '#ff5a5f';
       const [u, v] = [(point.u + 0.5) * scale, (point.v + 0.5) * scale];
@@ -87,11 +94,11 @@ export class Sight {
       c.moveTo(u, v);
       c.lineTo(u + LONGER * scale * (point.expectedU - point.u), v + LONGER * scale * (point.expectedV - point.v));
       c.stroke();
-      c.fillRect(u - 1.5, v - 1.5, 3, 3);
+      c.fillRect(u - 1.5 * pixel, v - 1.5 * pixel, 3 * pixel, 3 * pixel);
     }
   }
 
-  private paintMap(c: CanvasRenderingContext2D, frame: LiveFrame, scale: number): void {
+  private paintMap(c: CanvasRenderingContext2D, frame: LiveFrame, scale: number, pixel: number): void {
     const rig = this.model.hello?.rig;
     if (!rig) return;
     const near = new Set([frame.reference]);
@@ -107,7 +114,7 @@ export class Sight {
       const u = rig.cx + (rig.fx * (R[0] * dx + R[3] * dy + R[6] * dz)) / depth;
       const v = rig.cy + (rig.fy * (R[1] * dx + R[4] * dy + R[7] * dz)) / depth;
       if (u < 0 || v < 0 || u >= rig.width || v >= rig.height) return;
-      c.fillRect(u * scale - 1, v * scale - 1, 2, 2);
+      c.fillRect(u * scale - pixel, v * scale - pixel, 2 * pixel, 2 * pixel);
     }, MOST);
   }
 }

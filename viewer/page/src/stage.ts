@@ -4,8 +4,8 @@ import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {Cloud} from './cloud.ts';
 import {WideLines, type Segments} from './lines.ts';
 import type {CameraPose, Model} from './model.ts';
-import {PALETTES, type Palette, type Theme} from './palette.ts';
-import {State, type Keyframe, type PathFrame} from './wire.ts';
+import {PALETTES, eventColour, type Palette, type Theme} from './palette.ts';
+import {State, type Keyframe, type MapEvent, type PathFrame} from './wire.ts';
 
 export type View = 'follow' | 'top' | 'free';
 export type Layer = 'points' | 'keyframes' | 'covisible' | 'marginalised' | 'returns' | 'causal' | 'final' | 'truth' | 'grid';
@@ -31,6 +31,8 @@ export class Stage {
   part: number | null = null;
   selected: number | null = null;
   measured: THREE.Vector3[] = [];
+  /** That is looked at. */
+  event: MapEvent | null = null;
   drawn = 0;
   frameMs = 16;
 
@@ -142,6 +144,7 @@ export class Stage {
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.camera.updateProjectionMatrix();
+    if (this.drawn > 0) this.renderer.render(this.scene, this.camera);  // a canvas of another size is empty until then
     this.dirty = true;
   }
 
@@ -317,16 +320,23 @@ export class Stage {
     this.truth.end();
   }
 
+  /** Crosses, and what joins the first two. */
+  private addWay(to: Segments, points: readonly (readonly number[])[], cross: number, colour: THREE.Color): void {
+    for (const p of points) {
+      for (const axis of [[cross, 0, 0], [0, cross, 0], [0, 0, cross]])
+        to.add(p.map((x, k) => x - axis[k]), p.map((x, k) => x + axis[k]), colour);
+    }
+    if (points.length > 1) to.add([...points[0]], [...points[1]], colour);
+  }
+
+  /** What is measured, and where the event that is looked at took the camera. */
   private makeTape(): void {
     const segments = this.tape.begin();
-    const cross = 0.25 * this.frustum;
-    for (const point of this.measured) {
-      for (const axis of [[cross, 0, 0], [0, cross, 0], [0, 0, cross]]) {
-        const p = point.toArray();
-        segments.add(p.map((x, k) => x - axis[k]), p.map((x, k) => x + axis[k]), this.palette.measure);
-      }
+    this.addWay(segments, this.measured.map((point) => point.toArray()), 0.25 * this.frustum, this.palette.measure);
+    if (this.event && this.isShown(this.event.part)) {
+      const {before, after, partBefore, part, kind} = this.event;
+      this.addWay(segments, partBefore === part ? [before, after] : [after], this.frustum, new THREE.Color(eventColour(kind)));
     }
-    if (this.measured.length === 2) segments.add(this.measured[0].toArray(), this.measured[1].toArray(), this.palette.measure);
     this.tape.end();
   }
 

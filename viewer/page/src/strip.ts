@@ -32,7 +32,10 @@ export class Strip {
       this.made = made;
     }
     const budget = this.model.periodMs();
-    this.top = Math.max(1, 1.3 * budget, 1.15 * usual(frames.map((frame) => frame.latencyMs)));
+    const work = usual(frames.map((frame) => frame.stageMs.reduce((sum, ms) => sum + ms, 0)));
+    const latency = usual(frames.map((frame) => frame.latencyMs));
+    const most = budget > 0 ? Math.max(4 * budget, work) : latency;  // frames that queued for seconds shall not flatten all else
+    this.top = Math.max(1, 1.3 * budget, 1.15 * Math.min(latency, most));
     this.plot!.setData([
       frames.map((frame) => frame.frame),
       ...this.stacked(frames, stages.length),
@@ -66,7 +69,7 @@ export class Strip {
       scales: {x: {time: false}, y: {range: () => [0, this.top]}},
       axes: [
         {stroke: text, grid, ticks: {show: false}, size: 22, font: '10px system-ui', gap: 2},
-        {stroke: text, grid, ticks: {show: false}, size: 34, font: '10px system-ui', gap: 2, values: (_, ms) => ms.map((x) => `${x}`)},
+        {stroke: text, grid, ticks: {show: false}, size: 44, font: '10px system-ui', gap: 2, values: (_, ms) => ms.map((x) => `${x} ms`)},
       ],
       series: [
         {}, ...areas,
