@@ -71,6 +71,17 @@ function(twofold_program name)
   twofold_use_headers(${name} core)
 endfunction()
 
+# twofold_check_cpu(target shown): the program or shared library looks at the processor before all else, and says what it
+# lacks instead of dying of an instruction. The check itself is for every x86-64 processor.
+function(twofold_check_cpu target shown)
+  if(TWOFOLD_ARCH MATCHES "^x86-64-v[234]$" AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    add_library(${target}_cpu_level OBJECT ${PROJECT_SOURCE_DIR}/cmake/cpu_level.cpp)
+    target_compile_options(${target}_cpu_level PRIVATE -march=x86-64 -fPIC)
+    target_compile_definitions(${target}_cpu_level PRIVATE TWOFOLD_ARCH="${TWOFOLD_ARCH}" TWOFOLD_BINARY="${shown}")
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:${target}_cpu_level>)
+  endif()
+endfunction()
+
 # What a registered test needs around it under a sanitizer; nothing without one.
 function(twofold_sanitizer_environment name)
   if(TWOFOLD_SANITIZE)

@@ -23,6 +23,8 @@ class LockstepRun {
   const FrameRecord& step(const Frame& frame);
   void replay(const FrameFeed& feed, const Schedule& schedule, const std::atomic<bool>& interrupted,
               const ProgressSink& progress);
+  /// What the logs have lost so far: a sentence a file.
+  [[nodiscard]] std::vector<std::string> log_errors() const { return logs_.errors(); }
   /// Final pose graph optimisation; moves the result out.
   [[nodiscard]] RunResult finish();
 

@@ -56,6 +56,8 @@ class ThreadedRun {
   void wait(std::chrono::steady_clock::time_point deadline);
   /// A thread has ended early: time to stop; RunResult::error says why.
   [[nodiscard]] bool failed() const;
+  /// What the logs have lost so far: a sentence a file.
+  [[nodiscard]] std::vector<std::string> log_errors() const { return logs_.errors(); }
   /// Counts of what was collected.
   [[nodiscard]] const Progress& progress() const { return progress_; }
   /// What waits for tracker, mapper and loop closer. Any thread, wait-free: no more than a look at the rings.

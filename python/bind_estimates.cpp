@@ -159,8 +159,13 @@ void bind_estimate(py::module_& module) {
           [](const py::object& self) {
             return view_of(self.cast<const PoseEstimate&>().covariance.data(), {6, 6}, self);
           },
-          "(6, 6), read-only: of (translation [m], rotation [rad]) in the camera's axes, with the map taken "
-          "as true.")
+          "(6, 6), read-only: of (translation [m], rotation [rad]) in the camera's axes, relative to the "
+          "reference\n"
+          "keyframe. All zero for the frame that starts a map part, and defines its world; all NaN when "
+          "it is not known.")
+      .def_readonly(
+          "covariance_known", &PoseEstimate::covariance_known,
+          "False when the measurements leave a direction open, and for frames that are not tracked.")
       .def_property_readonly(
           "velocity",
           [](const py::object& self) {
@@ -169,8 +174,9 @@ void bind_estimate(py::module_& module) {
           "(6,), read-only: linear [m/s] and angular [rad/s], in the camera's axes.")
       .def_readonly("map_version", &PoseEstimate::map_version,
                     "Version of the map that it was tracked against.")
-      .def_readonly("exposed_ns", &PoseEstimate::exposed_ns,
-                    "When the frame was due, on CLOCK_MONOTONIC [ns].")
+      .def_readonly(
+          "exposed_ns", &PoseEstimate::exposed_ns,
+          "When the frame was exposed, on CLOCK_MONOTONIC [ns]; without `live`, when the tracker took it.")
       .def_readonly("latency_ns", &PoseEstimate::latency_ns,
                     "From then to the moment the pose was known [ns].")
       .def("__repr__", [](const PoseEstimate& pose) {
@@ -178,6 +184,10 @@ void bind_estimate(py::module_& module) {
           return fmt::format("<PoseEstimate {}: {}>", pose.frame, text_of(pose.T_world_camera));
         return fmt::format("<PoseEstimate {}: {}: {}>", pose.frame, to_string(pose.state), pose.reason);
       });
+}
+
+std::optional<std::uint32_t> known_id(std::uint32_t id) {
+  return id == kNoId ? std::nullopt : std::optional(id);
 }
 
 void bind_event(py::module_& module) {
@@ -201,6 +211,16 @@ void bind_event(py::module_& module) {
       .def_readonly("moved", &MapEvent::moved,
                     "Distance between the two [m]; of no meaning across map parts.")
       .def_readonly("turned", &MapEvent::turned, "Angle between the two [rad]; likewise.")
+      .def_property_readonly(
+          "loop_from", [](const MapEvent& event) { return known_id(event.loop_from); },
+          "Of a loop that was closed: the older keyframe. None: no loop, or not known.")
+      .def_property_readonly(
+          "loop_to", [](const MapEvent& event) { return known_id(event.loop_to); },
+          "The keyframe that came back; likewise.")
+      .def_readonly("keyframes_moved", &MapEvent::keyframes_moved,
+                    "How many moved by a centimetre or 0.2 degrees, or joined another part.")
+      .def_readonly("farthest_moved", &MapEvent::farthest_moved, "By a keyframe that kept its part [m].")
+      .def_readonly("most_turned", &MapEvent::most_turned, "Likewise [rad].")
       .def("__repr__", [](const MapEvent& event) {
         return fmt::format("<MapEvent {} at frame {}: moved {:.3f} m>", to_string(event.kind), event.frame,
                            event.moved);

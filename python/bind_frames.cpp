@@ -71,8 +71,9 @@ void bind_source(py::module_& module) {
       module, "Source",
       "Frames of a recording, a video, a rendered scene or a camera, rectified.\n\n"
       "Named as on the command line: a path, or euroc:DIR, kitti:DIR, tum:DIR, images:DIR, video:FILE, "
-      "v4l2:DEVICE,\n"
-      "synthetic:SCENE, with ?key=value&key=value. Iterating gives Frames; the interpreter runs on "
+      "mcap:FILE,\n"
+      "bag:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. Iterating gives Frames; the "
+      "interpreter runs on "
       "meanwhile.")
       .def(py::init([](const std::string& name, const std::optional<std::filesystem::path>& calibration,
                        bool preload, bool left_only) {
@@ -113,6 +114,10 @@ void bind_rectifier(py::module_& module) {
            "RuntimeError.")
       .def_property_readonly("rig", &FrameRectifier::rig, py::return_value_policy::copy,
                              "What the rectified frames are of.")
+      .def_property_readonly(
+          "T_rectified_raw", &FrameRectifier::T_rectified_raw,
+          "Pose, a rotation alone, of the calibrated left camera in the one that poses are of:\n"
+          "T_world_raw = pose.T_world_camera @ rectifier.T_rectified_raw.")
       .def(
           "rectify",
           [](const FrameRectifier& self, const PythonFrame& raw) {

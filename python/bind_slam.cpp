@@ -2,9 +2,11 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <map>
 #include <mutex>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
@@ -84,6 +86,7 @@ class SlamWithUpdates {
   }
 
   SlamSummary finish() {
+    finishing.store(true, std::memory_order_relaxed);  // it carries nothing else
     SlamSummary summary = slam.finish();
     updates->queue.close();
     return summary;
@@ -92,6 +95,7 @@ class SlamWithUpdates {
   const CameraRig rig;
   const std::size_t items_in_flight;
   const std::shared_ptr<Updates> updates;
+  std::atomic<bool> finishing{false};  // a push that is refused from now on is none of the frame's fault
   BrowserView view;
   Slam slam;
 };
@@ -107,7 +111,7 @@ struct DeleteUnlocked {
 };
 
 /// Pushes a source's frames until it ends or the reader of the updates closes them. A recording waits for
-/// the map, and for whoever reads; a camera for nobody.
+/// the map, and for whoever reads; a camera for nobody. Throws std::runtime_error when a frame is refused.
 void feed(Source& source, SlamWithUpdates& to) {
   PoseQueue& queue = to.updates->queue;
   FrameView frame;
@@ -118,7 +122,10 @@ void feed(Source& source, SlamWithUpdates& to) {
         if (queue.closed() || !to.slam.errors().empty()) return;
       }
     }
-    (void)to.push(frame);
+    const PushResult pushed = to.push(frame);
+    if (pushed.status != PushStatus::kRefused) continue;
+    if (to.finishing.load(std::memory_order_relaxed) || !to.slam.errors().empty()) return;
+    throw std::runtime_error(fmt::format("a frame at {} ns was refused: {}", frame.t_ns, pushed.reason));
   }
 }
 

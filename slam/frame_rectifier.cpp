@@ -42,6 +42,10 @@ const CameraRig& FrameRectifier::rig() const {
   return impl_->rig;
 }
 
+Pose FrameRectifier::T_rectified_raw() const {
+  return to_pose(SE3(impl_->rectifier.R_rectified_left(), Vector3::Zero()));
+}
+
 FrameView FrameRectifier::rectify(const FrameView& view) const {
   const Sensor sensor = impl_->rig.sensor;
   Frame raw;

@@ -43,6 +43,22 @@ void find_covariance(const Rig& rig, const GraphSnapshot& graph, PointId id, Map
   Eigen::Map<Matrix3>(point.covariance.data()) = factor.solve(Matrix3::Identity());
 }
 
+// What the heap and a count of uses take of a block beside its values, and the tree of a PersistentVector of
+// an entry.
+constexpr std::size_t kBlock = 48;
+constexpr std::size_t kEntry = 40;
+
+/// Of `count` values in one block of the heap.
+template <class T>
+std::size_t block_bytes(std::size_t count) {
+  return count == 0 ? 0 : kBlock + count * sizeof(T);
+}
+
+template <class List>
+std::size_t shared_list_bytes(const List& list) {
+  return block_bytes<List>(1) + block_bytes<typename List::value_type>(list.capacity());
+}
+
 }  // namespace
 
 MapSnapshot::MapSnapshot() : impl_(empty_map()) {}
@@ -154,19 +170,24 @@ std::vector<MapSnapshot::Part> MapSnapshot::parts() const {
 
 std::size_t MapSnapshot::memory_bytes() const {
   const MapVersion& map = *impl_->map;
-  std::size_t bytes = 0;
-  for_each_keyframe(map.graph, [&](const twofold::Keyframe& keyframe) {
-    bytes += sizeof keyframe + keyframe.observations->size() * sizeof(Observation) +
-             keyframe.edges->size() * sizeof(twofold::Edge);
+  const GraphSnapshot& graph = map.graph;
+  std::size_t bytes = sizeof map + block_bytes<ClosedLoop>(map.loops.loops->capacity()) +
+                      block_bytes<KeyframeId>(map.inner_window.capacity()) +
+                      block_bytes<KeyframeId>(map.outer_window.capacity());
+  // Culled ones stand in their chunks beside others, and have a replacement for a while.
+  bytes += graph.keyframe_count() * (kEntry + sizeof(twofold::Keyframe) + sizeof(Replacement)) +
+           graph.point_count() * (kEntry + sizeof(MapPoint)) +
+           map.places.size() * (kEntry + sizeof(std::shared_ptr<const PlaceAppearance>));
+  for_each_keyframe(graph, [&](const twofold::Keyframe& keyframe) {
+    bytes += shared_list_bytes(*keyframe.observations) + shared_list_bytes(*keyframe.edges);
     if (const PlaceAppearance* place = map.places.find(keyframe.id)) {
-      bytes += sizeof *place + place->corners.size() * sizeof(DescribedCorner) +
-               place->z.size() * sizeof(Eigen::Vector3f);
+      bytes += block_bytes<PlaceAppearance>(1) + block_bytes<DescribedCorner>(place->corners.capacity()) +
+               block_bytes<Eigen::Vector3f>(place->z.capacity());
     }
   });
-  for (std::uint32_t p = 0; p < map.graph.point_count(); ++p) {
-    const MapPoint& point = map.graph.point(PointId{p});
-    if (!point.alive()) continue;
-    bytes += sizeof point + sizeof(PointAppearance) + point.observers->size() * sizeof(KeyframeId);
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
+    const MapPoint& point = graph.point(PointId{p});
+    if (point.alive()) bytes += block_bytes<PointAppearance>(1) + shared_list_bytes(*point.observers);
   }
   return bytes;
 }

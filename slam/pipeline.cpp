@@ -21,6 +21,7 @@ class ThreadedPipeline final : public Pipeline {
   void push(Frame frame) override { run_.push(std::move(frame)); }
   void wait(std::chrono::steady_clock::time_point deadline) override { run_.wait(deadline); }
   [[nodiscard]] bool failed() override { return run_.failed(); }
+  [[nodiscard]] std::vector<std::string> log_errors() const override { return run_.log_errors(); }
   [[nodiscard]] QueueLengths waiting() const override {
     return {static_cast<std::int64_t>(run_.frames_waiting()),
             static_cast<std::int64_t>(run_.keyframes_waiting()),
@@ -46,6 +47,7 @@ class DeterministicPipeline final : public Pipeline {
   void push(Frame frame) override { (void)run_.step(frame); }
   void wait(std::chrono::steady_clock::time_point) override {}
   [[nodiscard]] bool failed() override { return false; }
+  [[nodiscard]] std::vector<std::string> log_errors() const override { return run_.log_errors(); }
   [[nodiscard]] QueueLengths waiting() const override { return {0, 0, 0}; }
   [[nodiscard]] RunResult finish() override { return run_.finish(); }
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "engine/lockstep_run.hpp"
 #include "engine/threaded_run.hpp"
@@ -27,6 +28,8 @@ class Pipeline {
   virtual void wait(std::chrono::steady_clock::time_point deadline) = 0;
   /// A thread has ended early: what is pushed now is not tracked, and the result says why.
   [[nodiscard]] virtual bool failed() = 0;
+  /// What the run's logs have lost so far, as on a disk that is full: a sentence a file.
+  [[nodiscard]] virtual std::vector<std::string> log_errors() const = 0;
   /// Any thread, wait-free, until finish has returned.
   [[nodiscard]] virtual QueueLengths waiting() const = 0;
   /// The last call.

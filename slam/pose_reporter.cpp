@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "engine/listeners.hpp"
 #include "slam/conversions.hpp"
 
 namespace twofold {
@@ -27,12 +28,26 @@ TrackingState state_of(const FrameRecord& record) {
   return record.cause == LostCause::kUnplaced ? TrackingState::kUnplaced : TrackingState::kLost;
 }
 
+/// The first frame of a map part is that part's world: it is its own reference, and nothing was measured.
+bool defines_world(const PoseReport& report) {
+  const FrameRecord& record = report.record;
+  return record.reference == record.part_causal && report.information.isZero(0) &&
+         record.T_c_ref.unpacked().log().isZero(0);
+}
+
 /// J^T W J is of delta in T_c_w <- exp(delta) T_c_w; for T_w_c the same delta stands on the right, negative,
 /// which a covariance does not show.
-void invert_information(const Matrix6& information, std::array<double, 36>& covariance) {
-  const Eigen::LDLT<Matrix6> factor(information);
+void find_covariance(const PoseReport& report, PoseEstimate& now) {
+  Eigen::Map<Matrix6> covariance(now.covariance.data());  // symmetric: either order
+  now.covariance_known = defines_world(report);
+  if (now.covariance_known) {
+    covariance.setZero();
+    return;
+  }
+  const Eigen::LDLT<Matrix6> factor(report.information);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return;
-  Eigen::Map<Matrix6>(covariance.data()) = factor.solve(Matrix6::Identity());  // symmetric: either order
+  covariance = factor.solve(Matrix6::Identity());
+  now.covariance_known = true;
 }
 
 MapEvent event_of(MapEventKind kind, const PoseEstimate& now) {
@@ -53,7 +68,25 @@ void set_poses(const SE3& T_w_before, const SE3& T_w_after, MapEvent& event) {
   event.turned = (T_w_before.so3().inverse() * T_w_after.so3()).log().norm();
 }
 
+void set_movement(const MapMovement& movement, MapEvent& event) {
+  event.keyframes_moved = movement.keyframes;
+  event.farthest_moved = movement.farthest;
+  event.most_turned = movement.most_turned;
+  if (event.kind == MapEventKind::kOptimisation) return;
+  event.loop_from = index(movement.loop_from);
+  event.loop_to = index(movement.loop_to);
+}
+
 }  // namespace
+
+void PoseReporter::listen(EngineOptions& options) {
+  options.on_map =
+      both(options.on_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
+             movements_.published(graph, window);
+           }));
+  options.on_loop =
+      both(options.on_loop, LoopListener([this](const ClosedLoop& loop) { movements_.found(loop); }));
+}
 
 PoseEstimate PoseReporter::next(const PoseReport& report, Events& events) {
   const FrameRecord& record = report.record;
@@ -75,7 +108,7 @@ PoseEstimate PoseReporter::next(const PoseReport& report, Events& events) {
     now.map_part = index(record.part_causal);
     now.reference_keyframe = index(record.reference);
     now.T_reference_camera = to_pose(record.T_c_ref.unpacked().inverse());
-    invert_information(report.information, now.covariance);
+    find_covariance(report, now);
     if (const auto T_last_w = last_T_c_w(report)) {
       const double dt = static_cast<double>(record.t_ns - last_.t_ns) * 1e-9;
       Eigen::Map<Vector6>(now.velocity.data()) = (*T_last_w * T_c_w.inverse()).log() / dt;
@@ -96,13 +129,16 @@ std::optional<SE3> PoseReporter::last_T_c_w(const PoseReport& report) const {
   return known ? final_T_c_w(last_, graph) : last_.T_c_w_causal.unpacked();
 }
 
-void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now, Events& events) const {
+void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now, Events& events) {
   if (report.correction.reason != CorrectionReason::kNone) {
     MapEvent& event = events.correction.emplace(event_of(kind_of(report.correction.reason), now));
     event.map_part_before = index(last_.part_causal);
     if (event.map_part == kNoId) event.map_part = index(report.graph.part(last_.reference));
     set_poses(report.correction.T_c_w_before.unpacked().inverse(),
               report.correction.T_c_w_after.unpacked().inverse(), event);
+    set_movement(movements_.take(report.record.snapshot_version), event);
+  } else if (now.state == TrackingState::kTracked) {
+    (void)movements_.take(report.record.snapshot_version);  // too small to be told of
   }
   if (now.state != TrackingState::kTracked || !was_lost_) return;
   // The tracker has started a part whose first keyframe the mapper has not seen yet.

@@ -2,13 +2,15 @@
 
 #include <optional>
 
+#include "engine/options.hpp"
 #include "engine/result.hpp"
+#include "slam/map_movements.hpp"
 #include "twofold/estimate.hpp"
 
 namespace twofold {
 
-/// Turns what the tracker reports into the public face's estimates and events. On the tracker's thread: no
-/// lock, no allocation.
+/// Turns what the tracker reports into the public face's estimates and events: for class Slam, and for all
+/// that the program shows and writes of a run. On the tracker's thread: no lock, no allocation.
 class PoseReporter {
  public:
   /// What a frame changed beside the camera's pose; at most a correction and then a new place.
@@ -17,14 +19,28 @@ class PoseReporter {
     std::optional<MapEvent> placing;  ///< relocalisation or new part
   };
 
-  /// To be called for every report, in their order.
+  /// Adds listeners to those of `options`, by which events know what moved in the map; this object must
+  /// outlive the run. Without it they know of the camera alone.
+  void listen(EngineOptions& options);
+
+  /// To be called for every report, in their order: hands over the events, and then the estimate.
+  template <class EventSink, class PoseSink>
+  void tell(const PoseReport& report, EventSink&& event, PoseSink&& pose) {
+    Events events;
+    const PoseEstimate estimate = next(report, events);
+    if (events.correction) event(*events.correction);
+    if (events.placing) event(*events.placing);
+    pose(estimate);
+  }
+  /// Likewise.
   [[nodiscard]] PoseEstimate next(const PoseReport& report, Events& events);
 
  private:
-  void find_events(const PoseReport& report, const PoseEstimate& now, Events& events) const;
+  void find_events(const PoseReport& report, const PoseEstimate& now, Events& events);
   /// Where the last tracked frame is in the map of this one; none if that is unknown, or in another part.
   [[nodiscard]] std::optional<SE3> last_T_c_w(const PoseReport& report) const;
 
+  MapMovements movements_;
   FrameRecord last_;  // the last frame that was tracked; of state kLost before the first
   bool was_lost_ = false;
 };

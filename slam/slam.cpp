@@ -13,6 +13,7 @@
 #include "engine/clock.hpp"
 #include "graph/map_file.hpp"
 #include "slam/conversions.hpp"
+#include "slam/fair_mutex.hpp"
 #include "slam/frame_details.hpp"
 #include "slam/frame_intake.hpp"
 #include "slam/guarded_callback.hpp"
@@ -28,10 +29,6 @@ namespace twofold {
 namespace {
 
 constexpr const char* kEndedEarly = "a thread of the engine has ended early: finish() says why";
-
-}  // namespace
-
-namespace {
 
 /// Says which thread is in a callback, while it is.
 class Telling {
@@ -69,9 +66,10 @@ class TWOFOLD_HIDDEN Slam::Impl {
     };
     engine.on_places = [this](const KeyframeDatabase& places) { maps.publish(places); };
     engine.on_loop = [this](const ClosedLoop& loop) { maps.publish(loop); };
+    reporter_.listen(engine);
     pipeline_ = make_pipeline(rig_, engine);
-    if (!options.run_folder.empty())
-      collector_ = std::jthread([this](const std::stop_token& stop) { collect_now_and_then(stop); });
+    if (options.mode == RunMode::kThreaded || !options.run_folder.empty())
+      caretaker_ = std::jthread([this](const std::stop_token& stop) { look_now_and_then(stop); });
   }
 
   template <class Callback, class Function>
@@ -104,8 +102,8 @@ class TWOFOLD_HIDDEN Slam::Impl {
   void tell(const PoseReport& report);
   void tell_details(const PoseReport& report);
   void expect_no_callback(const char* function) const;
-  void collect_now_and_then(const std::stop_token& stop);
-  /// A thread of the engine has ended early; errors() says so from now on.
+  void look_now_and_then(const std::stop_token& stop);
+  /// A thread of the engine has ended early. errors() says so from now on, and what the logs lost.
   [[nodiscard]] bool failed();
 
   const Rig rig_;
@@ -116,28 +114,28 @@ class TWOFOLD_HIDDEN Slam::Impl {
   std::atomic<std::thread::id>
       told_by_{};  // the thread that is in a callback. Relaxed: read by itself, or unequal
 
-  std::mutex pushing_;  // guards what follows: whoever pushes or finishes has his turn
+  FairMutex pushing_;  // guards what follows: whoever pushes or finishes has his turn
   FrameIntake intake_;
   bool pushed_ = false;
   std::int64_t frames_ = 0;   // that have a number, dropped ones included
   std::int64_t no_room_ = 0;  // frames dropped on the way in
   std::optional<SlamSummary> summary_;
 
-  mutable std::mutex errors_;  // guards engine_error_
+  mutable std::mutex errors_;  // guards what follows
   std::string engine_error_;
+  std::vector<std::string> log_errors_;
   std::unique_ptr<Pipeline> pipeline_;  // late: its threads end before what they use is destroyed
-  std::jthread collector_;              // of runs with a folder
+  std::jthread caretaker_;
 };
 
 /// On the tracker's thread.
 void Slam::Impl::tell(const PoseReport& report) {
   const Telling telling(told_by_);
-  PoseReporter::Events events;
-  estimate_ = reporter_.next(report, events);
-  if (events.correction) on_event(*events.correction);
-  if (events.placing) on_event(*events.placing);
-  latest.put(estimate_);
-  on_pose(estimate_);
+  reporter_.tell(report, on_event, [this](const PoseEstimate& pose) {
+    estimate_ = pose;
+    latest.put(estimate_);
+    on_pose(estimate_);
+  });
 }
 
 /// Likewise, once the tracker is done with the frame.
@@ -153,23 +151,29 @@ void Slam::Impl::expect_no_callback(const char* function) const {
     throw std::logic_error(fmt::format("{} was called from a callback", function));
 }
 
-/// A run folder is whole however the process ends, also when no frame comes for a while.
-void Slam::Impl::collect_now_and_then(const std::stop_token& stop) {
+/// A run folder is whole however the process ends, and errors() knows of them, also when no frame comes for a
+/// while.
+void Slam::Impl::look_now_and_then(const std::stop_token& stop) {
   constexpr auto kPause = std::chrono::milliseconds(50);
   std::mutex sleeping;
   std::condition_variable_any woken;
   for (std::unique_lock lock(sleeping);
        !woken.wait_for(lock, stop, kPause, [&] { return stop.stop_requested(); });) {
-    const std::unique_lock turn(pushing_, std::try_to_lock);  // who has it, collects
-    if (turn && pipeline_) pipeline_->collect();
+    const std::unique_lock turn(pushing_, std::try_to_lock);  // who has it, looks
+    if (!turn || !pipeline_) continue;
+    pipeline_->collect();
+    (void)failed();
   }
 }
 
 bool Slam::Impl::failed() {
-  if (!pipeline_->failed()) return false;
+  const bool ended = pipeline_->failed();
+  std::vector<std::string> lost = pipeline_->log_errors();
+  if (!ended && lost.empty()) return false;
   const std::scoped_lock lock(errors_);
-  engine_error_ = kEndedEarly;
-  return true;
+  if (ended) engine_error_ = kEndedEarly;
+  log_errors_ = std::move(lost);
+  return ended;
 }
 
 std::string Slam::Impl::refusal(const FrameView& frame) {
@@ -202,14 +206,14 @@ PushResult Slam::Impl::push(const FrameView& frame) {
 bool Slam::Impl::wait_for_room(std::int64_t timeout_ns) {
   expect_no_callback("wait_for_room");
   const auto deadline = deadline_of(timeout_ns);
-  constexpr auto kFailureCheck = std::chrono::milliseconds(50);
+  constexpr auto kTurn = std::chrono::milliseconds(10);  // then others have theirs; failures are looked for
   for (;;) {
     const std::scoped_lock turn(pushing_);
     if (summary_ || failed()) return false;
     if (pipeline_->has_room()) return true;
     const auto now = std::chrono::steady_clock::now();
     if (now >= deadline) return false;
-    pipeline_->wait(std::min(deadline, now + kFailureCheck));
+    pipeline_->wait(std::min(deadline, now + kTurn));
   }
 }
 
@@ -220,6 +224,7 @@ std::vector<std::string> Slam::Impl::errors() const {
   if (const auto error = on_frame.error()) errors.push_back(*error);
   const std::scoped_lock lock(errors_);
   if (!engine_error_.empty()) errors.push_back(engine_error_);
+  errors.insert(errors.end(), log_errors_.begin(), log_errors_.end());
   return errors;
 }
 
@@ -234,7 +239,8 @@ const SlamSummary& Slam::Impl::finish() {
   pipeline_.reset();
   {
     const std::scoped_lock lock(errors_);
-    engine_error_ = result.error;
+    engine_error_ = result.error;  // and what the logs lost
+    log_errors_.clear();
   }
   summary_->errors = errors();
   return *summary_;

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "streams/line_reader.hpp"
 
 namespace twofold {
@@ -25,9 +27,11 @@ class UdpOutput final : public PoseOutput {
  public:
   UdpOutput(FileDescriptor socket, PoseForm form) : socket_(std::move(socket)), form_(form) {}
 
+  /// A line that cannot be sent is gone, as those are that are lost on the way: an error says as often as not
+  /// that nobody listened to the line before.
   void offer(const std::string& lines) override {
     if (missed_ > 0 && send(missed_line(missed_, form_))) missed_ = 0;
-    if (!send(lines)) ++missed_;
+    (void)send(lines);
   }
   void miss(std::uint64_t lines) override { missed_ += lines; }
 
@@ -63,10 +67,13 @@ class UnixOutput final : public PoseOutput {
 
  private:
   void welcome() {
-    while (readers_.size() < kMaxReaders) {
+    for (;;) {
       FileDescriptor connection(::accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC));
       if (!connection) return;
-      readers_.emplace_back(std::move(connection), form_);
+      LineReader& reader = readers_.emplace_back(std::move(connection), form_);
+      if (readers_.size() <= kMaxReaders) continue;
+      reader.offer(error_line(fmt::format("{} readers are served already", kMaxReaders), form_));
+      readers_.pop_back();  // which closes it
     }
   }
 

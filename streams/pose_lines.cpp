@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "evaluation/tum_line.hpp"
+
 namespace twofold {
 namespace {
 
@@ -21,8 +23,11 @@ void append_pose(std::string& line, const PoseEstimate& pose) {
                  list(T.t), list(T.q), pose.map_part, pose.reference_keyframe);
   fmt::format_to(out, R"(,"position_in_reference":[{}],"orientation_in_reference":[{}])", list(T_ref.t),
                  list(T_ref.q));
-  fmt::format_to(out, R"(,"velocity":[{:.6g}],"covariance":[{:.6g}])", list(pose.velocity),
-                 list(pose.covariance));
+  fmt::format_to(out, R"(,"velocity":[{:.6g}])", list(pose.velocity));
+  if (pose.covariance_known)
+    fmt::format_to(out, R"(,"covariance":[{:.6g}])", list(pose.covariance));
+  else
+    line += R"(,"covariance":null)";
 }
 
 std::string json_pose(const PoseEstimate& pose) {
@@ -38,17 +43,23 @@ std::string json_pose(const PoseEstimate& pose) {
   return line;
 }
 
+std::string id_or_null(std::uint32_t id) {
+  return id == kNoId ? "null" : std::to_string(id);
+}
+
 std::string json_event(const MapEvent& event) {
   const Pose& before = event.T_world_camera_before;
   const Pose& after = event.T_world_camera_after;
   return fmt::format(
       R"({{"event":"{}","frame":{},"t_ns":{},"map_version":{},"keyframe":{},"map_part_before":{},)"
       R"("map_part":{},"moved":{:.6g},"turned":{:.6g},"position_before":[{}],"orientation_before":[{}],)"
-      R"("position":[{}],"orientation":[{}]}})"
+      R"("position":[{}],"orientation":[{}],"loop_from":{},"loop_to":{},"keyframes_moved":{},)"
+      R"("farthest_moved":{:.6g},"most_turned":{:.6g}}})"
       "\n",
       to_string(event.kind), event.frame, event.t_ns, event.map_version, event.keyframe,
       event.map_part_before, event.map_part, event.moved, event.turned, list(before.t), list(before.q),
-      list(after.t), list(after.q));
+      list(after.t), list(after.q), id_or_null(event.loop_from), id_or_null(event.loop_to),
+      event.keyframes_moved, event.farthest_moved, event.most_turned);
 }
 
 }  // namespace
@@ -57,8 +68,7 @@ std::string pose_line(const PoseEstimate& pose, PoseForm form) {
   if (form == PoseForm::kJson) return json_pose(pose);
   if (pose.state != TrackingState::kTracked) return "";
   const Pose& T = pose.T_world_camera;
-  return fmt::format("{}.{:09} {} {}\n", pose.t_ns / 1'000'000'000, pose.t_ns % 1'000'000'000,
-                     fmt::join(T.t, " "), fmt::join(T.q, " "));
+  return fmt::format("{} {} {}\n", seconds_text(pose.t_ns), fmt::join(T.t, " "), fmt::join(T.q, " "));
 }
 
 std::string event_line(const MapEvent& event, PoseForm form) {
@@ -70,6 +80,10 @@ std::string event_line(const MapEvent& event, PoseForm form) {
 std::string missed_line(std::uint64_t lines, PoseForm form) {
   return fmt::format(fmt::runtime(form == PoseForm::kJson ? "{{\"missed\":{}}}\n" : "# missed {} lines\n"),
                      lines);
+}
+
+std::string error_line(const std::string& why, PoseForm form) {
+  return fmt::format(fmt::runtime(form == PoseForm::kJson ? "{{\"error\":\"{}\"}}\n" : "# error: {}\n"), why);
 }
 
 }  // namespace twofold

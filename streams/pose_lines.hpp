@@ -18,4 +18,7 @@ enum class PoseForm : std::uint8_t {
 /// What a reader is told who could not keep up.
 [[nodiscard]] std::string missed_line(std::uint64_t lines, PoseForm form);
 
+/// What a reader is told who is not served.
+[[nodiscard]] std::string error_line(const std::string& why, PoseForm form);
+
 }  // namespace twofold

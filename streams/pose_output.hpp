@@ -8,7 +8,9 @@
 
 namespace twofold {
 
-/// Where lines go. One thread; no call waits for whoever reads.
+/// Where lines go. One thread; no call waits for whoever reads. A regular file is written at the speed of its
+/// disk: one that hangs, as of a network that is gone, holds up the other outputs and the end of the run, but
+/// never the tracker.
 class PoseOutput {
  public:
   virtual ~PoseOutput() = default;
@@ -22,9 +24,9 @@ class PoseOutput {
   [[nodiscard]] virtual std::string problem() const { return ""; }
 };
 
-/// @param target  "-": standard output; udp:HOST:PORT; unix:PATH, a socket that any number of readers may
-///                connect to and leave; zmq:ENDPOINT, which publishes there; else a file, or a pipe with a
-///                name, that somebody reads
+/// @param target  "-": standard output; udp:HOST:PORT; unix:PATH, a socket that 16 readers at a time may
+///                connect to and leave, others are told that they are too many; zmq:ENDPOINT, which publishes
+///                there; else a file, or a pipe with a name, that somebody reads
 ///
 /// Throws std::runtime_error naming the target and what is wrong with it.
 [[nodiscard]] std::unique_ptr<PoseOutput> open_pose_output(const std::string& target, PoseForm form);

@@ -47,6 +47,9 @@ void PoseStreams::write(const PoseOrEvent& item) {
 }
 
 void PoseStreams::hand_over_rest() {
+  if (const std::uint64_t missed = queue_.take_missed(); missed > 0) {
+    for (const auto& output : outputs_) output->miss(missed);
+  }
   const auto deadline = std::chrono::steady_clock::now() + kLastCall;
   for (;;) {
     bool done = true;

@@ -28,7 +28,7 @@ class PoseStreams {
   void tell(const PoseOrEvent& item) { queue_.put(item); }
 
   /// The last call of the telling thread, or any after its end: what was told goes out, as far as readers
-  /// take it within half a second.
+  /// take it within half a second. A disk that hangs is waited for.
   void finish();
   /// After that: of each output, what its reader cannot know.
   [[nodiscard]] std::vector<std::string> problems() const;

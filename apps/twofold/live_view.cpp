@@ -7,6 +7,7 @@
 
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/run_output.hpp"
+#include "engine/listeners.hpp"
 #include "graph/map_file.hpp"
 #include "io/files/io_error.hpp"
 #include "slam/conversions.hpp"
@@ -29,17 +30,6 @@ ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& 
     options.truth_t_ns.push_back(pose.t_ns);
   }
   return options;
-}
-
-/// Calls both, of which the first may be empty.
-template <class... Arguments>
-std::function<void(Arguments...)> both(std::function<void(Arguments...)> first,
-                                       std::function<void(Arguments...)> second) {
-  if (!first) return second;
-  return [first = std::move(first), second = std::move(second)](Arguments... arguments) {
-    first(arguments...);
-    second(arguments...);
-  };
 }
 
 }  // namespace
@@ -110,6 +100,7 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
 }
 
 void LiveView::listen(EngineOptions& options) {
+  reporter_.listen(options);
   options.on_frame = both(options.on_frame, PoseListener([this](const PoseReport& report) { tell(report); }));
   options.on_map =
       both(options.on_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
@@ -124,12 +115,10 @@ void LiveView::listen(EngineOptions& options) {
 
 /// The tracker's thread: no lock, no allocation.
 void LiveView::tell(const PoseReport& report) {
-  PoseReporter::Events events;
-  const PoseEstimate pose = reporter_.next(report, events);
-  if (events.correction) viewer_->tell(*events.correction);
-  if (events.placing) viewer_->tell(*events.placing);
   const FrameDetails::Impl details{rig_, report, waiting()};
-  viewer_->tell(pose, FrameDetails(details));
+  reporter_.tell(
+      report, [this](const MapEvent& event) { viewer_->tell(event); },
+      [&](const PoseEstimate& pose) { viewer_->tell(pose, FrameDetails(details)); });
 }
 
 std::string LiveView::obey(ViewCommand command) {

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/listeners.hpp"
 #include "io/files/io_error.hpp"
 
 namespace twofold {
@@ -24,15 +25,13 @@ PoseStreaming::PoseStreaming(const std::vector<std::string>& targets, const std:
   streams_.emplace(std::move(outputs), form);
 }
 
-PoseListener PoseStreaming::listener() {
-  if (!streams_) return {};
-  return [this](const PoseReport& report) {
-    PoseReporter::Events events;
-    const PoseEstimate pose = reporter_.next(report, events);
-    if (events.correction) streams_->tell(*events.correction);
-    if (events.placing) streams_->tell(*events.placing);
-    streams_->tell(pose);
-  };
+void PoseStreaming::listen(EngineOptions& options) {
+  if (!streams_) return;
+  reporter_.listen(options);
+  const auto put = [this](const PoseOrEvent& item) { streams_->tell(item); };
+  options.on_pose =
+      both(options.on_pose,
+           PoseListener([this, put](const PoseReport& report) { reporter_.tell(report, put, put); }));
 }
 
 void PoseStreaming::finish() {

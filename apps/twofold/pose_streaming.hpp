@@ -16,8 +16,8 @@ class PoseStreaming {
   /// to standard error from here on.
   PoseStreaming(const std::vector<std::string>& targets, const std::string& form);
 
-  /// For EngineOptions::on_pose; empty when nobody asked. Not valid beyond this object.
-  [[nodiscard]] PoseListener listener();
+  /// Adds its listeners to those of `options`, if anybody asked; this object must outlive the run.
+  void listen(EngineOptions& options);
   /// After the run.
   void finish();
   /// After that. Throws IoError when lines could not be written, as to a disk that is full.

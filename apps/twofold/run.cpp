@@ -173,7 +173,7 @@ int run(const RunArguments& arguments) {
   }
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
-  options.on_pose = poses.listener();
+  poses.listen(options);
   LiveView view(arguments.view, arguments.source, arguments.out, *source, images_to_look_at(arguments),
                 options);
   LiveSurface surface(arguments.surface, *source, options, options.deterministic || schedule.has_value());

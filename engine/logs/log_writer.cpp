@@ -29,13 +29,23 @@ void LogWriter::wait_for_room() const {
   while (behind()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
 
+std::vector<std::string> LogWriter::errors() const {
+  std::vector<std::string> errors;
+  for (const auto& file : files_) {
+    if (std::string lost = file->error();
+        !lost.empty() && std::count(errors.begin(), errors.end(), lost) == 0)
+      errors.push_back(std::move(lost));
+  }
+  return errors;
+}
+
 std::string LogWriter::finish() {
   thread_->request_stop();
   const auto outcome = thread_->join();
   for (const auto& file : files_) file->write_waiting();
-  for (const auto& file : files_) {
-    if (std::string lost = file->error(); !lost.empty()) return lost;
-  }
+  std::string lost;
+  for (const std::string& error : errors()) lost += (lost.empty() ? "" : "; ") + error;
+  if (!lost.empty()) return lost;
   return outcome ? "" : outcome.error();
 }
 

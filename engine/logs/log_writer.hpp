@@ -22,8 +22,9 @@ class LogWriter {
   [[nodiscard]] bool behind() const;
   /// Returns when none is. For those who have time.
   void wait_for_room() const;
-  /// After the last append: writes what waits and ends the thread. Empty, or what was lost of the first file
-  /// that lost something.
+  /// What was lost so far, a sentence a file; any thread.
+  [[nodiscard]] std::vector<std::string> errors() const;
+  /// After the last append: writes what waits and ends the thread. Empty, or all that was lost.
   [[nodiscard]] std::string finish();
 
  private:

@@ -2,6 +2,8 @@
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "engine/logs/log_writer.hpp"
 #include "engine/logs/replacement_log.hpp"
@@ -32,6 +34,11 @@ class RunLogs {
   /// Returns when it is not. For runs without a pace.
   void wait_for_room() const {
     if (writer_) writer_->wait_for_room();
+  }
+
+  /// What was lost so far: a sentence a file; any thread.
+  [[nodiscard]] std::vector<std::string> errors() const {
+    return writer_ ? writer_->errors() : std::vector<std::string>{};
   }
 
   /// Ends the files and moves the records into the result; what was lost becomes its error.

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "twofold/types.hpp"
@@ -17,20 +18,28 @@ enum class TrackingState : std::uint8_t {
 
 inline constexpr std::uint32_t kNoId = 0xffffffffU;
 
+/// PoseEstimate::covariance of which nothing is known: whoever takes it for a number notices.
+[[nodiscard]] constexpr std::array<double, 36> unknown_covariance() {
+  std::array<double, 36> covariance{};
+  covariance.fill(std::numeric_limits<double>::quiet_NaN());
+  return covariance;
+}
+
 /// What is known of the camera at one frame. Trivially copyable.
 struct PoseEstimate {
   std::int64_t frame = 0;  ///< counts pushed frames from 0, dropped ones included
   std::int64_t t_ns = 0;   ///< the frame's own time
   TrackingState state = TrackingState::kLost;
-  bool keyframe = false;     ///< proposed as a keyframe of the map
+  bool keyframe = false;  ///< proposed as a keyframe of the map
+  bool covariance_known = false;
   std::uint8_t effort = 0;   ///< effort level, 0: nothing left out (docs/architecture.md)
   const char* reason = "";   ///< why it is lost, in words; a string that lives as long as the program
   std::int32_t points = 0;   ///< measurements the pose rests on
   double tracked_share = 0;  ///< those over the points looked for, in [0, 1]
 
   // Of tracked frames only:
-  /// Of the left camera as the frames show it: rectified ones are turned against the lens that took them, by
-  /// the calibration's rectifying rotation. In the world of `map_part`, as the map has it now.
+  /// Of the left camera as the frames show it: rectified ones are turned against the lens that took them
+  /// (FrameRectifier::T_rectified_raw). In the world of `map_part`, as the map has it now.
   Pose T_world_camera;
   std::uint32_t map_part = kNoId;  ///< first keyframe of the part; parts have worlds of their own
   std::uint32_t reference_keyframe = kNoId;
@@ -40,8 +49,9 @@ struct PoseEstimate {
   /// keyframe is in the world, and the drift on the way there, is not in it. As large as the residuals of the
   /// last frames say, and a readout that nobody knows; what no residual shows, a wrong focal length or clock,
   /// is not in it. Honest within a factor of two in standard deviations where that was measured
-  /// (docs/results.md). Zero for the frame that starts a map part: that frame defines the world.
-  std::array<double, 36> covariance{};
+  /// (docs/results.md). All zero, and known, for the frame that starts a map part: that frame defines the
+  /// world. Not known (covariance_known is false: the measurements leave a direction open): all NaN.
+  std::array<double, 36> covariance = unknown_covariance();
   /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
   /// none.
   std::array<double, 6> velocity{};
@@ -80,6 +90,18 @@ struct MapEvent {
   Pose T_world_camera_after;
   double moved = 0;   ///< distance between the two [m]; of no meaning across map parts
   double turned = 0;  ///< angle between the two [rad]; likewise
+
+  // What the correction did to the map; zero for kRelocalisation and kNewPart, which correct nothing. Where
+  // one frame sees several versions at once, the largest of each. Which keyframes they are: compare
+  // Slam::map().keyframes() with those of a snapshot taken before, by their ids.
+  /// The loop that was closed, of kLoopClosure, kPoseGraph and kPartsJoined: the older keyframe. kNoId: none,
+  /// or not known. MapSnapshot::loops has more of it.
+  std::uint32_t loop_from = kNoId;
+  std::uint32_t loop_to = kNoId;  ///< the keyframe that came back
+  /// That moved by a centimetre or 0.2 degrees or more, or joined another part.
+  std::uint32_t keyframes_moved = 0;
+  double farthest_moved = 0;  ///< by a keyframe that kept its part [m]
+  double most_turned = 0;     ///< likewise [rad]
 };
 static_assert(std::is_trivially_copyable_v<MapEvent>);
 

@@ -17,9 +17,9 @@ namespace twofold {
 /// its own, wherever [m] is said here.
 /// Poses and positions are in the world of their map part, whose points x_world = T_world_camera x_camera.
 ///
-/// Memory: versions share what they have in common. One that is held keeps what the map has replaced since;
-/// memory_bytes() bounds that from above. Slam::held_maps() counts the handles' versions.
-/// Threads: all functions may be called by several threads at once.
+/// Memory: versions share what they have in common. One that is held keeps what the map has replaced since,
+/// at most memory_bytes(). Slam::held_maps() counts the handles' versions. Threads: all functions may be
+/// called by several threads at once.
 class TWOFOLD_API MapSnapshot {
  public:
   struct Keyframe {
@@ -40,8 +40,8 @@ class TWOFOLD_API MapSnapshot {
     std::uint32_t part = kNoId;        ///< map part, whose world `position` is in
     std::uint32_t observers = 0;       ///< keyframes that see it
     std::array<double, 3> position{};  ///< in the world of its part [m]
-    /// 3x3 row by row [m^2], from all its measurements with the keyframes' poses taken as true; all zero when
-    /// they do not determine the point.
+    /// 3x3 row by row [m^2], from all its measurements with the keyframes' poses taken as true. All zero,
+    /// which no point's is: not asked for, or the measurements do not determine the point.
     std::array<double, 9> covariance{};
   };
 
@@ -101,7 +101,8 @@ class TWOFOLD_API MapSnapshot {
   /// All map parts, ascending by id; one when everything is connected.
   [[nodiscard]] std::vector<Part> parts() const;
 
-  /// What keyframes, points, their lists and appearances take, shared or not. O(size of the map).
+  /// What the version takes on the heap, shared or not, counted generously: what holding it costs is less.
+  /// O(size of the map).
   [[nodiscard]] std::size_t memory_bytes() const;
 
   struct Impl;

@@ -24,6 +24,13 @@ class TWOFOLD_API FrameRectifier {
 
   /// What the rectified frames are of.
   [[nodiscard]] const CameraRig& rig() const;
+  /// How the left camera that poses are of stands in the one that was calibrated: a rotation alone, identity
+  /// for images that are rectified already. A robot's extrinsics are of the latter:
+  ///
+  ///   T_world_raw = compose(estimate.T_world_camera, rectifier.T_rectified_raw())
+  ///   T_world_body = compose(T_world_raw, inverse(T_body_raw))     // T_body_raw: where the camera is
+  ///   mounted
+  [[nodiscard]] Pose T_rectified_raw() const;
   /// @return  grey images, and depth, with an owner; those of `raw` themselves when they are rectified
   ///          already. Throws std::invalid_argument when `raw` is not of the calibrated cameras.
   [[nodiscard]] FrameView rectify(const FrameView& raw) const;

@@ -47,8 +47,9 @@ struct SlamOptions {
 
   /// A folder that exists. trajectory_causal.txt (TUM form) and schedule.log (for `twofold run
   /// --replay-schedule`) grow in it and are whole, but for the last 0.1 s, however the process ends; what is
-  /// remembered of each frame goes to its disk, so that memory does not grow with the time. A disk that is
-  /// full or too slow is no reason to stop: SlamSummary::errors says what was lost. Empty: all in memory.
+  /// remembered of each frame goes to its disk, so that memory does not grow with the time: not before
+  /// finish, which reads the poses into SlamSummary::trajectory. A disk that is full or too slow is no reason
+  /// to stop: Slam::errors says, while it runs, which file lost what. Empty: all in memory.
   std::filesystem::path run_folder = {};
   /// Without a folder: how many of the newest frames have a pose in SlamSummary::trajectory, >= 1, at 176
   /// bytes each; older ones are forgotten. A million are nine hours at 30 Hz.
@@ -93,11 +94,11 @@ struct SlamSummary {
     std::uint32_t map_part = kNoId;
     Pose T_world_camera;
   };
-  std::vector<FinalPose> trajectory;
+  std::vector<FinalPose> trajectory;  ///< 72 bytes each: 190 MB for a day at 30 Hz
   std::vector<StageTime> timings;
   std::vector<std::string> notes;  ///< requested settings (pinning, priority) that could not be applied
-  std::vector<std::string>
-      errors;  ///< what went wrong on the way: a callback that threw, a thread that ended
+  /// What went wrong on the way: a callback that threw, a thread that ended, a file that lost something.
+  std::vector<std::string> errors;
 };
 
 /// Versions of the map that somebody holds.
@@ -145,7 +146,9 @@ class TWOFOLD_API Slam {
 
   /// In a threaded run it waits for no thread of the engine, only for another caller inside push, has_room,
   /// wait_for_room or finish; in a deterministic one it returns when the frame is tracked and mapped. Refused
-  /// are images that do not fit the rig, time stamps that do not increase, and frames after finish().
+  /// are images that do not fit the rig, time stamps that do not increase, and frames after finish(). An
+  /// exception of the engine, as std::bad_alloc, comes out of push in a deterministic run; in a threaded one
+  /// it ends the thread it arose on, and errors() says so.
   PushResult push(const FrameView& frame);
   /// Whether a push would find room now; without another pushing thread, it will. Not `live`, also whether
   /// map and disk follow: a push is not dropped for their sake.
@@ -167,11 +170,13 @@ class TWOFOLD_API Slam {
   /// file and reason.
   void save_map(const std::filesystem::path& file) const;
 
-  /// What went wrong so far; tracking goes on unless it says otherwise.
+  /// What went wrong so far; tracking goes on unless it says otherwise. A thread that ended and a file that
+  /// lost something are in it within a second, whether frames come or not.
   [[nodiscard]] std::vector<std::string> errors() const;
 
   /// Tracks what is queued, makes all poses agree globally and ends the threads. A second call gives the same
-  /// answer. map() and save_map() then have the final map.
+  /// answer. map() and save_map() then have the final map. The answer is a copy with all poses of the run (or
+  /// those kept), and the Slam keeps one: the one place where memory grows with the time.
   SlamSummary finish();
 
  private:

@@ -14,7 +14,8 @@
 ///
 /// Everywhere: metres, radians, nanoseconds. T_a_b takes points of frame b to frame a, p_a = T_a_b * p_b.
 /// Camera axes: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel. No type here
-/// changes its layout with the compiler's flags.
+/// changes its layout with optimisation or -march; where the standard library's types are members, that is
+/// libstdc++'s, with its default ABI: no libc++, _GLIBCXX_DEBUG or _GLIBCXX_USE_CXX11_ABI=0.
 namespace twofold {
 
 /// Rigid motion T_a_b: p_a = q * p_b * q^-1 + t.
@@ -82,7 +83,9 @@ struct FrameView {
   ImageView right;        ///< stereo: as left
   ImageView depth;        ///< RGB-D: kDepth16, registered to left
   /// Keeps the pixels alive and unchanged: grey images and depth are then used where they are. Without it
-  /// they are copied.
+  /// they are copied. It is let go of when the engine is done with the frame, at the latest in finish(), on
+  /// any thread: one of the engine's, or one that is in a function of Slam. A deleter must not care which,
+  /// and must not call Slam.
   std::shared_ptr<const void> owner;
 };
 

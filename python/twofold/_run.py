@@ -11,7 +11,7 @@ from typing import Any
 
 from . import _core
 from ._core import MapEvent, PoseEstimate, RunMode, Source, Summary
-from ._slam import Slam, updates_of
+from ._slam import Slam, end_quietly, updates_of
 
 
 class _Feeder:
@@ -101,4 +101,4 @@ _open: weakref.WeakSet[Run] = weakref.WeakSet()
 def _finish_all() -> None:
     # Before Slam's own, which was registered earlier: a feeder must not wait for a reader that is gone.
     for open_run in list(_open):
-        open_run.finish()
+        end_quietly(open_run.finish)

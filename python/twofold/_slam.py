@@ -28,6 +28,14 @@ def updates_of(queue: _core.Updates) -> Iterator[PoseEstimate | MapEvent]:
             yield item
 
 
+def end_quietly(end: Callable[[], object]) -> None:
+    """At the interpreter's end one that fails must not keep the others from ending; what it raises is printed."""
+    try:
+        end()
+    except Exception:
+        traceback.print_exc()
+
+
 class _Dispatcher:
     """Calls Python functions with what comes out of a queue, on a thread of its own.
 
@@ -76,6 +84,7 @@ class Slam(_core.Slam):
     """
 
     _dispatcher: _Dispatcher | None = None
+    _iterated = False
 
     if not TYPE_CHECKING:  # the types are those of _core.Slam
 
@@ -97,6 +106,7 @@ class Slam(_core.Slam):
         """Poses and corrections of the map as they arise, until finish(); for one reader."""
         if self._dispatcher is not None:
             raise RuntimeError("the callbacks get the poses: there is one reader")
+        self._iterated = True
         return updates_of(self._updates)
 
     def poses(self) -> Iterator[PoseEstimate]:
@@ -129,6 +139,8 @@ class Slam(_core.Slam):
         self.finish()
 
     def _dispatch(self) -> _Dispatcher:
+        if self._iterated:
+            raise RuntimeError("updates() or poses() gets the poses: there is one reader")
         if self._dispatcher is None:
             self._dispatcher = _Dispatcher(self._updates)
         return self._dispatcher
@@ -141,5 +153,5 @@ _open: weakref.WeakSet[Slam] = weakref.WeakSet()
 def _finish_all() -> None:
     # A thread that comes back from libtwofold after the interpreter's end would bring the process down.
     for slam in list(_open):
-        slam.finish()
-        slam.close_view()
+        end_quietly(slam.finish)
+        end_quietly(slam.close_view)

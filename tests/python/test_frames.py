@@ -94,6 +94,7 @@ def test_rectifiers_follow_the_calibration(stereo_yaml: Path) -> None:
     rectifier = twofold.FrameRectifier(stereo_yaml)
     assert rectifier.rig.width == 64
     assert rectifier.rig.baseline == pytest.approx(0.1)
+    assert rectifier.T_rectified_raw.t.tolist() == [0, 0, 0], "nothing is turned here"
     left = grey(48, 64)
     frame = rectifier.rectify(twofold.Frame(5, left, left))
     assert frame.t_ns == 5

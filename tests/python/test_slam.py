@@ -174,3 +174,23 @@ def test_the_interpreters_lock_holds_up_neither_feeder_nor_tracker() -> None:
         sys.setswitchinterval(interval)
     assert latest is not None and latest.frame >= 30
     run.finish()
+
+
+def test_there_is_one_reader(rig: twofold.CameraRig) -> None:
+    with twofold.Slam(rig) as slam:
+        slam.updates()
+        with pytest.raises(RuntimeError, match="one reader"):
+            slam.on_pose(lambda pose: None)
+    with twofold.Slam(rig) as slam:
+        slam.on_event(lambda event: None)
+        with pytest.raises(RuntimeError, match="one reader"):
+            slam.poses()
+
+
+def test_what_is_not_known_is_said(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    with twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+        push_all(slam, frames[:3])
+        slam.finish()
+        poses = list(slam.poses())
+    assert poses[0].covariance_known and not poses[0].covariance.any(), "it defines the world"
+    assert poses[2].covariance_known and poses[2].covariance.any()

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
@@ -82,6 +83,28 @@ TEST(FrameRectifier, TakesOneCameraAlone) {
   EXPECT_EQ(frame.t_ns, 5);
   EXPECT_NE(frame.left.data, nullptr);
   EXPECT_EQ(frame.right.data, nullptr);
+}
+
+TEST(FrameRectifier, TheRawCameraIsTurnedAgainstTheRectifiedOne) {
+  const ScratchFolder folder;
+  folder.write("stereo.yaml", kRectifiedPair);
+  EXPECT_EQ(FrameRectifier(folder / "stereo.yaml").T_rectified_raw(), Pose{});
+  folder.write("turned.yaml", kTurnedPair);
+  const FrameRectifier rectifier(folder / "turned.yaml");
+  const Pose T = rectifier.T_rectified_raw();
+  EXPECT_EQ(T.t, (std::array<double, 3>{}));
+  // A ray of the raw left image is seen by the rectified camera where its pixels are found.
+  const Pose T_world_raw = compose(Pose{}, T);
+  const auto ray = transform(T_world_raw, {0, 0, 1});
+  const CameraRig& rig = rectifier.rig();
+  const double row = rig.cy + rig.fy * ray[1] / ray[2];
+  const cv::Mat image = ramp();
+  const FrameView rectified = rectifier.rectify(stereo_frame(1, image, image));
+  const auto* pixels = static_cast<const std::uint8_t*>(rectified.left.data);
+  const int v = static_cast<int>(std::lround(row)), u = static_cast<int>(std::lround(rig.cx));
+  ASSERT_TRUE(v >= 0 && v < rig.height);
+  EXPECT_NEAR(pixels[v * rectified.left.stride + u], 4 * 23.5, 4) << "the raw image's principal point";
+  EXPECT_GT(std::abs(T.q[0]), 0.01) << "it is turned about x";
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "graph/graph_writer.hpp"
 #include "slam/conversions.hpp"
 
@@ -81,7 +83,55 @@ TEST_F(PoseReporterTest, CovarianceIsTheInverseOfTheInformation) {
   const PoseEstimate pose = report(tracked(0, SE3()), information);
   const Eigen::Map<const Matrix6> covariance(pose.covariance.data());
   EXPECT_LT((covariance * information - Matrix6::Identity()).norm(), 1e-9);
-  EXPECT_EQ(report(tracked(1, SE3()), Matrix6::Zero()).covariance, (std::array<double, 36>{}));
+  EXPECT_TRUE(pose.covariance_known);
+}
+
+TEST_F(PoseReporterTest, AnUnknownCovarianceIsNoPerfectOne) {
+  const PoseEstimate first = report(tracked(0, SE3()), Matrix6::Zero());
+  EXPECT_TRUE(first.covariance_known) << "the first frame of a part defines its world";
+  EXPECT_EQ(first.covariance, (std::array<double, 36>{}));
+  Matrix6 open = Matrix6::Identity();
+  open(2, 2) = 0;  // nothing was measured along the optical axis
+  const Matrix6 none = Matrix6::Zero();
+  for (const Matrix6& information : {open, none}) {
+    const PoseEstimate pose = report(tracked(1, SE3(SO3(), Vector3(0, 0, 1))), information);
+    EXPECT_FALSE(pose.covariance_known);
+    for (const double value : pose.covariance) EXPECT_TRUE(std::isnan(value));
+  }
+  EXPECT_FALSE(report(lost(2)).covariance_known);
+  EXPECT_TRUE(std::isnan(PoseEstimate{}.covariance[0]));
+}
+
+TEST_F(PoseReporterTest, ACorrectionSaysWhatItDidToTheMap) {
+  EngineOptions options;
+  reporter_.listen(options);
+  const auto publish = [&] {
+    graph_ = writer_.publish();
+    options.on_map(graph_, {});
+  };
+  Keyframe keyframe;
+  keyframe.id = KeyframeId{1};
+  writer_.add_keyframe(std::move(keyframe));
+  publish();
+  (void)report(tracked(0, SE3()));
+  ClosedLoop loop;
+  loop.constraint.from = KeyframeId{0};
+  loop.constraint.to = KeyframeId{1};
+  options.on_loop(loop);
+  Edge edge;
+  edge.other = KeyframeId{1};
+  writer_.set_edge(KeyframeId{0}, edge);
+  const SE3 jump(SO3(), Vector3(0, 5, 0));
+  writer_.set_pose(KeyframeId{0}, jump);
+  writer_.announce_jump(MapChange::Kind::kLoopClosure);
+  publish();
+  correction_ = {CorrectionReason::kLoopClosure, 1, kPeriod, PackedPose(), PackedPose(jump)};
+  (void)report(tracked(1, jump));
+  ASSERT_TRUE(events_.correction);
+  EXPECT_EQ(events_.correction->loop_from, 0U);
+  EXPECT_EQ(events_.correction->loop_to, 1U);
+  EXPECT_EQ(events_.correction->keyframes_moved, 1U);
+  EXPECT_NEAR(events_.correction->farthest_moved, 5, 1e-12);
 }
 
 TEST_F(PoseReporterTest, ALostCameraThatFindsItselfIsAnEvent) {

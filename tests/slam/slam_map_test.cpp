@@ -1,6 +1,8 @@
+#include <malloc.h>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 #include <set>
 
 #include <unistd.h>
@@ -99,6 +101,43 @@ TEST_F(SlamMapTest, AHeldMapStaysAsItWasAndIsCounted) {
   const auto after = held.keyframes();
   ASSERT_EQ(after.size(), before.size());
   for (std::size_t k = 0; k < after.size(); ++k) EXPECT_EQ(after[k].T_world_camera, before[k].T_world_camera);
+}
+
+/// Bytes of the heap in use.
+std::size_t heap_bytes() {
+  const struct mallinfo2 info = ::mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
+bool heap_is_measured() {
+  const std::size_t before = heap_bytes();
+  const std::vector<char> block(1 << 20);
+  return heap_bytes() >= before + block.size();
+}
+
+TEST_F(SlamMapTest, WhatAHeldMapKeepsIsAtMostWhatItSays) {
+  if (!heap_is_measured()) GTEST_SKIP() << "a sanitizer has a heap of its own";
+  std::optional<MapSnapshot> held, whole;
+  {
+    Slam slam(rig(), deterministic());
+    push_all(slam, 0, 25);
+    held = slam.map();
+    push_all(slam, 25);
+    (void)slam.finish();
+    whole = slam.map();
+  }
+  const auto freed_by = [](std::optional<MapSnapshot>& map) {
+    const std::size_t before = heap_bytes();
+    map.reset();
+    return before - heap_bytes();
+  };
+  const std::size_t held_says = held->memory_bytes(), whole_says = whole->memory_bytes();
+  const std::size_t replaced = freed_by(held);  // beside the newest version
+  EXPECT_GT(replaced, 0U);
+  EXPECT_LE(replaced, held_says);
+  const std::size_t all = freed_by(whole);  // the last version that there is: nothing is shared
+  EXPECT_LE(all, whole_says);
+  EXPECT_GT(2 * all, whole_says) << "generous, but of use";
 }
 
 TEST_F(SlamMapTest, ASnapshotOutlivesItsSlam) {

@@ -3,9 +3,11 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <mutex>
 #include <numeric>
 #include <stdexcept>
 #include <thread>
@@ -14,7 +16,10 @@
 
 #include "engine/logs/schedule_log.hpp"
 #include "loopclosure/default_vocabulary.hpp"
+#include "slam/pipeline.hpp"
+#include "slam/slam_options.hpp"
 #include "tests/io/scratch_folder.hpp"
+#include "tests/io/small_files.hpp"
 #include "tests/slam/slam_run.hpp"
 #include "twofold/evaluation.hpp"
 
@@ -22,6 +27,31 @@ namespace twofold {
 namespace {
 
 using testing::run_engine;
+
+/// Shut, it holds whoever comes by.
+class Gate {
+ public:
+  void pass() {
+    std::unique_lock lock(lock_);
+    open_.wait(lock, [&] { return is_open_; });
+  }
+  void open() {
+    const std::scoped_lock lock(lock_);
+    is_open_ = true;
+    open_.notify_all();
+  }
+
+ private:
+  std::mutex lock_;
+  std::condition_variable open_;
+  bool is_open_ = false;
+};
+
+/// The pipeline's threads end whatever the test finds.
+struct OpenAtLast {
+  Gate& gate;
+  ~OpenAtLast() { gate.open(); }
+};
 
 class SlamTest : public testing::SlamRun {};
 
@@ -192,13 +222,42 @@ TEST_F(SlamTest, ACallbackThatWouldWaitForItselfIsTold) {
   }
 }
 
-TEST_F(SlamTest, NoPushIsDroppedForTheMapsSake) {
-  Slam slam(rig(), {.frame_buffers = 2 * kFrames});
-  for (std::size_t i = 0; i < kFrames; ++i) {
-    const PushResult pushed = slam.push(view(i));
-    EXPECT_TRUE(pushed) << i << ": " << pushed.reason;
+TEST_F(SlamTest, AMapperThatIsBehindTakesNoPushAway) {
+  Gate gate;
+  EngineOptions options = engine_options({.frame_buffers = 2 * kFrames});
+  int steps = 0;  // mapper's
+  options.before_step = [&](std::string_view thread) {
+    if (thread == "mapper" && ++steps > 1) gate.pass();
+  };
+  std::atomic<int> told{0}, versions{0};
+  options.on_map = [&](const GraphSnapshot&, const DoubleWindow&) { ++versions; };
+  options.on_pose = [&](const PoseReport&) { ++told; };
+  const auto pipeline = make_pipeline(testing::small_rig(), options);
+  const OpenAtLast open_at_last{gate};
+  const int first_version = versions;
+  // Until two keyframes wait for the mapper, which stands still after the first; each frame is tracked before
+  // the next one.
+  int pushed = 0;
+  while (pipeline->waiting().keyframes < 2 && pushed < kFrames) {
+    ASSERT_TRUE(pipeline->has_buffer());
+    pipeline->push((*frames_)[static_cast<std::size_t>(pushed++)]);
+    while (told < pushed || versions == first_version) std::this_thread::yield();
   }
-  EXPECT_EQ(slam.finish().tracked, kFrames);
+  ASSERT_GE(pipeline->waiting().keyframes, 2);
+  EXPECT_FALSE(pipeline->has_room()) << "who reads a recording waits for the map";
+  EXPECT_TRUE(pipeline->has_buffer());
+  const int blocked_at = pushed;
+  for (; pushed < kFrames; ++pushed) {
+    ASSERT_TRUE(pipeline->has_buffer())
+        << "the mapper's step stands still, and frame " << pushed << " has none";
+    pipeline->push((*frames_)[static_cast<std::size_t>(pushed)]);
+  }
+  EXPECT_GT(pushed, blocked_at);
+  EXPECT_FALSE(pipeline->has_room());
+  gate.open();
+  const RunResult result = pipeline->finish();
+  EXPECT_EQ(result.counts.frames, kFrames);
+  EXPECT_EQ(result.counts.dropped, 0);
 }
 
 TEST_F(SlamTest, TheRunsFolderIsWholeThoughNoFrameComes) {
@@ -217,6 +276,31 @@ TEST_F(SlamTest, TheRunsFolderIsWholeThoughNoFrameComes) {
   EXPECT_EQ(poses, kPushed) << "without another push";
   (void)slam.finish();
   std::filesystem::remove_all(folder);
+}
+
+TEST_F(SlamTest, ADiskThatIsFullIsSaidWhileItRuns) {
+  const ScratchFolder folder;
+  Slam slam(rig(), {.run_folder = folder.path()});
+  std::vector<std::string> errors;
+  {
+    const testing::SmallFiles small(300);
+    push_all(slam, 0, 10);
+    for (int wait = 0; wait < 500 && errors.size() < 2; ++wait) {  // without another push
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      errors = slam.errors();
+    }
+  }
+  const auto names = [](const std::vector<std::string>& all, const char* file) {
+    return std::any_of(all.begin(), all.end(), [&](const std::string& error) {
+      return error.find(file) != std::string::npos && error.find("bytes are lost") != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(names(errors, "trajectory_causal.txt"));
+  EXPECT_TRUE(names(errors, "(records of frames)"));
+  EXPECT_TRUE(slam.push(view(10))) << "tracking goes on";
+  const SlamSummary summary = slam.finish();
+  EXPECT_TRUE(names(summary.errors, "trajectory_causal.txt"));
+  EXPECT_TRUE(names(summary.errors, "(records of frames)"));
 }
 
 TEST_F(SlamTest, ASlowCallbackIsAStageOfItsOwn) {

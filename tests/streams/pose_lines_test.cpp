@@ -13,7 +13,9 @@ using testing::numbered_pose;
 TEST(PoseLines, JsonHasAllThatIsKnownOfATrackedFrame) {
   PoseEstimate pose = numbered_pose(12);
   pose.T_world_camera.q = {0, 0.6, 0, 0.8};
+  pose.covariance = {};
   pose.covariance[35] = 0.125;
+  pose.covariance_known = true;
   pose.velocity = {1, 2, 3, 4, 5, 6};
   pose.exposed_ns = 99;
   pose.latency_ns = 1500;
@@ -36,6 +38,11 @@ TEST(PoseLines, JsonHasAllThatIsKnownOfATrackedFrame) {
   EXPECT_EQ(line["map_version"], 7);
 }
 
+TEST(PoseLines, AnUnknownCovarianceIsNull) {
+  const json line = json::parse(pose_line(numbered_pose(1), PoseForm::kJson));
+  EXPECT_TRUE(line.at("covariance").is_null());
+}
+
 TEST(PoseLines, ALostFrameHasAReasonAndNoPose) {
   PoseEstimate pose = numbered_pose(3);
   pose.state = TrackingState::kLost;
@@ -49,6 +56,9 @@ TEST(PoseLines, ALostFrameHasAReasonAndNoPose) {
 
 TEST(PoseLines, TumFormIsTimeAndPose) {
   EXPECT_EQ(pose_line(numbered_pose(5), PoseForm::kTum), "1.000000005 5 0.25 -1 0 0 0 1\n");
+  PoseEstimate early = numbered_pose(5);
+  early.t_ns = -966'666'667;
+  EXPECT_EQ(pose_line(early, PoseForm::kTum), "-0.966666667 5 0.25 -1 0 0 0 1\n");
   EXPECT_EQ(missed_line(4, PoseForm::kTum), "# missed 4 lines\n");
 }
 
@@ -57,11 +67,18 @@ TEST(PoseLines, EventsSayWhatMovedAndByHowMuch) {
   event.kind = MapEventKind::kLoopClosure;
   event.frame = 8;
   event.moved = 0.5;
+  event.loop_from = 3;
+  event.keyframes_moved = 17;
+  event.farthest_moved = 2.5;
   event.T_world_camera_after.t = {1, 2, 3};
   const json line = json::parse(event_line(event, PoseForm::kJson));
   EXPECT_EQ(line["event"], "loop closure");
   EXPECT_EQ(line["frame"], 8);
   EXPECT_EQ(line["moved"], 0.5);
+  EXPECT_EQ(line["loop_from"], 3);
+  EXPECT_TRUE(line["loop_to"].is_null());
+  EXPECT_EQ(line["keyframes_moved"], 17);
+  EXPECT_EQ(line["farthest_moved"], 2.5);
   EXPECT_EQ(line["position"], json({1.0, 2.0, 3.0}));
   EXPECT_EQ(event_line(event, PoseForm::kTum).substr(0, 24), "# loop closure at frame ");
   EXPECT_EQ(json::parse(missed_line(4, PoseForm::kJson))["missed"], 4);

@@ -1,10 +1,8 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-#include <csignal>
 #include <fstream>
 
 #include <cstring>
@@ -12,6 +10,7 @@
 #include "streams/file_descriptor.hpp"
 #include "streams/pose_output.hpp"
 #include "tests/io/scratch_folder.hpp"
+#include "tests/io/small_files.hpp"
 #include "tests/streams/numbered_poses.hpp"
 
 namespace twofold {
@@ -19,6 +18,7 @@ namespace {
 
 using testing::Heard;
 using testing::numbered_pose;
+using testing::SmallFiles;
 
 std::string line(int frame) {
   return pose_line(numbered_pose(frame), PoseForm::kJson);
@@ -69,25 +69,6 @@ TEST(PoseOutputs, ADiskThatIsFullIsSaid) {
   EXPECT_FALSE(output->flush());
   EXPECT_EQ(output->problem(), "/dev/full: No space left on device: the last 3 lines are missing");
 }
-
-/// A file may not grow beyond some bytes, while this is there.
-class SmallFiles {
- public:
-  explicit SmallFiles(rlim_t bytes) : before_(::signal(SIGXFSZ, SIG_IGN)) {
-    (void)::getrlimit(RLIMIT_FSIZE, &limit_);
-    const rlimit small{bytes, limit_.rlim_max};
-    (void)::setrlimit(RLIMIT_FSIZE, &small);
-  }
-  SmallFiles(const SmallFiles&) = delete;
-  ~SmallFiles() {
-    (void)::setrlimit(RLIMIT_FSIZE, &limit_);
-    (void)::signal(SIGXFSZ, before_);
-  }
-
- private:
-  rlimit limit_{};
-  sighandler_t before_;
-};
 
 TEST(PoseOutputs, AFileGoesOnWhenThereIsRoomAgainAndEndsWithAWholeLine) {
   const std::string path = ::testing::TempDir() + "full_" + std::to_string(::getpid());
@@ -170,6 +151,55 @@ TEST(PoseOutputs, AnAbandonedUnixSocketIsReplacedAndALivingOneIsNot) {
   folder.write("file", "kept");
   EXPECT_NE(why_not("unix:" + (folder / "file")), "");
   EXPECT_TRUE(std::filesystem::exists(folder / "file"));
+}
+
+TEST(PoseOutputs, AUnixReaderTooManyIsToldAndGoes) {
+  const ScratchFolder folder;
+  const std::string path = folder / "poses.socket";
+  const auto output = open_pose_output("unix:" + path, PoseForm::kJson);
+  std::vector<FileDescriptor> readers;
+  for (int i = 0; i < 16; ++i) readers.push_back(connect_to(path));
+  output->offer(line(0));
+  const FileDescriptor late = connect_to(path);
+  output->offer(line(1));
+  EXPECT_EQ(receive(late), "{\"error\":\"16 readers are served already\"}\n");
+  char byte = 0;
+  EXPECT_EQ(::recv(late.get(), &byte, 1, 0), 0) << "the end";
+  Heard heard;
+  heard.take(receive(readers.back()));
+  EXPECT_EQ(heard.frames, (std::vector<std::int64_t>{0, 1}));
+  readers.pop_back();
+  output->offer(line(2));  // notices
+  output->offer(line(3));
+  const FileDescriptor next = connect_to(path);
+  output->offer(line(4));
+  Heard by_next;
+  by_next.take(receive(next));
+  EXPECT_EQ(by_next.frames, std::vector<std::int64_t>{4}) << "there is a place again";
+}
+
+TEST(PoseOutputs, UdpCountsNothingThatNobodyListenedTo) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const auto bound = [&] {
+    FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    EXPECT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    socklen_t size = sizeof address;
+    ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
+    return socket;
+  };
+  (void)bound();  // takes a port that is free, and is closed
+  const auto output =
+      open_pose_output("udp:127.0.0.1:" + std::to_string(ntohs(address.sin_port)), PoseForm::kJson);
+  for (int i = 0; i < 9; ++i) output->offer(line(i));
+  const FileDescriptor socket = bound();
+  for (int i = 9; i < 12; ++i) output->offer(line(i));
+  Heard heard;
+  heard.take(receive(socket));
+  EXPECT_EQ(heard.missed, 0) << "a count that is wrong is worse than none";
+  ASSERT_FALSE(heard.frames.empty());
+  EXPECT_EQ(heard.frames.back(), 11);
 }
 
 TEST(PoseOutputs, UdpSendsALineADatagram) {

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/listeners.hpp"
 #include "geometry/processor_time.hpp"
 #include "io/files/io_error.hpp"
 #include "surface/meshing.hpp"
@@ -61,16 +62,14 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
 }
 
 void LiveSurface::listen(EngineOptions& options) {
-  options.on_pose = [this, before = std::move(options.on_pose)](const PoseReport& report) {
-    if (before) before(report);
-    // Never full: the reader empties it before each frame it sends.
-    (void)decisions_.try_push({report.record.frame_index, report.record.keyframe});
-  };
-  options.on_map = [this, before = std::move(options.on_map)](const GraphSnapshot& graph,
-                                                              const DoubleWindow& window) {
-    if (before) before(graph, window);
-    maps_.publish(graph, window);
-  };
+  options.on_pose = both(options.on_pose, PoseListener([this](const PoseReport& report) {
+                           // Never full: the reader empties it before each frame it sends.
+                           (void)decisions_.try_push({report.record.frame_index, report.record.keyframe});
+                         }));
+  options.on_map =
+      both(options.on_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
+             maps_.publish(graph, window);
+           }));
 }
 
 void LiveSurface::show(const Frame& frame) {
