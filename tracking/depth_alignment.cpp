@@ -58,38 +58,56 @@ void DepthAlignment::add_view(KeyframeId id, const cv::Mat& depth, const SE3& T_
   order_[views_++] = static_cast<std::size_t>(slot - slots_.begin());
 }
 
-/// Residual m . x - 1: of depth, in shares of it.
-void DepthAlignment::add_pair(const DepthPlanes::Plane& seen, const DepthPlanes::Plane& plane,
-                              const SE3& T_view_c, const Pass& pass, Equations& equations) const {
+/// Residual m . x - 1: of depth, in shares of it. None when it is another surface.
+std::optional<DepthAlignment::Pair> DepthAlignment::pair_up(const DepthPlanes::Plane& seen,
+                                                            const DepthPlanes::Plane& plane,
+                                                            const SE3& T_view_c) const {
   const Matrix3 R = T_view_c.rotation();
   const Vector3 x = R * seen.x + T_view_c.translation();
   const double residual = plane.m.dot(x) - 1;
   const Vector3 m_c = R.transpose() * plane.m;
   const double length = plane.m.norm();
-  if (std::abs(residual) > kFarApart * length * x.norm()) return;
-  if (m_c.dot(seen.m) < kFacing * length * seen.m.norm()) return;
+  if (std::abs(residual) > kFarApart * length * x.norm()) return std::nullopt;
+  if (m_c.dot(seen.m) < kFacing * length * seen.m.norm()) return std::nullopt;
+  const double of_plane = plane.sigma * x.z();
+  return Pair{m_c, &plane, R, residual, of_plane * of_plane};
+}
+
+/// All views that meet a plane of the frame share its noise m, and add their own p_v: the covariance of their
+/// residuals is diag(p_v^2) + m^2 1 1^T. Their lines of the Jacobian are alike, so that its inverse comes to
+/// weights
+///
+///   w_v = p_v^-2 / (1 + m^2 sum_u p_u^-2)
+///
+/// (Sherman and Morrison): of many views no more is known than the frame's own reading.
+void DepthAlignment::add_pairs(const DepthPlanes::Plane& seen, std::span<const Pair> pairs, const Pass& pass,
+                               Equations& equations) const {
   // Planes of neighbouring cells share readings: together they are known as well as each cell's own mean.
-  const double of_point = seen.sigma * seen.x.z(), of_plane = plane.sigma * x.z();
-  const double variance =
-      of_point * of_point + of_plane * of_plane + options_.depth_sigma * options_.depth_sigma;
-  const double deviation = std::abs(residual) / std::sqrt(variance);
-  const double robust = 1 / (1 + deviation * deviation / (pass.kernel * pass.kernel));
-  const double weight = robust / variance;
-  Vector6 J;
-  J << m_c, seen.x.cross(m_c);  // of minus the residual
-  equations.H.noalias() += weight * J * J.transpose();
-  equations.g.noalias() -= weight * residual * J;
-  equations.deviations += std::min(deviation, kFarDeviation);
-  equations.squares += robust * deviation * deviation;
-  equations.weights += robust;
-  ++equations.pairs;
-  if (!pass.with_chance) return;
-  const double bent = options_.normal_sigma * options_.normal_sigma;
-  const Matrix3 of_normal = R.transpose() * plane.covariance * R +
-                            bent * (length * length * Matrix3::Identity() - m_c * m_c.transpose());
-  Eigen::Matrix<double, 6, 3> A;
-  A << Matrix3::Identity(), hat(seen.x);
-  equations.chance.noalias() += weight * A * of_normal * A.transpose();
+  const double of_point = seen.sigma * seen.x.z();
+  const double shared = of_point * of_point + options_.depth_sigma * options_.depth_sigma;
+  double precision = 0;
+  for (const Pair& pair : pairs) precision += 1 / pair.variance;
+  for (const Pair& pair : pairs) {
+    const double deviation = std::abs(pair.residual) / std::sqrt(pair.variance + shared);
+    const double robust = 1 / (1 + deviation * deviation / (pass.kernel * pass.kernel));
+    const double weight = robust / (pair.variance * (1 + shared * precision));
+    Vector6 J;
+    J << pair.m_c, seen.x.cross(pair.m_c);  // of minus the residual
+    equations.H.noalias() += weight * J * J.transpose();
+    equations.g.noalias() -= weight * pair.residual * J;
+    equations.deviations += std::min(deviation, kFarDeviation);
+    equations.squares += robust * deviation * deviation;
+    equations.weights += robust;
+    ++equations.pairs;
+    if (!pass.with_chance) continue;
+    const double bent = options_.normal_sigma * options_.normal_sigma;
+    const Matrix3 of_normal =
+        pair.R_view_c.transpose() * pair.view->covariance * pair.R_view_c +
+        bent * (pair.m_c.squaredNorm() * Matrix3::Identity() - pair.m_c * pair.m_c.transpose());
+    Eigen::Matrix<double, 6, 3> A;
+    A << Matrix3::Identity(), hat(seen.x);
+    equations.chance.noalias() += weight * A * of_normal * A.transpose();
+  }
 }
 
 DepthAlignment::Equations DepthAlignment::linearise(const SE3& T_c_ref, const Pass& pass) const {
@@ -101,14 +119,17 @@ DepthAlignment::Equations DepthAlignment::linearise(const SE3& T_c_ref, const Pa
   const std::vector<DepthPlanes::Plane>& planes = current_.planes();
   for (std::size_t i = 0; i < planes.size(); i += pass.stride) {
     const DepthPlanes::Plane& seen = planes[i];
-    const int before = equations.pairs;
+    std::array<Pair, kViews> pairs;
+    std::size_t met = 0;
     for (std::size_t v = 0; v < views_; ++v) {
       const Vector3 x = T_view_c[v] * seen.x;
       if (!in_front_of_camera(x)) continue;
       const DepthPlanes::Plane* plane = slots_[order_[v]].planes.at(rig_.camera.project(x));
-      if (plane != nullptr) add_pair(seen, *plane, T_view_c[v], pass, equations);
+      if (plane == nullptr) continue;
+      if (const auto pair = pair_up(seen, *plane, T_view_c[v])) pairs[met++] = *pair;
     }
-    equations.met += equations.pairs > before ? 1 : 0;
+    add_pairs(seen, std::span(pairs).first(met), pass, equations);
+    equations.met += met > 0 ? 1 : 0;
   }
   return equations;
 }
@@ -187,7 +208,8 @@ LostCause DepthAlignment::judge_structure() const {
   if (static_cast<int>(current_.planes().size()) < options_.min_planes) return LostCause::kTooFewMatches;
   Equations equations;
   for (const DepthPlanes::Plane& plane : current_.planes()) {
-    add_pair(plane, plane, SE3(), {options_.kernel, 1, true}, equations);
+    if (const auto pair = pair_up(plane, plane, SE3()))
+      add_pairs(plane, std::span(&*pair, 1), {options_.kernel, 1, true}, equations);
   }
   return determined(equations, Matrix6::Zero()) ? LostCause::kNone : LostCause::kNoStructure;
 }

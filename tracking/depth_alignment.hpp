@@ -101,8 +101,18 @@ class DepthAlignment {
     bool with_chance;
   };
   [[nodiscard]] Equations linearise(const SE3& T_c_ref, const Pass& pass) const;
-  void add_pair(const DepthPlanes::Plane& seen, const DepthPlanes::Plane& plane, const SE3& T_view_c,
-                const Pass& pass, Equations& equations) const;
+  /// What a plane of the frame and one of a view say of the pose.
+  struct Pair {
+    Vector3 m_c;                     ///< the view's plane in the frame's axes
+    const DepthPlanes::Plane* view;  ///< in the view's own
+    Matrix3 R_view_c;
+    double residual;  ///< distance, in shares of the depth
+    double variance;  ///< of the view's part of the residual
+  };
+  [[nodiscard]] std::optional<Pair> pair_up(const DepthPlanes::Plane& seen, const DepthPlanes::Plane& plane,
+                                            const SE3& T_view_c) const;
+  void add_pairs(const DepthPlanes::Plane& seen, std::span<const Pair> pairs, const Pass& pass,
+                 Equations& equations) const;
   void add_corners(const SE3& T_c_ref, std::span<const MotionObservation> corners, bool settling,
                    Equations& equations) const;
   [[nodiscard]] std::optional<Matrix6> determined(const Equations& equations,
