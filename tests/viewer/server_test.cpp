@@ -84,6 +84,7 @@ TEST_F(ViewServerTest, ShowsThePageToWhoKnowsTheToken) {
   EXPECT_NE(page.find("Content-Security-Policy: default-src 'none'; script-src 'self'"), std::string::npos);
   EXPECT_NE(page.find("frame-ancestors 'none'"), std::string::npos);
   EXPECT_EQ(page.find("Access-Control"), std::string::npos);
+  EXPECT_EQ(page.find(token_), std::string::npos) << "the cookie, which other ports get, is not the token";
   const std::string cookie =
       "Cookie: twofold-" + std::to_string(port_) + "=" + testing::cookie_for(port_, token_) + "\r\n";
   EXPECT_GT(answer(http_request("/page.js", cookie)).size(), 50000U);

@@ -177,8 +177,9 @@ TEST_F(ViewerTest, AMapThatThrowsIsToldAndTheRestGoesOn) {
   };
   Viewer viewer(kRig, map, {.port = 0});
   LocalClient client = watch(viewer);
-  EXPECT_NE(client.receive_until("the map cannot be shown: no map today").find("\"kind\":\"viewer\""),
-            std::string::npos);
+  const std::string failure = client.receive_until("the map cannot be shown: no map today");
+  EXPECT_NE(failure.find("\"kind\":\"viewer\""), std::string::npos);
+  EXPECT_NE(failure.find("the map cannot be shown: no map today"), std::string::npos) << "and why";
   EXPECT_TRUE(becomes([&] { return asked.load(std::memory_order_relaxed) > 1; })) << "it is asked again";
   viewer.tell(tracked_pose(0, 0));
   viewer.finish();
@@ -204,7 +205,9 @@ TEST_F(ViewerTest, FinishesOnceAndNotFromItsOwnCallbacks) {
   LocalClient client = watch(viewer);
   (void)client.receive(300);
   client.send(testing::text_frame("stop"));
-  EXPECT_NE(client.receive_until("not finished by what it calls").find("command failed"), std::string::npos);
+  const std::string refusal = client.receive_until("not finished by what it calls");
+  EXPECT_NE(refusal.find("command failed"), std::string::npos);
+  EXPECT_NE(refusal.find("not finished by what it calls"), std::string::npos);
   const std::jthread other([&viewer] { viewer.finish(); });
   viewer.finish();
   viewer.finish();

@@ -159,7 +159,7 @@ class Page {
     const select = $<HTMLSelectElement>('part');
     const wanted = ['camera', 'all', ...parts.map(([part]) => String(part))];
     if ([...select.options].map((option) => option.value).join() !== wanted.join()) {
-      select.replaceChildren(new Option('where the camera is', 'camera'), new Option('all, unrelated', 'all'),
+      select.replaceChildren(new Option('the camera’s', 'camera'), new Option('all, unrelated', 'all'),
         ...parts.map(([part, keyframes]) => new Option(`${part} (${keyframes} keyframes)`, String(part))));
       select.value = String(this.part);
     }

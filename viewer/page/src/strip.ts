@@ -33,7 +33,7 @@ export class Strip {
     }
     const budget = this.model.periodMs();
     const work = usual(frames.map((frame) => frame.stageMs.reduce((sum, ms) => sum + ms, 0)));
-    const latency = usual(frames.map((frame) => frame.latencyMs));
+    const latency = Math.max(work, usual(frames.map((frame) => frame.latencyMs)));  // that of runs without a pace is not known
     const most = budget > 0 ? Math.max(4 * budget, work) : latency;  // frames that queued for seconds shall not flatten all else
     this.top = Math.max(1, 1.3 * budget, 1.15 * Math.min(latency, most));
     this.plot!.setData([
