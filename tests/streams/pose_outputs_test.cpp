@@ -164,7 +164,7 @@ TEST(PoseOutputs, AUnixReaderTooManyIsToldAndGoes) {
   output->offer(line(1));
   EXPECT_EQ(receive(late), "{\"error\":\"16 readers are served already\"}\n");
   char byte = 0;
-  EXPECT_EQ(::recv(late.get(), &byte, 1, 0), 0) << "the end";
+  EXPECT_EQ(::recv(late.get(), &byte, 1, MSG_DONTWAIT), 0) << "the end";
   Heard heard;
   heard.take(receive(readers.back()));
   EXPECT_EQ(heard.frames, (std::vector<std::int64_t>{0, 1}));
