@@ -7,7 +7,7 @@
 namespace twofold {
 namespace {
 
-constexpr double kLeastTurn = 0.17;  // [rad]
+constexpr double kLeastTurn = 0.17;  // [rad] there and back in all: a rate of less says nothing
 constexpr double kStride = 0.35;  // [rad] between the two poses of a pair: enough to tell where the axis is
 
 struct Pair {
