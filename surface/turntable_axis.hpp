@@ -17,8 +17,9 @@ struct TurntableAxis {
 };
 
 /// Fits the axis to a way: camera centres c and rotations R of poses half a turn or less apart obey
-/// c_j - p = dR (c_i - p), dR = R_j R_i^T, whose rotation vectors all lie along the axis. Nothing for fewer
-/// than three poses, or where the camera turned by less than ten degrees in all.
+/// c_j - p = dR (c_i - p), dR = R_j R_i^T, whose rotation vectors all lie along the axis. Pairs are 20
+/// degrees apart. Nothing for fewer than two pairs, or where the way ends within ten degrees of where it
+/// began, turning to and fro: it has no rate.
 /// @param seconds  one a pose, growing
 /// @param T_w_c    poses of the camera relative to the object
 /// @param up       which of the two directions of the axis is up
