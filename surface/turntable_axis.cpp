@@ -7,8 +7,8 @@
 namespace twofold {
 namespace {
 
-constexpr double kLeastTurn = 0.17;  // [rad] there and back in all: a rate of less says nothing
 constexpr double kStride = 0.35;  // [rad] between the two poses of a pair: enough to tell where the axis is
+constexpr double kLeastTurn = 0.17;  // [rad] from the first pose to the last: less says nothing of the rate
 
 struct Pair {
   std::size_t from, to;

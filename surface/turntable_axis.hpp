@@ -17,9 +17,9 @@ struct TurntableAxis {
 };
 
 /// Fits the axis to a way: camera centres c and rotations R of poses half a turn or less apart obey
-/// c_j - p = dR (c_i - p), dR = R_j R_i^T, whose rotation vectors all lie along the axis. Nothing without two
-/// pairs of poses 0.35 rad (20 degrees) apart, or where the turns, there and back, cancel to less than 0.17
-/// rad (10 degrees).
+/// c_j - p = dR (c_i - p), dR = R_j R_i^T, whose rotation vectors all lie along the axis. Pairs are 20
+/// degrees apart. Nothing for fewer than two pairs, or where the way ends within ten degrees of where it
+/// began, turning to and fro: it has no rate.
 /// @param seconds  one a pose, growing
 /// @param T_w_c    poses of the camera relative to the object
 /// @param up       which of the two directions of the axis is up

@@ -20,9 +20,17 @@ SCENE = "synthetic:desk?frames=90&width=320&height=240&cover_at=1&cover=0.5"
 OBJECT = "synthetic:turntable?sensor=rgbd&frames=60"
 
 
+# 35 degrees of two turns, and too few to tell an axis.
+OBJECT = "synthetic:turntable?sensor=rgbd&frames={}"
+
+
+def schema_of(name: str) -> dict:
+    return json.loads((SCHEMAS / f"{name}.schema.json").read_text())
+
+
 def check(folder: Path, *names: str) -> None:
     for name in names:
-        schema = json.loads((SCHEMAS / f"{name}.schema.json").read_text())
+        schema = schema_of(name)
         jsonschema.Draft202012Validator.check_schema(schema)
         written = json.loads((folder / f"{name}.json").read_text())
         jsonschema.validate(written, schema, cls=jsonschema.Draft202012Validator)
@@ -36,7 +44,12 @@ with tempfile.TemporaryDirectory() as folder:
         if "--deterministic" in options:
             assert json.loads((out / "summary.json").read_text())["why_lost"], "the scene has lost frames"
 
-with tempfile.TemporaryDirectory() as folder:
-    subprocess.run([sys.argv[1], "object", OBJECT, "--deterministic", "--out", folder], check=True, stdout=subprocess.DEVNULL)
-    check(Path(folder), "summary", "timing", "object")
-    assert json.loads((Path(folder) / "object.json").read_text())["axis"], "the scene has a turntable"
+for frames, turns in (30, True), (8, False):
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.argv[1], "object", OBJECT.format(frames), "--deterministic", "--out", folder], check=True, stdout=subprocess.DEVNULL)
+        check(Path(folder), "object")
+        written = json.loads((Path(folder) / "object.json").read_text())
+        assert (written["axis"] is not None) == turns, f"{frames} frames: axis {written['axis']}"
+
+in_summary = schema_of("summary")["properties"]["surface"]["oneOf"][1]
+assert schema_of("object")["properties"]["surface"] == in_summary, "a surface is described alike in both"

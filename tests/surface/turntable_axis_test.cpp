@@ -72,5 +72,18 @@ TEST(TurntableAxis, NothingForACameraThatStoodStill) {
   EXPECT_FALSE(fit_turntable_axis({}, {}, Vector3::UnitZ()));
 }
 
+TEST(TurntableAxis, TakesTwoPairsOfPosesTwentyDegreesApart) {
+  const Way one_pair = turning(Vector3::UnitZ(), {0.1, 0, 0}, 1, 22);  // 0 and 21 degrees
+  EXPECT_FALSE(fit_turntable_axis(one_pair.seconds, one_pair.T_w_c, Vector3::UnitZ()));
+  const Way two_pairs = turning(Vector3::UnitZ(), {0.1, 0, 0}, 1, 23);
+  EXPECT_TRUE(fit_turntable_axis(two_pairs.seconds, two_pairs.T_w_c, Vector3::UnitZ()));
+}
+
+TEST(TurntableAxis, NothingForAPlateThatTurnedBack) {
+  Way way = turning(Vector3::UnitZ(), {0.1, 0, 0}, 1, 60);
+  for (std::size_t n = 31; n < way.T_w_c.size(); ++n) way.T_w_c[n] = way.T_w_c[60 - n];  // ends at 1 degree
+  EXPECT_FALSE(fit_turntable_axis(way.seconds, way.T_w_c, Vector3::UnitZ()));
+}
+
 }  // namespace
 }  // namespace twofold
