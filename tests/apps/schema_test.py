@@ -17,7 +17,6 @@ except ImportError:
 SCHEMAS = Path(__file__).parents[2] / "docs" / "schema"
 # A hand over the lens, from which the camera comes back: lost frames, a relocalisation, a loaded map, a pace.
 SCENE = "synthetic:desk?frames=90&width=320&height=240&cover_at=1&cover=0.5"
-OBJECT = "synthetic:turntable?sensor=rgbd&frames=60"
 
 
 # 35 degrees of two turns, and too few to tell an axis.
