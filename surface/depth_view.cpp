@@ -95,34 +95,52 @@ void find_jumps(const cv::Mat& raw, DepthView& view) {
 class SmoothedInverse {
  public:
   explicit SmoothedInverse(const cv::Mat& depth) : depth_(depth) {
-    for (Row* row : {&inverse_, &count_}) row->setZero(depth.cols + 4);
+    for (Row* row : {&inverse_, &count_}) row->setZero(depth.cols + 2 * kHalf);
+    for (Inverse& row : inverses_) {
+      row.value.setZero(depth.cols);
+      row.seen.setZero(depth.cols);
+    }
     for (Row& row : smooth_) row.setZero(depth.cols);
+    for (int y = 0; y < std::min(kHalf, depth.rows); ++y) invert(y);
   }
   /// Rows are asked for with growing y, from two rows above on to two below.
-  [[nodiscard]] const Row& row(int y) const { return smooth_[static_cast<std::size_t>(y + 5) % 5]; }
+  [[nodiscard]] const Row& row(int y) const { return smooth_[slot(y)]; }
   void add_row(int y) {
-    constexpr int kHalf = 2;
     const int width = depth_.cols;
+    if (y + kHalf < depth_.rows) invert(y + kHalf);
     inverse_.setZero();
     count_.setZero();
     for (int r = std::max(y - kHalf, 0); r <= std::min(y + kHalf, depth_.rows - 1); ++r) {
-      const auto* z = depth_.ptr<float>(r);
-      for (int x = 0; x < width; ++x) {
-        const float seen = z[x] > 0 ? 1.0f : 0.0f;
-        count_[x + kHalf] += seen;
-        inverse_[x + kHalf] += seen / std::max(z[x], 1e-3f);
-      }
+      inverse_.segment(kHalf, width) += inverses_[slot(r)].value;
+      count_.segment(kHalf, width) += inverses_[slot(r)].seen;
     }
     const auto five = [width](const Row& of) {
       return of.segment(0, width) + of.segment(1, width) + of.segment(2, width) + of.segment(3, width) +
              of.segment(4, width);
     };
-    smooth_[static_cast<std::size_t>(y + 5) % 5] = five(inverse_) / five(count_).max(0.5f);
+    smooth_[slot(y)] = five(inverse_) / five(count_).max(0.5f);
   }
 
  private:
+  static constexpr int kHalf = 2;
+  struct Inverse {
+    Row value, seen;  // 0 and 0 without a reading, else 1 / z and 1
+  };
+
+  static std::size_t slot(int y) { return static_cast<std::size_t>(y) % 5; }
+  /// Once a row, not once for each of the five squares that it lies in.
+  void invert(int y) {
+    const auto* z = depth_.ptr<float>(y);
+    Inverse& row = inverses_[slot(y)];
+    for (int x = 0; x < depth_.cols; ++x) {
+      row.seen[x] = z[x] > 0 ? 1.0f : 0.0f;
+      row.value[x] = row.seen[x] / std::max(z[x], 1e-3f);
+    }
+  }
+
   const cv::Mat& depth_;
   Row inverse_, count_;
+  std::array<Inverse, 5> inverses_;
   std::array<Row, 5> smooth_;
 };
 
@@ -182,11 +200,14 @@ void find_tiles(DepthView& view) {
   for (int y = 0; y < view.depth.rows; ++y) {
     auto* tiles = view.tiles.ptr<DepthTile>(y / kDepthTile);
     const auto* pixel = view.pixels.ptr<PixelReading>(y);
-    for (int x = 0; x < view.depth.cols; ++x) {
-      DepthTile& tile = tiles[x / kDepthTile];
-      tile.farthest = std::max(tile.farthest, std::max(pixel[x].depth, pixel[x].nearest));
-      tile.nearest = std::min(tile.nearest, pixel[x].nearest);
-      tile.least_slant = std::min(tile.least_slant, pixel[x].slant);
+    for (int left = 0; left < view.depth.cols; left += kDepthTile) {
+      DepthTile tile = tiles[left / kDepthTile];  // a copy: the compiler keeps it in registers
+      for (int x = left; x < std::min(left + kDepthTile, view.depth.cols); ++x) {
+        tile.farthest = std::max(tile.farthest, std::max(pixel[x].depth, pixel[x].nearest));
+        tile.nearest = std::min(tile.nearest, pixel[x].nearest);
+        tile.least_slant = std::min(tile.least_slant, pixel[x].slant);
+      }
+      tiles[left / kDepthTile] = tile;
     }
   }
 }

@@ -8,6 +8,8 @@ namespace {
 
 constexpr int kColumns = 160;             // of the finest cells, about
 constexpr std::size_t kMaxPlanes = 6000;  // beyond, the smallest are left out
+/// Of eight rows, so that those had at any time lie evenly.
+constexpr std::array<int, 8> kRowOrder{0, 4, 2, 6, 1, 5, 3, 7};
 constexpr double kEnoughReadings = 0.75;  // of a cell's pixels
 constexpr int kEnoughCells = 8;           // of 3 x 3
 constexpr int kManyColumns = 60;          // beyond, not every 3 x 3 is asked how means scatter
@@ -148,10 +150,24 @@ double DepthPlanes::scatter(const Means& means) {
 }
 
 void DepthPlanes::add_planes(int size) {
-  Means& means = means_[size];
-  means.sigma = scatter(means);
+  means_[size].sigma = scatter(means_[size]);
+  const std::size_t larger = planes_.size();
+  if (larger == kMaxPlanes || add_rows(size, 0, 1)) return;
+  // Full before the last row. Rows evenly over the image instead: its lower part would have no say.
+  planes_.resize(larger);
+  for (std::int16_t& plane : plane_of_cell_) {
+    if (plane >= static_cast<int>(larger)) plane = kNone;
+  }
+  for (const int first : kRowOrder) {
+    if (!add_rows(size, first, static_cast<int>(kRowOrder.size()))) return;
+  }
+}
+
+/// Planes of every step-th row of cells; whether there is room for more.
+bool DepthPlanes::add_rows(int size, int first_row, int step) {
+  const Means& means = means_[size];
   const int finest = 1 << size;  // cells of the finest size along a side
-  for (int row = 1; row + 1 < means.rows; ++row) {
+  for (int row = 1 + first_row; row + 1 < means.rows; row += step) {
     for (int column = 1; column + 1 < means.columns; ++column) {
       const int first = row * finest * means_[0].columns + column * finest;
       if (plane_of_cell_[static_cast<std::size_t>(first)] != kNone || !add_plane(means, column, row))
@@ -162,6 +178,7 @@ void DepthPlanes::add_planes(int size) {
       }
     }
   }
+  return planes_.size() < kMaxPlanes;
 }
 
 bool DepthPlanes::add_plane(const Means& means, int column, int row) {

@@ -62,6 +62,7 @@ class DepthPlanes {
   [[nodiscard]] static bool regress(const Means& means, int column, int row, Regression& regression);
   [[nodiscard]] double scatter(const Means& means);
   void add_planes(int size);
+  bool add_rows(int size, int first_row, int step);
   [[nodiscard]] bool add_plane(const Means& means, int column, int row);
 
   Rig rig_;

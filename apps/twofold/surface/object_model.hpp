@@ -16,8 +16,10 @@ namespace twofold {
 /// An upright box around the object, in the map's frame.
 struct ObjectBox {
   Vector3 centre{0, 0, 0};
-  Vector3 size{0, 0, 0};        ///< along its axes [m]
-  std::array<Vector3, 3> axes;  ///< unit; the third is up, the first the longer of the others
+  Vector3 size{0, 0, 0};  ///< along its axes [m]
+  std::array<Vector3, 3> axes{
+      Vector3::UnitX(), Vector3::UnitY(),
+      Vector3::UnitZ()};  ///< unit; the third is up, the first the longer of the others
 };
 
 /// What the frames of an object make, along their poses in the final map.
