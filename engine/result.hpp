@@ -52,6 +52,11 @@ enum class CorrectionReason : std::uint8_t {
   return "";
 }
 
+/// What moves by less is neither announced nor counted as moved: each round of the mapper moves everything a
+/// little.
+inline constexpr double kCorrection = 0.01;         // [m]
+inline constexpr double kCorrectionAngle = 0.0035;  // [rad]
+
 /// Announced with the first frame that is tracked against the corrected map: the frame before it, in the map
 /// it was tracked against and in the new one.
 struct PoseCorrection {

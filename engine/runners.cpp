@@ -6,9 +6,6 @@
 namespace twofold {
 namespace {
 
-// Smaller changes of the last frame's pose are not announced: each round of the mapper makes some.
-constexpr double kCorrection = 0.01;         // [m]
-constexpr double kCorrectionAngle = 0.0035;  // [rad]
 // A frame or two are lost now and then; the tracker finds on by itself.
 constexpr int kLostBeforeAsking = 2;
 

@@ -6,10 +6,6 @@
 namespace twofold {
 namespace {
 
-// As for the corrections that are announced (engine/runners.cpp).
-constexpr double kMoved = 0.01;     // [m]
-constexpr double kTurned = 0.0035;  // [rad]
-
 /// `later` comes after what is in `all`.
 void add(const MapMovement& later, MapMovement& all) {
   all.version = later.version;
@@ -55,7 +51,7 @@ void MapMovements::compare(const GraphSnapshot& graph, KeyframeId id, MapMovemen
   }
   const SE3 change = now.T_k_w * old.T_k_w.inverse();  // of the keyframe itself, wherever the origin is
   const double moved = change.translation().norm(), turned = change.so3().log().norm();
-  movement.keyframes += moved >= kMoved || turned >= kTurned;
+  movement.keyframes += moved >= kCorrection || turned >= kCorrectionAngle;
   movement.farthest = std::max(movement.farthest, moved);
   movement.most_turned = std::max(movement.most_turned, turned);
 }

@@ -236,8 +236,9 @@ void print_row(const Variation& variation, const Outcome& outcome) {
                                ? "-"
                                : fmt::format("{:.2f} / {:.2f} / {:.2f}", quantile(outcome.nees, 0.5), mean,
                                              quantile(outcome.nees, 0.95));
-  fmt::print("| {} | {}/{} | {:.5f} | {:.5f} | {} |\n", variation.name, outcome.tracked, outcome.frames,
-             outcome.ate, outcome.ate_causal, nees);
+  const auto metres = [](double ate) { return ate < 0 ? std::string("-") : fmt::format("{:.5f}", ate); };
+  fmt::print("| {} | {}/{} | {} | {} | {} |\n", variation.name, outcome.tracked, outcome.frames,
+             metres(outcome.ate), metres(outcome.ate_causal), nees);
   std::fflush(stdout);
 }
 
@@ -259,10 +260,12 @@ int main(int argc, char** argv) {
   app.add_option("--camera", camera, "mono: the left camera alone, errors after alignment with scale")
       ->check(CLI::IsMember({"all", "mono"}));
   app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
-  app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
+  CLI::Option* const one =
+      app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
   app.add_option("--every", every,
                  "instead of the variations: every first, second, .. frame, as many as given")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::PositiveNumber)
+      ->excludes(one);
   app.add_option("--truth", truth, "standard deviations of the truth's own poses: METRES RADIANS")
       ->expected(2);
   CLI11_PARSE(app, argc, argv);
@@ -286,7 +289,7 @@ int main(int argc, char** argv) {
           "\n| {} | tracked | ATE m | causal m | NEES / 6: median / mean / p95 |\n|---|---|---|---|---|\n",
           source);
       for (const twofold::Variation& variation : variations) {
-        if (only >= 0 && every.empty() && &variation != &variations[static_cast<std::size_t>(only)]) continue;
+        if (only >= 0 && &variation != &variations[static_cast<std::size_t>(only)]) continue;
         print_row(variation, twofold::run(source, options, variation, {truth[0], truth[1]}));
         if (as_it_is_only) break;
       }
