@@ -19,6 +19,11 @@ if(TWOFOLD_SHARED)
   # a program.
   target_compile_options(twofold_options INTERFACE -fPIC -fvisibility=hidden -fvisibility-inlines-hidden)
 endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  # By itself the compiler searches its memory for garbage every hundred megabytes, and finds next to none in what Eigen's
+  # templates become: a tenth of its time. Its largest process grows from 1.4 to 1.7 GB; what it writes stays as it is.
+  target_compile_options(twofold_options INTERFACE "SHELL:--param ggc-min-expand=1000" "SHELL:--param ggc-min-heapsize=2000000")
+endif()
 if(TWOFOLD_WERROR)
   target_compile_options(twofold_options INTERFACE -Werror)
 endif()
