@@ -1,8 +1,9 @@
 #include "evaluation/pose_consistency.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <utility>
+
+#include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
 namespace {
@@ -17,7 +18,7 @@ RelativeTruth::RelativeTruth(Trajectory truth, const TruthNoise& noise)
     : truth_(std::move(truth)), noise_(noise) {}
 
 double RelativeTruth::Comparison::normalised(const Matrix6& covariance) const {
-  return error.dot((covariance + of_truth).ldlt().solve(error)) / 6;
+  return error.dot(solve_symmetric(covariance + of_truth, error)) / 6;
 }
 
 /// Between the true poses before and after.

@@ -1,10 +1,10 @@
 // Start value of a new pose in the sliding window filter: fitted to the landmarks that are known already.
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "estimation/robust_kernel.hpp"
 #include "filters/sliding_window_filter.hpp"
+#include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
 namespace {
@@ -65,7 +65,7 @@ SE3 minimise(const PoseCost& cost, SE3 T_c_l) {
   for (int i = 0; i < 10; ++i) {
     Matrix6 damped = H;
     damped.diagonal() *= 1 + damping;
-    const Vector6 delta = damped.ldlt().solve(g);
+    const Vector6 delta = solve_symmetric(damped, g);
     const SE3 T_new = SE3::exp(delta) * T_c_l;
     const double next = cost.at(T_new);
     if (!std::isfinite(next) || next > current) {

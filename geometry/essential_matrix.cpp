@@ -2,9 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <Eigen/SVD>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numeric>
+#include <utility>
 
 #include "geometry/five_point_polynomials.hpp"
 #include "geometry/triangulation.hpp"
@@ -52,32 +56,85 @@ Constraints essential_constraints(const std::array<Matrix3, 4>& N) {
 
 }  // namespace
 
+namespace {
+
+/// Gauss-Jordan elimination, pivots sought in all of the rows and in the first `columns` columns that are
+/// left. By plain loops: Eigen's decompositions take the compiler five seconds each.
+/// @param order  out: the first Rows are the columns that became unit vectors, in the order of the rows
+/// @return false when the rows depend on each other
+template <int Rows, int Cols>
+bool eliminate(Eigen::Matrix<double, Rows, Cols>& M, int columns, int (&order)[Cols]) {
+  std::iota(std::begin(order), std::end(order), 0);
+  double largest_pivot = 0;
+  for (int k = 0; k < Rows; ++k) {
+    int pivot_row = k, pivot = k;
+    for (int r = k; r < Rows; ++r) {
+      for (int c = k; c < columns; ++c) {
+        if (std::abs(M(r, order[c])) > std::abs(M(pivot_row, order[pivot]))) pivot_row = r, pivot = c;
+      }
+    }
+    std::swap(order[k], order[pivot]);
+    for (int c = 0; c < Cols; ++c) std::swap(M(k, c), M(pivot_row, c));
+    const double value = M(k, order[k]);
+    largest_pivot = std::max(largest_pivot, std::abs(value));
+    if (!(std::abs(value) > Rows * std::numeric_limits<double>::epsilon() * largest_pivot)) return false;
+    for (int c = 0; c < Cols; ++c) M(k, c) /= value;
+    for (int r = 0; r < Rows; ++r) {
+      const double factor = M(r, order[k]);
+      if (r == k || factor == 0) continue;
+      for (int c = 0; c < Cols; ++c) M(r, c) -= factor * M(k, c);
+    }
+  }
+  return true;
+}
+
+/// Four orthonormal 3x3 matrices that span what A, of rows b a^T, says nothing of.
+bool find_null_space(Eigen::Matrix<double, 5, 9> A, std::array<Matrix3, 4>& N) {
+  int order[9];
+  if (!eliminate(A, 9, order)) return false;
+  for (int k = 0; k < 4; ++k) {
+    N[k].setZero();
+    N[k](order[5 + k] / 3, order[5 + k] % 3) = 1;
+    for (int r = 0; r < 5; ++r) N[k](order[r] / 3, order[r] % 3) = -A(r, order[5 + k]);
+    for (int pass = 0; pass < 2; ++pass) {  // Gram and Schmidt, twice to be orthogonal to all digits
+      for (int j = 0; j < k; ++j) N[k] -= N[j].cwiseProduct(N[k]).sum() * N[j];
+      N[k] /= N[k].norm();
+    }
+  }
+  // The last one's share of E must not be zero. It would be where it stands for an entry of E that is, as the
+  // diagonal's are without a rotation: all four are mixed, by a reflection without any symmetry.
+  const double v[4] = {0.31, 0.47, 0.59, 0.58};
+  Matrix3 along = Matrix3::Zero();
+  for (int k = 0; k < 4; ++k) along += v[k] * N[k];
+  const double norm2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3];
+  for (int k = 0; k < 4; ++k) N[k] -= 2 * v[k] / norm2 * along;
+  return true;
+}
+
+}  // namespace
+
 void solve_five_point(std::span<const Vector3, 5> bearings_a, std::span<const Vector3, 5> bearings_b,
                       std::vector<Matrix3>& solutions) {
-  Eigen::Matrix<double, 9, 5> At;  // columns: b a^T, row-major
+  Eigen::Matrix<double, 5, 9> A;  // rows: b a^T, row-major
   for (int i = 0; i < 5; ++i) {
     const Vector3 a = bearings_a[i].normalized();
     const Vector3 b = bearings_b[i].normalized();
-    At.col(i) << b.x() * a, b.y() * a, b.z() * a;
+    for (int k = 0; k < 9; ++k) A(i, k) = b[k / 3] * a[k % 3];
   }
-  // The last four columns of Q span the null space of A.
-  // Dynamic sizes from here on: Eigen would unroll the fixed ones into minutes of compilation.
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(At);
-  if (qr.rank() < 5) return;
-  const Eigen::MatrixXd Q = qr.householderQ();
   std::array<Matrix3, 4> N;
-  for (int k = 0; k < 4; ++k) {
-    N[k] = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(Q.col(5 + k).data());
-  }
+  if (!find_null_space(A, N)) return;
 
-  const Constraints C = essential_constraints(N);
-  const Eigen::FullPivLU<Eigen::MatrixXd> lu(C.leftCols<10>());
-  if (!lu.isInvertible()) return;
-  const Eigen::MatrixXd reduced = lu.solve(C.rightCols<10>());  // cubics = -reduced * basis
+  Constraints C = essential_constraints(N);
+  int order[20];
+  if (!eliminate(C, 10, order)) return;
+  // Cubics = -(the last ten columns) * basis; row r of C is that of cubic order[r].
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(10, 10);
+  for (int r = 0; r < 10; ++r) {
+    if (order[r] >= 6) continue;
+    for (int c = 0; c < 10; ++c) M(order[r], c) = -C(r, 10 + c);
+  }
 
   // Multiplication by x of the basis (x^2, xy, xz, y^2, yz, z^2, x, y, z, 1): the first six become cubics.
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(10, 10);
-  M.topRows<6>() = -reduced.topRows<6>();
   M(6, 0) = M(7, 1) = M(8, 2) = M(9, 6) = 1;
   const Eigen::EigenSolver<Eigen::MatrixXd> eigen(M);
   if (eigen.info() != Eigen::Success) return;

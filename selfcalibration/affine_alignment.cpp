@@ -1,8 +1,9 @@
 #include "selfcalibration/affine_alignment.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+
+#include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
 namespace {
@@ -13,9 +14,6 @@ constexpr float kSettledStep = 0.005F;   // [px]
 constexpr float kFarthestMove = 3;       // [px] from where the search began
 constexpr double kMinCorrelation = 0.9;  // of what is compared
 constexpr float kMinScale = 0.4F, kMaxScale = 2.5F;
-
-using Vector8 = Eigen::Matrix<double, 8, 1>;
-using Matrix8 = Eigen::Matrix<double, 8, 8>;
 
 /// Bilinear value and derivative. The place must be a pixel away from the border.
 struct Sample {
@@ -87,7 +85,7 @@ bool align_affine(const PointAppearance& appearance, const cv::Mat& image, Affin
     if (!stays_inside(now, image)) return false;
     AffineEquations sums = equations_at(appearance, image, now, gain, offset);
     sums.H.diagonal() *= 1 + 1e-6;
-    const Vector8 step = Matrix8(sums.H.selfadjointView<Eigen::Lower>()).ldlt().solve(sums.g);
+    const Vector8 step = solve_symmetric(sums.H, sums.g);
     if (!step.allFinite()) return false;
     now.A(0, 0) += static_cast<float>(step[0]);
     now.A(0, 1) += static_cast<float>(step[1]);

@@ -1,6 +1,5 @@
 #include "selfcalibration/self_calibration.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 
 #include "estimation/levenberg_marquardt.hpp"
 #include "geometry/option_check.hpp"
+#include "geometry/symmetric_solve.hpp"
 #include "selfcalibration/clip_start.hpp"
 #include "selfcalibration/median.hpp"
 
@@ -100,7 +100,7 @@ void solve_all(std::vector<ClipAdjustment>& clips, const std::vector<double>& we
       g += weights[c] * equations.g;
     }
     H.diagonal() *= 1 + damping.lambda();
-    const LensVector step = H.ldlt().solve(g);
+    const LensVector step = solve_symmetric(H, g);
     const SharedLens candidate = lens.plus(step);
     std::vector<ClipMotion> motions;
     for (const ClipAdjustment& clip : clips) motions.push_back(clip.stepped(step));
@@ -127,7 +127,7 @@ ClipWeights weigh_clips(std::vector<ClipAdjustment>& clips, const LensPrior& pri
     const LensEquations equations = clip.linearise(lens, 0);
     LensMatrix H = equations.H;
     H.diagonal() += prior.information;
-    const LensMatrix covariance = H.inverse();
+    const LensMatrix covariance = inverse_symmetric(H);
     deviations.push_back((covariance * equations.g)[0] / std::sqrt(covariance(0, 0)));
   }
   std::vector<double> sizes;
@@ -219,7 +219,7 @@ LensVector lens_sigma(const std::vector<Clip>& clips, std::vector<ClipAdjustment
     gradients.emplace_back(weights.of_clip[c] * equations.g);
   }
   for (const LensVector& g : grouped_gradients(clips, gradients)) scatter += g * g.transpose();
-  const LensMatrix covariance = H.inverse();
+  const LensMatrix covariance = inverse_symmetric(H);
   const LensVector by_corners = weights.spread * covariance.diagonal().cwiseSqrt();
   return by_corners.cwiseMax((covariance * scatter * covariance).diagonal().cwiseSqrt());
 }

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <span>
 
-#include <Eigen/Cholesky>
-
 #include "geometry/check.hpp"
+#include "geometry/symmetric_solve.hpp"
 #include "surface/triangle_grid.hpp"
 
 namespace twofold {
@@ -63,7 +62,7 @@ SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMe
       H += J * J.transpose();
       g += J * (n.dot(x) - plane->offset);
     }
-    const Vector6 delta = -H.ldlt().solve(g);
+    const Vector6 delta = -solve_symmetric(H, g);
     T = SE3::exp(delta) * T;
     within = std::max(kLeastReach, 0.8 * within);
   }

@@ -1,11 +1,11 @@
 #include "tracking/dense_alignment.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <opencv2/core.hpp>
 
+#include "geometry/symmetric_solve.hpp"
 #include "imaging/pixel_row.hpp"
 
 namespace twofold {
@@ -198,9 +198,9 @@ bool DenseAlignment::align_level(const PinholeCamera& level_camera, const cv::Ma
     best = state;
     best.rms = cost.rms;
     best.visible = cost.visible;
-    Eigen::Matrix<double, 8, 8> H = cost.H.cast<double>();
+    Matrix8 H = cost.H.cast<double>();
     for (int k = 0; k < 8; ++k) H(k, k) = H(k, k) * (1 + 1e-5) + 1e-3;
-    const Eigen::Matrix<double, 8, 1> step = H.ldlt().solve(cost.g.cast<double>());
+    const Vector8 step = solve_symmetric(H, cost.g.cast<double>());
     if (!step.allFinite()) break;
     // Inverse composition: the step moves the earlier frame, so its inverse goes to the right.
     state.T_cur_prev = state.T_cur_prev * SE3::exp(-step.head<6>());

@@ -6,6 +6,7 @@
 
 #include "geometry/option_check.hpp"
 #include "geometry/so3.hpp"
+#include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
 namespace {
@@ -186,7 +187,7 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
     if (equations.pairs < 6) return tl::unexpected(LostCause::kTooFewMatches);
     add_corners(result.T_c_ref, corners, pass.stride == 1, equations);
     equations.H.diagonal() *= 1 + 1e-9;  // a wall leaves directions open: they are judged in the end
-    const Vector6 step = -equations.H.ldlt().solve(equations.g);
+    const Vector6 step = -solve_symmetric(equations.H, equations.g);
     if (!step.allFinite() || !(step.norm() < 1)) return tl::unexpected(LostCause::kNoStructure);
     result.T_c_ref = SE3::exp(step) * result.T_c_ref;
     if (pass.stride == 1 && step.norm() < kSettled) break;

@@ -75,6 +75,26 @@ TEST(FivePoint, WorksForPlanarScenes) {
   EXPECT_GE(exact, 97);
 }
 
+/// Without a rotation entries of E are zero: the basis of the null space must not hang on one of them.
+TEST(FivePoint, WorksForMotionAlongTheAxesWithoutRotation) {
+  std::mt19937 rng(23);
+  int exact = 0;
+  for (int i = 0; i < 99; ++i) {
+    Pairs p = random_pairs(rng, 5, 0);
+    p.T_b_a = SE3(SO3(), Vector3::Unit(i % 3));
+    for (int k = 0; k < 5; ++k) {
+      const Vector3 x_b = p.T_b_a * Vector3((4 + k) * p.a[k]);
+      p.b[k] = x_b / x_b.z();
+    }
+    std::vector<Matrix3> solutions;
+    solve_five_point(std::span<const Vector3, 5>(p.a.data(), 5), std::span<const Vector3, 5>(p.b.data(), 5),
+                     solutions);
+    exact += std::any_of(solutions.begin(), solutions.end(),
+                         [&](const Matrix3& E) { return up_to_sign(E, essential_matrix(p.T_b_a)) < 1e-6; });
+  }
+  EXPECT_GE(exact, 97);
+}
+
 TEST(FivePoint, GivesNothingForRepeatedPoints) {
   const std::vector<Vector3> same(5, Vector3(0.1, 0.2, 1));
   std::vector<Matrix3> solutions;
