@@ -50,7 +50,7 @@ std::string SyntheticOptions::invalid_reason() const {
 
 const std::vector<std::string>& scene_names() {
   static const std::vector<std::string> kNames{"campus",  "cloister", "corridor", "courtyard",
-                                               "descent", "desk",     "turntable"};
+                                               "descent", "desk",     "terrace",  "turntable"};
   return kNames;
 }
 
@@ -74,6 +74,14 @@ SyntheticOptions default_options(const std::string& scene) {
     options.f = 0.5 * 320 / std::tan(40 * 0.017453292519943295);
     options.fps = 15;
     options.rounds = scene == "cloister" ? 1.3 : 1;
+  }
+  if (scene == "terrace") {  // by car: 80 degrees across, half a metre a frame
+    options.width = 640;
+    options.height = 240;
+    options.f = 0.5 * 640 / std::tan(40 * 0.017453292519943295);
+    options.baseline = 0.5;
+    options.fps = 15;
+    options.rounds = 1;
   }
   if (scene == "turntable") {
     options.f = 700;

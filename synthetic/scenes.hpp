@@ -36,6 +36,7 @@ inline constexpr int kTurntableTextures = 3;  ///< prints, wood, stone
                                     double plain = 0);    ///< up and down a corridor of 24 m
 [[nodiscard]] Staging make_cloister(std::uint64_t seed);  ///< sideways round a square of 16 m
 [[nodiscard]] Staging make_campus(std::uint64_t seed);    ///< a quadrangle and two large loops, 1.7 km
+[[nodiscard]] Staging make_terrace(std::uint64_t seed);   ///< 3 km along houses that are copies of four
 [[nodiscard]] Staging make_descent(
     std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
 /// A thing of 15 cm on a plate that turns before a camera, table and wall which stand still; the world is the

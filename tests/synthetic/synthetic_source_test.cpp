@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "io/sources/open_source.hpp"
+#include "synthetic/synthetic_sequence.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {
@@ -70,6 +71,24 @@ TEST(SyntheticSource, LargeLoopsComeBackToWhereTheyWere) {
   ASSERT_EQ(exact->next(b), FrameStatus::kFrame);
   EXPECT_EQ(cv::norm(a.left, b.left, cv::NORM_INF), 0);
   EXPECT_EQ(rough->ground_truth().size(), static_cast<std::size_t>(rough->frame_count().value_or(0)));
+}
+
+TEST(SyntheticSource, TheTerraceNeverComesBackButLooksAsIfItDid) {
+  const auto terrace = open_synthetic("terrace", {{"fps", "1"}});
+  const Trajectory& truth = terrace->ground_truth();
+  double path = 0, nearest = 1e9;
+  for (std::size_t i = 1; i < truth.size(); ++i) {
+    const Vector3 here = truth[i].T_w_c.translation();
+    path += (here - truth[i - 1].T_w_c.translation()).norm();
+    for (std::size_t k = 0; k + 8 <= i; ++k)  // 8 s are 64 m
+      nearest = std::min(nearest, (here - truth[k].T_w_c.translation()).norm());
+  }
+  EXPECT_NEAR(path, 3000, 20);
+  EXPECT_GT(nearest, 60);
+  // One house in four is painted; four pieces of road.
+  const synthetic::SyntheticSequence sequence(synthetic::default_options("terrace"));
+  EXPECT_EQ(sequence.scene().textures.size(), 4U * 6 + 4 + 6);
+  EXPECT_GT(sequence.scene().quads.size(), 4000U);
 }
 
 TEST(SyntheticSource, ACameraIsCoveredAndCarriedElsewhere) {
@@ -153,9 +172,9 @@ TEST(SyntheticSource, EffectsShowInTheImages) {
 }
 
 TEST(SyntheticSource, WrongParametersAreNamed) {
-  EXPECT_IO_ERROR(
-      open_synthetic("castle", {}),
-      "unknown scene 'castle' (known: campus, cloister, corridor, courtyard, descent, desk, turntable)");
+  EXPECT_IO_ERROR(open_synthetic("castle", {}),
+                  "unknown scene 'castle' (known: campus, cloister, corridor, courtyard, descent, desk, "
+                  "terrace, turntable)");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"colour", "1"}}), "unknown parameter 'colour'");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"width", "many"}}), "width='many' is not a number");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"width", "10"}}), "width must be between 32 and 4096");
