@@ -301,7 +301,7 @@ class Page {
     $('colouring').replaceChildren(...COLOURINGS.map((name) => new Option(name === 'observers' ? 'times seen' : name, name)));
     $('keys').replaceChildren(make('table', '', ...KEYS.map(([key, what]) => make('tr', '', make('td', '', make('kbd', key)), make('td', what)))));
     $('bar-colours').style.background = colourBar();
-    const windows = make('small', 'window', ...['inner', 'outer', 'neither'].map((name) => {
+    const windows = make('small', 'window', ...['inner', 'outer', 'none'].map((name) => {
       const word = make('b', name);
       word.className = name;
       return word;
