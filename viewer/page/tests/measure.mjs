@@ -1,5 +1,5 @@
 // The figures of docs/results.md: node measure.mjs run|map|hour OUTPUT_FOLDER
-import {existsSync, mkdirSync, readFileSync, readdirSync} from 'node:fs';
+import {mkdirSync, readFileSync, readdirSync, rmSync} from 'node:fs';
 import {join} from 'node:path';
 import {Program, openBrowser, openPage, report, until} from './program.mjs';
 import {Reader} from './reader.mjs';
@@ -23,7 +23,7 @@ function memory(pid) {
 
 const KINDS = [[null, 'no --view'], [0, 'nobody looks'], [1, '1 viewer'], [4, '4 viewers, one reads nothing']];
 const ROUNDS = Number(process.env.ROUNDS ?? 10);
-const SECONDS = Number(process.env.SECONDS ?? 20);
+const SECONDS = Number(process.env.ROUND_SECONDS ?? 20);
 const FIRST = 60;  // frames that begin the map, and in which viewers join
 const MORE = 0.05;  // that p99 may be longer with viewers
 const RESAMPLED = 2000;
@@ -91,11 +91,10 @@ const say = ({more, low, high}) => `${percent(more)} (${percent(low)} to ${perce
  * them. The program ends with 1 if p99 is more than 5 % longer, 2 if there were too few rounds to tell.
  */
 async function runs() {
-  const recording = join(out, `courtyard-${SECONDS}`);
-  if (!existsSync(join(recording, 'calib.txt')) && !existsSync(join(recording, 'mav0'))) {
-    const rendering = new Program(['render', `synthetic:courtyard?frames=${FIRST + 30 * SECONDS}`, '--out', recording]);
-    if (await rendering.end !== 0) throw new Error(rendering.text);
-  }
+  const recording = join(out, 'recording');
+  rmSync(recording, {recursive: true, force: true});
+  const rendering = new Program(['render', `synthetic:courtyard?frames=${FIRST + 30 * SECONDS}`, '--out', recording]);
+  if (await rendering.end !== 0) throw new Error(rendering.text);
   const found = new Map(KINDS.map(([, name]) => [name, []]));
   for (let round = 0; round < ROUNDS; ++round) {
     for (let k = 0; k < KINDS.length; ++k) {
