@@ -21,9 +21,12 @@ struct FinishFirst {
 void run(const char* name, int seconds_to_stay) {
   twofold::Source source(name);
   twofold::Slam slam(source.rig(), {.live = source.is_live()});
-  twofold::Viewer viewer(
-      source.rig(), [&] { return slam.map(); },
-      {.title = name, .port = 0, .stages = twofold::tracker_stages(), .efforts = twofold::effort_levels()});
+  twofold::Viewer viewer(source.rig(), [&] { return slam.map(); },
+                         {.title = name,
+                          .port = 0,
+                          .stages = twofold::tracker_stages(),
+                          .efforts = twofold::effort_levels(),
+                          .paced_by = source.is_live() ? "camera" : ""});
   const FinishFirst finish_first{slam};
   slam.on_frame([&](const twofold::PoseEstimate& pose, const twofold::FrameDetails& details) {
     viewer.tell(pose, details);

@@ -62,6 +62,7 @@ class SlamWithUpdates {
  public:
   SlamWithUpdates(const CameraRig& camera_rig, const SlamOptions& options)
       : rig(camera_rig),
+        live(options.live),
         items_in_flight(kItemsAFrame * static_cast<std::size_t>(std::max(options.frame_buffers, 1) + 1)),
         updates(std::make_shared<Updates>(std::bit_ceil(std::max<std::size_t>(512, 4 * items_in_flight)))),
         slam(camera_rig, options) {
@@ -93,6 +94,7 @@ class SlamWithUpdates {
   }
 
   const CameraRig rig;
+  const bool live;  // frames come at a camera's pace
   const std::size_t items_in_flight;
   const std::shared_ptr<Updates> updates;
   std::atomic<bool> finishing{false};  // a push that is refused from now on is none of the frame's fault
@@ -235,6 +237,7 @@ std::string view(SlamWithUpdates& self, const std::string& title, int port, cons
   options.port = port;
   options.stages = tracker_stages();
   options.efforts = effort_levels();
+  if (self.live) options.paced_by = "camera";
   for (const auto& pose : truth.value_or(PoseList{}).poses) {
     options.truth.push_back(pose.T_world_camera);
     options.truth_t_ns.push_back(pose.t_ns);

@@ -11,6 +11,7 @@
 namespace twofold {
 namespace {
 
+constexpr const char* kDropped = "dropped: a newer frame was there, or no room to wait";
 constexpr float kMoved = 0.002F;   // what moves less is not told again [m]
 constexpr int kHalved = 8;         // or doubled: standard deviations [codes]
 constexpr float kTurned = 0.001F;  // likewise [components of a unit quaternion]
@@ -173,7 +174,7 @@ std::uint8_t ViewScene::reason_number(const char* reason) {
 }
 
 void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns,
-                    const QueueLengths& waiting) {
+                    const QueueLengths& waiting, const ViewLosses& losses) {
   begin(pose.t_ns);
   ViewLiveFrame live;
   live.frame = static_cast<std::uint32_t>(pose.frame);
@@ -195,6 +196,9 @@ void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stag
   live.frames_waiting = number_of(waiting.frames);
   live.keyframes_waiting = number_of(waiting.keyframes);
   live.places_waiting = number_of(waiting.places);
+  live.frames_dropped = number_of(losses.dropped);
+  live.frames_lost = number_of(losses.lost);
+  add_dropped(live);
   live_.push_back(live);
   if (live_.size() > kLiveFrames) live_.pop_front();
   ++end_live_;
@@ -215,7 +219,26 @@ void ViewScene::add(const PoseEstimate& pose, std::span<const std::int64_t> stag
   add(frame);
 }
 
+void ViewScene::add_dropped(const ViewLiveFrame& next) {
+  if (next.frames_dropped == kViewNotKnown || next.frames_dropped <= dropped_) return;
+  const std::uint32_t room = next.frame > end_frame_ ? next.frame - end_frame_ : 0;
+  const std::uint32_t count = std::min({next.frames_dropped - dropped_, room, kMostDropped});
+  dropped_ = next.frames_dropped;
+  const float begin_t = end_t_;
+  for (std::uint32_t n = 1; n <= count; ++n) {
+    ViewPathFrame frame;
+    frame.frame = next.frame - count + n - 1;
+    frame.t = begin_t + (next.t - begin_t) * static_cast<float>(n) / static_cast<float>(count + 1);
+    frame.reference = frame.part = kNoId;
+    frame.state = kViewDropped;
+    frame.reason = reason_number(kDropped);
+    add(frame);
+  }
+}
+
 void ViewScene::add(const ViewPathFrame& frame) {
+  end_frame_ = frame.frame + 1;
+  end_t_ = frame.t;
   path_.append(frame, ++revision_);
   if (path_.size() > kMaxPath) thin_path();
 }

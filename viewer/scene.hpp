@@ -35,7 +35,7 @@ struct ViewMap {
 /// gone, the one before it stands for it.
 void mark_loops(const std::vector<MapSnapshot::Loop>& loops, ViewMap& view);
 
-/// Times of `t_ns` are counted from `start_ns`. O(size of the map); covariances take ten times as long as the
+/// Times of `t_ns` are counted from `start_ns`. O(size of the map); covariances take four times as long as the
 /// rest.
 [[nodiscard]] ViewMap view_of(const MapSnapshot& map, std::int64_t start_ns, bool with_covariance);
 
@@ -83,6 +83,12 @@ struct ViewEvent {
   std::optional<double> scale = {};
 };
 
+/// Frames of a live run that were not tracked, so far; -1: not known.
+struct ViewLosses {
+  std::int64_t dropped = -1;  ///< they came, and another one took their turn or their buffer
+  std::int64_t lost = -1;     ///< they never came: the camera or its driver lost them
+};
+
 /// Sets `in_reference` and `turned`.
 void set_pose_in_reference(const Pose& T_reference_camera, ViewPathFrame& frame);
 
@@ -95,9 +101,12 @@ class ViewScene {
   static constexpr std::size_t kMaxPath = 1U << 15;  // what a picture of it can show
   static constexpr std::size_t kLiveFrames = 512;
   static constexpr std::size_t kMaxEvents = 4096;
+  static constexpr std::uint32_t kMostDropped = 64;
 
-  void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns,
-           const QueueLengths& waiting = {});
+  /// Frames that were dropped since the last call are put before this one on the path, the newest
+  /// kMostDropped of them.
+  void add(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns, const QueueLengths& waiting = {},
+           const ViewLosses& losses = {});
   void add(const MapEvent& event);
   /// Corrections wait from here on for the map that they tell of, which says how far they changed its scale:
   /// of maps whose unit is arbitrary.
@@ -162,6 +171,7 @@ class ViewScene {
   [[nodiscard]] float seconds(std::int64_t t_ns) const {
     return static_cast<float>(1e-9 * static_cast<double>(t_ns - *start_ns_));
   }
+  void add_dropped(const ViewLiveFrame& next);
   /// Leaves out older frames of a path that has become too long.
   void thin_path();
   /// Those that the map of this version, which has these keyframes, was waited for by.
@@ -178,6 +188,9 @@ class ViewScene {
   ChangeSet<ViewPathFrame> path_;
   std::size_t thinned_ = 0;  // first frames of path_, of which every path_stride_-th was kept
   std::size_t path_stride_ = 2;
+  std::uint32_t end_frame_ = 0;  // one more than the number of the last frame of the path
+  float end_t_ = 0;              // its time
+  std::uint32_t dropped_ = 0;    // frames, so far
   std::deque<ViewLiveFrame> live_;
   std::deque<ViewEvent> events_;
   std::uint64_t end_live_ = 0, end_event_ = 0;

@@ -312,7 +312,8 @@ std::vector<asio::ip::address> network_addresses(const asio::ip::address& any) {
   return addresses;
 }
 
-/// For people: where it listens at all addresses, each of them, and the machine's name in the local network.
+/// For people: where it listens at all addresses, each of them, the machine's name in the local network, and
+/// the one for those who sit before the machine.
 std::vector<std::string> printed_addresses(const tcp::endpoint& at, const std::string& token) {
   std::vector<std::string> addresses;
   const auto add = [&](const std::string& host) {
@@ -328,7 +329,7 @@ std::vector<std::string> printed_addresses(const tcp::endpoint& at, const std::s
   for (const auto& address : network_addresses(at.address())) add_address(address);
   const std::string name = machine_name();
   if (!addresses.empty() && !name.empty()) add(name.substr(0, name.find('.')) + ".local");
-  if (addresses.empty()) add_address(asio::ip::address_v4::loopback());
+  add_address(asio::ip::address_v4::loopback());
   return addresses;
 }
 

@@ -68,6 +68,7 @@ std::string hello_text(const ViewTitle& title) {
                     {"hasTimes", title.has_times},
                     {"hasQueues", title.kind == ViewKind::kLive},
                     {"efforts", title.efforts},
+                    {"pacedBy", title.paced_by},
                     {"control", title.control},
                     {"keyframeImages", title.keyframe_images},
                     {"periodMs", title.period_ms}}}});

@@ -29,6 +29,7 @@ struct ViewTitle {
   std::vector<std::string> efforts = {};  ///< words of the effort levels, from 0 on; may be none
   bool control = false;                   ///< viewers may command
   bool keyframe_images = false;           ///< viewers may ask for images of keyframes
+  std::string paced_by = {};              ///< "camera", "recording"; empty: nothing
   double period_ms = 0;                   ///< between two frames: the budget; 0: as the frames' times say
 };
 

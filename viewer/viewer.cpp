@@ -40,6 +40,7 @@ struct ToldFrame {
   PoseEstimate pose;
   std::array<std::int64_t, kViewStages> stage_ns{};
   std::size_t stages = 0;
+  std::int64_t dropped = 0;  ///< frames before it, since the first that was told
 };
 
 struct ToldPoints {
@@ -76,6 +77,7 @@ ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   title.period_ms = 1e3 * options.frame_period;
   title.metres = options.metric.value_or(rig.sensor != Sensor::kMono);
   title.efforts = options.efforts;
+  title.paced_by = options.paced_by;
   title.has_deviations = true;
   title.control = static_cast<bool>(options.on_command);
   title.keyframe_images = static_cast<bool>(options.recorded_image);
@@ -163,6 +165,12 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     delete image_.load(std::memory_order_relaxed);  // relaxed: both threads are gone
   }
 
+  /// Frames whose numbers were left out between this one and the one told before, and all before that.
+  std::int64_t count_dropped(std::int64_t frame) {
+    if (next_frame_ >= 0 && frame > next_frame_) dropped_ += frame - next_frame_;
+    next_frame_ = frame + 1;
+    return dropped_;
+  }
   void push(const std::variant<ToldFrame, MapEvent>& told) {
     (void)ring_.try_push(std::variant<ToldFrame, MapEvent>(told));  // full: the page does without
   }
@@ -185,6 +193,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     keyframes_waiting_.store(waiting.keyframes, std::memory_order_relaxed);
     places_waiting_.store(waiting.places, std::memory_order_relaxed);
   }
+  void set_lost(std::int64_t frames) { frames_lost_.store(frames, std::memory_order_relaxed); }
   const ViewServer& server() const { return server_; }
   void finish() {
     if (self_.load(std::memory_order_relaxed) == std::this_thread::get_id())
@@ -242,7 +251,8 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         scene_.add(frame->pose, std::span(frame->stage_ns).first(frame->stages),
                    {frames_waiting_.load(std::memory_order_relaxed),
                     keyframes_waiting_.load(std::memory_order_relaxed),
-                    places_waiting_.load(std::memory_order_relaxed)});
+                    places_waiting_.load(std::memory_order_relaxed)},
+                   {frame->dropped, frames_lost_.load(std::memory_order_relaxed)});
         find_truth(frame->pose);
       } else {
         scene_.add(std::get<MapEvent>(told));
@@ -336,9 +346,11 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   std::atomic<bool> wants_image_{false};
   // Frames whose images were put last. Relaxed: who is late in seeing one shows it without its points.
   std::array<std::atomic<std::int64_t>, 16> shown_;
-  std::size_t images_ = 0;  // the source's
+  std::size_t images_ = 0;                      // the source's
+  std::int64_t next_frame_ = -1, dropped_ = 0;  // the teller's
   // Relaxed: numbers to be shown; they need not be of one moment.
-  std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1};
+  std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1},
+      frames_lost_{-1};
   std::atomic<std::thread::id> self_{};
   std::mutex finishing_;          // guards thread_ from there on
   std::optional<Worker> thread_;  // last: joins before what it uses is destroyed
@@ -366,6 +378,7 @@ bool Viewer::is_open_to_network() const {
 
 void Viewer::tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns) {
   ToldFrame frame{pose};
+  frame.dropped = impl_->count_dropped(pose.frame);
   frame.stages = std::min(stage_ns.size(), frame.stage_ns.size());
   std::copy_n(stage_ns.begin(), frame.stages, frame.stage_ns.begin());
   impl_->push(frame);
@@ -400,6 +413,10 @@ void Viewer::tell(std::int64_t frame, std::span<const MeasuredPoint> points) {
 
 void Viewer::tell_waiting(const QueueLengths& waiting) {
   impl_->set_waiting(waiting);
+}
+
+void Viewer::tell_lost(std::int64_t frames) {
+  impl_->set_lost(frames);
 }
 
 bool Viewer::wants_image() const {

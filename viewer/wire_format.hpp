@@ -35,7 +35,7 @@ namespace twofold {
 // Worlds are those of map parts; poses are T_world_camera; lengths are metres, or, where hello.metres is
 // false, of the one camera's own unit; times are seconds since the scene's first moment.
 
-inline constexpr std::uint32_t kViewProtocol = 4;
+inline constexpr std::uint32_t kViewProtocol = 5;
 static_assert(std::endian::native == std::endian::little, "records are sent as they lie in memory");
 
 inline constexpr std::uint32_t kViewNotKnown = 0xffffffffU;  ///< of numbers that may not be known
@@ -162,7 +162,9 @@ struct ViewLiveFrame {
   std::uint32_t keyframes_waiting = kViewNotKnown;  ///< for the mapper
   std::uint32_t frames_waiting = kViewNotKnown;     ///< for the tracker
   std::uint32_t places_waiting = kViewNotKnown;     ///< keyframes, for the loop closer
+  std::uint32_t frames_dropped = kViewNotKnown;     ///< that came and were not tracked, so far
+  std::uint32_t frames_lost = kViewNotKnown;        ///< that never came: lost by the camera, so far
 };
-static_assert(sizeof(ViewLiveFrame) == 108 && std::is_trivially_copyable_v<ViewLiveFrame>);
+static_assert(sizeof(ViewLiveFrame) == 116 && std::is_trivially_copyable_v<ViewLiveFrame>);
 
 }  // namespace twofold

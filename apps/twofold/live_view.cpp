@@ -1,12 +1,14 @@
 #include "apps/twofold/live_view.hpp"
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <opencv2/imgproc.hpp>
 
 #include <fmt/format.h>
 
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/run_output.hpp"
+#include "engine/clock.hpp"
 #include "engine/listeners.hpp"
 #include "graph/map_file.hpp"
 #include "io/files/io_error.hpp"
@@ -17,39 +19,73 @@
 namespace twofold {
 namespace {
 
+constexpr std::int64_t kLossesPeriodNs = 500'000'000;
+
+/// Of the last effort level, which drops frames if the run may.
+std::vector<std::string> words_of_efforts(LatePolicy late) {
+  std::vector<std::string> words = effort_levels();
+  if (late == LatePolicy::kQueue) words.back() = "no more can be left out, and no frame is dropped";
+  if (late == LatePolicy::kNewest) words.back() = "no more can be left out";
+  return words;
+}
+
+std::string paced_by(const PacingOptions& pacing) {
+  if (!pacing.keeps_pace()) return "";
+  return pacing.live ? "camera" : "recording";
+}
+
+/// Digits and nothing else, up to 65535.
+std::optional<int> port_of(const std::string& text) {
+  int port = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  return whole && port >= 0 && port <= 65535 ? std::optional(port) : std::nullopt;
+}
+
 ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& title,
-                             const FrameSource& source) {
+                             const FrameSource& source, const EngineOptions& engine) {
   ViewerOptions options;
   options.title = title;
   options.bind = arguments.bind;
   options.port = *arguments.port;
   options.stages = tracker_stages();
-  options.efforts = effort_levels();
+  options.efforts = words_of_efforts(engine.pacing.late);
+  if (!engine.deterministic) options.paced_by = paced_by(engine.pacing);
   for (const TimedPose& pose : source.ground_truth()) {
     options.truth.push_back(to_pose(pose.T_w_c));
     options.truth_t_ns.push_back(pose.t_ns);
   }
+  options.metric = !scale_is_arbitrary(source.rig(), engine);
   return options;
 }
 
 }  // namespace
 
-void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description) {
-  command
-      .add_option_function<int>(
-          "--view", [&arguments](const int& port) { arguments.port = port; }, description)
-      ->expected(0, 1)
-      ->default_str(std::to_string(kUsualViewPort))
-      ->check(CLI::Range(0, 65535))
-      ->type_name("[PORT]");
+void add_view_options(CLI::App& command, ViewArguments& arguments) {
+  const auto take_port = [&arguments](const std::string& text) {
+    arguments.port = port_of(text);
+    if (arguments.port) return;
+    throw CLI::ValidationError("--view", fmt::format("'{}' is no port: a number from 0 to 65535", text));
+  };
+  CLI::Option* view =
+      command
+          .add_option_function<std::string>("--view", take_port,
+                                            fmt::format("Show the run in a browser while it runs, at port {} "
+                                                        "of this machine or at PORT; 0: any that is free",
+                                                        kUsualViewPort))
+          ->expected(0, 1)
+          ->default_str(std::to_string(kUsualViewPort))
+          ->option_text("[PORT]");
   command
       .add_option("--view-bind", arguments.bind,
                   "Address to listen on: any but a loopback address shows camera and map to the network; "
                   "0.0.0.0: all of the machine's")
-      ->capture_default_str();
-  command.add_flag(
-      "--view-control", arguments.control,
-      "Viewers may save the map (to map.tfm in the output folder), pause mapping, and end the run");
+      ->capture_default_str()
+      ->needs(view);
+  command
+      .add_flag("--view-control", arguments.control,
+                "Viewers may save the map (to map.tfm in the output folder), pause mapping, and end the run")
+      ->needs(view);
 }
 
 void print_view_addresses(const ViewAddresses& viewer) {
@@ -75,16 +111,12 @@ ViewedImage viewed_image(const cv::Mat& image) {
 LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
                    const std::filesystem::path& folder, const FrameSource& source,
                    const RecordedImages& images, EngineOptions& options)
-    : rig_(source.rig()), map_file_(folder / "map.tfm") {
-  if (!arguments.port) {
-    if (arguments.control) throw IoError("--view-control", "needs --view");
-    return;
-  }
+    : rig_(source.rig()), map_file_(folder / "map.tfm"), source_(source) {
+  if (!arguments.port) return;
   const auto newest_map = [this] {
     return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps_.newest()}));
   };
-  ViewerOptions viewer = viewer_options(arguments, title, source);
-  viewer.metric = !scale_is_arbitrary(rig_, options);
+  ViewerOptions viewer = viewer_options(arguments, title, source, options);
   if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
   if (images) viewer.recorded_image = [images](std::int64_t t_ns) { return viewed_image(images(t_ns)); };
   try {
@@ -142,9 +174,18 @@ std::string LiveView::obey(ViewCommand command) {
 }
 
 void LiveView::show(const Frame& frame) {
-  if (!viewer_ || !viewer_->wants_image()) return;
+  if (!viewer_) return;
+  count_losses();
+  if (!viewer_->wants_image()) return;
   ViewedImage image = viewed_image(frame.left);
   viewer_->show(frame.index, image.pixels, std::move(image.owner));
+}
+
+/// Recordings lose none. A report has texts, too, so that it is not asked for with each frame.
+void LiveView::count_losses() {
+  if (!source_.is_live() || steady_now_ns() < losses_due_ns_) return;
+  losses_due_ns_ = steady_now_ns() + kLossesPeriodNs;
+  viewer_->tell_lost(static_cast<std::int64_t>(source_.report().lost));
 }
 
 void LiveView::show(const Progress& progress) {

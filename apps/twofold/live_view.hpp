@@ -27,8 +27,8 @@ struct ViewArguments {
   bool control = false;  ///< viewers may save the map, hold it, and end the run
 };
 
-/// --view [PORT], --view-bind and --view-control.
-void add_view_options(CLI::App& command, ViewArguments& arguments, const std::string& description);
+/// --view [PORT], and --view-bind and --view-control, which need it.
+void add_view_options(CLI::App& command, ViewArguments& arguments);
 /// For those who look at it.
 [[nodiscard]] ViewedImage viewed_image(const cv::Mat& image);
 /// Where a viewer can be reached.
@@ -45,8 +45,8 @@ void print_view_addresses(const ViewAddresses& viewer);
 /// The viewer of `twofold run --view`; nothing without that option.
 class LiveView {
  public:
-  /// Adds its listeners to those of `options`, which are called as before. Throws IoError when the port is
-  /// not to be had or the program was built without the viewer.
+  /// Adds its listeners to those of `options`, which are called as before. `source` outlives it. Throws
+  /// IoError when the port is not to be had or the program was built without the viewer.
   /// @param folder  where viewers may save the map to
   /// @param images  of frames that were played; may be empty
   LiveView(const ViewArguments& arguments, const std::string& title, const std::filesystem::path& folder,
@@ -61,13 +61,16 @@ class LiveView {
 
  private:
   void listen(EngineOptions& options);
+  void count_losses();
   void tell(const PoseReport& report);
   [[nodiscard]] QueueLengths waiting() const;
   [[nodiscard]] std::string obey(ViewCommand command);
 
   const Rig rig_;
   const std::filesystem::path map_file_;
-  PoseReporter reporter_;  // tracker's
+  const FrameSource& source_;
+  std::int64_t losses_due_ns_ = 0;  // reader's
+  PoseReporter reporter_;           // tracker's
   // As the reader saw them last; relaxed: numbers to be shown.
   std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1};
   MapLender maps_;

@@ -113,7 +113,7 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--vocabulary", arguments.vocabulary, "Vocabulary file instead of the built-in one");
   command.add_option("--record", arguments.record,
                      "Record the frames into this folder: the run can be repeated from it and schedule.log");
-  add_view_options(command, arguments.view, "Show the run in a browser while it runs, at this port");
+  add_view_options(command, arguments.view);
   add_live_surface_options(command, arguments.surface);
   add_map_options(command, arguments.map);
   command.add_flag("--no-places", arguments.no_places, "Recognise no places: no large loops are closed");

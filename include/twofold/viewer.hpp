@@ -39,7 +39,10 @@ struct ViewerOptions {
   std::vector<std::string> stages = {};   ///< names of what `tell` is given times of, at most 8
   std::vector<std::string> efforts = {};  ///< words of PoseEstimate::effort, from 0 on; may be none
   double frame_period = 0;                ///< the budget of a frame [s]; 0: as the frames' times say
-  std::vector<Pose> truth = {};           ///< T_world_camera of the true path, if it is known, in any world
+  /// Whose pace the run keeps, "camera" or "recording": the page says how far poses are behind it. Empty: no
+  /// pace; PoseEstimate::latency_ns is then what tracking took.
+  std::string paced_by = {};
+  std::vector<Pose> truth = {};  ///< T_world_camera of the true path, if it is known, in any world
   std::vector<std::int64_t> truth_t_ns = {};  ///< its times, ascending, as many; else nothing is shown
   /// Whether lengths are metres; else the map has a unit of its own: the page writes lengths without one,
   /// says by how much corrections changed the scale, and lays the true path scaled upon the tracked one.
@@ -70,11 +73,15 @@ struct ViewerOptions {
 ///
 /// Threads:
 /// - address, addresses, port, is_open_to_network: any, always.
-/// - tell (all four), wants_points: one, the tracker's. A copy into a ring: no lock, no allocation, no system
-///   call. A viewer that falls behind by the whole ring (1024 frames) leaves frames out.
-/// - tell_waiting: any, one at a time.
-/// - show, wants_image: one, that of the images' source.
-/// - finish: any but the viewer's own.
+/// - tell of poses, of MapEvents and of points, wants_points: one and the same for all of them, the
+/// tracker's,
+///   which calls Slam::on_frame and Slam::on_event: who tells events from another thread than poses has a
+///   data race. A copy into a ring: no lock, no allocation, no system call. A viewer that falls behind by the
+///   whole ring (1024 frames) leaves frames out.
+/// - tell_waiting, tell_lost: any, one at a time each.
+/// - show, wants_image: one, that of the images' source; it may be the tracker's.
+/// - finish, and the destructor, which finishes: any but the viewer's own, when no other thread is in one of
+///   the above any more.
 /// - map, on_command, recorded_image are called by the viewer's, one at a time; while they take, nobody is
 ///   served. What they throw becomes an event.
 /// After finish, tell and show do nothing that anybody sees.
@@ -90,13 +97,15 @@ class TWOFOLD_API Viewer {
 
   /// With its token: who knows it may look.
   [[nodiscard]] std::string address() const;
-  /// Where it listens at all addresses of the machine (bind = "0.0.0.0"), each of them; else the one.
+  /// Where it listens at all addresses of the machine (bind = "0.0.0.0"): each by which others reach it,
+  /// its name in the local network, and http://127.0.0.1 last; else the one.
   [[nodiscard]] std::vector<std::string> addresses() const;
   [[nodiscard]] int port() const;
   [[nodiscard]] bool is_open_to_network() const;
 
   /// Of Slam::on_frame: the pose, what the frame took and what waits; and what was measured, if the frame's
-  /// image is shown.
+  /// image is shown. Poses come in the order of their frames. Numbers that are left out between two of them
+  /// are shown as frames that were dropped (PoseEstimate::frame counts those, too).
   void tell(const PoseEstimate& pose, const FrameDetails& details);
   /// The same of other engines.
   /// @param stage_ns  what its stages took, in the order of ViewerOptions::stages
@@ -109,6 +118,9 @@ class TWOFOLD_API Viewer {
 
   /// What waits for the engine's threads; until it is told, it is not known.
   void tell_waiting(const QueueLengths& waiting);
+  /// Frames that never came because the camera or its driver lost them, since the run began; until it is
+  /// told, it is not known.
+  void tell_lost(std::int64_t frames);
 
   /// Whether an image would be shown if it came now: at most five a second are, while somebody looks.
   [[nodiscard]] bool wants_image() const;

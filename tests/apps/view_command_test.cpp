@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "tests/apps/command.hpp"
 
 namespace twofold {
@@ -18,6 +20,22 @@ TEST(ViewCommand, AFilterIsNotViewed) {
   expect_bad_input(
       run(folder, "run synthetic:desk?frames=2 --estimator swf --view --out '" + (folder / "run") + "'"),
       "--view: is not for --estimator swf");
+}
+
+TEST(ViewCommand, OptionsOfTheViewerNeedIt) {
+  const ScratchFolder folder;
+  const auto refused = [&](const std::string& options) {
+    const Outcome outcome =
+        run(folder, fmt::format("run 'synthetic:desk?frames=2' --out '{}' {}", folder / "run", options));
+    EXPECT_FALSE(std::filesystem::exists(folder / "run")) << "nothing is begun";
+    return outcome;
+  };
+  expect_bad_input(refused("--view-bind 127.0.0.1"), "--view-bind requires --view");
+  expect_bad_input(refused("--view-control"), "--view-control requires --view");
+  expect_bad_input(refused("--estimator swf --view-control"), "--view-control requires --view");
+  for (const char* port : {"abc", "70000", "-1", "84x", "8420.0"})
+    expect_bad_input(refused(fmt::format("--view={}", port)),
+                     fmt::format("'{}' is no port: a number from 0 to 65535", port));
 }
 
 TEST(ViewCommand, RunSaysWhereToLook) {

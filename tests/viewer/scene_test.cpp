@@ -51,7 +51,7 @@ TEST(ViewScene, MessagesAreThoseThatThePageIsTestedWith) {
   first.edges[1].loop = kClosesLoop;
   scene.show(first);
   const std::array<std::int64_t, 2> stages{1'000'000, 2'500'000};
-  scene.add(tracked_pose(4, 2), stages, {.frames = 2, .keyframes = 7});
+  scene.add(tracked_pose(4, 2), stages, {.frames = 2, .keyframes = 7}, {.lost = 3});
   const auto whole = scene.delta(0);
   const Revision before = scene.revision();
   ViewMap map = small_map(3, 2);
@@ -84,6 +84,41 @@ TEST(ViewScene, FramesMoveToAnotherKeyframeWhenTheirsGoes) {
   EXPECT_FLOAT_EQ(path[0].in_reference[1], 0);
   EXPECT_FLOAT_EQ(path[0].in_reference[2], 0.125);
   EXPECT_FLOAT_EQ(path[0].causal[0], 2);
+}
+
+TEST(ViewScene, DroppedFramesAreOnThePath) {
+  ViewScene scene;
+  const auto add = [&scene](std::int64_t frame, std::int64_t dropped) {
+    scene.add(tracked_pose(frame, 0), {}, {}, {.dropped = dropped, .lost = 2});
+  };
+  add(10, 0);
+  add(11, 0);
+  add(14, 2);     // 12 and 13
+  add(20, 4);     // 15 to 17 were not told, 18 and 19 were dropped
+  add(500, 400);  // more than are worth a mark each
+  const auto path = records<ViewPathFrame>(*scene.delta(0), ViewBlock::kPath);
+  ASSERT_EQ(path.size(), 9U + ViewScene::kMostDropped);
+  std::vector<std::uint32_t> dropped;
+  for (std::size_t i = 0; i < 8; ++i)
+    if (path[i].state == kViewDropped) dropped.push_back(path[i].frame);
+  EXPECT_EQ(dropped, (std::vector<std::uint32_t>{12, 13, 18, 19}));
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    EXPECT_GT(path[i].frame, path[i - 1].frame);
+    EXPECT_GT(path[i].t, path[i - 1].t);
+  }
+  EXPECT_EQ(path[8].frame, 500 - ViewScene::kMostDropped);
+  EXPECT_EQ(scene.reasons()[path[2].reason], "dropped: a newer frame was there, or no room to wait");
+  EXPECT_EQ(path[2].reference, kNoId);
+  EXPECT_EQ(scene.live(4).frames_dropped, 400U);
+  EXPECT_EQ(scene.live(4).frames_lost, 2U);
+}
+
+TEST(ViewScene, WhoTellsOfNoDroppedFramesHasNone) {
+  ViewScene scene;
+  scene.add(tracked_pose(1, 0), {});
+  scene.add(tracked_pose(100, 0), {});
+  EXPECT_EQ(records<ViewPathFrame>(*scene.delta(0), ViewBlock::kPath).size(), 2U);
+  EXPECT_EQ(scene.live(1).frames_dropped, kViewNotKnown);
 }
 
 TEST(ViewScene, NoticesGrossMotionOfPointsOnly) {

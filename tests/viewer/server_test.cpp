@@ -140,7 +140,22 @@ TEST_F(ViewServerTest, DropsWhoSaysTooMuch) {
 }
 
 TEST_F(ViewServerTest, SocketsAreOpenedAtOnePathAlone) {
-  EXPECT_TRUE(answer(upgrade_request(port_, token_, "", "/page.js")).starts_with("HTTP/1.1 404"));
+  for (const char* path : {"/page.js", "/", "/live/", "/live/..", "//live", "/Live", "/parts", "/live%00"})
+    EXPECT_TRUE(answer(upgrade_request(port_, token_, "", path)).starts_with("HTTP/1.1 404")) << path;
+}
+
+TEST_F(ViewServerTest, GivesOutThePagesFilesAndNothingElse) {
+  const std::string cookie =
+      "Cookie: twofold-" + std::to_string(port_) + "=" + testing::cookie_for(port_, token_) + "\r\n";
+  for (const char* path : {"/", "/page.js", "/page.css", "/icon.svg", "/licences.txt", "/page.js?x=/live"})
+    EXPECT_TRUE(answer(http_request(path, cookie)).starts_with("HTTP/1.1 200 OK")) << path;
+  EXPECT_NE(answer(http_request("/live?again", cookie)).find("there is room"), std::string::npos)
+      << "asked as a page, the socket's path answers in words";
+  for (const char* path : {"/live/", "/live/map", "/parts", "/parts/0", "/keyframe/1", "/page.js/",
+                           "//page.js", "/%70age.js", "/.", "/live/../page.js", "/map.tfm", "*", "page.js"})
+    EXPECT_TRUE(answer(http_request(path, cookie)).starts_with("HTTP/1.1 404")) << path;
+  for (const char* path : {"/live", "/parts", "/licences.txt"})
+    EXPECT_TRUE(answer(http_request(path)).starts_with("HTTP/1.1 403")) << path << " without a cookie";
 }
 
 TEST_F(ViewServerTest, DropsWhoTakesTooLong) {

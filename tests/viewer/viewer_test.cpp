@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <thread>
 
 #include <fmt/format.h>
@@ -55,6 +56,38 @@ TEST_F(ViewerTest, TellsWhatItIsToldAndTheEnd) {
   const std::string told = client.receive_until("the run is over");
   EXPECT_NE(told.find("parts joined"), std::string::npos);
   EXPECT_NE(told.find("the run is over"), std::string::npos);
+}
+
+/// The last of the live frames in what a client got: those of one message.
+ViewLiveFrame last_live_frame(const std::string& told) {
+  ViewMessageHeader header{ViewMessageKind::kFrames, 1};
+  for (header.number = 1; header.number < 10; ++header.number) {
+    const std::string begin(reinterpret_cast<const char*>(&header), sizeof header);
+    const std::size_t at = told.find(begin);
+    ViewLiveFrame frame;
+    const std::size_t last = at + begin.size() + (header.number - 1) * sizeof frame;
+    if (at == std::string::npos || last + sizeof frame > told.size()) continue;
+    std::memcpy(&frame, told.data() + last, sizeof frame);
+    return frame;
+  }
+  ADD_FAILURE() << "no live frames";
+  return {};
+}
+
+TEST_F(ViewerTest, TellsWhatWasDroppedAndLost) {
+  Viewer viewer(kRig, {}, {.port = 0, .paced_by = "camera"});
+  viewer.tell_lost(3);
+  for (const std::int64_t frame : {7, 8, 11, 12, 14}) viewer.tell(tracked_pose(frame, 0));  // told from 7 on
+  LocalClient client = watch(viewer);
+  const std::string reason = "dropped: a newer frame was there";
+  const std::string told =
+      client.receive_until(reason) + client.receive(4000, std::chrono::milliseconds(500));
+  EXPECT_NE(told.find(reason), std::string::npos);
+  EXPECT_NE(told.find("\"pacedBy\":\"camera\""), std::string::npos);
+  const ViewLiveFrame last = last_live_frame(told);
+  EXPECT_EQ(last.frame, 14U);
+  EXPECT_EQ(last.frames_dropped, 3U) << "9, 10 and 13";
+  EXPECT_EQ(last.frames_lost, 3U);
 }
 
 TEST_F(ViewerTest, NobodyWaitsForIt) {
@@ -116,8 +149,7 @@ TEST_F(ViewerTest, AsksForFiveImagesASecond) {
   EXPECT_LE(shown, 2 + took / std::chrono::milliseconds(200));
 }
 
-/// A map of three keyframes, a second apart.
-/// Keyframes 0, 1 and 3; number 2 was culled.
+/// A map of three keyframes, a second apart: keyframes 0, 1 and 3; number 2 was culled.
 MapSnapshot map_of_three() {
   GraphWriter writer;
   for (const std::uint32_t k : {0U, 1U, 3U}) {
@@ -244,6 +276,7 @@ TEST_F(ViewerTest, LoopbackAddressesAreNotTheNetwork) {
   EXPECT_EQ(other.addresses(), std::vector<std::string>{other.address()});
   const Viewer everywhere(kRig, {}, {.bind = "0.0.0.0", .port = 0});
   EXPECT_TRUE(everywhere.is_open_to_network());
+  EXPECT_TRUE(everywhere.addresses().back().starts_with("http://127.0.0.1:")) << "for who sits there";
   for (const std::string& address : everywhere.addresses()) {
     EXPECT_EQ(address.find("0.0.0.0"), std::string::npos) << "nobody can open that";
     EXPECT_NE(address.find(fmt::format(":{}/?token=", everywhere.port())), std::string::npos);

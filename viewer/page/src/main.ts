@@ -8,8 +8,8 @@ import {eventColour, type Theme} from './palette.ts';
 import {Sight} from './sight.ts';
 import {Stage, type Layer, type View} from './stage.ts';
 import {Strip} from './strip.ts';
-import {Timeline, clock, describe, isLost, lateStretches, length, lostStretches} from './timeline.ts';
-import {PROTOCOL, State, type Binary, type Keyframe, type KeyframeImage, type MapEvent, type Text} from './wire.ts';
+import {Timeline, clock, describe, lateStretches, lateTally, length, lostStretches, tally, type Tally} from './timeline.ts';
+import {PROTOCOL, State, type Binary, type Keyframe, type KeyframeImage, type LiveFrame, type MapEvent, type Text} from './wire.ts';
 
 const $ = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
@@ -22,7 +22,7 @@ function make(tag: string, text = '', ...children: Node[]): HTMLElement {
 }
 
 const LAYERS: [Layer | 'image', string, string][] = [
-  ['points', 'Points', ''], ['keyframes', 'Keyframes', 'two'], ['final', 'Final path', '--final'],
+  ['points', 'Points', ''], ['keyframes', 'Keyframes', '--keyframe'], ['final', 'Final path', '--final'],
   ['causal', 'Causal path', '--causal'], ['truth', 'True path', '--truth'], ['covisible', 'Covisibility', '--covisible'],
   ['marginalised', 'Marginalised', '--marginalised'], ['returns', 'Closed loops', '--back'], ['grid', 'Grid', ''],
   ['image', 'Camera image', ''],
@@ -35,6 +35,40 @@ const KEYS: [string, string][] = [
 ];
 const PERIODIC_MS = 200;
 const MOST_LISTED = 100;  // events
+const SILENT_S = 2;       // without a frame
+
+/** Of the panel that says how the engine is doing. */
+interface Line {
+  name: string;
+  value: string;
+  /** What that means. */
+  why: string;
+  /** Left out where there is little room. */
+  minor?: boolean;
+  bad?: boolean;
+}
+
+/** Frames of a recording are read before their time has come. */
+function queueLines(newest: LiveFrame, isReadAhead: boolean): Line[] {
+  const queues: [string, number | null, string, string][] = [
+    ['tracker', newest.framesWaiting, 'frame', isReadAhead ? ', read ahead' : ''],
+    ['mapper', newest.keyframesWaiting, 'keyframe', ''], ['loop closer', newest.placesWaiting, 'keyframe', '']];
+  return queues.flatMap(([thread, length, what, when]) => (length === null ? [] : [{
+    name: `${thread}’s queue`, value: `${length} ${what}${length === 1 ? '' : 's'}${when}`,
+    why: `${what}s that wait for the ${thread}${when ? ', or for their time to come' : ''}`}]));
+}
+
+function troubleLine(name: string, {frames, commonest}: Tally, why: string): Line {
+  return {name, value: frames === 0 ? 'none' : `${frames.toLocaleString('en')}${commonest ? `: ${commonest}` : ''}`, why, bad: frames > 0};
+}
+
+/** By the queue, and by the camera, where anybody counts those. */
+function droppedLine(dropped: number, lost: number | null): Line {
+  const byCamera = lost === null ? '' : `, ${lost.toLocaleString('en')} lost by the camera`;
+  return {name: 'dropped', value: `${dropped === 0 ? 'none' : dropped.toLocaleString('en')}${byCamera}`,
+    why: 'frames that were never tracked: a newer one was there, or no room to wait; lost by the camera: they never came from its driver',
+    bad: dropped + (lost ?? 0) > 0};
+}
 
 class Page {
   // First, so that the server answers while WebGL is being set up. Nothing is heard before the page has been made.
@@ -96,6 +130,7 @@ class Page {
       document.body.classList.toggle('finished', message.hello.kind === 'map' || !message.hello.hasTimes);
       $('no-events').textContent = message.hello.kind === 'live' ? 'none yet' : 'none';
       this.makeStages();
+      this.nameKeyframes(message.hello.kind === 'live');
       this.makeColours();
       this.hideWhatIsNot();
       $('commands').hidden = !message.hello.control;
@@ -138,11 +173,13 @@ class Page {
     if (this.stage.drawn === 0) return;  // the picture comes first
     this.sight.draw();
     if (this.playing) this.play();
+    if (this.silence() > 0) this.stale = true;
     if (!this.stale) return;
     this.stale = false;
     this.choosePart();
     this.showState();
     this.showFigures();
+    this.showEngine();
     if ($('strip').clientWidth > 0) this.strip.draw(this.stage.time);
     this.timeline.draw();
     this.showKeyframe();
@@ -190,43 +227,68 @@ class Page {
       const reason = this.model.reasons[newest.reason];
       return set(reason ? `${name}: ${reason}` : name, 'bad');
     }
-    const effort = this.model.hello?.efforts[newest.effort] ?? `effort level ${newest.effort}`;
-    return newest.effort > 0 ? set(`tracked, ${newest.effort}: ${effort}`, 'middling') : set('tracked', 'good');
+    if (newest.effort === 0) return set('tracked', 'good');
+    const efforts = this.model.hello?.efforts ?? [];
+    const saved = efforts.slice(1, newest.effort + 1);
+    set(`tracked, saving work: ${efforts[newest.effort] ?? `effort level ${newest.effort}`}`, 'middling');
+    pill.title = `effort level ${newest.effort} of ${Math.max(newest.effort, efforts.length - 1)}, because poses came late: ${saved.join('; ')}`;
+  }
+
+  /** Seconds for which a run that goes on has told no frame; 0: none that are worth a word. */
+  private silence(): number {
+    const {liveAt, hello} = this.model;
+    if (liveAt === null || hello?.kind !== 'live' || this.link !== 'open') return 0;
+    const seconds = (performance.now() - liveAt) / 1000;
+    return seconds > SILENT_S ? seconds : 0;
   }
 
   private showFigures(): void {
-    const newest = this.model.live.at(-1);
-    const hello = this.model.hello;
-    const isRun = hello?.kind !== 'map';
+    const {hello, path} = this.model;
     const count = (n: number) => n.toLocaleString('en');
-    const figures: [string, string, boolean][] = [['keyframes', count(this.model.keyframes.size), false], ['points', count(this.stage.cloud.size), false]];
-    if (isRun) {
-      const lost = this.model.path.reduce((sum, frame) => sum + (isLost(frame) ? 1 : 0), 0);
-      const late = lateStretches(this.model).reduce((sum, stretch) => sum + stretch.frames, 0);
-      figures.unshift(['frame', count(newest?.frame ?? this.model.path.at(-1)?.frame ?? 0), false]);
-      figures.push(['lost', count(lost), true], ['late', count(late), true]);
-    }
-    if (newest) {
-      figures.push(['latency', `${newest.latencyMs.toFixed(1)} ms`, false], ['found', `${(100 * newest.trackedShare).toFixed(0)} %`, true],
-        ['map', `v${newest.mapVersion}`, true]);
-      const waiting = [newest.framesWaiting, newest.keyframesWaiting, newest.placesWaiting];
-      const queues = waiting.map((n) => n ?? '–');
-      if (hello?.hasQueues && waiting.some((n) => n !== null)) figures.push(['queues', queues.join(' · '), true]);
-    }
-    $('figures').replaceChildren(...figures.map(([name, value, minor]) => {
-      const item = make('div', '', make('dt', name), make('dd', value));
-      item.classList.toggle('minor', minor);
-      item.dataset.name = name;
-      if (name === 'queues') item.title = 'waiting: frames for the tracker · keyframes for the mapper · keyframes for the loop closer';
+    const figures: [string, string][] = [['keyframes', count(this.model.keyframes.size)], ['points', count(this.stage.cloud.size)]];
+    if (hello?.kind !== 'map') figures.unshift(['frame', count(this.model.live.at(-1)?.frame ?? path.at(-1)?.frame ?? 0)]);
+    $('figures').replaceChildren(...figures.map(([name, value]) => make('div', '', make('dt', name), make('dd', value))));
+  }
+
+  /** How the engine is doing, in words: how far behind, what waits for which thread, what was left out and why. */
+  private showEngine(): void {
+    const {hello, live} = this.model;
+    const newest = live.at(-1);
+    const lines: Line[] = [];
+    if (hello?.kind === 'live' && newest) lines.push(this.lagLine(newest), ...queueLines(newest, hello.pacedBy === 'recording'));
+    const late = lateTally(this.model);
+    const lost = tally(lostStretches(this.model));
+    lines.push(troubleLine('late', late, 'poses that came when the next frame was there already; beside their number, why most of them did'));
+    lines.push(troubleLine('lost', lost, 'frames without a pose; beside their number, why most of them have none'));
+    const dropped = newest?.framesDropped ?? this.model.path.reduce((sum, frame) => sum + (frame.state === State.dropped ? 1 : 0), 0);
+    lines.push(droppedLine(dropped, newest?.framesLost ?? null));
+    if (newest) lines.push({name: 'points found', value: `${(100 * newest.trackedShare).toFixed(0)} %`, why: 'of the points of the map that were searched in the newest frame', minor: true});
+    $('engine').replaceChildren(...lines.map((line) => {
+      const item = make('div', '', make('dt', line.name), make('dd', line.value));
+      item.title = `${line.value}: ${line.why}`;
+      item.dataset.name = line.name;
+      item.classList.toggle('minor', line.minor ?? false);
+      item.classList.toggle('bad', line.bad ?? false);
       return item;
     }));
+  }
+
+  private lagLine(newest: LiveFrame): Line {
+    const {hello} = this.model;
+    const period = this.model.periodMs();
+    const silence = this.silence();
+    const took = newest.latencyMs < 1000 ? `${newest.latencyMs.toFixed(1)} ms` : `${(newest.latencyMs / 1000).toFixed(1)} s`;
+    if (!hello?.pacedBy) return {name: silence ? 'no frame for' : 'pose after', value: silence ? `${silence.toFixed(0)} s` : took, why: 'from when the newest frame was taken up to its pose; nobody said that this run keeps a pace'};
+    const name = `behind the ${hello.pacedBy}`;
+    if (silence) return {name, value: `no frame for ${silence.toFixed(0)} s`, why: 'no pose has come for that long', bad: true};
+    const frames = period > 0 ? `, ${(newest.latencyMs / period).toFixed(1)} frames` : '';
+    return {name, value: took + frames, why: 'from the exposure of the newest frame to its pose; above one frame it is late', bad: period > 0 && newest.latencyMs > period};
   }
 
   private makePanels(): void {
     $('layers').replaceChildren(...LAYERS.map(([layer, name, colour]) => {
       const sample = make('i');
-      if (colour === 'two') sample.className = 'two';
-      else if (colour) sample.style.background = `var(${colour})`;
+      if (colour) sample.style.background = `var(${colour})`;
       const box = document.createElement('input');
       box.type = 'checkbox';
       box.id = `layer-${layer}`;
@@ -239,8 +301,24 @@ class Page {
     $('colouring').replaceChildren(...COLOURINGS.map((name) => new Option(name === 'observers' ? 'times seen' : name, name)));
     $('keys').replaceChildren(make('table', '', ...KEYS.map(([key, what]) => make('tr', '', make('td', '', make('kbd', key)), make('td', what)))));
     $('bar-colours').style.background = colourBar();
+    const windows = make('small', 'window', ...['inner', 'outer', 'none'].map((name) => {
+      const word = make('b', name);
+      word.className = name;
+      return word;
+    }));
+    windows.id = 'windows';
+    $('layer-keyframes').parentElement!.after(windows);
+    this.nameKeyframes(true);
     this.setLayer('image', true);
     this.setView('follow');
+  }
+
+  /** Windows are a live run's: nobody knows those of a finished one. */
+  private nameKeyframes(areLive: boolean): void {
+    $('windows').hidden = !areLive;
+    const sample = $('layer-keyframes').parentElement!.querySelector('i')!;
+    sample.className = areLive ? 'three' : '';
+    sample.style.background = areLive ? '' : 'var(--keyframe)';
   }
 
   private setLayer(layer: Layer | 'image', on: boolean): void {

@@ -2,7 +2,6 @@
 import {NO_ID, State, type Delta, type Edge, type Hello, type Keyframe, type LiveFrame, type MapEvent, type PathFrame, type Truth} from './wire.ts';
 
 const LIVE_KEPT = 600;
-const LATE_KEPT = 4096;
 const EVENTS_KEPT = 4096;
 
 /** Position and orientation of a camera in the world of its part. */
@@ -38,10 +37,11 @@ export class Model {
   edges = new Map<string, Edge>();
   path: PathFrame[] = [];
   live: LiveFrame[] = [];
-  /** Of late frames, by their number: what held them up. */
-  readonly whyLate = new Map<number, string>();
   mapVersion = 0;
   mappingPaused = false;
+  /** When frames came last, by the page's clock [ms]; null: none have. */
+  liveAt: number | null = null;
+  private revision = 0;  // of the scene
 
   get isMetric(): boolean {
     return this.hello?.metres ?? true;
@@ -58,7 +58,7 @@ export class Model {
     this.events = [];
     this.live = [];
     this.truth = null;
-    this.whyLate.clear();
+    this.liveAt = null;
   }
 
   addEvents(events: MapEvent[]): void {
@@ -68,6 +68,8 @@ export class Model {
 
   take(delta: Delta): void {
     if (delta.whole) this.clear();
+    else if (delta.from !== this.revision) throw new Error(`what changed since revision ${delta.from} came to one that has ${this.revision}`);
+    this.revision = delta.last ? delta.to : delta.from;
     for (const id of delta.keyframesGone) this.keyframes.delete(id);
     for (const keyframe of delta.keyframes) this.keyframes.set(keyframe.id, keyframe);
     for (const gone of delta.edgesGone) this.edges.delete(`${gone.from}-${gone.to}`);
@@ -103,19 +105,11 @@ export class Model {
   }
 
   addLive(frames: LiveFrame[]): void {
+    this.liveAt = performance.now();
     this.live.push(...frames);
     if (this.live.length > LIVE_KEPT) this.live.splice(0, this.live.length - LIVE_KEPT);
     const newest = frames.at(-1);
     if (newest) this.mapVersion = newest.mapVersion;
-    const budget = this.periodMs();
-    for (const frame of frames) if (budget > 0 && frame.latencyMs > budget) this.explainLate(frame, budget);
-  }
-
-  /** As summary.json does: its own work, or whatever it waited for. */
-  private explainLate(frame: LiveFrame, budget: number): void {
-    const tracking = frame.stageMs.reduce((sum, ms) => sum + ms, 0);
-    this.whyLate.set(frame.frame, tracking > budget / 2 ? `tracking it took ${tracking.toFixed(0)} ms` : 'it waited: earlier frames, decoding, or no CPU');
-    if (this.whyLate.size > LATE_KEPT) this.whyLate.delete(this.whyLate.keys().next().value!);
   }
 
   /** Where the frame was as the map has it now. */

@@ -32,11 +32,38 @@ function stretches(model: Model, why: (frame: PathFrame) => string | null): Stre
 export function lostStretches(model: Model): Stretch[] {
   return stretches(model, (frame) => (isLost(frame) ? model.reasons[frame.reason] ?? '' : null));
 }
-/** Poses that came when the next frame was there already. */
+/** Poses that came when the next frame was there already, and frames that were dropped. */
 export function lateStretches(model: Model): Stretch[] {
   const budget = model.periodMs();
-  const isLate = (frame: PathFrame) => frame.state === State.dropped || (frame.state === State.tracked && budget > 0 && frame.latencyMs > budget);
-  return stretches(model, (frame) => (isLate(frame) ? model.whyLate.get(frame.frame) ?? model.reasons[frame.reason] ?? '' : null));
+  return stretches(model, (frame) => (frame.state === State.dropped || isLate(frame, budget) ? whyLate(model, frame, budget) : null));
+}
+/** In the run's own words; of live frames, whose run is still to say them, as summary.json will: its own work, or whatever it waited for. */
+function whyLate(model: Model, frame: PathFrame, budget: number): string {
+  if (frame.reason > 0) return model.reasons[frame.reason] ?? '';
+  return frame.trackingMs > budget / 2 ? `tracking it took ${frame.trackingMs.toFixed(0)} ms` : 'it waited: earlier frames, decoding, or no CPU';
+}
+function isLate(frame: PathFrame, budget: number): boolean {
+  return frame.state === State.tracked && budget > 0 && frame.latencyMs > budget;
+}
+
+/** How many frames, and what most of them suffered from. */
+export interface Tally {
+  frames: number;
+  commonest: string;
+}
+export function tally(found: readonly Stretch[]): Tally {
+  const counts = new Map<string, number>();
+  for (const {frames, reason} of found) {
+    const kind = reason.replace(/ \d[\d.]* ms$/, '');  // however long it took
+    counts.set(kind, (counts.get(kind) ?? 0) + frames);
+  }
+  const sorted = [...counts].sort((a, b) => b[1] - a[1]);
+  return {frames: sorted.reduce((sum, [, frames]) => sum + frames, 0), commonest: sorted[0]?.[0] ?? ''};
+}
+/** Of those frames that were tracked. */
+export function lateTally(model: Model): Tally {
+  const budget = model.periodMs();
+  return tally(stretches(model, (frame) => (isLate(frame, budget) ? whyLate(model, frame, budget) : null)));
 }
 
 export class Timeline {

@@ -1,6 +1,6 @@
 // The server's messages (viewer/wire_format.hpp), decoded. Arrays of points are views of the message.
 
-export const PROTOCOL = 4;
+export const PROTOCOL = 5;
 export const NO_ID = 0xffffffff;
 
 export interface Keyframe {
@@ -65,6 +65,10 @@ export interface LiveFrame extends Frame {
   framesWaiting: number | null;
   /** Keyframes that wait for the loop closer. */
   placesWaiting: number | null;
+  /** So far: they came and were not tracked. */
+  framesDropped: number | null;
+  /** So far: they never came, the camera lost them. */
+  framesLost: number | null;
 }
 
 /** Points as they came: each POINT_WORDS words, as whole numbers and as floating-point ones. */
@@ -129,7 +133,7 @@ export interface Measured {
 export type Binary = Delta | Frames | Image | KeyframeImage | Measured;
 
 const HEADER = 16;
-const SIZES = {keyframe: 52, edge: 12, path: 60, live: 108, measured: 32};
+const SIZES = {keyframe: 52, edge: 12, path: 60, live: 116, measured: 32};
 
 class Reader {
   readonly view: DataView;
@@ -147,8 +151,17 @@ class Reader {
   xyz = (o: number): [number, number, number] => [this.f32(o), this.f32(o + 4), this.f32(o + 8)];
   xyzw = (o: number): [number, number, number, number] => [this.f32(o), this.f32(o + 4), this.f32(o + 8), this.f32(o + 12)];
 
+  /** What is left is told by nobody: the message is of another version, or damaged. */
+  expectEnd(): void {
+    if (this.at !== this.buffer.byteLength) throw new Error(`a message is ${this.buffer.byteLength - this.at} bytes too long`);
+  }
+
+  expect(bytes: number): void {
+    if (this.at + bytes > this.buffer.byteLength) throw new Error('a message ends within a record');
+  }
+
   list<T>(count: number, size: number, read: () => T): T[] {
-    if (this.at + count * size > this.buffer.byteLength) throw new Error('a message ends within a record');
+    this.expect(count * size);
     const records: T[] = [];
     for (let i = 0; i < count; ++i, this.at += size) records.push(read());
     return records;
@@ -185,7 +198,7 @@ function liveFrame(r: Reader): LiveFrame {
     ...frame(r, 56), position: r.xyz(20), orientation: r.xyzw(32), trackedShare: r.f32(48), points: r.u32(52),
     mapVersion: r.u32(60),
     stageMs: Array.from({length: 8}, (_, s) => r.f32(64 + 4 * s)), keyframesWaiting: r.known(96),
-    framesWaiting: r.known(100), placesWaiting: r.known(104),
+    framesWaiting: r.known(100), placesWaiting: r.known(104), framesDropped: r.known(108), framesLost: r.known(112),
   };
 }
 
@@ -195,6 +208,7 @@ function measuredPoint(r: Reader): MeasuredPoint {
 }
 
 function pointBlock(r: Reader, count: number): PointBlock {
+  r.expect(4 * count * POINT_WORDS);
   const words = new Uint32Array(r.buffer, r.at, count * POINT_WORDS);
   const floats = new Float32Array(r.buffer, r.at, count * POINT_WORDS);
   r.at += 4 * count * POINT_WORDS;
@@ -208,6 +222,7 @@ function decodeDelta(r: Reader, flags: number, from: number, to: number): Delta 
   };
   const key = () => r.u32(0);
   while (r.at < r.buffer.byteLength) {
+    r.expect(8);
     const block = r.u32(0);
     const count = r.u32(4);
     r.at += 8;
@@ -226,15 +241,22 @@ function decodeDelta(r: Reader, flags: number, from: number, to: number): Delta 
   return delta;
 }
 
+/** A message that has nothing behind what it says it has. */
+function whole<Message extends Binary>(r: Reader, message: Message): Message {
+  r.expectEnd();
+  return message;
+}
+
 export function decode(buffer: ArrayBuffer): Binary {
+  if (buffer.byteLength < HEADER) throw new Error('a message ends within its header');
   const header = new DataView(buffer);
   const [kind, number, a, b] = [0, 4, 8, 12].map((at) => header.getUint32(at, true));
   const reader = new Reader(buffer);
   switch (kind) {
     case 1: return decodeDelta(reader, number, a, b);
-    case 2: return {kind: 'frames', frames: reader.list(number, SIZES.live, () => liveFrame(reader))};
+    case 2: return whole(reader, {kind: 'frames', frames: reader.list(number, SIZES.live, () => liveFrame(reader))});
     case 3: return {kind: 'image', frame: number, width: a, height: b, jpeg: new Uint8Array(buffer, HEADER)};
-    case 4: return {kind: 'measured', frame: number, points: reader.list(a, SIZES.measured, () => measuredPoint(reader))};
+    case 4: return whole(reader, {kind: 'measured', frame: number, points: reader.list(a, SIZES.measured, () => measuredPoint(reader))});
     case 5: return {kind: 'keyframe image', keyframe: number, jpeg: new Uint8Array(buffer, HEADER)};
     default: throw new Error(`unknown message ${kind}`);
   }
@@ -268,6 +290,8 @@ export interface Hello {
   hasQueues: boolean;
   /** Words of the effort levels. */
   efforts: string[];
+  /** Whose pace the run keeps: 'camera', 'recording'; empty: it keeps none. */
+  pacedBy: string;
   /** Commands are obeyed. */
   control: boolean;
   /** Images of keyframes can be asked for. */

@@ -66,6 +66,7 @@ async function liveRun() {
   await has(page, 'search regions in the image', '#sight canvas', '#ffd666', 60);
   assert.match(await page.textContent('#sight figcaption'), /points measured/);
 
+  await engineInWords(page);
   await picturesASecond(page);
   await keyframeImage(page);
   await lateJoiner(page, network.address);
@@ -79,6 +80,39 @@ async function liveRun() {
   const live = await command(page, run);
   await network.cut();
   return live;
+}
+
+/** How far it is behind, what waits, what was late: with names, and nothing of it, nor of the head, out of the page at 1400 pixels. */
+async function engineInWords(page) {
+  const small = page.viewportSize();
+  await page.setViewportSize({width: 1400, height: 800});
+  for (const words of [/behind the recording\d[\d.]* m?s, \d[\d.]* frames/, /tracker’s queue\d+ frames?, read ahead/, /mapper’s queue\d+ keyframe/,
+    /loop closer’s queue\d+ keyframe/, /late(none|\d+: (it waited|tracking it took))/, /lostnone/, /dropped(none|\d)/]) await says(page, '#engine', words);
+  const hidden = await page.evaluate(() => {
+    const boxes = [...document.querySelectorAll('#title, #state, #figures > div, #commands > button, header > nav > button')].filter((part) => part.offsetWidth > 0);
+    const lines = [...document.querySelectorAll('#engine > div')].filter((line) => line.getBoundingClientRect().bottom > document.querySelector('#strip-row').getBoundingClientRect().bottom);
+    const rights = boxes.map((part) => part.getBoundingClientRect());
+    const covered = boxes.filter((_, n) => rights[n].right > innerWidth || rights[n].height > 40 || rights.some((other, m) => m !== n && rights[n].left < other.right - 1 && other.left < rights[n].right - 1));
+    return [...covered, ...lines].map((part) => part.textContent);
+  });
+  assert.deepEqual(hidden, [], 'out of the page, or one over the other');
+  assert.match(await page.textContent('#figures'), /frame[\d,]+keyframes\d+points[\d,]+/);
+  assert.match(await page.textContent('#windows'), /inner.*outer/);
+  assert.equal(await page.evaluate(() => window.twofold.model.hello.efforts.at(-1)), 'drop frames');
+  await page.setViewportSize(small);
+  done('the engine in words, the head whole at 1400 pixels');
+}
+
+/** No window is known: the legend has the colour that all keyframes have. */
+async function greyKeyframes(page) {
+  assert.ok(!(await page.isVisible('#windows')), 'windows in the legend');
+  const [sample, drawn] = await page.evaluate(() => {
+    const colour = window.twofold.stage.palette.keyframe;
+    return [getComputedStyle(document.querySelector('#layer-keyframes').parentElement.querySelector('i')).backgroundColor, `#${colour.getHexString()}`];
+  });
+  const [r, g, b] = [1, 3, 5].map((at) => parseInt(drawn.slice(at, at + 2), 16));
+  assert.equal(sample, `rgb(${r}, ${g}, ${b})`);
+  done('keyframes are as the legend has them');
 }
 
 /** A click at a keyframe shows what the camera saw there; another one something else. */
@@ -198,6 +232,7 @@ async function finishedRun(live) {
   await until('the path', async () => (await report(page)).path >= live.path - 2);
   const {edges, truth} = await report(page);
   assert.ok(edges > 20 && truth > 20, `${edges} edges, ${truth} true positions`);
+  await greyKeyframes(page);
   const different = await difference(page, [live.picture, await mapPicture(page)]);
   assert.ok(different < 0.02, `the run's last picture and that of the finished run: ${different}`);
   done(`the same picture as at the run's end, but for ${(100 * different).toFixed(2)} %`);
@@ -232,6 +267,7 @@ async function closedLoop() {
   const run = new Program(['run', recording, '--preload', '--speed', '2', '--quiet', '--view', '0', '--out', join(out, 'loop_run')]);
   const page = await openPage(browser, await run.address());
   await until('a loop', async () => (await report(page)).loops > 0, 90000);
+  assert.match(await page.evaluate(() => window.twofold.model.hello.efforts.at(-1)), /no frame is dropped/);
   await says(page, '#events', /loop/);
   await page.evaluate(() => {  // the edge is short once the map has been bent: as near as two metres
     const {model, stage} = window.twofold;
@@ -265,6 +301,7 @@ async function telephone(port) {
 async function keyframesAndTape(view) {
   const page = await openPage(browser, await view.address());
   await until('the map', async () => (await report(page)).points > 500);
+  await greyKeyframes(page);
   await page.keyboard.press('2');
   await page.waitForTimeout(1000);
   const stage = await page.locator('#stage').boundingBox();

@@ -31,7 +31,7 @@ async function loop(page, run) {
 }
 
 async function live() {
-  const run = new Program(['run', recording, '--speed', '0.5', '--late', 'drop', '--quiet', '--view', '0', '--save-map', map, '--out', out], scratch);
+  const run = new Program(['run', recording, '--speed', '0.5', '--quiet', '--view', '0', '--save-map', map, '--out', out], scratch);
   const page = await openPage(browser, await run.address());
   await until('keyframes', async () => (await report(page)).keyframes > 5);
   await until('most of the run', async () => run.ended || (await page.evaluate(() => window.twofold.model.endTime())) > 16, 240000);

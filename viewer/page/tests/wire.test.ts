@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import {readFileSync} from 'node:fs';
 import {test} from 'node:test';
 import {Model} from '../src/model.ts';
-import {describe, lateStretches, lostStretches} from '../src/timeline.ts';
+import {describe, lateStretches, lateTally, lostStretches, tally} from '../src/timeline.ts';
 import {State, decode, type Delta, type Frames, type LiveFrame, type MapEvent} from '../src/wire.ts';
 
 const messages = JSON.parse(readFileSync(process.env.MESSAGES!, 'utf8')) as Record<string, string>;
@@ -46,6 +46,7 @@ test('live frames', () => {
   assert.deepEqual([frames[0].frame, frames[0].points, frames[0].trackedShare, frames[0].mapVersion], [4, 90, 0.75, 1]);
   assert.deepEqual(frames[0].stageMs.slice(0, 3), [1, 2.5, 0]);
   assert.deepEqual([frames[0].framesWaiting, frames[0].keyframesWaiting, frames[0].placesWaiting], [2, 7, null]);
+  assert.deepEqual([frames[0].framesDropped, frames[0].framesLost], [null, 3]);
 });
 
 test('measured points', () => {
@@ -78,16 +79,79 @@ test('late frames say what held them up', () => {
   const model = new Model();
   const frame = (n: number, latencyMs: number, stageMs: number[]): LiveFrame => ({frame: n, t: 0.05 * n, reference: 0, part: 0,
     state: State.tracked, reason: 0, keyframe: false, effort: 0, latencyMs, position: nowhere, orientation: [0, 0, 0, 1],
-    trackedShare: 1, points: 9, mapVersion: 1, stageMs, keyframesWaiting: 0, framesWaiting: 0, placesWaiting: 0});
+    trackedShare: 1, points: 9, mapVersion: 1, stageMs, keyframesWaiting: 0, framesWaiting: 0, placesWaiting: 0, framesDropped: 0, framesLost: null});
   const frames = [frame(0, 10, [5]), frame(1, 12, [5]), frame(2, 70, [60, 4]), frame(3, 80, [61, 3]), frame(4, 90, [4]), frame(5, 9, [4])];
-  for (const live of frames) model.take({kind: 'delta', whole: false, last: true, from: 1, to: 2, points: [], pointsGone: [], keyframes: [],
-    keyframesGone: [], edges: [], edgesGone: [], pathGone: [], path: [{...live, causal: nowhere, inReference: nowhere, turned: [0, 0, 0, 1], trackingMs: 0}]});
+  const dropped = {...frame(6, 0, []), state: State.dropped, reason: 1};
+  model.reasons = ['', 'dropped: a newer frame was there'];
+  const path = [...frames, dropped].map((live) => ({...live, causal: nowhere, inReference: nowhere, turned: [0, 0, 0, 1] as [number, number, number, number],
+    trackingMs: live.stageMs.reduce((sum, ms) => sum + ms, 0)}));
+  model.take({...decode(bytes(delta(2, 2, 0))) as Delta, path});
   model.addLive(frames);
   assert.deepEqual(lateStretches(model).map((late) => [late.frames, late.reason]),
-    [[2, 'tracking it took 64 ms'], [1, 'it waited: earlier frames, decoding, or no CPU']]);
+    [[2, 'tracking it took 64 ms'], [1, 'it waited: earlier frames, decoding, or no CPU'], [1, 'dropped: a newer frame was there']]);
+  assert.deepEqual(lateTally(model), {frames: 3, commonest: 'tracking it took'}, 'dropped ones were never tracked');
   assert.deepEqual(lostStretches(model), []);
 });
 
-test('messages that end too early are refused', () => {
-  for (const cut of [8, 40, 200, 360]) assert.throws(() => decode(bytes(messages.whole.slice(0, 2 * cut))));
+test('the commonest reason, however long each took', () => {
+  const stretch = (frames: number, reason: string) => ({begin: 0, end: 1, frames, reason});
+  assert.deepEqual(tally([]), {frames: 0, commonest: ''});
+  assert.deepEqual(tally([stretch(3, 'it waited'), stretch(2, 'tracking it took 64 ms'), stretch(2, 'tracking it took 1204 ms')]),
+    {frames: 7, commonest: 'tracking it took'});
+});
+
+// What is not as the server writes it.
+
+const u32 = (...numbers: number[]) => numbers.map((n) => Buffer.from(Uint32Array.of(n).buffer).toString('hex')).join('');
+const KIND = {delta: 1, frames: 2, image: 3, measured: 4, keyframeImage: 5};
+const delta = (flags: number, block: number, count: number, revision = 0) => u32(KIND.delta, flags, revision, revision + 1) + u32(block, count);
+
+test('messages that end too early are refused, wherever they end', () => {
+  const ends = (message: string) => {  // where a block begins, a message may end
+    const found = new Set([16]);
+    const sizes = [0, 28, 4, 52, 4, 12, 8, 60, 4];
+    const view = new DataView(bytes(message));
+    for (let at = 16; at < view.byteLength;) found.add((at += 8 + view.getUint32(at + 4, true) * sizes[view.getUint32(at, true)]));
+    return found;
+  };
+  const allowed = ends(messages.whole);
+  for (let cut = 0; 2 * cut < messages.whole.length; ++cut) {
+    const begin = () => decode(bytes(messages.whole.slice(0, 2 * cut)));
+    if (allowed.has(cut)) assert.doesNotThrow(begin);
+    else assert.throws(begin, /a message ends within (a record|its header)/, `${cut} bytes`);
+  }
+  for (let cut = 0; 2 * cut < messages.live.length; ++cut)
+    assert.throws(() => decode(bytes(u32(KIND.frames, 1, 0, 0), messages.live.slice(0, 2 * cut))), /a message ends within a record/, `${cut} bytes`);
+});
+
+test('counts beyond the message are refused, in every block', () => {
+  for (let block = 1; block <= 8; ++block) {
+    for (const count of [1, 1000, 0x10000000, 0xffffffff])
+      assert.throws(() => decode(bytes(delta(1, block, count))), /a message ends within a record/, `${count} of block ${block}`);
+  }
+  assert.throws(() => decode(bytes(u32(KIND.frames, 0xffffffff, 0, 0))), /within a record/);
+  assert.throws(() => decode(bytes(u32(KIND.measured, 7, 0xffffffff, 0))), /within a record/);
+});
+
+test('what is behind the last record, and kinds that there are not, are refused', () => {
+  assert.throws(() => decode(bytes(u32(KIND.frames, 1, 0, 0), messages.live, u32(0))), /4 bytes too long/);
+  assert.throws(() => decode(bytes(u32(KIND.measured, 7, 0, 0), u32(0, 0))), /8 bytes too long/);
+  assert.throws(() => decode(bytes(delta(1, 0, 0))), /unknown block 0/);
+  assert.throws(() => decode(bytes(delta(1, 9, 0))), /unknown block 9/);
+  assert.throws(() => decode(bytes(u32(0, 0, 0, 0))), /unknown message 0/);
+  assert.throws(() => decode(bytes(u32(6, 0, 0, 0))), /unknown message 6/);
+});
+
+test('changes are of the revision that the page has', () => {
+  const model = new Model();
+  const take = (flags: number, from: number, to: number) => model.take(decode(bytes(u32(KIND.delta, flags, from, to))) as Delta);
+  assert.throws(() => take(2, 3, 4), /since revision 3 came to one that has 0/);
+  take(1, 0, 4);  // the whole of it, in two messages
+  take(2, 0, 4);
+  take(2, 4, 7);
+  assert.throws(() => take(2, 4, 7), /since revision 4 came to one that has 7/);
+  take(0, 7, 9);
+  assert.throws(() => take(2, 9, 10), /since revision 9 came to one that has 7/, 'the rest is missing');
+  take(3, 0, 12);
+  take(2, 12, 13);
 });
