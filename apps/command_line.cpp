@@ -1,6 +1,7 @@
 #include "apps/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/core/utils/logger.hpp>
@@ -27,7 +28,8 @@ void forbid_hidden_threads() {
 
 /// One line, whatever the library put into its message.
 int report(const CLI::App& app, const std::string& what, int exit_code) {
-  fmt::print(stderr, "{}: {}\n", app.get_name(), what.substr(0, what.find('\n')));
+  const std::string line = fmt::format("{}: {}\n", app.get_name(), what.substr(0, what.find('\n')));
+  (void)std::fputs(line.c_str(), stderr);  // which throws nothing when standard error is full
   return exit_code;
 }
 
@@ -42,6 +44,8 @@ int run_command_line(CLI::App& app, int argc, char** argv, const int& exit_code)
     if (e.get_exit_code() == 0) return app.exit(e);  // --help
     const std::string hint = argc == 1 ? "; " + app.get_name() + " --help lists them" : "";
     return report(app, e.what() + hint, kBadInput);
+  } catch (const WriteError& e) {
+    return report(app, e.what(), kFailedRun);
   } catch (const IoError& e) {
     return report(app, e.what(), kBadInput);
   } catch (const MapFileError& e) {

@@ -9,7 +9,7 @@ enum ExitCode : int { kOk = 0, kFailedRun = 1, kBadInput = 2 };
 
 /// Parses the command line, which runs the subcommand that it names. An error becomes one line on the
 /// standard error output, after the program's name: kBadInput for a bad command line, an IoError or a
-/// MapFileError, kFailedRun for any other exception.
+/// MapFileError, kFailedRun for a WriteError and any other exception.
 /// @param exit_code  written by the subcommand
 /// @return  what the program ends with
 [[nodiscard]] int run_command_line(CLI::App& app, int argc, char** argv, const int& exit_code);

@@ -170,8 +170,9 @@ struct RunResult {
   std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted
   std::uint64_t keyframes_not_described = 0;  ///< the loop closer's queue was full
   bool interrupted = false;
-  /// Empty, or why the run ended early (a thread failed, the input broke), or what its logs lost.
+  /// Empty, or why the run ended early: a thread failed, the input broke.
   std::string error;
+  std::vector<std::string> losses;  ///< what its logs lost, a sentence a file
   /// Stereo: rows that right images lie lower than left ones, taken back while tracking [px]; 0: none.
   double row_offset = 0;
   double cpu_seconds = 0;  ///< all threads, from start to end of the run

@@ -1,15 +1,20 @@
 // A node as robots' middlewares (ROS and others) want it: images come in a callback of theirs, with stamps of
-// the time of day; poses go out from a thread of their own, with the stamps of their images.
+// the time of day; poses go out from a thread of their own, with the stamps of their images, in the axes and
+// frames of REP 103 and REP 105; what goes wrong is said while it runs.
 //   06_node [SOURCE]
 // The middleware is played by a source here; class Node is what you take.
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <twofold/pose_queue.hpp>
 #include <twofold/slam.hpp>
@@ -24,9 +29,44 @@ std::int64_t monotonic_ns() {  // CLOCK_MONOTONIC, which Slam's live runs are ti
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+/// From a camera's axes (x right, y down, z forward) to a robot's (x forward, y left, z up; REP 103).
+const twofold::Pose kRobotCamera{{-0.5, 0.5, -0.5, 0.5}, {0, 0, 0}};
+
+/// A motion between frames of camera axes as one between frames of robot axes.
+twofold::Pose in_robot_axes(const twofold::Pose& T) {
+  return compose(kRobotCamera, compose(T, inverse(kRobotCamera)));
+}
+
+using Covariance = std::array<double, 36>;
+
+/// What ROS wants in a PoseWithCovariance: of (x, y, z, rotations about x, y, z) along the axes of the frame
+/// that the pose is in. Twofold's is of (translation, rotation) along the camera's.
+/// @param T  of the camera in that frame
+Covariance along_axes_of_parent(const Covariance& camera, const twofold::Pose& T) {
+  const twofold::Pose R{T.q, {0, 0, 0}};
+  std::array<std::array<double, 3>, 3> column{};  // of the rotation matrix
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::array<double, 3> axis{};
+    axis[i] = 1;
+    column[i] = transform(R, axis);
+  }
+  Covariance parent{};
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t j = 0; j < 6; ++j)
+      for (std::size_t k = 0; k < 3; ++k)
+        for (std::size_t l = 0; l < 3; ++l)
+          parent[6 * i + j] +=
+              column[k][i % 3] * camera[6 * (i / 3 * 3 + k) + j / 3 * 3 + l] * column[l][j % 3];
+  return parent;
+}
+
 class Node {
  public:
-  explicit Node(const twofold::CameraRig& rig) : slam_(rig, {.live = true}) {
+  /// @param T_rectified_raw  of the source, or of the FrameRectifier that made the images: poses go out of
+  /// the
+  ///                         lens as it was calibrated, which a robot's extrinsics are of
+  Node(const twofold::CameraRig& rig, const twofold::Pose& T_rectified_raw)
+      : T_rectified_raw_(T_rectified_raw), slam_(rig, {.live = true}) {
     slam_.on_pose([this](const twofold::PoseEstimate& pose) { queue_.put(pose); });
     slam_.on_event([this](const twofold::MapEvent& event) { queue_.put(event); });
     publisher_ = std::jthread([this] { publish_all(); });
@@ -49,8 +89,8 @@ class Node {
     frame.t_ns = monotonic_ns() - age_ns;
     {
       const std::scoped_lock lock(lock_);
-      under_way_.emplace_back(frame.t_ns,
-                              stamp_ns);  // before the push: the pose may be there before it returns
+      // Before the push: the pose may be there before it returns.
+      under_way_.emplace_back(frame.t_ns, stamp_ns);
     }
     if (const auto pushed = slam_.push(frame); !pushed) std::printf("%s\n", pushed.reason.c_str());
   }
@@ -59,17 +99,30 @@ class Node {
 
  private:
   void publish_all() {
+    constexpr std::int64_t kLookForErrors = 500'000'000;
     twofold::PoseOrEvent item;
-    while (queue_.next(item) == twofold::QueueStatus::kItem) {
+    for (;;) {
+      const twofold::QueueStatus status = queue_.next(item, kLookForErrors);
+      if (status == twofold::QueueStatus::kEnd) return;
+      say_errors();
+      if (status != twofold::QueueStatus::kItem) continue;  // no frame came for a while
       if (const std::uint64_t missed = queue_.take_missed(); missed > 0)
         std::printf("publishing is too slow: %llu are missing\n", static_cast<unsigned long long>(missed));
       if (const auto* pose = std::get_if<twofold::PoseEstimate>(&item)) {
         publish(*pose, stamp_of(pose->t_ns));
       } else {
-        // The map was corrected: poses jump here, and the transform from map to odometry is to be told anew.
-        std::printf("%s\n", to_string(std::get<twofold::MapEvent>(item).kind));
+        correct(std::get<twofold::MapEvent>(item));
       }
     }
+  }
+
+  /// A thread of the engine that ended, a disk that is full: tracking may be over, or its records incomplete.
+  /// A node's diagnostics. Each new one once.
+  void say_errors() {
+    std::vector<std::string> errors = slam_.errors();
+    if (errors == errors_) return;
+    for (const std::string& error : errors) std::printf("error: %s\n", error.c_str());
+    errors_ = std::move(errors);
   }
 
   /// Forgets those before it, which were dropped.
@@ -79,23 +132,54 @@ class Node {
     return under_way_.empty() ? 0 : under_way_.front().second;
   }
 
-  /// To be replaced by the middleware's: this prints. The world is the camera at the start of its map part: x
-  /// right, y down, z forward, no gravity. covariance is relative to reference_keyframe, in the camera's
-  /// axes.
+  /// The map was corrected: the camera's pose jumps in it. In the frame odom it must not (REP 105), so that
+  /// the transform from map to odom jumps instead. The same formula holds when the camera found itself again
+  /// or goes on in another map part: odom goes on where the last pose was, and the way in between, which
+  /// nobody saw, is missing in it. Corrections below a centimetre and 0.2 degrees have no event: odom jumps
+  /// by those.
+  void correct(const twofold::MapEvent& event) {
+    const bool placed_before = event.map_part_before != twofold::kNoId;
+    const twofold::Pose T_after_before =
+        placed_before ? compose(event.T_world_camera_after, inverse(event.T_world_camera_before))
+                      : twofold::Pose{};
+    T_map_odom_ = compose(T_after_before, T_map_odom_);
+    map_part_ = event.map_part;
+    const twofold::Pose T = in_robot_axes(T_map_odom_);
+    std::printf("%s: map_%u -> odom  %.3f %.3f %.3f\n", to_string(event.kind), map_part_, T.t[0], T.t[1],
+                T.t[2]);
+  }
+
+  /// To be replaced by the middleware's: this prints. The world is the camera at the start of its map part,
+  /// no gravity: x of odom is where it looked then. Map parts have worlds of their own: each is a map frame
+  /// of its own, "map_" and its part, which `correct` ties to odom.
   void publish(const twofold::PoseEstimate& pose, std::int64_t stamp_ns) {
     if (pose.state != twofold::TrackingState::kTracked) return;
+    if (pose.map_part != map_part_) map_part_ = pose.map_part;  // the first one, which no event announces
     ++published_;
-    const double variance =
-        pose.covariance_known ? pose.covariance[0] : -1;  // -1: ROS has it for "not known"
-    std::printf("%lld.%09lld  forward %7.3f m, left %7.3f m, up %7.3f m  (variance %.2g m^2)\n",
+    const twofold::Pose T_odom_camera = compose(inverse(T_map_odom_), pose.T_world_camera);
+    const twofold::Pose T_odom_raw = in_robot_axes(compose(T_odom_camera, T_rectified_raw_));
+    // Of the pose relative to reference_keyframe: right for odometry, too small for a pose in the map.
+    const Covariance covariance = along_axes_of_parent(pose.covariance, compose(kRobotCamera, T_odom_camera));
+    std::printf("%lld.%09lld  map_%u odom  x %7.3f m, y %7.3f m, z %7.3f m",
                 static_cast<long long>(stamp_ns / 1'000'000'000),
-                static_cast<long long>(stamp_ns % 1'000'000'000), pose.T_world_camera.t[2],
-                -pose.T_world_camera.t[0], -pose.T_world_camera.t[1], variance);
+                static_cast<long long>(stamp_ns % 1'000'000'000), map_part_, T_odom_raw.t[0], T_odom_raw.t[1],
+                T_odom_raw.t[2]);
+    if (pose.covariance_known) {
+      std::printf("  (sigma %.1g %.1g %.1g m)\n", std::sqrt(covariance[0]), std::sqrt(covariance[7]),
+                  std::sqrt(covariance[14]));
+    } else {
+      std::printf("  (sigma unknown)\n");  // ROS has -1 in the first element for that
+    }
   }
 
   std::mutex lock_;                                              // guards under_way_
   std::deque<std::pair<std::int64_t, std::int64_t>> under_way_;  // time of the frame, stamp of its message
   std::atomic<int> published_{0};
+  const twofold::Pose T_rectified_raw_;
+  // The publisher's: in the camera's axes, as all of Twofold's.
+  twofold::Pose T_map_odom_;
+  std::uint32_t map_part_ = twofold::kNoId;
+  std::vector<std::string> errors_;
   twofold::PoseQueue queue_;
   twofold::Slam slam_;
   std::jthread publisher_;  // last: it ends before what it uses
@@ -105,7 +189,7 @@ int run(const char* name) {
   twofold::Source source(name, {.preload = true});
   int published = 0;
   {
-    Node node(source.rig());
+    Node node(source.rig(), source.T_rectified_raw());
     auto due = std::chrono::steady_clock::now();
     for (twofold::FrameView frame; source.next(frame); due += std::chrono::microseconds(33'333)) {
       std::this_thread::sleep_until(due);

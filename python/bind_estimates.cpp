@@ -89,10 +89,10 @@ void bind_pose(py::module_& module) {
 }
 
 void bind_rig(py::module_& module) {
-  py::enum_<Sensor>(module, "Sensor")
-      .value("STEREO", Sensor::kStereo)
-      .value("RGBD", Sensor::kRgbd)
-      .value("MONO", Sensor::kMono);
+  py::enum_<Sensor>(module, "Sensor", "What the frames are of.")
+      .value("STEREO", Sensor::kStereo, "a left and a right image")
+      .value("RGBD", Sensor::kRgbd, "an image and its depth")
+      .value("MONO", Sensor::kMono, "one camera, right up to its scale");
   const CameraRig d;
   py::class_<CameraRig>(
       module, "CameraRig",
@@ -115,29 +115,30 @@ void bind_rig(py::module_& module) {
            "are holes; readout of a rolling shutter [s], 0 when all rows are exposed at once, None when it "
            "is\n"
            "to be found out.")
-      .def_readwrite("sensor", &CameraRig::sensor)
-      .def_readwrite("width", &CameraRig::width)
-      .def_readwrite("height", &CameraRig::height)
-      .def_readwrite("fx", &CameraRig::fx)
-      .def_readwrite("fy", &CameraRig::fy)
-      .def_readwrite("cx", &CameraRig::cx)
-      .def_readwrite("cy", &CameraRig::cy)
-      .def_readwrite("baseline", &CameraRig::baseline)
-      .def_readwrite("depth_unit", &CameraRig::depth_unit)
-      .def_readwrite("depth_min", &CameraRig::depth_min)
-      .def_readwrite("depth_max", &CameraRig::depth_max)
-      .def_readwrite("readout", &CameraRig::readout);
+      .def_readwrite("sensor", &CameraRig::sensor, "Sensor: STEREO, RGBD or MONO.")
+      .def_readwrite("width", &CameraRig::width, "[px].")
+      .def_readwrite("height", &CameraRig::height, "[px].")
+      .def_readwrite("fx", &CameraRig::fx, "Focal length along x [px].")
+      .def_readwrite("fy", &CameraRig::fy, "Focal length along y [px].")
+      .def_readwrite("cx", &CameraRig::cx, "Principal point [px].")
+      .def_readwrite("cy", &CameraRig::cy, "Principal point [px].")
+      .def_readwrite("baseline", &CameraRig::baseline, "[m]; RGB-D: of the virtual right camera.")
+      .def_readwrite("depth_unit", &CameraRig::depth_unit, "Metres per unit of the depth image.")
+      .def_readwrite("depth_min", &CameraRig::depth_min, "Nearer readings are holes [m].")
+      .def_readwrite("depth_max", &CameraRig::depth_max, "Farther ones likewise [m].")
+      .def_readwrite("readout", &CameraRig::readout,
+                     "Of a rolling shutter [s]; 0: none; None: to be found out.");
 }
 
 void bind_estimate(py::module_& module) {
-  py::enum_<TrackingState>(module, "TrackingState")
+  py::enum_<TrackingState>(module, "TrackingState", "What became of a frame.")
       .value("TRACKED", TrackingState::kTracked, "the pose is known")
       .value("LOST", TrackingState::kLost, "looked at, no trustworthy pose")
       .value("UNPLACED", TrackingState::kUnplaced, "in a loaded map, no place of which was recognised yet");
   py::class_<PoseEstimate>(module, "PoseEstimate", "What is known of the camera at one frame.")
       .def_readonly("frame", &PoseEstimate::frame, "Counts pushed frames from 0, dropped ones included.")
       .def_readonly("t_ns", &PoseEstimate::t_ns, "The frame's own time [ns].")
-      .def_readonly("state", &PoseEstimate::state)
+      .def_readonly("state", &PoseEstimate::state, "TrackingState: tracked, lost or unplaced.")
       .def_property_readonly(
           "tracked", [](const PoseEstimate& pose) { return pose.state == TrackingState::kTracked; },
           "Whether the pose is known; without it, what follows `points` means nothing.")
@@ -148,12 +149,14 @@ void bind_estimate(py::module_& module) {
       .def_readonly("points", &PoseEstimate::points, "Measurements that the pose rests on.")
       .def_readonly("tracked_share", &PoseEstimate::tracked_share,
                     "Those over the points looked for, 0 to 1.")
-      .def_readonly("T_world_camera", &PoseEstimate::T_world_camera, "In the world of `map_part`.")
+      .def_readonly("T_world_camera", &PoseEstimate::T_world_camera,
+                    "Pose of the left camera [m] in the world of `map_part`.")
       .def_readonly("map_part", &PoseEstimate::map_part,
                     "First keyframe of the part; parts have worlds of their own.")
-      .def_readonly("reference_keyframe", &PoseEstimate::reference_keyframe)
+      .def_readonly("reference_keyframe", &PoseEstimate::reference_keyframe,
+                    "Id of the keyframe that the pose is known against.")
       .def_readonly("T_reference_camera", &PoseEstimate::T_reference_camera,
-                    "This survives corrections of the map.")
+                    "Pose relative to reference_keyframe [m]: this survives corrections of the map.")
       .def_property_readonly(
           "covariance",
           [](const py::object& self) {
@@ -191,23 +194,26 @@ std::optional<std::uint32_t> known_id(std::uint32_t id) {
 }
 
 void bind_event(py::module_& module) {
-  py::enum_<MapEventKind>(module, "MapEventKind")
-      .value("OPTIMISATION", MapEventKind::kOptimisation)
-      .value("LOOP_CLOSURE", MapEventKind::kLoopClosure)
-      .value("POSE_GRAPH", MapEventKind::kPoseGraph)
-      .value("PARTS_JOINED", MapEventKind::kPartsJoined)
-      .value("RELOCALISATION", MapEventKind::kRelocalisation)
-      .value("NEW_PART", MapEventKind::kNewPart);
+  py::enum_<MapEventKind>(module, "MapEventKind", "Why the camera's pose jumped.")
+      .value("OPTIMISATION", MapEventKind::kOptimisation, "a round of the double window")
+      .value("LOOP_CLOSURE", MapEventKind::kLoopClosure, "a place was recognised")
+      .value("POSE_GRAPH", MapEventKind::kPoseGraph, "the whole pose graph was optimised")
+      .value("PARTS_JOINED", MapEventKind::kPartsJoined, "the camera's part took another one's world")
+      .value("RELOCALISATION", MapEventKind::kRelocalisation, "the lost camera found itself")
+      .value("NEW_PART", MapEventKind::kNewPart, "the lost camera began another part");
   py::class_<MapEvent>(module, "MapEvent", "Why poses given out before are no longer what the map says.")
-      .def_readonly("kind", &MapEvent::kind)
+      .def_readonly("kind", &MapEvent::kind, "MapEventKind.")
       .def_readonly("frame", &MapEvent::frame, "The first that saw it.")
-      .def_readonly("t_ns", &MapEvent::t_ns)
-      .def_readonly("map_version", &MapEvent::map_version)
+      .def_readonly("t_ns", &MapEvent::t_ns, "That frame's time [ns].")
+      .def_readonly("map_version", &MapEvent::map_version, "The corrected version of the map.")
       .def_readonly("keyframe", &MapEvent::keyframe, "Reference keyframe of that frame.")
-      .def_readonly("map_part_before", &MapEvent::map_part_before)
-      .def_readonly("map_part", &MapEvent::map_part)
-      .def_readonly("T_world_camera_before", &MapEvent::T_world_camera_before)
-      .def_readonly("T_world_camera_after", &MapEvent::T_world_camera_after)
+      .def_readonly("map_part_before", &MapEvent::map_part_before, "Part the camera was in; NO_ID: none.")
+      .def_readonly("map_part", &MapEvent::map_part, "Part it is in now.")
+      .def_readonly("T_world_camera_before", &MapEvent::T_world_camera_before,
+                    "Pose of the last tracked frame as it was told [m].")
+      .def_readonly(
+          "T_world_camera_after", &MapEvent::T_world_camera_after,
+          "Where the corrected map has it [m]; after a relocalisation, the frame that found itself.")
       .def_readonly("moved", &MapEvent::moved,
                     "Distance between the two [m]; of no meaning across map parts.")
       .def_readonly("turned", &MapEvent::turned, "Angle between the two [rad]; likewise.")

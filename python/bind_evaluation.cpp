@@ -99,9 +99,9 @@ void bind_error(py::module_& module) {
       .def_readonly("pairs", &TrajectoryError::pairs, "Poses that have a true one.")
       .def_readonly("path_length", &TrajectoryError::path_length, "Of the truth over the pairs [m].")
       .def_readonly("ate_rmse", &TrajectoryError::ate_rmse, "Absolute trajectory error [m].")
-      .def_readonly("ate_mean", &TrajectoryError::ate_mean)
-      .def_readonly("ate_median", &TrajectoryError::ate_median)
-      .def_readonly("ate_max", &TrajectoryError::ate_max)
+      .def_readonly("ate_mean", &TrajectoryError::ate_mean, "[m].")
+      .def_readonly("ate_median", &TrajectoryError::ate_median, "[m].")
+      .def_readonly("ate_max", &TrajectoryError::ate_max, "[m].")
       .def_readonly("rotation_rmse", &TrajectoryError::rotation_rmse, "[rad].")
       .def_readonly("rpe_rmse", &TrajectoryError::rpe_rmse,
                     "Relative error over one second, translation [m].")
@@ -110,10 +110,10 @@ void bind_error(py::module_& module) {
         return fmt::format("<TrajectoryError over {} poses: ATE {:.4f} m rmse, {:.4f} m at most>",
                            error.pairs, error.ate_rmse, error.ate_max);
       });
-  py::enum_<AlignBy>(module, "AlignBy")
-      .value("NOTHING", AlignBy::kNothing)
-      .value("RIGID_MOTION", AlignBy::kRigidMotion)
-      .value("SIMILARITY", AlignBy::kSimilarity);
+  py::enum_<AlignBy>(module, "AlignBy", "What the estimate may be moved by before it is compared.")
+      .value("NOTHING", AlignBy::kNothing, "it is compared as it is")
+      .value("RIGID_MOTION", AlignBy::kRigidMotion, "rotation and translation")
+      .value("SIMILARITY", AlignBy::kSimilarity, "and scale, for one camera");
 }
 
 }  // namespace

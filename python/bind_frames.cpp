@@ -50,10 +50,13 @@ void bind_frame(py::module_& module) {
       .def(py::init(&make_frame), py::arg("t_ns"), py::arg("left"), py::arg("right") = py::none(),
            py::arg("depth") = py::none(), py::kw_only(), py::arg("colours") = "bgr",
            "t_ns [ns] must grow from frame to frame; colours: order in colour images, 'bgr' or 'rgb'.")
-      .def_property_readonly("t_ns", [](const PythonFrame& frame) { return frame.view.t_ns; })
-      .def_property_readonly("left", &image_of<&FrameView::left>, "A read-only view of the pixels.")
+      .def_property_readonly(
+          "t_ns", [](const PythonFrame& frame) { return frame.view.t_ns; }, "When it was taken [ns].")
+      .def_property_readonly("left", &image_of<&FrameView::left>,
+                             "A read-only view of the pixels: (height, width) uint8, or (height, width, 3).")
       .def_property_readonly("right", &image_of<&FrameView::right>, "The same, or None.")
-      .def_property_readonly("depth", &image_of<&FrameView::depth>, "The same, or None.")
+      .def_property_readonly("depth", &image_of<&FrameView::depth>,
+                             "(height, width) uint16 in units of CameraRig.depth_unit, read-only; or None.")
       .def_property_readonly(
           "copied", [](const PythonFrame& frame) { return py::tuple(py::cast(frame.copied)); },
           "Names of the images that were copied when the frame was made.");
@@ -85,7 +88,13 @@ void bind_source(py::module_& module) {
            py::arg("left_only") = false,
            "calibration: file instead of the recording's own; preload: decode everything now; left_only: the "
            "left camera alone, as Sensor.MONO. Raises RuntimeError.")
-      .def_property_readonly("rig", &Source::rig, py::return_value_policy::copy)
+      .def_property_readonly("rig", &Source::rig, py::return_value_policy::copy,
+                             "CameraRig of all frames: size [px], focal lengths [px], baseline [m].")
+      .def_property_readonly(
+          "T_rectified_raw", &Source::T_rectified_raw,
+          "Pose, a rotation alone, of the calibrated left camera in the one that poses are of, by the "
+          "calibration this\nsource uses; the identity where images come as they were: T_world_raw = "
+          "pose.T_world_camera @ source.T_rectified_raw.")
       .def_property_readonly("frame_count", &Source::frame_count, "None where it is not known beforehand.")
       .def_property_readonly("is_live", &Source::is_live,
                              "Frames come when they are taken, not when asked for.")
@@ -108,10 +117,13 @@ void bind_source(py::module_& module) {
 void bind_rectifier(py::module_& module) {
   py::class_<FrameRectifier>(module, "FrameRectifier",
                              "Makes rectified frames of those that a camera gives, by a calibration file.")
-      .def(py::init<const std::filesystem::path&, int, int>(), py::arg("calibration"), py::arg("width") = 0,
-           py::arg("height") = 0,
-           "width, height [px]: of the raw images, for calibrations that do not state it. Raises "
-           "RuntimeError.")
+      .def(py::init<const std::filesystem::path&, int, int, bool>(), py::arg("calibration"),
+           py::arg("width") = 0, py::arg("height") = 0, py::arg("left_only") = false,
+           "calibration: a file, or a folder in EuRoC's layout, which has a file a camera; width, height "
+           "[px]: of the raw\n"
+           "images, for calibrations that do not state it; left_only: of such a folder, the left camera "
+           "alone. Raises\n"
+           "RuntimeError, also for one file of a pair's two.")
       .def_property_readonly("rig", &FrameRectifier::rig, py::return_value_policy::copy,
                              "What the rectified frames are of.")
       .def_property_readonly(

@@ -47,7 +47,8 @@ void bind_map(py::module_& module) {
       "Tables are structured arrays, ascending by id, made when first asked for: read-only views that hold "
       "this object.\n"
       "While it is held, what the map has replaced since stays in memory, at most memory_bytes().")
-      .def_property_readonly("version", [](const MapRows& self) { return self.snapshot.version(); })
+      .def_property_readonly(
+          "version", [](const MapRows& self) { return self.snapshot.version(); }, "Grows with every version.")
       .def_property_readonly(
           "reference", [](const MapRows& self) { return self.snapshot.reference(); },
           "Keyframe in the middle of the windows; NO_ID in an empty map.")

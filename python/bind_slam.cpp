@@ -132,13 +132,13 @@ void feed(Source& source, SlamWithUpdates& to) {
 }
 
 void bind_push(py::module_& module) {
-  py::enum_<PushStatus>(module, "PushStatus")
+  py::enum_<PushStatus>(module, "PushStatus", "What became of a frame that was pushed.")
       .value("QUEUED", PushStatus::kQueued, "on its way to the tracker")
       .value("DROPPED", PushStatus::kDropped, "there was no room: the tracker is behind")
       .value("REFUSED", PushStatus::kRefused, "not to be used, and not counted as a frame");
   py::class_<PushResult>(module, "PushResult",
                          "Whether a frame was queued, dropped or refused; true when queued.")
-      .def_readonly("status", &PushResult::status)
+      .def_readonly("status", &PushResult::status, "PushStatus.")
       .def_readonly("reason", &PushResult::reason, "Of dropped and refused frames: what is wrong.")
       .def_readonly("frame", &PushResult::frame,
                     "The number that its pose has; -1: it was refused, and has none.")
@@ -158,24 +158,35 @@ std::map<std::uint32_t, PoseList> trajectories_of(const SlamSummary& summary) {
 
 void bind_summary(py::module_& module) {
   py::class_<StageTime>(module, "StageTime", "What a stage of a thread took, over the whole run.")
-      .def_readonly("thread", &StageTime::thread)
-      .def_readonly("stage", &StageTime::stage)
-      .def_readonly("count", &StageTime::count)
-      .def_readonly("mean_ms", &StageTime::mean_ms)
-      .def_readonly("p50_ms", &StageTime::p50_ms)
-      .def_readonly("p99_ms", &StageTime::p99_ms)
-      .def_readonly("max_ms", &StageTime::max_ms)
+      .def_readonly("thread", &StageTime::thread, "tracker, mapper or loop closer.")
+      .def_readonly("stage", &StageTime::stage, "Its name.")
+      .def_readonly("count", &StageTime::count, "How often it ran.")
+      .def_readonly("mean_ms", &StageTime::mean_ms, "[ms].")
+      .def_readonly("p50_ms", &StageTime::p50_ms, "Median [ms].")
+      .def_readonly("p99_ms", &StageTime::p99_ms, "Of a hundred, one took longer [ms].")
+      .def_readonly("max_ms", &StageTime::max_ms, "[ms].")
       .def("__repr__", [](const StageTime& self) {
         return fmt::format("<StageTime {}, {}: {} times, mean {:.3f} ms, p99 {:.3f} ms>", self.thread,
                            self.stage, self.count, self.mean_ms, self.p99_ms);
       });
+  using Readout = SlamSummary::Readout;
+  py::class_<Readout>(module, "Readout", "How long a rolling shutter takes, as a run measured it.")
+      .def_readonly("found", &Readout::found, "Whether it is one, and the run went on with it.")
+      .def_readonly("seconds", &Readout::seconds, "From the first row's exposure to the last one's [s].")
+      .def_readonly("sigma", &Readout::sigma, "Its standard deviation [s].")
+      .def_readonly("pairs", &Readout::pairs, "Pairs of frames that it was measured from.");
   py::class_<SlamSummary>(module, "Summary", "What a run came to.")
+      .def_readonly("row_offset", &SlamSummary::row_offset,
+                    "Stereo: rows that right images lie lower than left ones, taken back while tracking "
+                    "[px]; 0: none.")
+      .def_readonly("readout", &SlamSummary::readout,
+                    "Readout of the camera's shutter; None when the rig says it, or nothing was measured.")
       .def_readonly("frames", &SlamSummary::frames, "Queued or dropped.")
-      .def_readonly("tracked", &SlamSummary::tracked)
+      .def_readonly("tracked", &SlamSummary::tracked, "Frames whose pose was known at once.")
       .def_readonly("placed_later", &SlamSummary::placed_later,
                     "Before one camera's start, which said where they were.")
-      .def_readonly("lost", &SlamSummary::lost)
-      .def_readonly("dropped", &SlamSummary::dropped)
+      .def_readonly("lost", &SlamSummary::lost, "Frames without a pose, unplaced ones included.")
+      .def_readonly("dropped", &SlamSummary::dropped, "Frames there was no time or room for.")
       .def_property_readonly(
           "trajectory",
           [](const SlamSummary& self) {
@@ -187,9 +198,9 @@ void bind_summary(py::module_& module) {
           "Poses of the tracked frames in the final map: those of the map part that has most of them.")
       .def_property_readonly("trajectories", &trajectories_of,
                              "The same of every map part, by the part's id.")
-      .def_readonly("timings", &SlamSummary::timings)
+      .def_readonly("timings", &SlamSummary::timings, "StageTime of each thread's stages.")
       .def_readonly("notes", &SlamSummary::notes, "Requested settings that could not be applied.")
-      .def_readwrite("errors", &SlamSummary::errors, "What went wrong on the way.")
+      .def_readwrite("errors", &SlamSummary::errors, "What went wrong on the way, a sentence each.")
       .def("__repr__", [](const SlamSummary& self) {
         return fmt::format("<Summary of {} frames: {} tracked, {} lost, {} dropped>", self.frames,
                            self.tracked, self.lost, self.dropped);
@@ -327,7 +338,7 @@ void bind_slam_class(py::module_& module) {
 }  // namespace
 
 void bind_slam(py::module_& module) {
-  py::enum_<RunMode>(module, "RunMode")
+  py::enum_<RunMode>(module, "RunMode", "On how many threads a Slam works.")
       .value("THREADED", RunMode::kThreaded, "tracker, mapper and loop closer on threads of their own")
       .value("DETERMINISTIC", RunMode::kDeterministic, "all within push: same frames, same bytes");
   bind_push(module);

@@ -22,8 +22,10 @@ std::string FrameIntake::refusal(const FrameView& view) const {
                        last_t_ns_);
   if (std::string why = image_refusal("left", view.left, rig_.camera, false); !why.empty()) return why;
   switch (rig_.kind) {
-    case SensorKind::kStereo:
-      return image_refusal("right", view.right, rig_.camera, false);
+    case SensorKind::kStereo: {
+      std::string why = image_refusal("right", view.right, rig_.camera, false);
+      return why.empty() ? pair_refusal(view) : why;
+    }
     case SensorKind::kRgbd:
       return image_refusal("depth", view.depth, rig_.camera, true);
     case SensorKind::kMono:

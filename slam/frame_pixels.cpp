@@ -76,6 +76,12 @@ std::string pixels_refusal(const char* name, const ImageView& view, bool depth) 
   return "";
 }
 
+std::string pair_refusal(const FrameView& view) {
+  if (view.left.format == view.right.format) return "";
+  return fmt::format("the left image is {}, the right one {}: both must be of one format",
+                     name_of(view.left.format), name_of(view.right.format));
+}
+
 cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owner) {
   static const auto& kAllocator = *new OwnerAllocator;  // outlives every image
   if (view.data == nullptr) return {};

@@ -14,6 +14,9 @@ namespace twofold {
 /// @param name  of the image, for the sentence
 [[nodiscard]] std::string pixels_refusal(const char* name, const ImageView& view, bool depth);
 
+/// Empty when both images of a pair are of one format; else one sentence that says of which they are.
+[[nodiscard]] std::string pair_refusal(const FrameView& view);
+
 /// The pixels of a view that is not refused, CV_8UC1 or CV_16UC1; an empty image for a view without data.
 /// With an owner, grey images and depth stay where they are, and the image keeps the owner; else they are
 /// copied. Colour is turned to grey.

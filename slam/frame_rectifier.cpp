@@ -2,6 +2,7 @@
 
 #include "camera/rectifier.hpp"
 #include "io/files/calibration_file.hpp"
+#include "io/files/io_error.hpp"
 #include "slam/conversions.hpp"
 #include "slam/frame_pixels.hpp"
 #include "twofold/rectifier.hpp"
@@ -9,8 +10,31 @@
 namespace twofold {
 namespace {
 
-Calibration usable_calibration(const std::filesystem::path& file, int width, int height) {
-  Calibration calibration = read_calibration(file);
+/// EuRoC's layout: a file a camera.
+Calibration calibration_of_folder(const std::filesystem::path& folder, bool left_only) {
+  const auto cameras = std::filesystem::exists(folder / "mav0") ? folder / "mav0" : folder;
+  const auto left = cameras / "cam0" / "sensor.yaml", right = cameras / "cam1" / "sensor.yaml";
+  if (left_only || !std::filesystem::exists(right)) return read_calibration(left);
+  return read_euroc_calibration(left, right);
+}
+
+/// One file of a pair's two would give another rotation than the pair, without a word.
+void expect_alone(const std::filesystem::path& file) {
+  const auto folder = std::filesystem::absolute(file).parent_path();
+  if (file.filename() != "sensor.yaml" || folder.filename() != "cam0") return;
+  const auto other = folder.parent_path() / "cam1" / "sensor.yaml";
+  if (std::filesystem::exists(other))
+    throw IoError(file, "is of one camera of a pair, " + other.string() +
+                            " is of the other: give their folder " + folder.parent_path().string() +
+                            " (with left_only for this camera alone)");
+}
+
+Calibration usable_calibration(const std::filesystem::path& file, int width, int height, bool left_only) {
+  const bool folder = std::filesystem::is_directory(file);
+  if (!folder) expect_alone(file);
+  Calibration calibration = folder ? calibration_of_folder(file, left_only) : read_calibration(file);
+  if (left_only && calibration.kind != SensorKind::kMono)
+    throw IoError(file, "left_only is for folders in EuRoC's layout");
   if (width > 0 && height > 0) set_missing_size(width, height, &calibration);
   expect_valid(file, calibration);
   return calibration;
@@ -32,8 +56,9 @@ struct TWOFOLD_HIDDEN FrameRectifier::Impl {
   CameraRig rig;
 };
 
-FrameRectifier::FrameRectifier(const std::filesystem::path& calibration, int width, int height)
-    : impl_(std::make_unique<Impl>(usable_calibration(calibration, width, height))) {}
+FrameRectifier::FrameRectifier(const std::filesystem::path& calibration, int width, int height,
+                               bool left_only)
+    : impl_(std::make_unique<Impl>(usable_calibration(calibration, width, height, left_only))) {}
 FrameRectifier::~FrameRectifier() = default;
 FrameRectifier::FrameRectifier(FrameRectifier&&) noexcept = default;
 FrameRectifier& FrameRectifier::operator=(FrameRectifier&&) noexcept = default;
@@ -53,6 +78,8 @@ FrameView FrameRectifier::rectify(const FrameView& view) const {
   raw.left = usable_image("left", view, view.left, false);
   if (sensor == Sensor::kRgbd) raw.depth = usable_image("depth", view, view.depth, true);
   if (sensor == Sensor::kStereo) raw.right = usable_image("right", view, view.right, false);
+  if (const std::string why = pair_refusal(view); sensor == Sensor::kStereo && !why.empty())
+    throw std::invalid_argument(why);
   if (const std::string why = impl_->rectifier.mismatch_reason(raw); !why.empty())
     throw std::invalid_argument(why);
   Frame frame;

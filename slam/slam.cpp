@@ -89,6 +89,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
     return !summary_ && pipeline_->has_room();
   }
   [[nodiscard]] std::vector<std::string> errors() const;
+  void save_map(const std::filesystem::path& file);
   const SlamSummary& finish();
 
   GuardedCallback<PoseEstimate> on_pose{"on_pose"};
@@ -169,7 +170,6 @@ void Slam::Impl::look_now_and_then(const std::stop_token& stop) {
 bool Slam::Impl::failed() {
   const bool ended = pipeline_->failed();
   std::vector<std::string> lost = pipeline_->log_errors();
-  if (!ended && lost.empty()) return false;
   const std::scoped_lock lock(errors_);
   if (ended) engine_error_ = kEndedEarly;
   log_errors_ = std::move(lost);
@@ -228,6 +228,14 @@ std::vector<std::string> Slam::Impl::errors() const {
   return errors;
 }
 
+void Slam::Impl::save_map(const std::filesystem::path& file) {
+  expect_no_callback("save_map");
+  const auto map = maps.newest();
+  if (map->graph.keyframe_count() == 0)
+    throw std::runtime_error(file.string() + ": there is no map yet: no keyframe was made");
+  twofold::save_map(file, rig_, map->graph, map->places);
+}
+
 const SlamSummary& Slam::Impl::finish() {
   expect_no_callback("finish");
   const std::scoped_lock turn(pushing_);
@@ -239,8 +247,8 @@ const SlamSummary& Slam::Impl::finish() {
   pipeline_.reset();
   {
     const std::scoped_lock lock(errors_);
-    engine_error_ = result.error;  // and what the logs lost
-    log_errors_.clear();
+    engine_error_ = result.error;
+    log_errors_ = result.losses;
   }
   summary_->errors = errors();
   return *summary_;
@@ -294,8 +302,7 @@ HeldMaps Slam::held_maps() const {
 }
 
 void Slam::save_map(const std::filesystem::path& file) const {
-  const auto map = impl_->maps.newest();
-  twofold::save_map(file, impl_->rig(), map->graph, map->places);
+  impl_->save_map(file);
 }
 
 std::vector<std::string> Slam::errors() const {

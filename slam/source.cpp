@@ -38,6 +38,10 @@ const CameraRig& Source::rig() const {
   return impl_->rig;
 }
 
+Pose Source::T_rectified_raw() const {
+  return to_pose(SE3(impl_->source->R_rectified_raw(), Vector3::Zero()));
+}
+
 std::optional<std::int64_t> Source::frame_count() const {
   return impl_->source->frame_count();
 }

@@ -31,9 +31,12 @@ SlamSummary summarise(const RunResult& result) {
     summary.trajectory.push_back({record.t_ns, index(result.graph.part(record.reference)),
                                   to_pose(final_T_c_w(record, result.graph).inverse())});
   }
+  summary.row_offset = result.row_offset;
+  if (result.readout && result.readout->pairs > 1)
+    summary.readout = {result.readout->significant, result.readout->seconds, result.readout->sigma,
+                       static_cast<int>(result.readout->pairs)};
   for (const StageRecorder& thread : result.times) add_timings(thread, summary.timings);
   summary.notes = result.notes;
-  if (!result.error.empty()) summary.errors.push_back(result.error);
   return summary;
 }
 

@@ -26,7 +26,8 @@ class PoseOutput {
 
 /// @param target  "-": standard output; udp:HOST:PORT; unix:PATH, a socket that 16 readers at a time may
 ///                connect to and leave, others are told that they are too many; zmq:ENDPOINT, which publishes
-///                there; else a file, or a pipe with a name, that somebody reads
+///                there; else a file, or a pipe with a name, that somebody reads; when he
+///                leaves, another one may come. A file whose name has a colon before any slash is "./a:b"
 ///
 /// Throws std::runtime_error naming the target and what is wrong with it.
 [[nodiscard]] std::unique_ptr<PoseOutput> open_pose_output(const std::string& target, PoseForm form);

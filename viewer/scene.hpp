@@ -35,8 +35,8 @@ struct ViewMap {
 /// gone, the one before it stands for it.
 void mark_loops(const std::vector<MapSnapshot::Loop>& loops, ViewMap& view);
 
-/// Times of `t_ns` are counted from `start_ns`. O(size of the map); covariances take four times as long as the
-/// rest.
+/// Times of `t_ns` are counted from `start_ns`. O(size of the map); covariances take four times as long as
+/// the rest.
 [[nodiscard]] ViewMap view_of(const MapSnapshot& map, std::int64_t start_ns, bool with_covariance);
 
 /// Codes of the points' standard deviations by their ids; 0: not known. They are found by and by, as they

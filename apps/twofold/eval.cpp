@@ -49,6 +49,15 @@ Trajectory read_truth(const std::string& text) {
   return truth;
 }
 
+/// Of a run that was killed, too.
+Trajectory read_estimate(const std::string& file) {
+  if (trajectory_form(file) != TrajectoryForm::kTum) return read_trajectory(file);
+  std::string note;
+  Trajectory estimate = read_tum_trajectory(file, CutLine::kLeftOut, &note);
+  if (!note.empty()) fmt::print(stderr, "twofold: {}\n", note);
+  return estimate;
+}
+
 bool is_kitti(const std::string& file) {
   return fs::is_regular_file(file) && trajectory_form(file) == TrajectoryForm::kKitti;
 }
@@ -62,7 +71,7 @@ std::vector<PosePair> pair_poses(const EvalArguments& arguments) {
         estimate_by_line ? arguments.estimate : arguments.truth,
         "has no time stamps (KITTI form), the other trajectory has: they cannot be brought together");
   }
-  const Trajectory estimate = read_trajectory(arguments.estimate);
+  const Trajectory estimate = read_estimate(arguments.estimate);
   const Trajectory truth = read_truth(arguments.truth);
   if (!estimate_by_line) return associate(estimate, truth, std::llround(arguments.max_difference_s * 1e9));
   if (estimate.size() != truth.size()) {

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
 #include "engine/listeners.hpp"
 #include "io/files/io_error.hpp"
 
@@ -38,10 +36,8 @@ void PoseStreaming::finish() {
   if (streams_) streams_->finish();
 }
 
-void PoseStreaming::expect_success() const {
-  if (!streams_) return;
-  const std::vector<std::string> problems = streams_->problems();
-  if (!problems.empty()) throw IoError("--poses", fmt::format("{}", fmt::join(problems, "; ")));
+std::vector<std::string> PoseStreaming::problems() const {
+  return streams_ ? streams_->problems() : std::vector<std::string>();
 }
 
 }  // namespace twofold

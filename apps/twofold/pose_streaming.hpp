@@ -20,8 +20,8 @@ class PoseStreaming {
   void listen(EngineOptions& options);
   /// After the run.
   void finish();
-  /// After that. Throws IoError when lines could not be written, as to a disk that is full.
-  void expect_success() const;
+  /// After that: what was not written, as to a disk that is full, a sentence an output.
+  [[nodiscard]] std::vector<std::string> problems() const;
 
  private:
   PoseReporter reporter_;  // tracker's

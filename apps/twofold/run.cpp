@@ -13,6 +13,7 @@
 #include "apps/twofold/map_parts.hpp"
 #include "apps/twofold/pose_streaming.hpp"
 #include "apps/twofold/run_arguments.hpp"
+#include "apps/twofold/run_failures.hpp"
 #include "apps/twofold/run_filter.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "apps/twofold/surface/live_surface.hpp"
@@ -140,15 +141,21 @@ SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surfac
   return figures;
 }
 
-/// Throws what the run failed of: the source, a thread, or that nothing was tracked.
-void expect_success(const std::string& name, const FrameSource& source, const EngineOptions& options,
-                    const RunResult& result) {
-  if (!source.error().empty()) throw IoError("", source.error());
-  if (!result.error.empty()) throw std::runtime_error(result.error);
-  const bool any_tracked = result.counts.tracked > 0;
-  if (!any_tracked && options.map)
-    throw std::runtime_error(name + ": no place of the loaded map was recognised");
-  if (!any_tracked) throw std::runtime_error(name + ": no frame could be tracked");
+/// What the run failed of: the source, a thread, that nothing was tracked; and what its files lost.
+RunFailures failures_of(const std::string& name, const FrameSource& source, const EngineOptions& options,
+                        const RunResult& result, const PoseStreaming& poses) {
+  RunFailures failures;
+  if (!source.error().empty()) {
+    failures.add(source.error(), source.is_live() ? kFailedRun : kBadInput);
+  } else if (!result.error.empty()) {
+    failures.add(result.error);
+  } else if (result.counts.tracked == 0) {
+    failures.add(
+        name + (options.map ? ": no place of the loaded map was recognised" : ": no frame could be tracked"));
+  }
+  for (const std::string& loss : result.losses) failures.add(loss);
+  for (const std::string& problem : poses.problems()) failures.add("--poses " + problem);
+  return failures;
 }
 
 int run(const RunArguments& arguments) {
@@ -193,17 +200,21 @@ int run(const RunArguments& arguments) {
   view.finish();
   result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
   const std::vector<MapPart> parts = map_parts(result, options);
+  RunFailures failures = failures_of(arguments.source, *source, options, result, poses);
   std::vector<std::string> maps;
-  if (!arguments.map.save.empty()) {
-    maps = save_parts(arguments.map.save, source->rig(), result, parts);
-  }
+  if (!arguments.map.save.empty())
+    failures.attempt([&] { maps = save_parts(arguments.map.save, source->rig(), result, parts); });
   std::optional<SurfaceFigures> figures;
-  if (surface.wanted()) figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id);
-  write_run_output(
-      arguments.out,
-      {arguments.source, arguments.record, calibration ? auto_calibration_json(*calibration) : nullptr},
-      *source, options, result, parts, figures ? surface_json(*figures) : nullptr);
-  if (!arguments.trace.empty()) write_trace(arguments.trace, result);
+  if (surface.wanted())
+    failures.attempt(
+        [&] { figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id); });
+  failures.attempt([&] {
+    write_run_output(arguments.out,
+                     {arguments.source, arguments.record,
+                      calibration ? auto_calibration_json(*calibration) : nullptr, failures.all()},
+                     *source, options, result, parts, figures ? surface_json(*figures) : nullptr);
+  });
+  if (!arguments.trace.empty()) failures.attempt([&] { write_trace(arguments.trace, result); });
   print_summary(arguments.out, options, result, parts);
   if (figures) print_surface(*figures);
   if (scale_is_arbitrary(source->rig(), options))
@@ -212,8 +223,7 @@ int run(const RunArguments& arguments) {
   const SourceReport captured = source->report();
   for (const std::string& text : captured.summary) fmt::print("{}\n", text);
   for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
-  expect_success(arguments.source, *source, options, result);
-  poses.expect_success();
+  failures.expect_none();
   return kOk;
 }
 

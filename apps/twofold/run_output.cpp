@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/loop_latency.hpp"
@@ -43,7 +44,7 @@ void replace_causal_trajectory(const std::filesystem::path& file, const Trajecto
   write_tum_trajectory(beside, poses);
   std::error_code error;
   std::filesystem::rename(beside, file, error);
-  if (error) throw IoError(file, "cannot be written: " + error.message());
+  if (error) throw WriteError(file, "cannot be written: " + error.message());
 }
 
 /// Of an earlier run into the same folder, which had more parts.
@@ -114,6 +115,8 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
   const bool no_scale = scale_is_arbitrary(source.rig(), options);
   nlohmann::ordered_json summary = summary_json(frames.source, options, result, parts);
+  summary["errors"] = frames.errors;
+  summary["error"] = fmt::format("{}", fmt::join(frames.errors, "; "));
   summary["scale"] = no_scale ? "arbitrary" : "metric";
   summary["self_calibration"] = frames.calibration;
   summary["surface"] = surface;
@@ -139,7 +142,8 @@ void remove_results(const std::filesystem::path& folder) {
 
 void write_trace(const std::filesystem::path& file, const RunResult& result) {
   std::ofstream out(file);
-  if (!result.trace || !result.trace->write(out)) throw IoError(file.string(), "the trace cannot be written");
+  if (!result.trace || !result.trace->write(out))
+    throw WriteError(file.string(), "the trace cannot be written");
 }
 
 namespace {

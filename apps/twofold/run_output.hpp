@@ -17,7 +17,8 @@ struct RunFrames {
   std::string source;     ///< as given
   std::string recording;  ///< folder; empty: they were not recorded
   nlohmann::ordered_json calibration =
-      nullptr;  ///< what was found from the video itself, if it was asked for
+      nullptr;                           ///< what was found from the video itself, if it was asked for
+  std::vector<std::string> errors = {};  ///< of the run: what it failed of, and what was lost
 };
 
 /// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, groundtruth.txt if

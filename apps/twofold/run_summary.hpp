@@ -10,7 +10,8 @@
 
 namespace twofold {
 
-/// summary.json: counts, cost, loops, corrections of the pose, and of each lost or late frame the cause.
+/// summary.json: counts, cost, loops, corrections of the pose, and of each lost or late frame the cause;
+/// `errors` is left to the caller.
 [[nodiscard]] nlohmann::ordered_json summary_json(const std::string& source_text,
                                                   const EngineOptions& options, const RunResult& result,
                                                   const std::vector<MapPart>& parts);

@@ -39,14 +39,16 @@ std::vector<std::string> LogWriter::errors() const {
   return errors;
 }
 
-std::string LogWriter::finish() {
+std::vector<std::string> LogWriter::finish() {
   thread_->request_stop();
   const auto outcome = thread_->join();
-  for (const auto& file : files_) file->write_waiting();
-  std::string lost;
-  for (const std::string& error : errors()) lost += (lost.empty() ? "" : "; ") + error;
-  if (!lost.empty()) return lost;
-  return outcome ? "" : outcome.error();
+  for (const auto& file : files_) {
+    file->write_waiting();
+    file->give_up();
+  }
+  std::vector<std::string> lost = errors();
+  if (!outcome) lost.push_back(outcome.error());
+  return lost;
 }
 
 }  // namespace twofold

@@ -22,10 +22,10 @@ class LogWriter {
   [[nodiscard]] bool behind() const;
   /// Returns when none is. For those who have time.
   void wait_for_room() const;
-  /// What was lost so far, a sentence a file; any thread.
+  /// What was lost so far, and what waits for room on the disk, a sentence a file; any thread.
   [[nodiscard]] std::vector<std::string> errors() const;
-  /// After the last append: writes what waits and ends the thread. Empty, or all that was lost.
-  [[nodiscard]] std::string finish();
+  /// After the last append: writes what waits and ends the thread. What was lost, as errors.
+  [[nodiscard]] std::vector<std::string> finish();
 
  private:
   std::vector<std::shared_ptr<LogFile>> files_;

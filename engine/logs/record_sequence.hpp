@@ -30,7 +30,12 @@ class RecordSequence {
 
   void push_back(const T& record) {
     if (file_) {
-      file_->append(std::span(reinterpret_cast<const std::uint8_t*>(&record), sizeof(T)));
+      const std::span bytes(reinterpret_cast<const std::uint8_t*>(&record), sizeof(T));
+      if constexpr (requires { record.t_ns; }) {
+        file_->append(bytes, record.t_ns);
+      } else {
+        file_->append(bytes);
+      }
       return;
     }
     memory_.push_back(record);

@@ -19,10 +19,19 @@ RunLogs::RunLogs(const RunLogOptions& options, ReplacementLog& replacements) : o
 }
 
 void RunLogs::open_files(ReplacementLog& replacements) {
-  const auto unnamed = [this] { return LogFile::unnamed(options_.folder); };
-  const auto frames = unnamed(), corrections = unnamed(), culled = unnamed(), scaled = unnamed();
-  causal_ = std::make_shared<LogFile>(options_.folder / "trajectory_causal.txt");
-  schedule_file_ = std::make_shared<LogFile>(options_.folder / "schedule.log");
+  const auto unnamed = [this](const char* records, bool goes_on, const char* loss) {
+    return LogFile::unnamed(options_.folder, {records, goes_on, loss});
+  };
+  const auto frames = unnamed("records of frames", true, "their frames lack a final pose");
+  const auto corrections = unnamed("corrections of the map", true, "");
+  const char* const hanging = "final poses of frames on keyframes that were culled may be wrong";
+  const auto culled = unnamed("replacements of keyframes", false, hanging);
+  const auto scaled = unnamed("scales of keyframes", false, hanging);
+  causal_ = std::make_shared<LogFile>(options_.folder / "trajectory_causal.txt",
+                                      LogContent{.records = "poses", .goes_on = true, .loss = ""});
+  schedule_file_ = std::make_shared<LogFile>(
+      options_.folder / "schedule.log",
+      LogContent{.records = "steps", .goes_on = false, .loss = "a replay goes as far as the first of them"});
   frames_.keep_in(frames);
   corrections_.keep_in(corrections);
   replacements.keep_in(culled, scaled);
@@ -35,23 +44,34 @@ void RunLogs::add(const FrameRecord& record, const PoseCorrection& correction) {
   counts_.add(record.state);
   frames_.push_back(record);
   if (correction.reason != CorrectionReason::kNone) corrections_.push_back(correction);
-  if (!causal_ || record.state != FrameState::kTracked) return;
+  if (causal_ && record.state == FrameState::kTracked) add_causal(record);
+}
+
+void RunLogs::add_causal(const FrameRecord& record) {
+  std::string text;
+  if (gap_.poses > 0)
+    text = "# " + std::to_string(gap_.poses) + " poses are missing, from " + seconds_text(gap_.first_t_ns) +
+           " to " + seconds_text(gap_.last_t_ns) + ": there was no room on the disk\n";
   if (record.part_causal != part_ && part_ != kNoKeyframe)
-    causal_->append(
-        "# another map part, in a world of its own: " + std::to_string(index(record.part_causal)) + "\n");
-  part_ = record.part_causal;
-  causal_->append(tum_line({record.t_ns, record.T_c_w_causal.unpacked().inverse()}));
+    text += "# another map part, in a world of its own: " + std::to_string(index(record.part_causal)) + "\n";
+  text += tum_line({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
+  if (causal_->append(text, record.t_ns)) {
+    gap_ = {};
+    part_ = record.part_causal;
+    return;
+  }
+  if (gap_.poses++ == 0) gap_.first_t_ns = record.t_ns;
+  gap_.last_t_ns = record.t_ns;
 }
 
 void RunLogs::close(ReplacementLog& replacements, RunResult& result) {
   if (writer_) {
     ScheduleStreams::end(*schedule_file_);
-    const std::string lost = writer_->finish();
-    if (result.error.empty()) result.error = lost;
+    result.losses = writer_->finish();
     frames_.read_back();
     corrections_.read_back();
     replacements.read_back();
-    if (lost.empty()) merge_schedule_file();
+    if (result.losses.empty()) merge_schedule_file();
   }
   result.counts = counts_;
   result.frames = std::move(frames_);

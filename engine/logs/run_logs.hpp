@@ -16,7 +16,9 @@ namespace twofold {
 /// What a run leaves behind, taken down as it arises: records of frames, corrections, the replacements of
 /// culled keyframes, the schedule. With a folder (RunLogOptions) all of it goes to disk, where
 /// trajectory_causal.txt and schedule.log are whole at any time but for the last 0.1 s; without one it stays
-/// in memory. On disk, not in reserve: what the operating system has not written yet is lost with its power.
+/// in memory. Poses and records that a full disk does not take wait for room within the bound of LogFile; the
+/// others are missing, and the file goes on behind them. The schedule ends there: each step builds on the one
+/// before it. On disk, not in reserve: what the operating system has not written yet is lost with its power.
 ///
 /// Roles: add by the thread that takes frames back; each stream of the schedule and the replacement log by
 /// one thread each; close when these are joined.
@@ -41,11 +43,13 @@ class RunLogs {
     return writer_ ? writer_->errors() : std::vector<std::string>{};
   }
 
-  /// Ends the files and moves the records into the result; what was lost becomes its error.
+  /// Ends the files and moves the records into the result, with what was lost.
   void close(ReplacementLog& replacements, RunResult& result);
 
  private:
   void open_files(ReplacementLog& replacements);
+  /// A pose for the causal trajectory. After poses that were lost a comment says how many, and of when.
+  void add_causal(const FrameRecord& record);
   /// One section a thread: the bytes do not depend on the threads' turns.
   void merge_schedule_file();
 
@@ -54,7 +58,12 @@ class RunLogs {
   RecordSequence<FrameRecord> frames_;
   RecordSequence<PoseCorrection> corrections_;
   ScheduleStreams schedule_;
+  // What lines of the causal trajectory were lost since the last one that was taken.
+  struct Gap {
+    std::int64_t poses = 0, first_t_ns = 0, last_t_ns = 0;
+  };
   KeyframeId part_ = kNoKeyframe;  // of the line before in the causal trajectory
+  Gap gap_;
   std::shared_ptr<LogFile> causal_, schedule_file_;
   std::optional<LogWriter> writer_;
 };

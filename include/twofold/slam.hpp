@@ -95,6 +95,18 @@ struct SlamSummary {
     Pose T_world_camera;
   };
   std::vector<FinalPose> trajectory;  ///< 72 bytes each: 190 MB for a day at 30 Hz
+  /// Stereo: rows that right images lie lower than left ones, taken back while tracking [px]; 0: none. The
+  /// pair should be calibrated again.
+  double row_offset = 0;
+  /// Of a camera's shutter, when CameraRig::readout did not say it; no value: it did, or nothing was
+  /// measured.
+  struct Readout {
+    bool found = false;  ///< a rolling shutter, and the run went on with it
+    double seconds = 0;  ///< from the first row's exposure to the last one's
+    double sigma = 0;    ///< standard deviation [s]
+    int pairs = 0;       ///< of frames, from which it was measured
+  };
+  std::optional<Readout> readout;
   std::vector<StageTime> timings;
   std::vector<std::string> notes;  ///< requested settings (pinning, priority) that could not be applied
   /// What went wrong on the way: a callback that threw, a thread that ended, a file that lost something.
@@ -132,8 +144,8 @@ class TWOFOLD_API Slam {
   Slam& operator=(const Slam&) = delete;
 
   /// Called for every frame that was looked at, on the tracker's thread, which waits for it: it must not
-  /// block, and may call latest, map, held_maps and errors only; push, has_room, wait_for_room and finish
-  /// would wait for it, and throw std::logic_error there. What it uses must live until finish has returned.
+  /// block, and may call latest, map, held_maps and errors only; push, has_room, wait_for_room, save_map and
+  /// finish would wait, and throw std::logic_error there. What it uses must live until finish has returned.
   /// The time it takes is a stage of its own among SlamSummary::timings ("pose listener"), and in the next
   /// frame's latency. A callback that throws is not called again; tracking goes on, and errors() says what it
   /// threw. To be set before the first push, else std::logic_error is thrown.
@@ -167,7 +179,7 @@ class TWOFOLD_API Slam {
   [[nodiscard]] HeldMaps held_maps() const;
   /// Writes the newest version to a map file, on this thread, while the run goes on. The file is
   /// replaced atomically: a crash leaves either the old or the new version. Throws std::runtime_error naming
-  /// file and reason.
+  /// file and reason, also when there is no keyframe yet.
   void save_map(const std::filesystem::path& file) const;
 
   /// What went wrong so far; tracking goes on unless it says otherwise. A thread that ended and a file that
@@ -184,7 +196,7 @@ class TWOFOLD_API Slam {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Twofold's version, as "0.1.0".
+/// Twofold's version, as "0.2.0".
 [[nodiscard]] TWOFOLD_API const char* version();
 
 }  // namespace twofold

@@ -37,6 +37,11 @@ class TWOFOLD_API Source {
   Source& operator=(Source&&) noexcept;
 
   [[nodiscard]] const CameraRig& rig() const;
+  /// How the left camera that poses are of stands in the one that was calibrated, by the calibration that
+  /// this source uses: a rotation alone; the identity where it delivers the images as they came. Of several
+  /// calibrations that one could read, this is the right one for the poses of this source
+  /// (FrameRectifier::T_rectified_raw has the two lines to the pose of the body).
+  [[nodiscard]] Pose T_rectified_raw() const;
   /// Frames in all, where that is known beforehand.
   [[nodiscard]] std::optional<std::int64_t> frame_count() const;
   /// Frames come when they are taken, not when they are asked for.

@@ -36,13 +36,14 @@ class BagReader {
  public:
   virtual ~BagReader() = default;
 
-  /// All that the file says it holds; from its summary, or, without one, from a pass over all of it.
+  /// All that the file says it holds; from its summary, or, without a whole one, from a pass over all of it.
   [[nodiscard]] virtual const std::vector<BagTopic>& topics() const = 0;
   /// next gives the messages of these topics only, from the first one on.
   virtual void select(std::set<std::uint32_t> topics) = 0;
   /// False at the end. The data are valid until the next call of anything.
   virtual bool next(BagMessage& message) = 0;
-  /// Empty, or where the file is cut short: its recorder was killed, and what came before was given.
+  /// Empty, or where the file is cut short: its recorder was killed, and what came before was given; and that
+  /// its summary is damaged, without which all of it was read.
   [[nodiscard]] virtual std::string fault() const = 0;
 };
 

@@ -77,9 +77,7 @@ class McapReader final : public BagReader {
  public:
   explicit McapReader(BagFile file) : file_(std::move(file)) {
     if (!begins_with_magic(0)) file_.fail(0, "is no MCAP file");
-    guarded(0, [this] {
-      if (!read_summary()) read_all_channels();
-    });
+    if (!summary_is_usable()) guarded(at_, [this] { read_all_channels(); });
     rewind();
   }
 
@@ -93,7 +91,9 @@ class McapReader final : public BagReader {
     guarded(at_, [&] { found = find_next(message); });
     return found;
   }
-  [[nodiscard]] std::string fault() const override { return fault_; }
+  [[nodiscard]] std::string fault() const override {
+    return note_.empty() || fault_.empty() ? note_ + fault_ : note_ + "; " + fault_;
+  }
 
  private:
   [[nodiscard]] bool begins_with_magic(std::uint64_t at) const {
@@ -117,6 +117,8 @@ class McapReader final : public BagReader {
     fault_.clear();
   }
 
+  /// False when the file has no summary, or one that is damaged: which `fault` says.
+  bool summary_is_usable();
   bool read_summary();
   void read_all_channels();
   /// The record at at_, which then is behind it; nothing at the end of the data, or where the file is cut.
@@ -133,8 +135,20 @@ class McapReader final : public BagReader {
   std::uint64_t at_ = 0;
   std::vector<std::uint8_t> unpacked_;
   BagBytes chunk_{{}};
-  std::string fault_;
+  std::string note_;   // of the summary
+  std::string fault_;  // of the data
 };
+
+bool McapReader::summary_is_usable() {
+  try {
+    return read_summary();
+  } catch (const MalformedBytes& error) {
+    note_ = file_.name() + ": " + error.what() + "; the whole file was read for what it says";
+  }
+  channels_ = {};
+  chunk_topics_.clear();
+  return false;
+}
 
 /// Schemas, channels and which topics each chunk has. False when the file has none.
 bool McapReader::read_summary() {

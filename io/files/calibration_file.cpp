@@ -174,6 +174,8 @@ Calibration read_euroc_calibration(const fs::path& cam0, const fs::path& cam1) {
   calibration.right = right.model;
   calibration.T_right_left = read_euroc_sensor_pose(cam1).inverse() * read_euroc_sensor_pose(cam0);
   calibration.fps = left.rate_hz;
+  calibration.already_rectified = true;
+  if (!calibration.invalid_reason().empty()) calibration.already_rectified = false;
   return calibration;
 }
 

@@ -19,7 +19,8 @@ namespace twofold {
 /// images. Throws IoError naming file, key and what is wrong; keys the own form does not know are errors.
 [[nodiscard]] Calibration read_calibration(const std::filesystem::path& file);
 
-/// EuRoC keeps a file a camera. Poses of the cameras in the body come from T_BS.
+/// EuRoC keeps a file a camera. Poses of the cameras in the body come from T_BS. A pair of rectified images
+/// says so by its numbers alone: equal cameras, no distortion, a pure shift.
 [[nodiscard]] Calibration read_euroc_calibration(const std::filesystem::path& cam0,
                                                  const std::filesystem::path& cam1);
 

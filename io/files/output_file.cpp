@@ -8,17 +8,23 @@
 #include "io/files/io_error.hpp"
 
 namespace twofold {
+namespace {
+
+std::string why_not() {
+  return std::string("cannot be written: ") + std::strerror(errno != 0 ? errno : EIO);
+}
+
+}  // namespace
 
 OutputFile::OutputFile(std::filesystem::path file) : file_(std::move(file)) {
   errno = 0;
   stream_.open(file_, std::ios::binary | std::ios::trunc);
-  if (!stream_) close();
+  if (!stream_) throw IoError(file_, why_not());
 }
 
 void OutputFile::close() {
   stream_.close();  // a full disk may only show when the last buffer is flushed
-  if (!stream_)
-    throw IoError(file_, std::string("cannot be written: ") + std::strerror(errno != 0 ? errno : EIO));
+  if (!stream_) throw WriteError(file_, why_not());
 }
 
 void write_file(const std::filesystem::path& file, std::string_view content) {

@@ -6,7 +6,7 @@
 
 namespace twofold {
 
-/// A file that is written piece by piece: what is too long to be put together in memory. All throw IoError as
+/// A file that is written piece by piece: what is too long to be put together in memory. All throw as
 /// write_file.
 class OutputFile {
  public:
@@ -22,8 +22,8 @@ class OutputFile {
   std::ofstream stream_;
 };
 
-/// Writes a whole file. Throws IoError when it cannot be opened or not all of it could be written (disk
-/// full).
+/// Writes a whole file. Throws IoError when it cannot be opened, WriteError when not all of it could be
+/// written (disk full).
 void write_file(const std::filesystem::path& file, std::string_view content);
 
 /// Makes sure the folder exists and files can be written in it; throws IoError. Call it before a long run,

@@ -39,7 +39,7 @@ std::vector<TextLine> read_text_lines(const std::filesystem::path& file) {
       text.pop_back();
     const auto first = text.find_first_not_of(" \t");
     if (first == std::string::npos || text[first] == '#') continue;
-    lines.push_back({number, text});
+    lines.push_back({number, text, !stream.eof()});
   }
   if (stream.bad()) throw IoError(file, "cannot be read");
   return lines;

@@ -12,6 +12,7 @@ namespace twofold {
 struct TextLine {
   int number = 0;  ///< counts from 1
   std::string text;
+  bool ended = true;  ///< by a line end; false: the file's last, which may have been cut
 };
 
 /// Lines of a text file that are neither blank nor comments ('#' first), without line ends. Throws IoError

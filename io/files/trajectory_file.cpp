@@ -50,10 +50,34 @@ bool rounded_to_same_time(const TimedPose& first, const TimedPose& second) {
 
 }  // namespace
 
-Trajectory read_tum_trajectory(const fs::path& file) {
+namespace {
+
+/// The last line was not written to its end: fields are missing, or the last one is shorter than those of the
+/// lines before, all of which have the same decimals.
+bool is_cut(const std::vector<TextLine>& lines) {
+  if (lines.empty() || lines.back().ended) return false;
+  const Fields last = split_fields(lines.back().text);
+  if (last.size() != 8 || lines.size() == 1) return last.size() < 8;
+  const auto decimals = [](std::string_view number) {
+    const auto point = number.find('.');
+    return point == std::string_view::npos ? 0 : number.size() - point;
+  };
+  const Fields before = split_fields(lines[lines.size() - 2].text);
+  return decimals(last.back()) < decimals(before.back());
+}
+
+}  // namespace
+
+Trajectory read_tum_trajectory(const fs::path& file, CutLine cut, std::string* note) {
+  std::vector<TextLine> lines = read_text_lines(file);
+  if (cut == CutLine::kLeftOut && is_cut(lines)) {
+    if (note != nullptr)
+      *note = fmt::format("{}:{}: the last line is cut, and left out", file.string(), lines.back().number);
+    lines.pop_back();
+  }
   Trajectory trajectory;
   std::int64_t previous = -1;
-  for (const TextLine& line : read_text_lines(file)) {
+  for (const TextLine& line : lines) {
     const Fields fields = fields_of(file, line, 8, " \t");
     const std::int64_t t_ns = seconds_field(file, line.number, fields[0]);
     const Vector3 q_xyz = vector_at(file, line.number, fields, 4);

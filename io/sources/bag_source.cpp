@@ -60,6 +60,7 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
     throw IoError(calibration_file, error.what());
   }
   rig_ = rectifier_->rig();
+  R_rectified_raw_ = rectifier_->R_rectified_left();
   select_images();
 }
 

@@ -9,6 +9,7 @@ namespace twofold {
 CalibratedSource::CalibratedSource(std::unique_ptr<FrameSource> source, const Calibration& calibration)
     : source_(std::move(source)), rectifier_(calibration) {
   rig_ = rectifier_.rig();
+  R_rectified_raw_ = rectifier_.R_rectified_left() * source_->R_rectified_raw();
   ground_truth_ = source_->ground_truth();
 }
 

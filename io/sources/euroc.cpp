@@ -53,12 +53,6 @@ std::vector<RecordedFrame> pair_images(const fs::path& mav, const std::vector<St
   return frames;
 }
 
-/// A recording of rectified images says so by its numbers alone: equal cameras, no distortion, a pure shift.
-void recognise_rectified_pair(Calibration* calibration) {
-  calibration->already_rectified = true;
-  if (!calibration->invalid_reason().empty()) calibration->already_rectified = false;
-}
-
 /// The ground truth is of its own sensor S; its sensor.yaml, if there, says where that sits in the body.
 Trajectory read_truth(const fs::path& folder, const SE3& T_b_c) {
   if (!fs::exists(folder / "data.csv")) return {};
@@ -95,7 +89,6 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
   if (fs::exists(mav / "cam0" / "sensor.yaml")) T_b_c = read_euroc_camera(mav / "cam0" / "sensor.yaml").T_b_c;
   if (!calibration && stereo) {
     recording.calibration = read_euroc_calibration(recording.calibration_file, mav / "cam1" / "sensor.yaml");
-    recognise_rectified_pair(&recording.calibration);
   } else {
     recording.calibration = read_calibration(recording.calibration_file);
     if (stereo && recording.calibration.kind != SensorKind::kStereo) {

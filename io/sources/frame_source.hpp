@@ -8,6 +8,7 @@
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
 #include "evaluation/trajectory.hpp"
+#include "geometry/se3.hpp"
 #include "geometry/triangle_mesh.hpp"
 
 namespace twofold {
@@ -38,6 +39,10 @@ class FrameSource {
 
   /// The rectified rig all frames are of; constant.
   [[nodiscard]] const Rig& rig() const { return rig_; }
+
+  /// Turns points of the left camera as it was calibrated into that which rig() and the frames are of:
+  /// identity where images came rectified already, or need no turn.
+  [[nodiscard]] const SO3& R_rectified_raw() const { return R_rectified_raw_; }
 
   /// T_w_c of the camera the rig describes, strictly increasing in time; empty when there is no ground truth.
   [[nodiscard]] const Trajectory& ground_truth() const { return ground_truth_; }
@@ -72,6 +77,7 @@ class FrameSource {
   virtual bool read(Frame& frame) = 0;
 
   Rig rig_;
+  SO3 R_rectified_raw_;
   Trajectory ground_truth_;
 
  private:

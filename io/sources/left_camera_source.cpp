@@ -4,6 +4,7 @@ namespace twofold {
 
 LeftCameraSource::LeftCameraSource(std::unique_ptr<FrameSource> source) : source_(std::move(source)) {
   rig_ = source_->rig();
+  R_rectified_raw_ = source_->R_rectified_raw();
   rig_.kind = SensorKind::kMono;
   rig_.baseline = 0;
   ground_truth_ = source_->ground_truth();

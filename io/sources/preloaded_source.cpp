@@ -16,6 +16,7 @@ std::size_t bytes_of(const cv::Mat& image) {
 PreloadedSource::PreloadedSource(std::unique_ptr<FrameSource> source, std::size_t max_bytes)
     : source_(std::move(source)) {
   rig_ = source_->rig();
+  R_rectified_raw_ = source_->R_rectified_raw();
   ground_truth_ = source_->ground_truth();
   Frame frame;
   std::size_t image_bytes = 0;

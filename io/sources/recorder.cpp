@@ -192,7 +192,7 @@ void Recorder::write_frame(const Frame& frame) {
         fs::resize_file(list, fs::file_size(list, ignored) - fmt::format("{},{}\n", frame.t_ns, name).size(),
                         ignored);
     }
-    throw IoError(mav_ / fmt::format("cam{}", c) / "data.csv", "cannot be written (is the disk full?)");
+    throw WriteError(mav_ / fmt::format("cam{}", c) / "data.csv", "cannot be written (is the disk full?)");
   }
   const std::lock_guard lock(mutex_);
   counts_.bytes += bytes;

@@ -72,6 +72,7 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
     throw IoError(recording_.calibration_file, e.what());
   }
   rig_ = rectifier_->rig();
+  R_rectified_raw_ = rectifier_->R_rectified_left();
   ground_truth_ = rectified_trajectory(recording_.ground_truth, rectifier_->R_rectified_left());
 }
 

@@ -10,6 +10,7 @@ RecordingTee::RecordingTee(std::unique_ptr<FrameSource> source, const std::files
       folder_(folder),
       recorder_(folder, source_->rig().kind, calibration_of(source_->rig()), options) {
   rig_ = source_->rig();
+  R_rectified_raw_ = source_->R_rectified_raw();
   ground_truth_ = source_->ground_truth();
 }
 

@@ -33,6 +33,7 @@ ResampledSource::ResampledSource(std::unique_ptr<FrameSource> source, const Pinh
     : source_(std::move(source)) {
   TWOFOLD_CHECK(source_->rig().kind == SensorKind::kMono, "one camera has no second image to keep in step");
   rig_ = source_->rig();
+  R_rectified_raw_ = source_->R_rectified_raw();
   ground_truth_ = source_->ground_truth();
   PinholeCamera& camera = rig_.camera;
   for (const auto& [own, wanted] : {std::pair{camera.fx, like.fx}, {camera.fy, like.fy}}) {

@@ -43,6 +43,7 @@ void V4l2Source::set_up_calibration(SourceParameters& parameters, const SourceOp
     throw IoError(file, e.what());
   }
   rig_ = rectifier_->rig();
+  R_rectified_raw_ = rectifier_->R_rectified_left();
 }
 
 namespace {

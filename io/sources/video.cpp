@@ -41,6 +41,7 @@ VideoSource::VideoSource(const std::filesystem::path& file,
     throw IoError(calibration_file, e.what());
   }
   rig_ = rectifier_->rig();
+  R_rectified_raw_ = rectifier_->R_rectified_left();
 }
 
 void VideoSource::take_layout(SourceParameters& parameters) {

@@ -8,7 +8,11 @@ Everywhere: metres, radians, nanoseconds; T_a_b takes points of frame b to frame
 forward; quaternions x y z w.
 """
 
-from ._core import (
+from ._cpu import check as _check_processor
+
+_check_processor()  # before the library is loaded
+
+from ._core import (  # noqa: E402
     NO_ID,
     AlignBy,
     CameraRig,
@@ -21,6 +25,7 @@ from ._core import (
     PoseEstimate,
     PushResult,
     PushStatus,
+    Readout,
     RunMode,
     Sensor,
     Source,
@@ -49,6 +54,7 @@ __all__ = [
     "PoseEstimate",
     "PushResult",
     "PushStatus",
+    "Readout",
     "Run",
     "RunMode",
     "Sensor",

@@ -35,6 +35,30 @@ TEST(EvalCommand, WritesTableJsonAndPlot) {
   EXPECT_EQ(cv::imread(folder / "e.png").empty(), false);
 }
 
+/// As a run leaves its trajectory that was killed within a write.
+TEST(EvalCommand, ACutLastLineIsLeftOutAndSaid) {
+  const ScratchFolder folder;
+  const auto truth = write_circle(folder, "truth.txt", 1);
+  const std::string whole = content(truth);
+  for (const std::size_t cut :
+       {2U, 9U, 40U}) {  // within the last number's decimals, before it, in the middle
+    const auto killed = folder.write("killed.txt", whole.substr(0, whole.size() - cut)).string();
+    const auto outcome = run(folder, "eval " + killed + " " + truth + " --json " + (folder / "e.json"));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_NE(outcome.err.find("killed.txt:61: the last line is cut, and left out"), std::string::npos)
+        << outcome.err;
+    EXPECT_EQ(nlohmann::json::parse(content(folder / "e.json"))["poses"], 59);
+  }
+  const auto unended = folder.write("unended.txt", whole.substr(0, whole.size() - 1)).string();
+  const auto outcome = run(folder, "eval " + unended + " " + truth + " --json " + (folder / "e.json"));
+  EXPECT_EQ(outcome.err, "") << "it is whole, only its line end is missing";
+  EXPECT_EQ(nlohmann::json::parse(content(folder / "e.json"))["poses"], 60);
+  const std::string middle =
+      whole.substr(0, whole.find("\n", 200) - 30) + whole.substr(whole.find("\n", 200));
+  expect_bad_input(run(folder, "eval " + folder.write("middle.txt", middle).string() + " " + truth),
+                   "fields, 8 are needed");
+}
+
 TEST(EvalCommand, BadInputIsOneLineAndExitCodeTwo) {
   const ScratchFolder folder;
   const auto truth = write_circle(folder, "truth.txt", 1);

@@ -249,13 +249,60 @@ TEST_F(RunCommand, WhatDoesNotShowTheCalibrationIsRefused) {
   expect_bad_input(run_recording("--camera mono --calib auto"), "the camera moved too little");
 }
 
-TEST_F(RunCommand, FullDiskIsOneLineAndExitCodeTwo) {
+void expect_failed_run(const Outcome& outcome, const std::vector<std::string>& parts) {
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  for (const std::string& part : parts) EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+}
+
+TEST_F(RunCommand, AFullDiskIsOneLineThatNamesAllThatIsMissing) {
   // No file may grow beyond 8 KiB: writing fails as it does on a full disk.
   const std::string full_disk = "trap '' XFSZ; ulimit -f 16;";
-  expect_bad_input(run_recording("--deterministic", full_disk), "cannot be written");
-  expect_bad_input(run_recording("--deterministic --save-map '" + (folder_ / "map.tfm") + "'", full_disk),
-                   "cannot be written");
+  expect_failed_run(run_recording("--deterministic --save-map '" + (folder_ / "map.tfm") + "' --poses '" +
+                                      (folder_ / "poses.jsonl") + "'",
+                                  full_disk),
+                    {"poses.jsonl: File too large: the last", "map.tfm.tmp: cannot be written",
+                     "timing.json: cannot be written"});
   EXPECT_FALSE(fs::exists(folder_.path() / "map.tfm"));
+  expect_failed_run(
+      run_recording("--deterministic", "trap '' XFSZ; prlimit --pid $$ --fsize=1500;"),
+      {"(records of frames): File too large; ", " s to 1.150000000 s: their frames lack a final",
+       "trajectory_causal.txt: File too large; ", " poses are missing, from "});
+  // Not even the reason has room in its file: the exit code is there all the same.
+  EXPECT_EQ(run_recording("--deterministic", "trap '' XFSZ; prlimit --pid $$ --fsize=100;").exit_code, 1);
+}
+
+TEST_F(RunCommand, PosesThatWereLostAreInTheSummary) {
+  expect_failed_run(run_recording("--deterministic --poses /dev/full"),
+                    {"--poses /dev/full: No space left on device: the last 24 lines are missing"});
+  const auto summary = nlohmann::json::parse(result("summary.json"));
+  ASSERT_EQ(summary["errors"].size(), 1U);
+  EXPECT_NE(summary["errors"][0].get<std::string>().find("/dev/full"), std::string::npos);
+  EXPECT_EQ(summary["error"], summary["errors"][0]);
+}
+
+/// The disk is full for the first two seconds of four: afterwards nothing is missing.
+TEST_F(RunCommand, AFolderOnADiskThatIsFullForAWhileIsWholeInTheEnd) {
+  const std::string whole = folder_ / "whole.txt";
+  ASSERT_EQ(run_recording("--preload --speed 0.3").exit_code, 0);
+  fs::rename(folder_.path() / "result/trajectory_causal.txt", whole);
+  folder_.write("full.sh",
+                "trap '' XFSZ\nprlimit --pid $$ --fsize=150:unlimited\n\"$@\" &\nprogram=$!\nsleep 2\n"
+                "cp '" +
+                    (folder_ / "result/trajectory_causal.txt") + "' '" + (folder_ / "then.txt") +
+                    "'\nprlimit --pid $program --fsize=unlimited\nwait $program\n");
+  const Outcome outcome = run_recording("--preload --speed 0.3", "sh '" + (folder_ / "full.sh") + "'");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string then = content(folder_ / "then.txt");
+  EXPECT_EQ(std::count(then.begin(), then.end(), '\n'), 2) << "a comment and a pose";
+  EXPECT_TRUE(then.ends_with("\n"));
+  EXPECT_EQ(read_tum_trajectory(folder_ / "result/trajectory_causal.txt").size(),
+            read_tum_trajectory(whole).size());
+  std::ifstream log(folder_ / "result/schedule.log", std::ios::binary);
+  const auto schedule = read_schedule(log);
+  ASSERT_TRUE(schedule) << schedule.error();
+  EXPECT_TRUE(schedule->ended);
+  EXPECT_EQ(schedule->tracker.size(), static_cast<std::size_t>(kFrames));
 }
 
 /// The recording's images in a bag, with what their calibration says.

@@ -1,9 +1,7 @@
 #include "engine/logs/record_sequence.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -11,6 +9,7 @@
 
 #include "engine/logs/log_writer.hpp"
 #include "tests/io/scratch_folder.hpp"
+#include "tests/io/small_files.hpp"
 
 namespace twofold {
 namespace {
@@ -37,7 +36,7 @@ TEST(RecordSequence, ComesBackFromDiskAndCanBeChanged) {
   constexpr std::size_t kRecords = 100'000;
   for (std::size_t i = 0; i < kRecords; ++i)
     records.push_back({static_cast<std::int64_t>(i), 0.5 * static_cast<double>(i)});
-  EXPECT_EQ(writer.finish(), "");
+  EXPECT_TRUE(writer.finish().empty());
   records.read_back();
   ASSERT_EQ(records.size(), kRecords);
   records[7].half = 1;
@@ -82,7 +81,7 @@ TEST(LogWriter, WritesSoonWithoutBeingAsked) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(content(folder / "log.txt"), "first\n");
   file->append("last\n");
-  EXPECT_EQ(writer.finish(), "");
+  EXPECT_TRUE(writer.finish().empty());
   EXPECT_EQ(content(folder / "log.txt"), "first\nlast\n");
 }
 
@@ -102,27 +101,87 @@ TEST(LogFile, LossIsCountedAndNothingFollowsIt) {
   file.append("later");
   file.write_waiting();
   EXPECT_EQ(std::filesystem::file_size(folder / "log.txt"), appended);
-  EXPECT_NE(file.error().find("log.txt: the disk was too slow; 1005 bytes are lost"), std::string::npos)
+  EXPECT_NE(file.error().find("log.txt: the disk was too slow; 2 records are missing"), std::string::npos)
       << file.error();
 }
 
-TEST(LogFile, AFullDiskIsNamed) {
+std::string line_of(int n) {
+  return "line " + std::to_string(1000 + n) + "\n";
+}
+
+/// The disk takes two and a half lines, then nothing, then everything: the file ends with a whole line at any
+/// time, and no line is missing in the end.
+TEST(LogFile, AFileOnAFullDiskGoesOnWhenThereIsRoomAgain) {
   const ScratchFolder folder;
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit small{4096, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &small);
-  LogFile file(folder / "log.txt");
-  file.append(std::string(5000, 'x'));
+  LogFile file(folder / "log.txt", {"lines", true, ""});
+  std::string all;
+  const auto append = [&](int n) {
+    all += line_of(n);
+    EXPECT_TRUE(file.append(line_of(n), n));
+  };
+  {
+    const testing::SmallFiles full(2 * line_of(0).size() + 5);
+    for (int n = 0; n < 4; ++n) append(n);
+    file.write_waiting();
+    EXPECT_EQ(content(folder / "log.txt"), line_of(0) + line_of(1)) << "cut back to the last whole line";
+    append(4);
+    file.write_waiting();
+    EXPECT_EQ(file.written(), 2 * line_of(0).size());
+    EXPECT_NE(file.error().find("log.txt: File too large; 3 lines wait for room on the disk"),
+              std::string::npos)
+        << file.error();
+    EXPECT_FALSE(file.behind()) << "a run that waited for this disk would wait for ever";
+  }
   file.write_waiting();
-  setrlimit(RLIMIT_FSIZE, &before);
-  file.append("y");
+  append(5);
   file.write_waiting();
-  EXPECT_EQ(file.written(), 4096U);
-  EXPECT_NE(file.error().find("log.txt: cannot be written: File too large; 905 bytes are lost"),
-            std::string::npos)
+  file.give_up();
+  EXPECT_EQ(content(folder / "log.txt"), all);
+  EXPECT_EQ(file.error(), "");
+}
+
+/// Beyond what memory holds, lines are missing, and are named; those after them follow, where lines stand for
+/// themselves.
+TEST(LogFile, WhatIsLostOnAFullDiskIsNamed) {
+  const ScratchFolder folder;
+  const std::string line(LogFile::kMostWaiting / 4, 'x');
+  for (const bool goes_on : {true, false}) {
+    LogFile file(folder / "log.txt", {"lines", goes_on, "so it is"});
+    {
+      const testing::SmallFiles full(100);
+      std::int64_t n = 0;
+      for (; n < 2; ++n) EXPECT_TRUE(file.append(line, n * 1'000'000'000));
+      file.write_waiting();
+      for (; n < 4; ++n) EXPECT_TRUE(file.append(line, n * 1'000'000'000));
+      for (; n < 7; ++n) EXPECT_FALSE(file.append(line, n * 1'000'000'000)) << "what waits is bounded";
+      EXPECT_NE(file.error().find("log.txt: File too large; 3 lines are missing, from 4.000000000 s to "
+                                  "6.000000000 s: so it is; 4 lines wait for room on the disk"),
+                std::string::npos)
+          << file.error();
+    }
+    file.write_waiting();
+    EXPECT_EQ(file.append("later", 7'000'000'000), goes_on);
+    file.write_waiting();
+    EXPECT_EQ(std::filesystem::file_size(folder / "log.txt"), 4 * line.size() + (goes_on ? 5 : 0));
+  }
+}
+
+TEST(LogFile, WhatWaitsInTheEndIsLost) {
+  const ScratchFolder folder;
+  LogFile file(folder / "log.txt", {"poses", true, ""});
+  const testing::SmallFiles full(line_of(0).size() + 1);
+  for (int n = 0; n < 3; ++n) file.append(line_of(n), 500'000'000 * n);
+  file.write_waiting();
+  file.give_up();
+  EXPECT_EQ(content(folder / "log.txt"), line_of(0));
+  EXPECT_NE(
+      file.error().find("log.txt: File too large; 2 poses are missing, from 0.500000000 s to 1.000000000 s"),
+      std::string::npos)
       << file.error();
+}
+
+TEST(LogFile, AFileThatCannotBeMadeIsAnError) {
+  const ScratchFolder folder;
   EXPECT_THROW(LogFile(folder / "no/such/folder.txt"), std::runtime_error);
   EXPECT_THROW((void)LogFile::unnamed(folder / "no/such"), std::runtime_error);
 }

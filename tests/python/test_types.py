@@ -41,6 +41,39 @@ def test_the_stub_describes_what_is_there() -> None:
         assert {member for member in vars(value) if not member.startswith("_")} <= described(classes[name]), name
 
 
+def documented(value: object) -> bool:
+    """Has a docstring of more than the signatures that pybind11 writes."""
+    lines = (getattr(value, "__doc__", None) or "").splitlines()
+    return any(line.strip() and "->" not in line and not line.startswith("Overloaded") for line in lines)
+
+
+def test_help_says_what_everything_is() -> None:
+    missing = []
+    for name in set(twofold.__all__) - {"NO_ID", "__version__"}:
+        public = getattr(twofold, name)
+        missing += [] if documented(public) else [name]
+        if not isinstance(public, type):
+            continue
+        members = {member for member in dir(public) if not member.startswith("_")} - set(dir(int))
+        members -= {"name", "value"} if hasattr(public, "__members__") else set()  # pybind11's own
+        missing += [f"{name}.{member}" for member in members if not documented(getattr(public, member))]
+    assert sorted(missing) == []
+
+
+def test_a_processor_that_is_too_old_is_an_import_error(tmp_path: Path) -> None:
+    from twofold import _cpu
+
+    _cpu.check(level="x86-64-v3")  # what runs this
+    modern = "flags\t\t: fpu cx16 lahf_lm popcnt pni sse4_1 sse4_2 ssse3 avx avx2 bmi1 bmi2 f16c fma abm movbe xsave\n"
+    (tmp_path / "modern").write_text(modern)
+    _cpu.check(str(tmp_path / "modern"), "x86-64-v3")
+    (tmp_path / "old").write_text(modern.replace(" avx2", ""))
+    with pytest.raises(ImportError, match="x86-64-v3.*(avx2).*release-v2"):
+        _cpu.check(str(tmp_path / "old"), "x86-64-v3")
+    _cpu.check(str(tmp_path / "old"), "x86-64-v2")
+    _cpu.check(str(tmp_path / "none"), "x86-64-v3")  # the library looks for itself
+
+
 def test_options_are_typed(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     (tmp_path / "user.py").write_text("import twofold\n\ndef f(rig: twofold.CameraRig) -> None:\n    twofold.Slam(rig, inner=3)\n")

@@ -57,6 +57,9 @@ TEST_F(FrameIntakeTest, SaysWhatIsWrongWithAnImage) {
   frame.left.format = ImageFormat::kBgr8;
   frame.left.stride = 23;
   expect_refused(intake, frame, "stride is 23 bytes, but a row takes 24");
+  frame = stereo();
+  frame.right = image(ImageFormat::kBgr8);
+  expect_refused(intake, frame, "the left image is grey8, the right one bgr8: both must be of one format");
 }
 
 TEST_F(FrameIntakeTest, RgbdNeedsDepth) {

@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "tests/io/scratch_folder.hpp"
 #include "twofold/opencv.hpp"
 #include "twofold/rectifier.hpp"
+#include "twofold/source.hpp"
 
 namespace twofold {
 namespace {
@@ -70,6 +73,8 @@ TEST(FrameRectifier, SaysWhatIsWrong) {
   const FrameRectifier rectifier(folder / "stereo.yaml");
   const cv::Mat image = ramp();
   EXPECT_THROW((void)rectifier.rectify(stereo_frame(0, image, {})), std::invalid_argument);
+  const cv::Mat colour(image.size(), CV_8UC3);
+  EXPECT_THROW((void)rectifier.rectify(stereo_frame(0, image, colour)), std::invalid_argument);
   EXPECT_THROW((void)rectifier.rectify(stereo_frame(0, image, image.rowRange(0, 20))), std::invalid_argument);
 }
 
@@ -83,6 +88,61 @@ TEST(FrameRectifier, TakesOneCameraAlone) {
   EXPECT_EQ(frame.t_ns, 5);
   EXPECT_NE(frame.left.data, nullptr);
   EXPECT_EQ(frame.right.data, nullptr);
+}
+
+std::string euroc_camera(const char* T_BS) {
+  return std::string("sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [") + T_BS +
+         "]\nrate_hz: 20\nresolution: [64, 48]\ncamera_model: pinhole\n"
+         "intrinsics: [50, 50, 31.5, 23.5]\ndistortion_model: radial-tangential\n"
+         "distortion_coefficients: [0, 0, 0, 0]\n";
+}
+
+/// Two cameras, the right one turned by 0.05 rad about its x axis, with two images each.
+void write_euroc(const ScratchFolder& folder) {
+  const char* const left = "1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1";
+  const char* const right =
+      "1, 0, 0, 0.1,  0, 0.99875026, 0.04997917, 0,  0, -0.04997917, 0.99875026, 0,  0, 0, 0, 1";
+  for (const std::string camera : {"cam0", "cam1"}) {
+    std::filesystem::create_directories(folder.path() / camera / "data");
+    folder.write(camera + "/sensor.yaml", euroc_camera(camera == "cam0" ? left : right));
+    folder.write(camera + "/data.csv", "#timestamp [ns],filename\n10,10.png\n20,20.png\n");
+    for (const char* image : {"10.png", "20.png"})
+      cv::imwrite((folder.path() / camera / "data" / image).string(), ramp());
+  }
+}
+
+/// EuRoC has a file a camera: one of a pair's two says nothing of how the pair is rectified.
+TEST(FrameRectifier, OneFileOfAPairIsRefusedAndTheFolderGivesBoth) {
+  const ScratchFolder folder;
+  write_euroc(folder);
+  try {
+    const FrameRectifier rectifier(folder / "cam0/sensor.yaml");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("is of one camera of a pair"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("cam1/sensor.yaml"), std::string::npos);
+  }
+  const FrameRectifier pair(folder.path());
+  EXPECT_EQ(pair.rig().sensor, Sensor::kStereo);
+  EXPECT_NEAR(std::abs(pair.T_rectified_raw().q[0]), std::sin(0.05 / 4), 1e-6) << "half of the turn";
+  const FrameRectifier alone(folder.path(), 0, 0, true);
+  EXPECT_EQ(alone.rig().sensor, Sensor::kMono);
+  EXPECT_EQ(alone.T_rectified_raw(), Pose{});
+  std::filesystem::remove_all(folder.path() / "cam1");
+  EXPECT_EQ(FrameRectifier(folder / "cam0/sensor.yaml").rig().sensor, Sensor::kMono);
+}
+
+TEST(FrameRectifier, ASourceSaysWhatItUsesItself) {
+  const ScratchFolder folder;
+  write_euroc(folder);
+  const std::string name = "euroc:" + folder.path().string();
+  const Pose T = FrameRectifier(folder.path()).T_rectified_raw();
+  EXPECT_NE(T, Pose{});
+  EXPECT_EQ(Source(name).T_rectified_raw(), T);
+  EXPECT_EQ(Source(name, {.preload = true}).T_rectified_raw(), T);
+  EXPECT_EQ(Source(name, {.left_only = true}).T_rectified_raw(), T)
+      << "its left images are those of the pair";
+  EXPECT_EQ(Source("synthetic:desk?frames=1&width=64&height=48").T_rectified_raw(), Pose{});
 }
 
 TEST(FrameRectifier, TheRawCameraIsTurnedAgainstTheRectifiedOne) {

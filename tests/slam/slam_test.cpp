@@ -15,9 +15,11 @@
 #include <unistd.h>
 
 #include "engine/logs/schedule_log.hpp"
+#include "io/files/trajectory_file.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "slam/pipeline.hpp"
 #include "slam/slam_options.hpp"
+#include "slam/summary.hpp"
 #include "tests/io/scratch_folder.hpp"
 #include "tests/io/small_files.hpp"
 #include "tests/slam/slam_run.hpp"
@@ -222,6 +224,24 @@ TEST_F(SlamTest, ACallbackThatWouldWaitForItselfIsTold) {
   }
 }
 
+TEST_F(SlamTest, AMapIsSavedNeitherByACallbackNorBeforeThereIsOne) {
+  const ScratchFolder folder;
+  Slam slam(rig(), deterministic());
+  try {
+    slam.save_map(folder.path() / "map.tfm");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("map.tfm: there is no map yet"), std::string::npos);
+  }
+  slam.on_pose([&](const PoseEstimate&) { slam.save_map(folder.path() / "map.tfm"); });
+  push_all(slam, 0, 3);
+  ASSERT_EQ(slam.errors().size(), 1U);
+  EXPECT_NE(slam.errors()[0].find("save_map was called from a callback"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "map.tfm"));
+  slam.save_map(folder.path() / "map.tfm");
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "map.tfm"));
+}
+
 TEST_F(SlamTest, AMapperThatIsBehindTakesNoPushAway) {
   Gate gate;
   EngineOptions options = engine_options({.frame_buffers = 2 * kFrames});
@@ -278,9 +298,15 @@ TEST_F(SlamTest, TheRunsFolderIsWholeThoughNoFrameComes) {
   std::filesystem::remove_all(folder);
 }
 
-TEST_F(SlamTest, ADiskThatIsFullIsSaidWhileItRuns) {
+TEST_F(SlamTest, ADiskThatIsFullIsSaidWhileItRunsAndNothingIsLostWhenThereIsRoomAgain) {
   const ScratchFolder folder;
   Slam slam(rig(), {.run_folder = folder.path()});
+  const auto names = [](const std::vector<std::string>& all, const char* file) {
+    return std::any_of(all.begin(), all.end(), [&](const std::string& error) {
+      return error.find(file) != std::string::npos &&
+             error.find("wait for room on the disk") != std::string::npos;
+    });
+  };
   std::vector<std::string> errors;
   {
     const testing::SmallFiles small(300);
@@ -290,17 +316,46 @@ TEST_F(SlamTest, ADiskThatIsFullIsSaidWhileItRuns) {
       errors = slam.errors();
     }
   }
-  const auto names = [](const std::vector<std::string>& all, const char* file) {
-    return std::any_of(all.begin(), all.end(), [&](const std::string& error) {
-      return error.find(file) != std::string::npos && error.find("bytes are lost") != std::string::npos;
-    });
-  };
   EXPECT_TRUE(names(errors, "trajectory_causal.txt"));
   EXPECT_TRUE(names(errors, "(records of frames)"));
   EXPECT_TRUE(slam.push(view(10))) << "tracking goes on";
+  for (int wait = 0; wait < 500 && !slam.errors().empty(); ++wait)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_TRUE(slam.errors().empty()) << slam.errors()[0];
   const SlamSummary summary = slam.finish();
-  EXPECT_TRUE(names(summary.errors, "trajectory_causal.txt"));
-  EXPECT_TRUE(names(summary.errors, "(records of frames)"));
+  EXPECT_TRUE(summary.errors.empty());
+  EXPECT_EQ(summary.trajectory.size(), 11U);
+  EXPECT_EQ(read_tum_trajectory(folder.path() / "trajectory_causal.txt").size(), 11U);
+}
+
+/// Each file that lost something is a sentence of its own, during the run and after it.
+TEST_F(SlamTest, WhatEachFileLostIsSaidInASentenceOfItsOwn) {
+  const ScratchFolder folder;
+  Slam slam(rig(), {.run_folder = folder.path()});
+  const testing::SmallFiles small(300);
+  push_all(slam, 0, 10);
+  const SlamSummary summary = slam.finish();
+  ASSERT_EQ(summary.errors.size(), 2U);
+  EXPECT_NE(summary.errors[0].find("(records of frames): File too large; 9 records of frames are missing"),
+            std::string::npos)
+      << summary.errors[0];
+  EXPECT_NE(summary.errors[1].find(" poses are missing, from "), std::string::npos) << summary.errors[1];
+  EXPECT_EQ(slam.errors(), summary.errors);
+}
+
+TEST(SlamSummary, SaysWhatWasMeasuredOfTheCamera) {
+  RunResult result;
+  EXPECT_EQ(summarise(result).row_offset, 0);
+  EXPECT_FALSE(summarise(result).readout);
+  result.row_offset = -1.5;
+  result.readout = ReadoutEstimate{.seconds = 0.02, .sigma = 0.001, .pairs = 12, .significant = true};
+  const SlamSummary summary = summarise(result);
+  EXPECT_EQ(summary.row_offset, -1.5);
+  ASSERT_TRUE(summary.readout);
+  EXPECT_TRUE(summary.readout->found);
+  EXPECT_EQ(summary.readout->seconds, 0.02);
+  EXPECT_EQ(summary.readout->sigma, 0.001);
+  EXPECT_EQ(summary.readout->pairs, 12);
 }
 
 TEST_F(SlamTest, ASlowCallbackIsAStageOfItsOwn) {

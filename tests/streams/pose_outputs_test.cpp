@@ -1,11 +1,16 @@
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-#include <fstream>
 
+#include <algorithm>
+#include <array>
+#include <csignal>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 
 #include "streams/file_descriptor.hpp"
 #include "streams/pose_output.hpp"
@@ -99,6 +104,42 @@ TEST(PoseOutputs, AFileGoesOnWhenThereIsRoomAgainAndEndsWithAWholeLine) {
   }
   for (const std::string& text : lines_of()) EXPECT_EQ(text.back(), '\n') << text;
   ::unlink(path.c_str());
+}
+
+TEST(PoseOutputs, APipeWithANameIsReadByOneAfterTheOther) {
+  const ScratchFolder folder;
+  const std::string path = folder / "poses.fifo";
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  EXPECT_NE(why_not(path).find("nobody reads this pipe"), std::string::npos);
+  const auto reader = [&] { return FileDescriptor(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)); };
+  const auto heard = [](const FileDescriptor& from) {
+    Heard lines;
+    std::array<char, 4096> bytes{};
+    const ssize_t count = ::read(from.get(), bytes.data(), bytes.size());
+    lines.take(std::string(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(0, count))));
+    return lines.frames;
+  };
+  signal(SIGPIPE, SIG_IGN);  // PoseStreams blocks it
+  FileDescriptor first = reader();
+  const auto output = open_pose_output(path, PoseForm::kJson);
+  output->offer(line(0));
+  EXPECT_EQ(heard(first), std::vector<std::int64_t>{0});
+  first = FileDescriptor();
+  for (int i = 1; i < 4; ++i) output->offer(line(i));  // nobody is there
+  const FileDescriptor second = reader();
+  for (int i = 4; i < 6; ++i) output->offer(line(i));
+  EXPECT_EQ(heard(second), (std::vector<std::int64_t>{4, 5})) << "from his coming on";
+  EXPECT_EQ(output->problem(), "");
+}
+
+TEST(PoseOutputs, ASchemeThatIsNotKnownMakesNoFile) {
+  const ScratchFolder folder;
+  EXPECT_EQ(
+      why_not("foo:bar"),
+      "foo:bar: 'foo:' is none of udp:HOST:PORT, unix:PATH, zmq:ENDPOINT; a file of that name is ./foo:bar");
+  EXPECT_FALSE(std::filesystem::exists("foo:bar"));
+  EXPECT_EQ(why_not(folder / "foo:bar"), "");
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "foo:bar"));
 }
 
 TEST(PoseOutputs, UnixReadersComeAndGo) {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
@@ -135,14 +136,15 @@ void run_object(ObjectArguments& arguments) {
         ": the object could not be tracked: it is too small in the images, or without texture");
   const std::vector<MapPart> parts = map_parts(result, options);
   const ObjectModel model = build_object(*source, parts.front().trajectory, arguments.surface);
-  write_run_output(arguments.out, {arguments.source, ""}, *source, options, result, parts,
-                   surface_json(model.figures));
+  write_run_output(arguments.out, {arguments.source, "", nullptr, result.losses}, *source, options, result,
+                   parts, surface_json(model.figures));
   print_summary(arguments.out, options, result, parts);
   print_surface(model.figures);
   if (model.mesh.triangles.empty())
     throw std::runtime_error(arguments.source + ": the object's frames gave no surface");
   write_object(arguments, model, result);
   print_object(model, result);
+  if (!result.losses.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(result.losses, "; ")));
 }
 
 void add_mask_options(CLI::App& command, ObjectArguments& arguments) {

@@ -15,6 +15,7 @@ constexpr int kPatience = 150;  // frames of a source that may show no object be
 ObjectSource::ObjectSource(std::unique_ptr<FrameSource> source, const ObjectSourceOptions& options)
     : source_(std::move(source)), options_(options), masker_(source_->rig(), options.mask) {
   rig_ = source_->rig();
+  R_rectified_raw_ = source_->R_rectified_raw();
   ground_truth_ = source_->ground_truth();
 }
 

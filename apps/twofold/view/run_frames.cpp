@@ -54,7 +54,7 @@ void write_run_frames(const std::filesystem::path& file, const RunResult& result
                        static_cast<int>(record.effort));
   }
   out.close();
-  if (!out) throw IoError(file.string(), "cannot be written");
+  if (!out) throw WriteError(file.string(), "cannot be written");
 }
 
 std::vector<RunFrame> read_run_frames(const std::filesystem::path& file) {
