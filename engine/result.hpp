@@ -111,6 +111,8 @@ struct PoseReport {
   /// What the pose rests on, outliers included; points in the reference keyframe's frame.
   std::span<const MotionObservation> measured;
   SearchRegions searched;  ///< for these
+  /// Rows that right images lie lower than left ones, which the tracker takes back [px].
+  double row_offset = 0;
 };
 
 /// What the mapper did in all.

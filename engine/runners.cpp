@@ -125,7 +125,8 @@ PoseReport TrackerRunner::report(const FrameRecord& record) const {
           exposed_ns_,
           result.stage_ns,
           tracker_.last_observations(),
-          {result.T_c_ref_predicted, result.search_radius_px}};
+          {result.T_c_ref_predicted, result.search_radius_px},
+          tracker_.row_offset()};
 }
 
 /// Where the last tracked frame is in the map of this one, if that is elsewhere than it was said to be.

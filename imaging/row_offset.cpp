@@ -84,4 +84,11 @@ void take_back_row_offset(const cv::Mat& right, double offset, cv::Mat& out) {
   }
 }
 
+cv::Mat without_row_offset(const cv::Mat& right, double offset) {
+  if (offset == 0) return right;
+  cv::Mat moved;
+  take_back_row_offset(right, offset, moved);
+  return moved;
+}
+
 }  // namespace twofold

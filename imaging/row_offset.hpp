@@ -47,5 +47,7 @@ class RowOffsetMeter {
 /// Moves a right image's rows up by `offset` rows, between whole ones by linear interpolation; beyond the
 /// edge its last row goes on. `out` keeps its memory.
 void take_back_row_offset(const cv::Mat& right, double offset, cv::Mat& out);
+/// The same in an image of its own; without an offset, the right image itself.
+[[nodiscard]] cv::Mat without_row_offset(const cv::Mat& right, double offset);
 
 }  // namespace twofold

@@ -5,6 +5,7 @@
 
 #include "slam/conversions.hpp"
 #include "slam/frame_pixels.hpp"
+#include "slam/surface_pieces.hpp"
 #include "surface/meshing.hpp"
 #include "surface/stereo_depth.hpp"
 
@@ -48,16 +49,13 @@ cv::Mat colour_of(const ImageView& view) {
   return image;
 }
 
-std::array<float, 3> plain(const Eigen::Vector3f& v) {
-  return {v.x(), v.y(), v.z()};
-}
-
 }  // namespace
 
 struct SurfaceModel::Impl {
   Rig rig;
   SurfaceModelOptions options;
   SurfaceVolume volume;
+  MeshPieces pieces = {};
 };
 
 SurfaceModel::SurfaceModel(const CameraRig& rig, const SurfaceModelOptions& options)
@@ -109,13 +107,12 @@ SpacePoint SurfaceModel::at(const std::array<double, 3>& p_world) const {
 }
 
 SurfaceMesh SurfaceModel::mesh() const {
-  const TriangleMesh inside = extract_mesh(impl_->volume);
-  SurfaceMesh mesh;
-  for (const Eigen::Vector3f& x : inside.positions) mesh.positions.push_back(plain(x));
-  for (const Eigen::Vector3f& n : inside.normals) mesh.normals.push_back(plain(n));
-  mesh.colours = inside.colours;
-  mesh.triangles = inside.triangles;
-  return mesh;
+  return to_surface_mesh(extract_mesh(impl_->volume));
+}
+
+SurfaceChanges SurfaceModel::mesh_changes(std::uint64_t since) {
+  impl_->pieces.update(impl_->volume);
+  return {impl_->pieces.revision(), kBlockEdge * impl_->options.voxel, surface_pieces(impl_->pieces, since)};
 }
 
 std::size_t SurfaceModel::memory_bytes() const {

@@ -200,17 +200,39 @@ inline void update_colours(const RowUpdate& row, std::size_t first, VoxelBlock& 
   }
 }
 
+bool any_short(const LaneShort& lanes) {
+  const auto halves = reinterpret_cast<std::uint64_t __attribute__((vector_size(sizeof(LaneShort))))>(lanes);
+  return (halves[0] | halves[1]) != 0;
+}
+
 /// Nothing but free space, known as well as it can be: carving has nothing more to do here.
 bool is_all_free(const VoxelBlock& block, const FusionView& view, const SampleUnits& units) {
   const auto far = static_cast<std::int16_t>(0.9f * view.truncation / units.distance);
   const auto known = static_cast<std::uint16_t>(kFreeShare * view.most_weight / units.weight);
-  LaneShort other{};
-  for (std::size_t i = 0; i < kBlockSamples; i += kLanes) {
-    other |= load<LaneShort>(&block.distance[i]) <= far;
-    other |= load<LaneUnsignedShort>(&block.weight[i]) <= known;
+  constexpr std::size_t kLayer = kBlockEdge * kBlockEdge;  // most blocks show in the first that they are not
+  for (std::size_t layer = 0; layer < kBlockSamples; layer += kLayer) {
+    LaneShort other{};
+    for (std::size_t i = layer; i < layer + kLayer; i += kLanes) {
+      other |= load<LaneShort>(&block.distance[i]) <= far;
+      other |= load<LaneUnsignedShort>(&block.weight[i]) <= known;
+    }
+    if (any_short(other)) return false;
   }
-  const auto halves = reinterpret_cast<std::uint64_t __attribute__((vector_size(sizeof(LaneShort))))>(other);
-  return (halves[0] | halves[1]) == 0;
+  return true;
+}
+
+/// Free as far as samples can tell: seeing it once more changes nothing.
+bool is_settled(const std::int16_t* distances, const std::uint16_t* weights, std::int16_t free) {
+  return !any_short((load<LaneShort>(distances) != free) |
+                    (load<LaneUnsignedShort>(weights) != kMostWeightSteps));
+}
+
+/// Blocks lie anywhere in memory: the next one is fetched while one is worked on.
+constexpr int kRowsOfLine = 64 / (kLanes * static_cast<int>(sizeof(std::int16_t)));
+inline void fetch_line(const VoxelBlock& block, int row) {
+  const auto first = static_cast<std::size_t>(row) * kLanes;
+  __builtin_prefetch(&block.distance[first], 1);
+  __builtin_prefetch(&block.weight[first], 1);
 }
 
 /// One depth image, and what it says of every block.
@@ -219,37 +241,45 @@ struct BlockUpdate {
   const DepthView& images;
   const SampleUnits& units;
 
-  void operator()(const SE3& T_c_v, VoxelBlock& block) const {
+  /// Whether any sample took part.
+  bool operator()(const SE3& T_c_v, VoxelBlock& block, const VoxelBlock& next) const {
     const BlockPose pose = pose_of(view, T_c_v, block);
     const BlockBounds bounds = bounds_of(view, images, pose);
-    if (!bounds.in_image) return;
-    if (bounds.whole_in_image)
-      update_rows<true>(pose, bounds, block);
-    else
-      update_rows<false>(pose, bounds, block);
-    block.all_free = is_all_free(block, view, units);
+    if (!bounds.in_image) return false;
+    const bool any = bounds.whole_in_image ? update_rows<true>(pose, bounds, block, next)
+                                           : update_rows<false>(pose, bounds, block, next);
+    if (any) block.all_free = is_all_free(block, view, units);
+    return any;
   }
 
   template <bool kWholeInImage>
-  void update_rows(const BlockPose& pose, const BlockBounds& bounds, VoxelBlock& block) const {
+  bool update_rows(const BlockPose& pose, const BlockBounds& bounds, VoxelBlock& block,
+                   const VoxelBlock& next) const {
     const RowScale scale(view, units, pose);
     const auto* pixels = images.pixels.ptr<PixelReading>(0);
     const float depth_of_row = (kLanes - 1) * pose.dx.z();
+    const auto free = static_cast<std::int16_t>(std::lrint(scale.truncation * scale.distance));
     RowUpdate row;
+    bool any_row = false;
     for (int r = 0; r < kBlockEdge * kBlockEdge; ++r) {
+      if (r % kRowsOfLine == 0) fetch_line(next, r);
       const Eigen::Vector3f at = pose.row(r);
       if (std::min(at.z(), at.z() + depth_of_row) > bounds.last) continue;
       const auto first = static_cast<std::size_t>(r) * kLanes;
       if (std::max(at.z(), at.z() + depth_of_row) < bounds.first_free) {
+        if (is_settled(&block.distance[first], &block.weight[first], free)) continue;
         update_row(kZero + scale.truncation * scale.distance, kZero + kFreeShare * kMostWeightSteps,
                    &block.distance[first], &block.weight[first]);
+        any_row = true;
         continue;
       }
       measure_row<kWholeInImage>(view, scale, pixels, at, row);
       if (!any(row.weight > 0)) continue;
       if (any(row.near)) update_colours(row, first, block);
       update_row(row.distance, row.weight, &block.distance[first], &block.weight[first]);
+      any_row = true;
     }
+    return any_row;
   }
 };
 
@@ -260,7 +290,12 @@ void SurfaceVolume::fuse(const DepthView& view, const SE3& T_c_v) {
   collect_blocks(view, T_c_v);
   add_blocks_to_carve(view, T_c_v);
   const BlockUpdate update{f, view, units_};
-  for (const std::uint32_t block : touched_) update(T_c_v, blocks_[block]);
+  ++revision_;
+  for (std::size_t n = 0; n < touched_.size(); ++n) {
+    VoxelBlock& block = blocks_[touched_[n]];
+    const VoxelBlock& next = blocks_[touched_[std::min(n + 1, touched_.size() - 1)]];
+    if (update(T_c_v, block, next)) block.revision = revision_;
+  }
 }
 
 }  // namespace twofold

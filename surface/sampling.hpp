@@ -80,4 +80,37 @@ class Sampler {
   Eigen::Vector3i nearest_{0, 0, 0};
 };
 
+/// Reads a volume at the samples of another one of the same options, whose grid is turned and shifted against
+/// it: linearly between the eight samples around, and not where one of them was never seen.
+class Resampler {
+ public:
+  /// @param from   must outlive the resampler, and not change
+  /// @param T_f_t  of the other volume's frame in that of `from`
+  Resampler(const SurfaceVolume& from, const SE3& T_f_t);
+
+  /// Adds what is there to the running averages of a block of the other volume. Colours take part within
+  /// two and a half voxels of the surface, where there is one.
+  /// @return  whether anything is there
+  bool add_to(VoxelBlock& block);
+
+ private:
+  static constexpr int kCube = 16;  // samples that a turned block reaches over along an axis, at most
+  static constexpr int kRow = 3 * kBlockEdge;  // along x whole rows of blocks are copied
+
+  /// Copies the samples around a block, whose first one lies at `first`, of those samples from low_ on.
+  bool fill(const Vector3& first);
+  void fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, int z);
+  bool add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock& block) const;
+  void add_colour(std::uint32_t cube_index, float share, std::size_t sample, VoxelBlock& block) const;
+
+  const BlockTable& from_;
+  double voxel_;
+  SE3 T_f_t_;
+  Eigen::Matrix3f steps_;  ///< columns: along x, y and z of the other grid [samples]
+  Eigen::Vector3i low_{0, 0, 0}, high_{0, 0, 0};
+  std::array<const VoxelBlock*, 27> blocks_{};  ///< from that of low_ on
+  /// Weight in the upper half, distance in the lower one; x fastest, from the block of low_ on.
+  alignas(32) std::array<std::uint32_t, kRow * kCube * kCube> cube_{};
+};
+
 }  // namespace twofold

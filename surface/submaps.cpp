@@ -89,17 +89,26 @@ bool SubmapSurface::is_bent(const Submap& submap) const {
   });
 }
 
+/// Both depth and keyframes come in the order of frames, either of them first.
 void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph) {
   for (; next_keyframe_ < graph.keyframe_count(); ++next_keyframe_) {
-    const Keyframe& keyframe = graph.keyframe(KeyframeId{next_keyframe_});
-    if (keyframe.culled()) continue;
-    while (!waiting_.empty() && waiting_.front().frame_index < keyframe.frame_index) {
-      waiting_.pop_front();
-      ++report_.not_in_map;
+    without_depth_.push_back(KeyframeId{next_keyframe_});
+    if (without_depth_.size() > limits_.most_waiting) without_depth_.pop_front();
+  }
+  while (!without_depth_.empty() && !waiting_.empty()) {
+    const Keyframe& keyframe = graph.keyframe(without_depth_.front());
+    const std::int64_t frame = waiting_.front().frame_index;
+    if (keyframe.culled() || keyframe.frame_index < frame) {
+      without_depth_.pop_front();
+      continue;
     }
-    if (waiting_.empty() || waiting_.front().frame_index != keyframe.frame_index) continue;
     KeyframeDepth images = std::move(waiting_.front());
     waiting_.pop_front();
+    if (frame < keyframe.frame_index) {
+      ++report_.not_in_map;
+      continue;
+    }
+    without_depth_.pop_front();
     add_keyframe(graph, keyframe, std::move(images));
   }
 }
@@ -137,8 +146,13 @@ SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, con
     }
   }
   if (best != nullptr) return *best;
-  submaps_.push_back(std::make_unique<Submap>(Submap{
-      keyframe.id, SE3(), graph.T_k_w(keyframe.id).inverse(), keyframe.part, {}, SurfaceVolume(options_)}));
+  submaps_.push_back(std::make_unique<Submap>(Submap{next_submap_++,
+                                                     keyframe.id,
+                                                     SE3(),
+                                                     graph.T_k_w(keyframe.id).inverse(),
+                                                     keyframe.part,
+                                                     {},
+                                                     SurfaceVolume(options_)}));
   return *submaps_.back();
 }
 
@@ -163,6 +177,13 @@ SurfaceVolume SubmapSurface::whole(KeyframeId part) const {
   for (const auto& submap : submaps_)
     if (submap->part == part) all.add(submap->volume, submap->T_w_s);
   return all;
+}
+
+std::vector<PlacedVolume> SubmapSurface::placed(KeyframeId part) const {
+  std::vector<PlacedVolume> volumes;
+  for (const auto& submap : submaps_)
+    if (submap->part == part) volumes.push_back({submap->id, &submap->volume, submap->T_w_s});
+  return volumes;
 }
 
 std::size_t SubmapSurface::bytes() const {

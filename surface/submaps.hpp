@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "graph/snapshot.hpp"
+#include "surface/composition.hpp"
 #include "surface/packed_depth.hpp"
 #include "surface/volume.hpp"
 
@@ -58,14 +59,16 @@ class SubmapSurface {
   /// Options must be valid.
   SubmapSurface(const Rig& rig, const SurfaceOptions& options, const SubmapOptions& submaps);
 
-  /// A frame that is proposed as a keyframe; frame_index grows.
+  /// A frame that is proposed as a keyframe, before or after a map has it; frame_index grows.
   void offer(KeyframeDepth frame);
-  /// Takes the map as it is now. Versions grow.
+  /// Takes the map as it is now. Versions do not shrink.
   void step(const GraphSnapshot& graph);
 
   /// All submaps of a map part in its world frame, as it was in the last step, added into one.
   [[nodiscard]] SurfaceVolume whole(KeyframeId part) const;
   [[nodiscard]] bool has(KeyframeId part) const;
+  /// These submaps, as Composition takes them; valid until the next step.
+  [[nodiscard]] std::vector<PlacedVolume> placed(KeyframeId part) const;
 
   [[nodiscard]] const SubmapReport& report() const { return report_; }
   [[nodiscard]] std::size_t submap_count() const { return submaps_.size(); }
@@ -81,6 +84,7 @@ class SubmapSurface {
     SE3 T_k_s;         ///< along which it was fused
   };
   struct Submap {
+    std::uint32_t id = 0;
     KeyframeId hung_on = kNoKeyframe;  ///< one of its members
     SE3 T_k_s;                         ///< of that keyframe: constant
     SE3 T_w_s;                         ///< in the last step
@@ -100,9 +104,11 @@ class SubmapSurface {
   Rig rig_;
   SurfaceOptions options_;
   SubmapOptions limits_;
-  std::deque<KeyframeDepth> waiting_;  ///< ascending by frame
-  std::uint32_t next_keyframe_ = 0;    ///< the first that no step has seen
-  std::vector<std::unique_ptr<Submap>> submaps_;
+  std::deque<KeyframeDepth> waiting_;     ///< ascending by frame
+  std::uint32_t next_keyframe_ = 0;       ///< the first that no step has seen
+  std::deque<KeyframeId> without_depth_;  ///< the newest of those seen, whose depth may still come; ascending
+  std::vector<std::unique_ptr<Submap>> submaps_;  ///< ascending by id
+  std::uint32_t next_submap_ = 0;
   SubmapReport report_;
 };
 

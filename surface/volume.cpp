@@ -25,22 +25,42 @@ Occupancy SurfaceVolume::occupancy(const Vector3& x_v) const {
   return found->distance > 0 ? Occupancy::kFree : Occupancy::kOccupied;
 }
 
-/// Blocks of this volume that a block of another one reaches into.
-void SurfaceVolume::touch_overlapped(const VoxelBlock& block, const SE3& T_v_o) {
-  const double edge = kBlockEdge * options_.voxel;
-  Vector3 low = Vector3::Constant(1e300);
-  Vector3 high = -low;
-  for (int c = 0; c < 8; ++c) {
-    const Vector3 corner(block.at.x + (c & 1), block.at.y + (c >> 1 & 1), block.at.z + (c >> 2));
-    const Vector3 x_v = T_v_o * Vector3(corner * edge) / edge;
-    low = low.cwiseMin(x_v);
-    high = high.cwiseMax(x_v);
-  }
-  const Eigen::Vector3i first = low.array().floor().cast<int>();
-  const Eigen::Vector3i last = high.array().floor().cast<int>();
+std::vector<std::uint32_t> SurfaceVolume::add_overlapped(const BlockPosition& of_other, const SE3& T_v_o) {
+  // In blocks. The other block begins at the last sample of the block before: what lies between two blocks
+  // rests on both.
+  constexpr double kHalf = 0.5 * (1 + 1.0 / kBlockEdge);
+  constexpr double kOwnHalf = 0.5 * (1 - 1.0 / kBlockEdge);
+  constexpr double kRounding = 1e-6;
+  const Vector3 shift = T_v_o.translation() / (kBlockEdge * options_.voxel);
+  const Matrix3 R_v_o = T_v_o.rotation();
+  const Vector3 middle_o = Vector3(of_other.x, of_other.y, of_other.z) + Vector3::Constant(1 - kHalf);
+  const Vector3 middle = R_v_o * middle_o + shift;
+  const Vector3 half = R_v_o.cwiseAbs() * Vector3::Constant(kHalf + kRounding);
+  const Eigen::Vector3i first = (middle - half).array().floor().cast<int>();
+  const Eigen::Vector3i last = (middle + half).array().floor().cast<int>();
+  // Two boxes are apart, too, when they are so along an axis of the turned one.
+  const Vector3 reach_o =
+      (R_v_o.transpose().cwiseAbs() * Vector3::Constant(kOwnHalf)).array() + kHalf + kRounding;
+  std::vector<std::uint32_t> overlapped;
   for (int z = first.z(); z <= last.z(); ++z)
     for (int y = first.y(); y <= last.y(); ++y)
-      for (int x = first.x(); x <= last.x(); ++x) touch({x, y, z});
+      for (int x = first.x(); x <= last.x(); ++x) {
+        const Vector3 away = Vector3(x, y, z) + Vector3::Constant(kOwnHalf) - middle;
+        const Vector3 away_o = R_v_o.transpose() * away;
+        if ((away_o.array().abs() > reach_o.array()).any()) continue;
+        overlapped.push_back(blocks_.find_or_add({x, y, z}));
+      }
+  return overlapped;
+}
+
+void SurfaceVolume::compose_block(std::uint32_t block, std::span<Resampler* const> others) {
+  VoxelBlock& own = blocks_[block];
+  own.all_free = false;
+  own.distance.fill(0);
+  own.weight.fill(0);
+  for (auto& channel : own.colour) channel.fill(0);
+  own.revision = ++revision_;
+  for (Resampler* other : others) (void)other->add_to(own);
 }
 
 void SurfaceVolume::touch(const BlockPosition& at) {
@@ -57,31 +77,20 @@ void SurfaceVolume::touch_none() {
 }
 
 void SurfaceVolume::add(const SurfaceVolume& other, const SE3& T_v_o) {
-  touch_none();
-  for (const VoxelBlock* block : other.blocks_.sorted()) touch_overlapped(*block, T_v_o);
-  const SE3 T_o_v = T_v_o.inverse();
-  Sampler sampler(other.blocks_, other.units_, options_.voxel);
-  for (const std::uint32_t touched : touched_) {
-    VoxelBlock* block = &blocks_[touched];
-    block->all_free = false;
-    for (int i = 0; i < kBlockSamples; ++i) {
-      const auto s = static_cast<std::size_t>(i);
-      const Vector3 grid(kBlockEdge * block->at.x + i % 8, kBlockEdge * block->at.y + i / 8 % 8,
-                         kBlockEdge * block->at.z + i / 64);
-      const auto sample = sampler.at(T_o_v * Vector3(grid * options_.voxel));
-      if (!sample) continue;
-      const auto w = static_cast<float>(sample->weight) / units_.weight;
-      const float sum = block->weight[s] + w;
-      const float before = block->distance[s];
-      const float now = before + (static_cast<float>(sample->distance) / units_.distance - before) * w / sum;
-      block->distance[s] = static_cast<std::int16_t>(std::lrint(now));
-      const auto colour = sampler.colour();
-      for (std::size_t c = 0; c < 3; ++c) {
-        std::uint16_t& own = block->colour[c][s];
-        own = static_cast<std::uint16_t>(own + (colour[c] - own) * w / sum);
-      }
-      block->weight[s] = static_cast<std::uint16_t>(std::clamp<long>(std::lrint(sum), 1, kMostWeightSteps));
-    }
+  std::vector<std::uint32_t> reached;
+  for (std::size_t b = 0; b < other.blocks_.size(); ++b) {
+    const std::vector<std::uint32_t> some = add_overlapped(other.blocks_[b].at, T_v_o);
+    reached.insert(reached.end(), some.begin(), some.end());
+  }
+  std::sort(reached.begin(), reached.end());
+  reached.erase(std::unique(reached.begin(), reached.end()), reached.end());
+  ++revision_;
+  Resampler resampler(other, T_v_o.inverse());
+  for (const std::uint32_t b : reached) {
+    VoxelBlock& block = blocks_[b];
+    if (!resampler.add_to(block)) continue;
+    block.all_free = false;
+    block.revision = revision_;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "geometry/se3.hpp"
@@ -25,6 +26,8 @@ struct SurfaceDistance {
   double weight = 0;          ///< the least of the eight
 };
 
+class Resampler;
+
 /// A truncated signed distance field in sparse blocks  (Curless and Levoy, SIGGRAPH 1996; blocks found by
 /// hash: Niessner et al., SIGGRAPH Asia 2013). Sample g stands at g * voxel in the volume's frame v.
 ///
@@ -42,7 +45,16 @@ class SurfaceVolume {
   void fuse(const DepthView& view, const SE3& T_c_v);
   /// Adds another volume of the same options, whose frame lies at T_v_o in this one: resampled linearly.
   void add(const SurfaceVolume& other, const SE3& T_v_o);
-  void clear() { blocks_.clear(); }
+  void clear() {
+    blocks_.clear();
+    cleared_ = ++revision_;
+  }
+
+  /// Blocks of this volume that a block of another one, whose frame lies at T_v_o, has a say in; those that
+  /// were missing are there then, empty. Numbers, each once.
+  [[nodiscard]] std::vector<std::uint32_t> add_overlapped(const BlockPosition& of_other, const SE3& T_v_o);
+  /// Makes a block what other volumes say, added in this order.
+  void compose_block(std::uint32_t block, std::span<Resampler* const> others);
 
   /// Nothing where one of the eight samples around it was never seen.
   [[nodiscard]] std::optional<SurfaceDistance> distance(const Vector3& x_v) const;
@@ -52,6 +64,10 @@ class SurfaceVolume {
   [[nodiscard]] const BlockTable& blocks() const { return blocks_; }
   [[nodiscard]] const SampleUnits& units() const { return units_; }
   [[nodiscard]] std::size_t bytes() const { return blocks_.bytes(); }
+  /// Counts the calls that may have changed a sample; blocks have that of their last change.
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+  /// Revision of the last call of clear; 0: there was none.
+  [[nodiscard]] std::uint64_t cleared() const { return cleared_; }
 
  private:
   /// Blocks that the view has something to say about, each once.
@@ -59,11 +75,11 @@ class SurfaceVolume {
   void touch(const BlockPosition& at);
   void touch_none();
   void add_blocks_to_carve(const DepthView& view, const SE3& T_c_v);
-  void touch_overlapped(const VoxelBlock& block, const SE3& T_v_o);
 
   SurfaceOptions options_;
   SampleUnits units_;
   BlockTable blocks_;
+  std::uint64_t revision_ = 0, cleared_ = 0;
   std::vector<std::uint32_t> touched_;    ///< blocks that one fusion changes
   std::vector<std::uint8_t> is_touched_;  ///< of every block, whether it is among these
 };

@@ -27,10 +27,15 @@ std::size_t BlockTable::slot_of(const BlockPosition& at) const {
   return slot;
 }
 
-const VoxelBlock* BlockTable::find(const BlockPosition& at) const {
-  if (slots_.empty()) return nullptr;
+std::optional<std::uint32_t> BlockTable::number_of(const BlockPosition& at) const {
+  if (slots_.empty()) return std::nullopt;
   const std::uint32_t block = slots_[slot_of(at)].block;
-  return block == kFree ? nullptr : blocks_[block].get();
+  return block == kFree ? std::nullopt : std::optional(block);
+}
+
+const VoxelBlock* BlockTable::find(const BlockPosition& at) const {
+  const auto number = number_of(at);
+  return number ? blocks_[*number].get() : nullptr;
 }
 
 std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {

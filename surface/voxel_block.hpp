@@ -4,6 +4,7 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -36,7 +37,8 @@ inline constexpr int kMostWeightSteps = 65535;
 /// numbers of SampleUnits: what a volume costs is mostly the way of its samples to and from memory.
 struct VoxelBlock {
   BlockPosition at;
-  bool all_free = false;                                           ///< every sample is well known to be free
+  bool all_free = false;       ///< every sample is well known to be free
+  std::uint64_t revision = 0;  ///< of the volume (SurfaceVolume::revision) when a sample changed last
   alignas(64) std::array<std::int16_t, kBlockSamples> distance{};  ///< positive outside the surface
   alignas(64) std::array<std::uint16_t, kBlockSamples> weight{};   ///< 0: never seen
   alignas(
@@ -56,6 +58,7 @@ class BlockTable {
   [[nodiscard]] VoxelBlock* find(const BlockPosition& at) {
     return const_cast<VoxelBlock*>(std::as_const(*this).find(at));
   }
+  [[nodiscard]] std::optional<std::uint32_t> number_of(const BlockPosition& at) const;
   /// Its number: blocks are counted from 0 in the order they were added.
   std::uint32_t find_or_add(const BlockPosition& at);
 

@@ -52,6 +52,9 @@ std::optional<ViewMessage> ClientFeed::next(const ViewSight& sight) {
       message = newer(sight.image, image_);
     }
   }
+  if (!message) {
+    if (auto surface = next_surface()) message = ViewMessage{std::move(surface)};
+  }
   if (message) ++unacknowledged_;
   return message;
 }
@@ -64,7 +67,7 @@ std::optional<ViewMessage> ClientFeed::newer(const NewestMessage& newest, std::u
 
 bool ClientFeed::is_done() const {
   return told_end_ && event_ == scene_.end_event() && live_ == scene_.end_live() && !delta_ &&
-         revision_ == scene_.revision();
+         revision_ == scene_.revision() && surface_ == scene_.surface().newest();
 }
 
 std::optional<ViewMessage> ClientFeed::next_text() {
@@ -115,6 +118,14 @@ std::shared_ptr<const std::string> ClientFeed::next_piece() {
     revision_ = next_revision_;
   }
   return piece;
+}
+
+/// A piece at a time, after all else: a mesh is much, and late as it is.
+std::shared_ptr<const std::string> ClientFeed::next_surface() {
+  if (surface_ == scene_.surface().newest()) return nullptr;
+  const SurfaceLayer::Message message = scene_.surface().next(surface_);
+  surface_ = message.to;
+  return message.bytes;
 }
 
 bool ClientFeed::take(std::string_view message, Time now) {

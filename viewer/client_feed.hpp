@@ -74,6 +74,7 @@ class ClientFeed {
   [[nodiscard]] std::optional<ViewMessage> newer(const NewestMessage& newest, std::uint64_t& sent) const;
   [[nodiscard]] std::shared_ptr<const std::string> next_frames();
   [[nodiscard]] std::shared_ptr<const std::string> next_piece();
+  [[nodiscard]] std::shared_ptr<const std::string> next_surface();
 
   const ViewScene& scene_;
   const ViewTitle& title_;
@@ -86,6 +87,7 @@ class ClientFeed {
   Revision revision_ = 0, next_revision_ = 0;  // what it has, and has when the delta is through
   std::shared_ptr<const ViewScene::Delta> delta_;
   std::size_t piece_ = 0;                   // of delta_, to be sent next
+  std::uint64_t surface_ = 0;               // change that the client knows
   std::uint64_t image_ = 0, measured_ = 0;  // numbers of those sent last
   bool wants_images_ = false;
   std::optional<std::uint32_t> wanted_keyframe_;

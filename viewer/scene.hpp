@@ -13,6 +13,7 @@
 #include "twofold/map.hpp"
 #include "twofold/queue_lengths.hpp"
 #include "viewer/change_set.hpp"
+#include "viewer/surface_layer.hpp"
 #include "viewer/wire_format.hpp"
 
 namespace twofold {
@@ -122,6 +123,8 @@ class ViewScene {
     truth_ = std::move(truth);
     ++truths_;
   }
+  [[nodiscard]] const SurfaceLayer& surface() const { return surface_; }
+  [[nodiscard]] SurfaceLayer& surface() { return surface_; }
   /// No keyframe is made, until it is told otherwise.
   void set_mapping_paused(bool paused) {
     states_ += paused != mapping_paused_ ? 1 : 0;
@@ -205,6 +208,7 @@ class ViewScene {
   std::optional<std::int64_t> start_ns_;
   std::optional<ViewTruth> truth_;
   std::uint32_t truths_ = 0;
+  SurfaceLayer surface_;
   bool mapping_paused_ = false;
   std::uint32_t states_ = 1;
   struct Encoded {

@@ -49,6 +49,12 @@ struct ToldPoints {
   std::array<MeasuredPoint, 512> points;
 };
 
+struct ToldSurface {
+  std::uint32_t part = 0;
+  double edge = 0;
+  std::vector<SurfacePiece> pieces;
+};
+
 struct HeldImage {
   std::int64_t frame = 0;
   ImageView pixels;
@@ -194,6 +200,10 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     places_waiting_.store(waiting.places, std::memory_order_relaxed);
   }
   void set_lost(std::int64_t frames) { frames_lost_.store(frames, std::memory_order_relaxed); }
+  void put_surface(ToldSurface&& surface) {
+    const std::scoped_lock lock(surfaces_mutex_);
+    surfaces_.push_back(std::move(surface));
+  }
   const ViewServer& server() const { return server_; }
   void finish() {
     if (self_.load(std::memory_order_relaxed) == std::this_thread::get_id())
@@ -214,6 +224,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
             [&] { look_at_image(audience.wants_images, newest.image); });
     attempt("a keyframe's image cannot be shown",
             [&] { keyframe_images_.answer(audience.keyframes, steady_now_ns(), newest); });
+    attempt("the surface cannot be shown", [&] { look_at_surface(); });
     ToldPoints points;
     while (points_.try_pop(points)) newest.measured.put(measured_message(points));
   }
@@ -310,6 +321,15 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         steady_now_ns() + std::max(kNobodyPeriodNs, kDeviationShare * (thread_cpu_ns() - begin_cpu_ns));
   }
 
+  void look_at_surface() {
+    std::vector<ToldSurface> told;
+    {
+      const std::scoped_lock lock(surfaces_mutex_);
+      told.swap(surfaces_);
+    }
+    for (const ToldSurface& surface : told) scene_.surface().show(surface.part, surface.edge, surface.pieces);
+  }
+
   void look_at_image(bool wanted, NewestMessage& newest) {
     const std::int64_t now_ns = steady_now_ns();
     if (!wanted) {
@@ -335,6 +355,8 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
   SpscRing<ToldPoints> points_{8};
   PoseEstimate newest_;
+  std::mutex surfaces_mutex_;  // guards surfaces_
+  std::vector<ToldSurface> surfaces_;
   std::set<std::string> failures_;  // told
   PointDeviations deviations_;
   std::int64_t map_due_ns_ = 0, keyframes_due_ns_ = 0, deviations_due_ns_ = 0, image_due_ns_ = 0;
@@ -426,6 +448,10 @@ bool Viewer::wants_image() const {
 void Viewer::show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner) {
   if (!can_be_shown(left)) return;
   impl_->put(new HeldImage(owner ? HeldImage{frame, left, std::move(owner)} : own_copy(frame, left)));
+}
+
+void Viewer::show_surface(std::uint32_t part, double edge, std::vector<SurfacePiece> pieces) {
+  impl_->put_surface({part, edge, std::move(pieces)});
 }
 
 void Viewer::finish() {

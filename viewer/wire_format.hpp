@@ -13,14 +13,19 @@ namespace twofold {
 // Binary messages begin with a header:
 //   u32 kind      ViewMessageKind
 //   u32 number    kDelta: ViewDeltaFlags; kFrames: how many; kImage, kMeasured: frame number;
-//                 kKeyframeImage: keyframe
+//                 kKeyframeImage: keyframe; kSurface: kWhole, or 0
 //   u32 a, b      kDelta: revisions it leads from and to; kImage, kKeyframeImage: width and height of the
-//                 whole image [px]; kMeasured: a is how many points; else 0
+//                 whole image [px]; kMeasured: a is how many points; kSurface: how many pieces, and the
+//                 map part; else 0
 // and go on with
 //   kDelta   blocks: u32 ViewBlock, u32 count, then the records, or, of what is gone, its keys
 //   kFrames  ViewLiveFrame, in the order of time
 //   kImage   a JPEG
 //   kKeyframeImage  likewise; nothing: it has none
+//   kSurface  f32 edge of a cell, u32 0, then pieces of the mesh, which replace those of their cells, and
+//   with
+//             kWhole everything: i32 cell[3], u32 vertices, u32 triangles, ViewSurfaceVertex of each, u16 its
+//             three corners of each triangle, two bytes more if their number is odd
 //   kMeasured  MeasuredPoint (twofold/frame_details.hpp); comes before the frame itself
 // Text messages are JSON: an object with one of the members hello, state, reasons, truth, events, status
 // (viewer/texts.hpp).
@@ -45,7 +50,8 @@ enum class ViewMessageKind : std::uint32_t {
   kFrames = 2,
   kImage = 3,
   kMeasured = 4,
-  kKeyframeImage = 5
+  kKeyframeImage = 5,
+  kSurface = 6
 };
 
 enum ViewDeltaFlags : std::uint32_t { kWhole = 1, kLast = 2 };
@@ -138,6 +144,14 @@ struct ViewPathFrame {
   [[nodiscard]] std::uint32_t key() const { return frame; }
 };
 static_assert(sizeof(ViewPathFrame) == 60);
+
+/// Of the surface's mesh. The cell lies from a quarter of the range of positions to three quarters.
+struct ViewSurfaceVertex {
+  std::uint16_t position[3] = {};
+  std::int8_t normal[3] = {};  ///< times 127
+  std::uint8_t colour[3] = {};
+};
+static_assert(sizeof(ViewSurfaceVertex) == 12);
 
 inline constexpr int kViewStages = 8;
 

@@ -15,6 +15,7 @@
 #include "slam/conversions.hpp"
 #include "slam/frame_details.hpp"
 #include "slam/map_snapshot.hpp"
+#include "slam/surface_pieces.hpp"
 
 namespace twofold {
 namespace {
@@ -151,6 +152,14 @@ void LiveView::tell(const PoseReport& report) {
   reporter_.tell(
       report, [this](const MapEvent& event) { viewer_->tell(event); },
       [&](const PoseEstimate& pose) { viewer_->tell(pose, FrameDetails(details)); });
+}
+
+void LiveView::show(const MeshPieces& mesh, KeyframeId part, double voxel) {
+  if (part != mesh_part_) mesh_revision_ = 0;  // the viewer forgets the part before
+  mesh_part_ = part;
+  viewer_->show_surface(static_cast<std::uint32_t>(part), kBlockEdge * voxel,
+                        surface_pieces(mesh, mesh_revision_));
+  mesh_revision_ = mesh.revision();
 }
 
 std::string LiveView::obey(ViewCommand command) {

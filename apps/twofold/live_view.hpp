@@ -14,6 +14,7 @@
 #include "io/sources/recorded_images.hpp"
 #include "slam/map_lender.hpp"
 #include "slam/pose_reporter.hpp"
+#include "surface/mesh_pieces.hpp"
 #include "twofold/viewer.hpp"
 
 namespace twofold {
@@ -56,6 +57,9 @@ class LiveView {
   void show(const Frame& frame);
   /// The same thread.
   void show(const Progress& progress);
+  [[nodiscard]] bool wanted() const { return viewer_ != nullptr; }
+  /// What changed in a surface's mesh since the last call. One thread.
+  void show(const MeshPieces& mesh, KeyframeId part, double voxel);
   /// After the run, when the last map is there.
   void finish();
 
@@ -75,6 +79,8 @@ class LiveView {
   std::atomic<std::int64_t> frames_waiting_{-1}, keyframes_waiting_{-1}, places_waiting_{-1};
   MapLender maps_;
   std::atomic<bool> mapping_paused_{false};  // relaxed: a wish
+  std::uint64_t mesh_revision_ = 0;          // of the mesh that was shown
+  KeyframeId mesh_part_ = kNoKeyframe;
   std::unique_ptr<Viewer> viewer_;
 };
 

@@ -183,7 +183,13 @@ int run(const RunArguments& arguments) {
   poses.listen(options);
   LiveView view(arguments.view, arguments.source, arguments.out, *source, images_to_look_at(arguments),
                 options);
-  LiveSurface surface(arguments.surface, *source, options, options.deterministic || schedule.has_value());
+  LiveMesh::Listener show_mesh;
+  if (view.wanted())
+    show_mesh = [&](const MeshPieces& mesh, KeyframeId part) {
+      view.show(mesh, part, arguments.surface.voxel);
+    };
+  LiveSurface surface(arguments.surface, *source, options, options.deterministic || schedule.has_value(),
+                      show_mesh);
   ProgressLine line(source->frame_count(), arguments.quiet);
   const FrameFeed feed = feed_from(*source, view, surface);
   const ProgressSink progress = [&](const Progress& p) {

@@ -1,4 +1,6 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -11,9 +13,11 @@
 #include "apps/twofold/view/run_files.hpp"
 #include "engine/clock.hpp"
 #include "io/files/io_error.hpp"
+#include "io/files/mesh_file.hpp"
 #include "io/sources/recorded_images.hpp"
 #include "slam/conversions.hpp"
 #include "slam/map_snapshot.hpp"
+#include "slam/surface_pieces.hpp"
 #include "twofold/frame_details.hpp"
 #include "viewer/keyframe_images.hpp"
 #include "viewer/server.hpp"
@@ -106,12 +110,33 @@ void show_map_file(const std::filesystem::path& file, ViewScene& scene, ViewTitl
   }
 }
 
+/// The mesh that `run --surface` or `twofold surface` left, if there is one.
+void show_surface_of_run(const std::filesystem::path& folder, ViewScene& scene) {
+  constexpr double kCells = 48;  // along the mesh's longest side
+  const std::filesystem::path file = folder / "surface.ply";
+  if (!std::filesystem::is_regular_file(file)) return;
+  const SurfaceMesh mesh = to_surface_mesh(read_ply_mesh(file));
+  std::array<float, 3> low{}, high{};
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = v == 0 ? mesh.positions[v][a] : std::min(low[a], mesh.positions[v][a]);
+      high[a] = v == 0 ? mesh.positions[v][a] : std::max(high[a], mesh.positions[v][a]);
+    }
+  }
+  const float side = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  if (!(side > 0)) return;
+  const std::vector<RunPart> parts = read_run_parts(folder);
+  const double edge = side / kCells;
+  scene.surface().show(parts.empty() ? 0 : parts.front().name(), edge, cut_into_pieces(mesh, edge));
+}
+
 void view(const FileViewArguments& arguments) {
   ViewScene scene;
   ViewTitle title;
   KeyframeImages::Find images;
   if (std::filesystem::is_directory(arguments.path)) {
     show_finished_run(arguments.path, scene, title);
+    show_surface_of_run(arguments.path, scene);
     images = images_of_run(arguments.path);
     title.keyframe_images = static_cast<bool>(images);
     title.efforts = effort_levels();

@@ -2,7 +2,10 @@
 // distance.
 #include <benchmark/benchmark.h>
 
+#include <array>
+
 #include "bench/surface/depth_views.hpp"
+#include "surface/composition.hpp"
 #include "surface/meshing.hpp"
 #include "surface/packed_depth.hpp"
 #include "surface/volume.hpp"
@@ -61,6 +64,62 @@ void mesh_of_volume(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(extract_mesh(volume));
 }
 BENCHMARK(mesh_of_volume)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
+
+/// A keyframe's depth is fused, then the mesh of the blocks that it changed is made anew: the latter alone.
+void mesh_of_changes(benchmark::State& state) {
+  const DepthViews& all = depth_views();
+  SurfaceVolume volume(options_of(state));
+  for (std::size_t n = 0; n < kViews; ++n) volume.fuse(all.views[n], all.T_c_w[n]);
+  MeshPieces pieces;
+  pieces.update(volume);
+  std::size_t n = 0, blocks = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    volume.fuse(all.views[n % kViews], all.T_c_w[n % kViews]);
+    ++n;
+    state.ResumeTiming();
+    blocks += pieces.update(volume);
+  }
+  state.counters["blocks"] = static_cast<double>(blocks) / static_cast<double>(n);
+}
+BENCHMARK(mesh_of_changes)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
+
+/// The same where the keyframe's submap is one of two that overlap: they are joined anew in these blocks, and
+/// then meshed.
+void compose_changes(benchmark::State& state) {
+  const DepthViews& all = depth_views();
+  std::array<SurfaceVolume, 2> volumes{SurfaceVolume(options_of(state)), SurfaceVolume(options_of(state))};
+  for (std::size_t n = 0; n < kViews; ++n) volumes[n % 2].fuse(all.views[n], all.T_c_w[n]);
+  const SE3 T_w_v(SO3::exp(Vector3(0.1, 0.2, 0.3)), Vector3(0.1, 0.2, 0.3));
+  const std::array<PlacedVolume, 2> placed{{{0, &volumes[0], T_w_v}, {1, &volumes[1], T_w_v}}};
+  Composition composition(options_of(state));
+  composition.update(placed);
+  std::size_t n = 0, blocks = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    volumes[n % 2].fuse(all.views[n % kViews], all.T_c_w[n % kViews]);
+    ++n;
+    state.ResumeTiming();
+    blocks += composition.update(placed);
+  }
+  state.counters["blocks"] = static_cast<double>(blocks) / static_cast<double>(n);
+}
+BENCHMARK(compose_changes)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
+
+/// A loop moves one of the two.
+void compose_moved(benchmark::State& state) {
+  const DepthViews& all = depth_views();
+  std::array<SurfaceVolume, 2> volumes{SurfaceVolume(options_of(state)), SurfaceVolume(options_of(state))};
+  for (std::size_t n = 0; n < kViews; ++n) volumes[n % 2].fuse(all.views[n], all.T_c_w[n]);
+  Composition composition(options_of(state));
+  double by = 0;
+  for (auto _ : state) {
+    by = by > 0 ? 0 : 0.02;
+    composition.update(std::array<PlacedVolume, 2>{
+        {{0, &volumes[0], SE3()}, {1, &volumes[1], SE3(SO3::exp(Vector3(by, by, by)), Vector3(by, 0, 0))}}});
+  }
+}
+BENCHMARK(compose_moved)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
 
 void pack_and_unpack_depth(benchmark::State& state) {
   const cv::Mat& depth = depth_views().depth.front();

@@ -40,6 +40,19 @@ struct SurfaceMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
+/// The part of a mesh that lies in one cell of a grid.
+struct SurfacePiece {
+  std::array<std::int32_t, 3> cell{};  ///< its lowest corner, in edges of a cell
+  SurfaceMesh mesh;                    ///< vertices on the border are in several pieces; empty: nothing there
+};
+
+/// What changed in a mesh since a revision.
+struct SurfaceChanges {
+  std::uint64_t revision = 0;        ///< that it leads to
+  double edge = 0;                   ///< of a cell [m]
+  std::vector<SurfacePiece> pieces;  ///< these replace what was there
+};
+
 /// A dense surface from frames with poses, for planners and models: where is free space, how far is the next
 /// obstacle, and what does it look like. Memory follows the surface that was seen, not the time.
 ///
@@ -50,7 +63,7 @@ struct SurfaceMesh {
 /// What moves away is carved away by later frames. A model stays where its poses put it: after a loop
 /// closure, clear it and add the frames of keyframes anew, which the caller keeps (PoseEstimate::keyframe).
 /// One model holds one map part: poses of another have another world. Same calls, same answers. Threads: at
-/// and mesh by several at once, add and clear by one while nobody else does anything.
+/// and mesh by several at once, add, clear and mesh_changes by one while nobody else does anything.
 class TWOFOLD_API SurfaceModel {
  public:
   /// Throws std::invalid_argument naming the field of rig or options, the rule and the value; one camera has
@@ -71,6 +84,9 @@ class TWOFOLD_API SurfaceModel {
   /// p_world [m].
   [[nodiscard]] SpacePoint at(const std::array<double, 3>& p_world) const;
   [[nodiscard]] SurfaceMesh mesh() const;
+  /// What changed in the mesh after that revision; of 0 on, all of it. Only cells that frames changed are
+  /// made anew, so that asking after each frame is cheap. Small specks, which `mesh` leaves out, are there.
+  [[nodiscard]] SurfaceChanges mesh_changes(std::uint64_t since);
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

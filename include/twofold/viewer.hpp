@@ -12,6 +12,7 @@
 #include "twofold/frame_details.hpp"
 #include "twofold/map.hpp"
 #include "twofold/queue_lengths.hpp"
+#include "twofold/surface.hpp"
 #include "twofold/types.hpp"
 
 namespace twofold {
@@ -74,12 +75,12 @@ struct ViewerOptions {
 /// Threads:
 /// - address, addresses, port, is_open_to_network: any, always.
 /// - tell of poses, of MapEvents and of points, wants_points: one and the same for all of them, the
-/// tracker's,
-///   which calls Slam::on_frame and Slam::on_event: who tells events from another thread than poses has a
-///   data race. A copy into a ring: no lock, no allocation, no system call. A viewer that falls behind by the
-///   whole ring (1024 frames) leaves frames out.
+///   tracker's, which calls Slam::on_frame and Slam::on_event: who tells events from another thread than
+///   poses has a data race. A copy into a ring: no lock, no allocation, no system call. A viewer that falls
+///   behind by the whole ring (1024 frames) leaves frames out.
 /// - tell_waiting, tell_lost: any, one at a time each.
 /// - show, wants_image: one, that of the images' source; it may be the tracker's.
+/// - show_surface: any; waits for the viewer's thread while that takes pieces over: not for the tracker's.
 /// - finish, and the destructor, which finishes: any but the viewer's own, when no other thread is in one of
 ///   the above any more.
 /// - map, on_command, recorded_image are called by the viewer's, one at a time; while they take, nobody is
@@ -129,6 +130,11 @@ class TWOFOLD_API Viewer {
   /// @param owner  keeps its pixels alive and unchanged until the viewer is done with them, and is let go of
   ///               on this thread or the viewer's; null: they are copied
   void show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner);
+
+  /// Pieces of a mesh, in the world of a map part; a mesh of another part, or of cells of another edge,
+  /// replaces what was shown. At most about 256 MB of it are; a piece of more than 65,535 vertices is not.
+  /// @param edge  of a cell, in the map's unit
+  void show_surface(std::uint32_t part, double edge, std::vector<SurfacePiece> pieces);
 
   /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most three
   /// seconds beyond what a callback takes. A second call does nothing. Throws std::logic_error when one of

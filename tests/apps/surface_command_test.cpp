@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
+#include "imaging/row_offset.hpp"
 #include "io/files/mesh_file.hpp"
 #include "tests/apps/command.hpp"
 
@@ -63,6 +66,54 @@ TEST(SurfaceCommand, ThreadedRunsAndFinishedRunsGiveSurfacesToo) {
   EXPECT_EQ(mesh.normals.size(), mesh.positions.size());
   EXPECT_FALSE(content(folder / "after/p.png").empty());
   EXPECT_EQ(content(folder / "after/s.obj").rfind("# metres\nv ", 0), 0u);
+}
+
+TEST(SurfaceCommand, KeepsTheMeshUpToDateAndSaysHowFarItIsBehind) {
+  const ScratchFolder folder;
+  const Outcome live = run(
+      folder, "run " + kScene + " --surface 0.02 --surface-live --quiet --out '" + (folder / "live") + "'");
+  ASSERT_EQ(live.exit_code, 0) << live.err;
+  EXPECT_NE(live.out.find("live mesh   behind the map by"), std::string::npos) << live.out;
+  const auto surface = nlohmann::json::parse(content(folder / "live/summary.json"))["surface"];
+  EXPECT_GT(surface["live_mesh"]["updates"], 0);
+  EXPECT_GT(surface["live_mesh"]["maps"], 0);
+  EXPECT_GT(surface["live_mesh"]["behind_max_ms"], 0);
+  EXPECT_GT(surface["live_mesh"]["memory_mb"], 0);
+}
+
+/// In folder/NAME: a stereo run, and the surface of it when it is finished; right images lie `rows` lower.
+void make_surfaces(const ScratchFolder& scratch, const std::string& name, double rows) {
+  const auto in = [&](const std::string& what) { return scratch / (name + "/" + what); };
+  const std::string scene = "'synthetic:desk?width=320&height=240&frames=40'";
+  ASSERT_EQ(run(scratch, "render " + scene + " --out '" + in("recording") + "'").exit_code, 0);
+  for (const auto& file : std::filesystem::directory_iterator(in("recording/mav0/cam1/data"))) {
+    const cv::Mat right = cv::imread(file.path().string(), cv::IMREAD_GRAYSCALE);
+    ASSERT_TRUE(cv::imwrite(file.path().string(), without_row_offset(right, -rows)));
+  }
+  const Outcome outcome = run(scratch, "run '" + in("recording") + "' --deterministic --quiet " +
+                                           "--surface 0.02 --out '" + in("run") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  ASSERT_EQ(run(scratch, "surface '" + in("run") + "' --voxel 0.02 --out '" + in("after") + "'").exit_code,
+            0);
+}
+
+TEST(SurfaceCommand, RowsThatSlippedAreTakenBackForTheSurfaceToo) {
+  const ScratchFolder folder;
+  make_surfaces(folder, "aligned", 0);
+  make_surfaces(folder, "slipped", 2);
+  for (const char* mesh : {"run/surface.ply", "after/surface.ply"}) {
+    const Outcome outcome =
+        run(folder, "eval --surface '" + (folder / (std::string("slipped/") + mesh)) + "' '" +
+                        (folder / (std::string("aligned/") + mesh)) +
+                        "' --align none --threshold 0.03 --json '" + (folder / "eval.json") + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    const auto figures = nlohmann::json::parse(content(folder / "eval.json"));
+    const double right = figures["accuracy"]["within_threshold"];
+    const double there = figures["completeness"]["within_threshold"];
+    std::printf("%s: within 3 cm of that of aligned rows %.3f, of which there is %.3f\n", mesh, right, there);
+    EXPECT_GT(right, 0.9) << mesh;
+    EXPECT_GT(there, 0.9) << mesh;
+  }
 }
 
 TEST(SurfaceCommand, StereoGivesASurface) {

@@ -38,6 +38,28 @@ struct WallFrame {
   }
 };
 
+TEST(SurfaceModel, TellsWhatChangedInTheMesh) {
+  const WallFrame wall;
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  EXPECT_EQ(model.mesh_changes(0).revision, 0U);
+  ASSERT_GT(model.add(wall.view(), {}), 0);
+  const SurfaceChanges first = model.mesh_changes(0);
+  EXPECT_DOUBLE_EQ(first.edge, 0.16);
+  std::size_t triangles = 0;
+  for (const SurfacePiece& piece : first.pieces) triangles += piece.mesh.triangles.size();
+  EXPECT_EQ(triangles, model.mesh().triangles.size());
+  EXPECT_TRUE(model.mesh_changes(first.revision).pieces.empty());
+  // Another part of the wall, 60 cells away.
+  ASSERT_GT(model.add(wall.view(), {{0, 0, 0, 1}, {9.6, 0, 0}}), 0);
+  const SurfaceChanges second = model.mesh_changes(first.revision);
+  EXPECT_GT(second.revision, first.revision);
+  EXPECT_EQ(second.pieces.size(), first.pieces.size());
+  for (const SurfacePiece& piece : second.pieces) EXPECT_GT(piece.cell[0] * second.edge, 5);
+  model.clear();
+  for (const SurfacePiece& piece : model.mesh_changes(second.revision).pieces)
+    EXPECT_TRUE(piece.mesh.triangles.empty());
+}
+
 TEST(SurfaceModel, TellsFreeFromOccupiedAndUnknown) {
   const WallFrame wall;
   SurfaceModel model(depth_camera(), {.voxel = 0.02});

@@ -31,9 +31,13 @@ class SubmapSurfaceTest : public ::testing::Test {
       writer_.set_edge(keyframe.id, testing::edge_to(KeyframeId{static_cast<std::uint32_t>(n - 1)}, 50));
       writer_.set_reference(keyframe.id);
     }
+    surface.offer(depth_of_keyframe(n));
+  }
+  [[nodiscard]] KeyframeDepth depth_of_keyframe(int n) const {
     cv::Mat depth;
-    testing::depth_of(rig_, T_k_w, ball_).convertTo(depth, CV_16U, 1 / rig_.depth_unit);
-    surface.offer(pack_keyframe_depth(keyframe.frame_index, depth, {}));
+    testing::depth_of(rig_, testing::camera_around(n, kKeyframes), ball_)
+        .convertTo(depth, CV_16U, 1 / rig_.depth_unit);
+    return pack_keyframe_depth(10 * n, depth, {});
   }
   void add_all(SubmapSurface& surface) {
     for (int n = 0; n < kKeyframes; ++n) {
@@ -107,6 +111,23 @@ TEST_F(SubmapSurfaceTest, CulledKeyframesLeaveWhatTheyAdded) {
   surface.step(writer_.publish());
   EXPECT_EQ(surface.report().submaps_dropped, 1);
   EXPECT_EQ(surface.submap_count(), 2u);
+}
+
+TEST_F(SubmapSurfaceTest, DepthMayComeAfterTheKeyframe) {
+  SubmapSurface early(rig_, testing::fine_options(), limits_);
+  SubmapSurface late(rig_, testing::fine_options(), limits_);
+  for (int n = 0; n < kKeyframes; ++n) {
+    add_keyframe(early);
+    const GraphSnapshot& graph = writer_.publish();
+    early.step(graph);
+    late.step(graph);
+    if (n % 3 != 2) continue;  // of three at once
+    for (int m = n - 2; m <= n; ++m) late.offer(depth_of_keyframe(m));
+    late.step(graph);
+  }
+  EXPECT_EQ(late.report().fused, kKeyframes);
+  EXPECT_EQ(late.report().not_in_map, 0);
+  EXPECT_LT(error(late), 0.002);
 }
 
 TEST_F(SubmapSurfaceTest, MemoryIsBounded) {

@@ -8,6 +8,7 @@
 
 #include "engine/listeners.hpp"
 #include "geometry/processor_time.hpp"
+#include "imaging/row_offset.hpp"
 #include "io/files/io_error.hpp"
 #include "surface/meshing.hpp"
 #include "surface/stereo_depth.hpp"
@@ -17,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMostWaiting = 48;  // keyframes whose images wait for the surface's thread
 constexpr double kNearestStereo = 0.4;    // [m]
-constexpr auto kMapCheck = std::chrono::milliseconds(100);
+constexpr auto kMapCheck = std::chrono::milliseconds(20);
 
 }  // namespace
 
@@ -38,10 +39,12 @@ void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments
                   "Share of one processor's time that the surface may take while the run lasts")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
+  command.add_flag("--surface-live", arguments.live_mesh,
+                   "Keep the mesh up to date while the run lasts, and say how far it is behind the map");
 }
 
 LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source,
-                         EngineOptions& options, bool one_thread)
+                         EngineOptions& options, bool one_thread, LiveMesh::Listener on_mesh)
     : source_(&source), arguments_(arguments), rig_(source.rig()) {
   if (arguments.voxel == 0) return;
   if (rig_.kind == SensorKind::kMono)
@@ -54,6 +57,8 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
   if (const std::string reason = surface.invalid_reason(); !reason.empty())
     throw IoError("--surface", reason);
   surface_.emplace(rig_, surface, submaps);
+  if (!one_thread && (arguments.live_mesh || on_mesh))
+    mesh_ = std::make_unique<LiveMesh>(surface, std::move(on_mesh));
   listen(options);
   if (!one_thread) {
     worker_.emplace(WorkerOptions{.name = "surface", .time_slice = kPatientSlice},
@@ -62,12 +67,14 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
 }
 
 void LiveSurface::listen(EngineOptions& options) {
-  options.on_pose = both(options.on_pose, PoseListener([this](const PoseReport& report) {
-                           // Never full: the reader empties it before each frame it sends.
-                           (void)decisions_.try_push({report.record.frame_index, report.record.keyframe});
-                         }));
+  options.on_pose = both(
+      options.on_pose, PoseListener([this](const PoseReport& report) {
+        // Never full: the reader empties it before each frame it sends.
+        (void)decisions_.try_push({report.record.frame_index, report.record.keyframe, report.row_offset});
+      }));
   options.on_map =
       both(options.on_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
+             if (mesh_) mesh_->published(graph);
              maps_.publish(graph, window);
            }));
 }
@@ -88,7 +95,7 @@ void LiveSurface::sort_frames() {
     if (under_way_.empty() || under_way_.front().index != decision.frame) continue;
     if (decision.keyframe) {
       const std::scoped_lock lock(mutex_);
-      keyframes_.push_back(std::move(under_way_.front()));
+      keyframes_.emplace_back(std::move(under_way_.front()), decision.row_offset);
       if (keyframes_.size() > kMostWaiting) {
         keyframes_.pop_front();
         ++overtaken_;
@@ -118,24 +125,26 @@ void LiveSurface::work(const std::stop_token& stop) {
 }
 
 void LiveSurface::step() {
-  std::deque<Frame> taken;
+  Keyframes taken;
   {
     const std::scoped_lock lock(mutex_);
     taken.swap(keyframes_);
   }
-  for (Frame& frame : taken) {
-    take(frame);
+  for (auto& [frame, row_offset] : taken) {
+    take(frame, row_offset);
     frame = {};
   }
   const auto map = maps_.newest();
-  if (map->graph.version() == version_) return;
+  if (map->graph.version() == version_ && taken.empty()) return;
   version_ = map->graph.version();
   surface_->step(map->graph);
+  if (mesh_) mesh_->update(*surface_, map->graph);
 }
 
-void LiveSurface::take(const Frame& frame) {
+void LiveSurface::take(const Frame& frame, double row_offset) {
   cv::Mat depth = frame.depth;
-  if (rig_.kind == SensorKind::kStereo) depth = stereo_depth(rig_, frame.left, frame.right, kNearestStereo);
+  if (rig_.kind == SensorKind::kStereo)
+    depth = stereo_depth(rig_, frame.left, without_row_offset(frame.right, row_offset), kNearestStereo);
   cv::Mat colour;
   try {
     colour = source_->colour_image(frame.index);
@@ -157,7 +166,9 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   worker_.reset();
   sort_frames();
   step();
+  if (mesh_) figures.live_mesh = mesh_->figures();
   surface_->step(graph);
+  mesh_.reset();  // gives its memory to the whole
   const SurfaceVolume whole = surface_->whole(part);
   const std::int64_t begin_ns = thread_cpu_ns();
   TriangleMesh mesh = extract_mesh(whole);

@@ -6,7 +6,9 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 
+#include "apps/twofold/surface/live_mesh.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "engine/engine.hpp"
 #include "engine/spsc_ring.hpp"
@@ -21,16 +23,18 @@ namespace twofold {
 struct LiveSurfaceArguments {
   double voxel = 0;         ///< [m]; 0: no surface
   double memory_mb = 2000;  ///< of samples and depth images
+  bool live_mesh = false;   ///< kept up to date while the run lasts, unless that has one thread
   double load = 0.5;        ///< share of one processor's time that the thread may take, in (0, 1]
 };
 
-/// --surface, --surface-memory and --surface-load.
+/// --surface, --surface-memory, --surface-load and --surface-live.
 void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments);
 
 /// What the tracker made of a frame.
 struct KeyframeDecision {
   std::int64_t frame = 0;
   bool keyframe = false;  ///< it was proposed as one
+  double row_offset = 0;  ///< rows that the right image lies lower than the left one [px]
 };
 
 /// The surface of `twofold run --surface`; nothing without that option.
@@ -45,8 +49,9 @@ class LiveSurface {
   /// Adds its listeners to those of `options`, which are called as before. source must outlive the object.
   /// Throws IoError for a source without depth or options out of their ranges.
   /// @param one_thread  the run is deterministic, or a replay
+  /// @param on_mesh     asks for a mesh while the run lasts, on more than one thread; may be empty
   LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source, EngineOptions& options,
-              bool one_thread);
+              bool one_thread, LiveMesh::Listener on_mesh = {});
 
   /// The reader's thread, with each frame it reads.
   void show(const Frame& frame);
@@ -61,7 +66,9 @@ class LiveSurface {
   void work(const std::stop_token& stop);
   /// Takes the frames that wait, and the newest map.
   void step();
-  void take(const Frame& frame);
+  /// Frames and by how many rows their right images lie lower.
+  using Keyframes = std::deque<std::pair<Frame, double>>;
+  void take(const Frame& frame, double row_offset);
 
   const FrameSource* source_;
   const LiveSurfaceArguments arguments_;
@@ -75,9 +82,10 @@ class LiveSurface {
   SpscRing<KeyframeDecision> decisions_{256};  // tracker -> reader; longer than the frames under way
   std::deque<Frame> under_way_;                // reader's
   MapLender maps_;
+  std::unique_ptr<LiveMesh> mesh_;
 
   std::mutex mutex_;  // guards keyframes_ and overtaken_; taken by reader and surface alone
-  std::deque<Frame> keyframes_;
+  Keyframes keyframes_;
   int overtaken_ = 0;
   std::condition_variable_any arrived_;
   std::optional<Worker> worker_;  // last: joins before what it uses is destroyed

@@ -13,6 +13,7 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "geometry/processor_time.hpp"
+#include "imaging/row_offset.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/mesh_file.hpp"
 #include "io/files/output_file.hpp"
@@ -44,20 +45,31 @@ constexpr std::int64_t kSameTimeNs = 1'000'000;
 constexpr double kNearestStereo = 0.4;  // [m]
 constexpr int kPictureWidth = 1600;
 
-/// The source that a run was made of.
-std::string source_of_run(const fs::path& folder) {
+/// What a run was made of.
+struct RunInput {
+  std::string source;
+  double row_offset = 0;  ///< of the right images, which the run took back [px]
+};
+
+RunInput input_of_run(const fs::path& folder) {
   const fs::path file = folder / "summary.json";
   const auto summary = nlohmann::json::parse(std::ifstream(file), nullptr, false);
   if (!summary.is_object() || !summary.contains("source") || !summary["source"].is_string())
     throw IoError(file, "does not name the source of the run");
   if (summary.value("scale", "") == "arbitrary")
     throw IoError(file, "says that the scale is arbitrary (one camera): no depth fits its poses");
-  return summary["source"].get<std::string>();
+  RunInput input{summary["source"].get<std::string>()};
+  if (summary.contains("row_offset_px") && summary["row_offset_px"].is_number())
+    input.row_offset = summary["row_offset_px"].get<double>();
+  if (!(std::abs(input.row_offset) <= RowOffsetMeter::kMost))
+    throw IoError(file, "row_offset_px is more than any run takes back");
+  return input;
 }
 
 /// What to fuse, along which poses, and where to write.
 struct SurfaceJob {
   std::unique_ptr<FrameSource> source;
+  double row_offset = 0;  ///< RunInput::row_offset
   Trajectory poses;
   std::string poses_name;
   fs::path out;
@@ -72,7 +84,9 @@ SurfaceJob surface_job(const SurfaceArguments& arguments) {
   if (!is_run && arguments.out.empty()) throw IoError(arguments.input, "needs --out FOLDER for the surface");
   SourceOptions options;
   if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
-  job.source = open_source(is_run ? source_of_run(arguments.input) : arguments.input, options);
+  const RunInput input = is_run ? input_of_run(arguments.input) : RunInput{arguments.input};
+  job.source = open_source(input.source, options);
+  job.row_offset = input.row_offset;
   job.out = arguments.out.empty() ? arguments.input : arguments.out;
   if (arguments.poses == "truth") {
     job.poses = job.source->ground_truth();
@@ -98,13 +112,14 @@ const TimedPose* pose_at(const Trajectory& poses, std::int64_t t_ns) {
 
 class DepthFusion {
  public:
-  DepthFusion(const SurfaceArguments& arguments, const FrameSource& source, const SurfaceOptions& options)
-      : source_(source), volume_(options), grey_(arguments.grey) {}
+  DepthFusion(const SurfaceArguments& arguments, const SurfaceJob& job, const SurfaceOptions& options)
+      : source_(*job.source), row_offset_(job.row_offset), volume_(options), grey_(arguments.grey) {}
 
   void fuse(const Frame& frame, const SE3& T_w_c) {
     const Rig& rig = source_.rig();
     cv::Mat depth = frame.depth;
-    if (rig.kind == SensorKind::kStereo) depth = stereo_depth(rig, frame.left, frame.right, kNearestStereo);
+    if (rig.kind == SensorKind::kStereo)
+      depth = stereo_depth(rig, frame.left, without_row_offset(frame.right, row_offset_), kNearestStereo);
     cv::Mat colour;
     if (!grey_) colour = source_.colour_image(frame.index);
     coloured_ += !colour.empty();
@@ -144,6 +159,7 @@ class DepthFusion {
 
  private:
   const FrameSource& source_;
+  const double row_offset_;
   SurfaceVolume volume_;
   const bool grey_;
   int fused_ = 0, empty_ = 0, coloured_ = 0;
@@ -156,7 +172,7 @@ void run_surface(const SurfaceArguments& arguments) {
   SurfaceJob job = surface_job(arguments);
   prepare_output_folder(job.out);
   if (options.depth_noise == 0) options.depth_noise = usual_depth_noise(job.source->rig());
-  DepthFusion fusion(arguments, *job.source, options);
+  DepthFusion fusion(arguments, job, options);
   Frame frame;
   FrameStatus status;
   std::int64_t posed = 0;

@@ -6,6 +6,24 @@
 
 namespace twofold {
 
+namespace {
+
+nlohmann::ordered_json live_mesh_json(const std::optional<LiveMeshFigures>& f) {
+  if (!f) return nullptr;
+  return {{"updates", f->updates},
+          {"blocks_per_update", f->blocks_an_update},
+          {"update_ms", f->update_ms},
+          {"maps", f->maps},
+          {"behind_p50_ms", f->behind_p50_ms},
+          {"behind_p99_ms", f->behind_p99_ms},
+          {"behind_max_ms", f->behind_max_ms},
+          {"loops", f->loops},
+          {"loop_max_ms", f->loop_max_ms},
+          {"memory_mb", f->memory_mb}};
+}
+
+}  // namespace
+
 nlohmann::ordered_json surface_json(const SurfaceFigures& f) {
   return {{"voxel_m", f.voxel},
           {"depth_images_fused", f.fused},
@@ -18,6 +36,7 @@ nlohmann::ordered_json surface_json(const SurfaceFigures& f) {
           {"mb_per_cubic_metre", f.mb_a_cubic_metre},
           {"triangles", f.triangles},
           {"colour", f.colour},
+          {"live_mesh", live_mesh_json(f.live_mesh)},
           {"left_out", f.left_out}};
 }
 
@@ -30,6 +49,18 @@ void print_surface(const SurfaceFigures& f) {
       "            {}{} blocks, {:.0f} MB at most ({:.0f} MB for a cubic metre of blocks), colour: {}\n",
       f.submaps > 0 ? fmt::format("{} submaps, ", f.submaps) : "", f.blocks, f.memory_mb, f.mb_a_cubic_metre,
       f.colour);
+  if (f.live_mesh) {
+    const LiveMeshFigures& m = *f.live_mesh;
+    fmt::print(
+        "live mesh   behind the map by {:.0f} ms (p99 {:.0f}, max {:.0f}), {} updates of {:.0f} blocks, "
+        "{:.0f} "
+        "CPU-ms each, {:.0f} MB\n",
+        m.behind_p50_ms, m.behind_p99_ms, m.behind_max_ms, m.updates, m.blocks_an_update, m.update_ms,
+        m.memory_mb);
+    if (m.loops > 0)
+      fmt::print("            {} loop closures in the mesh after {:.0f} ms at most\n", m.loops,
+                 m.loop_max_ms);
+  }
   for (const std::string& what : f.left_out) fmt::print("left out    {}\n", what);
 }
 

@@ -1,13 +1,29 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "geometry/triangle_mesh.hpp"
 
 namespace twofold {
+
+/// What keeping the mesh up to date while a run lasts took. A version of the map is in the mesh when the
+/// depth of its keyframes is.
+struct LiveMeshFigures {
+  std::int64_t updates = 0;     ///< that made blocks anew
+  double blocks_an_update = 0;  ///< mean
+  double update_ms = 0;         ///< processor time, mean; after fusion
+  std::uint64_t maps = 0;       ///< versions of the map
+  double behind_p50_ms = 0;     ///< from such a version's publication until it was in the mesh
+  double behind_p99_ms = 0, behind_max_ms = 0;
+  std::uint64_t loops = 0;  ///< versions with a loop closure, or another change of all poses
+  double loop_max_ms = 0;   ///< the same for these, the slowest
+  double memory_mb = 0;     ///< of the joined samples and the mesh, at most
+};
 
 /// What fusing depth into a surface took, and what it left out.
 struct SurfaceFigures {
@@ -23,6 +39,7 @@ struct SurfaceFigures {
   std::size_t triangles = 0;
   std::vector<std::string> left_out;  ///< in words
   std::string colour;                 ///< where the colours come from
+  std::optional<LiveMeshFigures> live_mesh;
 };
 
 [[nodiscard]] nlohmann::ordered_json surface_json(const SurfaceFigures& figures);

@@ -22,7 +22,7 @@ function make(tag: string, text = '', ...children: Node[]): HTMLElement {
 }
 
 const LAYERS: [Layer | 'image', string, string][] = [
-  ['points', 'Points', ''], ['keyframes', 'Keyframes', '--keyframe'], ['final', 'Final path', '--final'],
+  ['points', 'Points', ''], ['surface', 'Surface', ''], ['keyframes', 'Keyframes', '--keyframe'], ['final', 'Final path', '--final'],
   ['causal', 'Causal path', '--causal'], ['truth', 'True path', '--truth'], ['covisible', 'Covisibility', '--covisible'],
   ['marginalised', 'Marginalised', '--marginalised'], ['returns', 'Closed loops', '--back'], ['grid', 'Grid', ''],
   ['image', 'Camera image', ''],
@@ -103,6 +103,9 @@ class Page {
       this.showKeyframeImage(message);
     } else if (message.kind === 'image') {
       this.sight.take(message);
+    } else if (message.kind === 'surface') {
+      this.stage.surface.take(message);
+      this.stage.redraw();
     } else if (message.kind === 'measured') {
       this.sight.takeMeasured(message);
     } else if (message.kind === 'frames') {
@@ -365,6 +368,7 @@ class Page {
     const edges = [...this.model.edges.values()];
     const has: Partial<Record<Layer | 'image', boolean>> = {
       causal: hello?.kind !== 'map', truth: this.model.truth !== null, image: hello?.kind === 'live',
+      surface: this.stage.surface.size > 0,
       marginalised: edges.some((edge) => edge.marginalised), returns: edges.some((edge) => edge.loop > 0),
     };
     for (const [layer, there] of Object.entries(has)) $(`layer-${layer}`).parentElement!.hidden = !there;

@@ -5,14 +5,16 @@ import {Cloud} from './cloud.ts';
 import {WideLines, type Segments} from './lines.ts';
 import type {CameraPose, Model} from './model.ts';
 import {PALETTES, eventColour, type Palette, type Theme} from './palette.ts';
+import {Surface} from './surface.ts';
 import {State, type Keyframe, type MapEvent, type PathFrame} from './wire.ts';
 
 export type View = 'follow' | 'top' | 'free';
-export type Layer = 'points' | 'keyframes' | 'covisible' | 'marginalised' | 'returns' | 'causal' | 'final' | 'truth' | 'grid';
+export type Layer = 'points' | 'surface' | 'keyframes' | 'covisible' | 'marginalised' | 'returns' | 'causal' | 'final' | 'truth' | 'grid';
 export type Picked = {keyframe: Keyframe} | {point: THREE.Vector3} | null;
 
 const SLOW_MS = 45;
 const FAST_MS = 38;
+const SURFACE_MS = 6;         // of a picture, for the surface to be made anew; a fifth where pictures take longer
 const FIRST_BUDGET = 200000;  // points
 const LEAST_BUDGET = 10000;
 const SOFTWARE_MS = 33;  // between frames that no graphics processor draws: the tracker may want the same processors
@@ -22,8 +24,9 @@ const MOST_EDGES = 4000;   // likewise, but for closed loops
 
 export class Stage {
   readonly cloud = new Cloud();
+  readonly surface = new Surface();
   readonly layers: Record<Layer, boolean> = {
-    points: true, keyframes: true, covisible: true, marginalised: true, returns: true, causal: true, final: true, truth: true, grid: true,
+    points: true, surface: true, keyframes: true, covisible: true, marginalised: true, returns: true, causal: true, final: true, truth: true, grid: true,
   };
   view: View = 'follow';
   /** Seconds; null: now. */
@@ -77,7 +80,7 @@ export class Stage {
     this.controls.addEventListener('change', () => this.redraw());
     this.controls.addEventListener('start', () => (this.moved = true));
     this.world.rotation.x = Math.PI;
-    this.world.add(this.cloud.group, this.edges.object, this.keyframes.object, this.truth.object, this.causal.object,
+    this.world.add(this.surface.group, this.cloud.group, this.edges.object, this.keyframes.object, this.truth.object, this.causal.object,
       this.final.object, this.windows.object, this.returns.object, this.body.object, this.tape.object);
     this.scene.add(this.world, this.grid.object);
     for (const lines of [this.final, this.causal, this.truth, this.windows, this.returns, this.body, this.tape]) lines.object.material.depthTest = false;
@@ -156,6 +159,8 @@ export class Stage {
     if (this.lines) this.makeLines();
     else if (this.path) this.makePaths();
     this.lines = this.path = false;
+    this.surface.group.visible = this.layers.surface && this.isShown(this.surface.part);
+    if (this.surface.update(Math.max(SURFACE_MS, 0.2 * this.frameMs))) this.dirty = true;
     this.makeBody();
     this.aim();
     this.chooseDetail();

@@ -130,7 +130,7 @@ export interface Measured {
   frame: number;
   points: MeasuredPoint[];
 }
-export type Binary = Delta | Frames | Image | KeyframeImage | Measured;
+export type Binary = Delta | Frames | Image | KeyframeImage | Measured | SurfaceMessage;
 
 const HEADER = 16;
 const SIZES = {keyframe: 52, edge: 12, path: 60, live: 116, measured: 32};
@@ -247,6 +247,61 @@ function whole<Message extends Binary>(r: Reader, message: Message): Message {
   return message;
 }
 
+/** A piece of the mesh, in the cell's place. */
+export interface SurfacePiece {
+  cell: [number, number, number];
+  /** x, y, z */
+  positions: Float32Array;
+  /** x, y, z times 127, 0 */
+  normals: Int8Array;
+  /** red, green, blue, 255 */
+  colours: Uint8Array;
+  /** Three of each triangle: numbers of vertices. */
+  corners: Uint16Array;
+}
+export interface SurfaceMessage {
+  kind: 'surface';
+  /** All that was there before is gone. */
+  whole: boolean;
+  part: number;
+  pieces: SurfacePiece[];
+}
+
+const SURFACE_VERTEX = 12;
+
+function surfacePiece(r: Reader, edge: number): SurfacePiece {
+  r.expect(20);
+  const cell = [0, 4, 8].map((at) => r.view.getInt32(r.at + at, true)) as [number, number, number];
+  const vertices = r.u32(12);
+  const triangles = r.u32(16);
+  r.at += 20;
+  r.expect(vertices * SURFACE_VERTEX + 2 * 3 * triangles);
+  const positions = new Float32Array(3 * vertices);
+  const normals = new Int8Array(4 * vertices);
+  const colours = new Uint8Array(4 * vertices).fill(255);
+  for (let v = 0; v < vertices; ++v, r.at += SURFACE_VERTEX) {
+    for (let a = 0; a < 3; ++a) {
+      positions[3 * v + a] = edge * (cell[a] + (2 * r.u16(2 * a)) / 65535 - 0.5);
+      normals[4 * v + a] = r.view.getInt8(r.at + 6 + a);
+      colours[4 * v + a] = r.u8(9 + a);
+    }
+  }
+  const corners = new Uint16Array(r.buffer.slice(r.at, r.at + 6 * triangles));
+  for (const corner of corners) if (corner >= vertices) throw new Error('a triangle without one of its vertices');
+  r.at += 6 * triangles + (triangles % 2 === 1 ? 2 : 0);
+  return {cell, positions, normals, colours, corners};
+}
+
+function decodeSurface(r: Reader, flags: number, count: number, part: number): SurfaceMessage {
+  r.expect(8);
+  const edge = r.f32(0);
+  if (!(edge > 0 && Number.isFinite(edge))) throw new Error('a surface of cells without an edge');
+  r.at += 8;
+  const pieces: SurfacePiece[] = [];
+  for (let n = 0; n < count; ++n) pieces.push(surfacePiece(r, edge));
+  return whole(r, {kind: 'surface', whole: (flags & 1) !== 0, part, pieces});
+}
+
 export function decode(buffer: ArrayBuffer): Binary {
   if (buffer.byteLength < HEADER) throw new Error('a message ends within its header');
   const header = new DataView(buffer);
@@ -258,6 +313,7 @@ export function decode(buffer: ArrayBuffer): Binary {
     case 3: return {kind: 'image', frame: number, width: a, height: b, jpeg: new Uint8Array(buffer, HEADER)};
     case 4: return whole(reader, {kind: 'measured', frame: number, points: reader.list(a, SIZES.measured, () => measuredPoint(reader))});
     case 5: return {kind: 'keyframe image', keyframe: number, jpeg: new Uint8Array(buffer, HEADER)};
+    case 6: return decodeSurface(reader, number, a, b);
     default: throw new Error(`unknown message ${kind}`);
   }
 }

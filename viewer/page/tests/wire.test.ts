@@ -3,8 +3,9 @@ import assert from 'node:assert/strict';
 import {readFileSync} from 'node:fs';
 import {test} from 'node:test';
 import {Model} from '../src/model.ts';
+import {Surface} from '../src/surface.ts';
 import {describe, lateStretches, lateTally, lostStretches, tally} from '../src/timeline.ts';
-import {State, decode, type Delta, type Frames, type LiveFrame, type MapEvent} from '../src/wire.ts';
+import {State, decode, type Delta, type Frames, type LiveFrame, type MapEvent, type SurfaceMessage} from '../src/wire.ts';
 
 const messages = JSON.parse(readFileSync(process.env.MESSAGES!, 'utf8')) as Record<string, string>;
 
@@ -59,6 +60,51 @@ test('measured points', () => {
 test('the image of a keyframe', () => {
   const header = '05000000' + '11000000' + '08000000' + '06000000';
   assert.deepEqual(decode(bytes(header, 'ffd8')), {kind: 'keyframe image', keyframe: 17, jpeg: new Uint8Array([0xff, 0xd8])});
+});
+
+test('pieces of the surface', () => {
+  const surface = decode(bytes(messages.surface)) as SurfaceMessage;
+  assert.deepEqual([surface.kind, surface.whole, surface.part, surface.pieces.length], ['surface', true, 7, 1]);
+  const [piece] = surface.pieces;
+  assert.deepEqual(piece.cell, [1, -2, 3]);
+  const expected = [0.5, -1, 1.5, 1, -1, 1.5, 1, -0.5, 1.5, 0.5, -0.5, 1.5];
+  piece.positions.forEach((x, i) => assert.ok(Math.abs(x - expected[i]) < 1e-5, `${i}: ${x}`));
+  assert.deepEqual([...piece.normals.slice(0, 3), ...piece.colours.slice(0, 4)], [0, 0, -127, 255, 128, 0, 255]);
+  assert.deepEqual([...piece.corners], [0, 1, 2, 0, 2, 3, 1, 2, 3]);
+});
+
+test('damaged pieces of the surface are refused whole', () => {
+  const whole = new Uint8Array(bytes(messages.surface));
+  const damaged = (change: (view: DataView) => void): ArrayBuffer => {
+    const copy = whole.slice().buffer;
+    change(new DataView(copy));
+    return copy;
+  };
+  const refused = (buffer: ArrayBuffer, why: RegExp) => assert.throws(() => decode(buffer), why);
+  for (let length = 16; length < whole.length - 2; ++length) refused(whole.slice(0, length).buffer, /ends within a record|without an edge/);
+  refused(damaged((view) => view.setUint32(8, 2, true)), /ends within a record/);           // pieces
+  refused(damaged((view) => view.setUint32(36, 0xffffffff, true)), /ends within a record/);  // vertices
+  refused(damaged((view) => view.setUint32(40, 0xffffffff, true)), /ends within a record/);  // triangles
+  refused(damaged((view) => view.setUint16(whole.length - 4, 4, true)), /without one of its vertices/);
+  for (const edge of [0, -1, NaN, Infinity]) refused(damaged((view) => view.setFloat32(16, edge, true)), /without an edge/);
+});
+
+test('what is shown of a surface is what came last', () => {
+  const surface = new Surface();
+  const message = decode(bytes(messages.surface)) as SurfaceMessage;
+  surface.take(message);
+  while (surface.update(1));
+  assert.deepEqual([surface.size, surface.group.children.length, surface.part], [3, 1, 7]);
+  const [piece] = message.pieces;
+  surface.take({...message, whole: false, pieces: [{...piece, cell: [100, 0, 0], corners: piece.corners.slice(0, 3)}]});
+  while (surface.update(1));
+  assert.deepEqual([surface.size, surface.group.children.length], [4, 2]);
+  surface.take({...message, whole: false, pieces: [{...piece, corners: new Uint16Array(0)}]});
+  while (surface.update(1));
+  assert.deepEqual([surface.size, surface.group.children.length], [1, 1]);
+  surface.take({...message, pieces: []});
+  while (surface.update(1));
+  assert.deepEqual([surface.size, surface.group.children.length], [0, 0]);
 });
 
 const nowhere: [number, number, number] = [0, 0, 0];

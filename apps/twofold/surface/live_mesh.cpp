@@ -1,0 +1,68 @@
+#include "apps/twofold/surface/live_mesh.hpp"
+
+#include <algorithm>
+
+#include "engine/stage_timer.hpp"
+#include "geometry/processor_time.hpp"
+
+namespace twofold {
+
+void LiveMesh::published(const GraphSnapshot& graph) {
+  const std::uint64_t jump = graph.last_jump().version;
+  // A full ring leaves a figure out.
+  (void)times_.try_push({graph.version(), steady_now_ns(), jump > last_jump_});
+  last_jump_ = jump;
+}
+
+void LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph) {
+  if (graph.reference() == kNoKeyframe) return;
+  const KeyframeId part = graph.part(graph.reference());
+  const std::int64_t begin_ns = thread_cpu_ns();
+  const std::size_t blocks = composition_.update(surface.placed(part));
+  if (blocks > 0) {
+    ++updates_;
+    blocks_ += blocks;
+    cpu_ns_ += thread_cpu_ns() - begin_ns;
+    most_bytes_ = std::max(most_bytes_, composition_.bytes());
+  }
+  take_times(graph.version());
+  if (composition_.mesh().revision() == revision_) return;
+  revision_ = composition_.mesh().revision();
+  if (listener_) listener_(composition_.mesh(), part);
+}
+
+/// The mesh is now that of this version of the map.
+void LiveMesh::take_times(std::uint64_t version) {
+  const std::int64_t now_ns = steady_now_ns();
+  for (;;) {
+    if (!next_time_) {
+      MapTime time;
+      if (!times_.try_pop(time)) return;
+      next_time_ = time;
+    }
+    if (next_time_->version > version) return;
+    behind_.record(now_ns - next_time_->published_ns);
+    if (next_time_->jumped) loops_.record(now_ns - next_time_->published_ns);
+    next_time_.reset();
+  }
+}
+
+LiveMeshFigures LiveMesh::figures() const {
+  const auto ms = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-6; };
+  LiveMeshFigures figures;
+  figures.updates = updates_;
+  if (updates_ > 0) {
+    figures.blocks_an_update = static_cast<double>(blocks_) / static_cast<double>(updates_);
+    figures.update_ms = ms(cpu_ns_) / static_cast<double>(updates_);
+  }
+  figures.maps = behind_.count();
+  figures.behind_p50_ms = ms(behind_.quantile_ns(0.5));
+  figures.behind_p99_ms = ms(behind_.quantile_ns(0.99));
+  figures.behind_max_ms = ms(behind_.max_ns());
+  figures.loops = loops_.count();
+  figures.loop_max_ms = ms(loops_.max_ns());
+  figures.memory_mb = static_cast<double>(most_bytes_) / (1 << 20);
+  return figures;
+}
+
+}  // namespace twofold

@@ -1,0 +1,112 @@
+#include "surface/composition.hpp"
+
+#include <algorithm>
+
+#include "geometry/check.hpp"
+
+namespace twofold {
+
+std::size_t Composition::update(std::span<const PlacedVolume> volumes, double rest) {
+  remove_all_but(volumes, rest);
+  for (const PlacedVolume& volume : volumes) take_changes(volume);
+  const std::size_t blocks = compose(volumes);
+  mesh_.update(whole_);
+  return blocks;
+}
+
+/// By the corners of what it holds: no sample moves farther.
+bool Composition::still_stands(const Member& member, const PlacedVolume& now, double rest) const {
+  if (now.volume->cleared() > member.revision) return false;
+  if (rest == 0) return member.T_w_v.matrix() == now.T_w_v.matrix();
+  double most = 0;
+  for (int c = 0; c < 8; ++c) {
+    const Vector3 corner((c & 1 ? member.high : member.low).x(), (c & 2 ? member.high : member.low).y(),
+                         (c & 4 ? member.high : member.low).z());
+    most = std::max(most, (now.T_w_v * corner - member.T_w_v * corner).norm());
+  }
+  return most <= rest * whole_.options().voxel;
+}
+
+void Composition::remove_all_but(std::span<const PlacedVolume> volumes, double rest) {
+  for (auto member = members_.begin(); member != members_.end();) {
+    const auto now = std::find_if(volumes.begin(), volumes.end(),
+                                  [&](const PlacedVolume& volume) { return volume.id == member->first; });
+    if (now != volumes.end() && still_stands(member->second, *now, rest)) {
+      ++member;
+      continue;
+    }
+    remove(member->first, member->second);
+    member = members_.erase(member);
+  }
+}
+
+void Composition::remove(std::uint32_t id, const Member& member) {
+  for (const std::uint32_t block : member.blocks) {
+    std::erase(in_block_[block], id);
+    mark(block);
+  }
+}
+
+void Composition::mark(std::uint32_t block) {
+  if (is_marked_[block] != 0) return;
+  is_marked_[block] = 1;
+  marked_.push_back(block);
+}
+
+/// Marks the blocks into which those reach that changed.
+void Composition::take_changes(const PlacedVolume& placed) {
+  const double edge = kBlockEdge * whole_.options().voxel;
+  const auto [found, is_new] = members_.try_emplace(placed.id);
+  Member& member = found->second;
+  if (is_new) {
+    member.T_w_v = placed.T_w_v;
+    member.low = Vector3::Constant(1e300);
+    member.high = -member.low;
+  }
+  const BlockTable& blocks = placed.volume->blocks();
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (blocks[b].revision <= member.revision) continue;
+    const Vector3 corner = edge * Vector3(blocks[b].at.x, blocks[b].at.y, blocks[b].at.z);
+    member.low = member.low.cwiseMin(corner);
+    member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
+    for (const std::uint32_t reached : whole_.add_overlapped(blocks[b].at, member.T_w_v)) {
+      if (reached >= in_block_.size()) {
+        in_block_.resize(reached + 1);
+        is_marked_.resize(reached + 1, 0);
+      }
+      std::vector<std::uint32_t>& ids = in_block_[reached];
+      const auto at = std::lower_bound(ids.begin(), ids.end(), placed.id);
+      if (at == ids.end() || *at != placed.id) {
+        ids.insert(at, placed.id);
+        member.blocks.push_back(reached);
+      }
+      mark(reached);
+    }
+  }
+  member.revision = placed.volume->revision();
+}
+
+std::size_t Composition::compose(std::span<const PlacedVolume> volumes) {
+  std::map<std::uint32_t, Resampler> resamplers;
+  for (const PlacedVolume& volume : volumes)
+    resamplers.try_emplace(volume.id, *volume.volume, members_.at(volume.id).T_w_v.inverse());
+  std::vector<Resampler*> reaching;
+  for (const std::uint32_t block : marked_) {
+    reaching.clear();
+    for (const std::uint32_t id : in_block_[block]) reaching.push_back(&resamplers.at(id));
+    whole_.compose_block(block, reaching);
+    is_marked_[block] = 0;
+  }
+  const std::size_t count = marked_.size();
+  marked_.clear();
+  return count;
+}
+
+std::size_t Composition::bytes() const {
+  std::size_t sum = whole_.bytes() + mesh_.bytes();
+  for (const auto& ids : in_block_) sum += sizeof(ids) + ids.capacity() * sizeof(ids[0]);
+  for (const auto& [id, member] : members_) sum += sizeof(member) + member.blocks.capacity() * 4;
+  return sum;
+}
+
+}  // namespace twofold

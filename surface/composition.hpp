@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "surface/mesh_pieces.hpp"
+#include "surface/sampling.hpp"
+#include "surface/volume.hpp"
+
+namespace twofold {
+
+/// A volume at its place among others.
+struct PlacedVolume {
+  std::uint32_t id = 0;  ///< never another one's
+  const SurfaceVolume* volume = nullptr;
+  SE3 T_w_v;  ///< of the volume's frame in the world
+};
+
+/// Several volumes in one, in the world's frame, and its mesh, kept up to date block by block: only what a
+/// volume changed, or what a moved volume leaves and comes to, is made anew. What it holds is what
+/// SurfaceVolume::add makes of the volumes in the order of their ids, byte for byte, once `settle` was
+/// called. One thread at a time.
+class Composition {
+ public:
+  explicit Composition(const SurfaceOptions& options) : whole_(options) {}
+
+  /// The volumes there are now, ascending by id. One that moved by no more than half a voxel stays
+  /// where it was, because poses never rest while the map grows.
+  /// @return  blocks made anew
+  std::size_t update(std::span<const PlacedVolume> volumes) { return update(volumes, kRest); }
+  /// As update, but volumes stand exactly where they are said to.
+  std::size_t settle(std::span<const PlacedVolume> volumes) { return update(volumes, 0); }
+
+  [[nodiscard]] const SurfaceVolume& whole() const { return whole_; }
+  [[nodiscard]] const MeshPieces& mesh() const { return mesh_; }
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  static constexpr double kRest = 0.5;  // [voxels]
+  struct Member {
+    SE3 T_w_v;                          ///< where it was added
+    std::uint64_t revision = 0;         ///< of the volume, as far as it was added
+    Vector3 low, high;                  ///< bounds of its blocks, in its frame [m]
+    std::vector<std::uint32_t> blocks;  ///< of the whole, into which it reaches; each once
+  };
+
+  std::size_t update(std::span<const PlacedVolume> volumes, double rest);
+  [[nodiscard]] bool still_stands(const Member& member, const PlacedVolume& now, double rest) const;
+  void remove_all_but(std::span<const PlacedVolume> volumes, double rest);
+  void remove(std::uint32_t id, const Member& member);
+  void take_changes(const PlacedVolume& volume);
+  void mark(std::uint32_t block);
+  std::size_t compose(std::span<const PlacedVolume> volumes);
+
+  SurfaceVolume whole_;
+  MeshPieces mesh_;
+  std::map<std::uint32_t, Member> members_;
+  std::vector<std::vector<std::uint32_t>> in_block_;  ///< of each block of the whole: ids, ascending
+  std::vector<std::uint32_t> marked_;                 ///< blocks to be made anew
+  std::vector<std::uint8_t> is_marked_;
+};
+
+}  // namespace twofold

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "geometry/triangle_mesh.hpp"
+#include "surface/block_mesh.hpp"
+#include "surface/volume.hpp"
+
+namespace twofold {
+
+/// The mesh of a volume in a piece for each block, of which only those are made anew whose samples, or whose
+/// neighbours' samples, changed. Whoever shows it asks for what changed since a revision. One thread at a
+/// time; memory follows the surface. Same volumes, same bytes.
+class MeshPieces {
+ public:
+  /// Takes over what changed in the volume since the last call, which was of the same volume.
+  /// @return  pieces extracted
+  std::size_t update(const SurfaceVolume& volume);
+
+  /// Counts the updates that changed a piece; 0: there is none yet.
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+  /// Blocks whose piece changed after that revision, ascending; also those that have none any more.
+  [[nodiscard]] std::vector<BlockPosition> changed_since(std::uint64_t revision) const;
+  /// The triangles of a block's cells by themselves: vertices on the border to the blocks behind it are in
+  /// their pieces as well. Specks of noise, which joined and least_triangles leave out, are among them.
+  [[nodiscard]] TriangleMesh piece(const BlockPosition& at) const;
+
+  /// All pieces as one mesh, in the order of their positions; they share the vertices on their borders.
+  /// Pieces of the surface of fewer than least_triangles triangles are left out, as extract_mesh leaves them
+  /// out.
+  [[nodiscard]] TriangleMesh joined(int least_triangles) const;
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  struct Piece {
+    BlockMesh mesh;
+    std::uint64_t revision = 0;  ///< of the last change
+  };
+  /// Of the blocks that an edge of a block's cells can lie in, those that have a piece.
+  using Behind = std::array<const BlockMesh*, 8>;
+
+  [[nodiscard]] Behind behind(const BlockPosition& at) const;
+  /// Which of the volume's blocks have a piece that rests on samples that changed.
+  [[nodiscard]] std::vector<std::uint32_t> outdated(const SurfaceVolume& volume) const;
+  bool replace(const BlockPosition& at, const BlockMesh& piece);
+
+  std::map<BlockPosition, Piece> pieces_;
+  std::uint64_t revision_ = 0;
+  std::uint64_t seen_ = 0;  ///< of the volume's revisions
+};
+
+}  // namespace twofold

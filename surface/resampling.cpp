@@ -1,0 +1,185 @@
+#include "surface/sampling.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "surface/lanes.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr double kRounding = 1e-3;  // [samples]: far more than floats of the cube's size differ by
+constexpr float kColourBand = 2.5f * kDistanceSteps;
+constexpr float kToPositive = 32768;  // conversion cuts off toward 0
+
+/// Neighbours along x of eight samples.
+struct LanePair {
+  LaneIndex first, second;
+};
+inline LanePair read_pairs(const std::uint32_t* from, const std::array<std::int32_t, kLanes>& index) {
+  using Two = std::uint64_t __attribute__((vector_size(16)));
+  const auto two = [&](std::size_t i) {
+    return Two{load<std::uint64_t>(from + index[i]), load<std::uint64_t>(from + index[i + 1])};
+  };
+  const auto low = reinterpret_cast<LaneIndex>(__builtin_shufflevector(two(0), two(2), 0, 1, 2, 3));
+  const auto high = reinterpret_cast<LaneIndex>(__builtin_shufflevector(two(4), two(6), 0, 1, 2, 3));
+  return {__builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14),
+          __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15)};
+}
+inline LaneIndex weight_of(const LaneIndex& sample) {
+  return (sample >> 16) & 0xffff;
+}
+inline Lane distance_of(const LaneIndex& sample) {
+  return real((sample << 16) >> 16);
+}
+inline LaneIndex smaller(const LaneIndex& a, const LaneIndex& b) {
+  return a < b ? a : b;
+}
+
+/// Eight samples between those of the cube, and which of the cube's they are nearest to.
+struct Resampled {
+  Lane distance;  ///< [steps]
+  LaneIndex weight, nearest;
+};
+
+/// Of a cube with so many samples along x, and along x and y. Weights are 0 where nothing was ever seen.
+inline Resampled resample(const std::uint32_t* cube, int row, int layer, const std::array<Lane, 3>& at) {
+  const LaneIndex x = whole(at[0]), y = whole(at[1]), z = whole(at[2]);
+  const Lane fx = at[0] - real(x), fy = at[1] - real(y), fz = at[2] - real(z);
+  const LaneIndex base = z * layer + y * row + x;
+  std::array<std::int32_t, kLanes> index;
+  std::memcpy(index.data(), &base, sizeof(base));
+  Resampled result;
+  result.weight = LaneIndex{} + kMostWeightSteps;
+  std::array<Lane, 4> along_x;
+  for (int c = 0; c < 4; ++c) {
+    const LanePair pair = read_pairs(cube + (c >> 1) * layer + (c & 1) * row, index);
+    result.weight = smaller(result.weight, smaller(weight_of(pair.first), weight_of(pair.second)));
+    if (!any(result.weight)) return result;
+    const Lane first = distance_of(pair.first);
+    along_x[static_cast<std::size_t>(c)] = first + fx * (distance_of(pair.second) - first);
+  }
+  const Lane y0 = along_x[0] + fy * (along_x[1] - along_x[0]);
+  const Lane y1 = along_x[2] + fy * (along_x[3] - along_x[2]);
+  result.distance = y0 + fz * (y1 - y0);
+  const auto step = [](const Lane& f, int by) { return (f > 0.5f) & by; };
+  result.nearest = base + step(fx, 1) + step(fy, row) + step(fz, layer);
+  return result;
+}
+
+}  // namespace
+
+Resampler::Resampler(const SurfaceVolume& from, const SE3& T_f_t)
+    : from_(from.blocks()),
+      voxel_(from.options().voxel),
+      T_f_t_(T_f_t),
+      steps_(T_f_t.rotation().cast<float>()) {}
+
+bool Resampler::add_to(VoxelBlock& block) {
+  const Vector3 origin(block.at.x, block.at.y, block.at.z);
+  const Vector3 first = T_f_t_ * Vector3(origin * (kBlockEdge * voxel_)) / voxel_;
+  if (!fill(first)) return false;
+  const Vector3 begin(low_.x() & ~7, low_.y(), low_.z());
+  const Eigen::Vector3f in_cube = (first - begin).cast<float>();
+  bool any = false;
+  for (int r = 0; r < kBlockEdge * kBlockEdge; ++r) {
+    const Eigen::Vector3f at = in_cube + static_cast<float>(r % kBlockEdge) * steps_.col(1) +
+                               static_cast<float>(r / kBlockEdge) * steps_.col(2);
+    any |= add_row(at, static_cast<std::size_t>(r) * kBlockEdge, block);
+  }
+  return any;
+}
+
+bool Resampler::fill(const Vector3& first) {
+  Vector3 low = first, high = first;
+  for (int a = 0; a < 3; ++a) {
+    const Vector3 edge = (kBlockEdge - 1) * steps_.col(a).cast<double>();
+    low += edge.cwiseMin(0);
+    high += edge.cwiseMax(0);
+  }
+  if (!(low.cwiseAbs().maxCoeff() < 1e9 && high.cwiseAbs().maxCoeff() < 1e9)) return false;
+  low_ = (low.array() - kRounding).floor().cast<int>();
+  high_ = (high.array() + kRounding).floor().cast<int>() + 1;
+  bool any = false;
+  for (int n = 0; n < 27; ++n) {
+    const BlockPosition at{(low_.x() >> 3) + n % 3, (low_.y() >> 3) + n / 3 % 3, (low_.z() >> 3) + n / 9};
+    const bool is_met = at.x <= high_.x() >> 3 && at.y <= high_.y() >> 3 && at.z <= high_.z() >> 3;
+    blocks_[static_cast<std::size_t>(n)] = is_met ? from_.find(at) : nullptr;
+    any = any || blocks_[static_cast<std::size_t>(n)] != nullptr;
+  }
+  if (!any) return false;
+  for (int z = low_.z(); z <= high_.z(); ++z) {
+    for (int y = low_.y(); y <= high_.y(); ++y) {
+      const auto n =
+          static_cast<std::size_t>((((z >> 3) - (low_.z() >> 3)) * 3 + (y >> 3) - (low_.y() >> 3)) * 3);
+      fill_row({blocks_[n], blocks_[n + 1], blocks_[n + 2]}, y, z);
+    }
+  }
+  return true;
+}
+
+void Resampler::fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, int z) {
+  std::uint32_t* to = &cube_[static_cast<std::size_t>(((z - low_.z()) * kCube + y - low_.y()) * kRow)];
+  const auto row = static_cast<std::size_t>(((z & 7) * kBlockEdge + (y & 7)) * kBlockEdge);
+  for (std::size_t n = 0; n < 3; ++n, to += kBlockEdge) {
+    LaneIndex samples{};
+    if (blocks[n] != nullptr) {
+      const auto weight =
+          __builtin_convertvector(load<LaneUnsignedShort>(&blocks[n]->weight[row]), LaneIndex);
+      const auto distance = __builtin_convertvector(load<LaneShort>(&blocks[n]->distance[row]), LaneIndex);
+      samples = weight << 16 | (distance & 0xffff);
+    }
+    std::memcpy(to, &samples, sizeof(samples));
+  }
+}
+
+/// Samples `first` to first + 7 of a block, whose first one lies `at` in the cube.
+bool Resampler::add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock& block) const {
+  const auto along = [&](int a) { return at[a] + steps_(a, 0) * kCount; };
+  const Resampled found = resample(cube_.data(), kRow, kRow * kCube, {along(0), along(1), along(2)});
+  const LaneIndex seen = found.weight > 0;
+  if (!any(seen)) return false;
+  const Lane weight = real(found.weight);
+  const Lane before = __builtin_convertvector(load<LaneShort>(&block.distance[first]), Lane);
+  const Lane before_weight = __builtin_convertvector(load<LaneUnsignedShort>(&block.weight[first]), Lane);
+  const Lane sum = before_weight + weight;
+  const Lane share = weight / larger(sum, kOne);
+  const Lane average = before + (found.distance - before) * share;
+  const LaneIndex steps = whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive);
+  const auto distances = __builtin_convertvector(seen ? steps : whole(before), LaneShort);
+  const auto weights =
+      __builtin_convertvector(whole(smaller(sum, kZero + kMostWeightSteps)), LaneUnsignedShort);
+  std::memcpy(&block.distance[first], &distances, sizeof(distances));
+  std::memcpy(&block.weight[first], &weights, sizeof(weights));
+  const LaneIndex near = seen & (found.distance < kColourBand) & (found.distance > -kColourBand);
+  if (!any(near)) return true;
+  for (int i = 0; i < kLanes; ++i)
+    if (near[i] != 0)
+      add_colour(static_cast<std::uint32_t>(found.nearest[i]), share[i], first + static_cast<std::size_t>(i),
+                 block);
+  return true;
+}
+
+void Resampler::add_colour(std::uint32_t cube_index, float share, std::size_t sample,
+                           VoxelBlock& block) const {
+  const int x = static_cast<int>(cube_index % kRow);
+  const int y = low_.y() + static_cast<int>(cube_index / kRow % kCube);
+  const int z = low_.z() + static_cast<int>(cube_index / (kRow * kCube));
+  const auto block_along = [&](int coordinate, int a) { return (coordinate >> 3) - (low_[a] >> 3); };
+  const VoxelBlock* from =
+      blocks_[static_cast<std::size_t>((block_along(z, 2) * 3 + block_along(y, 1)) * 3 + (x >> 3))];
+  const auto colour =
+      colour_of(*from, static_cast<std::size_t>(((z & 7) * kBlockEdge + (y & 7)) * kBlockEdge + (x & 7)));
+  const std::array<std::uint16_t, 3> none{};
+  if (colour == none) return;
+  const bool first = colour_of(block, sample) == none;
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::uint16_t& own = block.colour[c][sample];
+    const float before = own;
+    own = first ? colour[c]
+                : static_cast<std::uint16_t>(before + (static_cast<float>(colour[c]) - before) * share);
+  }
+}
+
+}  // namespace twofold

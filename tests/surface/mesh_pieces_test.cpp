@@ -1,0 +1,228 @@
+#include "surface/mesh_pieces.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <random>
+#include <vector>
+
+#include "surface/composition.hpp"
+#include "surface/meshing.hpp"
+#include "tests/surface/ball_views.hpp"
+
+namespace twofold {
+namespace {
+
+using testing::Ball;
+
+/// A ball before a wall, from views that a random walk takes.
+class RandomViews {
+ public:
+  explicit RandomViews(unsigned seed) : random_(seed) {}
+
+  void fuse_next(SurfaceVolume& volume) {
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    const auto vector = [&](double by) {
+      return Vector3(by * uniform(random_), by * uniform(random_), by * uniform(random_));
+    };
+    const SE3 T_c_w = SE3(SO3::exp(vector(0.2)), vector(0.1)) * SE3(SO3(), {0, 0, 0.8});
+    const Ball ball{vector(0.1), 0.1};
+    volume.fuse(make_depth_view(rig_, testing::depth_of(rig_, T_c_w, ball, 1.1), {}), T_c_w);
+  }
+  void fuse_ball(SurfaceVolume& volume, const Ball& ball) const {
+    const SE3 T_c_w(SO3(), {0, 0, 0.8});
+    volume.fuse(make_depth_view(rig_, testing::depth_of(rig_, T_c_w, ball), {}), T_c_w);
+  }
+
+ private:
+  Rig rig_ = testing::depth_rig(160, 120);
+  std::mt19937 random_;
+};
+
+SurfaceOptions options() {
+  SurfaceOptions coarse = testing::fine_options(0.02);
+  coarse.least_triangles = 8;
+  return coarse;
+}
+
+TEST(MeshPieces, AfterAnyFusionAreTheMeshOfTheWhole) {
+  SurfaceVolume volume(options());
+  MeshPieces pieces;
+  RandomViews views(1);
+  for (int n = 0; n < 12; ++n) {
+    if (n == 7) volume.clear();
+    views.fuse_next(volume);
+    pieces.update(volume);
+    const TriangleMesh whole = extract_mesh(volume);
+    ASSERT_GT(whole.triangles.size(), 500u);
+    ASSERT_TRUE(pieces.joined(volume.options().least_triangles) == whole) << n;
+  }
+}
+
+TEST(MeshPieces, OfBlocksThatDidNotChangeStay) {
+  SurfaceVolume volume(testing::fine_options(0.01));
+  const RandomViews views(1);
+  views.fuse_ball(volume, {{-0.2, 0, 0}, 0.15});
+  MeshPieces pieces;
+  const std::size_t first = pieces.update(volume);
+  const std::uint64_t revision = pieces.revision();
+  const std::size_t blocks = pieces.changed_since(0).size();
+  EXPECT_EQ(pieces.update(volume), 0u);
+  EXPECT_EQ(pieces.revision(), revision);
+  views.fuse_ball(volume, {{0.2, 0, 0}, 0.04});
+  EXPECT_LT(pieces.update(volume), first);
+  const std::vector<BlockPosition> changed = pieces.changed_since(revision);
+  EXPECT_FALSE(changed.empty());
+  for (const BlockPosition& at : changed) EXPECT_GE(at.x, 0);
+  EXPECT_EQ(pieces.changed_since(0).size(), blocks + changed.size());
+  EXPECT_TRUE(pieces.changed_since(pieces.revision()).empty());
+}
+
+TEST(MeshPieces, ThatGoAreToldAsEmpty) {
+  SurfaceVolume volume(options());
+  const RandomViews views(1);
+  views.fuse_ball(volume, {{0, 0, 0}, 0.1});
+  MeshPieces pieces;
+  pieces.update(volume);
+  const std::vector<BlockPosition> before = pieces.changed_since(0);
+  const std::uint64_t revision = pieces.revision();
+  volume.clear();
+  pieces.update(volume);
+  EXPECT_EQ(pieces.changed_since(revision), before);
+  for (const BlockPosition& at : before) EXPECT_TRUE(pieces.piece(at).triangles.empty());
+  EXPECT_TRUE(pieces.joined(0).positions.empty());
+}
+
+using Corners = std::array<std::array<float, 3>, 3>;
+void add_corners(const TriangleMesh& mesh, std::vector<Corners>& all) {
+  for (const auto& t : mesh.triangles) {
+    Corners corners;
+    for (std::size_t i = 0; i < 3; ++i) {
+      ASSERT_LT(t[i], mesh.positions.size());
+      corners[i] = {mesh.positions[t[i]].x(), mesh.positions[t[i]].y(), mesh.positions[t[i]].z()};
+    }
+    all.push_back(corners);
+  }
+}
+
+TEST(MeshPieces, OneByOneHaveAllTriangles) {
+  SurfaceVolume volume(options());
+  RandomViews views(2);
+  for (int n = 0; n < 3; ++n) views.fuse_next(volume);
+  MeshPieces pieces;
+  pieces.update(volume);
+  std::vector<Corners> of_pieces, of_whole;
+  for (const BlockPosition& at : pieces.changed_since(0)) add_corners(pieces.piece(at), of_pieces);
+  add_corners(pieces.joined(0), of_whole);
+  std::sort(of_pieces.begin(), of_pieces.end());
+  std::sort(of_whole.begin(), of_whole.end());
+  EXPECT_GT(of_whole.size(), 500u);
+  EXPECT_TRUE(of_pieces == of_whole);
+}
+
+class CompositionTest : public ::testing::Test {
+ protected:
+  CompositionTest() {
+    for (int n = 0; n < 3; ++n) {
+      volumes_.emplace_back(options());
+      views_.fuse_next(volumes_.back());
+    }
+    for (std::uint32_t n = 0; n < 3; ++n)
+      placed_.push_back({n, &volumes_[n], SE3(SO3::exp(Vector3(0.1 * n, 0.2, -0.1)), {0.03 * n, 0, 0.01})});
+  }
+  [[nodiscard]] TriangleMesh mesh_of_all() const {
+    SurfaceVolume whole(options());
+    for (const PlacedVolume& placed : placed_) whole.add(*placed.volume, placed.T_w_v);
+    return extract_mesh(whole);
+  }
+  void expect_same(const char* after) {
+    composition_.settle(placed_);
+    const TriangleMesh mesh = mesh_of_all();
+    EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh) << after;
+    EXPECT_TRUE(extract_mesh(composition_.whole()) == mesh) << after;
+  }
+  void move(std::size_t n, double by) { placed_[n].T_w_v = SE3(SO3(), {0, by, 0}) * placed_[n].T_w_v; }
+
+  RandomViews views_{3};
+  std::deque<SurfaceVolume> volumes_;
+  std::vector<PlacedVolume> placed_;
+  Composition composition_{options()};
+};
+
+TEST_F(CompositionTest, IsTheSumOfItsVolumesWhateverHappens) {
+  expect_same("adding");
+  views_.fuse_next(volumes_[1]);
+  expect_same("fusing");
+  move(0, 0.3);
+  views_.fuse_next(volumes_[2]);
+  expect_same("moving");
+  volumes_[1].clear();
+  views_.fuse_next(volumes_[1]);
+  expect_same("fusing anew");
+  placed_.erase(placed_.begin());
+  expect_same("removing");
+  volumes_.emplace_back(options());
+  views_.fuse_next(volumes_.back());
+  placed_.push_back({7, &volumes_.back(), SE3()});
+  move(0, 1e-6);
+  expect_same("a hair's breadth and another volume");
+}
+
+TEST_F(CompositionTest, FollowsOnlyWhatMovesByHalfAVoxel) {
+  EXPECT_GT(composition_.update(placed_), 0u);
+  const std::uint64_t revision = composition_.mesh().revision();
+  move(1, 0.4 * options().voxel);
+  EXPECT_EQ(composition_.update(placed_), 0u);
+  EXPECT_EQ(composition_.mesh().revision(), revision);
+  move(1, 0.4 * options().voxel);
+  EXPECT_GT(composition_.update(placed_), 0u);
+  EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
+}
+
+TEST(Resampler, ReadsBetweenTheSamples) {
+  SurfaceVolume volume(testing::fine_options(0.02));
+  RandomViews views(4);
+  for (int n = 0; n < 2; ++n) views.fuse_next(volume);
+  const SE3 T_w_v(SO3::exp(Vector3(0.3, -0.5, 0.7)), {0.11, -0.23, 0.05});
+  SurfaceVolume turned(testing::fine_options(0.02));
+  turned.add(volume, T_w_v);
+  std::size_t seen = 0;
+  for (const VoxelBlock* block : turned.blocks().sorted()) {
+    for (int i = 0; i < kBlockSamples; ++i) {
+      const Vector3 grid(8 * block->at.x + i % 8, 8 * block->at.y + i / 8 % 8, 8 * block->at.z + i / 64);
+      const auto expected = volume.distance(T_w_v.inverse() * Vector3(0.02 * grid));
+      const auto s = static_cast<std::size_t>(i);
+      if (block->weight[s] == 0) continue;
+      ++seen;
+      ASSERT_TRUE(expected.has_value());
+      EXPECT_NEAR(turned.units().distance * block->distance[s], expected->distance,
+                  1.1 * turned.units().distance);
+      EXPECT_NEAR(turned.units().weight * block->weight[s], expected->weight, turned.units().weight);
+    }
+  }
+  EXPECT_GT(seen, 20000u);
+}
+
+TEST(Resampler, LeavesNothingOut) {
+  SurfaceVolume volume(testing::fine_options(0.02));
+  RandomViews views(4);
+  views.fuse_next(volume);
+  SurfaceVolume copy(testing::fine_options(0.02));
+  copy.add(volume, SE3());
+  std::size_t seen = 0;
+  for (const VoxelBlock* block : copy.blocks().sorted()) {
+    const VoxelBlock* from = volume.blocks().find(block->at);
+    for (std::size_t s = 0; s < kBlockSamples; ++s) seen += block->weight[s] > 0;
+    if (from == nullptr) continue;
+    for (std::size_t s = 0; s < kBlockSamples; ++s) {
+      if (block->weight[s] == 0) continue;
+      EXPECT_NEAR(block->distance[s], from->distance[s], 1);
+    }
+  }
+  EXPECT_GT(seen, 10000u);
+}
+
+}  // namespace
+}  // namespace twofold
