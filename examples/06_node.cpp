@@ -3,6 +3,7 @@
 // frames of REP 103 and REP 105; what goes wrong is said while it runs.
 //   06_node [SOURCE]
 // The middleware is played by a source here; class Node is what you take.
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -11,6 +12,7 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -68,7 +70,7 @@ class Node {
   Node(const twofold::CameraRig& rig, const twofold::Pose& T_rectified_raw)
       : T_rectified_raw_(T_rectified_raw), slam_(rig, {.live = true}) {
     slam_.on_pose([this](const twofold::PoseEstimate& pose) { queue_.put(pose); });
-    slam_.on_event([this](const twofold::MapEvent& event) { queue_.put(event); });
+    slam_.on_event([this](const twofold::MapEvent& event) { events_.put(event); });
     publisher_ = std::jthread([this] { publish_all(); });
   }
   ~Node() {
@@ -109,10 +111,22 @@ class Node {
       if (const std::uint64_t missed = queue_.take_missed(); missed > 0)
         std::printf("publishing is too slow: %llu are missing\n", static_cast<unsigned long long>(missed));
       if (const auto* pose = std::get_if<twofold::PoseEstimate>(&item)) {
+        correct_until(pose->frame);
         publish(*pose, stamp_of(pose->t_ns));
-      } else {
-        correct(std::get<twofold::MapEvent>(item));
       }
+    }
+  }
+
+  /// Events are told before the pose of their frame. They have a queue of their own: poses may be left out
+  /// when publishing is too slow, but without one of these map -> odom would be wrong for good.
+  void correct_until(std::int64_t frame) {
+    for (;;) {
+      twofold::PoseOrEvent item;
+      if (!event_ && events_.next(item, 0) == twofold::QueueStatus::kItem)
+        event_ = std::get<twofold::MapEvent>(item);
+      if (!event_ || event_->frame > frame) return;
+      correct(*event_);
+      event_.reset();
     }
   }
 
@@ -120,8 +134,9 @@ class Node {
   /// A node's diagnostics. Each new one once.
   void say_errors() {
     std::vector<std::string> errors = slam_.errors();
-    if (errors == errors_) return;
-    for (const std::string& error : errors) std::printf("error: %s\n", error.c_str());
+    for (const std::string& error : errors)
+      if (std::find(errors_.begin(), errors_.end(), error) == errors_.end())
+        std::printf("error: %s\n", error.c_str());
     errors_ = std::move(errors);
   }
 
@@ -180,7 +195,9 @@ class Node {
   twofold::Pose T_map_odom_;
   std::uint32_t map_part_ = twofold::kNoId;
   std::vector<std::string> errors_;
-  twofold::PoseQueue queue_;
+  twofold::PoseQueue queue_;                // of poses
+  twofold::PoseQueue events_;               // far fewer: 512 of them are never behind
+  std::optional<twofold::MapEvent> event_;  // the publisher's: the next one
   twofold::Slam slam_;
   std::jthread publisher_;  // last: it ends before what it uses
 };

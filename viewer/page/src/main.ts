@@ -177,6 +177,8 @@ class Page {
     this.sight.draw();
     if (this.playing) this.play();
     if (this.silence() > 0) this.stale = true;
+    // Pieces become chunks between two pictures, also when no message comes any more.
+    if ($('layer-surface').parentElement!.hidden === this.stage.surface.size > 0) this.stale = true;
     if (!this.stale) return;
     this.stale = false;
     this.choosePart();

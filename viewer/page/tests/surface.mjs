@@ -27,7 +27,7 @@ const greyPixels = (page) => page.evaluate(() => {
 /** With nothing else in the picture, the mesh is there when its layer is on, and gone when it is off. */
 async function expectMesh(page, what) {
   await until(`triangles of ${what}`, () => page.evaluate(() => window.twofold.stage.surface.size > 1000), 90000);
-  assert.ok(await page.locator('#layer-surface').isVisible(), 'the layer can be switched');
+  await page.locator('#layer-surface').waitFor({state: 'visible', timeout: 20000});  // the layer can be switched
   await page.evaluate(() => {
     for (const layer of Object.keys(window.twofold.stage.layers)) if (layer !== 'surface') window.twofold.setLayer(layer, false);
   });

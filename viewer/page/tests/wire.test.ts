@@ -185,7 +185,7 @@ test('what is behind the last record, and kinds that there are not, are refused'
   assert.throws(() => decode(bytes(delta(1, 0, 0))), /unknown block 0/);
   assert.throws(() => decode(bytes(delta(1, 9, 0))), /unknown block 9/);
   assert.throws(() => decode(bytes(u32(0, 0, 0, 0))), /unknown message 0/);
-  assert.throws(() => decode(bytes(u32(6, 0, 0, 0))), /unknown message 6/);
+  assert.throws(() => decode(bytes(u32(7, 0, 0, 0))), /unknown message 7/);
 });
 
 test('changes are of the revision that the page has', () => {
