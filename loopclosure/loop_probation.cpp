@@ -14,21 +14,35 @@ std::optional<Sim3> pose_in_map(const GraphSnapshot& graph, KeyframeId to, Keyfr
   return Sim3(graph.T_k_w(to) * graph.T_k_w(from).inverse());
 }
 
-/// Length of the way between two keyframes of one part, from one keyframe to the next, each step in units of
-/// the depth of the scene there. Cost grows with the keyframes between.
-double distance_in_depths(const GraphSnapshot& graph, KeyframeId from, KeyframeId to) {
+/// From one keyframe to the next.
+struct Way {
+  double distance = 0;  ///< each step in units of the depth of the scene there
+  double turned = 0;    ///< [rad], without what a head or a car nods: of steps that lead somewhere
+};
+
+/// Between two keyframes of one part. Cost grows with the keyframes between.
+Way way_between(const GraphSnapshot& graph, KeyframeId from, KeyframeId to) {
+  constexpr double kStep = 1, kTurn = 0.3;  // [depths], [rad]
   const auto [first, last] = std::minmax({index(from), index(to)});
   const KeyframeId part = graph.part(to);
-  double distance = 0;
+  Way way;
   const Keyframe* before = nullptr;
+  const Keyframe* corner = nullptr;  // since which turning is counted
+  double distance_at_corner = 0;
   for (std::uint32_t k = first; k <= last; ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
     if (keyframe.culled() || keyframe.part != part) continue;
     if (before != nullptr && keyframe.median_depth > 0)
-      distance += (keyframe.T_k_w * before->T_k_w.inverse()).translation().norm() / keyframe.median_depth;
+      way.distance += (keyframe.T_k_w * before->T_k_w.inverse()).translation().norm() / keyframe.median_depth;
     before = &keyframe;
+    const double turn =
+        corner == nullptr ? 0 : (keyframe.T_k_w.so3() * corner->T_k_w.so3().inverse()).log().norm();
+    if (corner != nullptr && turn < kTurn && way.distance - distance_at_corner < kStep) continue;
+    way.turned += turn;
+    corner = &keyframe;
+    distance_at_corner = way.distance;
   }
-  return distance;
+  return way;
 }
 
 }  // namespace
@@ -38,7 +52,7 @@ bool LoopProbation::confirms(const LoopConstraint& loop, const GraphSnapshot& gr
     return index(held.to) + static_cast<std::uint32_t>(options_.patience) < index(loop.to);
   });
   const auto as_mapped = pose_in_map(graph, loop.to, loop.from);
-  if (scale_drifts_ && as_mapped && !explained_by_drift(*as_mapped, loop, graph)) return false;
+  if (as_mapped && !explained_by_drift(*as_mapped, loop, graph)) return false;
   const double depth = loop.scale * graph.keyframe(loop.from).median_depth;
   const bool confirmed =
       (as_mapped && same_pose(*as_mapped, loop.S_to_from(), depth)) ||
@@ -65,12 +79,16 @@ bool LoopProbation::same_pose(const Sim3& S_a, const Sim3& S_b, double depth) co
 
 bool LoopProbation::explained_by_drift(const Sim3& as_mapped, const LoopConstraint& loop,
                                        const GraphSnapshot& graph) const {
-  const double distance = distance_in_depths(graph, loop.from, loop.to);
-  const Keyframe& to = graph.keyframe(loop.to);
+  const Way way = way_between(graph, loop.from, loop.to);
+  const double depth = graph.keyframe(loop.to).median_depth;
   const Vector3 shift = as_mapped.without_scale().inverse().translation() -
                         loop.S_to_from().without_scale().inverse().translation();
-  return shift.norm() <= (options_.max_shift + options_.max_drift * distance) * to.median_depth &&
-         std::abs(std::log(loop.scale)) <= options_.max_scale + options_.max_scale_drift * distance;
+  const double turn = (as_mapped.so3() * loop.S_to_from().so3().inverse()).log().norm();
+  const double scale = std::abs(std::log(loop.scale));
+  const double drift = options_.max_drift + 0.5 * (scale + turn);
+  return shift.norm() <= (options_.slack + drift * way.distance) * depth &&
+         turn <= options_.slack_deg * std::numbers::pi / 180 + options_.max_turn_drift * way.turned &&
+         (!scale_drifts_ || scale <= options_.max_scale + options_.max_scale_drift * way.distance);
 }
 
 }  // namespace twofold

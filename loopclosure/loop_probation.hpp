@@ -15,9 +15,13 @@ struct ProbationOptions {
   double max_angle_deg = 6;  ///< ... and so much rotation
   double max_scale = 0.05;   ///< ... and so much of the logarithm of the scale
   int patience = 12;         ///< keyframe numbers after which a loop that nobody confirmed is dropped
-  // Of one camera. Distances are counted in median depths: by that much the camera drifts alike in any scene.
-  double max_drift = 0.5;         ///< shift that a loop may correct, per distance travelled since
-  double max_scale_drift = 0.02;  ///< logarithm of the scale, likewise
+  // What a loop may correct, by the way since its first keyframe. Distances are counted in median depths: by
+  // that much a camera drifts alike in any scene.
+  double slack = 0.3;      ///< shift that needs no way: keyframes may be placed badly
+  double slack_deg = 15;   ///< likewise rotation
+  double max_drift = 0.1;  ///< shift per distance travelled, besides what follows from scale and rotation
+  double max_turn_drift = 0.3;    ///< rotation per rotation since
+  double max_scale_drift = 0.02;  ///< of one camera: logarithm of the scale per distance travelled
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -30,8 +34,10 @@ struct ProbationOptions {
 /// Loops l and m agree when  S_m.to,m.from  =  S_m.to,l.to  S_l.to,l.from  S_l.from,m.from  up to the bounds,
 /// the outer two of the map, of scale 1.
 ///
-/// With one camera a loop may be of any scale. What it corrects is bounded by the distance travelled: a loop
-/// that says more is taken for a place that looks alike.
+/// What a loop corrects is bounded by the way between its keyframes: a loop that says more is taken for a
+/// place that looks alike, as houses of a street do. A scale s and a rotation by w that drifted evenly along
+/// a way d shift its end by (|log s| + |w|) d / 2. With one camera a loop may be of any scale within its
+/// bound.
 class LoopProbation {
  public:
   LoopProbation(SensorKind sensor, const ProbationOptions& options)

@@ -52,7 +52,10 @@ std::string ProbationOptions::invalid_reason() const {
       .above("max_shift", max_shift, 0)
       .above("max_angle_deg", max_angle_deg, 0)
       .above("max_scale", max_scale, 0)
+      .above("slack", slack, 0)
+      .above("slack_deg", slack_deg, 0)
       .above("max_drift", max_drift, 0)
+      .above("max_turn_drift", max_turn_drift, 0)
       .above("max_scale_drift", max_scale_drift, 0)
       .at_least("patience", patience, 1)
       .reason();

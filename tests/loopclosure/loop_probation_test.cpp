@@ -87,6 +87,34 @@ TEST_F(LoopProbationTest, PartsAreJoinedByTwo) {
   EXPECT_TRUE(probation_.confirms(loop(2, 23), graph_));
 }
 
+/// A street of houses that are all alike: two loops agree, and say that 60 m of driving led nowhere.
+TEST_F(LoopProbationTest, APlaceThatLooksAlikeFarAlongTheWayIsNotBelieved) {
+  for (const SensorKind sensor : {SensorKind::kStereo, SensorKind::kMono}) {
+    GraphWriter writer;
+    const auto along = [](std::uint32_t k) { return SE3(SO3(), Vector3(0, 0, -1.0 * k)); };
+    for (std::uint32_t k = 0; k < 80; ++k) {
+      Keyframe keyframe;
+      keyframe.id = KeyframeId{k};
+      keyframe.part = KeyframeId{0};
+      keyframe.T_k_w = along(k);
+      keyframe.median_depth = 5;
+      writer.add_keyframe(keyframe);
+      writer.set_reference(keyframe.id);
+    }
+    const GraphSnapshot graph = writer.publish();
+    const auto alike = [&](std::uint32_t from, std::uint32_t to) {  // houses repeat after 60
+      return LoopConstraint{1, KeyframeId{from}, KeyframeId{to}, along(to - 60) * along(from).inverse(), 100};
+    };
+    LoopProbation probation(sensor, {});
+    for (std::uint32_t k = 0; k < 8; ++k) EXPECT_FALSE(probation.confirms(alike(k, k + 60), graph)) << k;
+    ProbationOptions without_bound;
+    without_bound.max_drift = 10;
+    LoopProbation credulous(sensor, without_bound);
+    EXPECT_FALSE(credulous.confirms(alike(0, 60), graph));
+    EXPECT_TRUE(credulous.confirms(alike(1, 61), graph)) << "nothing but the way speaks against it";
+  }
+}
+
 /// One camera's unit may have drifted, but not by more than the way explains.
 TEST_F(LoopProbationTest, OneCameraMayHaveDriftedByAsMuchAsItWent) {
   const auto scaled = [](std::uint32_t from, std::uint32_t to, double scale) {
