@@ -85,9 +85,10 @@ bool LoopProbation::explained_by_drift(const Sim3& as_mapped, const LoopConstrai
                         loop.S_to_from().without_scale().inverse().translation();
   const double turn = (as_mapped.so3() * loop.S_to_from().so3().inverse()).log().norm();
   const double scale = std::abs(std::log(loop.scale));
+  const double turn_drift = scale_drifts_ ? options_.max_turn_drift_of_one_camera : options_.max_turn_drift;
   const double drift = options_.max_drift + 0.5 * (scale + turn);
   return shift.norm() <= (options_.slack + drift * way.distance) * depth &&
-         turn <= options_.slack_deg * std::numbers::pi / 180 + options_.max_turn_drift * way.turned &&
+         turn <= options_.slack_deg * std::numbers::pi / 180 + turn_drift * way.turned &&
          (!scale_drifts_ || scale <= options_.max_scale + options_.max_scale_drift * way.distance);
 }
 

@@ -20,7 +20,8 @@ struct ProbationOptions {
   double slack = 0.3;      ///< shift that needs no way: keyframes may be placed badly
   double slack_deg = 15;   ///< likewise rotation
   double max_drift = 0.1;  ///< shift per distance travelled, besides what follows from scale and rotation
-  double max_turn_drift = 0.3;    ///< rotation per rotation since
+  double max_turn_drift = 0.03;               ///< rotation per rotation since
+  double max_turn_drift_of_one_camera = 0.3;  ///< whose focal length may be wrong by a fifth
   double max_scale_drift = 0.02;  ///< of one camera: logarithm of the scale per distance travelled
 
   /// Empty when valid; otherwise names the field, the rule and the value.

@@ -56,6 +56,7 @@ std::string ProbationOptions::invalid_reason() const {
       .above("slack_deg", slack_deg, 0)
       .above("max_drift", max_drift, 0)
       .above("max_turn_drift", max_turn_drift, 0)
+      .above("max_turn_drift_of_one_camera", max_turn_drift_of_one_camera, 0)
       .above("max_scale_drift", max_scale_drift, 0)
       .at_least("patience", patience, 1)
       .reason();
