@@ -1,10 +1,6 @@
 #include "engine/engine.hpp"
 
-#include <stdexcept>
-
 #include "engine/health.hpp"
-#include "engine/lockstep_run.hpp"
-#include "engine/threaded_run.hpp"
 
 namespace twofold {
 namespace {
@@ -24,37 +20,39 @@ class CostMeter {
   std::int64_t start_ns_ = steady_now_ns();
 };
 
+/// False when the pipeline takes no more.
+bool wait_for_room(Pipeline& pipeline, const FrameSink& sink) {
+  constexpr auto kFailureCheck = std::chrono::milliseconds(50);  // a thread that failed wakes nobody
+  for (;;) {
+    pipeline.collect(sink);
+    if (pipeline.ended()) return false;
+    if (pipeline.has_room()) return true;
+    pipeline.wait(std::chrono::steady_clock::now() + kFailureCheck);
+  }
+}
+
 }  // namespace
 
-void Progress::count(const FrameRecord& record) {
-  ++frames;
-  lost += record.state == FrameState::kLost;
-  dropped += record.state == FrameState::kDropped;
-  keyframes += record.keyframe;
-  tracked_share = record.tracked_share;
-}
-
-LatencyHistogram exposure_to_pose(const RunResult& result) {
-  LatencyHistogram latency;
-  for (const FrameRecord& record : result.frames) {
-    if (record.state != FrameState::kDropped) latency.record(record.latency_ns);
+RunResult feed_all(Pipeline& pipeline, const FrameFeed& feed, const std::atomic<bool>& interrupted,
+                   const ProgressSink& progress) {
+  const FrameSink show = [&](const FrameRecord&, const PoseCorrection&) {
+    if (progress) progress(pipeline.progress());
+  };
+  FeedStatus status = FeedStatus::kFrame;
+  Frame frame;
+  // Relaxed: the flag carries no other data; seeing it a frame later is as good.
+  while (!interrupted.load(std::memory_order_relaxed) && wait_for_room(pipeline, show) &&
+         (status = feed(frame)) == FeedStatus::kFrame) {
+    pipeline.push(std::move(frame));
   }
-  return latency;
-}
-
-void expect_valid(const Rig& rig, const EngineOptions& options) {
-  if (const std::string reason = options.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
-  if (options.map) {
-    const std::string difference = options.localise_only ? localisation_difference(rig, options.map->rig)
-                                                         : rig_difference(rig, options.map->rig);
-    if (!difference.empty()) throw std::runtime_error("the map was made with another camera: " + difference);
-    if (rig.kind != options.map->rig.kind && !options.localise_only)
-      throw std::runtime_error("one camera can only be localised in the map of a stereo or RGB-D rig");
-    if (!options.vocabulary)
-      throw std::runtime_error("a camera finds itself in a map by recognition: a vocabulary is needed");
-  }
-  if (options.localise_only && !options.map)
-    throw std::runtime_error("localisation only needs a map to localise in");
+  const bool input_is_short = status == FeedStatus::kEnd && pipeline.frames_due() > 0;
+  pipeline.stop();
+  pipeline.collect(show);
+  RunResult result = pipeline.finish();
+  result.interrupted = interrupted.load(std::memory_order_relaxed);
+  if (status == FeedStatus::kError) result.error = "the input ended with an error";
+  if (input_is_short && !result.interrupted) result.error = "the schedule has more frames than the input";
+  return result;
 }
 
 Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std::move(options)) {
@@ -64,26 +62,17 @@ Engine::Engine(const Rig& rig, EngineOptions options) : rig_(rig), options_(std:
 RunResult Engine::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
                       const ProgressSink& progress) {
   const CostMeter cost;
-  RunResult result;
-  if (options_.deterministic) {
-    LockstepRun run(rig_, options_);
-    run.run(feed, interrupted, progress);
-    result = run.finish();
-  } else {
-    ThreadedRun run(rig_, options_);
-    run.run(feed, interrupted, progress);
-    result = run.finish();
-  }
+  const std::unique_ptr<Pipeline> pipeline = make_pipeline(rig_, options_);
+  RunResult result = feed_all(*pipeline, feed, interrupted, progress);
   cost.finish(result);
   return result;
 }
 
-RunResult Engine::replay(const FrameFeed& feed, const Schedule& schedule,
-                         const std::atomic<bool>& interrupted, const ProgressSink& progress) {
+RunResult Engine::replay(const FrameFeed& feed, Schedule schedule, const std::atomic<bool>& interrupted,
+                         const ProgressSink& progress) {
   const CostMeter cost;
-  LockstepRun run(rig_, options_);
-  run.replay(feed, schedule, interrupted, progress);
-  RunResult result = run.finish();
+  const std::unique_ptr<Pipeline> pipeline = make_replay(rig_, options_, std::move(schedule));
+  RunResult result = feed_all(*pipeline, feed, interrupted, progress);
   cost.finish(result);
   return result;
 }

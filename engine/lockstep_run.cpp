@@ -17,7 +17,7 @@ std::size_t pool_size(const EngineOptions& options) {
 
 }  // namespace
 
-LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
+LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options, std::optional<Schedule> schedule)
     : localise_only_(options.localise_only),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       pool_(pool_size(options)),
@@ -26,23 +26,24 @@ LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options)
       loop_closing_(rig, options, trace_.get()),
       logs_(options.logs, mapping_.replacement_log()),
       mapper_inbox_(std::bit_ceil(pool_size(options)), std::bit_ceil(pool_size(options))),
+      schedule_(std::move(schedule)),
       checkpoints_(rig, options.checkpoint),
-      snapshot_(mapping_.publish()) {}
-
-void LockstepRun::run(const FrameFeed& feed, const std::atomic<bool>& interrupted,
-                      const ProgressSink& progress) {
-  Frame frame;
-  FeedStatus status = FeedStatus::kEnd;
-  // Relaxed: the flag carries no other data; seeing it a frame later is as good.
-  while (!interrupted.load(std::memory_order_relaxed) && (status = feed(frame)) == FeedStatus::kFrame) {
-    (void)step(frame);
-    if (progress) progress(progress_);
-  }
-  result_.interrupted = interrupted.load(std::memory_order_relaxed);
-  if (status == FeedStatus::kError) fail("the input ended with an error");
+      snapshot_(mapping_.publish()) {
+  if (schedule_) history_.push_back(snapshot_);
 }
 
-const FrameRecord& LockstepRun::step(const Frame& frame) {
+void LockstepRun::push(Frame frame) {
+  if (schedule_)
+    replay(frame);
+  else
+    run_deterministically(frame);
+}
+
+void LockstepRun::collect(const FrameSink& sink) {
+  if (!std::exchange(collected_, true) && sink) sink(record_, correction_);
+}
+
+void LockstepRun::run_deterministically(const Frame& frame) {
   track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = localise_only_});
   if (request_) answer_request(snapshot_);
   if (const std::size_t proposals = mapper_inbox_.proposals_approx(); proposals > 0) {
@@ -53,63 +54,60 @@ const FrameRecord& LockstepRun::step(const Frame& frame) {
   }
   checkpoint_if_due(frame.t_ns);
   count();
-  return record_;
 }
 
-void LockstepRun::replay(const FrameFeed& feed, const Schedule& schedule,
-                         const std::atomic<bool>& interrupted, const ProgressSink& progress) {
-  Frame frame;
-  auto round = schedule.mapper.begin();
-  history_.push_back(snapshot_);
-  for (const TrackerStep& step : schedule.tracker) {
-    if (interrupted.load(std::memory_order_relaxed)) {  // relaxed: it carries no other data
-      result_.interrupted = true;
+void LockstepRun::replay(const Frame& frame) {
+  if (ended()) return;
+  const TrackerStep& step = schedule_->tracker[next_frame_];
+  if (frame.index > step.frame) {
+    fail("the schedule belongs to another recording: frame numbers differ");
+    return;
+  }
+  if (step.effort_level >= kEffortLevels) {
+    fail("the schedule has an effort level that this program does not know");
+    return;
+  }
+  if (frame.index < step.frame) {
+    drop(frame, step);
+  } else if (step.fate == TrackerStep::Fate::kDropped) {
+    drop(frame, step);
+    logs_.schedule().tracker.append(step);
+    ++next_frame_;
+  } else {
+    if (!replay_rounds_until(step.version)) {
+      end_replay("the mapper would need messages that were not sent");
       return;
-    }
-    if (feed(frame) != FeedStatus::kFrame) {
-      fail("the schedule has more frames than the input");
-      return;
-    }
-    if (frame.index != step.frame) {
-      fail("the schedule belongs to another recording: frame numbers differ");
-      return;
-    }
-    if (step.effort_level >= kEffortLevels) {
-      fail("the schedule has an effort level that this program does not know");
-      return;
-    }
-    if (step.fate == TrackerStep::Fate::kDropped) {
-      drop(frame, step);
-      count();
-      if (progress) progress(progress_);
-      continue;
-    }
-    for (; snapshot_.version() < step.version; ++round) {
-      if (round == schedule.mapper.end() || !can_map(*round)) {
-        if (!schedule.ended) return;  // the rest of what the killed run did is not known
-        fail("the schedule does not fit the input: the mapper would need messages that were not sent");
-        return;
-      }
-      map(round->proposals, round->loop_messages);
-      history_.push_back(snapshot_);
-      replay_loop_steps(schedule);
     }
     if (step.messages > 0 && !answer_) {
-      if (!schedule.ended) return;
-      fail("the schedule does not fit the input: the tracker would need an answer it did not ask for");
+      end_replay("the tracker would need an answer it did not ask for");
       return;
     }
     track(frame, step);
-    replay_loop_steps(schedule);
+    ++next_frame_;
+    replay_loop_steps();
     checkpoint_if_due(frame.t_ns);
-    count();
-    if (progress) progress(progress_);
   }
-  for (; round != schedule.mapper.end() && can_map(*round); ++round) {
-    map(round->proposals, round->loop_messages);
-    history_.push_back(snapshot_);
-    replay_loop_steps(schedule);
+  count();
+}
+
+bool LockstepRun::replay_rounds_until(std::uint64_t version) {
+  while (snapshot_.version() < version) {
+    if (next_round_ == schedule_->mapper.size() || !can_map(schedule_->mapper[next_round_])) return false;
+    replay_round(schedule_->mapper[next_round_++]);
   }
+  return true;
+}
+
+void LockstepRun::replay_round(const MapperStep& round) {
+  map(round.proposals, round.loop_messages);
+  history_.push_back(snapshot_);
+  replay_loop_steps();
+}
+
+void LockstepRun::end_replay(const char* why) {
+  if (schedule_->ended) fail(std::string("the schedule does not fit the input: ") + why);
+  next_frame_ = schedule_->tracker.size();
+  next_round_ = schedule_->mapper.size();
 }
 
 bool LockstepRun::can_map(const MapperStep& round) const {
@@ -117,9 +115,9 @@ bool LockstepRun::can_map(const MapperStep& round) const {
          round.loop_messages <= mapper_inbox_.loops_approx();
 }
 
-void LockstepRun::replay_loop_steps(const Schedule& schedule) {
-  for (; next_loop_step_ < schedule.loop_closer.size(); ++next_loop_step_) {
-    const LoopStep& step = schedule.loop_closer[next_loop_step_];
+void LockstepRun::replay_loop_steps() {
+  for (; next_loop_step_ < schedule_->loop_closer.size(); ++next_loop_step_) {
+    const LoopStep& step = schedule_->loop_closer[next_loop_step_];
     if (step.version > snapshot_.version() || (step.requests > 0 && !request_)) return;
     while (history_.front().version() < step.version) history_.pop_front();
     if (step.requests > 0) {
@@ -169,7 +167,8 @@ void LockstepRun::track(const Frame& frame, const TrackerStep& step) {
   tracking_.locate(frame, snapshot_, static_cast<EffortLevel>(step.effort_level), proposal, record_);
   tracking_.tell(due_ns, steady_now_ns(), record_);
   if (tracking_.prepare_next(record_)) mapper_inbox_.send(std::move(proposal));
-  logs_.add(record_, tracking_.correction());
+  correction_ = tracking_.correction();
+  logs_.add(record_, correction_);
   TrackerStep taken = step;
   taken.frame = record_.frame_index;
   taken.version = record_.snapshot_version;
@@ -183,8 +182,8 @@ void LockstepRun::drop(const Frame& frame, const TrackerStep& step) {
   record_.t_ns = frame.t_ns;
   record_.state = FrameState::kDropped;
   record_.effort = static_cast<EffortLevel>(step.effort_level);
-  logs_.schedule().tracker.append(step);
-  logs_.add(record_, {});
+  correction_ = {};
+  logs_.add(record_, correction_);
 }
 
 void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
@@ -212,6 +211,14 @@ void LockstepRun::count() {
   progress_.count(record_);
   progress_.map_version = snapshot_.version();
   progress_.queued = mapper_inbox_.proposals_approx();
+  collected_ = false;
+}
+
+/// Of a replay: the rounds that came after the last frame.
+void LockstepRun::stop() {
+  if (!schedule_ || failed() || frames_due() > 0) return;
+  for (; next_round_ < schedule_->mapper.size() && can_map(schedule_->mapper[next_round_]); ++next_round_)
+    replay_round(schedule_->mapper[next_round_]);
 }
 
 RunResult LockstepRun::finish() {

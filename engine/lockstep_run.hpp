@@ -2,33 +2,49 @@
 
 #include <deque>
 #include <limits>
+#include <optional>
 
 #include "engine/checkpoint_writer.hpp"
-#include "engine/engine.hpp"
 #include "engine/logs/run_logs.hpp"
 #include "engine/mapper_inbox.hpp"
+#include "engine/pipeline.hpp"
 #include "engine/runners.hpp"
 
 namespace twofold {
 
-/// All steps on the calling thread, in an order given from outside: the deterministic run maps each keyframe
-/// at once, the replay follows a schedule.
-class LockstepRun {
+/// All steps within push, on the calling thread: the deterministic run maps each keyframe before the next
+/// frame, the replay follows a schedule.
+class LockstepRun final : public Pipeline {
  public:
-  LockstepRun(const Rig& rig, const EngineOptions& options);
+  /// schedule: of the run to be repeated; nothing: the deterministic run
+  LockstepRun(const Rig& rig, const EngineOptions& options, std::optional<Schedule> schedule = {});
 
-  /// The deterministic run: each frame is mapped before the next one.
-  void run(const FrameFeed& feed, const std::atomic<bool>& interrupted, const ProgressSink& progress);
-  /// One frame of it. The record is valid until the next call.
-  const FrameRecord& step(const Frame& frame);
-  void replay(const FrameFeed& feed, const Schedule& schedule, const std::atomic<bool>& interrupted,
-              const ProgressSink& progress);
-  /// What the logs have lost so far: a sentence a file.
-  [[nodiscard]] std::vector<std::string> log_errors() const { return logs_.errors(); }
-  /// Final pose graph optimisation; moves the result out.
-  [[nodiscard]] RunResult finish();
+  [[nodiscard]] bool has_buffer() override { return true; }
+  [[nodiscard]] bool has_room() override { return true; }
+  /// Of a replay: frames that the schedule leaves out, as one that found no buffer then, count as dropped.
+  void push(Frame frame) override;
+  void collect(const FrameSink& sink) override;
+  void wait(std::chrono::steady_clock::time_point) override {}
+  [[nodiscard]] bool failed() const override { return !result_.error.empty(); }
+  [[nodiscard]] bool ended() const override { return failed() || (schedule_ && frames_due() == 0); }
+  [[nodiscard]] std::size_t frames_due() const override {
+    return schedule_ ? schedule_->tracker.size() - next_frame_ : 0;
+  }
+  [[nodiscard]] std::vector<std::string> log_errors() const override { return logs_.errors(); }
+  [[nodiscard]] const Progress& progress() const override { return progress_; }
+  void stop() override;
+  [[nodiscard]] RunResult finish() override;
 
  private:
+  void run_deterministically(const Frame& frame);
+  void replay(const Frame& frame);
+  /// Rounds of the mapper until the tracker sees this version. False when the schedule lacks one, or has one
+  /// that needs what was not sent.
+  [[nodiscard]] bool replay_rounds_until(std::uint64_t version);
+  void replay_round(const MapperStep& round);
+  /// The schedule asks for what did not happen: that of a killed run ends here, any other belongs to other
+  /// frames.
+  void end_replay(const char* why);
   /// `step` says what the frame meets: effort level, answers, whether a keyframe may be made.
   void track(const Frame& frame, const TrackerStep& step);
   /// `refused`: with nothing, as a loop closer does that has failed.
@@ -38,7 +54,7 @@ class LockstepRun {
   void close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph, std::size_t refused);
   /// Takes all steps of the loop closer whose inputs are there. It does not matter when within the replay a
   /// step is taken: what it sends waits until the schedule says that it arrived.
-  void replay_loop_steps(const Schedule& schedule);
+  void replay_loop_steps();
   /// Were all messages of this round sent?
   [[nodiscard]] bool can_map(const MapperStep& round) const;
   void drop(const Frame& frame, const TrackerStep& step);
@@ -55,11 +71,15 @@ class LockstepRun {
   MapperRunner mapping_;
   LoopCloserRunner loop_closing_;
   RunLogs logs_;
-  FrameRecord record_;  // of the newest frame
+  FrameRecord record_;         // of the newest frame
+  PoseCorrection correction_;  // likewise
+  bool collected_ = true;      // likewise
   MapperInbox mapper_inbox_;
   std::deque<ProposalHandle> mapped_;  // keyframes the loop closer has not seen
-  std::size_t next_loop_step_ = 0;     // of a replay
-  std::deque<GraphSnapshot> history_;  // of a replay: versions that loop closer steps may still need
+  // Of a replay: the schedule, what of it comes next, and versions that loop closer steps may still need.
+  std::optional<Schedule> schedule_;
+  std::size_t next_frame_ = 0, next_round_ = 0, next_loop_step_ = 0;
+  std::deque<GraphSnapshot> history_;
   std::optional<RelocalisationRequest> request_;
   std::optional<RelocalisationAnswer> answer_;
   CheckpointWriter checkpoints_;

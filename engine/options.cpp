@@ -19,6 +19,9 @@ std::string EngineOptions::invalid_reason() const {
       .at_least("logs.frames_in_memory", static_cast<double>(logs.frames_in_memory), 1)
       .at_least("frame_slots", static_cast<double>(frame_slots), 1)
       .at_least("proposal_slots", static_cast<double>(proposal_slots), 1);
+  check.that(!stepped || !deterministic, "stepped", "false where deterministic is true", 1)
+      .that(!stepped || checkpoint.period == 0, "checkpoint.period", "0 where stepped is true",
+            checkpoint.period);
   if (tracker_cpu) check.at_least("tracker_cpu", *tracker_cpu, 0);
   if (mapper_cpu) check.at_least("mapper_cpu", *mapper_cpu, 0);
   if (loop_closer_cpu) check.at_least("loop_closer_cpu", *loop_closer_cpu, 0);

@@ -73,8 +73,10 @@ struct EngineOptions {
 
   /// One thread, one order: each frame is tracked against the map with every earlier keyframe optimised.
   bool deterministic = false;
-  PacingOptions pacing{.speed = 0};  ///< of threaded runs
-  EffortOptions effort;              ///< of threaded runs that keep a pace
+  /// No threads: the caller's take the steps (Pipeline::step). No checkpoints then.
+  bool stepped = false;
+  PacingOptions pacing{.speed = 0};  ///< of threaded and stepped runs
+  EffortOptions effort;              ///< likewise, if they keep a pace
 
   std::size_t frame_slots = 8;     ///< frames decoded ahead, or waiting, at most
   std::size_t proposal_slots = 4;  ///< proposals waiting for the mapper at most, rounded up to a power of two

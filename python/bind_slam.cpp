@@ -211,15 +211,17 @@ using MaybePath = std::optional<std::filesystem::path>;
 
 std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
     const CameraRig& rig, RunMode mode, bool live, const MaybePath& map, bool localise_only, bool places,
-    const MaybePath& vocabulary, int inner_window, int outer_window, int frame_buffers,
-    std::optional<int> tracker_cpu, std::optional<int> mapper_cpu, std::optional<int> loop_closer_cpu,
-    std::optional<int> fifo_priority, const MaybePath& run_folder, std::int64_t kept_frames) {
+    const MaybePath& vocabulary, const MaybePath& schedule, int inner_window, int outer_window,
+    int frame_buffers, std::optional<int> tracker_cpu, std::optional<int> mapper_cpu,
+    std::optional<int> loop_closer_cpu, std::optional<int> fifo_priority, const MaybePath& run_folder,
+    std::int64_t kept_frames) {
   const SlamOptions options{mode,
                             live,
                             map.value_or(""),
                             localise_only,
                             places,
                             vocabulary.value_or(""),
+                            schedule.value_or(""),
                             inner_window,
                             outer_window,
                             frame_buffers,
@@ -272,7 +274,7 @@ void bind_slam_class(py::module_& module) {
   py::class_<SlamWithUpdates, std::unique_ptr<SlamWithUpdates, DeleteUnlocked>>(module, "Slam")
       .def(py::init(&make_slam), py::arg("rig"), py::kw_only(), py::arg("mode") = d.mode,
            py::arg("live") = d.live, py::arg("map") = py::none(), py::arg("localise_only") = d.localise_only,
-           py::arg("places") = d.places, py::arg("vocabulary") = py::none(),
+           py::arg("places") = d.places, py::arg("vocabulary") = py::none(), py::arg("schedule") = py::none(),
            py::arg("inner_window") = d.inner_window, py::arg("outer_window") = d.outer_window,
            py::arg("frame_buffers") = d.frame_buffers, py::arg("tracker_cpu") = d.tracker_cpu,
            py::arg("mapper_cpu") = d.mapper_cpu, py::arg("loop_closer_cpu") = d.loop_closer_cpu,
@@ -291,6 +293,13 @@ void bind_slam_class(py::module_& module) {
           [](SlamWithUpdates& self, double timeout) { return self.slam.wait_for_room(to_ns(timeout)); },
           py::arg("timeout"), Unlocked(),
           "Waits at most for timeout [s]; for recordings, of which no frame should be dropped.")
+      .def(
+          "step", [](SlamWithUpdates& self, SlamStep step) { return self.slam.step(step); }, py::arg("step"),
+          Unlocked(),
+          "Of RunMode.STEPPED: takes one step of the engine on this thread. False: there was nothing to do, "
+          "or "
+          "another thread is\n"
+          "taking this step.")
       .def(
           "latest", [](const SlamWithUpdates& self) { return self.slam.latest(); },
           "Of the newest frame that was processed, tracked or lost; None before the first. Waits for nobody.")
@@ -338,9 +347,15 @@ void bind_slam_class(py::module_& module) {
 }  // namespace
 
 void bind_slam(py::module_& module) {
-  py::enum_<RunMode>(module, "RunMode", "On how many threads a Slam works.")
+  py::enum_<RunMode>(module, "RunMode", "On which threads a Slam works, and in what order.")
       .value("THREADED", RunMode::kThreaded, "tracker, mapper and loop closer on threads of their own")
-      .value("DETERMINISTIC", RunMode::kDeterministic, "all within push: same frames, same bytes");
+      .value("DETERMINISTIC", RunMode::kDeterministic, "all within push: same frames, same bytes")
+      .value("REPLAY", RunMode::kReplay, "within push, in the order that `schedule` tells: that run's bytes")
+      .value("STEPPED", RunMode::kStepped, "no threads: the caller's take the steps (Slam.step)");
+  py::enum_<SlamStep>(module, "SlamStep", "What RunMode.STEPPED leaves to the caller.")
+      .value("TRACK", SlamStep::kTrack, "locates the camera in the oldest frame that waits")
+      .value("MAP", SlamStep::kMap, "takes in what the tracker proposed, and optimises the double window")
+      .value("CLOSE_LOOPS", SlamStep::kCloseLoops, "looks up places: of a lost camera, of new keyframes");
   bind_push(module);
   bind_summary(module);
   py::class_<Updates, std::shared_ptr<Updates>>(module, "Updates")

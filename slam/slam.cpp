@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "engine/clock.hpp"
+#include "engine/pipeline.hpp"
 #include "graph/map_file.hpp"
 #include "slam/conversions.hpp"
 #include "slam/fair_mutex.hpp"
@@ -20,7 +21,6 @@
 #include "slam/latest_value.hpp"
 #include "slam/map_lender.hpp"
 #include "slam/map_snapshot.hpp"
-#include "slam/pipeline.hpp"
 #include "slam/pose_reporter.hpp"
 #include "slam/slam_options.hpp"
 #include "slam/summary.hpp"
@@ -28,7 +28,25 @@
 namespace twofold {
 namespace {
 
-constexpr const char* kEndedEarly = "a thread of the engine has ended early: finish() says why";
+constexpr const char* kThreadEnded = "a thread of the engine has ended early: finish() says why";
+constexpr const char* kStepFailed = "a step of the engine has failed: finish() says why";
+
+PipelineStep to_engine(SlamStep step) {
+  switch (step) {
+    case SlamStep::kTrack:
+      return PipelineStep::kTrack;
+    case SlamStep::kMap:
+      return PipelineStep::kMap;
+    case SlamStep::kCloseLoops:
+      break;
+  }
+  return PipelineStep::kCloseLoops;
+}
+
+QueueLengths to_queue_lengths(const Pipeline::Waiting& waiting) {
+  return {static_cast<std::int64_t>(waiting.frames), static_cast<std::int64_t>(waiting.keyframes),
+          static_cast<std::int64_t>(waiting.places)};
+}
 
 /// Says which thread is in a callback, while it is.
 class Telling {
@@ -57,7 +75,11 @@ std::chrono::steady_clock::time_point deadline_of(std::int64_t timeout_ns) {
 class TWOFOLD_HIDDEN Slam::Impl {
  public:
   Impl(const CameraRig& camera_rig, const SlamOptions& options)
-      : rig_(to_rig(camera_rig)), live_(options.live), frame_buffers_(options.frame_buffers), intake_(rig_) {
+      : rig_(to_rig(camera_rig)),
+        mode_(options.mode),
+        live_(options.live),
+        frame_buffers_(options.frame_buffers),
+        intake_(rig_) {
     EngineOptions engine = engine_options(options);
     engine.on_pose = [this](const PoseReport& report) { tell(report); };
     engine.on_frame = [this](const PoseReport& report) { tell_details(report); };
@@ -67,7 +89,8 @@ class TWOFOLD_HIDDEN Slam::Impl {
     engine.on_places = [this](const KeyframeDatabase& places) { maps.publish(places); };
     engine.on_loop = [this](const ClosedLoop& loop) { maps.publish(loop); };
     reporter_.listen(engine);
-    pipeline_ = make_pipeline(rig_, engine);
+    pipeline_ = options.mode == RunMode::kReplay ? make_replay(rig_, engine, schedule_to_replay(options))
+                                                 : make_pipeline(rig_, engine);
     if (options.mode == RunMode::kThreaded || !options.run_folder.empty())
       caretaker_ = std::jthread([this](const std::stop_token& stop) { look_now_and_then(stop); });
   }
@@ -86,8 +109,9 @@ class TWOFOLD_HIDDEN Slam::Impl {
   [[nodiscard]] bool has_room() {
     expect_no_callback("has_room");
     const std::scoped_lock turn(pushing_);
-    return !summary_ && pipeline_->has_room();
+    return !summary_ && !failed() && !pipeline_->ended() && has_room_now();
   }
+  bool step(SlamStep step);
   [[nodiscard]] std::vector<std::string> errors() const;
   void save_map(const std::filesystem::path& file);
   const SlamSummary& finish();
@@ -104,10 +128,18 @@ class TWOFOLD_HIDDEN Slam::Impl {
   void tell_details(const PoseReport& report);
   void expect_no_callback(const char* function) const;
   void look_now_and_then(const std::stop_token& stop);
-  /// A thread of the engine has ended early. errors() says so from now on, and what the logs lost.
+  [[nodiscard]] const char* why_it_failed() const {
+    return mode_ == RunMode::kThreaded ? kThreadEnded : kStepFailed;
+  }
+  [[nodiscard]] bool has_room_now() {
+    pipeline_->collect({});
+    return pipeline_->has_room();
+  }
+  /// A step of the engine has failed. errors() says so from now on, and what the logs lost.
   [[nodiscard]] bool failed();
 
   const Rig rig_;
+  const RunMode mode_;
   const bool live_;
   const int frame_buffers_;
   PoseReporter reporter_;  // tracker's
@@ -142,7 +174,7 @@ void Slam::Impl::tell(const PoseReport& report) {
 /// Likewise, once the tracker is done with the frame.
 void Slam::Impl::tell_details(const PoseReport& report) {
   const Telling telling(told_by_);
-  const FrameDetails::Impl details{rig_, report, pipeline_->waiting()};
+  const FrameDetails::Impl details{rig_, report, to_queue_lengths(pipeline_->waiting())};
   on_frame(estimate_, FrameDetails(details));
 }
 
@@ -161,8 +193,8 @@ void Slam::Impl::look_now_and_then(const std::stop_token& stop) {
   for (std::unique_lock lock(sleeping);
        !woken.wait_for(lock, stop, kPause, [&] { return stop.stop_requested(); });) {
     const std::unique_lock turn(pushing_, std::try_to_lock);  // who has it, looks
-    if (!turn || !pipeline_) continue;
-    pipeline_->collect();
+    if (!turn || summary_ || !pipeline_) continue;
+    pipeline_->collect({});
     (void)failed();
   }
 }
@@ -171,14 +203,15 @@ bool Slam::Impl::failed() {
   const bool ended = pipeline_->failed();
   std::vector<std::string> lost = pipeline_->log_errors();
   const std::scoped_lock lock(errors_);
-  if (ended) engine_error_ = kEndedEarly;
+  if (ended) engine_error_ = why_it_failed();
   log_errors_ = std::move(lost);
   return ended;
 }
 
 std::string Slam::Impl::refusal(const FrameView& frame) {
   if (summary_) return "the run is over: finish() was called";
-  if (failed()) return kEndedEarly;
+  if (failed()) return why_it_failed();
+  if (pipeline_->ended()) return "the schedule has no more frames";
   if (std::string why = intake_.refusal(frame); !why.empty()) return why;
   constexpr std::int64_t kPlausible = 10'000'000'000;  // what a live frame may be late [ns]
   const std::int64_t now_ns = steady_now_ns();
@@ -193,6 +226,7 @@ PushResult Slam::Impl::push(const FrameView& frame) {
   const std::scoped_lock turn(pushing_);
   if (std::string why = refusal(frame); !why.empty()) return {PushStatus::kRefused, std::move(why)};
   pushed_ = true;
+  pipeline_->collect({});
   if (!pipeline_->has_buffer()) {
     intake_.skip(frame);
     ++no_room_;
@@ -200,6 +234,7 @@ PushResult Slam::Impl::push(const FrameView& frame) {
             fmt::format("the tracker is behind: all {} frame buffers are in use", frame_buffers_), frames_++};
   }
   pipeline_->push(intake_.take(frame));
+  if (mode_ == RunMode::kReplay) (void)failed();  // within the push
   return {PushStatus::kQueued, "", frames_++};
 }
 
@@ -209,11 +244,24 @@ bool Slam::Impl::wait_for_room(std::int64_t timeout_ns) {
   constexpr auto kTurn = std::chrono::milliseconds(10);  // then others have theirs; failures are looked for
   for (;;) {
     const std::scoped_lock turn(pushing_);
-    if (summary_ || failed()) return false;
-    if (pipeline_->has_room()) return true;
+    if (summary_ || failed() || pipeline_->ended()) return false;
+    if (has_room_now()) return true;
     const auto now = std::chrono::steady_clock::now();
     if (now >= deadline) return false;
     pipeline_->wait(std::min(deadline, now + kTurn));
+  }
+}
+
+bool Slam::Impl::step(SlamStep step) {
+  expect_no_callback("step");
+  if (mode_ != RunMode::kStepped)
+    throw std::logic_error("steps are taken from outside with RunMode::kStepped");
+  try {
+    return pipeline_->step(to_engine(step));
+  } catch (...) {
+    const std::scoped_lock lock(errors_);
+    engine_error_ = kStepFailed;
+    throw;
   }
 }
 
@@ -240,11 +288,12 @@ const SlamSummary& Slam::Impl::finish() {
   expect_no_callback("finish");
   const std::scoped_lock turn(pushing_);
   if (summary_) return *summary_;
+  pipeline_->stop();
   RunResult result = pipeline_->finish();
   summary_ = summarise(result);
   summary_->frames += no_room_;
   summary_->dropped += no_room_;
-  pipeline_.reset();
+  if (mode_ != RunMode::kStepped) pipeline_.reset();  // else other threads may still ask it for a step
   {
     const std::scoped_lock lock(errors_);
     engine_error_ = result.error;
@@ -285,6 +334,10 @@ bool Slam::has_room() const {
 
 bool Slam::wait_for_room(std::int64_t timeout_ns) {
   return impl_->wait_for_room(timeout_ns);
+}
+
+bool Slam::step(SlamStep step) {
+  return impl_->step(step);
 }
 
 std::optional<PoseEstimate> Slam::latest() const {

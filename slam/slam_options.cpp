@@ -15,7 +15,10 @@ void expect_sensible(const SlamOptions& options) {
   expect(options.kept_frames >= 1, "options.kept_frames must be >= 1");
   expect(options.run_folder.empty() || std::filesystem::is_directory(options.run_folder),
          "options.run_folder must be a folder");
-  expect(!options.live || options.mode == RunMode::kThreaded, "options.live needs RunMode::kThreaded");
+  const bool one_thread = options.mode == RunMode::kDeterministic || options.mode == RunMode::kReplay;
+  expect(!options.live || !one_thread, "options.live needs RunMode::kThreaded or kStepped");
+  expect(options.schedule.empty() == (options.mode != RunMode::kReplay),
+         "options.schedule and RunMode::kReplay belong together");
   expect(!options.localise_only || !options.map.empty(), "options.localise_only needs options.map");
   expect(options.map.empty() || options.places,
          "options.map needs options.places, by which the camera finds itself in the map");
@@ -23,10 +26,17 @@ void expect_sensible(const SlamOptions& options) {
 
 }  // namespace
 
+Schedule schedule_to_replay(const SlamOptions& options) {
+  auto schedule = load_schedule(options.schedule);
+  if (!schedule) throw std::runtime_error(options.schedule.string() + ": " + schedule.error());
+  return *std::move(schedule);
+}
+
 EngineOptions engine_options(const SlamOptions& options) {
   expect_sensible(options);
   EngineOptions engine;
   engine.deterministic = options.mode == RunMode::kDeterministic;
+  engine.stepped = options.mode == RunMode::kStepped;
   engine.pacing.live = options.live;
   engine.pacing.late = LatePolicy::kNewest;
   engine.localise_only = options.localise_only;

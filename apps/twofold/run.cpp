@@ -1,7 +1,6 @@
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <memory>
 
 #include <fmt/format.h>
@@ -66,10 +65,8 @@ std::vector<std::string> real_time_notes(const RunArguments& arguments) {
   return {};
 }
 
-Schedule load_schedule(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw IoError(file, "cannot be opened");
-  auto schedule = read_schedule(in);
+Schedule schedule_from(const std::string& file) {
+  auto schedule = load_schedule(file);
   if (!schedule) throw IoError(file, schedule.error());
   return *std::move(schedule);
 }
@@ -163,7 +160,7 @@ int run(const RunArguments& arguments) {
   EngineOptions options = engine_options(arguments);
   apply_map_options(arguments.map, options);
   std::optional<Schedule> schedule;
-  if (!arguments.replay_schedule.empty()) schedule = load_schedule(arguments.replay_schedule);
+  if (!arguments.replay_schedule.empty()) schedule = schedule_from(arguments.replay_schedule);
   prepare_output_folder(arguments.out);
   std::optional<AutoCalibration> calibration;
   std::unique_ptr<FrameSource> source = open_frames(arguments, calibration);
@@ -199,7 +196,7 @@ int run(const RunArguments& arguments) {
   catch_interrupts();
   const std::vector<std::string> notes = real_time_notes(arguments);
   Engine engine(source->rig(), options);
-  RunResult result = schedule ? engine.replay(feed, *schedule, interrupted(), progress)
+  RunResult result = schedule ? engine.replay(feed, *std::move(schedule), interrupted(), progress)
                               : engine.run(feed, interrupted(), progress);
   line.end();
   poses.finish();

@@ -1,5 +1,6 @@
 #include "engine/logs/schedule_log.hpp"
 
+#include <fstream>
 #include <istream>
 #include <iterator>
 #include <ostream>
@@ -251,6 +252,12 @@ tl::expected<Schedule, std::string> read_schedule(std::istream& in) {
   }
   if (in.bad()) return tl::make_unexpected(std::string("schedule log: reading failed"));
   return parse_schedule(file);
+}
+
+tl::expected<Schedule, std::string> load_schedule(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return tl::make_unexpected(std::string("cannot be opened"));
+  return read_schedule(in);
 }
 
 }  // namespace twofold

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <iosfwd>
 #include <memory>
 #include <span>
@@ -104,6 +105,9 @@ struct ScheduleStreams {
 [[nodiscard]] tl::expected<Schedule, std::string> parse_schedule(std::span<const std::uint8_t> file);
 /// Reads the stream to its end and parses it; a file of more than 256 MiB is refused.
 [[nodiscard]] tl::expected<Schedule, std::string> read_schedule(std::istream& in);
+
+/// Of a file; one that cannot be opened is an error, too.
+[[nodiscard]] tl::expected<Schedule, std::string> load_schedule(const std::filesystem::path& file);
 
 /// The same schedule with one section a thread, whatever the threads' turns were. Errors as above; records
 /// are not looked at.

@@ -16,8 +16,20 @@
 namespace twofold {
 
 enum class RunMode : std::uint8_t {
-  kThreaded,      ///< tracker, mapper and loop closer on threads of their own
-  kDeterministic  ///< all within push, on the caller's thread: same frames, same bytes
+  kThreaded,       ///< tracker, mapper and loop closer on threads of their own
+  kDeterministic,  ///< all within push, on the caller's thread: same frames, same bytes
+  /// Likewise, but in the order that the schedule.log of another run tells (SlamOptions::schedule): over the
+  /// frames of that run, its bytes.
+  kReplay,
+  /// The engine has no threads: yours take its steps (Slam::step), when and where you like.
+  kStepped
+};
+
+/// What RunMode::kStepped leaves to the caller. Each takes what waits for it, and none waits for another one.
+enum class SlamStep : std::uint8_t {
+  kTrack,      ///< locates the camera in the oldest frame that waits; callbacks are called here
+  kMap,        ///< takes in what the tracker proposed, and optimises the double window
+  kCloseLoops  ///< looks a lost camera's place up, else compares the oldest new keyframe with all places
 };
 
 struct SlamOptions {
@@ -25,7 +37,7 @@ struct SlamOptions {
   /// Frames are pushed when they are taken, and their times are of CLOCK_MONOTONIC: latency counts from
   /// there, a tracker that is late leaves work out, and of the frames that wait the newest wins; frames more
   /// than 10 s from now are refused. Otherwise frames are a recording's, and tracked as fast as the map can
-  /// follow. Needs RunMode::kThreaded.
+  /// follow. Needs RunMode::kThreaded or kStepped.
   bool live = false;
 
   /// Map to go on with (.tfm); empty: start one. The camera is unplaced until a place of it is recognised,
@@ -35,6 +47,9 @@ struct SlamOptions {
   /// Recognise places: closes large loops, finds a lost camera, joins map parts. Needed for `map`.
   bool places = true;
   std::filesystem::path vocabulary = {};  ///< instead of the built-in one
+
+  /// Of RunMode::kReplay: schedule.log of a run (run_folder), the other options being that run's.
+  std::filesystem::path schedule = {};
 
   int inner_window = 25;   ///< keyframes optimised with their points, >= 1
   int outer_window = 175;  ///< keyframes around them optimised by relative poses, >= 0
@@ -57,7 +72,8 @@ struct SlamOptions {
 };
 
 enum class PushStatus : std::uint8_t {
-  /// On its way to the tracker, or, in a deterministic run, tracked. With `live` a newer frame may still
+  /// On its way to the tracker, or, in a deterministic run or a replay, tracked. With `live` a newer frame
+  /// may still
   /// take its turn: it then counts as dropped, and nobody is called.
   kQueued,
   kDropped,  ///< in order, but all frame buffers were in use: the tracker is behind
@@ -143,12 +159,13 @@ class TWOFOLD_API Slam {
   Slam(const Slam&) = delete;
   Slam& operator=(const Slam&) = delete;
 
-  /// Called for every frame that was looked at, on the tracker's thread, which waits for it: it must not
-  /// block, and may call latest, map, held_maps and errors only; push, has_room, wait_for_room, save_map and
-  /// finish would wait, and throw std::logic_error there. What it uses must live until finish has returned.
-  /// The time it takes is a stage of its own among SlamSummary::timings ("pose listener"), and in the next
-  /// frame's latency. A callback that throws is not called again; tracking goes on, and errors() says what it
-  /// threw. To be set before the first push, else std::logic_error is thrown.
+  /// Called for every frame that was looked at, on the tracker's thread (where the tracker's steps are taken
+  /// by the caller's: on that one), which waits for it: it must not block, and may call latest, map,
+  /// held_maps and errors only; push, has_room, wait_for_room, step, save_map and finish would wait, and
+  /// throw std::logic_error there. What it uses must live until finish has returned. The time it takes is a
+  /// stage of its own among SlamSummary::timings ("pose listener"), and in the next frame's latency. A
+  /// callback that throws is not called again; tracking goes on, and errors() says what it threw. To be set
+  /// before the first push, else std::logic_error is thrown.
   void on_pose(PoseCallback callback);
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
@@ -157,10 +174,10 @@ class TWOFOLD_API Slam {
   void on_frame(FrameCallback callback);
 
   /// In a threaded run it waits for no thread of the engine, only for another caller inside push, has_room,
-  /// wait_for_room or finish; in a deterministic one it returns when the frame is tracked and mapped. Refused
-  /// are images that do not fit the rig, time stamps that do not increase, and frames after finish(). An
-  /// exception of the engine, as std::bad_alloc, comes out of push in a deterministic run; in a threaded one
-  /// it ends the thread it arose on, and errors() says so.
+  /// wait_for_room or finish; in a deterministic one or a replay it returns when the frame is tracked and
+  /// mapped. Refused are images that do not fit the rig, time stamps that do not increase, and frames after
+  /// finish(). An exception of the engine, as std::bad_alloc, comes out of push in a deterministic run; in a
+  /// threaded one it ends the thread it arose on, and errors() says so.
   PushResult push(const FrameView& frame);
   /// Whether a push would find room now; without another pushing thread, it will. Not `live`, also whether
   /// map and disk follow: a push is not dropped for their sake.
@@ -169,6 +186,15 @@ class TWOFOLD_API Slam {
   /// should be dropped, and which the map should follow.
   /// @return false after that time, when the run is over, or when a thread of the engine has failed
   [[nodiscard]] bool wait_for_room(std::int64_t timeout_ns);
+
+  /// Of RunMode::kStepped: takes one step on this thread. Any thread may take any step, different ones at
+  /// once: the tracker on a thread that is never late, the others where there is time. A map that waits for
+  /// its steps only grows old; but take all three kinds now and then, for each keeps the map's versions since
+  /// its last one. Without `live` has_room asks for steps of the map, too; finish takes all that are left.
+  /// @return false: there was nothing to do, or another thread is taking this step
+  /// What a step throws (std::bad_alloc, say) comes out, and the run has failed: finish() tells. Throws
+  /// std::logic_error in other modes.
+  bool step(SlamStep step);
 
   /// Of the newest frame that was processed, tracked or lost; nothing before the first. Wait-free: no lock,
   /// no retry, whatever the tracker does.

@@ -47,7 +47,10 @@ class Run:
 
     def __init__(self, source: str | Source, **options: Any) -> None:
         self.source = Source(source) if isinstance(source, str) else source
-        if options.get("mode") != RunMode.DETERMINISTIC:
+        mode = options.get("mode", RunMode.THREADED)
+        if mode == RunMode.STEPPED:
+            raise ValueError("run() takes no steps: RunMode.STEPPED is for a Slam of your own")
+        if mode == RunMode.THREADED:
             options.setdefault("live", self.source.is_live)
         self.slam = Slam(self.source.rig, **options)
         self._feeder: _Feeder | None = None

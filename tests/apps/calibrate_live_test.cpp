@@ -51,7 +51,7 @@ class CalibrateLive : public ::testing::Test {
       outcome.said.push_back(line);
       if (listener) listener(line);
     };
-    const CalibrationRequest request{kBoard, "chessboard:9x6:0.025", 20, file(), folder_ / "plot.png"};
+    const CalibrationRequest request{"chessboard:9x6:0.025", 20, file(), folder_ / "plot.png"};
     try {
       outcome.text = calibrate_from(source, request, stop_, say);
     } catch (const std::exception& e) {

@@ -75,7 +75,6 @@ TEST_F(EngineFailureTest, ALostCameraIsAnsweredWhenTheLoopCloserFails) {
     if (thread == "loop closer" && lost) throw std::runtime_error("out of order");
   };
   ThreadedRun run(small_rig(), options);
-  run.start();
   const FrameFeed frames = kidnapped(false, 1000);
   int after_failure = 0;
   for (Frame frame; after_failure < 20 && frames(frame) == FeedStatus::kFrame;) {

@@ -76,8 +76,7 @@ TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
     CostlyClock clock;
     std::atomic<bool> interrupted{false};
     ThreadedRun run(small_rig(), options, &clock);
-    run.run(feed(), interrupted, {});
-    const RunResult live = run.finish();
+    const RunResult live = feed_all(run, feed(), interrupted);
     ASSERT_EQ(live.error, "");
     ASSERT_EQ(live.frames.size(), static_cast<std::size_t>(kFrames));
     int lowest = 0;

@@ -1,6 +1,7 @@
 // Runs that are given their frames one at a time, and who is told of each pose.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -22,9 +23,14 @@ constexpr auto kLongest = std::chrono::minutes(5);
 
 class EnginePushTest : public testing::SwayingCamera {
  protected:
+  static EngineOptions stepped() {
+    EngineOptions options;
+    options.stepped = true;
+    return options;
+  }
   static const Frame& frame(std::size_t i) { return frames_->at(i); }
 
-  static void wait_for_room(ThreadedRun& run, const FrameSink& sink = {}) {
+  static void wait_for_room(SteppedRun& run, const FrameSink& sink = {}) {
     while (!run.has_room()) {
       run.collect(sink);
       ASSERT_FALSE(run.failed());
@@ -36,7 +42,6 @@ class EnginePushTest : public testing::SwayingCamera {
 
 TEST_F(EnginePushTest, PushedFramesAreCollectedInOrderAndReplay) {
   ThreadedRun run(small_rig(), {});
-  run.start();
   std::vector<std::int64_t> collected;
   const FrameSink sink = [&](const FrameRecord& record, const PoseCorrection&) {
     EXPECT_EQ(record.state, FrameState::kTracked) << describe(record.cause);
@@ -65,7 +70,6 @@ TEST_F(EnginePushTest, AFullRunTakesNoMoreAndNeverBlocks) {
     may_go_on.wait(false, std::memory_order_acquire);  // what a listener must never do: it holds the tracker
   };
   ThreadedRun run(small_rig(), options);
-  run.start();
   std::size_t pushed = 0;
   for (; run.has_room(); ++pushed) run.push(frame(pushed));
   EXPECT_EQ(pushed, options.frame_slots);
@@ -153,15 +157,90 @@ TEST_F(EnginePushTest, TheListenerHearsWherePointsWereSearched) {
   EXPECT_GT(points, 50 * kFrames);
 }
 
+TEST_F(EnginePushTest, StepsAreTakenByTheCallersThreadsAndReplay) {
+  SteppedRun run(small_rig(), stepped());
+  std::atomic<bool> done{false};
+  std::array<std::atomic<int>, 3> taken{};
+  const auto take = [&](PipelineStep step) {
+    while (!done.load()) {
+      if (run.step(step)) ++taken.at(static_cast<std::size_t>(step));
+    }
+  };
+  {
+    // Two that want the same step: they take turns.
+    const std::jthread tracker(take, PipelineStep::kTrack), another(take, PipelineStep::kTrack);
+    const std::jthread mapper(take, PipelineStep::kMap), loop_closer(take, PipelineStep::kCloseLoops);
+    for (std::size_t i = 0; i < kFrames; ++i) {
+      wait_for_room(run);
+      run.push(frame(i));
+    }
+    done = true;
+  }
+  run.stop();  // takes what is left
+  const RunResult result = run.finish();
+  EXPECT_EQ(result.error, "");
+  EXPECT_EQ(result.counts.tracked, kFrames);
+  for (const std::atomic<int>& steps : taken) EXPECT_GT(steps, 0);
+  expect_replay({}, feed(), result);
+}
+
+TEST_F(EnginePushTest, StepsInOneOrderGiveTheSameBytes) {
+  std::vector<RunResult> results;
+  for (int i = 0; i < 2; ++i) {
+    SteppedRun run(small_rig(), stepped());
+    EXPECT_FALSE(run.step(PipelineStep::kTrack)) << "no frame was pushed yet";
+    for (std::size_t k = 0; k < kFrames; ++k) {
+      run.collect({});
+      ASSERT_TRUE(run.has_buffer());
+      run.push(frame(k));
+      EXPECT_TRUE(run.step(PipelineStep::kTrack));
+      EXPECT_FALSE(run.step(PipelineStep::kTrack));
+      if (k % 5 != 0) continue;  // the map's steps come late, and together
+      while (run.step(PipelineStep::kMap) || run.step(PipelineStep::kCloseLoops)) {
+      }
+    }
+    run.stop();
+    EXPECT_FALSE(run.step(PipelineStep::kMap));
+    results.push_back(run.finish());
+  }
+  EXPECT_EQ(results[0].counts.tracked, kFrames);
+  EXPECT_GT(results[0].graph.keyframe_count(), 1U);
+  expect_same(results[0], results[1]);
+}
+
+TEST_F(EnginePushTest, AStepThatFailsEndsASteppedRunAndTellsWhoTookIt) {
+  EngineOptions options = stepped();
+  options.before_step = [](std::string_view step) {
+    if (step == "mapper") throw std::runtime_error("out of order");
+  };
+  SteppedRun run(small_rig(), options);
+  wait_for_room(run);
+  run.push(frame(0));
+  EXPECT_TRUE(run.step(PipelineStep::kTrack));
+  EXPECT_FALSE(run.failed());
+  EXPECT_THROW((void)run.step(PipelineStep::kMap), std::runtime_error);
+  EXPECT_TRUE(run.failed());
+  EXPECT_FALSE(run.step(PipelineStep::kMap));
+  run.stop();
+  const RunResult result = run.finish();
+  EXPECT_EQ(result.error, "mapper: out of order");
+  EXPECT_EQ(result.counts.tracked, 1);
+}
+
 TEST_F(EnginePushTest, ALockstepRunTakesOneFrameAtATime) {
   EngineOptions options;
   options.deterministic = true;
   LockstepRun run(small_rig(), options);
+  int collected = 0;
   for (std::size_t i = 0; i < kFrames; ++i) {
-    const FrameRecord& record = run.step(frame(i));
-    EXPECT_EQ(record.frame_index, static_cast<std::int64_t>(i));
-    EXPECT_EQ(record.state, FrameState::kTracked);
+    run.push(frame(i));
+    run.collect([&](const FrameRecord& record, const PoseCorrection&) {
+      EXPECT_EQ(record.frame_index, static_cast<std::int64_t>(i));
+      EXPECT_EQ(record.state, FrameState::kTracked);
+      ++collected;
+    });
   }
+  EXPECT_EQ(collected, kFrames);
   expect_same(run.finish(), testing::run_engine(options, feed()));
 }
 

@@ -103,3 +103,16 @@ def test_rectifiers_follow_the_calibration(stereo_yaml: Path) -> None:
         rectifier.rectify(twofold.Frame(5, left, grey(48, 32)))
     with pytest.raises(RuntimeError, match="nowhere.yaml"):
         twofold.FrameRectifier("nowhere.yaml")
+
+
+def test_a_calibrator_says_what_is_missing_and_refuses() -> None:
+    calibrator = twofold.BoardCalibrator("chessboard:9x6:0.025", 64, 48)
+    assert not calibrator.complete and calibrator.progress
+    calibrator.look(twofold.Frame(1, grey(48, 64)))
+    assert (calibrator.frames, calibrator.found, calibrator.chosen) == (1, 0, 0)
+    with pytest.raises(RuntimeError, match="the board was never seen"):
+        calibrator.calibrate()
+    with pytest.raises(ValueError, match="32x"):
+        calibrator.look(twofold.Frame(2, grey(48, 32)))
+    with pytest.raises(ValueError, match="board"):
+        twofold.BoardCalibrator("paper", 64, 48)

@@ -29,6 +29,29 @@ def test_deterministic_runs_repeat_themselves(frames: list[twofold.Frame], rig: 
     np.testing.assert_array_equal(positions[0], positions[1])
 
 
+def test_steps_are_taken_from_python_and_replayed(
+    frames: list[twofold.Frame], rig: twofold.CameraRig, tmp_path: Path
+) -> None:
+    step = twofold.SlamStep
+    with twofold.Slam(rig, mode=twofold.RunMode.STEPPED, run_folder=tmp_path) as slam:
+        assert not slam.step(step.TRACK)
+        for frame in frames:
+            assert slam.push(frame)
+            assert slam.step(step.TRACK)
+            while slam.step(step.MAP) or slam.step(step.CLOSE_LOOPS):
+                pass
+        stepped = slam.finish().trajectory
+    with twofold.Slam(rig, mode=twofold.RunMode.REPLAY, schedule=tmp_path / "schedule.log") as slam:
+        push_all(slam, frames)
+        replayed = slam.finish().trajectory
+    assert stepped.positions.shape == (40, 3)
+    np.testing.assert_array_equal(stepped.positions, replayed.positions)
+    with twofold.Slam(rig) as slam, pytest.raises(RuntimeError, match="STEPPED|kStepped"):
+        slam.step(step.TRACK)
+    with pytest.raises(ValueError, match="STEPPED"):
+        twofold.run(SCENE, mode=twofold.RunMode.STEPPED)
+
+
 def test_one_camera_is_placed_once_it_has_moved() -> None:
     source = twofold.Source(SCENE, left_only=True)
     assert source.rig.sensor == twofold.Sensor.MONO

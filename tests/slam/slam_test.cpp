@@ -15,9 +15,9 @@
 #include <unistd.h>
 
 #include "engine/logs/schedule_log.hpp"
+#include "engine/pipeline.hpp"
 #include "io/files/trajectory_file.hpp"
 #include "loopclosure/default_vocabulary.hpp"
-#include "slam/pipeline.hpp"
 #include "slam/slam_options.hpp"
 #include "slam/summary.hpp"
 #include "tests/io/scratch_folder.hpp"
@@ -175,6 +175,78 @@ TEST_F(SlamTest, ARunFolderTakesTheTrajectoryAndTheSchedule) {
   EXPECT_EQ(schedule->tracker.size(), static_cast<std::size_t>(kFrames));
 }
 
+TEST_F(SlamTest, ARunOfTheLibraryIsReplayedByTheLibrary) {
+  const ScratchFolder folder;
+  const auto poses_of = [](const SlamSummary& summary) {
+    std::vector<Pose> poses;
+    for (const auto& pose : summary.trajectory) poses.push_back(pose.T_world_camera);
+    return poses;
+  };
+  Slam threaded(rig(), {.run_folder = folder.path()});
+  push_all(threaded);
+  const SlamSummary expected = threaded.finish();
+  const SlamOptions replay{.mode = RunMode::kReplay, .schedule = folder.path() / "schedule.log"};
+  Slam again(rig(), replay);
+  push_all(again);
+  EXPECT_FALSE(again.has_room());
+  const PushResult beyond = again.push(view(0));
+  EXPECT_EQ(beyond.status, PushStatus::kRefused);
+  EXPECT_EQ(beyond.reason, "the schedule has no more frames");
+  const SlamSummary summary = again.finish();
+  EXPECT_TRUE(summary.errors.empty());
+  EXPECT_EQ(summary.tracked, kFrames);
+  EXPECT_EQ(poses_of(summary), poses_of(expected));
+
+  // Frames of another run: the schedule has a keyframe that nobody proposes.
+  Slam other(rig(), replay);
+  for (std::size_t i = 0; i < kFrames && other.has_room(); ++i) {
+    FrameView dark = view(0);
+    dark.t_ns = view(i).t_ns;
+    dark.right = dark.left;  // nothing has depth
+    (void)other.push(dark);
+  }
+  EXPECT_FALSE(other.errors().empty());
+  const SlamSummary failed = other.finish();
+  ASSERT_EQ(failed.errors.size(), 1U);
+  EXPECT_NE(failed.errors.front().find("schedule"), std::string::npos) << failed.errors.front();
+}
+
+TEST_F(SlamTest, AProgramDrivesTheStepsItself) {
+  Slam slam(rig(), {.mode = RunMode::kStepped, .frame_buffers = 3});
+  std::thread::id told_by;
+  int told = 0;
+  slam.on_pose([&](const PoseEstimate&) {
+    told_by = std::this_thread::get_id();
+    EXPECT_THROW((void)slam.step(SlamStep::kMap), std::logic_error);
+    ++told;
+  });
+  EXPECT_FALSE(slam.step(SlamStep::kTrack));
+  std::size_t pushed = 0;
+  for (; pushed < 3; ++pushed) ASSERT_TRUE(slam.push(view(pushed)));
+  EXPECT_EQ(slam.push(view(pushed++)).status, PushStatus::kDropped) << "nobody has taken a step";
+  EXPECT_EQ(told, 0);
+  while (slam.step(SlamStep::kTrack)) {
+  }
+  EXPECT_EQ(told, 3);
+  EXPECT_EQ(told_by, std::this_thread::get_id());
+  EXPECT_TRUE(slam.map().keyframes().empty()) << "nobody has taken a step of the map";
+  EXPECT_TRUE(slam.step(SlamStep::kMap));
+  EXPECT_FALSE(slam.map().keyframes().empty());
+  EXPECT_FALSE(slam.step(SlamStep::kMap)) << "all that was proposed is in the map";
+  EXPECT_TRUE(slam.step(SlamStep::kCloseLoops));
+  for (; pushed < kFrames; ++pushed) {
+    ASSERT_TRUE(slam.push(view(pushed)));
+    while (slam.step(SlamStep::kTrack) || slam.step(SlamStep::kMap) || slam.step(SlamStep::kCloseLoops)) {
+    }
+  }
+  const SlamSummary summary = slam.finish();
+  EXPECT_EQ(summary.tracked, kFrames - 1);
+  EXPECT_EQ(summary.dropped, 1);
+  EXPECT_FALSE(slam.step(SlamStep::kTrack));
+  Slam threaded(rig(), {});
+  EXPECT_THROW((void)threaded.step(SlamStep::kTrack), std::logic_error);
+}
+
 TEST_F(SlamTest, AfterTheEndAnswersAreKept) {
   Slam slam(rig(), deterministic());
   push_all(slam, 0, 20);
@@ -263,7 +335,7 @@ TEST_F(SlamTest, AMapperThatIsBehindTakesNoPushAway) {
     pipeline->push((*frames_)[static_cast<std::size_t>(pushed++)]);
     while (told < pushed || versions == first_version) std::this_thread::yield();
   }
-  ASSERT_GE(pipeline->waiting().keyframes, 2);
+  ASSERT_GE(pipeline->waiting().keyframes, 2U);
   EXPECT_FALSE(pipeline->has_room()) << "who reads a recording waits for the map";
   EXPECT_TRUE(pipeline->has_buffer());
   const int blocked_at = pushed;
@@ -275,6 +347,7 @@ TEST_F(SlamTest, AMapperThatIsBehindTakesNoPushAway) {
   EXPECT_GT(pushed, blocked_at);
   EXPECT_FALSE(pipeline->has_room());
   gate.open();
+  pipeline->stop();
   const RunResult result = pipeline->finish();
   EXPECT_EQ(result.counts.frames, kFrames);
   EXPECT_EQ(result.counts.dropped, 0);

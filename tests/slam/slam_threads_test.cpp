@@ -72,6 +72,25 @@ TEST_F(SlamThreadsTest, PushPollMapSaveAndStopFromFourThreads) {
   std::filesystem::remove(file);
 }
 
+TEST_F(SlamThreadsTest, AnyThreadTakesAnyStepWhileAnotherPushesAndFinishes) {
+  std::atomic<bool> done{false};
+  Slam slam(rig(), {.mode = RunMode::kStepped});
+  const auto take_steps = [&](SlamStep first) {
+    while (!done) {
+      for (int i = 0; i < 3; ++i) (void)slam.step(static_cast<SlamStep>((static_cast<int>(first) + i) % 3));
+    }
+  };
+  std::vector<std::jthread> threads;
+  for (const SlamStep first : {SlamStep::kTrack, SlamStep::kMap, SlamStep::kCloseLoops})
+    threads.emplace_back(take_steps, first);
+  push_all(slam);
+  const SlamSummary summary = slam.finish();  // while the others go on asking for steps
+  done = true;
+  threads.clear();
+  EXPECT_EQ(summary.tracked, kFrames);
+  EXPECT_TRUE(summary.errors.empty());
+}
+
 TEST_F(SlamThreadsTest, WhoPushesWhileAnotherFinishesIsRefusedAndNoFrameIsLost) {
   Slam slam(rig(), {});
   std::int64_t queued = 0;

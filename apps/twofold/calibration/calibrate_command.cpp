@@ -6,6 +6,7 @@
 #include "apps/twofold/calibration/calibration_session.hpp"
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
+#include "calibration/board.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 #include "io/sources/open_source.hpp"
@@ -32,9 +33,8 @@ std::unique_ptr<FrameSource> open_raw(const std::string& text) {
 }
 
 int calibrate(const CalibrateArguments& arguments) {
-  const auto board = parse_board(arguments.board);
-  if (!board) throw IoError("--board", board.error());
-  CalibrationRequest request{*board, arguments.board, arguments.views, arguments.out, arguments.residuals};
+  if (const auto board = parse_board(arguments.board); !board) throw IoError("--board", board.error());
+  CalibrationRequest request{arguments.board, arguments.views, arguments.out, arguments.residuals};
   if (request.plot.empty()) request.plot = fs::path(arguments.out).replace_extension(".png");
   if (request.out.has_parent_path()) prepare_output_folder(request.out.parent_path());
   catch_interrupts();

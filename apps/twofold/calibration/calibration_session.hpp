@@ -5,21 +5,20 @@
 #include <functional>
 #include <string>
 
-#include "calibration/board.hpp"
 #include "io/sources/frame_source.hpp"
+#include "twofold/calibration.hpp"
 
 namespace twofold {
 
 struct CalibrationRequest {
-  Board board;
-  std::string board_text;      ///< as the calibration file is to name it
-  int views = 20;              ///< wanted from a camera, >= 10
+  std::string board;           ///< as BoardCalibrator takes it
+  int views = 20;              ///< wanted from a camera, 10 to 200
   std::filesystem::path out;   ///< calibration file to write
   std::filesystem::path plot;  ///< picture of the residuals to write
 };
 
-/// Shows a source's frames to a ViewCollector until nothing is missing (a camera), the source ends or `stop`
-/// is set; calibrates; writes the calibration file and the picture of its residuals.
+/// Shows a source's frames to a BoardCalibrator until nothing is missing (a camera), the source ends or
+/// `stop` is set; calibrates; writes the calibration file and the picture of its residuals.
 ///
 /// @param source  of raw images
 /// @param say  hears a line for the person with the board whenever it changes
