@@ -243,11 +243,12 @@ PushResult push(SlamWithUpdates& self, const PythonFrame& frame) {
 
 /// Opens the viewer and returns its address.
 std::string view(SlamWithUpdates& self, const std::string& title, int port, const std::string& bind,
-                 const std::optional<PoseList>& truth) {
+                 const MaybePath& secrets, const std::optional<PoseList>& truth) {
   ViewerOptions options;
   options.title = title;
   options.bind = bind;
   options.port = port;
+  options.secrets = secrets.value_or("");
   options.stages = tracker_stages();
   options.efforts = effort_levels();
   if (self.live) options.paced_by = "camera";
@@ -325,12 +326,14 @@ void bind_slam_class(py::module_& module) {
       .def("errors", [](const SlamWithUpdates& self) { return self.slam.errors(); })
       .def("finish", &finish)
       .def("view", &view, py::kw_only(), py::arg("title") = "Twofold", py::arg("port") = ViewerOptions{}.port,
-           py::arg("bind") = ViewerOptions{}.bind, py::arg("truth") = py::none(),
+           py::arg("bind") = ViewerOptions{}.bind, py::arg("secrets") = py::none(),
+           py::arg("truth") = py::none(),
            "Shows the run in a browser while it runs, and returns the address to open, whose token lets one "
            "look.\n"
            "port: 0 for any that is free; bind: any but a loopback address shows camera and map to the "
            "network,\n"
-           "unencrypted; truth: Trajectory of the true path, in any world, scaled where one camera has a "
+           "unencrypted; secrets: file that keeps the address's token from run to run; truth: Trajectory of "
+           "the true path, in any world, scaled where one camera has a "
            "unit of "
            "its own.\n"
            "Nobody waits for who looks. Raises\n"

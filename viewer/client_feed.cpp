@@ -75,6 +75,7 @@ std::optional<ViewMessage> ClientFeed::next_text() {
     greeted_ = true;
     return ViewMessage{shared(hello_text(title_)), true};
   }
+  if (std::exchange(asked_, false)) return ViewMessage{shared("{}"), true};
   if (states_ < scene_.states()) {
     states_ = scene_.states();
     return ViewMessage{shared(state_text(scene_)), true};
@@ -135,6 +136,10 @@ bool ClientFeed::take(std::string_view message, Time now) {
     messages_ = 0;
   }
   if (++messages_ > kMessagesASecond) return false;
+  if (message == "still there?") {
+    asked_ = true;
+    return true;
+  }
   if (message == "images on" || message == "images off") {
     wants_images_ = message == "images on";
     return true;

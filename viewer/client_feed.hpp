@@ -90,6 +90,7 @@ class ClientFeed {
   std::uint64_t surface_ = 0;               // change that the client knows
   std::uint64_t image_ = 0, measured_ = 0;  // numbers of those sent last
   bool wants_images_ = false;
+  bool asked_ = false;  // whether anybody is there: any message is an answer
   std::optional<std::uint32_t> wanted_keyframe_;
   std::vector<ViewCommand> commands_;  // at most one of a kind
   std::optional<std::string> last_words_;

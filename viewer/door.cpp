@@ -1,7 +1,10 @@
 #include "viewer/door.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -60,6 +63,53 @@ std::string in_lower_case(std::string_view name) {
   return lower;
 }
 
+constexpr std::size_t kSecretDigits = 32;
+constexpr std::size_t kFileBytes = 2 * (kSecretDigits + 1);  // two lines
+
+class OpenFile {
+ public:
+  OpenFile(const std::filesystem::path& file, int flags)
+      : descriptor_(open(file.c_str(), flags | O_CLOEXEC, 0600)) {}
+  OpenFile(const OpenFile&) = delete;
+  ~OpenFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+/// Empty when nobody but this user could have read or written it.
+std::string why_not_private(const struct stat& status) {
+  if (!S_ISREG(status.st_mode)) return "is no file";
+  if (status.st_uid != geteuid()) return "belongs to another user";
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) return "can be read by others: chmod 600";
+  return "";
+}
+
+bool is_secret(std::string_view line) {
+  return line.size() == kSecretDigits && std::all_of(line.begin(), line.end(), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+         });
+}
+
+ViewDoor::Secrets secrets_of(const OpenFile& file, const std::string& name) {
+  struct stat status {};
+  if (fstat(file.descriptor(), &status) != 0) throw std::runtime_error(name + ": cannot be read");
+  if (const std::string why = why_not_private(status); !why.empty())
+    throw std::runtime_error(name + " " + why);
+  std::array<char, kFileBytes + 1> bytes{};
+  const ssize_t size = read(file.descriptor(), bytes.data(), bytes.size());
+  const std::string_view text(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+  const std::string_view token = text.substr(0, kSecretDigits);
+  const std::string_view cookie =
+      text.size() == kFileBytes ? text.substr(kSecretDigits + 1, kSecretDigits) : "";
+  if (!is_secret(token) || !is_secret(cookie))
+    throw std::runtime_error(name + " does not hold a viewer's secrets: remove it, and a new one is made");
+  return {std::string(token), std::string(cookie)};
+}
+
 }  // namespace
 
 ViewDoor::ViewDoor(Secrets secrets, int port, std::string_view machine_name)
@@ -107,6 +157,20 @@ std::string random_secret() {
   std::string digits;
   for (const unsigned char byte : bytes) digits += fmt::format("{:02x}", byte);
   return digits;
+}
+
+ViewDoor::Secrets secrets_kept_in(const std::filesystem::path& file) {
+  const ViewDoor::Secrets fresh{random_secret(), random_secret()};
+  if (file.empty()) return fresh;
+  if (const OpenFile made(file, O_WRONLY | O_CREAT | O_EXCL); made.descriptor() >= 0) {
+    const std::string text = fresh.token + "\n" + fresh.cookie + "\n";
+    if (write(made.descriptor(), text.data(), text.size()) != static_cast<ssize_t>(text.size()))
+      throw std::runtime_error(file.string() + ": cannot be written");
+    return fresh;
+  }
+  const OpenFile kept(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+  if (kept.descriptor() < 0) throw std::runtime_error(file.string() + ": can neither be made nor read");
+  return secrets_of(kept, file.string());
 }
 
 }  // namespace twofold

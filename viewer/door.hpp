@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -51,5 +52,8 @@ class ViewDoor {
 [[nodiscard]] std::string_view path_of(std::string_view target);
 /// 128 bits of the system's random numbers in hexadecimal digits. Throws std::runtime_error when it has none.
 [[nodiscard]] std::string random_secret();
+/// New ones; with a file, those in it: it is made when it is not there, readable by its owner alone. Throws
+/// std::runtime_error naming the file: others may read it, it is somebody else's, or holds something else.
+[[nodiscard]] ViewDoor::Secrets secrets_kept_in(const std::filesystem::path& file);
 
 }  // namespace twofold

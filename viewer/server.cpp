@@ -346,7 +346,7 @@ class ViewServer::Impl {
         timer_(context_),
         hall_{scene,
               title,
-              {{random_secret(), random_secret()}, acceptor_.local_endpoint().port(), machine_name()},
+              {secrets_kept_in(options.secrets), acceptor_.local_endpoint().port(), machine_name()},
               connections_,
               options.request_time},
         addresses_(printed_addresses(acceptor_.local_endpoint(), hall_.door.token())),

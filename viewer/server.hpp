@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <stop_token>
@@ -15,6 +16,7 @@ struct ViewServerOptions {
   std::string bind =
       "127.0.0.1";  ///< address to listen on; others than loopback show the scene to the network
   int port = 0;     ///< 0: any that is free
+  std::filesystem::path secrets = {};                                ///< ViewerOptions::secrets
   std::chrono::milliseconds request_time = std::chrono::seconds(5);  ///< for a request to come in
 };
 

@@ -152,7 +152,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         title_(title_of(rig, options)),
         keyframe_images_(find_images(map_, options_)),
         truth_(options.truth, options.truth_t_ns, !title_.metres),
-        server_({options.bind, options.port}, scene_, title_) {
+        server_({options.bind, options.port, options.secrets}, scene_, title_) {
     if (map_ && !title_.metres) scene_.find_scales();
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet

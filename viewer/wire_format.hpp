@@ -30,8 +30,9 @@ namespace twofold {
 // Text messages are JSON: an object with one of the members hello, state, reasons, truth, events, status
 // (viewer/texts.hpp).
 //
-// The page says "ack" for each message, "images on", "images off", where hello.keyframeImages is true
-// "keyframe ID", and, where hello.control is true, "save map", "stop", "pause mapping", "resume mapping".
+// The page says "ack" for each message, "still there?" after a while without any, which is answered by an
+// empty object, "images on", "images off", where hello.keyframeImages is true "keyframe ID", and, where
+// hello.control is true, "save map", "stop", "pause mapping", "resume mapping".
 //
 // A revision counts changes of the scene. A delta from revision 0 is the whole of it, and makes the page
 // forget what it had. One that is large comes in several messages; the last has kLast, and until then `from`

@@ -48,6 +48,7 @@ ViewerOptions viewer_options(const ViewArguments& arguments, const std::string& 
   ViewerOptions options;
   options.title = title;
   options.bind = arguments.bind;
+  options.secrets = arguments.secrets;
   options.port = *arguments.port;
   options.stages = tracker_stages();
   options.efforts = words_of_efforts(engine.pacing.late);
@@ -82,6 +83,12 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
                   "Address to listen on: any but a loopback address shows camera and map to the network; "
                   "0.0.0.0: all of the machine's")
       ->capture_default_str()
+      ->needs(view);
+  command
+      .add_option("--view-secrets", arguments.secrets,
+                  "File that keeps the address's token, so that it stays the same from run to run and open "
+                  "pages come "
+                  "back; made when it is not there")
       ->needs(view);
   command
       .add_flag("--view-control", arguments.control,

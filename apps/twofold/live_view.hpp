@@ -25,10 +25,11 @@ inline constexpr int kUsualViewPort = 8420;
 struct ViewArguments {
   std::optional<int> port;  ///< nothing: no viewer
   std::string bind = "127.0.0.1";
+  std::string secrets;   ///< ViewerOptions::secrets
   bool control = false;  ///< viewers may save the map, hold it, and end the run
 };
 
-/// --view [PORT], and --view-bind and --view-control, which need it.
+/// --view [PORT], and --view-bind, --view-secrets and --view-control, which need it.
 void add_view_options(CLI::App& command, ViewArguments& arguments);
 /// For those who look at it.
 [[nodiscard]] ViewedImage viewed_image(const cv::Mat& image);

@@ -161,6 +161,9 @@ void add_view_command(CLI::App& app, int& exit_code) {
                    "Address to listen on: any but a loopback address shows it to the network; 0.0.0.0: all "
                    "of the machine's")
       ->capture_default_str();
+  command->add_option(
+      "--secrets", arguments->server.secrets,
+      "File that keeps the address's token, so that it stays the same; made when it is not there");
   command->callback([arguments, &exit_code] {
     view(*arguments);
     exit_code = kOk;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -36,7 +37,11 @@ struct ViewerOptions {
   /// Address to listen on. Any but a loopback address shows camera and map to the network, unencrypted: from
   /// another machine, `ssh -L 8420:localhost:8420 ROBOT` is the better way.
   std::string bind = "127.0.0.1";
-  int port = 8420;                        ///< 0: any that is free
+  int port = 8420;  ///< 0: any that is free
+  /// Keeps what lets people in, so that the address stays the same when the program is started anew, and open
+  /// pages come back by themselves: made, for its owner alone, when it is not there. A file that others may
+  /// read is refused. Empty: a new address each time.
+  std::filesystem::path secrets = {};
   std::vector<std::string> stages = {};   ///< names of what `tell` is given times of, at most 8
   std::vector<std::string> efforts = {};  ///< words of PoseEstimate::effort, from 0 on; may be none
   double frame_period = 0;                ///< the budget of a frame [s]; 0: as the frames' times say

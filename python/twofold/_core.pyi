@@ -439,7 +439,13 @@ class Slam:
     def errors(self) -> list[str]: ...
     def finish(self) -> Summary: ...
     def view(
-        self, *, title: str = ..., port: int = ..., bind: str = ..., truth: Trajectory | None = None
+        self,
+        *,
+        title: str = ...,
+        port: int = ...,
+        bind: str = ...,
+        secrets: str | PathLike[str] | None = None,
+        truth: Trajectory | None = None,
     ) -> str: ...
     def close_view(self) -> None: ...
     @property

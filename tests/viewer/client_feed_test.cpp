@@ -86,6 +86,19 @@ TEST_F(ClientFeedTest, NonsenseIsRefused) {
   EXPECT_TRUE(feed.wants_images());
 }
 
+TEST_F(ClientFeedTest, WhoAsksIsAnsweredThoughThereIsNothingNew) {
+  ClientFeed feed(scene_, title_);
+  drain(feed);
+  EXPECT_FALSE(feed.next(sight_));
+  EXPECT_TRUE(feed.take("still there?"));
+  const auto answer = feed.next(sight_);
+  ASSERT_TRUE(answer);
+  EXPECT_TRUE(answer->text);
+  EXPECT_EQ(*answer->bytes, "{}");
+  EXPECT_TRUE(feed.take("ack"));
+  EXPECT_FALSE(feed.next(sight_)) << "once";
+}
+
 TEST_F(ClientFeedTest, AcksAreNotTooMuchHoweverFastTheyCome) {
   ClientFeed feed(scene_, title_);
   const ClientFeed::Time now{std::chrono::hours(1)};

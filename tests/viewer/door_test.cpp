@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <stdexcept>
+
+#include "tests/io/scratch_folder.hpp"
+
 namespace twofold {
 namespace {
 
@@ -28,6 +33,46 @@ TEST_F(ViewDoorTest, TokenOpensThePageAndCookieTheRest) {
   EXPECT_EQ(page("/?a=b&token=" + kSecret), Admission::kByToken);
   EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "", "other=1; " + cookie_), Admission::kByCookie);
   EXPECT_EQ(socket("http://127.0.0.1:8420", cookie_), Admission::kByCookie);
+}
+
+TEST(ViewSecrets, AreKeptInAFileOfTheOwnersAlone) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "secrets";
+  const ViewDoor::Secrets first = secrets_kept_in(file);
+  EXPECT_EQ(first.token.size(), 32U);
+  EXPECT_NE(first.token, first.cookie);
+  const ViewDoor::Secrets again = secrets_kept_in(file);
+  EXPECT_EQ(again.token, first.token);
+  EXPECT_EQ(again.cookie, first.cookie);
+  EXPECT_EQ(std::filesystem::status(file).permissions() & std::filesystem::perms::mask,
+            std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+  EXPECT_NE(secrets_kept_in({}).token, secrets_kept_in({}).token) << "without a file each time others";
+}
+
+TEST(ViewSecrets, AFileThatWillNotDoIsRefused) {
+  const ScratchFolder folder;
+  const auto file = folder.path() / "secrets";
+  (void)secrets_kept_in(file);
+  const auto expect_refused = [](const std::filesystem::path& refused, const char* part) {
+    try {
+      (void)secrets_kept_in(refused);
+      ADD_FAILURE() << refused;
+    } catch (const std::runtime_error& error) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  };
+  std::filesystem::permissions(file, std::filesystem::perms::group_read, std::filesystem::perm_options::add);
+  expect_refused(file, "read by others");
+  for (const char* content : {"", "00112233445566778899aabbccddeeff\n", "secret\nsecret\n"}) {
+    folder.write("other", content);
+    std::filesystem::permissions(folder.path() / "other",
+                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+    expect_refused(folder.path() / "other", "secrets");
+  }
+  std::filesystem::create_symlink(file, folder.path() / "link");
+  expect_refused(folder.path() / "link", "neither");
+  expect_refused(folder.path(), "is no file");
+  expect_refused(folder.path() / "nowhere" / "secrets", "neither");
 }
 
 TEST_F(ViewDoorTest, WithoutTokenOrWithAnotherNobodyEnters) {

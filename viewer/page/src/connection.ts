@@ -14,15 +14,41 @@ export interface Listener {
 }
 
 const RETRY_MS = [500, 1000, 2000, 4000];
+/** A network that is gone without a word leaves a socket open for ever: after so long without a message the other side is asked, and given up when it does not answer. */
+const ASK_MS = 5000;
+const ANSWER_MS = 10000;
 
 export class Connection {
   private socket: WebSocket | null = null;
   private tries = 0;
   private ended = false;
   private wantsImages = false;
+  private heard = 0;  // when something came from the other side, or it was called
+  private asked: number | null = null;  // when, since then
 
   constructor(private readonly listener: Listener) {
     this.open();
+    setInterval(() => this.watch(), 1000);
+  }
+
+  /** Counted from the question, not from the last message: a page in the background has its timers a minute apart. */
+  private watch(): void {
+    const socket = this.socket;
+    if (!socket || socket.readyState >= WebSocket.CLOSING) return;
+    const now = performance.now();
+    if (this.asked !== null && now - this.asked > ANSWER_MS) {
+      socket.onopen = socket.onmessage = socket.onclose = null;
+      socket.close();
+      this.retry();
+    } else if (this.asked === null && now - this.heard > ASK_MS) {
+      this.asked = now;
+      this.send('still there?');  // or it is not open yet
+    }
+  }
+
+  private hear(): void {
+    this.heard = performance.now();
+    this.asked = null;
   }
 
   setImages(on: boolean): void {
@@ -46,13 +72,16 @@ export class Connection {
     const socket = new WebSocket(`ws://${location.host}/live`);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
+    this.hear();
     socket.onopen = () => {
+      this.hear();
       this.tries = 0;
       this.ended = false;
       if (this.wantsImages) this.send('images on');
       this.listener.link('open', '');
     };
     socket.onmessage = (event) => {
+      this.hear();
       try {
         if (typeof event.data === 'string') this.takeText(JSON.parse(event.data) as Text);
         else this.listener.binary(decode(event.data as ArrayBuffer));
@@ -90,6 +119,6 @@ export class Connection {
       const answer = await fetch('/live', {cache: 'no-store', signal: AbortSignal.timeout(4000)});
       why = answer.ok ? '' : (await answer.text()).trim();
     } catch { /* nobody there */ }
-    if (why && this.socket === socket && socket?.readyState === WebSocket.CLOSED) this.listener.link('broken', why);
+    if (why && this.socket === socket && socket && socket.readyState >= WebSocket.CLOSING) this.listener.link('broken', why);
   }
 }

@@ -235,7 +235,7 @@ class Page {
     if (newest.effort === 0) return set('tracked', 'good');
     const efforts = this.model.hello?.efforts ?? [];
     const saved = efforts.slice(1, newest.effort + 1);
-    set(`tracked, saving work: ${efforts[newest.effort] ?? `effort level ${newest.effort}`}`, 'middling');
+    set(`tracked, saving work (${newest.effort} of ${Math.max(newest.effort, efforts.length - 1)})`, 'middling');
     pill.title = `effort level ${newest.effort} of ${Math.max(newest.effort, efforts.length - 1)}, because poses came late: ${saved.join('; ')}`;
   }
 
@@ -267,6 +267,7 @@ class Page {
     lines.push(troubleLine('lost', lost, 'frames without a pose; beside their number, why most of them have none'));
     const dropped = newest?.framesDropped ?? this.model.path.reduce((sum, frame) => sum + (frame.state === State.dropped ? 1 : 0), 0);
     lines.push(droppedLine(dropped, newest?.framesLost ?? null));
+    if (newest && newest.effort > 0) lines.push({name: 'saves work', value: hello?.efforts[newest.effort] ?? `effort level ${newest.effort}`, why: 'what the tracker leaves out last, because poses came late', bad: true});
     if (newest) lines.push({name: 'points found', value: `${(100 * newest.trackedShare).toFixed(0)} %`, why: 'of the points of the map that were searched in the newest frame', minor: true});
     $('engine').replaceChildren(...lines.map((line) => {
       const item = make('div', '', make('dt', line.name), make('dd', line.value));
@@ -287,7 +288,11 @@ class Page {
     const name = `behind the ${hello.pacedBy}`;
     if (silence) return {name, value: `no frame for ${silence.toFixed(0)} s`, why: 'no pose has come for that long', bad: true};
     const frames = period > 0 ? `, ${(newest.latencyMs / period).toFixed(1)} frames` : '';
-    return {name, value: took + frames, why: 'from the exposure of the newest frame to its pose; above one frame it is late', bad: period > 0 && newest.latencyMs > period};
+    const late = period > 0 && newest.latencyMs > period;
+    // None waits beside it: the tracker was there before the frame was.
+    const work = newest.stageMs.reduce((sum, ms) => sum + ms, 0);
+    const slow = late && newest.framesWaiting === 0 && newest.latencyMs > 2 * work ? ': frames come late' : '';
+    return {name, value: took + frames + slow, why: 'from the exposure of the newest frame to its pose; above one frame it is late. Frames that come late are slow to be read, decoded or rendered', bad: late};
   }
 
   private makePanels(): void {
@@ -306,7 +311,7 @@ class Page {
     $('colouring').replaceChildren(...COLOURINGS.map((name) => new Option(name === 'observers' ? 'times seen' : name, name)));
     $('keys').replaceChildren(make('table', '', ...KEYS.map(([key, what]) => make('tr', '', make('td', '', make('kbd', key)), make('td', what)))));
     $('bar-colours').style.background = colourBar();
-    const windows = make('small', 'window', ...['inner', 'outer', 'none'].map((name) => {
+    const windows = make('small', 'window', ...['inner', 'outer', 'neither'].map((name) => {
       const word = make('b', name);
       word.className = name;
       return word;

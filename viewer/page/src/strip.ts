@@ -68,7 +68,7 @@ export class Strip {
       cursor: {show: false},
       scales: {x: {time: false}, y: {range: () => [0, this.top]}},
       axes: [
-        {stroke: text, grid, ticks: {show: false}, size: 22, font: '10px system-ui', gap: 2},
+        {stroke: text, grid, ticks: {show: false}, size: 22, font: '10px system-ui', gap: 2, values: (_, frames) => frames.map((frame, n) => (n === 1 ? `frame ${frame}` : `${frame}`))},
         {stroke: text, grid, ticks: {show: false}, size: 44, font: '10px system-ui', gap: 2, values: (_, ms) => ms.map((x) => `${x} ms`)},
       ],
       series: [

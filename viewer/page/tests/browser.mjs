@@ -74,6 +74,7 @@ async function liveRun() {
   await page.waitForTimeout(1500);
   await page.screenshot({path: join(out, 'live.png')});
   await cutNetwork(page, network);
+  await hangNetwork(page, network);
   await page.reload();
   await until('all of it after a reload', async () => (await report(page)).keyframes >= 15);
   done('reloaded');
@@ -155,6 +156,17 @@ async function cutNetwork(page, network) {
   done('network cut for ten seconds and mended');
 }
 
+/** A page that is told nothing finds it out itself. */
+async function hangNetwork(page, network) {
+  const before = await report(page);
+  network.hang();
+  await until('the page gives the silent connection up and comes back', async () => {
+    const now = await report(page);
+    return now.link === 'open' && now.newest > before.newest + 60 && now.path > before.path;
+  });
+  done('network hung without a word, and noticed');
+}
+
 /** Saves the map, holds it, lets go of it, ends the run. */
 async function command(page, run) {
   await page.click('#save-map');
@@ -226,7 +238,7 @@ const difference = (page, pictures) => page.evaluate(async (pictures) => {
 }, pictures);
 
 async function finishedRun(live) {
-  const view = new Program(['view', join(out, 'run'), '--port', '0']);
+  const view = new Program(['view', join(out, 'run'), '--port', '0', '--secrets', join(out, 'secrets')]);
   const address = await view.address();
   const page = await openPage(browser, address);
   await until('the path', async () => (await report(page)).path >= live.path - 2);
@@ -255,8 +267,14 @@ async function finishedRun(live) {
   await view.stop('SIGKILL');
   await says(page, '#message', /lost|reached/);
   done('it is said that the program was killed');
+  const {port} = new URL(address);
+  const again = new Program(['view', join(out, 'run'), '--port', port, '--secrets', join(out, 'secrets')]);
+  assert.equal(await again.address(), address, 'the address stays the same');
+  await until('the page comes back to the program that was started anew', async () => (await report(page)).link === 'open');
+  done('started anew: the page came back');
+  await again.stop();
   await page.context().close();
-  return new URL(address).port;
+  return port;
 }
 
 /** Round a cloister, back to where it began: event and edges of the loop, in their colours. */

@@ -68,6 +68,13 @@ export class Network {
       resolve();
     }));
   }
+  /** Without a word: connections stay open, and nothing comes through any more. New ones are served. */
+  hang() {
+    for (const socket of this.sockets) {
+      socket.unpipe();
+      socket.pause();
+    }
+  }
   cut() {
     const closed = new Promise((resolve) => this.server.close(resolve));
     for (const socket of this.sockets) socket.destroy();
