@@ -49,8 +49,8 @@ struct BatchProjection {
     y = R(1, 0) * b.x + R(1, 1) * b.y + R(1, 2) * b.z + t.y();
     z = R(2, 0) * b.x + R(2, 1) * b.y + R(2, 2) * b.z + t.z();
     for (int lane = 0; lane < kLanes; ++lane) {
-      front[lane] = z[lane] > kMinDepth ? 1.0 : 0.0;
-      z[lane] = z[lane] > kMinDepth ? z[lane] : 1.0;
+      front[lane] = z[lane] > kSolverMinDepth ? 1.0 : 0.0;
+      z[lane] = z[lane] > kSolverMinDepth ? z[lane] : 1.0;
     }
     inv_z = z.inverse();
     eu = m.fx * x * inv_z + (m.cx - b.u);

@@ -11,7 +11,7 @@ namespace twofold {
 /// Solvers take a point nearer to the image plane than this for one behind the camera [m]. Far above
 /// rounding, but far below in_front_of_camera, so that a step may bring any point that was looked for
 /// somewhat nearer.
-inline constexpr double kMinDepth = 1e-6;
+inline constexpr double kSolverMinDepth = 1e-6;
 
 /// Smallest inverse depth the solvers let a point take [1/m]: points at infinity stay representable and
 /// never slip through it to behind the camera.
@@ -47,7 +47,7 @@ struct ObservationModel {
   /// Whitened squared error; infinity behind the camera (or for a NaN). z.z() may be NaN where its
   /// information is 0.
   [[nodiscard]] double chi2(const Vector3& x, const Eigen::Vector3f& z, const Eigen::Vector3f& info) const {
-    if (!(x.z() > kMinDepth)) return std::numeric_limits<double>::infinity();
+    if (!(x.z() > kSolverMinDepth)) return std::numeric_limits<double>::infinity();
     const double inv_z = 1.0 / x.z();
     const double eu = fx * x.x() * inv_z + cx - z.x();
     const double ev = fy * x.y() * inv_z + cy - z.y();

@@ -51,7 +51,7 @@ void VarianceFactor::update(const Rig& rig, std::span<const MotionObservation> o
   for (const MotionObservation& o : observations) {
     if (!o.inlier) continue;
     const Vector3 x = R * o.x_ref + motion.T_c_ref.translation();
-    if (!(x.z() > kMinDepth)) continue;
+    if (!(x.z() > kSolverMinDepth)) continue;
     const std::size_t region = region_of(rig, o.z);
     gradients[region] += wrench(model.linearise(x, o.z, o.information, kernel).force, x);
     seen[region] = true;
@@ -88,7 +88,7 @@ Vector6 readout_force(const Rig& rig, std::span<const MotionObservation> observa
   for (const MotionObservation& o : observations) {
     if (!o.inlier) continue;
     const Vector3 x = R * o.x_ref + motion.T_c_ref.translation();
-    if (!(x.z() > kMinDepth)) continue;
+    if (!(x.z() > kSolverMinDepth)) continue;
     const double row = (o.z.y() + 0.5) / rig.camera.height - 0.5;
     const Vector3 moved = row * (velocity.head<3>() + velocity.tail<3>().cross(x));
     sum += wrench(model.linearise(x, o.z, o.information, kernel).apply(moved), x);

@@ -102,7 +102,7 @@ void WindowLayout::collect_group(const WindowProblem& problem, int anchor, std::
         depth_shift.push_back(
             o.pose == anchor ? 0 : problem.poses[o.pose].T_k_w.translation().z() - row.dot(t_a_w));
       }
-      if (!(depth_row[slot].dot(y) + depth_shift[slot] > 2 * kMinDepth)) continue;
+      if (!(depth_row[slot].dot(y) + depth_shift[slot] > 2 * kSolverMinDepth)) continue;
       // Only a measurement that counts couples: a pose all of whose points are behind it has no place in the
       // system.
       const bool both_fixed = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;

@@ -11,13 +11,12 @@ namespace twofold {
 // q.
 std::optional<InverseDepthProjection> project_inverse_depth(const Rig& rig, const SE3& T_c_a,
                                                             const Vector3& psi) {
-  constexpr double kMinDepth = 1e-3;
   const double q = psi.z();
   const Vector3 ray_a(psi.x(), psi.y(), 1);
   const Matrix3 R = T_c_a.rotation();
   const Vector3& t = T_c_a.translation();
   const Vector3 h = R * ray_a + q * t;
-  if (!(h.z() > kMinDepth * std::max(q, 1.0))) return std::nullopt;
+  if (!(h.z() > kNearestDepth * std::max(q, 1.0))) return std::nullopt;
   const double fx = rig.camera.fx, fy = rig.camera.fy, b = rig.baseline, z = h.z();
   const Vector2 uv = rig.camera.project(h);
   InverseDepthProjection result;

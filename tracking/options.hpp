@@ -27,7 +27,7 @@ struct TrackerOptions {
 
   int wanted_matches = 180;           ///< stop searching once so many points were found in a frame
   int max_searches = 320;             ///< upper bound of points searched in a frame
-  int neighbour_keyframes = 20;       ///< N1 is cut off after the strongest so many
+  int neighbour_keyframes = 20;       ///< the reference keyframe's: so many, those that share most points
   double border_px = 8;               ///< points predicted closer to the image's edge are not searched, >= 0
   double min_view_cosine = 0.7;       ///< of the angle between a point's first ray and today's, in [-1, 1]
   int min_inliers = 18;               ///< fewer: lost

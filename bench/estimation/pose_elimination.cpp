@@ -42,7 +42,7 @@ PoseElimination::Values PoseElimination::start(const WindowProblem& problem) {
     const Vector3 p_w = T_w_frame_[k] * from_inverse_depth(point.psi);
     for (int n = 0; n < point.observation_count; ++n) {
       const auto& o = problem.observations[point.first_observation + n];
-      if (!((problem.poses[o.pose].T_k_w * p_w).z() > 2 * kMinDepth)) continue;
+      if (!((problem.poses[o.pose].T_k_w * p_w).z() > 2 * kSolverMinDepth)) continue;
       by_pose[o.pose].push_back({static_cast<int>(k), o.z, o.information});
       seen_[k] = 1;
     }
@@ -210,7 +210,7 @@ void PoseElimination::write_back(const Values& values, WindowProblem& problem) c
     if (seen_[k] == 0) continue;
     auto& point = problem.points[k];
     const Vector3 y = problem.poses[point.anchor].T_k_w * (T_w_frame_[k] * from_inverse_depth(values.psi[k]));
-    if (y.z() > kMinDepth) point.psi = to_inverse_depth(y);
+    if (y.z() > kSolverMinDepth) point.psi = to_inverse_depth(y);
   }
 }
 
