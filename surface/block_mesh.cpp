@@ -95,10 +95,8 @@ void BlockMesher::fill_row(int y, int z, std::size_t to) {
   copy(blocks[0], kBlockEdge - 1, 0);
   Lane distance{}, weight{};
   if (blocks[1] != nullptr) {
-    distance =
-        volume_.units().distance * __builtin_convertvector(load<LaneShort>(&blocks[1]->distance[row]), Lane);
-    weight = volume_.units().weight *
-             __builtin_convertvector(load<LaneUnsignedShort>(&blocks[1]->weight[row]), Lane);
+    distance = volume_.units().distance * real(load<LaneShort>(&blocks[1]->distance[row]));
+    weight = volume_.units().weight * real(load<LaneUnsignedShort>(&blocks[1]->weight[row]));
   }
   std::memcpy(&distance_[to + 1], &distance, sizeof(distance));
   std::memcpy(&weight_[to + 1], &weight, sizeof(weight));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "geometry/check.hpp"
+#include "surface/lanes.hpp"
 
 namespace twofold {
 namespace {
@@ -17,6 +19,11 @@ namespace {
 // Rows are worked on whole, in buffers that stay in the cache: images between the steps would cost more than
 // the arithmetic.
 using Row = Eigen::ArrayXf;
+using ConstRow = Eigen::Map<const Row>;
+
+ConstRow row_of(const cv::Mat& image, int y) {
+  return {image.ptr<float>(y), image.cols};
+}
 
 constexpr float kJumpRatio = 0.05f;  // of the depth, across two pixels; a slope of 75 degrees stays below it
 constexpr float kNone = 1e9f;
@@ -24,11 +31,7 @@ constexpr float kNone = 1e9f;
 /// [m]; kNone where there is no reading.
 cv::Mat readings(const Rig& rig, const cv::Mat& depth) {
   cv::Mat metres;
-  if (depth.type() == CV_16UC1) {
-    depth.convertTo(metres, CV_32F, rig.depth_unit);
-  } else {
-    metres = depth.clone();
-  }
+  depth.convertTo(metres, CV_32F, depth.type() == CV_16UC1 ? rig.depth_unit : 1.0);
   const auto low = static_cast<float>(rig.depth_min);
   const auto high = static_cast<float>(rig.depth_max);
   for (int y = 0; y < metres.rows; ++y) {
@@ -49,15 +52,13 @@ class Neighbourhood {
     farthest_.fill(0);
   }
   void at_row(int y) {
-    const auto* above = raw_.ptr<float>(std::max(y - 1, 0));
-    const auto* here = raw_.ptr<float>(y);
-    const auto* below = raw_.ptr<float>(std::min(y + 1, raw_.rows - 1));
-    const auto seen = [](float z) { return z < kNone ? z : 0.0f; };
-    for (int x = 0; x < raw_.cols; ++x) {
-      low_[x + 1] = std::min(above[x], std::min(here[x], below[x]));
-      high_[x + 1] = std::max(above[x], std::max(here[x], below[x]));
-      farthest_[x + 1] = std::max(seen(above[x]), std::max(seen(here[x]), seen(below[x])));
-    }
+    const ConstRow above = row_of(raw_, std::max(y - 1, 0));
+    const ConstRow here = row_of(raw_, y);
+    const ConstRow below = row_of(raw_, std::min(y + 1, raw_.rows - 1));
+    const auto seen = [](const ConstRow& z) { return z.min(kNone - z); };  // 0 instead of kNone
+    low_.segment(1, raw_.cols) = above.min(here).min(below);
+    high_.segment(1, raw_.cols) = above.max(here).max(below);
+    farthest_.segment(1, raw_.cols) = seen(above).max(seen(here)).max(seen(below));
   }
   /// Without a reading: kNone.
   [[nodiscard]] float nearest(int x) const { return std::min(low_[x], std::min(low_[x + 1], low_[x + 2])); }
@@ -74,19 +75,18 @@ class Neighbourhood {
   Row low_, high_, farthest_;  // of a column, which stands one to the right
 };
 
-/// Leaves readings beside a jump out of view.depth, and gives the pixels their neighbourhood.
-void find_jumps(const cv::Mat& raw, DepthView& view) {
+/// Leaves readings beside a jump out of `depth`. nearest: as PixelReading has it.
+void find_jumps(const cv::Mat& raw, cv::Mat& depth, cv::Mat& nearest) {
   Neighbourhood around(raw);
   for (int y = 0; y < raw.rows; ++y) {
     around.at_row(y);
     const auto* z = raw.ptr<float>(y);
-    auto* depth = view.depth.ptr<float>(y);
-    auto* pixel = view.pixels.ptr<PixelReading>(y);
+    auto* kept = depth.ptr<float>(y);
+    auto* near = nearest.ptr<float>(y);
     for (int x = 0; x < raw.cols; ++x) {
       const float low = around.nearest(x);
-      depth[x] = ((z[x] < kNone) & (around.farthest(x) - low <= kJumpRatio * low)) ? z[x] : 0.0f;
-      pixel[x].depth = depth[x];
-      pixel[x].nearest = around.has_hole(x) ? 0.0f : low;
+      kept[x] = ((z[x] < kNone) & (around.farthest(x) - low <= kJumpRatio * low)) ? z[x] : 0.0f;
+      near[x] = around.has_hole(x) ? 0.0f : low;
     }
   }
 }
@@ -130,12 +130,10 @@ class SmoothedInverse {
   static std::size_t slot(int y) { return static_cast<std::size_t>(y) % 5; }
   /// Once a row, not once for each of the five squares that it lies in.
   void invert(int y) {
-    const auto* z = depth_.ptr<float>(y);
+    const ConstRow z = row_of(depth_, y);
     Inverse& row = inverses_[slot(y)];
-    for (int x = 0; x < depth_.cols; ++x) {
-      row.seen[x] = z[x] > 0 ? 1.0f : 0.0f;
-      row.value[x] = row.seen[x] / std::max(z[x], 1e-3f);
-    }
+    row.seen = (z * 1e6f).min(1.0f);  // no reading is so near
+    row.value = row.seen / z.max(1e-3f);
   }
 
   const cv::Mat& depth_;
@@ -147,68 +145,156 @@ class SmoothedInverse {
 /// Inverse depth of a plane is linear in the image: w = n . (x, y, 1) on rays (x, y, 1), where n is the
 /// plane's normal over its distance. So the cosine is w over the lengths of n and of the ray. The slope is
 /// taken across seven pixels of a smoothed image, because that of two neighbours is mostly noise.
-void find_slopes(DepthView& view) {
-  constexpr int kHalf = 2;
-  const PinholeCamera& camera = view.camera;
-  const int width = view.depth.cols, height = view.depth.rows, inner = std::max(0, width - 2 * kHalf);
-  const auto fx = static_cast<float>(camera.fx), fy = static_cast<float>(camera.fy);
-  const Row rx =
-      (Row::LinSpaced(width, 0, static_cast<float>(width - 1)) - static_cast<float>(camera.cx)) / fx;
-  const Row rx_inner = rx.segment(inner > 0 ? kHalf : 0, inner);
-  SmoothedInverse smooth(view.depth);
-  Row facing(width), nx(inner), ny(inner), nz(inner), ray(width);
-  for (int y = 0; y < std::min(kHalf, height); ++y) smooth.add_row(y);
-  for (int y = 0; y < height; ++y) {
-    if (y + kHalf < height) smooth.add_row(y + kHalf);
-    const float ry = (static_cast<float>(y) - static_cast<float>(camera.cy)) / fy;
-    ray = (rx.square() + (ry * ry + 1)).sqrt();
-    facing.setOnes();
-    if (y >= kHalf && y + kHalf < height && inner > 0) {
-      const Row& w = smooth.row(y);
-      nx = fx / (2 * kHalf) * (w.tail(inner) - w.head(inner));
-      ny = fy / (2 * kHalf) *
-           (smooth.row(y + kHalf).segment(kHalf, inner) - smooth.row(y - kHalf).segment(kHalf, inner));
-      nz = w.segment(kHalf, inner) - nx * rx_inner - ny * ry;
-      nx = (nx.square() + ny.square() + nz.square()).max(1e-12f).sqrt() * ray.segment(kHalf, inner);
-      facing.segment(kHalf, inner) = (w.segment(kHalf, inner) / nx).min(1.0f).max(0.1f);
-    }
-    ray *= facing;
-    facing = 255 * facing + 0.5f;
-    auto* pixel = view.pixels.ptr<PixelReading>(y);
-    for (int x = 0; x < width; ++x) {
-      pixel[x].slant = ray[x];
-      pixel[x].colour_and_facing = static_cast<std::uint32_t>(static_cast<std::int32_t>(facing[x])) << 24;
-    }
+class Slopes {
+ public:
+  explicit Slopes(const DepthView& view)
+      : fx_(static_cast<float>(view.camera.fx)),
+        fy_(static_cast<float>(view.camera.fy)),
+        cy_(static_cast<float>(view.camera.cy)),
+        width_(view.depth.cols),
+        height_(view.depth.rows),
+        inner_(std::max(0, width_ - 2 * kHalf)),
+        rx_((Row::LinSpaced(width_, 0, static_cast<float>(width_ - 1)) - static_cast<float>(view.camera.cx)) /
+            fx_),
+        smooth_(view.depth),
+        facing_(width_),
+        nx_(inner_),
+        ny_(inner_),
+        nz_(inner_),
+        ray_(width_) {
+    for (int y = 0; y < std::min(kHalf, height_); ++y) smooth_.add_row(y);
   }
+  /// Rows are gone through from the first one on.
+  void at_row(int y) {
+    if (y + kHalf < height_) smooth_.add_row(y + kHalf);
+    const float ry = (static_cast<float>(y) - cy_) / fy_;
+    ray_ = (rx_.square() + (ry * ry + 1)).sqrt();
+    facing_.setOnes();
+    if (y >= kHalf && y + kHalf < height_ && inner_ > 0) {
+      const Row& w = smooth_.row(y);
+      nx_ = fx_ / (2 * kHalf) * (w.tail(inner_) - w.head(inner_));
+      ny_ = fy_ / (2 * kHalf) *
+            (smooth_.row(y + kHalf).segment(kHalf, inner_) - smooth_.row(y - kHalf).segment(kHalf, inner_));
+      nz_ = w.segment(kHalf, inner_) - nx_ * rx_.segment(kHalf, inner_) - ny_ * ry;
+      nx_ = (nx_.square() + ny_.square() + nz_.square()).max(1e-12f).sqrt() * ray_.segment(kHalf, inner_);
+      facing_.segment(kHalf, inner_) = (w.segment(kHalf, inner_) / nx_).min(1.0f).max(0.1f);
+    }
+    ray_ *= facing_;
+    facing_ = 255 * facing_ + 0.5f;
+  }
+  /// As PixelReading::slant.
+  [[nodiscard]] const Row& slant() const { return ray_; }
+  /// In 1/255, to be cut off.
+  [[nodiscard]] const Row& facing() const { return facing_; }
+
+ private:
+  static constexpr int kHalf = 2;
+  float fx_, fy_, cy_;
+  int width_, height_, inner_;
+  Row rx_;
+  SmoothedInverse smooth_;
+  Row facing_, nx_, ny_, nz_, ray_;
+};
+
+/// Red, green and blue of a row in the lower three bytes; 0 without an image.
+void read_colours(const cv::Mat& image, int y, std::vector<std::uint32_t>& colours) {
+  if (image.empty()) return;
+  const auto* colour = image.ptr<std::uint8_t>(y);
+  const std::size_t width = colours.size();
+  if (image.channels() == 1) {
+    for (std::size_t x = 0; x < width; ++x) colours[x] = colour[x] * 0x010101U;
+    return;
+  }
+  using Bytes = std::uint8_t __attribute__((vector_size(16)));
+  std::size_t x = 0;
+  for (; 3 * x + sizeof(Bytes) <= 3 * width; x += 4) {  // four pixels, and the beginning of the fifth
+    const auto four = load<Bytes>(colour + 3 * x);
+    const Bytes turned =
+        __builtin_shufflevector(four, Bytes{}, 2, 1, 0, 16, 5, 4, 3, 16, 8, 7, 6, 16, 11, 10, 9, 16);
+    std::memcpy(&colours[x], &turned, sizeof(turned));
+  }
+  for (; x < width; ++x)
+    colours[x] = static_cast<std::uint32_t>(colour[3 * x + 2] | colour[3 * x + 1] << 8 | colour[3 * x] << 16);
 }
 
-void add_colours(DepthView& view) {
-  for (int y = 0; y < view.colour.rows; ++y) {
-    const auto* colour = view.colour.ptr<std::uint8_t>(y);
-    auto* pixel = view.pixels.ptr<PixelReading>(y);
-    if (view.colour.channels() == 3) {
-      for (int x = 0; x < view.colour.cols; ++x, colour += 3)
-        pixel[x].colour_and_facing |=
-            static_cast<std::uint32_t>(colour[2] | colour[1] << 8 | colour[0] << 16);
-    } else {
-      for (int x = 0; x < view.colour.cols; ++x) pixel[x].colour_and_facing |= colour[x] * 0x010101U;
-    }
-  }
+/// Eight pixels: numbers of a kind come together, and go by the pixel.
+inline void store_pixels(const Lane& depth, const Lane& nearest, const Lane& slant, const Lane& colour,
+                         PixelReading* to) {
+  const auto low = [](const Lane& a, const Lane& b) {
+    return __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
+  };
+  const auto high = [](const Lane& a, const Lane& b) {
+    return __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+  };
+  const Lane low_first = low(depth, nearest), low_last = low(slant, colour);
+  const Lane high_first = high(depth, nearest), high_last = high(slant, colour);
+  const Lane p04 = __builtin_shufflevector(low_first, low_last, 0, 1, 8, 9, 4, 5, 12, 13);
+  const Lane p15 = __builtin_shufflevector(low_first, low_last, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Lane p26 = __builtin_shufflevector(high_first, high_last, 0, 1, 8, 9, 4, 5, 12, 13);
+  const Lane p37 = __builtin_shufflevector(high_first, high_last, 2, 3, 10, 11, 6, 7, 14, 15);
+  const auto store = [to](int pixel, const Lane& two) {
+    std::memcpy(static_cast<void*>(to + pixel), &two, sizeof(two));
+  };
+  store(0, __builtin_shufflevector(p04, p15, 0, 1, 2, 3, 8, 9, 10, 11));
+  store(2, __builtin_shufflevector(p26, p37, 0, 1, 2, 3, 8, 9, 10, 11));
+  store(4, __builtin_shufflevector(p04, p15, 4, 5, 6, 7, 12, 13, 14, 15));
+  store(6, __builtin_shufflevector(p26, p37, 4, 5, 6, 7, 12, 13, 14, 15));
 }
 
-void find_tiles(DepthView& view) {
+/// Bounds of the rows of one row of tiles.
+class TileRow {
+ public:
+  explicit TileRow(int width) : farthest_(width), nearest_(width), least_slant_(width) { clear(); }
+  void add(const ConstRow& depth, const ConstRow& nearest, const Row& slant) {
+    farthest_ = farthest_.max(depth).max(nearest);
+    nearest_ = nearest_.min(nearest);
+    least_slant_ = least_slant_.min(slant);
+  }
+  void take(DepthTile* tiles) {
+    const auto width = farthest_.size();
+    for (Eigen::Index left = 0; left < width; left += kDepthTile) {
+      const Eigen::Index size = std::min<Eigen::Index>(kDepthTile, width - left);
+      *tiles++ = {farthest_.segment(left, size).maxCoeff(), nearest_.segment(left, size).minCoeff(),
+                  least_slant_.segment(left, size).minCoeff()};
+    }
+    clear();
+  }
+
+ private:
+  void clear() {
+    farthest_.setZero();
+    nearest_.fill(kNone);
+    least_slant_.fill(kNone);
+  }
+  Row farthest_, nearest_, least_slant_;  // of the pixels of a column
+};
+
+/// Pixels and tiles, from depths and what find_jumps told.
+void find_pixels(const cv::Mat& nearest, DepthView& view) {
+  const int width = view.depth.cols;
+  Slopes slopes(view);
+  TileRow tile_row(width);
+  std::vector<std::uint32_t> colours(static_cast<std::size_t>(width));
   for (int y = 0; y < view.depth.rows; ++y) {
-    auto* tiles = view.tiles.ptr<DepthTile>(y / kDepthTile);
-    const auto* pixel = view.pixels.ptr<PixelReading>(y);
-    for (int left = 0; left < view.depth.cols; left += kDepthTile) {
-      DepthTile tile = tiles[left / kDepthTile];  // a copy: the compiler keeps it in registers
-      for (int x = left; x < std::min(left + kDepthTile, view.depth.cols); ++x) {
-        tile.farthest = std::max(tile.farthest, std::max(pixel[x].depth, pixel[x].nearest));
-        tile.nearest = std::min(tile.nearest, pixel[x].nearest);
-        tile.least_slant = std::min(tile.least_slant, pixel[x].slant);
-      }
-      tiles[left / kDepthTile] = tile;
+    const ConstRow depth = row_of(view.depth, y);
+    const ConstRow near = row_of(nearest, y);
+    slopes.at_row(y);
+    read_colours(view.colour, y, colours);
+    auto* pixel = view.pixels.ptr<PixelReading>(y);
+    int x = 0;
+    for (; x + kLanes <= width; x += kLanes) {
+      const LaneIndex colour = load<LaneIndex>(&colours[static_cast<std::size_t>(x)]) |
+                               whole(load<Lane>(&slopes.facing()[x])) << 24;
+      store_pixels(load<Lane>(depth.data() + x), load<Lane>(near.data() + x), load<Lane>(&slopes.slant()[x]),
+                   reinterpret_cast<Lane>(colour), pixel + x);
     }
+    for (; x < width; ++x) {
+      const auto facing = static_cast<std::uint32_t>(slopes.facing()[x]);
+      pixel[x] = {depth[x], near[x], slopes.slant()[x], colours[static_cast<std::size_t>(x)] | facing << 24};
+    }
+    tile_row.add(depth, near, slopes.slant());
+    if ((y + 1) % kDepthTile == 0 || y + 1 == view.depth.rows)
+      tile_row.take(view.tiles.ptr<DepthTile>(y / kDepthTile));
   }
 }
 
@@ -243,11 +329,9 @@ DepthView make_depth_view(const Rig& rig, const cv::Mat& depth, const cv::Mat& c
   view.pixels.create(depth.size(), CV_32FC4);
   view.tiles.create((depth.rows + kDepthTile - 1) / kDepthTile, (depth.cols + kDepthTile - 1) / kDepthTile,
                     CV_32FC3);
-  view.tiles.setTo(cv::Scalar(0, kNone, kNone));
-  find_jumps(readings(rig, depth), view);
-  find_slopes(view);
-  add_colours(view);
-  find_tiles(view);
+  cv::Mat nearest(depth.size(), CV_32FC1);
+  find_jumps(readings(rig, depth), view.depth, nearest);
+  find_pixels(nearest, view);
   return view;
 }
 

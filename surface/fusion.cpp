@@ -49,10 +49,6 @@ inline PixelLanes read_pixels(const PixelReading* pixels, const LaneIndex& index
 struct BlockPose {
   Eigen::Vector3f first, dx, dy, dz;  ///< [px m, px m, m]
   float truncation = 0;               ///< [m] at the block's depth
-
-  [[nodiscard]] Eigen::Vector3f row(int r) const {
-    return first + static_cast<float>(r % kBlockEdge) * dy + static_cast<float>(r / kBlockEdge) * dz;
-  }
 };
 
 BlockPose pose_of(const FusionView& view, const SE3& T_c_v, const VoxelBlock& block) {
@@ -121,6 +117,31 @@ struct RowUpdate {
   LaneIndex colour;
 };
 
+/// The eight rows of samples with the same z in the block.
+struct Layer {
+  Layer(const BlockPose& pose, const BlockBounds& bounds, int number) {
+    const auto along = [&](int a) {
+      return (pose.first[a] + kCount * pose.dy[a]) + static_cast<float>(number) * pose.dz[a];
+    };
+    const Lane z_first = along(2);
+    const Lane z_last = z_first + (kLanes - 1) * pose.dx.z();
+    store(u, along(0));
+    store(v, along(1));
+    store(z, z_first);
+    store(hidden, smaller(z_first, z_last) > bounds.last);
+    store(free, larger(z_first, z_last) < bounds.first_free);
+  }
+
+  std::array<float, kLanes> u, v, z;              ///< of each row's first sample, as BlockPose has them
+  std::array<std::int32_t, kLanes> hidden, free;  ///< not 0: all of the row's samples are
+
+ private:
+  template <class Array, class Vector>
+  static void store(Array& to, const Vector& lanes) {
+    std::memcpy(to.data(), &lanes, sizeof(lanes));
+  }
+};
+
 /// What samples are compared with, in the units they are kept in.
 struct RowScale {
   RowScale(const FusionView& view, const SampleUnits& units, const BlockPose& pose)
@@ -135,15 +156,15 @@ struct RowScale {
   float truncation, behind, distance, most_weight, weight;
 };
 
-/// The row of samples from `first` on (see BlockPose). Weights are those at the samples' depths, which are
-/// the readings' but for the truncation.
+/// Row y of a layer. Weights are those at the samples' depths, which are the readings' but for the
+/// truncation.
 template <bool kWholeInImage>
 inline void measure_row(const FusionView& view, const RowScale& scale, const PixelReading* pixels,
-                        const Eigen::Vector3f& first, RowUpdate& row) {
-  const Lane z = first.z() + scale.step[2];
+                        const Layer& layer, std::size_t y, RowUpdate& row) {
+  const Lane z = layer.z[y] + scale.step[2];
   const Lane inverse = kOne / (kWholeInImage ? z : larger(z, kZero + kLeastDepth));
-  Lane u = (first.x() + scale.step[0]) * inverse;
-  Lane v = (first.y() + scale.step[1]) * inverse;
+  Lane u = (layer.u[y] + scale.step[0]) * inverse;
+  Lane v = (layer.v[y] + scale.step[1]) * inverse;
   LaneIndex seen;
   if constexpr (!kWholeInImage) {
     seen = (z > kLeastDepth) & (u >= 0) & (v >= 0) & (u < view.width) & (v < view.height);
@@ -169,40 +190,38 @@ inline void measure_row(const FusionView& view, const RowScale& scale, const Pix
   row.colour = at.colour_and_facing;
 }
 
-/// Running averages of eight samples; what was seen once does not go back to weight 0.
-inline void update_row(const Lane& distance, const Lane& weight, std::int16_t* distances,
-                       std::uint16_t* weights) {
-  const Lane sum = __builtin_convertvector(load<LaneUnsignedShort>(weights), Lane) + weight;
-  Lane average = __builtin_convertvector(load<LaneShort>(distances), Lane);
-  average += (distance - average) * (weight / larger(sum, kZero + 1e-6f));
-  constexpr float kToPositive = 32768;  // conversion cuts off toward 0
-  const auto average_steps = __builtin_convertvector(
-      whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive), LaneShort);
-  const Lane bounded = smaller(sum + 0.5f, kZero + kMostWeightSteps);
-  const auto weight_steps =
-      __builtin_convertvector(whole(sum > 0 ? larger(bounded, kOne) : kZero), LaneUnsignedShort);
-  std::memcpy(distances, &average_steps, sizeof(average_steps));
-  std::memcpy(weights, &weight_steps, sizeof(weight_steps));
-}
-
-/// Colours of samples within two voxels of the surface; before update_row, which changes the weights.
-inline void update_colours(const RowUpdate& row, std::size_t first, VoxelBlock& block) {
-  const Lane weight = row.near ? row.weight : kZero;
-  const Lane before_steps = __builtin_convertvector(load<LaneUnsignedShort>(&block.weight[first]), Lane);
-  const Lane share = weight / larger(before_steps + weight, kZero + 1e-6f);
+/// Colours of samples within two voxels of the surface. share: of the new value in each average.
+inline void update_colours(const RowUpdate& row, const Lane& share, std::size_t first, VoxelBlock& block) {
+  const Lane near_share = row.near ? share : kZero;
   for (std::size_t c = 0; c < 3; ++c) {
     std::uint16_t* channel = &block.colour[c][first];
     const LaneIndex bits = (row.colour >> static_cast<int>(8 * c)) & 255;
-    const Lane before = __builtin_convertvector(load<LaneUnsignedShort>(channel), Lane);
-    const Lane after = before + (256 * real(bits) - before) * share;
-    const auto rounded = __builtin_convertvector(whole(after), LaneUnsignedShort);
+    const Lane before = real(load<LaneUnsignedShort>(channel));
+    const Lane after = before + (256 * real(bits) - before) * near_share;
+    const LaneUnsignedShort rounded = narrow_unsigned(whole(after));
     std::memcpy(channel, &rounded, sizeof(rounded));
   }
 }
 
-bool any_short(const LaneShort& lanes) {
-  const auto halves = reinterpret_cast<std::uint64_t __attribute__((vector_size(sizeof(LaneShort))))>(lanes);
-  return (halves[0] | halves[1]) != 0;
+/// Running averages of eight samples; what was seen once does not go back to weight 0.
+template <bool kColours>
+inline void update_row(const RowUpdate& row, std::size_t first, VoxelBlock& block) {
+  std::int16_t* distances = &block.distance[first];
+  std::uint16_t* weights = &block.weight[first];
+  const Lane sum = real(load<LaneUnsignedShort>(weights)) + row.weight;
+  const Lane share = row.weight / larger(sum, kZero + 1e-6f);
+  if constexpr (kColours) {
+    if (any(row.near)) update_colours(row, share, first, block);
+  }
+  Lane average = real(load<LaneShort>(distances));
+  average += (row.distance - average) * share;
+  constexpr float kToPositive = 32768;  // conversion cuts off toward 0
+  const LaneShort average_steps =
+      narrow(whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive));
+  const Lane bounded = smaller(sum + 0.5f, kZero + kMostWeightSteps);
+  const LaneUnsignedShort weight_steps = narrow_unsigned(whole(sum > 0 ? larger(bounded, kOne) : kZero));
+  std::memcpy(distances, &average_steps, sizeof(average_steps));
+  std::memcpy(weights, &weight_steps, sizeof(weight_steps));
 }
 
 /// Nothing but free space, known as well as it can be: carving has nothing more to do here.
@@ -216,15 +235,14 @@ bool is_all_free(const VoxelBlock& block, const FusionView& view, const SampleUn
       other |= load<LaneShort>(&block.distance[i]) <= far;
       other |= load<LaneUnsignedShort>(&block.weight[i]) <= known;
     }
-    if (any_short(other)) return false;
+    if (any(other)) return false;
   }
   return true;
 }
 
 /// Free as far as samples can tell: seeing it once more changes nothing.
 bool is_settled(const std::int16_t* distances, const std::uint16_t* weights, std::int16_t free) {
-  return !any_short((load<LaneShort>(distances) != free) |
-                    (load<LaneUnsignedShort>(weights) != kMostWeightSteps));
+  return !any((load<LaneShort>(distances) != free) | (load<LaneUnsignedShort>(weights) != kMostWeightSteps));
 }
 
 /// Blocks lie anywhere in memory: the next one is fetched while one is worked on.
@@ -233,6 +251,7 @@ inline void fetch_line(const VoxelBlock& block, int row) {
   const auto first = static_cast<std::size_t>(row) * kLanes;
   __builtin_prefetch(&block.distance[first], 1);
   __builtin_prefetch(&block.weight[first], 1);
+  for (const auto& channel : block.colour) __builtin_prefetch(&channel[first], 1);
 }
 
 /// One depth image, and what it says of every block.
@@ -257,27 +276,29 @@ struct BlockUpdate {
                    const VoxelBlock& next) const {
     const RowScale scale(view, units, pose);
     const auto* pixels = images.pixels.ptr<PixelReading>(0);
-    const float depth_of_row = (kLanes - 1) * pose.dx.z();
     const auto free = static_cast<std::int16_t>(std::lrint(scale.truncation * scale.distance));
     RowUpdate row;
+    RowUpdate free_row{
+        kZero + scale.truncation * scale.distance, kZero + kFreeShare * kMostWeightSteps, {}, {}};
     bool any_row = false;
-    for (int r = 0; r < kBlockEdge * kBlockEdge; ++r) {
-      if (r % kRowsOfLine == 0) fetch_line(next, r);
-      const Eigen::Vector3f at = pose.row(r);
-      if (std::min(at.z(), at.z() + depth_of_row) > bounds.last) continue;
-      const auto first = static_cast<std::size_t>(r) * kLanes;
-      if (std::max(at.z(), at.z() + depth_of_row) < bounds.first_free) {
-        if (is_settled(&block.distance[first], &block.weight[first], free)) continue;
-        update_row(kZero + scale.truncation * scale.distance, kZero + kFreeShare * kMostWeightSteps,
-                   &block.distance[first], &block.weight[first]);
+    for (int z = 0; z < kBlockEdge; ++z) {
+      const Layer layer(pose, bounds, z);
+      for (std::size_t y = 0; y < kBlockEdge; ++y) {
+        const int r = kBlockEdge * z + static_cast<int>(y);
+        if (r % kRowsOfLine == 0) fetch_line(next, r);
+        if (layer.hidden[y] != 0) continue;
+        const auto first = static_cast<std::size_t>(r) * kLanes;
+        if (layer.free[y] != 0) {
+          if (is_settled(&block.distance[first], &block.weight[first], free)) continue;
+          update_row<false>(free_row, first, block);
+          any_row = true;
+          continue;
+        }
+        measure_row<kWholeInImage>(view, scale, pixels, layer, y, row);
+        if (!any(row.weight > 0)) continue;
+        update_row<true>(row, first, block);
         any_row = true;
-        continue;
       }
-      measure_row<kWholeInImage>(view, scale, pixels, at, row);
-      if (!any(row.weight > 0)) continue;
-      if (any(row.near)) update_colours(row, first, block);
-      update_row(row.distance, row.weight, &block.distance[first], &block.weight[first]);
-      any_row = true;
     }
     return any_row;
   }

@@ -3,6 +3,10 @@
 #include <cstdint>
 #include <cstring>
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 #include "surface/voxel_block.hpp"
 
 namespace twofold {
@@ -20,17 +24,82 @@ constexpr Lane kCount{0, 1, 2, 3, 4, 5, 6, 7};
 constexpr Lane kZero{};
 constexpr Lane kOne = kZero + 1;
 
+// What follows says the same twice, since GCC 12 takes two to four instructions for what AVX2 has one for.
+
 inline Lane larger(const Lane& a, const Lane& b) {
+#ifdef __AVX2__
+  return _mm256_max_ps(a, b);
+#else
   return a > b ? a : b;
+#endif
 }
 inline Lane smaller(const Lane& a, const Lane& b) {
+#ifdef __AVX2__
+  return _mm256_min_ps(a, b);
+#else
   return a < b ? a : b;
+#endif
 }
+inline LaneIndex wide(const LaneShort& a) {
+#ifdef __AVX2__
+  return reinterpret_cast<LaneIndex>(_mm256_cvtepi16_epi32(reinterpret_cast<__m128i>(a)));
+#else
+  return __builtin_convertvector(a, LaneIndex);
+#endif
+}
+inline LaneIndex wide(const LaneUnsignedShort& a) {
+#ifdef __AVX2__
+  return reinterpret_cast<LaneIndex>(_mm256_cvtepu16_epi32(reinterpret_cast<__m128i>(a)));
+#else
+  return __builtin_convertvector(a, LaneIndex);
+#endif
+}
+/// Of numbers that fit.
+inline LaneShort narrow(const LaneIndex& a) {
+#ifdef __AVX2__
+  const auto all = reinterpret_cast<__m256i>(a);
+  return reinterpret_cast<LaneShort>(
+      _mm_packs_epi32(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1)));
+#else
+  return __builtin_convertvector(a, LaneShort);
+#endif
+}
+/// Likewise.
+inline LaneUnsignedShort narrow_unsigned(const LaneIndex& a) {
+#ifdef __AVX2__
+  const auto all = reinterpret_cast<__m256i>(a);
+  return reinterpret_cast<LaneUnsignedShort>(
+      _mm_packus_epi32(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1)));
+#else
+  return __builtin_convertvector(a, LaneUnsignedShort);
+#endif
+}
+inline bool any(const LaneIndex& lanes) {
+#ifdef __AVX2__
+  const auto all = reinterpret_cast<__m256i>(lanes);
+  return _mm256_testz_si256(all, all) == 0;
+#else
+  using Halves = std::uint64_t __attribute__((vector_size(sizeof(LaneIndex))));
+  const auto h = reinterpret_cast<Halves>(lanes);
+  return ((h[0] | h[1]) | (h[2] | h[3])) != 0;
+#endif
+}
+inline bool any(const LaneShort& lanes) {
+  const auto halves = reinterpret_cast<std::uint64_t __attribute__((vector_size(sizeof(LaneShort))))>(lanes);
+  return (halves[0] | halves[1]) != 0;
+}
+
 inline LaneIndex whole(const Lane& a) {
   return __builtin_convertvector(a, LaneIndex);
 }
 inline Lane real(const LaneIndex& a) {
   return __builtin_convertvector(a, Lane);
+}
+inline Lane real(const LaneShort& a) {
+  return real(wide(a));
+}
+inline Lane real(const LaneUnsignedShort& a) {
+  return real(wide(a));
 }
 
 template <class Vector>
@@ -38,12 +107,6 @@ inline Vector load(const void* from) {
   Vector lanes;
   std::memcpy(&lanes, from, sizeof(Vector));
   return lanes;
-}
-
-inline bool any(const LaneIndex& lanes) {
-  using Halves = std::uint64_t __attribute__((vector_size(sizeof(LaneIndex))));
-  const auto h = reinterpret_cast<Halves>(lanes);
-  return ((h[0] | h[1]) | (h[2] | h[3])) != 0;
 }
 
 inline float least(const Lane& lanes) {

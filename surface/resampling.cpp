@@ -125,9 +125,8 @@ void Resampler::fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, 
   for (std::size_t n = 0; n < 3; ++n, to += kBlockEdge) {
     LaneIndex samples{};
     if (blocks[n] != nullptr) {
-      const auto weight =
-          __builtin_convertvector(load<LaneUnsignedShort>(&blocks[n]->weight[row]), LaneIndex);
-      const auto distance = __builtin_convertvector(load<LaneShort>(&blocks[n]->distance[row]), LaneIndex);
+      const LaneIndex weight = wide(load<LaneUnsignedShort>(&blocks[n]->weight[row]));
+      const LaneIndex distance = wide(load<LaneShort>(&blocks[n]->distance[row]));
       samples = weight << 16 | (distance & 0xffff);
     }
     std::memcpy(to, &samples, sizeof(samples));
@@ -141,15 +140,14 @@ bool Resampler::add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock
   const LaneIndex seen = found.weight > 0;
   if (!any(seen)) return false;
   const Lane weight = real(found.weight);
-  const Lane before = __builtin_convertvector(load<LaneShort>(&block.distance[first]), Lane);
-  const Lane before_weight = __builtin_convertvector(load<LaneUnsignedShort>(&block.weight[first]), Lane);
+  const Lane before = real(load<LaneShort>(&block.distance[first]));
+  const Lane before_weight = real(load<LaneUnsignedShort>(&block.weight[first]));
   const Lane sum = before_weight + weight;
   const Lane share = weight / larger(sum, kOne);
   const Lane average = before + (found.distance - before) * share;
   const LaneIndex steps = whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive);
-  const auto distances = __builtin_convertvector(seen ? steps : whole(before), LaneShort);
-  const auto weights =
-      __builtin_convertvector(whole(smaller(sum, kZero + kMostWeightSteps)), LaneUnsignedShort);
+  const LaneShort distances = narrow(seen ? steps : whole(before));
+  const LaneUnsignedShort weights = narrow_unsigned(whole(smaller(sum, kZero + kMostWeightSteps)));
   std::memcpy(&block.distance[first], &distances, sizeof(distances));
   std::memcpy(&block.weight[first], &weights, sizeof(weights));
   const LaneIndex near = seen & (found.distance < kColourBand) & (found.distance > -kColourBand);
