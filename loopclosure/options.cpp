@@ -47,17 +47,28 @@ std::string RefinementOptions::invalid_reason() const {
       .reason();
 }
 
+std::string DriftOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("placement", placement, 0)
+      .above("placement_deg", placement_deg, 0)
+      .above("placement_scale", placement_scale, 0)
+      .above("shift", shift, 0)
+      .above("turn_deg", turn_deg, 0)
+      .above("log_scale", log_scale, 0)
+      .at_least("length_gain", length_gain, 0)
+      .at_least("turn_gain", turn_gain, 0)
+      .at_least("turn_gain_of_one_camera", turn_gain_of_one_camera, 0)
+      .at_least("log_scale_gain", log_scale_gain, 0)
+      .above("max_chi2", max_chi2, 0)
+      .reason();
+}
+
 std::string ProbationOptions::invalid_reason() const {
   return OptionCheck()
       .above("max_shift", max_shift, 0)
       .above("max_angle_deg", max_angle_deg, 0)
       .above("max_scale", max_scale, 0)
-      .above("slack", slack, 0)
-      .above("slack_deg", slack_deg, 0)
-      .above("max_drift", max_drift, 0)
-      .above("max_turn_drift", max_turn_drift, 0)
-      .above("max_turn_drift_of_one_camera", max_turn_drift_of_one_camera, 0)
-      .above("max_scale_drift", max_scale_drift, 0)
+      .nested("drift", drift.invalid_reason())
       .at_least("patience", patience, 1)
       .reason();
 }
