@@ -35,6 +35,32 @@ TEST_P(SelfCalibrationOf, FindsTheFocalLengthWithinItsStandardDeviation) {
 INSTANTIATE_TEST_SUITE_P(FocalLengthsOverWidth, SelfCalibrationOf,
                          ::testing::Values(0.45, 0.5, 0.8, 1.2, 2.0));
 
+/// Errors over their standard deviations, over worlds of several focal lengths, motions and noises: of 20
+/// normal ones the root mean square is within 0.61 and 1.41 in 99 of 100 cases. Less is too modest, more is
+/// too sure.
+TEST(SelfCalibration, TheStandardDeviationIsHonest) {
+  constexpr int kTrials = 20;
+  double squares = 0, sum = 0;
+  int beyond_three = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    ClipWorld world = world_of(kWidth * (0.5 + 0.3 * (trial % 4)));
+    world.seed = static_cast<unsigned>(100 + trial);
+    world.turn = trial % 3 == 0 ? 0.15 : 0.3;
+    world.noise_px = trial % 2 == 0 ? 0.1 : 0.3;
+    world.way *= trial % 5;
+    const auto found = self_calibrate(simulate_clips(world), kWidth, kHeight);
+    ASSERT_TRUE(found) << trial << ": " << found.error();
+    const double deviation = (found->lens.log_f - world.lens.log_f) / found->sigma[0];
+    squares += deviation * deviation;
+    sum += deviation;
+    beyond_three += std::abs(deviation) > 3 ? 1 : 0;
+  }
+  EXPECT_LT(std::sqrt(squares / kTrials), 1.41);
+  EXPECT_GT(std::sqrt(squares / kTrials), 0.61);
+  EXPECT_LT(std::abs(sum) / std::sqrt(kTrials), 2.6) << "biased";
+  EXPECT_LE(beyond_three, 1);
+}
+
 TEST(SelfCalibration, RotationAloneIsEnough) {
   ClipWorld world = world_of(500);
   world.way.setZero();
