@@ -2,6 +2,7 @@
 // of one grey level added, darker, cropped, smaller, seen in a mirror; how far apart its frames may be; and
 // whether the tracker knows how well it knows the pose (NEES).
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -48,7 +50,8 @@ struct RelativePose {
 /// One variation's outcome.
 struct Outcome {
   std::size_t frames = 0, tracked = 0;
-  double ate = 0, ate_causal = 0;  ///< [m]
+  std::vector<std::size_t> parts;  ///< frames in each part of the final map, the largest first
+  double ate = 0, ate_causal = 0;  ///< of the largest; causal: of the part that most frames named then [m]
   double clock = 0;                ///< scatter of time stamps [s]
   std::vector<double> nees;        ///< of each frame's pose relative to its reference keyframe, over 6
 };
@@ -169,6 +172,14 @@ double ate(const Trajectory& estimate, const Trajectory& truth, Alignment alignm
   return evaluation ? evaluation->absolute.rmse : -1;
 }
 
+Trajectory longest(const std::map<KeyframeId, Trajectory>& of_parts) {
+  Trajectory found;
+  for (const auto& [part, trajectory] : of_parts) {
+    if (trajectory.size() > found.size()) found = trajectory;
+  }
+  return found;
+}
+
 /// @param noise  of the truth; its clock is how far the recording's time stamps scatter
 Outcome run(const std::string& text, const SourceOptions& source_options, const Variation& variation,
             TruthNoise noise) {
@@ -204,18 +215,18 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   const std::atomic<bool> interrupted{false};
   const RunResult result = Engine(varied(source->rig(), variation), options).run(feed, interrupted);
   if (!result.error.empty()) throw std::runtime_error(text + ": " + result.error);
-  Trajectory estimate, causal;
+  std::map<KeyframeId, Trajectory> estimates, causal;  // parts have worlds of their own
   for (const FrameRecord& record : result.frames) {
     ++outcome.frames;
     if (!has_final_pose(record) || !result.graph.contains(record.reference)) continue;
-    if (record.state == FrameState::kPlacedLater) {
-      estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
-      continue;
-    }
+    estimates[result.graph.part(record.reference)].push_back(
+        {record.t_ns, final_T_c_w(record, result.graph).inverse()});
+    if (record.state == FrameState::kPlacedLater) continue;
     ++outcome.tracked;
-    estimate.push_back({record.t_ns, final_T_c_w(record, result.graph).inverse()});
-    causal.push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
+    causal[record.part_causal].push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
   }
+  for (const auto& [part, estimate] : estimates) outcome.parts.push_back(estimate.size());
+  std::sort(outcome.parts.rbegin(), outcome.parts.rend());
   noise.clock = jitter.sigma();
   outcome.clock = noise.clock;
   const RelativeTruth relative(truth, noise);
@@ -224,8 +235,8 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
       outcome.nees.push_back(comparison->normalised(pose.covariance));
   }
   const Alignment alignment = to_scale ? Alignment::kSe3 : Alignment::kSim3;
-  outcome.ate = ate(estimate, truth, alignment);
-  outcome.ate_causal = ate(causal, truth, alignment);
+  outcome.ate = ate(longest(estimates), truth, alignment);
+  outcome.ate_causal = ate(longest(causal), truth, alignment);
   return outcome;
 }
 
@@ -237,8 +248,8 @@ void print_row(const Variation& variation, const Outcome& outcome) {
                                : fmt::format("{:.2f} / {:.2f} / {:.2f}", quantile(outcome.nees, 0.5), mean,
                                              quantile(outcome.nees, 0.95));
   const auto metres = [](double ate) { return ate < 0 ? std::string("-") : fmt::format("{:.5f}", ate); };
-  fmt::print("| {} | {}/{} | {} | {} | {} |\n", variation.name, outcome.tracked, outcome.frames,
-             metres(outcome.ate), metres(outcome.ate_causal), nees);
+  fmt::print("| {} | {}/{} | {} | {} | {} | {} |\n", variation.name, outcome.tracked, outcome.frames,
+             fmt::join(outcome.parts, " + "), metres(outcome.ate), metres(outcome.ate_causal), nees);
   std::fflush(stdout);
 }
 
@@ -286,7 +297,8 @@ int main(int argc, char** argv) {
   try {
     for (const std::string& source : sources) {
       fmt::print(
-          "\n| {} | tracked | ATE m | causal m | NEES / 6: median / mean / p95 |\n|---|---|---|---|---|\n",
+          "\n| {} | tracked | in parts | ATE m | causal m | NEES / 6: median / mean / p95 "
+          "|\n|---|---|---|---|---|---|\n",
           source);
       for (const twofold::Variation& variation : variations) {
         if (only >= 0 && &variation != &variations[static_cast<std::size_t>(only)]) continue;
