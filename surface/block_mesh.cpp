@@ -36,12 +36,16 @@ std::uint16_t steps_of(float weight, float step) {
   return std::max<std::uint16_t>(steps, 1);
 }
 
-VertexPlace place_of(int s, const CubeEdge& edge) {
-  const int x = s % 8 + (edge.corner & 1);
-  const int y = s / 8 % 8 + (edge.corner >> 1 & 1);
-  const int z = s / 64 + (edge.corner >> 2);
-  return {static_cast<std::uint16_t>(x / 8 + 2 * (y / 8) + 4 * (z / 8)),
-          static_cast<std::uint16_t>(3 * static_cast<int>(sample_at(x, y, z)) + edge.axis)};
+/// From a sample to the one at a corner of its cell; as many back where that one is of a block behind.
+constexpr int corner_step(int corner) {
+  return (corner & 1) + kBlockEdge * (corner >> 1 & 1) + kBlockEdge * kBlockEdge * (corner >> 2);
+}
+
+/// last: bit a is set where sample s is the block's last one along axis a.
+VertexPlace place_of(int s, int last, const CubeEdge& edge) {
+  const int behind = edge.corner & last;
+  const int sample = s + corner_step(edge.corner) - kBlockEdge * corner_step(behind);
+  return {static_cast<std::uint16_t>(behind), static_cast<std::uint16_t>(3 * sample + edge.axis)};
 }
 
 }  // namespace
@@ -198,6 +202,7 @@ Eigen::Vector3f BlockMesher::gradient(int i) const {
 }
 
 void BlockMesher::add_triangles(BlockMesh& piece) const {
+  const auto& edges = cube_edges();
   for (int r = 0; r < kBlockEdge * kBlockEdge; ++r) {
     const int y = r % kBlockEdge, z = r / kBlockEdge;
     // In the order of a cell's corners, those at x + 1 left out.
@@ -215,10 +220,11 @@ void BlockMesher::add_triangles(BlockMesh& piece) const {
       unsigned code = 0;
       for (std::size_t i = 0; i < 4; ++i) code |= (rows[i].inside >> x & 3U) << (2 * i);
       const int s = r * kBlockEdge + x;
+      const int last = (x == kBlockEdge - 1) + 2 * (y == kBlockEdge - 1) + 4 * (z == kBlockEdge - 1);
       for (const auto& triangle : cube_triangles(code))
-        piece.triangles.push_back({place_of(s, cube_edges()[triangle[0]]),
-                                   place_of(s, cube_edges()[triangle[1]]),
-                                   place_of(s, cube_edges()[triangle[2]])});
+        piece.triangles.push_back({place_of(s, last, edges[triangle[0]]),
+                                   place_of(s, last, edges[triangle[1]]),
+                                   place_of(s, last, edges[triangle[2]])});
     }
   }
 }

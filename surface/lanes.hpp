@@ -40,6 +40,14 @@ inline Lane smaller(const Lane& a, const Lane& b) {
   return a < b ? a : b;
 #endif
 }
+inline LaneIndex smaller(const LaneIndex& a, const LaneIndex& b) {
+#ifdef __AVX2__
+  return reinterpret_cast<LaneIndex>(
+      _mm256_min_epi32(reinterpret_cast<__m256i>(a), reinterpret_cast<__m256i>(b)));
+#else
+  return a < b ? a : b;
+#endif
+}
 inline LaneIndex wide(const LaneShort& a) {
 #ifdef __AVX2__
   return reinterpret_cast<LaneIndex>(_mm256_cvtepi16_epi32(reinterpret_cast<__m128i>(a)));

@@ -108,7 +108,8 @@ bool MeshPieces::replace(const BlockPosition& at, const BlockMesh& piece) {
     return !piece.empty();
   }
   if (old->second.mesh == piece) return false;
-  old->second = {piece, revision_};
+  old->second.mesh = piece;  // into the memory it has
+  old->second.revision = revision_;
   return true;
 }
 

@@ -33,9 +33,6 @@ inline LaneIndex weight_of(const LaneIndex& sample) {
 inline Lane distance_of(const LaneIndex& sample) {
   return real((sample << 16) >> 16);
 }
-inline LaneIndex smaller(const LaneIndex& a, const LaneIndex& b) {
-  return a < b ? a : b;
-}
 
 /// Eight samples between those of the cube, and which of the cube's they are nearest to.
 struct Resampled {
@@ -68,15 +65,52 @@ inline Resampled resample(const std::uint32_t* cube, int row, int layer, const s
   return result;
 }
 
+/// Adds eight samples to the running averages of those of a block from `first` on.
+/// @return  what each new one is worth in its average; 0: nothing
+inline Lane average_row(const Lane& new_distance, const LaneIndex& new_weight, std::size_t first,
+                        VoxelBlock& block) {
+  const Lane weight = real(new_weight);
+  const Lane before = real(load<LaneShort>(&block.distance[first]));
+  const Lane sum = real(load<LaneUnsignedShort>(&block.weight[first])) + weight;
+  const Lane share = weight / larger(sum, kOne);
+  const Lane average = before + (new_distance - before) * share;
+  const LaneIndex steps = whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive);
+  const LaneShort distances = narrow(new_weight > 0 ? steps : whole(before));
+  const LaneUnsignedShort weights = narrow_unsigned(whole(smaller(sum, kZero + kMostWeightSteps)));
+  std::memcpy(&block.distance[first], &distances, sizeof(distances));
+  std::memcpy(&block.weight[first], &weights, sizeof(weights));
+  return share;
+}
+
+/// Samples that take part in the surface's colour.
+inline LaneIndex near_surface(const Lane& distance, const LaneIndex& weight) {
+  return (weight > 0) & (distance < kColourBand) & (distance > -kColourBand);
+}
+
+void add_colour(const std::array<std::uint16_t, 3>& colour, float share, std::size_t sample,
+                VoxelBlock& block) {
+  const std::array<std::uint16_t, 3> none{};
+  if (colour == none) return;
+  const bool first = colour_of(block, sample) == none;
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::uint16_t& own = block.colour[c][sample];
+    const float before = own;
+    own = first ? colour[c]
+                : static_cast<std::uint16_t>(before + (static_cast<float>(colour[c]) - before) * share);
+  }
+}
+
 }  // namespace
 
 Resampler::Resampler(const SurfaceVolume& from, const SE3& T_f_t)
     : from_(from.blocks()),
       voxel_(from.options().voxel),
       T_f_t_(T_f_t),
-      steps_(T_f_t.rotation().cast<float>()) {}
+      steps_(T_f_t.rotation().cast<float>()),
+      shift_(shift_in_blocks(T_f_t, kBlockEdge * voxel_)) {}
 
 bool Resampler::add_to(VoxelBlock& block) {
+  if (shift_) return add_same_samples(block);
   const Vector3 origin(block.at.x, block.at.y, block.at.z);
   const Vector3 first = T_f_t_ * Vector3(origin * (kBlockEdge * voxel_)) / voxel_;
   if (!fill(first)) return false;
@@ -89,6 +123,25 @@ bool Resampler::add_to(VoxelBlock& block) {
     any |= add_row(at, static_cast<std::size_t>(r) * kBlockEdge, block);
   }
   return any;
+}
+
+bool Resampler::add_same_samples(VoxelBlock& block) {
+  const VoxelBlock* from =
+      from_.find({block.at.x + shift_->x, block.at.y + shift_->y, block.at.z + shift_->z});
+  if (from == nullptr) return false;
+  bool any_seen = false;
+  for (std::size_t first = 0; first < kBlockSamples; first += kLanes) {
+    const LaneIndex weight = wide(load<LaneUnsignedShort>(&from->weight[first]));
+    if (!any(weight)) continue;
+    any_seen = true;
+    const Lane distance = real(load<LaneShort>(&from->distance[first]));
+    const Lane share = average_row(distance, weight, first, block);
+    const LaneIndex near = near_surface(distance, weight);
+    if (!any(near)) continue;
+    for (std::size_t i = 0; i < kLanes; ++i)
+      if (near[i] != 0) add_colour(colour_of(*from, first + i), share[i], first + i, block);
+  }
+  return any_seen;
 }
 
 bool Resampler::fill(const Vector3& first) {
@@ -137,47 +190,24 @@ void Resampler::fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, 
 bool Resampler::add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock& block) const {
   const auto along = [&](int a) { return at[a] + steps_(a, 0) * kCount; };
   const Resampled found = resample(cube_.data(), kRow, kRow * kCube, {along(0), along(1), along(2)});
-  const LaneIndex seen = found.weight > 0;
-  if (!any(seen)) return false;
-  const Lane weight = real(found.weight);
-  const Lane before = real(load<LaneShort>(&block.distance[first]));
-  const Lane before_weight = real(load<LaneUnsignedShort>(&block.weight[first]));
-  const Lane sum = before_weight + weight;
-  const Lane share = weight / larger(sum, kOne);
-  const Lane average = before + (found.distance - before) * share;
-  const LaneIndex steps = whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive);
-  const LaneShort distances = narrow(seen ? steps : whole(before));
-  const LaneUnsignedShort weights = narrow_unsigned(whole(smaller(sum, kZero + kMostWeightSteps)));
-  std::memcpy(&block.distance[first], &distances, sizeof(distances));
-  std::memcpy(&block.weight[first], &weights, sizeof(weights));
-  const LaneIndex near = seen & (found.distance < kColourBand) & (found.distance > -kColourBand);
+  if (!any(found.weight)) return false;
+  const Lane share = average_row(found.distance, found.weight, first, block);
+  const LaneIndex near = near_surface(found.distance, found.weight);
   if (!any(near)) return true;
-  for (int i = 0; i < kLanes; ++i)
+  for (std::size_t i = 0; i < kLanes; ++i)
     if (near[i] != 0)
-      add_colour(static_cast<std::uint32_t>(found.nearest[i]), share[i], first + static_cast<std::size_t>(i),
-                 block);
+      add_colour(colour_in_cube(static_cast<std::uint32_t>(found.nearest[i])), share[i], first + i, block);
   return true;
 }
 
-void Resampler::add_colour(std::uint32_t cube_index, float share, std::size_t sample,
-                           VoxelBlock& block) const {
-  const int x = static_cast<int>(cube_index % kRow);
-  const int y = low_.y() + static_cast<int>(cube_index / kRow % kCube);
-  const int z = low_.z() + static_cast<int>(cube_index / (kRow * kCube));
+std::array<std::uint16_t, 3> Resampler::colour_in_cube(std::uint32_t index) const {
+  const int x = static_cast<int>(index % kRow);
+  const int y = low_.y() + static_cast<int>(index / kRow % kCube);
+  const int z = low_.z() + static_cast<int>(index / (kRow * kCube));
   const auto block_along = [&](int coordinate, int a) { return (coordinate >> 3) - (low_[a] >> 3); };
   const VoxelBlock* from =
       blocks_[static_cast<std::size_t>((block_along(z, 2) * 3 + block_along(y, 1)) * 3 + (x >> 3))];
-  const auto colour =
-      colour_of(*from, static_cast<std::size_t>(((z & 7) * kBlockEdge + (y & 7)) * kBlockEdge + (x & 7)));
-  const std::array<std::uint16_t, 3> none{};
-  if (colour == none) return;
-  const bool first = colour_of(block, sample) == none;
-  for (std::size_t c = 0; c < 3; ++c) {
-    std::uint16_t& own = block.colour[c][sample];
-    const float before = own;
-    own = first ? colour[c]
-                : static_cast<std::uint16_t>(before + (static_cast<float>(colour[c]) - before) * share);
-  }
+  return colour_of(*from, static_cast<std::size_t>(((z & 7) * kBlockEdge + (y & 7)) * kBlockEdge + (x & 7)));
 }
 
 }  // namespace twofold

@@ -81,7 +81,8 @@ class Sampler {
 };
 
 /// Reads a volume at the samples of another one of the same options, whose grid is turned and shifted against
-/// it: linearly between the eight samples around, and not where one of them was never seen.
+/// it: linearly between the eight samples around, and not where one of them was never seen. Grids that are a
+/// shift_in_blocks apart have the same samples, which are taken as they are.
 class Resampler {
  public:
   /// @param from   must outlive the resampler, and not change
@@ -97,16 +98,19 @@ class Resampler {
   static constexpr int kCube = 16;  // samples that a turned block reaches over along an axis, at most
   static constexpr int kRow = 3 * kBlockEdge;  // along x whole rows of blocks are copied
 
+  bool add_same_samples(VoxelBlock& block);
   /// Copies the samples around a block, whose first one lies at `first`, of those samples from low_ on.
   bool fill(const Vector3& first);
   void fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, int z);
   bool add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock& block) const;
-  void add_colour(std::uint32_t cube_index, float share, std::size_t sample, VoxelBlock& block) const;
+  /// Of the sample of the cube with that index.
+  [[nodiscard]] std::array<std::uint16_t, 3> colour_in_cube(std::uint32_t index) const;
 
   const BlockTable& from_;
   double voxel_;
   SE3 T_f_t_;
-  Eigen::Matrix3f steps_;  ///< columns: along x, y and z of the other grid [samples]
+  Eigen::Matrix3f steps_;               ///< columns: along x, y and z of the other grid [samples]
+  std::optional<BlockPosition> shift_;  ///< T_f_t_, if it is one
   Eigen::Vector3i low_{0, 0, 0}, high_{0, 0, 0};
   std::array<const VoxelBlock*, 27> blocks_{};  ///< from that of low_ on
   /// Weight in the upper half, distance in the lower one; x fastest, from the block of low_ on.

@@ -13,6 +13,14 @@ namespace {
 constexpr int kJpegQuality = 92;
 constexpr double kBend = 0.5;  // voxels that poses inside a group may move
 
+/// T_w_s beside the keyframe, in whole blocks of the world's grid and not turned: until a loop moves the
+/// submap, a composition takes its samples as they are.
+SE3 begin_of_submap(const SE3& T_k_w, double voxel) {
+  const double edge = kBlockEdge * voxel;
+  const Vector3 blocks = (T_k_w.inverse().translation() / edge).array().round();
+  return SE3(SO3(), edge * blocks);
+}
+
 }  // namespace
 
 std::string SubmapOptions::invalid_reason() const {
@@ -146,13 +154,10 @@ SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, con
     }
   }
   if (best != nullptr) return *best;
-  submaps_.push_back(std::make_unique<Submap>(Submap{next_submap_++,
-                                                     keyframe.id,
-                                                     SE3(),
-                                                     graph.T_k_w(keyframe.id).inverse(),
-                                                     keyframe.part,
-                                                     {},
-                                                     SurfaceVolume(options_)}));
+  const SE3 T_k_w = graph.T_k_w(keyframe.id);
+  const SE3 T_w_s = begin_of_submap(T_k_w, options_.voxel);
+  submaps_.push_back(std::make_unique<Submap>(
+      Submap{next_submap_++, keyframe.id, T_k_w * T_w_s, T_w_s, keyframe.part, {}, SurfaceVolume(options_)}));
   return *submaps_.back();
 }
 

@@ -50,10 +50,12 @@ struct SubmapReport {
 /// Voxgraph, RA-L 2020).
 ///
 /// Each keyframe's depth is fused into the submap that it shares most points with, or begins one. A submap
-/// stands still relative to one of its keyframes: a loop moves it as a whole. When poses inside a group moved
-/// against each other by more than half a voxel, at the depth that is seen, the group is fused anew. Culled
-/// keyframes give up their depth, and what they had added remains until then; a submap that has none left
-/// goes. So memory follows the place. Same calls, same bytes; one thread at a time.
+/// stands still relative to one of its keyframes: a loop moves it as a whole. It begins on the world's grid
+/// of samples, so that nothing is resampled in a Composition while it has moved by less than half a voxel.
+/// When poses inside a group moved against each other by more than half a voxel, at the depth that is seen,
+/// the group is fused anew. Culled keyframes give up their depth, and what they had added remains until then;
+/// a submap that has none left goes. So memory follows the place. Same calls, same bytes; one thread at a
+/// time.
 class SubmapSurface {
  public:
   /// Options must be valid.

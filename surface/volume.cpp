@@ -25,7 +25,20 @@ Occupancy SurfaceVolume::occupancy(const Vector3& x_v) const {
   return found->distance > 0 ? Occupancy::kFree : Occupancy::kOccupied;
 }
 
+std::optional<BlockPosition> shift_in_blocks(const SE3& T, double edge) {
+  constexpr double kRounding = 1e-9;  // far less than a sample, however far away
+  const Vector3 shift = T.translation() / edge;
+  const Vector3 whole = shift.array().round();
+  if (!(whole.cwiseAbs().maxCoeff() < 1e9)) return std::nullopt;
+  const bool is_turned = (T.rotation() - Matrix3::Identity()).cwiseAbs().maxCoeff() > kRounding;
+  if (is_turned || (shift - whole).cwiseAbs().maxCoeff() > kRounding) return std::nullopt;
+  return BlockPosition{static_cast<std::int32_t>(whole.x()), static_cast<std::int32_t>(whole.y()),
+                       static_cast<std::int32_t>(whole.z())};
+}
+
 std::vector<std::uint32_t> SurfaceVolume::add_overlapped(const BlockPosition& of_other, const SE3& T_v_o) {
+  if (const auto shift = shift_in_blocks(T_v_o, kBlockEdge * options_.voxel))
+    return {blocks_.find_or_add({of_other.x + shift->x, of_other.y + shift->y, of_other.z + shift->z})};
   // In blocks. The other block begins at the last sample of the block before: what lies between two blocks
   // rests on both.
   constexpr double kHalf = 0.5 * (1 + 1.0 / kBlockEdge);

@@ -28,6 +28,10 @@ struct SurfaceDistance {
 
 class Resampler;
 
+/// By how many whole blocks of that edge [m] a frame is shifted, if it is neither turned nor shifted by a
+/// part of one: samples of both grids are the same positions then.
+[[nodiscard]] std::optional<BlockPosition> shift_in_blocks(const SE3& T, double edge);
+
 /// A truncated signed distance field in sparse blocks  (Curless and Levoy, SIGGRAPH 1996; blocks found by
 /// hash: Niessner et al., SIGGRAPH Asia 2013). Sample g stands at g * voxel in the volume's frame v.
 ///
@@ -43,7 +47,8 @@ class SurfaceVolume {
   /// along the ray, times the cosine between ray and normal; those farther in front are free: what stood
   /// there before is carved away.
   void fuse(const DepthView& view, const SE3& T_c_v);
-  /// Adds another volume of the same options, whose frame lies at T_v_o in this one: resampled linearly.
+  /// Adds another volume of the same options, whose frame lies at T_v_o in this one: resampled linearly, or
+  /// sample by sample where T_v_o is a shift_in_blocks.
   void add(const SurfaceVolume& other, const SE3& T_v_o);
   void clear() {
     blocks_.clear();

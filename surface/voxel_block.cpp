@@ -35,36 +35,38 @@ std::optional<std::uint32_t> BlockTable::number_of(const BlockPosition& at) cons
 
 const VoxelBlock* BlockTable::find(const BlockPosition& at) const {
   const auto number = number_of(at);
-  return number ? blocks_[*number].get() : nullptr;
+  return number ? &(*this)[*number] : nullptr;
 }
 
 std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {
-  if (2 * blocks_.size() >= slots_.size()) grow();
+  if (2 * size_ >= slots_.size()) grow();
   Slot& slot = slots_[slot_of(at)];
   if (slot.block == kFree) {
-    slot = {at, static_cast<std::uint32_t>(blocks_.size())};
-    blocks_.push_back(std::make_unique<VoxelBlock>());
-    blocks_.back()->at = at;
+    if (size_ == kChunk * chunks_.size())
+      chunks_.push_back(std::make_unique<std::array<VoxelBlock, kChunk>>());
+    slot = {at, static_cast<std::uint32_t>(size_)};
+    (*this)[size_++].at = at;
   }
   return slot.block;
 }
 
 void BlockTable::grow() {
   slots_.assign(std::max(kFirstSlots, 2 * slots_.size()), Slot{});
-  for (std::size_t b = 0; b < blocks_.size(); ++b)
-    slots_[slot_of(blocks_[b]->at)] = {blocks_[b]->at, static_cast<std::uint32_t>(b)};
+  for (std::size_t b = 0; b < size_; ++b)
+    slots_[slot_of((*this)[b].at)] = {(*this)[b].at, static_cast<std::uint32_t>(b)};
 }
 
 std::vector<const VoxelBlock*> BlockTable::sorted() const {
   std::vector<const VoxelBlock*> all;
-  all.reserve(blocks_.size());
-  for (const auto& block : blocks_) all.push_back(block.get());
+  all.reserve(size_);
+  for (std::size_t b = 0; b < size_; ++b) all.push_back(&(*this)[b]);
   std::sort(all.begin(), all.end(), [](const auto* a, const auto* b) { return a->at < b->at; });
   return all;
 }
 
 void BlockTable::clear() {
-  blocks_.clear();
+  chunks_.clear();
+  size_ = 0;
   slots_.clear();
 }
 

@@ -62,14 +62,17 @@ class BlockTable {
   /// Its number: blocks are counted from 0 in the order they were added.
   std::uint32_t find_or_add(const BlockPosition& at);
 
-  [[nodiscard]] std::size_t size() const { return blocks_.size(); }
-  [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return *blocks_[i]; }
-  [[nodiscard]] const VoxelBlock& operator[](std::size_t i) const { return *blocks_[i]; }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return (*chunks_[i / kChunk])[i % kChunk]; }
+  [[nodiscard]] const VoxelBlock& operator[](std::size_t i) const {
+    return (*chunks_[i / kChunk])[i % kChunk];
+  }
   /// In the order of their positions.
   [[nodiscard]] std::vector<const VoxelBlock*> sorted() const;
   void clear();
   [[nodiscard]] std::size_t bytes() const {
-    return blocks_.size() * (sizeof(VoxelBlock) + sizeof(blocks_[0])) + slots_.size() * sizeof(slots_[0]);
+    return chunks_.size() * (kChunk * sizeof(VoxelBlock) + sizeof(chunks_[0])) +
+           slots_.size() * sizeof(slots_[0]);
   }
 
  private:
@@ -83,7 +86,11 @@ class BlockTable {
   [[nodiscard]] std::size_t slot_of(const BlockPosition& at) const;
   void grow();
 
-  std::vector<std::unique_ptr<VoxelBlock>> blocks_;
+  /// Blocks are allocated so many at a time: one by one, what a volume gives back would be holes among what
+  /// others keep.
+  static constexpr std::size_t kChunk = 32;
+  std::vector<std::unique_ptr<std::array<VoxelBlock, kChunk>>> chunks_;
+  std::size_t size_ = 0;
   std::vector<Slot> slots_;  ///< a power of two, at most half of them taken
 };
 

@@ -86,11 +86,10 @@ BENCHMARK(mesh_of_changes)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
 
 /// The same where the keyframe's submap is one of two that overlap: they are joined anew in these blocks, and
 /// then meshed.
-void compose_changes(benchmark::State& state) {
+void compose(benchmark::State& state, const SE3& T_w_v) {
   const DepthViews& all = depth_views();
   std::array<SurfaceVolume, 2> volumes{SurfaceVolume(options_of(state)), SurfaceVolume(options_of(state))};
   for (std::size_t n = 0; n < kViews; ++n) volumes[n % 2].fuse(all.views[n], all.T_c_w[n]);
-  const SE3 T_w_v(SO3::exp(Vector3(0.1, 0.2, 0.3)), Vector3(0.1, 0.2, 0.3));
   const std::array<PlacedVolume, 2> placed{{{0, &volumes[0], T_w_v}, {1, &volumes[1], T_w_v}}};
   Composition composition(options_of(state));
   composition.update(placed);
@@ -104,7 +103,16 @@ void compose_changes(benchmark::State& state) {
   }
   state.counters["blocks"] = static_cast<double>(blocks) / static_cast<double>(n);
 }
+void compose_changes(benchmark::State& state) {
+  compose(state, SE3(SO3::exp(Vector3(0.1, 0.2, 0.3)), Vector3(0.1, 0.2, 0.3)));
+}
 BENCHMARK(compose_changes)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
+
+/// As submaps stand until a loop moves them: on the grid of the whole.
+void compose_changes_on_grid(benchmark::State& state) {
+  compose(state, SE3());
+}
+BENCHMARK(compose_changes_on_grid)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
 
 /// A loop moves one of the two.
 void compose_moved(benchmark::State& state) {

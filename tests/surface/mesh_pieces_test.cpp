@@ -205,6 +205,28 @@ TEST(Resampler, ReadsBetweenTheSamples) {
   EXPECT_GT(seen, 20000u);
 }
 
+TEST(Resampler, TakesTheSamplesOfAGridThatIsShiftedByBlocks) {
+  SurfaceVolume volume(testing::fine_options(0.02));
+  RandomViews views(4);
+  for (int n = 0; n < 2; ++n) views.fuse_next(volume);
+  const double edge = kBlockEdge * 0.02;
+  SurfaceVolume shifted(testing::fine_options(0.02));
+  shifted.add(volume, SE3(SO3(), edge * Vector3(3, -2, 5)));
+  ASSERT_EQ(shifted.blocks().size(), volume.blocks().size());
+  for (std::size_t b = 0; b < volume.blocks().size(); ++b) {
+    const VoxelBlock& from = volume.blocks()[b];
+    const VoxelBlock* block = shifted.blocks().find({from.at.x + 3, from.at.y - 2, from.at.z + 5});
+    ASSERT_NE(block, nullptr);
+    EXPECT_EQ(block->distance, from.distance);
+    EXPECT_EQ(block->weight, from.weight);
+  }
+  const std::size_t triangles = extract_mesh(volume).triangles.size();
+  ASSERT_GT(triangles, 1000u);
+  EXPECT_EQ(extract_mesh(shifted).triangles.size(), triangles);
+  EXPECT_FALSE(shift_in_blocks(SE3(SO3(), Vector3(0.5 * edge, 0, 0)), edge));
+  EXPECT_FALSE(shift_in_blocks(SE3(SO3::exp(Vector3(0, 1e-4, 0)), Vector3(edge, 0, 0)), edge));
+}
+
 TEST(Resampler, LeavesNothingOut) {
   SurfaceVolume volume(testing::fine_options(0.02));
   RandomViews views(4);

@@ -81,6 +81,16 @@ TEST_F(SubmapSurfaceTest, ALoopMovesSubmapsWithoutFusingAnew) {
   EXPECT_LT(error(surface, T_new_old), 0.002);
 }
 
+TEST_F(SubmapSurfaceTest, SubmapsBeginOnTheWorldsGrid) {
+  const SurfaceOptions options = testing::fine_options();
+  SubmapSurface surface(rig_, options, limits_);
+  add_all(surface);
+  const std::vector<PlacedVolume> placed = surface.placed(KeyframeId{0});
+  ASSERT_EQ(placed.size(), 3u);
+  for (const PlacedVolume& submap : placed)
+    EXPECT_TRUE(shift_in_blocks(submap.T_w_v, kBlockEdge * options.voxel)) << submap.T_w_v.matrix();
+}
+
 TEST_F(SubmapSurfaceTest, OnlyABentGroupIsFusedAnew) {
   SubmapSurface surface(rig_, testing::fine_options(), limits_);
   add_all(surface);
