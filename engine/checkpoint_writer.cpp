@@ -1,10 +1,10 @@
 #include "engine/checkpoint_writer.hpp"
 
 #include <algorithm>
-#include <exception>
 #include <utility>
 
 #include "engine/clock.hpp"
+#include "engine/thrown.hpp"
 #include "graph/map_file.hpp"
 
 namespace twofold {
@@ -22,11 +22,8 @@ void CheckpointWriter::save(const GraphSnapshot& graph, const KeyframeDatabase& 
   const std::int64_t begin_ns = steady_now_ns();
   try {
     save_(options_.file, rig_, graph, places);
-  } catch (const std::exception& error) {
-    report_.error = error.what();
-    return;
   } catch (...) {
-    report_.error = "an exception of unknown type";
+    report_.error = what_was_thrown();
     return;
   }
   ++report_.saved;

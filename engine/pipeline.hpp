@@ -70,9 +70,9 @@ class Pipeline {
   [[nodiscard]] virtual bool ended() const { return failed(); }
   /// Of a replay: frames that the schedule has beyond those pushed.
   [[nodiscard]] virtual std::size_t frames_due() const { return 0; }
-  /// Of a stepped run: takes that step. Any thread; different steps at once if the caller likes.
-  /// @return false: there was nothing to do, or another thread is at it. What a step throws comes out, and
-  /// the run has failed
+  /// Of a stepped run: takes that step. Any thread; different steps at once if the caller likes. What it
+  /// throws comes out, and the run has failed.
+  /// @return false: there was nothing to do, or another thread is at it
   [[nodiscard]] virtual bool step(PipelineStep) { return false; }
 
   /// What the run's logs have lost so far, as on a disk that is full: a sentence a file. Any thread.

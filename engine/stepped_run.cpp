@@ -4,6 +4,7 @@
 
 #include <bit>
 
+#include "engine/thrown.hpp"
 #include "imaging/image_buffers.hpp"
 
 namespace twofold {
@@ -27,17 +28,6 @@ const char* name_of(PipelineStep step) {
       break;
   }
   return "loop closer";
-}
-
-/// By the exception that is being handled.
-std::string what_was_thrown() {
-  try {
-    throw;
-  } catch (const std::exception& error) {
-    return error.what();
-  } catch (...) {
-    return "ended by an exception of unknown type";
-  }
 }
 
 }  // namespace

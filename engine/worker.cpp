@@ -11,8 +11,9 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
-#include <exception>
 #include <utility>
+
+#include "engine/thrown.hpp"
 
 namespace twofold {
 namespace {
@@ -114,10 +115,8 @@ void Worker::run(const std::stop_token& stop, const std::function<void(std::stop
   started_.notify_one();
   try {
     body(stop);
-  } catch (const std::exception& error) {
-    error_ = options_.name + ": " + error.what();
   } catch (...) {
-    error_ = options_.name + ": ended by an exception of unknown type";
+    error_ = options_.name + ": " + what_was_thrown();
   }
   finished_.store(true, std::memory_order_release);
 }

@@ -1,10 +1,11 @@
 #pragma once
 
 #include <atomic>
-#include <exception>
 #include <functional>
 #include <optional>
 #include <string>
+
+#include "engine/thrown.hpp"
 
 namespace twofold {
 
@@ -25,10 +26,8 @@ class GuardedCallback {
     if (!function_ || failed_.load(std::memory_order_relaxed)) return;  // relaxed: raised by this thread
     try {
       function_(arguments...);
-    } catch (const std::exception& error) {
-      fail(error.what());
     } catch (...) {
-      fail("an exception of unknown type");
+      fail(what_was_thrown());
     }
   }
 
@@ -38,7 +37,7 @@ class GuardedCallback {
   }
 
  private:
-  void fail(const char* what) {
+  void fail(const std::string& what) {
     what_ = "the callback of " + name_ + " threw, and is not called any more: " + what;
     failed_.store(true, std::memory_order_release);
   }

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "streams/file_descriptor.hpp"
+#include "engine/logs/file_descriptor.hpp"
 #include "streams/pose_lines.hpp"
 
 namespace twofold {

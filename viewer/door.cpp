@@ -12,6 +12,8 @@
 
 #include <fmt/format.h>
 
+#include "engine/logs/file_descriptor.hpp"
+
 namespace twofold {
 namespace {
 
@@ -66,20 +68,6 @@ std::string in_lower_case(std::string_view name) {
 constexpr std::size_t kSecretDigits = 32;
 constexpr std::size_t kFileBytes = 2 * (kSecretDigits + 1);  // two lines
 
-class OpenFile {
- public:
-  OpenFile(const std::filesystem::path& file, int flags)
-      : descriptor_(open(file.c_str(), flags | O_CLOEXEC, 0600)) {}
-  OpenFile(const OpenFile&) = delete;
-  ~OpenFile() {
-    if (descriptor_ >= 0) close(descriptor_);
-  }
-  [[nodiscard]] int descriptor() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
 /// Empty when nobody but this user could have read or written it.
 std::string why_not_private(const struct stat& status) {
   if (!S_ISREG(status.st_mode)) return "is no file";
@@ -94,13 +82,13 @@ bool is_secret(std::string_view line) {
          });
 }
 
-ViewDoor::Secrets secrets_of(const OpenFile& file, const std::string& name) {
+ViewDoor::Secrets secrets_of(const FileDescriptor& file, const std::string& name) {
   struct stat status {};
-  if (fstat(file.descriptor(), &status) != 0) throw std::runtime_error(name + ": cannot be read");
+  if (fstat(file.get(), &status) != 0) throw std::runtime_error(name + ": cannot be read");
   if (const std::string why = why_not_private(status); !why.empty())
     throw std::runtime_error(name + " " + why);
   std::array<char, kFileBytes + 1> bytes{};
-  const ssize_t size = read(file.descriptor(), bytes.data(), bytes.size());
+  const ssize_t size = read(file.get(), bytes.data(), bytes.size());
   const std::string_view text(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
   const std::string_view token = text.substr(0, kSecretDigits);
   const std::string_view cookie =
@@ -162,14 +150,14 @@ std::string random_secret() {
 ViewDoor::Secrets secrets_kept_in(const std::filesystem::path& file) {
   const ViewDoor::Secrets fresh{random_secret(), random_secret()};
   if (file.empty()) return fresh;
-  if (const OpenFile made(file, O_WRONLY | O_CREAT | O_EXCL); made.descriptor() >= 0) {
+  if (const FileDescriptor made(::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)); made) {
     const std::string text = fresh.token + "\n" + fresh.cookie + "\n";
-    if (write(made.descriptor(), text.data(), text.size()) != static_cast<ssize_t>(text.size()))
-      throw std::runtime_error(file.string() + ": cannot be written");
-    return fresh;
+    if (::write(made.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size())) return fresh;
+    (void)::unlink(file.c_str());  // half of it would be in the way the next time
+    throw std::runtime_error(file.string() + ": cannot be written");
   }
-  const OpenFile kept(file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
-  if (kept.descriptor() < 0) throw std::runtime_error(file.string() + ": can neither be made nor read");
+  const FileDescriptor kept(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!kept) throw std::runtime_error(file.string() + ": can neither be made nor read");
   return secrets_of(kept, file.string());
 }
 

@@ -87,8 +87,7 @@ void add_view_options(CLI::App& command, ViewArguments& arguments) {
   command
       .add_option("--view-secrets", arguments.secrets,
                   "File that keeps the address's token, so that it stays the same from run to run and open "
-                  "pages come "
-                  "back; made when it is not there")
+                  "pages come back; made when it is not there")
       ->needs(view);
   command
       .add_flag("--view-control", arguments.control,

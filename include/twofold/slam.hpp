@@ -73,8 +73,7 @@ struct SlamOptions {
 
 enum class PushStatus : std::uint8_t {
   /// On its way to the tracker, or, in a deterministic run or a replay, tracked. With `live` a newer frame
-  /// may still
-  /// take its turn: it then counts as dropped, and nobody is called.
+  /// may still take its turn: it then counts as dropped, and nobody is called.
   kQueued,
   kDropped,  ///< in order, but all frame buffers were in use: the tracker is behind
   kRefused   ///< not to be used, and not counted as a frame
@@ -191,9 +190,9 @@ class TWOFOLD_API Slam {
   /// once: the tracker on a thread that is never late, the others where there is time. A map that waits for
   /// its steps only grows old; but take all three kinds now and then, for each keeps the map's versions since
   /// its last one. Without `live` has_room asks for steps of the map, too; finish takes all that are left.
+  /// Throws std::logic_error in other modes. What the step itself throws (std::bad_alloc, say) comes out as
+  /// well, and the run has failed: finish() tells.
   /// @return false: there was nothing to do, or another thread is taking this step
-  /// What a step throws (std::bad_alloc, say) comes out, and the run has failed: finish() tells. Throws
-  /// std::logic_error in other modes.
   bool step(SlamStep step);
 
   /// Of the newest frame that was processed, tracked or lost; nothing before the first. Wait-free: no lock,

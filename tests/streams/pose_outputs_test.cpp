@@ -12,7 +12,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "streams/file_descriptor.hpp"
+#include "engine/logs/file_descriptor.hpp"
 #include "streams/pose_output.hpp"
 #include "tests/io/scratch_folder.hpp"
 #include "tests/io/small_files.hpp"
