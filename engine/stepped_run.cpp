@@ -276,9 +276,10 @@ bool SteppedRun::step_mapper() {
   logs_.schedule().mapper.append(
       {version, static_cast<std::uint32_t>(proposals.size()), static_cast<std::uint32_t>(loops.size())});
   for (ProposalHandle& proposal : proposals) {
-    // The loop closer may be behind by a whole ring: it then does not get to know this keyframe.
-    if (!keyframes_.try_push(std::move(proposal))) not_described_.fetch_add(1, std::memory_order_relaxed);
-    proposal.reset();
+    // The loop closer may be behind by a whole ring: it then does not get to know this keyframe, which goes
+    // back to its pool here.
+    ProposalHandle described = std::move(proposal);
+    if (!keyframes_.try_push(std::move(described))) not_described_.fetch_add(1, std::memory_order_relaxed);
   }
   loop_parking_.wake();
   reader_parking_.wake();

@@ -97,7 +97,7 @@ Vector6 readout_force(const Rig& rig, std::span<const MotionObservation> observa
 }
 
 Matrix6 information_under(const Matrix6& information, double variance_factor, const Vector6& force) {
-  const Matrix6 smaller = information / variance_factor;
+  Matrix6 smaller = information / variance_factor;
   const Vector6 f = force / variance_factor;
   // Sherman and Morrison: (C + b b^T)^-1 with C^-1 b = f.
   const Eigen::LLT<Matrix6> llt(smaller);

@@ -81,6 +81,7 @@ struct TWOFOLD_HIDDEN BoardCalibrator::Impl {
 
   [[nodiscard]] BoardCalibration calibrate_one(const std::vector<ViewPair>& pairs) const {
     std::vector<BoardView> views;
+    views.reserve(pairs.size());
     for (const ViewPair& pair : pairs) views.push_back(pair.left);
     const auto fit = calibrate_camera(views, board, size);
     if (!fit) refuse(fit.error());

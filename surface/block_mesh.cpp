@@ -157,9 +157,8 @@ SurfaceVertex BlockMesher::vertex(const BlockPosition& at, int s, int axis) cons
   const float di = distance_[static_cast<std::size_t>(i)];
   const float dj = distance_[static_cast<std::size_t>(j)];
   const float t = di / (di - dj);
-  Eigen::Vector3f grid(static_cast<float>(kBlockEdge * at.x + s % 8),
-                       static_cast<float>(kBlockEdge * at.y + s / 8 % 8),
-                       static_cast<float>(kBlockEdge * at.z + s / 64));
+  const Eigen::Vector3i sample(s % 8, s / 8 % 8, s / 64);
+  Eigen::Vector3f grid = (kBlockEdge * Eigen::Vector3i(at.x, at.y, at.z) + sample).cast<float>();
   grid[axis] += t;
   SurfaceVertex v;
   v.position = grid * voxel_;

@@ -118,8 +118,9 @@ bool Resampler::add_to(VoxelBlock& block) {
   const Eigen::Vector3f in_cube = (first - begin).cast<float>();
   bool any = false;
   for (int r = 0; r < kBlockEdge * kBlockEdge; ++r) {
-    const Eigen::Vector3f at = in_cube + static_cast<float>(r % kBlockEdge) * steps_.col(1) +
-                               static_cast<float>(r / kBlockEdge) * steps_.col(2);
+    const int y = r % kBlockEdge, z = r / kBlockEdge;
+    const Eigen::Vector3f at =
+        in_cube + static_cast<float>(y) * steps_.col(1) + static_cast<float>(z) * steps_.col(2);
     any |= add_row(at, static_cast<std::size_t>(r) * kBlockEdge, block);
   }
   return any;

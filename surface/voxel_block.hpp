@@ -18,7 +18,8 @@ inline constexpr int kBlockSamples = kBlockEdge * kBlockEdge * kBlockEdge;
 /// Which block of a volume: it holds the samples (8 x .. 8 x + 7, 8 y .. , 8 z .. ).
 struct BlockPosition {
   std::int32_t x = 0, y = 0, z = 0;
-  friend auto operator<=>(const BlockPosition&, const BlockPosition&) = default;
+  friend auto operator<=>(const BlockPosition&,
+                          const BlockPosition&) = default;  // NOLINT(modernize-use-nullptr): no 0 here
 };
 
 /// What one step of a sample's whole numbers is worth.

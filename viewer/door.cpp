@@ -148,7 +148,7 @@ std::string random_secret() {
 }
 
 ViewDoor::Secrets secrets_kept_in(const std::filesystem::path& file) {
-  const ViewDoor::Secrets fresh{random_secret(), random_secret()};
+  ViewDoor::Secrets fresh{random_secret(), random_secret()};
   if (file.empty()) return fresh;
   if (const FileDescriptor made(::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)); made) {
     const std::string text = fresh.token + "\n" + fresh.cookie + "\n";

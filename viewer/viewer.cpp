@@ -167,7 +167,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
         });
   }
   ~Impl() {
-    finish();
+    thread_.reset();                                // stops and joins; nobody else may be in here any more
     delete image_.load(std::memory_order_relaxed);  // relaxed: both threads are gone
   }
 
