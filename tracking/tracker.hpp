@@ -120,6 +120,7 @@ class Tracker {
 
   bool start_map(FrameStep& step);
   bool start_part(FrameStep& step);
+  void blame_structure(TrackResult& result);
   LostCause make_first_keyframe(FrameStep& step);
   LostCause start_from_motion(FrameStep& step);
   LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);

@@ -72,12 +72,24 @@ bool Tracker::start_map(FrameStep& step) {
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
   const bool corners_in_view = starter_.sees_corners(current_, options_.min_corners_seen);
+  if (!corners_in_view) blame_structure(step.result);
   if (loss_.seeing_for(corners_in_view, step.frame.t_ns) < options_.new_part_after || !corners_in_view ||
       loss_.lost_frames() < options_.new_part_frames) {
     return false;
   }
   if (step.free_proposal == nullptr || !immature_points_.pending().empty()) return false;
   return make_first_keyframe(step) == LostCause::kNone;
+}
+
+/// With few corners in view, that the map's points are not found says little: if surfaces, too, leave open
+/// how the camera moved, that is why it stays lost. Surfaces may not place it any more by then
+/// (surfaces_can_place), and have not been looked at.
+void Tracker::blame_structure(TrackResult& result) {
+  const bool unexplained =
+      result.cause == LostCause::kTooFewCandidates || result.cause == LostCause::kTooFewMatches;
+  if (!unexplained || !depth_) return;
+  depth_->look_at(current_.depth);
+  if (depth_->judge_structure() == LostCause::kNoStructure) result.cause = LostCause::kNoStructure;
 }
 
 /// The frame becomes the first keyframe of a map or map part, at identity.

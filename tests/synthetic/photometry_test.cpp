@@ -162,6 +162,8 @@ TEST_P(Photometry, SurfacesLookTheSameFromTwoPlaces) {
       }
     }
     ASSERT_GT(count, 10000);
+    EXPECT_LT(sum / count, 3.5);  // what resampling and a change of scale leave
+    EXPECT_LT(std::abs(signed_sum / count), 0.15);
   }
 }
 

@@ -161,6 +161,12 @@ TEST_F(DepthAlignmentTest, NeverGuessesAlongACorridorWithoutEnds) {
   const cv::Mat first = depth(T_first_w);
   alignment_.look_at(first);
   EXPECT_EQ(alignment_.judge_structure(), LostCause::kNoStructure);
+  // Half a metre along it: the walls are where they were.
+  alignment_.look_at(depth(SE3(SO3(), Vector3(0, 0, -0.5)) * T_first_w));
+  alignment_.add_view(KeyframeId{0}, first, SE3());
+  const auto placed = alignment_.align(SE3(), {});
+  ASSERT_FALSE(placed);
+  EXPECT_EQ(placed.error(), LostCause::kNoStructure);
 }
 
 TEST_F(DepthAlignmentTest, AFewCornersSayWhatAWallLeavesOpen) {
@@ -230,6 +236,29 @@ TEST_F(BareRoomTest, IsLostHonestlyBeforeOneWall) {
   ASSERT_EQ(odometry_.step(frame(1, T_corner_w_)).status, TrackStatus::kTracking);
   const TrackResult later = odometry_.step(frame(2, T_wall_w));
   EXPECT_EQ(later.status, TrackStatus::kLost);
+}
+
+/// It turns out of the corner, and on, until one wall is all that is left to see.
+TEST_F(BareRoomTest, IsLostOnceOneWallIsAllThatIsLeft) {
+  constexpr int kSteps = 60;
+  const Vector3 way = Vector3(0.5, 0.6, 0);
+  int tracked = 0, lost = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double left = 1 - static_cast<double>(i) / kSteps;
+    const SE3 T_c_w(SO3::exp(left * way), Vector3(0, 0, -1.6 * (1 - left)));
+    const TrackResult result = odometry_.step(frame(i, T_c_w));
+    if (result.status != TrackStatus::kTracking) {
+      ++lost;
+      EXPECT_EQ(result.cause, LostCause::kNoStructure) << i << ": " << describe(result.cause);
+      continue;
+    }
+    ++tracked;
+    const Vector6 error = (odometry_.T_c_w(result) * T_corner_w_ * T_c_w.inverse()).log();
+    EXPECT_LT(error.head<3>().norm(), 0.02) << i;
+    EXPECT_LT(error.tail<3>().norm(), 0.01) << i;
+  }
+  EXPECT_GT(tracked, 20);
+  EXPECT_GT(lost, 10);
 }
 
 }  // namespace
