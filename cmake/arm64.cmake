@@ -14,3 +14,8 @@ set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
 set(ENV{PKG_CONFIG_SYSROOT_DIR} ${CMAKE_SYSROOT})
 set(ENV{PKG_CONFIG_LIBDIR} ${CMAKE_SYSROOT}/usr/lib/aarch64-linux-gnu/pkgconfig:${CMAKE_SYSROOT}/usr/share/pkgconfig)
+
+# The interpreter that asks and runs is the machine's; what is built is for that in the sysroot, of the same version.
+file(GLOB Python_INCLUDE_DIR ${CMAKE_SYSROOT}/usr/include/python3.*)
+set(Python_NumPy_INCLUDE_DIR ${CMAKE_SYSROOT}/usr/lib/python3/dist-packages/numpy/core/include)
+string(REGEX REPLACE ".*python3[.]" ".cpython-3" PYTHON_MODULE_EXTENSION "${Python_INCLUDE_DIR}-aarch64-linux-gnu.so")
