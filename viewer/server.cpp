@@ -356,17 +356,18 @@ class ViewServer::Impl {
     take_lowest_priority();
     const Closing closing(*this);
     accept();
+    std::optional<Clock::time_point> next_look;
     while (!stop.stop_requested()) {
-      serve(viewers_.empty() ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10));
-      look_around(tick);
+      serve(next_look.value_or(Clock::now() + (viewers_.empty() ? kNobodyLookPeriod : kLookPeriod)));
+      next_look = look_around(tick);
     }
-    look_around(tick, true);
+    (void)look_around(tick, true);
     for (const auto& viewer : viewers_) viewer->feed().end(last_words());
     const auto deadline = Clock::now() + kLastCall;
     const auto is_done = [](const auto& viewer) { return viewer->is_done(); };
     while (!std::all_of(viewers_.begin(), viewers_.end(), is_done) && Clock::now() < deadline) {
       for (const auto& viewer : viewers_) viewer->write();
-      serve(std::chrono::milliseconds(10));
+      serve(Clock::now() + kLookPeriod);
     }
   }
   const std::vector<std::string>& addresses() const { return addresses_; }
@@ -391,15 +392,15 @@ class ViewServer::Impl {
     Impl& impl_;
   };
 
-  void serve(std::chrono::milliseconds time) {
+  void serve(Clock::time_point end) {
     bool over = false;
-    timer_.expires_after(time);
+    timer_.expires_at(end);
     timer_.async_wait([&over](Error) { over = true; });
     context_.restart();
     while (!over) context_.run_one();
   }
 
-  void look_around(const Tick& tick, bool is_last = false) {
+  std::optional<Clock::time_point> look_around(const Tick& tick, bool is_last = false) {
     if (!accepting_) accept();
     std::erase_if(viewers_, [](const auto& viewer) { return viewer->is_closed(); });
     Audience audience{.viewers = viewers_.size(), .is_last = is_last};
@@ -409,9 +410,10 @@ class ViewServer::Impl {
       if (const auto keyframe = viewer->feed().wanted_keyframe()) audience.keyframes.push_back(*keyframe);
     }
     const auto begin = Clock::now();
-    tick(audience, hall_.sight);
+    const auto next = tick(audience, hall_.sight);
     for (const auto& viewer : viewers_) viewer->excuse(Clock::now() - begin);
     for (const auto& viewer : viewers_) viewer->write();
+    return next;
   }
 
   void accept() {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -51,8 +52,12 @@ class ViewServer {
     std::vector<ViewCommand> commands = {};     ///< since the call before
     std::vector<std::uint32_t> keyframes = {};  ///< whose images viewers wait for
   };
-  /// Called every 10 ms while somebody is looking, else every 100 ms: brings the scene up to date.
-  using Tick = std::function<void(const Audience&, ViewSight& newest)>;
+  using Clock = std::chrono::steady_clock;
+  /// How often it is called while somebody is looking, and while nobody is.
+  static constexpr std::chrono::milliseconds kLookPeriod{10}, kNobodyLookPeriod{100};
+  /// Brings the scene up to date.
+  /// @return when it wants to be called again; nothing: after one of the periods
+  using Tick = std::function<std::optional<Clock::time_point>(const Audience&, ViewSight& newest)>;
   /// At the system's lowest priority, which this thread then keeps. Until a stop is asked for; viewers then
   /// get `last_words()` and what they still lack, for at most three seconds.
   void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words);

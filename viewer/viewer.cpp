@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -19,6 +20,7 @@
 #include "geometry/processor_time.hpp"
 #include "viewer/image_message.hpp"
 #include "viewer/keyframe_images.hpp"
+#include "viewer/look_times.hpp"
 #include "viewer/server.hpp"
 #include "viewer/truth.hpp"
 
@@ -41,6 +43,7 @@ struct ToldFrame {
   std::array<std::int64_t, kViewStages> stage_ns{};
   std::size_t stages = 0;
   std::int64_t dropped = 0;  ///< frames before it, since the first that was told
+  std::int64_t told_ns = 0;
 };
 
 struct ToldPoints {
@@ -156,15 +159,18 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     if (map_ && !title_.metres) scene_.find_scales();
     for (auto& frame : shown_)
       frame.store(-1, std::memory_order_relaxed);  // relaxed: nobody else is there yet
-    thread_.emplace(
-        WorkerOptions{.name = "viewer", .time_slice = kPatientSlice}, [this](const std::stop_token& stop) {
-          self_.store(std::this_thread::get_id(),
-                      std::memory_order_relaxed);  // relaxed: read by this thread, or not equal
-          server_.run(
-              stop,
-              [this](const ViewServer::Audience& audience, ViewSight& newest) { tick(audience, newest); },
-              [] { return std::string("the run is over"); });
-        });
+    thread_.emplace(WorkerOptions{.name = "viewer", .time_slice = kPatientSlice},
+                    [this](const std::stop_token& stop) {
+                      self_.store(std::this_thread::get_id(),
+                                  std::memory_order_relaxed);  // relaxed: read by this thread, or not equal
+                      server_.run(
+                          stop,
+                          [this](const ViewServer::Audience& audience, ViewSight& newest) {
+                            tick(audience, newest);
+                            return next_look(audience);
+                          },
+                          [] { return std::string("the run is over"); });
+                    });
   }
   ~Impl() {
     thread_.reset();                                // stops and joins; nobody else may be in here any more
@@ -229,6 +235,13 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     while (points_.try_pop(points)) newest.measured.put(measured_message(points));
   }
 
+  ViewServer::Clock::time_point next_look(const ViewServer::Audience& audience) const {
+    const std::chrono::nanoseconds period =
+        audience.viewers > 0 ? ViewServer::kLookPeriod : ViewServer::kNobodyLookPeriod;
+    return ViewServer::Clock::time_point(
+        std::chrono::nanoseconds(look_times_.next(steady_now_ns(), period.count())));
+  }
+
   /// What a callback or a library throws ends nothing but this attempt; each failure is told once.
   template <class Attempt>
   void attempt(const char* failure, const Attempt& attempt) {
@@ -259,6 +272,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
     while (ring_.try_pop(told)) {
       if (const auto* frame = std::get_if<ToldFrame>(&told)) {
         newest_ = frame->pose;
+        look_times_.add_frame(frame->pose.frame, frame->told_ns);
         scene_.add(frame->pose, std::span(frame->stage_ns).first(frame->stages),
                    {frames_waiting_.load(std::memory_order_relaxed),
                     keyframes_waiting_.load(std::memory_order_relaxed),
@@ -355,6 +369,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
   SpscRing<std::variant<ToldFrame, MapEvent>> ring_{kRing};
   SpscRing<ToldPoints> points_{8};
   PoseEstimate newest_;
+  LookTimes look_times_;
   std::mutex surfaces_mutex_;  // guards surfaces_
   std::vector<ToldSurface> surfaces_;
   std::set<std::string> failures_;  // told
@@ -401,6 +416,7 @@ bool Viewer::is_open_to_network() const {
 void Viewer::tell(const PoseEstimate& pose, std::span<const std::int64_t> stage_ns) {
   ToldFrame frame{pose};
   frame.dropped = impl_->count_dropped(pose.frame);
+  frame.told_ns = steady_now_ns();
   frame.stages = std::min(stage_ns.size(), frame.stage_ns.size());
   std::copy_n(stage_ns.begin(), frame.stages, frame.stage_ns.begin());
   impl_->push(frame);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
@@ -49,6 +50,7 @@ void serve(const ViewServerOptions& options, const ViewScene& scene, const ViewT
     images.answer(audience.keyframes, steady_now_ns(), newest);
     if (interrupted().load(std::memory_order_relaxed))
       stop.request_stop();  // relaxed: the flag carries no other data
+    return std::nullopt;
   };
   server->run(stop.get_token(), watch, [] { return std::string("the program has ended"); });
 }

@@ -82,6 +82,7 @@ void run(std::uint32_t points, int seconds, int speed) {
       pose.frame = last_frame = std::max(pose.frame, last_frame + 1);
       scene.add(pose, {});
     }
+    return std::nullopt;
   };
   server.run(stop.get_token(), tick, [] { return std::string("that was all"); });
 }

@@ -35,6 +35,7 @@ class ViewServerTest : public ::testing::Test {
           stop,
           [this](const ViewServer::Audience& audience, ViewSight& newest) {
             images_.answer(audience.keyframes, steady_now_ns(), newest);
+            return std::nullopt;
           },
           [] { return std::string("over"); });
     });

@@ -1,5 +1,5 @@
 // The figures of docs/results.md: node measure.mjs run|map|hour OUTPUT_FOLDER
-import {existsSync, mkdirSync, readFileSync, readdirSync, rmSync} from 'node:fs';
+import {existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync} from 'node:fs';
 import {connect} from 'node:net';
 import {join} from 'node:path';
 import {Program, openBrowser, openPage, report, until} from './program.mjs';
@@ -22,7 +22,7 @@ function memory(pid) {
   return Number(readFileSync(`/proc/${pid}/status`, 'utf8').match(/VmRSS:\s+(\d+)/)[1]) / 1024;
 }
 
-const ROUNDS = Number(process.env.ROUNDS ?? 10);
+const ROUNDS = Number(process.env.ROUNDS ?? 12);
 const SECONDS = Number(process.env.ROUND_SECONDS ?? 48);
 const RATE = 30;
 const FIRST = 60;  // frames that begin the map
@@ -33,6 +33,7 @@ const WITHOUT = 'no --view', JOIN = 'while they join';
 const MORE = 0.05;  // that p99 may be longer with viewers
 const RESAMPLED = 2000;
 const FEWEST = 6;  // rounds, of less nothing is concluded
+const CYCLES = SECONDS / SECTION / KINDS.length;  // of sections in a round
 
 /** What the tracker took for each frame [ms], by the frame's number; NaN where it was not tracked. */
 function trackingTimes(folder) {
@@ -82,18 +83,20 @@ async function runWithout(recording) {
   await ended(run);
   const times = trackingTimes(folder);
   const length = RATE * SECTION * KINDS.length;
-  return {cycles: Array.from({length: SECONDS / SECTION / KINDS.length}, (_, c) => tracked(times, FIRST + c * length, FIRST + (c + 1) * length)), megabytes: run.megabytes};
+  return {cycles: Array.from({length: CYCLES}, (_, c) => tracked(times, FIRST + c * length, FIRST + (c + 1) * length)), megabytes: run.megabytes};
 }
 
-/** Viewers come and go every SECTION seconds: the frames with each kind of them, cycle by cycle, and those in which they joined. */
+/**
+ * Viewers come and go every SECTION seconds: the frames with each kind of them, cycle by cycle, and those in which they joined. In as many
+ * rounds as there are kinds, each kind sees each section once.
+ */
 async function runWithViewers(recording, round) {
   const folder = join(out, 'run');
   const run = new PacedRun(recording, folder, ['--view', '0']);
   const address = await run.address();
   await run.reached(FIRST);
   const sections = [];
-  const cycles = SECONDS / SECTION / KINDS.length;
-  for (let section = 0; section < cycles * KINDS.length; ++section) {
+  for (let section = 0; section < CYCLES * KINDS.length; ++section) {
     const cycle = Math.floor(section / KINDS.length);
     const [viewers, name] = KINDS[(section + cycle + round) % KINDS.length];
     const readers = Array.from({length: viewers}, (_, n) => new Reader(address, n + 1 < viewers || viewers === 1));
@@ -121,12 +124,19 @@ function* random(seed) {
 
 const p99 = (cycles) => quantile(cycles.flat(), 0.99);
 
-/** By how much p99 with viewers is more than without, and where that lies nine times of ten if cycles are drawn anew. */
+/**
+ * By how much p99 with viewers is more than without, and where that lies nine times of ten if it is measured anew. Drawn are stretches of
+ * the way, each from as many rounds as there are kinds of viewers, so that each kind has seen all of it: some frames take longer than
+ * others, whoever looks.
+ */
 function compare(without, viewers) {
-  const more = (cycles) => p99(cycles.map((n) => viewers[n])) / p99(cycles.map((n) => without[n])) - 1;
-  const all = without.map((_, n) => n);
+  const more = (groups) => p99(groups.flat().map((n) => viewers[n])) / p99(groups.flat().map((n) => without[n])) - 1;
+  const all = Array.from({length: (ROUNDS / KINDS.length) * CYCLES}, (_, n) => {
+    const first = Math.floor(n / CYCLES) * KINDS.length * CYCLES + (n % CYCLES);
+    return KINDS.map((_, round) => first + round * CYCLES);
+  });
   const numbers = random(7);
-  const drawn = Array.from({length: RESAMPLED}, () => more(all.map(() => Math.floor(numbers.next().value * all.length))));
+  const drawn = Array.from({length: RESAMPLED}, () => more(all.map(() => all[Math.floor(numbers.next().value * all.length)])));
   return {more: more(all), low: quantile(drawn, 0.05), high: quantile(drawn, 0.95)};
 }
 const percent = (x) => `${x >= 0 ? '+' : ''}${(100 * x).toFixed(1)} %`;
@@ -145,6 +155,7 @@ function judge(name, than, change) {
  * few rounds to tell.
  */
 async function runs() {
+  if (ROUNDS % KINDS.length || !Number.isInteger(CYCLES)) throw new Error(`ROUNDS must be a multiple of ${KINDS.length}, ROUND_SECONDS of ${SECTION * KINDS.length}`);
   const recording = join(out, 'recording');
   rmSync(recording, {recursive: true, force: true});
   const rendering = new Program(['render', `synthetic:courtyard?frames=${FIRST + RATE * SECONDS + RATE}`, '--out', recording]);
@@ -170,6 +181,7 @@ async function runs() {
     }
     console.log(`round ${round + 1}: p99 so far [ms]: ${[...found].map(([name, cycles]) => `${name} ${p99(cycles).toFixed(2)}`).join(', ')}`);
   }
+  writeFileSync(join(out, 'times.json'), JSON.stringify(Object.fromEntries(found)));
   console.log(`\n${ROUNDS} rounds of ${SECONDS} s, at most ${megabytes[0].toFixed(0)} MB without a viewer, ${megabytes[1].toFixed(0)} with`);
   for (const [name, cycles] of found) {
     const times = cycles.flat();
