@@ -318,8 +318,11 @@ TEST_F(SlamTest, AMapperThatIsBehindTakesNoPushAway) {
   Gate gate;
   EngineOptions options = engine_options({.frame_buffers = 2 * kFrames});
   int steps = 0;  // mapper's
+  std::atomic<bool> stands{false};
   options.before_step = [&](std::string_view thread) {
-    if (thread == "mapper" && ++steps > 1) gate.pass();
+    if (thread != "mapper" || ++steps == 1) return;
+    stands = true;
+    gate.pass();
   };
   std::atomic<int> told{0}, versions{0};
   options.on_map = [&](const GraphSnapshot&, const DoubleWindow&) { ++versions; };
@@ -333,7 +336,8 @@ TEST_F(SlamTest, AMapperThatIsBehindTakesNoPushAway) {
   while (pipeline->waiting().keyframes < 2 && pushed < kFrames) {
     ASSERT_TRUE(pipeline->has_buffer());
     pipeline->push((*frames_)[static_cast<std::size_t>(pushed++)]);
-    while (told < pushed || versions == first_version) std::this_thread::yield();
+    while (told < pushed || versions == first_version || (pipeline->waiting().keyframes > 0 && !stands))
+      std::this_thread::yield();
   }
   ASSERT_GE(pipeline->waiting().keyframes, 2U);
   EXPECT_FALSE(pipeline->has_room()) << "who reads a recording waits for the map";
