@@ -10,14 +10,6 @@
 namespace twofold {
 namespace {
 
-/// EuRoC's layout: a file a camera.
-Calibration calibration_of_folder(const std::filesystem::path& folder, bool left_only) {
-  const auto cameras = std::filesystem::exists(folder / "mav0") ? folder / "mav0" : folder;
-  const auto left = cameras / "cam0" / "sensor.yaml", right = cameras / "cam1" / "sensor.yaml";
-  if (left_only || !std::filesystem::exists(right)) return read_calibration(left);
-  return read_euroc_calibration(left, right);
-}
-
 /// One file of a pair's two would give another rotation than the pair, without a word.
 void expect_alone(const std::filesystem::path& file) {
   const auto folder = std::filesystem::absolute(file).parent_path();
@@ -32,7 +24,7 @@ void expect_alone(const std::filesystem::path& file) {
 Calibration usable_calibration(const std::filesystem::path& file, int width, int height, bool left_only) {
   const bool folder = std::filesystem::is_directory(file);
   if (!folder) expect_alone(file);
-  Calibration calibration = folder ? calibration_of_folder(file, left_only) : read_calibration(file);
+  Calibration calibration = read_calibration(folder && left_only ? euroc_sensor_file(file, "cam0") : file);
   if (left_only && calibration.kind != SensorKind::kMono)
     throw IoError(file, "left_only is for folders in EuRoC's layout");
   if (width > 0 && height > 0) set_missing_size(width, height, &calibration);

@@ -1,5 +1,7 @@
 #include "io/bags/ros_images.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
@@ -12,6 +14,8 @@
 
 namespace twofold {
 namespace {
+
+static_assert(std::endian::native == std::endian::little, "native_copy turns big-endian numbers round");
 
 struct Encoding {
   int type = 0;         ///< OpenCV's
@@ -51,17 +55,23 @@ cv::Mat view_of(const ImageMessage& image, Encoding& encoding) {
     throw MalformedBytes("an image of impossible size");
   if (image.step < image.width * pixel || image.step > 4 * std::uint64_t{kMaxImagePixels})
     throw MalformedBytes("an image whose rows are shorter than its width");
-  if (image.big_endian && CV_ELEM_SIZE1(encoding.type) > 1) throw MalformedBytes("a big-endian image");
   // OpenCV has no view of what must not be written; nobody writes.
   return {static_cast<int>(image.height), static_cast<int>(image.width), encoding.type,
           const_cast<std::uint8_t*>(image.pixels.data()), image.step};
 }
 
-/// Rows may begin at any byte: a copy that OpenCV can read as wider numbers.
-cv::Mat aligned_copy(const cv::Mat& view) {
+/// Rows may begin at any byte, and wide numbers in either order: a copy that OpenCV can read.
+cv::Mat native_copy(const cv::Mat& view, bool big_endian) {
   cv::Mat copy(view.size(), view.type());
-  for (int y = 0; y < view.rows; ++y)
-    std::memcpy(copy.ptr(y), view.ptr(y), static_cast<std::size_t>(view.cols) * view.elemSize());
+  const auto row_size = static_cast<std::ptrdiff_t>(static_cast<std::size_t>(view.cols) * view.elemSize());
+  const auto number_size = static_cast<std::ptrdiff_t>(view.elemSize1());
+  for (int y = 0; y < view.rows; ++y) {
+    std::uint8_t* const row = copy.ptr(y);
+    std::copy(view.ptr(y), view.ptr(y) + row_size, row);
+    if (!big_endian || number_size == 1) continue;
+    for (std::ptrdiff_t at = 0; at < row_size; at += number_size)
+      std::reverse(row + at, row + at + number_size);
+  }
   return copy;
 }
 
@@ -99,9 +109,9 @@ cv::Mat grey_image(const ImageMessage& image) {
   if (encoding.conversion >= 0) {
     cv::cvtColor(view, grey, encoding.conversion);
   } else if (encoding.type == CV_16UC1) {
-    aligned_copy(view).convertTo(grey, CV_8U, 1.0 / 256);
+    native_copy(view, image.big_endian).convertTo(grey, CV_8U, 1.0 / 256);
   } else {
-    grey = aligned_copy(view);
+    grey = native_copy(view, image.big_endian);
   }
   return grey;
 }
@@ -112,7 +122,7 @@ cv::Mat grey_image(const CompressedImageMessage& image) {
 
 cv::Mat depth_image(const ImageMessage& image) {
   Encoding encoding;
-  const cv::Mat depth = aligned_copy(view_of(image, encoding));
+  const cv::Mat depth = native_copy(view_of(image, encoding), image.big_endian);
   if (encoding.type == CV_16UC1) return depth;
   if (encoding.type != CV_32FC1) throw MalformedBytes("a depth image of encoding '" + image.encoding + "'");
   cv::Mat units(depth.size(), CV_16UC1);

@@ -1,5 +1,8 @@
 #include "io/bags/ros_messages.hpp"
 
+#include <algorithm>
+#include <bit>
+
 #include "io/bags/bag_bytes.hpp"
 
 namespace twofold {
@@ -12,16 +15,22 @@ class FieldReader {
       : in_(message), cdr_(encoding == MessageEncoding::kCdr) {
     if (encoding == MessageEncoding::kOther) throw MalformedBytes("a message of unknown encoding");
     if (!cdr_) return;
-    // OMG DDSI-RTPS 10.2: two bytes for the kind, 1: little-endian CDR; two bytes of options.
+    // OMG DDSI-RTPS 10.2: two bytes for the kind, 0 or 1: big-endian or little-endian CDR; two bytes of
+    // options.
     const auto kind = in_.take(4);
-    if (kind[0] != 0 || kind[1] != 1) throw MalformedBytes("a message that is no little-endian CDR");
+    if (kind[0] != 0 || kind[1] > 1) throw MalformedBytes("a message that is no plain CDR");
+    big_endian_ = kind[1] == 0;
     in_ = BagBytes(in_.rest());
   }
 
   template <class T>
   T number() {
     if (cdr_) (void)in_.take((sizeof(T) - in_.at() % sizeof(T)) % sizeof(T));
-    return in_.number<T>();
+    if (!big_endian_) return in_.number<T>();
+    std::array<std::uint8_t, sizeof(T)> bytes;
+    for (std::uint8_t& byte : bytes) byte = in_.number<std::uint8_t>();
+    std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
   }
   std::string text() {
     const auto bytes = block();
@@ -53,7 +62,7 @@ class FieldReader {
 
  private:
   BagBytes in_;
-  bool cdr_;
+  bool cdr_, big_endian_ = false;
 };
 
 }  // namespace

@@ -179,8 +179,18 @@ Calibration read_euroc_calibration(const fs::path& cam0, const fs::path& cam1) {
   return calibration;
 }
 
+fs::path euroc_sensor_file(const fs::path& folder, const std::string& sensor) {
+  const fs::path inside = folder / "mav0";
+  std::error_code ignored;
+  return (fs::is_directory(inside, ignored) ? inside : folder) / sensor / "sensor.yaml";
+}
+
 Calibration read_calibration(const fs::path& file) {
   std::error_code ignored;
+  if (fs::is_directory(file, ignored)) {
+    const fs::path cam0 = euroc_sensor_file(file, "cam0"), cam1 = euroc_sensor_file(file, "cam1");
+    return fs::exists(cam1, ignored) ? read_euroc_calibration(cam0, cam1) : read_calibration(cam0);
+  }
   if (!fs::is_regular_file(file, ignored)) throw IoError(file, "no such calibration file");
   if (looks_like_kitti_calibration(file)) return read_kitti_calibration(file);
   const YamlNode root = YamlNode::load(file);

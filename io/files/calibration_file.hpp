@@ -14,11 +14,15 @@ namespace twofold {
 ///   Kalibr camchain   top-level keys cam0, cam1
 ///   EuRoC sensor.yaml top-level key camera_model or T_BS: one camera
 ///   KITTI calib.txt   lines "P0: twelve numbers"; has no image size: width and height stay 0
+///   EuRoC folder      cam0/sensor.yaml, and cam1/sensor.yaml of a pair, in it or in mav0 in it
 ///
 /// The result is not yet checked as a whole (see expect_valid), because a size may have to come from the
 /// images. Throws IoError naming file, key and what is wrong; keys the own form does not know are errors.
 [[nodiscard]] Calibration read_calibration(const std::filesystem::path& file);
 
+/// FOLDER/mav0/SENSOR/sensor.yaml where there is such a folder, else FOLDER/SENSOR/sensor.yaml.
+[[nodiscard]] std::filesystem::path euroc_sensor_file(const std::filesystem::path& folder,
+                                                      const std::string& sensor);
 /// EuRoC keeps a file a camera. Poses of the cameras in the body come from T_BS. A pair of rectified images
 /// says so by its numbers alone: equal cameras, no distortion, a pure shift.
 [[nodiscard]] Calibration read_euroc_calibration(const std::filesystem::path& cam0,

@@ -102,6 +102,78 @@ TEST(BagSource, WithoutCameraInfoACalibrationIsNeeded) {
   EXPECT_EQ(drain(*open_source(folder / "a.mcap", options)), std::to_string(kCount));
 }
 
+/// As EuRoC and TUM-VI publish theirs: two cameras and an inertial sensor, no camera_info.
+WrittenBag bag_of_two_cameras(const std::string& pixels) {
+  const MessageEncoding ros1 = MessageEncoding::kRos1;
+  WrittenBag bag;
+  bag.topics = {{"/imu0", "sensor_msgs/Imu"},
+                {"/cam1/image_raw", "sensor_msgs/Image"},
+                {"/cam0/image_raw", "sensor_msgs/Image"},
+                {"/vrpn_client/raw_transform", "geometry_msgs/TransformStamped"}};
+  const auto image = [&](int number) {
+    cv::Mat grey(kHeight, kWidth, CV_8UC1, cv::Scalar(number));
+    if (pixels == "mono16") grey.convertTo(grey, CV_16U, 256);
+    return grey;
+  };
+  for (int i = 0; i < kCount; ++i) {
+    const std::int64_t t = time_of(i);
+    bag.messages.push_back({0, t, Bytes(300, 1)});
+    bag.messages.push_back({1, t, image_message(ros1, t, image(100 + i), pixels)});
+    bag.messages.push_back({3, t, Bytes(90, 1)});
+    bag.messages.push_back({2, t, image_message(ros1, t, image(10 + i), pixels)});
+  }
+  return bag;
+}
+
+void expect_pairs(const std::string& name, const std::filesystem::path& calibration) {
+  EXPECT_IO_ERROR(open_source(name), "no calibration: give --calib FILE");
+  SourceOptions options;
+  options.calibration = calibration;
+  const auto source = open_source(name, options);
+  EXPECT_EQ(source->rig().kind, SensorKind::kStereo);
+  EXPECT_NEAR(source->rig().baseline, 0.1, 1e-9);
+  Frame frame;
+  for (int i = 0; i < kCount; ++i) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.t_ns, time_of(i));
+    EXPECT_EQ(frame.left.at<unsigned char>(kHeight / 2, kWidth / 2), 10 + i);
+    EXPECT_EQ(frame.right.at<unsigned char>(kHeight / 2, kWidth / 2), 100 + i);
+  }
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+}
+
+TEST(BagSource, EurocsBagsAreReadWithTheFolderOfTheirCalibration) {
+  const ScratchFolder folder;
+  folder.write("MH_01_easy.bag", text_of(rosbag_file(bag_of_two_cameras("mono8"), {})));
+  for (const std::string camera : {"cam0", "cam1"}) {
+    folder.write("calib/mav0/" + camera + "/sensor.yaml",
+                 "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1, 0, 0, " +
+                     std::string(camera == "cam0" ? "0" : "0.1") +
+                     ", 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: [64, 48]\n"
+                     "camera_model: pinhole\nintrinsics: [50, 50, 32, 24]\n"
+                     "distortion_model: radial-tangential\n"
+                     "distortion_coefficients: [-0.28, 0.07, 0.0002, 0.00002]\n");
+  }
+  expect_pairs(folder / "MH_01_easy.bag", folder / "calib");
+}
+
+TEST(BagSource, TumVisBagsAreReadWithKalibrsChain) {
+  const ScratchFolder folder;
+  folder.write("dataset-room1_512_16.bag",
+               text_of(rosbag_file(bag_of_two_cameras("mono16"), {.compression = "lz4"})));
+  const std::string camera =
+      "  camera_model: pinhole\n  distortion_coeffs: [0.0034, 0.0007, -0.002, 0.0002]\n"
+      "  distortion_model: equidistant\n  intrinsics: [24, 24, 32, 24]\n"
+      "  resolution: [64, 48]\n";
+  folder.write("camchain.yaml",
+               "cam0:\n  cam_overlaps: [1]\n" + camera +
+                   "  rostopic: /cam0/image_raw\ncam1:\n  T_cn_cnm1:\n"
+                   "  - [1, 0, 0, -0.1]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n  - [0, 0, 0, 1]\n"
+                   "  cam_overlaps: [0]\n" +
+                   camera + "  rostopic: /cam1/image_raw\n");
+  expect_pairs(folder / "dataset-room1_512_16.bag", folder / "camchain.yaml");
+}
+
 TEST(BagSource, AFileThatIsCutShortIsSaidToBe) {
   const ScratchFolder folder;
   Bytes file = mcap_file(stereo_bag(MessageEncoding::kCdr), {.chunk_messages = 1, .summary = false});

@@ -105,6 +105,41 @@ TEST(RosImages, DepthIsInMillimetres) {
   }
 }
 
+/// The same image as a big-endian machine writes it.
+cv::Mat turned_round(const cv::Mat& image) {
+  cv::Mat turned = image.clone();
+  const std::size_t size = image.elemSize1();
+  for (std::size_t at = 0; at < image.total() * image.elemSize(); at += size)
+    std::reverse(turned.data + at, turned.data + at + size);
+  return turned;
+}
+
+TEST(RosImages, NumbersMayBeBigEndian) {
+  cv::Mat wide(kHeight, kWidth, CV_16UC1), metres(kHeight, kWidth, CV_32FC1);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      wide.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(1000 * y + x);
+      metres.at<float>(y, x) = 0.5F + 0.01F * static_cast<float>(x + y);
+    }
+  }
+  const auto parsed = [](const Bytes& message, bool big_endian) {
+    ImageMessage image = parse_image(message, MessageEncoding::kRos1);
+    image.big_endian = big_endian;
+    return image;
+  };
+  for (const auto& [image, pixels] : {std::pair(wide, "16UC1"), std::pair(metres, "32FC1")}) {
+    const Bytes little = image_message(MessageEncoding::kRos1, 0, image, pixels);
+    const Bytes big = image_message(MessageEncoding::kRos1, 0, turned_round(image), pixels);
+    EXPECT_EQ(largest_difference(depth_image(parsed(big, true)), depth_image(parsed(little, false))), 0);
+  }
+  const Bytes little = image_message(MessageEncoding::kRos1, 0, wide, "mono16");
+  const Bytes big = image_message(MessageEncoding::kRos1, 0, turned_round(wide), "mono16");
+  EXPECT_EQ(largest_difference(grey_image(parsed(big, true)), grey_image(parsed(little, false))), 0);
+  const cv::Mat grey = numbered_image(kWidth, kHeight, 9);  // single bytes have no order
+  const Bytes bytes = image_message(MessageEncoding::kRos1, 0, grey, "mono8");
+  EXPECT_EQ(largest_difference(grey_image(parsed(bytes, true)), grey), 0);
+}
+
 TEST(RosImages, CompressedOnesAreDecoded) {
   const cv::Mat grey = numbered_image(kWidth, kHeight, 77);
   cv::Mat depth(kHeight, kWidth, CV_16UC1, cv::Scalar(1234));
@@ -163,12 +198,23 @@ TEST(RosMessages, CameraInfoIsReadInEitherEncoding) {
     EXPECT_EQ(info.R, written.R);
     EXPECT_EQ(info.P, written.P);
   }
-  Bytes big_endian = camera_info_message(MessageEncoding::kCdr, written);
-  big_endian[1] = 0;
-  EXPECT_NE(malformed([&] {
-              (void)parse_camera_info(big_endian, MessageEncoding::kCdr);
-            }).find("no little-endian CDR"),
-            std::string::npos);
+  Bytes parameter_list = camera_info_message(MessageEncoding::kCdr, written);
+  parameter_list[1] = 3;
+  EXPECT_NE(
+      malformed([&] { (void)parse_camera_info(parameter_list, MessageEncoding::kCdr); }).find("no plain CDR"),
+      std::string::npos);
+}
+
+TEST(RosMessages, CdrMayBeBigEndian) {
+  const Bytes message{0,   0,   0,   0,                                // CDR, big-endian
+                      0,   0,   0,   5, 0,   0,   0,   7, 0, 0, 0, 4,  // 5 s and 7 ns, a name of four bytes
+                      'c', 'a', 'm', 0,                                //
+                      0,   0,   0,   4, 'p', 'n', 'g', 0,              // format
+                      0,   0,   0,   2, 11,  12};                      // file
+  const CompressedImageMessage image = parse_compressed_image(message, MessageEncoding::kCdr);
+  EXPECT_EQ(image.t_ns, 5'000'000'007);
+  EXPECT_EQ(image.format, "png");
+  EXPECT_EQ(Bytes(image.file.begin(), image.file.end()), (Bytes{11, 12}));
 }
 
 }  // namespace
