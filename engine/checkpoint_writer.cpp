@@ -17,6 +17,16 @@ void CheckpointWriter::save_whole_map(const std::filesystem::path& file, const R
   save_map(file, rig, graph, places);
 }
 
+std::string CheckpointWriter::newest_error() const {
+  const std::scoped_lock lock(lock_);
+  return newest_error_;
+}
+
+void CheckpointWriter::set_newest_error(std::string error) {
+  const std::scoped_lock lock(lock_);
+  newest_error_ = std::move(error);
+}
+
 void CheckpointWriter::save(const GraphSnapshot& graph, const KeyframeDatabase& places) {
   if (graph.version() == report_.version) return;
   const std::int64_t begin_ns = steady_now_ns();
@@ -24,8 +34,10 @@ void CheckpointWriter::save(const GraphSnapshot& graph, const KeyframeDatabase& 
     save_(options_.file, rig_, graph, places);
   } catch (...) {
     report_.error = what_was_thrown();
+    set_newest_error(report_.error);
     return;
   }
+  set_newest_error("");
   ++report_.saved;
   report_.version = graph.version();
   report_.longest_ns = std::max(report_.longest_ns, steady_now_ns() - begin_ns);

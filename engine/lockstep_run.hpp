@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <deque>
 #include <limits>
 #include <optional>
@@ -31,6 +32,7 @@ class LockstepRun final : public Pipeline {
     return schedule_ ? schedule_->tracker.size() - next_frame_ : 0;
   }
   [[nodiscard]] std::vector<std::string> log_errors() const override { return logs_.errors(); }
+  [[nodiscard]] std::string checkpoint_error() const override { return checkpoints_.newest_error(); }
   [[nodiscard]] const Progress& progress() const override { return progress_; }
   void stop() override;
   [[nodiscard]] RunResult finish() override;
@@ -64,7 +66,14 @@ class LockstepRun final : public Pipeline {
   void count();
   void fail(const std::string& why) { result_.error = why; }
 
+  /// Whether there is no buffer for a keyframe, by the options.
+  [[nodiscard]] bool keyframes_withheld() const {
+    // Relaxed: a wish, which takes effect with one frame or the next.
+    return localise_only_ || (mapping_paused_ != nullptr && mapping_paused_->load(std::memory_order_relaxed));
+  }
+
   const bool localise_only_;
+  const std::atomic<bool>* const mapping_paused_;
   std::unique_ptr<Trace> trace_;
   ProposalPool pool_;
   TrackerRunner tracking_;

@@ -66,7 +66,7 @@ struct EngineOptions {
   std::shared_ptr<const SavedMap> map;
   bool localise_only = false;  ///< no keyframe is made: `map`, which must be there, does not change
   /// While true no keyframe is made: the map stays as it is, until it is false again. May be null; outlives
-  /// the run. Of threaded runs.
+  /// the run. A replay takes it from its log.
   const std::atomic<bool>* mapping_paused = nullptr;
   CheckpointOptions checkpoint;
   RunLogOptions logs;

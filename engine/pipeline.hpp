@@ -77,6 +77,8 @@ class Pipeline {
 
   /// What the run's logs have lost so far, as on a disk that is full: a sentence a file. Any thread.
   [[nodiscard]] virtual std::vector<std::string> log_errors() const = 0;
+  /// Why the newest checkpoint could not be written; empty: it could, or there was none yet. Any thread.
+  [[nodiscard]] virtual std::string checkpoint_error() const = 0;
   /// Counts of what was collected.
   [[nodiscard]] virtual const Progress& progress() const = 0;
   /// What waits for tracker, mapper and loop closer. Any thread, wait-free: no more than a look at the rings.

@@ -63,6 +63,7 @@ class SlamWithUpdates {
   SlamWithUpdates(const CameraRig& camera_rig, const SlamOptions& options)
       : rig(camera_rig),
         live(options.live),
+        keeps_pace(options.live || options.speed > 0),
         items_in_flight(kItemsAFrame * static_cast<std::size_t>(std::max(options.frame_buffers, 1) + 1)),
         updates(std::make_shared<Updates>(std::bit_ceil(std::max<std::size_t>(512, 4 * items_in_flight)))),
         slam(camera_rig, options) {
@@ -94,7 +95,8 @@ class SlamWithUpdates {
   }
 
   const CameraRig rig;
-  const bool live;  // frames come at a camera's pace
+  const bool live;        // frames come at a camera's pace
+  const bool keeps_pace;  // at that, or at a recording's
   const std::size_t items_in_flight;
   const std::shared_ptr<Updates> updates;
   std::atomic<bool> finishing{false};  // a push that is refused from now on is none of the frame's fault
@@ -113,13 +115,14 @@ struct DeleteUnlocked {
 };
 
 /// Pushes a source's frames until it ends or the reader of the updates closes them. A recording waits for
-/// the map, and for whoever reads; a camera for nobody. Throws std::runtime_error when a frame is refused.
+/// the map, and for whoever reads, unless it keeps its pace; a camera for nobody. Throws std::runtime_error
+/// when a frame is refused.
 void feed(Source& source, SlamWithUpdates& to) {
   PoseQueue& queue = to.updates->queue;
   FrameView frame;
   while (!queue.closed() && source.next(frame)) {
     if (!source.is_live()) {
-      if (!queue.wait_for_room(to.items_in_flight)) return;
+      if (!to.keeps_pace && !queue.wait_for_room(to.items_in_flight)) return;
       while (!to.slam.wait_for_room(to_ns(0.1))) {
         if (queue.closed() || !to.slam.errors().empty()) return;
       }
@@ -210,17 +213,22 @@ void bind_summary(py::module_& module) {
 using MaybePath = std::optional<std::filesystem::path>;
 
 std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
-    const CameraRig& rig, RunMode mode, bool live, const MaybePath& map, bool localise_only, bool places,
-    const MaybePath& vocabulary, const MaybePath& schedule, int inner_window, int outer_window,
-    int frame_buffers, std::optional<int> tracker_cpu, std::optional<int> mapper_cpu,
+    const CameraRig& rig, RunMode mode, bool live, double speed, std::optional<LateFrames> late,
+    const MaybePath& map, bool localise_only, bool places, const MaybePath& vocabulary,
+    const MaybePath& checkpoint, double checkpoint_period, const MaybePath& schedule, int inner_window,
+    int outer_window, int frame_buffers, std::optional<int> tracker_cpu, std::optional<int> mapper_cpu,
     std::optional<int> loop_closer_cpu, std::optional<int> fifo_priority, const MaybePath& run_folder,
-    std::int64_t kept_frames) {
+    std::int64_t kept_frames, const MaybePath& trace) {
   const SlamOptions options{mode,
                             live,
+                            speed,
+                            late,
                             map.value_or(""),
                             localise_only,
                             places,
                             vocabulary.value_or(""),
+                            checkpoint.value_or(""),
+                            checkpoint_period,
                             schedule.value_or(""),
                             inner_window,
                             outer_window,
@@ -230,7 +238,8 @@ std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
                             loop_closer_cpu,
                             fifo_priority,
                             run_folder.value_or(""),
-                            kept_frames};
+                            kept_frames,
+                            trace.value_or("")};
   const py::gil_scoped_release unlocked;
   return std::unique_ptr<SlamWithUpdates, DeleteUnlocked>(new SlamWithUpdates(rig, options));
 }
@@ -251,7 +260,7 @@ std::string view(SlamWithUpdates& self, const std::string& title, int port, cons
   options.secrets = secrets.value_or("");
   options.stages = tracker_stages();
   options.efforts = effort_levels();
-  if (self.live) options.paced_by = "camera";
+  if (self.keeps_pace) options.paced_by = self.live ? "camera" : "recording";
   for (const auto& pose : truth.value_or(PoseList{}).poses) {
     options.truth.push_back(pose.T_world_camera);
     options.truth_t_ns.push_back(pose.t_ns);
@@ -274,13 +283,16 @@ void bind_slam_class(py::module_& module) {
   const SlamOptions d;
   py::class_<SlamWithUpdates, std::unique_ptr<SlamWithUpdates, DeleteUnlocked>>(module, "Slam")
       .def(py::init(&make_slam), py::arg("rig"), py::kw_only(), py::arg("mode") = d.mode,
-           py::arg("live") = d.live, py::arg("map") = py::none(), py::arg("localise_only") = d.localise_only,
-           py::arg("places") = d.places, py::arg("vocabulary") = py::none(), py::arg("schedule") = py::none(),
-           py::arg("inner_window") = d.inner_window, py::arg("outer_window") = d.outer_window,
-           py::arg("frame_buffers") = d.frame_buffers, py::arg("tracker_cpu") = d.tracker_cpu,
-           py::arg("mapper_cpu") = d.mapper_cpu, py::arg("loop_closer_cpu") = d.loop_closer_cpu,
-           py::arg("fifo_priority") = d.fifo_priority, py::arg("run_folder") = py::none(),
-           py::arg("kept_frames") = d.kept_frames)
+           py::arg("live") = d.live, py::arg("speed") = d.speed, py::arg("late") = d.late,
+           py::arg("map") = py::none(), py::arg("localise_only") = d.localise_only,
+           py::arg("places") = d.places, py::arg("vocabulary") = py::none(),
+           py::arg("checkpoint") = py::none(), py::arg("checkpoint_period") = d.checkpoint_period,
+           py::arg("schedule") = py::none(), py::arg("inner_window") = d.inner_window,
+           py::arg("outer_window") = d.outer_window, py::arg("frame_buffers") = d.frame_buffers,
+           py::arg("tracker_cpu") = d.tracker_cpu, py::arg("mapper_cpu") = d.mapper_cpu,
+           py::arg("loop_closer_cpu") = d.loop_closer_cpu, py::arg("fifo_priority") = d.fifo_priority,
+           py::arg("run_folder") = py::none(), py::arg("kept_frames") = d.kept_frames,
+           py::arg("trace") = py::none())
       .def(
           "push", &push, py::arg("frame"),
           "Queued, dropped because there is no room, or refused (images that do not fit the rig, time that "
@@ -323,6 +335,11 @@ void bind_slam_class(py::module_& module) {
           [](const SlamWithUpdates& self, const std::filesystem::path& file) { self.slam.save_map(file); },
           py::arg("file"), Unlocked(),
           "Writes the newest version to a map file, which is replaced atomically. Raises RuntimeError.")
+      .def(
+          "pause_mapping", [](SlamWithUpdates& self, bool paused) { self.slam.pause_mapping(paused); },
+          py::arg("paused"),
+          "While paused, the map gets no keyframe: the camera is localised in what there is. Waits for "
+          "nobody.")
       .def("errors", [](const SlamWithUpdates& self) { return self.slam.errors(); })
       .def("finish", &finish)
       .def("view", &view, py::kw_only(), py::arg("title") = "Twofold", py::arg("port") = ViewerOptions{}.port,
@@ -359,6 +376,11 @@ void bind_slam(py::module_& module) {
       .value("TRACK", SlamStep::kTrack, "locates the camera in the oldest frame that waits")
       .value("MAP", SlamStep::kMap, "takes in what the tracker proposed, and optimises the double window")
       .value("CLOSE_LOOPS", SlamStep::kCloseLoops, "looks up places: of a lost camera, of new keyframes");
+  py::enum_<LateFrames>(module, "LateFrames",
+                        "What becomes of a frame whose successor is due, too, when its turn comes.")
+      .value("QUEUE", LateFrames::kQueue, "it is tracked: every frame is, however late")
+      .value("DROP", LateFrames::kDrop, "it is dropped once leaving work out is not enough")
+      .value("NEWEST", LateFrames::kNewest, "it is dropped: the newest one wins");
   bind_push(module);
   bind_summary(module);
   py::class_<Updates, std::shared_ptr<Updates>>(module, "Updates")

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <fstream>
 #include <mutex>
 #include <stdexcept>
 #include <stop_token>
@@ -79,6 +80,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
         mode_(options.mode),
         live_(options.live),
         frame_buffers_(options.frame_buffers),
+        trace_(options.trace),
         intake_(rig_) {
     EngineOptions engine = engine_options(options);
     engine.on_pose = [this](const PoseReport& report) { tell(report); };
@@ -88,6 +90,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
     };
     engine.on_places = [this](const KeyframeDatabase& places) { maps.publish(places); };
     engine.on_loop = [this](const ClosedLoop& loop) { maps.publish(loop); };
+    engine.mapping_paused = &mapping_paused_;
     reporter_.listen(engine);
     pipeline_ = options.mode == RunMode::kReplay ? make_replay(rig_, engine, schedule_to_replay(options))
                                                  : make_pipeline(rig_, engine);
@@ -112,6 +115,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
     return !summary_ && !failed() && !pipeline_->ended() && has_room_now();
   }
   bool step(SlamStep step);
+  void pause_mapping(bool paused) { mapping_paused_.store(paused, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::string> errors() const;
   void save_map(const std::filesystem::path& file);
   const SlamSummary& finish();
@@ -135,15 +139,20 @@ class TWOFOLD_HIDDEN Slam::Impl {
     pipeline_->collect({});
     return pipeline_->has_room();
   }
-  /// A step of the engine has failed. errors() says so from now on, and what the logs lost.
+  /// A step of the engine has failed. errors() says so from now on, and what is wrong with its files.
   [[nodiscard]] bool failed();
+  // Empty, or what went wrong.
+  [[nodiscard]] std::string checkpoint_error() const;
+  [[nodiscard]] std::string write_trace(const RunResult& result) const;
 
   const Rig rig_;
   const RunMode mode_;
   const bool live_;
   const int frame_buffers_;
-  PoseReporter reporter_;  // tracker's
-  PoseEstimate estimate_;  // likewise: of the frame in hand
+  const std::filesystem::path trace_;
+  std::atomic<bool> mapping_paused_{false};  // relaxed: a wish
+  PoseReporter reporter_;                    // tracker's
+  PoseEstimate estimate_;                    // likewise: of the frame in hand
   std::atomic<std::thread::id>
       told_by_{};  // the thread that is in a callback. Relaxed: read by itself, or unequal
 
@@ -156,7 +165,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
 
   mutable std::mutex errors_;  // guards what follows
   std::string engine_error_;
-  std::vector<std::string> log_errors_;
+  std::vector<std::string> file_errors_;
   std::unique_ptr<Pipeline> pipeline_;  // late: its threads end before what they use is destroyed
   std::jthread caretaker_;
 };
@@ -201,11 +210,23 @@ void Slam::Impl::look_now_and_then(const std::stop_token& stop) {
 
 bool Slam::Impl::failed() {
   const bool ended = pipeline_->failed();
-  std::vector<std::string> lost = pipeline_->log_errors();
+  std::vector<std::string> wrong = pipeline_->log_errors();
+  if (std::string why = checkpoint_error(); !why.empty()) wrong.push_back(std::move(why));
   const std::scoped_lock lock(errors_);
   if (ended) engine_error_ = why_it_failed();
-  log_errors_ = std::move(lost);
+  file_errors_ = std::move(wrong);
   return ended;
+}
+
+std::string Slam::Impl::checkpoint_error() const {
+  const std::string why = pipeline_->checkpoint_error();
+  return why.empty() ? why : "no checkpoint could be written: " + why;
+}
+
+std::string Slam::Impl::write_trace(const RunResult& result) const {
+  if (!result.trace) return "";
+  std::ofstream out(trace_);
+  return result.trace->write(out) ? "" : trace_.string() + ": the trace cannot be written";
 }
 
 std::string Slam::Impl::refusal(const FrameView& frame) {
@@ -272,7 +293,7 @@ std::vector<std::string> Slam::Impl::errors() const {
   if (const auto error = on_frame.error()) errors.push_back(*error);
   const std::scoped_lock lock(errors_);
   if (!engine_error_.empty()) errors.push_back(engine_error_);
-  errors.insert(errors.end(), log_errors_.begin(), log_errors_.end());
+  errors.insert(errors.end(), file_errors_.begin(), file_errors_.end());
   return errors;
 }
 
@@ -293,11 +314,14 @@ const SlamSummary& Slam::Impl::finish() {
   summary_ = summarise(result);
   summary_->frames += no_room_;
   summary_->dropped += no_room_;
+  std::vector<std::string> wrong = result.losses;
+  for (std::string why : {checkpoint_error(), write_trace(result)})
+    if (!why.empty()) wrong.push_back(std::move(why));
   if (mode_ != RunMode::kStepped) pipeline_.reset();  // else other threads may still ask it for a step
   {
     const std::scoped_lock lock(errors_);
     engine_error_ = result.error;
-    log_errors_ = result.losses;
+    file_errors_ = std::move(wrong);
   }
   summary_->errors = errors();
   return *summary_;
@@ -356,6 +380,10 @@ HeldMaps Slam::held_maps() const {
 
 void Slam::save_map(const std::filesystem::path& file) const {
   impl_->save_map(file);
+}
+
+void Slam::pause_mapping(bool paused) {
+  impl_->pause_mapping(paused);
 }
 
 std::vector<std::string> Slam::errors() const {

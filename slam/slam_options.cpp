@@ -1,5 +1,6 @@
 #include "slam/slam_options.hpp"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "loopclosure/default_vocabulary.hpp"
@@ -7,21 +8,54 @@
 namespace twofold {
 namespace {
 
+void expect(bool rule, const char* what) {
+  if (!rule) throw std::invalid_argument(what);
+}
+
+/// That of the file that a run is going to write: known now, not after an hour of mapping.
+bool has_folder(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.parent_path();
+  return folder.empty() || std::filesystem::is_directory(folder);
+}
+
+void expect_sensible_pace(const SlamOptions& options) {
+  const bool one_thread = options.mode == RunMode::kDeterministic || options.mode == RunMode::kReplay;
+  expect(!options.live || !one_thread, "options.live needs RunMode::kThreaded or kStepped");
+  expect(std::isfinite(options.speed) && options.speed >= 0, "options.speed must be finite and >= 0");
+  expect(options.speed == 0 || (options.mode == RunMode::kThreaded && !options.live),
+         "options.speed needs RunMode::kThreaded, without options.live");
+  expect(!options.late || options.live || options.speed > 0, "options.late needs options.live or speed");
+}
+
 void expect_sensible(const SlamOptions& options) {
-  const auto expect = [](bool rule, const char* what) {
-    if (!rule) throw std::invalid_argument(what);
-  };
   expect(options.frame_buffers >= 2, "options.frame_buffers must be >= 2");
   expect(options.kept_frames >= 1, "options.kept_frames must be >= 1");
   expect(options.run_folder.empty() || std::filesystem::is_directory(options.run_folder),
          "options.run_folder must be a folder");
-  const bool one_thread = options.mode == RunMode::kDeterministic || options.mode == RunMode::kReplay;
-  expect(!options.live || !one_thread, "options.live needs RunMode::kThreaded or kStepped");
+  expect_sensible_pace(options);
   expect(options.schedule.empty() == (options.mode != RunMode::kReplay),
          "options.schedule and RunMode::kReplay belong together");
   expect(!options.localise_only || !options.map.empty(), "options.localise_only needs options.map");
   expect(options.map.empty() || options.places,
          "options.map needs options.places, by which the camera finds itself in the map");
+  expect(options.checkpoint.empty() || options.mode != RunMode::kStepped,
+         "options.checkpoint is not for RunMode::kStepped: call save_map");
+  expect(std::isfinite(options.checkpoint_period) && options.checkpoint_period > 0,
+         "options.checkpoint_period must be finite and > 0");
+  expect(has_folder(options.checkpoint), "options.checkpoint is in a folder that is not there");
+  expect(has_folder(options.trace), "options.trace is in a folder that is not there");
+}
+
+LatePolicy late_policy(const SlamOptions& options) {
+  switch (options.late.value_or(options.live ? LateFrames::kNewest : LateFrames::kQueue)) {
+    case LateFrames::kQueue:
+      return LatePolicy::kQueue;
+    case LateFrames::kDrop:
+      return LatePolicy::kDrop;
+    case LateFrames::kNewest:
+      break;
+  }
+  return LatePolicy::kNewest;
 }
 
 }  // namespace
@@ -37,8 +71,7 @@ EngineOptions engine_options(const SlamOptions& options) {
   EngineOptions engine;
   engine.deterministic = options.mode == RunMode::kDeterministic;
   engine.stepped = options.mode == RunMode::kStepped;
-  engine.pacing.live = options.live;
-  engine.pacing.late = LatePolicy::kNewest;
+  engine.pacing = {.speed = options.speed, .late = late_policy(options), .live = options.live};
   engine.localise_only = options.localise_only;
   engine.mapper.inner_window = options.inner_window;
   engine.mapper.outer_window = options.outer_window;
@@ -47,6 +80,8 @@ EngineOptions engine_options(const SlamOptions& options) {
   engine.frame_slots = static_cast<std::size_t>(options.frame_buffers);
   engine.logs.folder = options.run_folder;
   engine.logs.frames_in_memory = static_cast<std::size_t>(options.kept_frames);
+  if (!options.checkpoint.empty()) engine.checkpoint = {options.checkpoint, options.checkpoint_period};
+  engine.trace = !options.trace.empty();
   engine.tracker_cpu = options.tracker_cpu;
   engine.mapper_cpu = options.mapper_cpu;
   engine.loop_closer_cpu = options.loop_closer_cpu;

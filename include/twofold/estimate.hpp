@@ -46,18 +46,19 @@ struct PoseEstimate {
   Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
   /// 6x6 row by row, of delta in T_reference_camera * exp(delta), delta = (translation [m], rotation [rad])
   /// in the camera's axes: how well the camera is known relative to the reference keyframe. Where that
-  /// keyframe is in the world, and the drift on the way there, is not in it. As large as the residuals of the
-  /// last frames say, and a readout that nobody knows; what no residual shows, a wrong focal length or clock,
-  /// is not in it. Honest within a factor of two in standard deviations where that was measured
-  /// (docs/results.md). All zero, and known, for the frame that starts a map part: that frame defines the
-  /// world. Not known (covariance_known is false: the measurements leave a direction open): all NaN.
+  /// keyframe is in the world, and the drift on the way there, is not in it. It is as large as the residuals
+  /// of the last frames say, and allows for a rolling shutter's readout as long as that is not known; what no
+  /// residual shows, a wrong focal length or clock, is not in it. Honest within a factor of two in standard
+  /// deviations where that was measured (docs/results.md). All zero, and known, for the frame that starts a
+  /// map part: that frame defines the world. Not known (covariance_known is false: the measurements leave a
+  /// direction open): all NaN.
   std::array<double, 36> covariance = unknown_covariance();
   /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
   /// none.
   std::array<double, 6> velocity{};
 
   std::uint64_t map_version = 0;  ///< of the map that the frame was tracked against
-  /// When the frame was exposed, on CLOCK_MONOTONIC; without a clock to keep (SlamOptions::live), when the
+  /// When the frame was exposed, on CLOCK_MONOTONIC; without a pace (SlamOptions::live, speed), when the
   /// tracker took it.
   std::int64_t exposed_ns = 0;
   std::int64_t latency_ns = 0;  ///< from then to the moment the pose was known

@@ -32,13 +32,29 @@ enum class SlamStep : std::uint8_t {
   kCloseLoops  ///< looks a lost camera's place up, else compares the oldest new keyframe with all places
 };
 
+/// What becomes of a frame whose successor is due, too, when its turn comes.
+enum class LateFrames : std::uint8_t {
+  kQueue,  ///< it is tracked: every frame is, however late
+  /// It is dropped if it has waited for 1.5 frame periods, or the tracker is late though it leaves out all
+  /// that it can (docs/architecture.md, effort levels).
+  kDrop,
+  kNewest  ///< it is dropped: the newest one wins
+};
+
 struct SlamOptions {
   RunMode mode = RunMode::kThreaded;
   /// Frames are pushed when they are taken, and their times are of CLOCK_MONOTONIC: latency counts from
-  /// there, a tracker that is late leaves work out, and of the frames that wait the newest wins; frames more
-  /// than 10 s from now are refused. Otherwise frames are a recording's, and tracked as fast as the map can
-  /// follow. Needs RunMode::kThreaded or kStepped.
+  /// there, and a tracker that is late leaves work out; frames more than 10 s from now are refused.
+  /// Otherwise frames are a recording's, and tracked as fast as the map can follow, or at `speed`. Needs
+  /// RunMode::kThreaded or kStepped.
   bool live = false;
+  /// A recording as if it were live: recorded seconds a second, > 0. The first frame is tracked when it
+  /// comes, every other one no earlier than its time after that; latency counts from there, and a tracker
+  /// that is late leaves work out. Frames may be pushed ahead of their time, as many as there are buffers.
+  /// 0: no such pace. Needs RunMode::kThreaded, without `live`.
+  double speed = 0;
+  /// With `live` or `speed`. Nothing: kNewest if `live`, else kQueue.
+  std::optional<LateFrames> late = {};
 
   /// Map to go on with (.tfm); empty: start one. The camera is unplaced until a place of it is recognised,
   /// or, after a second, in a map part of its own.
@@ -47,6 +63,14 @@ struct SlamOptions {
   /// Recognise places: closes large loops, finds a lost camera, joins map parts. Needed for `map`.
   bool places = true;
   std::filesystem::path vocabulary = {};  ///< instead of the built-in one
+
+  /// Map file that is written again and again during the run, replaced atomically, by a thread that nobody
+  /// waits for (in kDeterministic and kReplay within push): after a crash it has the map of the newest
+  /// checkpoint. The last map is yours to save (Slam::save_map). One that fails is tried again, and
+  /// Slam::errors says why as long as it does. Empty: none. Not with kStepped: call save_map there.
+  std::filesystem::path checkpoint = {};
+  /// From one checkpoint to the next [s] > 0; in kDeterministic and kReplay by the frames' times.
+  double checkpoint_period = 60;
 
   /// Of RunMode::kReplay: schedule.log of a run (run_folder), the other options being that run's.
   std::filesystem::path schedule = {};
@@ -69,11 +93,16 @@ struct SlamOptions {
   /// Without a folder: how many of the newest frames have a pose in SlamSummary::trajectory, >= 1, at 176
   /// bytes each; older ones are forgotten. A million are nine hours at 30 Hz.
   std::int64_t kept_frames = 1'000'000;
+
+  /// File that finish writes: when each thread took which step, how long its queue was and which version of
+  /// the map it saw, to be opened in ui.perfetto.dev. The newest 262,144 spans and values a thread, 6 MiB.
+  /// Empty: none.
+  std::filesystem::path trace = {};
 };
 
 enum class PushStatus : std::uint8_t {
-  /// On its way to the tracker, or, in a deterministic run or a replay, tracked. With `live` a newer frame
-  /// may still take its turn: it then counts as dropped, and nobody is called.
+  /// On its way to the tracker, or, in a deterministic run or a replay, tracked. With `live` or `speed` a
+  /// newer frame may still take its turn (LateFrames): it then counts as dropped, and nobody is called.
   kQueued,
   kDropped,  ///< in order, but all frame buffers were in use: the tracker is behind
   kRefused   ///< not to be used, and not counted as a frame
@@ -141,8 +170,8 @@ struct HeldMaps {
 ///   while (camera >> frame) slam.push(frame);
 ///   slam.finish();
 ///
-/// Threads: every function may be called by any thread, several at once, but for what callbacks may call
-/// (on_pose); those that push take turns.
+/// Threads: every function may be called by any thread, several at once; within a callback, only those that
+/// on_pose names. Threads that push take turns.
 class TWOFOLD_API Slam {
  public:
   using PoseCallback = std::function<void(const PoseEstimate&)>;
@@ -160,11 +189,11 @@ class TWOFOLD_API Slam {
 
   /// Called for every frame that was looked at, on the tracker's thread (where the tracker's steps are taken
   /// by the caller's: on that one), which waits for it: it must not block, and may call latest, map,
-  /// held_maps and errors only; push, has_room, wait_for_room, step, save_map and finish would wait, and
-  /// throw std::logic_error there. What it uses must live until finish has returned. The time it takes is a
-  /// stage of its own among SlamSummary::timings ("pose listener"), and in the next frame's latency. A
-  /// callback that throws is not called again; tracking goes on, and errors() says what it threw. To be set
-  /// before the first push, else std::logic_error is thrown.
+  /// held_maps, pause_mapping and errors only; push, has_room, wait_for_room, step, save_map and finish would
+  /// wait, and throw std::logic_error there. What it uses must live until finish has returned. The time it
+  /// takes is a stage of its own among SlamSummary::timings ("pose listener"), and in the next frame's
+  /// latency. A callback that throws is not called again; tracking goes on, and errors() says what it threw.
+  /// To be set before the first push, else std::logic_error is thrown.
   void on_pose(PoseCallback callback);
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
@@ -178,8 +207,8 @@ class TWOFOLD_API Slam {
   /// finish(). An exception of the engine, as std::bad_alloc, comes out of push in a deterministic run; in a
   /// threaded one it ends the thread it arose on, and errors() says so.
   PushResult push(const FrameView& frame);
-  /// Whether a push would find room now; without another pushing thread, it will. Not `live`, also whether
-  /// map and disk follow: a push is not dropped for their sake.
+  /// Whether a push would find room now; without another pushing thread, it will. Without a pace (`live`,
+  /// `speed`), also whether map and disk follow: a push is not dropped for their sake.
   [[nodiscard]] bool has_room() const;
   /// Waits until has_room, at most for `timeout_ns` (negative: for ever): for recordings, of which no frame
   /// should be dropped, and which the map should follow.
@@ -188,10 +217,10 @@ class TWOFOLD_API Slam {
 
   /// Of RunMode::kStepped: takes one step on this thread. Any thread may take any step, different ones at
   /// once: the tracker on a thread that is never late, the others where there is time. A map that waits for
-  /// its steps only grows old; but take all three kinds now and then, for each keeps the map's versions since
-  /// its last one. Without `live` has_room asks for steps of the map, too; finish takes all that are left.
-  /// Throws std::logic_error in other modes. What the step itself throws (std::bad_alloc, say) comes out as
-  /// well, and the run has failed: finish() tells.
+  /// its steps only grows old; but take all three kinds now and then, for each holds on to the versions of
+  /// the map since its last one. Without a pace has_room asks for steps of the map, too; finish takes all
+  /// that are left. Throws std::logic_error in other modes. What the step itself throws (std::bad_alloc, say)
+  /// comes out as well, and the run has failed: finish() tells.
   /// @return false: there was nothing to do, or another thread is taking this step
   bool step(SlamStep step);
 
@@ -207,8 +236,13 @@ class TWOFOLD_API Slam {
   /// file and reason, also when there is no keyframe yet.
   void save_map(const std::filesystem::path& file) const;
 
+  /// While paused, the map gets no keyframe: the camera is localised in what there is, as with localise_only,
+  /// from the next frame or the one after it on; in a map without keyframes it stays lost. Wait-free, any
+  /// thread, callbacks included. A replay pauses where its run did.
+  void pause_mapping(bool paused);
+
   /// What went wrong so far; tracking goes on unless it says otherwise. A thread that ended and a file that
-  /// lost something are in it within a second, whether frames come or not.
+  /// lost something or cannot be written are in it within a second, whether frames come or not.
   [[nodiscard]] std::vector<std::string> errors() const;
 
   /// Tracks what is queued, makes all poses agree globally and ends the threads. A second call gives the same

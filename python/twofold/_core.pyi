@@ -336,6 +336,11 @@ class SlamStep(_Enum):
     MAP: ClassVar[SlamStep]
     CLOSE_LOOPS: ClassVar[SlamStep]
 
+class LateFrames(_Enum):
+    QUEUE: ClassVar[LateFrames]
+    DROP: ClassVar[LateFrames]
+    NEWEST: ClassVar[LateFrames]
+
 class PushStatus(_Enum):
     QUEUED: ClassVar[PushStatus]
     DROPPED: ClassVar[PushStatus]
@@ -413,10 +418,14 @@ class Slam:
         *,
         mode: RunMode = ...,
         live: bool = False,
+        speed: float = 0,
+        late: LateFrames | None = None,
         map: str | PathLike[str] | None = None,
         localise_only: bool = False,
         places: bool = True,
         vocabulary: str | PathLike[str] | None = None,
+        checkpoint: str | PathLike[str] | None = None,
+        checkpoint_period: float = ...,
         schedule: str | PathLike[str] | None = None,
         inner_window: int = ...,
         outer_window: int = ...,
@@ -427,6 +436,7 @@ class Slam:
         fifo_priority: int | None = None,
         run_folder: str | PathLike[str] | None = None,
         kept_frames: int = ...,
+        trace: str | PathLike[str] | None = None,
     ) -> None: ...
     def push(self, frame: Frame) -> PushResult: ...
     def has_room(self) -> bool: ...
@@ -436,6 +446,7 @@ class Slam:
     def map(self) -> Map: ...
     def held_maps(self) -> tuple[int, int]: ...
     def save_map(self, file: str | PathLike[str]) -> None: ...
+    def pause_mapping(self, paused: bool) -> None: ...
     def errors(self) -> list[str]: ...
     def finish(self) -> Summary: ...
     def view(

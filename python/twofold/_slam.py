@@ -75,9 +75,27 @@ class Slam(_core.Slam):
         slam.push(twofold.Frame(t_ns, left, right))
         pose = slam.latest()
 
-    Options are those of twofold/slam.hpp: mode, live (times are of time.monotonic_ns(), the newest frame wins), map (file
-    to go on with), localise_only, places, vocabulary, inner_window, outer_window, frame_buffers, tracker_cpu, mapper_cpu,
-    loop_closer_cpu, fifo_priority, run_folder (in which trajectory_causal.txt and schedule.log grow), kept_frames. ValueError and RuntimeError say what is wrong with them.
+    Options are those of twofold/slam.hpp, each with its default:
+    mode=RunMode.THREADED      on which threads it works
+    live=False                 frames are pushed when they are taken; times are of time.monotonic_ns(), the newest frame wins
+    speed=0                    a recording as if it were live: recorded seconds a second; 0: as fast as the map can follow
+    late=None                  LateFrames, with live or speed: what becomes of frames whose turn comes late
+    map=None                   map file to go on with
+    localise_only=False        poses in that map, which does not change
+    places=True                recognise places: large loops, lost cameras, map parts
+    vocabulary=None            file instead of the built-in one
+    checkpoint=None            map file that is written again and again during the run
+    checkpoint_period=60       from one to the next [s]
+    schedule=None              of RunMode.REPLAY: schedule.log of the run to repeat
+    inner_window=25            keyframes optimised with their points
+    outer_window=175           keyframes around them, by relative poses
+    frame_buffers=8            frames on their way at most
+    tracker_cpu, mapper_cpu, loop_closer_cpu=None    pin the threads to these
+    fifo_priority=None         SCHED_FIFO for the tracker, 1..99
+    run_folder=None            folder in which trajectory_causal.txt and schedule.log grow
+    kept_frames=1_000_000      without one: how many of the newest frames have a pose in Summary.trajectory
+    trace=None                 file for ui.perfetto.dev, written by finish()
+    ValueError and RuntimeError say what is wrong with them.
 
     Any thread may call any method. The interpreter's lock is released while frames are pushed and while something is waited
     for; the tracker never waits for it: poses go through a queue, from which updates(), poses() or the callbacks read.

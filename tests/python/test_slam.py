@@ -217,3 +217,36 @@ def test_what_is_not_known_is_said(frames: list[twofold.Frame], rig: twofold.Cam
         poses = list(slam.poses())
     assert poses[0].covariance_known and not poses[0].covariance.any(), "it defines the world"
     assert poses[2].covariance_known and poses[2].covariance.any()
+
+
+def test_a_recording_is_played_at_its_own_pace_and_leaves_checkpoints_and_a_trace(
+    frames: list[twofold.Frame], rig: twofold.CameraRig, tmp_path: Path
+) -> None:
+    with twofold.Slam(
+        rig,
+        speed=2,
+        late=twofold.LateFrames.QUEUE,
+        checkpoint=tmp_path / "map.tfm",
+        checkpoint_period=0.1,
+        trace=tmp_path / "trace.json",
+    ) as slam:
+        push_all(slam, frames)
+        summary = slam.finish()
+        poses = list(slam.poses())
+    assert summary.tracked == 40 and not summary.errors
+    passed = [pose.exposed_ns - poses[0].exposed_ns for pose in poses]
+    assert passed == pytest.approx([(pose.t_ns - poses[0].t_ns) / 2 for pose in poses], abs=2)
+    assert (tmp_path / "map.tfm").stat().st_size > 0
+    assert "traceEvents" in (tmp_path / "trace.json").read_text()
+    with pytest.raises(ValueError, match="options.late"):
+        twofold.Slam(rig, late=twofold.LateFrames.DROP)
+
+
+def test_while_mapping_is_paused_no_keyframe_is_made(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    with twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+        push_all(slam, frames[:10])
+        slam.pause_mapping(True)
+        version = slam.map().version
+        push_all(slam, frames[10:])
+        assert slam.map().version == version
+        assert slam.finish().tracked == 40
