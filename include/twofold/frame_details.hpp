@@ -32,7 +32,7 @@ class TWOFOLD_API FrameDetails {
   [[nodiscard]] QueueLengths waiting() const;
   /// What the pose rests on, outliers included, as far as there is room for it; found when it is asked for.
   /// No lock, no allocation.
-  /// @return  how many it are
+  /// @return  how many there are in `found`
   [[nodiscard]] std::size_t points(std::span<MeasuredPoint> found) const;
 
   struct Impl;

@@ -16,12 +16,12 @@ class TWOFOLD_API FrameRectifier {
   /// @param calibration    file of any form that docs/calibration.md has, as `twofold calibrate` writes; or a
   ///                       folder in EuRoC's layout, which has a file a camera: both of cam0 and cam1 are
   ///                       read
-  /// @param width, height  of the raw images [px], of calibrations that do not state it; 0: it does
+  /// @param width, height  of the raw images [px], for files that do not state it, as KITTI's; 0: the file
+  ///                       does
   /// @param left_only      of a folder in EuRoC's layout, cam0 alone, as one camera
   ///
   /// rig().sensor says for how many cameras it is. Throws std::runtime_error naming the file and what is
-  /// wrong: also when it is one of EuRoC's, of one camera of a pair, which turns differently without the
-  /// other.
+  /// wrong. EuRoC's file of one camera of a pair is refused: alone, it gives another rotation than the pair.
   explicit FrameRectifier(const std::filesystem::path& calibration, int width = 0, int height = 0,
                           bool left_only = false);
   ~FrameRectifier();

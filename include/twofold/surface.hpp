@@ -14,7 +14,7 @@ struct SurfaceModelOptions {
   double voxel = 0.05;  ///< distance of two samples [m], 1e-4 .. 10
   double most_depth =
       0;  ///< readings farther than this begin no surface [m] >= 0; 0: CameraRig's bounds alone
-  double nearest_stereo = 0.4;  ///< stereo: disparities are searched up to that of this depth [m] > 0
+  double nearest_stereo = 0.4;  ///< stereo: the nearest depth that is looked for [m] > 0
 };
 
 enum class SpaceState : std::uint8_t {

@@ -35,7 +35,7 @@ struct Pose {
                                                           const std::array<double, 3>& p_b);
 
 /// kMono: one camera. It is placed once it has moved enough to see depth (until then it is lost, and
-/// PoseEstimate::reason says what is waited for). Its map and poses are right up to their scale, in which the
+/// PoseEstimate::reason says what it waits for). Its map and poses are right up to their scale, in which the
 /// median depth of the first map is about one. In a map that a rig made (SlamOptions::map with localise_only)
 /// its poses are in metres.
 enum class Sensor : std::uint8_t { kStereo, kRgbd, kMono };
