@@ -64,9 +64,8 @@ Covariance along_axes_of_parent(const Covariance& camera, const twofold::Pose& T
 
 class Node {
  public:
-  /// @param T_rectified_raw  of the source, or of the FrameRectifier that made the images: poses go out of
-  /// the
-  ///                         lens as it was calibrated, which a robot's extrinsics are of
+  /// @param T_rectified_raw  of the source, or of the FrameRectifier that made the images: what is published
+  ///                         is the pose of the lens as it was calibrated, which a robot's extrinsics are of
   Node(const twofold::CameraRig& rig, const twofold::Pose& T_rectified_raw)
       : T_rectified_raw_(T_rectified_raw), slam_(rig, {.live = true}) {
     slam_.on_pose([this](const twofold::PoseEstimate& pose) { queue_.put(pose); });

@@ -105,12 +105,13 @@ void bind_rig(py::module_& module) {
                               cy,     baseline, depth_unit, depth_min, depth_max, readout};
            }),
            py::kw_only(), py::arg("sensor") = d.sensor, py::arg("width"), py::arg("height"), py::arg("fx"),
-           py::arg("fy"), py::arg("cx"), py::arg("cy"), py::arg("baseline"),
+           py::arg("fy"), py::arg("cx"), py::arg("cy"), py::arg("baseline") = d.baseline,
            py::arg("depth_unit") = d.depth_unit, py::arg("depth_min") = d.depth_min,
            py::arg("depth_max") = d.depth_max, py::arg("readout") = d.readout,
            "Sizes, focal lengths and principal point in pixels; baseline in metres, of RGB-D that of the "
            "virtual right\n"
-           "camera (0.08); depth_unit: metres per unit of the depth image; readings outside depth_min to "
+           "camera (0.08), of MONO none; depth_unit: metres per unit of the depth image; readings outside "
+           "depth_min to "
            "depth_max [m]\n"
            "are holes; readout of a rolling shutter [s], 0 when all rows are exposed at once, None when it "
            "is\n"
@@ -127,7 +128,13 @@ void bind_rig(py::module_& module) {
       .def_readwrite("depth_min", &CameraRig::depth_min, "Nearer readings are holes [m].")
       .def_readwrite("depth_max", &CameraRig::depth_max, "Farther ones likewise [m].")
       .def_readwrite("readout", &CameraRig::readout,
-                     "Of a rolling shutter [s]; 0: none; None: to be found out.");
+                     "Of a rolling shutter [s]; 0: none; None: to be found out.")
+      .def("__repr__", [](const CameraRig& rig) {
+        const auto sensor = py::cast(rig.sensor).attr("name").cast<std::string>();
+        return fmt::format(
+            "<CameraRig {}: {}x{}, fx {:.2f}, fy {:.2f}, cx {:.2f}, cy {:.2f}, baseline {:.4f} m>", sensor,
+            rig.width, rig.height, rig.fx, rig.fy, rig.cx, rig.cy, rig.baseline);
+      });
 }
 
 void bind_estimate(py::module_& module) {

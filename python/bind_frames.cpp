@@ -2,6 +2,9 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <optional>
+#include <string>
+
+#include <fmt/format.h>
 
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
@@ -109,6 +112,12 @@ void bind_source(py::module_& module) {
              auto frame = next_frame(source);
              if (!frame) throw py::stop_iteration();
              return *std::move(frame);
+           })
+      .def("__repr__",
+           [](const Source& source) {
+             const auto count = source.frame_count();
+             return fmt::format("<Source{}: {}>", count ? fmt::format(" of {} frames", *count) : "",
+                                py::repr(py::cast(source.rig())).cast<std::string>());
            })
       .def("__enter__", [](const py::object& self) { return self; })
       .def("__exit__", [](Source& source, const py::args&) { source.stop(); });

@@ -48,9 +48,13 @@ TWOFOLD_API void save_calibration(const BoardCalibration& calibration, const std
 /// the views that a calibration needs, says which one is missing, and refuses a result that is not to be
 /// believed.
 ///
-///   BoardCalibrator calibrator({.board = "chessboard:9x6:0.025", .width = 640, .height = 480, .stereo =
-///   true}); while (!calibrator.complete() && camera >> frame) { calibrator.look(frame);
-///   show(calibrator.progress()); } save_calibration(calibrator.calibrate(), "camera.yaml");
+///   BoardCalibrator calibrator(
+///       {.board = "chessboard:9x6:0.025", .width = 640, .height = 480, .stereo = true});
+///   while (!calibrator.complete() && camera >> frame) {
+///     calibrator.look(frame);
+///     show(calibrator.progress());
+///   }
+///   save_calibration(calibrator.calibrate(), "camera.yaml");
 ///
 /// Used by one thread at a time.
 class TWOFOLD_API BoardCalibrator {

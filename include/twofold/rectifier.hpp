@@ -34,8 +34,7 @@ class TWOFOLD_API FrameRectifier {
   /// for images that are rectified already. A robot's extrinsics are of the latter:
   ///
   ///   T_world_raw = compose(estimate.T_world_camera, rectifier.T_rectified_raw())
-  ///   T_world_body = compose(T_world_raw, inverse(T_body_raw))     // T_body_raw: where the camera is
-  ///   mounted
+  ///   T_world_body = compose(T_world_raw, inverse(T_body_raw))  // T_body_raw: how the camera is mounted
   [[nodiscard]] Pose T_rectified_raw() const;
   /// @return  grey images, and depth, with an owner; those of `raw` themselves when they are rectified
   ///          already. Throws std::invalid_argument when `raw` is not of the calibrated cameras.

@@ -50,7 +50,8 @@ struct SlamOptions {
   bool live = false;
   /// A recording as if it were live: recorded seconds a second, > 0. The first frame is tracked when it
   /// comes, every other one no earlier than its time after that; latency counts from there, and a tracker
-  /// that is late leaves work out. Frames may be pushed ahead of their time, as many as there are buffers.
+  /// that is late leaves work out. Frames may be pushed ahead of their time, as many as there are buffers;
+  /// one that is pushed after it is late, whoever is to blame (SourceSettings::preload decodes beforehand).
   /// 0: no such pace. Needs RunMode::kThreaded, without `live`.
   double speed = 0;
   /// With `live` or `speed`. Nothing: kNewest if `live`, else kQueue.

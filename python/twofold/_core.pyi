@@ -62,7 +62,7 @@ class CameraRig:
         fy: float,
         cx: float,
         cy: float,
-        baseline: float,
+        baseline: float = ...,
         depth_unit: float = ...,
         depth_min: float = ...,
         depth_max: float = ...,

@@ -116,3 +116,12 @@ def test_a_calibrator_says_what_is_missing_and_refuses() -> None:
         calibrator.look(twofold.Frame(2, grey(48, 32)))
     with pytest.raises(ValueError, match="board"):
         twofold.BoardCalibrator("paper", 64, 48)
+
+
+def test_rigs_and_sources_say_what_they_are(rig: twofold.CameraRig) -> None:
+    assert repr(rig).startswith("<CameraRig STEREO: 320x240, fx 210.00")
+    assert repr(twofold.Source("synthetic:desk?frames=7&width=320&height=240")) == f"<Source of 7 frames: {rig!r}>"
+    mono = twofold.CameraRig(sensor=twofold.Sensor.MONO, width=64, height=48, fx=50, fy=50, cx=32, cy=24)
+    assert twofold.Slam(mono, mode=twofold.RunMode.DETERMINISTIC).finish().frames == 0
+    with pytest.raises(ValueError, match="rig.baseline must be > 0"):
+        twofold.Slam(twofold.CameraRig(width=64, height=48, fx=50, fy=50, cx=32, cy=24))
