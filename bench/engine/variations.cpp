@@ -47,8 +47,17 @@ struct RelativePose {
   Matrix6 covariance;
 };
 
+/// What became of a frame.
+struct FrameOutcome {
+  FrameRecord record;
+  std::size_t rank = 0;  ///< of its part of the final map, 0 the largest
+  double error = -1;     ///< of its final position, if it is in the largest part [m]
+};
+
 /// One variation's outcome.
 struct Outcome {
+  std::vector<FrameOutcome> each;  ///< of its frames
+
   std::size_t frames = 0, tracked = 0;
   std::vector<std::size_t> parts;  ///< frames in each part of the final map, the largest first
   double ate = 0, ate_causal = 0;  ///< of the largest; causal: of the part that most frames named then [m]
@@ -167,6 +176,29 @@ class ClockJitter {
   std::vector<double> intervals_;
 };
 
+/// Which part of the final map each frame is in, and how far from the truth.
+void judge_frames(const std::map<KeyframeId, Trajectory>& of_parts, const RunResult& result,
+                  const Trajectory& truth, Alignment alignment, std::vector<FrameOutcome>& frames) {
+  std::vector<std::pair<std::size_t, KeyframeId>> parts;
+  for (const auto& [part, trajectory] : of_parts) parts.emplace_back(trajectory.size(), part);
+  std::sort(parts.rbegin(), parts.rend());
+  std::map<std::int64_t, double> errors;
+  if (!parts.empty()) {
+    const auto evaluation =
+        evaluate(associate(of_parts.at(parts[0].second), truth, 20'000'000), {.alignment = alignment});
+    for (std::size_t i = 0; evaluation && i < evaluation->pairs.size(); ++i)
+      errors[evaluation->pairs[i].t_ns] = evaluation->position_errors[i];
+  }
+  for (FrameOutcome& frame : frames) {
+    if (!has_final_pose(frame.record) || !result.graph.contains(frame.record.reference)) continue;
+    const KeyframeId part = result.graph.part(frame.record.reference);
+    const auto at = std::find_if(parts.begin(), parts.end(), [&](const auto& p) { return p.second == part; });
+    frame.rank = static_cast<std::size_t>(at - parts.begin());
+    if (const auto error = errors.find(frame.record.t_ns); frame.rank == 0 && error != errors.end())
+      frame.error = error->second;
+  }
+}
+
 double ate(const Trajectory& estimate, const Trajectory& truth, Alignment alignment) {
   const auto evaluation = evaluate(associate(estimate, truth, 20'000'000), {.alignment = alignment});
   return evaluation ? evaluation->absolute.rmse : -1;
@@ -218,6 +250,7 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   std::map<KeyframeId, Trajectory> estimates, causal;  // parts have worlds of their own
   for (const FrameRecord& record : result.frames) {
     ++outcome.frames;
+    outcome.each.push_back({record});
     if (!has_final_pose(record) || !result.graph.contains(record.reference)) continue;
     estimates[result.graph.part(record.reference)].push_back(
         {record.t_ns, final_T_c_w(record, result.graph).inverse()});
@@ -235,9 +268,23 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
       outcome.nees.push_back(comparison->normalised(pose.covariance));
   }
   const Alignment alignment = to_scale ? Alignment::kSe3 : Alignment::kSim3;
+  judge_frames(estimates, result, truth, alignment, outcome.each);
   outcome.ate = ate(longest(estimates), truth, alignment);
   outcome.ate_causal = ate(longest(causal), truth, alignment);
   return outcome;
+}
+
+void print_frames(const Outcome& outcome) {
+  fmt::print("# frame, lost why | part, inliers, share of points found, keyframe, error m\n");
+  for (const FrameOutcome& frame : outcome.each) {
+    const FrameRecord& record = frame.record;
+    if (!has_final_pose(record)) {
+      fmt::print("{} lost: {}\n", record.frame_index, describe(record.cause));
+    } else {
+      fmt::print("{} {} {} {:.2f} {} {:.4f}\n", record.frame_index, frame.rank, record.inliers,
+                 record.tracked_share, record.keyframe ? "K" : "-", frame.error);
+    }
+  }
 }
 
 void print_row(const Variation& variation, const Outcome& outcome) {
@@ -261,6 +308,7 @@ int main(int argc, char** argv) {
   twofold::SourceOptions options;
   std::string calibration;
   bool as_it_is_only = false;
+  bool frames = false;
   std::string camera = "all";
   int only = -1;
   std::vector<int> every;
@@ -271,6 +319,7 @@ int main(int argc, char** argv) {
   app.add_option("--camera", camera, "mono: the left camera alone, errors after alignment with scale")
       ->check(CLI::IsMember({"all", "mono"}));
   app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
+  app.add_flag("--frames", frames, "what became of each frame");
   CLI::Option* const one =
       app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
   app.add_option("--every", every,
@@ -302,7 +351,9 @@ int main(int argc, char** argv) {
           source);
       for (const twofold::Variation& variation : variations) {
         if (only >= 0 && &variation != &variations[static_cast<std::size_t>(only)]) continue;
-        print_row(variation, twofold::run(source, options, variation, {truth[0], truth[1]}));
+        const twofold::Outcome outcome = twofold::run(source, options, variation, {truth[0], truth[1]});
+        print_row(variation, outcome);
+        if (frames) twofold::print_frames(outcome);
         if (as_it_is_only) break;
       }
     }
