@@ -53,7 +53,8 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   }
   // How much this scene's neighbouring views look alike; 0 at the start of a map.
   const double likeness = previous_ ? bag_score(view.bag, *previous_) : 0;
-  const auto candidates = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
+  auto candidates = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
+  if (candidates.empty()) candidates = in_older_parts(keyframe.id, view.bag, graph);
   std::optional<LoopConstraint> loop;
   for (const PlaceCandidate& candidate : candidates) {
     const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
@@ -69,6 +70,17 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   if (one_camera) view.z.clear();  // the map may change
   remember(keyframe.id, std::move(view));
   return loop;
+}
+
+/// A keyframe of a part that was begun after a loss is looked for as a lost camera is: it has few keyframes
+/// before it to be consistent with, and the same place may look much alike here and there only once.
+std::vector<PlaceCandidate> LoopCloser::in_older_parts(KeyframeId id, const BagOfWords& bag,
+                                                       const GraphSnapshot& graph) {
+  while (graph.keyframe(KeyframeId{oldest_}).culled()) ++oldest_;  // ends at `id` at the latest
+  const KeyframeId part = graph.part(id);
+  if (graph.keyframe(KeyframeId{oldest_}).part == part) return {};
+  return recogniser_.query_other_parts(part, bag,
+                                       static_cast<std::size_t>(options_.relocalisation_candidates), graph);
 }
 
 std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, const GraphSnapshot& graph) {

@@ -68,6 +68,8 @@ class LoopCloser {
   /// Does the view show the place of keyframe k? First by corners, then by the map's points.
   [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
                                                      const FrameImages& images, const GraphSnapshot& graph);
+  [[nodiscard]] std::vector<PlaceCandidate> in_older_parts(KeyframeId id, const BagOfWords& bag,
+                                                           const GraphSnapshot& graph);
   void collect_views(KeyframeId k, const GraphSnapshot& graph);
   [[nodiscard]] std::optional<double> scale_of(const Relocalisation& seen) const;
   void remember(KeyframeId id, PlaceView view);
@@ -80,6 +82,7 @@ class LoopCloser {
   PoseRefinement refinement_;
   LoopProbation probation_;
   KeyframeDatabase places_;
+  std::uint32_t oldest_ = 0;  ///< keyframe: all before it are culled
   std::vector<KeyframeId> neighbours_;
   std::vector<PlacedView> views_;
   // One camera only: depths of the keyframe at hand, and the places' views with those that the map gives

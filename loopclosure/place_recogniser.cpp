@@ -43,6 +43,13 @@ std::vector<PlaceCandidate> PlaceRecogniser::query_anywhere(const BagOfWords& ba
   return index_.query(bag, max_count, [&](KeyframeId k) { return !is_culled(graph, k); });
 }
 
+std::vector<PlaceCandidate> PlaceRecogniser::query_other_parts(KeyframeId part, const BagOfWords& bag,
+                                                               std::size_t max_count,
+                                                               const GraphSnapshot& graph) {
+  return index_.query(bag, max_count,
+                      [&](KeyframeId k) { return !is_culled(graph, k) && graph.part(k) != part; });
+}
+
 std::vector<KeyframeId> PlaceRecogniser::forget_culled(const GraphSnapshot& graph) {
   return index_.forget(static_cast<std::size_t>(options_.culled_visits),
                        [&](KeyframeId k) { return is_culled(graph, k); });

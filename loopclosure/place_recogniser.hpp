@@ -51,6 +51,11 @@ class PlaceRecogniser {
   /// Here as there, a culled keyframe is no candidate.
   [[nodiscard]] std::vector<PlaceCandidate> query_anywhere(const BagOfWords& bag, std::size_t max_count,
                                                            const GraphSnapshot& graph);
+  /// The same in the map's other parts: who is in a part of its own was lost, and may be where another one
+  /// knows its way.
+  [[nodiscard]] std::vector<PlaceCandidate> query_other_parts(KeyframeId part, const BagOfWords& bag,
+                                                              std::size_t max_count,
+                                                              const GraphSnapshot& graph);
 
  private:
   /// A place that the last queries agreed about.

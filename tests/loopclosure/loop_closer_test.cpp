@@ -128,6 +128,42 @@ TEST_F(LoopCloserTest, EveryPlaceIsFoundAfterHundredsOfThousandsOfKeyframes) {
   for (const KeyframeProposal& view : views) EXPECT_TRUE(closer.relocalise(view.images, graph_));
 }
 
+/// Two keyframes of a part that was begun after a loss suffice, without any before them that agree, and
+/// whatever is near them in the graph.
+TEST_F(LoopCloserTest, APartOfItsOwnIsLookedForInTheOlderOne) {
+  LoopCloserOptions strict = options();
+  strict.recogniser.consistency = 100;
+  LoopCloser closer(rig_, vocabulary(), strict);
+  for (int k = 0; k < kTurn; ++k) {
+    add_to_map(k);
+    EXPECT_FALSE(closer.step(keyframe(k), graph_));
+  }
+  const SE3 T_w_own = SE3(SO3::exp({0, 0.4, 0}), Vector3(3, 1, 2));
+  std::vector<LoopConstraint> loops;
+  for (int k = kTurn + 4; k < kTurn + 7; ++k) {
+    Keyframe added;
+    added.id = KeyframeId{static_cast<std::uint32_t>(k)};
+    added.part = KeyframeId{kTurn + 4};
+    added.T_k_w = truth(k) * T_w_own;
+    added.median_depth = 3;
+    while (graph_.keyframe_count() < static_cast<std::size_t>(k)) {
+      writer_.add_culled_keyframe({});
+      graph_ = writer_.publish();
+    }
+    writer_.add_keyframe(added);
+    writer_.set_reference(added.id);
+    graph_ = writer_.publish();
+    if (const auto loop = closer.step(keyframe(k), graph_)) loops.push_back(*loop);
+  }
+  ASSERT_FALSE(loops.empty());
+  for (const LoopConstraint& loop : loops) {
+    const SE3 T_to_from =
+        truth(static_cast<int>(index(loop.to))) * truth(static_cast<int>(index(loop.from))).inverse();
+    EXPECT_LT((loop.T_to_from * T_to_from.inverse()).log().norm(), 0.03);
+    EXPECT_LT(index(loop.from), static_cast<std::uint32_t>(kTurn));
+  }
+}
+
 /// The map is bent: it has the second round beside the first.
 TEST_F(LoopCloserTest, ALoopThatMovesTheMapWaitsForASecondWitness) {
   LoopCloser closer(rig_, vocabulary(), options());
