@@ -6,9 +6,6 @@
 namespace twofold {
 namespace {
 
-// A frame or two are lost now and then; the tracker finds on by itself.
-constexpr int kLostBeforeAsking = 2;
-
 /// Length of the way between two keyframes of one part, from one keyframe to the next.
 double distance_travelled(const GraphSnapshot& graph, KeyframeId a, KeyframeId b) {
   const auto [first, last] = std::minmax({index(a), index(b)});
@@ -147,13 +144,13 @@ void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecor
 }
 
 bool TrackerRunner::wants_relocalisation() const {
-  const bool lost = tracker_.unplaced() || tracker_.lost_frames() >= kLostBeforeAsking;
+  const bool lost = tracker_.unplaced() || tracker_.lost_frames() > 0;
   return can_relocalise_ && !answer_awaited_ && lost;
 }
 
 bool TrackerRunner::request_relocalisation(RelocalisationRequest& request) {
   if (!wants_relocalisation()) return false;
-  request.images.copy_from(tracker_.lost_images());
+  request.images.copy_from(tracker_.ask_where());
   answer_awaited_ = true;
   return true;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "imaging/level_pixels.hpp"
 
@@ -83,6 +84,7 @@ std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
   if (!level) return std::nullopt;
   Patch patch;
   warp_patch(appearance, warp->A_c_a, *level, patch);
+  if (options.gain != 1) scale_contrast(patch, options.gain);
   const cv::Mat& image = images.left.level(*level);
   const auto found = search_disc(patch, image, to_level(warp->uv, *level), options.radius_px);
   if (!found) return std::nullopt;
@@ -101,6 +103,26 @@ std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
     match.z.z() = right_from_depth(images.depth, rig, match.z.x(), match.z.y());
   }
   return match;
+}
+
+std::optional<float> brightness_since_anchor(const ImagePyramid& images, const PinholeCamera& camera,
+                                             const PointAppearance& appearance, const Vector3& psi,
+                                             const SE3& T_c_a) {
+  constexpr int kOctaves = 3;  // two pixels of so many levels higher are as wide as what was kept of the look
+  constexpr float kBlack = 4;  // [grey] darker tells nothing
+  const auto warp = predict_warp(camera, psi, T_c_a);
+  if (!warp || !camera.contains(warp->uv)) return std::nullopt;
+  const int level = std::min(appearance.level + kOctaves, ImagePyramid::kLevels - 1);
+  const cv::Mat& image = images.level(level);
+  const Eigen::Vector2f uv = to_level(warp->uv, level);
+  const int u = std::clamp(static_cast<int>(std::floor(uv.x())), 0, image.cols - 2);
+  const int v = std::clamp(static_cast<int>(std::floor(uv.y())), 0, image.rows - 2);
+  const auto *upper = image.ptr<std::uint8_t>(v) + u, *lower = image.ptr<std::uint8_t>(v + 1) + u;
+  const auto now = static_cast<float>(upper[0] + upper[1] + lower[0] + lower[1]) / 4;
+  const auto then =
+      static_cast<float>(std::accumulate(appearance.pixels.begin(), appearance.pixels.end(), 0)) /
+      static_cast<float>(appearance.pixels.size());
+  return now > kBlack && then > kBlack ? std::optional(now / then) : std::nullopt;
 }
 
 double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v) {

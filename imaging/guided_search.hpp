@@ -19,6 +19,7 @@ struct GuidedSearchOptions {
   float noise = 3;             ///< grey levels two views of the same surface differ by anyway
   int refine_iterations = 12;  ///< upper bound of sub-pixel Lucas-Kanade steps
   double right_search_px = 6;  ///< stereo: half range along the row around the predicted u_r, level pixels
+  float gain = 1;              ///< contrast of the view over that of the patch, as far as known before, > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -40,6 +41,13 @@ struct PointMatch {
 [[nodiscard]] std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
                                                    const PointAppearance& appearance, const Vector3& psi,
                                                    const SE3& T_c_a, const GuidedSearchOptions& options);
+
+/// Brightness of a view where a point should be seen over that of its patch: about the change of light since
+/// the anchor was taken, for the median of many points. Nothing when the point is not in view, or black.
+[[nodiscard]] std::optional<float> brightness_since_anchor(const ImagePyramid& images,
+                                                           const PinholeCamera& camera,
+                                                           const PointAppearance& appearance,
+                                                           const Vector3& psi, const SE3& T_c_a);
 
 /// Right coordinate that a depth image gives a left pixel: median of the valid readings of the 3x3 pixels
 /// around it, as u_r = u_l - f b / depth  (thesis 6.5.3). NaN at holes and where the readings jump (depth

@@ -22,6 +22,7 @@ std::string GuidedSearchOptions::invalid_reason() const {
       .at_least("noise", noise, 0)
       .at_least("refine_iterations", refine_iterations, 1)
       .above("right_search_px", right_search_px, 0)
+      .above("gain", gain, 0)
       .reason();
 }
 

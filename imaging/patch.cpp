@@ -162,6 +162,18 @@ void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a,
   fill_patch(bordered.data(), kBordered, patch);
 }
 
+void scale_contrast(Patch& patch, float gain) {
+  Eigen::Map<Eigen::Array<float, Patch::kArea, 1>, Eigen::Aligned32> value(patch.value);
+  const float mean = value.sum() / Patch::kArea;
+  value = gain * (value - mean) + std::min(gain * mean, 255.0F);
+  for (int i = 0; i < Patch::kArea; ++i) {
+    patch.gradient_u[i] *= gain;
+    patch.gradient_v[i] *= gain;
+    patch.rounded[i] = static_cast<std::int16_t>(std::lround(patch.value[i]));
+  }
+  patch.deviation *= gain;
+}
+
 bool cut_patch(const cv::Mat& level_image, int u, int v, Patch& patch) {
   const int u0 = u - Patch::kCentre - 1;
   const int v0 = v - Patch::kCentre - 1;

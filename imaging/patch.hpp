@@ -45,6 +45,9 @@ struct PatchWarp {
 /// Samples the appearance as it should look at `level` of the view.
 void warp_patch(const PointAppearance& appearance, const Eigen::Matrix2d& A_c_a, int level, Patch& patch);
 
+/// The patch in other light: all of it times `gain`, the mean at most white.
+void scale_contrast(Patch& patch, float gain);
+
 /// Patch around a whole pixel as it stands; false when too near to the border.
 [[nodiscard]] bool cut_patch(const cv::Mat& level_image, int u, int v, Patch& patch);
 

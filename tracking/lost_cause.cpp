@@ -89,13 +89,13 @@ void LossHistory::placed() {
   seeing_since_ns_ = 0;
 }
 
-double LossHistory::seeing_for(bool corners_in_view, std::int64_t t_ns) {
-  if (!corners_in_view) {
+double LossHistory::seeing_for(bool something_in_view, std::int64_t t_ns) {
+  if (!something_in_view) {
     seeing_since_ns_ = 0;
   } else if (seeing_since_ns_ == 0) {
     seeing_since_ns_ = t_ns;
   }
-  return corners_in_view ? static_cast<double>(t_ns - seeing_since_ns_) / 1e9 : 0;
+  return something_in_view ? static_cast<double>(t_ns - seeing_since_ns_) / 1e9 : 0;
 }
 
 const char* describe(LostCause cause) {

@@ -59,8 +59,8 @@ class LossHistory {
   void begin_frame(std::int64_t index, std::int64_t t_ns);
   void lost() { ++lost_frames_; }
   void placed();
-  /// @return for how long corners have been in view of the lost camera [s]
-  double seeing_for(bool corners_in_view, std::int64_t t_ns);
+  /// @return for how long there has been something in view of the lost camera [s]
+  double seeing_for(bool something_in_view, std::int64_t t_ns);
 
   /// Frames since the last one with a pose.
   [[nodiscard]] int lost_frames() const { return lost_frames_; }

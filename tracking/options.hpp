@@ -25,16 +25,22 @@ struct TrackerOptions {
   MotionOnlyOptions motion{
       .max_iterations = 15, .inlier_chi2_mono = 9.210, .inlier_chi2_stereo = 11.345, .stop_step = 1e-5};
 
-  int wanted_matches = 180;           ///< stop searching once so many points were found in a frame
-  int max_searches = 320;             ///< upper bound of points searched in a frame
-  int neighbour_keyframes = 20;       ///< the reference keyframe's: so many, those that share most points
-  double border_px = 8;               ///< points predicted closer to the image's edge are not searched, >= 0
-  double min_view_cosine = 0.7;       ///< of the angle between a point's first ray and today's, in [-1, 1]
-  int min_inliers = 18;               ///< fewer: lost
-  int scarce_inliers = 40;            ///< a depth camera with fewer is placed by surfaces as well, >= 0
-  double min_inlier_share = 0.25;     ///< of the matches found: fewer: lost
-  double lost_radius_px = 8;          ///< search radius while lost
-  double doubted_inlier_share = 0.5;  ///< of the matches: with fewer a wider search may find a better pose
+  int wanted_matches = 180;        ///< stop searching once so many points were found in a frame
+  int max_searches = 320;          ///< upper bound of points searched in a frame
+  int neighbour_keyframes = 20;    ///< the reference keyframe's: so many, those that share most points
+  double border_px = 8;            ///< points predicted closer to the image's edge are not searched, >= 0
+  double min_view_cosine = 0.7;    ///< of the angle between a point's first ray and today's, in [-1, 1]
+  int min_inliers = 18;            ///< fewer: lost
+  int scarce_inliers = 40;         ///< a depth camera with fewer is placed by surfaces as well, >= 0
+  double min_inlier_share = 0.25;  ///< of the matches found: fewer: lost
+  double lost_radius_px = 8;       ///< search radius while lost
+  /// The light has changed when so large a share of the points searched was missed ...
+  double light_missed_share = 0.5;
+  double light_change = 1.5;  ///< ... and the view is by so much brighter or darker there, > 1
+  /// With fewer of the matches, of those not many, or of the points searched, a wider search may find a
+  /// better pose.
+  double doubted_inlier_share = 0.5;
+  double doubted_visible_share = 0.12;
   /// A pose found by appearance must explain so much of the points found from it...
   double rough_inlier_share = 0.6;
   double rough_visible_share = 0.2;  ///< ... and of those that should be visible,

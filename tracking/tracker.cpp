@@ -18,10 +18,12 @@ constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr std::size_t kRecentViews = 4;
 constexpr int kRoundsFromRough = 3;
 
-/// A pose that few points agree on, of few that were found: a wider search may know a better one.
+/// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
+/// better one.
 bool hardly_supported(const TrackResult& result, const TrackerOptions& options) {
-  return result.inliers < options.doubted_inlier_share * result.matches &&
-         result.inliers < options.rough_visible_share * result.searched;
+  return result.inliers < options.doubted_visible_share * result.searched ||
+         (result.inliers < options.doubted_inlier_share * result.matches &&
+          result.inliers < options.rough_visible_share * result.searched);
 }
 
 RecentView room_for_view(const Rig& rig, const WideSearch& search) {
@@ -46,10 +48,11 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   matches_.reserve(searches);
+  missed_.reserve(searches);
   motion_.reserve(searches);
   anchors_.reserve(searches);
   inlier_ids_.reserve(searches);
-  depths_.reserve(std::max(searches, kMaxImmaturePoints));
+  samples_.reserve(std::max(searches, kMaxImmaturePoints));
   previous_points_.reserve(kMaxAlignmentPoints);
   if (rig.kind == SensorKind::kStereo) right_rows_.emplace(rig);
   if (!rig.readout) readout_.emplace(rig, searches);
@@ -62,6 +65,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   allocate_images(rig, current_);
   allocate_images(rig, previous_);
   wide_search_.prepare(previous_corners_);
+  asked_ = room_for_view(rig, wide_search_);
 }
 
 TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
@@ -99,18 +103,20 @@ void Tracker::prepare_next(FrameStep& step) {
 
 /// Pose of the frame relative to a reference keyframe, from the points of the map around that.
 bool Tracker::track(FrameStep& step) {
-  SearchStart start = search_start(step.graph);
-  if (start.placement.reference == kNoKeyframe) {
+  const auto asked = recognised(step.graph);
+  if (asked && search_from_recognised(*asked, step)) return true;
+  if (last_.reference == kNoKeyframe) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }
+  SearchStart start{last_, false};
   local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  const bool by_surfaces = corners_scarce_ && !start.rough && surfaces_can_place();
-  if (!start.rough) start.placement.T_c_ref = by_surfaces ? align_to_surfaces(step) : align_to_previous(step);
+  const bool by_surfaces = corners_scarce_ && surfaces_can_place();
+  start.placement.T_c_ref = by_surfaces ? align_to_surfaces(step) : align_to_previous(step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = search_from(start, step);
-  if (!start.rough && add_surfaces(start.placement.T_c_ref, cause, step)) return true;
+  if (add_surfaces(start.placement.T_c_ref, cause, step)) return true;
   const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
   if ((cause == LostCause::kNone && !doubted) || search_widely(step)) return true;
   if (doubted) {  // nothing better

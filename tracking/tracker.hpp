@@ -78,8 +78,9 @@ class Tracker {
   /// reference keyframe. Empty after any other step.
   [[nodiscard]] std::span<const EarlierFrame> earlier_frames() const { return earlier_frames_; }
 
-  /// Images of the last step's frame, if that was lost.
-  [[nodiscard]] const FrameImages& lost_images() const { return current_; }
+  /// Images of the last step's frame, which was lost: for the loop closer. They are kept until the next call,
+  /// because the answer to `relocalise` says where this frame was taken, and the camera moves on.
+  [[nodiscard]] const FrameImages& ask_where();
   /// Frames since the last one with a pose.
   [[nodiscard]] int lost_frames() const { return loss_.lost_frames(); }
   /// Map part of a frame that was just located, as the map has it that it was tracked against.
@@ -87,8 +88,9 @@ class Tracker {
     return part_of(step.graph, immature_points_, step.result.reference);
   }
 
-  /// Hint of the loop closer: the camera was recognised at T_c_k relative to keyframe `id`. The next step, if
-  /// its graph has the keyframe, looks for points around there, and forgets the hint. Ignored while tracking.
+  /// Hint of the loop closer: the frame that `ask_where` was called for was recognised at T_c_k relative to
+  /// keyframe `id`. The next step, if its graph has the keyframe, looks for points around there, then for
+  /// what that frame shows, and forgets the hint. Ignored while tracking.
   void relocalise(KeyframeId id, const SE3& T_c_k) { hint_ = Placement{id, T_c_k}; }
 
   /// Rows that a stereo pair's right images lie lower than its left ones, taken back by the tracker [px].
@@ -120,11 +122,12 @@ class Tracker {
 
   bool start_map(FrameStep& step);
   bool start_part(FrameStep& step);
-  void blame_structure(TrackResult& result);
+  bool sees_structure(TrackResult& result);
   LostCause make_first_keyframe(FrameStep& step);
   LostCause start_from_motion(FrameStep& step);
   LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
-  [[nodiscard]] SearchStart search_start(const GraphSnapshot& graph);
+  [[nodiscard]] std::optional<Placement> recognised(const GraphSnapshot& graph);
+  bool search_from_recognised(const Placement& asked, FrameStep& step);
 
   bool track(FrameStep& step);
   LostCause search_from(SearchStart start, FrameStep& step);
@@ -145,6 +148,9 @@ class Tracker {
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
+  bool search_point(std::uint32_t point, const SE3& T_c_ref, const GuidedSearchOptions& search,
+                    const FrameStep& step);
+  void search_in_other_light(const SE3& T_c_ref, GuidedSearchOptions search, const FrameStep& step);
   void learn_readout(const FrameStep& step, bool goes_on);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
@@ -195,6 +201,7 @@ class Tracker {
   SE3 T_cur_prev_;              ///< last good motion, the prediction of the next
   LossHistory loss_;
   std::optional<Placement> hint_;  ///< of relocalise
+  RecentView asked_;               ///< the frame that ask_where was called for
   bool unplaced_ = false;
   std::uint32_t frames_ = 0;
   Numbers next_;
@@ -202,13 +209,14 @@ class Tracker {
 
   // Of the last frame searched.
   std::vector<Match> matches_;             ///< those of map points first
+  std::vector<std::uint32_t> missed_;      ///< positions in local_map_.points()
   std::vector<MotionObservation> motion_;  ///< of matches_, one each
   std::vector<AlignmentPoint> previous_points_;
   std::vector<KeyframeId> anchors_;                ///< of the points of matches_, one each
   std::vector<DescribedCorner> previous_corners_;  ///< empty: not described yet
   bool previous_is_keyframe_ = false;              ///< then its images are among the recent views
   std::vector<PointId> inlier_ids_;                ///< scratch, as the next
-  std::vector<double> depths_;
+  std::vector<double> samples_;
   std::vector<PointAppearance> new_corners_;
 };
 

@@ -38,15 +38,15 @@ int Tracker::occupied_regions() const {
 }
 
 double Tracker::median_depth(const SE3& T_c_ref) {
-  depths_.clear();
+  samples_.clear();
   for (const MotionObservation& observation : motion_) {
-    if (observation.inlier) depths_.push_back((T_c_ref * observation.x_ref).z());
+    if (observation.inlier) samples_.push_back((T_c_ref * observation.x_ref).z());
   }
-  if (depths_.empty()) {
-    for (const ImmaturePoint& point : immature_points_.points()) depths_.push_back(1.0 / point.psi.z());
+  if (samples_.empty()) {
+    for (const ImmaturePoint& point : immature_points_.points()) samples_.push_back(1.0 / point.psi.z());
   }
-  const auto middle = depths_.begin() + static_cast<std::ptrdiff_t>(depths_.size() / 2);
-  std::nth_element(depths_.begin(), middle, depths_.end());
+  const auto middle = samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 2);
+  std::nth_element(samples_.begin(), middle, samples_.end());
   return *middle;
 }
 

@@ -10,6 +10,7 @@ namespace twofold {
 namespace {
 
 constexpr int kShutterRounds = 3;
+constexpr std::size_t kFewestInLight = 15;  // points that say by how much the light changed
 /// Cameras either read all rows at once or take up to a frame's period: while nobody knows [s].
 constexpr double kUnknownReadout = 0.015;
 
@@ -43,6 +44,7 @@ void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
 void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& step) {
   TrackResult& result = step.result;
   matches_.clear();
+  missed_.clear();
   result.searched = 0;
   result.T_c_ref_predicted = T_c_ref;
   result.search_radius_px = radius_px;
@@ -55,17 +57,47 @@ void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& ste
       break;
     }
     ++result.searched;
-    const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
-    const SE3 T_c_a = step.shutter.seen_from(rig_, T_c_ref, point.x_ref) * local_map_.T_ref_a(point);
-    const auto found = find_point(current_, rig_, *point.appearance, point.psi, T_c_a, search);
-    if (point.local >= 0) {
-      ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(point.local)];
-      local.failures = found ? 0 : static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
-      if (!found) local.agreed = 0;
-    }
-    if (found) matches_.push_back({static_cast<std::uint32_t>(i), *found});
+    if (!search_point(static_cast<std::uint32_t>(i), T_c_ref, search, step))
+      missed_.push_back(static_cast<std::uint32_t>(i));
   }
+  search_in_other_light(T_c_ref, search, step);
   result.matches = static_cast<int>(matches_.size());
+}
+
+/// @param point  position in local_map_.points()
+bool Tracker::search_point(std::uint32_t point, const SE3& T_c_ref, const GuidedSearchOptions& search,
+                           const FrameStep& step) {
+  const TrackedPoint& tracked = local_map_.points()[point];
+  const SE3 T_c_a = step.shutter.seen_from(rig_, T_c_ref, tracked.x_ref) * local_map_.T_ref_a(tracked);
+  const auto found = find_point(current_, rig_, *tracked.appearance, tracked.psi, T_c_a, search);
+  if (tracked.local >= 0) {
+    ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(tracked.local)];
+    local.failures = found ? 0 : static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
+    if (!found) local.agreed = 0;
+  }
+  if (found) matches_.push_back({point, *found});
+  return found.has_value();
+}
+
+/// Where many points were missed and the view is brighter or darker there than their patches are, the light
+/// has changed, and they are looked for as they look in it. Patches are not made as bright as the view one by
+/// one: before another surface than theirs that would make them look alike.
+void Tracker::search_in_other_light(const SE3& T_c_ref, GuidedSearchOptions search, const FrameStep& step) {
+  if (static_cast<double>(missed_.size()) < options_.light_missed_share * step.result.searched) return;
+  samples_.clear();
+  for (const std::uint32_t i : missed_) {
+    const TrackedPoint& point = local_map_.points()[i];
+    const SE3 T_c_a = T_c_ref * local_map_.T_ref_a(point);
+    const auto ratio =
+        brightness_since_anchor(current_.left, rig_.camera, *point.appearance, point.psi, T_c_a);
+    if (ratio) samples_.push_back(*ratio);
+  }
+  if (samples_.size() < kFewestInLight) return;
+  const auto middle = samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 2);
+  std::nth_element(samples_.begin(), middle, samples_.end());
+  if (*middle<options_.light_change&& * middle> 1 / options_.light_change) return;
+  search.gain = static_cast<float>(*middle);
+  for (const std::uint32_t i : missed_) (void)search_point(i, T_c_ref, search, step);
 }
 
 /// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on. None after a

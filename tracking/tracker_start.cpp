@@ -18,13 +18,30 @@ void Tracker::continue_from(const GraphSnapshot& graph) {
   unplaced_ = true;
 }
 
-/// Where the loop closer recognised the lost camera, else where the last good frame was.
-SearchStart Tracker::search_start(const GraphSnapshot& graph) {
+const FrameImages& Tracker::ask_where() {
+  asked_.images.copy_from(current_);
+  asked_.corners.clear();
+  return asked_.images;
+}
+
+/// Where the loop closer recognised the lost camera.
+std::optional<Placement> Tracker::recognised(const GraphSnapshot& graph) {
   const std::optional<Placement> hint = std::exchange(hint_, std::nullopt);
-  if (!hint || loss_.lost_frames() == 0 || !graph.contains(hint->reference)) return {last_, false};
+  if (!hint || loss_.lost_frames() == 0 || !graph.contains(hint->reference)) return std::nullopt;
   const auto place = placement_of(graph, hint->reference);
-  if (!place) return {last_, false};  // a late answer: the keyframe was culled long ago
-  return {{place->reference, hint->T_c_ref * place->T_c_ref}, true};
+  if (!place) return std::nullopt;  // a late answer: the keyframe was culled long ago
+  return Placement{place->reference, hint->T_c_ref * place->T_c_ref};
+}
+
+/// The camera is about where the frame was taken that was recognised, or, at few frames a second, where it
+/// can see what that frame shows.
+bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
+  local_map_.update(step.graph, asked.reference, immature_points_, options_.neighbour_keyframes);
+  step.lap(TrackerStage::kCandidates);
+  if (search_from({asked, true}, step) == LostCause::kNone) return true;
+  if (!options_.wide_search.enabled) return false;
+  wide_search_.look_at(current_);
+  return search_from_view(asked_.images, asked_.corners, asked, step);
 }
 
 /// A keyframe as the map has it: itself, or the one that was left in its place.
@@ -71,9 +88,9 @@ bool Tracker::start_map(FrameStep& step) {
 /// it goes on in a map part of its own, from identity, until a place of both parts is recognised. Not before
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
-  const bool corners_in_view = starter_.sees_corners(current_, options_.min_corners_seen);
-  if (!corners_in_view) blame_structure(step.result);
-  if (loss_.seeing_for(corners_in_view, step.frame.t_ns) < options_.new_part_after || !corners_in_view ||
+  const bool something_in_view =
+      starter_.sees_corners(current_, options_.min_corners_seen) || sees_structure(step.result);
+  if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.new_part_after || !something_in_view ||
       loss_.lost_frames() < options_.new_part_frames) {
     return false;
   }
@@ -81,15 +98,16 @@ bool Tracker::start_part(FrameStep& step) {
   return make_first_keyframe(step) == LostCause::kNone;
 }
 
-/// With few corners in view, that the map's points are not found says little: if surfaces, too, leave open
-/// how the camera moved, that is why it stays lost. Surfaces may not place it any more by then
-/// (surfaces_can_place), and have not been looked at.
-void Tracker::blame_structure(TrackResult& result) {
+/// With few corners in view: whether surfaces would tell how the camera moves from here on. That the map's
+/// points are not found says little then: if surfaces, too, leave that open, it is why the camera stays lost.
+bool Tracker::sees_structure(TrackResult& result) {
+  if (!depth_) return false;
+  depth_->look_at(current_.depth);
+  const LostCause open = depth_->judge_structure();
   const bool unexplained =
       result.cause == LostCause::kTooFewCandidates || result.cause == LostCause::kTooFewMatches;
-  if (!unexplained || !depth_) return;
-  depth_->look_at(current_.depth);
-  if (depth_->judge_structure() == LostCause::kNoStructure) result.cause = LostCause::kNoStructure;
+  if (unexplained && open == LostCause::kNoStructure) result.cause = open;
+  return open == LostCause::kNone;
 }
 
 /// The frame becomes the first keyframe of a map or map part, at identity.

@@ -77,6 +77,29 @@ TEST(HardPlaces, PeopleInTheCorridorDoNotTakeTheCameraAlong) {
   expect_not_taken_along("corridor");
 }
 
+/// By one stop and two thirds, and half of that: a frame later the same walls are three times as bright.
+void expect_found_in_other_light(const char* place) {
+  SyntheticOptions scene = small(place, 700);
+  scene.fps = 30;
+  const Walk steady = walk(scene);
+  scene.walkers = 4;
+  scene.plain = 0.5;
+  scene.exposure_steps = 1.7;
+  scene.flicker = 0.1;
+  const Walk changing = walk(scene);
+  std::printf("%s: ATE %.4f m alone in steady light, %.4f m among people while it changes\n", place,
+              steady.ate, changing.ate);
+  EXPECT_LT(changing.ate, 3 * steady.ate) << place;
+}
+
+TEST(HardPlaces, TheCourtyardIsFoundWhenTheLightChanges) {
+  expect_found_in_other_light("courtyard");
+}
+
+TEST(HardPlaces, TheCorridorIsFoundWhenTheLightChanges) {
+  expect_found_in_other_light("corridor");
+}
+
 TEST(HardPlaces, ABareCorridorIsTrackedByItsDepth) {
   SyntheticOptions scene = small("corridor", 160);
   scene.sensor = SensorKind::kRgbd;
@@ -86,6 +109,26 @@ TEST(HardPlaces, ABareCorridorIsTrackedByItsDepth) {
               bare.frames);
   EXPECT_EQ(bare.tracked, bare.frames);
   EXPECT_LT(bare.ate, 0.01 * bare.path);
+}
+
+/// A hand over the lens for a second, in which the camera walks on: surfaces alone may not place it in the
+/// old map any more, and begin a part of it.
+TEST(HardPlaces, AfterALossABareCorridorIsMappedOn) {
+  SyntheticOptions scene = small("corridor", 160);
+  scene.sensor = SensorKind::kRgbd;
+  scene.bare = true;
+  scene.cover_at = 4;
+  scene.cover = 1;
+  const SyntheticSequence sequence(scene);
+  const RunResult result = testing::run_whole(sequence.rig(), testing::frames_of(sequence)).result;
+  constexpr double kPatience = 1.1;  // after the hand: until a part is begun [s]
+  const double covered_until = scene.cover_at + scene.cover;
+  const auto tracked_again = static_cast<int>((covered_until + kPatience) * scene.fps);
+  for (const FrameRecord& record : result.frames) {
+    if (sequence.covered(static_cast<int>(record.frame_index))) continue;
+    if (record.frame_index > scene.cover_at * scene.fps && record.frame_index < tracked_again) continue;
+    EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << ": " << describe(record.cause);
+  }
 }
 
 }  // namespace

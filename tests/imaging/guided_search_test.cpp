@@ -172,6 +172,49 @@ TEST_F(GuidedSearch, SurvivesAChangeOfExposure) {
   EXPECT_LT(errors.rms_v(), 0.06);
 }
 
+/// Seen in the dark, looked for in the light: flat places are more like a faint patch than its own place is.
+TEST_F(GuidedSearch, FindsInTheLightWhatWasSeenInTheDark) {
+  constexpr double kDark = 0.3;
+  FrameImages dark, bright;
+  scene_.render(SE3(), kNoise, dark);
+  const auto darken = [](const cv::Mat& image) {
+    cv::Mat dim;
+    image.convertTo(dim, CV_8UC1, kDark);
+    return dim;
+  };
+  const std::vector<Start> starts = corners_of(scene_, rig_, dark, SE3());
+  const cv::Mat left = darken(dark.left.level(0));
+  dark.left.build(left);
+  const SE3 T_c_a = SE3::exp((Vector6() << 0.05, 0, 0, 0, 0.02, 0).finished());
+  scene_.render(T_c_a, kNoise, bright);
+  std::vector<double> ratios;
+  Errors as_it_is, brighter;
+  for (Start start : starts) {
+    ASSERT_TRUE(cut_appearance(dark.left.level(start.corner.level), start.corner.u, start.corner.v,
+                               start.corner.level, start.appearance));
+    const Vector3 truth = rig_.project(T_c_a * from_inverse_depth(start.psi));
+    if (!rig_.camera.contains(truth.head<2>(), 60) || truth.z() < 60) continue;
+    if (const auto ratio =
+            brightness_since_anchor(bright.left, rig_.camera, start.appearance, start.psi, T_c_a))
+      ratios.push_back(*ratio);
+    for (const double gain : {1.0, 1 / kDark}) {
+      Errors& errors = gain == 1 ? as_it_is : brighter;
+      ++errors.tried;
+      const GuidedSearchOptions options{.gain = static_cast<float>(gain)};
+      if (const auto match = find_point(bright, rig_, start.appearance, start.psi, T_c_a, options))
+        add(errors, match->z, truth, match->level);
+    }
+  }
+  ASSERT_GT(ratios.size(), 200U);
+  std::sort(ratios.begin(), ratios.end());
+  EXPECT_NEAR(ratios[ratios.size() / 2], 1 / kDark, 0.15 / kDark);
+  std::printf("%d, as bright as the view %d, of %d found\n", as_it_is.found, brighter.found, brighter.tried);
+  EXPECT_LT(as_it_is.found, 0.5 * as_it_is.tried);
+  EXPECT_GT(brighter.found, 0.85 * brighter.tried);
+  EXPECT_LT(brighter.rms_u(), 0.15);
+  EXPECT_LT(brighter.rms_v(), 0.15);
+}
+
 TEST_F(GuidedSearch, FindsNothingWhereThereIsNothing) {
   FrameImages first, second;
   scene_.render(SE3(), kNoise, first);
