@@ -151,6 +151,7 @@ class Tracker {
   bool search_point(std::uint32_t point, const SE3& T_c_ref, const GuidedSearchOptions& search,
                     const FrameStep& step);
   void search_in_other_light(const SE3& T_c_ref, GuidedSearchOptions search, const FrameStep& step);
+  void count_misses();
   void learn_readout(const FrameStep& step, bool goes_on);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
@@ -208,7 +209,7 @@ class Tracker {
   KeyframeView last_keyframe_;
 
   // Of the last frame searched.
-  std::vector<Match> matches_;             ///< those of map points first
+  std::vector<Match> matches_;             ///< those of map points first, but for those found in other light
   std::vector<std::uint32_t> missed_;      ///< positions in local_map_.points()
   std::vector<MotionObservation> motion_;  ///< of matches_, one each
   std::vector<AlignmentPoint> previous_points_;

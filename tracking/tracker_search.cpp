@@ -61,6 +61,7 @@ void Tracker::search_points(const SE3& T_c_ref, double radius_px, FrameStep& ste
       missed_.push_back(static_cast<std::uint32_t>(i));
   }
   search_in_other_light(T_c_ref, search, step);
+  count_misses();
   result.matches = static_cast<int>(matches_.size());
 }
 
@@ -70,13 +71,20 @@ bool Tracker::search_point(std::uint32_t point, const SE3& T_c_ref, const Guided
   const TrackedPoint& tracked = local_map_.points()[point];
   const SE3 T_c_a = step.shutter.seen_from(rig_, T_c_ref, tracked.x_ref) * local_map_.T_ref_a(tracked);
   const auto found = find_point(current_, rig_, *tracked.appearance, tracked.psi, T_c_a, search);
-  if (tracked.local >= 0) {
-    ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(tracked.local)];
-    local.failures = found ? 0 : static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
-    if (!found) local.agreed = 0;
+  if (!found) return false;
+  if (tracked.local >= 0) immature_points_.points()[static_cast<std::size_t>(tracked.local)].failures = 0;
+  matches_.push_back({point, *found});
+  return true;
+}
+
+void Tracker::count_misses() {
+  for (const std::uint32_t i : missed_) {
+    const int at = local_map_.points()[i].local;
+    if (at < 0) continue;
+    ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(at)];
+    local.failures = static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
+    local.agreed = 0;
   }
-  if (found) matches_.push_back({point, *found});
-  return found.has_value();
 }
 
 /// Where many points were missed and the view is brighter or darker there than their patches are, the light
@@ -95,9 +103,10 @@ void Tracker::search_in_other_light(const SE3& T_c_ref, GuidedSearchOptions sear
   if (samples_.size() < kFewestInLight) return;
   const auto middle = samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 2);
   std::nth_element(samples_.begin(), middle, samples_.end());
-  if (*middle<options_.light_change&& * middle> 1 / options_.light_change) return;
-  search.gain = static_cast<float>(*middle);
-  for (const std::uint32_t i : missed_) (void)search_point(i, T_c_ref, search, step);
+  const double gain = *middle;
+  if (std::max(gain, 1 / gain) < options_.light_change) return;
+  search.gain = static_cast<float>(gain);
+  std::erase_if(missed_, [&](std::uint32_t i) { return search_point(i, T_c_ref, search, step); });
 }
 
 /// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on. None after a
