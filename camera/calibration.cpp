@@ -21,6 +21,14 @@ std::string invalid_stereo(const Calibration& c) {
   return {};
 }
 
+std::string invalid_depth_camera(const DepthCamera& camera) {
+  if (const auto reason = camera.model.invalid_reason(); !reason.empty()) return "depth camera: " + reason;
+  const SE3& T = camera.T_left_depth;
+  if (!T.translation().allFinite() || !T.so3().quaternion().coeffs().allFinite())
+    return "T_left_depth is not finite";
+  return {};
+}
+
 std::string invalid_rectified(const Calibration& c) {
   if (!c.left.distortion.is_identity()) return "already_rectified: the left camera has distortion";
   if (c.kind != SensorKind::kStereo) return {};
@@ -58,6 +66,7 @@ std::string Calibration::invalid_reason() const {
     if (!(depth_min >= 0 && depth_max > depth_min)) return "depth_min, depth_max must satisfy 0 <= min < max";
     if (!(virtual_baseline > 0))
       return "virtual_baseline must be positive, is " + std::to_string(virtual_baseline);
+    if (depth_apart) return invalid_depth_camera(depth_camera);
   }
   return {};
 }

@@ -9,6 +9,12 @@
 
 namespace twofold {
 
+/// A camera that takes depth images beside the one that takes the others.
+struct DepthCamera {
+  CameraModel model;
+  SE3 T_left_depth;  ///< its pose in the left (the only other) camera [m]
+};
+
 /// What a calibration file says about a sensor, before rectification. `Rectifier` turns it into a Rig.
 struct Calibration {
   SensorKind kind = SensorKind::kStereo;
@@ -29,6 +35,9 @@ struct Calibration {
   double depth_min = 0.3;          ///< RGB-D: nearer readings are holes [m]
   double depth_max = 8.0;          ///< RGB-D: farther readings are holes [m]
   double virtual_baseline = 0.08;  ///< RGB-D: baseline of the virtual right camera (thesis 6.5.3) [m], > 0
+  /// RGB-D: depth images are depth_camera's; else they are the left camera's, pixel by pixel.
+  bool depth_apart = false;
+  DepthCamera depth_camera;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

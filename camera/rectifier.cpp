@@ -146,17 +146,27 @@ std::string RectifierOptions::invalid_reason() const {
 Rectifier::Rectifier(const Calibration& calibration, const RectifierOptions& options) {
   if (const auto reason = calibration.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
   if (const auto reason = options.invalid_reason(); !reason.empty()) throw std::runtime_error(reason);
-  const bool stereo = calibration.kind == SensorKind::kStereo;
   rig_.kind = calibration.kind;
   rig_.depth_unit = calibration.depth_unit;
   rig_.depth_min = calibration.depth_min;
   rig_.depth_max = calibration.depth_max;
   rig_.readout = calibration.readout;
-  if (stereo) rig_.baseline = calibration.T_right_left.translation().norm();
+  if (calibration.kind == SensorKind::kStereo) rig_.baseline = calibration.T_right_left.translation().norm();
   if (calibration.kind == SensorKind::kRgbd) rig_.baseline = calibration.virtual_baseline;
   raw_left_size_ = {calibration.left.pinhole.width, calibration.left.pinhole.height};
   raw_right_size_ = {calibration.right.pinhole.width, calibration.right.pinhole.height};
 
+  raw_depth_size_ = raw_left_size_;
+  find_maps(calibration, options);
+  if (!calibration.depth_apart || calibration.kind != SensorKind::kRgbd) return;
+  const PinholeCamera& depth = calibration.depth_camera.model.pinhole;
+  raw_depth_size_ = {depth.width, depth.height};
+  registration_.emplace(calibration.depth_camera, SE3(R_rectified_left_, Vector3::Zero()), rig_.camera,
+                        rig_.depth_unit);
+}
+
+void Rectifier::find_maps(const Calibration& calibration, const RectifierOptions& options) {
+  const bool stereo = calibration.kind == SensorKind::kStereo;
   const bool ideal = !stereo && calibration.left.distortion.is_identity() && options.width == 0;
   if (calibration.already_rectified || ideal) {
     rig_.camera = calibration.left.pinhole;
@@ -198,7 +208,11 @@ void Rectifier::rectify(const Frame& raw, Frame& rectified) const {
   };
   remap(raw.left, rectified.left, left_fixed_, true);
   remap(raw.right, rectified.right, right_fixed_, true);
-  remap(raw.depth, rectified.depth, left_fixed_, false);
+  if (registration_ && !raw.depth.empty()) {
+    registration_->apply(raw.depth, rectified.depth);
+  } else {
+    remap(raw.depth, rectified.depth, left_fixed_, false);
+  }
 }
 
 std::string Rectifier::mismatch_reason(const Frame& raw) const {
@@ -211,7 +225,8 @@ std::string Rectifier::mismatch_reason(const Frame& raw) const {
                         raw_right_size_.height);
   }
   if (rig_.kind == SensorKind::kRgbd) {
-    return image_reason(raw.depth, "depth", CV_16UC1, "16-bit", width, height);
+    return image_reason(raw.depth, "depth", CV_16UC1, "16-bit", raw_depth_size_.width,
+                        raw_depth_size_.height);
   }
   return {};
 }

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 
 #include "camera/calibration.hpp"
+#include "camera/depth_registration.hpp"
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
 
@@ -30,7 +32,8 @@ struct RectificationMap {
 };
 
 /// Turns raw images into those of a rectified Rig: no distortion, fx = fy; for stereo, both cameras parallel
-/// to each other and perpendicular to the baseline, so that corresponding points lie in the same row.
+/// to each other and perpendicular to the baseline, so that corresponding points lie in the same row; depth
+/// of a camera of its own registered to the rectified left one.
 ///
 /// Immutable after construction; rectify may be called from several threads at once.
 class Rectifier {
@@ -40,7 +43,7 @@ class Rectifier {
   explicit Rectifier(const Calibration& calibration, const RectifierOptions& options = {});
 
   [[nodiscard]] const Rig& rig() const { return rig_; }
-  /// The raw images are rectified already and are passed through (headers only, pixels are shared).
+  /// The raw intensity images are rectified already and are passed through (headers only, pixels are shared).
   [[nodiscard]] bool passes_through() const { return left_.x.empty(); }
 
   /// Rotation from the raw to the rectified camera: x_rectified = R x_raw. A trajectory of the rectified left
@@ -69,13 +72,16 @@ class Rectifier {
   struct ImageSize {
     int width = 0, height = 0;
   };
+  /// rig_.camera and what turns raw intensity images into its.
+  void find_maps(const Calibration& calibration, const RectifierOptions& options);
 
   Rig rig_;
-  ImageSize raw_left_size_, raw_right_size_;
+  ImageSize raw_left_size_, raw_right_size_, raw_depth_size_;
   SO3 R_rectified_left_;
   SO3 R_rectified_right_;
   RectificationMap left_, right_;
   FixedMap left_fixed_, right_fixed_;
+  std::optional<DepthRegistration> registration_;  ///< of depth that is not the left camera's
 };
 
 }  // namespace twofold

@@ -89,17 +89,18 @@ Calibration read_kalibr(const YamlNode& root) {
   return calibration;
 }
 
+Distortion read_own_distortion(const YamlNode& node) {
+  node.expect_keys({"model", "coefficients"});
+  const YamlNode coefficients = node.at("coefficients");
+  return distortion_of(node.at("model"), &coefficients);
+}
+
 CameraModel read_own_camera(const YamlNode& node) {
   node.expect_keys({"size", "intrinsics", "distortion"});
   CameraModel camera;
   read_size(node.at("size"), &camera.pinhole);
   read_intrinsics(node.at("intrinsics"), &camera.pinhole);
-  if (node.has("distortion")) {
-    const YamlNode distortion = node.at("distortion");
-    distortion.expect_keys({"model", "coefficients"});
-    const YamlNode coefficients = distortion.at("coefficients");
-    camera.distortion = distortion_of(distortion.at("model"), &coefficients);
-  }
+  if (node.has("distortion")) camera.distortion = read_own_distortion(node.at("distortion"));
   return camera;
 }
 
@@ -120,12 +121,26 @@ void read_own_stereo(const YamlNode& root, const std::vector<YamlNode>& cameras,
   calibration->T_right_left = root.at("T_right_left").rigid_motion();
 }
 
+/// Of depth images that are not the colour camera's; keys of the `depth` section.
+DepthCamera read_own_depth_camera(const YamlNode& node) {
+  DepthCamera camera;
+  read_size(node.at("size"), &camera.model.pinhole);
+  read_intrinsics(node.at("intrinsics"), &camera.model.pinhole);
+  if (node.has("distortion")) camera.model.distortion = read_own_distortion(node.at("distortion"));
+  camera.T_left_depth = node.at("T_left_depth").rigid_motion();
+  return camera;
+}
+
 void read_own_depth(const YamlNode& node, Calibration* calibration) {
-  node.expect_keys({"unit", "min", "max", "virtual_baseline"});
+  node.expect_keys(
+      {"unit", "min", "max", "virtual_baseline", "size", "intrinsics", "distortion", "T_left_depth"});
   if (node.has("unit")) calibration->depth_unit = node.at("unit").number();
   if (node.has("min")) calibration->depth_min = node.at("min").number();
   if (node.has("max")) calibration->depth_max = node.at("max").number();
   if (node.has("virtual_baseline")) calibration->virtual_baseline = node.at("virtual_baseline").number();
+  for (const char* key : {"size", "intrinsics", "distortion", "T_left_depth"})
+    calibration->depth_apart |= node.has(key);
+  if (calibration->depth_apart) calibration->depth_camera = read_own_depth_camera(node);
 }
 
 Calibration read_own(const YamlNode& root) {

@@ -88,7 +88,8 @@ Frame PlaybackSource::decode(const RecordedFrame& files) const {
   }
   if (calibration.kind == SensorKind::kRgbd) {
     frame.depth = read_depth_image(files.depth);
-    expect_size(files.depth, frame.depth, calibration.left.pinhole);
+    const CameraModel& camera = calibration.depth_apart ? calibration.depth_camera.model : calibration.left;
+    expect_size(files.depth, frame.depth, camera.pinhole);
   }
   return frame;
 }

@@ -41,6 +41,19 @@ TEST(CalibrationFile, OwnForm) {
   EXPECT_EQ(rgbd.depth_max, 5);
   EXPECT_EQ(rgbd.virtual_baseline, 0.075);
   EXPECT_EQ(rgbd.readout, 0.025);
+  EXPECT_FALSE(rgbd.depth_apart);
+  const auto apart = read_calibration(
+      folder.write("apart.yaml",
+                   "sensor: rgbd\ncameras: [{size: [640, 480], intrinsics: [525, 525, 319.5, 239.5]}]\n"
+                   "depth: {unit: 0.001, size: [320, 240], intrinsics: [290, 291, 160, 120],\n"
+                   "        distortion: {model: radtan, coefficients: [0.1, 0, 0, 0]},\n"
+                   "        T_left_depth: [1, 0, 0, -0.025,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]}\n"));
+  ASSERT_TRUE(apart.depth_apart);
+  EXPECT_EQ(apart.invalid_reason(), "");
+  EXPECT_EQ(apart.depth_camera.model.pinhole.fy, 291);
+  EXPECT_EQ(apart.depth_camera.model.pinhole.height, 240);
+  EXPECT_EQ(apart.depth_camera.model.distortion.coefficients[0], 0.1);
+  EXPECT_EQ(apart.depth_camera.T_left_depth.translation().x(), -0.025);
 }
 
 TEST(CalibrationFile, NamesTheKeyThatIsWrong) {
