@@ -7,7 +7,7 @@
 #include "slam/frame_pixels.hpp"
 #include "slam/surface_pieces.hpp"
 #include "surface/meshing.hpp"
-#include "surface/stereo_depth.hpp"
+#include "surface/stereo/stereo_depth.hpp"
 
 namespace twofold {
 namespace {

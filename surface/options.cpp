@@ -18,7 +18,7 @@ std::string SurfaceOptions::invalid_reason() const {
 
 double usual_depth_noise(const Rig& rig) {
   constexpr double kStructuredLight = 1.425e-3;
-  constexpr double kDisparity = 0.33;  // [px]
+  constexpr double kDisparity = 0.12;  // [px]
   return rig.kind == SensorKind::kRgbd ? kStructuredLight : kDisparity / (rig.camera.fx * rig.baseline);
 }
 

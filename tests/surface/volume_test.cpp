@@ -7,7 +7,6 @@
 
 #include "surface/meshing.hpp"
 #include "surface/packed_depth.hpp"
-#include "surface/stereo_depth.hpp"
 #include "tests/surface/ball_views.hpp"
 
 namespace twofold {
@@ -195,22 +194,6 @@ TEST(PackedDepth, GivesBackWhatItWasGiven) {
   const PackedDepth packed(depth);
   EXPECT_EQ(cv::norm(packed.unpacked(), depth, cv::NORM_INF), 0);
   EXPECT_LT(packed.bytes(), 2 * depth.total());
-}
-
-TEST(StereoDepth, FindsTheDistanceOfAWall) {
-  Rig rig = depth_rig();
-  rig.kind = SensorKind::kStereo;
-  std::mt19937 random(4);
-  cv::Mat left(240, 320, CV_8UC1);
-  for (int i = 0; i < static_cast<int>(left.total()); ++i) left.at<std::uint8_t>(i) = random() % 256;
-  const int disparity = 16;  // z = 256 * 0.1 / 16 = 1.6 m
-  cv::Mat right(left.size(), CV_8UC1, cv::Scalar(0));
-  left.colRange(disparity, 320).copyTo(right.colRange(0, 320 - disparity));
-  const cv::Mat depth = stereo_depth(rig, left, right, 0.5);
-  int found = 0;
-  for (int y = 40; y < 200; ++y)
-    for (int x = 100; x < 280; ++x) found += std::abs(depth.at<std::uint16_t>(y, x) - 1600) < 20;
-  EXPECT_GT(found, 0.95 * 160 * 180);
 }
 
 }  // namespace

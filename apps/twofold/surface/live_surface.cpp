@@ -11,7 +11,7 @@
 #include "imaging/row_offset.hpp"
 #include "io/files/io_error.hpp"
 #include "surface/meshing.hpp"
-#include "surface/stereo_depth.hpp"
+#include "surface/stereo/stereo_depth.hpp"
 
 namespace twofold {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "io/files/io_error.hpp"
-#include "surface/stereo_depth.hpp"
+#include "surface/stereo/stereo_depth.hpp"
 
 namespace twofold {
 namespace {

@@ -22,7 +22,7 @@
 #include "io/sources/open_source.hpp"
 #include "surface/mesh_picture.hpp"
 #include "surface/meshing.hpp"
-#include "surface/stereo_depth.hpp"
+#include "surface/stereo/stereo_depth.hpp"
 
 namespace twofold {
 namespace {

@@ -6,10 +6,12 @@
 
 namespace twofold {
 
-/// Depth from a rectified pair by semi-global matching  (Hirschmueller, PAMI 2008; OpenCV's).
+/// Depth from a rectified pair by semi-global matching  (Hirschmueller, PAMI 2008; OpenCV's), then
+/// refine_disparity.
 ///
-/// A disparity is kept where the match from the right image to the left agrees with it to a pixel, and where
-/// it is no speck of its own.
+/// A disparity is kept where the match from the right image to the left agrees with it to a pixel, where it
+/// is no speck of its own, where its standard deviation is at most a fifth of a pixel, and not within two
+/// pixels of something farther, because matching widens what is near.
 /// @param left, right  CV_8UC1 of the rig's size
 /// @param nearest      disparities are searched up to that of this depth [m] > 0
 /// @return  CV_16UC1 in units of rig.depth_unit, 0: none
