@@ -169,9 +169,10 @@ class Tracker {
   void hand_over_images(KeyframeProposal& proposal);
   void collect_observations(KeyframeProposal& proposal);
   void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
-  void start_points(KeyframeId anchor, const RollingShutter& shutter);
+  void start_points(KeyframeId anchor, const FrameStep& step);
   void observe_seeds(const FrameStep& step);
-  void start_seeds(KeyframeId anchor);
+  void occupy_unsearched(const SE3& T_c_ref);
+  void start_seeds(KeyframeId anchor, const SE3& T_c_ref);
   void revisit_reference(const GraphSnapshot& graph);
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);

@@ -67,7 +67,7 @@ void Tracker::propose_keyframe(FrameStep& step) {
   begin_proposal({step.result.reference, step.result.T_c_ref}, step);
   // Where corners are few, most lie on bare edges, along which they slide: the map takes none of them.
   if (!step.result.by_depth) collect_observations(proposal);
-  start_points(proposal.id, step.shutter);
+  start_points(proposal.id, step);
   last_keyframe_.occupied_regions = occupied_regions();
   if (right_rows_) right_rows_->look_at_keyframe(current_.left.level(0), current_.right.level(0));
   hand_over_images(proposal);
@@ -129,13 +129,13 @@ void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
 }
 
 /// New points where nothing is tracked.
-void Tracker::start_points(KeyframeId anchor, const RollingShutter& shutter) {
+void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
   starter_.clear();
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     if (motion_[m].inlier) starter_.occupy(matches_[m].found.z.head<2>().cast<float>());
   }
-  if (seeds_) return start_seeds(anchor);
-  starter_.start(current_, anchor, shutter, immature_points_);
+  if (seeds_) return start_seeds(anchor, step.result.T_c_ref);
+  starter_.start(current_, anchor, step.shutter, immature_points_);
 }
 
 /// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to
