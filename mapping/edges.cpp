@@ -6,13 +6,10 @@
 #include <numbers>
 
 namespace twofold {
-namespace {
 
 double mean_depth(const Keyframe& a, const Keyframe& b) {
   return std::max(0.5 * (a.median_depth + b.median_depth), 1e-6);
 }
-
-}  // namespace
 
 void covisible_keyframes(const GraphSnapshot& graph, KeyframeId id, IdMap& counts,
                          std::vector<Covisible>& result) {

@@ -19,7 +19,11 @@ PointSearch guided_point_search(const Rig& rig, double radius_px) {
 }
 
 MetricLoopCloser::MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search)
-    : rig_(rig), min_matches_(options.min_covisible), options_(options.loop), search_(std::move(search)) {}
+    : rig_(rig),
+      min_matches_(options.min_covisible),
+      scale_drifts_(rig.kind == SensorKind::kMono && options.scale_drifts),
+      options_(options.loop),
+      search_(std::move(search)) {}
 
 MetricLoopReport MetricLoopCloser::close(GraphWriter& writer, const DoubleWindow& window,
                                          const FrameImages& images) {
@@ -47,9 +51,25 @@ void MetricLoopCloser::split_neighbourhoods(const GraphSnapshot& graph, const Do
   far_.clear();
   direct_neighbours(graph, reference_, graph.keyframe(reference_).edges->size() + 1, near_);  // eq. 6.5
   const std::size_t count = std::min(static_cast<std::size_t>(options_.neighbourhood), window.nodes.size());
+  if (scale_drifts_) measure_ways(graph, window, count);
   for (std::size_t n = 0; n < count; ++n) {
     const KeyframeId id = window.nodes[n].id;
+    if (scale_drifts_ && ways_[n] > options_.max_way_of_one_camera) continue;
     if (id != reference_ && !find_edge(graph.keyframe(reference_), id)) far_.push_back(id);
+  }
+}
+
+/// What has passed through the view on the way from the reference to each member of N2.
+void MetricLoopCloser::measure_ways(const GraphSnapshot& graph, const DoubleWindow& window,
+                                    std::size_t count) {
+  ways_.assign(count, 0);
+  for (std::size_t n = 1; n < count; ++n) {
+    const auto parent = static_cast<std::size_t>(window.nodes[n].parent);
+    const Keyframe& from = graph.keyframe(window.nodes[parent].id);
+    const Keyframe& to = graph.keyframe(window.nodes[n].id);
+    const SE3 T_to_from = to.T_k_w * from.T_k_w.inverse();
+    const double depth = mean_depth(from, to);
+    ways_[n] = ways_[parent] + T_to_from.translation().norm() / depth + T_to_from.so3().log().norm();
   }
 }
 

@@ -31,6 +31,10 @@ struct MetricLoopReport {
 
 /// Metric loop closure  (thesis 6.4.1): finds points of the wider neighbourhood N2 that N1 does not see in
 /// the reference keyframe, and connects the reference with the keyframes that see them too.
+///
+/// It knows no scale. The unit of one camera drifts on the way, and what has drifted must not be tied
+/// together without a change of scale: such loops are left to recognition by appearance, whose are closed
+/// over Sim(3) (thesis 6.2.7). So N2 has members only that a short way along the window's tree leads to.
 class MetricLoopCloser {
  public:
   MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search);
@@ -47,6 +51,7 @@ class MetricLoopCloser {
   };
 
   void split_neighbourhoods(const GraphSnapshot& graph, const DoubleWindow& window);
+  void measure_ways(const GraphSnapshot& graph, const DoubleWindow& window, std::size_t count);
   void collect_candidates(const GraphSnapshot& graph);
   [[nodiscard]] std::optional<Vector2> find_in_view(const GraphSnapshot& graph, const MapPoint& point,
                                                     const Vector3& x_w) const;
@@ -58,12 +63,14 @@ class MetricLoopCloser {
 
   Rig rig_;
   int min_matches_;
+  bool scale_drifts_;
   MetricLoopOptions options_;
   PointSearch search_;
 
   KeyframeId reference_ = kNoKeyframe;
   std::vector<KeyframeId> near_;  ///< N1
   std::vector<KeyframeId> far_;   ///< N2 without N1
+  std::vector<double> ways_;      ///< from the reference to the members of N2, along the window's tree
   VisitedSet visited_;            ///< points seen from N1, and those met
   std::vector<PointId> near_points_;
   std::vector<int> taken_;             ///< candidates by cell of the image

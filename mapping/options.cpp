@@ -18,6 +18,7 @@ std::string MetricLoopOptions::invalid_reason() const {
       .above("max_error_px", max_error_px, 0)
       .at_least("border_px", border_px, 0)
       .within("min_view_cosine", min_view_cosine, -1, 1)
+      .above("max_way_of_one_camera", max_way_of_one_camera, 0)
       .nested("consensus", consensus.invalid_reason())
       .reason();
 }

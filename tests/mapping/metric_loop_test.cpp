@@ -21,10 +21,10 @@ class MetricLoopTest : public testing::Test {
     T_ref_true_ = SE3::exp((Vector6() << 0.15, -0.05, 0.1, 0.02, -0.03, 0.05).finished());
   }
 
-  void make_graph(const SE3& drift, double min_x = -0.9, double max_x = 0.9) {
+  void make_graph(const SE3& drift, double min_x = -0.9, double max_x = 0.9, double middle_x = 0.05) {
     writer_ = GraphWriter();
     old_ = add_keyframe(writer_, SE3());
-    const KeyframeId middle = add_keyframe(writer_, SE3(SO3(), {0.05, 0, 0}));
+    const KeyframeId middle = add_keyframe(writer_, SE3(SO3(), {middle_x, 0, 0}));
     reference_ = add_keyframe(writer_, drift * T_ref_true_);
     link(writer_, old_, middle, 40);
     link(writer_, middle, reference_, 40);
@@ -109,6 +109,21 @@ TEST_F(MetricLoopTest, DriftBeyondTheSearchRadiusClosesNothing) {
   EXPECT_GE(report.searched, options_.min_covisible);
   EXPECT_LT(report.found, options_.min_covisible);
   EXPECT_EQ(report.edges, 0);
+}
+
+TEST_F(MetricLoopTest, OneCameraTiesTogetherOnlyWhatHasOneUnit) {
+  rig_.kind = SensorKind::kMono;
+  make_graph(SE3());
+  EXPECT_EQ(close().edges, 1);
+  constexpr double kFarAway = 3;  // median depths, there and back
+  make_graph(SE3(), -0.9, 0.9, kFarAway);
+  EXPECT_EQ(close().searched, 0);
+  options_.scale_drifts = false;
+  EXPECT_EQ(close().edges, 1);
+  options_.scale_drifts = true;
+  rig_.kind = SensorKind::kStereo;
+  make_graph(SE3(), -0.9, 0.9, kFarAway);
+  EXPECT_EQ(close().edges, 1);
 }
 
 TEST_F(MetricLoopTest, WorkIsBoundedAndSpread) {
