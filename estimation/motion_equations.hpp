@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstring>
 #include <span>
 
 #include "estimation/motion_only.hpp"
@@ -13,6 +14,29 @@ namespace twofold {
 inline constexpr int kLanes = 4;
 using Lanes = Eigen::Array<double, kLanes, 1>;
 
+/// As the compiler's own vectors, which choose lane by lane without a branch.
+using LaneRegister = double __attribute__((vector_size(sizeof(double) * kLanes)));
+
+[[gnu::always_inline]] inline Lanes to_lanes(const LaneRegister& numbers) {
+  Lanes lanes;
+  std::memcpy(lanes.data(), &numbers, sizeof numbers);
+  return lanes;
+}
+[[gnu::always_inline]] inline LaneRegister to_register(const Lanes& lanes) {
+  LaneRegister numbers;
+  std::memcpy(&numbers, lanes.data(), sizeof numbers);
+  return numbers;
+}
+
+/// The same number of four observations. They meet in a register: what is stored one by one and then loaded
+/// together would have to reach the cache first.
+template <class Number>
+[[gnu::always_inline]] inline LaneRegister gather(const MotionObservation* const (&o)[kLanes],
+                                                  const Number& number) {
+  static_assert(kLanes == 4);
+  return LaneRegister{number(*o[0]), number(*o[1]), number(*o[2]), number(*o[3])};
+}
+
 /// A point behind the camera adds the cost of a far outlier and pulls at nothing: it can neither veto a step
 /// nor be bought by one.
 inline constexpr double kSigmasBehind = 100;
@@ -24,16 +48,26 @@ struct ObservationBatch {
   Lanes wu, wv, wr;  // information
   Lanes used;        // 1 or 0
 
-  ObservationBatch(std::span<const MotionObservation> all, std::size_t first, bool inliers_only) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const bool exists = first + lane < all.size();
-      const MotionObservation& o = all[exists ? first + lane : first];
-      x[lane] = o.x_ref.x(), y[lane] = o.x_ref.y(), z[lane] = o.x_ref.z();
-      u[lane] = o.z.x(), v[lane] = o.z.y();
-      r[lane] = o.information.z() == 0 ? 0.0 : o.z.z();
-      wu[lane] = o.information.x(), wv[lane] = o.information.y(), wr[lane] = o.information.z();
-      used[lane] = exists && (o.inlier || !inliers_only) ? 1.0 : 0.0;
-    }
+  [[gnu::always_inline]] ObservationBatch(std::span<const MotionObservation> all, std::size_t first,
+                                          bool inliers_only) {
+    const MotionObservation* o[kLanes];
+    const std::size_t last = all.size() - 1;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) o[lane] = &all[std::min(first + lane, last)];
+    x = to_lanes(gather(o, [](const auto& m) { return m.x_ref.x(); }));
+    y = to_lanes(gather(o, [](const auto& m) { return m.x_ref.y(); }));
+    z = to_lanes(gather(o, [](const auto& m) { return m.x_ref.z(); }));
+    u = to_lanes(gather(o, [](const auto& m) -> double { return m.z.x(); }));
+    v = to_lanes(gather(o, [](const auto& m) -> double { return m.z.y(); }));
+    const LaneRegister right = gather(o, [](const auto& m) -> double { return m.z.z(); });
+    wu = to_lanes(gather(o, [](const auto& m) -> double { return m.information.x(); }));
+    wv = to_lanes(gather(o, [](const auto& m) -> double { return m.information.y(); }));
+    const LaneRegister of_right = gather(o, [](const auto& m) -> double { return m.information.z(); });
+    r = to_lanes(of_right == 0 ? LaneRegister{} : right);
+    wr = to_lanes(of_right);
+    const LaneRegister wanted =
+        gather(o, [&](const auto& m) -> double { return int{m.inlier} | int{!inliers_only}; });
+    const auto count = static_cast<double>(all.size() - first);
+    used = to_lanes(LaneRegister{0, 1, 2, 3} < count ? wanted : LaneRegister{});
   }
 };
 
@@ -44,14 +78,14 @@ struct BatchProjection {
   Lanes chi2;
   Lanes front;  // 1 or 0
 
-  BatchProjection(const ObservationModel& m, const Matrix3& R, const Vector3& t, const ObservationBatch& b) {
+  [[gnu::always_inline]] BatchProjection(const ObservationModel& m, const Matrix3& R, const Vector3& t,
+                                         const ObservationBatch& b) {
     x = R(0, 0) * b.x + R(0, 1) * b.y + R(0, 2) * b.z + t.x();
     y = R(1, 0) * b.x + R(1, 1) * b.y + R(1, 2) * b.z + t.y();
     z = R(2, 0) * b.x + R(2, 1) * b.y + R(2, 2) * b.z + t.z();
-    for (int lane = 0; lane < kLanes; ++lane) {
-      front[lane] = z[lane] > kSolverMinDepth ? 1.0 : 0.0;
-      z[lane] = z[lane] > kSolverMinDepth ? z[lane] : 1.0;
-    }
+    const LaneRegister depth = to_register(z), one = LaneRegister{} + 1;
+    front = to_lanes(depth > kSolverMinDepth ? one : LaneRegister{});
+    z = to_lanes(depth > kSolverMinDepth ? depth : one);
     inv_z = z.inverse();
     eu = m.fx * x * inv_z + (m.cx - b.u);
     ev = m.fy * y * inv_z + (m.cy - b.v);
@@ -73,7 +107,8 @@ struct MotionEquations {
     for (Lanes& value : g) value.setZero();
   }
 
-  void add(const ObservationModel& m, const ObservationBatch& b, const BatchProjection& p, double delta) {
+  [[gnu::always_inline]] void add(const ObservationModel& m, const ObservationBatch& b,
+                                  const BatchProjection& p, double delta) {
     // Huber: with s = sqrt(chi2) and c = min(s, delta), rho = c (2 s - c) and the weight is delta / max(s,
     // delta).
     const Lanes s = p.chi2.sqrt();
@@ -94,15 +129,16 @@ struct MotionEquations {
     add_hessian(p, auu + arr, s02, cvv, s12, auu * u * u + cvv * v * v + arr * r * r);
   }
 
-  void add_gradient(const BatchProjection& p, const Lanes& f0, const Lanes& f1, const Lanes& f2) {
+  [[gnu::always_inline]] void add_gradient(const BatchProjection& p, const Lanes& f0, const Lanes& f1,
+                                           const Lanes& f2) {
     g[0] += f0, g[1] += f1, g[2] += f2;
     g[3] += p.y * f2 - p.z * f1;
     g[4] += p.z * f0 - p.x * f2;
     g[5] += p.x * f1 - p.y * f0;
   }
 
-  void add_hessian(const BatchProjection& p, const Lanes& s00, const Lanes& s02, const Lanes& s11,
-                   const Lanes& s12, const Lanes& s22) {
+  [[gnu::always_inline]] void add_hessian(const BatchProjection& p, const Lanes& s00, const Lanes& s02,
+                                          const Lanes& s11, const Lanes& s12, const Lanes& s22) {
     // Rows of the lower left block (-S X)^T = X S: columns of S crossed from the left by x (s01 = 0).
     const Lanes m00 = p.y * s02, m01 = p.y * s12 - p.z * s11, m02 = p.y * s22 - p.z * s12;
     const Lanes m10 = p.z * s00 - p.x * s02, m11 = -p.x * s12, m12 = p.z * s02 - p.x * s22;
