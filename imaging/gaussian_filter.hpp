@@ -19,7 +19,7 @@ class GaussianFilter {
   void apply(const cv::Mat& image, cv::Mat& smooth);
 
  private:
-  std::vector<std::uint16_t> rows_;  ///< smoothed along the rows [grey / 256]
+  std::vector<std::uint16_t> rows_;  ///< the last ones, smoothed along themselves [grey / 256]
 };
 
 }  // namespace twofold

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "estimation/motion_only.hpp"
 #include "geometry/absolute_orientation.hpp"
@@ -77,7 +78,7 @@ class SimilarityEstimator {
   SimilarityEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                       const std::vector<Match>& matches, const VerificationOptions& options)
       : rig_(rig),
-        max_stretch_(options.max_stretch),
+        shortest_(std::pow(std::max(0.0, 1 - options.max_stretch), 2)),
         outlier_(options.ransac_error_px * options.ransac_error_px) {
     for (const Match& match : matches) {
       const auto i = static_cast<std::size_t>(match.corner);
@@ -92,17 +93,17 @@ class SimilarityEstimator {
   void fit(std::span<const int, 3> sample, std::vector<Model>& models) const {
     const bool scale_known = rig_.kind != SensorKind::kMono;
     std::array<Vector3, 3> x_a, x_b;
-    double scale = 1;  // of the first side
+    double scale = 1;  // of the first side, squared
     for (std::size_t k = 0; k < 3; ++k) {
       const Pair& pair = pairs_[static_cast<std::size_t>(sample[k])];
       const Pair& next = pairs_[static_cast<std::size_t>(sample[(k + 1) % 3])];
       x_a[k] = pair.x_a;
       x_b[k] = pair.x_b;
-      const double in_b = (pair.x_b - next.x_b).norm();
-      double in_a = (pair.x_a - next.x_a).norm();
+      const double in_b = (pair.x_b - next.x_b).squaredNorm();
+      double in_a = (pair.x_a - next.x_a).squaredNorm();
       if (!scale_known && k == 0) scale = in_b / in_a;
       in_a *= scale;
-      if (!(std::abs(in_a - in_b) <= max_stretch_ * std::max(in_a, in_b))) return;
+      if (!(in_a >= shortest_ * in_b && in_b >= shortest_ * in_a)) return;
     }
     if (scale_known) {
       if (const auto T_b_a = align_rigid(x_b, x_a)) models.emplace_back(Sim3(*T_b_a));
@@ -128,34 +129,56 @@ class SimilarityEstimator {
   };
 
   const Rig& rig_;
-  double max_stretch_;
+  double shortest_;  ///< side over the longer of the two, squared
   double outlier_;
   std::vector<Pair> pairs_;
 };
 
-/// The corners of a view from top to bottom, so that a search looks at a few rows only.
-class CornersByRow {
+/// The corners of a view in square cells, a grid for each level, so that a search looks at a few of them
+/// only.
+class CornerGrid {
  public:
-  explicit CornersByRow(const std::vector<DescribedCorner>& corners) {
-    for (std::size_t j = 0; j < corners.size(); ++j) {
-      const double pixel = std::ldexp(1.0, corners[j].level);
-      entries_.push_back({corners[j].uv.cast<double>(), pixel, static_cast<int>(j), &corners[j].descriptor});
-      largest_pixel_ = std::max(largest_pixel_, pixel);
+  /// @param radius_px  the largest that is searched, pixels of a corner's level
+  CornerGrid(const PinholeCamera& camera, const std::vector<DescribedCorner>& corners, double radius_px) {
+    std::vector<int> order(corners.size());  // from top to bottom
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+      return corners[static_cast<std::size_t>(a)].uv.y() < corners[static_cast<std::size_t>(b)].uv.y();
+    });
+    for (int level = 0; level < ImagePyramid::kLevels; ++level) {
+      Level grid;
+      grid.pixel = std::ldexp(1.0, level);
+      grid.per_cell = 1 / (2 * grid.pixel * radius_px);  // a search meets four cells at most
+      grid.columns = static_cast<int>(camera.width * grid.per_cell) + 1;
+      grid.rows = static_cast<int>(camera.height * grid.per_cell) + 1;
+      fill(grid, level, corners, order);
+      if (!grid.entries.empty()) levels_.push_back(std::move(grid));
     }
-    std::stable_sort(entries_.begin(), entries_.end(),
-                     [](const Entry& a, const Entry& b) { return a.uv.y() < b.uv.y(); });
   }
 
-  /// The corner most like `descriptor` within `radius_px` pixels of its own level around uv.
+  /// The corner most like `descriptor` within `radius_px` pixels of its own level around uv, the upper one
+  /// among equals.
   [[nodiscard]] NearestDescriptor nearest(const Vector2& uv, const BinaryDescriptor& descriptor,
                                           double radius_px) const {
-    const double widest = radius_px * largest_pixel_;
-    auto entry = std::partition_point(entries_.begin(), entries_.end(),
-                                      [&](const Entry& e) { return e.uv.y() < uv.y() - widest; });
     NearestDescriptor nearest;
-    for (; entry != entries_.end() && entry->uv.y() <= uv.y() + widest; ++entry) {
-      if ((entry->uv - uv).cwiseAbs().maxCoeff() > radius_px * entry->pixel) continue;
-      nearest.offer(entry->corner, hamming_distance(descriptor, *entry->descriptor));
+    int rank = 0;
+    for (const Level& grid : levels_) {
+      const double radius = radius_px * grid.pixel;
+      const Eigen::Array2i first = grid.cell_of(uv.array() - radius),
+                           last = grid.cell_of(uv.array() + radius);
+      for (int row = first.y(); row <= last.y(); ++row) {
+        const int in_row = row * grid.columns;
+        const int begin = grid.begin[static_cast<std::size_t>(in_row + first.x())];
+        const int end = grid.begin[static_cast<std::size_t>(in_row + last.x() + 1)];
+        for (int e = begin; e < end; ++e) {
+          const Entry& entry = grid.entries[static_cast<std::size_t>(e)];
+          if ((entry.uv - uv).cwiseAbs().maxCoeff() > radius) continue;
+          const int distance = hamming_distance(descriptor, *entry.descriptor);
+          if (distance > nearest.distance || (distance == nearest.distance && entry.rank > rank)) continue;
+          nearest = {entry.corner, distance};
+          rank = entry.rank;
+        }
+      }
     }
     return nearest;
   }
@@ -163,35 +186,88 @@ class CornersByRow {
  private:
   struct Entry {
     Vector2 uv;
-    double pixel = 1;  ///< of its level, in those of level 0
     int corner = 0;
+    int rank = 0;  ///< from top to bottom
     const BinaryDescriptor* descriptor = nullptr;
   };
-  std::vector<Entry> entries_;
-  double largest_pixel_ = 1;
+  struct Level {
+    double pixel = 1;     ///< of the level, in those of level 0
+    double per_cell = 1;  ///< cells a pixel of level 0
+    int columns = 1, rows = 1;
+    std::vector<Entry> entries;  ///< by cell, row by row
+    std::vector<int> begin;      ///< of each cell's entries, and the end of the last
+
+    [[nodiscard]] Eigen::Array2i cell_of(const Eigen::Array2d& uv) const {
+      const Eigen::Array2d cell = (uv * per_cell).max(0).min(Eigen::Array2d(columns - 1, rows - 1));
+      return cell.cast<int>();
+    }
+    [[nodiscard]] std::size_t index_of(const Vector2& uv) const {
+      const Eigen::Array2i cell = cell_of(uv.array());
+      return static_cast<std::size_t>(cell.y() * columns + cell.x());
+    }
+  };
+
+  /// Sorts the level's corners into its cells, by counting.
+  static void fill(Level& grid, int level, const std::vector<DescribedCorner>& corners,
+                   const std::vector<int>& order) {
+    const auto on_level = [&](int j) { return corners[static_cast<std::size_t>(j)].level == level; };
+    grid.begin.assign(static_cast<std::size_t>(grid.columns * grid.rows) + 1, 0);
+    for (const int j : order) {
+      if (on_level(j))
+        ++grid.begin[grid.index_of(corners[static_cast<std::size_t>(j)].uv.cast<double>()) + 1];
+    }
+    std::partial_sum(grid.begin.begin(), grid.begin.end(), grid.begin.begin());
+    grid.entries.resize(static_cast<std::size_t>(grid.begin.back()));
+    std::vector<int> next(grid.begin.begin(), grid.begin.end() - 1);
+    for (std::size_t rank = 0; rank < order.size(); ++rank) {
+      const int j = order[rank];
+      if (!on_level(j)) continue;
+      const DescribedCorner& corner = corners[static_cast<std::size_t>(j)];
+      const Vector2 uv = corner.uv.cast<double>();
+      const auto at = static_cast<std::size_t>(next[grid.index_of(uv)]++);
+      grid.entries[at] = {uv, j, static_cast<int>(rank), &corner.descriptor};
+    }
+  }
+
+  std::vector<Level> levels_;  ///< those that have corners
 };
 
-/// Best partner in b, near to where T_b_a says, of each corner of the place that has depth; a corner of b
-/// serves once.
-std::vector<Match> match_guided(const Rig& rig, std::span<const PlacedView> place, const PlaceAppearance& b,
-                                const CornersByRow& corners_of_b, const SE3& T_b_a, double radius_px,
-                                const VerificationOptions& options) {
-  std::vector<Match> offered;
-  std::vector<NearestDescriptor> of_b(b.corners.size());
+/// A corner of the place that has depth.
+struct PlacePoint {
+  Match match;  ///< of no corner of b yet
+  const BinaryDescriptor* descriptor = nullptr;
+};
+
+std::vector<PlacePoint> points_of(const Rig& rig, std::span<const PlacedView> place,
+                                  const VerificationOptions& options) {
+  std::vector<PlacePoint> points;
   for (std::size_t v = 0; v < place.size(); ++v) {
     const PlaceAppearance& view = *place[v].appearance;
     const SE3 T_a_v = place[v].T_v_a.inverse();
     for (std::size_t i = 0; i < view.corners.size(); ++i) {
       if (!has_depth(view.z[i], options)) continue;
       const Vector3 x_a = T_a_v * rig.unproject(view.z[i].cast<double>());
-      const Vector3 x_b = T_b_a * x_a;
-      const auto uv = rig.camera.find_in_view(x_b, kDescriptorBorder);
-      if (!uv) continue;
-      const NearestDescriptor nearest = corners_of_b.nearest(*uv, view.corners[i].descriptor, radius_px);
-      if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
-      of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(offered.size()), nearest.distance);
-      offered.push_back({static_cast<int>(v), static_cast<int>(i), nearest.best, x_a});
+      points.push_back({{static_cast<int>(v), static_cast<int>(i), 0, x_a}, &view.corners[i].descriptor});
     }
+  }
+  return points;
+}
+
+/// Best partner in b, near to where T_b_a says, of each point of the place; a corner of b serves once.
+std::vector<Match> match_guided(const Rig& rig, const std::vector<PlacePoint>& place,
+                                const PlaceAppearance& b, const CornerGrid& corners_of_b, const SE3& T_b_a,
+                                double radius_px, const VerificationOptions& options) {
+  std::vector<Match> offered;
+  std::vector<NearestDescriptor> of_b(b.corners.size());
+  for (const PlacePoint& point : place) {
+    const Vector3 x_b = T_b_a * point.match.x_a;
+    const auto uv = rig.camera.find_in_view(x_b, kDescriptorBorder);
+    if (!uv) continue;
+    const NearestDescriptor nearest = corners_of_b.nearest(*uv, *point.descriptor, radius_px);
+    if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
+    of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(offered.size()), nearest.distance);
+    offered.push_back(point.match);
+    offered.back().b = nearest.best;
   }
   std::vector<Match> matches;
   for (const NearestDescriptor& nearest : of_b) {
@@ -337,11 +413,12 @@ std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const Placed
   if (!hypothesis) return std::nullopt;
 
   SE3 T_b_a = *hypothesis;
-  const CornersByRow corners_of_b(b.corners);
+  const std::vector<PlacePoint> points = points_of(rig, place, options);
+  const CornerGrid corners_of_b(rig.camera, b.corners, options.guided_radius_px);
   std::vector<Match> inliers;
   for (const double radius : {1.0, 0.5, 0.5}) {
     const std::vector<Match> guided =
-        match_guided(rig, place, b, corners_of_b, T_b_a, radius * options.guided_radius_px, options);
+        match_guided(rig, points, b, corners_of_b, T_b_a, radius * options.guided_radius_px, options);
     r.guided = static_cast<int>(guided.size());
     T_b_a = refine(rig, b, guided, T_b_a);
     inliers = keep_inliers(rig, b, guided, T_b_a, options);
