@@ -47,6 +47,11 @@ TEST(V4l2SourceTest, SideBySideStereo) {
       std::move(calls));
   EXPECT_EQ(source.rig().kind, SensorKind::kStereo);
   EXPECT_EQ(source.rig().camera.width, 32);
+  // It is rectified: nothing is resampled.
+  EXPECT_EQ(source.rig().camera.fx, 30);
+  EXPECT_EQ(source.rig().camera.cx, 15.5);
+  EXPECT_EQ(source.rig().camera.cy, 23.5);
+  EXPECT_EQ(source.rig().baseline, 0.1);
   EXPECT_TRUE(source.is_live());
   Frame frame;
   for (int k = 0; k < 20; ++k) {
