@@ -47,7 +47,7 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   if (kind == SensorKind::kStereo && baseline) {
     calibration.right = calibration.left;
     calibration.T_right_left = SE3(SO3(), Vector3(-*baseline, 0, 0));
-    // Nothing is left to be done, and resampling the images would blur them.
+    // Nothing is left to be done; resampling the images would take its time.
     calibration.already_rectified = calibration.left.distortion.is_identity();
   } else if (kind == SensorKind::kStereo && !from_file) {
     throw IoError(parameters.subject(), "no calibration: stereo needs the parameter 'baseline'");

@@ -7,6 +7,7 @@
 
 #include "fixtures/fake_device.hpp"
 #include "io/files/io_error.hpp"
+#include "io/sources/recording.hpp"
 #include "io/sources/source_parameters.hpp"
 
 namespace twofold {
@@ -47,7 +48,6 @@ TEST(V4l2SourceTest, SideBySideStereo) {
       std::move(calls));
   EXPECT_EQ(source.rig().kind, SensorKind::kStereo);
   EXPECT_EQ(source.rig().camera.width, 32);
-  // It is rectified: nothing is resampled.
   EXPECT_EQ(source.rig().camera.fx, 30);
   EXPECT_EQ(source.rig().camera.cx, 15.5);
   EXPECT_EQ(source.rig().camera.cy, 23.5);
@@ -60,6 +60,13 @@ TEST(V4l2SourceTest, SideBySideStereo) {
     EXPECT_EQ(frame.left.at<std::uint8_t>(20, 16), k);
     EXPECT_EQ(frame.right.at<std::uint8_t>(20, 16), 255 - k);
   }
+}
+
+TEST(V4l2SourceTest, APairOfGivenBaselineIsRectified) {
+  const SourceSpec spec = parse_source_spec("v4l2:/dev/video0?fx=30&fy=30&cx=15.5&cy=23.5&baseline=0.1");
+  SourceParameters parameters(spec.text, spec.parameters);
+  // Resampling its images would take time between exposure and pose.
+  EXPECT_TRUE(with_parameters({}, false, SensorKind::kStereo, parameters).already_rectified);
 }
 
 TEST(V4l2SourceTest, DeliveredImagesOutliveTheDriversBuffers) {
