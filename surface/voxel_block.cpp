@@ -1,6 +1,9 @@
 #include "surface/voxel_block.hpp"
 
+#include <sys/mman.h>
+
 #include <algorithm>
+#include <new>
 #include <utility>
 
 namespace twofold {
@@ -19,6 +22,17 @@ std::size_t hash_of(const BlockPosition& at) {
 }
 
 }  // namespace
+
+BlockTable::ChunkPointer BlockTable::new_chunk() {
+  void* pages = mmap(nullptr, sizeof(Chunk), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (pages == MAP_FAILED) throw std::bad_alloc();
+  return ChunkPointer(new (pages) Chunk());
+}
+
+void BlockTable::ReturnPages::operator()(Chunk* chunk) const {
+  std::destroy_at(chunk);
+  (void)munmap(chunk, sizeof(Chunk));
+}
 
 std::size_t BlockTable::slot_of(const BlockPosition& at) const {
   const std::size_t mask = slots_.size() - 1;
@@ -42,8 +56,7 @@ std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {
   if (2 * size_ >= slots_.size()) grow();
   Slot& slot = slots_[slot_of(at)];
   if (slot.block == kFree) {
-    if (size_ == kChunk * chunks_.size())
-      chunks_.push_back(std::make_unique<std::array<VoxelBlock, kChunk>>());
+    if (size_ == kChunk * chunks_.size()) chunks_.push_back(new_chunk());
     slot = {at, static_cast<std::uint32_t>(size_)};
     (*this)[size_++].at = at;
   }

@@ -87,10 +87,17 @@ class BlockTable {
   [[nodiscard]] std::size_t slot_of(const BlockPosition& at) const;
   void grow();
 
-  /// Blocks are allocated so many at a time: one by one, what a volume gives back would be holes among what
-  /// others keep.
+  /// Blocks are allocated so many at a time, in pages of their own: what a volume gives back goes back to the
+  /// system, where on the heap it would be holes among what others keep.
   static constexpr std::size_t kChunk = 32;
-  std::vector<std::unique_ptr<std::array<VoxelBlock, kChunk>>> chunks_;
+  using Chunk = std::array<VoxelBlock, kChunk>;
+  struct ReturnPages {
+    void operator()(Chunk* chunk) const;
+  };
+  using ChunkPointer = std::unique_ptr<Chunk, ReturnPages>;
+  /// Throws std::bad_alloc.
+  [[nodiscard]] static ChunkPointer new_chunk();
+  std::vector<ChunkPointer> chunks_;
   std::size_t size_ = 0;
   std::vector<Slot> slots_;  ///< a power of two, at most half of them taken
 };

@@ -1,9 +1,14 @@
 #include "surface/volume.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
+#include <fstream>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <random>
+#include <vector>
 
 #include "surface/meshing.hpp"
 #include "surface/packed_depth.hpp"
@@ -180,6 +185,35 @@ TEST(DepthView, NothingButHolesLeavesTheVolumeEmpty) {
     volume.fuse(make_depth_view(rig, cv::Mat(240, 320, CV_32FC1, cv::Scalar(z)), {}), SE3());
     EXPECT_EQ(volume.blocks().size(), 0u);
     EXPECT_TRUE(extract_mesh(volume).triangles.empty());
+  }
+}
+
+double resident_mb() {
+  std::ifstream statm("/proc/self/statm");
+  double all = 0, resident = 0;
+  statm >> all >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
+}
+
+/// Small things that others allocate meanwhile, and keep, must not hold what a volume gives back.
+TEST(BlockTable, GivesMemoryBackToTheSystem) {
+  constexpr int kBlocks = 20000;  // 100 MB
+  BlockTable table;
+  std::vector<std::unique_ptr<std::array<char, 2000>>> others;
+  const double before = resident_mb();
+  // The allocator learns from what is given back: only the second time does it take such memory from the
+  // heap.
+  for (int round = 0; round < 2; ++round) {
+    for (int i = 0; i < kBlocks; ++i) {
+      (void)table.find_or_add({i, 0, 0});
+      if (i % 16 == 0) others.push_back(std::make_unique<std::array<char, 2000>>());
+    }
+    const double full = resident_mb() - before;
+    table.clear();
+    const double empty = resident_mb() - before;
+    std::printf("%.0f MB, %.0f MB when cleared\n", full, empty);
+    EXPECT_GT(full, 90);
+    EXPECT_LT(empty, 20);
   }
 }
 
