@@ -204,6 +204,30 @@ std::size_t drop_small_pieces(TriangleMesh& mesh, int least) {
   return before - mesh.triangles.size();
 }
 
+std::size_t drop_pieces_beside(TriangleMesh& mesh, const Vector3& up) {
+  const std::vector<std::uint32_t> piece = pieces_of(mesh);
+  std::vector<int> triangles(mesh.positions.size(), 0), vertices(mesh.positions.size(), 0);
+  for (const auto& t : mesh.triangles) ++triangles[piece[t[0]]];
+  const auto largest =
+      static_cast<std::uint32_t>(std::max_element(triangles.begin(), triangles.end()) - triangles.begin());
+  const auto across = [&](const Vector3& x) -> Vector3 { return x - up.dot(x) * up; };
+  std::vector<Vector3> middle(mesh.positions.size(), Vector3::Zero());  // of each piece
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    middle[piece[v]] += across(mesh.positions[v].cast<double>());
+    ++vertices[piece[v]];
+  }
+  for (std::size_t p = 0; p < middle.size(); ++p) middle[p] /= std::max(vertices[p], 1);
+  double reach = 0;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+    if (piece[v] == largest)
+      reach = std::max(reach, (across(mesh.positions[v].cast<double>()) - middle[largest]).norm());
+  const std::size_t before = mesh.triangles.size();
+  std::erase_if(mesh.triangles,
+                [&](const auto& t) { return (middle[piece[t[0]]] - middle[largest]).norm() > reach; });
+  drop_unused_vertices(mesh);
+  return before - mesh.triangles.size();
+}
+
 TriangleMesh extract_mesh(const SurfaceVolume& volume) {
   MeshPieces pieces;
   pieces.update(volume);

@@ -17,4 +17,10 @@ namespace twofold {
 /// @return  triangles left out
 std::size_t drop_small_pieces(TriangleMesh& mesh, int least);
 
+/// Leaves out connected pieces that stand beside the largest one: whose middle lies farther from the upright
+/// line through its middle than any of its vertices. Then vertices that no triangle uses.
+/// @param up  unit
+/// @return  triangles left out
+std::size_t drop_pieces_beside(TriangleMesh& mesh, const Vector3& up);
+
 }  // namespace twofold

@@ -100,5 +100,26 @@ TEST(Meshing, SmallPiecesAreLeftOut) {
   EXPECT_EQ(mesh.positions.size(), 5u);
 }
 
+/// A thing, its lid that hovers above it, and something of the background.
+TEST(Meshing, PiecesBesideTheLargestOneAreLeftOut) {
+  TriangleMesh mesh;
+  const auto add_square = [&mesh](float x, float z, float half) {
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    for (const float dx : {-half, half})
+      for (const float dy : {-half, half}) mesh.positions.emplace_back(x + dx, dy, z);
+    mesh.positions.emplace_back(x, 0.0f, z);
+    for (const auto& [a, b] : {std::pair{0U, 1U}, {1U, 3U}, {3U, 2U}, {2U, 0U}})
+      mesh.triangles.push_back({first + a, first + b, first + 4});
+  };
+  add_square(0, 0, 1);
+  mesh.triangles.push_back({0, 1, 3});  // the largest
+  add_square(0.3f, 5, 0.5f);
+  add_square(3, 0, 1);
+  EXPECT_EQ(drop_pieces_beside(mesh, Vector3::UnitZ()), 4u);
+  EXPECT_EQ(mesh.triangles.size(), 9u);
+  EXPECT_EQ(mesh.positions.size(), 10u);
+  for (const auto& p : mesh.positions) EXPECT_LT(p.x(), 1.5f);
+}
+
 }  // namespace
 }  // namespace twofold

@@ -102,6 +102,7 @@ ObjectModel build_object(const ObjectSource& source, const Trajectory& poses, co
   const std::int64_t begin_ns = thread_cpu_ns();
   model.mesh = extract_mesh(volume);
   drop_small_pieces(model.mesh, static_cast<int>(model.mesh.triangles.size()) / kLeastPiece);
+  drop_pieces_beside(model.mesh, model.up);
   SurfaceFigures& f = model.figures;
   f.mesh_ms = static_cast<double>(thread_cpu_ns() - begin_ns) * 1e-6;
   f.voxel = options.voxel;

@@ -31,8 +31,8 @@ struct ObjectModel {
   SurfaceFigures figures;
 };
 
-/// Fuses the kept frames that have a pose. The largest piece of the mesh and those of at least a fiftieth of
-/// its triangles are kept. options must be valid, with depth_noise.
+/// Fuses the kept frames that have a pose. Pieces of the mesh that have a fiftieth of its triangles are kept,
+/// but for those that stand beside the largest one. options must be valid, with depth_noise.
 /// @param poses  T_w_c of frames, ascending in time
 [[nodiscard]] ObjectModel build_object(const ObjectSource& source, const Trajectory& poses,
                                        const SurfaceOptions& options);
