@@ -38,6 +38,7 @@ std::string TrackerOptions::invalid_reason() const {
       .within("min_view_cosine", min_view_cosine, -1, 1)
       .at_least("min_inliers", min_inliers, 3)
       .at_least("scarce_inliers", scarce_inliers, 0)
+      .at_least("telling_candidates", telling_candidates, 0)
       .within("min_inlier_share", min_inlier_share, 0, 1)
       .share("light_missed_share", light_missed_share)
       .above("light_change", light_change, 1)

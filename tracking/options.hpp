@@ -25,13 +25,16 @@ struct TrackerOptions {
   MotionOnlyOptions motion{
       .max_iterations = 15, .inlier_chi2_mono = 9.210, .inlier_chi2_stereo = 11.345, .stop_step = 1e-5};
 
-  int wanted_matches = 180;        ///< stop searching once so many points were found in a frame
-  int max_searches = 320;          ///< upper bound of points searched in a frame
-  int neighbour_keyframes = 20;    ///< the reference keyframe's: so many, those that share most points
-  double border_px = 8;            ///< points predicted closer to the image's edge are not searched, >= 0
-  double min_view_cosine = 0.7;    ///< of the angle between a point's first ray and today's, in [-1, 1]
-  int min_inliers = 18;            ///< fewer: lost
-  int scarce_inliers = 40;         ///< a depth camera with fewer is placed by surfaces as well, >= 0
+  int wanted_matches = 180;      ///< stop searching once so many points were found in a frame
+  int max_searches = 320;        ///< upper bound of points searched in a frame
+  int neighbour_keyframes = 20;  ///< the reference keyframe's: so many, those that share most points
+  double border_px = 8;          ///< points predicted closer to the image's edge are not searched, >= 0
+  double min_view_cosine = 0.7;  ///< of the angle between a point's first ray and today's, in [-1, 1]
+  int min_inliers = 18;          ///< fewer: lost
+  int scarce_inliers = 40;       ///< a depth camera with fewer is placed by surfaces as well, >= 0
+  /// So many points should be seen from a pose that surfaces alone gave after a loss, and are not found: it
+  /// is wrong.
+  int telling_candidates = 40;
   double min_inlier_share = 0.25;  ///< of the matches found: fewer: lost
   double lost_radius_px = 8;       ///< search radius while lost
   /// The light has changed when so large a share of the points searched was missed ...

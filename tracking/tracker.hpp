@@ -139,6 +139,7 @@ class Tracker {
   SE3 align_to_surfaces(FrameStep& step);
   bool add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step);
   LostCause place_without_points(LostCause found, FrameStep& step);
+  bool points_allow(FrameStep& step);
   LostCause place_by_surfaces(const SE3& T_c_ref, FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                         const Placement& view, FrameStep& step);

@@ -307,7 +307,27 @@ LostCause Tracker::place_without_points(LostCause found, FrameStep& step) {
   matches_.clear();
   motion_.clear();
   const LostCause open = place_by_surfaces(predicted_pose(), step);
-  return open == LostCause::kTooFewMatches ? found : open;
+  if (open != LostCause::kNone) return open == LostCause::kTooFewMatches ? found : open;
+  return points_allow(step) ? LostCause::kNone : found;
+}
+
+/// A pose that surfaces alone gave, from a start that may be far off, before the map's points: they may give
+/// a better one. After a loss nobody knows how the camera moves, and where enough of them should be seen and
+/// are not found, the pose is wrong.
+bool Tracker::points_allow(FrameStep& step) {
+  TrackResult& result = step.result;
+  const TrackResult by_surfaces = result;
+  result.by_depth = false;
+  if (search_from({{by_surfaces.reference, by_surfaces.T_c_ref}, true}, step) == LostCause::kNone)
+    return true;
+  if (loss_.lost_frames() > 0 && result.candidates >= options_.telling_candidates) return false;
+  const auto stage_ns = result.stage_ns;
+  result = by_surfaces;
+  result.stage_ns = stage_ns;
+  matches_.clear();
+  motion_.clear();
+  result.matches = result.inliers = 0;
+  return true;
 }
 
 /// @return kNone, or why that cannot be: the result is then as it was
