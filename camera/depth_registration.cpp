@@ -20,7 +20,7 @@ struct Sight {
 void keep_nearest(cv::Mat& registered, int u, int v, float z) {
   if (!(z >= 0.5f && z < 65535)) return;
   auto& kept = registered.at<std::uint16_t>(v, u);
-  const auto reading = static_cast<std::uint16_t>(z + 0.5f);
+  const auto reading = cv::saturate_cast<std::uint16_t>(z);
   if (kept == 0 || reading < kept) kept = reading;
 }
 
@@ -29,7 +29,7 @@ void draw_point(cv::Mat& registered, const Sight& s) {
   if (!(s.u > -0.5f && s.v > -0.5f && s.u < static_cast<float>(registered.cols) - 0.5f &&
         s.v < static_cast<float>(registered.rows) - 0.5f))
     return;
-  keep_nearest(registered, static_cast<int>(s.u + 0.5f), static_cast<int>(s.v + 0.5f), s.z);
+  keep_nearest(registered, cvRound(s.u), cvRound(s.v), s.z);
 }
 
 /// All pixels whose centre lies in a triangle; one that is seen from behind has none.
