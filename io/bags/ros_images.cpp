@@ -122,7 +122,7 @@ cv::Mat grey_image(const CompressedImageMessage& image) {
 
 cv::Mat depth_image(const ImageMessage& image) {
   Encoding encoding;
-  const cv::Mat depth = native_copy(view_of(image, encoding), image.big_endian);
+  cv::Mat depth = native_copy(view_of(image, encoding), image.big_endian);
   if (encoding.type == CV_16UC1) return depth;
   if (encoding.type != CV_32FC1) throw MalformedBytes("a depth image of encoding '" + image.encoding + "'");
   cv::Mat units(depth.size(), CV_16UC1);

@@ -33,8 +33,8 @@ class YamlNode {
   [[noreturn]] void fail(const std::string& problem) const;
 
  private:
-  YamlNode(std::filesystem::path file, std::string key, YAML::Node node)
-      : file_(std::move(file)), key_(std::move(key)), node_(std::move(node)) {}
+  YamlNode(std::filesystem::path file, std::string key, const YAML::Node& node)
+      : file_(std::move(file)), key_(std::move(key)), node_(node) {}
 
   std::filesystem::path file_;
   std::string key_;

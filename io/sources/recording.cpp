@@ -10,7 +10,6 @@
 #include "io/files/io_error.hpp"
 
 namespace twofold {
-namespace fs = std::filesystem;
 
 namespace {
 constexpr double kSupposedFocalLength = 1000;  // [px]
