@@ -233,7 +233,7 @@ class Refiner {
     return of_left > 0 && of_right > 0 ? std::clamp(std::sqrt(of_left / of_right), 0.5, 2.0) : 1.0;
   }
 
-  /// Difference and derivative along each pixel's own disparity, the latter for now in `information`.
+  /// Difference and derivative along each pixel's own disparity; weigh() makes its information of the latter.
   void warp(int y) {
     Level& pixels = levels_[0];
     const auto* l = left_.ptr<float>(y);
