@@ -30,6 +30,7 @@ LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabul
       recogniser_(vocabulary_->word_count(), options.recogniser),
       refinement_(rig, options.refinement),
       probation_(rig.kind, options.probation),
+      redundant_(rig.camera, options.redundant),
       depths_(rig.camera),
       place_depths_(rig.camera) {}
 
@@ -64,7 +65,9 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
     const SE3 T_to_from(verified->T_c_k.so3(), *scale * verified->T_c_k.translation());
     const LoopConstraint seen{graph.version(), candidate.keyframe, keyframe.id,
                               T_to_from,       verified->inliers,  *scale};
-    if (probation_.confirms(seen, graph)) loop = seen;
+    if (probation_.confirms(seen, graph) &&
+        !(one_camera && redundant_.contains(seen, refinement_.found(), graph)))
+      loop = seen;
     break;
   }
   if (one_camera) view.z.clear();  // the map may change

@@ -13,6 +13,7 @@
 #include "loopclosure/place_recogniser.hpp"
 #include "loopclosure/place_view.hpp"
 #include "loopclosure/pose_refinement.hpp"
+#include "loopclosure/redundant_loop.hpp"
 
 namespace twofold {
 
@@ -22,6 +23,7 @@ struct LoopCloserOptions {
   VerificationOptions verification;
   RefinementOptions refinement;
   ProbationOptions probation;
+  RedundantLoopOptions redundant;
   int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included
   int relocalisation_candidates = 10;  ///< places tried for a lost camera
 
@@ -43,7 +45,8 @@ struct Relocalisation {
 /// inverted file's lists only, and memory with the keyframes that are not culled.
 ///
 /// One camera has no depth of its own corners: those of a place follow from the map (DepthRegression), and a
-/// loop is a similarity. It needs points of the map around both keyframes.
+/// loop is a similarity. It needs points of the map around both keyframes. Loops that tell the map nothing
+/// are kept to itself (RedundantLoops).
 class LoopCloser {
  public:
   LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabulary, const LoopCloserOptions& options);
@@ -81,6 +84,7 @@ class LoopCloser {
   PlaceRecogniser recogniser_;
   PoseRefinement refinement_;
   LoopProbation probation_;
+  RedundantLoops redundant_;
   KeyframeDatabase places_;
   std::uint32_t oldest_ = 0;  ///< keyframe: all before it are culled
   std::vector<KeyframeId> neighbours_;

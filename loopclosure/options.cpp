@@ -73,6 +73,15 @@ std::string ProbationOptions::invalid_reason() const {
       .reason();
 }
 
+std::string RedundantLoopOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_way", max_way, 0)
+      .at_least("max_keyframes", max_keyframes, 1)
+      .at_least("max_shift_px", max_shift_px, 0)
+      .at_least("max_log_scale", max_log_scale, 0)
+      .reason();
+}
+
 std::string LoopCloserOptions::invalid_reason() const {
   return OptionCheck()
       .nested("corners", corners.invalid_reason())
@@ -80,6 +89,7 @@ std::string LoopCloserOptions::invalid_reason() const {
       .nested("verification", verification.invalid_reason())
       .nested("refinement", refinement.invalid_reason())
       .nested("probation", probation.invalid_reason())
+      .nested("redundant", redundant.invalid_reason())
       .at_least("place_views", place_views, 1)
       .at_least("relocalisation_candidates", relocalisation_candidates, 1)
       .reason();
