@@ -12,14 +12,16 @@ namespace {
 
 constexpr double kNearest = 0.02;  // [m]; triangles that reach nearer are left out
 
+/// Which triangle is nearest, pixel by pixel.
 class Raster {
  public:
   explicit Raster(const PinholeCamera& camera)
-      : image(camera.height, camera.width, CV_8UC3, cv::Scalar(255, 255, 255)),
-        inverse_depth_(camera.height, camera.width, CV_32FC1, cv::Scalar(0)) {}
+      : inverse_depth(camera.height, camera.width, CV_32FC1, cv::Scalar(0)) {}
 
-  /// Corners as (u, v, 1/z); colours at them as 0..255.
-  void triangle(const std::array<Eigen::Vector3f, 3>& p, const std::array<Eigen::Vector3f, 3>& colour) {
+  /// Corners as (u, v, 1/z). Calls visible(y, x, a, b, c) where the triangle is the nearest so far, with the
+  /// corners' shares.
+  template <class Visible>
+  void triangle(const std::array<Eigen::Vector3f, 3>& p, Visible visible) {
     const auto cross = [](const Eigen::Vector3f& o, const Eigen::Vector3f& a, float u, float v) {
       return (a.x() - o.x()) * (v - o.y()) - (a.y() - o.y()) * (u - o.x());
     };
@@ -29,8 +31,8 @@ class Raster {
       return std::pair{std::max(0, static_cast<int>(std::ceil(std::min({a, b, c})))),
                        std::min(size - 1, static_cast<int>(std::floor(std::max({a, b, c}))))};
     };
-    const auto [left, right] = range(p[0].x(), p[1].x(), p[2].x(), image.cols);
-    const auto [top, bottom] = range(p[0].y(), p[1].y(), p[2].y(), image.rows);
+    const auto [left, right] = range(p[0].x(), p[1].x(), p[2].x(), inverse_depth.cols);
+    const auto [top, bottom] = range(p[0].y(), p[1].y(), p[2].y(), inverse_depth.rows);
     for (int y = top; y <= bottom; ++y)
       for (int x = left; x <= right; ++x) {
         const auto u = static_cast<float>(x);
@@ -40,21 +42,37 @@ class Raster {
         const float c = 1 - a - b;
         if (a < 0 || b < 0 || c < 0) continue;
         const float w = a * p[0].z() + b * p[1].z() + c * p[2].z();
-        auto& before = inverse_depth_.at<float>(y, x);
+        auto& before = inverse_depth.at<float>(y, x);
         if (w <= before) continue;
         before = w;
-        const Eigen::Vector3f mixed = a * colour[0] + b * colour[1] + c * colour[2];
-        image.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(mixed.z()),
-                                     static_cast<std::uint8_t>(mixed.y()),
-                                     static_cast<std::uint8_t>(mixed.x())};
+        visible(y, x, a, b, c);
       }
   }
 
-  cv::Mat image;
-
- private:
-  cv::Mat inverse_depth_;
+  cv::Mat inverse_depth;  ///< [1/m]; 0: nothing
 };
+
+/// Vertices as (u, v, 1/z) in the picture; 1/z is 0 where they are too near or behind.
+std::vector<Eigen::Vector3f> corners_in(const PictureView& view, const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3f> corners(mesh.positions.size(), Eigen::Vector3f::Zero());
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const Vector3 x_c = view.T_c_w * Vector3(mesh.positions[v].cast<double>());
+    if (x_c.z() <= kNearest) continue;
+    const Vector2 uv = view.camera.project(x_c);
+    corners[v] = {static_cast<float>(uv.x()), static_cast<float>(uv.y()), static_cast<float>(1 / x_c.z())};
+  }
+  return corners;
+}
+
+template <class Visible>
+void draw_triangles(const TriangleMesh& mesh, const std::vector<Eigen::Vector3f>& corners, Raster& raster,
+                    Visible visible) {
+  for (const auto& t : mesh.triangles) {
+    if (corners[t[0]].z() <= 0 || corners[t[1]].z() <= 0 || corners[t[2]].z() <= 0) continue;
+    raster.triangle({corners[t[0]], corners[t[1]], corners[t[2]]},
+                    [&](int y, int x, float a, float b, float c) { visible(t, y, x, a, b, c); });
+  }
+}
 
 }  // namespace
 
@@ -62,26 +80,30 @@ cv::Mat draw_mesh(const TriangleMesh& mesh, std::span<const Rgb> colours, const 
   TWOFOLD_CHECK(mesh.normals.size() == mesh.positions.size(), "a mesh with normals");
   const Eigen::Matrix3f R_c_w = view.T_c_w.rotation().cast<float>();
   const Eigen::Vector3f light = Eigen::Vector3f(0.4f, -0.6f, -1.0f).normalized();
-  std::vector<Eigen::Vector3f> corners(mesh.positions.size());  // z 0: cannot be drawn
   std::vector<Eigen::Vector3f> shades(mesh.positions.size());
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-    const Vector3 x_c = view.T_c_w * Vector3(mesh.positions[v].cast<double>());
-    corners[v].setZero();
-    if (x_c.z() > kNearest) {
-      const Vector2 uv = view.camera.project(x_c);
-      corners[v] = {static_cast<float>(uv.x()), static_cast<float>(uv.y()), static_cast<float>(1 / x_c.z())};
-    }
     const float lit = 0.35f + 0.65f * std::max(0.0f, (R_c_w * mesh.normals[v]).dot(light));
     shades[v] = colours.empty() ? Eigen::Vector3f::Constant(235 * lit)
                                 : Eigen::Vector3f(colours[v][0], colours[v][1], colours[v][2]);
   }
+  cv::Mat image(view.camera.height, view.camera.width, CV_8UC3, cv::Scalar(255, 255, 255));
   Raster raster(view.camera);
-  for (const auto& t : mesh.triangles) {
-    if (corners[t[0]].z() <= 0 || corners[t[1]].z() <= 0 || corners[t[2]].z() <= 0) continue;
-    raster.triangle({corners[t[0]], corners[t[1]], corners[t[2]]},
-                    {shades[t[0]], shades[t[1]], shades[t[2]]});
-  }
-  return raster.image;
+  draw_triangles(mesh, corners_in(view, mesh), raster,
+                 [&](const auto& t, int y, int x, float a, float b, float c) {
+                   const Eigen::Vector3f mixed = a * shades[t[0]] + b * shades[t[1]] + c * shades[t[2]];
+                   image.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(mixed.z()),
+                                                static_cast<std::uint8_t>(mixed.y()),
+                                                static_cast<std::uint8_t>(mixed.x())};
+                 });
+  return image;
+}
+
+cv::Mat depth_of_mesh(const TriangleMesh& mesh, const PictureView& view) {
+  Raster raster(view.camera);
+  draw_triangles(mesh, corners_in(view, mesh), raster, [](const auto&, int, int, float, float, float) {});
+  cv::Mat depth = 1 / raster.inverse_depth;
+  depth.setTo(0, raster.inverse_depth == 0);
+  return depth;
 }
 
 PictureView overview_of(const TriangleMesh& mesh, const Vector3& up, int width) {

@@ -26,6 +26,10 @@ struct PictureView {
 [[nodiscard]] cv::Mat draw_mesh(const TriangleMesh& mesh, std::span<const Rgb> colours,
                                 const PictureView& view);
 
+/// Depth of the same triangles, CV_32FC1 [m]; 0 where there is none. Triangles that reach to within 2 cm of
+/// the camera are left out: large ones are to be subdivided before. Needs no normals.
+[[nodiscard]] cv::Mat depth_of_mesh(const TriangleMesh& mesh, const PictureView& view);
+
 /// From far away, against the mean direction that the surface faces, filling a picture of this width [px].
 /// up: direction that is up in the picture, in the mesh's frame.
 [[nodiscard]] PictureView overview_of(const TriangleMesh& mesh, const Vector3& up, int width);

@@ -40,28 +40,67 @@ struct Resampled {
   LaneIndex weight, nearest;
 };
 
-/// Of a cube with so many samples along x, and along x and y. Weights are 0 where nothing was ever seen.
+/// Where eight samples lie in cells of the cube, and what stands at the cells' corners: by twos along x, of
+/// which the first two lie at the smaller z, the first and the third at the smaller y.
+struct Cells {
+  std::array<LanePair, 4> corners;
+  std::array<Lane, 3> at;  ///< within the cell, 0 .. 1
+
+  [[nodiscard]] Lane linear() const {
+    std::array<Lane, 4> along_x;
+    for (std::size_t c = 0; c < 4; ++c) {
+      const Lane first = distance_of(corners[c].first);
+      along_x[c] = first + at[0] * (distance_of(corners[c].second) - first);
+    }
+    const Lane y0 = along_x[0] + at[1] * (along_x[1] - along_x[0]);
+    const Lane y1 = along_x[2] + at[1] * (along_x[3] - along_x[2]);
+    return y0 + at[2] * (y1 - y0);
+  }
+  /// All eight.
+  [[nodiscard]] LaneIndex are_seen() const {
+    LaneIndex seen = LaneIndex{} - 1;
+    for (const LanePair& pair : corners) seen &= (weight_of(pair.first) > 0) & (weight_of(pair.second) > 0);
+    return seen;
+  }
+  /// The mean of those that were seen, with the shares that they have in linear(); one of them was.
+  [[nodiscard]] Lane mean_of_seen() const {
+    Lane sum{}, share{};
+    for (std::size_t c = 0; c < 4; ++c) {
+      const Lane in_yz = ((c & 1) != 0 ? at[1] : kOne - at[1]) * ((c >> 1) != 0 ? at[2] : kOne - at[2]);
+      const auto take = [&](const LaneIndex& sample, const Lane& own_share) {
+        const Lane part = weight_of(sample) > 0 ? own_share : kZero;
+        sum += part * distance_of(sample);
+        share += part;
+      };
+      take(corners[c].first, in_yz * (kOne - at[0]));
+      take(corners[c].second, in_yz * at[0]);
+    }
+    return sum / larger(share, kZero + 1e-6f);
+  }
+};
+
+/// Of a cube with so many samples along x, and along x and y. Weights are those of the nearest samples, 0
+/// where these were never seen: or each time that samples are taken to another grid, what is known would lose
+/// a sample all around, and be known less.
 inline Resampled resample(const std::uint32_t* cube, int row, int layer, const std::array<Lane, 3>& at) {
   const LaneIndex x = whole(at[0]), y = whole(at[1]), z = whole(at[2]);
-  const Lane fx = at[0] - real(x), fy = at[1] - real(y), fz = at[2] - real(z);
+  Cells cells{{}, {at[0] - real(x), at[1] - real(y), at[2] - real(z)}};
   const LaneIndex base = z * layer + y * row + x;
+  const auto step = [](const Lane& f, int by) { return (f > 0.5f) & by; };
+  Resampled result{};
+  result.nearest = base + step(cells.at[0], 1) + step(cells.at[1], row) + step(cells.at[2], layer);
+  LaneIndex nearest;
+  for (std::size_t i = 0; i < kLanes; ++i) nearest[i] = static_cast<std::int32_t>(cube[result.nearest[i]]);
+  result.weight = weight_of(nearest);
+  if (!any(result.weight)) return result;
   std::array<std::int32_t, kLanes> index;
   std::memcpy(index.data(), &base, sizeof(base));
-  Resampled result;
-  result.weight = LaneIndex{} + kMostWeightSteps;
-  std::array<Lane, 4> along_x;
-  for (int c = 0; c < 4; ++c) {
-    const LanePair pair = read_pairs(cube + (c >> 1) * layer + (c & 1) * row, index);
-    result.weight = smaller(result.weight, smaller(weight_of(pair.first), weight_of(pair.second)));
-    if (!any(result.weight)) return result;
-    const Lane first = distance_of(pair.first);
-    along_x[static_cast<std::size_t>(c)] = first + fx * (distance_of(pair.second) - first);
-  }
-  const Lane y0 = along_x[0] + fy * (along_x[1] - along_x[0]);
-  const Lane y1 = along_x[2] + fy * (along_x[3] - along_x[2]);
-  result.distance = y0 + fz * (y1 - y0);
-  const auto step = [](const Lane& f, int by) { return (f > 0.5f) & by; };
-  result.nearest = base + step(fx, 1) + step(fy, row) + step(fz, layer);
+  for (int c = 0; c < 4; ++c)
+    cells.corners[static_cast<std::size_t>(c)] = read_pairs(cube + (c >> 1) * layer + (c & 1) * row, index);
+  result.distance = cells.linear();
+  const LaneIndex all_seen = cells.are_seen();
+  if (any((all_seen == 0) & (result.weight > 0)))
+    result.distance = all_seen != 0 ? result.distance : cells.mean_of_seen();
   return result;
 }
 

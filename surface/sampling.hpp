@@ -81,8 +81,9 @@ class Sampler {
 };
 
 /// Reads a volume at the samples of another one of the same options, whose grid is turned and shifted against
-/// it: linearly between the eight samples around, and not where one of them was never seen. Grids that are a
-/// shift_in_blocks apart have the same samples, which are taken as they are.
+/// it: linearly between the eight samples around, or those of them that were ever seen, with the weight of
+/// the nearest one, and not where that was never seen. Grids that are a shift_in_blocks apart have the same
+/// samples, which are taken as they are.
 class Resampler {
  public:
   /// @param from   must outlive the resampler, and not change

@@ -199,8 +199,8 @@ void add_render_command(CLI::App& app, int& exit_code) {
                                       "write the scene's true surfaces to this mesh (PLY)");
   auto* seen =
       command->add_option("--seen", arguments->seen,
-                          "the same, as far as the camera's depth images show them (sensor=rgbd); with "
-                          "--out or --surface or alone");
+                          "the same, as far as depth images show them (sensor=rgbd) or both cameras do "
+                          "(sensor=stereo); with --out or --surface or alone");
   command->callback([arguments, out, surface, seen, &exit_code] {
     if (out->count() + surface->count() + seen->count() == 0)
       throw IoError("--out", "is required, or --surface or --seen");

@@ -75,13 +75,17 @@ bool calibrates_itself(const RunArguments& arguments) {
   return arguments.calibration == "auto";
 }
 
+/// Empty: the source's own calibration holds, or none is known beforehand.
+std::string calibration_file_of(const RunArguments& arguments) {
+  return calibrates_itself(arguments) ? std::string() : arguments.calibration;
+}
+
 SourceOptions source_options_of(const RunArguments& arguments) {
   SourceOptions options;
   options.preload = arguments.preload;
   options.left_only = arguments.camera == "mono";
   options.stop = &interrupted();
-  if (!arguments.calibration.empty() && !calibrates_itself(arguments))
-    options.calibration = arguments.calibration;
+  if (const std::string file = calibration_file_of(arguments); !file.empty()) options.calibration = file;
   return options;
 }
 
@@ -213,7 +217,7 @@ int run(const RunArguments& arguments) {
         [&] { figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id); });
   failures.attempt([&] {
     write_run_output(arguments.out,
-                     {arguments.source, arguments.record,
+                     {arguments.source, arguments.record, calibration_file_of(arguments),
                       calibration ? auto_calibration_json(*calibration) : nullptr, failures.all()},
                      *source, options, result, parts, figures ? surface_json(*figures) : nullptr);
   });

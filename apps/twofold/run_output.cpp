@@ -120,8 +120,12 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   summary["scale"] = no_scale ? "arbitrary" : "metric";
   summary["self_calibration"] = frames.calibration;
   summary["surface"] = surface;
-  summary["recording"] = nullptr;
-  if (!frames.recording.empty()) summary["recording"] = std::filesystem::absolute(frames.recording).string();
+  const auto path_or_null = [](const std::string& file) {
+    return file.empty() ? nlohmann::ordered_json(nullptr)
+                        : nlohmann::ordered_json(std::filesystem::absolute(file).string());
+  };
+  summary["calibration_file"] = path_or_null(frames.calibration_file);
+  summary["recording"] = path_or_null(frames.recording);
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {

@@ -14,8 +14,9 @@ namespace twofold {
 
 /// Where a run's frames came from, and went to.
 struct RunFrames {
-  std::string source;     ///< as given
-  std::string recording;  ///< folder; empty: they were not recorded
+  std::string source;            ///< as given
+  std::string recording;         ///< folder; empty: they were not recorded
+  std::string calibration_file;  ///< given instead of the source's own; empty: none was
   nlohmann::ordered_json calibration =
       nullptr;                           ///< what was found from the video itself, if it was asked for
   std::vector<std::string> errors = {};  ///< of the run: what it failed of, and what was lost

@@ -59,7 +59,10 @@ void serve(const ViewServerOptions& options, const ViewScene& scene, const ViewT
 RecordedImages recorded_images(const RunJson& summary) {
   const RunJson recording = summary.value("recording", RunJson());
   if (recording.is_string()) return images_of_recording("euroc:" + recording.get<std::string>(), {});
-  return images_of_recording(summary.value("source", ""), {});
+  std::optional<std::filesystem::path> calibration;
+  if (const RunJson file = summary.value("calibration_file", RunJson()); file.is_string())
+    calibration = file.get<std::string>();
+  return images_of_recording(summary.value("source", ""), calibration);
 }
 
 /// Images of a run's keyframes, from what it recorded or else from the recording it was made of; empty when

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -116,6 +118,43 @@ TEST(SurfaceCommand, RowsThatSlippedAreTakenBackForTheSurfaceToo) {
   }
 }
 
+TEST(SurfaceCommand, OfARunGoesByTheCalibrationThatTheRunWasGiven) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run(folder, "render " + kScene + " --out '" + (folder / "recording") + "'").exit_code, 0);
+  std::ofstream(folder / "other.yaml")
+      << "sensor: rgbd\nfps: 30\ncameras: [{size: [320, 240], intrinsics: [240, 240, 158, 119]}]\n"
+         "depth: {unit: 0.001, min: 0.3, max: 8, virtual_baseline: 0.1}\n";
+  ASSERT_EQ(run(folder, "run 'tum:" + (folder / "recording") + "' --calib '" + (folder / "other.yaml") +
+                            "' --deterministic --quiet --out '" + (folder / "run") + "'")
+                .exit_code,
+            0);
+  for (const auto& [to, given] :
+       {std::pair{"a", std::string()}, {"b", " --calib '" + (folder / "other.yaml") + "'"}}) {
+    const Outcome outcome = run(
+        folder, "surface '" + (folder / "run") + "' --voxel 0.02" + given + " --out '" + (folder / to) + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  EXPECT_TRUE(content(folder / "a/surface.ply") == content(folder / "b/surface.ply"));
+}
+
+/// The farther apart its cameras stand, the less do both see at once.
+TEST(SurfaceCommand, OfAPairWhatBothCamerasSeeIsSeen) {
+  const ScratchFolder folder;
+  std::map<std::string, double> triangles;
+  for (const std::string baseline : {"0.001", "0.2"}) {
+    const std::string file = folder / (baseline + ".ply");
+    const Outcome outcome =
+        run(folder, "render 'synthetic:desk?width=320&height=240&frames=2&baseline=" + baseline +
+                        "' --seen '" + file + "'");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    triangles[baseline] = static_cast<double>(read_ply_mesh(file).triangles.size());
+  }
+  std::printf("triangles seen: %.0f by cameras in one place, %.0f by cameras 20 cm apart\n",
+              triangles["0.001"], triangles["0.2"]);
+  EXPECT_LT(triangles["0.2"], 0.9 * triangles["0.001"]);
+  EXPECT_GT(triangles["0.2"], 0.5 * triangles["0.001"]);
+}
+
 TEST(SurfaceCommand, StereoGivesASurface) {
   const ScratchFolder folder;
   const std::string scene = "'synthetic:desk?width=320&height=240&frames=20'";
@@ -134,8 +173,9 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
   expect_bad_input(run(folder, "surface '" + (folder / "nothing") + "'"), "not the folder of a finished run");
   expect_bad_input(run(folder, "surface 'synthetic:desk?sensor=mono&frames=5' --poses truth" + to),
                    "no depth");
-  expect_bad_input(run(folder, "render 'synthetic:desk?frames=5' --seen '" + (folder / "seen.ply") + "'"),
-                   "sensor=rgbd");
+  expect_bad_input(
+      run(folder, "render 'synthetic:desk?sensor=mono&frames=5' --seen '" + (folder / "seen.ply") + "'"),
+      "rgbd or stereo");
   std::ofstream(folder / "bad.ply")
       << "ply\nformat ascii 1.0\nelement vertex 99\nproperty float x\nend_header\n1";
   expect_bad_input(

@@ -136,8 +136,8 @@ void run_object(ObjectArguments& arguments) {
         ": the object could not be tracked: it is too small in the images, or without texture");
   const std::vector<MapPart> parts = map_parts(result, options);
   const ObjectModel model = build_object(*source, parts.front().trajectory, arguments.surface);
-  write_run_output(arguments.out, {arguments.source, "", nullptr, result.losses}, *source, options, result,
-                   parts, surface_json(model.figures));
+  write_run_output(arguments.out, {arguments.source, "", arguments.calibration, nullptr, result.losses},
+                   *source, options, result, parts, surface_json(model.figures));
   print_summary(arguments.out, options, result, parts);
   print_surface(model.figures);
   if (model.mesh.triangles.empty())

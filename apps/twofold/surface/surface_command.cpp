@@ -48,7 +48,8 @@ constexpr int kPictureWidth = 1600;
 /// What a run was made of.
 struct RunInput {
   std::string source;
-  double row_offset = 0;  ///< of the right images, which the run took back [px]
+  std::string calibration;  ///< file that the run was given; empty: none
+  double row_offset = 0;    ///< of the right images, which the run took back [px]
 };
 
 RunInput input_of_run(const fs::path& folder) {
@@ -58,7 +59,9 @@ RunInput input_of_run(const fs::path& folder) {
     throw IoError(file, "does not name the source of the run");
   if (summary.value("scale", "") == "arbitrary")
     throw IoError(file, "says that the scale is arbitrary (one camera): no depth fits its poses");
-  RunInput input{summary["source"].get<std::string>()};
+  RunInput input{summary["source"].get<std::string>(), {}};
+  if (summary.contains("calibration_file") && summary["calibration_file"].is_string())
+    input.calibration = summary["calibration_file"].get<std::string>();
   if (summary.contains("row_offset_px") && summary["row_offset_px"].is_number())
     input.row_offset = summary["row_offset_px"].get<double>();
   if (!(std::abs(input.row_offset) <= RowOffsetMeter::kMost))
@@ -82,9 +85,10 @@ SurfaceJob surface_job(const SurfaceArguments& arguments) {
     throw IoError(arguments.input,
                   "is not the folder of a finished run: give --poses truth, or a trajectory");
   if (!is_run && arguments.out.empty()) throw IoError(arguments.input, "needs --out FOLDER for the surface");
+  const RunInput input = is_run ? input_of_run(arguments.input) : RunInput{arguments.input, {}};
   SourceOptions options;
-  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
-  const RunInput input = is_run ? input_of_run(arguments.input) : RunInput{arguments.input};
+  for (const std::string& file : {input.calibration, arguments.calibration})
+    if (!file.empty()) options.calibration = file;
   job.source = open_source(input.source, options);
   job.row_offset = input.row_offset;
   job.out = arguments.out.empty() ? arguments.input : arguments.out;
@@ -209,7 +213,8 @@ void add_surface_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--poses", arguments->poses,
       "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise");
-  command->add_option("--calib", arguments->calibration, "Calibration file instead of the recording's own");
+  command->add_option("--calib", arguments->calibration,
+                      "Calibration file instead of the recording's own, or of that which the run was given");
   command->add_option("--out", arguments->out, "Folder for surface.ply and surface.glb; the run's otherwise");
   command->add_option("--voxel", arguments->options.voxel, "Distance of two samples of the surface [m]")
       ->capture_default_str();

@@ -10,8 +10,8 @@ namespace twofold {
 /// the source has none.
 void write_true_surface(const std::filesystem::path& file, const FrameSource& source);
 
-/// The same, cut into triangles of a centimetre, of which those are kept that a depth image shows. Reads the
-/// source to its end. Throws IoError, too when it gives no depth images.
+/// The same, cut into triangles of a centimetre, of which those are kept that a depth image shows or, of a
+/// pair, both cameras at once. Reads the source to its end. Throws IoError, too when it is one camera's.
 void write_seen_surface(const std::filesystem::path& file, FrameSource& source);
 
 }  // namespace twofold
