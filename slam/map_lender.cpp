@@ -39,6 +39,14 @@ std::shared_ptr<const MapVersion> MapLender::newest() {
   return loan;
 }
 
+void MapLender::catch_up() {
+  const std::unique_lock lock(borrowers_, std::try_to_lock);
+  if (!lock) return;
+  (void)maps_.mailbox(0).latest();
+  (void)places_.mailbox(0).latest();
+  (void)loops_.mailbox(0).latest();
+}
+
 MapLender::Loans MapLender::held() {
   const std::scoped_lock lock(borrowers_);
   Loans loans;

@@ -54,6 +54,11 @@ class MapLender {
   /// Borrowers. O(1). The same object as before, while that is held and nothing newer was published.
   [[nodiscard]] std::shared_ptr<const MapVersion> newest();
 
+  /// Anybody, now and then. Lets go of what was newest when somebody borrowed last, which the reader's ends
+  /// of the publishers keep alive until they are asked again. Waits for nobody: does nothing while one
+  /// borrows.
+  void catch_up();
+
   struct Loans {
     std::size_t versions = 0;
     std::uint64_t oldest = 0;  ///< version of the map; 0: nothing is held
@@ -66,7 +71,7 @@ class MapLender {
   SnapshotPublisher<KeyframeDatabase> places_{1, {}};
   SnapshotPublisher<LoopList> loops_{1, {}};
   LoopList all_loops_;    // loop closer's
-  std::mutex borrowers_;  // guards the readers' ends of both publishers, and loans_
+  std::mutex borrowers_;  // guards the readers' ends of the publishers, and loans_
   std::vector<std::weak_ptr<const MapVersion>> loans_;
 };
 

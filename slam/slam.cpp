@@ -247,6 +247,7 @@ PushResult Slam::Impl::push(const FrameView& frame) {
   const std::scoped_lock turn(pushing_);
   if (std::string why = refusal(frame); !why.empty()) return {PushStatus::kRefused, std::move(why)};
   pushed_ = true;
+  maps.catch_up();
   pipeline_->collect({});
   if (!pipeline_->has_buffer()) {
     intake_.skip(frame);

@@ -131,5 +131,18 @@ TEST(MapLender, LendsTheLoopsThatWereClosedSoFar) {
   EXPECT_EQ(loops[1].drift, 0) << "two worlds have nothing to do with each other";
 }
 
+// A program that looked at the map once must not keep that version for the rest of its run.
+TEST(MapLender, CatchingUpLetsGoOfWhatWasLentLast) {
+  MapLender lender;
+  lender.publish(ClosedLoop{});
+  const std::weak_ptr<const std::vector<ClosedLoop>> lent = lender.newest()->loops.loops;
+  lender.publish(ClosedLoop{});
+  lender.publish(ClosedLoop{});
+  ASSERT_FALSE(lent.expired()) << "the reader's end still has it: that is what catch_up is for";
+  lender.catch_up();
+  lender.publish(ClosedLoop{});  // the writer destroys what no reader looks at
+  EXPECT_TRUE(lent.expired());
+}
+
 }  // namespace
 }  // namespace twofold
