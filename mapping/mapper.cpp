@@ -65,7 +65,7 @@ MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals,
   form_windows(report);
   optimise(report);
   remove_outliers(report);
-  if (!proposals.empty()) close_metric_loops(proposals.back()->images, report);
+  close_metric_loops(proposals, report);
   cull(report);
   return report;
 }
@@ -157,10 +157,13 @@ void Mapper::remove_outliers(MapperReport& report) {
   report.culled_points += remove_outlier_observations(writer_, outliers_);
 }
 
-void Mapper::close_metric_loops(const FrameImages& images, MapperReport& report) {
+/// Of each new keyframe: one that is left out, because the mapper was behind and inserts several, would keep
+/// points of its own beside those that the map has there, and never become redundant.
+void Mapper::close_metric_loops(std::span<KeyframeProposal* const> proposals, MapperReport& report) {
   if (!options_.loop.enabled) return;
   const StageTime time(report.ms.loop);
-  report.loop_search = loop_closer_.close(writer_, window_, images);
+  for (const KeyframeProposal* proposal : proposals)
+    report.loop_search += loop_closer_.close(writer_, window_, proposal->id, proposal->images);
   report.metric_loops = report.loop_search.edges;
 }
 

@@ -36,9 +36,9 @@ struct MapperReport {
   int edges_marginalised = 0;  ///< of keyframes that left W1
   SolverSummary solver;
 
-  int outliers = 0;      ///< observations removed
-  int metric_loops = 0;  ///< edges added by metric loop closure
-  MetricLoopReport loop_search;
+  int outliers = 0;              ///< observations removed
+  int metric_loops = 0;          ///< edges added by metric loop closure
+  MetricLoopReport loop_search;  ///< of all that were inserted
   int culled_points = 0;
   std::vector<KeyframeId> culled_keyframes;
 
@@ -100,7 +100,7 @@ class Mapper {
   void leave_inner_window(MapperReport& report);
 
   void remove_outliers(MapperReport& report);
-  void close_metric_loops(const FrameImages& images, MapperReport& report);
+  void close_metric_loops(std::span<KeyframeProposal* const> proposals, MapperReport& report);
   void cull(MapperReport& report);
 
   Rig rig_;

@@ -18,6 +18,15 @@ PointSearch guided_point_search(const Rig& rig, double radius_px) {
   };
 }
 
+MetricLoopReport& MetricLoopReport::operator+=(const MetricLoopReport& other) {
+  searched += other.searched;
+  found += other.found;
+  agreed += other.agreed;
+  edges += other.edges;
+  observations += other.observations;
+  return *this;
+}
+
 MetricLoopCloser::MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search)
     : rig_(rig),
       min_matches_(options.min_covisible),
@@ -25,9 +34,10 @@ MetricLoopCloser::MetricLoopCloser(const Rig& rig, const MapperOptions& options,
       options_(options.loop),
       search_(std::move(search)) {}
 
-MetricLoopReport MetricLoopCloser::close(GraphWriter& writer, const DoubleWindow& window,
+MetricLoopReport MetricLoopCloser::close(GraphWriter& writer, const DoubleWindow& window, KeyframeId keyframe,
                                          const FrameImages& images) {
   MetricLoopReport report;
+  reference_ = keyframe;
   split_neighbourhoods(writer.graph(), window);
   if (far_.empty()) return report;
   collect_candidates(writer.graph());
@@ -46,7 +56,6 @@ MetricLoopReport MetricLoopCloser::close(GraphWriter& writer, const DoubleWindow
 }
 
 void MetricLoopCloser::split_neighbourhoods(const GraphSnapshot& graph, const DoubleWindow& window) {
-  reference_ = graph.reference();
   near_.clear();
   far_.clear();
   direct_neighbours(graph, reference_, graph.keyframe(reference_).edges->size() + 1, near_);  // eq. 6.5

@@ -27,6 +27,8 @@ struct MetricLoopReport {
   int agreed = 0;        ///< explained by T_loop
   int edges = 0;         ///< keyframes newly connected to the reference
   int observations = 0;  ///< added to the reference
+
+  MetricLoopReport& operator+=(const MetricLoopReport& other);
 };
 
 /// Metric loop closure  (thesis 6.4.1): finds points of the wider neighbourhood N2 that N1 does not see in
@@ -39,10 +41,12 @@ class MetricLoopCloser {
  public:
   MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search);
 
-  /// @param window  double window around the reference; its poses agree with one another, its first nodes
-  ///                are N2
-  /// @param images  of the reference keyframe
-  MetricLoopReport close(GraphWriter& writer, const DoubleWindow& window, const FrameImages& images);
+  /// @param window    double window around the newest keyframe; its poses agree with one another, its first
+  ///                  nodes are N2
+  /// @param keyframe  the reference: the newest keyframe, or one that was inserted together with it
+  /// @param images    of that keyframe
+  MetricLoopReport close(GraphWriter& writer, const DoubleWindow& window, KeyframeId keyframe,
+                         const FrameImages& images);
 
  private:
   struct Candidate {

@@ -173,7 +173,7 @@ class Tracker {
   void start_points(KeyframeId anchor, const FrameStep& step);
   void observe_seeds(const FrameStep& step);
   void occupy_unsearched(const SE3& T_c_ref);
-  void start_seeds(KeyframeId anchor, const SE3& T_c_ref);
+  void start_seeds(KeyframeId anchor);
   void revisit_reference(const GraphSnapshot& graph);
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);

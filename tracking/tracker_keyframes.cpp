@@ -128,14 +128,28 @@ void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
   proposal.new_points.push_back({point.id, point.anchor, point.psi, anchor_observation, point.appearance});
 }
 
-/// New points where nothing is tracked.
+/// New points where nothing is tracked or known.
 void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
   starter_.clear();
   for (std::size_t m = 0; m < matches_.size(); ++m) {
     if (motion_[m].inlier) starter_.occupy(matches_[m].found.z.head<2>().cast<float>());
   }
-  if (seeds_) return start_seeds(anchor, step.result.T_c_ref);
+  const bool enough_found = static_cast<int>(matches_.size()) >= step.bounds.wanted_matches;
+  if (enough_found && rig_.kind != SensorKind::kRgbd) occupy_unsearched(step.result.T_c_ref);
+  if (seeds_) return start_seeds(anchor);
   starter_.start(current_, anchor, step.shutter, immature_points_);
+}
+
+/// Where the map has points that nobody looked for, because enough others had been found: a place seen again
+/// would get new ones for ever. Uses up the candidates of this frame's search. Depth cameras are left out: they
+/// gained nothing by it, and had fewer fresh points when frames blurred (docs/results.md, seldom frames).
+void Tracker::occupy_unsearched(const SE3& T_c_ref) {
+  for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
+    const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
+    if (point.local >= 0) continue;  // few of these will ever be points of the map
+    const auto uv = rig_.camera.find_in_view(T_c_ref * point.x_ref);
+    if (uv) starter_.occupy(uv->cast<float>());
+  }
 }
 
 /// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to

@@ -68,22 +68,9 @@ void Tracker::observe_seeds(const FrameStep& step) {
   seeds_->observe(current_.left, median_depth(result.T_c_ref), T_c_anchor, immature_points_);
 }
 
-/// Where the map has points that nobody looked for, because enough others had been found: with cells so small
-/// there are more points in view than a frame needs, and a place seen again would get new ones for ever. Uses
-/// up the candidates of this frame's search.
-void Tracker::occupy_unsearched(const SE3& T_c_ref) {
-  for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
-    const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
-    if (point.local >= 0) continue;  // few of these will ever be points of the map
-    const auto uv = rig_.camera.find_in_view(T_c_ref * point.x_ref);
-    if (uv) starter_.occupy(uv->cast<float>());
-  }
-}
-
 /// Corners where no point is tracked or known, and none waits for its depth.
-void Tracker::start_seeds(KeyframeId anchor, const SE3& T_c_ref) {
+void Tracker::start_seeds(KeyframeId anchor) {
   seeds_->drop_stale(anchor);
-  occupy_unsearched(T_c_ref);
   seeds_->for_places([&](const Eigen::Vector2f& uv) { starter_.occupy(uv); });
   new_corners_.clear();
   starter_.choose_corners(current_, new_corners_);

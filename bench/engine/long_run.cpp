@@ -1,6 +1,7 @@
 // What hours in one place do to memory: a rendered scene again and again at 30 Hz by its time stamps, as fast
-// as the engine can; resident memory and the folder's files every so many minutes. Of a desk the images are
-// shown forwards and backwards, of a closed path (--closed) round by round.
+// as the engine can or at a multiple of that pace (--speed); resident memory and the folder's files every so
+// many minutes. Of a desk the images are shown forwards and backwards, of a closed path (--closed) round by
+// round.
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <exception>
@@ -25,6 +26,7 @@ struct Arguments {
   double hours = 24;
   std::string folder, scene = "desk";
   bool closed = false, deterministic = false;
+  double speed = 0;  ///< recorded seconds a second; 0: as fast as it goes
   int width = 320, height = 240, frames = 300;
   int minutes = 10;  ///< between two lines
 };
@@ -64,6 +66,7 @@ void run(const Arguments& arguments) {
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   options.logs.folder = arguments.folder;
   options.deterministic = arguments.deterministic;
+  options.pacing.speed = arguments.speed;
   const auto end = static_cast<std::int64_t>(arguments.hours * static_cast<double>(kFramesAnHour));
   std::int64_t index = 0;
   const FrameFeed feed = [&](Frame& frame) {
@@ -115,6 +118,9 @@ int main(int argc, char** argv) {
   app.add_flag("--closed", arguments.closed, "its path is closed: round by round instead of to and fro");
   app.add_flag("--deterministic", arguments.deterministic,
                "one thread: the mapper is never behind, as at the recording's own pace");
+  app.add_option("--speed", arguments.speed, "recorded seconds a second; 0: as fast as it goes")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--minutes", arguments.minutes, "of the recording between two lines")
       ->check(CLI::Range(1, 60))
       ->capture_default_str();

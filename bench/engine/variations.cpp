@@ -1,6 +1,7 @@
 // Whether a result is luck: the same recording with its first one, two, three frames left out and with noise
-// of one grey level added, darker, cropped, smaller, seen in a mirror; how far apart its frames may be; and
-// whether the tracker knows how well it knows the pose (NEES).
+// of one grey level added, darker, cropped, smaller, seen in a mirror; how far apart its frames may be; the
+// recording played backwards, and there and back again, which nothing was tuned on; and whether the tracker
+// knows how well it knows the pose (NEES).
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -29,6 +30,8 @@
 namespace twofold {
 namespace {
 
+enum class Order : std::uint8_t { kForwards, kBackwards, kThereAndBack };
+
 struct Variation {
   std::string name;
   int left_out = 0;       ///< frames at the beginning
@@ -38,6 +41,7 @@ struct Variation {
   double scale = 1;       ///< of width and height
   bool mirrored = false;  ///< left and right exchanged, the cameras of a pair too
   int every = 1;          ///< frames from one that is taken to the next
+  Order order = Order::kForwards;
 };
 
 /// Of one frame, with what the tracker said of it.
@@ -151,6 +155,32 @@ Trajectory varied(Trajectory truth, const Rig& rig, const Variation& variation) 
   return truth;
 }
 
+std::vector<Frame> read_all(FrameSource& source) {
+  std::vector<Frame> frames;
+  FrameStatus status{};
+  for (Frame frame; (status = source.next(frame)) == FrameStatus::kFrame;) {
+    frames.push_back(frame);
+    for (cv::Mat* image : {&frames.back().left, &frames.back().right, &frames.back().depth})
+      *image = image->clone();
+  }
+  if (status == FrameStatus::kError) throw std::runtime_error(source.error());
+  return frames;
+}
+
+/// Frames or poses as if the recording were played in another order; backwards, time is mirrored at its end.
+template <class Timed>
+std::vector<Timed> reordered(const std::vector<Timed>& forwards, Order order, std::int64_t end_ns) {
+  if (order == Order::kForwards) return forwards;
+  std::vector<Timed> out;
+  if (order == Order::kThereAndBack) out = forwards;
+  for (auto item = forwards.rbegin(); item != forwards.rend(); ++item) {
+    if (order == Order::kThereAndBack && item->t_ns >= end_ns) continue;  // it turns at the last frame
+    out.push_back(*item);
+    out.back().t_ns = 2 * end_ns - item->t_ns;
+  }
+  return out;
+}
+
 /// How far the time stamps of frames scatter about regular ones, which the camera's clock gives [s];
 /// intervals that a frame is missing in are left out.
 class ClockJitter {
@@ -216,7 +246,12 @@ Trajectory longest(const std::map<KeyframeId, Trajectory>& of_parts) {
 Outcome run(const std::string& text, const SourceOptions& source_options, const Variation& variation,
             TruthNoise noise) {
   const std::unique_ptr<FrameSource> source = open_source(text, source_options);
-  const Trajectory truth = varied(source->ground_truth(), source->rig(), variation);
+  std::vector<Frame> frames = read_all(*source);
+  if (frames.empty()) throw std::runtime_error(text + ": no frames");
+  const std::int64_t end_ns = frames.back().t_ns;
+  frames = reordered(frames, variation.order, end_ns);
+  const Trajectory truth =
+      reordered(varied(source->ground_truth(), source->rig(), variation), variation.order, end_ns);
   std::vector<RelativePose> relative_poses;
   ClockJitter jitter;
   Outcome outcome;
@@ -234,13 +269,12 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
     relative_poses.push_back(
         {record.T_c_ref.unpacked(), record.t_ns, t_ref_ns, report.information.inverse()});
   };
-  int unused = variation.left_out;
+  auto next = static_cast<std::size_t>(variation.left_out);
   const FrameFeed feed = [&](Frame& frame) {
-    FrameStatus status = source->next(frame);
-    for (; status == FrameStatus::kFrame && unused > 0; --unused) status = source->next(frame);
-    unused = variation.every - 1;
-    if (status != FrameStatus::kFrame)
-      return status == FrameStatus::kEnd ? FeedStatus::kEnd : FeedStatus::kError;
+    if (next >= frames.size()) return FeedStatus::kEnd;
+    frame = frames[next];
+    frame.index = static_cast<std::int64_t>(next);
+    next += static_cast<std::size_t>(variation.every);
     vary(frame, variation);
     return FeedStatus::kFrame;
   };
@@ -310,6 +344,7 @@ int main(int argc, char** argv) {
   bool as_it_is_only = false;
   bool frames = false;
   std::string camera = "all";
+  auto order = twofold::Order::kForwards;
   int only = -1;
   std::vector<int> every;
   std::vector<double> truth{0, 0};
@@ -322,6 +357,11 @@ int main(int argc, char** argv) {
   app.add_flag("--frames", frames, "what became of each frame");
   CLI::Option* const one =
       app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
+  app.add_option("--order", order, "that frames are played in")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, twofold::Order>{{"forwards", twofold::Order::kForwards},
+                                                {"backwards", twofold::Order::kBackwards},
+                                                {"there-and-back", twofold::Order::kThereAndBack}}));
   app.add_option("--every", every,
                  "instead of the variations: every first, second, .. frame, as many as given")
       ->check(CLI::PositiveNumber)
@@ -349,7 +389,8 @@ int main(int argc, char** argv) {
           "\n| {} | tracked | in parts | ATE m | causal m | NEES / 6: median / mean / p95 "
           "|\n|---|---|---|---|---|---|\n",
           source);
-      for (const twofold::Variation& variation : variations) {
+      for (twofold::Variation& variation : variations) {
+        variation.order = order;
         if (only >= 0 && &variation != &variations[static_cast<std::size_t>(only)]) continue;
         const twofold::Outcome outcome = twofold::run(source, options, variation, {truth[0], truth[1]});
         print_row(variation, outcome);

@@ -55,7 +55,7 @@ class MetricLoopTest : public testing::Test {
       if ((match.z.head<2>() - predicted).norm() > radius_px) return std::nullopt;
       return match;
     };
-    return MetricLoopCloser(rig_, options_, search).close(writer_, window_, FrameImages());
+    return MetricLoopCloser(rig_, options_, search).close(writer_, window_, reference_, FrameImages());
   }
 
   Rig rig_;
@@ -124,6 +124,18 @@ TEST_F(MetricLoopTest, OneCameraTiesTogetherOnlyWhatHasOneUnit) {
   rig_.kind = SensorKind::kStereo;
   make_graph(SE3(), -0.9, 0.9, kFarAway);
   EXPECT_EQ(close().edges, 1);
+}
+
+// The mapper was behind and has inserted another one since.
+TEST_F(MetricLoopTest, TheKeyframeNeedNotBeTheNewest) {
+  make_graph(SE3());
+  const KeyframeId newest = add_keyframe(writer_, T_ref_true_);
+  link(writer_, reference_, newest, 40);
+  writer_.set_reference(newest);
+  const MetricLoopReport report = close();
+  EXPECT_EQ(report.edges, 1);
+  EXPECT_NE(find_edge(writer_.graph().keyframe(reference_), old_), nullptr);
+  EXPECT_EQ(find_edge(writer_.graph().keyframe(newest), old_), nullptr);
 }
 
 TEST_F(MetricLoopTest, WorkIsBoundedAndSpread) {
