@@ -27,7 +27,7 @@ std::shared_ptr<const MapVersion> MapLender::newest() {
   const LoopList& loops = loops_.mailbox(0).latest();
   std::erase_if(loans_, [](const auto& loan) { return loan.expired(); });
   if (!loans_.empty()) {
-    const auto last = loans_.back().lock();
+    auto last = loans_.back().lock();
     if (last && last->version() == map.version() && last->places.version() == places.version() &&
         last->loops.version() == loops.version())
       return last;
