@@ -1,8 +1,8 @@
 #include "geometry/essential_matrix.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
+#include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
@@ -11,6 +11,8 @@
 #include <utility>
 
 #include "geometry/five_point_polynomials.hpp"
+#include "geometry/real_roots.hpp"
+#include "geometry/svd.hpp"
 #include "geometry/triangulation.hpp"
 
 namespace twofold {
@@ -111,6 +113,78 @@ bool find_null_space(Eigen::Matrix<double, 5, 9> A, std::array<Matrix3, 4>& N) {
   return true;
 }
 
+/// B(z) = B[0] + B[1] z + .. + B[4] z^4, with B(z) (x, y, 1)^T = 0 for every solution of the constraints.
+///
+/// Eliminating ten monomials leaves, for x^2, y^2 and x y each, two rows: one for the monomial and one for z
+/// times it. The former times z, taken from the latter, is linear in x and y  (Nister, PAMI 2004).
+bool hidden_variable_matrix(const Constraints& constraints, Matrix3 (&B)[5]) {
+  using five_point::kMonomials;
+  constexpr std::array<five_point::Exponents, 20> kOrder{
+      {{2, 0, 1}, {2, 0, 0}, {0, 2, 1}, {0, 2, 0}, {1, 1, 1}, {1, 1, 0}, {3, 0, 0},
+       {2, 1, 0}, {1, 2, 0}, {0, 3, 0}, {1, 0, 2}, {1, 0, 1}, {1, 0, 0}, {0, 1, 2},
+       {0, 1, 1}, {0, 1, 0}, {0, 0, 3}, {0, 0, 2}, {0, 0, 1}, {0, 0, 0}}};
+  Constraints C;
+  for (int k = 0; k < 20; ++k) {
+    const auto at = std::find(kMonomials.begin(), kMonomials.end(), kOrder[static_cast<std::size_t>(k)]);
+    C.col(k) = constraints.col(static_cast<int>(at - kMonomials.begin()));
+  }
+  int order[20];
+  if (!eliminate(C, 10, order)) return false;
+  int row_of[20] = {};
+  for (int r = 0; r < 10; ++r) row_of[order[r]] = r;
+  for (Matrix3& power : B) power.setZero();
+  for (int r = 0; r < 3; ++r) {
+    const auto above = C.row(row_of[2 * r]), below = C.row(row_of[2 * r + 1]);  // with z, without
+    int at = 10;
+    for (int c = 0; c < 3; ++c) {
+      for (int power = c < 2 ? 2 : 3; power >= 0; --power, ++at) {
+        B[power](r, c) += above[at];
+        B[power + 1](r, c) -= below[at];
+      }
+    }
+  }
+  return true;
+}
+
+/// Of a 3x3 matrix of polynomials whose columns have degree 3, 3 and 4; the coefficient of z^i at i.
+std::array<double, 11> determinant_of(const Matrix3 (&B)[5]) {
+  std::array<double, 11> sum{};
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      const Vector3 normal = B[i].col(0).cross(B[j].col(1));
+      for (int k = 0; k < 5; ++k) sum[static_cast<std::size_t>(i + j + k)] += normal.dot(B[k].col(2));
+    }
+  }
+  return sum;
+}
+
+/// What a matrix of rank two sends to zero: the longest of its rows' cross products.
+Vector3 null_vector(const Matrix3& M) {
+  Vector3 best = Vector3::Zero();
+  for (int r = 0; r < 3; ++r) {
+    const Vector3 v = M.row(r).cross(M.row((r + 1) % 3));
+    if (v.squaredNorm() > best.squaredNorm()) best = v;
+  }
+  return best;
+}
+
+/// Newton's steps onto the constraints themselves: roots of the determinant have lost half of their
+/// digits where two of them are near each other, as they are after small motions.
+Vector3 polished(const Constraints& constraints, Vector3 at) {
+  for (int step = 0; step < 4; ++step) {
+    Eigen::Matrix<double, 20, 1> monomials;
+    Eigen::Matrix<double, 20, 3> derivatives;
+    five_point::evaluate(at, monomials, derivatives);
+    const Eigen::Matrix<double, 10, 1> residual = constraints * monomials;
+    const Eigen::Matrix<double, 10, 3> J = constraints * derivatives;
+    const Vector3 shift = Matrix3(J.transpose() * J).inverse() * (J.transpose() * residual);
+    if (!shift.allFinite()) break;
+    at -= shift;
+    if (shift.norm() <= 1e-12 * at.norm()) break;
+  }
+  return at;
+}
+
 }  // namespace
 
 void solve_five_point(std::span<const Vector3, 5> bearings_a, std::span<const Vector3, 5> bearings_b,
@@ -124,25 +198,17 @@ void solve_five_point(std::span<const Vector3, 5> bearings_a, std::span<const Ve
   std::array<Matrix3, 4> N;
   if (!find_null_space(A, N)) return;
 
-  Constraints C = essential_constraints(N);
-  int order[20];
-  if (!eliminate(C, 10, order)) return;
-  // Cubics = -(the last ten columns) * basis; row r of C is that of cubic order[r].
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(10, 10);
-  for (int r = 0; r < 10; ++r) {
-    if (order[r] >= 6) continue;
-    for (int c = 0; c < 10; ++c) M(order[r], c) = -C(r, 10 + c);
-  }
-
-  // Multiplication by x of the basis (x^2, xy, xz, y^2, yz, z^2, x, y, z, 1): the first six become cubics.
-  M(6, 0) = M(7, 1) = M(8, 2) = M(9, 6) = 1;
-  const Eigen::EigenSolver<Eigen::MatrixXd> eigen(M);
-  if (eigen.info() != Eigen::Success) return;
-  for (int i = 0; i < 10; ++i) {
-    if (eigen.eigenvalues()[i].imag() != 0) continue;  // conjugate pairs are exact in a real Schur form
-    const Eigen::Matrix<double, 10, 1> v = eigen.eigenvectors().col(i).real();
-    if (v[9] == 0) continue;
-    const Matrix3 E = (v[6] * N[0] + v[7] * N[1] + v[8] * N[2]) / v[9] + N[3];
+  const Constraints constraints = essential_constraints(N);
+  Matrix3 B[5];
+  if (!hidden_variable_matrix(constraints, B)) return;
+  std::array<double, 10> roots;
+  const int count = real_roots(determinant_of(B), roots);
+  for (int i = 0; i < count; ++i) {
+    const double z = roots[static_cast<std::size_t>(i)];
+    const Vector3 v = null_vector(B[0] + z * (B[1] + z * (B[2] + z * (B[3] + z * B[4]))));
+    if (v[2] == 0) continue;
+    const Vector3 x = polished(constraints, Vector3(v[0] / v[2], v[1] / v[2], z));
+    const Matrix3 E = x[0] * N[0] + x[1] * N[1] + x[2] * N[2] + N[3];
     const double norm = E.norm();
     if (std::isfinite(norm) && norm > 0) solutions.push_back(E * (std::sqrt(2.0) / norm));
   }
@@ -159,9 +225,10 @@ double squared_sampson_distance(const Matrix3& E_b_a, const Vector3& bearing_a, 
 
 std::optional<SE3> decompose_essential(const Matrix3& E_b_a, std::span<const Vector3> bearings_a,
                                        std::span<const Vector3> bearings_b, std::span<const int> indices) {
-  const Eigen::JacobiSVD<Matrix3> svd(E_b_a, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Matrix3 U = svd.matrixU();
-  Matrix3 V = svd.matrixV();
+  const auto svd = decompose(E_b_a);
+  if (!svd) return std::nullopt;
+  Matrix3 U = svd->U;
+  Matrix3 V = svd->V;
   if (U.determinant() < 0) U = -U;
   if (V.determinant() < 0) V = -V;
   Matrix3 W;

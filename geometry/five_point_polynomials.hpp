@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "geometry/types.hpp"
+
 namespace twofold::five_point {
 
 /// Polynomials in (x, y, z) as coefficient rows. Monomials, highest degree first:
@@ -55,6 +57,23 @@ inline constexpr auto kProduct = [] {
     for (int j = 0; j < 4; ++j) r[kProduct[10 + i][16 + j]] += p[i] * q[j];
   }
   return r;
+}
+
+/// The monomials at (x, y, z), and their derivatives by x, y and z.
+inline void evaluate(const Vector3& at, Eigen::Matrix<double, 20, 1>& monomials,
+                     Eigen::Matrix<double, 20, 3>& derivatives) {
+  double power[3][5];  // x^(i - 1) at i; 0 stands where only a factor of 0 follows
+  for (int c = 0; c < 3; ++c) {
+    power[c][0] = 0;
+    power[c][1] = 1;
+    for (int i = 2; i < 5; ++i) power[c][i] = power[c][i - 1] * at[c];
+  }
+  for (int k = 0; k < 20; ++k) {
+    const auto [i, j, l] = kMonomials[static_cast<std::size_t>(k)];
+    const double x = power[0][i + 1], y = power[1][j + 1], z = power[2][l + 1];
+    monomials[k] = x * y * z;
+    derivatives.row(k) << i * power[0][i] * y * z, j * x * power[1][j] * z, l * x * y * power[2][l];
+  }
 }
 
 }  // namespace twofold::five_point

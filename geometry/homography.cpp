@@ -1,8 +1,9 @@
 #include "geometry/homography.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "geometry/svd.hpp"
 
 namespace twofold {
 namespace {
@@ -58,14 +59,14 @@ std::optional<Homography> estimate_homography(std::span<const Vector3> bearings_
 
 std::vector<SE3> decompose_homography(const Matrix3& H_b_a, const Vector3& bearing_a,
                                       const Vector3& bearing_b) {
-  const Eigen::JacobiSVD<Matrix3> svd(H_b_a, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (svd.info() != Eigen::Success) return {};  // not of finite numbers
-  const Vector3 s = svd.singularValues() / svd.singularValues()[1];
+  const auto svd = decompose(H_b_a);
+  if (!svd) return {};
+  const Vector3 s = svd->singular_values / svd->singular_values[1];
   constexpr double kTurnedOnTheSpot = 1e-9;
   if (!s.allFinite() || !(s[0] - s[2] > kTurnedOnTheSpot)) return {};
-  Matrix3 H = H_b_a / svd.singularValues()[1];
+  Matrix3 H = H_b_a / svd->singular_values[1];
   if (bearing_b.dot(H * bearing_a) < 0) H = -H;
-  Matrix3 V = svd.matrixV();
+  Matrix3 V = svd->V;
   if (V.determinant() < 0) V = -V;
   const double along_1 = std::sqrt(std::max(0.0, 1 - s[2] * s[2]));
   const double along_3 = std::sqrt(std::max(0.0, s[0] * s[0] - 1));

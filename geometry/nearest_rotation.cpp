@@ -1,15 +1,22 @@
 #include "geometry/nearest_rotation.hpp"
 
-#include <Eigen/SVD>
+#include <limits>
+
+#include "geometry/svd.hpp"
 
 namespace twofold {
 
 Matrix3 nearest_rotation(const Matrix3& M, Vector3* singular_values) {
-  const Eigen::JacobiSVD<Matrix3> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  if (singular_values) *singular_values = svd.singularValues();
+  const auto svd = decompose(M);
+  if (!svd) {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+    if (singular_values) singular_values->setConstant(kNaN);
+    return Matrix3::Constant(kNaN);
+  }
+  if (singular_values) *singular_values = svd->singular_values;
   Vector3 sign(1, 1, 1);
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign.z() = -1;
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  if ((svd->U * svd->V.transpose()).determinant() < 0) sign.z() = -1;
+  return svd->U * sign.asDiagonal() * svd->V.transpose();
 }
 
 Eigen::Matrix2d nearest_rotation(const Eigen::Matrix2d& M) {
