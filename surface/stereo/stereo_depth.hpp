@@ -6,6 +6,9 @@
 
 namespace twofold {
 
+/// How near a place may come to a pair by default [m].
+inline constexpr double kNearestStereo = 0.4;
+
 /// Depth from a rectified pair by semi-global matching  (Hirschmueller, PAMI 2008; OpenCV's), then
 /// refine_disparity.
 ///

@@ -17,7 +17,6 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kMostWaiting = 48;  // keyframes whose images wait for the surface's thread
-constexpr double kNearestStereo = 0.4;    // [m]
 constexpr auto kMapCheck = std::chrono::milliseconds(20);
 
 }  // namespace

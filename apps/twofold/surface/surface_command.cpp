@@ -42,7 +42,6 @@ struct SurfaceArguments {
 };
 
 constexpr std::int64_t kSameTimeNs = 1'000'000;
-constexpr double kNearestStereo = 0.4;  // [m]
 constexpr int kPictureWidth = 1600;
 
 /// What a run was made of.
