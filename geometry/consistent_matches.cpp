@@ -5,26 +5,11 @@
 #include <cmath>
 #include <cstdint>
 
+#include "geometry/agreement_graph.hpp"
 #include "geometry/option_check.hpp"
 
 namespace twofold {
 namespace {
-
-/// Rows of bits: the adjacency matrix of the agreement graph.
-class BitRows {
- public:
-  explicit BitRows(std::size_t n) : words_((n + 63) / 64), bits_(n * words_) {}
-
-  void set(std::size_t row, std::size_t column) { bits_[row * words_ + column / 64] |= bit(column); }
-  [[nodiscard]] std::span<const std::uint64_t> row(std::size_t i) const {
-    return {bits_.data() + i * words_, words_};
-  }
-  [[nodiscard]] static std::uint64_t bit(std::size_t column) { return std::uint64_t{1} << (column % 64); }
-
- private:
-  std::size_t words_;
-  std::vector<std::uint64_t> bits_;
-};
 
 int common(std::span<const std::uint64_t> a, std::span<const std::uint64_t> b) {
   int count = 0;
@@ -55,12 +40,10 @@ std::string ConsistencyOptions::invalid_reason() const {
 std::vector<int> consistent_matches(std::span<const PointMatch3d> matches,
                                     const ConsistencyOptions& options) {
   const std::size_t n = matches.size();
-  BitRows neighbours(n);
+  AgreementGraph graph(n);
   for (std::size_t a = 0; a < n; ++a) {
     for (std::size_t b = a + 1; b < n; ++b) {
-      if (!agree(matches[a], matches[b], options)) continue;
-      neighbours.set(a, b);
-      neighbours.set(b, a);
+      if (agree(matches[a], matches[b], options)) graph.join(a, b);
     }
   }
   std::vector<std::uint64_t> candidates((n + 63) / 64, ~std::uint64_t{0});
@@ -70,16 +53,16 @@ std::vector<int> consistent_matches(std::span<const PointMatch3d> matches,
     int best = -1, most = -1;
     for (std::size_t i = 0; i < n; ++i) {
       if (!open[i]) continue;
-      const int kept = common(candidates, neighbours.row(i));
+      const int kept = common(candidates, graph.row(i));
       if (kept <= most) continue;
       best = static_cast<int>(i);
       most = kept;
     }
     if (best < 0) break;
     clique.push_back(best);
-    const auto row = neighbours.row(static_cast<std::size_t>(best));
+    const auto row = graph.row(static_cast<std::size_t>(best));
     for (std::size_t w = 0; w < candidates.size(); ++w) candidates[w] &= row[w];
-    for (std::size_t i = 0; i < n; ++i) open[i] = (candidates[i / 64] & BitRows::bit(i)) != 0;
+    for (std::size_t i = 0; i < n; ++i) open[i] = (candidates[i / 64] & AgreementGraph::bit(i)) != 0;
   }
   std::sort(clique.begin(), clique.end());
   return clique;

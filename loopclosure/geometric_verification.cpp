@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 #include "estimation/motion_only.hpp"
 #include "geometry/absolute_orientation.hpp"
+#include "geometry/agreement_graph.hpp"
 #include "geometry/essential_matrix.hpp"
 #include "geometry/ransac.hpp"
 #include "imaging/binary_descriptor.hpp"
@@ -62,10 +64,28 @@ double per_squared_pixel(int level) {
   return std::ldexp(1.0, -2 * level);
 }
 
-/// A similarity and its inverse, which each residual needs.
+/// By how much directions in the image turn from view a to view b: what of the rotation is about the axis.
+double turn_of(const Matrix3& R_b_a) {
+  return std::atan2(R_b_a(1, 0) - R_b_a(0, 1), R_b_a(0, 0) + R_b_a(1, 1));
+}
+
+bool nearly_same_direction(double angle_0, double angle_1, double bound) {
+  constexpr double kRound = 2 * std::numbers::pi;
+  const double apart = angle_0 - angle_1;
+  return std::abs(apart - kRound * std::nearbyint(apart / kRound)) <=
+         bound;  // remainder() takes 5 times as long
+}
+
+double radians(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
+/// A similarity, and what each residual needs of it.
 struct TwoWaySimilarity {
-  explicit TwoWaySimilarity(const Sim3& S) : S_b_a(S), S_a_b(S.inverse()) {}
+  explicit TwoWaySimilarity(const Sim3& S)
+      : S_b_a(S), S_a_b(S.inverse()), turn(turn_of(S.without_scale().rotation())) {}
   Sim3 S_b_a, S_a_b;
+  double turn;
 };
 
 /// For geometry/ransac.hpp: S_b_a from three points known in both frames, of scale 1 unless there is one
@@ -79,16 +99,31 @@ class SimilarityEstimator {
                       const std::vector<Match>& matches, const VerificationOptions& options)
       : rig_(rig),
         shortest_(std::pow(std::max(0.0, 1 - options.max_stretch), 2)),
+        max_turn_(radians(options.max_turn_deg)),
         outlier_(options.ransac_error_px * options.ransac_error_px) {
     for (const Match& match : matches) {
       const auto i = static_cast<std::size_t>(match.corner);
       const auto j = static_cast<std::size_t>(match.b);
       pairs_.push_back({match.x_a, rig.unproject(b.z[j].cast<double>()), a.z[i], b.z[j],
-                        per_squared_pixel(a.corners[i].level), per_squared_pixel(b.corners[j].level)});
+                        per_squared_pixel(a.corners[i].level), per_squared_pixel(b.corners[j].level),
+                        double{b.corners[j].angle} - a.corners[i].angle});
     }
   }
 
   [[nodiscard]] int size() const { return static_cast<int>(pairs_.size()); }
+
+  /// Which matches one motion of a known scale can explain: they keep their distance and turn alike.
+  [[nodiscard]] AgreementGraph agreements() const {
+    AgreementGraph graph(pairs_.size());
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      for (std::size_t j = i + 1; j < pairs_.size(); ++j) {
+        if (turn_alike(pairs_[i], pairs_[j]) && as_long((pairs_[i].x_a - pairs_[j].x_a).squaredNorm(),
+                                                        (pairs_[i].x_b - pairs_[j].x_b).squaredNorm()))
+          graph.join(i, j);
+      }
+    }
+    return graph;
+  }
 
   void fit(std::span<const int, 3> sample, std::vector<Model>& models) const {
     const bool scale_known = rig_.kind != SensorKind::kMono;
@@ -103,7 +138,7 @@ class SimilarityEstimator {
       double in_a = (pair.x_a - next.x_a).squaredNorm();
       if (!scale_known && k == 0) scale = in_b / in_a;
       in_a *= scale;
-      if (!(in_a >= shortest_ * in_b && in_b >= shortest_ * in_a)) return;
+      if (!as_long(in_a, in_b) || !turn_alike(pair, next)) return;
     }
     if (scale_known) {
       if (const auto T_b_a = align_rigid(x_b, x_a)) models.emplace_back(Sim3(*T_b_a));
@@ -115,6 +150,7 @@ class SimilarityEstimator {
   /// The larger of the errors in either view; of outliers, one that makes them such.
   [[nodiscard]] double squared_residual(const Model& model, int i) const {
     const Pair& pair = pairs_[static_cast<std::size_t>(i)];
+    if (!nearly_same_direction(pair.turn, model.turn, max_turn_)) return 2 * outlier_;
     const double in_b = squared_error(rig_, model.S_b_a * pair.x_a, pair.z_b, pair.per_pixel_b);
     if (in_b > outlier_) return in_b;
     return std::max(squared_error(rig_, model.S_a_b * pair.x_b, pair.z_a, pair.per_pixel_a), in_b);
@@ -126,13 +162,49 @@ class SimilarityEstimator {
     Vector3 x_a, x_b;
     Eigen::Vector3f z_a, z_b;
     double per_pixel_a = 1, per_pixel_b = 1;
+    double turn = 0;  ///< of the corner, from a to b
   };
+
+  [[nodiscard]] bool as_long(double squared_a, double squared_b) const {
+    return squared_a >= shortest_ * squared_b && squared_b >= shortest_ * squared_a;
+  }
+  [[nodiscard]] bool turn_alike(const Pair& i, const Pair& j) const {
+    return nearly_same_direction(i.turn, j.turn, 2 * max_turn_);
+  }
 
   const Rig& rig_;
   double shortest_;  ///< side over the longer of the two, squared
+  double max_turn_;
   double outlier_;
   std::vector<Pair> pairs_;
 };
+
+/// What RANSAC would find if it drew every sample that can be right: where few matches are, it misses them,
+/// or not, by its seed.
+std::optional<RansacResult<TwoWaySimilarity>> best_of_all_samples(const SimilarityEstimator& estimator,
+                                                                  const VerificationOptions& options) {
+  const double threshold = options.ransac_error_px * options.ransac_error_px;
+  std::optional<RansacResult<TwoWaySimilarity>> best;
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<TwoWaySimilarity> models;
+  std::vector<int> inliers;
+  for (const auto& sample : estimator.agreements().triples(static_cast<std::size_t>(options.max_samples))) {
+    models.clear();
+    estimator.fit(sample, models);
+    if (models.empty()) continue;
+    inliers.clear();
+    double score = 0;  // as in geometry/ransac.hpp
+    for (int i = 0; i < estimator.size() && score < least; ++i) {
+      const double squared = estimator.squared_residual(models[0], i);
+      if (squared <= threshold) inliers.push_back(i);
+      score += std::min(squared, threshold);
+    }
+    if (score >= least) continue;
+    least = score;
+    best = RansacResult<TwoWaySimilarity>{models[0], inliers, 0};
+  }
+  return best;
+}
 
 /// The corners of a view in square cells, a grid for each level, so that a search looks at a few of them
 /// only.
@@ -236,6 +308,7 @@ class CornerGrid {
 struct PlacePoint {
   Match match;  ///< of no corner of b yet
   const BinaryDescriptor* descriptor = nullptr;
+  double angle = 0;  ///< as the place's own view would have it, if it saw the corner
 };
 
 std::vector<PlacePoint> points_of(const Rig& rig, std::span<const PlacedView> place,
@@ -244,28 +317,36 @@ std::vector<PlacePoint> points_of(const Rig& rig, std::span<const PlacedView> pl
   for (std::size_t v = 0; v < place.size(); ++v) {
     const PlaceAppearance& view = *place[v].appearance;
     const SE3 T_a_v = place[v].T_v_a.inverse();
+    const double turn = turn_of(T_a_v.rotation());
     for (std::size_t i = 0; i < view.corners.size(); ++i) {
       if (!has_depth(view.z[i], options)) continue;
       const Vector3 x_a = T_a_v * rig.unproject(view.z[i].cast<double>());
-      points.push_back({{static_cast<int>(v), static_cast<int>(i), 0, x_a}, &view.corners[i].descriptor});
+      points.push_back({{static_cast<int>(v), static_cast<int>(i), 0, x_a},
+                        &view.corners[i].descriptor,
+                        view.corners[i].angle + turn});
     }
   }
   return points;
 }
 
-/// Best partner in b, near to where T_b_a says, of each point of the place; a corner of b serves once.
+/// Best partner in b, near to where T_b_a says, of each point of the place, if it is turned as T_b_a says; a
+/// corner of b serves once.
 std::vector<Match> match_guided(const Rig& rig, const std::vector<PlacePoint>& place,
                                 const PlaceAppearance& b, const CornerGrid& corners_of_b, const SE3& T_b_a,
                                 double radius_px, const VerificationOptions& options) {
   std::vector<Match> offered;
   std::vector<NearestDescriptor> of_b(b.corners.size());
+  const double turn = turn_of(T_b_a.rotation());
+  const double max_turn = radians(options.max_turn_deg);
   for (const PlacePoint& point : place) {
     const Vector3 x_b = T_b_a * point.match.x_a;
     const auto uv = rig.camera.find_in_view(x_b, kDescriptorBorder);
     if (!uv) continue;
     const NearestDescriptor nearest = corners_of_b.nearest(*uv, *point.descriptor, radius_px);
     if (nearest.best < 0 || nearest.distance > options.guided_distance) continue;
-    of_b[static_cast<std::size_t>(nearest.best)].offer(static_cast<int>(offered.size()), nearest.distance);
+    const auto j = static_cast<std::size_t>(nearest.best);
+    if (!nearly_same_direction(double{b.corners[j].angle}, point.angle + turn, max_turn)) continue;
+    of_b[j].offer(static_cast<int>(offered.size()), nearest.distance);
     offered.push_back(point.match);
     offered.back().b = nearest.best;
   }
@@ -346,7 +427,8 @@ std::optional<SE3> pose_by_directions(const Rig& rig, const PlaceAppearance& b,
   const auto epipolar = estimate_relative_pose(bearings_a, bearings_b, ransac);
   if (!epipolar) return std::nullopt;
   report.ransac_inliers = static_cast<int>(epipolar->inliers.size());
-  if (report.ransac_inliers < options.min_hypothesis) return std::nullopt;
+  // Five points always agree with a pose of their own.
+  if (report.ransac_inliers < std::max(options.min_hypothesis, 6)) return std::nullopt;
   const SE3& T_b_a = epipolar->T_b_a;
   std::vector<Match> inliers;
   std::vector<double> lengths;
@@ -370,8 +452,10 @@ std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, con
   report.matches = static_cast<int>(matches.size());
   if (!depth_in_b) return pose_by_directions(rig, b, matches, options, report);
   const SimilarityEstimator estimator(rig, a, b, matches, options);
-  const auto found = ransac(estimator, RansacOptions{.threshold = options.ransac_error_px,
-                                                     .max_iterations = options.max_iterations});
+  const auto found = rig.kind != SensorKind::kMono
+                         ? best_of_all_samples(estimator, options)
+                         : ransac(estimator, RansacOptions{.threshold = options.ransac_error_px,
+                                                           .max_iterations = options.max_iterations});
   if (!found) return std::nullopt;
   report.ransac_inliers = static_cast<int>(found->inliers.size());
   if (report.ransac_inliers < options.min_hypothesis) return std::nullopt;

@@ -11,12 +11,16 @@
 namespace twofold {
 
 struct VerificationOptions {
-  int max_distance = 50;          ///< of a match's descriptors [bits]
-  double max_error_px = 3;        ///< reprojection error of an inlier, pixels of the corner's level
-  double ransac_error_px = 9;     ///< ... of a match that agrees with three others: their pose is rough
-  double max_stretch = 0.15;      ///< by so much of its length a sample's side may differ between the views
-  int max_iterations = 5000;      ///< samples; most fail at their sides already
-  int min_hypothesis = 6;         ///< matches that must agree before the pose is tried by guided matching
+  int max_distance = 50;       ///< of a match's descriptors [bits]
+  double max_error_px = 3;     ///< reprojection error of an inlier, pixels of the corner's level
+  double ransac_error_px = 9;  ///< ... of a match that agrees with three others: their pose is rough
+  double max_stretch = 0.15;   ///< by so much of its length a sample's side may differ between the views
+  /// A corner is turned by so much more or less than the views are against each other, about their axes: its
+  /// descriptor was compared in the direction that it has in either.
+  double max_turn_deg = 30;
+  int max_samples = 300;          ///< triangles of matches, any two of which agree
+  int max_iterations = 5000;      ///< one camera: samples drawn; most fail at their sides already
+  int min_hypothesis = 5;         ///< matches that must agree before the pose is tried by guided matching
   double guided_radius_px = 8;    ///< of the first round of guided matching, pixels of the corner's level;
                                   ///< the later rounds take half of it
   int guided_distance = 64;       ///< descriptors in guided matching [bits]
@@ -55,14 +59,16 @@ struct VerificationReport {
 
 /// Does view b show the place?  (thesis 5.3.1, 6.4.2)
 ///
-/// Mutual nearest descriptors of b and the place's own view; 3-point RANSAC on 3D-3D matches (eq. 5.11 - 5.14
-/// with s = 1, eq. 6.9), errors measured where they arise, in pixels; a sample whose triangles differ is no
-/// sample (a rigid body keeps its lengths). From the pose found on, the corners of all views of the place are
-/// looked for in b: what one view missed, its neighbours may have. At least Theta inliers, well spread.
+/// Mutual nearest descriptors of b and the place's own view; of all triangles of matches that keep their
+/// lengths, as a rigid body does, and turn alike, the pose that fits most 3D-3D matches (eq. 5.11 - 5.14 with
+/// s = 1, eq. 6.9), errors measured where they arise, in pixels. From the pose found on, the corners of all
+/// views of the place are looked for in b: what one view missed, its neighbours may have. A corner whose
+/// direction is not the one that the pose says is another. At least Theta inliers, well spread.
 /// Deterministic.
 ///
 /// With one camera (rig.kind) depths come from the map (DepthRegression; rig.baseline is the one they were
-/// written with), those of b in a unit that may have drifted: the three points give a similarity (eq. 5.14).
+/// written with), those of b in a unit that may have drifted: three points give a similarity (eq. 5.14), and
+/// are drawn (RANSAC), as without a scale no two matches can contradict each other by a length.
 /// Such depths propose; what counts are positions in the image, and the scale is the median of all inliers'.
 /// When nothing is known of b's depths, five points propose, and the place's depths give the length of the
 /// way.

@@ -22,6 +22,8 @@ std::string VerificationOptions::invalid_reason() const {
       .above("max_error_px", max_error_px, 0)
       .above("ransac_error_px", ransac_error_px, 0)
       .above("max_stretch", max_stretch, 0)
+      .within("max_turn_deg", max_turn_deg, 0, 180)
+      .at_least("max_samples", max_samples, 1)
       .at_least("max_iterations", max_iterations, 1)
       .at_least("min_hypothesis", min_hypothesis, 3)
       .above("guided_radius_px", guided_radius_px, 0)

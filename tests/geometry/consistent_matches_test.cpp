@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <random>
 
+#include "geometry/agreement_graph.hpp"
 #include "geometry/se3.hpp"
 
 namespace twofold {
@@ -81,6 +84,34 @@ TEST(ConsistentMatches, FewMatches) {
   EXPECT_TRUE(consistent_matches({}, {}).empty());
   const Body body = make_body(1, 0, 0, 1);
   EXPECT_EQ(consistent_matches(body.matches, {}), std::vector<int>{0});
+}
+
+/// Against all triples tried one by one, over the border of a word of bits.
+TEST(AgreementGraph, KnowsAllTriplesThatAgree) {
+  constexpr std::size_t kN = 130;
+  std::mt19937 random(3);
+  AgreementGraph graph(kN);
+  for (std::size_t a = 0; a < kN; ++a) {
+    for (std::size_t b = a + 1; b < kN; ++b) {
+      if (random() % 5 == 0) graph.join(a, b);
+    }
+  }
+  std::vector<std::array<int, 3>> all;
+  for (std::size_t a = 0; a < kN; ++a) {
+    for (std::size_t b = a + 1; b < kN; ++b) {
+      for (std::size_t c = b + 1; c < kN; ++c) {
+        if (graph.agree(a, b) && graph.agree(a, c) && graph.agree(b, c))
+          all.push_back({static_cast<int>(a), static_cast<int>(b), static_cast<int>(c)});
+      }
+    }
+  }
+  ASSERT_GT(all.size(), 1000U);
+  EXPECT_EQ(graph.triples(all.size()), all);
+  const auto some = graph.triples(100);
+  EXPECT_LE(some.size(), 100U);
+  EXPECT_GT(some.size(), 90U);
+  EXPECT_TRUE(std::includes(all.begin(), all.end(), some.begin(), some.end()));
+  EXPECT_TRUE(AgreementGraph(2).triples(5).empty());
 }
 
 }  // namespace

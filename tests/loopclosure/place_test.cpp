@@ -104,6 +104,28 @@ TEST_P(PlaceTest, EachRuleOfVerificationRefusesAlone) {
   EXPECT_GE(report.inliers, 4);
 }
 
+/// A third of the corners are turned by more than the camera is: they are others that look and lie alike.
+TEST_P(PlaceTest, CornersThatAreTurnedAreOthers) {
+  const PlaceView a = view(1, pose(0.1, {0.2, 0.1, -0.5}));
+  PlaceView b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  VerificationReport all, rest;
+  ASSERT_TRUE(verify(a, b, {}, &all));
+  for (std::size_t j = 0; j < b.corners.size(); j += 3) b.corners[j].angle += 2;
+  ASSERT_TRUE(verify(a, b, {}, &rest));
+  EXPECT_LT(rest.ransac_inliers, 0.8 * all.ransac_inliers);
+  EXPECT_LT(rest.inliers, 0.8 * all.inliers);
+  EXPECT_EQ(rest.matches, all.matches);
+}
+
+/// A camera that lies on its side sees the same corners, turned by as much.
+TEST_P(PlaceTest, ACameraThatRollsSeesThemTurnedAlike) {
+  const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5});
+  const SE3 roll(SO3::exp(Vector3(0, 0, 0.9)), Vector3(0, 0, 0));
+  const auto verified = verify(view(1, T_a_w), view(1, roll * T_a_w));
+  ASSERT_TRUE(verified);
+  EXPECT_LT((verified->T_b_a * roll.inverse()).log().norm(), 0.04);
+}
+
 TEST_P(PlaceTest, CornersOfOneSideOfTheImageAreNoLoop) {
   const PlaceView a = view(1, pose(0, {0, 0, 0}));
   PlaceView b = view(1, pose(0.02, {0.05, 0, 0}));
