@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "geometry/five_point_polynomials.hpp"
+#include "geometry/nearest_rotation.hpp"
 #include "geometry/real_roots.hpp"
-#include "geometry/svd.hpp"
 #include "geometry/triangulation.hpp"
 
 namespace twofold {

@@ -3,7 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "geometry/svd.hpp"
+#include "geometry/nearest_rotation.hpp"
 
 namespace twofold {
 namespace {

@@ -1,10 +1,15 @@
 #include "geometry/nearest_rotation.hpp"
 
+#include <Eigen/SVD>
 #include <limits>
 
-#include "geometry/svd.hpp"
-
 namespace twofold {
+
+std::optional<SingularValueDecomposition> decompose(const Matrix3& M) {
+  if (!M.allFinite()) return std::nullopt;
+  const Eigen::JacobiSVD<Matrix3> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return SingularValueDecomposition{svd.matrixU(), svd.matrixV(), svd.singularValues()};
+}
 
 Matrix3 nearest_rotation(const Matrix3& M, Vector3* singular_values) {
   const auto svd = decompose(M);
