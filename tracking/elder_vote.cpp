@@ -1,11 +1,18 @@
 #include "tracking/elder_vote.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "estimation/observation_model.hpp"
 #include "geometry/option_check.hpp"
 
 namespace twofold {
+namespace {
+
+// Medians of chi-square with two and three degrees of freedom.
+constexpr double kMedianMono = 1.386, kMedianStereo = 2.366;
+
+}  // namespace
 
 std::string ElderVoteOptions::invalid_reason() const {
   return OptionCheck()
@@ -23,6 +30,7 @@ ElderVote::ElderVote(const Rig& rig, std::size_t capacity, const ElderVoteOption
     : rig_(rig), options_(options) {
   by_age_.reserve(capacity);
   elders_.reserve(capacity);
+  chi2_.reserve(capacity);
 }
 
 std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation> observations,
@@ -36,6 +44,7 @@ std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation>
   MotionOnlyResult by_elders = optimise_motion(rig_, elders_, by_all.T_c_ref, solver);
   if (by_elders.inliers < options_.min_agreeing * static_cast<double>(elders_.size())) return std::nullopt;
 
+  if (mistrusted) by_elders = settle_elders(by_elders, solver);
   const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
   difference_ = split_factor(by_all.information, by_elders.information, apart);
   const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent &&
@@ -48,6 +57,29 @@ std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation>
   if (!misled && !mistrusted) return std::nullopt;
   by_elders.inliers = classify_observations(rig_, observations, by_elders.T_c_ref, solver);
   return by_elders;
+}
+
+/// Elders that what passes hides are looked for all the same, and some are found on it, by chance and near to
+/// where they would be seen: within the bound for outliers, which is wide (real errors have long tails), and
+/// with their depths wrong. Where the others lie says how wide it is in this frame.
+MotionOnlyResult ElderVote::settle_elders(const MotionOnlyResult& by_elders,
+                                          const MotionOnlyOptions& solver) {
+  const ObservationModel model(rig_);
+  chi2_.clear();
+  for (const MotionObservation& o : elders_) {
+    if (o.inlier) chi2_.push_back(model.chi2(by_elders.T_c_ref * o.x_ref, o.z, o.information));
+  }
+  if (chi2_.empty()) return by_elders;
+  const auto middle = chi2_.begin() + static_cast<std::ptrdiff_t>(chi2_.size() / 2);
+  std::nth_element(chi2_.begin(), middle, chi2_.end());
+  const double usual = rig_.kind == SensorKind::kMono ? kMedianMono : kMedianStereo;
+  const double narrower = std::min(1.0, *middle / usual);
+  MotionOnlyOptions strict = solver;
+  strict.huber_sigmas *= std::sqrt(narrower);
+  strict.inlier_chi2_mono *= narrower;
+  strict.inlier_chi2_stereo *= narrower;
+  const MotionOnlyResult settled = optimise_motion(rig_, elders_, by_elders.T_c_ref, strict);
+  return settled.converged ? settled : by_elders;
 }
 
 /// @return false when they are too few, or when nobody is younger

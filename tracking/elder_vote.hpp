@@ -59,6 +59,8 @@ class ElderVote {
 
  private:
   bool choose_elders(std::span<const MotionObservation> observations, std::span<const KeyframeId> anchors);
+  [[nodiscard]] MotionOnlyResult settle_elders(const MotionOnlyResult& by_elders,
+                                               const MotionOnlyOptions& solver);
   [[nodiscard]] double elders_nearer_to(const SE3& T_c_ref, const SE3& T_other) const;
   [[nodiscard]] int young_inliers(std::span<MotionObservation> observations,
                                   std::span<const KeyframeId> anchors, const SE3& T_c_ref,
@@ -71,6 +73,7 @@ class ElderVote {
   KeyframeId youngest_elder_ = kNoKeyframe;  ///< anchor
   std::vector<KeyframeId> by_age_;
   std::vector<MotionObservation> elders_;
+  std::vector<double> chi2_;  ///< of elders
 };
 
 }  // namespace twofold

@@ -56,5 +56,12 @@ TEST(PassingObject, DoesNotTakeTheCameraAlongWhenItIsSlow) {
   }
 }
 
+/// So fast that points which it hides are found on it, by chance.
+TEST(PassingObject, DoesNotTakeTheCameraAlongWhenItIsFast) {
+  for (const double share : {0.3, 0.4, 0.5}) {
+    EXPECT_LT(farthest({.share = share, .px_a_frame = 10}), 0.02) << share;
+  }
+}
+
 }  // namespace
 }  // namespace twofold
