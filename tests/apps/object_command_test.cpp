@@ -32,6 +32,19 @@ TEST(ObjectCommand, ModelsWhatTurnsBeforeAStaticCamera) {
   EXPECT_NEAR(object["box"]["size_m"][2], 0.147, 0.006);  // its foot is left on the plate
 }
 
+// A round thing turns without its depth changing: prints alone say how far, and its outline stands still.
+TEST(ObjectCommand, MetricLoopClosesTheTurnOfAJar) {
+  const ScratchFolder folder;
+  const Outcome outcome =
+      run(folder, "object 'synthetic:turntable?sensor=rgbd&shape=1&frames=330' --deterministic --out '" +
+                      (folder / "jar") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto jar = nlohmann::json::parse(content(folder / "jar/object.json"));
+  EXPECT_GT(jar["metric_loops"], 0);
+  EXPECT_EQ(jar["loops"], 0) << "appearance was needed";
+  EXPECT_NEAR(jar["axis"]["turned_deg"], 329 * 1.2, 0.3);
+}
+
 TEST(ObjectCommand, SaysWhatIsMissing) {
   const ScratchFolder folder;
   const std::string out = " --out '" + (folder / "model") + "'";

@@ -1,5 +1,6 @@
 // twofold object: the model of a thing on a turntable, or of one that a camera is carried around.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -51,6 +52,26 @@ std::unique_ptr<ObjectSource> object_source(ObjectArguments& arguments) {
        {arguments.frames.mask.invalid_reason(), arguments.surface.invalid_reason()})
     if (!reason.empty()) throw IoError("twofold object", reason);
   return std::make_unique<ObjectSource>(std::move(source), arguments.frames);
+}
+
+/// Tracking and mapping are laid out for scenes that fill the image. An object has a small part of it; the
+/// rest was filled in (fill_outside), and says nothing.
+EngineOptions options_for_object(const Rig& rig) {
+  constexpr double kShare = 0.1;  // of the image, that an object is thought to have
+  constexpr int kCellUnit = 4;    // [px] cells are multiples of it
+  EngineOptions options;
+  TrackerOptions& tracker = options.tracker;
+  // Patches of coarser levels reach around what is round or narrow and beyond its outline, which keeps its
+  // place when the object turns.
+  tracker.corner_levels = 1;
+  // So small that the object's part has a cell for each point.
+  const double area = kShare * rig.camera.width * rig.camera.height;
+  const auto units = std::lround(std::sqrt(area / tracker.max_new_points) / kCellUnit);
+  tracker.cell_px = std::clamp(kCellUnit * static_cast<int>(units), 2 * kCellUnit, tracker.cell_px);
+  // They are spread over the whole image: so many that the object's share of them is as large as usual.
+  MetricLoopOptions& loop = options.mapper.loop;
+  loop.max_searches = static_cast<int>(std::lround(loop.max_searches / kShare));
+  return options;
 }
 
 bool is_turntable(const ObjectModel& model) {
@@ -112,7 +133,7 @@ void run_object(ObjectArguments& arguments) {
   prepare_output_folder(arguments.out);
   const std::unique_ptr<ObjectSource> source = object_source(arguments);
   remove_results(arguments.out);
-  EngineOptions options;
+  EngineOptions options = options_for_object(source->rig());
   options.deterministic = arguments.deterministic;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   options.logs.folder = arguments.out;
