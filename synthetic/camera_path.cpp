@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "geometry/check.hpp"
 
@@ -90,6 +91,18 @@ CameraPath walk(const ClosedCurve& curve, const WalkStyle& style) {
         kDegree * (style.pitch_deg + 2.5 * std::sin(3 * lap + 0.5) + 0.5 * std::sin(2 * step + 1));
     const double roll = kDegree * (0.8 * std::sin(step + 1.2) + 0.6 * std::sin(5 * lap));
     return looking({xy.x(), xy.y(), z}, yaw, pitch, roll);
+  };
+}
+
+CameraPath flown(CameraPath path, double amplitude) {
+  return [path = std::move(path), amplitude](double t) {
+    // Frequencies [Hz] without a common multiple: the next round comes by otherwise.
+    const auto swing = [t](double hertz, double phase) { return std::sin(kTurn * hertz * t + phase); };
+    const Vector3 shift(0.25 * swing(0.41, 0) + 0.05 * swing(0.97, 2), 0.2 * swing(0.53, 1),
+                        0.3 * swing(0.31, 2));
+    const Vector3 turn(8 * swing(0.71, 0.5), 14 * swing(0.55, 0) + 8 * swing(1.13, 1),
+                       12 * swing(0.47, 2) + 4 * swing(1.31, 0));
+    return path(t) * SE3(SO3::exp(amplitude * kDegree * turn), amplitude * shift);
   };
 }
 

@@ -47,4 +47,8 @@ struct WalkStyle {
 /// differs from round to round by up to 0.2 m.
 [[nodiscard]] CameraPath walk(const ClosedCurve& curve, const WalkStyle& style);
 
+/// The path as a quadrotor in a hurry takes it: the camera swings about it in all six directions, with
+/// amplitude 1 by up to 0.47 m and 27 degrees, at up to 1.3 m and 124 degrees a second.
+[[nodiscard]] CameraPath flown(CameraPath path, double amplitude);
+
 }  // namespace twofold::synthetic

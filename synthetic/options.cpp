@@ -27,6 +27,7 @@ std::string SyntheticOptions::invalid_reason() const {
                                  outside("depth_noise", depth_noise, 0, 10),
                                  outside("blur", blur, 0, 1),
                                  outside("exposure", exposure, 0, 0.9),
+                                 outside("flight", flight, 0, 3),
                                  outside("walkers", walkers, 0, 16),
                                  outside("plain", plain, 0, 1),
                                  outside("shape", shape, 0, kTurntableShapes - 1),

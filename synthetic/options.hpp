@@ -26,6 +26,7 @@ struct SyntheticOptions {
   double depth_noise = 1;  ///< RGB-D: factor on the sensor's depth noise, 0 .. 10
   double blur = 0;         ///< exposure time as a share of the frame interval, 0 .. 1
   double exposure = 0;     ///< amplitude of the changes of gain, 0 .. 0.9
+  double flight = 0;       ///< the camera swings about its path (flown in camera_path.hpp) by so much, 0 .. 3
   bool object = false;     ///< something moves through the scene
   int walkers = 0;         ///< people around the camera (walkers.hpp), 0 .. 16; corridor and courtyard only
   double plain = 0;   ///< share of the walls' panels without texture, 0 .. 1; corridor and courtyard only

@@ -37,6 +37,7 @@ Staging make_staging(const SyntheticOptions& options, std::uint64_t seed) {
   Staging staging = make_place(options, seed);
   if (options.walkers > 0)
     staging.walkers = Walkers(staging.scene, staging.path, staging.walking_speed, options.walkers, seed);
+  if (options.flight > 0) staging.path = flown(staging.path, options.flight);
   if (options.bare) staging.scene.strip_textures();
   return staging;
 }

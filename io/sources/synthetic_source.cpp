@@ -89,6 +89,7 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
                                    {"exposure", &options.exposure},
                                    {"exposure_steps", &options.exposure_steps},
                                    {"flicker", &options.flicker},
+                                   {"flight", &options.flight},
                                    {"plain", &options.plain},
                                    {"drop", &options.drop},
                                    {"cover_at", &options.cover_at},

@@ -77,6 +77,18 @@ TEST(HardPlaces, PeopleInTheCorridorDoNotTakeTheCameraAlong) {
   expect_not_taken_along("corridor");
 }
 
+/// A quadrotor in a hurry: at up to 2.6 m and 250 degrees a second beside its way, with motion blur.
+TEST(HardPlaces, FlightThroughTheCourtyard) {
+  SyntheticOptions scene = small("courtyard", 160);
+  scene.fps = 20;
+  scene.flight = 2;
+  scene.blur = 0.3;
+  const Walk flight = walk(scene);
+  std::printf("flight: ATE %.4f m of %.1f m\n", flight.ate, flight.path);
+  EXPECT_EQ(flight.tracked, 160);
+  EXPECT_LT(flight.ate, 0.0025 * flight.path);
+}
+
 /// By one stop and two thirds, and half of that: a frame later the same walls are three times as bright.
 void expect_found_in_other_light(const char* place) {
   SyntheticOptions scene = small(place, 700);
