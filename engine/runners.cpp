@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "geometry/processor_time.hpp"
+
 namespace twofold {
 namespace {
 
@@ -227,6 +229,7 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
       on_loop_(options.on_loop),
       times_("loop closer", trace) {
   place_stage_ = times_.add_stage("place");
+  place_cpu_stage_ = times_.add_stage("place cpu");
   pose_graph_stage_ = times_.add_stage("pose graph");
   relocalise_stage_ = times_.add_stage("relocalisation");
   if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
@@ -242,7 +245,10 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
   if (!closer_) return messages_;
   optimise_if_due(graph);
   const ScopedStage timed(times_, place_stage_);
+  const std::int64_t begin_ns = steady_now_ns();
+  const std::int64_t cpu_begin_ns = thread_cpu_ns();
   const auto loop = closer_->step(keyframe, graph);
+  times_.record(place_cpu_stage_, begin_ns, thread_cpu_ns() - cpu_begin_ns);
   if (loop && !awaits_similarities(graph)) {
     const bool one_camera = rig_.kind == SensorKind::kMono && mapper_options_.scale_drifts;
     if (one_camera) messages_.emplace_back(close_over_sim3(graph, *loop, rig_, mapper_options_));

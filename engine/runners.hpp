@@ -157,7 +157,7 @@ class LoopCloserRunner {
   std::optional<LoopCloser> closer_;
   const KeyframeDatabase no_places_;
   StageRecorder times_;
-  StageId place_stage_, pose_graph_stage_, relocalise_stage_;
+  StageId place_stage_, place_cpu_stage_, pose_graph_stage_, relocalise_stage_;
   std::vector<LoopMessage> messages_;
   std::vector<ClosedLoop> loops_;
   std::optional<LoopConstraint> not_optimised_;  // newest loop that no pose graph optimisation has seen
