@@ -63,11 +63,13 @@ template <class Model>
 struct BestModel {
   Model model;
   int inliers = 0;
+  double score = 0;    ///< the lower the better
   int iterations = 0;  ///< samples drawn
 };
 
-/// Adaptive RANSAC (Fischler & Bolles, CACM 1981) with the truncated quadratic score of MSAC (Torr &
-/// Zisserman, 2000), which prefers, among models with the same inliers, the one that fits them better.
+/// Fits models to a sample; the best of them takes the place of `best` if it is better: by the truncated
+/// quadratic score of MSAC (Torr & Zisserman, 2000), which prefers, among models with the same inliers, the
+/// one that fits them better. It must have as many inliers as a sample has data.
 ///
 /// Estimator:
 ///   using Model;  static constexpr int kSampleSize;
@@ -76,20 +78,47 @@ struct BestModel {
 ///   double squared_residual(const Model&, int i) const;                        may be infinite
 ///
 /// @param models  scratch: with room for what one sample yields, nothing is allocated
+/// @return  whether one was better
+template <class Estimator>
+bool try_sample(const Estimator& estimator, std::span<const int, Estimator::kSampleSize> sample,
+                double threshold, std::vector<typename Estimator::Model>& models,
+                std::optional<BestModel<typename Estimator::Model>>& best) {
+  const double threshold2 = threshold * threshold;
+  double best_score = best ? best->score : std::numeric_limits<double>::infinity();
+  bool better = false;
+  models.clear();
+  estimator.fit(sample, models);
+  for (const auto& model : models) {
+    double score = 0;
+    int inliers = 0;
+    for (int i = 0; i < estimator.size() && score < best_score; ++i) {
+      const double r2 = estimator.squared_residual(model, i);
+      if (r2 <= threshold2) ++inliers;
+      score += r2 <= threshold2 ? r2 : threshold2;
+    }
+    if (score >= best_score || inliers < Estimator::kSampleSize) continue;
+    best_score = score;
+    best = {model, inliers, score};
+    better = true;
+  }
+  return better;
+}
+
+/// Adaptive RANSAC (Fischler & Bolles, CACM 1981): draws samples until one without outliers was among them
+/// with the probability asked for.
+///
+/// @param models  scratch, as for try_sample
 /// @return  the best model seen, not refined; nullopt when size() < kSampleSize or no model has kSampleSize
 /// inliers. Deterministic: depends on the estimator and the options only.
 template <class Estimator>
 [[nodiscard]] std::optional<BestModel<typename Estimator::Model>> best_model(
     const Estimator& estimator, const RansacOptions& options,
     std::vector<typename Estimator::Model>& models) {
-  using Model = typename Estimator::Model;
   constexpr int kSample = Estimator::kSampleSize;
   const int n = estimator.size();
   if (n < kSample) return std::nullopt;
-  const double threshold2 = options.threshold * options.threshold;
   SplitMix64 random(options.seed);
-  std::optional<BestModel<Model>> best;
-  double best_score = std::numeric_limits<double>::infinity();
+  std::optional<BestModel<typename Estimator::Model>> best;
   int needed = options.max_iterations;
   int iteration = 0;
   for (; iteration < needed; ++iteration) {
@@ -99,28 +128,29 @@ template <class Estimator>
         sample[k] = random.below(n);
       } while (std::find(sample.begin(), sample.begin() + k, sample[k]) != sample.begin() + k);
     }
-    models.clear();
-    estimator.fit(std::span<const int, kSample>(sample), models);
-    for (const Model& model : models) {
-      double score = 0;
-      int inliers = 0;
-      for (int i = 0; i < n && score < best_score; ++i) {
-        const double r2 = estimator.squared_residual(model, i);
-        if (r2 <= threshold2) ++inliers;
-        score += r2 <= threshold2 ? r2 : threshold2;
-      }
-      if (score >= best_score || inliers < kSample) continue;
-      best_score = score;
-      best = BestModel<Model>{model, inliers, 0};
-      // 1 - (1 - w^k)^N >= confidence, w the inlier share
-      const double p_good = std::pow(static_cast<double>(inliers) / n, kSample);
-      const double draws = p_good >= 1 ? 1 : std::log(1 - options.confidence) / std::log1p(-p_good);
-      needed = draws < options.max_iterations ? std::max(1, static_cast<int>(std::ceil(draws)))
-                                              : options.max_iterations;
-    }
+    if (!try_sample(estimator, std::span<const int, kSample>(sample), options.threshold, models, best))
+      continue;
+    // 1 - (1 - w^k)^N >= confidence, w the inlier share
+    const double p_good = std::pow(static_cast<double>(best->inliers) / n, kSample);
+    const double draws = p_good >= 1 ? 1 : std::log(1 - options.confidence) / std::log1p(-p_good);
+    needed = draws < options.max_iterations ? std::max(1, static_cast<int>(std::ceil(draws)))
+                                            : options.max_iterations;
   }
   if (best) best->iterations = iteration;
   return best;
+}
+
+/// The best model, with the data that agree with it.
+template <class Estimator>
+[[nodiscard]] std::optional<RansacResult<typename Estimator::Model>> with_inliers(
+    const Estimator& estimator, const std::optional<BestModel<typename Estimator::Model>>& best,
+    double threshold) {
+  if (!best) return std::nullopt;
+  RansacResult<typename Estimator::Model> result{best->model, {}, best->iterations};
+  for (int i = 0; i < estimator.size(); ++i) {
+    if (estimator.squared_residual(best->model, i) <= threshold * threshold) result.inliers.push_back(i);
+  }
+  return result;
 }
 
 /// best_model, with the data that agree with it.
@@ -128,14 +158,18 @@ template <class Estimator>
 [[nodiscard]] std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator,
                                                                             const RansacOptions& options) {
   std::vector<typename Estimator::Model> models;
-  const auto best = best_model(estimator, options, models);
-  if (!best) return std::nullopt;
-  RansacResult<typename Estimator::Model> result{best->model, {}, best->iterations};
-  const double threshold2 = options.threshold * options.threshold;
-  for (int i = 0; i < estimator.size(); ++i) {
-    if (estimator.squared_residual(best->model, i) <= threshold2) result.inliers.push_back(i);
-  }
-  return result;
+  return with_inliers(estimator, best_model(estimator, options, models), options.threshold);
+}
+
+/// What RANSAC would find if it drew these samples, each of them once.
+template <class Estimator>
+[[nodiscard]] std::optional<RansacResult<typename Estimator::Model>> best_of_samples(
+    const Estimator& estimator, std::span<const std::array<int, Estimator::kSampleSize>> samples,
+    double threshold) {
+  std::vector<typename Estimator::Model> models;
+  std::optional<BestModel<typename Estimator::Model>> best;
+  for (const auto& sample : samples) try_sample(estimator, std::span(sample), threshold, models, best);
+  return with_inliers(estimator, best, threshold);
 }
 
 }  // namespace twofold

@@ -1,7 +1,9 @@
 #include "loopclosure/loop_closer.hpp"
 
-#include <algorithm>
 #include <stdexcept>
+#include <utility>
+
+#include "loopclosure/median.hpp"
 
 namespace twofold {
 namespace {
@@ -130,9 +132,7 @@ std::optional<double> LoopCloser::scale_of(const Relocalisation& seen) const {
     if (depth) ratios.push_back(*depth / (seen.T_c_k * found.x_ref).z());
   }
   if (ratios.size() < kFewest) return std::nullopt;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+  return median(std::move(ratios));
 }
 
 /// The place's own view and those of its neighbours.

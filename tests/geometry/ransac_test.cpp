@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <set>
 #include <vector>
 
@@ -70,6 +71,19 @@ TEST(Ransac, ReturnsNothingWhenNothingFits) {
   e.x = {1, 1, 1};
   e.y = {0, 5, 9};
   EXPECT_FALSE(ransac(e, {.threshold = 1, .max_iterations = 20}));
+}
+
+TEST(Ransac, TriesTheSamplesThatItIsGivenAndNoOthers) {
+  const auto e = half_outliers(200);
+  const std::vector<std::array<int, 2>> mixed{{0, 1}, {3, 5}, {4, 7}};
+  const std::vector<std::array<int, 2>> with_a_right_one{{0, 1}, {10, 190}, {3, 5}};
+  const auto found = best_of_samples(e, std::span(with_a_right_one), 0.01);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->model.slope, 2, 1e-3);
+  EXPECT_EQ(found->inliers.size(), 100U);
+  const auto best_of_mixed = best_of_samples(e, std::span(mixed), 0.01);
+  EXPECT_TRUE(!best_of_mixed || best_of_mixed->inliers.size() < 10);
+  EXPECT_FALSE(best_of_samples(e, std::span(mixed).first(0), 0.01));
 }
 
 TEST(SplitMix64, CoversItsRange) {

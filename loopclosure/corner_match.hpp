@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "geometry/se3.hpp"
+#include "graph/place_appearance.hpp"
+
+namespace twofold {
+
+/// A corner of view b and the corner of one of a place's views that it is taken for.
+struct CornerMatch {
+  int view = 0;  ///< of the place
+  int corner = 0;
+  int b = 0;
+  Vector3 x_a;  ///< the place's point, in the frame of the place's own view [m]
+};
+
+/// False for a corner that none was measured of.
+[[nodiscard]] inline bool has_depth(const Eigen::Vector3f& z, double min_disparity_px) {
+  return z.x() - z.z() > min_disparity_px;  // false for NaN
+}
+
+/// What a squared error is multiplied by to be one in pixels of the corner's level.
+[[nodiscard]] inline double per_squared_pixel(int level) {
+  return std::ldexp(1.0, -2 * level);
+}
+
+/// Error of a measurement in units of the pixels of its level, squared; infinite behind the camera.
+/// @param per_pixel  per_squared_pixel of its level
+[[nodiscard]] inline double squared_error(const Rig& rig, const Vector3& x, const Eigen::Vector3f& z,
+                                          double per_pixel) {
+  if (!in_front_of_camera(x)) return std::numeric_limits<double>::infinity();
+  const Vector3 e = rig.project(x) - z.cast<double>();
+  const double squared = rig.kind == SensorKind::kMono ? e.head<2>().squaredNorm() : e.squaredNorm();
+  return squared * per_pixel;
+}
+
+[[nodiscard]] inline double radians(double degrees) {
+  return degrees * std::numbers::pi / 180;
+}
+
+/// By how much directions in the image turn from view a to view b: what of the rotation is about the axis.
+[[nodiscard]] inline double turn_of(const Matrix3& R_b_a) {
+  return std::atan2(R_b_a(1, 0) - R_b_a(0, 1), R_b_a(0, 0) + R_b_a(1, 1));
+}
+
+/// Whether two angles are no more than `bound` apart, full turns aside.
+[[nodiscard]] inline bool nearly_same_direction(double angle_0, double angle_1, double bound) {
+  constexpr double kRound = 2 * std::numbers::pi;
+  const double apart = angle_0 - angle_1;
+  return std::abs(apart - kRound * std::nearbyint(apart / kRound)) <=
+         bound;  // remainder() takes 5 times as long
+}
+
+/// Pose that fits the matches best, from T_b_a on; T_b_a if there is none.
+[[nodiscard]] SE3 refine_pose(const Rig& rig, const PlaceAppearance& b,
+                              const std::vector<CornerMatch>& matches, const SE3& T_b_a);
+
+}  // namespace twofold

@@ -1,0 +1,61 @@
+#include "loopclosure/similarity_estimator.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "geometry/absolute_orientation.hpp"
+
+namespace twofold {
+
+SimilarityEstimator::SimilarityEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
+                                         std::span<const CornerMatch> matches,
+                                         const VerificationOptions& options)
+    : rig_(rig),
+      shortest_(std::pow(std::max(0.0, 1 - options.max_stretch), 2)),
+      max_turn_(radians(options.max_turn_deg)),
+      outlier_(options.ransac_error_px * options.ransac_error_px) {
+  for (const CornerMatch& match : matches) {
+    const auto i = static_cast<std::size_t>(match.corner);
+    const auto j = static_cast<std::size_t>(match.b);
+    pairs_.push_back({match.x_a, rig.unproject(b.z[j].cast<double>()), a.z[i], b.z[j],
+                      per_squared_pixel(a.corners[i].level), per_squared_pixel(b.corners[j].level),
+                      double{b.corners[j].angle} - a.corners[i].angle});
+  }
+}
+
+AgreementGraph SimilarityEstimator::agreements() const {
+  AgreementGraph graph(pairs_.size());
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    for (std::size_t j = i + 1; j < pairs_.size(); ++j) {
+      if (turn_alike(pairs_[i], pairs_[j]) && as_long((pairs_[i].x_a - pairs_[j].x_a).squaredNorm(),
+                                                      (pairs_[i].x_b - pairs_[j].x_b).squaredNorm()))
+        graph.join(i, j);
+    }
+  }
+  return graph;
+}
+
+void SimilarityEstimator::fit(std::span<const int, 3> sample, std::vector<Model>& models) const {
+  const bool scale_known = rig_.kind != SensorKind::kMono;
+  std::array<Vector3, 3> x_a, x_b;
+  double scale = 1;  // of the first side, squared
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Pair& pair = pairs_[static_cast<std::size_t>(sample[k])];
+    const Pair& next = pairs_[static_cast<std::size_t>(sample[(k + 1) % 3])];
+    x_a[k] = pair.x_a;
+    x_b[k] = pair.x_b;
+    const double in_b = (pair.x_b - next.x_b).squaredNorm();
+    double in_a = (pair.x_a - next.x_a).squaredNorm();
+    if (!scale_known && k == 0) scale = in_b / in_a;
+    in_a *= scale;
+    if (!as_long(in_a, in_b) || !turn_alike(pair, next)) return;
+  }
+  if (scale_known) {
+    if (const auto T_b_a = align_rigid(x_b, x_a)) models.emplace_back(Sim3(*T_b_a));
+  } else if (const auto S_b_a = align_similarity(x_b, x_a)) {
+    models.emplace_back(*S_b_a);
+  }
+}
+
+}  // namespace twofold
