@@ -37,6 +37,16 @@ Vector2 draw_in_disc(std::mt19937& rng) {
   }
 }
 
+// Of the square that the comparisons are made in: rows are as long as a register.
+constexpr int kSquareRadius = static_cast<int>(kPatternRadius);
+constexpr int kSquareRows = 2 * kSquareRadius + 1;
+constexpr int kSquareColumns = 32;
+
+std::uint16_t place_in_square(const Vector2& p) {
+  const auto u = static_cast<int>(std::lround(p.x())), v = static_cast<int>(std::lround(p.y()));
+  return static_cast<std::uint16_t>((v + kSquareRadius) * kSquareColumns + u + kSquareRadius);
+}
+
 constexpr std::size_t kDiscColumns = 32;  // the disc's and one that is no part of it
 using DiscRow = std::uint8_t __attribute__((vector_size(kDiscColumns)));
 using DiscSums = std::int16_t __attribute__((vector_size(2 * kDiscColumns)));
@@ -202,11 +212,7 @@ CornerDescriber::CornerDescriber() {
     for (int d = 0; d < kDirections; ++d) {
       const double angle = 2 * std::numbers::pi * d / kDirections;
       const Eigen::Rotation2Dd R(angle);
-      const auto round = [](double x) { return static_cast<std::int8_t>(std::lround(x)); };
-      const Vector2 ra = R * a;
-      const Vector2 rb = R * b;
-      patterns_[static_cast<std::size_t>(d)][i] = {round(ra.x()), round(ra.y()), round(rb.x()),
-                                                   round(rb.y())};
+      patterns_[static_cast<std::size_t>(d)][i] = {place_in_square(R * a), place_in_square(R * b)};
     }
   }
 }
@@ -240,13 +246,16 @@ void CornerDescriber::describe_one(const cv::Mat& image, const cv::Mat& smooth,
   corner.angle = centroid_angle(image, u, v);
   const double turn = corner.angle / (2 * std::numbers::pi) * kDirections;
   const auto& pattern = patterns_[static_cast<std::size_t>(std::lround(turn)) % kDirections];
-  const std::uint8_t* centre = smooth.ptr<std::uint8_t>(v) + u;
-  const auto stride = static_cast<std::ptrdiff_t>(smooth.step);
+  std::array<std::uint8_t, std::size_t{kSquareRows} * kSquareColumns> square;
+  for (int row = 0; row < kSquareRows; ++row) {
+    const std::uint8_t* pixels = smooth.ptr<std::uint8_t>(v + row - kSquareRadius) + u - kSquareRadius;
+    std::memcpy(&square[static_cast<std::size_t>(row) * kSquareColumns], pixels, kSquareColumns);
+  }
   for (std::size_t word = 0; word < 4; ++word) {
     std::uint64_t bits = 0;
     for (std::size_t b = 0; b < 64; ++b) {
       const Comparison& c = pattern[64 * word + b];
-      bits |= static_cast<std::uint64_t>(centre[c.v0 * stride + c.u0] < centre[c.v1 * stride + c.u1]) << b;
+      bits |= std::uint64_t{square[c.first] < square[c.second]} << b;
     }
     corner.descriptor.bits[word] = bits;
   }

@@ -58,8 +58,10 @@ class CornerDescriber {
 
  private:
   static constexpr int kDirections = 32;
+  /// Two pixels of the square around a corner that all comparisons are made in, which is copied out of the
+  /// image: by their places in it.
   struct Comparison {
-    std::int8_t u0, v0, u1, v1;
+    std::uint16_t first, second;
   };
 
   void describe_one(const cv::Mat& image, const cv::Mat& smooth, DescribedCorner& corner) const;

@@ -44,10 +44,11 @@ std::vector<CornerMatch> match_guided(const Rig& rig, const std::vector<PlacePoi
                                       const VerificationOptions& options) {
   std::vector<CornerMatch> offered;
   std::vector<NearestDescriptor> of_b(b.corners.size());
-  const double turn = turn_of(T_b_a.rotation());
+  const Matrix3 R_b_a = T_b_a.rotation();
+  const double turn = turn_of(R_b_a);
   const double max_turn = radians(options.max_turn_deg);
   for (const PlacePoint& point : place) {
-    const Vector3 x_b = T_b_a * point.match.x_a;
+    const Vector3 x_b = R_b_a * point.match.x_a + T_b_a.translation();
     const auto uv = rig.camera.find_in_view(x_b, kDescriptorBorder);
     if (!uv) continue;
     const NearestDescriptor nearest = corners_of_b.nearest(*uv, *point.descriptor, radius_px);

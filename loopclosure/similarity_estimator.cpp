@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "geometry/absolute_orientation.hpp"
 
@@ -26,11 +27,28 @@ SimilarityEstimator::SimilarityEstimator(const Rig& rig, const PlaceAppearance& 
 
 AgreementGraph SimilarityEstimator::agreements() const {
   AgreementGraph graph(pairs_.size());
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    for (std::size_t j = i + 1; j < pairs_.size(); ++j) {
-      if (turn_alike(pairs_[i], pairs_[j]) && as_long((pairs_[i].x_a - pairs_[j].x_a).squaredNorm(),
-                                                      (pairs_[i].x_b - pairs_[j].x_b).squaredNorm()))
-        graph.join(i, j);
+  // All the later matches at once: this is done for every two of some hundred.
+  Eigen::ArrayX3d x_a(size(), 3), x_b(size(), 3);
+  Eigen::ArrayXd turn(size());
+  for (int i = 0; i < size(); ++i) {
+    const Pair& pair = pairs_[static_cast<std::size_t>(i)];
+    x_a.row(i) = pair.x_a;
+    x_b.row(i) = pair.x_b;
+    turn[i] = pair.turn;
+  }
+  Eigen::Array<bool, Eigen::Dynamic, 1> agree;
+  for (int i = 0; i < size(); ++i) {
+    const int later = size() - i - 1;
+    const auto squared_distances = [&](const Eigen::ArrayX3d& x) {
+      const auto from_i = [&](int k) { return (x.col(k).tail(later) - x(i, k)).square(); };
+      return (from_i(0) + from_i(1) + from_i(2)).eval();
+    };
+    const Eigen::ArrayXd in_a = squared_distances(x_a), in_b = squared_distances(x_b);
+    const Eigen::ArrayXd rounds = (turn.tail(later) - turn[i]) / (2 * std::numbers::pi);
+    agree = in_a >= shortest_ * in_b && in_b >= shortest_ * in_a &&
+            (rounds - rounds.rint()).abs() <= max_turn_ / std::numbers::pi;
+    for (int j = 0; j < later; ++j) {
+      if (agree[j]) graph.join(static_cast<std::size_t>(i), static_cast<std::size_t>(i + 1 + j));
     }
   }
   return graph;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -11,11 +12,20 @@
 
 namespace twofold {
 
-/// A similarity, and what each residual needs of it.
+/// A similarity, and what each residual needs of it: matrices, as a quaternion is made one for every point.
 struct TwoWaySimilarity {
   explicit TwoWaySimilarity(const Sim3& S)
-      : S_b_a(S), S_a_b(S.inverse()), turn(turn_of(S.without_scale().rotation())) {}
-  Sim3 S_b_a, S_a_b;
+      : S_b_a(S),
+        sR_b_a(S.scale() * S.rotation()),
+        sR_a_b(S.rotation().transpose() / S.scale()),
+        t_a_b(-(sR_a_b * S.translation())),
+        turn(turn_of(sR_b_a)) {}
+  [[nodiscard]] Vector3 to_b(const Vector3& x_a) const { return sR_b_a * x_a + S_b_a.translation(); }
+  [[nodiscard]] Vector3 to_a(const Vector3& x_b) const { return sR_a_b * x_b + t_a_b; }
+
+  Sim3 S_b_a;
+  Matrix3 sR_b_a, sR_a_b;
+  Vector3 t_a_b;
   double turn;
 };
 
@@ -41,9 +51,9 @@ class SimilarityEstimator {
   [[nodiscard]] double squared_residual(const Model& model, int i) const {
     const Pair& pair = pairs_[static_cast<std::size_t>(i)];
     if (!nearly_same_direction(pair.turn, model.turn, max_turn_)) return 2 * outlier_;
-    const double in_b = squared_error(rig_, model.S_b_a * pair.x_a, pair.z_b, pair.per_pixel_b);
+    const double in_b = squared_error(rig_, model.to_b(pair.x_a), pair.z_b, pair.per_pixel_b);
     if (in_b > outlier_) return in_b;
-    return std::max(squared_error(rig_, model.S_a_b * pair.x_b, pair.z_a, pair.per_pixel_a), in_b);
+    return std::max(squared_error(rig_, model.to_a(pair.x_b), pair.z_a, pair.per_pixel_a), in_b);
   }
 
  private:

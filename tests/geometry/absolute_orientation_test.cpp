@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <span>
+#include <utility>
 #include <vector>
 
 namespace twofold {
@@ -42,20 +44,23 @@ TEST_F(AbsoluteOrientation, RecoversExactMotions) {
   }
 }
 
+// Three points have a solution of their own, in closed form.
 TEST_F(AbsoluteOrientation, MinimisesTheSquaredDistance) {
-  const SE3 T(SO3::exp(random()), random());
-  const auto x_b = cloud(30);
-  const auto x_a = moved(T, x_b, 0.1);
-  const auto found = align_rigid(x_a, x_b);
-  ASSERT_TRUE(found);
-  const auto cost = [&](const SE3& T_a_b) {
-    double sum = 0;
-    for (std::size_t i = 0; i < x_a.size(); ++i) sum += (x_a[i] - T_a_b * x_b[i]).squaredNorm();
-    return sum;
-  };
-  for (int k = 0; k < 6; ++k) {
-    for (const double h : {1e-4, -1e-4})
-      EXPECT_GT(cost(SE3::exp(h * Vector6::Unit(k)) * *found), cost(*found));
+  for (const auto& [points, noise] : {std::pair{30, 0.1}, {3, 0.1}, {3, 0.7}}) {
+    const SE3 T(SO3::exp(random()), random());
+    const auto x_b = cloud(points);
+    const auto x_a = moved(T, x_b, noise);
+    const auto found = align_rigid(x_a, x_b);
+    ASSERT_TRUE(found);
+    const auto cost = [&](const SE3& T_a_b) {
+      double sum = 0;
+      for (std::size_t i = 0; i < x_a.size(); ++i) sum += (x_a[i] - T_a_b * x_b[i]).squaredNorm();
+      return sum;
+    };
+    for (int k = 0; k < 6; ++k) {
+      for (const double h : {1e-4, -1e-4, 0.5, -0.5})
+        EXPECT_GT(cost(SE3::exp(h * Vector6::Unit(k)) * *found), cost(*found)) << points << " points";
+    }
   }
 }
 
@@ -106,7 +111,10 @@ TEST_F(AbsoluteOrientation, RejectsDegenerateInput) {
   std::vector<Vector3> line;
   for (int i = 0; i < 10; ++i) line.push_back(Vector3(1, 2, 3) * i);
   EXPECT_FALSE(align_rigid(line, line));
+  EXPECT_FALSE(align_rigid(std::span(line).first(3), three));
+  EXPECT_FALSE(align_rigid(three, std::span(line).first(3)));
   const std::vector<Vector3> same(5, Vector3(1, 1, 1));
+  EXPECT_FALSE(align_rigid(std::span(same).first(3), three));
   EXPECT_FALSE(align_similarity(same, same));
 }
 
