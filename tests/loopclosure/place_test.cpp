@@ -4,7 +4,10 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
+#include <vector>
 
+#include "geometry/ransac.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/place_view.hpp"
 #include "tests/loopclosure/turning_camera.hpp"
@@ -152,6 +155,107 @@ TEST_P(PlaceTest, NeighboursLendTheirCorners) {
   EXPECT_EQ(together.matches, alone.matches);
   EXPECT_GT(together.inliers, 1.3 * alone.inliers);
 }
+
+/// Of a view with the other's corners and depths: each match is right, until something is said of it.
+class MatchRuleTest : public PlaceTest {
+ protected:
+  PlaceView a_ = view(1, pose(0.1, {0.2, 0.1, -0.5}));
+  PlaceView b_ = a_;
+
+  VerificationReport report(const VerificationOptions& options = {}) {
+    VerificationReport report;
+    (void)verify(a_, b_, options, &report);
+    return report;
+  }
+};
+
+TEST_P(MatchRuleTest, MatchesHaveDepthInBothViews) {
+  const VerificationReport all = report();
+  for (PlaceView* side : {&a_, &b_}) {
+    const std::vector<Eigen::Vector3f> kept = side->z;
+    for (std::size_t i = 0; i < side->z.size(); i += 2) side->z[i].z() = static_cast<float>(Rig::kNoRight);
+    EXPECT_LT(report().matches, 0.7 * all.matches);
+    for (std::size_t i = 0; i < side->z.size(); i += 2) side->z[i].z() = side->z[i].x() - 0.5F;  // far away
+    EXPECT_LT(report().matches, 0.7 * all.matches);
+    const bool of_place = side == &a_;
+    EXPECT_LT(report().guided, (of_place ? 0.7 : 1.1) * all.guided);
+    side->z = kept;
+  }
+}
+
+/// No two corners look alike but those of a match, and half of these differ by 64 bits.
+TEST_P(MatchRuleTest, MatchesAreNearEachOther) {
+  SplitMix64 random(6);
+  for (std::size_t i = 0; i < a_.corners.size(); ++i) {
+    for (std::uint64_t& bits : a_.corners[i].descriptor.bits) bits = random.next();
+    b_.corners[i].descriptor = a_.corners[i].descriptor;
+  }
+  const int all = report().matches;
+  for (std::size_t j = 0; j < b_.corners.size(); j += 2) b_.corners[j].descriptor.bits[0] ^= ~0ULL;
+  EXPECT_LT(report().matches, 0.7 * all);
+  VerificationOptions farther;
+  farther.max_distance = 64;
+  EXPECT_GT(report(farther).matches, 0.95 * all);
+}
+
+/// Every second corner of b looks as the one before it does, and belongs to no corner of a.
+TEST_P(MatchRuleTest, ACornerIsMatchedOnce) {
+  const int all = report().matches;
+  for (std::size_t j = 1; j < b_.corners.size(); j += 2)
+    b_.corners[j].descriptor = b_.corners[j - 1].descriptor;
+  const VerificationReport rest = report();
+  EXPECT_LT(rest.matches, 0.7 * all);
+  EXPECT_LE(rest.guided, static_cast<int>(b_.corners.size()));
+  const std::array<PlacedView, 2> twice{{{&a_, SE3()}, {&a_, SE3()}}};
+  VerificationReport together;
+  b_ = a_;
+  ASSERT_TRUE(verify_place(rig_, twice, b_, {}, &together));
+  EXPECT_LE(together.guided, static_cast<int>(b_.corners.size()));
+  EXPECT_EQ(together.guided, report().guided);
+}
+
+/// Points of b at twice their depth: no motion keeps lengths, although each of them is where it was in the
+/// left image.
+TEST_P(MatchRuleTest, ATriangleOfAnotherSizeIsNoHypothesis) {
+  for (Eigen::Vector3f& z : b_.z) z.z() = z.x() - 0.5F * (z.x() - z.z());
+  VerificationOptions anything;
+  anything.max_stretch = 0.9;
+  anything.ransac_error_px = 60;
+  ASSERT_GT(report(anything).ransac_inliers, 20);
+  anything.max_stretch = VerificationOptions().max_stretch;
+  EXPECT_EQ(report(anything).ransac_inliers, 0);
+}
+
+/// In guided matching, too, a corner that looks otherwise is another, and one that is turned.
+TEST_P(MatchRuleTest, GuidedMatchesLookAlikeAndAreTurnedAlike) {
+  const int all = report().guided;
+  const std::vector<DescribedCorner> kept = b_.corners;
+  for (std::size_t j = 0; j < kept.size(); j += 3) b_.corners[j].descriptor.bits = {~0ULL, 0, ~0ULL, 0};
+  EXPECT_LT(report().guided, 0.8 * all);
+  b_.corners = kept;
+  for (std::size_t j = 0; j < kept.size(); j += 3) b_.corners[j].angle += 2;
+  EXPECT_LT(report().guided, 0.8 * all);
+}
+
+/// Depths of half of b's corners are unknown: where they are in the left image is what speaks for them.
+TEST_P(MatchRuleTest, CornersWithoutDepthCountByTheirPlaceInTheImage) {
+  const int all = report().inliers;
+  for (std::size_t j = 0; j < b_.z.size(); j += 2) b_.z[j].z() = static_cast<float>(Rig::kNoRight);
+  EXPECT_GT(report().inliers, 0.9 * all);
+}
+
+TEST_P(MatchRuleTest, AViewWhoseCornersHaveNoPositionsIsNoPlace) {
+  ASSERT_TRUE(verify(a_, b_));
+  for (PlaceView* side : {&a_, &b_}) {
+    const std::vector<Eigen::Vector3f> kept = side->z;
+    side->z.pop_back();
+    EXPECT_FALSE(verify(a_, b_));
+    side->z = kept;
+  }
+  EXPECT_FALSE(verify_place(rig_, {}, b_, {}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, MatchRuleTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd));
 
 TEST_P(PlaceTest, LooksMoreLikeItselfThanLikeAnyOther) {
   const PlaceView here = view(1, pose(0, {0, 0, 0}));

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "geometry/inverse_depth.hpp"
 #include "graph/graph_writer.hpp"
 #include "imaging/corner_selection.hpp"
@@ -31,7 +33,8 @@ class PoseRefinementTest : public ::testing::Test {
   }
 
   /// @param right_every  one in so many points has its own patch, the others one of `other_room`
-  void make_map(int points, std::uint32_t other_room = 0, int right_every = 1) {
+  /// @param shift_px  every second point is so far beside where its patch is
+  void make_map(int points, std::uint32_t other_room = 0, int right_every = 1, double shift_px = 0) {
     Keyframe keyframe;
     keyframe.id = KeyframeId{0};
     keyframe.T_k_w = T_k_w_;
@@ -56,7 +59,8 @@ class PoseRefinementTest : public ::testing::Test {
       const double depth = room.depth(T_k_w_, uv);
       MapPoint point;
       point.anchor = KeyframeId{0};
-      point.psi = to_inverse_depth(rig_.camera.unproject(uv) * depth);
+      const double shift = index(id) % 2 == 0 ? 0 : shift_px;
+      point.psi = to_inverse_depth(rig_.camera.unproject(uv + Vector2(0, shift)) * depth);
       point.appearance = std::make_shared<const PointAppearance>(appearance);
       writer_.add_point(id, point);
       const double u_r = uv.x() - rig_.disparity_from_depth(depth);
@@ -90,6 +94,40 @@ TEST_F(PoseRefinementTest, AnotherRoomContradicts) {
   make_map(200, 2, 1000);
   RefinedPlace place;
   EXPECT_EQ(refine(SE3(), place), RefinementOutcome::kContradicted);
+}
+
+TEST_F(PoseRefinementTest, FewerThanAreAskedForAreNoPlace) {
+  make_map(200);
+  RefinedPlace place;
+  ASSERT_EQ(refine(SE3(), place), RefinementOutcome::kRefined);
+  RefinementOptions options;
+  options.min_inliers = place.inliers + 1;
+  EXPECT_EQ(refine(SE3(), place, options), RefinementOutcome::kContradicted);
+}
+
+/// All of them are found, and half of them do not stand where they should: things were moved, or the pose is
+/// another.
+TEST_F(PoseRefinementTest, PointsThatAreFoundElsewhereContradict) {
+  make_map(200, 0, 1, 2.5);
+  RefinementOptions options;
+  options.min_inlier_share = 0;
+  RefinedPlace place;
+  ASSERT_EQ(refine(SE3(), place, options), RefinementOutcome::kRefined);
+  ASSERT_GE(place.inliers, 2 * options.min_inliers);
+  EXPECT_EQ(refine(SE3(), place), RefinementOutcome::kContradicted);
+}
+
+/// One point in ten is the least that is enough, unless it is said otherwise (docs/places.md).
+TEST_F(PoseRefinementTest, MostPointsMissingContradictsWithoutBeingAskedFor) {
+  make_map(160, 2, 14);
+  RefinementOptions options;
+  options.min_inliers = 4;
+  RefinedPlace place;
+  const double share = std::exchange(options.min_visible_share, 0);
+  ASSERT_EQ(refine(SE3(), place, options), RefinementOutcome::kRefined);
+  ASSERT_LT(place.inliers, 16);
+  options.min_visible_share = share;
+  EXPECT_EQ(refine(SE3(), place, options), RefinementOutcome::kContradicted);
 }
 
 /// A poster in another room: enough points are where they should be, and agree; all the others are missing.
