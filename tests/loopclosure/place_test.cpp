@@ -255,6 +255,34 @@ TEST_P(MatchRuleTest, AViewWhoseCornersHaveNoPositionsIsNoPlace) {
   EXPECT_FALSE(verify_place(rig_, {}, b_, {}));
 }
 
+/// A lost camera that knows no depths: five directions agree with a pose of their own whatever they are, so
+/// that a sixth must speak for it.
+TEST_P(MatchRuleTest, FiveDirectionsAloneAreNoHypothesis) {
+  PlaceView b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  for (Eigen::Vector3f& z : b.z) z.z() = static_cast<float>(Rig::kNoRight);
+  rig_.kind = SensorKind::kMono;
+  VerificationOptions options;
+  options.min_inliers = 4;
+  options.min_in_half = 0;
+  options.min_inlier_share = 0;
+  const auto try_some = [&](std::size_t count) {
+    VerificationReport report;
+    for (std::size_t first = 0; first + count <= b.corners.size(); ++first) {
+      const auto from = static_cast<std::ptrdiff_t>(first), to = from + static_cast<std::ptrdiff_t>(count);
+      b_.corners.assign(b.corners.begin() + from, b.corners.begin() + to);
+      b_.z.assign(b.z.begin() + from, b.z.begin() + to);
+      (void)verify(a_, b_, options, &report);
+      if (report.ransac_inliers == static_cast<int>(count)) break;
+    }
+    return report;
+  };
+  const VerificationReport five = try_some(5), six = try_some(6);
+  ASSERT_EQ(five.ransac_inliers, 5);
+  EXPECT_EQ(five.guided, 0);
+  ASSERT_EQ(six.ransac_inliers, 6);
+  EXPECT_GT(six.guided, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Sensors, MatchRuleTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd));
 
 TEST_P(PlaceTest, LooksMoreLikeItselfThanLikeAnyOther) {
