@@ -46,6 +46,7 @@ struct Variation {
 
 /// Of one frame, with what the tracker said of it.
 struct RelativePose {
+  std::int64_t frame_index = 0;
   SE3 T_c_ref;
   std::int64_t t_c_ns = 0, t_ref_ns = 0;
   Matrix6 covariance;
@@ -58,6 +59,13 @@ struct FrameOutcome {
   double error = -1;     ///< of its final position, if it is in the largest part [m]
 };
 
+/// How far a frame's pose relative to its reference keyframe is from the truth.
+struct PoseError {
+  std::int64_t frame_index = 0, t_c_ns = 0, t_ref_ns = 0;
+  Vector6 error, sigma;  ///< sigma: said, with the truth's own [m, rad]
+  double nees = 0;       ///< over 6
+};
+
 /// One variation's outcome.
 struct Outcome {
   std::vector<FrameOutcome> each;  ///< of its frames
@@ -66,7 +74,7 @@ struct Outcome {
   std::vector<std::size_t> parts;  ///< frames in each part of the final map, the largest first
   double ate = 0, ate_causal = 0;  ///< of the largest; causal: of the part that most frames named then [m]
   double clock = 0;                ///< scatter of time stamps [s]
-  std::vector<double> nees;        ///< of each frame's pose relative to its reference keyframe, over 6
+  std::vector<PoseError> poses;    ///< relative to the frame's reference keyframe
 };
 
 double quantile(std::vector<double> values, double share) {
@@ -267,7 +275,7 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
     const std::int64_t t_ref_ns = report.graph.keyframe(record.reference).t_ns;
     if (t_ref_ns == record.t_ns) return;
     relative_poses.push_back(
-        {record.T_c_ref.unpacked(), record.t_ns, t_ref_ns, report.information.inverse()});
+        {record.frame_index, record.T_c_ref.unpacked(), record.t_ns, t_ref_ns, report.information.inverse()});
   };
   auto next = static_cast<std::size_t>(variation.left_out);
   const FrameFeed feed = [&](Frame& frame) {
@@ -298,8 +306,11 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   outcome.clock = noise.clock;
   const RelativeTruth relative(truth, noise);
   for (const RelativePose& pose : relative_poses) {
-    if (const auto comparison = relative.compare(pose.T_c_ref, pose.t_c_ns, pose.t_ref_ns))
-      outcome.nees.push_back(comparison->normalised(pose.covariance));
+    const auto comparison = relative.compare(pose.T_c_ref, pose.t_c_ns, pose.t_ref_ns);
+    if (!comparison) continue;
+    const Vector6 variances = (pose.covariance + comparison->of_truth).diagonal();
+    outcome.poses.push_back({pose.frame_index, pose.t_c_ns, pose.t_ref_ns, comparison->error,
+                             variances.cwiseSqrt(), comparison->normalised(pose.covariance)});
   }
   const Alignment alignment = to_scale ? Alignment::kSe3 : Alignment::kSim3;
   judge_frames(estimates, result, truth, alignment, outcome.each);
@@ -321,16 +332,33 @@ void print_frames(const Outcome& outcome) {
   }
 }
 
-void print_row(const Variation& variation, const Outcome& outcome) {
+void print_poses(const Outcome& outcome) {
+  fmt::print("# frame, since reference s | NEES / 6 | error mm, mrad | standard deviations mm, mrad\n");
+  for (const PoseError& pose : outcome.poses) {
+    fmt::print("{} {:.3f} {:.2f}", pose.frame_index, 1e-9 * static_cast<double>(pose.t_c_ns - pose.t_ref_ns),
+               pose.nees);
+    for (const double error : pose.error) fmt::print(" {:.3f}", 1e3 * error);
+    for (const double sigma : pose.sigma) fmt::print(" {:.3f}", 1e3 * sigma);
+    fmt::print("\n");
+  }
+}
+
+std::string nees_summary(const std::vector<PoseError>& poses) {
+  if (poses.empty()) return "-";
   double mean = 0;
-  for (const double nees : outcome.nees) mean += nees / static_cast<double>(outcome.nees.size());
-  const std::string nees = outcome.nees.empty()
-                               ? "-"
-                               : fmt::format("{:.2f} / {:.2f} / {:.2f}", quantile(outcome.nees, 0.5), mean,
-                                             quantile(outcome.nees, 0.95));
+  std::vector<double> each;
+  for (const PoseError& pose : poses) {
+    each.push_back(pose.nees);
+    mean += pose.nees / static_cast<double>(poses.size());
+  }
+  return fmt::format("{:.2f} / {:.2f} / {:.2f}", quantile(each, 0.5), mean, quantile(each, 0.95));
+}
+
+void print_row(const Variation& variation, const Outcome& outcome) {
   const auto metres = [](double ate) { return ate < 0 ? std::string("-") : fmt::format("{:.5f}", ate); };
   fmt::print("| {} | {}/{} | {} | {} | {} | {} |\n", variation.name, outcome.tracked, outcome.frames,
-             fmt::join(outcome.parts, " + "), metres(outcome.ate), metres(outcome.ate_causal), nees);
+             fmt::join(outcome.parts, " + "), metres(outcome.ate), metres(outcome.ate_causal),
+             nees_summary(outcome.poses));
   std::fflush(stdout);
 }
 
@@ -342,7 +370,7 @@ int main(int argc, char** argv) {
   twofold::SourceOptions options;
   std::string calibration;
   bool as_it_is_only = false;
-  bool frames = false;
+  bool frames = false, poses = false;
   std::string camera = "all";
   auto order = twofold::Order::kForwards;
   int only = -1;
@@ -355,6 +383,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"all", "mono"}));
   app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
   app.add_flag("--frames", frames, "what became of each frame");
+  app.add_flag("--poses", poses, "each pose relative to its reference keyframe against the truth");
   CLI::Option* const one =
       app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
   app.add_option("--order", order, "that frames are played in")
@@ -395,6 +424,7 @@ int main(int argc, char** argv) {
         const twofold::Outcome outcome = twofold::run(source, options, variation, {truth[0], truth[1]});
         print_row(variation, outcome);
         if (frames) twofold::print_frames(outcome);
+        if (poses) twofold::print_poses(outcome);
         if (as_it_is_only) break;
       }
     }
