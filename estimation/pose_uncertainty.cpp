@@ -2,29 +2,21 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 
 #include "estimation/observation_model.hpp"
 #include "estimation/robust_kernel.hpp"
+#include "geometry/so3.hpp"
+#include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
 namespace {
 
-constexpr int kColumns = 6, kRows = 4;
-constexpr int kFewestRegions = 12;
-constexpr int kEvery = 3;                // frames: what errors are like changes slowly
 constexpr double kNewestRegions = 0.25;  // share of the newest value in the smoothed one
 constexpr double kNewestSplit = 0.1;
+constexpr double kOfFrame = 0.5;  // share of the frame's own residuals in its covariance
 constexpr int kPoseDimensions = 6;
-
-/// Region of a measurement, counted in rows.
-std::size_t region_of(const Rig& rig, const Eigen::Vector3f& z) {
-  const int column = static_cast<int>(z.x() * kColumns / static_cast<float>(rig.camera.width));
-  const int row = static_cast<int>(z.y() * kRows / static_cast<float>(rig.camera.height));
-  return static_cast<std::size_t>(std::clamp(row, 0, kRows - 1) * kColumns +
-                                  std::clamp(column, 0, kColumns - 1));
-}
 
 void smooth(std::optional<double>& mean, double newest, double share) {
   if (!std::isfinite(newest)) return;
@@ -37,36 +29,46 @@ Vector6 wrench(const Vector3& force, const Vector3& x) {
   return result;
 }
 
+/// A^T S A, A = [I, -hat(x)]: S about a point, as information about the pose that it is seen from.
+Matrix6 about_pose(const ObservationTerms& terms, const Vector3& x) {
+  Matrix3 S;
+  S << terms.s00, 0, terms.s02, 0, terms.s11, terms.s12, terms.s02, terms.s12, terms.s22;
+  const Matrix3 X = hat(x), B = -S * X;
+  Matrix6 result;
+  result << S, B, B.transpose(), X * B;
+  return result;
+}
+
 }  // namespace
 
-void VarianceFactor::update(const Rig& rig, std::span<const MotionObservation> observations,
-                            const MotionOnlyResult& motion, const MotionOnlyOptions& options) {
-  if (regions_ && frames_++ % kEvery != 0) return;
-  const ObservationModel model(rig);
+void PoseUncertainty::update(std::span<const MotionObservation> observations, const MotionOnlyResult& motion,
+                             const MotionOnlyOptions& options) {
+  const ObservationModel model(rig_);
   const HuberKernel kernel{options.huber_sigmas};
   const Matrix3 R = motion.T_c_ref.rotation();
-  std::array<Vector6, kColumns * kRows> gradients;
-  gradients.fill(Vector6::Zero());
-  std::array<bool, kColumns * kRows> seen{};
+  sums_.clear();
   for (const MotionObservation& o : observations) {
     if (!o.inlier) continue;
     const Vector3 x = R * o.x_ref + motion.T_c_ref.translation();
     if (!(x.z() > kSolverMinDepth)) continue;
-    const std::size_t region = region_of(rig, o.z);
-    gradients[region] += wrench(model.linearise(x, o.z, o.information, kernel).force, x);
-    seen[region] = true;
+    const ObservationTerms terms = model.linearise(x, o.z, o.information, kernel);
+    sums_.add(o.z.head<2>(), about_pose(terms, x), wrench(terms.force, x));
   }
-  const auto regions = static_cast<int>(std::count(seen.begin(), seen.end(), true));
-  if (regions < kFewestRegions) return;
-  const Eigen::LLT<Matrix6> llt(motion.information);
-  if (llt.info() != Eigen::Success) return;
-  double trace = 0;
-  for (const Vector6& g : gradients) trace += llt.matrixL().solve(g).squaredNorm();
-  smooth(regions_, trace / kPoseDimensions * regions / (regions - kPoseDimensions), kNewestRegions);
+  if (const auto factor = sums_.variance_factor(motion.information))
+    smooth(regions_, *factor, kNewestRegions);
+  of_frame_ = sums_.jackknife(motion.information);
 }
 
-void VarianceFactor::add_split(double factor) {
+void PoseUncertainty::add_split(double factor) {
   smooth(split_, factor, kNewestSplit);
+}
+
+Matrix6 PoseUncertainty::covariance(const Matrix6& information) const {
+  const Matrix6 usual = variance_factor() * inverse_symmetric(information);
+  if (!of_frame_ || !regions_) return usual;
+  // What splits show and regions do not is missing in the frame's own part by the same factor.
+  const double hidden = variance_factor() / std::max(*regions_, std::numeric_limits<double>::min());
+  return (1 - kOfFrame) * usual + kOfFrame * hidden * *of_frame_;
 }
 
 std::optional<double> split_factor(const Matrix6& information_of_all, const Matrix6& information_of_some,
@@ -94,16 +96,6 @@ Vector6 readout_force(const Rig& rig, std::span<const MotionObservation> observa
     sum += wrench(model.linearise(x, o.z, o.information, kernel).apply(moved), x);
   }
   return sum;
-}
-
-Matrix6 information_under(const Matrix6& information, double variance_factor, const Vector6& force) {
-  Matrix6 smaller = information / variance_factor;
-  const Vector6 f = force / variance_factor;
-  // Sherman and Morrison: (C + b b^T)^-1 with C^-1 b = f.
-  const Eigen::LLT<Matrix6> llt(smaller);
-  const double share = 1 + f.dot(llt.solve(f));
-  if (llt.info() != Eigen::Success || !std::isfinite(share)) return smaller;
-  return smaller - f * f.transpose() / share;
 }
 
 }  // namespace twofold

@@ -6,39 +6,46 @@
 
 #include "camera/rig.hpp"
 #include "estimation/motion_only.hpp"
+#include "estimation/region_sums.hpp"
 
 namespace twofold {
 
-/// How much larger, or smaller, the covariance of poses is than the rig's noise says: the variance factor
-/// that adjustments estimate afterwards from their residuals, here from regions of the image.
+/// How well poses are known, as residuals say.
 ///
 /// (J^T W J)^-1 takes every measurement to err by itself and as the rig says. Both are wrong: noise depends
 /// on camera, light and texture, and what lies side by side errs together, because its points hang on the
-/// same keyframes and lens, shutter and depth sensor bend regions and not pixels. Residuals show both. With
-/// g_r = sum of J^T W e over the inliers of region r the covariance is C S C, S = sum g_r g_r^T, whatever the
-/// errors are within a region (the sandwich of Huber 1967, clusters of Liang and Zeger 1986); six of k
-/// regions are lost to the pose. Of that only the size is taken, tr(S C) / 6 k / (k - 6): one frame's regions
-/// are too few for a matrix. It is smoothed over frames.
+/// same keyframes and lens, shutter and depth sensor bend regions and not pixels. Residuals show both. The
+/// size of what they show is smoothed over frames; one frame's regions are too few for a matrix. But where a
+/// frame hangs on few measurements that err, it alone shows it, so that half of the covariance is the frame's
+/// own (RegionSums::jackknife).
 ///
 /// What all residuals of a frame hide, an error that the pose itself takes up, is not in it.
-class VarianceFactor {
+class PoseUncertainty {
  public:
-  /// One frame's residuals, of which every third frame's are looked at. A frame with few regions says
-  /// nothing. No allocation.
+  explicit PoseUncertainty(const Rig& rig) : rig_(rig), sums_(rig.camera) {}
+
+  /// One frame's residuals. A frame with few regions says nothing. No allocation.
   /// @param observations  as the solver, with `options`, left them, of which `motion` is the result
-  void update(const Rig& rig, std::span<const MotionObservation> observations, const MotionOnlyResult& motion,
+  void update(std::span<const MotionObservation> observations, const MotionOnlyResult& motion,
               const MotionOnlyOptions& options);
 
   /// One frame's pose from some of its measurements against that from all of them (split_factor): what all
   /// measurements of the others have in common shows there, and not between regions.
   void add_split(double factor);
 
-  /// The larger of both; 1 before the first frame.
-  [[nodiscard]] double value() const { return std::max(regions_.value_or(1), split_.value_or(0)); }
+  /// The larger of what regions and splits say; 1 before the first frame.
+  [[nodiscard]] double variance_factor() const { return std::max(regions_.value_or(1), split_.value_or(0)); }
+
+  /// Of a pose with this J^T W J. The frame's own share is that of the last update.
+  [[nodiscard]] Matrix6 covariance(const Matrix6& information) const;
+  /// The next covariance is of a frame whose own residuals are not known: their part is the usual one.
+  void forget_frame() { of_frame_.reset(); }
 
  private:
+  Rig rig_;
+  RegionSums sums_;
   std::optional<double> regions_, split_;
-  unsigned frames_ = 0;
+  std::optional<Matrix6> of_frame_;
 };
 
 /// Squared difference of a pose that some measurements give from the one that all give, over its covariance
@@ -54,10 +61,5 @@ class VarianceFactor {
 [[nodiscard]] Vector6 readout_force(const Rig& rig, std::span<const MotionObservation> observations,
                                     const MotionOnlyResult& motion, const Vector6& velocity,
                                     const MotionOnlyOptions& options);
-
-/// Inverse of `variance_factor` information^-1 + b b^T, b = information^-1 force: of a pose that a force of
-/// so many standard deviations pushes, nobody knows which way.
-[[nodiscard]] Matrix6 information_under(const Matrix6& information, double variance_factor,
-                                        const Vector6& force);
 
 }  // namespace twofold

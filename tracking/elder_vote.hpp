@@ -50,7 +50,7 @@ class ElderVote {
                                                          const MotionOnlyOptions& solver);
 
   /// By how much the elders' pose and that of all differed last, over what independent errors of the rig's
-  /// noise let expect: a variance factor (VarianceFactor::add_split). Nothing when nobody was asked, or
+  /// noise let expect: a variance factor (PoseUncertainty::add_split). Nothing when nobody was asked, or
   /// nobody could say.
   [[nodiscard]] std::optional<double> difference() const { return difference_; }
 

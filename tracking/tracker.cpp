@@ -44,6 +44,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       wide_search_(rig, options.wide_search),
       recent_views_(kRecentViews, room_for_view(rig, wide_search_)),
       elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
+      uncertainty_(rig),
       immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options) {
   const auto searches = static_cast<std::size_t>(options.max_searches);

@@ -187,7 +187,7 @@ class Tracker {
   WideSearch wide_search_;
   RecentViews recent_views_;
   ElderVote elder_vote_;
-  VarianceFactor variance_;
+  PoseUncertainty uncertainty_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
   std::optional<RightRows> right_rows_;      ///< stereo only

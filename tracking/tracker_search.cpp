@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/symmetric_solve.hpp"
 #include "imaging/view_change.hpp"
 #include "tracking/tracker.hpp"
 
@@ -221,18 +222,23 @@ double Tracker::readout_sigma() const {
 Matrix6 Tracker::honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
                                     const Frame& frame) {
   // A pose that elders alone give is not the one that all points agree on.
-  if (!elder_vote_.mistrusts_the_young()) {
-    variance_.update(rig_, motion_, motion, solver);
-    if (const auto difference = elder_vote_.difference()) variance_.add_split(*difference);
+  if (elder_vote_.mistrusts_the_young()) {
+    uncertainty_.forget_frame();
+  } else {
+    uncertainty_.update(motion_, motion, solver);
+    if (const auto difference = elder_vote_.difference()) uncertainty_.add_split(*difference);
   }
-  Vector6 force = Vector6::Zero();
+  Matrix6 covariance = uncertainty_.covariance(motion.information);
   const auto velocity = velocity_at(motion.T_c_ref, frame);
   const double sigma = readout_sigma();
   if (velocity && sigma > 0) {
     // The reference keyframe moved as well, and as fast.
-    force = std::sqrt(2.0) * sigma * readout_force(rig_, motion_, motion, *velocity, solver);
+    const Vector6 force = std::sqrt(2.0) * sigma * readout_force(rig_, motion_, motion, *velocity, solver);
+    const Vector6 pushed = solve_symmetric(motion.information, force);
+    covariance += pushed * pushed.transpose();
   }
-  return information_under(motion.information, variance_.value(), force);
+  const Matrix6 information = inverse_symmetric(covariance);
+  return information.allFinite() ? information : motion.information / uncertainty_.variance_factor();
 }
 
 /// Inliers whose depths several keyframes know.

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "camera/pinhole.hpp"
+#include "geometry/types.hpp"
+
+namespace twofold {
+
+/// What the parts of an image say of a pose, each by itself. Few parts with measurements say nothing.
+class RegionSums {
+ public:
+  explicit RegionSums(const PinholeCamera& camera) : width_(camera.width), height_(camera.height) { clear(); }
+
+  void clear();
+  /// One measurement at `uv`: its part of J^T W J and of the gradient J^T W e.
+  void add(const Eigen::Vector2f& uv, const Matrix6& information, const Vector6& gradient);
+
+  /// By how much errors that regions have in common make the covariance larger than information^-1, the
+  /// inverse of J^T W J of all: with g_r the gradient of region r it is C S C, S = sum g_r g_r^T, whatever
+  /// the errors are within a region (the sandwich of Huber 1967, clusters of Liang and Zeger 1986), and of
+  /// that the size, tr(S C) / 6 k / (k - 6); six of k regions are lost to the pose.
+  [[nodiscard]] std::optional<double> variance_factor(const Matrix6& information) const;
+  /// The covariance from how far the pose moves when each region is left out: (k - 1) / k sum d_r d_r^T
+  /// (jackknife of clusters, Bell and McCaffrey 2002; one Gauss-Newton step each). A measurement that carries
+  /// the pose off by itself leaves no residual that would tell, and says to be exact. Without it the others
+  /// do. A region without which the pose is not determined is left out of the sum.
+  [[nodiscard]] std::optional<Matrix6> jackknife(const Matrix6& information) const;
+
+ private:
+  static constexpr int kColumns = 6, kRows = 4;
+  struct Region {
+    Matrix6 information;
+    Vector6 gradient;
+    bool seen;
+  };
+  int width_, height_;
+  std::array<Region, kColumns * kRows> regions_;
+};
+
+}  // namespace twofold
