@@ -202,6 +202,7 @@ SE3 Tracker::align_to_previous(FrameStep& step) {
 void Tracker::remember_frame(const FrameStep& step) {
   const TrackResult& result = step.result;
   const bool goes_on = loss_.lost_frames() == 0 && result.reference == last_.reference;
+  last_velocity_ = goes_on ? velocity_at(result.T_c_ref, step.frame) : std::nullopt;
   T_cur_prev_ = goes_on ? result.T_c_ref * last_.T_c_ref.inverse() : SE3();
   last_ = {result.reference, result.T_c_ref};
   last_t_ns_ = step.frame.t_ns;

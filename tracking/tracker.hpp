@@ -157,8 +157,10 @@ class Tracker {
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
+  [[nodiscard]] Matrix6 shutter_covariance(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
+                                           const FrameStep& step) const;
   [[nodiscard]] Matrix6 honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
-                                           const Frame& frame);
+                                           const FrameStep& step);
   [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, const Frame& frame) const;
   [[nodiscard]] double readout_sigma() const;
   void give_up_frame(LostCause cause, TrackResult& result);
@@ -199,9 +201,10 @@ class Tracker {
   std::optional<DepthSeeds> seeds_;
   std::vector<EarlierFrame> earlier_frames_;
 
-  std::int64_t last_t_ns_ = 0;  ///< of the last good frame
-  Placement last_;              ///< of the last good frame
-  SE3 T_cur_prev_;              ///< last good motion, the prediction of the next
+  std::int64_t last_t_ns_ = 0;            ///< of the last good frame
+  Placement last_;                        ///< of the last good frame
+  SE3 T_cur_prev_;                        ///< last good motion, the prediction of the next
+  std::optional<Vector6> last_velocity_;  ///< in the last good frame, if the one before says
   LossHistory loss_;
   std::optional<Placement> hint_;  ///< of relocalise
   RecentView asked_;               ///< the frame that ask_where was called for

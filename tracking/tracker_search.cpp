@@ -204,7 +204,7 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   result.status = TrackStatus::kTracking;
   result.reference = start.reference;
   result.T_c_ref = motion.T_c_ref;
-  result.information = honest_information(motion, solver, step.frame);
+  result.information = honest_information(motion, solver, step);
   return LostCause::kNone;
 }
 
@@ -218,9 +218,28 @@ double Tracker::readout_sigma() const {
   return std::hypot(std::sqrt(prior * (1 - trust)), unused);
 }
 
+/// What a rolling shutter adds to the covariance. Its readout is known with an error, if at all; and the
+/// motion within a frame is taken to be that since the frame before, which is wrong by half of what the
+/// motion changed by, or by all of it where the frame before knew none.
+Matrix6 Tracker::shutter_covariance(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
+                                    const FrameStep& step) const {
+  Matrix6 covariance = Matrix6::Zero();
+  const auto velocity = velocity_at(motion.T_c_ref, step.frame);
+  if (!velocity || step.result.reference != last_.reference) return covariance;
+  const Vector6 change = last_velocity_ ? 0.5 * (*velocity - *last_velocity_) : *velocity;
+  for (const Vector6& bent :
+       {Vector6(readout_sigma() * *velocity), Vector6(rig_.readout.value_or(0) * change)}) {
+    if (bent.isZero(0)) continue;
+    const Vector6 pushed =
+        solve_symmetric(motion.information, readout_force(rig_, motion_, motion, bent, solver));
+    covariance += 2 * pushed * pushed.transpose();  // the reference keyframe moved as well, and alike
+  }
+  return covariance;
+}
+
 /// What is known of the pose relative to the reference keyframe, as the residuals say.
 Matrix6 Tracker::honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
-                                    const Frame& frame) {
+                                    const FrameStep& step) {
   // A pose that elders alone give is not the one that all points agree on.
   if (elder_vote_.mistrusts_the_young()) {
     uncertainty_.forget_frame();
@@ -228,15 +247,8 @@ Matrix6 Tracker::honest_information(const MotionOnlyResult& motion, const Motion
     uncertainty_.update(motion_, motion, solver);
     if (const auto difference = elder_vote_.difference()) uncertainty_.add_split(*difference);
   }
-  Matrix6 covariance = uncertainty_.covariance(motion.information);
-  const auto velocity = velocity_at(motion.T_c_ref, frame);
-  const double sigma = readout_sigma();
-  if (velocity && sigma > 0) {
-    // The reference keyframe moved as well, and as fast.
-    const Vector6 force = std::sqrt(2.0) * sigma * readout_force(rig_, motion_, motion, *velocity, solver);
-    const Vector6 pushed = solve_symmetric(motion.information, force);
-    covariance += pushed * pushed.transpose();
-  }
+  const Matrix6 covariance =
+      uncertainty_.covariance(motion.information) + shutter_covariance(motion, solver, step);
   const Matrix6 information = inverse_symmetric(covariance);
   return information.allFinite() ? information : motion.information / uncertainty_.variance_factor();
 }

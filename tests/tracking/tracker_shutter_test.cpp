@@ -1,6 +1,9 @@
 // A camera whose rows are exposed one after the other, turned quickly to and fro.
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <map>
+
 #include "tests/tracking/tracked_sequence.hpp"
 
 namespace twofold {
@@ -60,6 +63,31 @@ TEST(TrackerShutter, KnowsWhereTheCameraWasWhenEachRowWasExposed) {
   const double ignored = error_with(0);
   EXPECT_LT(known, 0.006);
   EXPECT_GT(ignored, 3 * known);
+}
+
+/// What is taken for the motion within a frame is that since the one before: where the camera speeds up or
+/// slows down, that is wrong, and bends all of the image alike.
+TEST(TrackerShutter, PosesAreKnownNoBetterThanTheMotionWithinAFrame) {
+  Rig rig = test_rig(SensorKind::kStereo, 320, 240);
+  rig.readout = kReadout;
+  Odometry odometry(rig);
+  std::map<KeyframeId, int> frame_of;
+  double nees = 0;
+  int count = 0;
+  for (int i = 0; i < kFrames; ++i) {
+    const TrackResult result = odometry.step(shaken_frames()[static_cast<std::size_t>(i)]);
+    if (i > 0) {
+      const SE3 truth =
+          shaken_T_c_w(i * kInterval) * shaken_T_c_w(frame_of.at(result.reference) * kInterval).inverse();
+      const Vector6 error = (result.T_c_ref * truth.inverse()).log();
+      nees += error.dot(result.information * error) / 6;
+      ++count;
+    }
+    if (result.proposed) frame_of[odometry.proposal().id] = i;
+  }
+  std::printf("NEES / 6 %.2f\n", nees / count);
+  EXPECT_GT(nees / count, 0.3);
+  EXPECT_LT(nees / count, 3);
 }
 
 TEST(TrackerShutter, FindsTheReadoutThatNobodyGave) {
