@@ -42,7 +42,7 @@ Matrix6 about_pose(const ObservationTerms& terms, const Vector3& x) {
 }  // namespace
 
 void PoseUncertainty::update(std::span<const MotionObservation> observations, const MotionOnlyResult& motion,
-                             const MotionOnlyOptions& options) {
+                             const MotionOnlyOptions& options, bool all_agree) {
   const ObservationModel model(rig_);
   const HuberKernel kernel{options.huber_sigmas};
   const Matrix3 R = motion.T_c_ref.rotation();
@@ -54,6 +54,8 @@ void PoseUncertainty::update(std::span<const MotionObservation> observations, co
     const ObservationTerms terms = model.linearise(x, o.z, o.information, kernel);
     sums_.add(o.z.head<2>(), about_pose(terms, x), wrench(terms.force, x));
   }
+  of_frame_.reset();
+  if (!all_agree) return;
   if (const auto factor = sums_.variance_factor(motion.information))
     smooth(regions_, *factor, kNewestRegions);
   of_frame_ = sums_.jackknife(motion.information);
@@ -78,24 +80,6 @@ std::optional<double> split_factor(const Matrix6& information_of_all, const Matr
   if (of_others.info() != Eigen::Success) return std::nullopt;
   const Vector6 force = information_of_some * apart;
   return (apart.dot(force) + of_others.matrixL().solve(force).squaredNorm()) / kPoseDimensions;
-}
-
-Vector6 readout_force(const Rig& rig, std::span<const MotionObservation> observations,
-                      const MotionOnlyResult& motion, const Vector6& velocity,
-                      const MotionOnlyOptions& options) {
-  const ObservationModel model(rig);
-  const HuberKernel kernel{options.huber_sigmas};
-  const Matrix3 R = motion.T_c_ref.rotation();
-  Vector6 sum = Vector6::Zero();
-  for (const MotionObservation& o : observations) {
-    if (!o.inlier) continue;
-    const Vector3 x = R * o.x_ref + motion.T_c_ref.translation();
-    if (!(x.z() > kSolverMinDepth)) continue;
-    const double row = (o.z.y() + 0.5) / rig.camera.height - 0.5;
-    const Vector3 moved = row * (velocity.head<3>() + velocity.tail<3>().cross(x));
-    sum += wrench(model.linearise(x, o.z, o.information, kernel).apply(moved), x);
-  }
-  return sum;
 }
 
 }  // namespace twofold

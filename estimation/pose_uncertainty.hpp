@@ -26,8 +26,9 @@ class PoseUncertainty {
 
   /// One frame's residuals. A frame with few regions says nothing. No allocation.
   /// @param observations  as the solver, with `options`, left them, of which `motion` is the result
+  /// @param all_agree     the pose is that of all of them; otherwise residuals are no measure of it
   void update(std::span<const MotionObservation> observations, const MotionOnlyResult& motion,
-              const MotionOnlyOptions& options);
+              const MotionOnlyOptions& options, bool all_agree);
 
   /// One frame's pose from some of its measurements against that from all of them (split_factor): what all
   /// measurements of the others have in common shows there, and not between regions.
@@ -38,8 +39,8 @@ class PoseUncertainty {
 
   /// Of a pose with this J^T W J. The frame's own share is that of the last update.
   [[nodiscard]] Matrix6 covariance(const Matrix6& information) const;
-  /// The next covariance is of a frame whose own residuals are not known: their part is the usual one.
-  void forget_frame() { of_frame_.reset(); }
+  /// RegionSums::by_rows of the last update.
+  [[nodiscard]] const Matrix6& by_rows() const { return sums_.by_rows(); }
 
  private:
   Rig rig_;
@@ -54,12 +55,5 @@ class PoseUncertainty {
 /// @return  nothing when the others would not determine a pose
 [[nodiscard]] std::optional<double> split_factor(const Matrix6& information_of_all,
                                                  const Matrix6& information_of_some, const Vector6& apart);
-
-/// J^T W J e, summed over the inliers: what moves the pose if rows are read one after the other, for one
-/// second a frame, and nobody knows. e is how far each point moves until its row is read.
-/// @param velocity  of the camera, left perturbation (v, omega) a second
-[[nodiscard]] Vector6 readout_force(const Rig& rig, std::span<const MotionObservation> observations,
-                                    const MotionOnlyResult& motion, const Vector6& velocity,
-                                    const MotionOnlyOptions& options);
 
 }  // namespace twofold

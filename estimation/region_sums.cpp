@@ -14,6 +14,7 @@ constexpr int kOfPose = 6;  // dimensions
 
 void RegionSums::clear() {
   regions_.fill({Matrix6::Zero(), Vector6::Zero(), false});
+  by_rows_.setZero();
 }
 
 void RegionSums::add(const Eigen::Vector2f& uv, const Matrix6& information, const Vector6& gradient) {
@@ -24,6 +25,7 @@ void RegionSums::add(const Eigen::Vector2f& uv, const Matrix6& information, cons
   region.information += information;
   region.gradient += gradient;
   region.seen = true;
+  by_rows_ += ((uv.y() + 0.5) / height_ - 0.5) * information;
 }
 
 std::optional<double> RegionSums::variance_factor(const Matrix6& information) const {

@@ -17,6 +17,10 @@ class RegionSums {
   /// One measurement at `uv`: its part of J^T W J and of the gradient J^T W e.
   void add(const Eigen::Vector2f& uv, const Matrix6& information, const Vector6& gradient);
 
+  /// Sum over the measurements of (how far below the middle of the image, in heights) J^T W J. Times a
+  /// velocity (v, omega): J^T W e of what a camera that moves so while its rows are read one after the other,
+  /// for one second a frame, displaces measurements by.
+  [[nodiscard]] const Matrix6& by_rows() const { return by_rows_; }
   /// By how much errors that regions have in common make the covariance larger than information^-1, the
   /// inverse of J^T W J of all: with g_r the gradient of region r it is C S C, S = sum g_r g_r^T, whatever
   /// the errors are within a region (the sandwich of Huber 1967, clusters of Liang and Zeger 1986), and of
@@ -37,6 +41,7 @@ class RegionSums {
   };
   int width_, height_;
   std::array<Region, kColumns * kRows> regions_;
+  Matrix6 by_rows_;
 };
 
 }  // namespace twofold

@@ -20,6 +20,7 @@ constexpr double kWidestKernel = 30;  // [standard deviations]
 constexpr double kFarDeviation = 30;  // counts as no farther [standard deviations]
 constexpr double kCornerHuber = 1.5;  // [standard deviations]
 constexpr double kCornerChi2 = 30;    // farther ones are mistakes
+constexpr double kOfRegions = 0.5;    // share of the jackknife in the covariance
 
 }  // namespace
 
@@ -111,7 +112,8 @@ void DepthAlignment::add_pairs(const DepthPlanes::Plane& seen, std::span<const P
   }
 }
 
-DepthAlignment::Equations DepthAlignment::linearise(const SE3& T_c_ref, const Pass& pass) const {
+DepthAlignment::Equations DepthAlignment::linearise(const SE3& T_c_ref, const Pass& pass,
+                                                    RegionSums* regions) const {
   Equations equations;
   std::array<SE3, kViews> T_view_c;
   for (std::size_t v = 0; v < views_; ++v) {
@@ -129,14 +131,18 @@ DepthAlignment::Equations DepthAlignment::linearise(const SE3& T_c_ref, const Pa
       if (plane == nullptr) continue;
       if (const auto pair = pair_up(seen, *plane, T_view_c[v])) pairs[met++] = *pair;
     }
+    const Matrix6 H_before = equations.H;
+    const Vector6 g_before = equations.g;
     add_pairs(seen, std::span(pairs).first(met), pass, equations);
+    if (regions != nullptr && met > 0)
+      regions->add(rig_.camera.project(seen.x).cast<float>(), equations.H - H_before, equations.g - g_before);
     equations.met += met > 0 ? 1 : 0;
   }
   return equations;
 }
 
 void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObservation> corners,
-                                 bool settling, Equations& equations) const {
+                                 bool settling, Equations& equations, RegionSums* regions) const {
   for (const MotionObservation& corner : corners) {
     const Vector3 x = T_c_ref * corner.x_ref;
     if (!in_front_of_camera(x)) continue;
@@ -150,8 +156,11 @@ void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObser
     J << Matrix3::Identity(), -hat(x);
     J = rig_.project_jacobian(x) * J;
     const Eigen::Matrix<double, 6, 3> weighted = robust * J.transpose() * information.asDiagonal();
-    equations.H.noalias() += weighted * J;
-    equations.g.noalias() += weighted * residual;
+    const Matrix6 H = weighted * J;
+    const Vector6 g = weighted * residual;
+    equations.H += H;
+    equations.g += g;
+    if (regions != nullptr) regions->add(corner.z.head<2>(), H, g);
   }
 }
 
@@ -176,32 +185,46 @@ std::optional<Matrix6> DepthAlignment::determined(const Equations& equations,
 }
 
 tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
-    const SE3& T_c_ref, std::span<const MotionObservation> corners) const {
+    const SE3& T_c_ref_start, std::span<const MotionObservation> corners) const {
   if (static_cast<int>(current_.planes().size()) < options_.min_planes || views_ == 0)
     return tl::unexpected(LostCause::kTooFewMatches);
-  Result result{T_c_ref, Matrix6::Zero(), 0};
+  SE3 T_c_ref = T_c_ref_start;
   Pass pass{kWidestKernel, kFirstStride, false};
   if (static_cast<int>(corners.size()) < options_.min_corners) corners = {};
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
-    Equations equations = linearise(result.T_c_ref, pass);
+    Equations equations = linearise(T_c_ref, pass);
     if (equations.pairs < 6) return tl::unexpected(LostCause::kTooFewMatches);
-    add_corners(result.T_c_ref, corners, pass.stride == 1, equations);
+    add_corners(T_c_ref, corners, pass.stride == 1, equations);
     equations.H.diagonal() *= 1 + 1e-9;  // a wall leaves directions open: they are judged in the end
     const Vector6 step = -solve_symmetric(equations.H, equations.g);
     if (!step.allFinite() || !(step.norm() < 1)) return tl::unexpected(LostCause::kNoStructure);
-    result.T_c_ref = SE3::exp(step) * result.T_c_ref;
+    T_c_ref = SE3::exp(step) * T_c_ref;
     if (pass.stride == 1 && step.norm() < kSettled) break;
     if (step.norm() < kNearlySettled) pass.stride = 1;
     pass.kernel = std::clamp(2 * equations.deviations / equations.pairs, options_.kernel, kWidestKernel);
   }
-  const Equations depth = linearise(result.T_c_ref, {options_.kernel, 1, true});
+  return judge(T_c_ref, corners);
+}
+
+/// Whether a pose is to be believed, and how well it is known.
+tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::judge(
+    const SE3& T_c_ref, std::span<const MotionObservation> corners) const {
+  Result result;
+  result.T_c_ref = T_c_ref;
+  RegionSums regions(rig_.camera);
+  const Equations depth = linearise(T_c_ref, {options_.kernel, 1, true}, &regions);
   result.met = static_cast<double>(depth.met) / static_cast<double>(current_.planes().size());
   if (result.met < options_.min_met) return tl::unexpected(LostCause::kTooFewMatches);
   Equations of_corners;
-  add_corners(result.T_c_ref, corners, true, of_corners);
+  add_corners(T_c_ref, corners, true, of_corners, &regions);
   const auto information = determined(depth, of_corners.H);
   if (!information) return tl::unexpected(LostCause::kNoStructure);
-  result.information = *information;
+  result.all = depth.H + of_corners.H;
+  result.by_rows = regions.by_rows();
+  const auto of_regions = regions.jackknife(result.all);
+  const double factor = std::max(1.0, regions.variance_factor(result.all).value_or(1));
+  const Matrix6 usual = factor * inverse_symmetric(*information);
+  result.covariance = of_regions ? Matrix6(kOfRegions * *of_regions + (1 - kOfRegions) * usual) : usual;
   return result;
 }
 

@@ -8,6 +8,7 @@
 
 #include "camera/rig.hpp"
 #include "estimation/motion_only.hpp"
+#include "estimation/region_sums.hpp"
 #include "graph/ids.hpp"
 #include "tracking/depth_planes.hpp"
 #include "tracking/lost_cause.hpp"
@@ -42,6 +43,10 @@ struct DepthAlignmentOptions {
 /// (errors in variables). A direction that mostly chance determines, along a bare wall or a corridor without
 /// ends, is refused and not guessed.
 ///
+/// Half of the covariance is what the parts of the image say that is left when each of them is left out
+/// (RegionSums): lens, shutter and sensor bend surfaces together, and a pose that hangs on the end of a
+/// corridor is known as well as that end.
+///
 /// Bounded work, no allocation after construction.
 class DepthAlignment {
  public:
@@ -61,8 +66,10 @@ class DepthAlignment {
 
   struct Result {
     SE3 T_c_ref;
-    Matrix6 information;  ///< of T_c_ref, left perturbation (v, omega), what is owed to chance taken off
-    double met = 0;       ///< share of the frame's planes that were met
+    Matrix6 covariance;  ///< of T_c_ref, left perturbation (v, omega)
+    Matrix6 all;         ///< J^T W J, what is owed to chance included
+    Matrix6 by_rows;     ///< RegionSums::by_rows
+    double met = 0;      ///< share of the frame's planes that were met
   };
   /// @param T_c_ref  prediction
   /// @param corners  found in the frame, in the reference's frame; may be none
@@ -100,7 +107,9 @@ class DepthAlignment {
     std::size_t stride;  ///< every so many planes of the frame
     bool with_chance;
   };
-  [[nodiscard]] Equations linearise(const SE3& T_c_ref, const Pass& pass) const;
+  /// @param regions  adds what each plane of the frame says; may be null
+  [[nodiscard]] Equations linearise(const SE3& T_c_ref, const Pass& pass,
+                                    RegionSums* regions = nullptr) const;
   /// What a plane of the frame and one of a view say of the pose.
   struct Pair {
     Vector3 m_c;                     ///< the view's plane in the frame's axes
@@ -114,9 +123,11 @@ class DepthAlignment {
   void add_pairs(const DepthPlanes::Plane& seen, std::span<const Pair> pairs, const Pass& pass,
                  Equations& equations) const;
   void add_corners(const SE3& T_c_ref, std::span<const MotionObservation> corners, bool settling,
-                   Equations& equations) const;
+                   Equations& equations, RegionSums* regions = nullptr) const;
   [[nodiscard]] std::optional<Matrix6> determined(const Equations& equations,
                                                   const Matrix6& of_corners) const;
+  [[nodiscard]] tl::expected<Result, LostCause> judge(const SE3& T_c_ref,
+                                                      std::span<const MotionObservation> corners) const;
 
   Rig rig_;
   DepthAlignmentOptions options_;

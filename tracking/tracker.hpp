@@ -157,7 +157,7 @@ class Tracker {
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
-  [[nodiscard]] Matrix6 shutter_covariance(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
+  [[nodiscard]] Matrix6 shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
                                            const FrameStep& step) const;
   [[nodiscard]] Matrix6 honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
                                            const FrameStep& step);

@@ -221,17 +221,17 @@ double Tracker::readout_sigma() const {
 /// What a rolling shutter adds to the covariance. Its readout is known with an error, if at all; and the
 /// motion within a frame is taken to be that since the frame before, which is wrong by half of what the
 /// motion changed by, or by all of it where the frame before knew none.
-Matrix6 Tracker::shutter_covariance(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
+/// @param by_rows  RegionSums::by_rows of the measurements that `information` is of
+Matrix6 Tracker::shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
                                     const FrameStep& step) const {
   Matrix6 covariance = Matrix6::Zero();
-  const auto velocity = velocity_at(motion.T_c_ref, step.frame);
+  const auto velocity = velocity_at(step.result.T_c_ref, step.frame);
   if (!velocity || step.result.reference != last_.reference) return covariance;
   const Vector6 change = last_velocity_ ? 0.5 * (*velocity - *last_velocity_) : *velocity;
   for (const Vector6& bent :
        {Vector6(readout_sigma() * *velocity), Vector6(rig_.readout.value_or(0) * change)}) {
     if (bent.isZero(0)) continue;
-    const Vector6 pushed =
-        solve_symmetric(motion.information, readout_force(rig_, motion_, motion, bent, solver));
+    const Vector6 pushed = solve_symmetric(information, by_rows * bent);
     covariance += 2 * pushed * pushed.transpose();  // the reference keyframe moved as well, and alike
   }
   return covariance;
@@ -241,14 +241,12 @@ Matrix6 Tracker::shutter_covariance(const MotionOnlyResult& motion, const Motion
 Matrix6 Tracker::honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
                                     const FrameStep& step) {
   // A pose that elders alone give is not the one that all points agree on.
-  if (elder_vote_.mistrusts_the_young()) {
-    uncertainty_.forget_frame();
-  } else {
-    uncertainty_.update(motion_, motion, solver);
-    if (const auto difference = elder_vote_.difference()) uncertainty_.add_split(*difference);
-  }
-  const Matrix6 covariance =
-      uncertainty_.covariance(motion.information) + shutter_covariance(motion, solver, step);
+  const bool all_agree = !elder_vote_.mistrusts_the_young();
+  uncertainty_.update(motion_, motion, solver, all_agree);
+  const auto difference = elder_vote_.difference();
+  if (all_agree && difference) uncertainty_.add_split(*difference);
+  const Matrix6 covariance = uncertainty_.covariance(motion.information) +
+                             shutter_covariance(motion.information, uncertainty_.by_rows(), step);
   const Matrix6 information = inverse_symmetric(covariance);
   return information.allFinite() ? information : motion.information / uncertainty_.variance_factor();
 }
@@ -360,7 +358,8 @@ LostCause Tracker::place_by_surfaces(const SE3& T_c_ref, FrameStep& step) {
   result.cause = LostCause::kNone;
   result.reference = last_.reference;
   result.T_c_ref = placed->T_c_ref;
-  result.information = placed->information;
+  result.information =
+      inverse_symmetric(placed->covariance + shutter_covariance(placed->all, placed->by_rows, step));
   result.matches = static_cast<int>(matches_.size());
   result.inliers = classify_observations(rig_, motion_, result.T_c_ref, options_.motion);
   return LostCause::kNone;

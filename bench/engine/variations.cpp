@@ -250,23 +250,25 @@ Trajectory longest(const std::map<KeyframeId, Trajectory>& of_parts) {
   return found;
 }
 
-/// @param noise  of the truth; its clock is how far the recording's time stamps scatter
+/// @param noise    of the truth; its clock is how far the recording's time stamps scatter
+/// @param readout  of the cameras, where the source leaves it open [s]
 Outcome run(const std::string& text, const SourceOptions& source_options, const Variation& variation,
-            TruthNoise noise) {
+            TruthNoise noise, std::optional<double> readout) {
   const std::unique_ptr<FrameSource> source = open_source(text, source_options);
+  Rig rig = source->rig();
+  if (!rig.readout) rig.readout = readout;
   std::vector<Frame> frames = read_all(*source);
   if (frames.empty()) throw std::runtime_error(text + ": no frames");
   const std::int64_t end_ns = frames.back().t_ns;
   frames = reordered(frames, variation.order, end_ns);
-  const Trajectory truth =
-      reordered(varied(source->ground_truth(), source->rig(), variation), variation.order, end_ns);
+  const Trajectory truth = reordered(varied(source->ground_truth(), rig, variation), variation.order, end_ns);
   std::vector<RelativePose> relative_poses;
   ClockJitter jitter;
   Outcome outcome;
   EngineOptions options;
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  const bool to_scale = source->rig().kind != SensorKind::kMono;  // lengths are comparable with the truth's
+  const bool to_scale = rig.kind != SensorKind::kMono;  // lengths are comparable with the truth's
   options.on_pose = [&](const PoseReport& report) {
     const FrameRecord& record = report.record;
     jitter.add(record.t_ns);
@@ -287,7 +289,7 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
     return FeedStatus::kFrame;
   };
   const std::atomic<bool> interrupted{false};
-  const RunResult result = Engine(varied(source->rig(), variation), options).run(feed, interrupted);
+  const RunResult result = Engine(varied(rig, variation), options).run(feed, interrupted);
   if (!result.error.empty()) throw std::runtime_error(text + ": " + result.error);
   std::map<KeyframeId, Trajectory> estimates, causal;  // parts have worlds of their own
   for (const FrameRecord& record : result.frames) {
@@ -376,6 +378,7 @@ int main(int argc, char** argv) {
   int only = -1;
   std::vector<int> every;
   std::vector<double> truth{0, 0};
+  std::optional<double> readout;
   CLI::App app("Runs of one recording that should differ by little");
   app.add_option("source", sources, "as of 'twofold run'")->required();
   app.add_option("--calib", calibration, "calibration file for all of them");
@@ -395,6 +398,7 @@ int main(int argc, char** argv) {
                  "instead of the variations: every first, second, .. frame, as many as given")
       ->check(CLI::PositiveNumber)
       ->excludes(one);
+  app.add_option("--readout", readout, "of the cameras, where the source leaves it open [s]; rendered: 0");
   app.add_option("--truth", truth, "standard deviations of the truth's own poses: METRES RADIANS")
       ->expected(2);
   CLI11_PARSE(app, argc, argv);
@@ -421,7 +425,8 @@ int main(int argc, char** argv) {
       for (twofold::Variation& variation : variations) {
         variation.order = order;
         if (only >= 0 && &variation != &variations[static_cast<std::size_t>(only)]) continue;
-        const twofold::Outcome outcome = twofold::run(source, options, variation, {truth[0], truth[1]});
+        const twofold::Outcome outcome =
+            twofold::run(source, options, variation, {truth[0], truth[1]}, readout);
         print_row(variation, outcome);
         if (frames) twofold::print_frames(outcome);
         if (poses) twofold::print_poses(outcome);
