@@ -219,6 +219,7 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::judge(
   add_corners(T_c_ref, corners, true, of_corners, &regions);
   const auto information = determined(depth, of_corners.H);
   if (!information) return tl::unexpected(LostCause::kNoStructure);
+  result.information = *information;
   result.all = depth.H + of_corners.H;
   result.by_rows = regions.by_rows();
   const auto of_regions = regions.jackknife(result.all);

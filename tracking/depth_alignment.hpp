@@ -66,10 +66,11 @@ class DepthAlignment {
 
   struct Result {
     SE3 T_c_ref;
-    Matrix6 covariance;  ///< of T_c_ref, left perturbation (v, omega)
-    Matrix6 all;         ///< J^T W J, what is owed to chance included
-    Matrix6 by_rows;     ///< RegionSums::by_rows
-    double met = 0;      ///< share of the frame's planes that were met
+    Matrix6 covariance;   ///< of T_c_ref, left perturbation (v, omega)
+    Matrix6 information;  ///< if each plane erred by itself: J^T W J, what is owed to chance taken off
+    Matrix6 all;          ///< J^T W J
+    Matrix6 by_rows;      ///< RegionSums::by_rows
+    double met = 0;       ///< share of the frame's planes that were met
   };
   /// @param T_c_ref  prediction
   /// @param corners  found in the frame, in the reference's frame; may be none

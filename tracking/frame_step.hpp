@@ -41,6 +41,8 @@ class FrameStep {
   bool started = false;        ///< a map or map part, with this frame
   RollingShutter shutter;      ///< as the camera moves in this frame, as far as known
   TrackResult result;
+  /// Of a pose that surfaces gave, as if each plane erred by itself: so edges of points are weighed, too.
+  Matrix6 information_of_planes = Matrix6::Zero();
 
   /// Attributes the time since the last lap to a stage.
   void lap(TrackerStage stage) {

@@ -84,7 +84,7 @@ void Tracker::begin_proposal(const Placement& placement, FrameStep& step) {
   proposal.snapshot_version = step.graph.version();
   proposal.reference = placement.reference;
   proposal.T_k_ref = placement.T_c_ref;
-  if (step.result.by_depth) proposal.pose_information = step.result.information;
+  if (step.result.by_depth) proposal.pose_information = step.information_of_planes;
   proposal.median_depth = last_keyframe_.median_depth;
   immature_points_.add_pending({proposal.id, placement.reference, placement.T_c_ref});
   step.result.proposed = true;

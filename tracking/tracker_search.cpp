@@ -358,6 +358,7 @@ LostCause Tracker::place_by_surfaces(const SE3& T_c_ref, FrameStep& step) {
   result.cause = LostCause::kNone;
   result.reference = last_.reference;
   result.T_c_ref = placed->T_c_ref;
+  step.information_of_planes = placed->information;
   result.information =
       inverse_symmetric(placed->covariance + shutter_covariance(placed->all, placed->by_rows, step));
   result.matches = static_cast<int>(matches_.size());

@@ -99,7 +99,7 @@ TEST_F(DepthAlignmentTest, SeveralKeyframesSayMoreThanOne) {
                           T_view_ref);
     }
     const auto placed = alignment_.align(SE3(), {});
-    return placed ? placed->all.trace() : 0;
+    return placed ? placed->information.trace() : 0;
   };
   const double one = information(1);
   EXPECT_GT(one, 0);
