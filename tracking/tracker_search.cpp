@@ -312,8 +312,18 @@ bool Tracker::add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step)
   const bool few =
       found != LostCause::kNone ? corners_scarce_ : step.result.inliers < options_.scarce_inliers;
   if (!few || !surfaces_can_place()) return false;
-  const SE3& start = found == LostCause::kNone ? step.result.T_c_ref : T_c_ref;
-  return place_by_surfaces(start, step) == LostCause::kNone;
+  const TrackResult by_points = step.result;
+  const SE3& start = found == LostCause::kNone ? by_points.T_c_ref : T_c_ref;
+  if (place_by_surfaces(start, step) != LostCause::kNone) return false;
+  if (loss_.lost_frames() == 0) return true;
+  // After a loss surfaces may have found another place of the same shape: what points say counts.
+  if (found != LostCause::kNone ? points_allow(step) : 2 * step.result.inliers >= by_points.inliers)
+    return true;
+  const auto stage_ns = step.result.stage_ns;
+  step.result = by_points;
+  step.result.stage_ns = stage_ns;
+  classify_observations(rig_, motion_, by_points.T_c_ref, options_.motion);
+  return false;
 }
 
 /// Before the frame is given up: what it measures, and no points.

@@ -137,6 +137,44 @@ TEST(Tracker, TakesBackRowsThatAreSomeApart) {
   }
 }
 
+/// Half a turn away a box of a room has the same shape: after a loss its surfaces fit there as well, and what
+/// is on the walls tells.
+TEST(Tracker, TakesNoPlaceForAnotherOfTheSameShape) {
+  const Rig rig = test_rig(SensorKind::kRgbd, 320, 240);
+  RenderedScene scene(rig, {3, 2, 3}, 21);
+  Odometry odometry(rig);
+  std::int64_t index = 0;
+  const auto step = [&](const SE3& T_c_w, bool dark, bool covered) {
+    FrameImages images;
+    scene.render(T_c_w, 2, images);
+    Frame frame{index, index * std::int64_t{33'000'000}, images.left.level(0).clone(), {}, images.depth};
+    if (dark) frame.left.setTo(3);
+    if (covered) frame.depth.setTo(0);
+    ++index;
+    return odometry.step(frame);
+  };
+  // Down into a corner; steps aside end in the middle of the room.
+  const auto at = [](double turned, double aside) {
+    return SE3(SO3::exp(Vector3(0.5, 0, 0)) * SO3::exp(Vector3(0, turned, 0)), Vector3(aside, 0, 0));
+  };
+  constexpr int kSteps = 30;
+  for (int i = 0; i <= kSteps; ++i) {
+    const TrackResult tracked = step(at(0.5 + 0.01 * i, 0.02 * (i - kSteps)), false, false);
+    ASSERT_EQ(tracked.status, TrackStatus::kTracking) << i;
+  }
+  const SE3 T_last_w = at(0.8, 0);
+  const TrackResult by_surfaces = step(T_last_w, true, false);  // the light goes out
+  ASSERT_EQ(by_surfaces.status, TrackStatus::kTracking) << describe(by_surfaces.cause);
+  ASSERT_TRUE(by_surfaces.by_depth);
+  ASSERT_EQ(step(T_last_w, true, true).status, TrackStatus::kLost);
+  const TrackResult elsewhere = step(at(0.8 + M_PI, 0), false, false);
+  EXPECT_EQ(elsewhere.status, TrackStatus::kLost) << elsewhere.candidates << " candidates";
+  const TrackResult back = step(T_last_w, false, false);
+  ASSERT_EQ(back.status, TrackStatus::kTracking) << describe(back.cause);
+  const SE3 T_c_first = T_last_w * at(0.5, -0.02 * kSteps).inverse();
+  EXPECT_LT((odometry.T_c_w(back) * T_c_first.inverse()).translation().norm(), 0.03);
+}
+
 TEST(Tracker, SaysThatItIsLostForWhatWasMissedBefore) {
   const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
   const auto cause_after = [&](std::int64_t missing, std::int64_t gap_ns) {
