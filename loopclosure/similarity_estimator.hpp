@@ -16,15 +16,15 @@ namespace twofold {
 struct TwoWaySimilarity {
   explicit TwoWaySimilarity(const Sim3& S)
       : S_b_a(S),
-        sR_b_a(S.scale() * S.rotation()),
-        sR_a_b(S.rotation().transpose() / S.scale()),
-        t_a_b(-(sR_a_b * S.translation())),
-        turn(turn_of(sR_b_a)) {}
-  [[nodiscard]] Vector3 to_b(const Vector3& x_a) const { return sR_b_a * x_a + S_b_a.translation(); }
-  [[nodiscard]] Vector3 to_a(const Vector3& x_b) const { return sR_a_b * x_b + t_a_b; }
+        H_b_a(S.scale() * S.rotation()),
+        H_a_b(S.rotation().transpose() / S.scale()),
+        t_a_b(-(H_a_b * S.translation())),
+        turn(turn_of(H_b_a)) {}
+  [[nodiscard]] Vector3 to_b(const Vector3& x_a) const { return H_b_a * x_a + S_b_a.translation(); }
+  [[nodiscard]] Vector3 to_a(const Vector3& x_b) const { return H_a_b * x_b + t_a_b; }
 
   Sim3 S_b_a;
-  Matrix3 sR_b_a, sR_a_b;
+  Matrix3 H_b_a, H_a_b;  ///< scale times rotation
   Vector3 t_a_b;
   double turn;
 };
