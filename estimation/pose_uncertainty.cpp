@@ -66,7 +66,7 @@ void PoseUncertainty::add_split(double factor) {
 }
 
 Matrix6 PoseUncertainty::covariance(const Matrix6& information) const {
-  const Matrix6 usual = variance_factor() * inverse_symmetric(information);
+  Matrix6 usual = variance_factor() * inverse_symmetric(information);
   if (!of_frame_ || !regions_) return usual;
   // What splits show and regions do not is missing in the frame's own part by the same factor.
   const double hidden = variance_factor() / std::max(*regions_, std::numeric_limits<double>::min());
