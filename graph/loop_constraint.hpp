@@ -13,7 +13,8 @@ struct LoopConstraint {
   KeyframeId from = kNoKeyframe;
   KeyframeId to = kNoKeyframe;
   SE3 T_to_from;    ///< verified geometrically, in the unit of `to` [m]
-  int inliers = 0;  ///< matches that agree with it: weight of the edge
+  int inliers = 0;  ///< matches that agree with it
+  int weight = 1;   ///< of the edge, >= 1: the inliers, each as far as its point's position is known
   double scale =
       1;  ///< lengths around `to` over the same around `from`. 1 but for one camera, whose unit drifts
 

@@ -65,8 +65,8 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
     const auto scale = scale_of(*verified);
     if (!scale) continue;
     const SE3 T_to_from(verified->T_c_k.so3(), *scale * verified->T_c_k.translation());
-    const LoopConstraint seen{graph.version(), candidate.keyframe, keyframe.id,
-                              T_to_from,       verified->inliers,  *scale};
+    const LoopConstraint seen{graph.version(),   candidate.keyframe, keyframe.id, T_to_from,
+                              verified->inliers, verified->weight,   *scale};
     if (probation_.confirms(seen, graph) &&
         !(one_camera && redundant_.contains(seen, refinement_.found(), graph)))
       loop = seen;
@@ -111,10 +111,10 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
   RefinedPlace refined;
   switch (refinement_.refine(graph, k, images, place->T_b_a, refined)) {
     case RefinementOutcome::kRefined:
-      return Relocalisation{k, refined.T_c_k, refined.inliers};
+      return Relocalisation{k, refined.T_c_k, refined.inliers, refined.weight};
     case RefinementOutcome::kTooFewPoints:
       if (rig_.kind == SensorKind::kMono) return std::nullopt;
-      return Relocalisation{k, place->T_b_a, place->inliers};
+      return Relocalisation{k, place->T_b_a, place->inliers, place->inliers};
     case RefinementOutcome::kContradicted:
       break;
   }

@@ -36,6 +36,7 @@ struct Relocalisation {
   KeyframeId keyframe = kNoKeyframe;
   SE3 T_c_k;
   int inliers = 0;
+  int weight = 1;  ///< what they are worth together (RefinedPlace)
 };
 
 /// Large-scale loop closure  (thesis 6.4.2), and relocalisation.

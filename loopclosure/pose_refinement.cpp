@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "graph/point_covariance.hpp"
 #include "imaging/guided_search.hpp"
 
 namespace twofold {
@@ -19,6 +20,7 @@ RefinementOutcome PoseRefinement::refine(const GraphSnapshot& graph, KeyframeId 
     if (!motion.converged || motion.inliers < options_.min_inliers) return RefinementOutcome::kContradicted;
     result.T_c_k = motion.T_c_ref;
   }
+  result.weight = weight_of_inliers();
   const bool agreed = result.inliers >= options_.min_inlier_share * static_cast<double>(found_.size()) &&
                       result.inliers >= options_.min_visible_share * static_cast<double>(visible_.size());
   return agreed ? RefinementOutcome::kRefined : RefinementOutcome::kContradicted;
@@ -43,6 +45,7 @@ void PoseRefinement::search(const GraphSnapshot& graph, KeyframeId place, const 
   GuidedSearchOptions options;
   options.radius_px = radius_px;
   found_.clear();
+  known_.clear();
   const SE3 T_k_w = graph.T_k_w(place);
   for (const PointId id : visible_) {
     const MapPoint& point = graph.point(id);
@@ -50,8 +53,26 @@ void PoseRefinement::search(const GraphSnapshot& graph, KeyframeId place, const 
     const auto match = find_point(images, rig_, *point.appearance, point.psi, T_c_a, options);
     if (!match) continue;
     const Eigen::Vector3f z = match->z.cast<float>();
-    found_.push_back({T_k_w * graph.position(id), z, rig_.information(z, match->level)});
+    const Eigen::Vector3f of_pixels = rig_.information(z, match->level);
+    const Eigen::Vector3f left = information(graph, id, T_c_k * T_k_w, of_pixels);
+    found_.push_back({T_k_w * graph.position(id), z, left});
+    known_.push_back(std::min(1.0f, left.x() / of_pixels.x() + left.y() / of_pixels.y()));
   }
+}
+
+Eigen::Vector3f PoseRefinement::information(const GraphSnapshot& graph, PointId id, const SE3& T_c_w,
+                                            const Eigen::Vector3f& of_pixels) const {
+  const auto P_w = point_covariance(rig_, graph, id);
+  if (!P_w) return of_pixels;
+  const Matrix3 J = rig_.project_jacobian(T_c_w * graph.position(id)) * T_c_w.rotation();
+  const Eigen::Array3f of_position = (J * *P_w * J.transpose()).diagonal().cast<float>();
+  return of_pixels.array() / (1 + of_pixels.array() * of_position);
+}
+
+int PoseRefinement::weight_of_inliers() const {
+  double sum = 0;
+  for (std::size_t i = 0; i < found_.size(); ++i) sum += found_[i].inlier ? known_[i] : 0.0;
+  return std::max(1, static_cast<int>(std::lround(sum)));
 }
 
 }  // namespace twofold

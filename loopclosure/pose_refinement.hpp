@@ -30,6 +30,10 @@ struct RefinementOptions {
 struct RefinedPlace {
   SE3 T_c_k;
   int inliers = 0;
+  /// Inliers, each as far as its position is known from here: 1 if to a pixel's noise or better, as a point
+  /// is that an edge's two keyframes both measure (edge_information); towards 0 where its depth shifts it by
+  /// more.
+  int weight = 1;
 };
 
 enum class RefinementOutcome : std::uint8_t {
@@ -40,7 +44,8 @@ enum class RefinementOutcome : std::uint8_t {
 
 /// Looks for the map's points around a keyframe in a view whose place was recognised. Their patches, and
 /// depths estimated from many frames, give the pose far more exactly than described corners with depths from
-/// one frame; and they are evidence that does not depend on the descriptors.
+/// one frame; and they are evidence that does not depend on the descriptors. Seen from aside, a depth's error
+/// shifts a point: each is weighed by how well it is known from here.
 class PoseRefinement {
  public:
   PoseRefinement(const Rig& rig, const RefinementOptions& options) : rig_(rig), options_(options) {}
@@ -56,6 +61,10 @@ class PoseRefinement {
   void collect_points(const GraphSnapshot& graph, KeyframeId place, const SE3& T_c_k);
   void search(const GraphSnapshot& graph, KeyframeId place, const FrameImages& images, const SE3& T_c_k,
               double radius_px);
+  /// What a point's measurement tells of a pose: Omega, less the noise of its position.
+  [[nodiscard]] Eigen::Vector3f information(const GraphSnapshot& graph, PointId id, const SE3& T_c_w,
+                                            const Eigen::Vector3f& of_pixels) const;
+  [[nodiscard]] int weight_of_inliers() const;
 
   Rig rig_;
   RefinementOptions options_;
@@ -63,6 +72,7 @@ class PoseRefinement {
   std::vector<PointId> visible_;
   VisitedSet visited_;
   std::vector<MotionObservation> found_;
+  std::vector<float> known_;  ///< of each that was found, what it adds to RefinedPlace::weight: (0, 1]
 };
 
 }  // namespace twofold

@@ -94,7 +94,7 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   if (from == to) return;
   const SE3 T_to_from = T_loop_to.inverse() * loop.T_to_from * T_loop_from;
   report.joined += join_parts(writer_, from, to, T_to_from);
-  link_marginalised(writer_, from, to, std::max(1, loop.inliers), T_to_from);
+  link_marginalised(writer_, from, to, loop.weight, T_to_from);
   if (options_.hook) options_.hook->loop_closed(from, to);
   writer_.announce_jump(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
   ++report.loops;

@@ -21,12 +21,12 @@ Matrix7 similarity_information(const Keyframe& from, const Keyframe& to, const E
   return information;
 }
 
-/// The loop in the place of an edge: it weighs as much as all that agrees with it.
+/// The loop in the place of an edge.
 Similarities::Constraint loop_constraint(const GraphSnapshot& graph, const LoopConstraint& loop, int from,
                                          int to, const Rig& rig, const MapperOptions& options) {
   Edge edge;
   edge.other = loop.to;
-  edge.weight = std::max(1, loop.inliers);
+  edge.weight = loop.weight;
   return {
       from, to, loop.S_to_from(),
       similarity_information(graph.keyframe(loop.from), graph.keyframe(loop.to), edge, rig, options.edge)};

@@ -1,9 +1,9 @@
 #include "slam/map_snapshot.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 
 #include "graph/part_extraction.hpp"
+#include "graph/point_covariance.hpp"
 #include "imaging/guided_search.hpp"
 #include "slam/conversions.hpp"
 
@@ -23,24 +23,6 @@ void for_each_keyframe(const GraphSnapshot& graph, const Visit& visit) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
     if (!keyframe.culled()) visit(keyframe);
   }
-}
-
-/// (sum over observers of J^T Omega J)^-1, J = d z / d x_w: the poses are taken as true.
-void find_covariance(const Rig& rig, const GraphSnapshot& graph, PointId id, MapSnapshot::Point& point) {
-  const Vector3 x_w(point.position[0], point.position[1], point.position[2]);
-  Matrix3 information = Matrix3::Zero();
-  for (const KeyframeId observer : *graph.point(id).observers) {
-    const Keyframe& keyframe = graph.keyframe(observer);
-    const Observation* seen = find_observation(keyframe, id);
-    const Vector3 x_k = keyframe.T_k_w * x_w;
-    if (seen == nullptr || !in_front_of_camera(x_k)) continue;
-    const Matrix3 J = rig.project_jacobian(x_k) * keyframe.T_k_w.rotation();
-    const Vector3 weight = rig.information(seen->z, seen->level).cast<double>();
-    information += J.transpose() * weight.asDiagonal() * J;
-  }
-  const Eigen::LDLT<Matrix3> factor(information);
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return;
-  Eigen::Map<Matrix3>(point.covariance.data()) = factor.solve(Matrix3::Identity());
 }
 
 // What the heap and a count of uses take of a block beside its values, and the tree of a PersistentVector of
@@ -117,7 +99,8 @@ std::vector<MapSnapshot::Point> MapSnapshot::points(bool with_covariance) const 
     point.part = index(graph.part(from.anchor));
     point.observers = static_cast<std::uint32_t>(from.observers->size());
     Eigen::Map<Vector3>(point.position.data()) = graph.position(PointId{p});
-    if (with_covariance) find_covariance(impl_->rig, graph, PointId{p}, point);
+    const auto covariance = with_covariance ? point_covariance(impl_->rig, graph, PointId{p}) : std::nullopt;
+    if (covariance) Eigen::Map<Matrix3>(point.covariance.data()) = *covariance;
   }
   return points;
 }

@@ -35,7 +35,7 @@ class RedundantLoopTest : public ::testing::Test {
   /// What the images say: where the map has it, but for `error` and a scale.
   static LoopConstraint loop(const GraphSnapshot& graph, const SE3& error = SE3(), double scale = 1) {
     const SE3 T = error * graph.T_k_w(kTo) * graph.T_k_w(kFrom).inverse();
-    return {graph.version(), kFrom, kTo, SE3(T.so3(), scale * T.translation()), 100, scale};
+    return {graph.version(), kFrom, kTo, SE3(T.so3(), scale * T.translation()), 100, 100, scale};
   }
   bool redundant(const LoopConstraint& loop, const GraphSnapshot& graph) {
     return loops_.contains(loop, wall_, graph);

@@ -86,7 +86,7 @@ TEST(MapParts, AProposalWithoutReferenceStartsOneAndALoopJoinsIt) {
   loop.from = KeyframeId{6};
   loop.to = KeyframeId{1};
   loop.T_to_from = kConstraint;
-  loop.inliers = 40;
+  loop.weight = 40;
   const MapperReport report = mapper.step({}, std::span(&loop, 1));
   EXPECT_EQ(report.joined, 2);
   EXPECT_EQ(mapper.graph().last_jump().kind, MapChange::Kind::kPartsJoined);

@@ -30,7 +30,7 @@ TEST(Mapper, ANewMapPartStartsItsOwnWindowAndIsJoinedByALoop) {
   LoopConstraint loop;
   loop.from = lost.id;
   loop.to = KeyframeId{7};
-  loop.inliers = 40;
+  loop.weight = 40;
   loop.T_to_from = SE3(SO3(), {0.1, 0, 0});
   report = mapper.step({}, std::span(&loop, 1));
   EXPECT_EQ(report.loops, 1);

@@ -50,7 +50,7 @@ GraphWriter drifting_map() {
 
 LoopConstraint loop_of(std::uint32_t from, std::uint32_t to, double scale) {
   const SE3 T = truth(to) * truth(from).inverse();
-  return {1, KeyframeId{from}, KeyframeId{to}, SE3(T.so3(), scale * T.translation()), 100, scale};
+  return {1, KeyframeId{from}, KeyframeId{to}, SE3(T.so3(), scale * T.translation()), 100, 100, scale};
 }
 
 /// Root mean square distance of keyframes or points from the truth, in the best unit.
