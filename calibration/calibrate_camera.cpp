@@ -1,19 +1,14 @@
-#include <algorithm>
 #include <numeric>
 #include <opencv2/calib3d.hpp>
+#include <span>
 
+#include "base/check.hpp"
+#include "base/median.hpp"
 #include "calibration/calibrate_alone.hpp"
 #include "calibration/refusal.hpp"
-#include "geometry/check.hpp"
 
 namespace twofold {
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Solves with the views `used`; fills everything but the coverage.
 struct Solved {
@@ -58,7 +53,8 @@ Solved solve_camera(const std::vector<BoardView>& views, const Board& board, cv:
 /// The views whose error is not far above the others': a moved or half hidden board spoils few of them.
 std::vector<int> without_outliers(const std::vector<int>& used, const std::vector<double>& errors,
                                   double factor) {
-  const double limit = factor > 0 ? factor * median(errors) : 1e9;
+  std::vector<double> by_size = errors;
+  const double limit = factor > 0 ? factor * median(std::span(by_size)) : 1e9;
   std::vector<int> kept;
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (errors[i] <= limit) kept.push_back(used[i]);

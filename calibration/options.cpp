@@ -1,6 +1,6 @@
+#include "base/option_check.hpp"
 #include "calibration/calibrate.hpp"
 #include "calibration/view_guide.hpp"
-#include "geometry/option_check.hpp"
 
 namespace twofold {
 

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

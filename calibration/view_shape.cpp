@@ -4,6 +4,9 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <span>
+
+#include "base/median.hpp"
 
 namespace twofold {
 
@@ -45,9 +48,7 @@ int tilted_views(const std::vector<ViewShape>& shapes, double angle) {
     std::vector<double> values;
     values.reserve(shapes.size());
     for (const ViewShape& shape : shapes) values.push_back(shape.normal[axis]);
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                     values.end());
-    middle[axis] = values[values.size() / 2];
+    middle[axis] = median(std::span(values));
   }
   middle = cv::normalize(middle);
   return static_cast<int>(std::count_if(shapes.begin(), shapes.end(), [&](const ViewShape& shape) {

@@ -54,9 +54,9 @@ function(twofold_use_headers target name)
   endif()
 endfunction()
 
-# Who builds everything compiles the files of a room in batches: less than half of the processor time. Who changes one
+# Who builds everything compiles the files of a room or a test in batches: less than half of the processor time. Who changes one
 # file at a time turns it off; the preset dev does.
-option(TWOFOLD_UNITY "Compile the files of a library in batches" ON)
+option(TWOFOLD_UNITY "Compile the files of a library or test in batches" ON)
 
 # twofold_library(name SOURCES ... PUBLIC ... PRIVATE ...): one static library a folder, alias twofold::name.
 function(twofold_library name)
@@ -120,6 +120,9 @@ function(twofold_test name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE twofold::options ${ARG_LIBS} GTest::gtest GTest::gtest_main)
   twofold_use_headers(${name} tests)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${TWOFOLD_UNITY})
+  # It replaces operator new of the whole program, and stays by itself.
+  set_source_files_properties(../allocation_counter.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   add_test(NAME ${name} COMMAND ${name})
   if(CMAKE_CROSSCOMPILING)
     math(EXPR ARG_TIMEOUT "40 * ${ARG_TIMEOUT}")  # emulated

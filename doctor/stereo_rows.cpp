@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+#include <span>
 #include <vector>
+
+#include "base/median.hpp"
 
 namespace twofold {
 namespace {
@@ -12,11 +14,10 @@ namespace {
 constexpr double kWell = 0.35;  // [px] as far as tracking lets it be
 constexpr const char* kRemedy = "calibrate the pair again (twofold calibrate)";
 
-double median(std::span<const RowOffset> offsets) {
+double median_rows(std::span<const RowOffset> offsets) {
   std::vector<double> rows;
   for (const RowOffset& offset : offsets) rows.push_back(offset.rows);
-  std::nth_element(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(rows.size() / 2), rows.end());
-  return rows[rows.size() / 2];
+  return median(std::span(rows));
 }
 
 }  // namespace
@@ -27,7 +28,7 @@ Finding check_rows(std::span<const RowOffset> offsets) {
     return {Health::kWarn, subject, "too little is found in both images to tell",
             "show the camera something with texture; if that does not help, " + std::string(kRemedy)};
   }
-  const double rows = median(offsets);
+  const double rows = median_rows(offsets);
   const std::string state = fmt::format("right images lie {:.2f} rows {} than left ones", std::abs(rows),
                                         rows > 0 ? "lower" : "higher");
   if (std::abs(rows) <= kWell) return {Health::kOk, subject, state, ""};

@@ -1,7 +1,7 @@
 #include "engine/effort_controller.hpp"
 
-#include "geometry/check.hpp"
-#include "geometry/option_check.hpp"
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 

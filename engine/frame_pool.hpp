@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "geometry/atomics.hpp"
-#include "geometry/check.hpp"
+#include "base/atomics.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 

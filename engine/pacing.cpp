@@ -4,8 +4,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "geometry/check.hpp"
-#include "geometry/option_check.hpp"
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <stop_token>
 
-#include "geometry/atomics.hpp"
+#include "base/atomics.hpp"
 
 namespace twofold {
 

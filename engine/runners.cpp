@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "geometry/processor_time.hpp"
+#include "base/processor_time.hpp"
 
 namespace twofold {
 namespace {

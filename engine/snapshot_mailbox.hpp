@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/atomics.hpp"
-#include "geometry/check.hpp"
+#include "base/atomics.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 

@@ -6,8 +6,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "geometry/atomics.hpp"
-#include "geometry/check.hpp"
+#include "base/atomics.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 

@@ -8,7 +8,7 @@
 #include <ostream>
 #include <utility>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

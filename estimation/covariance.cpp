@@ -2,7 +2,7 @@
 
 #include <Eigen/LU>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 

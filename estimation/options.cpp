@@ -1,6 +1,6 @@
+#include "base/option_check.hpp"
 #include "estimation/motion_only.hpp"
 #include "estimation/window_problem.hpp"
-#include "geometry/option_check.hpp"
 
 namespace twofold {
 

@@ -1,7 +1,7 @@
 #include "estimation/pose_consensus.hpp"
 
+#include "base/option_check.hpp"
 #include "geometry/absolute_orientation.hpp"
-#include "geometry/option_check.hpp"
 #include "geometry/ransac.hpp"
 
 namespace twofold {

@@ -1,10 +1,10 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "base/check.hpp"
 #include "estimation/levenberg_marquardt.hpp"
 #include "estimation/observation_model.hpp"
 #include "estimation/window_solver.hpp"
-#include "geometry/check.hpp"
 #include "geometry/inverse_depth.hpp"
 
 namespace twofold {

@@ -2,9 +2,9 @@
 
 #include <utility>
 
+#include "base/check.hpp"
 #include "estimation/minimise.hpp"
 #include "estimation/reduced_system.hpp"
-#include "geometry/check.hpp"
 
 namespace twofold {
 

@@ -5,9 +5,9 @@
 #include <numbers>
 #include <numeric>
 
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 #include "geometry/absolute_orientation.hpp"
-#include "geometry/check.hpp"
-#include "geometry/option_check.hpp"
 
 namespace twofold {
 namespace {

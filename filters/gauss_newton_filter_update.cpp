@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/processor_time.hpp"
 #include "filters/gauss_newton_filter.hpp"
-#include "geometry/processor_time.hpp"
 
 namespace twofold {
 namespace {

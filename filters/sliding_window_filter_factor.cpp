@@ -1,6 +1,6 @@
 #include "filters/sliding_window_filter_factor.hpp"
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

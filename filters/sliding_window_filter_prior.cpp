@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/check.hpp"
 #include "geometry/cbh.hpp"
-#include "geometry/check.hpp"
 
 namespace twofold {
 namespace {

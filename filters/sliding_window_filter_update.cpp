@@ -1,7 +1,9 @@
 // Linearisation of the sliding window filter: the measurement, process and prior parts of SWF eq. 5-7.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "filters/sliding_window_filter.hpp"
 #include "geometry/cbh.hpp"
@@ -183,10 +185,8 @@ void SlidingWindowFilter::update_threshold() {
   if (chi2s.empty()) return;
   double limit2 = huber_ * huber_;
   if (huber_ == 0) {  // no threshold yet: three times the robust spread given by the median
-    std::nth_element(chi2s.begin(), chi2s.begin() + static_cast<std::ptrdiff_t>(chi2s.size() / 2),
-                     chi2s.end());
     const double least = options_.min_inlier_sigma * options_.min_inlier_sigma;
-    limit2 = 9.0 * 3.0 * std::max(chi2s[chi2s.size() / 2] / kMedianChi2, least);
+    limit2 = 9.0 * 3.0 * std::max(median(std::span(chi2s)) / kMedianChi2, least);
   }
   double sum = 0;
   int inliers = 0;

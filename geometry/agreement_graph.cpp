@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

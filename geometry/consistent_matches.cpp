@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/option_check.hpp"
 #include "geometry/agreement_graph.hpp"
-#include "geometry/option_check.hpp"
 
 namespace twofold {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 

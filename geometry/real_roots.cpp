@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

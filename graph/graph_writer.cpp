@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

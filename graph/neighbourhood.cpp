@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

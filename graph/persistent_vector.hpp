@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "graph/shared_array.hpp"
 
 namespace twofold {

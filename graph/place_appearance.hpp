@@ -11,7 +11,7 @@ namespace twofold {
 struct PlaceAppearance {
   std::vector<DescribedCorner> corners;
   /// In step with corners: (u_l, v_l, u_r) level-0 pixels; u_r is Rig::kNoRight where no depth is known.
-  /// Empty for a monocular rig.
+  /// Empty as stored for a monocular rig (loopclosure/depth_regression.hpp fills it).
   std::vector<Eigen::Vector3f> z;
 };
 

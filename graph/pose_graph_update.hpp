@@ -13,8 +13,8 @@ struct KeyframePose {
   SE3 T_k_w;
 };
 
-/// Message to the mapper: poses of one connected part of the map that agree with all its edges. They are as
-/// good as the version they were computed from, and their world frame is their own.
+/// Message to the mapper: poses of one component of the map's graph that agree with all its edges. They are
+/// as good as the version they were computed from, and their world frame is their own.
 struct PoseGraphUpdate {
   std::uint64_t snapshot_version = 0;
   std::vector<KeyframePose> poses;  ///< first: the keyframe that was fixed

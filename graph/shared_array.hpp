@@ -7,7 +7,7 @@
 #include <new>
 #include <utility>
 
-#include "geometry/atomics.hpp"
+#include "base/atomics.hpp"
 
 namespace twofold {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "imaging/byte_run.hpp"
 #include "imaging/structure_tensor.hpp"
 

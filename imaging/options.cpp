@@ -1,4 +1,4 @@
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 #include "imaging/corner_selection.hpp"
 #include "imaging/guided_search.hpp"
 #include "imaging/plane_warp.hpp"

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <utility>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "imaging/patch.hpp"
 
 namespace twofold {

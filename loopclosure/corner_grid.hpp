@@ -16,8 +16,9 @@ class CornerGrid {
   /// @param radius_px  the largest that is searched, pixels of a corner's level
   CornerGrid(const PinholeCamera& camera, std::span<const DescribedCorner> corners, double radius_px);
 
-  /// The corner most like `descriptor` within `radius_px` pixels of its own level around uv, the upper one
-  /// among equals.
+  /// The corner most like `descriptor` in the square of half-width `radius_px`, pixels of the corner's own
+  /// level, around uv [level-0 pixels], the upper one among equals. `best` is its position in `corners`, -1
+  /// if there is none.
   [[nodiscard]] NearestDescriptor nearest(const Vector2& uv, const BinaryDescriptor& descriptor,
                                           double radius_px) const;
 

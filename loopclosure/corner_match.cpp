@@ -4,8 +4,8 @@
 
 namespace twofold {
 
-SE3 refine_pose(const Rig& rig, const PlaceAppearance& b, const std::vector<CornerMatch>& matches,
-                const SE3& T_b_a) {
+SE3 fit_pose_to_corners(const Rig& rig, const PlaceAppearance& b, const std::vector<CornerMatch>& matches,
+                        const SE3& T_b_a) {
   std::vector<MotionObservation> observations;
   observations.reserve(matches.size());
   for (const CornerMatch& match : matches) {

@@ -19,12 +19,12 @@ struct CornerMatch {
   Vector3 x_a;  ///< the place's point, in the frame of the place's own view [m]
 };
 
-/// False for a corner that none was measured of.
+/// Whether a corner's depth is known and it is near enough to tell about translation.
 [[nodiscard]] inline bool has_depth(const Eigen::Vector3f& z, double min_disparity_px) {
   return z.x() - z.z() > min_disparity_px;  // false for NaN
 }
 
-/// What a squared error is multiplied by to be one in pixels of the corner's level.
+/// Factor that turns a squared error in level-0 pixels into one in pixels of `level`.
 [[nodiscard]] inline double per_squared_pixel(int level) {
   return std::ldexp(1.0, -2 * level);
 }
@@ -39,11 +39,8 @@ struct CornerMatch {
   return squared * per_pixel;
 }
 
-[[nodiscard]] inline double radians(double degrees) {
-  return degrees * std::numbers::pi / 180;
-}
-
-/// By how much directions in the image turn from view a to view b: what of the rotation is about the axis.
+/// By how much directions in the image turn from view a to view b, the part of the rotation about the
+/// camera's axis [rad], positive from x to y; a factor of scale makes no difference.
 [[nodiscard]] inline double turn_of(const Matrix3& R_b_a) {
   return std::atan2(R_b_a(1, 0) - R_b_a(0, 1), R_b_a(0, 0) + R_b_a(1, 1));
 }
@@ -56,8 +53,8 @@ struct CornerMatch {
          bound;  // remainder() takes 5 times as long
 }
 
-/// Pose that fits the matches best, from T_b_a on; T_b_a if there is none.
-[[nodiscard]] SE3 refine_pose(const Rig& rig, const PlaceAppearance& b,
-                              const std::vector<CornerMatch>& matches, const SE3& T_b_a);
+/// Pose that fits the matches best, found from T_b_a on; T_b_a itself when the solver does not converge.
+[[nodiscard]] SE3 fit_pose_to_corners(const Rig& rig, const PlaceAppearance& b,
+                                      const std::vector<CornerMatch>& matches, const SE3& T_b_a);
 
 }  // namespace twofold

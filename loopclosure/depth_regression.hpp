@@ -18,7 +18,7 @@ class DepthRegression {
  public:
   explicit DepthRegression(const PinholeCamera& camera) : camera_(camera) {}
 
-  /// Goes on with the points that keyframe k, which must not be culled, observes.
+  /// Forgets what it knew, and learns the points that keyframe k, which must not be culled, observes.
   void learn(const GraphSnapshot& graph, KeyframeId k);
 
   /// @param uv  level-0 pixels

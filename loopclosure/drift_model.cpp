@@ -4,12 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "base/angles.hpp"
 
 namespace twofold {
 namespace {
-
-constexpr double kRadians = std::numbers::pi / 180;
 
 /// Where the steps lead with their errors.
 template <class Steps>
@@ -119,7 +118,7 @@ DriftModel::Step DriftModel::step(const SE3& D, double distance, double depth) c
 
 Vector7 DriftModel::variance(double shift, double turn_deg, double log_scale, double depth) const {
   Vector7 deviations;
-  deviations << Vector3::Constant(shift * depth), Vector3::Constant(turn_deg * kRadians), log_scale;
+  deviations << Vector3::Constant(shift * depth), Vector3::Constant(turn_deg * kDegree), log_scale;
   return deviations.cwiseAbs2();
 }
 

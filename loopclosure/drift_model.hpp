@@ -26,7 +26,8 @@ struct DriftOptions {
   double turn_gain = 0.02;               ///< share of all turns
   double turn_gain_of_one_camera = 0.1;  ///< whose focal length may be wrong by a fifth
   double log_scale_gain = 0.007;         ///< of one camera: logarithm of the scale per way
-  double max_chi2 = 24.3;                ///< 99.9 % of chi-square with 7 degrees of freedom
+  double max_chi2 = 24.3;                ///< 99.9 % of chi-square with 7 degrees of freedom; where the
+                                         ///< scale is known 6 count, and it is 99.95 %
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -38,16 +39,16 @@ struct DriftOptions {
 /// DriftOptions: some of chance, drawn for each step, some of the calibration, common to all. The most
 /// probable ones with which the steps lead where the loop says,
 ///
-///   exp(xi_n) D_n ... exp(xi_1) D_1  =  S_to_from,
+///   exp(pi) exp(xi_n) D_n ... exp(xi_1) D_1  =  S_to_from,
 ///
-/// are found by Gauss-Newton, and their squared Mahalanobis distance is compared with max_chi2. So shift,
-/// rotation and scale must follow from each other: who says that a street has turned by 60 degrees must also
-/// say where its end has gone.
+/// pi by how much the last keyframe is placed badly, are found by Gauss-Newton, and their squared Mahalanobis
+/// distance is compared with max_chi2. So shift, rotation and scale must follow from each other: who says
+/// that a street has turned by 60 degrees must also say where its end has gone.
 class DriftModel {
  public:
   DriftModel(SensorKind sensor, const DriftOptions& options);
 
-  /// Cost grows with the keyframes between the two.
+  /// Cost grows with the keyframe ids between the two, culled ones included.
   /// @param from, to   keyframes of one part of the map, `to` not culled
   /// @param S_to_from  p_to = S_to_from * p_from, lengths around `to` in its own unit
   [[nodiscard]] bool explains(const GraphSnapshot& graph, KeyframeId from, KeyframeId to,

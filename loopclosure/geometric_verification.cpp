@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/angles.hpp"
 #include "loopclosure/corner_grid.hpp"
 #include "loopclosure/corner_match.hpp"
-#include "loopclosure/median.hpp"
-#include "loopclosure/place_hypothesis.hpp"
+#include "loopclosure/pose_hypothesis.hpp"
 
 namespace twofold {
 namespace {
@@ -46,7 +46,7 @@ std::vector<CornerMatch> match_guided(const Rig& rig, const std::vector<PlacePoi
   std::vector<NearestDescriptor> of_b(b.corners.size());
   const Matrix3 R_b_a = T_b_a.rotation();
   const double turn = turn_of(R_b_a);
-  const double max_turn = radians(options.max_turn_deg);
+  const double max_turn = options.max_turn_deg * kDegree;
   for (const PlacePoint& point : place) {
     const Vector3 x_b = R_b_a * point.match.x_a + T_b_a.translation();
     const auto uv = rig.camera.find_in_view(x_b, kDescriptorBorder);
@@ -109,19 +109,6 @@ bool well_spread(const Rig& rig, std::span<const PlacedView> place, const PlaceA
   return std::min(in_place.least(), in_b.least()) >= min_in_half;
 }
 
-/// Median ratio of the depths that b has to those that the place gives it; 1 unless there is one camera.
-double scale_of(const Rig& rig, const PlaceAppearance& b, const std::vector<CornerMatch>& matches,
-                const SE3& T_b_a, const VerificationOptions& options) {
-  if (rig.kind != SensorKind::kMono) return 1;
-  std::vector<double> ratios;
-  for (const CornerMatch& match : matches) {
-    const Eigen::Vector3f& z_b = b.z[static_cast<std::size_t>(match.b)];
-    if (has_depth(z_b, options.min_disparity_px))
-      ratios.push_back(rig.depth_from_disparity(z_b.x() - z_b.z()) / (T_b_a * match.x_a).z());
-  }
-  return ratios.empty() ? 1 : median(std::move(ratios));
-}
-
 bool has_positions(const PlaceAppearance& view) {
   return view.z.size() == view.corners.size();
 }
@@ -138,7 +125,7 @@ std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const Placed
     if (!has_positions(*view.appearance)) return std::nullopt;
   }
   if (place.empty() || !has_positions(b)) return std::nullopt;
-  const auto hypothesis = find_hypothesis(rig, *place[0].appearance, b, options, r);
+  const auto hypothesis = find_pose_hypothesis(rig, *place[0].appearance, b, options, r);
   if (!hypothesis) return std::nullopt;
 
   SE3 T_b_a = *hypothesis;
@@ -149,7 +136,7 @@ std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const Placed
     const std::vector<CornerMatch> guided =
         match_guided(rig, points, b, corners_of_b, T_b_a, radius * options.guided_radius_px, options);
     r.guided = static_cast<int>(guided.size());
-    T_b_a = refine_pose(rig, b, guided, T_b_a);
+    T_b_a = fit_pose_to_corners(rig, b, guided, T_b_a);
     inliers = keep_inliers(rig, b, guided, T_b_a, options);
   }
   r.inliers = static_cast<int>(inliers.size());
@@ -157,7 +144,7 @@ std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const Placed
   if (r.inliers < options.min_inliers || r.inliers < options.min_inlier_share * r.guided || !r.well_spread) {
     return std::nullopt;
   }
-  return VerifiedPlace{T_b_a, scale_of(rig, b, inliers, T_b_a, options), r.inliers};
+  return VerifiedPlace{T_b_a, r.inliers};
 }
 
 }  // namespace twofold

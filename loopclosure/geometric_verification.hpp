@@ -13,14 +13,15 @@ namespace twofold {
 struct VerificationOptions {
   int max_distance = 50;       ///< of a match's descriptors [bits]
   double max_error_px = 3;     ///< reprojection error of an inlier, pixels of the corner's level
-  double ransac_error_px = 9;  ///< ... of a match that agrees with three others: their pose is rough
+  double ransac_error_px = 9;  ///< ... while poses come from three points each, which are rough
   double max_stretch = 0.15;   ///< by so much of its length a sample's side may differ between the views
-  /// A corner is turned by so much more or less than the views are against each other, about their axes: its
-  /// descriptor was compared in the direction that it has in either.
+  /// A match counts only if its corner's direction turned between the views as the pose says, about the
+  /// camera's axis, give or take this.
   double max_turn_deg = 30;
   int max_samples = 300;          ///< triangles of matches, any two of which agree
   int max_iterations = 5000;      ///< one camera: samples drawn; most fail at their sides already
-  int min_hypothesis = 5;         ///< matches that must agree before the pose is tried by guided matching
+  int min_hypothesis = 5;         ///< matches that must agree before the pose is tried by guided matching;
+                                  ///< at least 6 for a lost single camera, whose pose needs 5
   double guided_radius_px = 8;    ///< of the first round of guided matching, pixels of the corner's level;
                                   ///< the later rounds take half of it
   int guided_distance = 64;       ///< descriptors in guided matching [bits]
@@ -30,7 +31,7 @@ struct VerificationOptions {
   /// corner of the image. Theta / 2, as for metric loops (6.4.1), would refuse views that share half of what
   /// they see (docs/places.md).
   int min_in_half = 4;
-  double min_disparity_px = 1;  ///< corners farther than this tell nothing about translation
+  double min_disparity_px = 1;  ///< corners with less tell nothing about translation
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -43,14 +44,13 @@ struct PlacedView {
 };
 
 struct VerifiedPlace {
-  SE3 T_b_a;         ///< p_b = T_b_a * p_a, in the unit of the place  [m]
-  double scale = 1;  ///< of the unit of b's depths: they are those of p_b times this. 1 but for one camera
-  int inliers = 0;   ///< corners of b within the error bound, each of a corner of the place that has depth
+  SE3 T_b_a;        ///< p_b = T_b_a * p_a, in the unit of the place  [m]
+  int inliers = 0;  ///< corners of b within the error bound, each of a corner of the place that has depth
 };
 
 /// What became of a pair of views; for statistics and tests.
 struct VerificationReport {
-  int matches = 0;  ///< of descriptors, mutual, both with depth
+  int matches = 0;  ///< of descriptors, mutual, both with depth (a lost single camera's: the place's)
   int ransac_inliers = 0;
   int guided = 0;  ///< matched by guided search at the end
   int inliers = 0;
@@ -59,17 +59,17 @@ struct VerificationReport {
 
 /// Does view b show the place?  (thesis 5.3.1, 6.4.2)
 ///
-/// Mutual nearest descriptors of b and the place's own view; of all triangles of matches that keep their
-/// lengths, as a rigid body does, and turn alike, the pose that fits most 3D-3D matches (eq. 5.11 - 5.14 with
-/// s = 1, eq. 6.9), errors measured where they arise, in pixels. From the pose found on, the corners of all
-/// views of the place are looked for in b: what one view missed, its neighbours may have. A corner whose
-/// direction is not the one that the pose says is another. At least Theta inliers, well spread.
-/// Deterministic.
+/// Mutual nearest descriptors of b and the place's own view; of up to max_samples triangles of matches
+/// that keep their lengths, as a rigid body does, and turn alike, the pose that fits most 3D-3D matches
+/// (eq. 5.11 - 5.14 with s = 1, eq. 6.9), errors measured where they arise, in pixels. From the pose found
+/// on, the corners of all views of the place are looked for in b: what one view missed, its neighbours may
+/// have. A corner whose direction is not the one that the pose says is another. At least Theta inliers, well
+/// spread. Deterministic.
 ///
 /// With one camera (rig.kind) depths come from the map (DepthRegression; rig.baseline is the one they were
 /// written with), those of b in a unit that may have drifted: three points give a similarity (eq. 5.14), and
 /// are drawn (RANSAC), as without a scale no two matches can contradict each other by a length.
-/// Such depths propose; what counts are positions in the image, and the scale is the median of all inliers'.
+/// Such depths propose; what counts are positions in the image.
 /// When nothing is known of b's depths, five points propose, and the place's depths give the length of the
 /// way.
 ///

@@ -1,9 +1,10 @@
 #include "loopclosure/loop_closer.hpp"
 
+#include <span>
 #include <stdexcept>
 #include <utility>
 
-#include "loopclosure/median.hpp"
+#include "base/median.hpp"
 
 namespace twofold {
 namespace {
@@ -67,8 +68,7 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
     const SE3 T_to_from(verified->T_c_k.so3(), *scale * verified->T_c_k.translation());
     const LoopConstraint seen{graph.version(),   candidate.keyframe, keyframe.id, T_to_from,
                               verified->inliers, verified->weight,   *scale};
-    if (probation_.confirms(seen, graph) &&
-        !(one_camera && redundant_.contains(seen, refinement_.found(), graph)))
+    if (probation_.confirms(seen, graph) && !(one_camera && redundant_.has(seen, refinement_.found(), graph)))
       loop = seen;
     break;
   }
@@ -121,8 +121,9 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
   return std::nullopt;
 }
 
-/// The unit of the keyframe at hand over that of the place: by the depths that the points of the place have
-/// from here, and those that the map gives the same positions in the image. Their median.
+/// What lengths around the keyframe at hand measure over what they measure around the place (the inverse
+/// ratio of their units): depths that the map gives positions in the image, over those that the points of the
+/// place have from here. Their median.
 std::optional<double> LoopCloser::scale_of(const Relocalisation& seen) const {
   if (rig_.kind != SensorKind::kMono) return 1.0;
   constexpr std::size_t kFewest = 12;
@@ -132,7 +133,7 @@ std::optional<double> LoopCloser::scale_of(const Relocalisation& seen) const {
     if (depth) ratios.push_back(*depth / (seen.T_c_k * found.x_ref).z());
   }
   if (ratios.size() < kFewest) return std::nullopt;
-  return median(std::move(ratios));
+  return median(std::span(ratios));
 }
 
 /// The place's own view and those of its neighbours.

@@ -43,7 +43,8 @@ struct Relocalisation {
 ///
 /// Remembers how the place of every keyframe looks. Reads snapshots, changes nothing: a loop goes to the
 /// mapper as a message. Single-threaded; the same calls give the same answers. A step's cost grows with the
-/// inverted file's lists only, and memory with the keyframes that are not culled.
+/// inverted file's lists and, when a loop was verified that the map does not know, with the keyframes ever
+/// made between its two (DriftModel); memory with the keyframes that are not culled.
 ///
 /// One camera has no depth of its own corners: those of a place follow from the map (DepthRegression), and a
 /// loop is a similarity. It needs points of the map around both keyframes. Loops that tell the map nothing

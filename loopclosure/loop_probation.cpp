@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "base/angles.hpp"
 
 namespace twofold {
 namespace {
@@ -47,7 +48,7 @@ bool LoopProbation::agree(const LoopConstraint& held, const LoopConstraint& loop
 bool LoopProbation::same_pose(const Sim3& S_a, const Sim3& S_b, double depth) const {
   const Sim3 difference = S_a * S_b.inverse();
   return difference.translation().norm() <= options_.max_shift * depth &&
-         difference.so3().log().norm() <= options_.max_angle_deg * std::numbers::pi / 180 &&
+         difference.so3().log().norm() <= options_.max_angle_deg * kDegree &&
          std::abs(std::log(difference.scale())) <= options_.max_scale;
 }
 

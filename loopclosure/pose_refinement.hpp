@@ -30,9 +30,9 @@ struct RefinementOptions {
 struct RefinedPlace {
   SE3 T_c_k;
   int inliers = 0;
-  /// Inliers, each as far as its position is known from here: 1 if to a pixel's noise or better, as a point
-  /// is that an edge's two keyframes both measure (edge_information); towards 0 where its depth shifts it by
-  /// more.
+  /// Sum over the inliers of how well each one's position is known from here: 1 if its error projects to no
+  /// more than pixels' noise, as of a point that both keyframes of an edge measure (edge_information);
+  /// towards 0 where its depth shifts it by more.
   int weight = 1;
 };
 
@@ -44,14 +44,14 @@ enum class RefinementOutcome : std::uint8_t {
 
 /// Looks for the map's points around a keyframe in a view whose place was recognised. Their patches, and
 /// depths estimated from many frames, give the pose far more exactly than described corners with depths from
-/// one frame; and they are evidence that does not depend on the descriptors. Seen from aside, a depth's error
-/// shifts a point: each is weighed by how well it is known from here.
+/// one frame; and they are evidence that does not depend on the descriptors. Seen from the side, a depth's
+/// error shifts a point: each is weighed by how well it is known from here.
 class PoseRefinement {
  public:
   PoseRefinement(const Rig& rig, const RefinementOptions& options) : rig_(rig), options_(options) {}
 
   /// @param T_c_k   pose of the view relative to keyframe `place`, about right
-  /// @param result  set when refined
+  /// @param result  of kRefined; overwritten by the other outcomes
   [[nodiscard]] RefinementOutcome refine(const GraphSnapshot& graph, KeyframeId place,
                                          const FrameImages& images, const SE3& T_c_k, RefinedPlace& result);
   /// What it found when it last refined a place, points in the place's frame; outliers included.
@@ -61,7 +61,8 @@ class PoseRefinement {
   void collect_points(const GraphSnapshot& graph, KeyframeId place, const SE3& T_c_k);
   void search(const GraphSnapshot& graph, KeyframeId place, const FrameImages& images, const SE3& T_c_k,
               double radius_px);
-  /// What a point's measurement tells of a pose: Omega, less the noise of its position.
+  /// What a point's measurement tells of a pose: the diagonal of (Omega^-1 + J P J^T)^-1, P its position's
+  /// covariance; correlations of u, v, and u_r are left out.
   [[nodiscard]] Eigen::Vector3f information(const GraphSnapshot& graph, PointId id, const SE3& T_c_w,
                                             const Eigen::Vector3f& of_pixels) const;
   [[nodiscard]] int weight_of_inliers() const;

@@ -5,8 +5,8 @@
 
 namespace twofold {
 
-bool RedundantLoops::contains(const LoopConstraint& loop, std::span<const MotionObservation> found,
-                              const GraphSnapshot& graph) {
+bool RedundantLoops::has(const LoopConstraint& loop, std::span<const MotionObservation> found,
+                         const GraphSnapshot& graph) {
   return graph.part(loop.from) == graph.part(loop.to) &&
          std::abs(std::log(loop.scale)) <= options_.max_log_scale && moves_nothing(loop, found, graph) &&
          short_way(loop, graph);

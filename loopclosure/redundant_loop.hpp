@@ -42,8 +42,8 @@ class RedundantLoops {
 
   /// @param loop   between keyframes of `graph` that are not culled
   /// @param found  points that it rests on, in the frame of loop.from; outliers among them are left out
-  [[nodiscard]] bool contains(const LoopConstraint& loop, std::span<const MotionObservation> found,
-                              const GraphSnapshot& graph);
+  [[nodiscard]] bool has(const LoopConstraint& loop, std::span<const MotionObservation> found,
+                         const GraphSnapshot& graph);
 
  private:
   [[nodiscard]] bool moves_nothing(const LoopConstraint& loop, std::span<const MotionObservation> found,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/angles.hpp"
 #include "geometry/absolute_orientation.hpp"
 
 namespace twofold {
@@ -14,7 +15,7 @@ SimilarityEstimator::SimilarityEstimator(const Rig& rig, const PlaceAppearance& 
                                          const VerificationOptions& options)
     : rig_(rig),
       shortest_(std::pow(std::max(0.0, 1 - options.max_stretch), 2)),
-      max_turn_(radians(options.max_turn_deg)),
+      max_turn_(options.max_turn_deg * kDegree),
       outlier_(options.ransac_error_px * options.ransac_error_px) {
   for (const CornerMatch& match : matches) {
     const auto i = static_cast<std::size_t>(match.corner);

@@ -12,7 +12,7 @@
 
 namespace twofold {
 
-/// A similarity, and what each residual needs of it: matrices, as a quaternion is made one for every point.
+/// A similarity and its inverse as matrices: a quaternion would be made one again for each point.
 struct TwoWaySimilarity {
   explicit TwoWaySimilarity(const Sim3& S)
       : S_b_a(S),
@@ -36,18 +36,20 @@ class SimilarityEstimator {
   using Model = TwoWaySimilarity;
   static constexpr int kSampleSize = 3;
 
+  /// @param rig  outlives the estimator
   /// @param matches  of view a; both corners of each have depth
   SimilarityEstimator(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                       std::span<const CornerMatch> matches, const VerificationOptions& options);
 
   [[nodiscard]] int size() const { return static_cast<int>(pairs_.size()); }
 
-  /// Which matches one motion of a known scale can explain: they keep their distance and turn alike.
+  /// Which pairs of matches one motion of a known scale can explain: they keep their distance and turn alike.
   [[nodiscard]] AgreementGraph agreements() const;
 
   void fit(std::span<const int, 3> sample, std::vector<Model>& models) const;
 
-  /// The larger of the errors in either view; of outliers, one that makes them such.
+  /// The larger of the errors in either view [squared pixels of the corner's level]; of outliers, one that
+  /// makes them such.
   [[nodiscard]] double squared_residual(const Model& model, int i) const {
     const Pair& pair = pairs_[static_cast<std::size_t>(i)];
     if (!nearly_same_direction(pair.turn, model.turn, max_turn_)) return 2 * outlier_;

@@ -6,7 +6,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

@@ -39,7 +39,7 @@ Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
     : rig_(rig),
       options_(validated(options)),
       builder_(rig, options),
-      loop_closer_(rig, options, std::move(search)),
+      metric_loops_(rig, options, std::move(search)),
       point_culler_(rig, options.culling) {}
 
 Mapper::Mapper(const Rig& rig, const MapperOptions& options)
@@ -163,7 +163,7 @@ void Mapper::close_metric_loops(std::span<KeyframeProposal* const> proposals, Ma
   if (!options_.loop.enabled) return;
   const StageTime time(report.ms.loop);
   for (const KeyframeProposal* proposal : proposals)
-    report.loop_search += loop_closer_.close(writer_, window_, proposal->id, proposal->images);
+    report.loop_search += metric_loops_.close(writer_, window_, proposal->id, proposal->images);
   report.metric_loops = report.loop_search.edges;
 }
 

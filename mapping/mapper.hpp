@@ -108,7 +108,7 @@ class Mapper {
   GraphWriter writer_;
   WindowBuilder builder_;
   WindowSolver solver_;
-  MetricLoopCloser loop_closer_;
+  MetricLoopCloser metric_loops_;
   PointCuller point_culler_;
 
   DoubleWindow window_;       ///< of the last round

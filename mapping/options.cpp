@@ -1,6 +1,6 @@
 #include "mapping/options.hpp"
 
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 

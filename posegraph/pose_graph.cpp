@@ -5,9 +5,9 @@
 #include <limits>
 #include <optional>
 
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 #include "estimation/robust_kernel.hpp"
-#include "geometry/check.hpp"
-#include "geometry/option_check.hpp"
 #include "posegraph/pose_graph_equations.hpp"
 #include "posegraph/pose_graph_error.hpp"
 #include "posegraph/pose_graph_initialisation.hpp"

@@ -35,7 +35,7 @@ struct PoseGraphEquations {
     system.set_structure(structure, kDof);
   }
 
-  /// Normal equations H delta = -gradient of half the cost at graph.poses.
+  /// Fills the system with H = J^T W J and the gradient J^T W e of half the cost, at graph.poses.
   void linearise(const PoseGraph<Group>& graph, const PoseGraphOptions& options) {
     const HuberKernel kernel{options.huber};
     system.set_zero();

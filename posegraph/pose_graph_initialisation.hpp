@@ -5,9 +5,10 @@
 
 namespace twofold {
 
-/// Best positions for given rotations: minimises sum t_ji |c_j - c_i - R_i^T c_ji|^2 over the positions c, t
-/// the mean diagonal entry of the translation information. The matrix, a weighted graph Laplacian, does not
-/// depend on the poses and is factorised once.
+/// Best positions for given rotations: minimises sum t_ji |c_j - c_i - R_i^T p_ji|^2 over the camera centres
+/// c in the world, p_ji the measured centre of j in the frame of i, T_j_i^-1's translation, t the mean
+/// diagonal entry of the translation information. Without an origin pose 0 is held. The matrix, a weighted
+/// graph Laplacian, does not depend on the poses and is factorised once.
 template <class Group>
 class PoseGraphPositions {
  public:
@@ -15,7 +16,7 @@ class PoseGraphPositions {
 
   /// @param structure  of the poses, its edges the graph's constraints; must outlive this
   PoseGraphPositions(const PoseGraph<Group>& graph, const BlockStructure& structure);
-  /// Moves all poses but the origin, along with their rotations as they are. False, and nothing moves, when
+  /// Sets the positions of all poses but the origin; rotations stay. False, and nothing moves, when
   /// the Laplacian is singular.
   bool update(const PoseGraph<Group>& graph, std::vector<Group>& poses);
 

@@ -3,9 +3,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "estimation/levenberg_marquardt.hpp"
-#include "selfcalibration/median.hpp"
 
 namespace twofold {
 namespace {
@@ -98,7 +99,7 @@ double ClipAdjustment::estimated_sigma(const SharedLens& lens) const {
     const double dof = std::max(1.0, 2 * n - 3 - pose_size() / corners);
     sums.push_back(sum / (dof * std::pow(1 - 2 / (9 * dof), 3)));  // median of chi2, Wilson and Hilferty
   }
-  return std::sqrt(median_of(std::move(sums)));
+  return std::sqrt(median(std::span(sums)));
 }
 
 bool ClipAdjustment::add_point(const SharedLens& lens, std::size_t corner, PointBlock& block) {

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "imaging/fast_corners.hpp"
 #include "imaging/level_pixels.hpp"
 #include "imaging/patch.hpp"
 #include "selfcalibration/affine_alignment.hpp"
-#include "selfcalibration/median.hpp"
 
 namespace twofold {
 namespace {
@@ -29,7 +30,7 @@ constexpr int kBorder = 12;
 double median_distance(const std::vector<Eigen::Vector2f>& a, const std::vector<Eigen::Vector2f>& b) {
   std::vector<double> distances;
   for (std::size_t i = 0; i < a.size(); ++i) distances.push_back((a[i] - b[i]).norm());
-  return median_of(distances);
+  return median(std::span(distances));
 }
 
 /// By the two neighbours in time [px/s]; of a clip's first frame by the two that follow.

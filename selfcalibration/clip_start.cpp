@@ -1,12 +1,13 @@
 #include "selfcalibration/clip_start.hpp"
 
 #include <algorithm>
+#include <span>
 
+#include "base/median.hpp"
 #include "geometry/essential_matrix.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "geometry/triangulation.hpp"
 #include "geometry/view_rotation.hpp"
-#include "selfcalibration/median.hpp"
 
 namespace twofold {
 namespace {
@@ -41,7 +42,7 @@ std::vector<Vector3> rays(const ClipView& of, const ClipView& view, const Shared
 void scale_to_one(ClipMotion& motion) {
   std::vector<double> rho;
   for (const Vector3& psi : motion.psi) rho.push_back(psi.z());
-  const double unit = std::max(median_of(std::move(rho)), 1e-6);
+  const double unit = std::max(median(std::span(rho)), 1e-6);
   for (Vector3& psi : motion.psi) psi.z() /= unit;
   for (SE3& T : motion.T_view_first) T.translation() *= unit;
 }

@@ -5,14 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 #include <fmt/format.h>
 
+#include "base/median.hpp"
+#include "base/option_check.hpp"
 #include "estimation/levenberg_marquardt.hpp"
-#include "geometry/option_check.hpp"
 #include "geometry/symmetric_solve.hpp"
 #include "selfcalibration/clip_start.hpp"
-#include "selfcalibration/median.hpp"
 
 namespace twofold {
 namespace {
@@ -134,7 +135,7 @@ ClipWeights weigh_clips(std::vector<ClipAdjustment>& clips, const LensPrior& pri
   for (const double d : deviations) sizes.push_back(std::abs(d));
   ClipWeights weights;
   weights.spread =
-      std::max(1.0, 1.4826 * median_of(sizes));  // of a normal distribution's median to its deviation
+      std::max(1.0, 1.4826 * median(std::span(sizes)));  // of a normal distribution's median to its deviation
   for (const double deviation : deviations) {
     const double d = deviation / (kClipKernel * weights.spread);
     weights.of_clip.push_back(1 / ((1 + d * d) * (1 + d * d)));
@@ -278,7 +279,7 @@ tl::expected<SelfCalibration, std::string> self_calibrate(const std::vector<Clip
   found.f_sigma = found.lens.f() * std::hypot(found.sigma[0], options.systematic_sigma);
   std::vector<double> corner_sigmas;
   for (const ClipAdjustment& clip : adjustments) corner_sigmas.push_back(clip.sigma());
-  found.corner_sigma_px = median_of(corner_sigmas);
+  found.corner_sigma_px = median(std::span(corner_sigmas));
   if (std::string refusal = refusal_of(found, width, options); !refusal.empty())
     return tl::unexpected(std::move(refusal));
   return found;

@@ -1,4 +1,5 @@
 #include "twofold/evaluation.hpp"
+#include "base/angles.hpp"
 
 #include <cmath>
 #include <stdexcept>
@@ -9,8 +10,6 @@
 
 namespace twofold {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 Trajectory to_trajectory(const std::vector<StampedPose>& poses) {
   Trajectory trajectory;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "geometry/atomics.hpp"
+#include "base/atomics.hpp"
 
 namespace twofold {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "sparse/block_kernels.hpp"
 
 namespace twofold {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "sparse/cholmod_common.hpp"
 
 namespace twofold {

@@ -1,6 +1,6 @@
 #include <vector>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "sparse/block_factor.hpp"
 #include "sparse/block_kernels.hpp"
 

@@ -2,7 +2,7 @@
 #include <memory>
 #include <vector>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "sparse/block_factor.hpp"
 #include "sparse/block_kernels.hpp"
 #include "sparse/panel_structure.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <span>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "geometry/symmetric_solve.hpp"
 #include "surface/triangle_grid.hpp"
 

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <Eigen/Core>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "surface/lanes.hpp"
 
 namespace twofold {

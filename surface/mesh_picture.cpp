@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "geometry/check.hpp"
-#include "geometry/option_check.hpp"
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <zlib.h>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 

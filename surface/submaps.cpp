@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 
-#include "geometry/check.hpp"
-#include "geometry/option_check.hpp"
-#include "geometry/processor_time.hpp"
+#include "base/check.hpp"
+#include "base/option_check.hpp"
+#include "base/processor_time.hpp"
 
 namespace twofold {
 namespace {

@@ -5,13 +5,13 @@
 #include <numbers>
 #include <utility>
 
-#include "geometry/check.hpp"
+#include "base/angles.hpp"
+#include "base/check.hpp"
 
 namespace twofold::synthetic {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr int kStepsPerSpan = 64;
 
 }  // namespace

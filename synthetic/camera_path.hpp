@@ -44,11 +44,11 @@ struct WalkStyle {
 };
 
 /// Walking along the curve: the head bobs at step frequency, sways, nods and glances aside; the line walked
-/// differs from round to round by up to 0.2 m.
+/// strays from the curve by up to 0.2 m, in each round by another way.
 [[nodiscard]] CameraPath walk(const ClosedCurve& curve, const WalkStyle& style);
 
-/// The path as a quadrotor in a hurry takes it: the camera swings about it in all six directions, with
-/// amplitude 1 by up to 0.47 m and 27 degrees, at up to 1.3 m and 124 degrees a second.
+/// The path as a quadrotor in a hurry takes it: the camera swings about it in all six degrees of freedom, in
+/// its own axes: with amplitude 1 by up to 0.47 m and 27 degrees, at up to 1.3 m/s and 124 degrees/s.
 [[nodiscard]] CameraPath flown(CameraPath path, double amplitude);
 
 }  // namespace twofold::synthetic

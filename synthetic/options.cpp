@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/angles.hpp"
 #include "synthetic/scenes.hpp"
 
 namespace twofold::synthetic {
@@ -64,7 +65,7 @@ SyntheticOptions default_options(const std::string& scene) {
   if (scene == "descent") {  // SWF 4.2: 25 degrees across, 15 cm a frame
     options.width = 1024;
     options.height = 768;
-    options.f = 0.5 * 1024 / std::tan(12.5 * 0.017453292519943295);
+    options.f = 0.5 * 1024 / std::tan(12.5 * kDegree);
     options.baseline = 0.1;
     options.fps = 10;
     options.rounds = 1;
@@ -72,14 +73,14 @@ SyntheticOptions default_options(const std::string& scene) {
   if (scene == "cloister" || scene == "campus") {  // 80 degrees across
     options.width = 320;
     options.height = 240;
-    options.f = 0.5 * 320 / std::tan(40 * 0.017453292519943295);
+    options.f = 0.5 * 320 / std::tan(40 * kDegree);
     options.fps = 15;
     options.rounds = scene == "cloister" ? 1.3 : 1;
   }
   if (scene == "terrace") {  // by car: 80 degrees across, half a metre a frame
     options.width = 640;
     options.height = 240;
-    options.f = 0.5 * 640 / std::tan(40 * 0.017453292519943295);
+    options.f = 0.5 * 640 / std::tan(40 * kDegree);
     options.baseline = 0.5;
     options.fps = 15;
     options.rounds = 1;

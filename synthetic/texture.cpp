@@ -9,7 +9,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold::synthetic {
 namespace {

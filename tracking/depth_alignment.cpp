@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 #include "geometry/so3.hpp"
 #include "geometry/symmetric_solve.hpp"
 

@@ -36,16 +36,16 @@ struct DepthAlignmentOptions {
 /// Places a depth camera where there are hardly any corners: aligns what it measures to what keyframes
 /// measured.
 ///
-/// Minimises, over the frame's pose, the distances of its surface points from the planes of several keyframes
-/// (Chen and Medioni, 1992; projective association) together with the reprojection errors of what corners
-/// there are. Planes from noisy readings seem to differ in direction even when they are one: of the
-/// information J^T W J a part is owed to that, which is known from the planes' covariance, and taken off
-/// (errors in variables). A direction that mostly chance determines, along a bare wall or a corridor without
-/// ends, is refused and not guessed.
+/// Minimises, over the frame's pose, how far its surface points lie from the planes of several keyframes,
+/// along the view's ray and as a share of the depth (Chen and Medioni, 1992; projective association) together
+/// with the reprojection errors of what corners there are. Planes from noisy readings seem to differ in
+/// direction even when they are one: of the information J^T W J a part is owed to that, which is known from
+/// the planes' covariance, and taken off (errors in variables). A direction that mostly chance determines,
+/// along a bare wall or a corridor without ends, is refused and not guessed.
 ///
-/// Half of the covariance is what the parts of the image say that is left when each of them is left out
-/// (RegionSums): lens, shutter and sensor bend surfaces together, and a pose that hangs on the end of a
-/// corridor is known as well as that end.
+/// Half of the covariance is from how far the pose moves when each region of the image is left out
+/// (RegionSums, jackknife): lens, shutter and sensor bend surfaces together, and a pose that hangs on the end
+/// of a corridor is known as well as that end.
 ///
 /// Bounded work, no allocation after construction.
 class DepthAlignment {
@@ -56,9 +56,9 @@ class DepthAlignment {
 
   /// The keyframes to align to, at most kViews. Planes of one that is added after every clear_views() are
   /// kept and not made anew.
-  /// @param depth       as Frame::depth, of the rig
-  /// @param T_view_ref  pose of the frame that `align` says the pose relative to, in the view's frame
   void clear_views() { views_ = 0; }
+  /// @param depth       as Frame::depth, of the rig
+  /// @param T_view_ref  pose of the reference of `align`'s T_c_ref, in the view's frame
   void add_view(KeyframeId id, const cv::Mat& depth, const SE3& T_view_ref);
 
   /// Reads the frame to be placed.
@@ -116,7 +116,7 @@ class DepthAlignment {
     Vector3 m_c;                     ///< the view's plane in the frame's axes
     const DepthPlanes::Plane* view;  ///< in the view's own
     Matrix3 R_view_c;
-    double residual;  ///< distance, in shares of the depth
+    double residual;  ///< (z - z of the plane on that ray) / z of the plane
     double variance;  ///< of the view's part of the residual
   };
   [[nodiscard]] std::optional<Pair> pair_up(const DepthPlanes::Plane& seen, const DepthPlanes::Plane& plane,

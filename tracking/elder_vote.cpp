@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/option_check.hpp"
 #include "estimation/observation_model.hpp"
-#include "geometry/option_check.hpp"
 
 namespace twofold {
 namespace {

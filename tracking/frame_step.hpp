@@ -20,8 +20,8 @@ struct Placement {
 /// Where the search for one frame's pose begins.
 struct SearchStart {
   Placement placement;
-  /// Found by appearance, maybe of an earlier frame: far points are found from there, and lead to where near
-  /// ones are. Else: the last good frame's, from where images are aligned.
+  /// Found by appearance, maybe of an earlier frame, or by depth images after a loss: far points are found
+  /// from there, and lead to where near ones are. Else: the last good frame's, from where images are aligned.
   bool rough = false;
 };
 

@@ -9,7 +9,7 @@
 
 namespace twofold {
 
-/// A point the tracker started itself and that no snapshot holds yet  (thesis 6.3: candidates are used for
+/// A point the tracker started itself and that no snapshot holds yet  (thesis 6.3: such points are used for
 /// tracking at once, and join the map only when a later keyframe finds them again).
 struct ImmaturePoint {
   KeyframeId anchor = kNoKeyframe;
@@ -54,7 +54,7 @@ class ImmaturePoints {
   void clear_points();
   /// Forgets what the map has taken over.
   void adopt(const GraphSnapshot& graph);
-  /// Forgets candidates that failed too often or that `newest - anchor` keyframes did not confirm.
+  /// Forgets points that failed too often or that `newest - anchor` keyframes did not confirm.
   void drop_stale(KeyframeId newest, int max_failures, int max_age);
 
  private:

@@ -27,8 +27,8 @@ struct KeyframeBacklog {
                                 const KeyframeBacklog& backlog, const TrackerOptions& options,
                                 const EffortBounds& bounds);
 
-/// The same for a frame that was placed by depth alone: the camera has moved on or turned, and there may be
-/// corners again.
+/// The same for a frame that was placed by its depth image (TrackResult::by_depth): the camera has moved on
+/// or turned, and there may be corners again.
 [[nodiscard]] bool keyframe_due_by_motion(const SE3& T_c_ref, const KeyframeView& last,
                                           const KeyframeBacklog& backlog, const TrackerOptions& options);
 

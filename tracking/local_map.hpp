@@ -13,7 +13,7 @@ namespace twofold {
 
 /// A point worth searching for in the next frames.
 struct TrackedPoint {
-  PointId id = kNoPoint;                        ///< kNoPoint: a candidate the map does not know
+  PointId id = kNoPoint;                        ///< kNoPoint: an immature point, which the map does not know
   int local = -1;                               ///< position in ImmaturePoints, -1 for map points
   int anchor = 0;                               ///< position in LocalMap::anchors
   const PointAppearance* appearance = nullptr;  ///< lives as long as the snapshot, or the local point

@@ -1,6 +1,6 @@
 #include "tracking/options.hpp"
 
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 
@@ -43,9 +43,9 @@ std::string TrackerOptions::invalid_reason() const {
       .share("light_missed_share", light_missed_share)
       .above("light_change", light_change, 1)
       .share("doubted_inlier_share", doubted_inlier_share)
-      .share("doubted_visible_share", doubted_visible_share)
+      .share("doubted_searched_share", doubted_searched_share)
       .share("rough_inlier_share", rough_inlier_share)
-      .share("rough_visible_share", rough_visible_share)
+      .share("rough_searched_share", rough_searched_share)
       .at_least("rough_min_inliers", rough_min_inliers, 0)
       .at_least("rough_min_mapped", rough_min_mapped, 0)
       .within("trusted_after", trusted_after, 0, 255)
@@ -67,7 +67,7 @@ std::string TrackerOptions::invalid_reason() const {
       .at_least("min_corner_score", min_corner_score, 0)
       .at_least("scarce_points", scarce_points, 0)
       .at_least("max_failures", max_failures, 1)
-      .at_least("max_candidate_age", max_candidate_age, 0)
+      .at_least("max_immature_age", max_immature_age, 0)
       .nested("first_structure", first_structure.invalid_reason())
       .nested("seeds", seeds.invalid_reason())
       .reason();

@@ -31,9 +31,9 @@ struct TrackerOptions {
   double border_px = 8;          ///< points predicted closer to the image's edge are not searched, >= 0
   double min_view_cosine = 0.7;  ///< of the angle between a point's first ray and today's, in [-1, 1]
   int min_inliers = 18;          ///< fewer: lost
-  int scarce_inliers = 40;       ///< a depth camera with fewer is placed by surfaces as well, >= 0
-  /// So many points should be seen from a pose that surfaces alone gave after a loss, and are not found: it
-  /// is wrong.
+  int scarce_inliers = 40;       ///< a depth camera with fewer is placed by its depth image as well, >= 0
+  /// After a loss, a pose from the depth image alone is rejected when so many points should be seen from it
+  /// and the search does not confirm it.
   int telling_candidates = 40;
   double min_inlier_share = 0.25;  ///< of the matches found: fewer: lost
   double lost_radius_px = 8;       ///< search radius while lost
@@ -43,15 +43,16 @@ struct TrackerOptions {
   /// With fewer of the matches, of those not many, or of the points searched, a wider search may find a
   /// better pose.
   double doubted_inlier_share = 0.5;
-  double doubted_visible_share = 0.12;
+  double doubted_searched_share = 0.12;
   /// A pose found by appearance must explain so much of the points found from it...
   double rough_inlier_share = 0.6;
-  double rough_visible_share = 0.2;  ///< ... and of those that should be visible,
-  int rough_min_inliers = 40;        ///< and so many points, or
-  int rough_min_mapped = 10;         ///< so many that the map has, seen from two places
-  /// While young points are mistrusted: frames in a row in which a candidate must agree to be confirmed.
+  double rough_searched_share = 0.2;  ///< ... and of those searched,
+  int rough_min_inliers = 40;         ///< and so many points, or
+  int rough_min_mapped = 10;          ///< so many that the map has, seen from two places
+  /// While young points are mistrusted: frames in a row in which an immature point must agree to be
+  /// confirmed.
   int trusted_after = 3;
-  int moving_after = 2;           ///< times in a row that a candidate is found elsewhere: it is said to move
+  int moving_after = 2;  ///< times in a row that an immature point is found elsewhere: it is said to move
   double new_part_after = 1;      ///< lost for so long while corners are seen: a new map part is started [s]
   int new_part_frames = 5;        ///< ... and for so many frames
   int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see
@@ -73,8 +74,8 @@ struct TrackerOptions {
   /// In the dark, with fewer points in view, tracked and started, faint corners will do: half the threshold,
   /// a quarter of the score, where the pyramid has averaged the noise away.
   int scarce_points = 90;
-  int max_failures = 4;       ///< candidates not found so many frames in a row are given up
-  int max_candidate_age = 3;  ///< keyframes after which an unconfirmed candidate is given up
+  int max_failures = 4;      ///< immature points not found so many frames in a row are given up
+  int max_immature_age = 3;  ///< keyframes after which an immature point is given up
 
   // One camera only.
   FirstStructureOptions first_structure;

@@ -39,8 +39,10 @@ struct TrackResult {
   int inliers = 0;
   int moving = 0;           ///< points found again and again where nothing that stands still would be
   float alignment_rms = 0;  ///< [grey]
-  bool by_depth = false;    ///< the pose rests on the depth image itself, and on no points
-  bool proposed = false;    ///< the free proposal was filled
+  /// The pose is that of DepthAlignment: from the depth image, together with what points were found. The map
+  /// takes none of them as observations.
+  bool by_depth = false;
+  bool proposed = false;  ///< the free proposal was filled
   std::array<std::int64_t, kTrackerStages> stage_ns{};
 
   [[nodiscard]] double tracked_share() const {

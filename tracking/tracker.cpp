@@ -21,9 +21,9 @@ constexpr int kRoundsFromRough = 3;
 /// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
 /// better one.
 bool hardly_supported(const TrackResult& result, const TrackerOptions& options) {
-  return result.inliers < options.doubted_visible_share * result.searched ||
+  return result.inliers < options.doubted_searched_share * result.searched ||
          (result.inliers < options.doubted_inlier_share * result.matches &&
-          result.inliers < options.rough_visible_share * result.searched);
+          result.inliers < options.rough_searched_share * result.searched);
 }
 
 RecentView room_for_view(const Rig& rig, const WideSearch& search) {

@@ -214,8 +214,8 @@ class Tracker {
   KeyframeView last_keyframe_;
 
   // Of the last frame searched.
-  std::vector<Match> matches_;             ///< those of map points first, but for those found in other light
-  std::vector<std::uint32_t> missed_;      ///< positions in local_map_.points()
+  std::vector<Match> matches_;         ///< in the order of the search, which mixes map points and young ones
+  std::vector<std::uint32_t> missed_;  ///< positions in local_map_.points()
   std::vector<MotionObservation> motion_;  ///< of matches_, one each
   std::vector<AlignmentPoint> previous_points_;
   std::vector<KeyframeId> anchors_;                ///< of the points of matches_, one each

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_buffers.hpp"
 #include "tracking/tracker.hpp"
@@ -45,9 +47,7 @@ double Tracker::median_depth(const SE3& T_c_ref) {
   if (samples_.empty()) {
     for (const ImmaturePoint& point : immature_points_.points()) samples_.push_back(1.0 / point.psi.z());
   }
-  const auto middle = samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 2);
-  std::nth_element(samples_.begin(), middle, samples_.end());
-  return *middle;
+  return median(std::span(samples_));
 }
 
 bool Tracker::keyframe_is_due(const FrameStep& step) const {
@@ -71,7 +71,7 @@ void Tracker::propose_keyframe(FrameStep& step) {
   last_keyframe_.occupied_regions = occupied_regions();
   if (right_rows_) right_rows_->look_at_keyframe(current_.left.level(0), current_.right.level(0));
   hand_over_images(proposal);
-  immature_points_.drop_stale(proposal.id, options_.max_failures, options_.max_candidate_age);
+  immature_points_.drop_stale(proposal.id, options_.max_failures, options_.max_immature_age);
 }
 
 /// Numbers the keyframe, whose pose relative to its reference is `placement`.
@@ -119,7 +119,7 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
             [](const Observation& a, const Observation& b) { return a.point < b.point; });
 }
 
-/// A candidate was found again in a later keyframe: it gets its number and goes to the map.
+/// An immature point was found again in a later keyframe: it gets its number and goes to the map.
 void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
   point.id = PointId{next_.point++};
   point.proposed_in = proposal.id;

@@ -2,7 +2,9 @@
 // the pose that fits.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "geometry/symmetric_solve.hpp"
 #include "imaging/view_change.hpp"
 #include "tracking/tracker.hpp"
@@ -102,9 +104,7 @@ void Tracker::search_in_other_light(const SE3& T_c_ref, GuidedSearchOptions sear
     if (ratio) samples_.push_back(*ratio);
   }
   if (samples_.size() < kFewestInLight) return;
-  const auto middle = samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 2);
-  std::nth_element(samples_.begin(), middle, samples_.end());
-  const double gain = *middle;
+  const double gain = median(std::span(samples_));
   if (std::max(gain, 1 / gain) < options_.light_change) return;
   search.gain = static_cast<float>(gain);
   std::erase_if(missed_, [&](std::uint32_t i) { return search_point(i, T_c_ref, search, step); });
@@ -266,7 +266,7 @@ int Tracker::mapped_inliers() const {
 bool Tracker::well_supported(const TrackResult& result) const {
   return (result.inliers >= options_.rough_min_inliers || mapped_inliers() >= options_.rough_min_mapped) &&
          result.inliers >= options_.rough_inlier_share * result.matches &&
-         result.inliers >= options_.rough_visible_share * result.searched;
+         result.inliers >= options_.rough_searched_share * result.searched;
 }
 
 // A depth camera where there are hardly any corners: what it measures says where it is.

@@ -14,10 +14,10 @@
 #include <variant>
 #include <vector>
 
+#include "base/processor_time.hpp"
 #include "engine/clock.hpp"
 #include "engine/spsc_ring.hpp"
 #include "engine/worker.hpp"
-#include "geometry/processor_time.hpp"
 #include "viewer/image_message.hpp"
 #include "viewer/keyframe_images.hpp"
 #include "viewer/look_times.hpp"

@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
                  "Problem written by --dump or window_from_run; none: a generated one");
   app.add_option("--inner", g.inner, "Generated: keyframes of the inner window");
   app.add_option("--outer", g.outer, "Generated: keyframes of the outer window");
-  app.add_option("--points", g.points_per_keyframe, "Generated: landmarks a keyframe");
+  app.add_option("--points", g.points_per_keyframe, "Generated: points a keyframe");
   app.add_option("--outer-observations", g.outer_observations, "Generated: outer keyframes observe points");
   app.add_option("--seed", g.seed, "Generated: seed");
   app.add_option("--outliers", g.outliers, "Generated: share of wrong matches");

@@ -9,9 +9,9 @@
 #include <cstdio>
 #include <map>
 
+#include "base/processor_time.hpp"
 #include "bench/posegraph/ceres_pose_graph.hpp"
 #include "fixtures/g2o_file.hpp"
-#include "geometry/processor_time.hpp"
 #include "posegraph/pose_graph_equations.hpp"
 #include "posegraph/pose_graph_initialisation.hpp"
 

@@ -9,9 +9,9 @@
 
 #include <fmt/core.h>
 
+#include "base/processor_time.hpp"
 #include "evaluation/evaluation.hpp"
 #include "fixtures/plain_map.hpp"
-#include "geometry/processor_time.hpp"
 #include "io/files/trajectory_file.hpp"
 #include "io/sources/open_source.hpp"
 #include "mapping/mapper.hpp"

@@ -10,7 +10,7 @@
 #include <memory>
 #include <vector>
 
-#include "geometry/processor_time.hpp"
+#include "base/processor_time.hpp"
 #include "graph/map_file.hpp"
 #include "slam/map_snapshot.hpp"
 #include "viewer/scene.hpp"

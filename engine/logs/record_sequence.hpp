@@ -6,11 +6,11 @@
 #include <span>
 #include <type_traits>
 
+#include "base/check.hpp"
 #include "engine/logs/chunked_vector.hpp"
 #include "engine/logs/index_iterator.hpp"
 #include "engine/logs/log_file.hpp"
 #include "engine/logs/mapped_file.hpp"
-#include "geometry/check.hpp"
 
 namespace twofold {
 

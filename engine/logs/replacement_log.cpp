@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "graph/id_map.hpp"
 
 namespace twofold {

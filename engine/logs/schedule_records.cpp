@@ -1,6 +1,6 @@
 #include "engine/logs/schedule_records.hpp"
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 
 namespace twofold {
 

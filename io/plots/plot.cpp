@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "geometry/check.hpp"
-#include "geometry/option_check.hpp"
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 #include "io/files/output_file.hpp"
 #include "io/plots/plot_ink.hpp"
 

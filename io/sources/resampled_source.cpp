@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
 #include "io/files/io_error.hpp"
 
 namespace twofold {

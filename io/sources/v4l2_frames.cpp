@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 #include "io/files/io_error.hpp"
 
 namespace twofold {

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <vector>
 
-#include "geometry/check.hpp"
+#include "base/check.hpp"
+#include "base/median.hpp"
 #include "surface/lanes.hpp"
 
 namespace twofold {
@@ -399,9 +401,7 @@ class Refiner {
       for (int x = 0; x < size_.width; x += kSampleEvery)
         if (pixels.disparity.row(y)[x] > 0) rests.push_back(pixels.rest.row(y)[x]);
     if (rests.empty()) return;
-    const auto middle = rests.begin() + static_cast<std::ptrdiff_t>(rests.size() / 2);
-    std::nth_element(rests.begin(), middle, rests.end());
-    noise_ = std::max(noise_ * std::sqrt(*middle), 0.1f);
+    noise_ = std::max(noise_ * std::sqrt(median(std::span(rests))), 0.1f);
   }
 
   cv::Size size_;

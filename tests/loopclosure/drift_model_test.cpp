@@ -1,9 +1,9 @@
 #include "loopclosure/drift_model.hpp"
+#include "base/angles.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "graph/graph_writer.hpp"
@@ -11,7 +11,6 @@
 namespace twofold {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kDepth = 5;  // [m]
 
 /// Steps of a metre, each turned by what `yaw_deg` says of it; seen with some error of each step.
@@ -51,7 +50,7 @@ class Drive {
     for (const double yaw : yaw_deg_) {
       const double turn = as_mapped ? yaw * (1 + turn_gain) + bend_deg : yaw;
       const double scale = as_mapped ? 1 : std::exp(log_scale);
-      poses.push_back(Sim3(scale, SO3::exp({0, turn * kRadians, 0}), Vector3(0, 0, -1)) * poses.back());
+      poses.push_back(Sim3(scale, SO3::exp({0, turn * kDegree, 0}), Vector3(0, 0, -1)) * poses.back());
     }
     return poses;
   }

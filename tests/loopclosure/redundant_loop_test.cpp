@@ -38,7 +38,7 @@ class RedundantLoopTest : public ::testing::Test {
     return {graph.version(), kFrom, kTo, SE3(T.so3(), scale * T.translation()), 100, 100, scale};
   }
   bool redundant(const LoopConstraint& loop, const GraphSnapshot& graph) {
-    return loops_.contains(loop, wall_, graph);
+    return loops_.has(loop, wall_, graph);
   }
   static std::vector<MotionObservation> wall() {
     std::vector<MotionObservation> points;

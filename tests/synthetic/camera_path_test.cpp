@@ -1,4 +1,5 @@
 #include "synthetic/camera_path.hpp"
+#include "base/angles.hpp"
 
 #include <gtest/gtest.h>
 

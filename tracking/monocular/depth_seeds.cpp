@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 namespace {

@@ -2,14 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
+#include "base/option_check.hpp"
 #include "estimation/motion_only.hpp"
 #include "filters/anchored_views.hpp"
 #include "filters/inverse_depth_filter.hpp"
 #include "geometry/essential_matrix.hpp"
 #include "geometry/homography.hpp"
 #include "geometry/inverse_depth.hpp"
-#include "geometry/option_check.hpp"
 #include "geometry/view_rotation.hpp"
 
 namespace twofold {
@@ -40,15 +42,11 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
-double median(std::vector<double> values) {
-  return quantile(std::move(values), 0.5);
-}
-
 double median_flow(const CornerViews& views) {
   std::vector<double> flow;
   for (std::size_t i = 0; i < views.first.size(); ++i)
     flow.push_back((views.last[i] - views.first[i]).norm());
-  return median(std::move(flow));
+  return median(std::span(flow));
 }
 
 /// Size of the intersection of two ascending lists.
@@ -311,7 +309,7 @@ class Attempt {
     if (static_cast<int>(depths.size()) < options_.min_points ||
         quantile(std::move(errors), kNearShare) > options_.max_depth_error)
       return tl::unexpected(LostCause::kTooLittleParallax);
-    const double unit = median(std::move(depths));
+    const double unit = median(std::span(depths));
     const SE3& T_last_first = views.views[0].T_c_a;
     structure.T_last_first = {T_last_first.so3(), T_last_first.translation() / unit};
     for (Vector3& psi : structure.psi) psi.z() *= unit;

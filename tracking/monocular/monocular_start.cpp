@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "estimation/motion_only.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_buffers.hpp"
@@ -21,10 +23,7 @@ double median_flow(const StartCandidate& candidate) {
   std::vector<float> flow;
   for (const FollowedCorner& corner : candidate.corners)
     flow.push_back((corner.uv - corner.appearance.uv).norm());
-  if (flow.empty()) return 0;
-  const auto middle = flow.begin() + static_cast<std::ptrdiff_t>(flow.size() / 2);
-  std::nth_element(flow.begin(), middle, flow.end());
-  return *middle;
+  return median(std::span(flow));
 }
 
 }  // namespace

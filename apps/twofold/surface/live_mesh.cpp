@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "base/processor_time.hpp"
 #include "engine/stage_timer.hpp"
-#include "geometry/processor_time.hpp"
 
 namespace twofold {
 

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "base/processor_time.hpp"
 #include "engine/listeners.hpp"
-#include "geometry/processor_time.hpp"
 #include "imaging/row_offset.hpp"
 #include "io/files/io_error.hpp"
 #include "surface/meshing.hpp"

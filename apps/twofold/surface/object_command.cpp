@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,6 +14,7 @@
 #include "apps/twofold/run_output.hpp"
 #include "apps/twofold/surface/object_model.hpp"
 #include "apps/twofold/surface/object_source.hpp"
+#include "base/angles.hpp"
 #include "engine/engine.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/mesh_file.hpp"
@@ -37,7 +37,6 @@ struct ObjectArguments {
 };
 
 constexpr double kTurntable = 0.01;  // [m] that the camera's way may deviate from turning about an axis
-constexpr double kDegree = std::numbers::pi / 180;
 
 std::unique_ptr<ObjectSource> object_source(ObjectArguments& arguments) {
   SourceOptions options;

@@ -6,7 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "geometry/processor_time.hpp"
+#include "base/processor_time.hpp"
 #include "surface/mesh_picture.hpp"
 #include "surface/meshing.hpp"
 

@@ -12,7 +12,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
-#include "geometry/processor_time.hpp"
+#include "base/processor_time.hpp"
 #include "imaging/row_offset.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/mesh_file.hpp"

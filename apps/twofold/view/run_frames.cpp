@@ -4,11 +4,13 @@
 #include <array>
 #include <fstream>
 #include <set>
+#include <span>
 #include <sstream>
 #include <string_view>
 
 #include <fmt/format.h>
 
+#include "base/median.hpp"
 #include "io/files/io_error.hpp"
 
 namespace twofold {
@@ -20,10 +22,7 @@ constexpr std::array<std::string_view, 4> kStates{"tracked", "lost", "dropped", 
 std::int64_t usual_interval(const Trajectory& poses) {
   std::vector<std::int64_t> intervals;
   for (std::size_t i = 1; i < poses.size(); ++i) intervals.push_back(poses[i].t_ns - poses[i - 1].t_ns);
-  if (intervals.empty()) return 1;
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return std::max<std::int64_t>(1, *middle);
+  return std::max<std::int64_t>(1, median(std::span(intervals)));
 }
 
 /// Of frames [begin, end), which nobody knows: between those before and after, or at the usual interval.

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <functional>
 
+#include "base/processor_time.hpp"
 #include "experiments/double_window/experiments.hpp"
 #include "experiments/plot.hpp"
-#include "geometry/processor_time.hpp"
 
 namespace twofold::bench {
 namespace {

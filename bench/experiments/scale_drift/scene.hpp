@@ -7,7 +7,7 @@
 
 namespace twofold::bench {
 
-/// A camera's true way past point landmarks  [m].
+/// A camera's true way past points  [m].
 struct Scene {
   Rig rig;                 ///< monocular
   std::vector<SE3> T_c_w;  ///< true poses, in time

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/processor_time.hpp"
 #include "experiments/plot.hpp"
 #include "experiments/sliding_window/experiments.hpp"
 #include "experiments/sliding_window/simulation.hpp"
-#include "geometry/processor_time.hpp"
 
 namespace twofold::bench {
 namespace {

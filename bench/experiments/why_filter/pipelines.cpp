@@ -5,9 +5,9 @@
 #include <cmath>
 #include <map>
 
+#include "base/processor_time.hpp"
 #include "estimation/motion_only.hpp"
 #include "estimation/window_solver.hpp"
-#include "geometry/processor_time.hpp"
 
 namespace twofold::bench {
 namespace {

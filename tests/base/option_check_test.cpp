@@ -1,4 +1,4 @@
-#include "geometry/option_check.hpp"
+#include "base/option_check.hpp"
 
 #include <limits>
 

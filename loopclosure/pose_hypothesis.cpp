@@ -1,12 +1,13 @@
-#include "loopclosure/place_hypothesis.hpp"
+#include "loopclosure/pose_hypothesis.hpp"
 
 #include <algorithm>
+#include <span>
 
+#include "base/median.hpp"
 #include "geometry/essential_matrix.hpp"
 #include "geometry/ransac.hpp"
 #include "imaging/binary_descriptor.hpp"
 #include "loopclosure/corner_match.hpp"
-#include "loopclosure/median.hpp"
 #include "loopclosure/similarity_estimator.hpp"
 
 namespace twofold {
@@ -58,7 +59,8 @@ std::optional<SE3> pose_by_directions(const Rig& rig, const PlaceAppearance& b,
     const Vector3 across = bearings_b[m].cross(T_b_a.translation());
     lengths.push_back(-across.dot(bearings_b[m].cross(T_b_a.so3() * matches[m].x_a)) / across.squaredNorm());
   }
-  return refine_pose(rig, b, inliers, SE3(T_b_a.so3(), median(std::move(lengths)) * T_b_a.translation()));
+  return fit_pose_to_corners(rig, b, inliers,
+                             SE3(T_b_a.so3(), median(std::span(lengths)) * T_b_a.translation()));
 }
 
 /// RANSAC without chance: few of the matches are right where the view has changed, and draws miss them, or
@@ -71,8 +73,8 @@ std::optional<RansacResult<TwoWaySimilarity>> best_of_all(const SimilarityEstima
 
 }  // namespace
 
-std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
-                                   const VerificationOptions& options, VerificationReport& report) {
+std::optional<SE3> find_pose_hypothesis(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
+                                        const VerificationOptions& options, VerificationReport& report) {
   const bool depth_in_b = rig.kind != SensorKind::kMono ||
                           std::any_of(b.z.begin(), b.z.end(),
                                       [&](const auto& z) { return has_depth(z, options.min_disparity_px); });
@@ -89,7 +91,7 @@ std::optional<SE3> find_hypothesis(const Rig& rig, const PlaceAppearance& a, con
   if (report.ransac_inliers < options.min_hypothesis) return std::nullopt;
   std::vector<CornerMatch> inliers;
   for (const int i : found->inliers) inliers.push_back(matches[static_cast<std::size_t>(i)]);
-  return refine_pose(rig, b, inliers, found->model.S_b_a.without_scale());
+  return fit_pose_to_corners(rig, b, inliers, found->model.S_b_a.without_scale());
 }
 
 }  // namespace twofold

@@ -1,0 +1,9 @@
+#pragma once
+
+#include <numbers>
+
+namespace twofold {
+
+inline constexpr double kDegree = std::numbers::pi / 180;  ///< [rad]
+
+}  // namespace twofold
