@@ -6,6 +6,7 @@
 #include "slam/conversions.hpp"
 #include "slam/frame_pixels.hpp"
 #include "slam/surface_pieces.hpp"
+#include "surface/free_space.hpp"
 #include "surface/meshing.hpp"
 #include "surface/stereo/stereo_depth.hpp"
 
@@ -27,6 +28,8 @@ SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& option
   surface.depth_noise = usual_depth_noise(rig);
   if (const std::string reason = surface.invalid_reason(); !reason.empty())
     throw std::invalid_argument("options: " + reason);
+  if (!(options.max_free_depth >= 0))
+    throw std::invalid_argument("options: max_free_depth must be at least 0");
   if (!(options.nearest_stereo > 0)) throw std::invalid_argument("options: nearest_stereo must be above 0");
   return surface;
 }
@@ -52,14 +55,21 @@ cv::Mat colour_of(const ImageView& view) {
 }  // namespace
 
 struct SurfaceModel::Impl {
+  Impl(const Rig& its_rig, const SurfaceModelOptions& its_options)
+      : rig(its_rig),
+        options(its_options),
+        volume(surface_options(its_rig, its_options)),
+        free(volume.options(), its_options.max_free_depth) {}
+
   Rig rig;
   SurfaceModelOptions options;
   SurfaceVolume volume;
+  FreeSpace free;
   MeshPieces pieces = {};
 };
 
 SurfaceModel::SurfaceModel(const CameraRig& rig, const SurfaceModelOptions& options)
-    : impl_(new Impl{depth_rig(rig), options, SurfaceVolume(surface_options(depth_rig(rig), options))}) {}
+    : impl_(new Impl(depth_rig(rig), options)) {}
 SurfaceModel::~SurfaceModel() = default;
 SurfaceModel::SurfaceModel(SurfaceModel&&) noexcept = default;
 SurfaceModel& SurfaceModel::operator=(SurfaceModel&&) noexcept = default;
@@ -88,18 +98,26 @@ int SurfaceModel::add(const FrameView& frame, const Pose& T_world_camera) {
     throw std::invalid_argument(defect);
   const DepthView view = make_depth_view(rig, depth, colour);
   const int readings = cv::countNonZero(view.depth);
-  if (readings > 0) impl_->volume.fuse(view, T_w_c.inverse());
+  if (readings == 0) return 0;
+  impl_->volume.fuse(view, T_w_c.inverse());
+  impl_->free.add(view, T_w_c.inverse());
   return readings;
 }
 
 void SurfaceModel::clear() {
   impl_->volume.clear();
+  impl_->free.clear();
 }
 
 SpacePoint SurfaceModel::at(const std::array<double, 3>& p_world) const {
   SpacePoint point;
-  const auto found = impl_->volume.distance({p_world[0], p_world[1], p_world[2]});
-  if (!found) return point;
+  const Vector3 x_w(p_world[0], p_world[1], p_world[2]);
+  const auto found = impl_->volume.distance(x_w);
+  if (!found) {
+    const auto clearance = impl_->free.clearance(impl_->volume, x_w);
+    if (clearance) point = {SpaceState::kFree, *clearance, {0, 0, 0}};
+    return point;
+  }
   point.state = found->distance > 0 ? SpaceState::kFree : SpaceState::kOccupied;
   point.distance = found->distance;
   point.gradient = {found->gradient.x(), found->gradient.y(), found->gradient.z()};
@@ -116,7 +134,7 @@ SurfaceChanges SurfaceModel::mesh_changes(std::uint64_t since) {
 }
 
 std::size_t SurfaceModel::memory_bytes() const {
-  return impl_->volume.bytes();
+  return impl_->volume.bytes() + impl_->free.bytes() + impl_->pieces.bytes();
 }
 
 }  // namespace twofold

@@ -11,16 +11,6 @@ namespace {
 
 constexpr std::size_t kFirstSlots = 1024;
 
-/// Primes of Teschner et al., Optimized Spatial Hashing (VMV 2003), then mixed, since the table takes low
-/// bits.
-std::size_t hash_of(const BlockPosition& at) {
-  const auto part = [](std::int32_t c, std::uint64_t prime) {
-    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(c)) * prime;
-  };
-  const std::uint64_t h = part(at.x, 73856093) ^ part(at.y, 19349669) ^ part(at.z, 83492791);
-  return static_cast<std::size_t>((h * 0x9e3779b97f4a7c15ULL) >> 24);
-}
-
 }  // namespace
 
 BlockTable::ChunkPointer BlockTable::new_chunk() {

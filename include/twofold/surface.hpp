@@ -14,22 +14,28 @@ struct SurfaceModelOptions {
   double voxel = 0.05;  ///< distance of two samples [m], 1e-4 .. 10
   double most_depth =
       0;  ///< readings farther than this begin no surface [m] >= 0; 0: CameraRig's bounds alone
-  double nearest_stereo = 0.4;  ///< stereo: the nearest depth that is looked for [m] > 0
+  /// Free space away from surfaces is kept as far as this from the camera [m] >= 0; 0: as far as there are
+  /// readings.
+  double max_free_depth = 0;
+  double nearest_stereo = 0.4;  ///< stereo: the nearest depth that is looked for [m] > 0; the nearer, the
+                                ///< longer `add` takes
 };
 
 enum class SpaceState : std::uint8_t {
-  kUnknown,  ///< never seen, or too far inside a surface
-  kFree,
-  kOccupied
+  kUnknown,  ///< never seen, too far inside a surface, or hidden by what stands where free space was
+  kFree,     ///< outside every surface, near one or seen through
+  kOccupied  ///< inside a surface, as far as the truncation
 };
 
 /// What is known of one position.
 struct SpacePoint {
   SpaceState state = SpaceState::kUnknown;
   /// From the surface [m], positive outside; truncated at four voxels or at three standard deviations of the
-  /// depth, whichever is more.
+  /// depth, whichever is more, but never at more than 60 voxels. Free space away from surfaces: four voxels,
+  /// or less within a voxel of where distances are known. kUnknown: 0.
   double distance = 0;
-  std::array<double, 3> gradient{0, 0, 0};  ///< d distance / d position: away from the surface
+  /// d distance / d position: away from the surface; 0 in free space away from surfaces, and where unknown.
+  std::array<double, 3> gradient{0, 0, 0};
 };
 
 /// Triangles go round anticlockwise seen from outside.
@@ -54,13 +60,18 @@ struct SurfaceChanges {
 };
 
 /// A dense surface from frames with poses, for planners and models: where is free space, how far is the next
-/// obstacle, and what does it look like. Memory follows the surface that was seen, not the time.
+/// obstacle, and what does it look like.
 ///
 ///   SurfaceModel model(rig, {.voxel = 0.05});
 ///   if (estimate.state == TrackingState::kTracked) model.add(frame, estimate.T_world_camera);
 ///   if (model.at({x, y, z}).state == SpaceState::kFree) ...
 ///
-/// What moves away is carved away by later frames. A model stays where its poses put it: after a loop
+/// Near surfaces distances are known; farther from them, free space is known in cells of four voxels an
+/// edge, of which one frame must have seen through all: with no hole in the depth over it, and no surface
+/// within the truncation behind it. A thing thinner than a cell therefore keeps the cell unknown around it.
+///
+/// What moves away is carved away by later frames. What comes to stand in free space makes unknown what it
+/// hides, since that may be its inside. A model stays where its poses put it: after a loop
 /// closure, clear it and add the frames of keyframes anew, which the caller keeps (PoseEstimate::keyframe).
 /// One model holds one map part: poses of another have another world. Same calls, same answers. Threads: at
 /// and mesh by several at once, add, clear and mesh_changes by one while nobody else does anything.

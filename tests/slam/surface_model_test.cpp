@@ -90,10 +90,109 @@ TEST(SurfaceModel, TellsFreeFromOccupiedAndUnknown) {
   EXPECT_EQ(model.at({10, 0, 1.47}).state, SpaceState::kUnknown);
 }
 
+/// A pixel's 16 bits [mm].
+void draw_box(WallFrame& wall, int left, int right, int top, int bottom, std::uint16_t depth) {
+  for (int y = top; y < bottom; ++y)
+    for (int x = left; x < right; ++x) wall.depth[static_cast<std::size_t>(y * kWidth + x)] = depth;
+}
+
+/// The wall is 3 m away.
+WallFrame far_wall() {
+  WallFrame wall;
+  draw_box(wall, 0, kWidth, 0, kHeight, 3000);
+  return wall;
+}
+
+TEST(SurfaceModel, KnowsTheFreeSpaceThatItSawThrough) {
+  const WallFrame wall = far_wall();
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  const Pose T_world_camera{{0, 0, 0, 1}, {10, 0, 0}};
+  ASSERT_GT(model.add(wall.view(), T_world_camera), 0);
+  const SpacePoint before = model.at({10, 0, 2});
+  EXPECT_EQ(before.state, SpaceState::kFree);
+  EXPECT_DOUBLE_EQ(before.distance, 0.08);
+  EXPECT_EQ(before.gradient, (std::array<double, 3>{0, 0, 0}));
+  EXPECT_EQ(model.at({10.9, 0.4, 2}).state, SpaceState::kFree);
+  // No gap between the truncation of the surface and the free space before it.
+  for (double z = 0.8; z < 2.99; z += 0.003)
+    EXPECT_EQ(model.at({10.1, 0.1, z}).state, SpaceState::kFree) << z;
+  EXPECT_EQ(model.at({10, 0, 3.5}).state, SpaceState::kUnknown);  // behind the wall
+  EXPECT_EQ(model.at({11.5, 0, 2}).state, SpaceState::kUnknown);  // beside the view
+  EXPECT_EQ(model.at({10, 1.1, 2}).state, SpaceState::kUnknown);
+  EXPECT_EQ(model.at({10, 0, -1}).state, SpaceState::kUnknown);  // behind the camera
+  EXPECT_EQ(model.at({NAN, 0, 2}).state, SpaceState::kUnknown);
+  EXPECT_EQ(model.at({1e300, 0, 2}).state, SpaceState::kUnknown);
+  model.clear();
+  EXPECT_EQ(model.at({10, 0, 2}).state, SpaceState::kUnknown);
+}
+
+TEST(SurfaceModel, KeepsFreeSpaceAsFarAsItIsTold) {
+  const WallFrame wall = far_wall();
+  SurfaceModel all(depth_camera(), {.voxel = 0.02});
+  SurfaceModel near(depth_camera(), {.voxel = 0.02, .max_free_depth = 1.5});
+  ASSERT_GT(all.add(wall.view(), {}), 0);
+  ASSERT_GT(near.add(wall.view(), {}), 0);
+  EXPECT_EQ(near.at({0, 0, 1.2}).state, SpaceState::kFree);
+  EXPECT_EQ(near.at({0, 0, 1.7}).state, SpaceState::kUnknown);
+  EXPECT_EQ(near.at({0, 0, 2.97}).state, SpaceState::kFree);  // of the surface
+  EXPECT_LT(near.memory_bytes(), all.memory_bytes());
+}
+
+TEST(SurfaceModel, DoesNotSeeThroughAHoleInTheDepth) {
+  WallFrame wall = far_wall();
+  draw_box(wall, 78, 82, 58, 62, 0);
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  ASSERT_GT(model.add(wall.view(), {}), 0);
+  EXPECT_EQ(model.at({0, 0, 2}).state, SpaceState::kUnknown);
+  EXPECT_EQ(model.at({0.5, 0, 2}).state, SpaceState::kFree);
+}
+
+TEST(SurfaceModel, SeesNothingThroughAPillarThinnerThanACell) {
+  WallFrame wall = far_wall();
+  draw_box(wall, 79, 81, 0, kHeight, 1900);  // 3 cm wide
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  ASSERT_GT(model.add(wall.view(), {}), 0);
+  EXPECT_NE(model.at({0.005, 0, 1.94}).state, SpaceState::kFree);
+  EXPECT_NE(model.at({0.02, 0.3, 2.3}).state, SpaceState::kFree);
+  EXPECT_EQ(model.at({0.5, 0, 1.94}).state, SpaceState::kFree);
+  EXPECT_EQ(model.at({0, 0, 1.3}).state, SpaceState::kFree);
+}
+
+TEST(SurfaceModel, WhatComesToStandInFreeSpaceIsNotFreeInside) {
+  WallFrame wall = far_wall();
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(wall.view(), {}), 0);
+  EXPECT_EQ(model.at({0, 0, 1.55}).state, SpaceState::kFree);
+  EXPECT_EQ(model.at({0, 0, 2.2}).state, SpaceState::kFree);
+  draw_box(wall, 50, 110, 30, 90, 1500);
+  for (int n = 0; n < 30; ++n) ASSERT_GT(model.add(wall.view(), {}), 0);
+  // As far as the blocks of the wall, which stay as they were.
+  for (double z = 1.52; z < 2.7; z += 0.01) EXPECT_NE(model.at({0, 0, z}).state, SpaceState::kFree) << z;
+  EXPECT_EQ(model.at({0, 0, 1.3}).state, SpaceState::kFree);
+  EXPECT_EQ(model.at({0.9, 0, 2.2}).state, SpaceState::kFree);  // beside the box
+  // It is gone again.
+  const WallFrame empty = far_wall();
+  for (int n = 0; n < 30; ++n) ASSERT_GT(model.add(empty.view(), {}), 0);
+  EXPECT_EQ(model.at({0, 0, 1.55}).state, SpaceState::kFree);
+  EXPECT_EQ(model.at({0, 0, 2.2}).state, SpaceState::kFree);
+}
+
+TEST(SurfaceModel, KeepsTheNextRoomFreeBehindAWall) {
+  const WallFrame wall = far_wall();
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  // From 4 m behind the wall, away from it; then the wall from this side.
+  ASSERT_GT(model.add(wall.view(), {{0, 0, 0, 1}, {0, 0, 4}}), 0);
+  EXPECT_EQ(model.at({0, 0, 6}).state, SpaceState::kFree);
+  for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(wall.view(), {}), 0);
+  EXPECT_EQ(model.at({0, 0, 2}).state, SpaceState::kFree);
+  EXPECT_EQ(model.at({0, 0, 6}).state, SpaceState::kFree);
+}
+
 TEST(SurfaceModel, RefusesWhatMakesNoSense) {
   EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel = 0}), std::invalid_argument);
   EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel = std::numeric_limits<double>::quiet_NaN()}),
                std::invalid_argument);
+  EXPECT_THROW(SurfaceModel(depth_camera(), {.max_free_depth = -1}), std::invalid_argument);
   EXPECT_THROW(SurfaceModel{CameraRig()}, std::invalid_argument);
   SurfaceModel model(depth_camera(), {.voxel = 0.02});
   WallFrame wall;
