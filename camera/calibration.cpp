@@ -61,9 +61,11 @@ std::string Calibration::invalid_reason() const {
   if (readout && (!(*readout >= 0) || !std::isfinite(*readout))) {
     return "readout must not be negative, is " + std::to_string(*readout);
   }
-  if (kind == SensorKind::kRgbd) {
+  if (kind != SensorKind::kMono) {
     if (!(depth_unit > 0)) return "depth_unit must be positive, is " + std::to_string(depth_unit);
     if (!(depth_min >= 0 && depth_max > depth_min)) return "depth_min, depth_max must satisfy 0 <= min < max";
+  }
+  if (kind == SensorKind::kRgbd) {
     if (!(virtual_baseline > 0))
       return "virtual_baseline must be positive, is " + std::to_string(virtual_baseline);
     if (depth_apart) return invalid_depth_camera(depth_camera);

@@ -76,7 +76,7 @@ Rig to_rig(const CameraRig& rig) {
   }
   if (rig.readout) expect(*rig.readout >= 0, "readout", ">= 0", *rig.readout);
   inside.readout = rig.readout;
-  if (rig.sensor != Sensor::kRgbd) return inside;
+  if (rig.sensor == Sensor::kMono) return inside;
   expect(positive(rig.depth_unit), "depth_unit", "> 0", rig.depth_unit);
   expect(positive(rig.depth_min), "depth_min", "> 0", rig.depth_min);
   expect(rig.depth_max > rig.depth_min, "depth_max", "> depth_min", rig.depth_max);

@@ -32,6 +32,9 @@ TEST(CalibrationFile, OwnForm) {
   EXPECT_NEAR(c.T_right_left.translation().x(), -0.11, 1e-15);
   EXPECT_EQ(c.fps, 20);
   EXPECT_EQ(c.invalid_reason(), "");
+  Calibration far = c;  // of surfaces
+  far.depth_min = far.depth_max + 1;
+  EXPECT_NE(far.invalid_reason(), "");
 
   const auto rgbd = read_calibration(folder.write(
       "d.yaml",

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <stdexcept>
 
 namespace twofold {
@@ -186,6 +188,27 @@ TEST(SurfaceModel, KeepsTheNextRoomFreeBehindAWall) {
   for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(wall.view(), {}), 0);
   EXPECT_EQ(model.at({0, 0, 2}).state, SpaceState::kFree);
   EXPECT_EQ(model.at({0, 0, 6}).state, SpaceState::kFree);
+}
+
+/// Texture 0.65 m away: 16 pixels of disparity.
+TEST(SurfaceModel, OfAPairEndsWhereTheRigSays) {
+  CameraRig rig = depth_camera();
+  rig.sensor = Sensor::kStereo;
+  std::mt19937 random(3);
+  std::vector<std::uint8_t> left(kWidth * kHeight), right(kWidth * kHeight);
+  for (std::uint8_t& pixel : left) pixel = static_cast<std::uint8_t>(random() % 256);
+  std::copy(left.begin() + 16, left.end(), right.begin());
+  FrameView frame;
+  frame.left = {left.data(), kWidth, kHeight, kWidth, ImageFormat::kGrey8};
+  frame.right = {right.data(), kWidth, kHeight, kWidth, ImageFormat::kGrey8};
+  EXPECT_GT(SurfaceModel(rig).add(frame, {}), kWidth * kHeight / 4);
+  rig.depth_max = 0.6;
+  EXPECT_EQ(SurfaceModel(rig).add(frame, {}), 0);
+  rig.depth_max = 8;
+  rig.depth_min = 0.7;
+  EXPECT_EQ(SurfaceModel(rig).add(frame, {}), 0);
+  rig.depth_min = 9;
+  EXPECT_THROW(SurfaceModel{rig}, std::invalid_argument);
 }
 
 TEST(SurfaceModel, RefusesWhatMakesNoSense) {
