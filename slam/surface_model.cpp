@@ -6,7 +6,7 @@
 #include "slam/conversions.hpp"
 #include "slam/frame_pixels.hpp"
 #include "slam/surface_pieces.hpp"
-#include "surface/free_space.hpp"
+#include "surface/free_space/free_space.hpp"
 #include "surface/meshing.hpp"
 #include "surface/stereo/stereo_depth.hpp"
 
@@ -24,7 +24,7 @@ Rig depth_rig(const CameraRig& rig) {
 SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& options) {
   SurfaceOptions surface;
   surface.voxel = options.voxel;
-  surface.most_depth = options.most_depth;
+  surface.max_depth = options.max_depth;
   surface.depth_noise = usual_depth_noise(rig);
   if (const std::string reason = surface.invalid_reason(); !reason.empty())
     throw std::invalid_argument("options: " + reason);

@@ -97,7 +97,7 @@ void BlockMesher::fill_row(int y, int z, std::size_t to) {
     weight_[to + x] = block != nullptr ? volume_.units().weight * block->weight[row + from] : 0;
   };
   copy(blocks[0], kBlockEdge - 1, 0);
-  Lane distance{}, weight{};
+  Lanes distance{}, weight{};
   if (blocks[1] != nullptr) {
     distance = volume_.units().distance * real(load<LaneShort>(&blocks[1]->distance[row]));
     weight = volume_.units().weight * real(load<LaneUnsignedShort>(&blocks[1]->weight[row]));

@@ -15,7 +15,7 @@ namespace twofold {
 struct SurfaceVertex {
   Eigen::Vector3f position;  ///< [m]
   Eigen::Vector3f normal;    ///< unit, pointing outside
-  float sigma = 0;           ///< standard deviation of the position along the normal [m]
+  float sigma = 0;           ///< standard deviation of the position along the normal, an upper estimate [m]
   std::array<std::uint8_t, 3> colour{};
 
   friend bool operator==(const SurfaceVertex&, const SurfaceVertex&) = default;

@@ -16,7 +16,7 @@ constexpr int kPixelStep = 2;        // between readings that blocks are made fo
 constexpr float kWideBlock = 12.0f;  // [px]: every second of these rows is enough for blocks at least so wide
 constexpr int kGroup = kLanes * kPixelStep;
 
-inline LaneIndex floor_of(const Lane& a) {
+inline LaneIndex floor_of(const Lanes& a) {
   const LaneIndex toward_zero = whole(a);
   return toward_zero + (real(toward_zero) > a);  // a comparison gives -1
 }
@@ -59,13 +59,13 @@ class LastBlocks {
 };
 
 /// Every kPixelStep-th reading of a row from x on; 0 beyond its end.
-inline Lane every_second(const float* row, int x, int width) {
+inline Lanes every_second(const float* row, int x, int width) {
   static_assert(kPixelStep == 2);
   if (x + kGroup <= width) {
-    return __builtin_shufflevector(load<Lane>(row + x), load<Lane>(row + x + kLanes), 0, 2, 4, 6, 8, 10, 12,
+    return __builtin_shufflevector(load<Lanes>(row + x), load<Lanes>(row + x + kLanes), 0, 2, 4, 6, 8, 10, 12,
                                    14);
   }
-  Lane z{};
+  Lanes z{};
   for (int i = 0; i < kLanes && x + kPixelStep * i < width; ++i) z[i] = row[x + kPixelStep * i];
   return z;
 }
@@ -78,7 +78,7 @@ void SurfaceVolume::collect_blocks(const DepthView& view, const SE3& T_c_v) {
   const float blocks_a_metre = 1 / (f.voxel * kBlockEdge);
   const Eigen::Matrix3f R_v_c = f.R_c_v.transpose() * blocks_a_metre;
   const Eigen::Vector3f eye = T_c_v.inverse().translation().cast<float>() * blocks_a_metre;
-  const auto most_depth = static_cast<float>(options_.most_depth > 0 ? options_.most_depth : 1e9);
+  const auto max_depth = static_cast<float>(options_.max_depth > 0 ? options_.max_depth : 1e9);
   touch_none();
   const auto groups = static_cast<std::size_t>((view.depth.cols + kGroup - 1) / kGroup);
   std::vector<LastBlocks> last;
@@ -87,17 +87,17 @@ void SurfaceVolume::collect_blocks(const DepthView& view, const SE3& T_c_v) {
     const float ry = (static_cast<float>(y) - f.cy) / f.fy;
     const float nearest = y % (2 * kPixelStep) == 0 ? 0 : f.fx * f.voxel * kBlockEdge / kWideBlock;
     for (int x = 0; x < view.depth.cols; x += kGroup) {
-      const Lane z = every_second(row, x, view.depth.cols);
-      const LaneIndex valid = (z > nearest) & (z <= most_depth);
+      const Lanes z = every_second(row, x, view.depth.cols);
+      const LaneIndex valid = (z > nearest) & (z <= max_depth);
       if (!any(valid)) continue;
-      const Lane rx = (static_cast<float>(x) + kPixelStep * kCount - f.cx) / f.fx;
+      const Lanes rx = (static_cast<float>(x) + kPixelStep * kCount - f.cx) / f.fx;
       // How far the rays reach, in depth: the band is as wide as it is for the farthest of them.
       const float shortest = std::sqrt(1 + ry * ry + least(rx * rx));
       const float reach = f.truncation_at(largest(valid ? z : kZero)) / shortest;
       const int steps = std::max(2, static_cast<int>(std::ceil(4 * reach * blocks_a_metre)));
       while (last.size() <= static_cast<std::size_t>(steps)) last.emplace_back(groups * kLanes);
       for (int s = 0; s <= steps; ++s) {
-        const Lane at = z + reach * (2 * static_cast<float>(s) / static_cast<float>(steps) - 1);
+        const Lanes at = z + reach * (2 * static_cast<float>(s) / static_cast<float>(steps) - 1);
         std::array<LaneIndex, 3> block;
         for (int a = 0; a < 3; ++a)
           block[static_cast<std::size_t>(a)] =

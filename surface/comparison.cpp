@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kReach = 10;  // thresholds
 
-DistanceStatistics statistics(const std::vector<SurfaceSample>& samples, const TriangleGrid& surface,
+DistanceStatistics statistics(const std::vector<MeshPoint>& samples, const TriangleGrid& surface,
                               double threshold) {
   std::vector<float> distances;
   distances.reserve(samples.size());
@@ -22,7 +22,7 @@ DistanceStatistics statistics(const std::vector<SurfaceSample>& samples, const T
   if (samples.empty()) return s;
   double sum = 0, squares = 0;
   std::size_t near = 0;
-  for (const SurfaceSample& sample : samples) {
+  for (const MeshPoint& sample : samples) {
     const float d = surface.distance(sample.position);
     distances.push_back(d);
     sum += d;
@@ -46,13 +46,13 @@ SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMe
   constexpr float kSpacing = 0.05f;     // of the points [m]
   constexpr double kLeastReach = 0.02;  // in the end [m]
   const TriangleGrid surface(truth, static_cast<float>(reach));
-  const std::vector<SurfaceSample> samples = sample_surface(estimate, kSpacing);
+  const std::vector<MeshPoint> samples = sample_surface(estimate, kSpacing);
   SE3 T = T_w_e;
   double within = reach;
   for (int step = 0; step < kSteps; ++step) {
     Matrix6 H = 1e-9 * Matrix6::Identity();
     Vector6 g = Vector6::Zero();
-    for (const SurfaceSample& sample : samples) {
+    for (const MeshPoint& sample : samples) {
       const Vector3 x = T * Vector3(sample.position.cast<double>());
       const auto plane = surface.nearest_plane(x.cast<float>());
       if (!plane || plane->distance > within) continue;

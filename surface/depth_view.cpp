@@ -182,8 +182,8 @@ class Slopes {
     ray_ *= facing_;
     facing_ = 255 * facing_ + 0.5f;
   }
-  /// As PixelReading::slant.
-  [[nodiscard]] const Row& slant() const { return ray_; }
+  /// As PixelReading::distance_per_depth.
+  [[nodiscard]] const Row& distance_per_depth() const { return ray_; }
   /// In 1/255, to be cut off.
   [[nodiscard]] const Row& facing() const { return facing_; }
 
@@ -218,21 +218,21 @@ void read_colours(const cv::Mat& image, int y, std::vector<std::uint32_t>& colou
 }
 
 /// Eight pixels: numbers of a kind come together, and go by the pixel.
-inline void store_pixels(const Lane& depth, const Lane& nearest, const Lane& slant, const Lane& colour,
-                         PixelReading* to) {
-  const auto low = [](const Lane& a, const Lane& b) {
+inline void store_pixels(const Lanes& depth, const Lanes& nearest, const Lanes& distance_per_depth,
+                         const Lanes& colour, PixelReading* to) {
+  const auto low = [](const Lanes& a, const Lanes& b) {
     return __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
   };
-  const auto high = [](const Lane& a, const Lane& b) {
+  const auto high = [](const Lanes& a, const Lanes& b) {
     return __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
   };
-  const Lane low_first = low(depth, nearest), low_last = low(slant, colour);
-  const Lane high_first = high(depth, nearest), high_last = high(slant, colour);
-  const Lane p04 = __builtin_shufflevector(low_first, low_last, 0, 1, 8, 9, 4, 5, 12, 13);
-  const Lane p15 = __builtin_shufflevector(low_first, low_last, 2, 3, 10, 11, 6, 7, 14, 15);
-  const Lane p26 = __builtin_shufflevector(high_first, high_last, 0, 1, 8, 9, 4, 5, 12, 13);
-  const Lane p37 = __builtin_shufflevector(high_first, high_last, 2, 3, 10, 11, 6, 7, 14, 15);
-  const auto store = [to](int pixel, const Lane& two) {
+  const Lanes low_first = low(depth, nearest), low_last = low(distance_per_depth, colour);
+  const Lanes high_first = high(depth, nearest), high_last = high(distance_per_depth, colour);
+  const Lanes p04 = __builtin_shufflevector(low_first, low_last, 0, 1, 8, 9, 4, 5, 12, 13);
+  const Lanes p15 = __builtin_shufflevector(low_first, low_last, 2, 3, 10, 11, 6, 7, 14, 15);
+  const Lanes p26 = __builtin_shufflevector(high_first, high_last, 0, 1, 8, 9, 4, 5, 12, 13);
+  const Lanes p37 = __builtin_shufflevector(high_first, high_last, 2, 3, 10, 11, 6, 7, 14, 15);
+  const auto store = [to](int pixel, const Lanes& two) {
     std::memcpy(static_cast<void*>(to + pixel), &two, sizeof(two));
   };
   store(0, __builtin_shufflevector(p04, p15, 0, 1, 2, 3, 8, 9, 10, 11));
@@ -244,18 +244,20 @@ inline void store_pixels(const Lane& depth, const Lane& nearest, const Lane& sla
 /// Bounds of the rows of one row of tiles.
 class TileRow {
  public:
-  explicit TileRow(int width) : farthest_(width), nearest_(width), least_slant_(width) { clear(); }
-  void add(const ConstRow& depth, const ConstRow& nearest, const Row& slant) {
+  explicit TileRow(int width) : farthest_(width), nearest_(width), least_distance_per_depth_(width) {
+    clear();
+  }
+  void add(const ConstRow& depth, const ConstRow& nearest, const Row& distance_per_depth) {
     farthest_ = farthest_.max(depth).max(nearest);
     nearest_ = nearest_.min(nearest);
-    least_slant_ = least_slant_.min(slant);
+    least_distance_per_depth_ = least_distance_per_depth_.min(distance_per_depth);
   }
   void take(DepthTile* tiles) {
     const auto width = farthest_.size();
     for (Eigen::Index left = 0; left < width; left += kDepthTile) {
       const Eigen::Index size = std::min<Eigen::Index>(kDepthTile, width - left);
       *tiles++ = {farthest_.segment(left, size).maxCoeff(), nearest_.segment(left, size).minCoeff(),
-                  least_slant_.segment(left, size).minCoeff()};
+                  least_distance_per_depth_.segment(left, size).minCoeff()};
     }
     clear();
   }
@@ -264,9 +266,9 @@ class TileRow {
   void clear() {
     farthest_.setZero();
     nearest_.fill(kNone);
-    least_slant_.fill(kNone);
+    least_distance_per_depth_.fill(kNone);
   }
-  Row farthest_, nearest_, least_slant_;  // of the pixels of a column
+  Row farthest_, nearest_, least_distance_per_depth_;  // of the pixels of a column
 };
 
 /// Pixels and tiles, from depths and what find_jumps told.
@@ -284,15 +286,16 @@ void find_pixels(const cv::Mat& nearest, DepthView& view) {
     int x = 0;
     for (; x + kLanes <= width; x += kLanes) {
       const LaneIndex colour = load<LaneIndex>(&colours[static_cast<std::size_t>(x)]) |
-                               whole(load<Lane>(&slopes.facing()[x])) << 24;
-      store_pixels(load<Lane>(depth.data() + x), load<Lane>(near.data() + x), load<Lane>(&slopes.slant()[x]),
-                   reinterpret_cast<Lane>(colour), pixel + x);
+                               whole(load<Lanes>(&slopes.facing()[x])) << 24;
+      store_pixels(load<Lanes>(depth.data() + x), load<Lanes>(near.data() + x),
+                   load<Lanes>(&slopes.distance_per_depth()[x]), reinterpret_cast<Lanes>(colour), pixel + x);
     }
     for (; x < width; ++x) {
       const auto facing = static_cast<std::uint32_t>(slopes.facing()[x]);
-      pixel[x] = {depth[x], near[x], slopes.slant()[x], colours[static_cast<std::size_t>(x)] | facing << 24};
+      pixel[x] = {depth[x], near[x], slopes.distance_per_depth()[x],
+                  colours[static_cast<std::size_t>(x)] | facing << 24};
     }
-    tile_row.add(depth, near, slopes.slant());
+    tile_row.add(depth, near, slopes.distance_per_depth());
     if ((y + 1) % kDepthTile == 0 || y + 1 == view.depth.rows)
       tile_row.take(view.tiles.ptr<DepthTile>(y / kDepthTile));
   }

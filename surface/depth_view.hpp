@@ -12,7 +12,8 @@ namespace twofold {
 struct PixelReading {
   float depth = 0;    ///< [m]; 0: no reading
   float nearest = 0;  ///< the smallest depth of the pixel and its eight neighbours [m]; 0 if one has none
-  float slant = 0;    ///< distance from the surface over difference of depths: facing times the ray's length
+  /// Distance from the surface for each metre of depth before it: facing times the ray's length.
+  float distance_per_depth = 0;
   /// From the lowest byte on: red, green, blue (0 without an image), and the cosine of the angle between ray
   /// and surface normal in 1/255, at least a tenth.
   std::uint32_t colour_and_facing = 0;
@@ -22,9 +23,9 @@ inline constexpr int kDepthTile = 8;  ///< pixels along an edge of a DepthTile
 
 /// Bounds of the readings in a square of pixels.
 struct DepthTile {
-  float farthest = 0;     ///< no reading, nor any neighbour's, is farther [m]
-  float nearest = 0;      ///< no reading, nor any neighbour's, is nearer [m]; 0 if one of them is missing
-  float least_slant = 0;  ///< of PixelReading::slant
+  float farthest = 0;  ///< no PixelReading::depth or ::nearest is larger [m]
+  float nearest = 0;   ///< no reading, nor any neighbour's, is nearer [m]; 0 if one of them is missing
+  float least_distance_per_depth = 0;  ///< of PixelReading::distance_per_depth
 };
 
 /// A depth image as fusion reads it.

@@ -18,7 +18,7 @@ constexpr float kFreeShare = 0.1f;     // of most_weight: what the sight of free
 
 /// Eight readings, each kind together.
 struct PixelLanes {
-  Lane depth, nearest, slant;
+  Lanes depth, nearest, distance_per_depth;
   LaneIndex colour_and_facing;
 };
 
@@ -29,14 +29,14 @@ inline PixelLanes read_pixels(const PixelReading* pixels, const LaneIndex& index
   const LaneIndex bytes = index * static_cast<int>(sizeof(PixelReading));
   std::memcpy(offset.data(), &bytes, sizeof(bytes));
   const auto* from = reinterpret_cast<const char*>(pixels);
-  std::array<Lane, 4> pair;  // readings i and i + 4
+  std::array<Lanes, 4> pair;  // readings i and i + 4
   for (std::size_t i = 0; i < 4; ++i)
     pair[i] = __builtin_shufflevector(load<Four>(from + offset[i]), load<Four>(from + offset[i + 4]), 0, 1, 2,
                                       3, 4, 5, 6, 7);
-  const Lane low01 = __builtin_shufflevector(pair[0], pair[1], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Lane high01 = __builtin_shufflevector(pair[0], pair[1], 2, 10, 3, 11, 6, 14, 7, 15);
-  const Lane low23 = __builtin_shufflevector(pair[2], pair[3], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Lane high23 = __builtin_shufflevector(pair[2], pair[3], 2, 10, 3, 11, 6, 14, 7, 15);
+  const Lanes low01 = __builtin_shufflevector(pair[0], pair[1], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Lanes high01 = __builtin_shufflevector(pair[0], pair[1], 2, 10, 3, 11, 6, 14, 7, 15);
+  const Lanes low23 = __builtin_shufflevector(pair[2], pair[3], 0, 8, 1, 9, 4, 12, 5, 13);
+  const Lanes high23 = __builtin_shufflevector(pair[2], pair[3], 2, 10, 3, 11, 6, 14, 7, 15);
   return {__builtin_shufflevector(low01, low23, 0, 1, 8, 9, 4, 5, 12, 13),
           __builtin_shufflevector(low01, low23, 2, 3, 10, 11, 6, 7, 14, 15),
           __builtin_shufflevector(high01, high23, 0, 1, 8, 9, 4, 5, 12, 13),
@@ -76,17 +76,17 @@ struct BlockBounds {
 BlockBounds bounds_of(const FusionView& view, const DepthView& images, const BlockPose& pose) {
   constexpr float kLast = kBlockEdge - 1;
   constexpr float kRounding = 0.1f;  // [px]: far more than sums differ by
-  constexpr Lane kX{0, kLast, 0, kLast, 0, kLast, 0, kLast}, kY{0, 0, kLast, kLast, 0, 0, kLast, kLast},
+  constexpr Lanes kX{0, kLast, 0, kLast, 0, kLast, 0, kLast}, kY{0, 0, kLast, kLast, 0, 0, kLast, kLast},
       kZ{0, 0, 0, 0, kLast, kLast, kLast, kLast};
   const auto corners = [&](int a) {
     return pose.first[a] + kX * pose.dx[a] + kY * pose.dy[a] + kZ * pose.dz[a];
   };
-  const Lane z = corners(2);
+  const Lanes z = corners(2);
   BlockBounds bounds;
   if (least(z) <= kLeastDepth) return bounds;
-  const Lane inverse = kOne / z;
-  const Lane u = corners(0) * inverse;
-  const Lane v = corners(1) * inverse;
+  const Lanes inverse = kOne / z;
+  const Lanes u = corners(0) * inverse;
+  const Lanes v = corners(1) * inverse;
   const float left = least(u), right = largest(u), top = least(v), bottom = largest(v);
   bounds.in_image = right >= 0 && bottom >= 0 && left < view.width && top < view.height;
   if (!bounds.in_image) return bounds;
@@ -102,17 +102,18 @@ BlockBounds bounds_of(const FusionView& view, const DepthView& images, const Blo
     for (int x = x0; x <= x1; ++x) {
       all.farthest = std::max(all.farthest, tiles[x].farthest);
       all.nearest = std::min(all.nearest, tiles[x].nearest);
-      all.least_slant = std::min(all.least_slant, tiles[x].least_slant);
+      all.least_distance_per_depth =
+          std::min(all.least_distance_per_depth, tiles[x].least_distance_per_depth);
     }
   }
   bounds.last = all.farthest + pose.truncation;
-  if (bounds.whole_in_image) bounds.first_free = all.nearest - pose.truncation / all.least_slant;
+  if (bounds.whole_in_image) bounds.first_free = all.nearest - pose.truncation / all.least_distance_per_depth;
   return bounds;
 }
 
 struct RowUpdate {
-  Lane distance;   ///< new value for the average [steps]
-  Lane weight;     ///< [steps]; 0: the view says nothing
+  Lanes distance;  ///< new value for the average [steps]
+  Lanes weight;    ///< [steps]; 0: the view says nothing
   LaneIndex near;  ///< samples that take part in the surface's colour
   LaneIndex colour;
 };
@@ -123,8 +124,8 @@ struct Layer {
     const auto along = [&](int a) {
       return (pose.first[a] + kCount * pose.dy[a]) + static_cast<float>(number) * pose.dz[a];
     };
-    const Lane z_first = along(2);
-    const Lane z_last = z_first + (kLanes - 1) * pose.dx.z();
+    const Lanes z_first = along(2);
+    const Lanes z_last = z_first + (kLanes - 1) * pose.dx.z();
     store(u, along(0));
     store(v, along(1));
     store(z, z_first);
@@ -152,7 +153,7 @@ struct RowScale {
         most_weight(kReadingShare * kMostWeightSteps / 255),
         weight(view.voxel * view.voxel / (view.noise * view.noise) / units.weight / 255) {}
 
-  std::array<Lane, 3> step;  ///< from the row's first sample to the others
+  std::array<Lanes, 3> step;  ///< from the row's first sample to the others
   float truncation, behind, distance, most_weight, weight;
 };
 
@@ -161,10 +162,10 @@ struct RowScale {
 template <bool kWholeInImage>
 inline void measure_row(const FusionView& view, const RowScale& scale, const PixelReading* pixels,
                         const Layer& layer, std::size_t y, RowUpdate& row) {
-  const Lane z = layer.z[y] + scale.step[2];
-  const Lane inverse = kOne / (kWholeInImage ? z : larger(z, kZero + kLeastDepth));
-  Lane u = (layer.u[y] + scale.step[0]) * inverse;
-  Lane v = (layer.v[y] + scale.step[1]) * inverse;
+  const Lanes z = layer.z[y] + scale.step[2];
+  const Lanes inverse = kOne / (kWholeInImage ? z : larger(z, kZero + kLeastDepth));
+  Lanes u = (layer.u[y] + scale.step[0]) * inverse;
+  Lanes v = (layer.v[y] + scale.step[1]) * inverse;
   LaneIndex seen;
   if constexpr (!kWholeInImage) {
     seen = (z > kLeastDepth) & (u >= 0) & (v >= 0) & (u < view.width) & (v < view.height);
@@ -172,17 +173,17 @@ inline void measure_row(const FusionView& view, const RowScale& scale, const Pix
     v = seen ? v : kZero;
   }
   const PixelLanes at = read_pixels(pixels, whole(v) * view.stride + whole(u));
-  const Lane in_depth = at.depth - z;
-  const Lane s = in_depth * at.slant;
+  const Lanes in_depth = at.depth - z;
+  const Lanes s = in_depth * at.distance_per_depth;
   const LaneIndex in_band = (at.depth > 0) & (in_depth >= -scale.truncation) & (s <= scale.truncation);
   // Free: all pixels around see farther than this, so that the rim of a thing is not worn away.
-  const LaneIndex is_free = (at.nearest - z) * at.slant > scale.truncation;
+  const LaneIndex is_free = (at.nearest - z) * at.distance_per_depth > scale.truncation;
   // Behind the surface readings count less and less, or thin things would be carved from the other side.
-  const Lane behind = smaller(kOne, (in_depth + scale.truncation) * scale.behind);
-  const Lane squared = inverse * inverse;
-  const Lane facing = real((at.colour_and_facing >> 24) & 255);
-  const Lane weight = facing * behind * smaller(scale.weight * squared * squared, kZero + scale.most_weight);
-  const Lane banded = in_band ? weight : kZero;
+  const Lanes behind = smaller(kOne, (in_depth + scale.truncation) * scale.behind);
+  const Lanes squared = inverse * inverse;
+  const Lanes facing = real((at.colour_and_facing >> 24) & 255);
+  const Lanes weight = facing * behind * smaller(scale.weight * squared * squared, kZero + scale.most_weight);
+  const Lanes banded = in_band ? weight : kZero;
   row.distance = scale.distance * (is_free ? kZero + scale.truncation : s);
   row.weight = is_free ? kZero + kFreeShare * kMostWeightSteps : banded;
   if constexpr (!kWholeInImage) row.weight = seen ? row.weight : kZero;
@@ -191,13 +192,13 @@ inline void measure_row(const FusionView& view, const RowScale& scale, const Pix
 }
 
 /// Colours of samples within two voxels of the surface. share: of the new value in each average.
-inline void update_colours(const RowUpdate& row, const Lane& share, std::size_t first, VoxelBlock& block) {
-  const Lane near_share = row.near ? share : kZero;
+inline void update_colours(const RowUpdate& row, const Lanes& share, std::size_t first, VoxelBlock& block) {
+  const Lanes near_share = row.near ? share : kZero;
   for (std::size_t c = 0; c < 3; ++c) {
     std::uint16_t* channel = &block.colour[c][first];
     const LaneIndex bits = (row.colour >> static_cast<int>(8 * c)) & 255;
-    const Lane before = real(load<LaneUnsignedShort>(channel));
-    const Lane after = before + (256 * real(bits) - before) * near_share;
+    const Lanes before = real(load<LaneUnsignedShort>(channel));
+    const Lanes after = before + (256 * real(bits) - before) * near_share;
     const LaneUnsignedShort rounded = narrow_unsigned(whole(after));
     std::memcpy(channel, &rounded, sizeof(rounded));
   }
@@ -208,23 +209,23 @@ template <bool kColours>
 inline void update_row(const RowUpdate& row, std::size_t first, VoxelBlock& block) {
   std::int16_t* distances = &block.distance[first];
   std::uint16_t* weights = &block.weight[first];
-  const Lane sum = real(load<LaneUnsignedShort>(weights)) + row.weight;
-  const Lane share = row.weight / larger(sum, kZero + 1e-6f);
+  const Lanes sum = real(load<LaneUnsignedShort>(weights)) + row.weight;
+  const Lanes share = row.weight / larger(sum, kZero + 1e-6f);
   if constexpr (kColours) {
     if (any(row.near)) update_colours(row, share, first, block);
   }
-  Lane average = real(load<LaneShort>(distances));
+  Lanes average = real(load<LaneShort>(distances));
   average += (row.distance - average) * share;
   constexpr float kToPositive = 32768;  // conversion cuts off toward 0
   const LaneShort average_steps =
       narrow(whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive));
-  const Lane bounded = smaller(sum + 0.5f, kZero + kMostWeightSteps);
+  const Lanes bounded = smaller(sum + 0.5f, kZero + kMostWeightSteps);
   const LaneUnsignedShort weight_steps = narrow_unsigned(whole(sum > 0 ? larger(bounded, kOne) : kZero));
   std::memcpy(distances, &average_steps, sizeof(average_steps));
   std::memcpy(weights, &weight_steps, sizeof(weight_steps));
 }
 
-/// Nothing but free space, known as well as it can be: carving has nothing more to do here.
+/// Nothing but free space, seen more than once: carving has nothing more to do here.
 bool is_all_free(const VoxelBlock& block, const FusionView& view, const SampleUnits& units) {
   const auto far = static_cast<std::int16_t>(0.9f * view.truncation / units.distance);
   const auto known = static_cast<std::uint16_t>(kFreeShare * view.most_weight / units.weight);

@@ -15,25 +15,25 @@ namespace twofold {
 // GCC and Clang share, since neither makes vectors of these short loops by itself. Comparisons give -1 or 0
 // for each lane. Only for files of this room: whose ABI vectors follow where AVX is missing is not settled.
 inline constexpr int kLanes = kBlockEdge;  // samples of a row, updated together
-using Lane = float __attribute__((vector_size(kLanes * sizeof(float))));
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
 using LaneIndex = std::int32_t __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
 using LaneShort = std::int16_t __attribute__((vector_size(kLanes * sizeof(std::int16_t))));
 using LaneUnsignedShort = std::uint16_t __attribute__((vector_size(kLanes * sizeof(std::uint16_t))));
 
-constexpr Lane kCount{0, 1, 2, 3, 4, 5, 6, 7};
-constexpr Lane kZero{};
-constexpr Lane kOne = kZero + 1;
+constexpr Lanes kCount{0, 1, 2, 3, 4, 5, 6, 7};
+constexpr Lanes kZero{};
+constexpr Lanes kOne = kZero + 1;
 
 // What follows says the same twice, since GCC 12 takes two to four instructions for what AVX2 has one for.
 
-inline Lane larger(const Lane& a, const Lane& b) {
+inline Lanes larger(const Lanes& a, const Lanes& b) {
 #ifdef __AVX2__
   return _mm256_max_ps(a, b);
 #else
   return a > b ? a : b;
 #endif
 }
-inline Lane smaller(const Lane& a, const Lane& b) {
+inline Lanes smaller(const Lanes& a, const Lanes& b) {
 #ifdef __AVX2__
   return _mm256_min_ps(a, b);
 #else
@@ -97,16 +97,16 @@ inline bool any(const LaneShort& lanes) {
   return (halves[0] | halves[1]) != 0;
 }
 
-inline LaneIndex whole(const Lane& a) {
+inline LaneIndex whole(const Lanes& a) {
   return __builtin_convertvector(a, LaneIndex);
 }
-inline Lane real(const LaneIndex& a) {
-  return __builtin_convertvector(a, Lane);
+inline Lanes real(const LaneIndex& a) {
+  return __builtin_convertvector(a, Lanes);
 }
-inline Lane real(const LaneShort& a) {
+inline Lanes real(const LaneShort& a) {
   return real(wide(a));
 }
-inline Lane real(const LaneUnsignedShort& a) {
+inline Lanes real(const LaneUnsignedShort& a) {
   return real(wide(a));
 }
 
@@ -117,8 +117,8 @@ inline Vector load(const void* from) {
   return lanes;
 }
 
-inline float least(const Lane& lanes) {
-  using Half = float __attribute__((vector_size(sizeof(Lane) / 2)));
+inline float least(const Lanes& lanes) {
+  using Half = float __attribute__((vector_size(sizeof(Lanes) / 2)));
   const Half low = __builtin_shufflevector(lanes, lanes, 0, 1, 2, 3);
   const Half high = __builtin_shufflevector(lanes, lanes, 4, 5, 6, 7);
   const Half four = low < high ? low : high;
@@ -126,7 +126,7 @@ inline float least(const Lane& lanes) {
   const float b = four[2] < four[3] ? four[2] : four[3];
   return a < b ? a : b;
 }
-inline float largest(const Lane& lanes) {
+inline float largest(const Lanes& lanes) {
   return -least(-lanes);
 }
 

@@ -108,7 +108,10 @@ bool MeshPieces::replace(const BlockPosition& at, const BlockMesh& piece) {
     return !piece.empty();
   }
   if (old->second.mesh == piece) return false;
-  old->second.mesh = piece;  // into the memory it has
+  if (piece.empty())
+    old->second.mesh = BlockMesh();  // gives its memory back
+  else
+    old->second.mesh = piece;  // into the memory it has
   old->second.revision = revision_;
   return true;
 }
@@ -116,7 +119,7 @@ bool MeshPieces::replace(const BlockPosition& at, const BlockMesh& piece) {
 std::vector<BlockPosition> MeshPieces::changed_since(std::uint64_t revision) const {
   std::vector<BlockPosition> changed;
   for (const auto& [at, piece] : pieces_)
-    if (piece.revision > revision) changed.push_back(at);
+    if (piece.revision > revision && !(revision == 0 && piece.mesh.empty())) changed.push_back(at);
   return changed;
 }
 

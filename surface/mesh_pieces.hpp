@@ -13,7 +13,8 @@ namespace twofold {
 
 /// The mesh of a volume in a piece for each block, of which only those are made anew whose samples, or whose
 /// neighbours' samples, changed. Whoever shows it asks for what changed since a revision. One thread at a
-/// time; memory follows the surface. Same volumes, same bytes.
+/// time; memory follows the surface. Same volumes, same bytes. Where there is no surface any more, only the
+/// revision stays.
 class MeshPieces {
  public:
   /// Takes over what changed in the volume since the last call, which was of the same volume.
@@ -22,7 +23,8 @@ class MeshPieces {
 
   /// Counts the updates that changed a piece; 0: there is none yet.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// Blocks whose piece changed after that revision, ascending; also those that have none any more.
+  /// Blocks whose piece changed after that revision, ascending; also those that have none any
+  /// more, unless it is 0: there was nothing before.
   [[nodiscard]] std::vector<BlockPosition> changed_since(std::uint64_t revision) const;
   /// The triangles of a block's cells by themselves: vertices on the border to the blocks behind it are in
   /// their pieces as well. Specks of noise, which joined and least_triangles leave out, are among them.

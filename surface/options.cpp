@@ -8,7 +8,7 @@ std::string SurfaceOptions::invalid_reason() const {
   return OptionCheck()
       .within("voxel", voxel, 1e-4, 10)
       .within("truncation", truncation, 2, 20)
-      .at_least("most_depth", most_depth, 0)
+      .at_least("max_depth", max_depth, 0)
       .within("depth_noise", depth_noise, 0, 1)
       .above("least_weight", least_weight, 0)
       .at_least("most_weight", most_weight, 1)

@@ -30,13 +30,13 @@ inline LanePair read_pairs(const std::uint32_t* from, const std::array<std::int3
 inline LaneIndex weight_of(const LaneIndex& sample) {
   return (sample >> 16) & 0xffff;
 }
-inline Lane distance_of(const LaneIndex& sample) {
+inline Lanes distance_of(const LaneIndex& sample) {
   return real((sample << 16) >> 16);
 }
 
 /// Eight samples between those of the cube, and which of the cube's they are nearest to.
 struct Resampled {
-  Lane distance;  ///< [steps]
+  Lanes distance;  ///< [steps]
   LaneIndex weight, nearest;
 };
 
@@ -44,16 +44,16 @@ struct Resampled {
 /// which the first two lie at the smaller z, the first and the third at the smaller y.
 struct Cells {
   std::array<LanePair, 4> corners;
-  std::array<Lane, 3> at;  ///< within the cell, 0 .. 1
+  std::array<Lanes, 3> at;  ///< within the cell, 0 .. 1
 
-  [[nodiscard]] Lane linear() const {
-    std::array<Lane, 4> along_x;
+  [[nodiscard]] Lanes linear() const {
+    std::array<Lanes, 4> along_x;
     for (std::size_t c = 0; c < 4; ++c) {
-      const Lane first = distance_of(corners[c].first);
+      const Lanes first = distance_of(corners[c].first);
       along_x[c] = first + at[0] * (distance_of(corners[c].second) - first);
     }
-    const Lane y0 = along_x[0] + at[1] * (along_x[1] - along_x[0]);
-    const Lane y1 = along_x[2] + at[1] * (along_x[3] - along_x[2]);
+    const Lanes y0 = along_x[0] + at[1] * (along_x[1] - along_x[0]);
+    const Lanes y1 = along_x[2] + at[1] * (along_x[3] - along_x[2]);
     return y0 + at[2] * (y1 - y0);
   }
   /// All eight.
@@ -63,12 +63,12 @@ struct Cells {
     return seen;
   }
   /// The mean of those that were seen, with the shares that they have in linear(); one of them was.
-  [[nodiscard]] Lane mean_of_seen() const {
-    Lane sum{}, share{};
+  [[nodiscard]] Lanes mean_of_seen() const {
+    Lanes sum{}, share{};
     for (std::size_t c = 0; c < 4; ++c) {
-      const Lane in_yz = ((c & 1) != 0 ? at[1] : kOne - at[1]) * ((c >> 1) != 0 ? at[2] : kOne - at[2]);
-      const auto take = [&](const LaneIndex& sample, const Lane& own_share) {
-        const Lane part = weight_of(sample) > 0 ? own_share : kZero;
+      const Lanes in_yz = ((c & 1) != 0 ? at[1] : kOne - at[1]) * ((c >> 1) != 0 ? at[2] : kOne - at[2]);
+      const auto take = [&](const LaneIndex& sample, const Lanes& own_share) {
+        const Lanes part = weight_of(sample) > 0 ? own_share : kZero;
         sum += part * distance_of(sample);
         share += part;
       };
@@ -82,11 +82,11 @@ struct Cells {
 /// Of a cube with so many samples along x, and along x and y. Weights are those of the nearest samples, 0
 /// where these were never seen: or each time that samples are taken to another grid, what is known would lose
 /// a sample all around, and be known less.
-inline Resampled resample(const std::uint32_t* cube, int row, int layer, const std::array<Lane, 3>& at) {
+inline Resampled resample(const std::uint32_t* cube, int row, int layer, const std::array<Lanes, 3>& at) {
   const LaneIndex x = whole(at[0]), y = whole(at[1]), z = whole(at[2]);
   Cells cells{{}, {at[0] - real(x), at[1] - real(y), at[2] - real(z)}};
   const LaneIndex base = z * layer + y * row + x;
-  const auto step = [](const Lane& f, int by) { return (f > 0.5f) & by; };
+  const auto step = [](const Lanes& f, int by) { return (f > 0.5f) & by; };
   Resampled result{};
   result.nearest = base + step(cells.at[0], 1) + step(cells.at[1], row) + step(cells.at[2], layer);
   LaneIndex nearest;
@@ -106,13 +106,13 @@ inline Resampled resample(const std::uint32_t* cube, int row, int layer, const s
 
 /// Adds eight samples to the running averages of those of a block from `first` on.
 /// @return  what each new one is worth in its average; 0: nothing
-inline Lane average_row(const Lane& new_distance, const LaneIndex& new_weight, std::size_t first,
-                        VoxelBlock& block) {
-  const Lane weight = real(new_weight);
-  const Lane before = real(load<LaneShort>(&block.distance[first]));
-  const Lane sum = real(load<LaneUnsignedShort>(&block.weight[first])) + weight;
-  const Lane share = weight / larger(sum, kOne);
-  const Lane average = before + (new_distance - before) * share;
+inline Lanes average_row(const Lanes& new_distance, const LaneIndex& new_weight, std::size_t first,
+                         VoxelBlock& block) {
+  const Lanes weight = real(new_weight);
+  const Lanes before = real(load<LaneShort>(&block.distance[first]));
+  const Lanes sum = real(load<LaneUnsignedShort>(&block.weight[first])) + weight;
+  const Lanes share = weight / larger(sum, kOne);
+  const Lanes average = before + (new_distance - before) * share;
   const LaneIndex steps = whole(average + (kToPositive + 0.5f)) - static_cast<int>(kToPositive);
   const LaneShort distances = narrow(new_weight > 0 ? steps : whole(before));
   const LaneUnsignedShort weights = narrow_unsigned(whole(smaller(sum, kZero + kMostWeightSteps)));
@@ -122,7 +122,7 @@ inline Lane average_row(const Lane& new_distance, const LaneIndex& new_weight, s
 }
 
 /// Samples that take part in the surface's colour.
-inline LaneIndex near_surface(const Lane& distance, const LaneIndex& weight) {
+inline LaneIndex near_surface(const Lanes& distance, const LaneIndex& weight) {
   return (weight > 0) & (distance < kColourBand) & (distance > -kColourBand);
 }
 
@@ -174,8 +174,8 @@ bool Resampler::add_same_samples(VoxelBlock& block) {
     const LaneIndex weight = wide(load<LaneUnsignedShort>(&from->weight[first]));
     if (!any(weight)) continue;
     any_seen = true;
-    const Lane distance = real(load<LaneShort>(&from->distance[first]));
-    const Lane share = average_row(distance, weight, first, block);
+    const Lanes distance = real(load<LaneShort>(&from->distance[first]));
+    const Lanes share = average_row(distance, weight, first, block);
     const LaneIndex near = near_surface(distance, weight);
     if (!any(near)) continue;
     for (std::size_t i = 0; i < kLanes; ++i)
@@ -231,7 +231,7 @@ bool Resampler::add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock
   const auto along = [&](int a) { return at[a] + steps_(a, 0) * kCount; };
   const Resampled found = resample(cube_.data(), kRow, kRow * kCube, {along(0), along(1), along(2)});
   if (!any(found.weight)) return false;
-  const Lane share = average_row(found.distance, found.weight, first, block);
+  const Lanes share = average_row(found.distance, found.weight, first, block);
   const LaneIndex near = near_surface(found.distance, found.weight);
   if (!any(near)) return true;
   for (std::size_t i = 0; i < kLanes; ++i)

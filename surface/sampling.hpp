@@ -35,17 +35,7 @@ class Sampler {
       result.weight = std::min<double>(result.weight, units_.weight * static_cast<double>(block->weight[s]));
     }
     interpolate(d, f, result);
-    nearest_ = {base.x() + (f.x() > 0.5), base.y() + (f.y() > 0.5), base.z() + (f.z() > 0.5)};
     return result;
-  }
-
-  /// Colour of the sample nearest to where `at` found something last, red, green, blue in 1/256.
-  [[nodiscard]] std::array<float, 3> colour() {
-    const Eigen::Vector3i& n = nearest_;
-    const VoxelBlock* block = block_at({n.x() >> 3, n.y() >> 3, n.z() >> 3});
-    const auto c =
-        colour_of(*block, static_cast<std::size_t>(((n.z() & 7) * 8 + (n.y() & 7)) * 8 + (n.x() & 7)));
-    return {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
   }
 
  private:
@@ -77,7 +67,6 @@ class Sampler {
   bool any_ = false;
   BlockPosition last_at_;
   const VoxelBlock* last_ = nullptr;
-  Eigen::Vector3i nearest_{0, 0, 0};
 };
 
 /// Reads a volume at the samples of another one of the same options, whose grid is turned and shifted against

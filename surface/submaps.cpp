@@ -81,10 +81,7 @@ void SubmapSurface::move_submaps(const GraphSnapshot& graph) {
     for (Member& member : submap->members) member.T_k_w = graph.keyframe(member.id).T_k_w;
     if (!is_bent(*submap)) continue;
     submap->volume.clear();
-    for (Member& member : submap->members) {
-      fuse(*submap, member);
-      ++report_.fused_anew;
-    }
+    for (Member& member : submap->members) report_.fused_anew += fuse(*submap, member);
   }
 }
 
@@ -132,7 +129,7 @@ void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& key
   member.images = std::move(images);
   member.reach = std::max(keyframe.median_depth, rig_.depth_min);
   member.T_k_w = keyframe.T_k_w;
-  fuse(submap, member);
+  report_.without_readings += !fuse(submap, member);
   submap.members.push_back(std::move(member));
 }
 
@@ -161,20 +158,17 @@ SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, con
   return *submaps_.back();
 }
 
-void SubmapSurface::fuse(Submap& submap, Member& member) {
+bool SubmapSurface::fuse(Submap& submap, Member& member) {
   const std::int64_t begin_ns = thread_cpu_ns();
   cv::Mat colour;
   if (!member.images.colour.empty()) colour = cv::imdecode(member.images.colour, cv::IMREAD_UNCHANGED);
   const DepthView view = make_depth_view(rig_, member.images.depth.unpacked(), colour);
   member.T_k_s = member.T_k_w * submap.T_w_s;
-  submap.volume.fuse(view, member.T_k_s);
-  report_.without_readings += share_of_readings(view) == 0;
-  ++report_.fused;
+  const bool any = share_of_readings(view) > 0;
+  if (any) submap.volume.fuse(view, member.T_k_s);
+  report_.fused += any;
   report_.fusion_ns += thread_cpu_ns() - begin_ns;
-}
-
-bool SubmapSurface::has(KeyframeId part) const {
-  return std::any_of(submaps_.begin(), submaps_.end(), [&](const auto& s) { return s->part == part; });
+  return any;
 }
 
 SurfaceVolume SubmapSurface::whole(KeyframeId part) const {

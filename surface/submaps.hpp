@@ -37,7 +37,7 @@ struct SubmapReport {
   int fused = 0;               ///< depth images, each time
   int fused_anew = 0;          ///< of these, because their submap's poses had changed
   std::int64_t fusion_ns = 0;  ///< processor time of all, unpacking included
-  int without_readings = 0;    ///< depth images that are all holes
+  int without_readings = 0;    ///< keyframes whose depth image is all holes: not among these
   int not_in_map = 0;          ///< frames that were proposed as keyframes, but never entered the map
   int culled = 0;              ///< keyframes whose depth was let go of when the map culled them
   int submaps_dropped = 0;     ///< when all their keyframes were culled
@@ -68,7 +68,6 @@ class SubmapSurface {
 
   /// All submaps of a map part in its world frame, as it was in the last step, added into one.
   [[nodiscard]] SurfaceVolume whole(KeyframeId part) const;
-  [[nodiscard]] bool has(KeyframeId part) const;
   /// These submaps, as Composition takes them; valid until the next step.
   [[nodiscard]] std::vector<PlacedVolume> placed(KeyframeId part) const;
 
@@ -101,7 +100,8 @@ class SubmapSurface {
   void add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, KeyframeDepth images);
   [[nodiscard]] Submap& submap_for(const GraphSnapshot& graph, const Keyframe& keyframe);
   [[nodiscard]] bool is_bent(const Submap& submap) const;
-  void fuse(Submap& submap, Member& member);
+  /// False for an image without readings, of which nothing becomes.
+  bool fuse(Submap& submap, Member& member);
 
   Rig rig_;
   SurfaceOptions options_;

@@ -52,8 +52,8 @@ TriangleMesh subdivided(const TriangleMesh& mesh, float longest) {
   return fine;
 }
 
-std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, float spacing) {
-  std::vector<SurfaceSample> samples;
+std::vector<MeshPoint> sample_surface(const TriangleMesh& mesh, float spacing) {
+  std::vector<MeshPoint> samples;
   double owed = 0.5;  // points that the area passed so far is still to get
   double u = 0, v = 0;
   for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) {

@@ -13,12 +13,12 @@ namespace twofold {
 /// positions only.
 [[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh, float longest);
 
-/// Points spread evenly over a mesh, one for each `spacing`^2 of area; the same for the same mesh.
-struct SurfaceSample {
+struct MeshPoint {
   Eigen::Vector3f position{0, 0, 0};
-  std::uint32_t triangle = 0;
+  std::uint32_t triangle = 0;  ///< that it lies on
 };
-[[nodiscard]] std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, float spacing);
+/// Points spread evenly over a mesh, one for each `spacing`^2 of area; the same for the same mesh.
+[[nodiscard]] std::vector<MeshPoint> sample_surface(const TriangleMesh& mesh, float spacing);
 
 /// Finds the distance of points to a mesh: its triangles sorted into the cells of a grid.
 class TriangleGrid {
@@ -26,7 +26,7 @@ class TriangleGrid {
   /// reach: distances beyond it are not looked for [m] > 0
   TriangleGrid(const TriangleMesh& mesh, float reach);
 
-  /// Distance to the nearest triangle [m], at most reach().
+  /// Distance to the nearest triangle [m], at most the reach.
   [[nodiscard]] float distance(const Eigen::Vector3f& x) const;
   /// The plane of the nearest triangle within reach.
   struct Plane {
@@ -35,7 +35,6 @@ class TriangleGrid {
     float distance = 0;               ///< of the triangle [m]
   };
   [[nodiscard]] std::optional<Plane> nearest_plane(const Eigen::Vector3f& x) const;
-  [[nodiscard]] float reach() const { return reach_; }
 
  private:
   static constexpr int kCellsToReach = 4;

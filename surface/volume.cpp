@@ -19,12 +19,6 @@ std::optional<SurfaceDistance> SurfaceVolume::distance(const Vector3& x_v) const
   return Sampler(blocks_, units_, options_.voxel).at(x_v);
 }
 
-Occupancy SurfaceVolume::occupancy(const Vector3& x_v) const {
-  const auto found = distance(x_v);
-  if (!found) return Occupancy::kUnknown;
-  return found->distance > 0 ? Occupancy::kFree : Occupancy::kOccupied;
-}
-
 std::optional<BlockPosition> shift_in_blocks(const SE3& T, double edge) {
   constexpr double kRounding = 1e-9;  // far less than a sample, however far away
   const Vector3 shift = T.translation() / edge;

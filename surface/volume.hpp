@@ -12,13 +12,6 @@
 
 namespace twofold {
 
-/// What is known of one position of space.
-enum class Occupancy : std::uint8_t {
-  kUnknown,  ///< never seen, or too far inside a surface
-  kFree,     ///< outside of every surface
-  kOccupied  ///< inside, as far as the truncation
-};
-
 /// The signed distance at one position, linear between the eight samples around it.
 struct SurfaceDistance {
   double distance = 0;        ///< [m], positive outside, truncated
@@ -35,9 +28,11 @@ class Resampler;
 /// A truncated signed distance field in sparse blocks  (Curless and Levoy, SIGGRAPH 1996; blocks found by
 /// hash: Niessner et al., SIGGRAPH Asia 2013). Sample g stands at g * voxel in the volume's frame v.
 ///
-/// A sample's weight is the information of its distance in units of 1 / voxel^2, of each reading
-/// voxel^2 / sigma(z)^2, so that its standard deviation is voxel / sqrt(weight). Same calls, same bytes. One
-/// thread at a time.
+/// A sample's weight stands for the information of its distance in units of 1 / voxel^2: voxel / sqrt(weight)
+/// is an upper estimate of its standard deviation. Each reading adds voxel^2 / sigma(z)^2, but less the more
+/// aslant the surface is seen and the farther the sample is behind it, and at most a fifth of most_weight;
+/// each sight of free space adds a tenth of most_weight. The sum ends at most_weight, so that the estimate is
+/// never below voxel / sqrt(most_weight). Same calls, same bytes. One thread at a time.
 class SurfaceVolume {
  public:
   /// options must be valid; depth_noise above 0.
@@ -63,7 +58,6 @@ class SurfaceVolume {
 
   /// Nothing where one of the eight samples around it was never seen.
   [[nodiscard]] std::optional<SurfaceDistance> distance(const Vector3& x_v) const;
-  [[nodiscard]] Occupancy occupancy(const Vector3& x_v) const;
 
   [[nodiscard]] const SurfaceOptions& options() const { return options_; }
   [[nodiscard]] const BlockTable& blocks() const { return blocks_; }

@@ -63,7 +63,7 @@ struct VoxelBlock {
 }
 
 /// The blocks there are, found by position: a hash table with open addresses. Blocks are never taken out one
-/// by one. References stay valid until clear.
+/// by one, so that they are all there where a surface ever was. References stay valid until clear.
 class BlockTable {
  public:
   [[nodiscard]] const VoxelBlock* find(const BlockPosition& at) const;

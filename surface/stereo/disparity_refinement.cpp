@@ -32,8 +32,8 @@ class Field {
       : values_(size.height + 2 * kMargin, size.width + 2 * kMargin + kLanes, CV_32FC1, cv::Scalar(fill)) {}
   [[nodiscard]] float* row(int y) { return values_.ptr<float>(y + kMargin) + kMargin; }
   [[nodiscard]] const float* row(int y) const { return values_.ptr<float>(y + kMargin) + kMargin; }
-  [[nodiscard]] Lane lane(int y, int x) const { return load<Lane>(row(y) + x); }
-  void set(int y, int x, const Lane& lane) { std::memcpy(row(y) + x, &lane, sizeof(lane)); }
+  [[nodiscard]] Lanes lane(int y, int x) const { return load<Lanes>(row(y) + x); }
+  void set(int y, int x, const Lanes& lane) { std::memcpy(row(y) + x, &lane, sizeof(lane)); }
   [[nodiscard]] cv::Mat inner(const cv::Size& size) const {
     return values_(cv::Rect(kMargin, kMargin, size.width, size.height));
   }
@@ -83,22 +83,22 @@ constexpr WindowShape kFirstWindow{2, 1.5f, 0.1f};  // of the coarsest level, be
 
 /// Where a window's plane is looked for, eight windows at once.
 struct Expected {
-  Lane disparity, variance;  ///< [px, px^2]
-  Lane slope_x, slope_y;     ///< [px/px]
-  Lane slope_variance;
+  Lanes disparity, variance;  ///< [px, px^2]
+  Lanes slope_x, slope_y;     ///< [px/px]
+  Lanes slope_variance;
 };
 
 /// Equations of slope along x, slope along y and disparity, in eight windows at once.
 struct Equations {
-  std::array<std::array<Lane, 3>, 3> A{};  ///< symmetric, lower half
-  std::array<Lane, 3> b{};
+  std::array<std::array<Lanes, 3>, 3> A{};  ///< symmetric, lower half
+  std::array<Lanes, 3> b{};
 
   /// A[2][2] becomes the information of x[2] with the others unknown, b[2] that times x[2].  (L D L^T)
   void eliminate() {
     for (std::size_t k = 0; k < 3; ++k) {
-      const Lane inverse = kOne / A[k][k];
+      const Lanes inverse = kOne / A[k][k];
       for (std::size_t i = k + 1; i < 3; ++i) {
-        const Lane l = A[i][k] * inverse;
+        const Lanes l = A[i][k] * inverse;
         for (std::size_t j = k + 1; j <= i; ++j) A[i][j] -= l * A[j][k];
         b[i] -= l * b[k];
       }
@@ -116,9 +116,9 @@ struct Equations {
 /// What takes part in eight windows that lie side by side, relative to the disparities of their centres.
 struct WindowSums {
   Equations equations;
-  Lane squares{}, count{};
+  Lanes squares{}, count{};
 
-  void add_row(const Level& level, const WindowShape& window, const Lane& centre, const Expected& plane,
+  void add_row(const Level& level, const WindowShape& window, const Lanes& centre, const Expected& plane,
                int dy, int y, int x) {
     const float* d = level.disparity.row(y + dy) + x;
     const float* information = level.information.row(y + dy) + x;
@@ -126,19 +126,19 @@ struct WindowSums {
     const float* square = level.squares.row(y + dy) + x;
     const float* pixels = level.count.row(y + dy) + x;
     const float fy = level.step * static_cast<float>(dy);
-    const Lane row_plane = centre + plane.slope_y * fy;
-    Lane p{}, px{}, pxx{}, q{}, qx{};
+    const Lanes row_plane = centre + plane.slope_y * fy;
+    Lanes p{}, px{}, pxx{}, q{}, qx{};
     for (int dx = -window.half; dx <= window.half; ++dx) {
       const float fx = level.step * static_cast<float>(dx);
-      const Lane at = load<Lane>(d + dx);
-      const Lane off = at - row_plane - plane.slope_x * fx;
+      const Lanes at = load<Lanes>(d + dx);
+      const Lanes off = at - row_plane - plane.slope_x * fx;
       const LaneIndex in = (off < window.within) & (off > -window.within);
-      const Lane by = at - centre;
-      const Lane p_in = in ? load<Lane>(information + dx) : kZero;
-      const Lane e_in = in ? load<Lane>(pull + dx) : kZero;
-      const Lane q_in = in ? p_in * by - e_in : kZero;
-      squares += in ? load<Lane>(square + dx) + by * (q_in - e_in) : kZero;
-      count += in ? load<Lane>(pixels + dx) : kZero;
+      const Lanes by = at - centre;
+      const Lanes p_in = in ? load<Lanes>(information + dx) : kZero;
+      const Lanes e_in = in ? load<Lanes>(pull + dx) : kZero;
+      const Lanes q_in = in ? p_in * by - e_in : kZero;
+      squares += in ? load<Lanes>(square + dx) + by * (q_in - e_in) : kZero;
+      count += in ? load<Lanes>(pixels + dx) : kZero;
       p += p_in;
       px += p_in * fx;
       pxx += p_in * (fx * fx);
@@ -159,7 +159,7 @@ struct WindowSums {
 };
 
 /// Of four numbers side by side each one twice.
-Lane twice(const float* from) {
+Lanes twice(const float* from) {
   using Four = float __attribute__((vector_size(4 * sizeof(float))));
   const auto four = load<Four>(from);
   return __builtin_shufflevector(four, four, 0, 0, 1, 1, 2, 2, 3, 3);
@@ -324,7 +324,7 @@ class Refiner {
   }
 
   void solve(const WindowShape& window, Level& level, const Level* above, int y, int x) const {
-    const Lane centre = level.disparity.lane(y, x);
+    const Lanes centre = level.disparity.lane(y, x);
     level.found.set(y, x, kZero + kUnmatched);
     if (!any(centre > 0)) return;
     const Expected expected =
@@ -335,11 +335,11 @@ class Refiner {
     const Equations own = sums.equations;
     Equations& solved = sums.equations;
     take_expected(window, centre, expected, sums.count, solved);
-    Lane rest = sums.squares;
+    Lanes rest = sums.squares;
     for (std::size_t k = 0; k < 3; ++k) rest -= solved.b[k] * own.b[k];
     rest = larger(rest, kZero) / larger(sums.count - 3, kOne);
     const float noise = noise_ * noise_;
-    const Lane moved = solved.b[2];
+    const Lanes moved = solved.b[2];
     const LaneIndex good = (centre > 0) & (moved < 1) & (moved > -1) & (sums.count > kLeastCount);
     level.found.set(y, x, good ? centre + moved : kZero + kUnmatched);
     level.variance.set(y, x, larger(rest, kZero + noise) / solved.A[2][2]);
@@ -349,19 +349,19 @@ class Refiner {
   }
 
   /// Nothing but the slopes that were found before.
-  static Expected expected_from(const Level& level, const Lane& centre, int y, int x) {
+  static Expected expected_from(const Level& level, const Lanes& centre, int y, int x) {
     return {centre, kZero + kFirstSigma * kFirstSigma, level.slope_x.lane(y, x), level.slope_y.lane(y, x),
             kZero + kFirstSlope * kFirstSlope};
   }
   /// The plane of the level above, where it lies near.
-  static Expected expected_from(const Level& above, const WindowShape& window, const Lane& centre, int y,
+  static Expected expected_from(const Level& above, const WindowShape& window, const Lanes& centre, int y,
                                 int x) {
-    constexpr Lane kSide{-1, 1, -1, 1, -1, 1, -1, 1};
+    constexpr Lanes kSide{-1, 1, -1, 1, -1, 1, -1, 1};
     const float quarter = 0.25f * above.step;
     const float fy = y % 2 == 0 ? -quarter : quarter;
     const auto there = [&](const Field& field) { return twice(field.row(y / 2) + x / 2); };
-    const Lane a = there(above.slope_x), b = there(above.slope_y);
-    const Lane d = there(above.disparity) + a * (kSide * quarter) + b * fy;
+    const Lanes a = there(above.slope_x), b = there(above.slope_y);
+    const Lanes d = there(above.disparity) + a * (kSide * quarter) + b * fy;
     const LaneIndex fits = (d - centre < window.within) & (d - centre > -window.within);
     return {fits ? d : centre, fits ? there(above.variance) : kZero + kFirstSigma * kFirstSigma,
             fits ? a : kZero, fits ? b : kZero,
@@ -370,24 +370,24 @@ class Refiner {
 
   /// Adds what is expected, and solves. The disparity counts as far as the window's own agrees with it:
   /// surfaces need not be planes as large as the level above has them.
-  void take_expected(const WindowShape& window, const Lane& centre, const Expected& expected,
-                     const Lane& count, Equations& equations) const {
+  void take_expected(const WindowShape& window, const Lanes& centre, const Expected& expected,
+                     const Lanes& count, Equations& equations) const {
     constexpr float kGradientNoise =
         0.25f;                   // of the information of pixels without texture, in units of noise^2
     constexpr float kAgree = 4;  // variances
-    constexpr Lane kNone = kZero + 1e-3f;
-    const Lane noise = kZero + noise_ * noise_;
+    constexpr Lanes kNone = kZero + 1e-3f;
+    const Lanes noise = kZero + noise_ * noise_;
     auto& [A, b] = equations;
-    const Lane slope_weight = noise / expected.slope_variance;
+    const Lanes slope_weight = noise / expected.slope_variance;
     A[0][0] += slope_weight;
     A[1][1] += slope_weight;
     b[0] += slope_weight * expected.slope_x;
     b[1] += slope_weight * expected.slope_y;
     equations.eliminate();
-    const Lane apart = expected.disparity - centre - b[2] / larger(A[2][2], kNone);
-    const Lane own_variance = noise / larger(A[2][2] - count * noise * kGradientNoise, kNone);
-    const Lane bend = larger(apart * apart - kAgree * own_variance, kZero + window.bend * window.bend);
-    const Lane weight = noise / (expected.variance + bend);
+    const Lanes apart = expected.disparity - centre - b[2] / larger(A[2][2], kNone);
+    const Lanes own_variance = noise / larger(A[2][2] - count * noise * kGradientNoise, kNone);
+    const Lanes bend = larger(apart * apart - kAgree * own_variance, kZero + window.bend * window.bend);
+    const Lanes weight = noise / (expected.variance + bend);
     A[2][2] += weight;
     b[2] += weight * (expected.disparity - centre);
     equations.substitute();

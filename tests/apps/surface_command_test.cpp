@@ -184,7 +184,7 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
   // Nothing within range: the near end of the desk is half a metre away.
   const Outcome empty = run(folder,
                             "surface 'synthetic:desk?sensor=rgbd&frames=3&width=160&height=120' --poses "
-                            "truth --most-depth 0.31" +
+                            "truth --max-depth 0.31" +
                                 to);
   EXPECT_EQ(empty.exit_code, 1);
   EXPECT_NE(empty.err.find("gave no surface"), std::string::npos) << empty.err;

@@ -91,6 +91,7 @@ TEST(MeshPieces, ThatGoAreToldAsEmpty) {
   volume.clear();
   pieces.update(volume);
   EXPECT_EQ(pieces.changed_since(revision), before);
+  EXPECT_TRUE(pieces.changed_since(0).empty());  // of pieces that nobody has
   for (const BlockPosition& at : before) EXPECT_TRUE(pieces.piece(at).triangles.empty());
   EXPECT_TRUE(pieces.joined(0).positions.empty());
 }

@@ -148,6 +148,14 @@ TEST_F(SubmapSurfaceTest, MemoryIsBounded) {
   EXPECT_LT(static_cast<double>(surface.report().most_bytes), 4e6);
 }
 
+TEST_F(SubmapSurfaceTest, ImagesWithoutReadingsAreNotFused) {
+  ball_.centre = {0, 0, 100};
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  EXPECT_EQ(surface.report().fused, 0);
+  EXPECT_EQ(surface.report().without_readings, kKeyframes);
+}
+
 TEST_F(SubmapSurfaceTest, FramesThatNeverBecomeKeyframesAreLetGoOf) {
   limits_.most_waiting = 3;
   SubmapSurface surface(rig_, testing::fine_options(), limits_);

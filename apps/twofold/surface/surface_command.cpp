@@ -221,7 +221,7 @@ void add_surface_command(CLI::App& app, int& exit_code) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
-      ->add_option("--most-depth", arguments->options.most_depth,
+      ->add_option("--max-depth", arguments->options.max_depth,
                    "Readings farther than this begin no surface [m]; 0: no limit")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

@@ -1,4 +1,4 @@
-#include "surface/depth_bounds.hpp"
+#include "surface/free_space/depth_bounds.hpp"
 
 namespace twofold {
 namespace {

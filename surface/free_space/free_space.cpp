@@ -1,9 +1,9 @@
-#include "surface/free_space.hpp"
+#include "surface/free_space/free_space.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "surface/depth_bounds.hpp"
+#include "surface/free_space/depth_bounds.hpp"
 #include "surface/fusion_view.hpp"
 #include "surface/lanes.hpp"
 
@@ -37,18 +37,18 @@ class FreeSpace::Look {
 
   /// What is seen of a cube. first, edge: [cells]
   [[nodiscard]] Sight at(const Vector3& first, float edge) const {
-    constexpr Lane kX{0, 1, 0, 1, 0, 1, 0, 1}, kY{0, 0, 1, 1, 0, 0, 1, 1}, kZ{0, 0, 0, 0, 1, 1, 1, 1};
+    constexpr Lanes kX{0, 1, 0, 1, 0, 1, 0, 1}, kY{0, 0, 1, 1, 0, 0, 1, 1}, kZ{0, 0, 0, 0, 1, 1, 1, 1};
     const Eigen::Vector3f corner = K_ * (T_c_v_ * Vector3(first * cell_)).cast<float>();
     const auto corners = [&](int a) {
       return corner[a] + edge * (kX * steps_(a, 0) + kY * steps_(a, 1) + kZ * steps_(a, 2));
     };
-    const Lane uz = corners(0), vz = corners(1), z = corners(2);
+    const Lanes uz = corners(0), vz = corners(1), z = corners(2);
     const float near = least(z), far = largest(z);
     if (far <= kLeastDepth || near >= reach_) return Sight::kNone;
     if (largest(uz) < 0 || largest(vz) < 0) return Sight::kNone;
     if (least(uz - fusion_.width * z) >= 0 || least(vz - fusion_.height * z) >= 0) return Sight::kNone;
     if (near <= kLeastDepth) return Sight::kMixed;
-    const Lane u = uz / z, v = vz / z;
+    const Lanes u = uz / z, v = vz / z;
     const float left = least(u), top = least(v), right = largest(u), bottom = largest(v);
     const DepthBounds::Range seen =
         bounds_.within(static_cast<int>(std::max(left, 0.0f)), static_cast<int>(std::max(top, 0.0f)),
