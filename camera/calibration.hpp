@@ -31,9 +31,9 @@ struct Calibration {
   /// Nothing: nobody knows, and the tracker finds out.
   std::optional<double> readout;
 
-  double depth_unit = 0.001;       ///< RGB-D: metres per unit of the 16-bit depth image, > 0
-  double depth_min = 0.3;          ///< RGB-D: nearer readings are holes [m]
-  double depth_max = 8.0;          ///< RGB-D: farther readings are holes [m]
+  double depth_unit = 0.001;       ///< metres per unit of the 16-bit depth image, > 0; stereo: of a surface's
+  double depth_min = 0.3;          ///< nearer readings are holes [m]; stereo: of surfaces only
+  double depth_max = 8.0;          ///< farther readings likewise [m]
   double virtual_baseline = 0.08;  ///< RGB-D: baseline of the virtual right camera (thesis 6.5.3) [m], > 0
   /// RGB-D: depth images are depth_camera's; else they are the left camera's, pixel by pixel.
   bool depth_apart = false;

@@ -160,6 +160,8 @@ cv::Mat draw(const EvalArguments& arguments, const Evaluation& e) {
 
 void run_eval(const EvalArguments& arguments) {
   if (arguments.surface) {
+    if (arguments.alignment == Alignment::kSim3)
+      throw IoError("--align", "sim3 is for trajectories: a surface is moved rigidly (se3) or not (none)");
     eval_surface({arguments.estimate, arguments.truth, arguments.seen,
                   arguments.alignment != Alignment::kNone, arguments.fit, arguments.threshold, arguments.json,
                   arguments.plot});
@@ -192,24 +194,36 @@ void add_eval_command(CLI::App& app, int& exit_code) {
           "what the estimate may be moved by: nothing, a rigid motion, or with scale")
       ->check(CLI::IsMember({"none", "se3", "sim3"}))
       ->default_str("se3");
-  command
-      ->add_option("--max-difference", arguments->max_difference_s, "largest difference of time stamps [s]")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  CLI::Option* difference = command
+                                ->add_option("--max-difference", arguments->max_difference_s,
+                                             "largest difference of time stamps [s]")
+                                ->check(CLI::NonNegativeNumber)
+                                ->capture_default_str();
   command->add_option("--json", arguments->json, "write all figures to this file");
   command->add_option("--plot", arguments->plot,
                       "draw both paths from above, or the surface, coloured by error, to this PNG file");
-  command->add_flag("--surface", arguments->surface,
-                    "compare meshes; moved as the estimate's trajectory.txt onto groundtruth.txt beside it, "
-                    "if they are there, unless --align none");
-  command->add_flag(
-      "--fit", arguments->fit,
-      "--surface: then moves the estimate so that the surfaces fit best (iterated closest points)");
-  command->add_option("--seen", arguments->seen,
-                      "mesh of what a camera saw (render --seen): completeness is asked of it");
-  command->add_option("--threshold", arguments->threshold, "distance of surfaces that counts as near [m]")
+  CLI::Option* surface =
+      command
+          ->add_flag("--surface", arguments->surface,
+                     "compare meshes; moved as the estimate's trajectory.txt onto groundtruth.txt beside it, "
+                     "if they are there, unless --align none")
+          ->excludes(difference);
+  command
+      ->add_flag("--fit", arguments->fit,
+                 "--surface: then moves the estimate so that the surfaces fit best (iterated closest "
+                 "points); they must "
+                 "lie within 25 cm before")
+      ->needs(surface);
+  command
+      ->add_option("--seen", arguments->seen,
+                   "--surface: mesh of what a camera saw (render --seen): completeness is asked of it")
+      ->needs(surface);
+  command
+      ->add_option("--threshold", arguments->threshold,
+                   "--surface: distance of surfaces that counts as near [m]")
       ->check(CLI::Range(1e-4, 10.0))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(surface);
   command->callback([arguments, &exit_code] {
     run_eval(*arguments);
     exit_code = kOk;

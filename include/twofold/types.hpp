@@ -52,9 +52,11 @@ struct CameraRig {
   double cy = 0;        ///< [px]
   double baseline = 0;  ///< [m] > 0; RGB-D: of the virtual right camera that turns depth into disparity, say
                         ///< 0.08; kMono: unused
-  double depth_unit = 0.001;  ///< RGB-D: metres per unit of the depth image, > 0
-  double depth_min = 0.3;     ///< nearer readings are holes [m]; stereo: of surfaces only
-  double depth_max = 8.0;     ///< farther ones likewise
+  /// Metres per unit of the depth image, > 0; stereo: of the depth that a surface is made of, which ends at
+  /// 65535 of them.
+  double depth_unit = 0.001;
+  double depth_min = 0.3;  ///< nearer readings are holes [m] > 0; stereo: of surfaces only
+  double depth_max = 8.0;  ///< farther ones likewise, > depth_min
   /// Rolling shutter: from the exposure of the first row to that of the last [s], >= 0; 0: all rows at once.
   /// Nothing: not known, and found out while a camera turns to and fro.
   std::optional<double> readout = std::nullopt;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -107,7 +108,14 @@ GlbPart glb_triangles(const TriangleMesh& mesh) {
   return part;
 }
 
-std::string glb_bytes(const TriangleMesh& mesh) {
+/// x, y, z, w of the rotation that brings `up` to y: half a turn about x, and what is left then.
+nlohmann::ordered_json glb_rotation(const Vector3& up) {
+  const Eigen::Quaterniond half(0, 1, 0, 0);
+  const Eigen::Quaterniond q = Eigen::Quaterniond::FromTwoVectors(half * up, Vector3::UnitY()) * half;
+  return {q.x(), q.y(), q.z(), q.w()};
+}
+
+std::string glb_bytes(const TriangleMesh& mesh, const Vector3& up) {
   using Json = nlohmann::ordered_json;
   std::vector<GlbPart> parts{glb_positions(mesh), glb_normals(mesh)};
   Json attributes{{"POSITION", 0}, {"NORMAL", 1}};
@@ -132,7 +140,7 @@ std::string glb_bytes(const TriangleMesh& mesh) {
       {"asset", {{"version", "2.0"}, {"generator", "twofold"}}},
       {"scene", 0},
       {"scenes", Json::array({{{"nodes", {0}}}})},
-      {"nodes", Json::array({{{"mesh", 0}}})},
+      {"nodes", Json::array({{{"mesh", 0}, {"rotation", glb_rotation(up)}}})},
       {"meshes",
        Json::array({{{"primitives", Json::array({{{"attributes", attributes}, {"indices", indices}}})}}})},
       {"buffers", Json::array({{{"byteLength", binary.size()}}})},
@@ -193,13 +201,13 @@ void write_obj_mesh(const std::filesystem::path& file, const TriangleMesh& mesh)
   write_file(file, {text.data(), text.size()});
 }
 
-void write_glb_mesh(const std::filesystem::path& file, const TriangleMesh& mesh) {
+void write_glb_mesh(const std::filesystem::path& file, const TriangleMesh& mesh, const Vector3& up) {
   if (mesh.triangles.empty() || mesh.normals.size() != mesh.positions.size())
     throw IoError(file, "a GLB file needs triangles and normals");
   constexpr std::size_t kMost = std::size_t{1} << 32;
   if (28 * mesh.positions.size() + 12 * mesh.triangles.size() + 4096 >= kMost)
     throw IoError(file, "the mesh is too large for a GLB file, which ends at 4 GB");
-  write_file(file, glb_bytes(mesh));
+  write_file(file, glb_bytes(mesh, up));
 }
 
 }  // namespace twofold

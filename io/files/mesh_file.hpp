@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "geometry/triangle_mesh.hpp"
+#include "geometry/types.hpp"
 
 namespace twofold {
 
@@ -20,8 +21,10 @@ void write_ply_mesh(const std::filesystem::path& file, const TriangleMesh& mesh)
 /// Wavefront OBJ: vertices with colours behind the coordinates, normals, faces. Throws as above.
 void write_obj_mesh(const std::filesystem::path& file, const TriangleMesh& mesh);
 
-/// Binary glTF 2.0: one mesh with positions, normals and colours. Throws as above, and for a mesh without
-/// triangles or normals, or one of 4 GB or more.
-void write_glb_mesh(const std::filesystem::path& file, const TriangleMesh& mesh);
+/// Binary glTF 2.0: one mesh with positions, normals and colours, whose node turns `up` (unit) to y, which is
+/// up there: cameras' own axes have y down. Throws as above, and for a mesh without triangles or normals, or
+/// one of 4 GB or more.
+void write_glb_mesh(const std::filesystem::path& file, const TriangleMesh& mesh,
+                    const Vector3& up = -Vector3::UnitY());
 
 }  // namespace twofold

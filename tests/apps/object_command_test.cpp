@@ -52,6 +52,11 @@ TEST(ObjectCommand, SaysWhatIsMissing) {
   expect_bad_input(run(folder, "object " + kFew + " --depth-cut 0.31" + out), "hardly any depth");
   expect_bad_input(run(folder, "object " + kFew + " --above 0.3" + out), "nothing is left above");
   expect_bad_input(run(folder, "object " + kFew + " --voxel 0" + out), "voxel");
+  const Outcome none =
+      run(folder,
+          "object 'synthetic:turntable?sensor=rgbd&width=160&height=120&frames=160' --depth-cut 0.31" + out);
+  expect_bad_input(none, "none of the first 150 frames shows an object");
+  EXPECT_EQ(none.err.find(": :"), std::string::npos) << none.err;
   const Outcome small =
       run(folder, "object 'synthetic:turntable?sensor=stereo&width=160&height=120&frames=8'" + out);
   EXPECT_EQ(small.exit_code, 1);

@@ -155,6 +155,17 @@ TEST(SurfaceCommand, OfAPairWhatBothCamerasSeeIsSeen) {
   EXPECT_GT(triangles["0.2"], 0.5 * triangles["0.001"]);
 }
 
+TEST(SurfaceCommand, SaysWhatHadNoPoseAndThatGreyWasAskedFor) {
+  const ScratchFolder folder;
+  const std::string scene = "'synthetic:desk?sensor=rgbd&width=160&height=120&frames=6'";
+  std::ofstream(folder / "poses.txt") << "0 0 0 0 0 0 0 1\n";
+  const Outcome outcome = run(folder, "surface " + scene + " --grey --voxel 0.02 --poses '" +
+                                          (folder / "poses.txt") + "' --out '" + (folder / "result") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("5 frames of whose time"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("as asked for (--grey)"), std::string::npos) << outcome.out;
+}
+
 TEST(SurfaceCommand, StereoGivesASurface) {
   const ScratchFolder folder;
   const std::string scene = "'synthetic:desk?width=320&height=240&frames=20'";
@@ -170,6 +181,10 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
   expect_bad_input(run(folder, "run 'synthetic:desk?sensor=mono&frames=5' --surface 0.01 --quiet" + to),
                    "one camera gives no depth");
   expect_bad_input(run(folder, "run " + kScene + " --surface 0.00001 --quiet" + to), "voxel must be");
+  for (const char* option : {"--surface-memory 100", "--surface-load 0.3", "--surface-live"})
+    expect_bad_input(run(folder, "run " + kScene + " --quiet " + option + to), "requires --surface");
+  expect_bad_input(run(folder, "surface " + kScene + " --poses truth --depth-noise 2" + to),
+                   "twofold surface: depth_noise must be");
   expect_bad_input(run(folder, "surface '" + (folder / "nothing") + "'"), "not the folder of a finished run");
   expect_bad_input(run(folder, "surface 'synthetic:desk?sensor=mono&frames=5' --poses truth" + to),
                    "no depth");
@@ -181,6 +196,10 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
   expect_bad_input(
       run(folder, "eval --surface '" + (folder / "bad.ply") + "' '" + (folder / "bad.ply") + "'"),
       "too short for 99");
+  for (const char* option : {"--fit", "--seen a.ply", "--threshold 0.02"})
+    expect_bad_input(run(folder, std::string("eval a.txt b.txt ") + option), "requires --surface");
+  expect_bad_input(run(folder, "eval --surface a.ply b.ply --align sim3"), "sim3 is for trajectories");
+  expect_bad_input(run(folder, "eval --surface a.ply b.ply --max-difference 0.1"), "excludes");
   // Nothing within range: the near end of the desk is half a metre away.
   const Outcome empty = run(folder,
                             "surface 'synthetic:desk?sensor=rgbd&frames=3&width=160&height=120' --poses "

@@ -102,6 +102,19 @@ TEST(MeshFile, AnyDamageIsRefusedOrRead) {
   }
 }
 
+TEST(MeshFile, GlbIsUprightWhateverIsUp) {
+  const ScratchFolder folder;
+  for (const Vector3& up : {Vector3(0, -1, 0), Vector3(0, 0, 1), Vector3(0, 1, 0), Vector3(0.6, 0, -0.8)}) {
+    write_glb_mesh(folder / "a.glb", sample_mesh(), up);
+    const std::string bytes = bytes_of(folder / "a.glb");
+    std::uint32_t size = 0;
+    std::memcpy(&size, bytes.data() + 12, 4);
+    const auto q =
+        nlohmann::json::parse(bytes.substr(20, size))["nodes"][0]["rotation"].get<std::vector<double>>();
+    EXPECT_NEAR((Eigen::Quaterniond(q[3], q[0], q[1], q[2]) * up).y(), 1, 1e-12);
+  }
+}
+
 TEST(MeshFile, GlbHoldsTheMesh) {
   const ScratchFolder folder;
   const TriangleMesh mesh = sample_mesh();
@@ -127,6 +140,8 @@ TEST(MeshFile, GlbHoldsTheMesh) {
   const std::size_t view = json["accessors"][indices]["bufferView"];
   const std::size_t offset = json["bufferViews"][view]["byteOffset"];
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(word(binary + offset + 4 * i), mesh.triangles[i / 3][i % 3]);
+  // y is up in glTF: down in the mesh, or z.
+  EXPECT_EQ(json["nodes"][0]["rotation"], (nlohmann::json{1.0, 0.0, 0.0, 0.0}));
   TriangleMesh none = mesh;
   none.triangles.clear();
   EXPECT_THROW(write_glb_mesh(folder / "b.glb", none), IoError);

@@ -17,7 +17,7 @@ namespace twofold {
 struct MapTime {
   std::uint64_t version = 0;
   std::int64_t published_ns = 0;
-  bool jumped = false;  ///< a loop was closed
+  bool jumped = false;  ///< all poses were corrected: a loop, or the pose graph
 };
 
 /// The mesh of the map part that the camera is in, kept up to date while the run lasts, and how far it is

@@ -22,24 +22,30 @@ constexpr auto kMapCheck = std::chrono::milliseconds(20);
 }  // namespace
 
 void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments) {
-  command
-      .add_option(
-          "--surface", arguments.voxel,
-          "Fuse the keyframes' depth into a mesh (surface.ply, surface.glb), with samples this far apart [m]")
-      ->check(CLI::PositiveNumber);
+  CLI::Option* surface = command
+                             .add_option("--surface", arguments.voxel,
+                                         "Fuse the keyframes' depth into a mesh (surface.ply, surface.glb), "
+                                         "with samples this far apart [m]")
+                             ->check(CLI::PositiveNumber);
   command
       .add_option("--surface-memory", arguments.memory_mb,
                   "No more keyframes are fused once samples and depth images take this much [MiB]; the mesh "
                   "takes as much again")
       ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(surface);
   command
       .add_option("--surface-load", arguments.load,
-                  "Share of one processor's time that the surface may take while the run lasts")
+                  "Share of one processor's time that the surface may take while the run lasts; runs on one "
+                  "thread (--deterministic, --replay-schedule) take what they need")
       ->check(CLI::Range(0.01, 1.0))
-      ->capture_default_str();
-  command.add_flag("--surface-live", arguments.live_mesh,
-                   "Keep the mesh up to date while the run lasts, and say how far it is behind the map");
+      ->capture_default_str()
+      ->needs(surface);
+  command
+      .add_flag("--surface-live", arguments.live_mesh,
+                "Keep the mesh up to date while the run lasts, and say how far it is behind the map; not on "
+                "one thread")
+      ->needs(surface);
 }
 
 LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source,
@@ -150,7 +156,6 @@ void LiveSurface::take(const Frame& frame, double row_offset) {
   } catch (const IoError& error) {
     defect_ = error.what();
   }
-  ++taken_;
   coloured_ += !colour.empty();
   if (colour.empty()) colour = frame.left;
   if (std::string defect = depth_defect(rig_, depth, colour); !defect.empty()) {
@@ -173,16 +178,12 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   TriangleMesh mesh = extract_mesh(whole);
   figures.mesh_ms = static_cast<double>(thread_cpu_ns() - begin_ns) * 1e-6;
   const SubmapReport& report = surface_->report();
-  figures.voxel = arguments_.voxel;
+  describe_volume(whole, figures);
   figures.submaps = surface_->submap_count();
   figures.fused = report.fused;
   figures.fused_anew = report.fused_anew;
   figures.fusion_ms = static_cast<double>(report.fusion_ns) * 1e-6 / std::max(1, report.fused);
-  figures.blocks = whole.blocks().size();
   figures.memory_mb = static_cast<double>(report.most_bytes) / (1 << 20);
-  const double block = std::pow(kBlockEdge * arguments_.voxel, 3);
-  figures.mb_a_cubic_metre = static_cast<double>(whole.bytes()) / (1 << 20) /
-                             std::max(1e-9, static_cast<double>(whole.blocks().size()) * block);
   figures.triangles = mesh.triangles.size();
   figures.colour = coloured_ > 0 ? "of the recording" : "grey: the source gives no other";
   const auto left_out = [&](int count, const std::string& what) {

@@ -56,7 +56,7 @@ class LiveSurface {
   /// The reader's thread, with each frame it reads.
   void show(const Frame& frame);
 
-  /// After the run: fuses what still waits, into the final map, and extracts the mesh of its first part.
+  /// After the run: fuses what still waits, into the final map, and extracts the mesh of map part `part`.
   [[nodiscard]] TriangleMesh finish(const GraphSnapshot& graph, KeyframeId part, SurfaceFigures& figures);
   [[nodiscard]] bool wanted() const { return surface_.has_value(); }
 
@@ -75,7 +75,7 @@ class LiveSurface {
   Rig rig_;
   std::optional<SubmapSurface> surface_;  // the surface's thread's
   std::uint64_t version_ = 0;             // likewise: of the map it saw last
-  int coloured_ = 0, taken_ = 0;          // likewise
+  int coloured_ = 0;                      // likewise
   std::string defect_;                    // likewise: of the newest image that did not fit
   int unfit_ = 0;                         // likewise
 

@@ -120,7 +120,7 @@ void print_object(const ObjectModel& model, const RunResult& result) {
 
 void write_object(const ObjectArguments& arguments, const ObjectModel& model, const RunResult& result) {
   const std::filesystem::path out = arguments.out;
-  write_surface(out, model.mesh);
+  write_surface(out, model.mesh, model.up);
   TriangleMesh cloud = model.mesh;
   cloud.triangles.clear();
   write_ply_mesh(out / "cloud.ply", cloud);

@@ -105,12 +105,9 @@ ObjectModel build_object(const ObjectSource& source, const Trajectory& poses, co
   drop_pieces_beside(model.mesh, model.up);
   SurfaceFigures& f = model.figures;
   f.mesh_ms = static_cast<double>(thread_cpu_ns() - begin_ns) * 1e-6;
-  f.voxel = options.voxel;
   f.fusion_ms = static_cast<double>(fusion_ns) * 1e-6 / f.fused;
-  f.blocks = volume.blocks().size();
+  describe_volume(volume, f);
   f.memory_mb = static_cast<double>(volume.bytes()) / (1 << 20);
-  f.mb_a_cubic_metre =
-      f.memory_mb / std::max(1e-9, static_cast<double>(f.blocks) * std::pow(kBlockEdge * options.voxel, 3));
   f.triangles = model.mesh.triangles.size();
   f.left_out = source.left_out();
   f.colour = source.coloured() ? "of the recording" : "grey: the source gives no other";

@@ -26,8 +26,9 @@ struct ObjectBox {
 struct ObjectModel {
   TriangleMesh mesh;  ///< in the map's frame: the object stands still in it
   ObjectBox box;
-  Vector3 up{0, 0, 1};                ///< normal of the support plane
-  std::optional<TurntableAxis> axis;  ///< nothing when the camera did not turn about the object
+  Vector3 up{0, 0, 1};  ///< normal of the support plane
+  std::optional<TurntableAxis>
+      axis;  ///< however much the camera's way deviates from it; nothing where it has no rate
   SurfaceFigures figures;
 };
 

@@ -27,10 +27,10 @@ bool ObjectSource::read(Frame& frame) {
       case FrameStatus::kEnd:
         return false;
       case FrameStatus::kError:
-        throw IoError("", source_->error());
+        throw IoError(source_->error());
     }
     if (mask(frame)) return true;
-    if (shown_ == 0 && without_object_ == kPatience) throw IoError("", nothing_shown());
+    if (shown_ == 0 && without_object_ == kPatience) throw IoError(nothing_shown());
   }
 }
 
@@ -72,13 +72,19 @@ void ObjectSource::keep(const Frame& frame, const cv::Mat& depth, const cv::Mat&
 std::vector<std::string> ObjectSource::left_out() const {
   std::vector<std::string> all;
   if (without_object_ > 0) all.push_back(fmt::format("{} frames: {}", without_object_, reason_));
-  if (not_kept_ > 0) all.push_back(fmt::format("the depth of {} frames, for want of memory", not_kept_));
+  if (not_kept_ > 0)
+    all.push_back(fmt::format("the depth of {} frames, beyond {} MiB: raise --every", not_kept_,
+                              options_.most_bytes >> 20));
   return all;
 }
 
 std::string ObjectSource::nothing_shown() const {
   if (shown_ > 0) return {};
-  return "no frame shows an object: " + (reason_.empty() ? "there is none" : reason_);
+  if (reason_.empty()) return "no frame shows an object: there is none";
+  const bool is_all = without_object_ < kPatience;
+  return (is_all ? "no frame shows an object: "
+                 : fmt::format("none of the first {} frames shows an object: ", kPatience)) +
+         reason_;
 }
 
 }  // namespace twofold

@@ -36,7 +36,7 @@ struct SurfaceArguments {
   std::string out;
   std::string picture;
   std::string obj;
-  int every = 1;
+  std::size_t every = 1;
   bool grey = false;
   SurfaceOptions options;
 };
@@ -145,16 +145,14 @@ class DepthFusion {
     const std::int64_t begin_ns = thread_cpu_ns();
     TriangleMesh mesh = extract_mesh(volume_);
     figures.mesh_ms = static_cast<double>(thread_cpu_ns() - begin_ns) * 1e-6;
-    figures.voxel = volume_.options().voxel;
+    describe_volume(volume_, figures);
     figures.fused = fused_;
     figures.fusion_ms = static_cast<double>(fusion_ns_) * 1e-6 / std::max(1, fused_);
-    figures.blocks = volume_.blocks().size();
     figures.memory_mb = static_cast<double>(volume_.bytes()) / (1 << 20);
-    const double block = std::pow(kBlockEdge * volume_.options().voxel, 3);
-    figures.mb_a_cubic_metre =
-        figures.memory_mb / std::max(1e-9, static_cast<double>(figures.blocks) * block);
     figures.triangles = mesh.triangles.size();
-    figures.colour = coloured_ > 0 ? "of the recording" : "grey: the source gives no other";
+    figures.colour = coloured_ > 0 ? "of the recording"
+                     : grey_       ? "grey: as asked for (--grey)"
+                                   : "grey: the source gives no other";
     if (empty_ > 0)
       figures.left_out.push_back(fmt::format("{} depth images without any reading within range", empty_));
     return mesh;
@@ -169,34 +167,49 @@ class DepthFusion {
   std::int64_t fusion_ns_ = 0;
 };
 
+/// Most of a run's frames are no keyframes, and a recording's truth may have more poses than frames: what
+/// one expects to find is said.
+void say_without_partner(bool of_keyframes, std::size_t poses, std::size_t posed, std::size_t unposed,
+                         SurfaceFigures& figures) {
+  if (of_keyframes && posed < poses)
+    figures.left_out.push_back(
+        fmt::format("{} keyframes of whose time (to 1 ms) the source has no frame", poses - posed));
+  if (!of_keyframes && unposed > 0)
+    figures.left_out.push_back(fmt::format("{} frames of whose time (to 1 ms) there is no pose", unposed));
+}
+
 void run_surface(const SurfaceArguments& arguments) {
   SurfaceOptions options = arguments.options;
-  if (const std::string reason = options.invalid_reason(); !reason.empty()) throw IoError("--voxel", reason);
+  if (const std::string reason = options.invalid_reason(); !reason.empty())
+    throw IoError("twofold surface", reason);
   SurfaceJob job = surface_job(arguments);
   prepare_output_folder(job.out);
   if (options.depth_noise == 0) options.depth_noise = usual_depth_noise(job.source->rig());
   DepthFusion fusion(arguments, job, options);
   Frame frame;
   FrameStatus status;
-  std::int64_t posed = 0;
+  std::size_t posed = 0, unposed = 0;
   while ((status = job.source->next(frame)) == FrameStatus::kFrame) {
     const TimedPose* pose = pose_at(job.poses, frame.t_ns);
-    if (pose != nullptr && posed++ % arguments.every == 0) fusion.fuse(frame, pose->T_w_c);
+    if (pose == nullptr)
+      ++unposed;
+    else if (posed++ % arguments.every == 0)
+      fusion.fuse(frame, pose->T_w_c);
   }
-  if (status == FrameStatus::kError) throw IoError("", job.source->error());
+  if (status == FrameStatus::kError) throw IoError(job.source->error());
   if (posed == 0)
     throw IoError(job.poses_name, "no frame of the source was taken at the time of one of its poses");
   SurfaceFigures figures;
   const TriangleMesh mesh = fusion.finish(figures);
+  say_without_partner(arguments.poses.empty(), job.poses.size(), posed, unposed, figures);
   print_surface(figures);
   if (mesh.triangles.empty())
     throw std::runtime_error(arguments.input + ": the depth images gave no surface");
-  write_surface(job.out, mesh);
+  const Vector3 up = up_axis_of(job.poses) == 2 ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
+  write_surface(job.out, mesh, up);
   if (!arguments.obj.empty()) write_obj_mesh(arguments.obj, mesh);
-  if (!arguments.picture.empty()) {
-    const Vector3 up = up_axis_of(job.poses) == 2 ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
+  if (!arguments.picture.empty())
     write_png(arguments.picture, draw_mesh(mesh, mesh.colours, overview_of(mesh, up, kPictureWidth)));
-  }
   fmt::print("written to  {}\n", job.out.string());
 }
 
@@ -204,17 +217,22 @@ void run_surface(const SurfaceArguments& arguments) {
 
 void add_surface_command(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<SurfaceArguments>();
-  CLI::App* command = app.add_subcommand("surface", "Fuse the depth of a run or a recording into a mesh");
+  CLI::App* command =
+      app.add_subcommand("surface",
+                         "Fuse the depth of a run or a recording into a mesh; memory grows with "
+                         "the surface, without a limit");
   command
       ->add_option("INPUT", arguments->input,
                    "Folder of a finished run, whose source is read again, or a source")
       ->required();
   command->add_option(
       "--poses", arguments->poses,
-      "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise");
+      "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise. A frame has "
+      "a pose if their times differ by no more than 1 ms");
   command->add_option("--calib", arguments->calibration,
                       "Calibration file instead of the recording's own, or of that which the run was given");
-  command->add_option("--out", arguments->out, "Folder for surface.ply and surface.glb; the run's otherwise");
+  command->add_option("--out", arguments->out,
+                      "Folder for surface.ply and surface.glb; the run's otherwise, whose own are replaced");
   command->add_option("--voxel", arguments->options.voxel, "Distance of two samples of the surface [m]")
       ->capture_default_str();
   command->add_option("--every", arguments->every, "Fuse every so many-th frame that has a pose")
@@ -222,7 +240,9 @@ void add_surface_command(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command
       ->add_option("--max-depth", arguments->options.max_depth,
-                   "Readings farther than this begin no surface [m]; 0: no limit")
+                   "Readings farther than this begin no surface [m]; 0: only those beyond the calibration's "
+                   "depth: max (8 "
+                   "m by default)")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command

@@ -1,5 +1,8 @@
 #include "apps/twofold/surface/surface_output.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "io/files/mesh_file.hpp"
@@ -24,6 +27,14 @@ nlohmann::ordered_json live_mesh_json(const std::optional<LiveMeshFigures>& f) {
 
 }  // namespace
 
+void describe_volume(const SurfaceVolume& volume, SurfaceFigures& figures) {
+  figures.voxel = volume.options().voxel;
+  figures.blocks = volume.blocks().size();
+  const double block = std::pow(kBlockEdge * figures.voxel, 3);  // [m^3]
+  figures.mb_a_cubic_metre = static_cast<double>(volume.bytes()) / (1 << 20) /
+                             std::max(1e-9, static_cast<double>(figures.blocks) * block);
+}
+
 nlohmann::ordered_json surface_json(const SurfaceFigures& f) {
   return {{"voxel_m", f.voxel},
           {"depth_images_fused", f.fused},
@@ -46,7 +57,7 @@ void print_surface(const SurfaceFigures& f) {
       "of {:g} m\n",
       f.fused, f.fusion_ms, f.fused_anew, f.triangles, f.mesh_ms, f.voxel);
   fmt::print(
-      "            {}{} blocks, {:.0f} MB at most ({:.0f} MB for a cubic metre of blocks), colour: {}\n",
+      "            {}{} blocks, {:.0f} MiB at most ({:.0f} MiB for a cubic metre of blocks), colour: {}\n",
       f.submaps > 0 ? fmt::format("{} submaps, ", f.submaps) : "", f.blocks, f.memory_mb, f.mb_a_cubic_metre,
       f.colour);
   if (f.live_mesh) {
@@ -54,22 +65,23 @@ void print_surface(const SurfaceFigures& f) {
     fmt::print(
         "live mesh   behind the map by {:.0f} ms (p99 {:.0f}, max {:.0f}), {} updates of {:.0f} blocks, "
         "{:.0f} "
-        "CPU-ms each, {:.0f} MB\n",
+        "CPU-ms each, {:.0f} MiB\n",
         m.behind_p50_ms, m.behind_p99_ms, m.behind_max_ms, m.updates, m.blocks_an_update, m.update_ms,
         m.memory_mb);
     if (m.loops > 0)
-      fmt::print("            {} loop closures in the mesh after {:.0f} ms at most\n", m.loops,
-                 m.loop_max_ms);
+      fmt::print(
+          "            {} corrections of all poses (loops, pose graph) in the mesh after {:.0f} ms at most\n",
+          m.loops, m.loop_max_ms);
   }
   for (const std::string& what : f.left_out) fmt::print("left out    {}\n", what);
 }
 
-void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh) {
+void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh, const Vector3& up) {
   std::error_code ignored;
   for (const char* name : {"surface.ply", "surface.glb"}) std::filesystem::remove(folder / name, ignored);
   if (mesh.triangles.empty()) return;
   write_ply_mesh(folder / "surface.ply", mesh);
-  write_glb_mesh(folder / "surface.glb", mesh);
+  write_glb_mesh(folder / "surface.glb", mesh, up);
 }
 
 }  // namespace twofold

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "geometry/triangle_mesh.hpp"
+#include "geometry/types.hpp"
+#include "surface/volume.hpp"
 
 namespace twofold {
 
@@ -20,9 +22,9 @@ struct LiveMeshFigures {
   std::uint64_t maps = 0;       ///< versions of the map
   double behind_p50_ms = 0;     ///< from such a version's publication until it was in the mesh
   double behind_p99_ms = 0, behind_max_ms = 0;
-  std::uint64_t loops = 0;  ///< versions with a loop closure, or another change of all poses
+  std::uint64_t loops = 0;  ///< versions with a correction of all poses: loops, pose graph
   double loop_max_ms = 0;   ///< the same for these, the slowest
-  double memory_mb = 0;     ///< of the joined samples and the mesh, at most
+  double memory_mb = 0;     ///< of the joined samples and the mesh, at most [MiB]
 };
 
 /// What fusing depth into a surface took, and what it left out.
@@ -30,23 +32,27 @@ struct SurfaceFigures {
   double voxel = 0;             ///< [m]
   int fused = 0;                ///< depth images
   std::size_t submaps = 0;      ///< of a run; 0: all went into one volume
-  int fused_anew = 0;           ///< of these, because poses had changed
+  int fused_anew = 0;           ///< of the depth images fused, because poses had changed
   double fusion_ms = 0;         ///< processor time of a depth image, mean
   double mesh_ms = 0;           ///< the same of extracting the mesh at the end
   std::size_t blocks = 0;       ///< of 8^3 samples
-  double memory_mb = 0;         ///< of samples and depth images, at most
-  double mb_a_cubic_metre = 0;  ///< of samples, for each cubic metre of blocks
+  double memory_mb = 0;         ///< of samples and depth images, at most [MiB]
+  double mb_a_cubic_metre = 0;  ///< of samples, for each cubic metre of blocks [MiB]
   std::size_t triangles = 0;
   std::vector<std::string> left_out;  ///< in words
   std::string colour;                 ///< where the colours come from
   std::optional<LiveMeshFigures> live_mesh;
 };
 
+/// Fills in what the volume that the mesh is made of tells: voxel, blocks and mb_a_cubic_metre.
+void describe_volume(const SurfaceVolume& volume, SurfaceFigures& figures);
 [[nodiscard]] nlohmann::ordered_json surface_json(const SurfaceFigures& figures);
 void print_surface(const SurfaceFigures& figures);
 
 /// surface.ply and surface.glb in this folder; those of an earlier run are removed when there is no triangle.
 /// Throws IoError.
-void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh);
+/// @param up  unit: what is shown upright
+void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh,
+                   const Vector3& up = -Vector3::UnitY());
 
 }  // namespace twofold

@@ -117,7 +117,7 @@ void write_seen_surface(const std::filesystem::path& file, FrameSource& source) 
     if (pose != poses.end() && pose->t_ns == frame.t_ns)
       pieces.look(looks_of(rig, frame, pose->T_w_c.inverse(), screens));
   }
-  if (status == FrameStatus::kError) throw IoError("", source.error());
+  if (status == FrameStatus::kError) throw IoError(source.error());
   std::size_t kept = 0;
   for (std::size_t n = 0; n < mesh.triangles.size(); ++n)
     if (pieces.seen()[n] != 0) mesh.triangles[kept++] = mesh.triangles[n];
