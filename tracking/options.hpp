@@ -71,8 +71,8 @@ struct TrackerOptions {
   int cell_px = 28;             ///< at most one new point a cell and only where no point is tracked
   int max_new_points = 220;     ///< started in one keyframe
   float min_corner_score = 12;  ///< Shi-Tomasi [grey^2/px^2]
-  /// In the dark or in a blurred image, with fewer points in view, tracked and started, faint corners will
-  /// do: half the threshold, a quarter of the score, where the pyramid has averaged the noise away.
+  /// In the dark, with fewer points in view, tracked and started, faint corners will do: half the threshold,
+  /// a quarter of the score, where the pyramid has averaged the noise away.
   int scarce_points = 90;
   int max_failures = 4;      ///< immature points not found so many frames in a row are given up
   int max_immature_age = 3;  ///< keyframes after which an immature point is given up

@@ -16,6 +16,12 @@ constexpr int kMaxRowShift = 8;             // between left and right image, loo
 constexpr int kClearly = 3;                 // times as many corners with depth: that was the mistake
 constexpr double kFarthestDisparity = 0.3;  // [px] below it the depth is as good as infinite
 
+/// Low contrast is for want of light, not of texture.
+bool is_dark(const FrameImages& images) {
+  constexpr double kDark = 60;  // [grey]
+  return cv::mean(images.left.level(4))[0] < kDark;
+}
+
 Eigen::Vector2f at_level_zero(const Corner& corner) {
   const float s = std::ldexp(1.0F, corner.level);
   return {(static_cast<float>(corner.u) + 0.5F) * s - 0.5F, (static_cast<float>(corner.v) + 0.5F) * s - 0.5F};
@@ -60,7 +66,7 @@ PointStarter::CornerBounds PointStarter::usual_corners() const {
   return {0, options_.corner_threshold, options_.min_corner_score};
 }
 
-/// For want of light, or where the image was smeared by a fast turn: contrast is low then, and noise is not.
+/// For the dark: contrast is low there, and noise is not.
 PointStarter::CornerBounds PointStarter::faint_corners() const {
   return {1, std::max(options_.corner_threshold / 2, 1), options_.min_corner_score / 4};
 }
@@ -82,7 +88,7 @@ void PointStarter::spread_corners(const FrameImages& images, const CornerBounds&
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                         ImmaturePoints& local) {
   int started = start_at(usual_corners(), options_.max_new_points, images, anchor, shutter, local);
-  if (tracked_ < options_.scarce_points)
+  if (tracked_ < options_.scarce_points && is_dark(images))
     started += start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, local);
   return started;
 }

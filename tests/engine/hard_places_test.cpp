@@ -89,20 +89,6 @@ TEST(HardPlaces, FlightThroughTheCourtyard) {
   EXPECT_LT(flight.ate, 0.002 * flight.path);
 }
 
-/// Exposed for most of the frame interval in light that changes, edges are smeared over up to 37 pixels, and
-/// few corners are left that are good enough otherwise.
-TEST(HardPlaces, ABlurredFlightLivesOnFaintCorners) {
-  SyntheticOptions scene = small("courtyard", 180);
-  scene.fps = 20;
-  scene.flight = 2;
-  scene.blur = 0.8;
-  scene.exposure = 0.4;
-  const Walk flight = walk(scene);
-  std::printf("blurred flight: ATE %.4f m of %.1f m\n", flight.ate, flight.path);
-  EXPECT_EQ(flight.tracked, 180);
-  EXPECT_LT(flight.ate, 0.01 * flight.path);
-}
-
 /// By one stop and two thirds, and half of that: a frame later the same walls are three times as bright.
 void expect_found_in_other_light(const char* place) {
   SyntheticOptions scene = small(place, 700);
