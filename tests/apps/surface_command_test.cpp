@@ -158,7 +158,7 @@ TEST(SurfaceCommand, OfAPairWhatBothCamerasSeeIsSeen) {
 TEST(SurfaceCommand, SaysWhatHadNoPoseAndThatGreyWasAskedFor) {
   const ScratchFolder folder;
   const std::string scene = "'synthetic:desk?sensor=rgbd&width=160&height=120&frames=6'";
-  std::ofstream(folder / "poses.txt") << "0 0 0 0 0 0 0 1\n";
+  std::ofstream(folder / "poses.txt") << "1 0 0 0 0 0 0 1\n";
   const Outcome outcome = run(folder, "surface " + scene + " --grey --voxel 0.02 --poses '" +
                                           (folder / "poses.txt") + "' --out '" + (folder / "result") + "'");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
