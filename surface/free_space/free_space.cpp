@@ -65,8 +65,8 @@ class FreeSpace::Look {
     const Vector3 middle_c = T_c_v_ * Vector3(Vector3(cell.x + 0.5, cell.y + 0.5, cell.z + 0.5) * cell_);
     const auto uv = view_.camera.find_in_view(middle_c);
     if (!uv) return std::nullopt;
-    const double reading =
-        view_.depth.at<float>(static_cast<int>(uv->y() + 0.5), static_cast<int>(uv->x() + 0.5));
+    const double reading = view_.depth.at<float>(static_cast<int>(std::floor(uv->y() + 0.5)),
+                                                 static_cast<int>(std::floor(uv->x() + 0.5)));
     const double half_c = 0.5 * cell_ * fusion_.R_c_v.row(2).cwiseAbs().sum();
     if (reading <= 0 || reading > middle_c.z() - half_c) return std::nullopt;
     return to_cell(T_v_c_ * Vector3(middle_c * (reading / middle_c.z())) / cell_);
