@@ -4,8 +4,6 @@
 #include <cstddef>
 #include <span>
 
-#include "base/median.hpp"
-
 namespace twofold {
 
 /// The middle one by size, of an even number the upper of the two; 0 of none. Reorders the values; allocates
