@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 
@@ -39,15 +40,17 @@ class LineReaderTest : public ::testing::TestWithParam<Kind> {
 
   /// At most `bytes` of what is there.
   std::string read(std::size_t bytes = 1U << 22) {
-    std::string text(bytes, '\0');
-    std::size_t size = 0;
-    ssize_t now = 0;
-    while (size < bytes && (now = ::read(theirs_.get(), text.data() + size, bytes - size)) > 0)
-      size += static_cast<std::size_t>(now);
-    text.resize(size);
+    std::string text;
+    while (text.size() < bytes) {
+      const ssize_t size = ::read(theirs_.get(), piece_.data(), std::min(bytes - text.size(), piece_.size()));
+      if (size <= 0) break;
+      text.append(piece_.data(), static_cast<std::size_t>(size));
+    }
     return text;
   }
 
+  std::array<char, 4096>
+      piece_{};  // many are read in these tests: a large one would be most of what they cost
   FileDescriptor theirs_, ours_;
 };
 
