@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/right_of_way.hpp"
 #include "engine/effort_controller.hpp"
 #include "engine/pacing.hpp"
 #include "graph/map_file.hpp"
@@ -85,6 +86,10 @@ struct EngineOptions {
   std::optional<int> mapper_cpu;
   std::optional<int> loop_closer_cpu;
   std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
+
+  /// Taken while the tracker works on a frame of a run that keeps a pace, for threads of the caller's that
+  /// can wait. May be null; outlives the run.
+  RightOfWay* right_of_way = nullptr;
 
   PoseListener on_pose;      ///< as soon as the pose is known; may be empty
   PoseListener on_frame;     ///< once the tracker is done with the frame, all stages timed; likewise

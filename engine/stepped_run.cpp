@@ -181,6 +181,7 @@ bool SteppedRun::step_tracker(const std::stop_token& stop) {
   if (!frames_.try_pop(slot)) return false;
   const Arrival arrival = pacer_.wait_for(
       slot->frame.t_ns, [this] { return successor_t_ns(); }, stop);
+  const RightOfWayTaken way(options_.pacing.keeps_pace() ? options_.right_of_way : nullptr);
   begin_step(PipelineStep::kTrack);
   slot->record = FrameRecord{};
   slot->correction.reason = CorrectionReason::kNone;

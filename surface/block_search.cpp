@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "base/right_of_way.hpp"
 #include "surface/fusion_view.hpp"
 #include "surface/lanes.hpp"
 #include "surface/volume.hpp"
@@ -83,6 +84,7 @@ void SurfaceVolume::collect_blocks(const DepthView& view, const SE3& T_c_v) {
   const auto groups = static_cast<std::size_t>((view.depth.cols + kGroup - 1) / kGroup);
   std::vector<LastBlocks> last;
   for (int y = 0; y < view.depth.rows; y += kPixelStep) {
+    make_way();
     const auto* row = view.depth.ptr<float>(y);
     const float ry = (static_cast<float>(y) - f.cy) / f.fy;
     const float nearest = y % (2 * kPixelStep) == 0 ? 0 : f.fx * f.voxel * kBlockEdge / kWideBlock;

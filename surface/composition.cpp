@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.hpp"
+#include "base/right_of_way.hpp"
 
 namespace twofold {
 
@@ -82,6 +83,7 @@ void Composition::take_changes(const PlacedVolume& placed) {
       }
       mark(reached);
     }
+    make_way();
   }
   member.revision = placed.volume->revision();
 }
@@ -96,6 +98,7 @@ std::size_t Composition::compose(std::span<const PlacedVolume> volumes) {
     for (const std::uint32_t id : in_block_[block]) reaching.push_back(&resamplers.at(id));
     whole_.compose_block(block, reaching);
     is_marked_[block] = 0;
+    make_way();
   }
   const std::size_t count = marked_.size();
   marked_.clear();

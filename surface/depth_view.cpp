@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "base/check.hpp"
+#include "base/right_of_way.hpp"
 #include "surface/lanes.hpp"
 
 namespace twofold {
@@ -79,6 +80,7 @@ class Neighbourhood {
 void find_jumps(const cv::Mat& raw, cv::Mat& depth, cv::Mat& nearest) {
   Neighbourhood around(raw);
   for (int y = 0; y < raw.rows; ++y) {
+    make_way();
     around.at_row(y);
     const auto* z = raw.ptr<float>(y);
     auto* kept = depth.ptr<float>(y);
@@ -278,6 +280,7 @@ void find_pixels(const cv::Mat& nearest, DepthView& view) {
   TileRow tile_row(width);
   std::vector<std::uint32_t> colours(static_cast<std::size_t>(width));
   for (int y = 0; y < view.depth.rows; ++y) {
+    make_way();
     const ConstRow depth = row_of(view.depth, y);
     const ConstRow near = row_of(nearest, y);
     slopes.at_row(y);

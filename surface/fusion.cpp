@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/right_of_way.hpp"
 #include "surface/fusion_view.hpp"
 #include "surface/lanes.hpp"
 #include "surface/volume.hpp"
@@ -317,6 +318,7 @@ void SurfaceVolume::fuse(const DepthView& view, const SE3& T_c_v) {
     VoxelBlock& block = blocks_[touched_[n]];
     const VoxelBlock& next = blocks_[touched_[std::min(n + 1, touched_.size() - 1)]];
     if (update(T_c_v, block, next)) block.revision = revision_;
+    make_way();
   }
 }
 

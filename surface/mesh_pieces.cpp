@@ -4,6 +4,7 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "base/right_of_way.hpp"
 #include "surface/meshing.hpp"
 
 namespace twofold {
@@ -95,6 +96,7 @@ std::size_t MeshPieces::update(const SurfaceVolume& volume) {
     const BlockPosition& at = volume.blocks()[b].at;
     mesher.extract(at, piece);
     any |= replace(at, piece);
+    make_way();
   }
   if (!any) revision_ = before;
   seen_ = volume.revision();

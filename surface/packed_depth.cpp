@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include "base/check.hpp"
+#include "base/right_of_way.hpp"
 
 namespace twofold {
 
@@ -12,6 +13,7 @@ PackedDepth::PackedDepth(const cv::Mat& depth) : rows_(depth.rows), cols_(depth.
   std::vector<std::uint8_t> plain(2 * pixels);
   std::size_t i = 0;
   for (int y = 0; y < rows_; ++y) {
+    make_way();
     const auto* row = depth.ptr<std::uint16_t>(y);
     std::uint16_t before = 0;
     for (int x = 0; x < cols_; ++x, ++i) {
@@ -41,6 +43,7 @@ cv::Mat PackedDepth::unpacked() const {
                 "packed depth is whole");
   std::size_t i = 0;
   for (int y = 0; y < rows_; ++y) {
+    make_way();
     auto* row = depth.ptr<std::uint16_t>(y);
     std::uint16_t before = 0;
     for (int x = 0; x < cols_; ++x, ++i) {

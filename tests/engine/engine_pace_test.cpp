@@ -50,6 +50,27 @@ TEST_F(EnginePaceTest, EveryProposedKeyframeReachesTheMapHoweverShortTheQueueIs)
   expect_replay(options, feed(), live);
 }
 
+TEST_F(EnginePaceTest, TheTrackerHasTheRightOfWayOverThreadsOfTheCallersWhereThereIsAPace) {
+  RightOfWay right;
+  std::atomic<int> told{0}, taken{0};
+  EngineOptions options;
+  options.right_of_way = &right;
+  options.on_pose = options.on_frame = [&](const PoseReport&) {
+    ++told;
+    taken += right.taken();
+  };
+  options.pacing.speed = 200;
+  (void)run(options);
+  EXPECT_GE(told, 2 * kFrames);
+  EXPECT_EQ(taken, told);
+  EXPECT_FALSE(right.taken());
+  told = taken = 0;
+  options.pacing.speed = 0;  // the tracker never rests
+  (void)run(options);
+  EXPECT_GE(told, 2 * kFrames);
+  EXPECT_EQ(taken, 0);
+}
+
 /// Time passes when it is read, which is two or three times a frame, and for a while more than a frame has.
 class CostlyClock : public PacingClock {
  public:

@@ -72,6 +72,7 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
 }
 
 void LiveSurface::listen(EngineOptions& options) {
+  options.right_of_way = &right_of_way_;
   options.on_pose = both(
       options.on_pose, PoseListener([this](const PoseReport& report) {
         // Never full: the reader empties it before each frame it sends.
@@ -114,6 +115,7 @@ void LiveSurface::sort_frames() {
 
 void LiveSurface::work(const std::stop_token& stop) {
   yield_to_other_threads();
+  const MakesWay makes_way(right_of_way_);
   while (!stop.stop_requested()) {
     {
       std::unique_lock lock(mutex_);

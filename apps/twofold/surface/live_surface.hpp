@@ -10,6 +10,7 @@
 
 #include "apps/twofold/surface/live_mesh.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
+#include "base/right_of_way.hpp"
 #include "engine/engine.hpp"
 #include "engine/spsc_ring.hpp"
 #include "engine/worker.hpp"
@@ -42,8 +43,9 @@ struct KeyframeDecision {
 /// A client of the engine, on a thread of its own that runs when the others leave time. The reader keeps the
 /// images of frames that are under way (they are counted, not copied), until the tracker has said which of
 /// them it wants as keyframes; those wait for the surface's thread, which gets their depth, reads snapshots
-/// of the map, and fuses. Nobody waits for it: the oldest of too many waiting frames is let go of, and
-/// counted. Runs on one thread fuse between two frames, so that the same input gives the same bytes.
+/// of the map, and fuses, but for the moments in which the tracker is at work. Nobody waits for it: the
+/// oldest of too many waiting frames is let go of, and counted. Runs on one thread fuse between two frames,
+/// so that the same input gives the same bytes.
 class LiveSurface {
  public:
   /// Adds its listeners to those of `options`, which are called as before. source must outlive the object.
@@ -81,6 +83,7 @@ class LiveSurface {
 
   SpscRing<KeyframeDecision> decisions_{256};  // tracker -> reader; longer than the frames under way
   std::deque<Frame> under_way_;                // reader's
+  RightOfWay right_of_way_;                    // the tracker's, before the surface's thread
   MapLender maps_;
   std::unique_ptr<LiveMesh> mesh_;
 
