@@ -52,10 +52,11 @@ void SubmapSurface::offer(KeyframeDepth frame) {
   ++report_.overtaken;
 }
 
-void SubmapSurface::step(const GraphSnapshot& graph) {
+void SubmapSurface::step(const GraphSnapshot& graph, const SubmapWork& work) {
   let_go_of_culled(graph);
   move_submaps(graph);
-  take_new_keyframes(graph);
+  fuse_bent(work.anew);
+  take_new_keyframes(graph, work.keyframes);
   report_.most_bytes = std::max(report_.most_bytes, bytes());
 }
 
@@ -79,27 +80,43 @@ void SubmapSurface::move_submaps(const GraphSnapshot& graph) {
     submap->T_w_s = hung_on.T_k_w.inverse() * submap->T_k_s;
     submap->part = hung_on.part;
     for (Member& member : submap->members) member.T_k_w = graph.keyframe(member.id).T_k_w;
-    if (!is_bent(*submap)) continue;
-    submap->volume.clear();
-    for (Member& member : submap->members) report_.fused_anew += fuse(*submap, member);
   }
 }
 
-/// Whether a point that one of the keyframes sees would be fused elsewhere now.
-bool SubmapSurface::is_bent(const Submap& submap) const {
-  return std::any_of(submap.members.begin(), submap.members.end(), [&](const Member& member) {
+void SubmapSurface::fuse_bent(std::size_t most) {
+  std::vector<std::pair<double, Submap*>> bent;
+  for (const auto& submap : submaps_)
+    if (const double bend = bend_of(*submap); bend > kBend * options_.voxel)
+      bent.emplace_back(bend, submap.get());
+  if (bent.size() > most)
+    std::stable_sort(bent.begin(), bent.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+  const std::size_t now = std::min(most, bent.size());
+  for (std::size_t n = 0; n < now; ++n) {
+    Submap& submap = *bent[n].second;
+    submap.volume.clear();
+    for (Member& member : submap.members) report_.fused_anew += fuse(submap, member);
+  }
+  bent_ = bent.size() - now;
+}
+
+/// By how much a point that one of the keyframes sees would be fused elsewhere now, at most [m].
+double SubmapSurface::bend_of(const Submap& submap) const {
+  double most = 0;
+  for (const Member& member : submap.members) {
     const SE3 T_now_then = member.T_k_w * submap.T_w_s * member.T_k_s.inverse();
-    const double moved = T_now_then.translation().norm() + T_now_then.so3().log().norm() * member.reach;
-    return moved > kBend * options_.voxel;
-  });
+    most = std::max(most, T_now_then.translation().norm() + T_now_then.so3().log().norm() * member.reach);
+  }
+  return most;
 }
 
 /// Both depth and keyframes come in the order of frames, either of them first.
-void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph) {
+void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph, std::size_t most) {
   for (; next_keyframe_ < graph.keyframe_count(); ++next_keyframe_) {
     without_depth_.push_back(KeyframeId{next_keyframe_});
     if (without_depth_.size() > limits_.most_waiting) without_depth_.pop_front();
   }
+  keyframes_left_ = false;
   while (!without_depth_.empty() && !waiting_.empty()) {
     const Keyframe& keyframe = graph.keyframe(without_depth_.front());
     const std::int64_t frame = waiting_.front().frame_index;
@@ -107,12 +124,16 @@ void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph) {
       without_depth_.pop_front();
       continue;
     }
-    KeyframeDepth images = std::move(waiting_.front());
-    waiting_.pop_front();
     if (frame < keyframe.frame_index) {
+      waiting_.pop_front();
       ++report_.not_in_map;
       continue;
     }
+    keyframes_left_ = most == 0;
+    if (keyframes_left_) return;
+    --most;
+    KeyframeDepth images = std::move(waiting_.front());
+    waiting_.pop_front();
     without_depth_.pop_front();
     add_keyframe(graph, keyframe, std::move(images));
   }

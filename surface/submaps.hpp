@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <vector>
@@ -20,6 +21,12 @@ struct SubmapOptions {
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// How much of what waits a step does at most.
+struct SubmapWork {
+  std::size_t keyframes = std::numeric_limits<std::size_t>::max();  ///< new ones, fused
+  std::size_t anew = std::numeric_limits<std::size_t>::max();       ///< bent submaps, fused anew
 };
 
 /// What a frame that is to become a keyframe gives to the surface.
@@ -53,9 +60,9 @@ struct SubmapReport {
 /// stands still relative to one of its keyframes: a loop moves it as a whole. It begins on the world's grid
 /// of samples, so that nothing is resampled in a Composition while it has moved by less than half a voxel.
 /// When poses inside a group moved against each other by more than half a voxel, at the depth that is seen,
-/// the group is fused anew. Culled keyframes give up their depth, and what they had added remains until then;
-/// a submap that has none left goes. So memory follows the place. Same calls, same bytes; one thread at a
-/// time.
+/// the submap is bent, and fused anew. Culled keyframes give up their depth, and what they had added remains
+/// until then; a submap that has none left goes. So memory follows the place. Same calls, same bytes; one
+/// thread at a time.
 class SubmapSurface {
  public:
   /// Options must be valid.
@@ -63,8 +70,13 @@ class SubmapSurface {
 
   /// A frame that is proposed as a keyframe, before or after a map has it; frame_index grows.
   void offer(KeyframeDepth frame);
-  /// Takes the map as it is now. Versions do not shrink.
-  void step(const GraphSnapshot& graph);
+  /// Takes the map as it is now. Versions do not shrink. Submaps move with their keyframes in any case, which
+  /// takes no time; what `work` leaves waits for later steps, of bent submaps those that are bent least.
+  void step(const GraphSnapshot& graph, const SubmapWork& work = {});
+  /// Submaps that are bent and wait to be fused anew.
+  [[nodiscard]] std::size_t bent() const { return bent_; }
+  /// Whether the last step left anything to do in the map it had.
+  [[nodiscard]] bool unfinished() const { return bent_ > 0 || keyframes_left_; }
 
   /// All submaps of a map part in its world frame, as it was in the last step, added into one.
   [[nodiscard]] SurfaceVolume whole(KeyframeId part) const;
@@ -96,10 +108,11 @@ class SubmapSurface {
 
   void let_go_of_culled(const GraphSnapshot& graph);
   void move_submaps(const GraphSnapshot& graph);
-  void take_new_keyframes(const GraphSnapshot& graph);
+  void take_new_keyframes(const GraphSnapshot& graph, std::size_t most);
   void add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, KeyframeDepth images);
   [[nodiscard]] Submap& submap_for(const GraphSnapshot& graph, const Keyframe& keyframe);
-  [[nodiscard]] bool is_bent(const Submap& submap) const;
+  void fuse_bent(std::size_t most);
+  [[nodiscard]] double bend_of(const Submap& submap) const;
   /// False for an image without readings, of which nothing becomes.
   bool fuse(Submap& submap, Member& member);
 
@@ -111,6 +124,8 @@ class SubmapSurface {
   std::deque<KeyframeId> without_depth_;  ///< the newest of those seen, whose depth may still come; ascending
   std::vector<std::unique_ptr<Submap>> submaps_;  ///< ascending by id
   std::uint32_t next_submap_ = 0;
+  std::size_t bent_ = 0;         ///< after the last step
+  bool keyframes_left_ = false;  ///< likewise
   SubmapReport report_;
 };
 

@@ -107,6 +107,48 @@ TEST_F(SubmapSurfaceTest, OnlyABentGroupIsFusedAnew) {
   EXPECT_EQ(surface.report().fused_anew, limits_.most_keyframes);
 }
 
+TEST_F(SubmapSurfaceTest, BentGroupsMoveAtOnceAndAreFusedAnewOneByOneMostBentFirst) {
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  // Everything moves, the last keyframe of the first submap 8 mm further, one of the second 20 mm.
+  const SE3 T_new_old(SO3(), Vector3(0.3, -0.2, 0.5));
+  for (std::uint32_t k = 0; k < kKeyframes; ++k) {
+    const double further = k == 4 ? 0.008 : k == 6 ? 0.02 : 0.0;
+    const SE3 T_k_w = writer_.graph().keyframe(KeyframeId{k}).T_k_w * T_new_old.inverse();
+    writer_.set_pose(KeyframeId{k}, SE3(SO3(), Vector3(further, 0, 0)) * T_k_w);
+  }
+  const GraphSnapshot& graph = writer_.publish();
+  surface.step(graph, {.anew = 0});
+  EXPECT_EQ(surface.bent(), 2u);
+  EXPECT_EQ(surface.report().fused_anew, 0);
+  EXPECT_LT(error(surface, T_new_old), 0.002);  // as it was, elsewhere
+  const auto revision = [&](std::size_t n) { return surface.placed(KeyframeId{0})[n].volume->cleared(); };
+  surface.step(graph, {.anew = 1});
+  EXPECT_EQ(surface.bent(), 1u);
+  EXPECT_EQ(revision(0), 0u);
+  EXPECT_GT(revision(1), 0u);
+  surface.step(graph, {.anew = 1});
+  EXPECT_EQ(surface.bent(), 0u);
+  EXPECT_GT(revision(0), 0u);
+  const int all = surface.report().fused_anew;
+  surface.step(graph, {.anew = 1});
+  EXPECT_EQ(surface.report().fused_anew, all);
+}
+
+TEST_F(SubmapSurfaceTest, AStepDoesAsMuchAsItIsAllowedAndSaysWhetherAnythingIsLeft) {
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  for (int n = 0; n < 5; ++n) add_keyframe(surface);
+  const GraphSnapshot& graph = writer_.publish();
+  for (const int fused : {0, 2, 4, 5}) {
+    surface.step(graph, {.keyframes = fused == 0 ? 0U : 2U});
+    EXPECT_EQ(surface.report().fused, fused);
+    EXPECT_EQ(surface.unfinished(), fused < 5);
+  }
+  surface.offer(depth_of_keyframe(5));  // not in the map yet: nothing to do
+  surface.step(graph, {.keyframes = 2});
+  EXPECT_FALSE(surface.unfinished());
+}
+
 TEST_F(SubmapSurfaceTest, CulledKeyframesLeaveWhatTheyAdded) {
   SubmapSurface surface(rig_, testing::fine_options(), limits_);
   add_all(surface);

@@ -26,6 +26,7 @@ void LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph) 
     most_bytes_ = std::max(most_bytes_, composition_.bytes());
   }
   take_times(graph.version());
+  take_settled(surface);
   if (composition_.mesh().revision() == revision_) return;
   revision_ = composition_.mesh().revision();
   if (listener_) listener_(composition_.mesh(), part);
@@ -42,9 +43,19 @@ void LiveMesh::take_times(std::uint64_t version) {
     }
     if (next_time_->version > version) return;
     behind_.record(now_ns - next_time_->published_ns);
-    if (next_time_->jumped) loops_.record(now_ns - next_time_->published_ns);
+    if (next_time_->jumped) {
+      loops_.record(now_ns - next_time_->published_ns);
+      if (!unsettled_ns_) unsettled_ns_ = next_time_->published_ns;
+    }
     next_time_.reset();
   }
+}
+
+/// All that corrections bent is fused anew now, from the oldest of those on.
+void LiveMesh::take_settled(const SubmapSurface& surface) {
+  if (!unsettled_ns_ || surface.bent() > 0) return;
+  settled_.record(steady_now_ns() - *unsettled_ns_);
+  unsettled_ns_.reset();
 }
 
 LiveMeshFigures LiveMesh::figures() const {
@@ -61,6 +72,7 @@ LiveMeshFigures LiveMesh::figures() const {
   figures.behind_max_ms = ms(behind_.max_ns());
   figures.loops = loops_.count();
   figures.loop_max_ms = ms(loops_.max_ns());
+  figures.settled_max_ms = ms(settled_.max_ns());
   figures.memory_mb = static_cast<double>(most_bytes_) / (1 << 20);
   return figures;
 }

@@ -40,6 +40,7 @@ class LiveMesh {
 
  private:
   void take_times(std::uint64_t version);
+  void take_settled(const SubmapSurface& surface);
 
   Composition composition_;
   Listener listener_;
@@ -48,6 +49,8 @@ class LiveMesh {
   std::uint64_t last_jump_ = 0;    // mapper's
   std::optional<MapTime> next_time_;
   LatencyHistogram behind_, loops_;
+  std::optional<std::int64_t> unsettled_ns_;  // since when submaps that a correction bent may wait
+  LatencyHistogram settled_;
   std::int64_t updates_ = 0, cpu_ns_ = 0;
   std::size_t blocks_ = 0, most_bytes_ = 0;
 };

@@ -17,6 +17,7 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kMostWaiting = 48;  // keyframes whose images wait for the surface's thread
+constexpr SubmapWork kWork{.keyframes = 4, .anew = 1};  // at a time: some tenths of a second
 constexpr auto kMapCheck = std::chrono::milliseconds(20);
 
 }  // namespace
@@ -142,10 +143,16 @@ void LiveSurface::step() {
     frame = {};
   }
   const auto map = maps_.newest();
-  if (map->graph.version() == version_ && taken.empty()) return;
+  if (map->graph.version() == version_ && taken.empty() && !surface_->unfinished()) return;
   version_ = map->graph.version();
-  surface_->step(map->graph);
-  if (mesh_) mesh_->update(*surface_, map->graph);
+  if (!mesh_) return surface_->step(map->graph);
+  // A loop is in the mesh as soon as submaps have moved: before what is new, and what the loop bent, of which
+  // each step does a part.
+  for (const SubmapWork& work : {SubmapWork{0, 0}, kWork}) {
+    surface_->step(map->graph, work);
+    mesh_->update(*surface_, map->graph);
+    if (!surface_->unfinished()) return;
+  }
 }
 
 void LiveSurface::take(const Frame& frame, double row_offset) {
