@@ -125,8 +125,10 @@ class GaussNewtonFilter {
   [[nodiscard]] VectorX offset(const Mean& from) const;
   void estimate_motion(const std::vector<Seen>& all);
   [[nodiscard]] std::vector<Seen> with_depth(const std::vector<Seen>& all) const;
-  [[nodiscard]] bool innovation(const std::vector<Seen>& seen, const MatrixX* Sigma, MatrixX& S, MatrixX& J_T,
-                                VectorX& d) const;
+  struct Innovation;
+  class InnovationWeight;
+  [[nodiscard]] std::optional<Innovation> innovation(const std::vector<Seen>& seen, bool with_map) const;
+  [[nodiscard]] MatrixX map_covariance() const;
   void eliminate(const std::vector<int>& indices);
 
   Rig rig_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace twofold {
 
@@ -53,52 +54,62 @@ InverseDepthFilter InverseDepthFilter::from_stereo(const Rig& rig, const Vector3
   return filter;
 }
 
+namespace {
+
+/// A measurement against its prediction.
+struct Innovation {
+  Vector3 d;  ///< z - z_hat; the third component 0 where the measurement has none
+  Matrix3 J;  ///< of z_hat by psi, likewise
+};
+
+/// None when the point is behind the camera.
+std::optional<Innovation> innovation(const Rig& rig, const SE3& T_c_a, const Vector3& psi, const Vector3& z) {
+  const auto p = project_inverse_depth(rig, T_c_a, psi);
+  if (!p) return std::nullopt;
+  Innovation result{z - p->z_hat, p->J_psi};
+  if (!std::isnan(z.z())) return result;
+  result.d.z() = 0;
+  result.J.row(2).setZero();
+  return result;
+}
+
+}  // namespace
+
 bool InverseDepthFilter::update(const Rig& rig, const SE3& T_c_a, const Vector3& z, double sigma_px,
                                 int iterations) {
-  const bool stereo = !std::isnan(z.z());
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double weight = 1 / (sigma_px * sigma_px);
-  const auto residual = [&](const Vector3& z_hat) {
-    Vector3 r = z - z_hat;
-    if (!stereo) r.z() = 0;
-    return r;
-  };
-  const Vector3 prior = psi;
-  const auto cost = [&](const Vector3& at) {
-    const auto p = project_inverse_depth(rig, T_c_a, at);
-    if (!p) return std::numeric_limits<double>::infinity();
-    const Vector3 d = at - prior;
-    return d.dot(information * d) + weight * residual(p->z_hat).squaredNorm();
+  const auto cost = [&](const Vector3& at, const std::optional<Innovation>& seen) {
+    const Vector3 moved = at - psi;
+    return seen ? moved.dot(information * moved) + weight * seen->d.squaredNorm() : kInfinity;
   };
   Vector3 at = psi;
-  double best = cost(at);
+  auto seen = innovation(rig, T_c_a, at, z);
+  double best = cost(at, seen);
   if (!std::isfinite(best)) return false;
   double damping = 1e-6;
   for (int i = 0; i < iterations; ++i) {
-    const auto p = project_inverse_depth(rig, T_c_a, at);
-    Matrix3 J = p->J_psi;
-    if (!stereo) J.row(2).setZero();
-    Matrix3 H = information + weight * J.transpose() * J;
-    const Vector3 g = weight * J.transpose() * residual(p->z_hat) - information * (at - prior);
+    Matrix3 H = information + weight * seen->J.transpose() * seen->J;
+    const Vector3 g = weight * seen->J.transpose() * seen->d - information * (at - psi);
     // The floor keeps a depth that this measurement says nothing about where it is.
     H.diagonal() += damping * (H.diagonal() + Vector3::Ones());
     const Vector3 delta = H.ldlt().solve(g);
     const Vector3 next = at + delta;
-    const double value = delta.allFinite() ? cost(next) : std::numeric_limits<double>::infinity();
+    const auto next_seen = delta.allFinite() ? innovation(rig, T_c_a, next, z) : std::nullopt;
+    const double value = cost(next, next_seen);
     if (value > best) {
       damping = std::max(10 * damping, 1e-3);
       continue;
     }
     at = next;
-    const bool done = best - value < 1e-10;
+    seen = next_seen;
+    const bool settled = best - value < 1e-10;
     best = value;
     damping *= 0.1;
-    if (done) break;
+    if (settled) break;
   }
-  const auto p = project_inverse_depth(rig, T_c_a, at);
-  Matrix3 J = p->J_psi;
-  if (!stereo) J.row(2).setZero();
   psi = at;
-  information += weight * J.transpose() * J;  // eq. 3.37
+  information += weight * seen->J.transpose() * seen->J;  // eq. 3.37
   return true;
 }
 

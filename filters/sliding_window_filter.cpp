@@ -101,6 +101,7 @@ FilterSummary SlidingWindowFilter::optimise() {
   return optimise(options_.max_iterations);
 }
 
+/// Gauss-Newton; damped, as Levenberg and Marquardt do, after steps that failed.
 FilterSummary SlidingWindowFilter::optimise(int max_iterations) {
   summary_.iterations = summary_.factorisations = 0;
   summary_.converged = false;
@@ -111,37 +112,24 @@ FilterSummary SlidingWindowFilter::optimise(int max_iterations) {
   double current = cost();
   double last_decrement = 0;
   // Between two calls in a frame the state keeps its structure, so that the factor may serve again.
-  bool factor_is_good = options_.reuse_factor && factor_serves_;
+  bool reuse_factor = options_.reuse_factor && factor_serves_;
   while (summary_.iterations < max_iterations) {
     ++summary_.iterations;
-    const bool reused = factor_is_good;
-    if (!factor_is_good) {
-      ++summary_.factorisations;
-      factor_serves_ = factor_.factorise(equations_, damping);
-      if (!factor_serves_) {
-        damping = std::max(10 * damping, 1e-6);
-        continue;
-      }
+    if (!reuse_factor && !factorise(damping)) {
+      damping = std::max(10 * damping, 1e-6);
+      continue;
     }
     factor_.solve(equations_.g_poses, equations_.g_landmarks, step_);
     const double decrement = this->decrement();
     const Estimate before = estimate();
     apply(step_);
-    const double next = cost();
-    // First-estimate derivatives lead to a point that is not exactly the minimum of the cost, so that close
-    // to it the cost may rise a little; a rise by one is within the noise of a single residual. What an old
-    // factor promises is no measure.
-    const double slack =
-        1e-9 * (1 + std::abs(current)) + (first_estimates() ? 1.0 + (reused ? 0.0 : decrement) : 0.0);
-    if (!(next <= current + slack) && decrement > options_.stop_decrement) {
+    summary_.converged = decrement <= options_.stop_decrement;
+    if (summary_.converged) break;
+    if (!(cost() <= current + allowed_rise(current, reuse_factor ? 0.0 : decrement))) {
       set_estimate(before);
-      factor_is_good = false;
-      if (!reused) damping = std::max(10 * damping, 1e-3);
+      if (!reuse_factor) damping = std::max(10 * damping, 1e-3);
+      reuse_factor = false;
       continue;
-    }
-    if (decrement <= options_.stop_decrement) {
-      summary_.converged = true;
-      break;
     }
     damping *= 0.1;
     if (summary_.iterations <= 5) update_threshold();
@@ -149,7 +137,7 @@ FilterSummary SlidingWindowFilter::optimise(int max_iterations) {
     current = cost();
     // Not after the first step, which is the longest: its factor would serve the second one badly.
     const bool contracts = summary_.iterations > 1 && decrement < 0.05 * last_decrement;
-    factor_is_good = options_.reuse_factor && contracts;
+    reuse_factor = options_.reuse_factor && contracts;
     last_decrement = decrement;
   }
   summary_.cost = cost();
@@ -157,6 +145,20 @@ FilterSummary SlidingWindowFilter::optimise(int max_iterations) {
   summary_.poses = pose_count();
   summary_.landmarks = landmark_count();
   return summary_;
+}
+
+bool SlidingWindowFilter::factorise(double damping) {
+  ++summary_.factorisations;
+  factor_serves_ = factor_.factorise(equations_, damping);
+  return factor_serves_;
+}
+
+/// First-estimate derivatives lead to a point that is not exactly the minimum of the cost, so that close to
+/// it the cost may rise a little; a rise by one is within the noise of a single residual.
+/// @param promised  expected fall of the cost; 0 of an old factor's step: what that promises is no measure
+double SlidingWindowFilter::allowed_rise(double cost, double promised) const {
+  const double rounding = 1e-9 * (1 + std::abs(cost));
+  return first_estimates() ? rounding + (1.0 + promised) : rounding;
 }
 
 double SlidingWindowFilter::decrement() const {

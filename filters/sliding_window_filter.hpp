@@ -193,8 +193,10 @@ class SlidingWindowFilter {
   };
   [[nodiscard]] Estimate estimate() const;
   void set_estimate(const Estimate& estimate);
+  bool factorise(double damping);
   /// g^T delta of step_, the expected fall of the cost.
   [[nodiscard]] double decrement() const;
+  [[nodiscard]] double allowed_rise(double cost, double promised) const;
   void apply(const FilterStep& step);
   void move_frame();
   [[nodiscard]] bool first_estimates() const {

@@ -65,6 +65,19 @@ struct Normal {
   }
 };
 
+/// The level of the view's pyramid at which the patch has about its own size; none where the plane is seen
+/// from its edge, too large or too small.
+/// @param A_v_r  level-0 pixels of the view by pixels of the patch
+std::optional<int> level_of_patch(const Eigen::Matrix2d& A_v_r) {
+  const double determinant = A_v_r.determinant();
+  const double longest = A_v_r.norm();
+  if (!(determinant > kMinCosine * longest * longest) || determinant > kMaxScale * kMaxScale ||
+      determinant < 1 / (kMaxScale * kMaxScale)) {
+    return std::nullopt;
+  }
+  return std::clamp(static_cast<int>(std::lround(0.5 * std::log2(determinant))), 0, 2);
+}
+
 }  // namespace
 
 std::optional<Matrix3> plane_homography(const PinholeCamera& camera, const SE3& T_v_r, const Vector3& x_r,
@@ -108,16 +121,11 @@ std::optional<SurfaceAlignment> align_surface_patch(const SurfacePatch& patch, c
                                                     const ImagePyramid& view,
                                                     const SurfaceAlignmentOptions& options) {
   const Eigen::Matrix2d A_0 = map_pixel_jacobian(H_v_r, patch.uv);
-  const double determinant = A_0.determinant();
-  const double longest = A_0.norm();
-  if (!(determinant > kMinCosine * longest * longest) || determinant > kMaxScale * kMaxScale ||
-      determinant < 1 / (kMaxScale * kMaxScale)) {
-    return std::nullopt;
-  }
-  const int level = std::clamp(static_cast<int>(std::lround(0.5 * std::log2(determinant))), 0, 2);
-  const double scale = std::ldexp(1.0, -level);
+  const auto level = level_of_patch(A_0);
+  if (!level) return std::nullopt;
+  const double scale = std::ldexp(1.0, -*level);
   const auto to_level = [scale](const Vector2& uv) -> Vector2 { return (uv.array() + 0.5) * scale - 0.5; };
-  const cv::Mat& image = view.level(level);
+  const cv::Mat& image = view.level(*level);
   Vector2 places[SurfacePatch::kArea];
   for (int i = 0; i < SurfacePatch::kArea; ++i) {
     const Vector2 offset(i % SurfacePatch::kSize - SurfacePatch::kHalf,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "base/check.hpp"
 #include "base/option_check.hpp"
@@ -138,28 +139,50 @@ struct Positions<Sim3> {
   static double resolve(PoseGraph<Sim3>&, double cost, const PoseGraphOptions&) { return cost; }
 };
 
-/// Levenberg-Marquardt damping relative to the diagonal; `least` is 0 for Gauss-Newton.
-class Damping {
+/// How each step is made: with which damping (Levenberg-Marquardt, relative to the diagonal), and whether by
+/// the factor of the step before.
+class StepControl {
  public:
-  explicit Damping(double least) : least_(least), value_(least) {}
-  [[nodiscard]] double value() const { return value_; }
-  [[nodiscard]] bool least() const { return value_ == least_; }
-  /// gain: true decrease over the one the linear model promised.
-  void accepted(double gain) {
-    if (gain < 0.25) value_ *= 4;
-    if (gain > 0.75) value_ *= 0.1;
-    if (value_ < kNone) value_ = least_;
+  /// @param least_damping  0: Gauss-Newton until a step fails
+  StepControl(double least_damping, double keep_factor_below)
+      : least_(least_damping), damping_(least_damping), keep_factor_below_(keep_factor_below) {}
+  [[nodiscard]] double damping() const { return damping_; }
+  [[nodiscard]] bool own_factor() const { return own_factor_; }
+
+  /// @param gain      true decrease over the one that the linear model promised
+  /// @param decrease  relative to the cost
+  void accepted(double gain, double decrease) {
+    const bool undamped = damping_ == least_;
+    const bool contracts = own_factor_ ? decrease < keep_factor_below_ : decrease < last_decrease_ / 3;
+    if (own_factor_) adapt(gain);
+    own_factor_ = !(undamped && contracts);
+    last_decrease_ = decrease;
   }
-  /// False when there is nothing left to try.
+  /// Once more with a factor of its own, or else shorter. False when there is nothing left to try.
   [[nodiscard]] bool rejected() {
-    value_ = std::max(10 * value_, kFirst);
-    return value_ < kMost;
+    if (std::exchange(own_factor_, true)) damping_ = std::max(10 * damping_, kFirst);
+    return damping_ < kMost;
   }
 
  private:
   static constexpr double kNone = 1e-9, kFirst = 1e-5, kMost = 1e8;
-  double least_, value_;
+
+  void adapt(double gain) {
+    if (gain < 0.25) damping_ *= 4;
+    if (gain > 0.75) damping_ *= 0.1;
+    if (damping_ < kNone) damping_ = least_;
+  }
+
+  double least_, damping_, keep_factor_below_;
+  bool own_factor_ = true;
+  double last_decrease_ = 1;
 };
+
+template <class Group>
+double least_damping(const PoseGraph<Group>& graph, const PoseGraphOptions& options) {
+  constexpr double kOfGauge = 1e-9;
+  return graph.origin < 0 ? std::max(options.initial_damping, kOfGauge) : options.initial_damping;
+}
 
 }  // namespace
 
@@ -176,47 +199,32 @@ SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseG
   double cost = positions.chordal(graph, summary.initial_cost, options);
   if (options.on_cost) options.on_cost(0, cost);
 
-  constexpr double kGaugeDamping = 1e-9;
-  Damping damping(graph.origin < 0 ? std::max(options.initial_damping, kGaugeDamping)
-                                   : options.initial_damping);
-  bool keep_factor = false;
+  StepControl control(least_damping(graph, options), options.keep_factor_below);
   bool linearised = false;
-  double last_decrease = 1;  // relative to the cost
   summary.termination = Termination::kIterationLimit;
   while (summary.iterations < options.max_iterations) {
-    if (!linearised) w.equations.linearise(graph, options);
-    linearised = true;
+    if (!std::exchange(linearised, true)) w.equations.linearise(graph, options);
     ++summary.iterations;
-    const bool own_factor = !keep_factor;
-    keep_factor = false;
-    const auto [tried_cost, promised] = w.try_step(graph, options, cost, own_factor, damping.value());
+    const bool own_factor = control.own_factor();
+    const auto [tried_cost, promised] = w.try_step(graph, options, cost, own_factor, control.damping());
     if (!(tried_cost < cost)) {
       graph.poses = w.before;
-      if (!own_factor) continue;  // once more with its own factor
-      if (promised >= 0 && promised < options.relative_decrease * cost) {
-        summary.termination = Termination::kConverged;
-        break;
-      }
-      if (damping.rejected()) continue;
-      summary.termination = Termination::kNoStepFound;
+      const bool converged = own_factor && promised >= 0 && promised < options.relative_decrease * cost;
+      if (!converged && control.rejected()) continue;
+      summary.termination = converged ? Termination::kConverged : Termination::kNoStepFound;
       break;
     }
-    const double gain = (cost - tried_cost) / promised;
-    const double new_cost = positions.resolve(graph, tried_cost, options);
-    const double decrease = (cost - new_cost) / cost;
     ++summary.accepted_steps;
     linearised = false;
-    cost = new_cost;
+    const double gain = (cost - tried_cost) / promised;
+    const double before = std::exchange(cost, positions.resolve(graph, tried_cost, options));
+    const double decrease = (before - cost) / before;
     if (options.on_cost) options.on_cost(summary.iterations, cost);
     if (decrease < options.relative_decrease) {
       summary.termination = Termination::kConverged;
       break;
     }
-    const bool was_least = damping.least();
-    if (own_factor) damping.accepted(gain);
-    keep_factor =
-        was_least && (own_factor ? decrease < options.keep_factor_below : decrease < last_decrease / 3);
-    last_decrease = decrease;
+    control.accepted(gain, decrease);
   }
   summary.final_cost = cost;
   return summary;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -140,6 +141,50 @@ std::string association_line(std::int64_t t_ns) {
   return fmt::format("{0} mav0/cam0/data/{1}.png {0} mav0/depth0/data/{1}.png\n", seconds, t_ns);
 }
 
+/// What is rendered, in EuRoC's layout; with depth, in TUM's as well.
+class RenderedRecording {
+ public:
+  /// Throws IoError when the folder has one already.
+  RenderedRecording(const fs::path& folder, const Rig& rig, double rate_hz)
+      : folder_(folder), rig_(rig), rate_hz_(rate_hz) {
+    std::error_code ignored;
+    if (fs::exists(mav(), ignored)) throw IoError(mav(), "is there already; give another folder");
+    left_.emplace(mav() / "cam0");
+    if (rig.kind == SensorKind::kStereo) right_.emplace(mav() / "cam1");
+    if (rig.kind == SensorKind::kRgbd) depth_.emplace(mav() / "depth0");
+  }
+
+  void add(const Frame& frame) {
+    left_->add(frame.t_ns, frame.left);
+    if (right_) right_->add(frame.t_ns, frame.right);
+    if (!depth_) return;
+    depth_->add(frame.t_ns, frame.depth);
+    associations_ += association_line(frame.t_ns);
+  }
+
+  void finish(const Trajectory& truth) const {
+    left_->finish(camera_yaml(rig_, "rendered, left", 0, rate_hz_));
+    if (right_) right_->finish(camera_yaml(rig_, "rendered, right", rig_.baseline, rate_hz_));
+    if (depth_) {
+      depth_->finish(camera_yaml(rig_, "rendered, depth", 0, rate_hz_) +
+                     fmt::format("depth_unit: {}\n", rig_.depth_unit));
+      write_file(folder_ / "associations.txt", associations_);
+      write_tum_trajectory(folder_ / "groundtruth.txt", truth);
+    }
+    write_truth(mav() / "state_groundtruth_estimate0", truth);
+    write_file(folder_ / "calibration.yaml", calibration_yaml(rig_, rate_hz_));
+  }
+
+ private:
+  [[nodiscard]] fs::path mav() const { return folder_ / "mav0"; }
+
+  const fs::path folder_;
+  const Rig rig_;
+  const double rate_hz_;
+  std::optional<SensorFolder> left_, right_, depth_;
+  std::string associations_;
+};
+
 void run_render(const RenderArguments& arguments) {
   if (arguments.source.rfind("synthetic:", 0) != 0)
     throw IoError(arguments.source, "is not a rendered source (synthetic:SCENE?...)");
@@ -147,45 +192,19 @@ void run_render(const RenderArguments& arguments) {
   if (!arguments.surface.empty()) write_true_surface(arguments.surface, *source);
   if (!arguments.seen.empty()) write_seen_surface(arguments.seen, *open_source(arguments.source));
   if (arguments.out.empty()) return;
-  const Rig& rig = source->rig();
-  const fs::path out = arguments.out;
-  const fs::path mav = out / "mav0";
-  std::error_code ignored;
-  if (fs::exists(mav, ignored)) throw IoError(mav, "is there already; give another folder");
 
-  const double rate_hz = rate_of(source->ground_truth());
-  SensorFolder left(mav / "cam0");
-  std::unique_ptr<SensorFolder> right, depth;
-  if (rig.kind == SensorKind::kStereo) right = std::make_unique<SensorFolder>(mav / "cam1");
-  if (rig.kind == SensorKind::kRgbd) depth = std::make_unique<SensorFolder>(mav / "depth0");
-
+  RenderedRecording recording(arguments.out, source->rig(), rate_of(source->ground_truth()));
   RenderProgress progress(source->frame_count().value_or(0));
-  std::string associations;
   Frame frame;
   FrameStatus status;
   while ((status = source->next(frame)) == FrameStatus::kFrame) {
-    left.add(frame.t_ns, frame.left);
-    if (right) right->add(frame.t_ns, frame.right);
-    if (depth) {
-      depth->add(frame.t_ns, frame.depth);
-      associations += association_line(frame.t_ns);
-    }
+    recording.add(frame);
     progress.step();
   }
   if (status == FrameStatus::kError) throw IoError(source->error());
-
-  left.finish(camera_yaml(rig, "rendered, left", 0, rate_hz));
-  if (right) right->finish(camera_yaml(rig, "rendered, right", rig.baseline, rate_hz));
-  if (depth) {
-    depth->finish(camera_yaml(rig, "rendered, depth", 0, rate_hz) +
-                  fmt::format("depth_unit: {}\n", rig.depth_unit));
-    write_file(out / "associations.txt", associations);
-    write_tum_trajectory(out / "groundtruth.txt", source->ground_truth());
-  }
-  write_truth(mav / "state_groundtruth_estimate0", source->ground_truth());
-  write_file(out / "calibration.yaml", calibration_yaml(rig, rate_hz));
+  recording.finish(source->ground_truth());
   fmt::print("{} frames written to {} (read them with {}:{})\n", progress.done(), arguments.out,
-             depth ? "tum" : "euroc", arguments.out);
+             source->rig().kind == SensorKind::kRgbd ? "tum" : "euroc", arguments.out);
 }
 
 }  // namespace

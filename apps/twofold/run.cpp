@@ -2,6 +2,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -65,7 +69,10 @@ std::vector<std::string> real_time_notes(const RunArguments& arguments) {
   return {};
 }
 
-Schedule schedule_from(const std::string& file) {
+/// That of the run to be repeated; none: it is not asked for.
+std::optional<Schedule> schedule_of(const RunArguments& arguments) {
+  const std::string& file = arguments.replay_schedule;
+  if (file.empty()) return std::nullopt;
   auto schedule = load_schedule(file);
   if (!schedule) throw IoError(file, schedule.error());
   return *std::move(schedule);
@@ -111,6 +118,21 @@ std::unique_ptr<FrameSource> open_frames(const RunArguments& arguments,
   return source;
 }
 
+/// The source as the run takes it, and what `options` need to say of it. Only once it is known to fit, what
+/// an earlier run left in the folder goes.
+std::unique_ptr<FrameSource> prepared(std::unique_ptr<FrameSource> source, const RunArguments& arguments,
+                                      EngineOptions& options) {
+  if (source->is_live()) {
+    options.pacing.live = true;
+    if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
+  }
+  source = resampled_for_map(std::move(source), options);
+  expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
+  remove_results(arguments.out);
+  if (arguments.record.empty()) return source;
+  return std::make_unique<RecordingTee>(std::move(source), arguments.record);
+}
+
 /// Of keyframes that a viewer clicks.
 RecordedImages images_to_look_at(const RunArguments& arguments) {
   if (!arguments.view.port) return {};
@@ -132,6 +154,31 @@ FrameFeed feed_from(FrameSource& source, LiveView& view, LiveSurface& surface) {
     }
     return FeedStatus::kError;
   };
+}
+
+/// The surface's mesh while it arises; nothing without a viewer.
+LiveMesh::Listener mesh_listener(LiveView& view, double voxel) {
+  if (!view.wanted()) return {};
+  return [&view, voxel](const MeshPieces& mesh, KeyframeId part) { view.show(mesh, part, voxel); };
+}
+
+RunResult run_engine(const RunArguments& arguments, const EngineOptions& options,
+                     std::optional<Schedule> schedule, FrameSource& source, LiveView& view,
+                     LiveSurface& surface) {
+  ProgressLine line(source.frame_count(), arguments.quiet);
+  const FrameFeed feed = feed_from(source, view, surface);
+  const ProgressSink progress = [&](const Progress& p) {
+    line.show(p);
+    view.show(p);
+  };
+  catch_interrupts();
+  const std::vector<std::string> notes = real_time_notes(arguments);
+  Engine engine(source.rig(), options);
+  RunResult result = schedule ? engine.replay(feed, *std::move(schedule), interrupted(), progress)
+                              : engine.run(feed, interrupted(), progress);
+  line.end();
+  result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+  return result;
 }
 
 SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surface, const GraphSnapshot& graph,
@@ -159,53 +206,47 @@ RunFailures failures_of(const std::string& name, const FrameSource& source, cons
   return failures;
 }
 
+RunFrames frames_of(const RunArguments& arguments, const std::optional<AutoCalibration>& calibration,
+                    const RunFailures& failures) {
+  return {arguments.source, arguments.record, calibration_file_of(arguments),
+          calibration ? auto_calibration_json(*calibration) : nullptr, failures.all()};
+}
+
+/// The summary, and what stands below it.
+void print_results(const RunArguments& arguments, const EngineOptions& options, const FrameSource& source,
+                   const RunResult& result, const std::vector<MapPart>& parts,
+                   const std::vector<std::string>& maps, const std::optional<SurfaceFigures>& surface) {
+  print_summary(arguments.out, options, result, parts);
+  if (surface) print_surface(*surface);
+  if (scale_is_arbitrary(source.rig(), options))
+    fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");
+  for (const std::string& map : maps) fmt::print("map in      {}\n", map);
+  const SourceReport captured = source.report();
+  for (const std::string& text : captured.summary) fmt::print("{}\n", text);
+  for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
+}
+
 int run(const RunArguments& arguments) {
   if (arguments.estimator == "swf") return run_with_filter(arguments);
   EngineOptions options = engine_options(arguments);
   apply_map_options(arguments.map, options);
-  std::optional<Schedule> schedule;
-  if (!arguments.replay_schedule.empty()) schedule = schedule_from(arguments.replay_schedule);
+  options.logs.folder = arguments.out;
+  std::optional<Schedule> schedule = schedule_of(arguments);
   prepare_output_folder(arguments.out);
   std::optional<AutoCalibration> calibration;
-  std::unique_ptr<FrameSource> source = open_frames(arguments, calibration);
-  if (source->is_live()) {
-    options.pacing.live = true;
-    if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
-  }
-  source = resampled_for_map(std::move(source), options);
-  expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
-  options.logs.folder = arguments.out;
-  remove_results(arguments.out);
-  if (!arguments.record.empty()) {
-    source = std::make_unique<RecordingTee>(std::move(source), arguments.record);
-  }
+  const auto source = prepared(open_frames(arguments, calibration), arguments, options);
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   poses.listen(options);
   LiveView view(arguments.view, arguments.source, arguments.out, *source, images_to_look_at(arguments),
                 options);
-  LiveMesh::Listener show_mesh;
-  if (view.wanted())
-    show_mesh = [&](const MeshPieces& mesh, KeyframeId part) {
-      view.show(mesh, part, arguments.surface.voxel);
-    };
-  LiveSurface surface(arguments.surface, *source, options, options.deterministic || schedule.has_value(),
-                      show_mesh);
-  ProgressLine line(source->frame_count(), arguments.quiet);
-  const FrameFeed feed = feed_from(*source, view, surface);
-  const ProgressSink progress = [&](const Progress& p) {
-    line.show(p);
-    view.show(p);
-  };
-  catch_interrupts();
-  const std::vector<std::string> notes = real_time_notes(arguments);
-  Engine engine(source->rig(), options);
-  RunResult result = schedule ? engine.replay(feed, *std::move(schedule), interrupted(), progress)
-                              : engine.run(feed, interrupted(), progress);
-  line.end();
+  const bool one_thread = options.deterministic || schedule.has_value();
+  LiveSurface surface(arguments.surface, *source, options, one_thread,
+                      mesh_listener(view, arguments.surface.voxel));
+  const RunResult result = run_engine(arguments, options, std::move(schedule), *source, view, surface);
   poses.finish();
   view.finish();
-  result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+
   const std::vector<MapPart> parts = map_parts(result, options);
   RunFailures failures = failures_of(arguments.source, *source, options, result, poses);
   std::vector<std::string> maps;
@@ -216,20 +257,11 @@ int run(const RunArguments& arguments) {
     failures.attempt(
         [&] { figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id); });
   failures.attempt([&] {
-    write_run_output(arguments.out,
-                     {arguments.source, arguments.record, calibration_file_of(arguments),
-                      calibration ? auto_calibration_json(*calibration) : nullptr, failures.all()},
-                     *source, options, result, parts, figures ? surface_json(*figures) : nullptr);
+    write_run_output(arguments.out, frames_of(arguments, calibration, failures), *source, options, result,
+                     parts, figures ? surface_json(*figures) : nullptr);
   });
   if (!arguments.trace.empty()) failures.attempt([&] { write_trace(arguments.trace, result); });
-  print_summary(arguments.out, options, result, parts);
-  if (figures) print_surface(*figures);
-  if (scale_is_arbitrary(source->rig(), options))
-    fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");
-  for (const std::string& map : maps) fmt::print("map in      {}\n", map);
-  const SourceReport captured = source->report();
-  for (const std::string& text : captured.summary) fmt::print("{}\n", text);
-  for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
+  print_results(arguments, options, *source, result, parts, maps, figures);
   failures.expect_none();
   return kOk;
 }

@@ -71,7 +71,9 @@ EngineOptions engine_options(const RunArguments& arguments) {
   return options;
 }
 
-void add_run_options(CLI::App& command, RunArguments& arguments) {
+namespace {
+
+void add_frame_options(CLI::App& command, RunArguments& arguments) {
   command
       .add_option("SOURCE", arguments.source,
                   "Path, or scheme:ARGUMENT?key=value (kitti, euroc, tum, images, "
@@ -94,6 +96,9 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
       .add_option("--late", arguments.late,
                   "Frames that are late: queue (recordings do), drop, or newest (cameras do)")
       ->check(CLI::IsMember(kLatePolicies));
+}
+
+void add_estimator_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--windows", arguments.windows, "Keyframes in the inner and outer window")
       ->capture_default_str();
   command
@@ -104,12 +109,23 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--window", arguments.window, "Poses the sliding window filter keeps (0: all)")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+}
+
+void add_pose_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--poses", arguments.poses,
                      "Poses while they arise: - (standard output), FILE, udp:HOST:PORT, unix:PATH, "
                      "zmq:tcp://127.0.0.1:5556; may be repeated");
   command.add_option("--poses-form", arguments.poses_form, "json or tum, a line a frame")
       ->check(CLI::IsMember({"json", "tum"}))
       ->capture_default_str();
+}
+
+}  // namespace
+
+void add_run_options(CLI::App& command, RunArguments& arguments) {
+  add_frame_options(command, arguments);
+  add_estimator_options(command, arguments);
+  add_pose_options(command, arguments);
   command.add_option("--vocabulary", arguments.vocabulary, "Vocabulary file instead of the built-in one");
   command.add_option("--record", arguments.record,
                      "Record the frames into this folder: the run can be repeated from it and schedule.log");

@@ -179,6 +179,37 @@ void print_loops(const RunResult& result) {
   if (result.loops.size() > kMost) fmt::print("loop        {} more\n", result.loops.size() - kMost);
 }
 
+/// Maps beside the one that the run made: loaded, saved on the way, of parts that never joined.
+void print_other_maps(const EngineOptions& options, const RunResult& result,
+                      const std::vector<MapPart>& parts) {
+  if (options.map) {
+    const auto frame = recognised_at(options, result);
+    fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),
+               frame ? fmt::format("recognised at frame {}", *frame)
+                     : std::string("no place of it was recognised: poses are not in its frame"));
+  }
+  if (const CheckpointReport& c = result.checkpoints; options.checkpoint.period > 0) {
+    fmt::print("checkpoints {} saved, the slowest in {:.0f} ms{}{}\n", c.saved,
+               static_cast<double>(c.longest_ns) * 1e-6, c.error.empty() ? "" : "; one failed: ", c.error);
+  }
+  for (const MapPart& part : parts) {
+    if (parts.size() == 1) break;
+    fmt::print("map part    {} keyframes, {} frames, first keyframe {}\n", part.keyframes,
+               part.trajectory.size(), index(part.id));
+  }
+}
+
+void print_times(const EngineOptions& options, const RunResult& result) {
+  for (const StageRecorder& recorder : result.times) {
+    if (recorder.thread_name() == "loop closer") continue;
+    fmt::print("{:<11} {}\n", recorder.thread_name(), durations(recorder.histogram(0)));
+  }
+  if (options.pacing.keeps_pace()) fmt::print("exposure to pose: {}\n", durations(exposure_to_pose(result)));
+  const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
+  fmt::print("cost        {:.1f} s wall, {:.1f} s CPU ({:.1f} CPU-ms a frame), {:.0f} MB at most\n",
+             result.wall_seconds, result.cpu_seconds, 1e3 * result.cpu_seconds / frames, result.peak_rss_mb);
+}
+
 }  // namespace
 
 void print_summary(const std::filesystem::path& folder, const EngineOptions& options, const RunResult& result,
@@ -196,29 +227,8 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
     fmt::print("readout     {:.1f} +- {:.1f} ms: a rolling shutter, found from {} pairs of frames\n",
                1e3 * result.readout->seconds, 1e3 * result.readout->sigma, result.readout->pairs);
   }
-  if (options.map) {
-    const auto frame = recognised_at(options, result);
-    fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),
-               frame ? fmt::format("recognised at frame {}", *frame)
-                     : std::string("no place of it was recognised: poses are not in its frame"));
-  }
-  if (const CheckpointReport& c = result.checkpoints; options.checkpoint.period > 0) {
-    fmt::print("checkpoints {} saved, the slowest in {:.0f} ms{}{}\n", c.saved,
-               static_cast<double>(c.longest_ns) * 1e-6, c.error.empty() ? "" : "; one failed: ", c.error);
-  }
-  for (const MapPart& part : parts) {
-    if (parts.size() == 1) break;
-    fmt::print("map part    {} keyframes, {} frames, first keyframe {}\n", part.keyframes,
-               part.trajectory.size(), index(part.id));
-  }
-  for (const StageRecorder& recorder : result.times) {
-    if (recorder.thread_name() == "loop closer") continue;
-    fmt::print("{:<11} {}\n", recorder.thread_name(), durations(recorder.histogram(0)));
-  }
-  if (options.pacing.keeps_pace()) fmt::print("exposure to pose: {}\n", durations(exposure_to_pose(result)));
-  const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
-  fmt::print("cost        {:.1f} s wall, {:.1f} s CPU ({:.1f} CPU-ms a frame), {:.0f} MB at most\n",
-             result.wall_seconds, result.cpu_seconds, 1e3 * result.cpu_seconds / frames, result.peak_rss_mb);
+  print_other_maps(options, result, parts);
+  print_times(options, result);
   if (result.row_offset != 0)
     fmt::print(
         "rows        right images lie {:.1f} rows {} than left ones: calibrate the pair again; went on with "
