@@ -11,7 +11,7 @@ namespace twofold {
 namespace {
 
 /// One observation of the point at hand, its pose relative to the anchor worked out.
-struct View {
+struct PointView {
   Matrix3 R_i_a;
   Vector3 t_i_a;
   const WindowProblem::Observation* observation;
@@ -22,12 +22,12 @@ struct PointEquations {
   Vector3 g = Vector3::Zero();
 };
 
-double point_cost(const ObservationModel& model, const HuberKernel& kernel, const std::vector<View>& views,
-                  const Vector3& psi) {
+double point_cost(const ObservationModel& model, const HuberKernel& kernel,
+                  const std::vector<PointView>& views, const Vector3& psi) {
   if (!(psi.z() > 0)) return std::numeric_limits<double>::infinity();
   const Vector3 y = from_inverse_depth(psi);
   double cost = 0;
-  for (const View& view : views) {
+  for (const PointView& view : views) {
     const Vector3 x = view.R_i_a * y + view.t_i_a;
     cost += kernel.rho(model.chi2(x, view.observation->z, view.observation->information));
   }
@@ -35,10 +35,10 @@ double point_cost(const ObservationModel& model, const HuberKernel& kernel, cons
 }
 
 PointEquations point_equations(const ObservationModel& model, const HuberKernel& kernel,
-                               const std::vector<View>& views, const Vector3& psi) {
+                               const std::vector<PointView>& views, const Vector3& psi) {
   PointEquations sum;
   const Vector3 y = from_inverse_depth(psi);
-  for (const View& view : views) {
+  for (const PointView& view : views) {
     const Vector3 x = view.R_i_a * y + view.t_i_a;
     const auto terms = model.linearise(x, view.observation->z, view.observation->information, kernel);
     const Matrix3 J = inverse_depth_jacobian(view.R_i_a, psi);
@@ -52,7 +52,7 @@ PointEquations point_equations(const ObservationModel& model, const HuberKernel&
 
 /// Views of a point that lie in front of their camera at the start; the others cannot be linearised.
 void collect_views(const WindowProblem& problem, const WindowProblem::Point& point,
-                   const ObservationModel& model, std::vector<View>& views) {
+                   const ObservationModel& model, std::vector<PointView>& views) {
   views.clear();
   const SE3 T_w_a = problem.poses[point.anchor].T_k_w.inverse();
   const Vector3 y = from_inverse_depth(point.psi);
@@ -66,8 +66,8 @@ void collect_views(const WindowProblem& problem, const WindowProblem::Point& poi
   }
 }
 
-void optimise_point(const ObservationModel& model, const HuberKernel& kernel, const std::vector<View>& views,
-                    const WindowSolverOptions& options, Vector3& psi) {
+void optimise_point(const ObservationModel& model, const HuberKernel& kernel,
+                    const std::vector<PointView>& views, const WindowSolverOptions& options, Vector3& psi) {
   LevenbergMarquardtDamping damping(options.initial_damping);
   double cost = point_cost(model, kernel, views, psi);
   PointEquations equations = point_equations(model, kernel, views, psi);
@@ -102,7 +102,7 @@ void optimise_point(const ObservationModel& model, const HuberKernel& kernel, co
 void optimise_structure(WindowProblem& problem, const WindowSolverOptions& options) {
   const ObservationModel model(problem.rig);
   const HuberKernel kernel{options.huber_sigmas};
-  std::vector<View> views;
+  std::vector<PointView> views;
   for (auto& point : problem.points) {
     if (!(point.psi.z() > 0)) continue;
     collect_views(problem, point, model, views);

@@ -42,12 +42,12 @@ using PixelsView = Eigen::Map<const Pixels, Eigen::Aligned32>;
 /// Least squares for the residual I - (gain T + offset), T with its mean removed. A row of the Jacobian is
 /// the gradients of the template, T and 1.
 template <int kMotions>
-struct Normal {
+struct PatchEquations {
   static constexpr int kSize = kMotions + 2;
   using Matrix = Eigen::Matrix<float, kSize, kSize>;
   using Vector = Eigen::Matrix<float, kSize, 1>;
 
-  explicit Normal(const Patch& patch) : gu(patch.gradient_u), gv(patch.gradient_v) {
+  explicit PatchEquations(const Patch& patch) : gu(patch.gradient_u), gv(patch.gradient_v) {
     const PixelsView value(patch.value);
     mean = value.sum() / Patch::kArea;
     t = value - mean;
@@ -93,16 +93,16 @@ struct Normal {
 template <int kMotions>
 std::optional<AlignmentResult> align(const Patch& patch, const cv::Mat& image, const Eigen::Vector2f& start,
                                      int max_iterations) {
-  const Normal<kMotions> normal(patch);
+  const PatchEquations<kMotions> equations(patch);
   AlignmentResult result{start, 0};
   alignas(32) float window[Patch::kArea];
   float gain = 1;
-  float offset = normal.mean;
+  float offset = equations.mean;
   float last_move = 0;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!sample_window(image, result.uv, window)) return std::nullopt;
     float squares = 0;
-    const auto step = normal.step(PixelsView(window), gain, offset, squares);
+    const auto step = equations.step(PixelsView(window), gain, offset, squares);
     // Inverse composition: the template's motion is undone in the image, scaled by the gain it was found
     // with.
     Eigen::Vector2f move(step(0) / gain, 0);

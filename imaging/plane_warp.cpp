@@ -34,13 +34,13 @@ using Pixels = Eigen::Array<float, SurfacePatch::kArea, 1>;
 using PixelsView = Eigen::Map<const Pixels, Eigen::Aligned32>;
 
 /// Least squares for the residual view - (gain T + offset) over (move, gain, offset); T has no mean.
-struct Normal {
+struct SurfacePatchEquations {
   Pixels J_u, J_v, T;
   float mean = 0;
   Eigen::Matrix4f inverse;
 
   /// @param A_v_r  level pixels of the view by pixels of the patch
-  Normal(const SurfacePatch& patch, const Eigen::Matrix2d& A_v_r, bool along_row) {
+  SurfacePatchEquations(const SurfacePatch& patch, const Eigen::Matrix2d& A_v_r, bool along_row) {
     const PixelsView value(patch.value), gu(patch.gradient_u), gv(patch.gradient_v);
     // A move in the view is A^-1 of it in the patch: the gradient by the view's pixels.
     const Eigen::Matrix2f A_r_v = A_v_r.inverse().cast<float>();
@@ -132,9 +132,9 @@ std::optional<SurfaceAlignment> align_surface_patch(const SurfacePatch& patch, c
                          i / SurfacePatch::kSize - SurfacePatch::kHalf);
     places[i] = to_level(map_pixel(H_v_r, patch.uv + offset));
   }
-  const Normal normal(patch, scale * A_0, options.along_row);
+  const SurfacePatchEquations equations(patch, scale * A_0, options.along_row);
   Vector2 move(0, 0);
-  float gain = 1, offset = normal.mean;
+  float gain = 1, offset = equations.mean;
   double last = 0;
   SurfaceAlignment result;
   Pixels window;
@@ -143,7 +143,7 @@ std::optional<SurfaceAlignment> align_surface_patch(const SurfacePatch& patch, c
       if (!sample(image, places[i].x() + move.x(), places[i].y() + move.y(), window[i])) return std::nullopt;
     }
     float squares = 0;
-    const Eigen::Vector4f step = normal.step(window, gain, offset, squares);
+    const Eigen::Vector4f step = equations.step(window, gain, offset, squares);
     const Vector2 d = step.head<2>().cast<double>() / gain;
     move -= d;
     gain += step[2];

@@ -13,12 +13,12 @@ namespace twofold {
 namespace {
 
 /// Adds the time of a scope to a counter.
-class StageTime {
+class ScopeTimer {
  public:
-  explicit StageTime(double& ms) : ms_(ms), start_(Clock::now()) {}
-  ~StageTime() { ms_ += std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
-  StageTime(const StageTime&) = delete;
-  StageTime& operator=(const StageTime&) = delete;
+  explicit ScopeTimer(double& ms) : ms_(ms), start_(Clock::now()) {}
+  ~ScopeTimer() { ms_ += std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
+  ScopeTimer(const ScopeTimer&) = delete;
+  ScopeTimer& operator=(const ScopeTimer&) = delete;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -71,7 +71,7 @@ MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals,
 }
 
 void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
-  const StageTime time(report.ms.insert);
+  const ScopeTimer time(report.ms.insert);
   const InsertionReport insertion =
       insert_keyframe(writer_, proposal, options_.min_covisible, consistent_, counts_);
   keep_measured_pose(writer_, proposal, rig_, options_);
@@ -102,7 +102,7 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
 
 /// Both windows around the reference; edges that W1 leaves behind; poses and edges of what entered  (6.2.3).
 void Mapper::form_windows(MapperReport& report) {
-  const StageTime time(report.ms.window);
+  const ScopeTimer time(report.ms.window);
   select_double_window(graph(), options_, selection_, next_window_);
   leave_inner_window(report);
   report.poses_set = enter_window(writer_, consistent_, next_window_);
@@ -129,14 +129,14 @@ void Mapper::leave_inner_window(MapperReport& report) {
 /// Structure-only after poses were set, then eq. 6.4 over everything in the windows.
 void Mapper::optimise(MapperReport& report) {
   {
-    const StageTime time(report.ms.build);
+    const ScopeTimer time(report.ms.build);
     builder_.build(graph(), window_);
     report.points = static_cast<int>(builder_.problem().points.size());
     report.observations = static_cast<int>(builder_.problem().observations.size());
     report.constraints = static_cast<int>(builder_.problem().constraints.size());
   }
   {
-    const StageTime time(report.ms.solve);
+    const ScopeTimer time(report.ms.solve);
     if (report.poses_set > 0 && options_.structure_iterations > 0) {
       WindowSolverOptions structure = options_.solver;
       structure.max_iterations = options_.structure_iterations;
@@ -146,12 +146,12 @@ void Mapper::optimise(MapperReport& report) {
     report.solver = solver_.solve(builder_.problem(), options_.solver);
     if (options_.hook) options_.hook->after_solve(window_, builder_.problem());
   }
-  const StageTime time(report.ms.write);
+  const ScopeTimer time(report.ms.write);
   builder_.write_back(writer_, window_);
 }
 
 void Mapper::remove_outliers(MapperReport& report) {
-  const StageTime time(report.ms.cull);
+  const ScopeTimer time(report.ms.cull);
   builder_.find_outliers(window_, outliers_);
   report.outliers = static_cast<int>(outliers_.size());
   report.culled_points += remove_outlier_observations(writer_, outliers_);
@@ -161,14 +161,14 @@ void Mapper::remove_outliers(MapperReport& report) {
 /// points of its own beside those that the map has there, and never become redundant.
 void Mapper::close_metric_loops(std::span<KeyframeProposal* const> proposals, MapperReport& report) {
   if (!options_.loop.enabled) return;
-  const StageTime time(report.ms.loop);
+  const ScopeTimer time(report.ms.loop);
   for (const KeyframeProposal* proposal : proposals)
     report.loop_search += metric_loops_.close(writer_, window_, proposal->id, proposal->images);
   report.metric_loops = report.loop_search.edges;
 }
 
 void Mapper::cull(MapperReport& report) {
-  const StageTime time(report.ms.cull);
+  const ScopeTimer time(report.ms.cull);
   if (options_.culling.points && !inserted_.empty()) {
     report.culled_points += point_culler_.cull(writer_, inserted_.back(), builder_.point_ids());
   }

@@ -78,9 +78,11 @@ struct Section {
 };
 
 /// Walks over a file's sections. `ended` becomes true with the end section.
-class SectionReader {
+class ScheduleSectionReader {
  public:
-  explicit SectionReader(std::span<const std::uint8_t> file) : file_(file), in_(file) { read_header(); }
+  explicit ScheduleSectionReader(std::span<const std::uint8_t> file) : file_(file), in_(file) {
+    read_header();
+  }
 
   /// False at the end, where the file is torn, or when something is wrong.
   bool next(Section& section) {
@@ -152,7 +154,7 @@ std::string parse_steps(const Section& section, Step& last, std::vector<Step>& s
     last = step;
   }
   if (in.ok() && !in.at_end()) in.fail("has bytes left over");
-  return in.ok() ? "" : SectionReader::name_of(section.id) + " " + in.failure() + " of its records";
+  return in.ok() ? "" : ScheduleSectionReader::name_of(section.id) + " " + in.failure() + " of its records";
 }
 
 }  // namespace
@@ -204,7 +206,7 @@ bool write_schedule(std::ostream& out, const ScheduleStreams& schedule) {
 }
 
 tl::expected<Schedule, std::string> parse_schedule(std::span<const std::uint8_t> file) {
-  SectionReader reader(file);
+  ScheduleSectionReader reader(file);
   Schedule schedule;
   TrackerStep tracker;
   MapperStep mapper;
@@ -221,7 +223,7 @@ tl::expected<Schedule, std::string> parse_schedule(std::span<const std::uint8_t>
 }
 
 tl::expected<std::vector<std::uint8_t>, std::string> merge_schedule(std::span<const std::uint8_t> file) {
-  SectionReader reader(file);
+  ScheduleSectionReader reader(file);
   std::array<std::vector<std::uint8_t>, kSectionNames.size()> bytes;
   std::array<std::uint64_t, kSectionNames.size()> records{};
   for (Section section; reader.next(section);) {

@@ -30,12 +30,12 @@ enum Opcode : std::uint8_t {
   kDataEnd = 0x0F
 };
 
-struct Record {
+struct McapRecord {
   std::uint8_t opcode = 0;
   std::span<const std::uint8_t> content;
 };
 
-Record next_record(BagBytes& in) {
+McapRecord next_record(BagBytes& in) {
   const std::uint8_t opcode = in.u8();
   return {opcode, in.take(in.u64())};
 }
@@ -47,7 +47,7 @@ std::uint32_t crc_of(std::span<const std::uint8_t> bytes) {
 /// Schemas and channels, wherever they stand: in the summary, in chunks, between them.
 class Channels {
  public:
-  void take(const Record& record) {
+  void take(const McapRecord& record) {
     BagBytes in(record.content);
     if (record.opcode == kSchema) {
       const std::uint16_t id = in.u16();
@@ -122,11 +122,11 @@ class McapReader final : public BagReader {
   bool read_summary();
   void read_all_channels();
   /// The record at at_, which then is behind it; nothing at the end of the data, or where the file is cut.
-  std::optional<Record> next_of_file();
-  void open_chunk(const Record& record);
+  std::optional<McapRecord> next_of_file();
+  void open_chunk(const McapRecord& record);
   [[nodiscard]] bool is_wanted_chunk(std::uint64_t begin) const;
   bool find_next(BagMessage& message);
-  bool take_message(const Record& record, BagMessage& message) const;
+  bool take_message(const McapRecord& record, BagMessage& message) const;
 
   BagFile file_;
   Channels channels_;
@@ -156,7 +156,7 @@ bool McapReader::read_summary() {
     return false;
   const std::uint64_t footer_at = file_.size() - kMagic.size() - kFooter;
   BagBytes in(file_.part(footer_at, kFooter));
-  const Record footer = next_record(in);
+  const McapRecord footer = next_record(in);
   if (footer.opcode != kFooterRecord) return false;
   BagBytes fields(footer.content);
   const std::uint64_t begin = fields.u64();
@@ -169,7 +169,7 @@ bool McapReader::read_summary() {
   if (crc != 0 && crc != crc_of(file_.part(begin, file_.size() - kMagic.size() - 4 - begin)))
     throw MalformedBytes("the summary is damaged: its checksum does not fit");
   for (BagBytes records(summary); !records.at_end();) {
-    const Record record = next_record(records);
+    const McapRecord record = next_record(records);
     channels_.take(record);
     if (record.opcode != kChunkIndex) continue;
     BagBytes index(record.content);
@@ -192,8 +192,8 @@ void McapReader::read_all_channels() {
   }
 }
 
-std::optional<Record> McapReader::next_of_file() {
-  const auto cut = [this]() -> std::optional<Record> {
+std::optional<McapRecord> McapReader::next_of_file() {
+  const auto cut = [this]() -> std::optional<McapRecord> {
     fault_ = file_.name() + ": is cut short at byte " + std::to_string(at_);
     return std::nullopt;
   };
@@ -203,12 +203,12 @@ std::optional<Record> McapReader::next_of_file() {
   const std::uint64_t length = head.u64();
   if (opcode == kDataEnd || opcode == kFooterRecord) return std::nullopt;
   if (length > file_.size() - at_ - kRecordHeader) return cut();
-  const Record record{opcode, file_.part(at_ + kRecordHeader, length)};
+  const McapRecord record{opcode, file_.part(at_ + kRecordHeader, length)};
   at_ += kRecordHeader + length;
   return record;
 }
 
-void McapReader::open_chunk(const Record& record) {
+void McapReader::open_chunk(const McapRecord& record) {
   BagBytes in(record.content);
   (void)in.take(16);
   const std::uint64_t size = in.u64();
@@ -244,7 +244,7 @@ bool McapReader::find_next(BagMessage& message) {
   }
 }
 
-bool McapReader::take_message(const Record& record, BagMessage& message) const {
+bool McapReader::take_message(const McapRecord& record, BagMessage& message) const {
   if (record.opcode != kMessage) return false;
   BagBytes in(record.content);
   message.topic = in.u16();

@@ -47,14 +47,14 @@ std::string text(const Fields& fields, const char* name) {
   return {field->second.begin(), field->second.end()};
 }
 
-struct Record {
+struct RosbagRecord {
   Fields fields;
   std::uint8_t operation = 0;
   std::span<const std::uint8_t> data;
 };
 
-Record next_record(BagBytes& in) {
-  Record record;
+RosbagRecord next_record(BagBytes& in) {
+  RosbagRecord record;
   record.fields = fields_of(in.block());
   record.operation = number<std::uint8_t>(record.fields, "op");
   record.data = in.block();
@@ -99,11 +99,11 @@ class RosbagReader final : public BagReader {
   }
   /// From the connections that are repeated behind the chunks; without an index from all chunks.
   void read_topics();
-  void take_connection(const Record& record);
-  std::optional<Record> next_of_file();
-  void open_chunk(const Record& record);
+  void take_connection(const RosbagRecord& record);
+  std::optional<RosbagRecord> next_of_file();
+  void open_chunk(const RosbagRecord& record);
   bool find_next(BagMessage& message);
-  bool take_message(const Record& record, BagMessage& message) const;
+  bool take_message(const RosbagRecord& record, BagMessage& message) const;
 
   BagFile file_;
   std::vector<BagTopic> topics_;
@@ -130,7 +130,7 @@ void RosbagReader::read_topics() {
   }
 }
 
-void RosbagReader::take_connection(const Record& record) {
+void RosbagReader::take_connection(const RosbagRecord& record) {
   if (record.operation != kConnection) return;
   const auto id = number<std::uint32_t>(record.fields, "conn");
   const bool known =
@@ -141,7 +141,7 @@ void RosbagReader::take_connection(const Record& record) {
 }
 
 /// The record at at_, which then is behind it; nothing at the end, or where the file is cut.
-std::optional<Record> RosbagReader::next_of_file() {
+std::optional<RosbagRecord> RosbagReader::next_of_file() {
   if (at_ == file_.size()) return std::nullopt;
   std::uint64_t end = at_;
   for (int block = 0; block < 2; ++block) {  // header, data
@@ -154,12 +154,12 @@ std::optional<Record> RosbagReader::next_of_file() {
     end += 4 + size;
   }
   BagBytes in(file_.part(at_, end - at_));
-  const Record record = next_record(in);
+  const RosbagRecord record = next_record(in);
   at_ = end;
   return record;
 }
 
-void RosbagReader::open_chunk(const Record& record) {
+void RosbagReader::open_chunk(const RosbagRecord& record) {
   const std::string compression = text(record.fields, "compression");
   const auto size = number<std::uint32_t>(record.fields, "size");
   if (compression == "none") {
@@ -181,7 +181,7 @@ bool RosbagReader::find_next(BagMessage& message) {
   }
 }
 
-bool RosbagReader::take_message(const Record& record, BagMessage& message) const {
+bool RosbagReader::take_message(const RosbagRecord& record, BagMessage& message) const {
   if (record.operation != kMessageData) return false;
   message.topic = number<std::uint32_t>(record.fields, "conn");
   if (!wanted_.contains(message.topic)) return false;
