@@ -20,8 +20,8 @@ struct Placement {
 /// Where the search for one frame's pose begins.
 struct SearchStart {
   Placement placement;
-  /// Found by appearance, maybe of an earlier frame, or by depth images after a loss: far points are found
-  /// from there, and lead to where near ones are. Else: the last good frame's, from where images are aligned.
+  /// By appearance, maybe of an earlier frame, or by depth alignment alone: far points are found from there,
+  /// and lead to where near ones are. Else: aligned to the last good frame.
   bool rough = false;
 };
 
@@ -36,12 +36,13 @@ class FrameStep {
   const GraphSnapshot& graph;
   KeyframeProposal* const free_proposal;  ///< null: no keyframe can be made
   const EffortBounds bounds;
-  bool surfaces_read = false;  ///< of the frame's depth image
-  bool tracked = false;        ///< in the map that there was
-  bool started = false;        ///< a map or map part, with this frame
-  RollingShutter shutter;      ///< as the camera moves in this frame, as far as known
+  bool depth_read = false;  ///< the frame's depth image, by the depth alignment
+  bool tracked = false;     ///< in the map that there was
+  bool started = false;     ///< a map or map part, with this frame
+  RollingShutter shutter;   ///< as the camera moves in this frame, as far as known
   TrackResult result;
-  /// Of a pose that surfaces gave, as if each plane erred by itself: so edges of points are weighed, too.
+  /// Of a pose that depth alignment gave, as if each plane erred by itself: so edges of points are weighed,
+  /// too.
   Matrix6 information_of_planes = Matrix6::Zero();
 
   /// Attributes the time since the last lap to a stage.

@@ -44,7 +44,7 @@ struct TrackerOptions {
   /// better pose.
   double doubted_inlier_share = 0.5;
   double doubted_searched_share = 0.12;
-  /// A pose found by appearance must explain so much of the points found from it...
+  /// A pose from a rough start must explain so much of the points found from it...
   double rough_inlier_share = 0.6;
   double rough_searched_share = 0.2;  ///< ... and of those searched,
   int rough_min_inliers = 40;         ///< and so many points, or

@@ -38,7 +38,7 @@ RecentView room_for_view(const Rig& rig, const WideSearch& search) {
 Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
-      alignment_(kMaxAlignmentPoints, options.alignment),
+      dense_alignment_(kMaxAlignmentPoints, options.alignment),
       local_map_(kMaxCandidates),
       quadtree_(rig.camera.width, rig.camera.height, kMaxCandidates),
       wide_search_(rig, options.wide_search),
@@ -57,7 +57,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   previous_points_.reserve(kMaxAlignmentPoints);
   if (rig.kind == SensorKind::kStereo) right_rows_.emplace(rig);
   if (!rig.readout) readout_.emplace(rig, searches);
-  if (rig.kind == SensorKind::kRgbd) depth_.emplace(rig, options.depth);
+  if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) {
     monocular_start_.emplace(rig, options);
     seeds_.emplace(rig, options.search, options.seeds, kMaxSeeds);
@@ -110,21 +110,21 @@ bool Tracker::track(FrameStep& step) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }
-  SearchStart start{last_, false};
+  SearchStart start{.placement = last_, .rough = false};
   local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  const bool by_surfaces = corners_scarce_ && surfaces_can_place();
-  start.placement.T_c_ref = by_surfaces ? align_to_surfaces(step) : align_to_previous(step);
+  const bool by_depth = corners_scarce_ && depth_can_place();
+  start.placement.T_c_ref = by_depth ? align_to_depth(step) : align_to_previous(step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = search_from(start, step);
-  if (add_surfaces(start.placement.T_c_ref, cause, step)) return true;
+  if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
   const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
   if ((cause == LostCause::kNone && !doubted) || search_widely(step)) return true;
   if (doubted) {  // nothing better
     local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
     cause = search_from(start, step);
   }
-  if (cause != LostCause::kNone) cause = place_without_points(cause, step);
+  if (cause != LostCause::kNone) cause = place_by_depth_alone(cause, step);
   if (cause != LostCause::kNone) give_up_frame(cause, step.result);
   return cause == LostCause::kNone;
 }
@@ -181,16 +181,26 @@ void Tracker::follow(const GraphSnapshot& graph) {
   }
 }
 
+/// Since the last good frame: constant velocity, none after a loss.
+SE3 Tracker::predicted_motion() const {
+  return loss_.lost_frames() > 0 ? SE3() : T_cur_prev_;
+}
+
+SE3 Tracker::predicted_pose() const {
+  return predicted_motion() * last_.T_c_ref;
+}
+
 /// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from constant velocity, then from rest.
 SE3 Tracker::align_to_previous(FrameStep& step) {
-  const SE3 start = loss_.lost_frames() > 0 ? SE3() : T_cur_prev_;
+  const SE3 start = predicted_motion();
   if (previous_points_.empty()) return start * last_.T_c_ref;
-  DenseAlignmentResult best = alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_,
-                                               start, step.bounds.finest_alignment_level);
+  DenseAlignmentResult best =
+      dense_alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, start,
+                             step.bounds.finest_alignment_level);
   if (step.bounds.align_from_rest && (!best.converged || best.rms > 0.5 * options_.max_alignment_rms)) {
     const DenseAlignmentResult rest =
-        alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, SE3(),
-                         step.bounds.finest_alignment_level);
+        dense_alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, SE3(),
+                               step.bounds.finest_alignment_level);
     if (rest.converged && (!best.converged || rest.rms < best.rms)) best = rest;
   }
   step.result.alignment_rms = best.rms;

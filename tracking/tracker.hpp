@@ -122,7 +122,6 @@ class Tracker {
 
   bool start_map(FrameStep& step);
   bool start_part(FrameStep& step);
-  bool sees_structure(TrackResult& result);
   LostCause make_first_keyframe(FrameStep& step);
   LostCause start_from_motion(FrameStep& step);
   LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
@@ -133,18 +132,12 @@ class Tracker {
   LostCause search_from(SearchStart start, FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
   bool search_widely(FrameStep& step);
-  void look_at_surfaces(FrameStep& step);
-  [[nodiscard]] SE3 predicted_pose() const;
-  [[nodiscard]] bool surfaces_can_place() const;
-  SE3 align_to_surfaces(FrameStep& step);
-  bool add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step);
-  LostCause place_without_points(LostCause found, FrameStep& step);
-  bool points_allow(FrameStep& step);
-  LostCause place_by_surfaces(const SE3& T_c_ref, FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                         const Placement& view, FrameStep& step);
   [[nodiscard]] int mapped_inliers() const;
   [[nodiscard]] bool well_supported(const TrackResult& result) const;
+  [[nodiscard]] SE3 predicted_motion() const;
+  [[nodiscard]] SE3 predicted_pose() const;
   SE3 align_to_previous(FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
@@ -164,6 +157,20 @@ class Tracker {
   [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, const Frame& frame) const;
   [[nodiscard]] double readout_sigma() const;
   void give_up_frame(LostCause cause, TrackResult& result);
+
+  [[nodiscard]] bool depth_can_place() const;
+  void read_depth(FrameStep& step);
+  tl::expected<DepthAlignment::Result, LostCause> align_depth(const SE3& T_c_ref,
+                                                              std::span<const MotionObservation> corners,
+                                                              FrameStep& step);
+  SE3 align_to_depth(FrameStep& step);
+  bool place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step);
+  LostCause place_by_depth_alone(LostCause found, FrameStep& step);
+  bool points_allow(FrameStep& step);
+  LostCause place_by_depth(const SE3& T_c_ref, FrameStep& step);
+  LostCause judge_structure(FrameStep& step);
+  bool sees_structure(FrameStep& step);
+
   void remember_frame(const FrameStep& step);
 
   [[nodiscard]] bool keyframe_is_due(const FrameStep& step) const;
@@ -183,7 +190,7 @@ class Tracker {
   Rig rig_;  ///< constant but for the readout, once that is found
   const TrackerOptions options_;
   FrameImages current_, previous_;  ///< of the frame at hand, and of the last good one
-  DenseAlignment alignment_;
+  DenseAlignment dense_alignment_;
   LocalMap local_map_;
   Quadtree quadtree_;
   WideSearch wide_search_;
@@ -192,10 +199,10 @@ class Tracker {
   PoseUncertainty uncertainty_;
   ImmaturePoints immature_points_;
   PointStarter starter_;
-  std::optional<RightRows> right_rows_;      ///< stereo only
-  std::optional<DepthAlignment> depth_;      ///< RGB-D only
-  std::optional<ReadoutEstimator> readout_;  ///< if the calibration leaves it open
-  bool corners_scarce_ = false;              ///< the last good frame was placed by surfaces
+  std::optional<RightRows> right_rows_;            ///< stereo only
+  std::optional<DepthAlignment> depth_alignment_;  ///< RGB-D only
+  std::optional<ReadoutEstimator> readout_;        ///< if the calibration leaves it open
+  bool corners_scarce_ = false;                    ///< the last good frame was placed by depth
   // One camera only: where its depths come from.
   std::optional<MonocularStart> monocular_start_;
   std::optional<DepthSeeds> seeds_;

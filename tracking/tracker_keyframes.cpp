@@ -63,7 +63,7 @@ bool Tracker::keyframe_is_due(const FrameStep& step) const {
 void Tracker::propose_keyframe(FrameStep& step) {
   KeyframeProposal& proposal = *step.free_proposal;
   last_keyframe_.median_depth =
-      step.result.by_depth ? depth_->typical_depth() : median_depth(step.result.T_c_ref);
+      step.result.by_depth ? depth_alignment_->typical_depth() : median_depth(step.result.T_c_ref);
   begin_proposal({step.result.reference, step.result.T_c_ref}, step);
   // Where corners are few, most lie on bare edges, along which they slide: the map takes none of them.
   if (!step.result.by_depth) collect_observations(proposal);

@@ -260,120 +260,13 @@ int Tracker::mapped_inliers() const {
   return count;
 }
 
-/// A pose found by appearance is believed when the map's points are found where they should be seen from
+/// A pose from a rough start is believed when the map's points are found where they should be seen from
 /// there: from a wrong one some are found as well, but few agree. Few points that were measured from one
 /// place only all agree, and are all wrong by their depths' errors.
 bool Tracker::well_supported(const TrackResult& result) const {
   return (result.inliers >= options_.rough_min_inliers || mapped_inliers() >= options_.rough_min_mapped) &&
          result.inliers >= options_.rough_inlier_share * result.matches &&
          result.inliers >= options_.rough_searched_share * result.searched;
-}
-
-// A depth camera where there are hardly any corners: what it measures says where it is.
-
-/// The keyframes made last whose place relative to the last good frame's reference is known, and the frame.
-void Tracker::look_at_surfaces(FrameStep& step) {
-  if (step.surfaces_read) return;
-  step.surfaces_read = true;
-  depth_->look_at(current_.depth);
-  depth_->clear_views();
-  const KeyframeId part = part_of(step.graph, immature_points_, last_.reference);
-  for (std::size_t age = 0; age < recent_views_.size(); ++age) {
-    const RecentView& view = recent_views_[age];
-    const auto placement = placement_of(step.graph, view.id);
-    if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
-    const SE3 T_placed_ref =
-        relative_pose(step.graph, immature_points_, placement->reference, last_.reference);
-    depth_->add_view(view.id, view.images.depth, placement->T_c_ref * T_placed_ref);
-  }
-}
-
-/// From shape alone the camera is placed only beside where it was: after some frames the last good one shows
-/// something else, and one corner of a room looks like the next.
-bool Tracker::surfaces_can_place() const {
-  constexpr int kPatience = 5;  // lost frames
-  return depth_ && last_.reference != kNoKeyframe && loss_.lost_frames() <= kPatience;
-}
-
-SE3 Tracker::predicted_pose() const {
-  return (loss_.lost_frames() > 0 ? SE3() : T_cur_prev_) * last_.T_c_ref;
-}
-
-/// In place of the alignment to the last frame's points, of which there were too few.
-SE3 Tracker::align_to_surfaces(FrameStep& step) {
-  look_at_surfaces(step);
-  const auto aligned = depth_->align(predicted_pose(), {});
-  return aligned ? aligned->T_c_ref : align_to_previous(step);
-}
-
-/// After the search for points: few of them say less than they and the surfaces together.
-/// @param found  what the search came to
-bool Tracker::add_surfaces(const SE3& T_c_ref, LostCause found, FrameStep& step) {
-  const bool few =
-      found != LostCause::kNone ? corners_scarce_ : step.result.inliers < options_.scarce_inliers;
-  if (!few || !surfaces_can_place()) return false;
-  const TrackResult by_points = step.result;
-  const SE3& start = found == LostCause::kNone ? by_points.T_c_ref : T_c_ref;
-  if (place_by_surfaces(start, step) != LostCause::kNone) return false;
-  if (loss_.lost_frames() == 0) return true;
-  // After a loss surfaces may have found another place of the same shape: what points say counts.
-  if (found != LostCause::kNone ? points_allow(step) : 2 * step.result.inliers >= by_points.inliers)
-    return true;
-  const auto stage_ns = step.result.stage_ns;
-  step.result = by_points;
-  step.result.stage_ns = stage_ns;
-  classify_observations(rig_, motion_, by_points.T_c_ref, options_.motion);
-  return false;
-}
-
-/// Before the frame is given up: what it measures, and no points.
-/// @return kNone, or why that is not enough
-LostCause Tracker::place_without_points(LostCause found, FrameStep& step) {
-  if (!surfaces_can_place()) return found;
-  matches_.clear();
-  motion_.clear();
-  const LostCause open = place_by_surfaces(predicted_pose(), step);
-  if (open != LostCause::kNone) return open == LostCause::kTooFewMatches ? found : open;
-  return points_allow(step) ? LostCause::kNone : found;
-}
-
-/// A pose that surfaces alone gave, from a start that may be far off, before the map's points: they may give
-/// a better one. After a loss nobody knows how the camera moves, and where enough of them should be seen and
-/// are not found, the pose is wrong.
-bool Tracker::points_allow(FrameStep& step) {
-  TrackResult& result = step.result;
-  const TrackResult by_surfaces = result;
-  result.by_depth = false;
-  if (search_from({{by_surfaces.reference, by_surfaces.T_c_ref}, true}, step) == LostCause::kNone)
-    return true;
-  if (loss_.lost_frames() > 0 && result.candidates >= options_.telling_candidates) return false;
-  const auto stage_ns = result.stage_ns;
-  result = by_surfaces;
-  result.stage_ns = stage_ns;
-  matches_.clear();
-  motion_.clear();
-  result.matches = result.inliers = 0;
-  return true;
-}
-
-/// @return kNone, or why that cannot be: the result is then as it was
-LostCause Tracker::place_by_surfaces(const SE3& T_c_ref, FrameStep& step) {
-  look_at_surfaces(step);
-  const auto placed = depth_->align(T_c_ref, motion_);
-  step.lap(TrackerStage::kAlignment);
-  if (!placed) return placed.error();
-  TrackResult& result = step.result;
-  result.status = TrackStatus::kTracking;
-  result.by_depth = true;
-  result.cause = LostCause::kNone;
-  result.reference = last_.reference;
-  result.T_c_ref = placed->T_c_ref;
-  step.information_of_planes = placed->information;
-  result.information =
-      inverse_symmetric(placed->covariance + shutter_covariance(placed->all, placed->by_rows, step));
-  result.matches = static_cast<int>(matches_.size());
-  result.inliers = classify_observations(rig_, motion_, result.T_c_ref, options_.motion);
-  return LostCause::kNone;
 }
 
 }  // namespace twofold

@@ -38,7 +38,7 @@ std::optional<Placement> Tracker::recognised(const GraphSnapshot& graph) {
 bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   local_map_.update(step.graph, asked.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  if (search_from({asked, true}, step) == LostCause::kNone) return true;
+  if (search_from({.placement = asked, .rough = true}, step) == LostCause::kNone) return true;
   if (!options_.wide_search.enabled) return false;
   wide_search_.look_at(current_);
   return search_from_view(asked_.images, asked_.corners, asked, step);
@@ -73,7 +73,8 @@ bool Tracker::search_from_view(const FrameImages& images, std::vector<DescribedC
   step.lap(TrackerStage::kAlignment);
   if (!T_c_view) return false;
   local_map_.update(step.graph, view.reference, immature_points_, options_.neighbour_keyframes);
-  return search_from({{view.reference, *T_c_view * view.T_c_ref}, true}, step) == LostCause::kNone;
+  const Placement placement{view.reference, *T_c_view * view.T_c_ref};
+  return search_from({.placement = placement, .rough = true}, step) == LostCause::kNone;
 }
 
 bool Tracker::start_map(FrameStep& step) {
@@ -89,25 +90,13 @@ bool Tracker::start_map(FrameStep& step) {
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
   const bool something_in_view =
-      starter_.sees_corners(current_, options_.min_corners_seen) || sees_structure(step.result);
+      starter_.sees_corners(current_, options_.min_corners_seen) || sees_structure(step);
   if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.new_part_after || !something_in_view ||
       loss_.lost_frames() < options_.new_part_frames) {
     return false;
   }
   if (step.free_proposal == nullptr || !immature_points_.pending().empty()) return false;
   return make_first_keyframe(step) == LostCause::kNone;
-}
-
-/// With few corners in view: whether surfaces would tell how the camera moves from here on. That the map's
-/// points are not found says little then: if surfaces, too, leave that open, it is why the camera stays lost.
-bool Tracker::sees_structure(TrackResult& result) {
-  if (!depth_) return false;
-  depth_->look_at(current_.depth);
-  const LostCause open = depth_->judge_structure();
-  const bool unexplained =
-      result.cause == LostCause::kTooFewCandidates || result.cause == LostCause::kTooFewMatches;
-  if (unexplained && open == LostCause::kNoStructure) result.cause = open;
-  return open == LostCause::kNone;
 }
 
 /// The frame becomes the first keyframe of a map or map part, at identity.
@@ -122,8 +111,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   immature_points_.clear_points();
   starter_.clear();
   if (starter_.start(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
-    if (depth_) depth_->look_at(current_.depth);
-    const LostCause open = depth_ ? depth_->judge_structure() : LostCause::kTooFewMatches;
+    const LostCause open = judge_structure(step);
     if (open != LostCause::kNone) {
       immature_points_.clear_points();  // there were none but these
       return open == LostCause::kNoStructure ? open : LostCause::kNoTexture;
@@ -132,7 +120,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   }
   matches_.clear();
   motion_.clear();
-  last_keyframe_ = {step.result.by_depth ? depth_->typical_depth() : median_depth(SE3()), 0};
+  last_keyframe_ = {step.result.by_depth ? depth_alignment_->typical_depth() : median_depth(SE3()), 0};
   begin_proposal({kNoKeyframe, SE3()}, step);
   hand_over_images(*step.free_proposal);
   next_.first_of_part = index(id);

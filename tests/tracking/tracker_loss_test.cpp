@@ -163,9 +163,9 @@ TEST(Tracker, TakesNoPlaceForAnotherOfTheSameShape) {
     ASSERT_EQ(tracked.status, TrackStatus::kTracking) << i;
   }
   const SE3 T_last_w = at(0.8, 0);
-  const TrackResult by_surfaces = step(T_last_w, true, false);  // the light goes out
-  ASSERT_EQ(by_surfaces.status, TrackStatus::kTracking) << describe(by_surfaces.cause);
-  ASSERT_TRUE(by_surfaces.by_depth);
+  const TrackResult by_depth = step(T_last_w, true, false);  // the light goes out
+  ASSERT_EQ(by_depth.status, TrackStatus::kTracking) << describe(by_depth.cause);
+  ASSERT_TRUE(by_depth.by_depth);
   ASSERT_EQ(step(T_last_w, true, true).status, TrackStatus::kLost);
   const TrackResult elsewhere = step(at(0.8 + M_PI, 0), false, false);
   EXPECT_EQ(elsewhere.status, TrackStatus::kLost) << elsewhere.candidates << " candidates";

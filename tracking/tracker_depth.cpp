@@ -1,0 +1,135 @@
+// A depth camera where there are hardly any corners: depth alignment says where it is, together with what
+// points were found, or alone.
+#include <utility>
+
+#include "geometry/symmetric_solve.hpp"
+#include "tracking/tracker.hpp"
+
+namespace twofold {
+namespace {
+
+/// The result is again what it was, but for the time that passed.
+void restore(const TrackResult& earlier, TrackResult& result) {
+  const auto stage_ns = result.stage_ns;
+  result = earlier;
+  result.stage_ns = stage_ns;
+}
+
+}  // namespace
+
+/// From shape alone the camera is placed only beside where it was: after some frames the last good one shows
+/// something else, and one corner of a room looks like the next.
+bool Tracker::depth_can_place() const {
+  constexpr int kPatience = 5;  // lost frames
+  return depth_alignment_ && last_.reference != kNoKeyframe && loss_.lost_frames() <= kPatience;
+}
+
+void Tracker::read_depth(FrameStep& step) {
+  if (!std::exchange(step.depth_read, true)) depth_alignment_->look_at(current_.depth);
+}
+
+/// To the keyframes made last whose place relative to the last good frame's reference is known.
+tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
+    const SE3& T_c_ref, std::span<const MotionObservation> corners, FrameStep& step) {
+  read_depth(step);
+  depth_alignment_->clear_views();
+  const KeyframeId part = part_of(step.graph, immature_points_, last_.reference);
+  for (std::size_t age = 0; age < recent_views_.size(); ++age) {
+    const RecentView& view = recent_views_[age];
+    const auto placement = placement_of(step.graph, view.id);
+    if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
+    const SE3 T_placed_ref =
+        relative_pose(step.graph, immature_points_, placement->reference, last_.reference);
+    depth_alignment_->add_view(view.id, view.images.depth, placement->T_c_ref * T_placed_ref);
+  }
+  return depth_alignment_->align(T_c_ref, corners);
+}
+
+/// In place of the alignment to the last frame's points, of which there were too few.
+SE3 Tracker::align_to_depth(FrameStep& step) {
+  const auto aligned = align_depth(predicted_pose(), {}, step);
+  return aligned ? aligned->T_c_ref : align_to_previous(step);
+}
+
+/// After the search for points: few of them say less than they and depth together.
+/// @param found  what the search came to
+bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step) {
+  const bool points_placed = found == LostCause::kNone;
+  const bool few = points_placed ? step.result.inliers < options_.scarce_inliers : corners_scarce_;
+  if (!few || !depth_can_place()) return false;
+  const TrackResult by_points = step.result;
+  if (place_by_depth(points_placed ? by_points.T_c_ref : T_c_ref, step) != LostCause::kNone) return false;
+  if (loss_.lost_frames() == 0) return true;
+  // After a loss depth may have found another place of the same shape: what points say counts.
+  if (points_placed ? 2 * step.result.inliers >= by_points.inliers : points_allow(step)) return true;
+  restore(by_points, step.result);
+  classify_observations(rig_, motion_, by_points.T_c_ref, options_.motion);
+  return false;
+}
+
+/// Before the frame is given up: what it measures, and no points.
+/// @return kNone, or why that is not enough
+LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
+  if (!depth_can_place()) return found;
+  matches_.clear();
+  motion_.clear();
+  const LostCause open = place_by_depth(predicted_pose(), step);
+  if (open != LostCause::kNone) return open == LostCause::kTooFewMatches ? found : open;
+  return points_allow(step) ? LostCause::kNone : found;
+}
+
+/// A pose that depth alone gave, from a start that may be far off, before the map's points: they may give a
+/// better one. After a loss nobody knows how the camera moves, and where enough of them should be seen and
+/// are not found, the pose is wrong.
+bool Tracker::points_allow(FrameStep& step) {
+  TrackResult& result = step.result;
+  const TrackResult by_depth = result;
+  result.by_depth = false;
+  const Placement placement{by_depth.reference, by_depth.T_c_ref};
+  if (search_from({.placement = placement, .rough = true}, step) == LostCause::kNone) return true;
+  if (loss_.lost_frames() > 0 && result.candidates >= options_.telling_candidates) return false;
+  restore(by_depth, result);
+  matches_.clear();
+  motion_.clear();
+  result.matches = result.inliers = 0;
+  return true;
+}
+
+/// By depth and the points found, of which there may be none.
+/// @return kNone, or why that cannot be: the result is then as it was
+LostCause Tracker::place_by_depth(const SE3& T_c_ref, FrameStep& step) {
+  const auto placed = align_depth(T_c_ref, motion_, step);
+  step.lap(TrackerStage::kAlignment);
+  if (!placed) return placed.error();
+  TrackResult& result = step.result;
+  result.status = TrackStatus::kTracking;
+  result.by_depth = true;
+  result.cause = LostCause::kNone;
+  result.reference = last_.reference;
+  result.T_c_ref = placed->T_c_ref;
+  step.information_of_planes = placed->information;
+  result.information =
+      inverse_symmetric(placed->covariance + shutter_covariance(placed->all, placed->by_rows, step));
+  result.matches = static_cast<int>(matches_.size());
+  result.inliers = classify_observations(rig_, motion_, result.T_c_ref, options_.motion);
+  return LostCause::kNone;
+}
+
+/// Whether the frame would be placed relative to itself by its depth alone: kNone, or why not.
+LostCause Tracker::judge_structure(FrameStep& step) {
+  if (!depth_alignment_) return LostCause::kTooFewMatches;
+  read_depth(step);
+  return depth_alignment_->judge_structure();
+}
+
+/// With few corners in view: whether depth would tell how the camera moves from here on. That the map's
+/// points are not found says little then: if depth, too, leaves that open, it is why the camera stays lost.
+bool Tracker::sees_structure(FrameStep& step) {
+  const LostCause open = judge_structure(step);
+  LostCause& cause = step.result.cause;
+  const bool unexplained = cause == LostCause::kTooFewCandidates || cause == LostCause::kTooFewMatches;
+  if (unexplained && open == LostCause::kNoStructure) cause = open;
+  return open == LostCause::kNone;
+}
+
+}  // namespace twofold
