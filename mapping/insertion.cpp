@@ -17,11 +17,11 @@ const Observation* observation_of(const KeyframeProposal& proposal, PointId poin
   return at != list.end() && at->point == point ? &*at : nullptr;
 }
 
-/// The reference, or the keyframe that inherited its place, and the new keyframe's pose relative to it.
-std::pair<KeyframeId, SE3> present_reference(const GraphSnapshot& graph, const KeyframeProposal& proposal) {
-  const auto live_replacement = graph.live_replacement(proposal.reference);
-  TWOFOLD_CHECK(live_replacement, "the reference of a proposal was culled too long ago");
-  return {live_replacement->id, proposal.T_k_ref * live_replacement->T_this_live};
+/// The reference, or the keyframe that stands for it, and the new keyframe's pose relative to that.
+std::pair<KeyframeId, SE3> live_reference(const GraphSnapshot& graph, const KeyframeProposal& proposal) {
+  const auto live = graph.live_replacement(proposal.reference);
+  TWOFOLD_CHECK(live, "the reference of a proposal was culled too long ago");
+  return {live->id, proposal.T_k_ref * live->T_this_live};
 }
 
 void add_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, const SE3& T_k_w, KeyframeId part) {
@@ -117,7 +117,7 @@ InsertionReport insert_keyframe(GraphWriter& writer, const KeyframeProposal& pro
   if (!first_of_part) {
     TWOFOLD_CHECK(writer.graph().contains(proposal.reference), "a proposal refers to a known keyframe");
     SE3 T_k_ref;
-    std::tie(reference, T_k_ref) = present_reference(writer.graph(), proposal);
+    std::tie(reference, T_k_ref) = live_reference(writer.graph(), proposal);
     T_k_w = T_k_ref * writer.graph().keyframe(reference).T_k_w;
   }
   const KeyframeId part = first_of_part ? proposal.id : writer.graph().keyframe(reference).part;
@@ -140,7 +140,7 @@ bool keep_measured_pose(GraphWriter& writer, const KeyframeProposal& proposal, c
                         const MapperOptions& options) {
   if (proposal.reference == kNoKeyframe || proposal.pose_information.isZero(0)) return false;
   const GraphSnapshot& graph = writer.graph();
-  const auto [reference, T_k_ref] = present_reference(graph, proposal);
+  const auto [reference, T_k_ref] = live_reference(graph, proposal);
   const Keyframe &keyframe = graph.keyframe(proposal.id), &other = graph.keyframe(reference);
   if (shared_points(keyframe, other) >= options.min_covisible) return false;
   const int weight = weight_of_measured_pose(proposal.pose_information, keyframe, other, rig, options.edge);

@@ -10,10 +10,10 @@ constexpr std::size_t kMaxEdges = 512;
 
 }  // namespace
 
-SE3 pose_in_world(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k) {
+SE3 pose_in_world(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k) {
   SE3 T_k_here;
   for (const PendingKeyframe* pending = nullptr; !graph.contains(k); k = pending->reference) {
-    pending = local.find_pending(k);
+    pending = immature.find_pending(k);
     TWOFOLD_CHECK(pending != nullptr, "keyframe neither in the map nor pending");
     T_k_here = T_k_here * pending->T_k_ref;
     if (pending->reference == kNoKeyframe) return T_k_here;
@@ -21,9 +21,9 @@ SE3 pose_in_world(const GraphSnapshot& graph, const ImmaturePoints& local, Keyfr
   return T_k_here * graph.T_k_w(k);
 }
 
-KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k) {
+KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k) {
   while (!graph.contains(k)) {
-    const PendingKeyframe* pending = local.find_pending(k);
+    const PendingKeyframe* pending = immature.find_pending(k);
     TWOFOLD_CHECK(pending != nullptr, "keyframe neither in the map nor pending");
     if (pending->reference == kNoKeyframe) return k;
     k = pending->reference;
@@ -31,9 +31,9 @@ KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& local, Keyf
   return graph.part(k);
 }
 
-SE3 relative_pose(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k, KeyframeId ref) {
+SE3 relative_pose(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k, KeyframeId ref) {
   if (k == ref) return {};
-  return pose_in_world(graph, local, k) * pose_in_world(graph, local, ref).inverse();
+  return pose_in_world(graph, immature, k) * pose_in_world(graph, immature, ref).inverse();
 }
 
 LocalMap::LocalMap(std::size_t capacity) : met_(kTable, 0) {
@@ -53,23 +53,23 @@ bool LocalMap::first_sight(PointId id) {
   return true;
 }
 
-int LocalMap::anchor_position(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local) {
+int LocalMap::anchor_position(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& immature) {
   // Points of one keyframe stand together, and new anchors are few: the last ones are the likely ones.
   for (std::size_t i = anchors_.size(); i-- > 0;) {
     if (anchors_[i].id == id) return static_cast<int>(i);
   }
   if (anchors_.size() == anchors_.capacity()) return -1;
-  anchors_.push_back({id, relative_pose(graph, local, origin_.reference, id)});
+  anchors_.push_back({id, relative_pose(graph, immature, origin_.reference, id)});
   return static_cast<int>(anchors_.size()) - 1;
 }
 
-void LocalMap::add_neighbour(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local) {
+void LocalMap::add_neighbour(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& immature) {
   for (const Observation& observation : *graph.keyframe(id).observations) {
     // The table stays sparse because the points do.
     if (points_.size() == points_.capacity()) return;
     const MapPoint& point = graph.point(observation.point);
     if (!point.alive() || !first_sight(observation.point)) continue;
-    const int anchor = anchor_position(graph, point.anchor, local);
+    const int anchor = anchor_position(graph, point.anchor, immature);
     if (anchor < 0) continue;
     const SE3& T_ref_a = anchors_[static_cast<std::size_t>(anchor)].T_ref_a;
     points_.push_back({observation.point, -1, anchor, point.appearance.get(), point.psi,
@@ -77,23 +77,23 @@ void LocalMap::add_neighbour(const GraphSnapshot& graph, KeyframeId id, const Im
   }
 }
 
-void LocalMap::update(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& local,
+void LocalMap::update(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& immature,
                       int max_neighbours) {
-  const Origin origin{graph.version(), local.revision(), reference};
+  const Origin origin{graph.version(), immature.revision(), reference};
   if (origin == origin_) return;
   origin_ = origin;
-  rebuild(graph, local, max_neighbours);
+  rebuild(graph, immature, max_neighbours);
 }
 
-void LocalMap::rebuild(const GraphSnapshot& graph, const ImmaturePoints& local, int max_neighbours) {
+void LocalMap::rebuild(const GraphSnapshot& graph, const ImmaturePoints& immature, int max_neighbours) {
   const KeyframeId reference = origin_.reference;
   points_.clear();
   anchors_.clear();
   neighbours_.clear();
   ++round_;
-  for (std::size_t i = 0; i < local.points().size() && points_.size() < points_.capacity(); ++i) {
-    const ImmaturePoint& point = local.points()[i];
-    const int anchor = anchor_position(graph, point.anchor, local);
+  for (std::size_t i = 0; i < immature.points().size() && points_.size() < points_.capacity(); ++i) {
+    const ImmaturePoint& point = immature.points()[i];
+    const int anchor = anchor_position(graph, point.anchor, immature);
     if (anchor < 0) continue;
     const SE3& T_ref_a = anchors_[static_cast<std::size_t>(anchor)].T_ref_a;
     points_.push_back({point.id, static_cast<int>(i), anchor, &point.appearance, point.psi,
@@ -109,7 +109,7 @@ void LocalMap::rebuild(const GraphSnapshot& graph, const ImmaturePoints& local, 
   }
   const std::size_t own = points_.size();
   for (const KeyframeId id : neighbours_) {
-    add_neighbour(graph, id, local);
+    add_neighbour(graph, id, immature);
     if (id == reference) reference_range_ = {own, points_.size()};
   }
 }

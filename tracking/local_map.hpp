@@ -14,9 +14,9 @@ namespace twofold {
 /// A point worth searching for in the next frames.
 struct TrackedPoint {
   PointId id = kNoPoint;                        ///< kNoPoint: an immature point, which the map does not know
-  int local = -1;                               ///< position in ImmaturePoints, -1 for map points
+  int immature = -1;                            ///< position in ImmaturePoints, -1 for map points
   int anchor = 0;                               ///< position in LocalMap::anchors
-  const PointAppearance* appearance = nullptr;  ///< lives as long as the snapshot, or the local point
+  const PointAppearance* appearance = nullptr;  ///< lives as long as the snapshot, or the immature point
   Vector3 psi{0, 0, 1};
   Vector3 x_ref{0, 0, 1};  ///< in the reference keyframe's frame [m]
 };
@@ -34,7 +34,7 @@ class LocalMap {
 
   /// Collects the points around `reference`, a keyframe of the graph or a pending one, unless nothing of that
   /// has changed since the last time.
-  void update(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& local,
+  void update(const GraphSnapshot& graph, KeyframeId reference, const ImmaturePoints& immature,
               int max_neighbours);
 
   [[nodiscard]] std::span<const TrackedPoint> points() const { return points_; }
@@ -63,10 +63,10 @@ class LocalMap {
     friend bool operator==(const Origin&, const Origin&) = default;
   };
 
-  void rebuild(const GraphSnapshot& graph, const ImmaturePoints& local, int max_neighbours);
+  void rebuild(const GraphSnapshot& graph, const ImmaturePoints& immature, int max_neighbours);
   bool first_sight(PointId id);
-  int anchor_position(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local);
-  void add_neighbour(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& local);
+  int anchor_position(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& immature);
+  void add_neighbour(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& immature);
 
   std::vector<TrackedPoint> points_;
   std::vector<AnchorPose> anchors_;
@@ -78,11 +78,11 @@ class LocalMap {
 };
 
 /// T_k_w of a keyframe in the graph, or of a pending one through the keyframes it was proposed relative to.
-[[nodiscard]] SE3 pose_in_world(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k);
+[[nodiscard]] SE3 pose_in_world(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k);
 /// Map part of a keyframe in the graph or pending.
-[[nodiscard]] KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k);
+[[nodiscard]] KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k);
 /// T_k_ref of two keyframes of one part, each in the graph or pending.
-[[nodiscard]] SE3 relative_pose(const GraphSnapshot& graph, const ImmaturePoints& local, KeyframeId k,
+[[nodiscard]] SE3 relative_pose(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k,
                                 KeyframeId ref);
 
 }  // namespace twofold

@@ -86,15 +86,16 @@ void PointStarter::spread_corners(const FrameImages& images, const CornerBounds&
 }
 
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
-                        ImmaturePoints& local) {
-  int started = start_at(usual_corners(), options_.max_new_points, images, anchor, shutter, local);
+                        ImmaturePoints& immature) {
+  int started = start_at(usual_corners(), options_.max_new_points, images, anchor, shutter, immature);
   if (tracked_ < options_.scarce_points && is_dark(images))
-    started += start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, local);
+    started +=
+        start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, immature);
   return started;
 }
 
 int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameImages& images,
-                           KeyframeId anchor, const RollingShutter& shutter, ImmaturePoints& local) {
+                           KeyframeId anchor, const RollingShutter& shutter, ImmaturePoints& immature) {
   spread_corners(images, bounds);
   int started = 0;
   for (std::int64_t i = quadtree_.next(); i >= 0 && started < wanted; i = quadtree_.next()) {
@@ -104,7 +105,7 @@ int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameIm
     point.anchor = anchor;
     if (occupied_[cell_of(uv)] != 0 || !measure(images, corner, point)) continue;
     if (!shutter.at_rest()) move_to_mid_exposure(shutter, point);
-    if (!local.add(point)) break;
+    if (!immature.add(point)) break;
     occupy(uv);
     ++started;
   }

@@ -34,7 +34,7 @@ class PointStarter {
   /// Starts points anchored in keyframe `anchor` where nothing is tracked, evenly over the image; returns how
   /// many. The anchor's pose is that at mid-exposure.
   int start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
-            ImmaturePoints& local);
+            ImmaturePoints& immature);
   /// For one camera: patches where nothing is tracked, evenly over the image, appended to `appearances` up to
   /// its capacity and TrackerOptions::max_new_points. Marks their places as occupied.
   void choose_corners(const FrameImages& images, std::vector<PointAppearance>& appearances);
@@ -57,7 +57,7 @@ class PointStarter {
   [[nodiscard]] CornerBounds usual_corners() const;
   [[nodiscard]] CornerBounds faint_corners() const;
   int start_at(const CornerBounds& bounds, int wanted, const FrameImages& images, KeyframeId anchor,
-               const RollingShutter& shutter, ImmaturePoints& local);
+               const RollingShutter& shutter, ImmaturePoints& immature);
   void spread_corners(const FrameImages& images, const CornerBounds& bounds);
   [[nodiscard]] bool measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const;
   void move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const;

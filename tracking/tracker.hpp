@@ -141,6 +141,11 @@ class Tracker {
   SE3 align_to_previous(FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
+  /// One that the tracker started; null: the map has it.
+  [[nodiscard]] ImmaturePoint* immature_point(const TrackedPoint& point) {
+    return point.immature < 0 ? nullptr
+                              : &immature_points_.points()[static_cast<std::size_t>(point.immature)];
+  }
   void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
   bool search_point(std::uint32_t point, const SE3& T_c_ref, const GuidedSearchOptions& search,
                     const FrameStep& step);

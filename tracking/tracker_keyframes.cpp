@@ -103,14 +103,13 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
     if (!motion_[m].inlier) continue;
     const TrackedPoint& point = local_map_.points()[matches_[m].point];
     PointId id = point.id;
-    if (point.local >= 0) {
-      ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(point.local)];
-      if (local.id == kNoPoint && elder_vote_.mistrusts_the_young() &&
-          local.agreed < options_.trusted_after) {
+    if (ImmaturePoint* young = immature_point(point)) {
+      if (young->id == kNoPoint && elder_vote_.mistrusts_the_young() &&
+          young->agreed < options_.trusted_after) {
         continue;  // chance finds what moves near where it was
       }
-      if (local.id == kNoPoint) confirm(local, proposal);
-      id = local.id;
+      if (young->id == kNoPoint) confirm(*young, proposal);
+      id = young->id;
     }
     const auto level = static_cast<std::uint8_t>(matches_[m].found.level);
     proposal.observations.push_back({id, motion_[m].z, level});
@@ -147,7 +146,7 @@ void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
 void Tracker::occupy_unsearched(const SE3& T_c_ref) {
   for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
     const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
-    if (point.local >= 0) continue;  // few of these will ever be points of the map
+    if (point.immature >= 0) continue;  // few of these will ever be points of the map
     const auto uv = rig_.camera.find_in_view(T_c_ref * point.x_ref);
     if (uv) starter_.occupy(uv->cast<float>());
   }

@@ -75,18 +75,17 @@ bool Tracker::search_point(std::uint32_t point, const SE3& T_c_ref, const Guided
   const SE3 T_c_a = step.shutter.seen_from(rig_, T_c_ref, tracked.x_ref) * local_map_.T_ref_a(tracked);
   const auto found = find_point(current_, rig_, *tracked.appearance, tracked.psi, T_c_a, search);
   if (!found) return false;
-  if (tracked.local >= 0) immature_points_.points()[static_cast<std::size_t>(tracked.local)].failures = 0;
+  if (ImmaturePoint* young = immature_point(tracked)) young->failures = 0;
   matches_.push_back({point, *found});
   return true;
 }
 
 void Tracker::count_misses() {
   for (const std::uint32_t i : missed_) {
-    const int at = local_map_.points()[i].local;
-    if (at < 0) continue;
-    ImmaturePoint& local = immature_points_.points()[static_cast<std::size_t>(at)];
-    local.failures = static_cast<std::uint8_t>(std::min(local.failures + 1, 255));
-    local.agreed = 0;
+    ImmaturePoint* young = immature_point(local_map_.points()[i]);
+    if (young == nullptr) continue;
+    young->failures = static_cast<std::uint8_t>(std::min(young->failures + 1, 255));
+    young->agreed = 0;
   }
 }
 
@@ -167,15 +166,14 @@ int Tracker::ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solve
   if (overruled) motion = *overruled;
   int moving = 0;
   for (std::size_t m = 0; m < matches_.size(); ++m) {
-    const int local = local_map_.points()[matches_[m].point].local;
-    if (local < 0) continue;
-    ImmaturePoint& point = immature_points_.points()[static_cast<std::size_t>(local)];
-    const int agreed = motion_[m].inlier ? std::min(point.agreed + 1, 255) : 0;
-    point.agreed = static_cast<std::uint8_t>(agreed);
-    point.moved = static_cast<std::uint8_t>(motion_[m].inlier ? 0 : std::min(point.moved + 1, 255));
+    ImmaturePoint* young = immature_point(local_map_.points()[matches_[m].point]);
+    if (young == nullptr) continue;
+    const int agreed = motion_[m].inlier ? std::min(young->agreed + 1, 255) : 0;
+    young->agreed = static_cast<std::uint8_t>(agreed);
+    young->moved = static_cast<std::uint8_t>(motion_[m].inlier ? 0 : std::min(young->moved + 1, 255));
     const bool expelled = overruled && agreed == 0;  // found, but it is something that moves
-    if (expelled) point.failures = 255;
-    moving += expelled || point.moved >= options_.moving_after ? 1 : 0;
+    if (expelled) young->failures = 255;
+    moving += expelled || young->moved >= options_.moving_after ? 1 : 0;
   }
   return moving;
 }
@@ -255,7 +253,7 @@ Matrix6 Tracker::honest_information(const MotionOnlyResult& motion, const Motion
 int Tracker::mapped_inliers() const {
   int count = 0;
   for (std::size_t m = 0; m < matches_.size(); ++m) {
-    count += motion_[m].inlier && local_map_.points()[matches_[m].point].local < 0 ? 1 : 0;
+    count += motion_[m].inlier && local_map_.points()[matches_[m].point].immature < 0 ? 1 : 0;
   }
   return count;
 }

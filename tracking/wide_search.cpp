@@ -56,12 +56,12 @@ std::optional<SE3> WideSearch::find(const FrameImages& earlier, std::vector<Desc
                                     const GuidedSearchOptions& search) {
   if (corners.empty()) describe(earlier, corners);
   match(earlier, corners, search);
-  const auto rough = consensus_.find(matches_, options_.min_agreeing);
-  if (!rough) return std::nullopt;
+  const auto agreed = consensus_.find(matches_, options_.min_agreeing);
+  if (!agreed) return std::nullopt;
   std::erase_if(matches_,
-                [&](const MotionObservation& match) { return !consensus_.explains(*rough, match); });
+                [&](const MotionObservation& match) { return !consensus_.explains(*agreed, match); });
   // Depths of one frame are poor; where the corners are seen is not.
-  return optimise_motion(rig_, matches_, *rough, {}).T_c_ref;
+  return optimise_motion(rig_, matches_, *agreed, {}).T_c_ref;
 }
 
 /// Corners that look alike, each more than any other, and have depth in both frames.
