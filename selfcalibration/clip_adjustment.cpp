@@ -105,55 +105,54 @@ double ClipAdjustment::estimated_sigma(const SharedLens& lens) const {
 bool ClipAdjustment::add_point(const SharedLens& lens, std::size_t corner, PointBlock& block) {
   const std::size_t n = clip_->views.size();
   const Vector3& psi = motion.psi[corner];
-  block.V_inverse.setZero();
+  Matrix3 V = Matrix3::Zero();
   block.g.setZero();
   block.W = Eigen::Matrix<double, Eigen::Dynamic, 3>::Zero(pose_size() + kLensParameters, 3);
-  std::vector<CornerTerm> terms(n);
+  std::vector<Projection> projections(n);
+  std::vector<Vector2> errors(n, Vector2::Zero());
   double sum = 0, seen = 0;
   for (std::size_t k = 0; k < n; ++k) {
     const ClipView& view = clip_->views[k];
     if (!view.sees(corner)) continue;
     ++seen;
-    Projection projection;
     if (!project(lens, ray_at(motion.T_view_first[k], psi), view.uv[corner], view.velocity[corner],
-                 projection, true)) {
+                 projections[k], true)) {
+      block.V_inverse.setZero();
       return false;
     }
-    terms[k] = {(view.uv[corner] - projection.uv) / sigma_, projection.d_point, projection.d_lens};
-    sum += terms[k].error.squaredNorm();
+    errors[k] = (view.uv[corner] - projections[k].uv) / sigma_;
+    sum += errors[k].squaredNorm();
   }
   const double cauchy = 1 / (1 + sum / seen / kKernel);
   const double weight = redescending_ ? cauchy * cauchy : cauchy;
+  const int lens_at = pose_size();
   for (std::size_t k = 0; k < n; ++k) {
-    if (clip_->views[k].sees(corner)) add_term(terms[k], weight, k, psi, block);
+    if (!clip_->views[k].sees(corner)) continue;
+    const SE3& T = motion.T_view_first[k];
+    const Matrix3 R = T.rotation();
+    Matrix3 p_psi;
+    p_psi << R.col(0), R.col(1), T.translation();
+    const Matrix23 d_psi = projections[k].d_point * p_psi / sigma_;
+    const Eigen::Matrix<double, 2, kLensParameters> d_lens = projections[k].d_lens / sigma_;
+    V += weight * d_psi.transpose() * d_psi;
+    block.g += weight * d_psi.transpose() * errors[k];
+    block.W.bottomRows<kLensParameters>() += weight * d_lens.transpose() * d_psi;
+    H_.bottomRightCorner<kLensParameters, kLensParameters>() += weight * d_lens.transpose() * d_lens;
+    g_.tail<kLensParameters>() += weight * d_lens.transpose() * errors[k];
+    if (k == 0) continue;
+    const int at = 6 * (static_cast<int>(k) - 1);
+    Matrix36 p_pose;
+    p_pose << psi.z() * Matrix3::Identity(), -hat(ray_at(T, psi));
+    const Eigen::Matrix<double, 2, 6> d_pose = projections[k].d_point * p_pose / sigma_;
+    H_.block<6, 6>(at, at) += weight * d_pose.transpose() * d_pose;
+    H_.block<6, kLensParameters>(at, lens_at) += weight * d_pose.transpose() * d_lens;
+    g_.segment<6>(at) += weight * d_pose.transpose() * errors[k];
+    block.W.middleRows<6>(at) = weight * d_pose.transpose() * d_psi;
   }
-  block.V_inverse(2, 2) += 1 / (kRhoSigma * kRhoSigma);  // inverted once the damping is known
+  V(2, 2) += 1 / (kRhoSigma * kRhoSigma);
   block.g[2] -= (psi.z() - 1) / (kRhoSigma * kRhoSigma);
+  block.V_inverse = V;  // inverted once the damping is known
   return true;
-}
-
-void ClipAdjustment::add_term(const CornerTerm& term, double weight, std::size_t view, const Vector3& psi,
-                              PointBlock& block) {
-  const SE3& T = motion.T_view_first[view];
-  const Matrix3 R = T.rotation();
-  Matrix3 p_psi;
-  p_psi << R.col(0), R.col(1), T.translation();
-  const Matrix23 d_psi = term.d_point * p_psi / sigma_;
-  const Eigen::Matrix<double, 2, kLensParameters> d_lens = term.d_lens / sigma_;
-  block.V_inverse += weight * d_psi.transpose() * d_psi;
-  block.g += weight * d_psi.transpose() * term.error;
-  block.W.bottomRows<kLensParameters>() += weight * d_lens.transpose() * d_psi;
-  H_.bottomRightCorner<kLensParameters, kLensParameters>() += weight * d_lens.transpose() * d_lens;
-  g_.tail<kLensParameters>() += weight * d_lens.transpose() * term.error;
-  if (view == 0) return;
-  const int at = 6 * (static_cast<int>(view) - 1);
-  Matrix36 p_pose;
-  p_pose << psi.z() * Matrix3::Identity(), -hat(ray_at(T, psi));
-  const Eigen::Matrix<double, 2, 6> d_pose = term.d_point * p_pose / sigma_;
-  H_.block<6, 6>(at, at) += weight * d_pose.transpose() * d_pose;
-  H_.block<6, kLensParameters>(at, pose_size()) += weight * d_pose.transpose() * d_lens;
-  g_.segment<6>(at) += weight * d_pose.transpose() * term.error;
-  block.W.middleRows<6>(at) = weight * d_pose.transpose() * d_psi;
 }
 
 LensEquations ClipAdjustment::linearise(const SharedLens& lens, double damping) {

@@ -70,7 +70,7 @@ class ClipAdjustment {
 
  private:
   struct PointBlock {
-    Matrix3 V_inverse;  ///< while it is summed up, V
+    Matrix3 V_inverse;
     Vector3 g;
     Eigen::Matrix<double, Eigen::Dynamic, 3> W;  ///< by poses and lens
   };
@@ -82,14 +82,6 @@ class ClipAdjustment {
                                          double sigma_px) const;
   [[nodiscard]] int pose_size() const { return 6 * (static_cast<int>(clip_->views.size()) - 1); }
   bool add_point(const SharedLens& lens, std::size_t corner, PointBlock& block);
-  /// A corner in one view.
-  struct CornerTerm {
-    Vector2 error{0, 0};  ///< [standard deviations]
-    Matrix23 d_point;     ///< derivative of the pixel by the point before projection
-    Eigen::Matrix<double, 2, kLensParameters> d_lens;
-  };
-  void add_term(const CornerTerm& term, double weight, std::size_t view, const Vector3& psi,
-                PointBlock& block);
 
   const Clip* clip_;
   double sigma_;
