@@ -9,8 +9,6 @@ namespace {
 
 using namespace twofold::testing;
 
-const Board kBoard{BoardKind::kChessboard, 9, 6, 0.025, 0, MarkerFamily::k4x4};
-const cv::Size kSize(640, 480);
 constexpr int kViews = 30;
 
 CameraModel left_camera() {
@@ -79,13 +77,13 @@ std::vector<BoardView> projected_views(int count, double max_tilt, double noise_
 
 void expect_refused(const std::vector<BoardView>& views, const std::string& part,
                     const CalibrationOptions& options = {}) {
-  const auto fit = calibrate_camera(views, kBoard, kSize, options);
+  const auto fit = calibrate_camera(views, kBoard, kImageSize, options);
   ASSERT_FALSE(fit.has_value()) << "not refused: " << part;
   EXPECT_NE(fit.error().find(part), std::string::npos) << fit.error();
 }
 
 TEST(Calibrate, RecoversADistortingCameraFromRenderedViews) {
-  const auto fit = calibrate_camera(rendered_views(), kBoard, kSize);
+  const auto fit = calibrate_camera(rendered_views(), kBoard, kImageSize);
   ASSERT_TRUE(fit.has_value()) << fit.error();
   const PinholeCamera truth = left_camera().pinhole, found = fit->model.pinhole;
   SCOPED_TRACE(::testing::Message() << "rms " << fit->rms_px << " px, fx " << found.fx << " +- "
@@ -106,7 +104,7 @@ TEST(Calibrate, RecoversADistortingCameraFromRenderedViews) {
 }
 
 TEST(Calibrate, RecoversTheBaselineFromRenderedPairs) {
-  const auto fit = calibrate_stereo(rendered_pairs(), kBoard, kSize);
+  const auto fit = calibrate_stereo(rendered_pairs(), kBoard, kImageSize);
   ASSERT_TRUE(fit.has_value()) << fit.error();
   const double baseline = T_right_left().translation().norm();
   RecordProperty("baseline_error_percent",
@@ -122,7 +120,7 @@ TEST(Calibrate, RecoversTheBaselineFromRenderedPairs) {
 TEST(Calibrate, LeavesOutAViewThatIsWrong) {
   std::vector<BoardView> views = projected_views(20, 0.6, 0.05);
   for (std::size_t i = 0; i < views[7].pixels.size(); i += 2) views[7].pixels[i].x += 4;
-  const auto fit = calibrate_camera(views, kBoard, kSize);
+  const auto fit = calibrate_camera(views, kBoard, kImageSize);
   ASSERT_TRUE(fit.has_value()) << fit.error();
   EXPECT_EQ(fit->used.size(), 19U);
   EXPECT_EQ(std::count(fit->used.begin(), fit->used.end(), 7), 0);
@@ -156,7 +154,7 @@ TEST(Calibrate, RefusesAHighReprojectionError) {
   expect_refused(projected_views(20, 0.6, 1.0), "high reprojection error");
   const Board narrow{BoardKind::kChessboard, 6, 9, 0.025, 0,
                      MarkerFamily::k4x4};  // rows and columns confused
-  const auto fit = calibrate_camera(projected_views(20, 0.6, 0.05), narrow, kSize);
+  const auto fit = calibrate_camera(projected_views(20, 0.6, 0.05), narrow, kImageSize);
   EXPECT_FALSE(fit.has_value());
 }
 
@@ -173,12 +171,12 @@ TEST(Calibrate, RefusesPairsWhoseImagesDoNotBelongTogether) {
   const BoardView first = pairs.front().right;
   for (std::size_t i = 0; i + 1 < pairs.size(); ++i) pairs[i].right = pairs[i + 1].right;
   pairs.back().right = first;
-  const auto fit = calibrate_stereo(pairs, kBoard, kSize);
+  const auto fit = calibrate_stereo(pairs, kBoard, kImageSize);
   ASSERT_FALSE(fit.has_value());
   EXPECT_NE(fit.error().find("both cameras together: high reprojection error"), std::string::npos)
       << fit.error();
   pairs.resize(5);
-  EXPECT_NE(calibrate_stereo(pairs, kBoard, kSize).error().find("left camera: too few views"),
+  EXPECT_NE(calibrate_stereo(pairs, kBoard, kImageSize).error().find("left camera: too few views"),
             std::string::npos);
 }
 

@@ -9,9 +9,6 @@ namespace {
 
 using namespace twofold::testing;
 
-const Board kBoard{BoardKind::kChessboard, 9, 6, 0.025, 0, MarkerFamily::k4x4};
-const cv::Size kSize(640, 480);
-
 BoardView view_at(const SO3& R, const Vector3& centre_c) {
   const CameraModel camera = test_camera(520, 320, 240, 0, 0, 0, 0);
   BoardView view;
@@ -32,17 +29,17 @@ bool asks_for(const ViewGuide& guide, const std::string& part) {
 }
 
 TEST(ViewShape, TellsWhichSideIsFartherAway) {
-  const auto yaw = shape_of(view_at(SO3::exp(Vector3(0, -0.4, 0)), {0, 0, 0.4}), kBoard, kSize);
+  const auto yaw = shape_of(view_at(SO3::exp(Vector3(0, -0.4, 0)), {0, 0, 0.4}), kBoard, kImageSize);
   ASSERT_TRUE(yaw.has_value());
   EXPECT_NEAR(yaw->yaw(), 0.4, 0.08);  // a turn about -y takes the right side away
   EXPECT_NEAR(yaw->pitch(), 0, 0.05);
-  const auto pitch = shape_of(view_at(SO3::exp(Vector3(0.4, 0, 0)), {0, 0, 0.4}), kBoard, kSize);
+  const auto pitch = shape_of(view_at(SO3::exp(Vector3(0.4, 0, 0)), {0, 0, 0.4}), kBoard, kImageSize);
   ASSERT_TRUE(pitch.has_value());
   EXPECT_NEAR(pitch->pitch(), 0.4, 0.08);  // about x: the lower side
 }
 
 TEST(ViewGuide, TakesOnlyNewViews) {
-  ViewGuide guide(kBoard, kSize);
+  ViewGuide guide(kBoard, kImageSize);
   EXPECT_TRUE(guide.offer(view_at(SO3(), {0, 0, 0.4})));
   EXPECT_FALSE(guide.offer(view_at(SO3(), {0.001, 0, 0.4})));
   EXPECT_TRUE(guide.offer(view_at(SO3(), {0.08, 0, 0.4})));
@@ -52,7 +49,7 @@ TEST(ViewGuide, TakesOnlyNewViews) {
 TEST(ViewGuide, AsksForWhatIsMissingUntilNothingIs) {
   ViewGuideOptions options;
   options.wanted_views = 9;
-  ViewGuide guide(kBoard, kSize, options);
+  ViewGuide guide(kBoard, kImageSize, options);
   EXPECT_TRUE(guide.offer(view_at(SO3(), {-0.08, -0.08, 0.4})));
   for (const char* part :
        {"upper right", "right side", "left side", "lower side", "upper side", "nearer", "8 more"})
@@ -76,7 +73,7 @@ TEST(ViewGuide, ThinsOutALongRecording) {
   ViewGuideOptions options;
   options.most_views = 12;
   options.wanted_views = 10;
-  ViewGuide guide(kBoard, kSize, options);
+  ViewGuide guide(kBoard, kImageSize, options);
   std::mt19937 random(4);
   for (int i = 0; i < 400; ++i) {
     const SE3 T_c_b = random_pose(kBoard, 0.5, random);

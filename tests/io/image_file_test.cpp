@@ -1,6 +1,5 @@
 #include "io/files/image_file.hpp"
 
-#include <fstream>
 #include <random>
 
 #include "tests/io/scratch_folder.hpp"
@@ -8,18 +7,11 @@
 namespace twofold {
 namespace {
 
-namespace fs = std::filesystem;
-
 cv::Mat noise_image() {
   cv::Mat image(40, 60, CV_8UC1);
   std::mt19937 rng(3);
   for (int i = 0; i < 40 * 60; ++i) image.data[i] = static_cast<unsigned char>(rng() & 0xff);
   return image;
-}
-
-std::string bytes_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 TEST(ImageFile, ReadsGreyColourAndDepth) {

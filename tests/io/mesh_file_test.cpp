@@ -6,7 +6,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <sstream>
 
 #include "io/files/io_error.hpp"
 #include "tests/io/scratch_folder.hpp"
@@ -22,12 +21,6 @@ TriangleMesh sample_mesh() {
   mesh.sigmas.assign(4, 0.001f);
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   return mesh;
-}
-
-std::string bytes_of(const std::string& file) {
-  std::stringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
 }
 
 std::string refusal(const std::string& file) {

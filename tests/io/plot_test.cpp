@@ -1,7 +1,6 @@
 #include "io/plots/plot.hpp"
 
 #include <cstring>
-#include <fstream>
 
 #include "io/files/ply.hpp"
 #include "tests/io/scratch_folder.hpp"
@@ -33,8 +32,7 @@ TEST(Ply, WritesHeaderAndPoints) {
   const ScratchFolder folder;
   const PlyPoint points[] = {{Vector3(1, 2, 3), {10, 20, 30}, 0.5f}, {Vector3(-4, 0, 0), {}, 0}};
   write_ply(folder.path() / "m.ply", points);
-  std::ifstream stream(folder.path() / "m.ply", std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  const std::string bytes = bytes_of(folder.path() / "m.ply");
   EXPECT_NE(bytes.find("element vertex 2\n"), std::string::npos);
   const auto body = bytes.find("end_header\n") + 11;
   ASSERT_EQ(bytes.size() - body, 2 * (24 + 3 + 4 + 8u));

@@ -7,7 +7,7 @@
 namespace twofold {
 namespace {
 
-constexpr double kDepth = 4;
+constexpr double kMedianDepth = 4;
 constexpr KeyframeId kFrom{0}, kTo{5};
 
 /// Keyframes 0 to 5 along a line, each joined to the next by an edge, before a wall.
@@ -20,7 +20,7 @@ class RedundantLoopTest : public ::testing::Test {
       keyframe.id = KeyframeId{k};
       keyframe.part = kFrom;
       keyframe.T_k_w = SE3(SO3(), Vector3(-step * k, 0, 0));
-      keyframe.median_depth = kDepth;
+      keyframe.median_depth = kMedianDepth;
       writer.add_keyframe(keyframe);
       writer.set_reference(keyframe.id);
     }
@@ -42,8 +42,9 @@ class RedundantLoopTest : public ::testing::Test {
   }
   static std::vector<MotionObservation> wall() {
     std::vector<MotionObservation> points;
-    for (int i = -5; i <= 5; ++i) points.push_back({Vector3(0.2 * i, 0.1 * i, kDepth), {0, 0, 0}, {1, 1, 0}});
-    points.push_back({Vector3(0, 0, -kDepth), {0, 0, 0}, {1, 1, 0}, false});  // an outlier says nothing
+    for (int i = -5; i <= 5; ++i)
+      points.push_back({Vector3(0.2 * i, 0.1 * i, kMedianDepth), {0, 0, 0}, {1, 1, 0}});
+    points.push_back({Vector3(0, 0, -kMedianDepth), {0, 0, 0}, {1, 1, 0}, false});  // an outlier says nothing
     return points;
   }
 
@@ -72,7 +73,7 @@ TEST_F(RedundantLoopTest, ItChangesTheScale) {
 
 /// The ends of a ring that has not drifted: without the loop they would have nothing to do with each other.
 TEST_F(RedundantLoopTest, ItJoinsWhatOnlyALongWayJoins) {
-  const GraphSnapshot far = line(1.05 * 4 * kDepth / 5);  // a way of 4.2 depths
+  const GraphSnapshot far = line(1.05 * 4 * kMedianDepth / 5);  // a way of 4.2 depths
   EXPECT_FALSE(redundant(loop(far), far));
   const GraphSnapshot torn = line(0.2, 4);
   EXPECT_FALSE(redundant(loop(torn), torn));

@@ -15,8 +15,7 @@ namespace {
 
 using namespace twofold::testing;
 
-const Board kBoard{BoardKind::kChessboard, 9, 6, 0.025, 0, MarkerFamily::k4x4};
-constexpr const char* kBoardText = "chessboard:9x6:0.025";
+constexpr const char* kBoardText = "chessboard:9x6:0.025";  // kBoard
 constexpr double kBaseline = 0.08;
 
 CameraModel left_camera() {

@@ -13,7 +13,7 @@ PoseEstimate numbered(std::int64_t frame) {
   return pose;
 }
 
-std::int64_t number_of(const PoseOrEvent& item) {
+std::int64_t frame_of(const PoseOrEvent& item) {
   return std::visit([](const auto& value) { return value.frame; }, item);
 }
 
@@ -41,7 +41,7 @@ TEST(PoseQueue, WhatHasNoRoomIsCounted) {
   PoseOrEvent item;
   for (int i = 0; i < 4; ++i) {
     ASSERT_EQ(queue.next(item, 0), QueueStatus::kItem);
-    EXPECT_EQ(number_of(item), i);
+    EXPECT_EQ(frame_of(item), i);
   }
 }
 
@@ -57,7 +57,7 @@ TEST(PoseQueue, NothingIsMissedByWhoWaitsForRoom) {
   });
   PoseOrEvent item;
   std::int64_t expected = 0;
-  while (queue.next(item) == QueueStatus::kItem) EXPECT_EQ(number_of(item), expected++);
+  while (queue.next(item) == QueueStatus::kItem) EXPECT_EQ(frame_of(item), expected++);
   teller.join();
   EXPECT_EQ(expected, kItems);
   EXPECT_EQ(queue.take_missed(), 0U);

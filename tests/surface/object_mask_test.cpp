@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kNoise = 1.425e-3;
 
-ObjectMaskOptions options() {
+ObjectMaskOptions mask_options() {
   ObjectMaskOptions o;
   o.depth_noise = kNoise;
   return o;
@@ -78,7 +78,7 @@ class ObjectMaskTest : public ::testing::Test {
 };
 
 TEST_F(ObjectMaskTest, FindsWhatStandsOnTheUpperOfTwoPlanes) {
-  ObjectMasker masker(rig_, options());
+  ObjectMasker masker(rig_, mask_options());
   const auto mask = masker.mask(render(looking_down(0.6)));
   ASSERT_TRUE(mask) << mask.error();
   const cv::Mat all(parts_.size(), CV_8UC1, cv::Scalar(255));
@@ -91,7 +91,7 @@ TEST_F(ObjectMaskTest, FindsWhatStandsOnTheUpperOfTwoPlanes) {
 }
 
 TEST_F(ObjectMaskTest, FollowsThePlaneOfACameraThatWalks) {
-  ObjectMasker masker(rig_, options());
+  ObjectMasker masker(rig_, mask_options());
   for (int n = 0; n < 20; ++n) {
     const auto mask = masker.mask(render(looking_down(0.5 + 0.01 * n)));
     ASSERT_TRUE(mask) << mask.error();
@@ -102,11 +102,11 @@ TEST_F(ObjectMaskTest, FollowsThePlaneOfACameraThatWalks) {
 
 TEST_F(ObjectMaskTest, SaysWhatIsMissing) {
   const cv::Mat none(rig_.camera.height, rig_.camera.width, CV_16UC1, cv::Scalar(0));
-  const auto without_depth = ObjectMasker(rig_, options()).mask(none);
+  const auto without_depth = ObjectMasker(rig_, mask_options()).mask(none);
   ASSERT_FALSE(without_depth);
   EXPECT_NE(without_depth.error().find("hardly any depth"), std::string::npos);
 
-  const auto empty_plate = ObjectMasker(rig_, options()).mask(render(looking_down(0.6), false));
+  const auto empty_plate = ObjectMasker(rig_, mask_options()).mask(render(looking_down(0.6), false));
   ASSERT_FALSE(empty_plate);
   EXPECT_NE(empty_plate.error().find("nothing is left above"), std::string::npos);
 
@@ -114,7 +114,7 @@ TEST_F(ObjectMaskTest, SaysWhatIsMissing) {
   std::mt19937 random(4);
   for (int i = 0; i < static_cast<int>(scattered.total()); ++i)
     scattered.at<std::uint16_t>(i) = static_cast<std::uint16_t>(1600 + random() % 2300);  // 0.32 to 0.78 m
-  const auto no_plane = ObjectMasker(rig_, options()).mask(scattered);
+  const auto no_plane = ObjectMasker(rig_, mask_options()).mask(scattered);
   ASSERT_FALSE(no_plane);
   EXPECT_NE(no_plane.error().find("no plane"), std::string::npos);
 }

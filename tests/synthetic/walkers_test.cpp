@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFps = 10;
 
-SyntheticOptions small(const std::string& scene) {
+SyntheticOptions small_walk(const std::string& scene) {
   SyntheticOptions options;
   options.scene = scene;
   options.width = 160;
@@ -38,7 +38,7 @@ double flat_share(const cv::Mat& intensity) {
 
 TEST(Walkers, OneWalksTwoMetresAheadForEightSeconds) {
   for (const char* scene : {"corridor", "courtyard"}) {
-    SyntheticOptions options = small(scene);
+    SyntheticOptions options = small_walk(scene);
     const SyntheticSequence empty(options);
     options.walkers = 1;
     const SyntheticSequence walked(options);
@@ -60,7 +60,7 @@ TEST(Walkers, OneWalksTwoMetresAheadForEightSeconds) {
 }
 
 TEST(Walkers, OthersComeTowardsTheCameraAndPass) {
-  SyntheticOptions options = small("courtyard");
+  SyntheticOptions options = small_walk("courtyard");
   const SyntheticSequence empty(options);
   options.walkers = 2;
   const SyntheticSequence walked(options);
@@ -78,7 +78,7 @@ TEST(Walkers, OthersComeTowardsTheCameraAndPass) {
 
 TEST(PlainWalls, LoseTheirShareOfTexture) {
   for (const char* scene : {"corridor", "courtyard"}) {
-    SyntheticOptions options = small(scene);
+    SyntheticOptions options = small_walk(scene);
     const double painted = flat_share(SyntheticSequence(options).exact_view(40).intensity);
     options.plain = 0.5;
     const double half = flat_share(SyntheticSequence(options).exact_view(40).intensity);
@@ -93,7 +93,7 @@ TEST(PlainWalls, LoseTheirShareOfTexture) {
 }
 
 TEST(Light, StepsByHalfAndByAllOfTheStopsAndFlickers) {
-  SyntheticOptions options = small("desk");
+  SyntheticOptions options = small_walk("desk");
   options.width = 64;
   options.height = 48;
   const SyntheticSequence steady(options);

@@ -8,7 +8,7 @@
 namespace twofold {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::int64_t kPoseInterval = 1'000'000'000;  // of the true ones [ns]
 
 /// True poses along x, one a second.
 struct Walk {
@@ -18,7 +18,7 @@ struct Walk {
   explicit Walk(int seconds, double speed = 1) {
     for (int n = 0; n < seconds; ++n) {
       poses.push_back({.q = {0, 0, 0, 1}, .t = {speed * n, 0, 0}});
-      t_ns.push_back(n * kSecond);
+      t_ns.push_back(n * kPoseInterval);
     }
   }
 };
@@ -26,7 +26,7 @@ struct Walk {
 /// What one camera makes of it: its world is turned by 90 degrees about z and has another unit.
 TrackedPose tracked(int second, double unit, std::uint32_t part = 0) {
   const double half = std::numbers::sqrt2 / 2;
-  return {second * kSecond, {.q = {0, 0, half, half}, .t = {5, unit * second, 2}}, part};
+  return {second * kPoseInterval, {.q = {0, 0, half, half}, .t = {5, unit * second, 2}}, part};
 }
 
 TEST(TruthBesideTest, StandsWhereTheFirstTrackedPoseDoes) {
@@ -74,7 +74,7 @@ TEST(TruthBesideTest, WaitsForAWayOfThatPart) {
 
 TEST(TruthBesideTest, NothingOfWhatDoesNotFit) {
   const Walk walk(10);
-  TruthBeside none({}, {}, false), unequal(walk.poses, {0, kSecond}, false),
+  TruthBeside none({}, {}, false), unequal(walk.poses, {0, kPoseInterval}, false),
       still(Walk(10, 0).poses, walk.t_ns, true);
   EXPECT_FALSE(none.add(tracked(0, 1)));
   EXPECT_FALSE(unequal.add(tracked(0, 1)));
