@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "base/median.hpp"
@@ -45,6 +46,34 @@ bool project(const SharedLens& lens, const Vector3& p, const Vector2& seen, cons
 
 Vector3 ray_at(const SE3& T, const Vector3& psi) {
   return T.so3() * Vector3(psi.x(), psi.y(), 1) + psi.z() * T.translation();
+}
+
+/// A corner in the views that see it, in step with the clip's.
+struct ProjectedCorner {
+  std::vector<Projection> projections;
+  std::vector<Vector2> errors;  ///< [standard deviations]
+  double mean_square = 0;       ///< of these
+};
+
+/// None when it is behind the camera in one of them.
+std::optional<ProjectedCorner> project_corner(const Clip& clip, const ClipMotion& motion,
+                                              const SharedLens& lens, std::size_t corner, double sigma_px) {
+  const std::size_t n = clip.views.size();
+  ProjectedCorner seen{std::vector<Projection>(n), std::vector<Vector2>(n, Vector2::Zero())};
+  double sum = 0, views = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const ClipView& view = clip.views[k];
+    if (!view.sees(corner)) continue;
+    ++views;
+    if (!project(lens, ray_at(motion.T_view_first[k], motion.psi[corner]), view.uv[corner],
+                 view.velocity[corner], seen.projections[k], true)) {
+      return std::nullopt;
+    }
+    seen.errors[k] = (view.uv[corner] - seen.projections[k].uv) / sigma_px;
+    sum += seen.errors[k].squaredNorm();
+  }
+  seen.mean_square = sum / views;
+  return seen;
 }
 
 }  // namespace
@@ -108,22 +137,13 @@ bool ClipAdjustment::add_point(const SharedLens& lens, std::size_t corner, Point
   Matrix3 V = Matrix3::Zero();
   block.g.setZero();
   block.W = Eigen::Matrix<double, Eigen::Dynamic, 3>::Zero(pose_size() + kLensParameters, 3);
-  std::vector<Projection> projections(n);
-  std::vector<Vector2> errors(n, Vector2::Zero());
-  double sum = 0, seen = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const ClipView& view = clip_->views[k];
-    if (!view.sees(corner)) continue;
-    ++seen;
-    if (!project(lens, ray_at(motion.T_view_first[k], psi), view.uv[corner], view.velocity[corner],
-                 projections[k], true)) {
-      block.V_inverse.setZero();
-      return false;
-    }
-    errors[k] = (view.uv[corner] - projections[k].uv) / sigma_;
-    sum += errors[k].squaredNorm();
+  const auto seen = project_corner(*clip_, motion, lens, corner, sigma_);
+  if (!seen) {
+    block.V_inverse.setZero();
+    return false;
   }
-  const double cauchy = 1 / (1 + sum / seen / kKernel);
+  const auto& [projections, errors, mean_square] = *seen;
+  const double cauchy = 1 / (1 + mean_square / kKernel);
   const double weight = redescending_ ? cauchy * cauchy : cauchy;
   const int lens_at = pose_size();
   for (std::size_t k = 0; k < n; ++k) {
