@@ -162,6 +162,7 @@ class Tracker {
   [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, const Frame& frame) const;
   [[nodiscard]] double readout_sigma() const;
   void give_up_frame(LostCause cause, TrackResult& result);
+  void remember_frame(const FrameStep& step);
 
   [[nodiscard]] bool depth_can_place() const;
   void read_depth(FrameStep& step);
@@ -175,8 +176,6 @@ class Tracker {
   LostCause place_by_depth(const SE3& T_c_ref, FrameStep& step);
   LostCause judge_structure(FrameStep& step);
   bool sees_structure(FrameStep& step);
-
-  void remember_frame(const FrameStep& step);
 
   [[nodiscard]] bool keyframe_is_due(const FrameStep& step) const;
   void propose_keyframe(FrameStep& step);

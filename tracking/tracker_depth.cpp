@@ -24,6 +24,7 @@ bool Tracker::depth_can_place() const {
   return depth_alignment_ && last_.reference != kNoKeyframe && loss_.lost_frames() <= kPatience;
 }
 
+/// The frame's depth image, once.
 void Tracker::read_depth(FrameStep& step) {
   if (!std::exchange(step.depth_read, true)) depth_alignment_->look_at(current_.depth);
 }
