@@ -207,7 +207,7 @@ class PlyReader {
         if (property.name == kPosition[i]) x[i] = static_cast<float>(value);
         if (property.name == kNormal[i]) n[i] = static_cast<float>(value);
         if (property.name == kColour[i] && property.type == PlyType::kUint8)
-          rgb[static_cast<std::size_t>(i)] = std::clamp(static_cast<int>(value), 0, 255);
+          rgb[static_cast<std::size_t>(i)] = static_cast<int>(std::clamp(value, 0.0, 255.0));
       }
     }
     if (!x.allFinite()) fail(fmt::format("vertex {} has no finite position x y z", mesh.positions.size()));
@@ -218,6 +218,7 @@ class PlyReader {
                               static_cast<std::uint8_t>(rgb[2])});
     mesh.positions.push_back(x);
     if (mesh.normals.size() != mesh.positions.size()) mesh.normals.clear();
+    if (mesh.colours.size() != mesh.positions.size()) mesh.colours.clear();
   }
 
   void read_other(const PlyElement& element, TriangleMesh& mesh) {
