@@ -115,6 +115,11 @@ nlohmann::ordered_json glb_rotation(const Vector3& up) {
   return {q.x(), q.y(), q.z(), q.w()};
 }
 
+/// Without one it is metal, as glTF has it, which is nearly black where only lamps are.
+nlohmann::ordered_json glb_material() {
+  return {{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}}};
+}
+
 std::string glb_bytes(const TriangleMesh& mesh, const Vector3& up) {
   using Json = nlohmann::ordered_json;
   std::vector<GlbPart> parts{glb_positions(mesh), glb_normals(mesh)};
@@ -142,7 +147,9 @@ std::string glb_bytes(const TriangleMesh& mesh, const Vector3& up) {
       {"scenes", Json::array({{{"nodes", {0}}}})},
       {"nodes", Json::array({{{"mesh", 0}, {"rotation", glb_rotation(up)}}})},
       {"meshes",
-       Json::array({{{"primitives", Json::array({{{"attributes", attributes}, {"indices", indices}}})}}})},
+       Json::array({{{"primitives",
+                      Json::array({{{"attributes", attributes}, {"indices", indices}, {"material", 0}}})}}})},
+      {"materials", Json::array({glb_material()})},
       {"buffers", Json::array({{{"byteLength", binary.size()}}})},
       {"bufferViews", views},
       {"accessors", accessors}};

@@ -157,6 +157,9 @@ TEST(MeshFile, GlbHoldsTheMesh) {
   const std::size_t view = json["accessors"][indices]["bufferView"];
   const std::size_t offset = json["bufferViews"][view]["byteOffset"];
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(word(binary + offset + 4 * i), mesh.triangles[i / 3][i % 3]);
+  const std::size_t material = json["meshes"][0]["primitives"][0].value("material", 99);
+  ASSERT_LT(material, json.value("materials", nlohmann::json::array()).size()) << "metal, by default";
+  EXPECT_EQ(json["materials"][material]["pbrMetallicRoughness"]["metallicFactor"], 0);
   // y is up in glTF: down in the mesh, or z.
   EXPECT_EQ(json["nodes"][0]["rotation"], (nlohmann::json{1.0, 0.0, 0.0, 0.0}));
   TriangleMesh none = mesh;
