@@ -32,9 +32,11 @@ struct SpacePoint {
   SpaceState state = SpaceState::kUnknown;
   /// From the surface [m], positive outside; truncated at four voxels or at three standard deviations of the
   /// depth, whichever is more, but never at more than 60 voxels. Free space away from surfaces: four voxels,
-  /// or less within a voxel of where distances are known. kUnknown: 0.
+  /// or less within a voxel of where distances are known. kUnknown: 0. Measured along the
+  /// cameras' rays and shortened by the slant: beside rims and in clutter a surface may be nearer.
   double distance = 0;
-  /// d distance / d position: away from the surface; 0 in free space away from surfaces, and where unknown.
+  /// d distance / d position: away from the surface, up to what was said; its length is about 1. 0 in free
+  /// space away from surfaces, and where unknown.
   std::array<double, 3> gradient{0, 0, 0};
 };
 
