@@ -19,7 +19,8 @@ class RightOfWay {
       false};  // relaxed: nothing is handed over with it, and a late reader loses nothing
 };
 
-/// Takes the right of way for its scope; nothing for a null pointer.
+/// Takes the right of way for its scope; does nothing if it is null. Not nested: the inner one would give up
+/// the outer one's.
 class RightOfWayTaken {
  public:
   explicit RightOfWayTaken(RightOfWay* right) : right_(right) {
@@ -35,11 +36,12 @@ class RightOfWayTaken {
   RightOfWay* right_;
 };
 
-/// While it lives, make_way on the thread that made it waits while `right` is taken; one at a time a thread.
+/// While it lives, make_way on the thread that made it waits while `right` is taken. At most one a thread.
 class MakesWay {
  public:
-  /// @param longest  so long does make_way wait at most, and then for as long not at all: where the other
-  ///                 thread never rests, half of the time is left
+  /// @param right    must outlive this
+  /// @param longest  of one wait; after one that reached it, make_way does not wait for as long. So half of
+  ///                 the time is left beside a thread that never rests, and its rests beside one that does
   explicit MakesWay(const RightOfWay& right,
                     std::chrono::nanoseconds longest = std::chrono::milliseconds(10));
   ~MakesWay();
@@ -47,8 +49,8 @@ class MakesWay {
   MakesWay& operator=(const MakesWay&) = delete;
 };
 
-/// To be called in the inner loops of long work, every few microseconds to a millisecond. Returns at once on
-/// threads that make way for nobody.
+/// To be called in the inner loops of long work, every few microseconds to a millisecond, without locks that
+/// the other thread may want. Returns at once on threads that make way for nobody.
 void make_way();
 
 }  // namespace twofold

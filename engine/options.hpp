@@ -87,8 +87,9 @@ struct EngineOptions {
   std::optional<int> loop_closer_cpu;
   std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
 
-  /// Taken while the tracker works on a frame of a run that keeps a pace, for threads of the caller's that
-  /// can wait. May be null; outlives the run.
+  /// Taken by the tracker's step from when a frame is due until it is done, in threaded and stepped runs that
+  /// keep a pace: threads of the caller's that can wait make way for it (MakesWay). Of one engine; may be
+  /// null; outlives the run.
   RightOfWay* right_of_way = nullptr;
 
   PoseListener on_pose;      ///< as soon as the pose is known; may be empty

@@ -9,6 +9,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <twofold/slam.hpp>
@@ -20,7 +21,7 @@ namespace {
 using twofold::SpacePoint;
 using twofold::SpaceState;
 
-/// What keyframes saw, in the world of the map part that the first of them is in.
+/// What keyframes saw, in the world of the map part that the first of them is in, whatever name that has.
 class Surroundings {
  public:
   explicit Surroundings(const twofold::CameraRig& rig) : model_(rig, {.voxel = 0.02}) {}
@@ -32,17 +33,23 @@ class Surroundings {
     model_.add(frame, pose.T_world_camera);
   }
 
-  /// A surface stays where its poses put it; the map has corrected them since.
+  /// A surface stays where its poses put it; the map has corrected them since, and where it joined parts,
+  /// either may have the other's name now.
   void correct(const twofold::MapSnapshot& map) {
     model_.clear();
+    std::map<std::int64_t, twofold::FrameView> kept;
     for (const auto& keyframe : map.keyframes()) {
       const auto frame = frames_.find(keyframe.frame);
-      if (frame != frames_.end() && keyframe.part == part_)
-        model_.add(frame->second, keyframe.T_world_camera);
+      if (frame == frames_.end()) continue;
+      part_ = keyframe.part;
+      model_.add(frame->second, keyframe.T_world_camera);
+      kept.insert(*frame);
     }
+    frames_ = std::move(kept);  // others are keyframes no more
   }
 
   [[nodiscard]] const twofold::SurfaceModel& model() const { return model_; }
+  [[nodiscard]] std::uint32_t part() const { return part_; }
 
  private:
   twofold::SurfaceModel model_;
@@ -77,8 +84,11 @@ bool ask_ahead(const twofold::SurfaceModel& model, const twofold::Pose& T_world_
   while (stop != begin && (stop - 1)->distance < kRadius) --stop;
   if (stop == begin) return false;
   const SpacePoint& last = *(stop - 1);
-  std::printf("free to go until %.2f m: there %.3f m from a surface, more towards (%.2f %.2f %.2f)\n",
-              metres(stop - 1), last.distance, last.gradient[0], last.gradient[1], last.gradient[2]);
+  std::printf("free to go until %.2f m: there at least %.3f m from a surface", metres(stop - 1),
+              last.distance);
+  if (last.gradient != twofold::SpacePoint().gradient)  // near enough to tell
+    std::printf(", more towards (%.2f %.2f %.2f)", last.gradient[0], last.gradient[1], last.gradient[2]);
+  std::printf("\n");
   return true;
 }
 
@@ -92,12 +102,16 @@ void write_obj(const std::string& file, const twofold::SurfaceMesh& mesh) {
 
 int run(const std::string& name, const std::string& mesh) {
   twofold::Source source(name);
-  // All on one thread here. A robot's surface has a thread of its own: `add` takes 10 to 100 ms.
+  // All on one thread here. A robot's surface has a thread of its own: `add` takes 10 to 100 ms for a depth
+  // image, more for a pair.
   twofold::Slam slam(source.rig(), {.mode = twofold::RunMode::kDeterministic});
   bool corrected = false;
-  slam.on_event([&](const twofold::MapEvent&) { corrected = true; });
+  slam.on_event([&](const twofold::MapEvent& event) {
+    corrected |=
+        event.kind != twofold::MapEventKind::kNewPart && event.kind != twofold::MapEventKind::kRelocalisation;
+  });
   Surroundings surroundings(source.rig());
-  twofold::Pose T_world_camera;
+  twofold::Pose T_world_camera;  // in the surroundings' world
   for (twofold::FrameView frame; source.next(frame);) {
     slam.push(frame);
     const auto pose = slam.latest();
@@ -105,7 +119,7 @@ int run(const std::string& name, const std::string& mesh) {
     if (corrected) surroundings.correct(slam.map());
     corrected = false;
     if (pose->keyframe) surroundings.add(frame, *pose);
-    T_world_camera = pose->T_world_camera;
+    if (pose->map_part == surroundings.part()) T_world_camera = pose->T_world_camera;
   }
   const bool known = ask_ahead(surroundings.model(), T_world_camera);
   if (!mesh.empty()) write_obj(mesh, surroundings.model().mesh());

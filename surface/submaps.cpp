@@ -41,7 +41,7 @@ KeyframeDepth pack_keyframe_depth(std::int64_t frame_index, const cv::Mat& depth
 }
 
 SubmapSurface::SubmapSurface(const Rig& rig, const SurfaceOptions& options, const SubmapOptions& submaps)
-    : rig_(rig), options_(options), limits_(submaps) {
+    : rig_(rig), options_(options), limits_(submaps), next_keyframe_(submaps.first_keyframe) {
   TWOFOLD_CHECK(options.invalid_reason().empty() && submaps.invalid_reason().empty(), "valid options");
 }
 

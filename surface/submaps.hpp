@@ -16,8 +16,11 @@ namespace twofold {
 
 struct SubmapOptions {
   int most_keyframes = 10;        ///< of a submap >= 1
-  std::size_t most_waiting = 64;  ///< depth images of frames that no map has as keyframes yet >= 1
-  double memory_mb = 2000;        ///< of samples and depth images > 0
+  std::size_t most_waiting = 64;  ///< depth images that wait for their keyframes, or to be fused >= 1
+  /// Of samples and depth images [MiB] > 0: with more than this no keyframe is added, and its depth is let go
+  /// of. What is fused anew may exceed it.
+  double memory_mb = 2000;
+  std::uint32_t first_keyframe = 0;  ///< those before are of another run's frames: a loaded map's
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -45,7 +48,7 @@ struct SubmapReport {
   int fused_anew = 0;          ///< of these, because their submap's poses had changed
   std::int64_t fusion_ns = 0;  ///< processor time of all, unpacking included
   int without_readings = 0;    ///< keyframes whose depth image is all holes: not among these
-  int not_in_map = 0;          ///< frames that were proposed as keyframes, but never entered the map
+  int not_in_map = 0;          ///< frames without a keyframe: never in the map, culled, or too far back
   int culled = 0;              ///< keyframes whose depth was let go of when the map culled them
   int submaps_dropped = 0;     ///< when all their keyframes were culled
   int beyond_memory = 0;       ///< keyframes that were not fused for want of memory
@@ -68,7 +71,8 @@ class SubmapSurface {
   /// Options must be valid.
   SubmapSurface(const Rig& rig, const SurfaceOptions& options, const SubmapOptions& submaps);
 
-  /// A frame that is proposed as a keyframe, before or after a map has it; frame_index grows.
+  /// A frame that is proposed as a keyframe, before or after a map has it; frame_index grows, and is not
+  /// compared with that of keyframes before SubmapOptions::first_keyframe.
   void offer(KeyframeDepth frame);
   /// Takes the map as it is now. Versions do not shrink. Submaps move with their keyframes in any case, which
   /// takes no time; what `work` leaves waits for later steps, of bent submaps those that are bent least.
@@ -120,7 +124,7 @@ class SubmapSurface {
   SurfaceOptions options_;
   SubmapOptions limits_;
   std::deque<KeyframeDepth> waiting_;     ///< ascending by frame
-  std::uint32_t next_keyframe_ = 0;       ///< the first that no step has seen
+  std::uint32_t next_keyframe_;           ///< the first that no step has seen
   std::deque<KeyframeId> without_depth_;  ///< the newest of those seen, whose depth may still come; ascending
   std::vector<std::unique_ptr<Submap>> submaps_;  ///< ascending by id
   std::uint32_t next_submap_ = 0;

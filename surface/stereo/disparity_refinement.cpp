@@ -10,6 +10,7 @@
 
 #include "base/check.hpp"
 #include "base/median.hpp"
+#include "base/right_of_way.hpp"
 #include "surface/lanes.hpp"
 
 namespace twofold {
@@ -183,7 +184,10 @@ class Refiner {
   void run() {
     right_ *= contrast();
     for (int round = 0; round < kRounds; ++round) {
-      for (int y = 0; y < size_.height; ++y) warp(y);
+      for (int y = 0; y < size_.height; ++y) {
+        make_way();
+        warp(y);
+      }
       weigh();
       for (std::size_t k = 1; k < kLevels; ++k) gather(levels_[k - 1], levels_[k]);
       if (round == 0) solve(kFirstWindow, levels_.back(), nullptr);
@@ -318,8 +322,10 @@ class Refiner {
   }
 
   void solve(const WindowShape& window, Level& level, const Level* above) const {
-    for (int y = 0; y < level.size.height; ++y)
+    for (int y = 0; y < level.size.height; ++y) {
+      make_way();
       for (int x = 0; x < level.size.width; x += kLanes) solve(window, level, above, y, x);
+    }
     std::swap(level.found, level.disparity);
   }
 

@@ -23,7 +23,7 @@ class SubmapSurfaceTest : public ::testing::Test {
     const SE3 T_k_w = testing::camera_around(n, kKeyframes);
     Keyframe keyframe;
     keyframe.id = KeyframeId{static_cast<std::uint32_t>(n)};
-    keyframe.frame_index = 10 * n;
+    keyframe.frame_index = 10 * (n - loaded_);
     keyframe.T_k_w = T_k_w;
     keyframe.median_depth = 0.7;
     writer_.add_keyframe(keyframe);
@@ -31,13 +31,13 @@ class SubmapSurfaceTest : public ::testing::Test {
       writer_.set_edge(keyframe.id, testing::edge_to(KeyframeId{static_cast<std::uint32_t>(n - 1)}, 50));
       writer_.set_reference(keyframe.id);
     }
-    surface.offer(depth_of_keyframe(n));
+    if (n >= loaded_) surface.offer(depth_of_keyframe(n));
   }
   [[nodiscard]] KeyframeDepth depth_of_keyframe(int n) const {
     cv::Mat depth;
     testing::depth_of(rig_, testing::camera_around(n, kKeyframes), ball_)
         .convertTo(depth, CV_16U, 1 / rig_.depth_unit);
-    return pack_keyframe_depth(10 * n, depth, {});
+    return pack_keyframe_depth(10 * (n - loaded_), depth, {});
   }
   void add_all(SubmapSurface& surface) {
     for (int n = 0; n < kKeyframes; ++n) {
@@ -58,6 +58,7 @@ class SubmapSurfaceTest : public ::testing::Test {
   Rig rig_;
   Ball ball_{{0.02, -0.01, 0.03}, 0.15};
   GraphWriter writer_;
+  int loaded_ = 0;  ///< keyframes that the map has from another run, whose frames were counted likewise
   SubmapOptions limits_{.most_keyframes = 5, .most_waiting = 64, .memory_mb = 500};
 };
 
@@ -180,6 +181,26 @@ TEST_F(SubmapSurfaceTest, DepthMayComeAfterTheKeyframe) {
   EXPECT_EQ(late.report().fused, kKeyframes);
   EXPECT_EQ(late.report().not_in_map, 0);
   EXPECT_LT(error(late), 0.002);
+}
+
+TEST_F(SubmapSurfaceTest, KeyframesOfALoadedMapGetNoDepth) {
+  for (int n = 0; n < 3; ++n) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{static_cast<std::uint32_t>(n)};
+    keyframe.frame_index = 20 * n;
+    keyframe.T_k_w = SE3(SO3(), Vector3(5, 0, 0));
+    writer_.add_keyframe(keyframe);
+  }
+  loaded_ = 3;
+  limits_.first_keyframe = 3;
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  while (writer_.graph().keyframe_count() < kKeyframes) {
+    add_keyframe(surface);
+    surface.step(writer_.publish());
+  }
+  EXPECT_EQ(surface.report().fused, kKeyframes - loaded_);
+  EXPECT_EQ(surface.report().not_in_map, 0);
+  EXPECT_LT(error(surface), 0.002);
 }
 
 TEST_F(SubmapSurfaceTest, MemoryIsBounded) {

@@ -20,8 +20,8 @@ struct MapTime {
   bool jumped = false;  ///< all poses were corrected: a loop, or the pose graph
 };
 
-/// The mesh of the map part that the camera is in, kept up to date while the run lasts, and how far it is
-/// behind the map.
+/// The mesh of the map part that the reference keyframe is in, kept up to date while the run lasts, and how
+/// far it is behind the map.
 class LiveMesh {
  public:
   /// Told of the mesh each time it changed, on the surface's thread.

@@ -3,9 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include <fmt/format.h>
 
+#include "base/check.hpp"
 #include "base/processor_time.hpp"
 #include "engine/listeners.hpp"
 #include "imaging/row_offset.hpp"
@@ -60,6 +62,7 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
   surface.depth_noise = usual_depth_noise(rig_);
   SubmapOptions submaps;
   submaps.memory_mb = arguments.memory_mb;
+  if (options.map) submaps.first_keyframe = static_cast<std::uint32_t>(options.map->graph.keyframe_count());
   if (const std::string reason = surface.invalid_reason(); !reason.empty())
     throw IoError("--surface", reason);
   surface_.emplace(rig_, surface, submaps);
@@ -73,6 +76,7 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
 }
 
 void LiveSurface::listen(EngineOptions& options) {
+  TWOFOLD_CHECK(options.right_of_way == nullptr, "one client asks for the tracker's right of way");
   options.right_of_way = &right_of_way_;
   options.on_pose = both(
       options.on_pose, PoseListener([this](const PoseReport& report) {
@@ -136,7 +140,9 @@ void LiveSurface::step() {
   Keyframes taken;
   {
     const std::scoped_lock lock(mutex_);
-    taken.swap(keyframes_);
+    const std::size_t most = worker_ ? kWork.keyframes : keyframes_.size();
+    for (; !keyframes_.empty() && taken.size() < most; keyframes_.pop_front())
+      taken.push_back(std::move(keyframes_.front()));
   }
   for (auto& [frame, row_offset] : taken) {
     take(frame, row_offset);
@@ -163,7 +169,8 @@ void LiveSurface::take(const Frame& frame, double row_offset) {
   try {
     colour = source_->colour_image(frame.index);
   } catch (const IoError& error) {
-    defect_ = error.what();
+    colour_defect_ = error.what();
+    ++without_colour_;
   }
   coloured_ += !colour.empty();
   if (colour.empty()) colour = frame.left;
@@ -176,7 +183,12 @@ void LiveSurface::take(const Frame& frame, double row_offset) {
 }
 
 TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, SurfaceFigures& figures) {
-  worker_.reset();
+  if (worker_) {
+    worker_->request_stop();
+    const auto ended = worker_->join();
+    worker_.reset();
+    if (!ended) throw std::runtime_error(ended.error());
+  }
   sort_frames();
   step();
   if (mesh_) figures.live_mesh = mesh_->figures();
@@ -204,6 +216,8 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   left_out(report.beyond_memory, "keyframes beyond the memory that the surface may take (--surface-memory)");
   left_out(report.overtaken + overtaken_, "keyframes, because the surface was behind (--surface-load)");
   left_out(unfit_, "images that did not fit: " + defect_);
+  left_out(without_colour_, "colour images: " + colour_defect_);
+  left_out(report.not_in_map, "depth images whose frames are no keyframes of the map");
   return mesh;
 }
 

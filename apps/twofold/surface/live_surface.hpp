@@ -43,12 +43,14 @@ struct KeyframeDecision {
 /// A client of the engine, on a thread of its own that runs when the others leave time. The reader keeps the
 /// images of frames that are under way (they are counted, not copied), until the tracker has said which of
 /// them it wants as keyframes; those wait for the surface's thread, which gets their depth, reads snapshots
-/// of the map, and fuses, but for the moments in which the tracker is at work. Nobody waits for it: the
+/// of the map, and fuses; while the tracker is at work it stands still, but where a library has the thread
+/// (matching of pairs, image files). Nobody waits for it: the
 /// oldest of too many waiting frames is let go of, and counted. Runs on one thread fuse between two frames,
 /// so that the same input gives the same bytes.
 class LiveSurface {
  public:
-  /// Adds its listeners to those of `options`, which are called as before. source must outlive the object.
+  /// Adds its listeners to those of `options`, which are called as before, and takes its right_of_way, which
+  /// must be null. source must outlive the object, and the object the run.
   /// Throws IoError for a source without depth or options out of their ranges.
   /// @param one_thread  the run is deterministic, or a replay
   /// @param on_mesh     asks for a mesh while the run lasts, on more than one thread; may be empty
@@ -58,7 +60,8 @@ class LiveSurface {
   /// The reader's thread, with each frame it reads.
   void show(const Frame& frame);
 
-  /// After the run: fuses what still waits, into the final map, and extracts the mesh of map part `part`.
+  /// Once, after the run, if wanted(): fuses what still waits, into the final map, and extracts the mesh of
+  /// map part `part`. Throws what the surface's thread failed of.
   [[nodiscard]] TriangleMesh finish(const GraphSnapshot& graph, KeyframeId part, SurfaceFigures& figures);
   [[nodiscard]] bool wanted() const { return surface_.has_value(); }
 
@@ -80,10 +83,12 @@ class LiveSurface {
   int coloured_ = 0;                      // likewise
   std::string defect_;                    // likewise: of the newest image that did not fit
   int unfit_ = 0;                         // likewise
+  std::string colour_defect_;             // likewise: of the newest that could not be read
+  int without_colour_ = 0;                // likewise
 
   SpscRing<KeyframeDecision> decisions_{256};  // tracker -> reader; longer than the frames under way
   std::deque<Frame> under_way_;                // reader's
-  RightOfWay right_of_way_;                    // the tracker's, before the surface's thread
+  RightOfWay right_of_way_;                    // set by the tracker, read by the surface
   MapLender maps_;
   std::unique_ptr<LiveMesh> mesh_;
 
