@@ -11,7 +11,6 @@
 
 namespace twofold::testing {
 
-inline const Board kBoard{BoardKind::kChessboard, 9, 6, 0.025, 0, MarkerFamily::k4x4};
 inline constexpr int kWidth = 640, kHeight = 480;
 inline const CameraModel kLeft = test_camera(460, 324.3, 237.1, -0.28, 0.074, 0.0002, -0.0004);
 inline const CameraModel kRight = test_camera(457, 315.6, 243.8, -0.27, 0.069, -0.0003, 0.0003);
