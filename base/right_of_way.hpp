@@ -15,8 +15,8 @@ class RightOfWay {
   [[nodiscard]] bool taken() const { return taken_.load(std::memory_order_relaxed); }
 
  private:
-  std::atomic<bool> taken_{
-      false};  // relaxed: nothing is handed over with it, and a late reader loses nothing
+  // Relaxed: nothing is handed over with it, and a late reader loses nothing.
+  std::atomic<bool> taken_{false};
 };
 
 /// Takes the right of way for its scope; does nothing if it is null. Not nested: the inner one would give up

@@ -54,14 +54,16 @@ TEST(MeshFile, PlyOfOthersIsRead) {
   EXPECT_EQ(mesh.triangles[1], (std::array<std::uint32_t, 3>{0, 2, 3}));
 }
 
-// Their header promises colours of the first vertex alone.
+// The beginning of a header: one vertex with a colour.
+constexpr const char* kColouredVertex =
+    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+
 TEST(MeshFile, PlyWithTwoSetsOfVerticesHasColoursOfAllOrNone) {
   const ScratchFolder folder;
-  std::ofstream(folder / "a.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
-                                     "property float y\nproperty float z\nproperty uchar red\n"
-                                     "property uchar green\nproperty uchar blue\nelement vertex 2\n"
-                                     "property float x\nproperty float y\nproperty float z\nend_header\n"
-                                     "0 0 0 1 2 3\n1 0 0\n1 1 0\n";
+  std::ofstream(folder / "a.ply") << kColouredVertex
+                                  << "element vertex 2\nproperty float x\nproperty float y\n"
+                                     "property float z\nend_header\n0 0 0 1 2 3\n1 0 0\n1 1 0\n";
   const TriangleMesh mesh = read_ply_mesh(folder / "a.ply");
   EXPECT_EQ(mesh.positions.size(), 3u);
   EXPECT_TRUE(mesh.colours.empty()) << mesh.colours.size();
@@ -69,10 +71,7 @@ TEST(MeshFile, PlyWithTwoSetsOfVerticesHasColoursOfAllOrNone) {
 
 TEST(MeshFile, PlyColoursBeyondAByteEndAtIt) {
   const ScratchFolder folder;
-  std::ofstream(folder / "a.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
-                                     "property float y\nproperty float z\nproperty uchar red\n"
-                                     "property uchar green\nproperty uchar blue\nend_header\n"
-                                     "0 0 0 1e300 -1e300 7\n";
+  std::ofstream(folder / "a.ply") << kColouredVertex << "end_header\n0 0 0 1e300 -1e300 7\n";
   const TriangleMesh mesh = read_ply_mesh(folder / "a.ply");
   ASSERT_EQ(mesh.colours.size(), 1u);
   EXPECT_EQ(mesh.colours[0], (std::array<std::uint8_t, 3>{255, 0, 7}));

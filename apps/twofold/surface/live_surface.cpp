@@ -18,7 +18,6 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kMostWaiting = 48;  // keyframes whose images wait for the surface's thread
 constexpr SubmapWork kWork{.keyframes = 4, .anew = 1};  // at a time: some tenths of a second
 constexpr auto kMapCheck = std::chrono::milliseconds(20);
 
@@ -128,7 +127,7 @@ void LiveSurface::work(const std::stop_token& stop) {
     }
     if (stop.stop_requested()) return;  // the caller takes the rest
     const std::int64_t begin_ns = thread_cpu_ns();
-    step();
+    step(kWork.keyframes);
     const double rest_ns = static_cast<double>(thread_cpu_ns() - begin_ns) * (1 / arguments_.load - 1);
     std::unique_lock lock(mutex_);
     (void)arrived_.wait_for(lock, stop, std::chrono::nanoseconds(std::llround(rest_ns)),
@@ -136,12 +135,11 @@ void LiveSurface::work(const std::stop_token& stop) {
   }
 }
 
-void LiveSurface::step() {
+void LiveSurface::step(std::size_t most_frames) {
   Keyframes taken;
   {
     const std::scoped_lock lock(mutex_);
-    const std::size_t most = worker_ ? kWork.keyframes : keyframes_.size();
-    for (; !keyframes_.empty() && taken.size() < most; keyframes_.pop_front())
+    for (; !keyframes_.empty() && taken.size() < most_frames; keyframes_.pop_front())
       taken.push_back(std::move(keyframes_.front()));
   }
   for (auto& [frame, row_offset] : taken) {

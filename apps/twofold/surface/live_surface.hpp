@@ -44,9 +44,8 @@ struct KeyframeDecision {
 /// images of frames that are under way (they are counted, not copied), until the tracker has said which of
 /// them it wants as keyframes; those wait for the surface's thread, which gets their depth, reads snapshots
 /// of the map, and fuses; while the tracker is at work it stands still, but where a library has the thread
-/// (matching of pairs, image files). Nobody waits for it: the
-/// oldest of too many waiting frames is let go of, and counted. Runs on one thread fuse between two frames,
-/// so that the same input gives the same bytes.
+/// (matching of pairs, image files). Nobody waits for it: the oldest of too many waiting frames is let go of,
+/// and counted. Runs on one thread fuse between two frames, so that the same input gives the same bytes.
 class LiveSurface {
  public:
   /// Adds its listeners to those of `options`, which are called as before, and takes its right_of_way, which
@@ -66,11 +65,13 @@ class LiveSurface {
   [[nodiscard]] bool wanted() const { return surface_.has_value(); }
 
  private:
+  static constexpr std::size_t kMostWaiting = 48;  // keyframes whose images wait for the surface's thread
+
   void listen(EngineOptions& options);
   void sort_frames();
   void work(const std::stop_token& stop);
-  /// Takes the frames that wait, and the newest map.
-  void step();
+  /// Takes the oldest of the frames that wait, and the newest map.
+  void step(std::size_t most_frames = kMostWaiting);
   /// Frames and by how many rows their right images lie lower.
   using Keyframes = std::deque<std::pair<Frame, double>>;
   void take(const Frame& frame, double row_offset);

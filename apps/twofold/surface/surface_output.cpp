@@ -71,9 +71,8 @@ void print_surface(const SurfaceFigures& f) {
         m.memory_mb);
     if (m.loops > 0)
       fmt::print(
-          "            {} corrections of all poses (loops, pose graph) in the mesh after {:.0f} ms at most; "
-          "what "
-          "they bent fused anew after {:.0f}\n",
+          "            {} corrections of all poses (loops, pose graph) in the mesh after {:.0f} ms at most;\n"
+          "            what they bent fused anew after {:.0f} ms\n",
           m.loops, m.loop_max_ms, m.settled_max_ms);
   }
   for (const std::string& what : f.left_out) fmt::print("left out    {}\n", what);
