@@ -119,7 +119,7 @@ void SurfaceVolume::add_blocks_to_carve(const DepthView& view, const SE3& T_c_v)
   const double edge = kBlockEdge * options_.voxel;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     if (is_touched_[b] != 0) continue;
-    const VoxelBlock& block = blocks_[b];
+    const BlockHead& block = blocks_.head(b);
     if (block.all_free) continue;
     const Vector3 centre(block.at.x + 0.5, block.at.y + 0.5, block.at.z + 0.5);
     const Vector3 centre_c = T_c_v * Vector3(centre * edge);

@@ -66,11 +66,12 @@ void Composition::take_changes(const PlacedVolume& placed) {
   }
   const BlockTable& blocks = placed.volume->blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (blocks[b].revision <= member.revision) continue;
-    const Vector3 corner = edge * Vector3(blocks[b].at.x, blocks[b].at.y, blocks[b].at.z);
+    const BlockHead& block = blocks.head(b);
+    if (block.revision <= member.revision) continue;
+    const Vector3 corner = edge * Vector3(block.at.x, block.at.y, block.at.z);
     member.low = member.low.cwiseMin(corner);
     member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
-    for (const std::uint32_t reached : whole_.add_overlapped(blocks[b].at, member.T_w_v)) {
+    for (const std::uint32_t reached : whole_.add_overlapped(block.at, member.T_w_v)) {
       if (reached >= in_block_.size()) {
         in_block_.resize(reached + 1);
         is_marked_.resize(reached + 1, 0);

@@ -263,13 +263,13 @@ struct BlockUpdate {
   const SampleUnits& units;
 
   /// Whether any sample took part.
-  bool operator()(const SE3& T_c_v, VoxelBlock& block, const VoxelBlock& next) const {
+  bool operator()(const SE3& T_c_v, BlockHead& head, VoxelBlock& block, const VoxelBlock& next) const {
     const BlockPose pose = pose_of(view, T_c_v, block);
     const BlockBounds bounds = bounds_of(view, images, pose);
     if (!bounds.in_image) return false;
     const bool any = bounds.whole_in_image ? update_rows<true>(pose, bounds, block, next)
                                            : update_rows<false>(pose, bounds, block, next);
-    if (any) block.all_free = is_all_free(block, view, units);
+    if (any) head.all_free = is_all_free(block, view, units);
     return any;
   }
 
@@ -315,9 +315,9 @@ void SurfaceVolume::fuse(const DepthView& view, const SE3& T_c_v) {
   const BlockUpdate update{f, view, units_};
   ++revision_;
   for (std::size_t n = 0; n < touched_.size(); ++n) {
-    VoxelBlock& block = blocks_[touched_[n]];
     const VoxelBlock& next = blocks_[touched_[std::min(n + 1, touched_.size() - 1)]];
-    if (update(T_c_v, block, next)) block.revision = revision_;
+    BlockHead& head = blocks_.head(touched_[n]);
+    if (update(T_c_v, head, blocks_[touched_[n]], next)) head.revision = revision_;
     make_way();
   }
 }

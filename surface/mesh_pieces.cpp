@@ -68,8 +68,9 @@ std::vector<std::uint32_t> MeshPieces::outdated(const SurfaceVolume& volume) con
   const BlockTable& blocks = volume.blocks();
   std::vector<std::uint8_t> is_outdated(blocks.size(), 0);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (blocks[b].revision <= seen_) continue;
-    const BlockPosition& at = blocks[b].at;
+    const BlockHead& block = blocks.head(b);
+    if (block.revision <= seen_) continue;
+    const BlockPosition& at = block.at;
     for (int n = 0; n < 27; ++n) {
       const auto near = blocks.number_of({at.x + n % 3 - 1, at.y + n / 3 % 3 - 1, at.z + n / 9 - 1});
       if (near) is_outdated[*near] = 1;
@@ -93,7 +94,7 @@ std::size_t MeshPieces::update(const SurfaceVolume& volume) {
   BlockMesher mesher(volume);
   const std::vector<std::uint32_t> blocks = outdated(volume);
   for (const std::uint32_t b : blocks) {
-    const BlockPosition& at = volume.blocks()[b].at;
+    const BlockPosition& at = volume.blocks().head(b).at;
     mesher.extract(at, piece);
     any |= replace(at, piece);
     make_way();

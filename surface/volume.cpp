@@ -62,11 +62,10 @@ std::vector<std::uint32_t> SurfaceVolume::add_overlapped(const BlockPosition& of
 
 void SurfaceVolume::compose_block(std::uint32_t block, std::span<Resampler* const> others) {
   VoxelBlock& own = blocks_[block];
-  own.all_free = false;
   own.distance.fill(0);
   own.weight.fill(0);
   for (auto& channel : own.colour) channel.fill(0);
-  own.revision = ++revision_;
+  blocks_.head(block) = {own.at, false, ++revision_};
   for (Resampler* other : others) (void)other->add_to(own);
 }
 
@@ -86,7 +85,7 @@ void SurfaceVolume::touch_none() {
 void SurfaceVolume::add(const SurfaceVolume& other, const SE3& T_v_o) {
   std::vector<std::uint32_t> reached;
   for (std::size_t b = 0; b < other.blocks_.size(); ++b) {
-    const std::vector<std::uint32_t> some = add_overlapped(other.blocks_[b].at, T_v_o);
+    const std::vector<std::uint32_t> some = add_overlapped(other.blocks_.head(b).at, T_v_o);
     reached.insert(reached.end(), some.begin(), some.end());
   }
   std::sort(reached.begin(), reached.end());
@@ -94,10 +93,7 @@ void SurfaceVolume::add(const SurfaceVolume& other, const SE3& T_v_o) {
   ++revision_;
   Resampler resampler(other, T_v_o.inverse());
   for (const std::uint32_t b : reached) {
-    VoxelBlock& block = blocks_[b];
-    if (!resampler.add_to(block)) continue;
-    block.all_free = false;
-    block.revision = revision_;
+    if (resampler.add_to(blocks_[b])) blocks_.head(b) = {blocks_.head(b).at, false, revision_};
   }
 }
 

@@ -3,8 +3,10 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <memory>
 #include <new>
-#include <utility>
+#include <type_traits>
 
 namespace twofold {
 namespace {
@@ -13,17 +15,27 @@ constexpr std::size_t kFirstSlots = 1024;
 
 }  // namespace
 
-BlockTable::ChunkPointer BlockTable::new_chunk() {
-  // All is written at once: pages that are asked for together cost half of what they do one by one.
-  void* pages =
-      mmap(nullptr, sizeof(Chunk), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-  if (pages == MAP_FAILED) throw std::bad_alloc();
-  return ChunkPointer(new (pages) Chunk());
+BlockTable::ChunkPointer BlockTable::new_chunk(bool large_page) {
+  // Aligned to its size: what was mapped around it is given back.
+  constexpr std::size_t kMapped = 2 * kChunkBytes;
+  void* mapped = mmap(nullptr, kMapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (mapped == MAP_FAILED) throw std::bad_alloc();
+  auto* begin = static_cast<std::byte*>(mapped);
+  std::size_t space = kMapped;
+  void* aligned = mapped;
+  (void)std::align(kChunkBytes, kChunkBytes, aligned, space);
+  auto* chunk = static_cast<std::byte*>(aligned);
+  if (chunk != begin) (void)munmap(begin, static_cast<std::size_t>(chunk - begin));
+  if (space != kChunkBytes) (void)munmap(chunk + kChunkBytes, space - kChunkBytes);
+  // Advice: a kernel without large pages clears small ones, which cost half when they are asked for together.
+  (void)madvise(chunk, kChunkBytes, large_page ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
+  if (large_page) (void)madvise(chunk, kChunkBytes, MADV_POPULATE_WRITE);
+  return ChunkPointer(reinterpret_cast<VoxelBlock*>(chunk));
 }
 
-void BlockTable::ReturnPages::operator()(Chunk* chunk) const {
-  std::destroy_at(chunk);
-  (void)munmap(chunk, sizeof(Chunk));
+void BlockTable::ReturnPages::operator()(VoxelBlock* chunk) const {
+  static_assert(std::is_trivially_destructible_v<VoxelBlock>);
+  (void)munmap(chunk, kChunkBytes);
 }
 
 std::size_t BlockTable::slot_of(const BlockPosition& at) const {
@@ -45,33 +57,46 @@ const VoxelBlock* BlockTable::find(const BlockPosition& at) const {
 }
 
 std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {
-  if (2 * size_ >= slots_.size()) grow();
+  if (2 * size() >= slots_.size()) grow();
   Slot& slot = slots_[slot_of(at)];
   if (slot.block == kFree) {
-    if (size_ == kChunk * chunks_.size()) chunks_.push_back(new_chunk());
-    slot = {at, static_cast<std::uint32_t>(size_)};
-    (*this)[size_++].at = at;
+    add_block().at = at;
+    slot = {at, static_cast<std::uint32_t>(size())};
+    heads_.push_back({.at = at});
   }
   return slot.block;
 }
 
+VoxelBlock& BlockTable::add_block() {
+  const std::size_t in_chunk = size() % kChunk;
+  if (in_chunk == 0) chunks_.push_back(new_chunk(!chunks_.empty()));
+  return *new (chunks_.back().get() + in_chunk) VoxelBlock();
+}
+
 void BlockTable::grow() {
   slots_.assign(std::max(kFirstSlots, 2 * slots_.size()), Slot{});
-  for (std::size_t b = 0; b < size_; ++b)
-    slots_[slot_of((*this)[b].at)] = {(*this)[b].at, static_cast<std::uint32_t>(b)};
+  for (std::size_t b = 0; b < size(); ++b)
+    slots_[slot_of(heads_[b].at)] = {heads_[b].at, static_cast<std::uint32_t>(b)};
 }
 
 std::vector<const VoxelBlock*> BlockTable::sorted() const {
   std::vector<const VoxelBlock*> all;
-  all.reserve(size_);
-  for (std::size_t b = 0; b < size_; ++b) all.push_back(&(*this)[b]);
+  all.reserve(size());
+  for (std::size_t b = 0; b < size(); ++b) all.push_back(&(*this)[b]);
   std::sort(all.begin(), all.end(), [](const auto* a, const auto* b) { return a->at < b->at; });
   return all;
 }
 
+std::size_t BlockTable::bytes() const {
+  const std::size_t in_first = std::min(size(), kChunk) * sizeof(VoxelBlock);
+  const std::size_t in_others = chunks_.size() > 1 ? (chunks_.size() - 1) * kChunkBytes : 0;
+  return in_first + in_others + chunks_.size() * sizeof(chunks_[0]) + heads_.capacity() * sizeof(heads_[0]) +
+         slots_.size() * sizeof(slots_[0]);
+}
+
 void BlockTable::clear() {
   chunks_.clear();
-  size_ = 0;
+  heads_.clear();
   slots_.clear();
 }
 

@@ -49,8 +49,6 @@ inline constexpr int kMostWeightSteps = 65535;
 /// numbers of SampleUnits: what a volume costs is mostly the way of its samples to and from memory.
 struct VoxelBlock {
   BlockPosition at;
-  bool all_free = false;       ///< every sample is well known to be free
-  std::uint64_t revision = 0;  ///< of the volume (SurfaceVolume::revision) when a sample changed last
   alignas(64) std::array<std::int16_t, kBlockSamples> distance{};  ///< positive outside the surface
   alignas(64) std::array<std::uint16_t, kBlockSamples> weight{};   ///< 0: never seen
   alignas(
@@ -61,6 +59,14 @@ struct VoxelBlock {
 [[nodiscard]] inline std::array<std::uint16_t, 3> colour_of(const VoxelBlock& block, std::size_t i) {
   return {block.colour[0][i], block.colour[1][i], block.colour[2][i]};
 }
+
+/// What is asked of all blocks one after the other. Blocks themselves lie pages apart: a glance at each of
+/// them costs more than the arithmetic.
+struct BlockHead {
+  BlockPosition at;
+  bool all_free = false;       ///< every sample is well known to be free
+  std::uint64_t revision = 0;  ///< of the volume (SurfaceVolume::revision) when a sample changed last
+};
 
 /// The blocks there are, found by position: a hash table with open addresses. Blocks are never taken out one
 /// by one, so that they are all there where a surface ever was. References stay valid until clear.
@@ -74,18 +80,17 @@ class BlockTable {
   /// Its number: blocks are counted from 0 in the order they were added.
   std::uint32_t find_or_add(const BlockPosition& at);
 
-  [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return (*chunks_[i / kChunk])[i % kChunk]; }
+  [[nodiscard]] std::size_t size() const { return heads_.size(); }
+  [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return chunks_[i / kChunk].get()[i % kChunk]; }
   [[nodiscard]] const VoxelBlock& operator[](std::size_t i) const {
-    return (*chunks_[i / kChunk])[i % kChunk];
+    return chunks_[i / kChunk].get()[i % kChunk];
   }
+  [[nodiscard]] BlockHead& head(std::size_t i) { return heads_[i]; }
+  [[nodiscard]] const BlockHead& head(std::size_t i) const { return heads_[i]; }
   /// In the order of their positions.
   [[nodiscard]] std::vector<const VoxelBlock*> sorted() const;
   void clear();
-  [[nodiscard]] std::size_t bytes() const {
-    return chunks_.size() * (kChunk * sizeof(VoxelBlock) + sizeof(chunks_[0])) +
-           slots_.size() * sizeof(slots_[0]);
-  }
+  [[nodiscard]] std::size_t bytes() const;
 
  private:
   static constexpr std::uint32_t kFree = 0xffffffff;
@@ -98,18 +103,22 @@ class BlockTable {
   [[nodiscard]] std::size_t slot_of(const BlockPosition& at) const;
   void grow();
 
-  /// Blocks are allocated so many at a time, in pages of their own: what a volume gives back goes back to the
-  /// system, where on the heap it would be holes among what others keep.
-  static constexpr std::size_t kChunk = 32;
-  using Chunk = std::array<VoxelBlock, kChunk>;
+  VoxelBlock& add_block();
+
+  /// Blocks live in pages of their own: what a volume gives back goes back to the system, where on the heap
+  /// it would be holes among what others keep. A chunk is a large page of the processor's, so that the kernel
+  /// clears it at once, and blocks are reached without a walk through its tables; the first chunk, which a
+  /// small volume hardly fills, is of small pages, each taken when it is written to.
+  static constexpr std::size_t kChunkBytes = std::size_t{1} << 21;
+  static constexpr std::size_t kChunk = kChunkBytes / sizeof(VoxelBlock);
   struct ReturnPages {
-    void operator()(Chunk* chunk) const;
+    void operator()(VoxelBlock* chunk) const;
   };
-  using ChunkPointer = std::unique_ptr<Chunk, ReturnPages>;
+  using ChunkPointer = std::unique_ptr<VoxelBlock, ReturnPages>;
   /// Throws std::bad_alloc.
-  [[nodiscard]] static ChunkPointer new_chunk();
+  [[nodiscard]] static ChunkPointer new_chunk(bool large_page);
   std::vector<ChunkPointer> chunks_;
-  std::size_t size_ = 0;
+  std::vector<BlockHead> heads_;
   std::vector<Slot> slots_;  ///< a power of two, at most half of them taken
 };
 
