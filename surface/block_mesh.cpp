@@ -67,13 +67,16 @@ void BlockMesher::extract(const BlockPosition& at, BlockMesh& piece) {
 
 bool BlockMesher::find_blocks(const BlockPosition& at) {
   const BlockTable& blocks = volume_.blocks();
-  around_[kOwn] = blocks.find(at);
-  if (around_[kOwn] == nullptr) return false;
-  for (int n = 1; n < 8; ++n) {  // its own cells end in the blocks behind it
+  bool any_inside = false, any_outside = false;
+  for (int n = 0; n < 8; ++n) {  // its own cells end in the blocks behind it
     const int x = n & 1, y = n >> 1 & 1, z = n >> 2;
-    around_[kOwn + static_cast<std::size_t>(x + 3 * y + 9 * z)] = blocks.find({at.x + x, at.y + y, at.z + z});
+    const auto number = blocks.number_of({at.x + x, at.y + y, at.z + z});
+    around_[kOwn + static_cast<std::size_t>(x + 3 * y + 9 * z)] = number ? &blocks[*number] : nullptr;
+    if (!number) continue;
+    any_inside |= blocks.head(*number).any_inside;
+    any_outside |= blocks.head(*number).any_outside;
   }
-  if (!find_rows()) return false;
+  if (around_[kOwn] == nullptr || !any_inside || !any_outside || !find_rows()) return false;
   for (int n = 0; n < 27; ++n) {
     const int x = n % 3 - 1, y = n / 3 % 3 - 1, z = n / 9 - 1;
     if (std::min({x, y, z}) < 0)

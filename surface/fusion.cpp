@@ -316,8 +316,8 @@ void SurfaceVolume::fuse(const DepthView& view, const SE3& T_c_v) {
   ++revision_;
   for (std::size_t n = 0; n < touched_.size(); ++n) {
     const VoxelBlock& next = blocks_[touched_[std::min(n + 1, touched_.size() - 1)]];
-    BlockHead& head = blocks_.head(touched_[n]);
-    if (update(T_c_v, head, blocks_[touched_[n]], next)) head.revision = revision_;
+    const std::uint32_t b = touched_[n];
+    if (update(T_c_v, blocks_.head(b), blocks_[b], next)) blocks_.set_changed(b, revision_);
     make_way();
   }
 }

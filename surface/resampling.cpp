@@ -215,7 +215,8 @@ bool Resampler::fill(const Vector3& first) {
 void Resampler::fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, int z) {
   std::uint32_t* to = &cube_[static_cast<std::size_t>(((z - low_.z()) * kCube + y - low_.y()) * kRow)];
   const auto row = static_cast<std::size_t>(((z & 7) * kBlockEdge + (y & 7)) * kBlockEdge);
-  for (std::size_t n = 0; n < 3; ++n, to += kBlockEdge) {
+  const auto reached = static_cast<std::size_t>((high_.x() >> 3) - (low_.x() >> 3) + 1);
+  for (std::size_t n = 0; n < reached; ++n, to += kBlockEdge) {
     LaneIndex samples{};
     if (blocks[n] != nullptr) {
       const LaneIndex weight = wide(load<LaneUnsignedShort>(&blocks[n]->weight[row]));

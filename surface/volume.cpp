@@ -65,8 +65,9 @@ void SurfaceVolume::compose_block(std::uint32_t block, std::span<Resampler* cons
   own.distance.fill(0);
   own.weight.fill(0);
   for (auto& channel : own.colour) channel.fill(0);
-  blocks_.head(block) = {own.at, false, ++revision_};
   for (Resampler* other : others) (void)other->add_to(own);
+  blocks_.head(block).all_free = false;
+  blocks_.set_changed(block, ++revision_);
 }
 
 void SurfaceVolume::touch(const BlockPosition& at) {
@@ -93,7 +94,9 @@ void SurfaceVolume::add(const SurfaceVolume& other, const SE3& T_v_o) {
   ++revision_;
   Resampler resampler(other, T_v_o.inverse());
   for (const std::uint32_t b : reached) {
-    if (resampler.add_to(blocks_[b])) blocks_.head(b) = {blocks_.head(b).at, false, revision_};
+    if (!resampler.add_to(blocks_[b])) continue;
+    blocks_.head(b).all_free = false;
+    blocks_.set_changed(b, revision_);
   }
 }
 

@@ -8,6 +8,8 @@
 #include <new>
 #include <type_traits>
 
+#include "surface/lanes.hpp"
+
 namespace twofold {
 namespace {
 
@@ -77,6 +79,20 @@ void BlockTable::grow() {
   slots_.assign(std::max(kFirstSlots, 2 * slots_.size()), Slot{});
   for (std::size_t b = 0; b < size(); ++b)
     slots_[slot_of(heads_[b].at)] = {heads_[b].at, static_cast<std::uint32_t>(b)};
+}
+
+void BlockTable::set_changed(std::size_t i, std::uint64_t revision) {
+  const VoxelBlock& block = (*this)[i];
+  LaneShort inside{}, outside{};
+  for (std::size_t s = 0; s < kBlockSamples; s += kLanes) {
+    const LaneShort seen = load<LaneUnsignedShort>(&block.weight[s]) > 0;
+    const LaneShort below = load<LaneShort>(&block.distance[s]) < 0;
+    inside |= seen & below;
+    outside |= seen & ~below;
+  }
+  heads_[i].any_inside = any(inside);
+  heads_[i].any_outside = any(outside);
+  heads_[i].revision = revision;
 }
 
 std::vector<const VoxelBlock*> BlockTable::sorted() const {

@@ -65,6 +65,8 @@ struct VoxelBlock {
 struct BlockHead {
   BlockPosition at;
   bool all_free = false;       ///< every sample is well known to be free
+  bool any_inside = false;     ///< of the surface: a sample that was seen
+  bool any_outside = false;    ///< likewise
   std::uint64_t revision = 0;  ///< of the volume (SurfaceVolume::revision) when a sample changed last
 };
 
@@ -87,6 +89,8 @@ class BlockTable {
   }
   [[nodiscard]] BlockHead& head(std::size_t i) { return heads_[i]; }
   [[nodiscard]] const BlockHead& head(std::size_t i) const { return heads_[i]; }
+  /// A block's samples have changed: its head says so, and on which sides of the surface they are.
+  void set_changed(std::size_t i, std::uint64_t revision);
   /// In the order of their positions.
   [[nodiscard]] std::vector<const VoxelBlock*> sorted() const;
   void clear();

@@ -142,21 +142,29 @@ void LiveSurface::step(std::size_t most_frames) {
     for (; !keyframes_.empty() && taken.size() < most_frames; keyframes_.pop_front())
       taken.push_back(std::move(keyframes_.front()));
   }
+  const bool moved = maps_.newest()->graph.version() != version_;
+  if (!moved && taken.empty() && !surface_->unfinished()) return;
+  if (mesh_ && moved) follow_map();
   for (auto& [frame, row_offset] : taken) {
     take(frame, row_offset);
     frame = {};
   }
   const auto map = maps_.newest();
-  if (map->graph.version() == version_ && taken.empty() && !surface_->unfinished()) return;
   version_ = map->graph.version();
-  if (!mesh_) return surface_->step(map->graph);
-  // A loop is in the mesh as soon as submaps have moved: before what is new, and what the loop bent, of which
-  // each step does a part.
-  for (const SubmapWork& work : {SubmapWork{0, 0}, kWork}) {
-    surface_->step(map->graph, work);
+  surface_->step(map->graph, mesh_ ? kWork : SubmapWork{});
+  if (mesh_) follow_map();
+}
+
+/// A loop is in the mesh before more is fused: several may come one after the other.
+void LiveSurface::follow_map() {
+  std::uint64_t last_jump = 0;
+  do {
+    const auto map = maps_.newest();
+    version_ = map->graph.version();
+    surface_->step(map->graph, {.keyframes = 0, .anew = 0});
     mesh_->update(*surface_, map->graph);
-    if (!surface_->unfinished()) return;
-  }
+    last_jump = maps_.newest()->graph.last_jump().version;
+  } while (last_jump > version_);
 }
 
 void LiveSurface::take(const Frame& frame, double row_offset) {

@@ -72,6 +72,8 @@ class LiveSurface {
   void work(const std::stop_token& stop);
   /// Takes the oldest of the frames that wait, and the newest map.
   void step(std::size_t most_frames = kMostWaiting);
+  /// Submaps and mesh as the newest map has them.
+  void follow_map();
   /// Frames and by how many rows their right images lie lower.
   using Keyframes = std::deque<std::pair<Frame, double>>;
   void take(const Frame& frame, double row_offset);
