@@ -20,7 +20,7 @@ class Sampler {
   /// Nothing where one of the eight samples around x_v [m] was never seen.
   [[nodiscard]] std::optional<SurfaceDistance> at(const Vector3& x_v) {
     const Vector3 grid = x_v / voxel_;
-    if (!(grid.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
+    if (!(grid.array().abs() < kFarthest).all()) return std::nullopt;  // NaN, too
     const Eigen::Vector3i base = grid.array().floor().cast<int>();
     const Vector3 f = grid - base.cast<double>();
     std::array<double, 8> d{};

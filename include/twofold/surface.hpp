@@ -76,7 +76,8 @@ struct SurfaceChanges {
 /// hides, since that may be its inside. A model stays where its poses put it: after a loop
 /// closure, clear it and add the frames of keyframes anew, which the caller keeps (PoseEstimate::keyframe).
 /// One model holds one map part: poses of another have another world. Same calls, same answers. Threads: at
-/// and mesh by several at once, add, clear and mesh_changes by one while nobody else does anything.
+/// and mesh by several at once, add, clear and mesh_changes by one while nobody else does anything. A model
+/// that was moved from may only be assigned to or destroyed.
 class TWOFOLD_API SurfaceModel {
  public:
   /// Throws std::invalid_argument naming the field of rig or options, the rule and the value; one camera has
@@ -98,7 +99,7 @@ class TWOFOLD_API SurfaceModel {
   int add(const FrameView& frame, const Pose& T_world_camera);
   void clear();
 
-  /// p_world [m].
+  /// p_world [m]. What is not finite is unknown.
   [[nodiscard]] SpacePoint at(const std::array<double, 3>& p_world) const;
   [[nodiscard]] SurfaceMesh mesh() const;
   /// What changed in the mesh after that revision; of 0 on, all of it. Only cells that frames changed are

@@ -153,7 +153,7 @@ bool FreeSpace::contains(const BlockPosition& cell) const {
 
 std::optional<double> FreeSpace::clearance(const SurfaceVolume& volume, const Vector3& x_v) const {
   const Vector3 grid = x_v / options_.voxel;
-  if (!(grid.cwiseAbs().maxCoeff() < kCellEdge * kFarthestCell)) return std::nullopt;
+  if (!(grid.array().abs() < kCellEdge * kFarthestCell).all()) return std::nullopt;  // NaN, too
   const BlockPosition base = to_cell(grid);
   double clearance = options_.truncation * options_.voxel;
   for (int c = 0; c < 8; ++c) {

@@ -211,6 +211,20 @@ TEST(SurfaceModel, OfAPairEndsWhereTheRigSays) {
   EXPECT_THROW(SurfaceModel{rig}, std::invalid_argument);
 }
 
+TEST(SurfaceModel, KnowsNothingOfPositionsThatAreNoNumbers) {
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(far_wall().view(), {}), 0);
+  const std::array<double, 3> free{0, 0, 1};
+  ASSERT_EQ(model.at(free).state, SpaceState::kFree);
+  for (const double none : {double{NAN}, double{INFINITY}, -1e300}) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::array<double, 3> position = free;
+      position[axis] = none;
+      EXPECT_EQ(model.at(position).state, SpaceState::kUnknown) << none << " along axis " << axis;
+    }
+  }
+}
+
 TEST(SurfaceModel, RefusesWhatMakesNoSense) {
   EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel = 0}), std::invalid_argument);
   EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel = std::numeric_limits<double>::quiet_NaN()}),

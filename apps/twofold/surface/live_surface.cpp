@@ -76,6 +76,7 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
 
 void LiveSurface::listen(EngineOptions& options) {
   TWOFOLD_CHECK(options.right_of_way == nullptr, "one client asks for the tracker's right of way");
+  TWOFOLD_CHECK(options.frame_slots < kMostDecisions, "each frame under way has room for its decision");
   options.right_of_way = &right_of_way_;
   options.on_pose = both(
       options.on_pose, PoseListener([this](const PoseReport& report) {

@@ -89,9 +89,10 @@ class LiveSurface {
   std::string colour_defect_;             // likewise: of the newest that could not be read
   int without_colour_ = 0;                // likewise
 
-  SpscRing<KeyframeDecision> decisions_{256};  // tracker -> reader; longer than the frames under way
-  std::deque<Frame> under_way_;                // reader's
-  RightOfWay right_of_way_;                    // set by the tracker, read by the surface
+  static constexpr std::size_t kMostDecisions = 256;      // more than frames are ever under way
+  SpscRing<KeyframeDecision> decisions_{kMostDecisions};  // tracker -> reader
+  std::deque<Frame> under_way_;                           // reader's
+  RightOfWay right_of_way_;                               // set by the tracker, read by the surface
   MapLender maps_;
   std::unique_ptr<LiveMesh> mesh_;
 
