@@ -6,12 +6,17 @@
 #include "base/right_of_way.hpp"
 
 namespace twofold {
+namespace {
 
-std::size_t Composition::update(std::span<const PlacedVolume> volumes, double rest) {
+constexpr std::size_t kAsked = 64;  // blocks from one question to the next: about a millisecond
+
+}  // namespace
+
+std::size_t Composition::update(std::span<const PlacedVolume> volumes, double rest, const GivesUp& gives_up) {
   remove_all_but(volumes, rest);
   for (const PlacedVolume& volume : volumes) take_changes(volume);
-  const std::size_t blocks = compose(volumes);
-  mesh_.update(whole_);
+  const std::size_t blocks = compose(volumes, gives_up);
+  if (!unfinished()) mesh_.update(whole_);
   return blocks;
 }
 
@@ -89,21 +94,25 @@ void Composition::take_changes(const PlacedVolume& placed) {
   member.revision = placed.volume->revision();
 }
 
-std::size_t Composition::compose(std::span<const PlacedVolume> volumes) {
+std::size_t Composition::compose(std::span<const PlacedVolume> volumes, const GivesUp& gives_up) {
   std::map<std::uint32_t, Resampler> resamplers;
   for (const PlacedVolume& volume : volumes)
     resamplers.try_emplace(volume.id, *volume.volume, members_.at(volume.id).T_w_v.inverse());
   std::vector<Resampler*> reaching;
-  for (const std::uint32_t block : marked_) {
+  std::size_t done = 0;
+  for (const std::size_t all = marked_.size(); done < all; ++done) {
+    if (gives_up && done % kAsked == kAsked - 1 &&
+        gives_up(static_cast<double>(done) / static_cast<double>(all)))
+      break;
+    const std::uint32_t block = marked_[done];
     reaching.clear();
     for (const std::uint32_t id : in_block_[block]) reaching.push_back(&resamplers.at(id));
     whole_.compose_block(block, reaching);
     is_marked_[block] = 0;
     make_way();
   }
-  const std::size_t count = marked_.size();
-  marked_.clear();
-  return count;
+  marked_.erase(marked_.begin(), marked_.begin() + static_cast<std::ptrdiff_t>(done));
+  return done;
 }
 
 std::size_t Composition::bytes() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <vector>
@@ -26,12 +27,22 @@ class Composition {
  public:
   explicit Composition(const SurfaceOptions& options) : whole_(options) {}
 
+  /// Asked now and then while blocks are made anew, with the share that is done.
+  using GivesUp = std::function<bool(double done)>;
+
   /// The volumes there are now, ascending by id. One that moved by no more than half a voxel stays
   /// where it was, because poses never rest while the map grows.
+  ///
+  /// @param gives_up  true: the remaining blocks, and the mesh, are left to the next call, since the
+  ///                  volumes have moved again meanwhile
   /// @return  blocks made anew
-  std::size_t update(std::span<const PlacedVolume> volumes) { return update(volumes, kRest); }
+  std::size_t update(std::span<const PlacedVolume> volumes, const GivesUp& gives_up = {}) {
+    return update(volumes, kRest, gives_up);
+  }
   /// As update, but volumes stand exactly where they are said to.
-  std::size_t settle(std::span<const PlacedVolume> volumes) { return update(volumes, 0); }
+  std::size_t settle(std::span<const PlacedVolume> volumes) { return update(volumes, 0, {}); }
+  /// Whether the last call gave up.
+  [[nodiscard]] bool unfinished() const { return !marked_.empty(); }
 
   [[nodiscard]] const SurfaceVolume& whole() const { return whole_; }
   [[nodiscard]] const MeshPieces& mesh() const { return mesh_; }
@@ -46,13 +57,13 @@ class Composition {
     std::vector<std::uint32_t> blocks;  ///< of the whole, into which it reaches; each once
   };
 
-  std::size_t update(std::span<const PlacedVolume> volumes, double rest);
+  std::size_t update(std::span<const PlacedVolume> volumes, double rest, const GivesUp& gives_up);
   [[nodiscard]] bool still_stands(const Member& member, const PlacedVolume& now, double rest) const;
   void remove_all_but(std::span<const PlacedVolume> volumes, double rest);
   void remove(std::uint32_t id, const Member& member);
   void take_changes(const PlacedVolume& volume);
   void mark(std::uint32_t block);
-  std::size_t compose(std::span<const PlacedVolume> volumes);
+  std::size_t compose(std::span<const PlacedVolume> volumes, const GivesUp& gives_up);
 
   SurfaceVolume whole_;
   MeshPieces mesh_;

@@ -72,7 +72,7 @@ std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {
 VoxelBlock& BlockTable::add_block() {
   const std::size_t in_chunk = size() % kChunk;
   if (in_chunk == 0) chunks_.push_back(new_chunk(!chunks_.empty()));
-  return *new (chunks_.back().get() + in_chunk) VoxelBlock();
+  return chunks_.back().get()[in_chunk];  // pages come cleared, and so is an empty block
 }
 
 void BlockTable::grow() {

@@ -182,6 +182,29 @@ TEST_F(CompositionTest, FollowsOnlyWhatMovesByHalfAVoxel) {
   EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
 }
 
+TEST_F(CompositionTest, WhatItGivesUpIsDoneByTheNextCall) {
+  const std::size_t all = composition_.update(placed_);
+  ASSERT_GT(all, 200u);
+  const TriangleMesh before = composition_.mesh().joined(0);
+  move(0, 0.3);
+  move(1, 0.3);
+  move(2, 0.3);
+  std::size_t asked = 0;
+  const std::size_t some = composition_.update(placed_, [&](double done) {
+    ++asked;
+    EXPECT_LT(done, 1);
+    return done > 0.2;
+  });
+  EXPECT_GT(asked, 0u);
+  EXPECT_GT(some, 0u);
+  EXPECT_TRUE(composition_.unfinished());
+  EXPECT_TRUE(composition_.mesh().joined(0) == before) << "a mesh of two places at once";
+  move(2, -0.1);
+  EXPECT_GT(composition_.update(placed_), 0u);
+  EXPECT_FALSE(composition_.unfinished());
+  EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
+}
+
 /// 0 where nothing was ever seen.
 std::uint16_t weight_of_nearest_sample(const SurfaceVolume& volume, const Vector3& x_v) {
   const Eigen::Vector3i g = (x_v / volume.options().voxel).array().round().cast<int>();

@@ -14,22 +14,26 @@ void LiveMesh::published(const GraphSnapshot& graph) {
   last_jump_ = jump;
 }
 
-void LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph) {
-  if (graph.reference() == kNoKeyframe) return;
+bool LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph,
+                      const Composition::GivesUp& gives_up) {
+  if (graph.reference() == kNoKeyframe) return true;
   const KeyframeId part = graph.part(graph.reference());
   const std::int64_t begin_ns = thread_cpu_ns();
-  const std::size_t blocks = composition_.update(surface.placed(part));
+  const std::size_t blocks = composition_.update(surface.placed(part), gives_up);
   if (blocks > 0) {
     ++updates_;
     blocks_ += blocks;
     cpu_ns_ += thread_cpu_ns() - begin_ns;
     most_bytes_ = std::max(most_bytes_, composition_.bytes());
   }
+  if (composition_.unfinished()) return false;
   take_times(graph.version());
   take_settled(surface);
-  if (composition_.mesh().revision() == revision_) return;
-  revision_ = composition_.mesh().revision();
-  if (listener_) listener_(composition_.mesh(), part);
+  if (composition_.mesh().revision() != revision_) {
+    revision_ = composition_.mesh().revision();
+    if (listener_) listener_(composition_.mesh(), part);
+  }
+  return true;
 }
 
 /// The mesh is now that of this version of the map.

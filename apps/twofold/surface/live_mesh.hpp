@@ -34,7 +34,10 @@ class LiveMesh {
   void published(const GraphSnapshot& graph);
 
   /// The surface's thread: makes the mesh what the submaps are now, in this map.
-  void update(const SubmapSurface& surface, const GraphSnapshot& graph);
+  /// @param gives_up  as of Composition::update
+  /// @return  false: it gave up
+  bool update(const SubmapSurface& surface, const GraphSnapshot& graph,
+              const Composition::GivesUp& gives_up = {});
   /// After the run.
   [[nodiscard]] LiveMeshFigures figures() const;
 

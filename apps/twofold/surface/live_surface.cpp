@@ -156,16 +156,21 @@ void LiveSurface::step(std::size_t most_frames) {
   if (mesh_) follow_map();
 }
 
-/// A loop is in the mesh before more is fused: several may come one after the other.
+/// A loop is in the mesh before more is fused. Where one comes after the other, what is begun for the first
+/// is given up, once, unless half of it is done: neither waits for more than one and a half times what all
+/// takes.
 void LiveSurface::follow_map() {
-  std::uint64_t last_jump = 0;
+  constexpr double kNearlyDone = 0.5;
+  const auto another_loop = [this] { return maps_.newest()->graph.last_jump().version > version_; };
+  bool may_give_up = true;
   do {
     const auto map = maps_.newest();
     version_ = map->graph.version();
     surface_->step(map->graph, {.keyframes = 0, .anew = 0});
-    mesh_->update(*surface_, map->graph);
-    last_jump = maps_.newest()->graph.last_jump().version;
-  } while (last_jump > version_);
+    may_give_up = mesh_->update(*surface_, map->graph, [&](double done) {
+      return may_give_up && done < kNearlyDone && another_loop();
+    });
+  } while (another_loop());
 }
 
 void LiveSurface::take(const Frame& frame, double row_offset) {
