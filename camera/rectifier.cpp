@@ -106,9 +106,10 @@ RectificationMap make_map(const PinholeCamera& rectified, const SO3& R_rectified
       row_x[u] = row_y[u] = kNoSource;
       if (ray.z() <= 0) continue;
       Eigen::Matrix2d J;
-      const Vector2 xy_d = raw.distortion.distort(ray.head<2>() / ray.z(), &J);
-      if (!(J.determinant() > 0))
-        continue;  // beyond the fold of the polynomial: a mirrored copy of the image
+      const Vector2 xy = ray.head<2>() / ray.z();
+      const Vector2 xy_d = raw.distortion.distort(xy, &J);
+      if (!(J.determinant() > 0) || !raw.distortion.reaches(xy))
+        continue;  // beyond a fold or a pole: another copy of the image
       row_x[u] = static_cast<float>(raw.pinhole.fx * xy_d.x() + raw.pinhole.cx);
       row_y[u] = static_cast<float>(raw.pinhole.fy * xy_d.y() + raw.pinhole.cy);
     }

@@ -41,4 +41,16 @@ inline Calibration double_sphere() {
   return c;
 }
 
+/// A wide pair whose maker calibrates with the rational model.
+inline Calibration rational() {
+  Calibration c = euroc();
+  c.left = {
+      {570.2, 569.8, 641.5, 395.1, 1280, 800},
+      {DistortionModel::kRational, {0.4371, -2.5066, 0.0006, -0.0002, 1.4637, 0.3137, -2.3387, 1.3903}}};
+  c.right = {
+      {571.1, 570.4, 636.2, 402.7, 1280, 800},
+      {DistortionModel::kRational, {0.4402, -2.5101, -0.0003, 0.0004, 1.4661, 0.3171, -2.3417, 1.3926}}};
+  return c;
+}
+
 }  // namespace twofold

@@ -17,7 +17,8 @@ float sample(const cv::Mat& map, double u, double v) {
 }
 
 class StereoRectifier : public ::testing::TestWithParam<Calibration> {};
-INSTANTIATE_TEST_SUITE_P(Rigs, StereoRectifier, ::testing::Values(euroc(), fisheye(), double_sphere()));
+INSTANTIATE_TEST_SUITE_P(Rigs, StereoRectifier,
+                         ::testing::Values(euroc(), fisheye(), double_sphere(), rational()));
 
 /// Project points through the raw cameras and look up, in the maps, the rectified pixels that show these raw
 /// pixels.
@@ -158,6 +159,27 @@ TEST(Rectifier, UndistortsDepthWithoutMixingSurfaces) {
   const int far = cv::countNonZero(out.depth == 5000);
   EXPECT_EQ(near + far, 480 * 752);
   EXPECT_GT(near, 100000);
+}
+
+/// The quotient folds at r = 1.042 and grows again from 1.1 on: what lies beyond would be seen twice.
+TEST(Rectifier, ShowsNothingBeyondTheFoldOfALens) {
+  Calibration c;
+  c.kind = SensorKind::kMono;
+  c.left = {{300, 300, 500, 350, 1000, 700},
+            {DistortionModel::kRational, {0.0826, -2.605, 0, 0, 1.595, -0.0417, -2.42, 1.517}}};
+  const Rectifier rectifier(c, {.field = 1, .max_half_field_deg = 65});
+  int within = 0, beyond = 0;
+  for (int v = 0; v < rectifier.rig().camera.height; v += 5) {
+    for (int u = 0; u < rectifier.rig().camera.width; u += 5) {
+      const double r = rectifier.rig().camera.unproject(Vector2(u, v)).head<2>().norm();
+      const bool seen = rectifier.left_map().x.at<float>(v, u) > -1000;
+      if (std::abs(r - 1.042) < 0.001) continue;
+      EXPECT_EQ(seen, r < 1.042) << r;
+      ++(r < 1.042 ? within : beyond);
+    }
+  }
+  EXPECT_GT(within, 1000);
+  EXPECT_GT(beyond, 1000);
 }
 
 TEST(Rectifier, MonoWithoutDistortionKeepsItsIntrinsics) {
