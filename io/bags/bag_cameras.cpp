@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "camera/opencv_distortion.hpp"
 #include "io/bags/bag_bytes.hpp"
 
 namespace twofold {
@@ -128,20 +129,33 @@ PinholeCamera pinhole_of(const double* matrix, std::size_t columns, const Camera
           matrix[columns + 2], static_cast<int>(info.width), static_cast<int>(info.height)};
 }
 
-Distortion distortion_of(const CameraInfoMessage& info) {
-  Distortion distortion;
-  std::vector<double> D = info.D;
-  while (!D.empty() && D.back() == 0) D.pop_back();
-  if (D.empty()) return distortion;
-  const bool fisheye = info.distortion_model == "equidistant" || info.distortion_model == "fisheye";
-  const bool known =
-      fisheye || info.distortion_model == "plumb_bob" || info.distortion_model == "rational_polynomial";
-  distortion.model = fisheye ? DistortionModel::kEquidistant : DistortionModel::kRadTan;
-  if (!known || D.size() > static_cast<std::size_t>(distortion.coefficient_count()))
-    throw MalformedBytes("camera_info has a distortion '" + info.distortion_model + "' of " +
-                         std::to_string(D.size()) + " coefficients, which is not known: give --calib");
+/// Zeros at the end may be left out.
+tl::expected<Distortion, std::string> pinhole_distortion(std::vector<double> D) {
+  std::size_t used = D.size();
+  while (used > 0 && D[used - 1] == 0) --used;
+  if (used <= 5) D.resize(5);
+  return opencv_distortion(D);
+}
+
+tl::expected<Distortion, std::string> fisheye_distortion(std::vector<double> D) {
+  while (D.size() > 4 && D.back() == 0) D.pop_back();
+  if (D.size() > 4) return tl::make_unexpected("has " + std::to_string(D.size()) + " coefficients, not 4");
+  Distortion distortion{DistortionModel::kEquidistant, {}};
   std::copy(D.begin(), D.end(), distortion.coefficients.begin());
   return distortion;
+}
+
+/// Zeros alone are no distortion, whatever the model.
+Distortion distortion_of(const CameraInfoMessage& info) {
+  if (std::all_of(info.D.begin(), info.D.end(), [](double k) { return k == 0; })) return {};
+  const std::string& model = info.distortion_model;
+  tl::expected<Distortion, std::string> distortion = tl::make_unexpected("is not known");
+  if (model == "equidistant" || model == "fisheye") distortion = fisheye_distortion(info.D);
+  if (model == "plumb_bob" || model == "rational_polynomial") distortion = pinhole_distortion(info.D);
+  if (!distortion)
+    throw MalformedBytes("camera_info: the distortion '" + model + "' " + distortion.error() +
+                         ": give --calib");
+  return *distortion;
 }
 
 CameraModel model_of(const BagCamera& camera, const CameraInfoMessage& info) {

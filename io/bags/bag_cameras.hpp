@@ -42,7 +42,7 @@ struct WantedTopics {
 [[nodiscard]] BagCameras choose_cameras(const std::vector<BagTopic>& topics, const WantedTopics& wanted);
 
 /// What the cameras' CameraInfo says; `right` for stereo. Throws MalformedBytes when it says nothing (K is
-/// zero) or names a distortion that is not known.
+/// zero), names a distortion that is not known, or has more coefficients than are supported.
 [[nodiscard]] Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& left,
                                          const std::optional<CameraInfoMessage>& right);
 

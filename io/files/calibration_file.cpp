@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "camera/opencv_distortion.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/kitti_calibration.hpp"
 #include "io/files/yaml_node.hpp"
@@ -15,27 +16,31 @@ namespace {
 namespace fs = std::filesystem;
 
 Distortion distortion_of(const YamlNode& model, const YamlNode* coefficients) {
-  static const std::map<std::string, DistortionModel> kNames{{"none", DistortionModel::kNone},
-                                                             {"radtan", DistortionModel::kRadTan},
-                                                             {"radial-tangential", DistortionModel::kRadTan},
-                                                             {"plumb_bob", DistortionModel::kRadTan},
-                                                             {"equidistant", DistortionModel::kEquidistant}};
+  static const std::map<std::string, DistortionModel> kNames{
+      {"none", DistortionModel::kNone},
+      {"radtan", DistortionModel::kRadTan},
+      {"radial-tangential", DistortionModel::kRadTan},
+      {"plumb_bob", DistortionModel::kRadTan},
+      {"rational", DistortionModel::kRational},
+      {"rational_polynomial", DistortionModel::kRational},
+      {"equidistant", DistortionModel::kEquidistant}};
   const auto name = kNames.find(model.text());
-  if (name == kNames.end()) model.fail(fmt::format("is '{}', not none, radtan or equidistant", model.text()));
-  Distortion distortion;
-  distortion.model = name->second;
+  if (name == kNames.end())
+    model.fail(fmt::format("is '{}', not none, radtan, rational or equidistant", model.text()));
+  if (name->second == DistortionModel::kNone) return {};
+  const YamlNode& given = coefficients ? *coefficients : model;
   const auto values = coefficients ? coefficients->numbers() : std::vector<double>{};
-  const bool radtan = distortion.model == DistortionModel::kRadTan;
-  const bool count_fits =
-      distortion.model == DistortionModel::kNone || values.size() == 4 || (radtan && values.size() == 5);
-  if (!count_fits) {
-    (coefficients ? *coefficients : model)
-        .fail(fmt::format("{} coefficients do not fit the model", values.size()));
-  }
-  if (distortion.model != DistortionModel::kNone) {
+  if (name->second == DistortionModel::kEquidistant) {
+    if (values.size() != 4) given.fail(fmt::format("has {} coefficients, equidistant has 4", values.size()));
+    Distortion distortion{DistortionModel::kEquidistant, {}};
     std::copy(values.begin(), values.end(), distortion.coefficients.begin());
+    return distortion;
   }
-  return distortion;
+  if (name->second == DistortionModel::kRational && values.size() < 8)
+    given.fail(fmt::format("has {} coefficients, rational has 8", values.size()));
+  const auto distortion = opencv_distortion(values);
+  if (!distortion) given.fail(distortion.error());
+  return *distortion;
 }
 
 void read_size(const YamlNode& node, PinholeCamera* camera) {
@@ -167,6 +172,22 @@ Calibration read_own(const YamlNode& root) {
 }
 
 }  // namespace
+
+const char* distortion_name(DistortionModel model) {
+  switch (model) {
+    case DistortionModel::kNone:
+      break;
+    case DistortionModel::kRadTan:
+      return "radtan";
+    case DistortionModel::kEquidistant:
+      return "equidistant";
+    case DistortionModel::kDoubleSphere:
+      return "ds";
+    case DistortionModel::kRational:
+      return "rational";
+  }
+  return "none";
+}
 
 EurocCamera read_euroc_camera(const fs::path& file) {
   const YamlNode root = YamlNode::load(file);

@@ -38,6 +38,10 @@ struct EurocCamera {
 [[nodiscard]] SE3 read_euroc_sensor_pose(const std::filesystem::path& file);
 [[nodiscard]] EurocCamera read_euroc_camera(const std::filesystem::path& file);
 
+/// A lens as `model` or `distortion_model` of these files names it: none, radtan, equidistant, rational; ds,
+/// which is a `camera_model`.
+[[nodiscard]] const char* distortion_name(DistortionModel model);
+
 /// Fills in a size that the calibration file did not state.
 void set_missing_size(int width, int height, Calibration* calibration);
 

@@ -14,13 +14,13 @@ std::string camera_text(const CameraModel& model) {
   std::string text = fmt::format("  - size: [{}, {}]\n    intrinsics: [{:.9g}, {:.9g}, {:.9g}, {:.9g}]\n",
                                  c.width, c.height, c.fx, c.fy, c.cx, c.cy);
   if (model.distortion.is_identity()) return text;
-  const bool radtan = model.distortion.model == DistortionModel::kRadTan;
   const auto& k = model.distortion.coefficients;
-  const std::size_t count = radtan && k[4] != 0 ? 5 : 4;
+  const bool without_k3 = model.distortion.model == DistortionModel::kRadTan && k[4] == 0;
+  const int count = without_k3 ? 4 : model.distortion.coefficient_count();
   std::vector<std::string> values;
-  for (std::size_t i = 0; i < count; ++i) values.push_back(fmt::format("{:.9g}", k[i]));
+  for (int i = 0; i < count; ++i) values.push_back(fmt::format("{:.9g}", k[i]));
   return text + fmt::format("    distortion:\n      model: {}\n      coefficients: [{}]\n",
-                            radtan ? "radtan" : "equidistant", fmt::join(values, ", "));
+                            distortion_name(model.distortion.model), fmt::join(values, ", "));
 }
 
 std::string quality_text(const CalibrationQuality& quality) {

@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include "base/option_check.hpp"
+#include "io/files/calibration_file.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 
@@ -15,17 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string distortion_lines(const Distortion& distortion) {
+  if (distortion.model == DistortionModel::kNone) return {};
   const auto& k = distortion.coefficients;
-  switch (distortion.model) {
-    case DistortionModel::kRadTan:
-      return fmt::format("distortion_model: radtan\ndistortion_coefficients: [{}, {}, {}, {}, {}]\n", k[0],
-                         k[1], k[2], k[3], k[4]);
-    case DistortionModel::kEquidistant:
-      return fmt::format("distortion_model: equidistant\ndistortion_coefficients: [{}, {}, {}, {}]\n", k[0],
-                         k[1], k[2], k[3]);
-    default:
-      return {};
-  }
+  return fmt::format("distortion_model: {}\ndistortion_coefficients: [{}]\n",
+                     distortion_name(distortion.model),
+                     fmt::join(k.begin(), k.begin() + distortion.coefficient_count(), ", "));
 }
 
 /// fmt writes the shortest text that reads back as the same number.

@@ -1,5 +1,7 @@
 #include "io/files/calibration_file.hpp"
 
+#include <tuple>
+
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {
@@ -83,6 +85,84 @@ TEST(CalibrationFile, NamesTheKeyThatIsWrong) {
     const auto message = error(text);
     EXPECT_NE(message.find(part), std::string::npos) << message << "\nfor\n" << text;
     EXPECT_NE(message.find("c.yaml"), std::string::npos) << message;
+  }
+}
+
+constexpr const char* kEight = "[0.4371, -2.5066, 0.0006, -0.0002, 1.4637, 0.3137, -2.3387, 1.3903]";
+
+std::string one_camera(const std::string& model, const std::string& coefficients) {
+  return "sensor: mono\ncameras:\n  - size: [1280, 720]\n    intrinsics: [610, 611, 640, 360]\n"
+         "    distortion: {model: " +
+         model + ", coefficients: " + coefficients + "}\n";
+}
+
+std::string euroc_camera(const std::string& model, const std::string& coefficients) {
+  return "sensor_type: camera\ncamera_model: pinhole\nresolution: [1280, 720]\n"
+         "intrinsics: [610, 611, 640, 360]\ndistortion_model: " +
+         model + "\ndistortion_coefficients: " + coefficients + "\n";
+}
+
+/// Whatever the model is called, as OpenCV takes coefficients: eight of them are a quotient unless the last
+/// three are zero.
+TEST(CalibrationFile, RationalLens) {
+  const ScratchFolder folder;
+  const auto lens = [&](const std::string& text) {
+    return read_calibration(folder.write("c.yaml", text)).left.distortion;
+  };
+  const Distortion rational = lens(one_camera("rational", kEight));
+  EXPECT_EQ(rational.model, DistortionModel::kRational);
+  EXPECT_EQ(rational.coefficients,
+            (Distortion::Coefficients{0.4371, -2.5066, 0.0006, -0.0002, 1.4637, 0.3137, -2.3387, 1.3903}));
+  const std::string zeros = std::string(kEight).replace(std::string(kEight).size() - 1, 1, ", 0, 0, 0, 0]");
+  for (const std::string& text : {one_camera("rational_polynomial", kEight), one_camera("radtan", kEight),
+                                  one_camera("rational", zeros), euroc_camera("rational_polynomial", kEight),
+                                  euroc_camera("radial-tangential", kEight)}) {
+    const Distortion distortion = lens(text);
+    EXPECT_EQ(distortion.model, DistortionModel::kRational) << text;
+    EXPECT_EQ(distortion.coefficients, rational.coefficients) << text;
+  }
+  const Distortion plain = lens(one_camera("rational", "[0.1, -0.2, 0, 0, 0.05, 0, 0, 0]"));
+  EXPECT_EQ(plain.model, DistortionModel::kRadTan);
+  EXPECT_EQ(plain.coefficients[4], 0.05);
+}
+
+TEST(CalibrationFile, SaysWhyALensIsRefused) {
+  const ScratchFolder folder;
+  const auto error = [&](const std::string& model, const std::string& coefficients) {
+    return io_error_of(
+        [&] { (void)read_calibration(folder.write("c.yaml", one_camera(model, coefficients))); });
+  };
+  const std::tuple<const char*, const char*, const char*> cases[] = {
+      {"fancy", "[0.1]", "is 'fancy', not none, radtan, rational or equidistant"},
+      {"radtan", "[0.1, 0, 0]", "has 3 coefficients, not 4, 5, 8, 12 or 14"},
+      {"rational", "[0.1, 0, 0, 0, 0]", "has 5 coefficients, rational has 8"},
+      {"rational", "[0.1, 0, 0, 0, 0, 0.1, 0, 0, 0]", "has 9 coefficients, not 4, 5, 8, 12 or 14"},
+      {"rational", "[0.1, 0, 0, 0, 0, 0.1, 0, 0, 0.01, 0, 0, 0]", "thin prism or a tilted sensor"},
+      {"equidistant", "[0.1, 0, 0]", "has 3 coefficients, equidistant has 4"}};
+  for (const auto& [model, coefficients, part] : cases) {
+    const auto message = error(model, coefficients);
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+    EXPECT_NE(message.find("cameras[0].distortion."), std::string::npos) << message;
+  }
+}
+
+TEST(CalibrationFile, WrittenLensesAreReadBack) {
+  const ScratchFolder folder;
+  const Distortion lenses[] = {
+      {},
+      {DistortionModel::kRadTan, {-0.2, 0.05, 0.001, 0.002}},
+      {DistortionModel::kRadTan, {-0.2, 0.05, 0.001, 0.002, 0.01}},
+      {DistortionModel::kEquidistant, {0.01, 0.02, 0.03, 0.04}},
+      {DistortionModel::kRational, {0.4371, -2.5066, 0.0006, -0.0002, 1.4637, 0.3137, -2.3387, 1.39031234}}};
+  for (const Distortion& lens : lenses) {
+    Calibration written;
+    written.kind = SensorKind::kMono;
+    written.left = {{610, 611, 640, 360, 1280, 720}, lens};
+    write_calibration(folder.path() / "c.yaml", written, {});
+    const Calibration c = read_calibration(folder.path() / "c.yaml");
+    EXPECT_EQ(c.left.distortion.model, lens.model);
+    EXPECT_EQ(c.left.distortion.coefficients, lens.coefficients);
+    EXPECT_EQ(c.left.pinhole.fy, 611);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <opencv2/core.hpp>
 
+#include "io/files/calibration_file.hpp"
 #include "io/files/io_error.hpp"
 #include "io/sources/open_source.hpp"
 #include "tests/io/scratch_folder.hpp"
@@ -60,6 +61,24 @@ TEST(RecorderTest, WhatIsRecordedReadsBackBitForBit) {
     EXPECT_EQ(cv::norm(frame.right, test_frame(k).right, cv::NORM_INF), 0);
   }
   EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+}
+
+TEST(RecorderTest, TheLensIsKeptDigitByDigit) {
+  const ScratchFolder scratch;
+  const Distortion lenses[] = {
+      {DistortionModel::kRadTan, {-0.1, 1.0 / 3, 1e-4, -2e-5, 0.03}},
+      {DistortionModel::kEquidistant, {0.1, 1.0 / 3, 1e-4, -2e-5}},
+      {DistortionModel::kDoubleSphere, {-0.2, 1.0 / 3}},
+      {DistortionModel::kRational, {0.1, -1.0 / 3, 1e-4, -2e-5, 0.03, 0.05, -0.7, 2.0 / 3}}};
+  for (const Distortion& lens : lenses) {
+    Calibration calibration = calibration_of(test_rig(SensorKind::kMono));
+    calibration.left.distortion = lens;
+    const fs::path folder = scratch.path() / std::to_string(static_cast<int>(lens.model));
+    { const Recorder recorder(folder, SensorKind::kMono, calibration); }
+    const EurocCamera read = read_euroc_camera(folder / "mav0/cam0/sensor.yaml");
+    EXPECT_EQ(read.model.distortion.model, lens.model);
+    EXPECT_EQ(read.model.distortion.coefficients, lens.coefficients);
+  }
 }
 
 TEST(RecorderTest, EveryFrameThatDoesNotFitTheQueueIsCounted) {

@@ -106,6 +106,33 @@ TEST(BagCameras, RawPairsKeepTheirLensAndTheirTurn) {
   EXPECT_LT((calibration.T_right_left * of_left - of_right).norm(), 1e-9);
 }
 
+/// As the drivers of depth sensors publish their lenses.
+TEST(BagCameras, KnowTheRationalModel) {
+  const std::vector<double> eight{0.4371, -2.5066, 0.0006, -0.0002, 1.4637, 0.3137, -2.3387, 1.3903};
+  const auto lens = [](const std::string& model, const std::vector<double>& D) {
+    WrittenCameraInfo info = rectified_info(false);
+    info.model = model;
+    info.D = D;
+    const BagCameras camera =
+        choose_cameras(topics({{"/rgb/image_raw", "Image"}, {"/rgb/camera_info", "CameraInfo"}}), {});
+    const Calibration calibration = calibration_of(camera, message_of(info), {});
+    EXPECT_EQ(calibration.invalid_reason(), "");
+    return calibration.left.distortion;
+  };
+  std::vector<double> fourteen = eight;
+  fourteen.resize(14);
+  for (const auto& [model, D] :
+       {std::pair("rational_polynomial", eight), {"rational_polynomial", fourteen}, {"plumb_bob", eight}}) {
+    const Distortion distortion = lens(model, D);
+    EXPECT_EQ(distortion.model, DistortionModel::kRational);
+    EXPECT_TRUE(std::equal(eight.begin(), eight.end(), distortion.coefficients.begin()));
+  }
+  EXPECT_EQ(lens("rational_polynomial", {0.1, -0.2, 0, 0, 0.05, 0, 0, 0}).model, DistortionModel::kRadTan);
+  EXPECT_EQ(lens("plumb_bob", {0.1, -0.2, 0, 0, 0.05}).coefficients[4], 0.05);
+  EXPECT_EQ(lens("plumb_bob", {0.1, -0.2}).coefficients[1], -0.2) << "zeros may be left out";
+  EXPECT_EQ(lens("rational_polynomial", std::vector<double>(8, 0.0)).model, DistortionModel::kNone);
+}
+
 TEST(BagCameras, SayWhatTheInfoLacks) {
   const auto why = [](const WrittenCameraInfo& left, const WrittenCameraInfo& right) {
     try {
@@ -122,9 +149,18 @@ TEST(BagCameras, SayWhatTheInfoLacks) {
   EXPECT_NE(why(uncalibrated, right).find("not calibrated"), std::string::npos);
   EXPECT_NE(why(left, left).find("no baseline"), std::string::npos);
   WrittenCameraInfo strange = left;
-  strange.model = "rational_polynomial";
-  strange.D = {1, 1, 1, 1, 1, 1, 1, 1};
-  EXPECT_NE(why(strange, right).find("'rational_polynomial' of 8 coefficients"), std::string::npos);
+  const auto why_strange = [&](const std::string& model, const std::vector<double>& D) {
+    strange.model = model;
+    strange.D = D;
+    return why(strange, right);
+  };
+  EXPECT_NE(why_strange("omnidirectional", {1}).find("'omnidirectional' is not known"), std::string::npos);
+  EXPECT_NE(why_strange("plumb_bob", {1, 1, 1, 1, 1, 1}).find("'plumb_bob' has 6 coefficients"),
+            std::string::npos);
+  EXPECT_NE(why_strange("equidistant", {1, 1, 1, 1, 1}).find("'equidistant' has 5 coefficients"),
+            std::string::npos);
+  const std::vector<double> tilted{1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0.01, 0};
+  EXPECT_NE(why_strange("rational_polynomial", tilted).find("tilted sensor"), std::string::npos);
   WrittenCameraInfo bent = left;
   bent.R = {1, 1, 1, 1, 1, 1, 1, 1, 1};
   EXPECT_NE(why(bent, right).find("no rotation"), std::string::npos);
