@@ -95,6 +95,22 @@ TEST(Distortion, RationalWithoutDenominatorIsRadialTangential) {
   }
 }
 
+/// The same lens twice: EuRoC's polynomial times 1 + k4 r^2, over it.
+TEST(Distortion, ACommonFactorOfAQuotientCancels) {
+  const double k1 = kRadTan.coefficients[0], k2 = kRadTan.coefficients[1], k4 = 0.4;
+  const Distortion expanded{
+      DistortionModel::kRational,
+      {k1 + k4, k2 + k1 * k4, kRadTan.coefficients[2], kRadTan.coefficients[3], k2 * k4, k4, 0, 0}};
+  for (const Vector2& xy : {Vector2(0, 0), Vector2(0.3, -0.2), Vector2(-0.8, 0.5)}) {
+    EXPECT_LT((expanded.distort(xy) - kRadTan.distort(xy)).norm(), 1e-15);
+    const auto undistorted = expanded.undistort(xy), of_radtan = kRadTan.undistort(xy);
+    ASSERT_EQ(undistorted.has_value(), of_radtan.has_value());
+    if (undistorted) {
+      EXPECT_LT((*undistorted - *of_radtan).norm(), 1e-9);
+    }
+  }
+}
+
 TEST(Distortion, UndistortFailsBeyondTheFoldOfAQuotient) {
   // It grows up to r = 1.042, where it is 1.44, falls to 1.27 at r = 1.17, and grows again without end.
   const auto along_x = [](double r) { return kFoldingRational.distort({r, 0}); };
