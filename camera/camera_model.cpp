@@ -1,8 +1,23 @@
 #include "camera/camera_model.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace twofold {
+namespace {
+
+/// Whether the largest circle around the principal point that fits into the image can be seen.
+bool sees_its_middle(const CameraModel& camera) {
+  const PinholeCamera& p = camera.pinhole;
+  const double radius = std::min({p.cx, p.cy, p.width - 1 - p.cx, p.height - 1 - p.cy});
+  if (radius <= 0) return true;
+  const Vector2 centre(p.cx, p.cy);
+  const Vector2 right(radius, 0), down(0, radius);
+  const auto sees = [&](const Vector2& offset) { return camera.unproject(centre + offset).has_value(); };
+  return sees(right) && sees(-right) && sees(down) && sees(-down);
+}
+
+}  // namespace
 
 std::string CameraModel::invalid_reason() const {
   const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
@@ -13,7 +28,14 @@ std::string CameraModel::invalid_reason() const {
     return "image size must be positive, is " + std::to_string(pinhole.width) + " x " +
            std::to_string(pinhole.height);
   }
-  return distortion.invalid_reason();
+  if (auto reason = distortion.invalid_reason(); !reason.empty()) return reason;
+  // Its coefficients are large and nearly cancel each other: in another order they make no lens.
+  if (distortion.model == DistortionModel::kRational && !sees_its_middle(*this)) {
+    return "the lens folds the middle of the image over: are its coefficients k1 k2 p1 p2 k3 k4 k5 k6, in "
+           "this "
+           "order and with all their digits?";
+  }
+  return {};
 }
 
 Vector2 CameraModel::project(const Vector3& x_c, Matrix23* J) const {

@@ -150,6 +150,46 @@ TEST(Distortion, UndistortStaysBeforeAPole) {
   EXPECT_LT(back->x(), 1) << "what the lens sees there";
 }
 
+/// Whatever numbers a file has: a point that is given back is one that the lens sees at this pixel.
+TEST(Distortion, UndistortsWhatIsSeenOrNothing) {
+  std::mt19937 rng(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int found = 0, none = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Distortion lens{i % 2 == 0 ? DistortionModel::kRational : DistortionModel::kRadTan, {}};
+    for (double& k : lens.coefficients) k = std::pow(10, 3 * unit(rng) - 1) * unit(rng);
+    const Vector2 xy_d(2 * unit(rng), 2 * unit(rng));
+    const auto xy = lens.undistort(xy_d);
+    ++(xy ? found : none);
+    if (!xy) continue;
+    EXPECT_LT((lens.distort(*xy) - xy_d).norm(), 1e-8);
+    EXPECT_TRUE(lens.reaches(*xy)) << xy->transpose();
+  }
+  EXPECT_GT(found, 2000);
+  EXPECT_GT(none, 2000);
+}
+
+/// Along the radius alone there is one point for each pixel that is seen.
+TEST(Distortion, UndistortsAllThatIsSeen) {
+  std::mt19937 rng(8);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int seen = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Distortion lens{DistortionModel::kRational, {}};
+    for (double& k : lens.coefficients) k = std::pow(10, 3 * unit(rng) - 1) * unit(rng);
+    lens.coefficients[2] = lens.coefficients[3] = 0;
+    const Vector2 xy(1.5 * unit(rng), 1.5 * unit(rng));
+    if (!lens.reaches(1.01 * xy)) continue;  // not at the fold itself, where Newton's steps are lost
+    ++seen;
+    const auto back = lens.undistort(lens.distort(xy));
+    ASSERT_TRUE(back) << "lens " << i;
+    Eigen::Matrix2d J;
+    (void)lens.distort(xy, &J);
+    EXPECT_LT((J * (*back - xy)).norm(), 1e-8) << "lens " << i;
+  }
+  EXPECT_GT(seen, 2000);
+}
+
 TEST(Distortion, FisheyeSeriesJoinsClosedForm) {
   const Vector2 inside = kFisheye.distort({0.9999e-6, 0});
   const Vector2 outside = kFisheye.distort({1.0001e-6, 0});
@@ -206,6 +246,20 @@ TEST(CameraModel, OfARationalLensIsInvertedAllOverItsImage) {
     }
   }
   EXPECT_LT(farthest, 1e-9);
+}
+
+/// Its maker's tools print k1 to k6 first and p2, p1 last.
+TEST(CameraModel, SaysThatCoefficientsAreInAnotherOrder) {
+  CameraModel camera{{610.3, 610.1, 638.7, 367.4, 1280, 720}, kRational};
+  EXPECT_EQ(camera.invalid_reason(), "");
+  const auto [k1, k2, p1, p2, k3, k4, k5, k6] = kRational.coefficients;
+  camera.distortion.coefficients = {k1, k2, k3, k4, k5, k6, p2, p1};
+  EXPECT_NE(camera.invalid_reason().find("k1 k2 p1 p2 k3 k4 k5 k6, in this order"), std::string::npos);
+  // Only corners beyond its fold: they stay black.
+  camera.distortion = kFoldingRational;
+  camera.pinhole.fx = camera.pinhole.fy = 480;
+  EXPECT_FALSE(camera.unproject({0, 0}));
+  EXPECT_EQ(camera.invalid_reason(), "");
 }
 
 }  // namespace
