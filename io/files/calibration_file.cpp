@@ -15,6 +15,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
+Distortion opencv_distortion_of(const YamlNode& coefficients) {
+  const auto distortion = opencv_distortion(coefficients.numbers());
+  if (!distortion) coefficients.fail(distortion.error());
+  return *distortion;
+}
+
+Distortion equidistant_of(const YamlNode& coefficients) {
+  const auto values = coefficients.numbers();
+  if (values.size() != 4)
+    coefficients.fail(fmt::format("has {} coefficients, equidistant has 4", values.size()));
+  Distortion distortion{DistortionModel::kEquidistant, {}};
+  std::copy(values.begin(), values.end(), distortion.coefficients.begin());
+  return distortion;
+}
+
+/// @param coefficients  null where there are none
 Distortion distortion_of(const YamlNode& model, const YamlNode* coefficients) {
   static const std::map<std::string, DistortionModel> kNames{
       {"none", DistortionModel::kNone},
@@ -28,19 +44,12 @@ Distortion distortion_of(const YamlNode& model, const YamlNode* coefficients) {
   if (name == kNames.end())
     model.fail(fmt::format("is '{}', not none, radtan, rational or equidistant", model.text()));
   if (name->second == DistortionModel::kNone) return {};
-  const YamlNode& given = coefficients ? *coefficients : model;
-  const auto values = coefficients ? coefficients->numbers() : std::vector<double>{};
-  if (name->second == DistortionModel::kEquidistant) {
-    if (values.size() != 4) given.fail(fmt::format("has {} coefficients, equidistant has 4", values.size()));
-    Distortion distortion{DistortionModel::kEquidistant, {}};
-    std::copy(values.begin(), values.end(), distortion.coefficients.begin());
-    return distortion;
-  }
-  if (name->second == DistortionModel::kRational && values.size() < 8)
-    given.fail(fmt::format("has {} coefficients, rational has 8", values.size()));
-  const auto distortion = opencv_distortion(values);
-  if (!distortion) given.fail(distortion.error());
-  return *distortion;
+  if (!coefficients) model.fail(fmt::format("is '{}', but there are no coefficients", model.text()));
+  if (name->second == DistortionModel::kEquidistant) return equidistant_of(*coefficients);
+  const std::size_t count = coefficients->items().size();
+  if (name->second == DistortionModel::kRational && count < 8)
+    coefficients->fail(fmt::format("has {} coefficients, rational has 8", count));
+  return opencv_distortion_of(*coefficients);
 }
 
 void read_size(const YamlNode& node, PinholeCamera* camera) {
@@ -91,6 +100,29 @@ Calibration read_kalibr(const YamlNode& root) {
     calibration.right = read_camera(root.at("cam1"), "distortion_coeffs");
     calibration.T_right_left = root.at("cam1").at("T_cn_cnm1").rigid_motion();
   }
+  return calibration;
+}
+
+/// ROS names the model; OpenCV says only whether it is a fisheye.
+Distortion read_opencv_lens(const YamlNode& root) {
+  if (!root.has("distortion_coefficients")) return {};
+  const YamlNode coefficients = root.at("distortion_coefficients").at("data");
+  if (root.has("distortion_model")) return distortion_of(root.at("distortion_model"), &coefficients);
+  const bool fisheye = root.has("fisheye_model") && root.at("fisheye_model").integer() != 0;
+  return fisheye ? equidistant_of(coefficients) : opencv_distortion_of(coefficients);
+}
+
+/// As OpenCV's calibration program writes it, and ROS' keeps camera_info.
+Calibration read_opencv(const YamlNode& root) {
+  Calibration calibration;
+  calibration.kind = SensorKind::kMono;
+  const YamlNode matrix = root.at("camera_matrix");
+  const auto K = matrix.at("data").numbers(9);
+  if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
+    matrix.fail("is not [fx, 0, cx, 0, fy, cy, 0, 0, 1]");
+  calibration.left.pinhole = {
+      K[0], K[4], K[2], K[5], root.at("image_width").integer(), root.at("image_height").integer()};
+  calibration.left.distortion = read_opencv_lens(root);
   return calibration;
 }
 
@@ -232,6 +264,7 @@ Calibration read_calibration(const fs::path& file) {
   const YamlNode root = YamlNode::load(file);
   if (root.has("cameras")) return read_own(root);
   if (root.has("cam0")) return read_kalibr(root);
+  if (root.has("camera_matrix")) return read_opencv(root);
   if (root.has("camera_model") || root.has("T_BS")) {
     const EurocCamera camera = read_euroc_camera(file);
     Calibration calibration;
@@ -240,7 +273,9 @@ Calibration read_calibration(const fs::path& file) {
     calibration.fps = camera.rate_hz;
     return calibration;
   }
-  throw IoError(file, "has none of the keys 'cameras', 'cam0', 'camera_model' or 'P0:': not a calibration");
+  throw IoError(
+      file,
+      "has none of the keys 'cameras', 'cam0', 'camera_model', 'camera_matrix' or 'P0:': not a calibration");
 }
 
 void set_missing_size(int width, int height, Calibration* calibration) {

@@ -13,6 +13,7 @@ namespace twofold {
 ///   own YAML          top-level key `cameras`
 ///   Kalibr camchain   top-level keys cam0, cam1
 ///   EuRoC sensor.yaml top-level key camera_model or T_BS: one camera
+///   OpenCV, ROS       top-level key camera_matrix: one camera
 ///   KITTI calib.txt   lines "P0: twelve numbers"; has no image size: width and height stay 0
 ///   EuRoC folder      cam0/sensor.yaml, and cam1/sensor.yaml of a pair, in it or in mav0 in it
 ///

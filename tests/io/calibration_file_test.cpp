@@ -146,6 +146,80 @@ TEST(CalibrationFile, SaysWhyALensIsRefused) {
   }
 }
 
+/// As cameracalibrator of ROS saves it.
+constexpr const char* kRos = R"(image_width: 1280
+image_height: 720
+camera_name: webcam
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [610.2, 0., 640.1, 0., 611.3, 360.4, 0., 0., 1.]
+distortion_model: rational_polynomial
+distortion_coefficients:
+  rows: 1
+  cols: 8
+  data: [0.4371, -2.5066, 0.0006, -0.0002, 1.4637, 0.3137, -2.3387, 1.3903]
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [1., 0., 0., 0., 1., 0., 0., 0., 1.]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [600., 0., 641., 0., 0., 605., 361., 0., 0., 0., 1., 0.]
+)";
+/// As OpenCV's example program does.
+constexpr const char* kOpenCv = R"(%YAML:1.0
+---
+calibration_time: "Thu Nov 26 02:00:00 2026"
+nframes: 20
+image_width: 640
+image_height: 480
+board_width: 9
+flags: 16384
+fisheye_model: 0
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 5.2e+02, 0., 3.2e+02, 0., 5.21e+02, 2.4e+02, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 8
+   cols: 1
+   dt: d
+   data: [ 2.0e-01, 5.0e-02, 5.0e-04, -3.0e-04, 1.0e-03,
+       5.0e-01, 1.5e-01, 1.0e-02 ]
+avg_reprojection_error: 2.1e-01
+)";
+
+TEST(CalibrationFile, OfOpenCvAndRos) {
+  const ScratchFolder folder;
+  const auto read = [&](const std::string& text) { return read_calibration(folder.write("c.yaml", text)); };
+  const Calibration ros = read(kRos);
+  EXPECT_EQ(ros.kind, SensorKind::kMono);
+  EXPECT_EQ(ros.invalid_reason(), "");
+  EXPECT_EQ(ros.left.pinhole.fy, 611.3);
+  EXPECT_EQ(ros.left.pinhole.cx, 640.1);
+  EXPECT_EQ(ros.left.pinhole.width, 1280);
+  EXPECT_EQ(ros.left.distortion.model, DistortionModel::kRational);
+  EXPECT_EQ(ros.left.distortion.coefficients[7], 1.3903);
+  const Calibration opencv = read(kOpenCv);
+  EXPECT_EQ(opencv.invalid_reason(), "");
+  EXPECT_EQ(opencv.left.pinhole.cy, 240);
+  EXPECT_EQ(opencv.left.distortion.model, DistortionModel::kRational);
+  EXPECT_EQ(opencv.left.distortion.coefficients[5], 0.5);
+  // Of a fisheye, four numbers mean something else.
+  const std::string four =
+      with(with(kOpenCv, "1.0e-03,\n       5.0e-01, 1.5e-01, 1.0e-02 ]", "]"), "-3.0e-04,", "-3.0e-04");
+  EXPECT_EQ(read(four).left.distortion.model, DistortionModel::kRadTan);
+  EXPECT_EQ(read(with(four, "fisheye_model: 0", "fisheye_model: 1")).left.distortion.model,
+            DistortionModel::kEquidistant);
+  EXPECT_IO_ERROR(read(with(kOpenCv, "fisheye_model: 0", "fisheye_model: 1")), "equidistant has 4");
+  EXPECT_IO_ERROR(read(with(kRos, "[610.2, 0.,", "[610.2, 0.3,")), "is not [fx, 0, cx, 0, fy, cy, 0, 0, 1]");
+  EXPECT_IO_ERROR(read(with(kRos, "image_width: 1280\n", "")), "key 'image_width' is missing");
+  EXPECT_IO_ERROR(read(with(kRos, "rational_polynomial", "thin_prism")), "is 'thin_prism'");
+}
+
 TEST(CalibrationFile, WrittenLensesAreReadBack) {
   const ScratchFolder folder;
   const Distortion lenses[] = {
