@@ -66,9 +66,9 @@ Vector2 rational(const Vector2& xy, const Coefficients& k, Matrix2* J) {
   const double s = xy.squaredNorm();
   const double denominator = D[0] + s * (D[1] + s * (D[2] + s * D[3]));
   const double g = (N[0] + s * (N[1] + s * (N[2] + s * N[3]))) / denominator;
-  const double dN = N[1] + s * (2 * N[2] + s * 3 * N[3]);
-  const double dD = D[1] + s * (2 * D[2] + s * 3 * D[3]);
-  const double dg = 2 * (dN - g * dD) / denominator;
+  const double slope_of_n = N[1] + s * (2 * N[2] + s * 3 * N[3]);
+  const double slope_of_d = D[1] + s * (2 * D[2] + s * 3 * D[3]);
+  const double dg = 2 * (slope_of_n - g * slope_of_d) / denominator;
   return shift_tangentially(xy, k, scale_radially(xy, g, dg, J), J);
 }
 

@@ -18,6 +18,7 @@ std::string camera_text(const CameraModel& model) {
   const bool without_k3 = model.distortion.model == DistortionModel::kRadTan && k[4] == 0;
   const int count = without_k3 ? 4 : model.distortion.coefficient_count();
   std::vector<std::string> values;
+  values.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) values.push_back(fmt::format("{:.9g}", k[i]));
   return text + fmt::format("    distortion:\n      model: {}\n      coefficients: [{}]\n",
                             distortion_name(model.distortion.model), fmt::join(values, ", "));
@@ -43,6 +44,7 @@ void write_calibration(const std::filesystem::path& file, const Calibration& cal
     text += camera_text(calibration.right);
     const Matrix4 T = calibration.T_right_left.matrix();
     std::vector<std::string> rows;
+    rows.reserve(4);
     for (int i = 0; i < 4; ++i)
       rows.push_back(fmt::format("{:.12g}, {:.12g}, {:.12g}, {:.12g}", T(i, 0), T(i, 1), T(i, 2), T(i, 3)));
     text += fmt::format("T_right_left: [{}]\n", fmt::join(rows, ",  "));

@@ -28,6 +28,7 @@ std::string sensor_yaml(const CameraModel& camera, const SE3& T_b_c, double fps)
   const PinholeCamera& p = camera.pinhole;
   const Eigen::Matrix4d T = T_b_c.matrix();
   std::vector<double> rows;
+  rows.reserve(16);
   for (int i = 0; i < 16; ++i) rows.push_back(T(i / 4, i % 4));
   std::string text = "sensor_type: camera\n";
   text += fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", fmt::join(rows, ", "));

@@ -55,6 +55,33 @@ TEST(BagSource, OneCameraOfAPair) {
   EXPECT_IO_ERROR(open_source("mcap:" + (folder / "a.mcap") + "?colour=1"), "colour");
 }
 
+/// As a depth sensor's driver publishes its raw colour images.
+TEST(BagSource, RectifiesWhatARationalLensTook) {
+  const ScratchFolder folder;
+  const MessageEncoding cdr = MessageEncoding::kCdr;
+  WrittenCameraInfo info = rectified_info(false);
+  info.model = "rational_polynomial";
+  info.D = {0.2, 0.05, 0, 0, 0.001, 0.5, 0.15, 0.01};
+  WrittenBag bag;
+  bag.topics = {{"/rgb/image_raw", "sensor_msgs/Image"}, {"/rgb/camera_info", "sensor_msgs/CameraInfo"}};
+  cv::Mat ramp(kHeight, kWidth, CV_8UC1);
+  for (int u = 0; u < kWidth; ++u) ramp.col(u).setTo(4 * u);
+  bag.messages.push_back({1, time_of(0), camera_info_message(cdr, info)});
+  bag.messages.push_back({0, time_of(0), image_message(cdr, time_of(0), ramp, "mono8")});
+  folder.write("a.mcap", text_of(mcap_file(bag, {})));
+  const auto source = open_source(folder / "a.mcap");
+  Frame frame;
+  ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+  const Distortion lens{DistortionModel::kRational, {0.2, 0.05, 0, 0, 0.001, 0.5, 0.15, 0.01}};
+  const PinholeCamera& rectified = source->rig().camera;
+  for (int u = 2; u < kWidth - 2; u += 5) {
+    const Vector2 xy = rectified.unproject(Vector2(u, 20)).head<2>();
+    EXPECT_NEAR(frame.left.at<unsigned char>(20, u), 4 * (50 * lens.distort(xy).x() + 32), 1.1) << u;
+  }
+  const Vector2 rim = rectified.unproject(Vector2(0, 24)).head<2>();
+  EXPECT_GT((rim - lens.distort(rim)).norm(), 0.05) << "or this says nothing";
+}
+
 /// Depth is 10 ms late, once 20, and once missing.
 TEST(BagSource, PairsDepthByTime) {
   const ScratchFolder folder;
