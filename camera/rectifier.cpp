@@ -56,9 +56,9 @@ void include_border(const CameraModel& camera, const SO3& R_rectified_raw, doubl
   }
   // An edge that is out of sight altogether: the image goes on to the limit.
   w.outer.x_min = w.outer.x_min > w.outer.x_max ? -limit : w.outer.x_min;
-  w.outer.x_max = w.outer.x_max < w.outer.x_min ? limit : w.outer.x_max;
+  w.outer.x_max = w.outer.x_max <= w.outer.x_min ? limit : w.outer.x_max;
   w.outer.y_min = w.outer.y_min > w.outer.y_max ? -limit : w.outer.y_min;
-  w.outer.y_max = w.outer.y_max < w.outer.y_min ? limit : w.outer.y_max;
+  w.outer.y_max = w.outer.y_max <= w.outer.y_min ? limit : w.outer.y_max;
 }
 
 /// Pinhole with fx = fy whose width x height pixels lie in the inner window (field = 0), cover the outer one

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+#include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <random>
 

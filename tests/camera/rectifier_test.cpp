@@ -161,25 +161,47 @@ TEST(Rectifier, UndistortsDepthWithoutMixingSurfaces) {
   EXPECT_GT(near, 100000);
 }
 
-/// The quotient folds at r = 1.042 and grows again from 1.1 on: what lies beyond would be seen twice.
-TEST(Rectifier, ShowsNothingBeyondTheFoldOfALens) {
+/// A lens that folds at this radius and grows again a little farther out: what lies beyond would be seen
+/// twice.
+class FoldingLens : public ::testing::TestWithParam<std::pair<Distortion, double>> {};
+INSTANTIATE_TEST_SUITE_P(
+    Models, FoldingLens,
+    ::testing::Values(std::pair(Distortion{DistortionModel::kRadTan, {-0.6, 0, 0, 0, 0.1}}, 0.8218),
+                      std::pair(Distortion{DistortionModel::kRational,
+                                           {0.0826, -2.605, 0, 0, 1.595, -0.0417, -2.42, 1.517}},
+                                1.042)));
+
+TEST_P(FoldingLens, ShowsNothingBeyondItsFold) {
+  const auto [lens, fold] = GetParam();
   Calibration c;
   c.kind = SensorKind::kMono;
-  c.left = {{300, 300, 500, 350, 1000, 700},
-            {DistortionModel::kRational, {0.0826, -2.605, 0, 0, 1.595, -0.0417, -2.42, 1.517}}};
+  c.left = {{300, 300, 500, 350, 1000, 700}, lens};
   const Rectifier rectifier(c, {.field = 1, .max_half_field_deg = 65});
   int within = 0, beyond = 0;
   for (int v = 0; v < rectifier.rig().camera.height; v += 5) {
     for (int u = 0; u < rectifier.rig().camera.width; u += 5) {
       const double r = rectifier.rig().camera.unproject(Vector2(u, v)).head<2>().norm();
       const bool seen = rectifier.left_map().x.at<float>(v, u) > -1000;
-      if (std::abs(r - 1.042) < 0.001) continue;
-      EXPECT_EQ(seen, r < 1.042) << r;
-      ++(r < 1.042 ? within : beyond);
+      if (std::abs(r - fold) < 0.001) continue;
+      EXPECT_EQ(seen, r < fold) << r;
+      ++(r < fold ? within : beyond);
     }
   }
   EXPECT_GT(within, 1000);
   EXPECT_GT(beyond, 1000);
+}
+
+/// All four edges of a fisheye's image are behind it: the limit alone says how far the rectified one goes.
+TEST(Rectifier, TakesALensThatSeesToAllSides) {
+  Calibration c;
+  c.kind = SensorKind::kMono;
+  c.left = {{150, 150, 319.5, 239.5, 640, 480}, {DistortionModel::kEquidistant, {}}};
+  for (const double field : {0.0, 1.0}) {
+    const PinholeCamera camera = Rectifier(c, {.field = field, .max_half_field_deg = 60}).rig().camera;
+    EXPECT_NEAR(camera.fx, (field == 0 ? 319.5 : 239.5) / std::tan(60 * M_PI / 180), 1e-9);
+    EXPECT_NEAR(camera.cx, 319.5, 1e-9);
+    EXPECT_NEAR(camera.cy, 239.5, 1e-9);
+  }
 }
 
 TEST(Rectifier, MonoWithoutDistortionKeepsItsIntrinsics) {
