@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "io/files/calibration_file.hpp"
 #include "io/files/trajectory_file.hpp"
 #include "io/sources/open_source.hpp"
 
@@ -55,6 +56,22 @@ TEST(RealRecordings, EurocTruthIsOfTheCameraNotTheBody) {
     EXPECT_LT((truth[i].T_w_c.translation() - raw[i].T_w_c.translation()).norm(), 1e-5);
     EXPECT_LT((truth[i].T_w_c.so3().inverse() * raw[i].T_w_c.so3()).log().norm(), 0.05);
   }
+}
+
+/// Written by OpenCV's own program of its own chessboards.
+TEST(RealRecordings, OpenCvsCalibrationIsRead) {
+  const char* root = std::getenv("TWOFOLD_DATA");
+  if (!root) GTEST_SKIP() << "TWOFOLD_DATA is not set";
+  const auto file = std::filesystem::path(root) / "calib_opencv_chessboard_13pairs/left_intrinsics.yml";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file;
+  const Calibration c = read_calibration(file);
+  EXPECT_EQ(c.kind, SensorKind::kMono);
+  EXPECT_EQ(c.invalid_reason(), "");
+  EXPECT_NEAR(c.left.pinhole.fx, 535.91573396, 1e-6);
+  EXPECT_NEAR(c.left.pinhole.cy, 235.57082910, 1e-6);
+  EXPECT_EQ(c.left.pinhole.width, 640);
+  EXPECT_EQ(c.left.distortion.model, DistortionModel::kRadTan);
+  EXPECT_NEAR(c.left.distortion.coefficients[4], 0.23839153, 1e-8);
 }
 
 }  // namespace
