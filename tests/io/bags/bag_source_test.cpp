@@ -115,6 +115,36 @@ TEST(BagSource, PairsDepthByTime) {
             std::string::npos);
 }
 
+/// A depth sensor's two cameras with lenses of their own, as a bag has them that nobody asked for registered
+/// depth.
+TEST(BagSource, RegistersDepthByTheCalibrationFile) {
+  const ScratchFolder folder;
+  const MessageEncoding cdr = MessageEncoding::kCdr;
+  WrittenBag bag;
+  bag.topics = {{"/rgb/image_raw", "sensor_msgs/Image"}, {"/depth/image_raw", "sensor_msgs/Image"}};
+  bag.messages.push_back(
+      {0, time_of(0), image_message(cdr, time_of(0), numbered_image(kWidth, kHeight, 0), "mono8")});
+  const cv::Mat depth(30, 40, CV_16UC1, cv::Scalar(2000));
+  bag.messages.push_back({1, time_of(0), image_message(cdr, time_of(0), depth, "16UC1")});
+  folder.write("a.mcap", text_of(mcap_file(bag, {})));
+  const std::string lens =
+      "distortion: {model: rational, coefficients: [0.2, 0.05, 0, 0, 0.001, 0.5, 0.15, 0.01]}";
+  folder.write("sensor.yaml",
+               "sensor: rgbd\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24], " + lens +
+                   "}\ndepth:\n  size: [40, 30]\n  intrinsics: [25, 25, 19.5, 14.5]\n  " + lens +
+                   "\n  T_left_depth: [1, 0, 0, -0.03,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]\n");
+  SourceOptions options;
+  options.calibration = folder / "sensor.yaml";
+  const auto source = open_source(folder / "a.mcap", options);
+  Frame frame;
+  ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+  ASSERT_EQ(frame.depth.size(), cv::Size(kWidth, kHeight));
+  for (int v = 4; v < kHeight - 4; v += 4) {
+    for (int u = 8; u < kWidth - 8; u += 4)
+      EXPECT_EQ(frame.depth.at<std::uint16_t>(v, u), 2000) << u << ", " << v;
+  }
+}
+
 TEST(BagSource, WithoutCameraInfoACalibrationIsNeeded) {
   const ScratchFolder folder;
   WrittenBag bag = stereo_bag(MessageEncoding::kCdr);
