@@ -125,9 +125,12 @@ bool Distortion::is_identity() const {
 }
 
 std::string Distortion::invalid_reason() const {
+  constexpr double kLargest = 1e9;  // those of lenses are below a thousand; products must stay finite
   for (int i = 0; i < coefficient_count(); ++i) {
     if (!std::isfinite(coefficients[i]))
       return "distortion coefficient " + std::to_string(i + 1) + " is not finite";
+    if (std::abs(coefficients[i]) > kLargest)
+      return "distortion coefficient " + std::to_string(i + 1) + " must be within 1e9";
   }
   if (model == DistortionModel::kDoubleSphere && !(coefficients[1] >= 0 && coefficients[1] <= 1)) {
     return "double sphere alpha must be in [0, 1], is " + std::to_string(coefficients[1]);
@@ -163,6 +166,7 @@ bool Distortion::reaches(const Vector2& xy) const {
 }
 
 std::optional<Vector2> Distortion::undistort(const Vector2& xy_d) const {
+  if (!std::isfinite(xy_d.squaredNorm())) return std::nullopt;
   if (is_identity()) return xy_d;
   constexpr int kMaxIterations = 50;
   constexpr double kTolerance = 1e-13;

@@ -198,6 +198,14 @@ TEST(Distortion, FisheyeSeriesJoinsClosedForm) {
   EXPECT_NEAR((outside - inside).x(), 2e-10, 1e-15);
 }
 
+TEST(Distortion, UndistortsNothingThatIsNotFinite) {
+  for (const Distortion& lens : {kNone, kRadTan, kFisheye, kDoubleSphere, kRational}) {
+    for (const double x : {double{NAN}, double{INFINITY}, -1e200}) {
+      EXPECT_FALSE(lens.undistort({x, 0})) << static_cast<int>(lens.model) << " " << x;
+    }
+  }
+}
+
 TEST(Distortion, SaysWhatIsInvalid) {
   EXPECT_EQ(kRadTan.invalid_reason(), "");
   Distortion bad = kRadTan;
@@ -208,6 +216,8 @@ TEST(Distortion, SaysWhatIsInvalid) {
   EXPECT_EQ(bad.invalid_reason(), "");
   bad.coefficients[7] = INFINITY;
   EXPECT_NE(bad.invalid_reason().find("coefficient 8"), std::string::npos);
+  bad.coefficients[7] = -1e10;
+  EXPECT_NE(bad.invalid_reason().find("coefficient 8 must be within 1e9"), std::string::npos);
 }
 
 TEST(Distortion, WithoutCoefficientsIsNone) {

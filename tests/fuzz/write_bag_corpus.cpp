@@ -13,9 +13,16 @@ WrittenBag small_bag(MessageEncoding encoding) {
   WrittenBag bag;
   bag.topics = {{"/a/image", "sensor_msgs/Image"}, {"/a/camera_info", "sensor_msgs/CameraInfo"}};
   WrittenCameraInfo info;
+  info.width = 4;
+  info.height = 3;
+  info.K = {4, 0, 1.5, 0, 4, 1, 0, 0, 1};
   info.D = {0.1, 0.2};
+  WrittenCameraInfo rational = info;
+  rational.model = "rational_polynomial";
+  rational.D = {0.2, 0.05, 0.0005, -0.0003, 0.001, 0.5, 0.15, 0.01};
   bag.messages = {{0, 5, image_message(encoding, 5, cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)), "mono8")},
                   {1, 5, camera_info_message(encoding, info)},
+                  {1, 6, camera_info_message(encoding, rational)},
                   {0, 6, compressed_image_message(encoding, 6, "png", Bytes(9, 3))}};
   return bag;
 }
