@@ -6,6 +6,9 @@
 namespace twofold {
 namespace {
 
+constexpr int kLargestSide =
+    16384;  // maps for two such images take four gigabytes: a file's mistake costs more
+
 /// Whether the largest circle around the principal point that fits into the image can be seen.
 bool sees_its_middle(const CameraModel& camera) {
   const PinholeCamera& p = camera.pinhole;
@@ -28,12 +31,15 @@ std::string CameraModel::invalid_reason() const {
     return "image size must be positive, is " + std::to_string(pinhole.width) + " x " +
            std::to_string(pinhole.height);
   }
+  if (pinhole.width > kLargestSide || pinhole.height > kLargestSide) {
+    return "image size must be within " + std::to_string(kLargestSide) + " a side, is " +
+           std::to_string(pinhole.width) + " x " + std::to_string(pinhole.height);
+  }
   if (auto reason = distortion.invalid_reason(); !reason.empty()) return reason;
   // Its coefficients are large and nearly cancel each other: in another order they make no lens.
   if (distortion.model == DistortionModel::kRational && !sees_its_middle(*this)) {
-    return "the lens folds the middle of the image over: are its coefficients k1 k2 p1 p2 k3 k4 k5 k6, in "
-           "this "
-           "order and with all their digits?";
+    return "the lens folds the middle of the image over: are its coefficients k1 k2 p1 p2 k3 k4 k5 k6, "
+           "in this order and with all their digits?";
   }
   return {};
 }

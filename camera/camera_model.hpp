@@ -13,8 +13,9 @@ struct CameraModel {
   PinholeCamera pinhole;  ///< intrinsics and size of the raw image
   Distortion distortion;
 
-  /// Empty when valid; otherwise names the field, the rule and the value. A rational lens that folds or has a
-  /// pole within the circle around the principal point that fits into the image is not.
+  /// Empty when valid; otherwise names the field, the rule and the value. A rational lens, whose
+  /// coefficients nearly cancel each other, must be one that sees the right, left, upper and lower end of
+  /// the largest circle around the principal point that fits into the image.
   [[nodiscard]] std::string invalid_reason() const;
 
   /// Raw pixel of a point in the camera frame [m]; x_c.z() must be positive.

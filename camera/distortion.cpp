@@ -159,10 +159,23 @@ Vector2 Distortion::distort(const Vector2& xy, Eigen::Matrix2d* J) const {
 }
 
 bool Distortion::reaches(const Vector2& xy) const {
-  if (model != DistortionModel::kRadTan && model != DistortionModel::kRational) return true;
-  const RadialQuotient radial(model, coefficients);
-  const double s = xy.squaredNorm();
-  return is_positive_to(s, radial.D) && is_positive_to(s, radial.growth());
+  switch (model) {
+    case DistortionModel::kRadTan:
+    case DistortionModel::kRational: {
+      const RadialQuotient radial(model, coefficients);
+      const double s = xy.squaredNorm();
+      return is_positive_to(s, radial.D) && is_positive_to(s, radial.growth());
+    }
+    case DistortionModel::kEquidistant: {
+      const auto& k = coefficients;
+      const double theta = std::atan(xy.norm());
+      return is_positive_to(theta * theta, std::array{1.0, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]});
+    }
+    case DistortionModel::kDoubleSphere:
+    case DistortionModel::kNone:
+      break;
+  }
+  return true;
 }
 
 std::optional<Vector2> Distortion::undistort(const Vector2& xy_d) const {

@@ -37,9 +37,9 @@ struct Distortion {
   /// @param J  if not null, d result / d xy
   [[nodiscard]] Vector2 distort(const Vector2& xy, Eigen::Matrix2d* J = nullptr) const;
 
-  /// Whether the image grows with the radius all the way from the optical axis to xy. Beyond a fold or, where
-  /// kRational divides by zero, a pole of the radial part distort still gives pixels, but no lens sees xy
-  /// there. Asked of kRadTan and kRational; the others' Jacobian tells.
+  /// Whether the radial part of the image, tangential terms left out, grows with the radius all the way from
+  /// the optical axis to xy. Beyond a fold or, where kRational divides by zero, a pole distort still gives
+  /// pixels, but no lens sees xy there. kDoubleSphere always does.
   [[nodiscard]] bool reaches(const Vector2& xy) const;
 
   /// Inverse of distort by damped Newton iterations.

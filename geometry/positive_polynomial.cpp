@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "base/check.hpp"
 
@@ -48,6 +49,7 @@ bool is_positive(Bernstein& b, std::size_t degree, int halvings) {
 bool is_positive_to(double end, std::span<const double> coefficients) {
   TWOFOLD_CHECK(!coefficients.empty() && coefficients.size() <= kMostCoefficients, "degree");
   Bernstein b = bernstein(coefficients, end);
+  if (!std::all_of(b.begin(), b.end(), [](double x) { return std::isfinite(x); })) return false;
   return is_positive(b, coefficients.size() - 1, kMostHalvings);
 }
 

@@ -13,6 +13,7 @@ constexpr std::size_t kAsked = 64;  // blocks from one question to the next: abo
 }  // namespace
 
 std::size_t Composition::update(std::span<const PlacedVolume> volumes, double rest, const GivesUp& gives_up) {
+  let_go_of_empty_blocks();
   remove_all_but(volumes, rest);
   for (const PlacedVolume& volume : volumes) take_changes(volume);
   const std::size_t blocks = compose(volumes, gives_up);
@@ -20,9 +21,36 @@ std::size_t Composition::update(std::span<const PlacedVolume> volumes, double re
   return blocks;
 }
 
+/// Blocks are never taken out of a volume one by one: where moved volumes have left more than they are in,
+/// all begins anew.
+void Composition::let_go_of_empty_blocks() {
+  constexpr std::size_t kFew = 1000;
+  if (empty_blocks_ < std::max(kFew, whole_.blocks().size() / 2)) return;
+  whole_.clear();
+  members_.clear();
+  in_block_.clear();
+  is_marked_.clear();
+  marked_.clear();
+  empty_blocks_ = 0;
+}
+
+/// By the blocks that changed since it was added.
+void Composition::extend_bounds(Member& member, const SurfaceVolume& volume) const {
+  const double edge = kBlockEdge * whole_.options().voxel;
+  for (std::size_t b = 0; b < volume.blocks().size(); ++b) {
+    const BlockHead& block = volume.blocks().head(b);
+    if (block.revision <= member.revision) continue;
+    const Vector3 corner = edge * Vector3(block.at.x, block.at.y, block.at.z);
+    member.low = member.low.cwiseMin(corner);
+    member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
+  }
+}
+
 /// By the corners of what it holds: no sample moves farther.
-bool Composition::still_stands(const Member& member, const PlacedVolume& now, double rest) const {
+bool Composition::still_stands(Member& member, const PlacedVolume& now, double rest) const {
   if (now.volume->cleared() > member.revision) return false;
+  extend_bounds(member, *now.volume);
+  if ((member.low.array() > member.high.array()).any()) return false;  // it holds nothing
   if (rest == 0) return member.T_w_v.matrix() == now.T_w_v.matrix();
   double most = 0;
   for (int c = 0; c < 8; ++c) {
@@ -49,6 +77,7 @@ void Composition::remove_all_but(std::span<const PlacedVolume> volumes, double r
 void Composition::remove(std::uint32_t id, const Member& member) {
   for (const std::uint32_t block : member.blocks) {
     std::erase(in_block_[block], id);
+    empty_blocks_ += in_block_[block].empty();
     mark(block);
   }
 }
@@ -61,29 +90,26 @@ void Composition::mark(std::uint32_t block) {
 
 /// Marks the blocks into which those reach that changed.
 void Composition::take_changes(const PlacedVolume& placed) {
-  const double edge = kBlockEdge * whole_.options().voxel;
   const auto [found, is_new] = members_.try_emplace(placed.id);
   Member& member = found->second;
   if (is_new) {
     member.T_w_v = placed.T_w_v;
-    member.low = Vector3::Constant(1e300);
-    member.high = -member.low;
+    extend_bounds(member, *placed.volume);
   }
   const BlockTable& blocks = placed.volume->blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockHead& block = blocks.head(b);
     if (block.revision <= member.revision) continue;
-    const Vector3 corner = edge * Vector3(block.at.x, block.at.y, block.at.z);
-    member.low = member.low.cwiseMin(corner);
-    member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
     for (const std::uint32_t reached : whole_.add_overlapped(block.at, member.T_w_v)) {
       if (reached >= in_block_.size()) {
+        empty_blocks_ += reached + 1 - in_block_.size();
         in_block_.resize(reached + 1);
         is_marked_.resize(reached + 1, 0);
       }
       std::vector<std::uint32_t>& ids = in_block_[reached];
       const auto at = std::lower_bound(ids.begin(), ids.end(), placed.id);
       if (at == ids.end() || *at != placed.id) {
+        empty_blocks_ -= ids.empty();
         ids.insert(at, placed.id);
         member.blocks.push_back(reached);
       }

@@ -51,14 +51,16 @@ class Composition {
  private:
   static constexpr double kRest = 0.5;  // [voxels]
   struct Member {
-    SE3 T_w_v;                          ///< where it was added
-    std::uint64_t revision = 0;         ///< of the volume, as far as it was added
-    Vector3 low, high;                  ///< bounds of its blocks, in its frame [m]
-    std::vector<std::uint32_t> blocks;  ///< of the whole, into which it reaches; each once
+    SE3 T_w_v;                                            ///< where it was added
+    std::uint64_t revision = 0;                           ///< of the volume, as far as it was added
+    Vector3 low = Vector3::Constant(1e300), high = -low;  ///< bounds of its blocks, in its frame [m]
+    std::vector<std::uint32_t> blocks;                    ///< of the whole, into which it reaches; each once
   };
 
   std::size_t update(std::span<const PlacedVolume> volumes, double rest, const GivesUp& gives_up);
-  [[nodiscard]] bool still_stands(const Member& member, const PlacedVolume& now, double rest) const;
+  void let_go_of_empty_blocks();
+  void extend_bounds(Member& member, const SurfaceVolume& volume) const;
+  [[nodiscard]] bool still_stands(Member& member, const PlacedVolume& now, double rest) const;
   void remove_all_but(std::span<const PlacedVolume> volumes, double rest);
   void remove(std::uint32_t id, const Member& member);
   void take_changes(const PlacedVolume& volume);
@@ -71,6 +73,7 @@ class Composition {
   std::vector<std::vector<std::uint32_t>> in_block_;  ///< of each block of the whole: ids, ascending
   std::vector<std::uint32_t> marked_;                 ///< blocks to be made anew
   std::vector<std::uint8_t> is_marked_;
+  std::size_t empty_blocks_ = 0;  ///< into which no volume reaches any more
 };
 
 }  // namespace twofold

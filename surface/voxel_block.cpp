@@ -62,7 +62,7 @@ std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {
   if (2 * size() >= slots_.size()) grow();
   Slot& slot = slots_[slot_of(at)];
   if (slot.block == kFree) {
-    add_block().at = at;
+    add_block().at = at;  // the last that may throw
     slot = {at, static_cast<std::uint32_t>(size())};
     heads_.push_back({.at = at});
   }
@@ -76,7 +76,9 @@ VoxelBlock& BlockTable::add_block() {
 }
 
 void BlockTable::grow() {
-  slots_.assign(std::max(kFirstSlots, 2 * slots_.size()), Slot{});
+  const std::size_t slots = std::max(kFirstSlots, 2 * slots_.size());
+  heads_.reserve(slots / 2);  // a block that has a slot finds room for its head
+  slots_.assign(slots, Slot{});
   for (std::size_t b = 0; b < size(); ++b)
     slots_[slot_of(heads_[b].at)] = {heads_[b].at, static_cast<std::uint32_t>(b)};
 }

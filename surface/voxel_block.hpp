@@ -39,9 +39,9 @@ struct SampleUnits {
   float weight = 1;
 };
 
-/// Distances reach 64 voxels either way, in steps far below what any sensor tells apart.
-inline constexpr int kDistanceSteps = 512;  ///< a voxel
-inline constexpr int kMostDistanceVoxels = 60;
+/// Sixteen bits hold distances of 64 voxels either way, in steps far below what any sensor tells apart.
+inline constexpr int kDistanceSteps = 512;      ///< a voxel
+inline constexpr int kMostDistanceVoxels = 60;  ///< that any truncation may have
 /// Weights end at this number of steps.
 inline constexpr int kMostWeightSteps = 65535;
 
@@ -71,7 +71,8 @@ struct BlockHead {
 };
 
 /// The blocks there are, found by position: a hash table with open addresses. Blocks are never taken out one
-/// by one, so that they are all there where a surface ever was. References stay valid until clear.
+/// by one, so that they are all there where a surface ever was. References to blocks stay valid until clear,
+/// those to heads until the next find_or_add.
 class BlockTable {
  public:
   [[nodiscard]] const VoxelBlock* find(const BlockPosition& at) const;

@@ -65,7 +65,7 @@ struct SurfaceChanges {
 /// obstacle, and what does it look like.
 ///
 ///   SurfaceModel model(rig, {.voxel = 0.05});
-///   if (estimate.state == TrackingState::kTracked) model.add(frame, estimate.T_world_camera);
+///   if (estimate.keyframe && estimate.map_part == part) model.add(frame, estimate.T_world_camera);
 ///   if (model.at({x, y, z}).state == SpaceState::kFree) ...
 ///
 /// Near surfaces distances are known; farther from them, free space is known in cells of four voxels an

@@ -18,6 +18,17 @@ bool contains(const std::string& text, std::string_view part) {
   return text.find(part) != std::string::npos;
 }
 
+/// Whether one of its words says so, as in /cam/image_rect_color; /direct/image_raw has none.
+bool names_rectified(std::string_view topic) {
+  while (!topic.empty()) {
+    const std::size_t end = std::min(topic.find_first_of("/_"), topic.size());
+    const std::string_view word = topic.substr(0, end);
+    if (word == "rect" || word == "rectified") return true;
+    topic.remove_prefix(std::min(end + 1, topic.size()));
+  }
+  return false;
+}
+
 bool is_depth(const BagTopic& topic) {
   return contains(topic.name, "depth");
 }
@@ -25,7 +36,7 @@ bool is_depth(const BagTopic& topic) {
 /// Smaller is taken first.
 int rank(const BagTopic& topic) {
   const bool compressed = topic.type == "sensor_msgs/CompressedImage";
-  return (compressed ? 2 : 0) + (contains(topic.name, "rect") ? 0 : 1);
+  return (compressed ? 2 : 0) + (names_rectified(topic.name) ? 0 : 1);
 }
 
 std::string list(const std::vector<BagTopic>& topics) {
@@ -133,7 +144,7 @@ PinholeCamera pinhole_of(const double* matrix, std::size_t columns, const Camera
 tl::expected<Distortion, std::string> pinhole_distortion(std::vector<double> D) {
   std::size_t used = D.size();
   while (used > 0 && D[used - 1] == 0) --used;
-  if (used <= 5) D.resize(5);
+  D.resize(used <= 5 ? 5 : std::max<std::size_t>(used, 8));
   return opencv_distortion(D);
 }
 
@@ -145,12 +156,14 @@ tl::expected<Distortion, std::string> fisheye_distortion(std::vector<double> D) 
   return distortion;
 }
 
-/// Zeros alone are no distortion, whatever the model.
+/// Zeros alone are no distortion, but of a fisheye, whose image is none of a pinhole even so.
 Distortion distortion_of(const CameraInfoMessage& info) {
-  if (std::all_of(info.D.begin(), info.D.end(), [](double k) { return k == 0; })) return {};
   const std::string& model = info.distortion_model;
+  const bool fisheye = model == "equidistant" || model == "fisheye";
+  const bool zero = std::all_of(info.D.begin(), info.D.end(), [](double k) { return k == 0; });
+  if (info.D.empty() || (zero && !fisheye)) return {};
   tl::expected<Distortion, std::string> distortion = tl::make_unexpected("is not known");
-  if (model == "equidistant" || model == "fisheye") distortion = fisheye_distortion(info.D);
+  if (fisheye) distortion = fisheye_distortion(info.D);
   if (model == "plumb_bob" || model == "rational_polynomial") distortion = pinhole_distortion(info.D);
   if (!distortion)
     throw MalformedBytes("camera_info: the distortion '" + model + "' " + distortion.error() +
@@ -186,7 +199,7 @@ double baseline_of(const CameraInfoMessage& right) {
 }  // namespace
 
 bool BagCamera::rectified() const {
-  return contains(images.name, "rect");
+  return names_rectified(images.name);
 }
 
 BagCameras choose_cameras(const std::vector<BagTopic>& topics, const WantedTopics& wanted) {
@@ -227,8 +240,11 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
     calibration.T_right_left = T_rectified;
     return calibration;
   }
-  const SE3 T_rect_left(rotation_of(left), Vector3::Zero()),
-      T_rect_right(rotation_of(*right), Vector3::Zero());
+  // Of a pair of which one camera's images are rectified, that one's are turned already.
+  const auto rotation = [](const BagCamera& camera, const CameraInfoMessage& info) {
+    return SE3(camera.rectified() ? SO3() : rotation_of(info), Vector3::Zero());
+  };
+  const SE3 T_rect_left = rotation(cameras.left, left), T_rect_right = rotation(*cameras.right, *right);
   calibration.T_right_left = T_rect_right.inverse() * T_rectified * T_rect_left;
   return calibration;
 }

@@ -128,6 +128,7 @@ Calibration read_opencv(const YamlNode& root) {
 
 Distortion read_own_distortion(const YamlNode& node) {
   node.expect_keys({"model", "coefficients"});
+  if (!node.has("coefficients")) return distortion_of(node.at("model"), nullptr);
   const YamlNode coefficients = node.at("coefficients");
   return distortion_of(node.at("model"), &coefficients);
 }

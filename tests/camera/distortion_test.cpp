@@ -132,6 +132,19 @@ TEST(Distortion, UndistortFailsBeyondTheFoldOfAQuotient) {
   EXPECT_FALSE(kFoldingRational.reaches({1.6, 0})) << "the Jacobian does not tell";
 }
 
+TEST(Distortion, AFisheyeThatTurnsInsideOutReachesItsFold) {
+  // theta - theta^3: it folds at 33.1 degrees, and is upside down beyond 57.3.
+  const Distortion lens{DistortionModel::kEquidistant, {-1, 0, 0, 0}};
+  EXPECT_TRUE(lens.reaches({std::tan(33 * M_PI / 180), 0}));
+  EXPECT_FALSE(lens.reaches({0, std::tan(33.2 * M_PI / 180)}));
+  Eigen::Matrix2d J;
+  const Vector2 beyond(std::tan(60 * M_PI / 180), 0);
+  (void)lens.distort(beyond, &J);
+  ASSERT_GT(J.determinant(), 0) << "the Jacobian does not tell";
+  EXPECT_FALSE(lens.reaches(beyond));
+  EXPECT_TRUE((Distortion{DistortionModel::kEquidistant, {}}.reaches({100, 100})));
+}
+
 TEST(Distortion, UndistortStaysBeforeAPole) {
   // r / (1 - r^2): every radius before the pole at r = 1, and again every one behind it.
   const Distortion pole{DistortionModel::kRational, {0, 0, 0, 0, 0, -1, 0, 0}};

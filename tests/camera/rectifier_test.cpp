@@ -169,7 +169,9 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(std::pair(Distortion{DistortionModel::kRadTan, {-0.6, 0, 0, 0, 0.1}}, 0.8218),
                       std::pair(Distortion{DistortionModel::kRational,
                                            {0.0826, -2.605, 0, 0, 1.595, -0.0417, -2.42, 1.517}},
-                                1.042)));
+                                1.042),
+                      // 1 + 3 k1 t^2 + 5 k2 t^4 is zero at t = 0.78585, and again at 0.96.
+                      std::pair(Distortion{DistortionModel::kEquidistant, {-0.9, 0.35}}, 1.0009)));
 
 TEST_P(FoldingLens, ShowsNothingBeyondItsFold) {
   const auto [lens, fold] = GetParam();

@@ -62,6 +62,8 @@ TEST(PositivePolynomial, IsNotWhatIsNotFinite) {
   EXPECT_FALSE(positive(nan, {1, 1, 1}));
   EXPECT_FALSE(positive(1, {1, -inf, inf}));
   EXPECT_FALSE(positive(inf, {1, -1, 1}));
+  EXPECT_FALSE(positive(1, {1, inf}));
+  EXPECT_FALSE(positive(inf, {1, 1}));
 }
 
 }  // namespace

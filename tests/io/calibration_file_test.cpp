@@ -126,6 +126,14 @@ TEST(CalibrationFile, RationalLens) {
   EXPECT_EQ(plain.coefficients[4], 0.05);
 }
 
+TEST(CalibrationFile, ALensMayBeNone) {
+  const ScratchFolder folder;
+  const auto file = folder.write("c.yaml",
+                                 "cameras:\n  - size: [640, 480]\n    intrinsics: [500, 500, 320, 240]\n"
+                                 "    distortion: {model: none}\n");
+  EXPECT_EQ(read_calibration(file).left.distortion.model, DistortionModel::kNone);
+}
+
 TEST(CalibrationFile, SaysWhyALensIsRefused) {
   const ScratchFolder folder;
   const auto error = [&](const std::string& model, const std::string& coefficients) {

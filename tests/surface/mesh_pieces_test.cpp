@@ -182,6 +182,27 @@ TEST_F(CompositionTest, FollowsOnlyWhatMovesByHalfAVoxel) {
   EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
 }
 
+TEST_F(CompositionTest, KeepsNoBlocksWhereNothingIsAnyMore) {
+  composition_.update(placed_);
+  const std::size_t once = composition_.whole().blocks().size();
+  for (int n = 0; n < 30; ++n) {
+    for (std::size_t i = 0; i < 3; ++i) move(i, 5);
+    composition_.update(placed_);
+  }
+  EXPECT_LT(composition_.whole().blocks().size(), 4 * once + 2000);
+  expect_same("wandering");
+}
+
+TEST_F(CompositionTest, FollowsAVolumeThatHadNothingYet) {
+  volumes_.emplace_back(options());
+  placed_.push_back({3, &volumes_.back(), SE3()});
+  composition_.update(placed_);
+  move(3, 0.3);
+  views_.fuse_next(volumes_.back());
+  composition_.update(placed_);
+  EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
+}
+
 TEST_F(CompositionTest, WhatItGivesUpIsDoneByTheNextCall) {
   const std::size_t all = composition_.update(placed_);
   ASSERT_GT(all, 200u);

@@ -24,7 +24,7 @@ struct MapTime {
 /// far it is behind the map.
 class LiveMesh {
  public:
-  /// Told of the mesh each time it changed, on the surface's thread.
+  /// Told of the mesh each time it changed, on the thread that calls update.
   using Listener = std::function<void(const MeshPieces& mesh, KeyframeId part)>;
 
   LiveMesh(const SurfaceOptions& options, Listener listener)
@@ -33,7 +33,7 @@ class LiveMesh {
   /// The mapper's thread, when a map is published: a clock is read, and a ring written.
   void published(const GraphSnapshot& graph);
 
-  /// The surface's thread: makes the mesh what the submaps are now, in this map.
+  /// The surface's thread, or whoever ended it: makes the mesh what the submaps are now, in this map.
   /// @param gives_up  as of Composition::update
   /// @return  false: it gave up
   bool update(const SubmapSurface& surface, const GraphSnapshot& graph,

@@ -150,27 +150,30 @@ void LiveSurface::step(std::size_t most_frames) {
     take(frame, row_offset);
     frame = {};
   }
+  if (mesh_ && loop_came()) follow_map();
   const auto map = maps_.newest();
   version_ = map->graph.version();
   surface_->step(map->graph, mesh_ ? kWork : SubmapWork{});
   if (mesh_) follow_map();
 }
 
-/// A loop is in the mesh before more is fused. Where one comes after the other, what is begun for the first
-/// is given up, once, unless half of it is done: neither waits for more than one and a half times what all
-/// takes.
+/// A loop is in the mesh before more is fused. Where another one comes meanwhile, what is begun for the first
+/// is given up, once, unless half of it is done: neither of two waits for more than one and a half times what
+/// all takes.
 void LiveSurface::follow_map() {
   constexpr double kNearlyDone = 0.5;
-  const auto another_loop = [this] { return maps_.newest()->graph.last_jump().version > version_; };
   bool may_give_up = true;
   do {
     const auto map = maps_.newest();
     version_ = map->graph.version();
     surface_->step(map->graph, {.keyframes = 0, .anew = 0});
-    may_give_up = mesh_->update(*surface_, map->graph, [&](double done) {
-      return may_give_up && done < kNearlyDone && another_loop();
-    });
-  } while (another_loop());
+    may_give_up = mesh_->update(
+        *surface_, map->graph, [&](double done) { return may_give_up && done < kNearlyDone && loop_came(); });
+  } while (loop_came());
+}
+
+bool LiveSurface::loop_came() {
+  return maps_.newest()->graph.last_jump().version > version_;
 }
 
 void LiveSurface::take(const Frame& frame, double row_offset) {

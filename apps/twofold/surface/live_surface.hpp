@@ -74,6 +74,8 @@ class LiveSurface {
   void step(std::size_t most_frames = kMostWaiting);
   /// Submaps and mesh as the newest map has them.
   void follow_map();
+  /// All poses were corrected since the map that submaps and mesh follow.
+  [[nodiscard]] bool loop_came();
   /// Frames and by how many rows their right images lie lower.
   using Keyframes = std::deque<std::pair<Frame, double>>;
   void take(const Frame& frame, double row_offset);

@@ -49,6 +49,17 @@ TEST(BagCameras, AreFoundByTypeAndName) {
             "/camera/infra1/image_rect_raw/compressed | /camera/infra2/image_rect_raw/compressed | -");
 }
 
+TEST(BagCameras, AreRectifiedWhereAWordOfTheTopicSaysSo) {
+  const auto rectified = [](const std::string& name) {
+    return choose_cameras(topics({{name, "Image"}}), {}).left.rectified();
+  };
+  for (const char* name :
+       {"/cam/image_rect", "/cam/image_rect_color/compressed", "/left/image_rectified", "/rect/image"})
+    EXPECT_TRUE(rectified(name)) << name;
+  for (const char* name : {"/cam/image_raw", "/direct_cam/image_raw", "/corrected", "/rectangle/image_raw"})
+    EXPECT_FALSE(rectified(name)) << name;
+}
+
 TEST(BagCameras, AreThoseThatTheUserNames) {
   const std::vector<std::pair<std::string, std::string>> names{
       {"/front", "Image"}, {"/back", "Image"}, {"/range", "Image"}, {"/imu", "Imu"}};
@@ -104,6 +115,13 @@ TEST(BagCameras, RawPairsKeepTheirLensAndTheirTurn) {
   const Vector3 of_left = R_rect_left.inverse() * rectified;
   const Vector3 of_right = R_rect_right.inverse() * Vector3(rectified - Vector3(0.2, 0, 0));
   EXPECT_LT((calibration.T_right_left * of_left - of_right).norm(), 1e-9);
+  // Of a left camera that was recorded rectified, that turn is in the images.
+  BagCameras mixed = stereo("image_raw");
+  mixed.left = stereo("image_rect").left;
+  const Calibration half = calibration_of(mixed, message_of(left), message_of(right));
+  EXPECT_FALSE(half.already_rectified);
+  EXPECT_EQ(half.left.distortion.model, DistortionModel::kNone);
+  EXPECT_LT((half.T_right_left * rectified - of_right).norm(), 1e-9);
 }
 
 /// As the drivers of depth sensors publish their lenses.
@@ -130,7 +148,11 @@ TEST(BagCameras, KnowTheRationalModel) {
   EXPECT_EQ(lens("rational_polynomial", {0.1, -0.2, 0, 0, 0.05, 0, 0, 0}).model, DistortionModel::kRadTan);
   EXPECT_EQ(lens("plumb_bob", {0.1, -0.2, 0, 0, 0.05}).coefficients[4], 0.05);
   EXPECT_EQ(lens("plumb_bob", {0.1, -0.2}).coefficients[1], -0.2) << "zeros may be left out";
+  EXPECT_EQ(lens("rational_polynomial", {0.1, -0.2, 0, 0, 0.05, 0.2}).coefficients[5], 0.2);
   EXPECT_EQ(lens("rational_polynomial", std::vector<double>(8, 0.0)).model, DistortionModel::kNone);
+  EXPECT_EQ(lens("equidistant", std::vector<double>(4, 0.0)).model, DistortionModel::kEquidistant)
+      << "a fisheye without coefficients is no pinhole";
+  EXPECT_EQ(lens("equidistant", {}).model, DistortionModel::kNone);
 }
 
 TEST(BagCameras, SayWhatTheInfoLacks) {
