@@ -141,10 +141,14 @@ PinholeCamera pinhole_of(const double* matrix, std::size_t columns, const Camera
 }
 
 /// Zeros at the end may be left out.
-tl::expected<Distortion, std::string> pinhole_distortion(std::vector<double> D) {
+tl::expected<Distortion, std::string> pinhole_distortion(const std::string& model, std::vector<double> D) {
   std::size_t used = D.size();
   while (used > 0 && D[used - 1] == 0) --used;
-  D.resize(used <= 5 ? 5 : std::max<std::size_t>(used, 8));
+  if (used <= 5) {
+    D.resize(5);
+  } else if (model == "rational_polynomial") {
+    D.resize(std::max<std::size_t>(D.size(), 8));
+  }
   return opencv_distortion(D);
 }
 
@@ -164,7 +168,7 @@ Distortion distortion_of(const CameraInfoMessage& info) {
   if (info.D.empty() || (zero && !fisheye)) return {};
   tl::expected<Distortion, std::string> distortion = tl::make_unexpected("is not known");
   if (fisheye) distortion = fisheye_distortion(info.D);
-  if (model == "plumb_bob" || model == "rational_polynomial") distortion = pinhole_distortion(info.D);
+  if (model == "plumb_bob" || model == "rational_polynomial") distortion = pinhole_distortion(model, info.D);
   if (!distortion)
     throw MalformedBytes("camera_info: the distortion '" + model + "' " + distortion.error() +
                          ": give --calib");

@@ -128,9 +128,10 @@ TEST(CalibrationFile, RationalLens) {
 
 TEST(CalibrationFile, ALensMayBeNone) {
   const ScratchFolder folder;
-  const auto file = folder.write("c.yaml",
-                                 "cameras:\n  - size: [640, 480]\n    intrinsics: [500, 500, 320, 240]\n"
-                                 "    distortion: {model: none}\n");
+  const auto file =
+      folder.write("c.yaml",
+                   "sensor: mono\ncameras:\n  - size: [640, 480]\n    intrinsics: [500, 500, 320, 240]\n"
+                   "    distortion: {model: none}\n");
   EXPECT_EQ(read_calibration(file).left.distortion.model, DistortionModel::kNone);
 }
 
