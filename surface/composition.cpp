@@ -142,8 +142,8 @@ std::size_t Composition::compose(std::span<const PlacedVolume> volumes, const Gi
 }
 
 std::size_t Composition::bytes() const {
-  std::size_t sum = whole_.bytes() + mesh_.bytes();
-  for (const auto& ids : in_block_) sum += sizeof(ids) + ids.capacity() * sizeof(ids[0]);
+  std::size_t sum = whole_.bytes() + mesh_.bytes() + in_block_.capacity() * sizeof(in_block_[0]);
+  for (const auto& ids : in_block_) sum += ids.capacity() * sizeof(ids[0]);
   for (const auto& [id, member] : members_) sum += sizeof(member) + member.blocks.capacity() * 4;
   return sum;
 }
