@@ -142,8 +142,9 @@ std::size_t Composition::compose(std::span<const PlacedVolume> volumes, const Gi
 }
 
 std::size_t Composition::bytes() const {
-  std::size_t sum = whole_.bytes() + mesh_.bytes() + in_block_.capacity() * sizeof(in_block_[0]);
-  for (const auto& ids : in_block_) sum += ids.capacity() * sizeof(ids[0]);
+  using Ids = decltype(in_block_)::value_type;
+  std::size_t sum = whole_.bytes() + mesh_.bytes() + in_block_.capacity() * sizeof(Ids);
+  for (const Ids& ids : in_block_) sum += ids.capacity() * sizeof(Ids::value_type);
   for (const auto& [id, member] : members_) sum += sizeof(member) + member.blocks.capacity() * 4;
   return sum;
 }

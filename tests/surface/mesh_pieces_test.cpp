@@ -245,7 +245,9 @@ TEST(Resampler, ReadsBetweenTheSamples) {
   std::size_t seen = 0, at_rims = 0;
   for (const VoxelBlock* block : turned.blocks().sorted()) {
     for (int i = 0; i < kBlockSamples; ++i) {
-      const Vector3 grid(8 * block->at.x + i % 8, 8 * block->at.y + i / 8 % 8, 8 * block->at.z + i / 64);
+      const Vector3 grid =
+          Eigen::Vector3i(8 * block->at.x + i % 8, 8 * block->at.y + i / 8 % 8, 8 * block->at.z + i / 64)
+              .cast<double>();
       const Vector3 x_v = T_w_v.inverse() * Vector3(0.02 * grid);
       const auto expected = volume.distance(x_v);
       const auto s = static_cast<std::size_t>(i);

@@ -12,6 +12,7 @@ using namespace testing;
 
 std::vector<BagTopic> topics(const std::vector<std::pair<std::string, std::string>>& names) {
   std::vector<BagTopic> topics;
+  topics.reserve(names.size());
   for (const auto& [name, type] : names)
     topics.push_back(
         {static_cast<std::uint32_t>(topics.size()), name, "sensor_msgs/" + type, MessageEncoding::kRos1});
