@@ -6,7 +6,7 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kRadTanCount = 5, kRationalCount = 8;
+constexpr std::size_t kRadTanCount = 5, kRationalCount = 8, kEquidistantCount = 4;
 
 bool all_zero(std::span<const double> coefficients) {
   return std::all_of(coefficients.begin(), coefficients.end(), [](double k) { return k == 0; });
@@ -26,6 +26,14 @@ tl::expected<Distortion, std::string> opencv_distortion(std::span<const double> 
   const bool quotient = used.size() == kRationalCount && !all_zero(used.subspan(kRadTanCount));
   distortion.model = quotient ? DistortionModel::kRational : DistortionModel::kRadTan;
   std::copy(used.begin(), used.end(), distortion.coefficients.begin());
+  return distortion;
+}
+
+tl::expected<Distortion, std::string> equidistant_distortion(std::span<const double> k) {
+  if (k.size() < kEquidistantCount || !all_zero(k.subspan(kEquidistantCount)))
+    return tl::make_unexpected("has " + std::to_string(k.size()) + " coefficients, equidistant has 4");
+  Distortion distortion{DistortionModel::kEquidistant, {}};
+  std::copy_n(k.begin(), kEquidistantCount, distortion.coefficients.begin());
   return distortion;
 }
 

@@ -15,4 +15,11 @@ namespace twofold {
 ///         coefficients; a thin prism (s) or a tilted sensor (tau) that is not zero
 [[nodiscard]] tl::expected<Distortion, std::string> opencv_distortion(std::span<const double> coefficients);
 
+/// The lens of the four coefficients of OpenCV's fisheye module, ROS' and Kalibr's equidistant model: k1 k2
+/// k3 k4, with zeros after them where a vector has room for more.
+///
+/// @return kEquidistant; or why there is none: fewer than four, or others behind them that are not zero
+[[nodiscard]] tl::expected<Distortion, std::string> equidistant_distortion(
+    std::span<const double> coefficients);
+
 }  // namespace twofold

@@ -1,7 +1,8 @@
 // Whether a result is luck: the same recording with its first one, two, three frames left out and with noise
 // of one grey level added, darker, cropped, smaller, seen in a mirror; how far apart its frames may be; the
-// recording played backwards, and there and back again, which nothing was tuned on; and whether the tracker
-// knows how well it knows the pose (NEES).
+// recording played backwards, and there and back again, which nothing was tuned on; what real cameras do to
+// it
+// (--hard); and whether the tracker knows how well it knows the pose (NEES).
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -20,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/engine/hardships.hpp"
 #include "engine/engine.hpp"
 #include "evaluation/evaluation.hpp"
 #include "evaluation/pose_consistency.hpp"
@@ -42,6 +44,7 @@ struct Variation {
   bool mirrored = false;  ///< left and right exchanged, the cameras of a pair too
   int every = 1;          ///< frames from one that is taken to the next
   Order order = Order::kForwards;
+  const Hardship* hardship = nullptr;  ///< befalls what is left after all that
 };
 
 /// Of one frame, with what the tracker said of it.
@@ -119,7 +122,8 @@ cv::Mat exposed(const cv::Mat& image, const Variation& variation, std::uint64_t 
   return synthetic::expose(intensity, variation.gain, variation.noise, {17, stream});
 }
 
-void vary(Frame& frame, const Variation& variation) {
+/// False if the frame is lost on its way. `t` counts from the recording's first frame [s].
+bool vary(Frame& frame, const Variation& variation, double t) {
   frame.left = reshaped(frame.left, variation);
   frame.right = reshaped(frame.right, variation);
   frame.depth = reshaped(frame.depth, variation);
@@ -127,6 +131,7 @@ void vary(Frame& frame, const Variation& variation) {
   const auto stream = static_cast<std::uint64_t>(2 * frame.index);
   frame.left = exposed(frame.left, variation, stream);
   frame.right = exposed(frame.right, variation, stream + 1);
+  return variation.hardship == nullptr || variation.hardship->befall(frame, t);
 }
 
 /// The rig that takes such images.
@@ -146,6 +151,7 @@ Rig varied(Rig rig, const Variation& variation) {
   camera.width = size.width;
   camera.height = size.height;
   if (variation.mirrored) camera.cx = camera.width - 1 - camera.cx;
+  if (variation.hardship != nullptr) variation.hardship->miscalibrate(rig);
   return rig;
 }
 
@@ -281,11 +287,12 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   };
   auto next = static_cast<std::size_t>(variation.left_out);
   const FrameFeed feed = [&](Frame& frame) {
-    if (next >= frames.size()) return FeedStatus::kEnd;
-    frame = frames[next];
-    frame.index = static_cast<std::int64_t>(next);
-    next += static_cast<std::size_t>(variation.every);
-    vary(frame, variation);
+    for (bool is_there = false; !is_there; next += static_cast<std::size_t>(variation.every)) {
+      if (next >= frames.size()) return FeedStatus::kEnd;
+      frame = frames[next];
+      frame.index = static_cast<std::int64_t>(next);
+      is_there = vary(frame, variation, 1e-9 * static_cast<double>(frame.t_ns - frames.front().t_ns));
+    }
     return FeedStatus::kFrame;
   };
   const std::atomic<bool> interrupted{false};
@@ -371,7 +378,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> sources;
   twofold::SourceOptions options;
   std::string calibration;
-  bool as_it_is_only = false;
+  bool as_it_is_only = false, hard = false;
   bool frames = false, poses = false;
   std::string camera = "all";
   auto order = twofold::Order::kForwards;
@@ -388,7 +395,7 @@ int main(int argc, char** argv) {
   app.add_flag("--frames", frames, "what became of each frame");
   app.add_flag("--poses", poses, "each pose relative to its reference keyframe against the truth");
   CLI::Option* const one =
-      app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::Range(0, 8));
+      app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::NonNegativeNumber);
   app.add_option("--order", order, "that frames are played in")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, twofold::Order>{{"forwards", twofold::Order::kForwards},
@@ -398,6 +405,7 @@ int main(int argc, char** argv) {
                  "instead of the variations: every first, second, .. frame, as many as given")
       ->check(CLI::PositiveNumber)
       ->excludes(one);
+  app.add_flag("--hard", hard, "instead of the variations: what real cameras do to a recording");
   app.add_option("--readout", readout, "of the cameras, where the source leaves it open [s]; rendered: 0");
   app.add_option("--truth", truth, "standard deviations of the truth's own poses: METRES RADIANS")
       ->expected(2);
@@ -413,7 +421,11 @@ int main(int argc, char** argv) {
                                                 {"the middle 90 %", 0, 0, 1, 0.9},
                                                 {"three quarters of the size", 0, 0, 1, 1, 0.75},
                                                 {"in a mirror", 0, 0, 1, 1, 1, true}};
-  if (!every.empty()) variations.clear();
+  if (!every.empty() || hard) variations.clear();
+  if (hard) {
+    for (const twofold::Hardship& hardship : twofold::hardships())
+      variations.push_back({.name = hardship.name, .hardship = &hardship});
+  }
   for (const int n : every)
     variations.push_back({.name = fmt::format("frames 0, {}, {}, ..", n, 2 * n), .every = n});
   try {

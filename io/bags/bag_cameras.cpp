@@ -153,11 +153,8 @@ tl::expected<Distortion, std::string> pinhole_distortion(const std::string& mode
 }
 
 tl::expected<Distortion, std::string> fisheye_distortion(std::vector<double> D) {
-  while (D.size() > 4 && D.back() == 0) D.pop_back();
-  if (D.size() > 4) return tl::make_unexpected("has " + std::to_string(D.size()) + " coefficients, not 4");
-  Distortion distortion{DistortionModel::kEquidistant, {}};
-  std::copy(D.begin(), D.end(), distortion.coefficients.begin());
-  return distortion;
+  D.resize(std::max<std::size_t>(D.size(), 4));
+  return equidistant_distortion(D);
 }
 
 /// Zeros alone are no distortion, but of a fisheye, whose image is none of a pinhole even so.

@@ -1,6 +1,5 @@
 #include "io/files/calibration_file.hpp"
 
-#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
@@ -22,12 +21,9 @@ Distortion opencv_distortion_of(const YamlNode& coefficients) {
 }
 
 Distortion equidistant_of(const YamlNode& coefficients) {
-  const auto values = coefficients.numbers();
-  if (values.size() != 4)
-    coefficients.fail(fmt::format("has {} coefficients, equidistant has 4", values.size()));
-  Distortion distortion{DistortionModel::kEquidistant, {}};
-  std::copy(values.begin(), values.end(), distortion.coefficients.begin());
-  return distortion;
+  const auto distortion = equidistant_distortion(coefficients.numbers());
+  if (!distortion) coefficients.fail(distortion.error());
+  return *distortion;
 }
 
 /// @param coefficients  null where there are none
@@ -39,7 +35,8 @@ Distortion distortion_of(const YamlNode& model, const YamlNode* coefficients) {
       {"plumb_bob", DistortionModel::kRadTan},
       {"rational", DistortionModel::kRational},
       {"rational_polynomial", DistortionModel::kRational},
-      {"equidistant", DistortionModel::kEquidistant}};
+      {"equidistant", DistortionModel::kEquidistant},
+      {"fisheye", DistortionModel::kEquidistant}};
   const auto name = kNames.find(model.text());
   if (name == kNames.end())
     model.fail(fmt::format("is '{}', not none, radtan, rational or equidistant", model.text()));

@@ -51,5 +51,19 @@ TEST(OpenCvDistortion, SaysWhyThereIsNone) {
   }
 }
 
+TEST(EquidistantDistortion, HasFourCoefficientsAndZerosBehindThem) {
+  for (const std::vector<double>& k : {kept(4), kept(14, kept(4))}) {
+    const auto distortion = equidistant_distortion(k);
+    ASSERT_TRUE(distortion) << distortion.error();
+    EXPECT_EQ(distortion->model, DistortionModel::kEquidistant);
+    EXPECT_TRUE(std::equal(k.begin(), k.begin() + 4, distortion->coefficients.begin()));
+    EXPECT_TRUE(std::all_of(distortion->coefficients.begin() + 4, distortion->coefficients.end(),
+                            [](double c) { return c == 0; }));
+  }
+  for (const std::vector<double>& k : {kept(0), kept(3), kept(5)})
+    EXPECT_EQ(equidistant_distortion(k).error(),
+              "has " + std::to_string(k.size()) + " coefficients, equidistant has 4");
+}
+
 }  // namespace
 }  // namespace twofold

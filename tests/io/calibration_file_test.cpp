@@ -147,7 +147,8 @@ TEST(CalibrationFile, SaysWhyALensIsRefused) {
       {"rational", "[0.1, 0, 0, 0, 0]", "has 5 coefficients, rational has 8"},
       {"rational", "[0.1, 0, 0, 0, 0, 0.1, 0, 0, 0]", "has 9 coefficients, not 4, 5, 8, 12 or 14"},
       {"rational", "[0.1, 0, 0, 0, 0, 0.1, 0, 0, 0.01, 0, 0, 0]", "thin prism or a tilted sensor"},
-      {"equidistant", "[0.1, 0, 0]", "has 3 coefficients, equidistant has 4"}};
+      {"equidistant", "[0.1, 0, 0]", "has 3 coefficients, equidistant has 4"},
+      {"fisheye", "[0.1, 0, 0]", "has 3 coefficients, equidistant has 4"}};
   for (const auto& [model, coefficients, part] : cases) {
     const auto message = error(model, coefficients);
     EXPECT_NE(message.find(part), std::string::npos) << message;
