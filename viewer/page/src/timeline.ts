@@ -66,6 +66,9 @@ export function lateTally(model: Model): Tally {
   return tally(stretches(model, (frame) => (isLate(frame, budget) ? whyLate(model, frame, budget) : null)));
 }
 
+/** Asked for by somebody who watches, at whatever moment. */
+const COMMANDS = new Set(['map saved', 'mapping paused', 'mapping resumed', 'run stopped', 'command failed']);
+
 export class Timeline {
   onTime: (time: number | null) => void = () => {};
   onEvent: (event: MapEvent) => void = () => {};
@@ -140,11 +143,16 @@ export class Timeline {
     const say = (what: string, stretch: Stretch) => `${what} for ${stretch.frames} frame${stretch.frames > 1 ? 's' : ''}: ${stretch.reason}`;
     const lost = this.lost.find(under);
     const late = this.late.find(under);
-    const text = event ? describe(event, this.model.isMetric) : lost ? say('lost', lost) : late ? say('late', late) : clock(t);
+    const text = event ? this.describeAll(event.t) : lost ? say('lost', lost) : late ? say('late', late) : clock(t);
     this.tip.textContent = text;
     this.tip.hidden = false;
     const room = this.tip.parentElement!.clientWidth - this.tip.offsetWidth - 8;
     this.tip.style.left = `${Math.max(8, Math.min(room, pointer.offsetX - this.tip.offsetWidth / 2))}px`;
+  }
+
+  /** What happened at that moment, one below the other: of marks at the same place only the upper one can be pointed at. */
+  private describeAll(t: number): string {
+    return this.model.events.filter((event) => event.t === t).map((event) => describe(event, this.model.isMetric)).join('\n');
   }
 
   draw(): void {
@@ -169,7 +177,8 @@ export class Timeline {
     c.fillRect(8, line - 2, this.x(this.time ?? end) - 8, 4);
     this.markStretches(c, this.late, line, 'late');
     this.markStretches(c, this.lost, line, 'lost');
-    for (const event of this.model.events) this.mark(c, event);
+    for (const event of this.model.events) if (!COMMANDS.has(event.kind)) this.mark(c, event);
+    for (const event of this.model.events) if (COMMANDS.has(event.kind)) this.markCommand(c, event);
     this.ticks(c, end, line, h, style);
     c.fillStyle = style.getPropertyValue('--text');
     c.beginPath();
@@ -189,6 +198,15 @@ export class Timeline {
     c.beginPath();
     c.arc(this.x(event.t), small ? 13 : 9, small ? 2 : 4.5, 0, 2 * Math.PI);
     c.fill();
+  }
+
+  /**
+   * A bar over the marks of what the map does by itself, and narrower than those are: a loop is known only some time after the keyframe that
+   * closes it, so that its mark comes to lie where the map was saved with that keyframe, and either has to be seen.
+   */
+  private markCommand(c: CanvasRenderingContext2D, event: MapEvent): void {
+    c.fillStyle = eventColour(event.kind);
+    c.fillRect(Math.round(this.x(event.t)) - 1, 2, 3, 16);
   }
 
   private ticks(c: CanvasRenderingContext2D, end: number, line: number, height: number, style: CSSStyleDeclaration): void {

@@ -297,10 +297,31 @@ async function closedLoop() {
   });
   await has(page, 'edges of a closed loop', '#stage', '#ff5a5f', 20);
   await has(page, 'the loop on the time line', '#timeline', '#ffd166', 10);
+  await savedWithLoop(page);
   await page.screenshot({path: join(out, 'loop.png')});
   expectNoFaults(page);
   await run.stop();
   await page.context().close();
+}
+
+/** The map was saved with the keyframe that then closed a loop, which is told later: the time line shows both. */
+async function savedWithLoop(page) {
+  const tip = await page.evaluate(() => {
+    const {model, timeline} = window.twofold;
+    const loop = model.events.find((event) => event.kind === 'loop');
+    model.events = [{...loop, kind: 'map saved', text: 'map.tfm', loop: null}, loop];
+    timeline.draw();
+    const canvas = document.querySelector('#timeline');
+    const {left, top} = canvas.getBoundingClientRect();
+    canvas.dispatchEvent(new PointerEvent('pointermove', {clientX: left + timeline.x(loop.t), clientY: top + 9}));
+    return document.querySelector('#tip').textContent;
+  });
+  for (const [what, colour] of [['the saved map', '#6ac8ff'], ['the loop below it', '#ffd166']]) {
+    const pixels = await countPixels(page, '#timeline', colour);
+    assert.ok(pixels >= 20, `${what}: ${pixels} pixels of ${colour} on the time line`);
+  }
+  assert.match(tip, /^map saved · map\.tfm\nloop · [^\n]+$/);
+  done('a map that was saved with the keyframe of a loop, and the loop');
 }
 
 async function telephone(port) {
