@@ -461,8 +461,9 @@ class Page {
       make('p', '', ...jump));
   }
   private select(id: number | null): void {
+    if (id === this.stage.selected) return;
     $('keyframe-image').hidden = $('no-keyframe-image').hidden = true;
-    if (id !== null && id !== this.stage.selected && this.model.hello?.keyframeImages) this.connection.askForKeyframe(id);
+    if (id !== null && this.model.hello?.keyframeImages) this.connection.askForKeyframe(id);
     this.stage.selected = id;
     this.stage.changed();
     this.stale = true;
