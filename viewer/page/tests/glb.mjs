@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import {readFileSync, readdirSync, writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 import validator from 'gltf-validator';
-import {Program, countPixels, openBrowser, openPage} from './program.mjs';
+import {Program, countPixels, explain, openBrowser, openPage} from './program.mjs';
 
 const out = process.argv[2];
 const HOST = 'http://files.test';  // nowhere: answered from the output folder
@@ -96,6 +96,9 @@ try {
     between('height', box.size[1], 0.135, 0.155);
     for (const k of [0, 2]) between('breadth', box.size[k], 0.07, 0.14);
   });
+} catch (error) {
+  await explain(out);
+  throw error;
 } finally {
   await browser.close();
 }

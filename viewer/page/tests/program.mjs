@@ -2,26 +2,77 @@
 import {spawn} from 'node:child_process';
 import {existsSync} from 'node:fs';
 import {connect, createServer} from 'node:net';
+import {join} from 'node:path';
 import {chromium} from 'playwright-core';
 
 export const TWOFOLD = process.env.TWOFOLD ?? 'build/release/apps/twofold/twofold';
 
-/** Until `check` gives something true; throws after `ms`. */
+const programs = [];
+const pages = new Set();  // that are open
+let isOutOfTime = false;  // `timeout` has said so
+process.once('SIGTERM', () => {
+  isOutOfTime = true;
+  setTimeout(() => process.exit(124), 20000).unref();  // what is waited for may be no page
+});
+process.on('exit', () => {
+  for (const program of programs) if (!program.ended) program.process.kill('SIGKILL');
+});
+
+/** What the page itself has thrown. */
+const thrown = (page) => page.faults.filter((fault) => !/^(WebSocket connection|Failed to load resource)/.test(fault));
+
+/** Until `check` gives something true; throws after `ms`, or when an open page has thrown something: nothing of it can be relied on then. */
 export async function until(what, check, ms = 40000) {
   const end = performance.now() + ms;
   for (;;) {
     const value = await check();
     if (value) return value;
+    const [fault] = [...pages].flatMap(thrown);
+    if (fault) throw new Error(`a page's fault, while it was waited for ${what}: ${fault}`);
+    if (isOutOfTime) throw new Error(`out of time: ${what}`);
     if (performance.now() > end) throw new Error(`in vain: ${what}`);
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
 }
 
+/** For whoever has no more than the log of a test that failed: what the programs said, what is in the pages; their pictures go into a folder. */
+export async function explain(folder) {
+  for (const program of programs) console.error(`twofold ${program.args.join(' ')}\n  ${program.ended ? 'ended' : 'runs'}: ${program.text.slice(-2000).trim()}`);
+  for (const [n, page] of [...pages].entries()) {
+    console.error(`page ${page.url()}, faults: ${JSON.stringify(page.faults)}`);
+    const hung = new Promise((_, reject) => setTimeout(() => reject(new Error('it does not answer')), 10000).unref());
+    try {
+      console.error(JSON.stringify(await Promise.race([page.evaluate(contents), hung]), null, 1));
+      const path = join(folder, `failed_${n}.png`);
+      await page.screenshot({path, timeout: 10000});
+      console.error(`its picture: ${path}`);
+    } catch (error) {
+      console.error(`  ${error.message}`);
+    }
+  }
+}
+
+/** Within the page. */
+function contents() {
+  const text = (id) => document.getElementById(id)?.textContent;
+  const sizes = [...document.querySelectorAll('canvas')].map((canvas) => `${canvas.id}: ${canvas.width}x${canvas.height}, shown ${canvas.clientWidth}x${canvas.clientHeight}`);
+  const {twofold} = window;
+  if (!twofold) return {message: text('message'), sizes};
+  const {model, stage, timeline} = twofold;
+  return {
+    report: twofold.report(), state: text('state'), message: text('message'), fault: text('fault'), sizes,
+    time: timeline.time, endTime: model.endTime(), dirty: stage.dirty, stale: twofold.stale, socket: twofold.connection.socket?.readyState,
+    events: model.events.slice(-40).map(({kind, t, frame, text}) => `${kind} ${text} at ${t.toFixed(3)} s, frame ${frame}`),
+  };
+}
+
 /** A running `twofold` that shows itself; `address` when it has said where. */
 export class Program {
   constructor(args, cwd = '.') {
+    this.args = args;
     this.text = '';
     this.ended = false;
+    programs.push(this);
     this.process = spawn(TWOFOLD, args, {cwd, env: {...process.env, OPENBLAS_NUM_THREADS: '1'}});
     for (const stream of [this.process.stdout, this.process.stderr]) stream.on('data', (data) => (this.text += data));
     this.end = new Promise((resolve) => this.process.on('exit', (code) => {
@@ -47,13 +98,17 @@ export class Network {
     const network = new Network();
     const url = new URL(address);
     network.sockets = new Set();
+    network.hung = new WeakSet();
     const program = {port: Number(url.port), host: url.hostname};
     network.server = createServer((near) => {
       const far = connect(program);
       for (const [socket, other] of [[near, far], [far, near]]) {
         network.sockets.add(socket);
         socket.on('error', () => {});
-        socket.on('close', () => network.sockets.delete(socket));
+        socket.on('close', () => {
+          network.sockets.delete(socket);
+          if (!network.hung.has(other)) other.end();  // also after an error, of which a pipe says nothing
+        });
         socket.pipe(other);
       }
     });
@@ -71,6 +126,7 @@ export class Network {
   /** Without a word: connections stay open, and nothing comes through any more. New ones are served. */
   hang() {
     for (const socket of this.sockets) {
+      this.hung.add(socket);
       socket.unpipe();
       socket.pause();
     }
@@ -87,6 +143,7 @@ export async function openBrowser() {
   if (!executablePath) throw new Error('chromium is missing: scripts/setup --tests installs it');
   return chromium.launch({
     executablePath,
+    handleSIGTERM: false,  // pages have yet to be explained
     args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
   });
 }
@@ -98,10 +155,18 @@ export async function openPage(browser, address, options = {}) {
   page.faults = [];
   page.on('console', (message) => message.type() === 'error' && page.faults.push(message.text()));
   page.on('pageerror', (error) => page.faults.push(String(error)));
+  pages.add(page);
+  page.on('close', () => pages.delete(page));
   page.opened = performance.now();
   await page.goto(address);
   return page;
 }
+
+/** Until nothing is left to be drawn: for pages to which nothing new comes. */
+export const settled = (page) => until('a picture that is whole', () => page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => {
+  const {dirty, fence} = window.twofold.stage;
+  resolve(!dirty && !fence);
+}))));
 
 export const report = (page) => page.evaluate(() => window.twofold?.report() ?? {});
 

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import {mkdirSync} from 'node:fs';
 import {join} from 'node:path';
-import {Program, openBrowser, openPage, until} from './program.mjs';
+import {Program, explain, openBrowser, openPage, until} from './program.mjs';
 
 const out = process.argv[2];
 mkdirSync(out, {recursive: true});
@@ -54,6 +54,9 @@ try {
   const late = await openPage(browser, await view.address());
   await expectMesh(late, 'mesh of a finished run');
   await view.stop();
+} catch (error) {
+  await explain(out);
+  throw error;
 } finally {
   await browser.close();
 }
