@@ -6,7 +6,7 @@ import {Connection, type Command, type Link} from './connection.ts';
 import {Model} from './model.ts';
 import {eventColour, type Theme} from './palette.ts';
 import {Sight} from './sight.ts';
-import {Stage, type Layer, type View} from './stage.ts';
+import {Stage, contextOf, type Layer, type View} from './stage.ts';
 import {Strip} from './strip.ts';
 import {Timeline, clock, describe, lateStretches, lateTally, length, lostStretches, tally, type Tally} from './timeline.ts';
 import {PROTOCOL, State, type Binary, type Keyframe, type KeyframeImage, type LiveFrame, type MapEvent, type Text} from './wire.ts';
@@ -79,17 +79,19 @@ class Page {
     fault: (error) => showFault(error),
   });
   readonly model = new Model();
-  readonly stage = new Stage($('stage'), this.model);
+  readonly stage: Stage;
   readonly strip = new Strip($('strip'), this.model);
   readonly timeline = new Timeline($('timeline'), $('tip'), this.model);
-  readonly sight = new Sight($('sight'), this.model, this.stage.cloud);
+  readonly sight: Sight;
   private link: Link = 'connecting';
   private measuring = false;
   private playing = 0;
   private stale = true;
   private part: number | 'camera' | 'all' = 'camera';
 
-  constructor() {
+  constructor(context: WebGL2RenderingContext) {
+    this.stage = new Stage($('stage'), context, this.model);
+    this.sight = new Sight($('sight'), this.model, this.stage.cloud);
     history.replaceState(null, '', '/');  // the token is in a cookie by now, and needs no second place
     this.makePanels();
     this.listen();
@@ -659,13 +661,14 @@ function speaksTheSame(protocol: number): boolean {
 }
 
 function start(): void {
-  if (!document.createElement('canvas').getContext('webgl2')) {
+  const context = contextOf($('stage'));
+  if (!context) {
     $('message').textContent = 'this browser has no WebGL 2, which the picture is drawn with: see its settings for hardware acceleration, or try another one';
     $('message').hidden = false;
     $('state').textContent = 'no picture';
     return;
   }
-  window.twofold = new Page();
+  window.twofold = new Page(context);
 }
 
 declare global {

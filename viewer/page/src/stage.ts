@@ -69,8 +69,8 @@ export class Stage {
   private readonly target = new THREE.Vector3();
   private moved = false;  // by hand
 
-  constructor(private readonly canvas: HTMLCanvasElement, private readonly model: Model) {
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: false, preserveDrawingBuffer: true, powerPreference: 'low-power'});
+  constructor(private readonly canvas: HTMLCanvasElement, context: WebGL2RenderingContext, private readonly model: Model) {
+    this.renderer = new THREE.WebGLRenderer({canvas, context});
     this.renderer.debug.checkShaderErrors = false;  // each question waits for the compiler
     const slow = drawsInSoftware(this.renderer.getContext());
     this.leastMs = slow ? SOFTWARE_MS : 0;
@@ -460,6 +460,11 @@ export class Stage {
     this.renderer.render(this.scene, this.camera);
     this.canvas.toBlob(done, 'image/png');
   }
+}
+
+/** Null: the browser has no WebGL 2. It is the picture's own: another, made to find that out, would be work for nothing. */
+export function contextOf(canvas: HTMLCanvasElement): WebGL2RenderingContext | null {
+  return canvas.getContext('webgl2', {antialias: false, preserveDrawingBuffer: true, powerPreference: 'low-power'});
 }
 
 /** Smooth edges, by more pixels than the screen has, are for those who have a graphics processor. */

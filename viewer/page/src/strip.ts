@@ -61,7 +61,7 @@ export class Strip {
     const text = style.getPropertyValue('--faint');
     const grid = {stroke: style.getPropertyValue('--track'), width: 1};
     const areas = stages.map((label, s) => ({label, fill: STAGES[s], stroke: STAGES[s], width: 0, points: {show: false}})).reverse();
-    return new uPlot({
+    return onSoftwareCanvas(() => new uPlot({
       width: this.place.clientWidth,
       height: this.place.clientHeight,
       legend: {show: false},
@@ -76,11 +76,28 @@ export class Strip {
         {label: 'exposure to pose', stroke: style.getPropertyValue('--text'), width: 1.5, points: {show: false}},
         {label: 'budget', stroke: '#ff5a5f', width: 1.5, dash: [6, 4], points: {show: false}},
       ],
-    }, [[0], ...stages.map(() => [0]), [0], [0]], this.place);
+    }, [[0], ...stages.map(() => [0]), [0], [0]], this.place));
   }
 
   static legend(stages: string[]): [string, string][] {
     return stages.map((name, s) => [name, STAGES[s]]);
+  }
+}
+
+/**
+ * uPlot makes its canvas itself, with a context that the graphics processor draws; where there is none, whoever draws waits until the big
+ * picture is through, for seconds while its shaders are compiled. Plots are small: here the context is one that waits for nobody.
+ */
+function onSoftwareCanvas(make: () => uPlot): uPlot {
+  const {prototype} = HTMLCanvasElement;
+  const asBefore = prototype.getContext as (this: HTMLCanvasElement, kind: string, options?: object) => RenderingContext | null;
+  prototype.getContext = function (this: HTMLCanvasElement, kind: string) {
+    return asBefore.call(this, kind, {willReadFrequently: true});
+  } as typeof prototype.getContext;
+  try {
+    return make();
+  } finally {
+    prototype.getContext = asBefore as typeof prototype.getContext;
   }
 }
 
