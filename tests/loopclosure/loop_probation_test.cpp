@@ -70,11 +70,30 @@ TEST_F(LoopProbationTest, TheMapItselfIsAWitness) {
 
 TEST_F(LoopProbationTest, PatienceEnds) {
   ProbationOptions options;
-  options.patience = 3;
+  EXPECT_FALSE(probation_.confirms(loop(1, 11), graph_));
+  EXPECT_TRUE(probation_.confirms(loop(1, 13), graph_)) << "they agree, if the first one is still held";
+  options.patience = 1;
   LoopProbation probation(SensorKind::kStereo, options);
   EXPECT_FALSE(probation.confirms(loop(1, 11), graph_));
-  EXPECT_FALSE(probation.confirms(loop(1, 15), graph_));
-  EXPECT_TRUE(probation.confirms(loop(1, 18), graph_));
+  EXPECT_FALSE(probation.confirms(loop(1, 13), graph_));
+  EXPECT_TRUE(probation.confirms(loop(1, 14), graph_));
+}
+
+/// Two that agree, of which the way explains the second only: the first shows that places look alike here.
+TEST_F(LoopProbationTest, WhatDriftDoesNotExplainIsNoWitness) {
+  const LoopConstraint first = loop(1, 11, SE3(SO3(), Vector3(-0.4, 0, 0))), second = loop(3, 12);
+  const DriftModel drift(SensorKind::kStereo, {});
+  const auto chi2 = [&](const LoopConstraint& l) { return drift.chi2(graph_, l.from, l.to, l.S_to_from()); };
+  ASSERT_GT(chi2(first), 1.1 * chi2(second));
+  ProbationOptions options;
+  options.drift.max_chi2 = 1.05 * chi2(first);
+  LoopProbation credulous(SensorKind::kStereo, options);
+  EXPECT_FALSE(credulous.confirms(first, graph_));
+  EXPECT_TRUE(credulous.confirms(second, graph_));
+  options.drift.max_chi2 = 0.95 * chi2(first);
+  LoopProbation probation(SensorKind::kStereo, options);
+  EXPECT_FALSE(probation.confirms(first, graph_));
+  EXPECT_FALSE(probation.confirms(second, graph_));
 }
 
 /// Poses of different parts say nothing about each other: the map is no witness, and two loops agree along
@@ -128,8 +147,10 @@ TEST_F(LoopProbationTest, OneCameraMayHaveDriftedByAsMuchAsItWent) {
     EXPECT_FALSE(probation.confirms(scaled(1, 11, scale), graph_));
     EXPECT_EQ(probation.confirms(scaled(3, 12, scale), graph_), scale < 1.1) << scale;
   }
-  EXPECT_FALSE(probation_.confirms(scaled(1, 11, 1.02), graph_));
-  EXPECT_FALSE(probation_.confirms(scaled(3, 12, 1.1), graph_)) << "of different scale, they do not agree";
+  LoopProbation probation(SensorKind::kMono, {});
+  EXPECT_FALSE(probation.confirms(scaled(1, 11, 0.98), graph_));
+  EXPECT_FALSE(probation.confirms(scaled(3, 12, 1.04), graph_)) << "of different scale, they do not agree";
+  EXPECT_TRUE(probation.confirms(scaled(3, 13, 1.04), graph_)) << "drift explains either";
 }
 
 /// A street of houses that are all alike, driven round a block: what the images say is right for its copies,

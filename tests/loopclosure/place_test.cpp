@@ -142,6 +142,20 @@ TEST_P(PlaceTest, CornersOfOneSideOfTheImageAreNoLoop) {
   EXPECT_FALSE(report.well_spread);
 }
 
+/// What the place shows in the left half of its image the camera sees in the middle of its own.
+TEST_P(PlaceTest, CornersOfOneSideOfThePlaceAreNoLoop) {
+  PlaceView a = view(1, pose(0, {0, 0, 0}));
+  const PlaceView b = view(1, pose(0.3, {0, 0, 0}));
+  ASSERT_TRUE(verify(a, b));
+  for (DescribedCorner& corner : a.corners) {
+    if (corner.uv.x() > 310) corner.descriptor = {};
+  }
+  VerificationReport report;
+  EXPECT_FALSE(verify(a, b, {}, &report));
+  EXPECT_GE(report.inliers, VerificationOptions().min_inliers);
+  EXPECT_FALSE(report.well_spread);
+}
+
 /// Half of the corners are missing in the place's own view; its neighbour has them.
 TEST_P(PlaceTest, NeighboursLendTheirCorners) {
   const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5}), T_n_w = pose(0.12, {0.25, 0.1, -0.5});

@@ -119,6 +119,33 @@ TEST_F(PoseRefinementTest, PointsThatAreFoundElsewhereContradict) {
   EXPECT_EQ(refine(SE3(), place, options), RefinementOutcome::kContradicted);
 }
 
+/// Once the first round has found the pose, what is found beside where it should be is something else.
+TEST_F(PoseRefinementTest, TheSecondRoundLooksNearer) {
+  make_map(200, 0, 1, 4);
+  RefinedPlace place;
+  PoseRefinement refinement(rig_, {});
+  ASSERT_EQ(refinement.refine(graph_, KeyframeId{0}, view_, truth(), place), RefinementOutcome::kRefined);
+  EXPECT_GT(place.inliers, 0.7 * static_cast<double>(refinement.found().size()));
+}
+
+TEST_F(PoseRefinementTest, PointsAtTheImagesBorderAreNotLookedFor) {
+  make_map(200);
+  RefinementOptions options;
+  options.border_px = 100;
+  RefinedPlace place;
+  EXPECT_EQ(refine(SE3(), place, options), RefinementOutcome::kTooFewPoints);
+}
+
+TEST_F(PoseRefinementTest, LooksForNoMorePointsThanItMay) {
+  make_map(200);
+  RefinementOptions options;
+  options.max_points = 60;
+  RefinedPlace place;
+  PoseRefinement refinement(rig_, options);
+  ASSERT_EQ(refinement.refine(graph_, KeyframeId{0}, view_, truth(), place), RefinementOutcome::kRefined);
+  EXPECT_LE(refinement.found().size(), 60U);
+}
+
 /// From where the map was made a point falls onto its pixel whatever its depth; from aside it does not, and
 /// says no more of the pose than its depth is known.
 TEST_F(PoseRefinementTest, FromAsideAPointTellsAsMuchAsItsDepthIsKnown) {
@@ -132,6 +159,21 @@ TEST_F(PoseRefinementTest, FromAsideAPointTellsAsMuchAsItsDepthIsKnown) {
   ASSERT_EQ(PoseRefinement(rig_, {}).refine(graph_, KeyframeId{0}, view_, beside * T_k_w_.inverse(), near),
             RefinementOutcome::kRefined);
   EXPECT_LT(1.0 * aside.weight / aside.inliers, 0.8 * near.weight / near.inliers);
+}
+
+/// Nearly half of the points that are found, and as well known as the others, are outliers.
+TEST_F(PoseRefinementTest, OutliersAddNothingToTheWeight) {
+  make_map(200, 0, 1, 4);
+  RenderedScene scene(rig_, Vector3(3, 2, 4), 1);
+  scene.render(T_k_w_, 1.5, view_);
+  RefinementOptions options;
+  options.second_radius_px = 5;
+  options.min_inlier_share = 0;
+  PoseRefinement refinement(rig_, options);
+  RefinedPlace place;
+  ASSERT_EQ(refinement.refine(graph_, KeyframeId{0}, view_, SE3(), place), RefinementOutcome::kRefined);
+  ASSERT_LT(place.inliers, 0.7 * static_cast<double>(refinement.found().size()));
+  EXPECT_LE(place.weight, place.inliers);
 }
 
 /// One point in ten is the least that is enough, unless it is said otherwise (docs/places.md).

@@ -13,13 +13,13 @@ constexpr KeyframeId kFrom{0}, kTo{5};
 /// Keyframes 0 to 5 along a line, each joined to the next by an edge, before a wall.
 class RedundantLoopTest : public ::testing::Test {
  protected:
-  GraphSnapshot line(double step, int edges = 5) {
+  GraphSnapshot line(double step, int edges = 5, double roll = 0) {
     GraphWriter writer;
     for (std::uint32_t k = 0; k <= index(kTo); ++k) {
       Keyframe keyframe;
       keyframe.id = KeyframeId{k};
       keyframe.part = kFrom;
-      keyframe.T_k_w = SE3(SO3(), Vector3(-step * k, 0, 0));
+      keyframe.T_k_w = SE3(SO3::exp({0, 0, roll * k}), Vector3(-step * k, 0, 0));
       keyframe.median_depth = kMedianDepth;
       writer.add_keyframe(keyframe);
       writer.set_reference(keyframe.id);
@@ -77,6 +77,20 @@ TEST_F(RedundantLoopTest, ItJoinsWhatOnlyALongWayJoins) {
   EXPECT_FALSE(redundant(loop(far), far));
   const GraphSnapshot torn = line(0.2, 4);
   EXPECT_FALSE(redundant(loop(torn), torn));
+}
+
+/// What a camera saw before it turned has left its view.
+TEST_F(RedundantLoopTest, TurnsAreAWayToo) {
+  const GraphSnapshot turned = line(0, 5, 0.9);
+  EXPECT_FALSE(redundant(loop(turned), turned));
+  const GraphSnapshot nodding = line(0, 5, 0.7);
+  EXPECT_TRUE(redundant(loop(nodding), nodding));
+}
+
+TEST_F(RedundantLoopTest, PointsBehindTheCameraSayNothing) {
+  const GraphSnapshot near = line(0.2);
+  for (MotionObservation& point : wall_) point.x_ref.z() = -kMedianDepth;
+  EXPECT_FALSE(redundant(loop(near), near));
 }
 
 TEST_F(RedundantLoopTest, ItRestsOnNothing) {

@@ -109,6 +109,91 @@ TEST(CullRedundantKeyframes, KeepsUpWithAMapperThatInsertsSeveralAtATime) {
   }
 }
 
+/// The tracker's proposals hang on the reference.
+TEST(CullRedundantKeyframes, TheReferenceStays) {
+  const Rig rig = simulation::thesis_rig();
+  GraphWriter writer = chain(20);
+  std::vector<KeyframeId> all;
+  for (std::uint32_t i = 0; i < 20; ++i) all.push_back(k(i));
+  for (int n = 0; n < 20; ++n) add_point(writer, rig, {0.2, 0.01 * n, 1}, all);
+  writer.set_reference(k(11));
+  DoubleWindow window;
+  for (const KeyframeId id : all) window.nodes.push_back({.id = id});
+  window.inner = window.nodes.size();
+  int points = 0;
+  EXPECT_EQ(cull_redundant_keyframes(writer, window, {}, 1, points), (std::vector{k(10), k(9)}));
+}
+
+TEST(RemoveKeyframe, PointsThatOneKeyframeAloneWouldSeeGoWithIt) {
+  const Rig rig = simulation::thesis_rig();
+  GraphWriter writer = chain(4);
+  const PointId one_left = add_point(writer, rig, {0.1, 0, 1}, {k(1), k(2)});
+  const PointId two_left = add_point(writer, rig, {0.1, 0.1, 1}, {k(0), k(1), k(2)});
+  EXPECT_EQ(remove_keyframe(writer, k(1)), 1);
+  EXPECT_FALSE(writer.graph().point(one_left).alive());
+  EXPECT_TRUE(writer.graph().point(two_left).alive());
+}
+
+TEST(RemoveOutlierObservations, APointIsHeldByItsAnchorAndAnotherKeyframe) {
+  const Rig rig = simulation::thesis_rig();
+  GraphWriter writer = chain(4);
+  const PointId alone = add_point(writer, rig, {0.1, 0, 1}, {k(0), k(1)});
+  const PointId adrift = add_point(writer, rig, {0.1, 0.1, 1}, {k(0), k(1), k(2)});
+  const PointId held = add_point(writer, rig, {0.1, 0.2, 1}, {k(0), k(1), k(2)});
+  const std::vector<WindowBuilder::Outlier> outliers{{k(0), adrift}, {k(1), alone}, {k(1), held}};
+  EXPECT_EQ(remove_outlier_observations(writer, outliers), 2);
+  EXPECT_FALSE(writer.graph().point(alone).alive()) << "seen from its anchor only";
+  EXPECT_FALSE(writer.graph().point(adrift).alive()) << "its anchor does not see it";
+  EXPECT_TRUE(writer.graph().point(held).alive());
+}
+
+/// A point is missed only by who should have seen it, and as its patch shows it.
+class PointInViewTest : public testing::Test {
+ protected:
+  /// Whether a keyframe at T_k_w is said to have missed a point that two at the origin saw at x_w.
+  [[nodiscard]] bool missed(const SE3& T_k_w, const Vector3& x_w) const {
+    GraphWriter writer;
+    for (const double x : {0.0, 0.02}) add_keyframe(writer, SE3(SO3(), {-x, 0, 0}));
+    const KeyframeId newest = add_keyframe(writer, T_k_w);
+    const std::vector<PointId> points{add_point(writer, rig_, x_w, {k(0), k(1)})};
+    return PointCuller(rig_, options_).cull(writer, newest, points) == 1;
+  }
+  static SE3 at(const Vector3& place) { return {SO3(), -place}; }
+
+  const Rig rig_ = simulation::thesis_rig();
+  CullingOptions options_ = [] {
+    CullingOptions options;
+    options.max_misses = 1;
+    return options;
+  }();
+};
+
+TEST_F(PointInViewTest, WellInsideOfTheImage) {
+  const Vector2 near_border(options_.view_border_px - 5, 200);
+  const Vector3 x = 2 * rig_.camera.unproject(near_border);
+  EXPECT_FALSE(missed(SE3(), x));
+  EXPECT_TRUE(missed(SE3(), 2 * rig_.camera.unproject(near_border + Vector2(10, 0))));
+}
+
+TEST_F(PointInViewTest, FromAboutAsFar) {
+  const Vector3 x(0, 0, 3);
+  EXPECT_TRUE(missed(at({0, 0, 0.9}), x));
+  EXPECT_FALSE(missed(at({0, 0, 1.1}), x)) << "1.6 times as near";
+  EXPECT_TRUE(missed(at({0, 0, -1.4}), x));
+  EXPECT_FALSE(missed(at({0, 0, -1.6}), x)) << "1.5 times as far";
+}
+
+TEST_F(PointInViewTest, FromAboutTheSameSide) {
+  const Vector3 x(0, 0, 3);
+  const auto from_aside = [&](double angle) {
+    const Matrix3 R = SO3::exp({0, angle, 0}).matrix();
+    const SE3 T_w_k(SO3::exp({0, angle, 0}), x - R * x);
+    return missed(T_w_k.inverse(), x);
+  };
+  EXPECT_TRUE(from_aside(0.4));
+  EXPECT_FALSE(from_aside(0.5)) << "the cosine is 0.88";
+}
+
 struct Size {
   std::size_t keyframes = 0, points = 0, observations = 0, edges = 0;
 };

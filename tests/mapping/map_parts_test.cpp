@@ -48,6 +48,21 @@ TEST(MapParts, TheSmallerPartMovesAsAWhole) {
   }
 }
 
+TEST(MapParts, OfTwoAlikeTheYoungerMovesWhicheverTheLoopComesFrom) {
+  for (const bool from_older : {true, false}) {
+    GraphWriter writer = chain(4);
+    const KeyframeId older{1}, younger{index(add_part(writer, 4)) + 1};
+    const SE3 before = writer.graph().T_k_w(older);
+    if (from_older) {
+      join_parts(writer, older, younger, kConstraint);
+    } else {
+      join_parts(writer, younger, older, kConstraint);
+    }
+    EXPECT_EQ(writer.graph().T_k_w(older).matrix(), before.matrix()) << from_older;
+    EXPECT_EQ(writer.graph().part(younger), KeyframeId{0}) << from_older;
+  }
+}
+
 TEST(MapParts, KeyframesOfOnePartStay) {
   GraphWriter writer = chain(5);
   EXPECT_EQ(join_parts(writer, KeyframeId{0}, KeyframeId{4}, kConstraint), 0);

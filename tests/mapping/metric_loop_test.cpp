@@ -153,6 +153,35 @@ TEST_F(MetricLoopTest, WorkIsBoundedAndSpread) {
   EXPECT_EQ(close().searched, static_cast<int>(parts.size()));
 }
 
+/// Two that see the points: one of them enough of them.
+TEST_F(MetricLoopTest, OnlyWhoSharesEnoughPointsIsConnected) {
+  make_graph(SE3());
+  const KeyframeId other = add_keyframe(writer_, SE3(SO3(), {0, 0.05, 0}));
+  link(writer_, old_, other, 40);
+  for (std::uint32_t p = 0; p < 19; ++p) {
+    Observation observation;
+    observation.point = PointId{p};
+    observation.z = rig_.project(writer_.graph().T_k_w(other) * x_w_[p]).cast<float>();
+    writer_.add_observations(other, std::span(&observation, 1));
+  }
+  writer_.set_reference(reference_);
+  MapperOptions windows;
+  windows.inner_window = 2;
+  windows.outer_window = 5;
+  SelectionScratch scratch;
+  select_double_window(writer_.graph(), windows, scratch, window_);
+  ASSERT_TRUE(window_.contains(other));
+  options_.min_covisible = 20;
+  EXPECT_EQ(close().edges, 1);
+  EXPECT_EQ(find_edge(writer_.graph().keyframe(reference_), other), nullptr);
+}
+
+TEST_F(MetricLoopTest, PointsAtTheImagesBorderAreNotSearched) {
+  make_graph(SE3());
+  options_.loop.border_px = 230;  // 20 of 480 rows are left
+  EXPECT_LT(close().searched, options_.min_covisible);
+}
+
 TEST_F(MetricLoopTest, PointsSeenFromAnotherSideAreNotSearched) {
   make_graph(SE3());
   options_.loop.min_view_cosine = std::cos(0.02);

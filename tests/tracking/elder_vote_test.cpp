@@ -58,6 +58,51 @@ TEST_F(ElderVoteTest, AFewElderOnesAreNotEnough) {
   EXPECT_FALSE(ask());
 }
 
+TEST_F(ElderVoteTest, TheirShareAloneDoesNotMakeThemEnough) {
+  add(28, KeyframeId{0}, Vector3::Zero());
+  add(52, KeyframeId{7}, Vector3(0.1, 0, 0));
+  EXPECT_FALSE(ask());
+  ElderVoteOptions fewer;
+  fewer.min_elders = 28;
+  vote_ = ElderVote(rig_, 300, fewer);
+  EXPECT_TRUE(ask());
+}
+
+/// A quarter of the elders were found on what hides them, near to where they would be seen.
+TEST_F(ElderVoteTest, WhileTheYoungAreMistrustedElderOnesMustBeWhereTheOthersAre) {
+  add(60, KeyframeId{0}, Vector3::Zero());
+  add(100, KeyframeId{7}, Vector3(0.1, 0, 0));
+  ASSERT_TRUE(ask());
+  for (std::size_t n = 0; n < 60; ++n) {
+    const float shift = n % 4 == 0 ? 1.1F : 0.05F * (static_cast<float>(n % 3) - 1);
+    observations_[n].z += Eigen::Vector3f(shift, 0, shift);
+  }
+  const auto pose = ask();
+  ASSERT_TRUE(pose);
+  EXPECT_LT(pose->T_c_ref.translation().norm(), 1e-3);
+}
+
+/// Some of the oldest points are on what passes as well: then they are no witnesses.
+TEST_F(ElderVoteTest, EldersThatDisagreeOverruleNobody) {
+  add(34, KeyframeId{0}, Vector3::Zero());
+  add(26, KeyframeId{0}, Vector3(0, 0.3, 0));
+  add(100, KeyframeId{7}, Vector3(0.1, 0, 0));
+  EXPECT_FALSE(ask());
+  EXPECT_FALSE(vote_.mistrusts_the_young());
+}
+
+/// The map has drifted between its old and its new keyframes: the young go with either pose.
+TEST_F(ElderVoteTest, TheYoungThatGoWithTheEldersAreNotMistrusted) {
+  add(60, KeyframeId{0}, Vector3::Zero());
+  add(100, KeyframeId{7}, Vector3(0.012, 0, 0));
+  ElderVoteOptions any_dissent;
+  any_dissent.min_loyal = 1;
+  vote_ = ElderVote(rig_, 300, any_dissent);
+  ASSERT_TRUE(ask()) << "the elders' pose is another";
+  vote_ = ElderVote(rig_, 300, {});
+  EXPECT_FALSE(ask());
+}
+
 /// Far elders in the middle of the image hardly know how the camera is turned about its axis; where some of
 /// them were found beside where they are, these decide. The nearer young know it.
 TEST_F(ElderVoteTest, MistakesAmongFarEldersDoNotOverruleWhatTheMostOfThemSee) {

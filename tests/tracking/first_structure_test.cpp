@@ -135,6 +135,40 @@ TEST(FirstStructure, WaitsWhileTheCameraStandsOrTurnsOnTheSpot) {
               "turning, nearly");
 }
 
+TEST(FirstStructure, WaitsForTheFlowThatIsAskedFor) {
+  const CornerViews views = views_of({scattered, moving({-0.6, 0, 0}, {0, 0, 0})}, 1);
+  FirstStructureOptions options;
+  ASSERT_TRUE(first_structure(kRig, views, options));
+  options.min_flow_px = 100;
+  const auto start = first_structure(kRig, views, options);
+  ASSERT_FALSE(start);
+  EXPECT_EQ(start.error(), LostCause::kTooLittleParallax);
+}
+
+/// Nine corners in ten follow one motion.
+TEST(FirstStructure, WantsMostCornersToAgree) {
+  const CornerViews views = views_of({scattered, moving({-0.6, 0, 0}, {0, 0, 0})}, 1);
+  FirstStructureOptions options;
+  options.min_share = 0.8;
+  ASSERT_TRUE(first_structure(kRig, views, options));
+  options.min_share = 0.95;
+  const auto start = first_structure(kRig, views, options);
+  ASSERT_FALSE(start);
+  EXPECT_EQ(start.error(), LostCause::kNoCommonMotion);
+}
+
+/// Every third corner is on the horizon: it agrees with the motion, and knows no depth.
+TEST(FirstStructure, PointsWithoutADepthDoNotJoin) {
+  const auto before_a_horizon = [](int i, double s) {
+    return Vector3((i % 3 == 0 ? 1000 : 1) * scattered(i, s));
+  };
+  const auto start =
+      first_structure(kRig, views_of({before_a_horizon, moving({-0.6, 0, 0}, {0, 0, 0})}, 1), {});
+  ASSERT_TRUE(start) << describe(start.error());
+  EXPECT_GT(start->corners.size(), 60U);
+  for (const int corner : start->corners) EXPECT_NE(corner % 3, 0) << corner;
+}
+
 TEST(FirstStructure, IsNotStartedBySomethingThatMoves) {
   const auto passing = [](int i, double s) {
     return Vector3(scattered(i, s) + (i % 3 == 0 ? s * Vector3(0.8, 0, 0) : Vector3(0, 0, 0)));

@@ -1,0 +1,159 @@
+#include "tracking/monocular/depth_seeds.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fixtures/rendered_scene.hpp"
+#include "imaging/fast_corners.hpp"
+#include "imaging/patch.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr KeyframeId kAnchor{3};
+constexpr double kMedianDepth = 4;
+
+/// Corners of a rendered room, seen from its middle; others of a room that is not there.
+class DepthSeedsTest : public ::testing::Test {
+ protected:
+  /// @param room  whose corners are to be found
+  void begin(const DepthSeedOptions& options, std::uint32_t room = 21) {
+    seeds_.emplace(rig_, GuidedSearchOptions{}, options, 300);
+    testing::RenderedScene scene(rig_, kRoom, room);
+    FrameImages images;
+    scene.render(SE3(), 1, images);
+    std::vector<Corner> corners;
+    corners.reserve(1000);
+    const int columns = rig_.camera.width / 32, rows = rig_.camera.height / 32;
+    const std::vector<std::uint8_t> free(static_cast<std::size_t>(columns * rows), 0);
+    detect_corners(images.left.level(0), 0, 10, 15, 12, {32, columns, rows, free}, corners);
+    for (const Corner& corner : corners) {
+      PointAppearance appearance;
+      if (cut_appearance(images.left.level(0), corner.u, corner.v, 0, appearance))
+        seeds_->add(kAnchor, appearance);
+    }
+    ASSERT_GT(seeds_->size(), 30U);
+  }
+  /// The camera has moved by `shift` to the right.
+  void look(double shift, double median_depth = kMedianDepth) {
+    const SE3 T_c_a(SO3(), Vector3(-shift, 0, 0));
+    FrameImages images;
+    scene_.render(T_c_a, 1, images);
+    seeds_->observe(
+        images.left, median_depth, [&](KeyframeId) { return T_c_a; }, ready_);
+  }
+  [[nodiscard]] std::size_t ready() const { return ready_.points().size(); }
+  /// By how far two views' depths are apart that differ by a pixel, as inverse depths.
+  [[nodiscard]] double shift_for(double inverse_depth_error) const {
+    return rig_.noise.sigma_px / (rig_.camera.fx * inverse_depth_error);
+  }
+
+  const Rig rig_ = testing::test_rig(SensorKind::kMono, 320, 240);
+  const Vector3 kRoom{3, 2, kMedianDepth};
+  testing::RenderedScene scene_{rig_, kRoom, 21};
+  std::optional<DepthSeeds> seeds_;
+  ImmaturePoints ready_{300, 1};
+};
+
+TEST_F(DepthSeedsTest, APointIsUsedWhenItsDepthIsKnown) {
+  DepthSeedOptions options;
+  options.far_error = 0;
+  begin(options);
+  const std::size_t all = seeds_->size();
+  look(shift_for(1.6 * options.near_error / kMedianDepth));  // few are as near as that
+  EXPECT_LT(ready(), all / 4);
+  const std::size_t early = ready();
+  look(shift_for(0.4 * options.near_error / kMedianDepth));
+  EXPECT_GT(ready(), early + all / 2);
+  int wrong = 0;
+  for (const ImmaturePoint& point : ready_.points()) {
+    const double truth = 1 / scene_.depth(SE3(), point.appearance.uv.cast<double>());
+    wrong += std::abs(point.psi.z() - truth) > 3 * options.near_error * truth ? 1 : 0;
+  }
+  EXPECT_LE(wrong, static_cast<int>(ready()) / 20);
+  EXPECT_EQ(seeds_->size() + ready(), all) << "it is no seed any more";
+}
+
+/// What is far away is known to be far long before its distance is.
+TEST_F(DepthSeedsTest, AFarPointIsUsedWhenItIsKnownToBeFar) {
+  constexpr double kNear = kMedianDepth / 10;  // most of the scene is there
+  for (const double far_error : {0.0, 0.02}) {
+    ready_.clear_points();
+    DepthSeedOptions options;
+    options.near_error = 0.05;
+    options.far_error = far_error;
+    begin(options);
+    look(shift_for(0.4 * 0.02 / kNear), kNear);
+    EXPECT_EQ(ready() > seeds_->size(), far_error > 0) << ready();
+  }
+}
+
+TEST_F(DepthSeedsTest, APointIsUsedWhenEnoughFramesHaveSeenIt) {
+  DepthSeedOptions options;
+  options.min_looks = 2;
+  begin(options);
+  look(0.3);
+  EXPECT_EQ(ready(), 0U);
+  look(0.6);
+  EXPECT_GT(ready(), seeds_->size());
+}
+
+/// What was seen from far aside is not known better by a look from beside where it was seen first.
+TEST_F(DepthSeedsTest, ALookThatAddsLittleIsNoWitness) {
+  DepthSeedOptions options;
+  options.min_looks = 2;
+  begin(options);
+  look(0.6);
+  for (int frame = 0; frame < 3; ++frame) look(0.1);
+  EXPECT_LT(ready(), seeds_->size() / 4);
+  look(0.9);
+  EXPECT_GT(ready(), seeds_->size());
+}
+
+TEST_F(DepthSeedsTest, WhatIsNeverFoundIsGivenUpSooner) {
+  DepthSeedOptions options;
+  options.max_first_misses = 2;
+  options.max_misses = 50;
+  begin(options, 99);
+  const std::size_t all = seeds_->size();
+  look(0.3);
+  EXPECT_GT(seeds_->size() + ready(), all - 1);
+  look(0.32);
+  EXPECT_LT(seeds_->size(), all / 4);
+}
+
+TEST_F(DepthSeedsTest, WhatIsLostIsGivenUpAfterSomeMisses) {
+  DepthSeedOptions options;
+  options.near_error = 1e-6;
+  options.far_error = 0;
+  options.max_misses = 2;
+  begin(options);
+  look(0.2);
+  const std::size_t seen = seeds_->size();
+  ASSERT_GT(seen, 25U);
+  scene_ = testing::RenderedScene(rig_, kRoom, 99);  // something else is there
+  look(0.4);
+  EXPECT_GT(seeds_->size(), 9 * seen / 10);
+  look(0.6);
+  EXPECT_LT(seeds_->size(), seen / 3);
+}
+
+/// From where the corner was seen first, nothing can be learnt, and nothing counts as missed.
+TEST_F(DepthSeedsTest, ACameraThatStandsLooksForNothing) {
+  begin({}, 99);
+  const std::size_t all = seeds_->size();
+  for (int frame = 0; frame < 5; ++frame) look(0.001);
+  EXPECT_EQ(seeds_->size(), all);
+}
+
+TEST_F(DepthSeedsTest, TheOldAreGivenUp) {
+  begin({});
+  const DepthSeedOptions options;
+  const auto newest = index(kAnchor) + static_cast<std::uint32_t>(options.max_age);
+  seeds_->drop_stale(KeyframeId{newest});
+  EXPECT_GT(seeds_->size(), 0U);
+  seeds_->drop_stale(KeyframeId{newest + 1});
+  EXPECT_EQ(seeds_->size(), 0U);
+}
+
+}  // namespace
+}  // namespace twofold

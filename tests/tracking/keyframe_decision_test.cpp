@@ -1,0 +1,104 @@
+#include "tracking/keyframe_decision.hpp"
+
+#include <gtest/gtest.h>
+
+namespace twofold {
+namespace {
+
+/// A frame that sees 90 of 100 points, from where the last keyframe was made.
+class KeyframeDecisionTest : public ::testing::Test {
+ protected:
+  KeyframeDecisionTest() {
+    result_.reference_in_view = 1;
+    result_.searched = 100;
+    result_.matches = 90;
+  }
+
+  void move(double depths) { result_.T_c_ref = SE3(SO3(), {0, depths * last_.median_depth, 0}); }
+  [[nodiscard]] bool due(EffortLevel effort = EffortLevel::kEverything) const {
+    return keyframe_due(result_, last_, occupied_, backlog_, options_, bounds_of(effort, options_));
+  }
+  [[nodiscard]] bool due_by_motion() const {
+    return keyframe_due_by_motion(result_.T_c_ref, last_, backlog_, options_);
+  }
+
+  const TrackerOptions options_;
+  TrackResult result_;
+  KeyframeView last_{.median_depth = 2, .occupied_regions = 20};
+  KeyframeBacklog backlog_{.room = true, .pending = 0, .map_is_young = false};
+  int occupied_ = 20;
+};
+
+TEST_F(KeyframeDecisionTest, NoneWhereTheCameraStands) {
+  EXPECT_FALSE(due());
+  EXPECT_FALSE(due_by_motion());
+}
+
+TEST_F(KeyframeDecisionTest, WhenTheCameraHasMovedOn) {
+  move(0.95 * options_.keyframe_parallax);
+  EXPECT_FALSE(due());
+  EXPECT_FALSE(due_by_motion());
+  move(1.05 * options_.keyframe_parallax);
+  EXPECT_TRUE(due());
+  EXPECT_TRUE(due_by_motion());
+}
+
+TEST_F(KeyframeDecisionTest, WhenLittleIsLeftOfWhatTheReferenceSaw) {
+  result_.matches = 66;
+  EXPECT_FALSE(due());
+  result_.matches = 64;
+  EXPECT_TRUE(due()) << "the others are hidden, or look otherwise";
+  result_.matches = 90;
+  result_.reference_in_view = 0.7;
+  EXPECT_TRUE(due()) << "the others are out of view";
+}
+
+TEST_F(KeyframeDecisionTest, WhenHalfOfTheImageHasEmptied) {
+  occupied_ = 10;
+  EXPECT_FALSE(due());
+  occupied_ = 9;
+  EXPECT_TRUE(due());
+}
+
+TEST_F(KeyframeDecisionTest, TheSecondOneComesEarly) {
+  move(0.25 * options_.keyframe_parallax);
+  EXPECT_FALSE(due());
+  backlog_.map_is_young = true;
+  EXPECT_TRUE(due());
+  EXPECT_TRUE(due(EffortLevel::kFewerIterations)) << "without it there is no map";
+  move(0.15 * options_.keyframe_parallax);
+  EXPECT_FALSE(due());
+}
+
+TEST_F(KeyframeDecisionTest, AMapperThatIsBehindGetsUrgentOnesOnly) {
+  backlog_.pending = options_.max_pending;
+  move(1);
+  EXPECT_FALSE(due());
+  EXPECT_FALSE(due_by_motion());
+  result_.matches = 36;
+  EXPECT_FALSE(due());
+  result_.matches = 34;
+  EXPECT_TRUE(due());
+  backlog_.room = false;
+  EXPECT_FALSE(due());
+  backlog_ = {.room = false, .pending = 0};
+  EXPECT_FALSE(due_by_motion());
+}
+
+TEST_F(KeyframeDecisionTest, ATrackerThatIsBehindMakesUrgentOnesOnly) {
+  move(1);
+  result_.matches = 36;
+  EXPECT_FALSE(due(EffortLevel::kFewerIterations));
+  result_.matches = 34;
+  EXPECT_TRUE(due(EffortLevel::kFewerIterations));
+}
+
+TEST_F(KeyframeDecisionTest, ByDepthWhenTheCameraHasTurned) {
+  result_.T_c_ref = SE3(SO3::exp({0, 0.19, 0}), Vector3::Zero());
+  EXPECT_FALSE(due_by_motion());
+  result_.T_c_ref = SE3(SO3::exp({0, 0.21, 0}), Vector3::Zero());
+  EXPECT_TRUE(due_by_motion());
+}
+
+}  // namespace
+}  // namespace twofold
