@@ -128,6 +128,64 @@ TEST(Tracker, MakesNoKeyframeWithoutABuffer) {
   EXPECT_FALSE(result.proposed);
 }
 
+/// The sixth frame of a sequence.
+TrackResult sixth_frame(const TrackerOptions& options) {
+  Odometry odometry(test_rig(SensorKind::kStereo, 320, 240), options);
+  TrackResult result;
+  for (std::size_t i = 0; i < 6; ++i) result = odometry.step(frames(SensorKind::kStereo)[i]);
+  return result;
+}
+
+TEST(Tracker, LooksForPointsInsideOfTheBorder) {
+  TrackerOptions options;
+  const int everywhere = sixth_frame(options).candidates;
+  options.border_px = 60;  // 60 % and half of the image
+  options.min_inliers = 5;
+  EXPECT_LT(sixth_frame(options).candidates, everywhere / 2);
+}
+
+TEST(Tracker, LooksForPointsFromTheSideTheyWereSeenFrom) {
+  TrackerOptions options;
+  options.min_view_cosine = 1;
+  const TrackResult result = sixth_frame(options);
+  EXPECT_EQ(result.status, TrackStatus::kLost);
+  EXPECT_EQ(result.candidates, 0);
+  EXPECT_EQ(result.cause, LostCause::kTooFewCandidates);
+}
+
+TEST(Tracker, StopsSearchingWhenItHasEnough) {
+  TrackerOptions options;
+  options.wanted_matches = 60;
+  const TrackResult enough = sixth_frame(options);
+  EXPECT_EQ(enough.matches, 60);
+  EXPECT_LT(enough.searched, enough.candidates);
+  options = {};
+  options.max_searches = 50;
+  EXPECT_EQ(sixth_frame(options).searched, 50);
+}
+
+/// Why the first of ten frames is lost when so many points must agree, and 60 are searched for.
+LostCause first_loss(int min_inliers, TrackerOptions options = {}) {
+  options.wanted_matches = 60;
+  options.min_inliers = min_inliers;
+  options.wide_search.enabled = false;
+  Odometry odometry(test_rig(SensorKind::kStereo, 320, 240), options);
+  for (std::size_t i = 0; i < 10; ++i) {
+    const TrackResult result = odometry.step(frames(SensorKind::kStereo)[i]);
+    if (result.status == TrackStatus::kLost) return result.cause;
+  }
+  return LostCause::kNone;
+}
+
+TEST(Tracker, IsLostWhenFewerPointsAgreeThanMust) {
+  EXPECT_EQ(first_loss(60), LostCause::kNone);
+  EXPECT_EQ(first_loss(61), LostCause::kTooFewMatches);
+  EXPECT_EQ(first_loss(1000), LostCause::kTooFewCandidates);
+  TrackerOptions strict;
+  strict.motion.inlier_chi2_stereo = 0.02;  // a tenth of a pixel, and no point is free of noise
+  EXPECT_EQ(first_loss(60, strict), LostCause::kInconsistentMatches);
+}
+
 TEST(Tracker, DoesNotStartOnAnEmptyWall) {
   Frame frame = frames(SensorKind::kStereo)[0];
   frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(90));
