@@ -72,8 +72,8 @@ InverseDepthRange DepthSeeds::range_of(const Seed& seed, double median_depth) co
           std::clamp(q, 0.0, nearest)};
 }
 
-/// Another look from nearly the same place sees the same thing again, its errors included: it is no new
-/// witness.
+/// A look along much less parallax than what is known came from adds nothing but its errors. Another one from
+/// the same place counts: it says better where the point is seen from there.
 bool DepthSeeds::worth_a_look(const Seed& seed, const EpipolarStretch& stretch, const SE3& T_c_a) const {
   if (!known(seed)) return stretch.length_px() > kShortestStretch;
   const auto p = project_inverse_depth(rig_, T_c_a, seed.filter.psi);
