@@ -221,6 +221,45 @@ TEST(Tracker, GoesWhereItIsRelocalised) {
   EXPECT_EQ(odometry.step(sequence[3]).status, TrackStatus::kTracking);
 }
 
+/// A camera in a map that another one made, told about where it is.
+TrackStatus told_where_it_is(TrackerOptions options) {
+  options.wide_search.enabled = false;
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  static const GraphSnapshot map = [&] {
+    Odometry odometry(SensorKind::kStereo);
+    for (std::size_t i = 0; i < 20; ++i) odometry.step(sequence[i]);
+    return odometry.snapshot();
+  }();
+  Tracker tracker(test_rig(SensorKind::kStereo, 320, 240), options);
+  tracker.continue_from(map);
+  KeyframeProposal proposal;
+  tracker.prepare(proposal);
+  EXPECT_EQ(tracker.step(sequence[1], map, &proposal).status, TrackStatus::kLost);
+  const SE3 off(SO3::exp(Vector3(0.01, -0.01, 0)), Vector3::Zero());
+  tracker.relocalise(KeyframeId{0}, off * true_T_c_w(2));
+  return tracker.step(sequence[2], map, &proposal).status;
+}
+
+TEST(Tracker, BelievesAnAnswerThatEnoughOfTheMapsPointsSupport) {
+  EXPECT_EQ(told_where_it_is({}), TrackStatus::kTracking);
+  TrackerOptions options;
+  options.rough_min_inliers = 10'000;
+  EXPECT_EQ(told_where_it_is(options), TrackStatus::kTracking) << "points that the map has will do";
+  options.rough_min_mapped = 10'000;
+  EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost);
+  options = {};
+  options.rough_searched_share = 1;
+  EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost) << "some of those searched are not found";
+  options = {};
+  options.motion.inlier_chi2_stereo = 0.1;
+  options.min_inliers = 6;
+  options.rough_min_mapped = 6;
+  options.min_inlier_share = options.rough_inlier_share = options.rough_searched_share = 0.01;
+  EXPECT_EQ(told_where_it_is(options), TrackStatus::kTracking);
+  options.rough_inlier_share = 1;
+  EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost) << "some of those found do not agree";
+}
+
 TEST(Tracker, IsPlacedExactlyByAnAnswerThatIsAStepOld) {
   const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
   Odometry odometry(SensorKind::kStereo);

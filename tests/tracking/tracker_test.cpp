@@ -186,6 +186,15 @@ TEST(Tracker, IsLostWhenFewerPointsAgreeThanMust) {
   EXPECT_EQ(first_loss(60, strict), LostCause::kInconsistentMatches);
 }
 
+TEST(Tracker, IsLostWhenMostOfWhatIsFoundDisagrees) {
+  TrackerOptions options;
+  options.motion.inlier_chi2_stereo = 0.05;
+  options.min_inlier_share = 0.01;
+  EXPECT_EQ(first_loss(6, options), LostCause::kNone);
+  options.min_inlier_share = 0.95;
+  EXPECT_EQ(first_loss(6, options), LostCause::kInconsistentMatches);
+}
+
 TEST(Tracker, DoesNotStartOnAnEmptyWall) {
   Frame frame = frames(SensorKind::kStereo)[0];
   frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(90));
