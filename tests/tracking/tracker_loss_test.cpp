@@ -260,6 +260,17 @@ TEST(Tracker, BelievesAnAnswerThatEnoughOfTheMapsPointsSupport) {
   EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost) << "some of those found do not agree";
 }
 
+/// An answer that comes when the camera has been found without it is about a frame long past.
+TEST(Tracker, WhileItKnowsItsWayNoAnswerMovesIt) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  Odometry odometry(SensorKind::kStereo);
+  TrackResult before;
+  for (std::size_t i = 0; i < 30; ++i) before = odometry.step(sequence[i]);
+  ASSERT_NE(before.reference, KeyframeId{0});
+  odometry.tracker().relocalise(KeyframeId{0}, true_T_c_w(30));
+  EXPECT_NE(odometry.step(sequence[30]).reference, KeyframeId{0});
+}
+
 TEST(Tracker, IsPlacedExactlyByAnAnswerThatIsAStepOld) {
   const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
   Odometry odometry(SensorKind::kStereo);
