@@ -53,6 +53,13 @@ struct TrackerOptions {
   /// confirmed.
   int trusted_after = 3;
   int moving_after = 2;  ///< times in a row that an immature point is found elsewhere: it is said to move
+  /// While lost, so long after the last pose, the camera is looked for first where it is if it went on as it
+  /// moved [s].
+  double coast_for = 1.5;
+  /// A pose from a rough start, in metres, may be so far from where the camera would be had it gone on: by
+  /// what an acceleration adds [m/s^2], and by what the poses themselves err [m].
+  double max_acceleration = 10;
+  double reach_slack = 0.5;
   double new_part_after = 1;      ///< lost for so long while corners are seen: a new map part is started [s]
   int new_part_frames = 5;        ///< ... and for so many frames
   int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see

@@ -110,11 +110,12 @@ bool Tracker::track(FrameStep& step) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }
+  if (search_ahead(step)) return true;
   SearchStart start{.placement = last_, .rough = false};
   local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
   const bool by_depth = corners_scarce_ && depth_can_place();
-  start.placement.T_c_ref = by_depth ? align_to_depth(step) : align_to_previous(step);
+  start.placement.T_c_ref = by_depth ? align_to_depth(step) : align_to_previous(predicted_motion(), step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = search_from(start, step);
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
@@ -190,9 +191,8 @@ SE3 Tracker::predicted_pose() const {
   return predicted_motion() * last_.T_c_ref;
 }
 
-/// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from constant velocity, then from rest.
-SE3 Tracker::align_to_previous(FrameStep& step) {
-  const SE3 start = predicted_motion();
+/// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from the motion since, then from rest.
+SE3 Tracker::align_to_previous(const SE3& start, FrameStep& step) {
   if (previous_points_.empty()) return start * last_.T_c_ref;
   DenseAlignmentResult best =
       dense_alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, start,

@@ -132,13 +132,16 @@ class Tracker {
   LostCause search_from(SearchStart start, FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
   bool search_widely(FrameStep& step);
+  bool search_roughly_from(const Placement& placement, FrameStep& step);
+  [[nodiscard]] bool is_within_reach(const FrameStep& step) const;
+  bool search_ahead(FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                         const Placement& view, FrameStep& step);
   [[nodiscard]] int mapped_inliers() const;
   [[nodiscard]] bool well_supported(const TrackResult& result) const;
   [[nodiscard]] SE3 predicted_motion() const;
   [[nodiscard]] SE3 predicted_pose() const;
-  SE3 align_to_previous(FrameStep& step);
+  SE3 align_to_previous(const SE3& start, FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   /// One that the tracker started; null: the map has it.

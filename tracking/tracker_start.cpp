@@ -38,7 +38,7 @@ std::optional<Placement> Tracker::recognised(const GraphSnapshot& graph) {
 bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   local_map_.update(step.graph, asked.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  if (search_from({.placement = asked, .rough = true}, step) == LostCause::kNone) return true;
+  if (search_roughly_from(asked, step)) return true;
   if (!options_.wide_search.enabled) return false;
   wide_search_.look_at(current_);
   return search_from_view(asked_.images, asked_.corners, asked, step);
@@ -66,6 +66,42 @@ bool Tracker::search_widely(FrameStep& step) {
   return false;
 }
 
+bool Tracker::search_roughly_from(const Placement& placement, FrameStep& step) {
+  return search_from({.placement = placement, .rough = true}, step) == LostCause::kNone &&
+         is_within_reach(step);
+}
+
+/// Streets repeat themselves, and what looks alike may be the next house but four: the camera must have got
+/// there from where it was last, as fast as it moved then, and no other than by what accelerates things that
+/// carry cameras.
+bool Tracker::is_within_reach(const FrameStep& step) const {
+  const KeyframeId here = step.result.reference;
+  const bool knows_way = rig_.kind != SensorKind::kMono && last_velocity_;  // one camera's unit is no metre
+  if (!knows_way ||
+      part_of(step.graph, immature_points_, here) != part_of(step.graph, immature_points_, last_.reference))
+    return true;
+  const double seconds = 1e-9 * static_cast<double>(step.frame.t_ns - last_t_ns_);
+  const SE3 T_here_last = relative_pose(step.graph, immature_points_, here, last_.reference);
+  const SE3 T_c_last = step.result.T_c_ref * T_here_last * last_.T_c_ref.inverse();
+  const SE3 went_on = SE3::exp(seconds * *last_velocity_);
+  const double off = (T_c_last.inverse().translation() - went_on.inverse().translation()).norm();
+  return off <= options_.reach_slack + 0.5 * options_.max_acceleration * seconds * seconds;
+}
+
+/// After several frames without a pose: where the camera is if it went on as it moved. First of all, because
+/// a street may look the same from where the camera was last, too.
+bool Tracker::search_ahead(FrameStep& step) {
+  const double seconds = 1e-9 * static_cast<double>(step.frame.t_ns - last_t_ns_);
+  if (loss_.lost_frames() < 2 || !last_velocity_ || !(seconds <= options_.coast_for)) return false;
+  local_map_.update(step.graph, last_.reference, immature_points_, options_.neighbour_keyframes);
+  step.lap(TrackerStage::kCandidates);
+  const SE3 motion = SE3::exp(seconds * *last_velocity_);
+  if (search_roughly_from({last_.reference, motion * last_.T_c_ref}, step)) return true;
+  const SE3 T_c_ref = align_to_previous(motion, step);
+  step.lap(TrackerStage::kAlignment);
+  return search_roughly_from({last_.reference, T_c_ref}, step);
+}
+
 /// What looks alike proposes a pose, the map's points around there decide.
 bool Tracker::search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                                const Placement& view, FrameStep& step) {
@@ -73,8 +109,7 @@ bool Tracker::search_from_view(const FrameImages& images, std::vector<DescribedC
   step.lap(TrackerStage::kAlignment);
   if (!T_c_view) return false;
   local_map_.update(step.graph, view.reference, immature_points_, options_.neighbour_keyframes);
-  const Placement placement{view.reference, *T_c_view * view.T_c_ref};
-  return search_from({.placement = placement, .rough = true}, step) == LostCause::kNone;
+  return search_roughly_from({view.reference, *T_c_view * view.T_c_ref}, step);
 }
 
 bool Tracker::start_map(FrameStep& step) {

@@ -3,9 +3,11 @@
 // TWOFOLD_DATA names the folder.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <opencv2/core.hpp>
 #include <string>
 
 #include "io/sources/open_source.hpp"
@@ -100,6 +102,31 @@ TEST_P(SeldomFrames, OfATurningCameraAreNotPlacedWhereTheMapsPointsAreNotSeen) {
 // 0.083 and 0.029 m; 0.211 and 0.107 m when such poses were believed.
 INSTANTIATE_TEST_SUITE_P(All, SeldomFrames, ::testing::Values(std::pair(4, 0.12), std::pair(6, 0.06)),
                          [](const auto& test) { return "Every" + std::to_string(test.param.first); });
+
+/// Seven black frames of a car at 12 m/s: two parts of the map, and ten more frames lost, when it was looked
+/// for only where it had been.
+TEST(BlackFrames, OfACarLeaveOneMap) {
+  const char* data = std::getenv("TWOFOLD_DATA");
+  if (data == nullptr) GTEST_SKIP() << "TWOFOLD_DATA is not set";
+  const auto source = open_source("kitti:" + std::string(data) + "/stereo_kitti06_51", {});
+  const FrameFeed feed = [&source](Frame& frame) {
+    if (source->next(frame) != FrameStatus::kFrame) return FeedStatus::kEnd;
+    if (frame.index >= 20 && frame.index < 27)
+      frame.left = frame.right = cv::Mat::zeros(frame.left.size(), CV_8UC1);
+    return FeedStatus::kFrame;
+  };
+  const auto [result, path] = testing::run_whole(source->rig(), feed);
+  int parts = 0;
+  for (const FrameRecord& record : result.frames) {
+    if (has_final_pose(record))
+      parts = std::max(parts, static_cast<int>(index(result.graph.part(record.reference))));
+  }
+  EXPECT_EQ(parts, 0);
+  EXPECT_GE(path.size(), 42U);
+  const auto evaluation = evaluate(associate(path, source->ground_truth(), 20'000'000), {});
+  ASSERT_TRUE(evaluation);
+  EXPECT_LT(evaluation->absolute.rmse, 0.039);
+}
 
 }  // namespace
 }  // namespace twofold
