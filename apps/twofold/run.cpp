@@ -14,6 +14,7 @@
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/live_view.hpp"
 #include "apps/twofold/map_parts.hpp"
+#include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/pose_streaming.hpp"
 #include "apps/twofold/run_arguments.hpp"
 #include "apps/twofold/run_failures.hpp"
@@ -121,14 +122,14 @@ std::unique_ptr<FrameSource> open_frames(const RunArguments& arguments,
 /// The source as the run takes it, and what `options` need to say of it. Only once it is known to fit, what
 /// an earlier run left in the folder goes.
 std::unique_ptr<FrameSource> prepared(std::unique_ptr<FrameSource> source, const RunArguments& arguments,
-                                      EngineOptions& options) {
+                                      const std::filesystem::path& calibration, EngineOptions& options) {
   if (source->is_live()) {
     options.pacing.live = true;
     if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
   }
   source = resampled_for_map(std::move(source), options);
   expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
-  remove_results(arguments.out);
+  remove_results(arguments.out, calibration);
   if (arguments.record.empty()) return source;
   return std::make_unique<RecordingTee>(std::move(source), arguments.record);
 }
@@ -232,9 +233,13 @@ int run(const RunArguments& arguments) {
   apply_map_options(arguments.map, options);
   options.logs.folder = arguments.out;
   std::optional<Schedule> schedule = schedule_of(arguments);
+  expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   std::optional<AutoCalibration> calibration;
-  const auto source = prepared(open_frames(arguments, calibration), arguments, options);
+  auto frames = open_frames(arguments, calibration);
+  const std::filesystem::path calibrated_by =
+      calibration ? calibration->file : std::filesystem::path(calibration_file_of(arguments));
+  const auto source = prepared(std::move(frames), arguments, calibrated_by, options);
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   poses.listen(options);

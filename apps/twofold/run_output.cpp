@@ -12,6 +12,7 @@
 #include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
+#include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/run_summary.hpp"
 #include "apps/twofold/view/run_frames.hpp"
 #include "evaluation/evaluation.hpp"
@@ -45,19 +46,6 @@ void replace_causal_trajectory(const std::filesystem::path& file, const Trajecto
   std::error_code error;
   std::filesystem::rename(beside, file, error);
   if (error) throw WriteError(file, "cannot be written: " + error.message());
-}
-
-/// Of an earlier run into the same folder, which had more parts.
-void remove_part_files(const std::filesystem::path& folder, std::size_t parts) {
-  const auto remove = [&](const char* stem, std::size_t n, const char* extension) {
-    std::error_code error;
-    return std::filesystem::remove(folder / part_file(stem, n, extension), error);
-  };
-  for (std::size_t n = parts; remove("trajectory", n, ".txt"); ++n) {
-    remove("keyframes", n, ".txt");
-    remove("map", n, ".ply");
-    remove("edges", n, ".txt");
-  }
 }
 
 /// At most so many poses as a picture can show, from all over the trajectory.
@@ -133,15 +121,6 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
               draw_run(frames.source, final_poses, causal_poses, source.ground_truth(),
                        no_scale ? Alignment::kSim3 : Alignment::kSe3));
   }
-}
-
-void remove_results(const std::filesystem::path& folder) {
-  std::error_code error;
-  for (const char* file : {"trajectory.txt", "keyframes.txt", "frames.txt", "edges.txt", "map.ply",
-                           "groundtruth.txt", "timing.json", "summary.json", "loop_latency.txt",
-                           "trajectory.png", "surface.ply", "surface.glb", "cloud.ply", "object.json"})
-    std::filesystem::remove(folder / file, error);
-  remove_part_files(folder, 1);
 }
 
 void write_trace(const std::filesystem::path& file, const RunResult& result) {

@@ -31,10 +31,6 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
                       const EngineOptions& options, const RunResult& result,
                       const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface = nullptr);
 
-/// Of an earlier run into the folder, what is written at the end only: should this run be killed, its folder
-/// holds nothing of another one's.
-void remove_results(const std::filesystem::path& folder);
-
 /// Chrome/Perfetto trace; the run must have kept one.
 void write_trace(const std::filesystem::path& file, const RunResult& result);
 

@@ -160,6 +160,34 @@ TEST_F(RunCommand, InterruptedRunKeepsItsResults) {
   EXPECT_FALSE(result("map.ply").empty());
 }
 
+TEST_F(RunCommand, TheFolderOfTheSourceIsNoOutputFolder) {
+  const std::string truth = recording_.string() + "/groundtruth.txt";
+  std::ofstream(truth) << "mine\n";
+  fs::create_directory_symlink(recording_, folder_.path() / "link");
+  const std::string source = "run 'kitti:" + recording_.string() + "' --deterministic --out '";
+  for (const std::string& out : {recording_.string(), folder_ / "link", recording_.string() + "/image_0/.."})
+    expect_bad_input(run(folder_, source + out + "'"), "is the folder of the source");
+  EXPECT_EQ(content(truth), "mine\n");
+}
+
+TEST_F(RunCommand, OnlyWhatARunHasWrittenIsReplaced) {
+  const std::string foreign = folder_.write("result/summary.json", "{\"source\": \"my thesis\"}");
+  expect_bad_input(run_recording("--deterministic"), "result/summary.json: would be overwritten");
+  EXPECT_EQ(content(foreign), "{\"source\": \"my thesis\"}");
+  fs::remove(foreign);
+  folder_.write("result/map.ply", "mine");
+  folder_.write("result/notes.txt", "mine");
+  expect_bad_input(run_recording("--deterministic"), "result/map.ply: would be overwritten");
+  EXPECT_EQ(result("map.ply"), "mine");
+  fs::remove(folder_ / "result/map.ply");
+  ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
+  fs::remove(folder_ / "result/schedule.log");
+  EXPECT_EQ(run_recording("--deterministic").exit_code, 0) << "by summary.json";
+  fs::remove(folder_ / "result/summary.json");
+  EXPECT_EQ(run_recording("--deterministic").exit_code, 0) << "by schedule.log";
+  EXPECT_EQ(result("notes.txt"), "mine");
+}
+
 /// Until `lines` poses are in the file; false when the program has ended before.
 bool wait_for_lines(pid_t program, const std::string& file, int lines) {
   for (;;) {

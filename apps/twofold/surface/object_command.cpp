@@ -11,6 +11,7 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
 #include "apps/twofold/map_parts.hpp"
+#include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "apps/twofold/surface/object_model.hpp"
 #include "apps/twofold/surface/object_source.hpp"
@@ -129,9 +130,10 @@ void write_object(const ObjectArguments& arguments, const ObjectModel& model, co
 }
 
 void run_object(ObjectArguments& arguments) {
+  expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   const std::unique_ptr<ObjectSource> source = object_source(arguments);
-  remove_results(arguments.out);
+  remove_results(arguments.out, arguments.calibration);
   EngineOptions options = options_for_object(source->rig());
   options.deterministic = arguments.deterministic;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());

@@ -1,0 +1,88 @@
+#include "apps/twofold/output/output_folder.hpp"
+
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "apps/twofold/map_parts.hpp"
+#include "engine/logs/schedule_log.hpp"
+#include "io/files/io_error.hpp"
+#include "io/sources/source_path.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kLogs{"trajectory_causal.txt", "schedule.log"};
+constexpr std::array kResults{"trajectory.txt", "keyframes.txt",    "frames.txt",   "edges.txt",
+                              "map.ply",        "groundtruth.txt",  "timing.json",  "summary.json",
+                              "trajectory.png", "loop_latency.txt", "surface.ply",  "surface.glb",
+                              "cloud.ply",      "object.json",      "structure.ply"};
+
+/// summary.json of a run of whatever estimator; null: there is none.
+nlohmann::json earlier_summary(const fs::path& folder) {
+  std::ifstream file(folder / "summary.json");
+  nlohmann::json summary = nlohmann::json::parse(file, nullptr, false);
+  if (!summary.is_object()) return nullptr;
+  for (const char* key : {"source", "frames", "tracked", "wall_seconds"})
+    if (!summary.contains(key)) return nullptr;
+  return summary;
+}
+
+bool is_of_a_run(const fs::path& folder) {
+  return !earlier_summary(folder).is_null() || load_schedule(folder / "schedule.log").has_value();
+}
+
+void expect_not_of_source(const fs::path& folder, const std::string& source) {
+  const auto path = path_of_source(source);
+  std::error_code error;
+  if (!path || !fs::equivalent(folder, *path, error)) return;
+  throw IoError(folder, "is the folder of the source: --out must name another one");
+}
+
+}  // namespace
+
+void expect_output_folder(const fs::path& folder, const std::string& source) {
+  expect_not_of_source(folder, source);
+  if (is_of_a_run(folder)) return;
+  const auto expect_free = [&](const char* name) {
+    std::error_code error;
+    if (!fs::exists(fs::symlink_status(folder / name, error))) return;
+    throw IoError(folder / name,
+                  "would be overwritten, and no run of Twofold has left its mark beside it (summary.json, "
+                  "schedule.log): name another folder for --out, or move the file");
+  };
+  for (const char* name : kLogs) expect_free(name);
+  for (const char* name : kResults) expect_free(name);
+}
+
+void remove_results(const fs::path& folder, const fs::path& calibration) {
+  std::error_code error;
+  const nlohmann::json summary = earlier_summary(folder);
+  const fs::path own = folder / "calibration.yaml";  // a run's only if it calibrated itself
+  if (summary.is_object() && summary.value("self_calibration", nlohmann::json()).is_object() &&
+      !fs::equivalent(own, calibration, error))
+    fs::remove(own, error);
+  for (const char* name : kResults) fs::remove(folder / name, error);
+  remove_part_files(folder, 1);
+}
+
+void remove_part_files(const fs::path& folder, std::size_t parts) {
+  const auto remove = [&](const char* stem, std::size_t n, const char* extension) {
+    std::error_code error;
+    return fs::remove(folder / part_file(stem, n, extension), error);
+  };
+  for (std::size_t n = parts; remove("trajectory", n, ".txt"); ++n) {
+    remove("keyframes", n, ".txt");
+    remove("map", n, ".ply");
+    remove("edges", n, ".txt");
+  }
+}
+
+void remove_logs(const fs::path& folder) {
+  std::error_code error;
+  for (const char* name : kLogs) fs::remove(folder / name, error);
+}
+
+}  // namespace twofold
