@@ -191,7 +191,7 @@ SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surfac
 }
 
 /// What the run failed of: the source, a thread, that nothing was tracked; and what its files lost.
-RunFailures failures_of(const std::string& name, const FrameSource& source, const EngineOptions& options,
+RunFailures failures_of(const std::string& name, FrameSource& source, const EngineOptions& options,
                         const RunResult& result, const PoseStreaming& poses) {
   RunFailures failures;
   if (!source.error().empty()) {
@@ -204,6 +204,9 @@ RunFailures failures_of(const std::string& name, const FrameSource& source, cons
   }
   for (const std::string& loss : result.losses) failures.add(loss);
   for (const std::string& problem : poses.problems()) failures.add("--poses " + problem);
+  if (auto* recording = dynamic_cast<RecordingTee*>(&source)) {  // what --record has put round the source
+    if (const std::string loss = recording->finish(); !loss.empty()) failures.add("--record " + loss);
+  }
   return failures;
 }
 

@@ -27,13 +27,16 @@ SourceReport RecordingTee::report() const {
   const Recorder::Counts counts = recorder_.counts();
   report.summary.push_back(
       fmt::format("recorded    {} frames in {}", counts.written + counts.queued, folder_.string()));
-  if (counts.refused > 0) {
-    report.faults.push_back(
-        fmt::format("{} frames are missing in the recording, because writing was too slow or failed: the run "
-                    "cannot be repeated from it",
-                    counts.refused));
-  }
   return report;
+}
+
+std::string RecordingTee::finish() {
+  const std::string reason = recorder_.finish();
+  const std::uint64_t missing = recorder_.counts().refused;
+  if (missing == 0) return reason;
+  return fmt::format("{}: {} frames are missing in the recording, from which the run cannot be repeated: {}",
+                     folder_.string(), missing,
+                     reason.empty() ? "writing was slower than the camera" : reason);
 }
 
 }  // namespace twofold

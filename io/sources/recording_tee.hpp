@@ -20,8 +20,11 @@ class RecordingTee final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override { return source_->frame_count(); }
   [[nodiscard]] bool is_live() const override { return source_->is_live(); }
   [[nodiscard]] bool is_raw() const override { return source_->is_raw(); }
-  /// The source's, and what was recorded; faults when frames that were delivered are not in the recording.
+  /// The source's, and what was recorded.
   [[nodiscard]] SourceReport report() const override;
+  /// Writes what is still queued, after the last frame. What of the delivered frames is not in the recording,
+  /// and why; empty: all are.
+  [[nodiscard]] std::string finish();
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override {
     return source_->colour_image(index);
   }

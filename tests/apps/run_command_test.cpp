@@ -309,6 +309,17 @@ TEST_F(RunCommand, PosesThatWereLostAreInTheSummary) {
   EXPECT_EQ(summary["error"], summary["errors"][0]);
 }
 
+TEST_F(RunCommand, ARecordingThatAFullDiskCutIsAFailure) {
+  const std::string full_disk = "trap '' XFSZ; prlimit --pid $$ --fsize=16384;";  // an image is larger
+  for (const std::string order : {"", "--deterministic "}) {
+    const std::string folder = folder_ / (order.empty() ? "recorded" : "recorded again");
+    expect_failed_run(
+        run_recording(order + "--record '" + folder + "'", full_disk),
+        {"--record " + folder + ": 24 frames are missing in the recording", "cannot be written"});
+    EXPECT_NE(result("summary.json").find("missing in the recording"), std::string::npos);
+  }
+}
+
 /// The disk is full for the first two seconds of four: afterwards nothing is missing.
 TEST_F(RunCommand, AFolderOnADiskThatIsFullForAWhileIsWholeInTheEnd) {
   const std::string whole = folder_ / "whole.txt";
