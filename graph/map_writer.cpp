@@ -1,14 +1,17 @@
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <utility>
 
 #include "graph/map_file.hpp"
 #include "graph/map_format.hpp"
+#include "graph/map_place.hpp"
 
 namespace twofold {
 namespace {
@@ -16,12 +19,31 @@ namespace {
 using namespace map_format;
 namespace fs = std::filesystem;
 
-/// A file that appears under its name only when it is complete.
+/// What symbolic links lead to, whether it is there or not: that is replaced, and they stay.
+fs::path followed(fs::path file) {
+  constexpr int kMostLinks = 40;  // as the kernel has it
+  std::error_code error;
+  for (int links = 0; links < kMostLinks && fs::is_symlink(file, error); ++links)
+    file = file.parent_path() / fs::read_symlink(file, error);
+  return file;
+}
+
+bool begins_as_map(const fs::path& file) {
+  std::array<char, kMagic.size()> begin{};
+  std::ifstream in(file, std::ios::binary);
+  in.read(begin.data(), begin.size());
+  return in.good() && begin == kMagic;
+}
+
+/// A file that appears under its name only when it is complete, with the mode of the one that it replaces.
 class ReplacedFile {
  public:
-  explicit ReplacedFile(fs::path file) : file_(std::move(file)), temporary_(file_.string() + ".tmp") {
-    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  explicit ReplacedFile(const fs::path& file) : file_(followed(file)), temporary_(file_.string() + ".tmp") {
+    ::unlink(temporary_.c_str());  // of a program that was killed
+    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     if (fd_ < 0) fail("cannot be opened for writing");
+    struct stat before {};
+    if (::stat(file_.c_str(), &before) == 0) (void)::fchmod(fd_, before.st_mode & 07777);
   }
   ReplacedFile(const ReplacedFile&) = delete;
   ReplacedFile& operator=(const ReplacedFile&) = delete;
@@ -222,11 +244,30 @@ void expect_loadable(const fs::path& file, const GraphSnapshot& graph) {
                      " keyframes, " + std::to_string(graph.point_count()) + " points have been made");
 }
 
+/// Only a map is replaced: whatever else has the name would be lost.
+void expect_replaceable(const fs::path& file) {
+  const auto refuse = [&](const char* why) { throw MapFileError(file.string() + ": " + why); };
+  const fs::path target = followed(file);
+  std::error_code error;
+  const fs::file_status status = fs::status(target, error);
+  if (!fs::exists(status)) return;
+  if (fs::is_directory(status)) refuse("is a folder, no file that a map could be written to");
+  if (!fs::is_regular_file(status)) refuse("is no regular file: no map is written to it");
+  if (fs::file_size(target, error) > 0 && !begins_as_map(target))
+    refuse("is there already and no map: it is not overwritten");
+}
+
 }  // namespace
+
+void expect_place_for_map(const fs::path& file) {
+  expect_replaceable(file);
+  const ReplacedFile probe(file);  // whose temporary file goes again
+}
 
 void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph,
               const KeyframeDatabase& places) {
   expect_loadable(file, graph);
+  expect_replaceable(file);
   ReplacedFile out(file);
   ByteWriter bytes;
   for (const char c : kMagic) bytes.put(c);

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "graph/map_place.hpp"
 #include "graph/part_extraction.hpp"
 #include "io/files/io_error.hpp"
 #include "io/sources/resampled_source.hpp"
@@ -24,6 +25,7 @@ void expect_sensible(const MapArguments& arguments, const EngineOptions& options
   const std::filesystem::path folder = std::filesystem::path(arguments.save).parent_path();
   if (!folder.empty() && !std::filesystem::is_directory(folder))  // known now, not after an hour of mapping
     throw IoError(arguments.save, "the folder is not there");
+  if (!arguments.save.empty()) expect_place_for_map(arguments.save);
 }
 
 }  // namespace

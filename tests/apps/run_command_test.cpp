@@ -1,3 +1,4 @@
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -281,6 +282,21 @@ void expect_failed_run(const Outcome& outcome, const std::vector<std::string>& p
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   for (const std::string& part : parts) EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+}
+
+TEST_F(RunCommand, WhereAMapCannotBeWrittenIsSaidBeforeTheRun) {
+  const auto expect_refused = [&](const std::string& file, const std::string& why) {
+    expect_bad_input(run_recording("--deterministic --save-map '" + file + "'"), why);
+    EXPECT_FALSE(fs::exists(folder_ / "result"));
+  };
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  expect_refused(folder_ / "pipe", "pipe: is no regular file");
+  EXPECT_TRUE(fs::is_fifo(folder_ / "pipe"));
+  folder_.write("letter.txt", "Dear");
+  expect_refused(folder_ / "letter.txt", "letter.txt: is there already and no map");
+  EXPECT_EQ(content(folder_ / "letter.txt"), "Dear");
+  expect_refused(folder_.path().string(), "is a folder");
+  expect_refused("/proc/map.tfm", "/proc/map.tfm.tmp: cannot be opened");
 }
 
 TEST_F(RunCommand, AFullDiskIsOneLineThatNamesAllThatIsMissing) {

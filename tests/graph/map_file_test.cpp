@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -13,6 +14,7 @@
 
 #include "fixtures/graph_invariants.hpp"
 #include "fixtures/live_memory.hpp"
+#include "graph/map_place.hpp"
 #include "tests/graph/same_map.hpp"
 #include "tests/graph/sample_map.hpp"
 
@@ -111,6 +113,39 @@ TEST_F(MapFileTest, WhatIsSavedIsLoaded) {
   EXPECT_EQ(broken_invariant(loaded.graph), "");
   expect_same(map, loaded);
   EXPECT_FALSE(fs::exists(file_.string() + ".tmp"));
+}
+
+TEST_F(MapFileTest, ALinkIsWrittenThroughAndAModeStays) {
+  const SavedMap map = sample_map(2, 2, 1);
+  const fs::path link = file_.string() + ".link";
+  for (const bool there : {false, true}) {
+    SCOPED_TRACE(there);
+    fs::remove(link);
+    fs::create_symlink(file_.filename(), link);
+    if (there) fs::permissions(file_, fs::perms::owner_read | fs::perms::owner_write);
+    save_map(link, map);
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_FALSE(fs::is_symlink(file_));
+    expect_same(map, load_map(file_));
+  }
+  EXPECT_EQ(fs::status(file_).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+  fs::remove(link);
+}
+
+TEST_F(MapFileTest, OnlyAMapIsReplaced) {
+  const SavedMap map = sample_map(2, 2, 1);
+  fs::remove(file_);
+  ASSERT_EQ(mkfifo(file_.c_str(), 0600), 0);
+  EXPECT_THROW(save_map(file_, map), MapFileError);
+  EXPECT_TRUE(fs::is_fifo(file_));
+  fs::remove(file_);
+  std::ofstream(file_) << "a letter";
+  EXPECT_THROW(save_map(file_, map), MapFileError);
+  EXPECT_EQ(fs::file_size(file_), 8U);
+  std::ofstream{file_};  // made beforehand, as by mktemp
+  EXPECT_NO_THROW(save_map(file_, map));
+  EXPECT_NO_THROW(save_map(file_, map));
+  EXPECT_THROW(expect_place_for_map(file_.parent_path()), MapFileError);
 }
 
 /// Written by the programs that had these versions.
