@@ -98,12 +98,12 @@ SourceOptions source_options_of(const RunArguments& arguments) {
 }
 
 int run_with_filter(const RunArguments& arguments) {
-  if (!arguments.poses.empty()) throw IoError("--poses", "is not for --estimator swf");
-  if (arguments.view.port) throw IoError("--view", "is not for --estimator swf");
-  if (arguments.surface.voxel > 0) throw IoError("--surface", "is not for --estimator swf");
-  if (calibrates_itself(arguments)) throw IoError("--calib auto", "is not for --estimator swf");
+  expect_options_of_filter(arguments);
+  expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
+  remove_results(arguments.out, calibration_file_of(arguments));
+  remove_logs(arguments.out);
   catch_interrupts();
   run_filter(*source, arguments.source, arguments.window, arguments.out, interrupted());
   return kOk;

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -38,6 +39,33 @@ std::vector<int> parse_numbers(const std::string& text, std::size_t count, const
 }
 
 }  // namespace
+
+void expect_options_of_filter(const RunArguments& given) {
+  const RunArguments unset;
+  const std::pair<const char*, bool> options_of_engine[] = {
+      {"--poses", !given.poses.empty()},
+      {"--poses-form", given.poses_form != unset.poses_form},
+      {"--view", given.view.port.has_value()},
+      {"--surface", given.surface.voxel > 0},
+      {"--calib auto", given.calibration == "auto"},
+      {"--save-map", !given.map.save.empty()},
+      {"--checkpoint", given.map.checkpoint != 0},
+      {"--load-map", !given.map.load.empty()},
+      {"--localise-only", given.map.localise_only},
+      {"--record", !given.record.empty()},
+      {"--trace", !given.trace.empty()},
+      {"--replay-schedule", !given.replay_schedule.empty()},
+      {"--speed", given.speed != unset.speed},
+      {"--late", given.late != unset.late},
+      {"--pin", !given.pin.empty()},
+      {"--rt", given.real_time},
+      {"--windows", given.windows != unset.windows},
+      {"--vocabulary", !given.vocabulary.empty()},
+      {"--no-places", given.no_places},
+      {"--no-metric-loops", given.no_metric_loops}};
+  for (const auto& [option, is_given] : options_of_engine)
+    if (is_given) throw IoError(option, "is not for --estimator swf");
+}
 
 EngineOptions engine_options(const RunArguments& arguments) {
   EngineOptions options;

@@ -42,6 +42,9 @@ struct RunArguments {
 
 void add_run_options(CLI::App& command, RunArguments& arguments);
 
+/// Refuses (IoError) each option that --estimator swf, the filter alone, does nothing for.
+void expect_options_of_filter(const RunArguments& arguments);
+
 /// Checks what the command line's own parser does not; IoError names the option. Maps are added by
 /// apply_map_options.
 [[nodiscard]] EngineOptions engine_options(const RunArguments& arguments);

@@ -253,6 +253,27 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
                    "/proc/nothing");
 }
 
+TEST_F(RunCommand, TheFilterRefusesWhatItDoesNotDo) {
+  for (const std::string option :
+       {"--save-map m.tfm", "--checkpoint 5", "--load-map m.tfm", "--localise-only", "--record rec",
+        "--trace t", "--replay-schedule s.log", "--speed 1", "--late drop", "--pin 0,0,0", "--rt",
+        "--windows 20,35", "--vocabulary v", "--no-places", "--no-metric-loops", "--poses -", "--calib auto"})
+    expect_bad_input(run_recording("--estimator swf " + option),
+                     option.substr(0, option.find(' ')) + (option == "--calib auto" ? " auto" : "") +
+                         ": is not for --estimator swf");
+}
+
+/// Each estimator leaves a folder that holds its own files alone.
+TEST_F(RunCommand, NothingOfAnotherEstimatorStays) {
+  ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
+  ASSERT_EQ(run_recording("--estimator swf").exit_code, 0);
+  for (const char* name : {"map.ply", "schedule.log", "frames.txt", "keyframes.txt", "timing.json"})
+    EXPECT_FALSE(fs::exists(folder_.path() / "result" / name)) << name;
+  EXPECT_TRUE(fs::exists(folder_ / "result/structure.ply"));
+  ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "result/structure.ply"));
+}
+
 /// A walk that turns shows the focal length, and the file that is written gives the next run the same camera.
 TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   constexpr double kFocalLength = 256;
