@@ -12,6 +12,7 @@
 #include "io/files/output_file.hpp"
 #include "io/files/ply.hpp"
 #include "io/files/trajectory_file.hpp"
+#include "io/sources/source_path.hpp"
 #include "structure/structure_filter.hpp"
 
 namespace twofold {
@@ -70,11 +71,16 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_ply(folder / "structure.ply", points);
   const double mean_ms = busy_ms / static_cast<double>(std::max<std::size_t>(1, frames));
-  const nlohmann::ordered_json summary{{"source", source_text},      {"estimator", "swf"},
-                                       {"window", window},           {"frames", frames},
-                                       {"tracked", smoothed.size()}, {"restarts", filter.restarts()},
-                                       {"points", points.size()},    {"wall_seconds", wall.count()},
-                                       {"mean_ms", mean_ms},         {"slowest_ms", slowest_ms}};
+  const nlohmann::ordered_json summary{{"source", absolute_source(source_text)},
+                                       {"estimator", "swf"},
+                                       {"window", window},
+                                       {"frames", frames},
+                                       {"tracked", smoothed.size()},
+                                       {"restarts", filter.restarts()},
+                                       {"points", points.size()},
+                                       {"wall_seconds", wall.count()},
+                                       {"mean_ms", mean_ms},
+                                       {"slowest_ms", slowest_ms}};
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   fmt::print("{} frames, {} tracked, {} restarts, {} points; {:.1f} ms a frame, slowest {:.1f}; {}\n", frames,
              smoothed.size(), filter.restarts(), points.size(), mean_ms, slowest_ms, folder.string());

@@ -7,6 +7,7 @@
 #include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "apps/twofold/recoveries.hpp"
+#include "io/sources/source_path.hpp"
 
 namespace twofold {
 namespace {
@@ -187,7 +188,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
   for (std::uint32_t p = 0; p < result.graph.point_count(); ++p)
     points += result.graph.point(PointId{p}).alive();
   const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
-  Json json{{"source", source_text},
+  Json json{{"source", absolute_source(source_text)},
             {"interrupted", result.interrupted},
             {"error", result.error},
             {"errors", Json::array()},

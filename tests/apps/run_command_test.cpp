@@ -120,6 +120,17 @@ TEST_F(RunCommand, WritesEveryOutputAndFollowsTheTruth) {
   EXPECT_TRUE(nlohmann::json::parse(content(folder_ / "trace.json")).contains("traceEvents"));
 }
 
+/// Who reads the summary from another folder finds the recording.
+TEST_F(RunCommand, TheSummaryNamesTheSourceByItsWholePath) {
+  const std::string in_its_folder = "cd '" + folder_.path().string() + "' &&";
+  for (const auto& [given, whole] : {std::pair<std::string, std::string>{"recording", recording_.string()},
+                                     {"kitti:recording", "kitti:" + recording_.string()}}) {
+    const Outcome outcome = run(folder_, "run " + given + " --deterministic --out result", in_its_folder);
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(nlohmann::json::parse(result("summary.json"))["source"], whole);
+  }
+}
+
 TEST_F(RunCommand, RealTimeWishesAreGrantedOrSaidNotToBe) {
   // The superuser has capabilities to be taken away before limits mean anything.
   const std::string unprivileged =
