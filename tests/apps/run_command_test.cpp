@@ -162,14 +162,18 @@ TEST_F(RunCommand, LiveRunIsReplayedByteForByte) {
 }
 
 TEST_F(RunCommand, InterruptedRunKeepsItsResults) {
-  const Outcome outcome = run_recording("--speed 0.3 --preload", "timeout --preserve-status -s INT 2");
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const auto summary = nlohmann::json::parse(result("summary.json"));
-  EXPECT_EQ(summary["interrupted"], true);
-  EXPECT_GT(summary["tracked"], 2);
-  EXPECT_LT(summary["tracked"], kFrames);
-  EXPECT_FALSE(read_trajectory(folder_ / "result/trajectory.txt").empty());
-  EXPECT_FALSE(result("map.ply").empty());
+  for (const std::string signal : {"INT", "TERM", "HUP"}) {
+    SCOPED_TRACE(signal);
+    const Outcome outcome =
+        run_recording("--speed 0.3 --preload", "timeout --preserve-status -s " + signal + " 2");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    const auto summary = nlohmann::json::parse(result("summary.json"));
+    EXPECT_EQ(summary["interrupted"], true);
+    EXPECT_GT(summary["tracked"], 2);
+    EXPECT_LT(summary["tracked"], kFrames);
+    EXPECT_FALSE(read_trajectory(folder_ / "result/trajectory.txt").empty());
+    EXPECT_FALSE(result("map.ply").empty());
+  }
 }
 
 TEST_F(RunCommand, TheFolderOfTheSourceIsNoOutputFolder) {
