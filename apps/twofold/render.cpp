@@ -213,7 +213,9 @@ void add_render_command(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<RenderArguments>();
   CLI::App* command = app.add_subcommand("render", "Write a rendered scene as a recording in EuRoC's layout");
   command->add_option("SOURCE", arguments->source, "synthetic:SCENE?key=value&...")->required();
-  auto* out = command->add_option("--out", arguments->out, "folder to write mav0 into");
+  auto* out = command->add_option(
+      "--out", arguments->out,
+      "folder to write mav0 into (EuRoC's layout; RGB-D: TUM's, as associations.txt says)");
   auto* surface = command->add_option("--surface", arguments->surface,
                                       "write the scene's true surfaces to this mesh (PLY)");
   auto* seen =

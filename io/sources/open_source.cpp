@@ -104,9 +104,11 @@ std::string recognise_layout(const fs::path& path) {
   if (fs::is_character_file(path, error)) return "v4l2";
   if (!fs::exists(path, error)) throw IoError(path, "no such file or folder");
   expect_folder(path);
+  // Before EuRoC's: a rendered RGB-D recording has its images in mav0, where nothing tells of their depth.
+  if (fs::exists(path / "associations.txt")) return "tum";
   if (fs::exists(path / "mav0") || fs::exists(path / "cam0" / "data.csv")) return "euroc";
   if (fs::exists(path / "image_0")) return "kitti";
-  if (fs::exists(path / "associations.txt") || fs::exists(path / "rgb.txt")) return "tum";
+  if (fs::exists(path / "rgb.txt")) return "tum";
   if (fs::exists(path / "times.txt") || fs::exists(path / "left") || fs::exists(path / "calibration.yaml")) {
     return "images";
   }

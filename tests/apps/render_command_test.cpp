@@ -56,6 +56,7 @@ TEST(RenderCommand, RgbdIsReadBackAsTum) {
   const std::string source = "synthetic:desk?width=160&height=120&frames=3&sensor=rgbd";
   ASSERT_EQ(render(source, scratch / "out"), 0);
   expect_same_recording(*open_source(source), *open_source("tum:" + (scratch / "out")));
+  expect_same_recording(*open_source(source), *open_source(scratch / "out"));  // recognised as such
 }
 
 TEST(RenderCommand, BadInputEndsWithTwo) {
