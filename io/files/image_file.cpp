@@ -4,6 +4,7 @@
 #include <cctype>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -48,6 +49,42 @@ bool has_image_extension(const fs::path& file) {
   return false;
 }
 
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+/// Takes the digits that `text` begins with; without zeros before them, so that the longer is the larger.
+std::string_view take_number(std::string_view& text) {
+  const auto end = std::find_if_not(text.begin(), text.end(), is_digit);
+  std::string_view digits = text.substr(0, static_cast<std::size_t>(end - text.begin()));
+  text.remove_prefix(digits.size());
+  digits.remove_prefix(std::min(digits.find_first_not_of('0'), digits.size()));
+  return digits;
+}
+
+/// Numbers by their value, 2.png before 10.png; all else as text.
+bool precedes(std::string_view a, std::string_view b) {
+  while (!a.empty() && !b.empty()) {
+    if (is_digit(a.front()) && is_digit(b.front())) {
+      const std::string_view m = take_number(a), n = take_number(b);
+      if (m.size() != n.size()) return m.size() < n.size();
+      if (m != n) return m < n;
+    } else {
+      if (a.front() != b.front()) return a.substr(0, 1) < b.substr(0, 1);  // as bytes without a sign
+      a.remove_prefix(1);
+      b.remove_prefix(1);
+    }
+  }
+  return a.size() < b.size();
+}
+
+/// Names that differ in zeros only, as 1.png and 01.png, are in order of their text.
+bool file_precedes(const fs::path& a, const fs::path& b) {
+  const std::string first = a.filename().string(), second = b.filename().string();
+  if (precedes(first, second)) return true;
+  return !precedes(second, first) && first < second;
+}
+
 }  // namespace
 
 cv::Mat read_grey_image(const fs::path& file) {
@@ -77,7 +114,7 @@ std::vector<fs::path> list_images(const fs::path& folder) {
     if (has_image_extension(entry.path())) files.push_back(entry.path());
   }
   if (files.empty()) throw IoError(folder, "the folder holds no images");
-  std::sort(files.begin(), files.end());
+  std::sort(files.begin(), files.end(), file_precedes);
   return files;
 }
 

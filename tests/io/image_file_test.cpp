@@ -25,6 +25,16 @@ TEST(ImageFile, ReadsGreyColourAndDepth) {
   EXPECT_IO_ERROR(read_depth_image(folder.path() / "a.png"), "this one has 1 of 8");
 }
 
+TEST(ImageFile, NumbersInNamesAreInOrderOfTheirValue) {
+  const ScratchFolder folder;
+  const std::vector<std::string> names{"0.png",    "1.png",     "02.png",     "2.png",    "10.png",
+                                       "a1b2.png", "a1b10.png", "a01b20.png", "a2b1.png", "b.png"};
+  for (auto name = names.rbegin(); name != names.rend(); ++name) folder.write(*name, "");
+  std::vector<std::string> listed;
+  for (const auto& file : list_images(folder.path())) listed.push_back(file.filename().string());
+  EXPECT_EQ(listed, names);
+}
+
 /// However short an image file is cut, it is refused: no decoder gets to fill in the rest.
 TEST(ImageFile, RefusesEveryTruncation) {
   const ScratchFolder folder;
