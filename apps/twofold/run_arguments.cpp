@@ -38,6 +38,18 @@ std::vector<int> parse_numbers(const std::string& text, std::size_t count, const
   return numbers;
 }
 
+/// What contradicts itself, or would do nothing.
+void expect_consistent(const RunArguments& given) {
+  const RunArguments unset;
+  if (given.deterministic && given.speed != unset.speed)
+    throw IoError("--speed", "has no meaning with --deterministic, which keeps no pace");
+  if (given.deterministic && !given.replay_schedule.empty())
+    throw IoError("--replay-schedule", "repeats another run's order, --deterministic has one of its own");
+  if (given.poses_form != unset.poses_form && given.poses.empty())
+    throw IoError("--poses-form", "needs --poses");
+  if (given.window != unset.window) throw IoError("--window", "is for --estimator swf (--windows?)");
+}
+
 }  // namespace
 
 void expect_options_of_filter(const RunArguments& given) {
@@ -68,6 +80,7 @@ void expect_options_of_filter(const RunArguments& given) {
 }
 
 EngineOptions engine_options(const RunArguments& arguments) {
+  expect_consistent(arguments);
   EngineOptions options;
   options.deterministic = arguments.deterministic;
   options.trace = !arguments.trace.empty();

@@ -258,6 +258,11 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
   expect_bad_input(run_recording("--windows 25"), "--windows");
   expect_bad_input(run_recording("--windows 0,10"), "--windows");
   expect_bad_input(run_recording("--late never"), "late");
+  expect_bad_input(run_recording("--deterministic --speed 1"),
+                   "--speed: has no meaning with --deterministic");
+  expect_bad_input(run_recording("--deterministic --replay-schedule x"), "--replay-schedule: repeats");
+  expect_bad_input(run_recording("--poses-form tum"), "--poses-form: needs --poses");
+  expect_bad_input(run_recording("--window 20"), "--window: is for --estimator swf");
   expect_bad_input(run_recording("--replay-schedule /nonexistent"), "/nonexistent");
   expect_bad_input(run_recording("--calib /nonexistent.yaml"), "/nonexistent.yaml");
   folder_.write("noise.log", "this is no schedule");
