@@ -62,8 +62,14 @@ bool is_kitti(const std::string& file) {
   return fs::is_regular_file(file) && trajectory_form(file) == TrajectoryForm::kKitti;
 }
 
+/// Poses of the estimate that have a partner in the truth, and how many there are in all.
+struct Pairing {
+  std::vector<PosePair> pairs;
+  std::size_t of = 0;
+};
+
 /// By time, or by line when neither file has times.
-std::vector<PosePair> pair_poses(const EvalArguments& arguments) {
+Pairing pair_poses(const EvalArguments& arguments) {
   if (!fs::is_regular_file(arguments.estimate)) throw IoError(arguments.estimate, "no such trajectory file");
   const bool estimate_by_line = is_kitti(arguments.estimate);
   if (estimate_by_line != is_kitti(arguments.truth)) {
@@ -73,12 +79,13 @@ std::vector<PosePair> pair_poses(const EvalArguments& arguments) {
   }
   const Trajectory estimate = read_estimate(arguments.estimate);
   const Trajectory truth = read_truth(arguments.truth);
-  if (!estimate_by_line) return associate(estimate, truth, std::llround(arguments.max_difference_s * 1e9));
+  if (!estimate_by_line)
+    return {associate(estimate, truth, std::llround(arguments.max_difference_s * 1e9)), estimate.size()};
   if (estimate.size() != truth.size()) {
     throw IoError(arguments.estimate, fmt::format("has {} poses without time stamps, {} has {}",
                                                   estimate.size(), arguments.truth, truth.size()));
   }
-  return associate(estimate, truth, 0);
+  return {associate(estimate, truth, 0), estimate.size()};
 }
 
 void print_row(const char* name, const char* unit, const ErrorStatistics& s) {
@@ -86,10 +93,12 @@ void print_row(const char* name, const char* unit, const ErrorStatistics& s) {
              s.rmse, s.mean, s.median, s.stddev, s.max);
 }
 
-void print_table(const EvalArguments& arguments, const Evaluation& e, bool has_times) {
-  fmt::print("{} against {}\n{} poses, path {:.3f} m, align {}, scale {:.6f}, ATE {:.4f} % of the path\n",
-             arguments.estimate, arguments.truth, e.pairs.size(), e.path_length, name_of(arguments.alignment),
-             e.S_w_e.scale(), e.path_length > 0 ? 100 * e.absolute.rmse / e.path_length : 0.0);
+void print_table(const EvalArguments& arguments, const Evaluation& e, std::size_t of, bool has_times) {
+  fmt::print(
+      "{} against {}\n{} poses of {} have a partner, path {:.3f} m, align {}, scale {:.6f}, ATE {:.4f} % of "
+      "the path\n",
+      arguments.estimate, arguments.truth, e.pairs.size(), of, e.path_length, name_of(arguments.alignment),
+      e.S_w_e.scale(), e.path_length > 0 ? 100 * e.absolute.rmse / e.path_length : 0.0);
   if (e.half_scales) {
     const auto& [first, second] = *e.half_scales;
     fmt::print("scale of the halves {:.6f} and {:.6f}, {:.3f} % apart\n", first, second,
@@ -120,13 +129,14 @@ nlohmann::ordered_json to_json(const RelativeError& e) {
           {"translation_percent", to_json(e.translation_percent)}};
 }
 
-std::string json_text(const EvalArguments& arguments, const Evaluation& e, bool has_times) {
+std::string json_text(const EvalArguments& arguments, const Evaluation& e, std::size_t of, bool has_times) {
   const Eigen::Quaterniond& q = e.S_w_e.so3().quaternion();
   const Vector3& t = e.S_w_e.translation();
   nlohmann::ordered_json json{{"estimate", arguments.estimate},
                               {"ground_truth", arguments.truth},
                               {"align", name_of(arguments.alignment)},
                               {"poses", e.pairs.size()},
+                              {"poses_of_estimate", of},
                               {"path_length_m", e.path_length},
                               {"alignment",
                                {{"scale", e.S_w_e.scale()},
@@ -169,11 +179,13 @@ void run_eval(const EvalArguments& arguments) {
   }
   EvaluationOptions options;
   options.alignment = arguments.alignment;
-  const auto evaluation = evaluate(pair_poses(arguments), options);
+  const Pairing pairing = pair_poses(arguments);
+  const auto evaluation = evaluate(pairing.pairs, options);
   if (!evaluation) throw IoError(arguments.estimate, evaluation.error());
   const bool has_times = !is_kitti(arguments.estimate);
-  print_table(arguments, *evaluation, has_times);
-  if (!arguments.json.empty()) write_file(arguments.json, json_text(arguments, *evaluation, has_times));
+  print_table(arguments, *evaluation, pairing.of, has_times);
+  if (!arguments.json.empty())
+    write_file(arguments.json, json_text(arguments, *evaluation, pairing.of, has_times));
   if (!arguments.plot.empty()) write_png(arguments.plot, draw(arguments, *evaluation));
 }
 

@@ -35,6 +35,22 @@ TEST(EvalCommand, WritesTableJsonAndPlot) {
   EXPECT_EQ(cv::imread(folder / "e.png").empty(), false);
 }
 
+TEST(EvalCommand, HowManyPosesHaveAPartnerIsSaid) {
+  const ScratchFolder folder;
+  const auto estimate = write_circle(folder, "estimate.txt", 1);
+  std::istringstream whole(content(write_circle(folder, "truth.txt", 1)));
+  std::string some, line;
+  for (int i = 0; i < 12 && std::getline(whole, line); ++i) some += line + "\n";
+  const auto truth = folder.write("some.txt", some).string();
+  const auto outcome = run(folder, "eval " + estimate + " " + truth + " --json " + (folder / "e.json"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(content(folder / "e.json"));
+  EXPECT_LT(json["poses"], 13);
+  EXPECT_EQ(json["poses_of_estimate"], 60);
+  EXPECT_NE(outcome.out.find(json["poses"].dump() + " poses of 60 have a partner"), std::string::npos)
+      << outcome.out;
+}
+
 /// As a run leaves its trajectory that was killed within a write.
 TEST(EvalCommand, ACutLastLineIsLeftOutAndSaid) {
   const ScratchFolder folder;
