@@ -1,6 +1,7 @@
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -190,6 +191,16 @@ SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surfac
   return figures;
 }
 
+/// ": " and why most frames were lost; empty: none was.
+std::string main_cause(const RunResult& result) {
+  std::map<std::string, std::size_t> causes;
+  for (const FrameRecord& record : result.frames)
+    if (record.state == FrameState::kLost) ++causes[describe(record.cause)];
+  const auto most = std::max_element(causes.begin(), causes.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == causes.end() ? "" : ": " + most->first;
+}
+
 /// What the run failed of: the source, a thread, that nothing was tracked; and what its files lost.
 RunFailures failures_of(const std::string& name, FrameSource& source, const EngineOptions& options,
                         const RunResult& result, const PoseStreaming& poses) {
@@ -199,8 +210,8 @@ RunFailures failures_of(const std::string& name, FrameSource& source, const Engi
   } else if (!result.error.empty()) {
     failures.add(result.error);
   } else if (result.counts.tracked == 0) {
-    failures.add(
-        name + (options.map ? ": no place of the loaded map was recognised" : ": no frame could be tracked"));
+    failures.add(name + (options.map ? ": no place of the loaded map was recognised"
+                                     : ": no frame could be tracked" + main_cause(result)));
   }
   for (const std::string& loss : result.losses) failures.add(loss);
   for (const std::string& problem : poses.problems()) failures.add("--poses " + problem);

@@ -516,8 +516,9 @@ TEST_F(RunCommand, RecordingWithoutTextureIsAFailedRun) {
   }
   const Outcome outcome = run_recording("--deterministic");
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.err.find("no frame could be tracked"), std::string::npos) << outcome.err;
   const auto summary = nlohmann::json::parse(result("summary.json"));
+  const std::string cause = summary["why_lost"].back()["cause"];
+  EXPECT_NE(outcome.err.find("no frame could be tracked: " + cause), std::string::npos) << outcome.err;
   EXPECT_EQ(summary["why_lost"].size(), static_cast<std::size_t>(kFrames));
 }
 

@@ -64,7 +64,8 @@ void add_calibrate_command(CLI::App& app, int& exit_code) {
   command->add_option("--views", arguments->views, "Different views wanted from a camera")
       ->check(CLI::Range(10, 200))
       ->capture_default_str();
-  command->add_option("--residuals", arguments->residuals, "Picture of the residuals (default: cal.png for cal.yaml)");
+  command->add_option("--residuals", arguments->residuals,
+                      "Picture of the residuals (default: cal.png for cal.yaml)");
   command->add_flag("--quiet", arguments->quiet, "Do not say which view is missing");
   command->callback([arguments, &exit_code] { exit_code = calibrate(*arguments); });
 }
