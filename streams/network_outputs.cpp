@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "streams/line_reader.hpp"
+#include "streams/port.hpp"
 
 namespace twofold {
 namespace {
@@ -108,6 +109,7 @@ std::unique_ptr<PoseOutput> open_udp(const std::string& address, PoseForm form) 
   const std::string target = "udp:" + address;
   const std::size_t colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0) fail(target, "must be udp:HOST:PORT");
+  if (is_beyond_ports(address.substr(colon + 1))) fail(target, "a port is 65535 at most");
   std::string host = address.substr(0, colon);
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
   addrinfo hints{};

@@ -504,6 +504,8 @@ TEST_F(RunCommand, PosesThatNobodyReadsAnyMoreDoNotEndTheRun) {
                               "' | head -1 >'" + (folder_ / "out") + "'";
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(nlohmann::json::parse(result("summary.json"))["tracked"], kFrames);
+  for (const std::string target : {"udp:127.0.0.1:70000", "zmq:tcp://127.0.0.1:70000"})
+    expect_bad_input(run_recording("--poses " + target), "a port is 65535 at most");
   expect_bad_input(run_recording("--poses udp:nonsense"), "--poses: udp:nonsense: must be udp:HOST:PORT");
 }
 
