@@ -21,6 +21,7 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   PinholeCamera& camera = calibration.left.pinhole;
   const bool supposed = !from_file && parameters.suppose_camera();
   if (supposed) camera.fx = camera.fy = kSupposedFocalLength;
+  int taken = 0;
   for (const auto& [key, value] :
        {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}}) {
     const auto given = parameters.take_number(key);
@@ -29,8 +30,12 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
           parameters.subject(),
           fmt::format("no calibration: give --calib FILE or fx, fy, cx, cy ('{}' is missing)", key));
     }
-    if (given) *value = *given;
+    if (!given) continue;
+    *value = *given;
+    ++taken;
   }
+  if (from_file && taken > 0 && taken < 4)  // a camera half of the one, half of the other
+    throw IoError(parameters.subject(), "beside a calibration file: all of fx, fy, cx, cy, or none");
   const auto take_positive = [&](const char* key) {
     const auto given = parameters.take_number(key);
     if (given && *given <= 0)

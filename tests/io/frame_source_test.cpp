@@ -157,6 +157,10 @@ TEST(FrameSource, TumAssociatesAndScales) {
   EXPECT_IO_ERROR(open_source("tum:" + folder.path().string() + intrinsics + "&depth_scale=0"),
                   "must be positive");
   EXPECT_IO_ERROR(open_source("tum:" + folder.path().string() + "?fx=-50&fy=50&cx=32&cy=24"), "left camera");
+  folder.write("camera.txt", "fx 40\nfy 40\ncx 32\ncy 24\nwidth 64\nheight 48\n");
+  EXPECT_IO_ERROR(open_source("tum:" + folder.path().string() + "?fx=50"), "all of fx, fy, cx, cy, or none");
+  EXPECT_EQ(open_source("tum:" + folder.path().string() + intrinsics)->rig().camera.fx, 50);
+  fs::remove(folder.path() / "camera.txt");
   const auto source = open_source("tum:" + folder.path().string() + intrinsics + "&depth_scale=1000");
   EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
   EXPECT_EQ(source->rig().depth_unit, 0.001);
