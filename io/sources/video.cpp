@@ -27,6 +27,7 @@ VideoSource::VideoSource(const std::filesystem::path& file,
     throw IoError(file, "is not a video that can be decoded");
   const int width = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)) / (side_by_side_ ? 2 : 1);
   const int height = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT));
+  announced_ = capture_.get(cv::CAP_PROP_FRAME_COUNT);
   fps_ = fps.value_or(used.fps > 0 ? used.fps : capture_.get(cv::CAP_PROP_FPS));
   if (!(fps_ > 0) || !std::isfinite(fps_)) throw IoError(file, "has no frame rate: give the parameter fps");
   set_missing_size(width, height, &used);
@@ -71,6 +72,7 @@ bool VideoSource::read(Frame& frame) {
   raw.t_ns = std::llround(static_cast<double>(index_) / fps_ * 1e9);
   if (!decode(&raw)) {
     if (index_ == 0) throw IoError(file_, "holds no frame that can be decoded");
+    at_end_ = true;
     return false;
   }
   if (const auto reason = rectifier_->mismatch_reason(raw); !reason.empty()) throw IoError(file_, reason);
@@ -78,6 +80,18 @@ bool VideoSource::read(Frame& frame) {
   frame = Frame();  // its old images may still be held elsewhere: never write into them
   rectifier_->rectify(raw, frame);
   return true;
+}
+
+SourceReport VideoSource::report() const {
+  SourceReport report;
+  // Containers that have no count take length times rate: a frame or two, or one in a hundred, say nothing.
+  constexpr double kTold = 0.98, kSlack = 2;
+  if (at_end_ && static_cast<double>(index_) < kTold * announced_ - kSlack) {
+    report.faults.push_back(
+        fmt::format("{}: {} frames could be decoded of {:.0f} that are announced: it is cut short or damaged",
+                    file_.string(), index_, announced_));
+  }
+  return report;
 }
 
 }  // namespace twofold

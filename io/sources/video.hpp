@@ -20,6 +20,9 @@ class VideoSource final : public FrameSource {
   VideoSource(const std::filesystem::path& file, const std::optional<std::filesystem::path>& calibration,
               SourceParameters& parameters);
 
+  /// A fault once the end was reached if the container had announced more frames.
+  [[nodiscard]] SourceReport report() const override;
+
  private:
   bool read(Frame& frame) override;
   void take_layout(SourceParameters& parameters);
@@ -30,7 +33,9 @@ class VideoSource final : public FrameSource {
   bool side_by_side_ = false;
   double fps_ = 0;
   std::optional<Rectifier> rectifier_;
+  double announced_ = 0;  ///< frames, as the container says; some guess, and some say nothing
   std::int64_t index_ = 0;
+  bool at_end_ = false;
 };
 
 }  // namespace twofold

@@ -245,6 +245,27 @@ TEST(FrameSource, VideoSideBySide) {
   EXPECT_EQ(drain(*source), "2");
 }
 
+TEST(FrameSource, AVideoThatIsCutShortSaysSo) {
+  const ScratchFolder folder;
+  const std::string file = folder / "cut.avi";
+  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25,
+                         {kWidth, kHeight});
+  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here cannot write MJPEG";
+  for (int i = 0; i < 40; ++i) writer.write(numbered_image(kWidth, kHeight, i, CV_8UC3));
+  writer.release();
+  const auto faults = [&] {
+    const auto source = open_source("video:" + file + "?fx=50&fy=50&cx=32&cy=24");
+    EXPECT_TRUE(source->report().faults.empty()) << "its end was not reached";
+    (void)drain(*source);
+    return source->report().faults;
+  };
+  EXPECT_TRUE(faults().empty());
+  fs::resize_file(file, fs::file_size(file) / 2);
+  ASSERT_EQ(faults().size(), 1U);
+  EXPECT_NE(faults()[0].find("frames could be decoded of 40 that are announced"), std::string::npos)
+      << faults()[0];
+}
+
 TEST(FrameSource, EurocRefusesUnequalCounts) {
   const ScratchFolder folder;
   const char* sensor =
