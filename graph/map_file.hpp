@@ -42,6 +42,9 @@ inline constexpr std::uint16_t kMapFormatVersion = 3;
 /// MapFileError; the temporary file is then removed. A graph with more keyframes or points, culled ones
 /// included, than load_map takes is refused before anything is written.
 ///
+/// Only a map is replaced, or an empty file: links are followed and stay, modes are kept, and what else has
+/// the name, or is no regular file, is refused (graph/map_place.hpp).
+///
 /// Looks at graph and places through these references only and copies neither, so that any reader they were
 /// published to may save them, while their writers go on. Places of keyframes that `graph` does not have, or
 /// has culled, are left out.
