@@ -110,12 +110,12 @@ bool Tracker::track(FrameStep& step) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }
-  if (search_ahead(step)) return true;
   SearchStart start{.placement = last_, .rough = false};
   local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
+  if (search_ahead(step)) return true;
   const bool by_depth = corners_scarce_ && depth_can_place();
-  start.placement.T_c_ref = by_depth ? align_to_depth(step) : align_to_previous(predicted_motion(), step);
+  start.placement.T_c_ref = by_depth ? align_to_depth(step) : aligned_pose(step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = search_from(start, step);
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
@@ -192,8 +192,9 @@ SE3 Tracker::predicted_pose() const {
 }
 
 /// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from the motion since, then from rest.
-SE3 Tracker::align_to_previous(const SE3& start, FrameStep& step) {
-  if (previous_points_.empty()) return start * last_.T_c_ref;
+/// @return the motion; nothing if it is not to be trusted
+std::optional<SE3> Tracker::align_to_previous(const SE3& start, FrameStep& step) {
+  if (previous_points_.empty()) return std::nullopt;
   DenseAlignmentResult best =
       dense_alignment_.align(rig_.camera, previous_.left, current_.left, previous_points_, start,
                              step.bounds.finest_alignment_level);
@@ -205,7 +206,12 @@ SE3 Tracker::align_to_previous(const SE3& start, FrameStep& step) {
   }
   step.result.alignment_rms = best.rms;
   const bool trusted = best.converged && best.rms < options_.max_alignment_rms;
-  return (trusted ? best.T_cur_prev : start) * last_.T_c_ref;
+  return trusted ? std::optional(best.T_cur_prev) : std::nullopt;
+}
+
+SE3 Tracker::aligned_pose(FrameStep& step) {
+  const SE3 start = predicted_motion();
+  return align_to_previous(start, step).value_or(start) * last_.T_c_ref;
 }
 
 /// What the next frame starts from.

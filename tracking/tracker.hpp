@@ -141,7 +141,8 @@ class Tracker {
   [[nodiscard]] bool well_supported(const TrackResult& result) const;
   [[nodiscard]] SE3 predicted_motion() const;
   [[nodiscard]] SE3 predicted_pose() const;
-  SE3 align_to_previous(const SE3& start, FrameStep& step);
+  std::optional<SE3> align_to_previous(const SE3& start, FrameStep& step);
+  SE3 aligned_pose(FrameStep& step);
   [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result);
   /// One that the tracker started; null: the map has it.

@@ -49,7 +49,7 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
 /// In place of the alignment to the last frame's points, of which there were too few.
 SE3 Tracker::align_to_depth(FrameStep& step) {
   const auto aligned = align_depth(predicted_pose(), {}, step);
-  return aligned ? aligned->T_c_ref : align_to_previous(predicted_motion(), step);
+  return aligned ? aligned->T_c_ref : aligned_pose(step);
 }
 
 /// After the search for points: few of them say less than they and depth together.

@@ -93,13 +93,11 @@ bool Tracker::is_within_reach(const FrameStep& step) const {
 bool Tracker::search_ahead(FrameStep& step) {
   const double seconds = 1e-9 * static_cast<double>(step.frame.t_ns - last_t_ns_);
   if (loss_.lost_frames() < 2 || !last_velocity_ || !(seconds <= options_.coast_for)) return false;
-  local_map_.update(step.graph, last_.reference, immature_points_, options_.neighbour_keyframes);
-  step.lap(TrackerStage::kCandidates);
   const SE3 motion = SE3::exp(seconds * *last_velocity_);
   if (search_roughly_from({last_.reference, motion * last_.T_c_ref}, step)) return true;
-  const SE3 T_c_ref = align_to_previous(motion, step);
+  const std::optional<SE3> aligned = align_to_previous(motion, step);
   step.lap(TrackerStage::kAlignment);
-  return search_roughly_from({last_.reference, T_c_ref}, step);
+  return aligned && search_roughly_from({last_.reference, *aligned * last_.T_c_ref}, step);
 }
 
 /// What looks alike proposes a pose, the map's points around there decide.

@@ -120,10 +120,15 @@ std::unique_ptr<FrameSource> open_frames(const RunArguments& arguments,
   return source;
 }
 
+struct PreparedSource {
+  std::unique_ptr<FrameSource> source;
+  RecordingTee* recorder = nullptr;  ///< the source itself, with --record
+};
+
 /// The source as the run takes it, and what `options` need to say of it. Only once it is known to fit, what
 /// an earlier run left in the folder goes.
-std::unique_ptr<FrameSource> prepared(std::unique_ptr<FrameSource> source, const RunArguments& arguments,
-                                      const std::filesystem::path& calibration, EngineOptions& options) {
+PreparedSource prepared(std::unique_ptr<FrameSource> source, const RunArguments& arguments,
+                        const std::filesystem::path& calibration, EngineOptions& options) {
   if (source->is_live()) {
     options.pacing.live = true;
     if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
@@ -131,8 +136,10 @@ std::unique_ptr<FrameSource> prepared(std::unique_ptr<FrameSource> source, const
   source = resampled_for_map(std::move(source), options);
   expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
   remove_results(arguments.out, calibration);
-  if (arguments.record.empty()) return source;
-  return std::make_unique<RecordingTee>(std::move(source), arguments.record);
+  if (arguments.record.empty()) return {std::move(source)};
+  auto recording = std::make_unique<RecordingTee>(std::move(source), arguments.record);
+  RecordingTee* const recorder = recording.get();
+  return {std::move(recording), recorder};
 }
 
 /// Of keyframes that a viewer clicks.
@@ -202,8 +209,9 @@ std::string main_cause(const RunResult& result) {
 }
 
 /// What the run failed of: the source, a thread, that nothing was tracked; and what its files lost.
-RunFailures failures_of(const std::string& name, FrameSource& source, const EngineOptions& options,
+RunFailures failures_of(const std::string& name, const PreparedSource& frames, const EngineOptions& options,
                         const RunResult& result, const PoseStreaming& poses) {
+  const FrameSource& source = *frames.source;
   RunFailures failures;
   if (!source.error().empty()) {
     failures.add(source.error(), source.is_live() ? kFailedRun : kBadInput);
@@ -215,8 +223,8 @@ RunFailures failures_of(const std::string& name, FrameSource& source, const Engi
   }
   for (const std::string& loss : result.losses) failures.add(loss);
   for (const std::string& problem : poses.problems()) failures.add("--poses " + problem);
-  if (auto* recording = dynamic_cast<RecordingTee*>(&source)) {  // what --record has put round the source
-    if (const std::string loss = recording->finish(); !loss.empty()) failures.add("--record " + loss);
+  if (frames.recorder != nullptr) {
+    if (const std::string loss = frames.recorder->finish(); !loss.empty()) failures.add("--record " + loss);
   }
   return failures;
 }
@@ -250,10 +258,11 @@ int run(const RunArguments& arguments) {
   expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   std::optional<AutoCalibration> calibration;
-  auto frames = open_frames(arguments, calibration);
+  auto opened = open_frames(arguments, calibration);
   const std::filesystem::path calibrated_by =
       calibration ? calibration->file : std::filesystem::path(calibration_file_of(arguments));
-  const auto source = prepared(std::move(frames), arguments, calibrated_by, options);
+  const PreparedSource frames = prepared(std::move(opened), arguments, calibrated_by, options);
+  const auto& source = frames.source;
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   poses.listen(options);
@@ -267,7 +276,7 @@ int run(const RunArguments& arguments) {
   view.finish();
 
   const std::vector<MapPart> parts = map_parts(result, options);
-  RunFailures failures = failures_of(arguments.source, *source, options, result, poses);
+  RunFailures failures = failures_of(arguments.source, frames, options, result, poses);
   std::vector<std::string> maps;
   if (!arguments.map.save.empty())
     failures.attempt([&] { maps = save_parts(arguments.map.save, source->rig(), result, parts); });

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -12,8 +13,6 @@
 
 namespace twofold {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 template <class Change>
 void change_images(Frame& frame, const Change& change) {
@@ -26,7 +25,7 @@ void change_images(Frame& frame, const Change& change) {
 double chance(const Frame& frame, std::uint64_t what) {
   const std::uint64_t word =
       synthetic::mix64(synthetic::mix64(what) ^ static_cast<std::uint64_t>(frame.index));
-  return static_cast<double>(word >> 11) * 0x1.0p-53;
+  return synthetic::unit_interval(word);
 }
 
 cv::Mat looked_up(const cv::Mat& image, double gain, double gamma) {
@@ -66,7 +65,7 @@ bool compress(Frame& frame, double /*t*/) {
 }
 
 bool bend_tones(Frame& frame, double t) {
-  const double gamma = std::exp2(std::sin(2 * kPi * t / 5));
+  const double gamma = std::exp2(std::sin(2 * std::numbers::pi * t / 5));
   change_images(frame, [&](const cv::Mat& image) { return looked_up(image, 1, gamma); });
   return true;
 }
@@ -83,7 +82,7 @@ bool overexpose(Frame& frame, double /*t*/) {
 }
 
 bool darken(Frame& frame, double /*t*/) {
-  auto stream = static_cast<std::uint64_t>(2 * frame.index);
+  auto stream = static_cast<std::uint64_t>(2 * frame.index);  // another one for each image
   change_images(frame, [&](const cv::Mat& image) { return exposed(image, 0.25, 3, stream++); });
   return true;
 }
@@ -124,7 +123,7 @@ bool kill_pixels(Frame& frame, double /*t*/) {
   return true;
 }
 
-/// A finger or mud on the lens, out of focus.
+/// A finger or mud on the lens.
 bool soil(Frame& frame, double /*t*/) {
   change_images(frame, [](const cv::Mat& image) {
     cv::Mat out = image.clone();

@@ -1,8 +1,7 @@
 // Whether a result is luck: the same recording with its first one, two, three frames left out and with noise
 // of one grey level added, darker, cropped, smaller, seen in a mirror; how far apart its frames may be; the
-// recording played backwards, and there and back again, which nothing was tuned on; what real cameras do to
-// it
-// (--hard); and whether the tracker knows how well it knows the pose (NEES).
+// recording played backwards, and there and back again, which nothing was tuned on; with --hard, what real
+// cameras do to it; and whether the tracker knows how well it knows the pose (NEES).
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -17,6 +16,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -371,6 +371,32 @@ void print_row(const Variation& variation, const Outcome& outcome) {
   std::fflush(stdout);
 }
 
+std::vector<Variation> usual_ones() {
+  return {{"as it is"},
+          {"first frame left out", 1},
+          {"first two left out", 2},
+          {"first three left out", 3},
+          {"noise of one grey level", 0, 1},
+          {"gain 0.9", 0, 0, 0.9},
+          {"the middle 90 %", 0, 0, 1, 0.9},
+          {"three quarters of the size", 0, 0, 1, 1, 0.75},
+          {"in a mirror", 0, 0, 1, 1, 1, true}};
+}
+
+std::vector<Variation> seldom_ones(const std::vector<int>& every) {
+  std::vector<Variation> variations;
+  for (const int n : every)
+    variations.push_back({.name = fmt::format("frames 0, {}, {}, ..", n, 2 * n), .every = n});
+  return variations;
+}
+
+std::vector<Variation> hard_ones() {
+  std::vector<Variation> variations;
+  for (const Hardship& hardship : hardships())
+    variations.push_back({.name = hardship.name, .hardship = &hardship});
+  return variations;
+}
+
 }  // namespace
 }  // namespace twofold
 
@@ -401,34 +427,25 @@ int main(int argc, char** argv) {
           std::map<std::string, twofold::Order>{{"forwards", twofold::Order::kForwards},
                                                 {"backwards", twofold::Order::kBackwards},
                                                 {"there-and-back", twofold::Order::kThereAndBack}}));
-  app.add_option("--every", every,
-                 "instead of the variations: every first, second, .. frame, as many as given")
-      ->check(CLI::PositiveNumber)
-      ->excludes(one);
-  app.add_flag("--hard", hard, "instead of the variations: what real cameras do to a recording");
+  CLI::Option* const seldom =
+      app.add_option("--every", every,
+                     "instead of the variations: every first, second, .. frame, as many as given")
+          ->check(CLI::PositiveNumber)
+          ->excludes(one);
+  app.add_flag("--hard", hard, "instead of the variations: what real cameras do to a recording")
+      ->excludes(seldom);
   app.add_option("--readout", readout, "of the cameras, where the source leaves it open [s]; rendered: 0");
   app.add_option("--truth", truth, "standard deviations of the truth's own poses: METRES RADIANS")
       ->expected(2);
   CLI11_PARSE(app, argc, argv);
   if (!calibration.empty()) options.calibration = calibration;
   options.left_only = camera == "mono";
-  std::vector<twofold::Variation> variations = {{"as it is"},
-                                                {"first frame left out", 1},
-                                                {"first two left out", 2},
-                                                {"first three left out", 3},
-                                                {"noise of one grey level", 0, 1},
-                                                {"gain 0.9", 0, 0, 0.9},
-                                                {"the middle 90 %", 0, 0, 1, 0.9},
-                                                {"three quarters of the size", 0, 0, 1, 1, 0.75},
-                                                {"in a mirror", 0, 0, 1, 1, 1, true}};
-  if (!every.empty() || hard) variations.clear();
-  if (hard) {
-    for (const twofold::Hardship& hardship : twofold::hardships())
-      variations.push_back({.name = hardship.name, .hardship = &hardship});
-  }
-  for (const int n : every)
-    variations.push_back({.name = fmt::format("frames 0, {}, {}, ..", n, 2 * n), .every = n});
   try {
+    std::vector<twofold::Variation> variations = hard            ? twofold::hard_ones()
+                                                 : every.empty() ? twofold::usual_ones()
+                                                                 : twofold::seldom_ones(every);
+    if (only >= static_cast<int>(variations.size()))
+      throw std::invalid_argument(fmt::format("--only {}: the last one is {}", only, variations.size() - 1));
     for (const std::string& source : sources) {
       fmt::print(
           "\n| {} | tracked | in parts | ATE m | causal m | NEES / 6: median / mean / p95 "

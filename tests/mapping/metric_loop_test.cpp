@@ -35,6 +35,10 @@ class MetricLoopTest : public testing::Test {
       x_w_.emplace_back(x(rng), y(rng), z(rng));
       add_point(writer_, rig_, x_w_.back(), {old_});
     }
+    select_window();
+  }
+
+  void select_window() {
     writer_.set_reference(reference_);
     MapperOptions windows;
     windows.inner_window = 2;
@@ -164,12 +168,7 @@ TEST_F(MetricLoopTest, OnlyWhoSharesEnoughPointsIsConnected) {
     observation.z = rig_.project(writer_.graph().T_k_w(other) * x_w_[p]).cast<float>();
     writer_.add_observations(other, std::span(&observation, 1));
   }
-  writer_.set_reference(reference_);
-  MapperOptions windows;
-  windows.inner_window = 2;
-  windows.outer_window = 5;
-  SelectionScratch scratch;
-  select_double_window(writer_.graph(), windows, scratch, window_);
+  select_window();
   ASSERT_TRUE(window_.contains(other));
   options_.min_covisible = 20;
   EXPECT_EQ(close().edges, 1);
