@@ -20,7 +20,9 @@ struct CornerSelectionOptions {
 
 /// Picks the corners of an image that describe its place: each level is parted into cells, each cell gives
 /// its best corner, so that a busy corner of the image does not speak for the rest; the strongest are kept.
-/// A level gets cells in proportion to its share of the corners wanted, half as many as the level below.
+/// A level gets cells in proportion to its share of the corners wanted, half as many as the level below. In
+/// the dark, where corners are missing, higher levels give fainter ones in their place: at half the threshold
+/// and a quarter of the score.
 ///
 /// Keeps buffers between calls; one instance a thread.
 class CornerSelector {
@@ -32,9 +34,19 @@ class CornerSelector {
   void select(const ImagePyramid& pyramid, std::vector<DescribedCorner>& corners);
 
  private:
+  /// Which corners are good enough.
+  struct Bounds {
+    int threshold = 0;
+    float min_score = 0;
+  };
+
+  void add(const ImagePyramid& pyramid, int level, int wanted, const Bounds& bounds,
+           std::vector<DescribedCorner>& corners);
+  void add_faint(const ImagePyramid& pyramid, std::vector<DescribedCorner>& corners);
+
   CornerSelectionOptions options_;
   std::vector<Corner> found_;
-  std::vector<std::uint8_t> free_cells_;
+  std::vector<std::uint8_t> occupied_;
 };
 
 }  // namespace twofold

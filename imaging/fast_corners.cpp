@@ -78,8 +78,7 @@ ByteRun strength_in_run(const std::uint8_t* p, const Circle& circle, int thresho
 
 constexpr double kPerPixel = 1.0 / (4 * 64);  // from a StructureTensor's eigenvalue to a score
 
-constexpr int kMaxColumns = 256;
-constexpr int kMaxMasks = 1 << 14;  // of one strip: 128 rows of 4096 pixels
+constexpr int kMaxMasks = 1 << 14;  // kept of one strip: 128 rows of 4096 pixels
 
 /// One row of cells on one pyramid level, and the best corner found in each so far.
 struct Strip {
@@ -88,13 +87,14 @@ struct Strip {
   int cell;    // side in pixels of the level
   int u0, u1;  // columns and rows of pixels looked at
   int v0, v1;
-  std::span<std::uint32_t> weak;  // by run and row: corners that do not stand out far
+  int threshold, far;             // of grey levels by which corners stand out, and stand out far
+  std::span<std::uint32_t> weak;  // by run and row: corners that do not stand out far; empty: not kept
   struct Best {
     int u = 0, v = 0;
     double eigenvalue = 0;
   };
-  std::array<bool, kMaxColumns> wanted{};
-  std::array<Best, kMaxColumns> best{};
+  std::array<bool, CellGrid::kMaxColumns> wanted{};
+  std::array<Best, CellGrid::kMaxColumns> best{};
 
   /// Pixels [begin, begin + kRun) of the strip's rows: the cell of each, and those in wanted cells that no
   /// run before has looked at.
@@ -135,26 +135,37 @@ struct Strip {
     }
   }
 
-  /// Finds all corners; judges those that stand out by more than `strong` and keeps the others for later.
-  void scan(int threshold, int strong) {
-    const ByteRun far = run_of(static_cast<std::uint8_t>(std::min(strong, 255)));
+  /// Corners of a run's pixels in row v.
+  struct Found {
+    std::uint32_t strong, weak;
+  };
+  [[nodiscard]] Found find(const Run& run, int v) const {
+    const ByteRun found = strength_in_run(image.ptr<std::uint8_t>(v) + run.begin, circle, threshold);
+    const std::uint32_t strong = mask_of(above(found, run_of(static_cast<std::uint8_t>(far))));
+    return {strong, mask_of(above(found, run_of(0))) & ~strong};
+  }
+
+  /// Judges the corners that stand out far, and keeps the others for later.
+  void judge_strong() {
     for (int first = u0; first < u1; first += kRun) {
       const Run run = run_at(first);
       if (run.wanted == 0) continue;
       for (int v = v0; v < v1; ++v) {
-        const ByteRun found = strength_in_run(image.ptr<std::uint8_t>(v) + run.begin, circle, threshold);
-        const std::uint32_t strong_ones = mask_of(above(found, far));
-        weak_at(first, v) = mask_of(above(found, run_of(0))) & ~strong_ones;
-        judge(strong_ones & run.wanted, run, v);
+        const Found found = find(run, v);
+        if (!weak.empty()) weak_at(first, v) = found.weak;
+        judge(found.strong & run.wanted, run, v);
       }
     }
   }
 
-  /// Judges what scan kept for later, of the cells still wanted.
+  /// Judges the others, of the cells still wanted. Where there was no room to keep them they are found again.
   void judge_weak() {
     for (int first = u0; first < u1; first += kRun) {
       const Run run = run_at(first);
-      for (int v = v0; v < v1 && run.wanted != 0; ++v) judge(weak_at(first, v) & run.wanted, run, v);
+      for (int v = v0; v < v1 && run.wanted != 0; ++v) {
+        const std::uint32_t corners = weak.empty() ? find(run, v).weak : weak_at(first, v);
+        judge(corners & run.wanted, run, v);
+      }
     }
   }
 };
@@ -163,12 +174,12 @@ struct Strip {
 
 void detect_corners(const cv::Mat& image, int level, int threshold, float min_score, int border,
                     const CellGrid& grid, std::vector<Corner>& corners) {
-  TWOFOLD_CHECK(grid.columns <= kMaxColumns, "image too wide for cells of this size");
+  TWOFOLD_CHECK(grid.columns <= CellGrid::kMaxColumns, "image too wide for cells of this size");
   if (image.cols < kRun + 2 * border) return;
   const int cell = grid.cell_px >> level;
   const Circle circle = circle_offsets(static_cast<std::ptrdiff_t>(image.step));
-  TWOFOLD_CHECK((image.cols / kRun + 1) * cell <= kMaxMasks, "cells too large for an image so wide");
   std::array<std::uint32_t, kMaxMasks> weak;
+  const bool room = (image.cols / kRun + 1) * cell <= kMaxMasks;
   for (int row = 0; row < grid.rows; ++row) {
     Strip strip{image,
                 circle,
@@ -177,11 +188,13 @@ void detect_corners(const cv::Mat& image, int level, int threshold, float min_sc
                 std::min(grid.columns * cell, image.cols - border),
                 std::max(row * cell, border),
                 std::min((row + 1) * cell, image.rows - border),
-                weak};
+                threshold,
+                std::min(kStrong * threshold, 255),
+                room ? std::span<std::uint32_t>(weak) : std::span<std::uint32_t>()};
     const std::uint8_t* occupied = grid.occupied.data() + row * grid.columns;
     for (int c = 0; c < grid.columns; ++c) strip.wanted[static_cast<std::size_t>(c)] = occupied[c] == 0;
     // Strong corners first: in rich texture there are enough of them, and far fewer to score.
-    strip.scan(threshold, kStrong * threshold);
+    strip.judge_strong();
     const double enough = std::max(min_score / kPerPixel, 1.0);
     for (std::size_t c = 0; c < static_cast<std::size_t>(grid.columns); ++c) {
       strip.wanted[c] = strip.wanted[c] && strip.best[c].eigenvalue < enough;

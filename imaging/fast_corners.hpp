@@ -16,10 +16,17 @@ struct Corner {
 
 /// Cells of an image, in level-0 pixels; those that hold a point already need no corner.
 struct CellGrid {
+  static constexpr int kMaxColumns = 256;
+
   int cell_px = 32;  ///< side of a cell, a multiple of 4
-  int columns = 0;
+  int columns = 0;   ///< kMaxColumns at most
   int rows = 0;
   std::span<const std::uint8_t> occupied;  ///< columns * rows, row-major; non-zero: no corner wanted
+
+  /// Side of the smallest cells that an image so wide can be parted into.
+  [[nodiscard]] static constexpr int smallest_cell_px(int image_width) {
+    return (image_width / kMaxColumns + 4) / 4 * 4;
+  }
 };
 
 /// FAST-9 corners (Rosten and Drummond, ECCV 2006): nine of the sixteen pixels on the circle of radius 3 in a

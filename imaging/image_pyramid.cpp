@@ -75,4 +75,9 @@ void FrameImages::copy_from(const FrameImages& other) {
   }
 }
 
+bool is_dark(const ImagePyramid& pyramid) {
+  constexpr double kDark = 60;  // [grey]
+  return cv::mean(pyramid.level(ImagePyramid::kLevels - 1))[0] < kDark;
+}
+
 }  // namespace twofold

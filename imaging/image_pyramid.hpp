@@ -35,4 +35,7 @@ struct FrameImages {
   void copy_from(const FrameImages& other);
 };
 
+/// Whether contrast is low for want of light, not of texture.
+[[nodiscard]] bool is_dark(const ImagePyramid& pyramid);
+
 }  // namespace twofold

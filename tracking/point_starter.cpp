@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
 
 #include "geometry/inverse_depth.hpp"
 #include "imaging/row_offset.hpp"
@@ -15,12 +14,6 @@ constexpr int kBorder = 12;                 // of a level: room for the patch an
 constexpr int kMaxRowShift = 8;             // between left and right image, looked for [px]
 constexpr int kClearly = 3;                 // times as many corners with depth: that was the mistake
 constexpr double kFarthestDisparity = 0.3;  // [px] below it the depth is as good as infinite
-
-/// Low contrast is for want of light, not of texture.
-bool is_dark(const FrameImages& images) {
-  constexpr double kDark = 60;  // [grey]
-  return cv::mean(images.left.level(4))[0] < kDark;
-}
 
 Eigen::Vector2f at_level_zero(const Corner& corner) {
   const float s = std::ldexp(1.0F, corner.level);
@@ -40,6 +33,7 @@ TrackerOptions with_cells_of_one_camera(const Rig& rig, TrackerOptions options) 
 
 PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options)
     : rig_(rig), options_(options), quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
+  options_.cell_px = std::max(options_.cell_px, CellGrid::smallest_cell_px(rig.camera.width));
   columns_ = rig.camera.width / options.cell_px + 1;
   rows_ = rig.camera.height / options.cell_px + 1;
   occupied_.resize(static_cast<std::size_t>(columns_ * rows_));
@@ -88,7 +82,7 @@ void PointStarter::spread_corners(const FrameImages& images, const CornerBounds&
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                         ImmaturePoints& immature) {
   int started = start_at(usual_corners(), options_.max_new_points, images, anchor, shutter, immature);
-  if (tracked_ < options_.scarce_points && is_dark(images))
+  if (tracked_ < options_.scarce_points && is_dark(images.left))
     started +=
         start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, immature);
   return started;

@@ -175,6 +175,56 @@ bool slip_rows(Frame& frame, double /*t*/) {
   return true;
 }
 
+/// A round lens before a larger sensor, or what undistorting leaves: black outside of a circle.
+bool mask_circle(Frame& frame, double /*t*/) {
+  change_images(frame, [](const cv::Mat& image) {
+    cv::Mat mask = cv::Mat::zeros(image.size(), CV_8UC1), out = mask.clone();
+    const int radius = static_cast<int>(0.58 * std::min(image.cols, image.rows));
+    cv::circle(mask, {image.cols / 2, image.rows / 2}, radius, 255, cv::FILLED, cv::LINE_AA);
+    cv::multiply(image, mask, out, 1.0 / 255);
+    return out;
+  });
+  return true;
+}
+
+/// What moves with the camera, a bonnet or a robot's own body: spots in the lower fifth of the image, so near
+/// that a pair sees them a twelfth of its width apart and a depth camera measures nothing.
+bool show_bonnet(Frame& frame, double /*t*/) {
+  int shift = 0;  // of the image, to the left
+  change_images(frame, [&](const cv::Mat& image) {
+    cv::Mat out = image.clone();
+    const int top = out.rows * 4 / 5, width = 2 * out.cols;
+    cv::Mat spots(out.rows - top, width, CV_32FC1), bonnet;
+    for (int y = 0; y < spots.rows; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const auto key = static_cast<std::uint64_t>(y * width + x);
+        spots.at<float>(y, x) =
+            static_cast<float>(110 + 500 * (synthetic::unit_interval(synthetic::mix64(key)) - 0.5));
+      }
+    }
+    cv::GaussianBlur(spots, spots, {}, 3);
+    spots(cv::Rect(shift, 0, out.cols, spots.rows)).convertTo(bonnet, CV_8UC1);
+    bonnet.copyTo(out.rowRange(top, out.rows));
+    shift += out.cols / 12;
+    return out;
+  });
+  if (!frame.depth.empty()) frame.depth.rowRange(frame.depth.rows * 4 / 5, frame.depth.rows).setTo(0);
+  return true;
+}
+
+/// The time, written into each image by the recorder.
+bool write_caption(Frame& frame, double t) {
+  change_images(frame, [&](const cv::Mat& image) {
+    cv::Mat out = image.clone();
+    const auto text = "CAM 1  2024-05-01  10:00:" + std::to_string(10 + static_cast<int>(t) % 50);
+    const double scale = image.cols / 640.0;
+    cv::putText(out, text, {static_cast<int>(24 * scale), static_cast<int>(40 * scale)},
+                cv::FONT_HERSHEY_SIMPLEX, scale, 255, 2);
+    return out;
+  });
+  return true;
+}
+
 bool nothing(Frame& /*frame*/, double /*t*/) {
   return true;
 }
@@ -203,6 +253,9 @@ const std::vector<Hardship>& hardships() {
       {"right image 0.7 rows too low", slip_rows},
       {"focal length 2 % too long", nothing, [](Rig& rig) { rig.camera.fx *= 1.02, rig.camera.fy *= 1.02; }},
       {"principal point off by 6 px", nothing, [](Rig& rig) { rig.camera.cx += 6, rig.camera.cy -= 6; }},
+      {"black outside of a circle", mask_circle},
+      {"a bonnet in the lower fifth", show_bonnet},
+      {"the time written into the image", write_caption},
   };
   return kAll;
 }

@@ -6,6 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <random>
+#include <utility>
+#include <vector>
+
+#include "imaging/corner_selection.hpp"
+#include "imaging/image_pyramid.hpp"
 
 namespace twofold {
 namespace {
@@ -108,6 +113,48 @@ TEST(FastCorners, AreThoseOfTheDefinition) {
         ASSERT_NEAR(corner.score, score_by_definition(image, corner.u, corner.v), 1e-2 + 1e-4 * corner.score);
       }
     }
+  }
+}
+
+/// Images of telephones, panoramas: what stands out weakly in a row of cells is then found twice, not kept.
+TEST(FastCorners, AreTheSameInAnImageOfAnyWidth) {
+  constexpr int kCell = 168, kColumns = 5;
+  const cv::Mat wide = random_image(7000, 400);
+  const cv::Mat narrow = wide.colRange(0, (kColumns + 1) * kCell).clone();
+  std::vector<Corner> of_wide, of_narrow;
+  for (const auto& [image, corners] : {std::pair(&wide, &of_wide), std::pair(&narrow, &of_narrow)}) {
+    std::vector<std::uint8_t> occupied;
+    const CellGrid grid = grid_over(*image, kCell, occupied);
+    corners->reserve(1000);
+    detect_corners(*image, 0, 10, 20, 8, grid, *corners);
+    std::erase_if(*corners, [](const Corner& corner) { return corner.u >= kColumns * kCell; });
+  }
+  ASSERT_EQ(of_narrow.size(), 3U * kColumns);
+  ASSERT_EQ(of_wide.size(), of_narrow.size());
+  for (std::size_t i = 0; i < of_wide.size(); ++i) {
+    EXPECT_EQ(of_wide[i].u, of_narrow[i].u);
+    EXPECT_EQ(of_wide[i].v, of_narrow[i].v);
+    EXPECT_EQ(of_wide[i].score, of_narrow[i].score);
+  }
+}
+
+TEST(FastCorners, GridsHaveRoomForTheWidestImage) {
+  for (const int width : {32, 640, 3840, 4096, 7168, 12000, 16384}) {
+    const int cell = CellGrid::smallest_cell_px(width);
+    EXPECT_LE(width / cell + 1, CellGrid::kMaxColumns) << width;
+    EXPECT_EQ(cell % 4, 0);
+  }
+}
+
+TEST(CornerSelector, TakesImagesOfAnyShape) {
+  for (const auto& [width, height] : {std::pair(3840, 2160), std::pair(16384, 96), std::pair(128, 4000)}) {
+    ImagePyramid pyramid;
+    pyramid.build(random_image(width, height));
+    CornerSelector selector({.wanted = 700});
+    std::vector<DescribedCorner> corners;
+    selector.select(pyramid, corners);
+    EXPECT_GT(corners.size(), 300U) << width << "x" << height;
+    EXPECT_LE(corners.size(), 700U) << width << "x" << height;
   }
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "geometry/ransac.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/place_view.hpp"
+#include "synthetic/image_effects.hpp"
 #include "tests/loopclosure/turning_camera.hpp"
 
 namespace twofold {
@@ -30,6 +32,20 @@ class PlaceTest : public ::testing::TestWithParam<SensorKind> {
     RenderedScene scene(rig_, Vector3(3, 2, 4), room);
     FrameImages images;
     scene.render(T_c_w, 2.0, images);
+    return describer_.describe(images, *vocabulary());
+  }
+  /// With so much of the light, and the noise that a sensor has then.
+  PlaceView view_in_the_dark(std::uint32_t room, const SE3& T_c_w, double gain) {
+    RenderedScene scene(rig_, Vector3(3, 2, 4), room);
+    FrameImages images;
+    scene.render(T_c_w, 0, images);
+    std::uint64_t stream = room;
+    for (ImagePyramid* pyramid : {&images.left, &images.right}) {
+      if (pyramid == &images.right && rig_.kind != SensorKind::kStereo) continue;
+      cv::Mat light;
+      pyramid->level(0).convertTo(light, CV_32FC1);
+      pyramid->build(synthetic::expose(light, gain, 3, {1, 2 * stream++}));
+    }
     return describer_.describe(images, *vocabulary());
   }
   std::optional<VerifiedPlace> verify(const PlaceView& a, const PlaceView& b,
@@ -76,6 +92,24 @@ TEST_P(PlaceTest, VerifiesTheSamePlaceAndFindsThePose) {
   EXPECT_LT(error.head<3>().norm(), 0.03);
   EXPECT_LT(error.tail<3>().norm(), 0.01);
   EXPECT_GE(verified->inliers, VerificationOptions().min_inliers);
+}
+
+/// A hundred grey levels are seven, and noise is three.
+TEST_P(PlaceTest, VerifiesTheSamePlaceInTheDark) {
+  constexpr double kGain = 0.07;
+  const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5});
+  const SE3 T_b_w = pose(-0.05, {-0.1, 0, -0.2});
+  const PlaceView place = view_in_the_dark(1, T_a_w, kGain);
+  VerificationReport report;
+  const auto verified = verify(place, view_in_the_dark(1, T_b_w, kGain), {}, &report);
+  ASSERT_TRUE(verified) << place.corners.size() << " corners, " << report.matches << " matches, "
+                        << report.ransac_inliers << " in RANSAC, " << report.inliers << " of "
+                        << report.guided << " guided";
+  const Vector6 error = (verified->T_b_a * (T_b_w * T_a_w.inverse()).inverse()).log();
+  EXPECT_LT(error.head<3>().norm(), 0.3);  // noise is in the depths as well; the map's points find it exactly
+  EXPECT_LT(error.tail<3>().norm(), 0.05);
+  for (std::uint32_t room = 2; room < 6; ++room)
+    EXPECT_FALSE(verify(place, view_in_the_dark(room, T_b_w, kGain))) << room;
 }
 
 TEST_P(PlaceTest, RejectsAnotherRoomAndAnotherWall) {
