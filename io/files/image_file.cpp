@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <fstream>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
@@ -87,8 +89,17 @@ bool file_precedes(const fs::path& a, const fs::path& b) {
 
 }  // namespace
 
-cv::Mat read_grey_image(const fs::path& file) {
-  return decode(file, cv::IMREAD_GRAYSCALE);
+cv::Mat read_grey_image(const fs::path& file, int bits) {
+  if (bits >= 16) return decode(file, cv::IMREAD_GRAYSCALE);
+  cv::Mat image = decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  if (image.depth() != CV_8U) image.convertTo(image, CV_8U, std::ldexp(1.0, 8 - bits));
+  return image;
+}
+
+int bits_used(const fs::path& file) {
+  double brightest = 0;
+  cv::minMaxLoc(decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH), nullptr, &brightest);
+  return std::ilogb(std::max(brightest, 0.5)) + 1;
 }
 
 cv::Mat read_colour_image(const fs::path& file) {

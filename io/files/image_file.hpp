@@ -16,7 +16,13 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 /// Throws IoError when the file is missing, of no known kind, cut short, damaged (PNG: chunk check sums;
 /// JPEG: end marker) or too large. The decoders alone would fill the missing part of a cut-off JPEG with grey
 /// and go on.
-[[nodiscard]] cv::Mat read_grey_image(const std::filesystem::path& file);
+///
+/// `bits` of an image of 16 bits: the grey levels that it can hold are 2^bits; brighter ones become white.
+[[nodiscard]] cv::Mat read_grey_image(const std::filesystem::path& file, int bits = 16);
+
+/// Bits that the brightest pixel of a grey image takes: 8 or fewer but for files of 16 bits, of which many
+/// cameras use 10 or 12. Throws as above.
+[[nodiscard]] int bits_used(const std::filesystem::path& file);
 
 /// An image file as CV_8UC3 (blue, green, red); empty when it has no colour. Throws as above.
 [[nodiscard]] cv::Mat read_colour_image(const std::filesystem::path& file);

@@ -17,6 +17,7 @@ class PreloadedSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(frames_.size());
   }
+  [[nodiscard]] SourceReport report() const override { return source_->report(); }
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override {
     return source_->colour_image(index);
   }

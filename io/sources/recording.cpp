@@ -66,8 +66,28 @@ Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_ra
   return rectified;
 }
 
+namespace {
+
+/// Bits of the grey levels: files of 16 bits often hold 10, 12 or 14. One image alone may be a dark one: some
+/// from all of the recording are looked at, if the first has more than 8.
+int grey_bits_of(const std::vector<RecordedFrame>& frames) {
+  constexpr std::size_t kLooks = 6;
+  int bits = bits_used(frames.front().left);
+  if (bits <= 8) return 16;
+  for (std::size_t k = 1; k < kLooks; ++k) {
+    try {
+      bits = std::max(bits, bits_used(frames[k * (frames.size() - 1) / (kLooks - 1)].left));
+    } catch (const IoError&) {  // is told when it is that frame's turn
+    }
+  }
+  return (bits + 1) / 2 * 2;
+}
+
+}  // namespace
+
 PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recording)) {
   if (recording_.frames.empty()) throw IoError(recording_.folder, "the recording holds no frames");
+  grey_bits_ = grey_bits_of(recording_.frames);
   const cv::Mat first = read_grey_image(recording_.frames[0].left);
   set_missing_size(first.cols, first.rows, &recording_.calibration);
   expect_valid(recording_.calibration_file, recording_.calibration);
@@ -86,10 +106,10 @@ Frame PlaybackSource::decode(const RecordedFrame& files) const {
   const Calibration& calibration = recording_.calibration;
   Frame frame;
   frame.t_ns = files.t_ns;
-  frame.left = read_grey_image(files.left);
+  frame.left = read_grey_image(files.left, grey_bits_);
   expect_size(files.left, frame.left, calibration.left.pinhole);
   if (calibration.kind == SensorKind::kStereo) {
-    frame.right = read_grey_image(files.right);
+    frame.right = read_grey_image(files.right, grey_bits_);
     expect_size(files.right, frame.right, calibration.right.pinhole);
   }
   if (calibration.kind == SensorKind::kRgbd) {
@@ -98,6 +118,14 @@ Frame PlaybackSource::decode(const RecordedFrame& files) const {
     expect_size(files.depth, frame.depth, camera.pinhole);
   }
   return frame;
+}
+
+SourceReport PlaybackSource::report() const {
+  SourceReport report;
+  if (grey_bits_ < 16)
+    report.summary.push_back(fmt::format("{}: images of 16 bits hold {}: grey levels were taken from 0 to {}",
+                                         recording_.folder.string(), grey_bits_, (1 << grey_bits_) - 1));
+  return report;
 }
 
 cv::Mat PlaybackSource::colour_image(std::int64_t index) const {
@@ -112,7 +140,7 @@ cv::Mat PlaybackSource::left_image(std::int64_t t_ns) const {
                                    [](const RecordedFrame& frame, std::int64_t t) { return frame.t_ns < t; });
   if (at == recording_.frames.end() || at->t_ns != t_ns) return {};
   cv::Mat raw = read_colour_image(at->left);
-  if (raw.empty()) raw = read_grey_image(at->left);
+  if (raw.empty()) raw = read_grey_image(at->left, grey_bits_);
   return rectified_left(at->left, raw);
 }
 

@@ -60,6 +60,7 @@ class PlaybackSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(recording_.frames.size());
   }
+  [[nodiscard]] SourceReport report() const override;
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
   /// The rectified left image of the frame with that time stamp, in colour if it has any, else grey; empty
   /// when there is no such frame. Any thread. Throws IoError.
@@ -72,6 +73,7 @@ class PlaybackSource final : public FrameSource {
 
   Recording recording_;
   std::optional<Rectifier> rectifier_;
+  int grey_bits_ = 16;  ///< of images of 16 bits
   std::size_t next_ = 0;
 };
 

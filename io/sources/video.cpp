@@ -17,6 +17,7 @@ VideoSource::VideoSource(const std::filesystem::path& file,
     : file_(file) {
   take_layout(parameters);
   const auto fps = parameters.take_number("fps");
+  if (fps && !(*fps > 0)) throw IoError(parameters.subject(), fmt::format("fps={} must be positive", *fps));
   const SensorKind kind = side_by_side_ ? SensorKind::kStereo : SensorKind::kMono;
   Calibration base;
   if (calibration) base = read_calibration(*calibration);
@@ -28,7 +29,9 @@ VideoSource::VideoSource(const std::filesystem::path& file,
   const int width = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)) / (side_by_side_ ? 2 : 1);
   const int height = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT));
   announced_ = capture_.get(cv::CAP_PROP_FRAME_COUNT);
-  fps_ = fps.value_or(used.fps > 0 ? used.fps : capture_.get(cv::CAP_PROP_FPS));
+  at_fixed_rate_ = fps.has_value();
+  fps_ = fps.value_or(capture_.get(cv::CAP_PROP_FPS));
+  if (!(fps_ > 0) || !std::isfinite(fps_)) fps_ = used.fps;
   if (!(fps_ > 0) || !std::isfinite(fps_)) throw IoError(file, "has no frame rate: give the parameter fps");
   set_missing_size(width, height, &used);
   expect_valid(calibration_file, used);
@@ -66,15 +69,26 @@ bool VideoSource::decode(Frame* raw) {
   return true;
 }
 
+/// Of the frame that was decoded last, since the first one.
+std::int64_t VideoSource::time_stamp() {
+  if (at_fixed_rate_) return std::llround(static_cast<double>(index_) / fps_ * 1e9);
+  const std::int64_t t_ns = std::llround(1e6 * capture_.get(cv::CAP_PROP_POS_MSEC));
+  if (index_ == 0) first_t_ns_ = t_ns;
+  const std::int64_t since_first = t_ns - first_t_ns_;
+  if (index_ == 0 || since_first > last_t_ns_) return since_first;
+  ++without_time_;
+  return last_t_ns_ + std::llround(1e9 / fps_);
+}
+
 bool VideoSource::read(Frame& frame) {
   Frame raw;
   raw.index = index_;
-  raw.t_ns = std::llround(static_cast<double>(index_) / fps_ * 1e9);
   if (!decode(&raw)) {
     if (index_ == 0) throw IoError(file_, "holds no frame that can be decoded");
     at_end_ = true;
     return false;
   }
+  raw.t_ns = last_t_ns_ = time_stamp();
   if (const auto reason = rectifier_->mismatch_reason(raw); !reason.empty()) throw IoError(file_, reason);
   ++index_;
   frame = Frame();  // its old images may still be held elsewhere: never write into them
@@ -84,6 +98,12 @@ bool VideoSource::read(Frame& frame) {
 
 SourceReport VideoSource::report() const {
   SourceReport report;
+  if (without_time_ > 0) {
+    report.summary.push_back(fmt::format(
+        "{}: {} frames have no time of their own, or one that is not after the frame before: each was taken "
+        "to be 1/{:g} s after that (the parameter fps gives all frames the same rate)",
+        file_.string(), without_time_, fps_));
+  }
   // Containers that have no count take length times rate: a frame or two, or one in a hundred, say nothing.
   constexpr double kTold = 0.98, kSlack = 2;
   if (at_end_ && static_cast<double>(index_) < kTold * announced_ - kSlack) {

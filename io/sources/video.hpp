@@ -12,8 +12,8 @@ namespace twofold {
 
 /// A video file: one image a frame, or with layout=side-by-side a stereo pair (left image in the left half).
 ///
-/// Time stamps are the frame number over the frame rate (the file's, the calibration's or the parameter fps):
-/// what containers say about single frames differs between decoders, and a run must not depend on that.
+/// Time stamps are what the file says of each frame, counted from the first one: telephones take fewer frames
+/// a second in poor light. With the parameter fps they are the frame's number over that rate.
 class VideoSource final : public FrameSource {
  public:
   /// Throws IoError.
@@ -27,14 +27,19 @@ class VideoSource final : public FrameSource {
   bool read(Frame& frame) override;
   void take_layout(SourceParameters& parameters);
   [[nodiscard]] bool decode(Frame* raw);
+  [[nodiscard]] std::int64_t time_stamp();
 
   std::filesystem::path file_;
   cv::VideoCapture capture_;
   bool side_by_side_ = false;
-  double fps_ = 0;
+  bool at_fixed_rate_ = false;  ///< fps_, whatever the file says of its frames
+  double fps_ = 0;              ///< else where the file says nothing
   std::optional<Rectifier> rectifier_;
   double announced_ = 0;  ///< frames, as the container says; some guess, and some say nothing
   std::int64_t index_ = 0;
+  std::int64_t first_t_ns_ = 0;    ///< as the file has it
+  std::int64_t last_t_ns_ = 0;     ///< as it was given out
+  std::int64_t without_time_ = 0;  ///< frames
   bool at_end_ = false;
 };
 

@@ -1,4 +1,10 @@
+#include <cstdint>
+#include <fstream>
 #include <opencv2/videoio.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -243,6 +249,88 @@ TEST(FrameSource, VideoSideBySide) {
   ASSERT_EQ(source->next(frame), FrameStatus::kFrame);
   EXPECT_EQ(frame.t_ns, 40'000'000);
   EXPECT_EQ(drain(*source), "2");
+}
+
+/// Cameras with 12 bits write them into files of 16: the upper byte alone would be black.
+TEST(FrameSource, GreyLevelsOfTwelveBitsAreNotTakenForSixteen) {
+  for (const int brightest : {4000, 1000, 60000}) {
+    const ScratchFolder folder;
+    for (int i = 0; i < 8; ++i) {
+      // The first ones are dark, whatever the camera can do.
+      cv::Mat image(kHeight, kWidth, CV_16UC1, cv::Scalar(i < 2 ? 600 : brightest / 2));
+      if (i >= 2) image.at<std::uint16_t>(3, 5) = static_cast<std::uint16_t>(brightest);
+      folder.write_image(fmt::format("{:03d}.png", i), image);
+    }
+    const auto source =
+        open_source("images:" + folder.path().string() + "?fps=10&fx=50&fy=50&cx=31.5&cy=23.5");
+    const double white = brightest == 4000 ? 4096 : brightest == 1000 ? 1024 : 65536;
+    std::vector<double> grey;
+    for (Frame frame; source->next(frame) == FrameStatus::kFrame;) grey.push_back(cv::mean(frame.left)[0]);
+    ASSERT_EQ(grey.size(), 8U);
+    EXPECT_NEAR(grey.front(), 256 * 600 / white, 1);
+    EXPECT_NEAR(grey.back(), 256 * (brightest / 2) / white, 1);
+    const auto told = source->report().summary;
+    ASSERT_EQ(told.size(), brightest == 60000 ? 0U : 1U);
+    if (!told.empty()) EXPECT_NE(told[0].find("images of 16 bits hold 1"), std::string::npos) << told[0];
+  }
+}
+
+/// Gives the frames of an MP4 file, all of the same length, lengths of their own: (frames, times as long).
+/// Its index is the last part of the file, so that it may grow.
+void stretch_frames(const std::string& file,
+                    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& runs) {
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const auto at = [&](const char* box) {
+    const std::size_t name = bytes.find(box);
+    if (name == std::string::npos || name < 4) throw std::runtime_error(std::string("no box ") + box);
+    return name - 4;
+  };
+  const auto number = [&](std::size_t from) {
+    std::uint32_t n = 0;
+    for (std::size_t i = 0; i < 4; ++i) n = n << 8 | static_cast<std::uint8_t>(bytes[from + i]);
+    return n;
+  };
+  const auto big_endian = [](std::uint32_t n) {
+    std::string four;
+    for (const int shift : {24, 16, 8, 0}) four += static_cast<char>(n >> shift & 255);
+    return four;
+  };
+  const std::size_t stts = at("stts");
+  const std::uint32_t length = number(stts + 20);
+  std::string table = big_endian(static_cast<std::uint32_t>(runs.size()));
+  for (const auto& [frames, times] : runs) table += big_endian(frames) + big_endian(times * length);
+  const auto grown = static_cast<std::uint32_t>(table.size() - 12);
+  for (const char* box : {"moov", "trak", "mdia", "minf", "stbl", "stts"})
+    bytes.replace(at(box), 4, big_endian(number(at(box)) + grown));
+  bytes.replace(stts + 12, 12, table);
+  bytes.replace(at("edts") + 4, 4, "free");  // it cuts the film to its old length
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+TEST(FrameSource, FramesOfAVideoHaveTheTimesThatTheFileGivesThem) {
+  const ScratchFolder folder;
+  const std::string file = folder / "telephone.mp4";
+  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
+                         {kWidth, kHeight});
+  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here cannot write MPEG-4";
+  for (int i = 0; i < 8; ++i) writer.write(numbered_image(kWidth, kHeight, i, CV_8UC3));
+  writer.release();
+  stretch_frames(file, {{3, 1}, {1, 7}, {4, 3}});
+  const auto times = [&](const std::string& parameters, const SourceOptions& options = {}) {
+    const auto source = open_source("video:" + file + parameters, options);
+    std::vector<std::int64_t> ms;
+    for (Frame frame; source->next(frame) == FrameStatus::kFrame;) ms.push_back(frame.t_ns / 1'000'000);
+    return ms;
+  };
+  const std::vector<std::int64_t> of_file{0, 40, 80, 120, 400, 520, 640, 760};
+  EXPECT_EQ(times("?fx=50&fy=50&cx=32&cy=24"), of_file);
+  const std::vector<std::int64_t> at_ten{0, 100, 200, 300, 400, 500, 600, 700};
+  EXPECT_EQ(times("?fx=50&fy=50&cx=32&cy=24&fps=10"), at_ten);
+  SourceOptions with_rate;
+  with_rate.calibration = folder.write(
+      "lens.yaml", "sensor: mono\nfps: 60\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n");
+  EXPECT_EQ(times("", with_rate), of_file) << "the rate is what the camera was asked for";
 }
 
 TEST(FrameSource, AVideoThatIsCutShortSaysSo) {
