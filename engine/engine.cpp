@@ -20,14 +20,27 @@ class CostMeter {
   std::int64_t start_ns_ = steady_now_ns();
 };
 
-/// False when the pipeline takes no more.
-bool wait_for_room(Pipeline& pipeline, const FrameSink& sink) {
+/// False when the pipeline takes no more, or the run is interrupted.
+bool wait_for_room(Pipeline& pipeline, const std::atomic<bool>& interrupted, const FrameSink& sink) {
   constexpr auto kFailureCheck = std::chrono::milliseconds(50);  // a thread that failed wakes nobody
-  for (;;) {
+  // Relaxed: the flag carries no other data; seeing it later is as good.
+  while (!interrupted.load(std::memory_order_relaxed)) {
     pipeline.collect(sink);
     if (pipeline.ended()) return false;
     if (pipeline.has_room()) return true;
     pipeline.wait(std::chrono::steady_clock::now() + kFailureCheck);
+  }
+  return false;
+}
+
+/// Returns when all frames that were pushed are done with, or none will be, or the run is interrupted.
+void play_out(Pipeline& pipeline, std::int64_t pushed, const std::atomic<bool>& interrupted,
+              const FrameSink& sink) {
+  constexpr auto kCheck = std::chrono::milliseconds(50);
+  while (!interrupted.load(std::memory_order_relaxed) && !pipeline.ended()) {
+    pipeline.collect(sink);
+    if (pipeline.progress().frames >= pushed) return;
+    pipeline.wait(std::chrono::steady_clock::now() + kCheck);
   }
 }
 
@@ -40,11 +53,13 @@ RunResult feed_all(Pipeline& pipeline, const FrameFeed& feed, const std::atomic<
   };
   FeedStatus status = FeedStatus::kFrame;
   Frame frame;
-  // Relaxed: the flag carries no other data; seeing it a frame later is as good.
-  while (!interrupted.load(std::memory_order_relaxed) && wait_for_room(pipeline, show) &&
-         (status = feed(frame)) == FeedStatus::kFrame) {
+  std::int64_t pushed = 0;
+  while (wait_for_room(pipeline, interrupted, show) && (status = feed(frame)) == FeedStatus::kFrame) {
     pipeline.push(std::move(frame));
+    ++pushed;
   }
+  play_out(pipeline, pushed, interrupted, show);
+  if (interrupted.load(std::memory_order_relaxed)) pipeline.end_pace();
   const bool input_is_short = status == FeedStatus::kEnd && pipeline.frames_due() > 0;
   pipeline.stop();
   pipeline.collect(show);

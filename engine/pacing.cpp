@@ -28,7 +28,7 @@ std::int64_t Pacer::exposed_ns(std::int64_t t_ns) const {
   return start_ns_ + std::llround(static_cast<double>(t_ns - first_t_ns_) / options_.speed);
 }
 
-Arrival Pacer::wait_for(std::int64_t t_ns, const std::stop_token& stop) {
+Arrival Pacer::wait_for(std::int64_t t_ns) {
   std::int64_t now_ns = clock_->now_ns();
   if (!options_.keeps_pace()) return {now_ns, 0, 0, false};
   if (!started_) {
@@ -41,8 +41,9 @@ Arrival Pacer::wait_for(std::int64_t t_ns, const std::stop_token& stop) {
   arrival.exposed_ns = exposed_ns(t_ns);
   arrival.period_ns = exposed_ns(t_ns + interval_.ns()) - arrival.exposed_ns;
   if (!options_.live && now_ns < arrival.exposed_ns) {
-    clock_->sleep_until(arrival.exposed_ns, stop);
+    clock_->sleep_until(arrival.exposed_ns, waits_ended_.get_token());
     now_ns = clock_->now_ns();
+    arrival.exposed_ns = std::min(arrival.exposed_ns, now_ns);
   }
   arrival.late_ns = std::max<std::int64_t>(now_ns - arrival.exposed_ns, 0);
   return arrival;

@@ -63,29 +63,33 @@ class Pacer {
   /// clock: nullptr for the steady clock; otherwise outlives the pacer.
   explicit Pacer(const PacingOptions& options, PacingClock* clock = nullptr);
 
-  /// Waits for the exposure of the frame with time stamp t_ns; a stop request ends that early.
+  /// Waits for the exposure of the frame with time stamp t_ns, unless end_waits was called.
   /// @param successor_t_ns  asked after the wait: time stamp of the frame behind it, nullopt when none is
   /// there
   template <class SuccessorStamp>
-  [[nodiscard]] Arrival wait_for(std::int64_t t_ns, SuccessorStamp&& successor_t_ns,
-                                 const std::stop_token& stop) {
-    Arrival arrival = wait_for(t_ns, stop);
+  [[nodiscard]] Arrival wait_for(std::int64_t t_ns, SuccessorStamp&& successor_t_ns) {
+    Arrival arrival = wait_for(t_ns);
     const std::optional<std::int64_t> next_t_ns = successor_t_ns();
     arrival.overtaken =
         options_.keeps_pace() && next_t_ns && exposed_ns(*next_t_ns) <= arrival.exposed_ns + arrival.late_ns;
     return arrival;
   }
 
+  /// From now on nobody waits: a frame that is still to be exposed is exposed when it is asked for. Any
+  /// thread; ends a wait that lasts.
+  void end_waits() { waits_ended_.request_stop(); }
+
   /// Time on the clock that frames are paced by [ns].
   [[nodiscard]] std::int64_t now_ns() { return clock_->now_ns(); }
 
  private:
-  [[nodiscard]] Arrival wait_for(std::int64_t t_ns, const std::stop_token& stop);
+  [[nodiscard]] Arrival wait_for(std::int64_t t_ns);
   [[nodiscard]] std::int64_t exposed_ns(std::int64_t t_ns) const;
 
   PacingOptions options_;
   PacingClock steady_;
   PacingClock* clock_;
+  std::stop_source waits_ended_;
   UsualInterval interval_;  // by time stamps
   bool started_ = false;
   std::int64_t first_t_ns_ = 0;

@@ -87,6 +87,8 @@ class Pipeline {
   };
   [[nodiscard]] virtual Waiting waiting() const { return {}; }
 
+  /// From now on nobody waits for the exposure of a frame that was pushed. Any thread.
+  virtual void end_pace() {}
   /// No more frames: returns when all that were pushed have been tracked and mapped. They can still be
   /// collected.
   virtual void stop() = 0;

@@ -122,7 +122,7 @@ bool SteppedRun::take(PipelineStep step) {
   try {
     switch (step) {
       case PipelineStep::kTrack:
-        return step_tracker({});
+        return step_tracker();
       case PipelineStep::kMap:
         return step_mapper();
       case PipelineStep::kCloseLoops:
@@ -176,11 +176,10 @@ void SteppedRun::map_late_loops() {
 
 // The tracker's step: no lock, no allocation, no input or output.
 
-bool SteppedRun::step_tracker(const std::stop_token& stop) {
+bool SteppedRun::step_tracker() {
   SlotHandle slot;
   if (!frames_.try_pop(slot)) return false;
-  const Arrival arrival = pacer_.wait_for(
-      slot->frame.t_ns, [this] { return successor_t_ns(); }, stop);
+  const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, [this] { return successor_t_ns(); });
   const RightOfWayTaken way(options_.pacing.keeps_pace() ? options_.right_of_way : nullptr);
   begin_step(PipelineStep::kTrack);
   slot->record = FrameRecord{};

@@ -47,6 +47,7 @@ class SteppedRun : public Pipeline {
   [[nodiscard]] Waiting waiting() const override {
     return {frames_.size_approx(), mapper_inbox_.proposals_approx(), keyframes_.size_approx()};
   }
+  void end_pace() override { pacer_.end_waits(); }
   /// Takes all steps that are left, on this thread.
   void stop() override;
   [[nodiscard]] RunResult finish() override;
@@ -55,7 +56,7 @@ class SteppedRun : public Pipeline {
   // One step each; false when there was nothing to do. Each by one thread at a time.
 
   /// No lock, no allocation, no input or output.
-  [[nodiscard]] bool step_tracker(const std::stop_token& stop);
+  [[nodiscard]] bool step_tracker();
   [[nodiscard]] bool step_mapper();
   [[nodiscard]] bool step_loop_closer();
 

@@ -54,8 +54,9 @@ void ThreadedRun::join_threads() {
 }
 
 void ThreadedRun::tracker_thread(const std::stop_token& stop) {
+  const std::stop_callback on_stop(stop, [this] { end_pace(); });
   const auto ready = [this] { return tracker_has_work() || frames_ended_.load(std::memory_order_acquire); };
-  while (tracker_parking_.wait(stop, ready) && step_tracker(stop)) {
+  while (tracker_parking_.wait(stop, ready) && step_tracker()) {
   }
 }
 

@@ -71,6 +71,35 @@ TEST_F(EnginePaceTest, TheTrackerHasTheRightOfWayOverThreadsOfTheCallersWhereThe
   EXPECT_EQ(taken, 0);
 }
 
+/// Time stamps jump by a day: the run waits for that, but not when it is told to end.
+TEST_F(EnginePaceTest, AnInterruptDoesNotWaitForFramesThatAreStillToCome) {
+  for (const int after :
+       {3, kFrames - 2}) {  // the recording goes on for long, or it has been read to its end
+    const FrameFeed all = feed();
+    std::atomic<bool> interrupted{false};
+    const FrameFeed jumping = [&](Frame& frame) {
+      const FeedStatus status = all(frame);
+      if (frame.index >= after) frame.t_ns += 86'400LL * 1'000'000'000;
+      return status;
+    };
+    EngineOptions options;
+    options.pacing.speed = 1000;
+    std::atomic<int> tracked{0};
+    options.on_pose = [&](const PoseReport&) { ++tracked; };
+    std::jthread user([&](const std::stop_token& stop) {
+      while (tracked < after && !stop.stop_requested()) std::this_thread::yield();
+      interrupted = true;
+    });
+    const auto start = std::chrono::steady_clock::now();
+    const RunResult result = Engine(small_rig(), options).run(jumping, interrupted);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(40))
+        << "waited for a day at 1000";
+    EXPECT_TRUE(result.interrupted);
+    EXPECT_GE(result.frames.size(), static_cast<std::size_t>(after));
+    for (const FrameRecord& record : result.frames) EXPECT_GE(record.latency_ns, 0);
+  }
+}
+
 /// Time passes when it is read, which is two or three times a frame, and for a while more than a frame has.
 class CostlyClock : public PacingClock {
  public:

@@ -21,10 +21,8 @@ class FakeClock : public PacingClock {
 };
 
 /// The turn of a frame, none, or one with time stamp `next_t_ns`, being there behind it.
-Arrival turn(Pacer& pacer, std::int64_t t_ns, std::optional<std::int64_t> next_t_ns = std::nullopt,
-             const std::stop_token& stop = {}) {
-  return pacer.wait_for(
-      t_ns, [&] { return next_t_ns; }, stop);
+Arrival turn(Pacer& pacer, std::int64_t t_ns, std::optional<std::int64_t> next_t_ns = std::nullopt) {
+  return pacer.wait_for(t_ns, [&] { return next_t_ns; });
 }
 
 TEST(Pacer, FollowsRecordedStampsAtTheAskedSpeed) {
@@ -41,6 +39,18 @@ TEST(Pacer, FollowsRecordedStampsAtTheAskedSpeed) {
       EXPECT_FALSE(arrival.overtaken);
     }
   }
+}
+
+TEST(Pacer, WhenWaitsHaveEndedAFrameIsExposedWhenItIsAskedFor) {
+  FakeClock clock;
+  Pacer pacer({.speed = 1}, &clock);
+  (void)turn(pacer, 0);
+  pacer.end_waits();
+  const std::int64_t now = clock.now;
+  const Arrival arrival = turn(pacer, 3'600'000 * kMs);
+  EXPECT_EQ(clock.now, now);
+  EXPECT_EQ(arrival.exposed_ns, now);
+  EXPECT_EQ(arrival.late_ns, 0);
 }
 
 TEST(Pacer, OneSlowFrameShowsInAllItDelays) {
@@ -113,15 +123,14 @@ TEST(Pacer, FullSpeedHasNoPace) {
   EXPECT_EQ(clock.now, start);
 }
 
-TEST(Pacer, SteadyClockWaitsAndAStopEndsIt) {
+TEST(Pacer, SteadyClockWaitsUntilWaitsEnd) {
   Pacer pacer({.speed = 1});
-  std::stop_source stop;
-  const Arrival first = turn(pacer, 0, std::nullopt, stop.get_token());
-  const Arrival second = turn(pacer, 15 * kMs, std::nullopt, stop.get_token());
+  const Arrival first = turn(pacer, 0);
+  const Arrival second = turn(pacer, 15 * kMs);
   EXPECT_EQ(second.exposed_ns - first.exposed_ns, 15 * kMs);
   EXPECT_GE(steady_now_ns() - first.exposed_ns, 15 * kMs);
-  stop.request_stop();
-  (void)turn(pacer, 3'600'000 * kMs, std::nullopt, stop.get_token());  // an hour
+  pacer.end_waits();
+  (void)turn(pacer, 3'600'000 * kMs);  // an hour
   EXPECT_LT(steady_now_ns() - first.exposed_ns, 60'000 * kMs);
 }
 
