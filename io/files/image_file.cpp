@@ -34,7 +34,7 @@ cv::Mat decode(const fs::path& file, int flags) {
   if (const auto defect = image_defect(bytes); !defect.empty()) throw IoError(file, "the image " + defect);
   cv::Mat image;
   try {
-    image = cv::imdecode(bytes, flags);
+    image = cv::imdecode(bytes, flags | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {  // empty image below
   }
   if (image.empty()) throw IoError(file, "the image cannot be decoded");

@@ -11,7 +11,9 @@ namespace twofold {
 /// Largest image accepted from a file [pixels]; sizes in files are not trusted before anything is allocated.
 inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 
-/// An image file as CV_8UC1; colour becomes luminance, 16 bits become 8.
+/// An image file as CV_8UC1; colour becomes luminance, 16 bits become 8. Rows are those of the file, as the
+/// sensor has them, whatever EXIF says of how to hold the picture: depth images and calibrations know nothing
+/// of it.
 ///
 /// Throws IoError when the file is missing, of no known kind, cut short, damaged (PNG: chunk check sums;
 /// JPEG: end marker) or too large. The decoders alone would fill the missing part of a cut-off JPEG with grey

@@ -1,5 +1,7 @@
 #include "io/files/image_file.hpp"
 
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <random>
 
 #include "tests/io/scratch_folder.hpp"
@@ -23,6 +25,25 @@ TEST(ImageFile, ReadsGreyColourAndDepth) {
   const cv::Mat depth(4, 5, CV_16UC1, cv::Scalar(40000));
   EXPECT_EQ(cv::norm(read_depth_image(folder.write_image("d.png", depth)), depth, cv::NORM_INF), 0);
   EXPECT_IO_ERROR(read_depth_image(folder.path() / "a.png"), "this one has 1 of 8");
+}
+
+/// A telephone that was held upside down.
+TEST(ImageFile, RowsAreThoseOfTheSensorWhateverExifSays) {
+  const ScratchFolder folder;
+  cv::Mat image(40, 60, CV_8UC3, cv::Scalar::all(20));
+  image.rowRange(0, 20).setTo(cv::Scalar::all(220));
+  std::string jpeg = bytes_of(folder.write_image("a.jpg", image));
+  // One entry in big-endian TIFF: orientation (0x0112), short, 3.
+  const std::string exif(
+      "\xff\xe1\0\x22"
+      "Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x03\0\0\0\0\0\0",
+      36);
+  jpeg.insert(2, exif);
+  const auto turned = folder.write("turned.jpg", jpeg);
+  ASSERT_LT(cv::mean(cv::imread(turned.string(), cv::IMREAD_GRAYSCALE).rowRange(0, 15))[0], 40)
+      << "the file says that it is upside down";
+  EXPECT_GT(cv::mean(read_grey_image(turned).rowRange(0, 15))[0], 200);
+  EXPECT_GT(cv::mean(read_colour_image(turned).rowRange(0, 15))[0], 200);
 }
 
 TEST(ImageFile, NumbersInNamesAreInOrderOfTheirValue) {
