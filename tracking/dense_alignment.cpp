@@ -135,6 +135,27 @@ void DenseAlignment::prepare(const PinholeCamera& level_camera, const cv::Mat& i
   mean_inverse_depth_ = inverse_depths / std::max(1, usable);
 }
 
+/// The upper triangle of blocks of H: (pose, pose), (pose, light), (light, light).
+inline void DenseAlignment::Cost::add(const Sample& s, const Pixels& residual, const Pixels& w) {
+  const Pixels wr = w * residual, wu = w * s.gradient_u, wv = w * s.gradient_v, wt = w * s.value;
+  squares += (wr * residual).sum();
+  weights += w.sum();
+  // sum over the pixels of w J J^T with J = gu du + gv dv, then value, then 1: all but du, dv are sums.
+  const float uv_sum = (wu * s.gradient_v).sum();
+  const Row along_u = (wu * s.gradient_u).sum() * s.du + uv_sum * s.dv;
+  const Row along_v = uv_sum * s.du + (wv * s.gradient_v).sum() * s.dv;
+  H.noalias() += along_u * s.du.transpose();
+  H.noalias() += along_v * s.dv.transpose();
+  H.col(6) += (wu * s.value).sum() * s.du + (wv * s.value).sum() * s.dv;
+  H.col(7) += wu.sum() * s.du + wv.sum() * s.dv;
+  H(6, 6) += (wt * s.value).sum();
+  H(6, 7) += wt.sum();
+  H(7, 7) += w.sum();
+  g += (wu * residual).sum() * s.du + (wv * residual).sum() * s.dv;
+  g(6) += (wt * residual).sum();
+  g(7) += wr.sum();
+}
+
 void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& image,
                               std::span<const AlignmentPoint> points, const DenseAlignmentResult& state,
                               Cost& cost) const {
@@ -142,8 +163,7 @@ void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& 
   const Vector3& t = state.T_cur_prev.translation();
   cost.H.setZero();
   cost.g.setZero();
-  float squares = 0;
-  float weights = 0;
+  cost.squares = cost.weights = 0;
   int visible = 0;
   int usable = 0;
   Pixels now;
@@ -162,28 +182,11 @@ void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& 
     sample_4x4(window, now);
     const Sample& s = samples_[i];
     const Pixels residual = now - state.gain * s.value - state.offset;
-    const Pixels w = options_.huber_grey / residual.abs().max(options_.huber_grey);
-    const Pixels wr = w * residual, wu = w * s.gradient_u, wv = w * s.gradient_v, wt = w * s.value;
-    squares += (wr * residual).sum();
-    weights += w.sum();
-    // sum over the pixels of w J J^T with J = gu du + gv dv, then value, then 1: all but du, dv are sums.
-    const float uv_sum = (wu * s.gradient_v).sum();
-    const Row along_u = (wu * s.gradient_u).sum() * s.du + uv_sum * s.dv;
-    const Row along_v = uv_sum * s.du + (wv * s.gradient_v).sum() * s.dv;
-    cost.H.noalias() += along_u * s.du.transpose();
-    cost.H.noalias() += along_v * s.dv.transpose();
-    cost.H.col(6) += (wu * s.value).sum() * s.du + (wv * s.value).sum() * s.dv;
-    cost.H.col(7) += wu.sum() * s.du + wv.sum() * s.dv;
-    cost.H(6, 6) += (wt * s.value).sum();
-    cost.H(6, 7) += wt.sum();
-    cost.H(7, 7) += w.sum();
-    cost.g += (wu * residual).sum() * s.du + (wv * residual).sum() * s.dv;
-    cost.g(6) += (wt * residual).sum();
-    cost.g(7) += wr.sum();
+    cost.add(s, residual, options_.huber_grey / residual.abs().max(options_.huber_grey));
   }
   cost.H.bottomLeftCorner<2, 6>() = cost.H.topRightCorner<6, 2>().transpose();
   cost.H(7, 6) = cost.H(6, 7);
-  cost.rms = weights > 0 ? std::sqrt(squares / weights) : 1e9F;
+  cost.rms = cost.weights > 0 ? std::sqrt(cost.squares / cost.weights) : 1e9F;
   cost.visible = usable > 0 ? static_cast<float>(visible) / static_cast<float>(usable) : 0.0F;
 }
 

@@ -65,8 +65,12 @@ class DenseAlignment {
   struct Cost {
     float rms = 0;
     float visible = 0;
+    float squares = 0, weights = 0;  ///< of residuals: w r^2, w
     Eigen::Matrix<float, 8, 8> H;
     Row g;
+
+    /// A patch's residuals and their weights.
+    void add(const Sample& sample, const Pixels& residual, const Pixels& w);
   };
 
   void prepare(const PinholeCamera& level_camera, const cv::Mat& image, int level,
