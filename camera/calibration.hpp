@@ -32,6 +32,7 @@ struct Calibration {
   std::optional<double> readout;
 
   double depth_unit = 0.001;       ///< metres per unit of the 16-bit depth image, > 0; stereo: of a surface's
+  bool depth_unit_stated = false;  ///< the file says it; else a layout may know better
   double depth_min = 0.3;          ///< nearer readings are holes [m]; stereo: of surfaces only
   double depth_max = 8.0;          ///< farther readings likewise [m]
   double virtual_baseline = 0.08;  ///< RGB-D: baseline of the virtual right camera (thesis 6.5.3) [m], > 0

@@ -169,7 +169,8 @@ DepthCamera read_own_depth_camera(const YamlNode& node) {
 void read_own_depth(const YamlNode& node, Calibration* calibration) {
   node.expect_keys(
       {"unit", "min", "max", "virtual_baseline", "size", "intrinsics", "distortion", "T_left_depth"});
-  if (node.has("unit")) calibration->depth_unit = node.at("unit").number();
+  calibration->depth_unit_stated = node.has("unit");
+  if (calibration->depth_unit_stated) calibration->depth_unit = node.at("unit").number();
   if (node.has("min")) calibration->depth_min = node.at("min").number();
   if (node.has("max")) calibration->depth_max = node.at("max").number();
   if (node.has("virtual_baseline")) calibration->virtual_baseline = node.at("virtual_baseline").number();

@@ -17,6 +17,8 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kMaxDifferenceNs = 20'000'000;  // as the benchmark's own association script
 constexpr double kTumDepthUnit = 1.0 / 5000;  // the benchmark's depth images, where no file says otherwise
 
+constexpr const char* kCameraText = "camera.txt";
+
 struct StampedFile {
   std::int64_t t_ns = 0;
   fs::path file;
@@ -78,32 +80,60 @@ std::vector<RecordedFrame> associate(const std::vector<StampedFile>& rgb,
 
 /// Lines "key value" (fx fy cx cy [width height depth_scale ...]), found beside some recordings of this
 /// layout.
-void take_camera_text(const fs::path& file, Calibration* calibration) {
-  PinholeCamera& camera = calibration->left.pinhole;
-  double width = 0, height = 0, scale = 0;
-  const std::map<std::string, double*, std::less<>> keys{
-      {"fx", &camera.fx}, {"fy", &camera.fy},  {"cx", &camera.cx},         {"cy", &camera.cy},
-      {"width", &width},  {"height", &height}, {"fps", &calibration->fps}, {"depth_scale", &scale}};
-  std::map<std::string, bool, std::less<>> seen;
+std::map<std::string, double> read_camera_text(const fs::path& file) {
+  std::map<std::string, double> values;
   for (const TextLine& line : read_text_lines(file)) {
     const auto fields = split_fields(line.text);
     if (fields.size() != 2) throw IoError(file, line.number, "is not 'key value'");
-    if (const auto key = keys.find(fields[0]); key != keys.end()) {
-      *key->second = number_field(file, line.number, fields[1]);
-      seen[key->first] = true;
-    }
+    const std::string key(fields[0]);
+    for (const char* known : {"fx", "fy", "cx", "cy", "width", "height", "fps", "depth_scale"})
+      if (key == known) values[key] = number_field(file, line.number, fields[1]);
   }
-  for (const char* key : {"fx", "fy", "cx", "cy"}) {
-    if (!seen[key]) throw IoError(file, fmt::format("key '{}' is missing", key));
+  return values;
+}
+
+void take_depth_scale(const fs::path& file, const std::map<std::string, double>& values,
+                      Calibration* calibration) {
+  const auto scale = values.find("depth_scale");
+  if (scale == values.end()) return;
+  if (scale->second <= 0)
+    throw IoError(file, fmt::format("key 'depth_scale' is {}, must be positive", scale->second));
+  calibration->depth_unit = 1.0 / scale->second;
+  calibration->depth_unit_stated = true;
+}
+
+void take_camera_text(const fs::path& file, Calibration* calibration) {
+  const auto values = read_camera_text(file);
+  const auto value_or = [&](const char* key, double otherwise) {
+    const auto value = values.find(key);
+    return value == values.end() ? otherwise : value->second;
+  };
+  PinholeCamera& camera = calibration->left.pinhole;
+  for (const auto& [key, parameter] :
+       {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}}) {
+    if (!values.contains(key)) throw IoError(file, fmt::format("key '{}' is missing", key));
+    *parameter = values.at(key);
   }
-  if (seen["depth_scale"]) {
-    if (scale <= 0) throw IoError(file, fmt::format("key 'depth_scale' is {}, must be positive", scale));
-    calibration->depth_unit = 1.0 / scale;
-  }
+  const double width = value_or("width", 0), height = value_or("height", 0);
   if (width < 0 || width > 1e5 || height < 0 || height > 1e5)
     throw IoError(file, "impossible width or height");
   camera.width = static_cast<int>(width);
   camera.height = static_cast<int>(height);
+  calibration->fps = value_or("fps", calibration->fps);
+  take_depth_scale(file, values, calibration);
+}
+
+/// Most calibration files know of lenses only: then the folder's own files say what a unit of its depth
+/// images is, else the benchmark does.
+void find_depth_unit(const fs::path& folder, Calibration* calibration) {
+  if (!calibration->depth_unit_stated && fs::exists(folder / "calibration.yaml")) {
+    const Calibration beside = read_calibration(folder / "calibration.yaml");
+    calibration->depth_unit_stated = beside.depth_unit_stated;
+    calibration->depth_unit = beside.depth_unit;
+  }
+  if (!calibration->depth_unit_stated && fs::exists(folder / kCameraText))
+    take_depth_scale(folder / kCameraText, read_camera_text(folder / kCameraText), calibration);
+  if (!calibration->depth_unit_stated) calibration->depth_unit = kTumDepthUnit;
 }
 
 /// --calib, else calibration.yaml, else camera.txt, else parameters alone. `source` is what to name in
@@ -111,18 +141,18 @@ void take_camera_text(const fs::path& file, Calibration* calibration) {
 Calibration read_tum_calibration(const fs::path& folder, const std::optional<fs::path>& given,
                                  SourceParameters& parameters, fs::path* source) {
   Calibration base;
-  base.depth_unit = kTumDepthUnit;
   bool from_file = true;
   if (given || fs::exists(folder / "calibration.yaml")) {
     *source = given.value_or(folder / "calibration.yaml");
     base = read_calibration(*source);
-  } else if (fs::exists(folder / "camera.txt")) {
-    *source = folder / "camera.txt";
+  } else if (fs::exists(folder / kCameraText)) {
+    *source = folder / kCameraText;
     take_camera_text(*source, &base);
   } else {
     *source = parameters.subject();
     from_file = false;
   }
+  find_depth_unit(folder, &base);
   return with_parameters(std::move(base), from_file, SensorKind::kRgbd, parameters);
 }
 

@@ -181,6 +181,33 @@ TEST(FrameSource, TumAssociatesAndScales) {
   }
 }
 
+/// Lenses are known from files that say nothing of depth; the unit is the folder's or the benchmark's then.
+TEST(FrameSource, TumDepthUnitWhereTheCalibrationDoesNotSayIt) {
+  const ScratchFolder folder;
+  write_tum(folder);
+  const std::string camera = "sensor: rgbd\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n";
+  const auto given = folder.write("given/lens.yaml", camera);
+  const auto unit_of = [&](const std::string& parameters, const std::optional<fs::path>& calibration) {
+    return open_source("tum:" + folder.path().string() + parameters, {.calibration = calibration})
+        ->rig()
+        .depth_unit;
+  };
+  EXPECT_EQ(unit_of("", given), 1.0 / 5000);
+  const auto ros = folder.write(
+      "given/ros.yaml",
+      "image_width: 64\nimage_height: 48\ncamera_matrix: {data: [50, 0, 32, 0, 50, 24, 0, 0, 1]}\n");
+  EXPECT_EQ(unit_of("", ros), 1.0 / 5000);
+  EXPECT_EQ(unit_of("?depth_scale=500", given), 1.0 / 500);
+  folder.write("camera.txt", "fx 40\nfy 40\ncx 32\ncy 24\ndepth_scale 2000\n");
+  EXPECT_EQ(unit_of("", given), 1.0 / 2000);
+  folder.write("calibration.yaml", camera);
+  EXPECT_EQ(unit_of("", {}), 1.0 / 2000);
+  folder.write("calibration.yaml", camera + "depth: {unit: 0.002}\n");
+  EXPECT_EQ(unit_of("", {}), 0.002);
+  EXPECT_EQ(unit_of("", given), 0.002);
+  EXPECT_EQ(unit_of("", folder.write("given/lens.yaml", camera + "depth: {unit: 0.001}\n")), 0.001);
+}
+
 TEST(FrameSource, ImageFolderAndItsTimes) {
   const ScratchFolder folder;
   for (int i = 0; i < 3; ++i)
