@@ -65,14 +65,6 @@ Trajectory read_truth(const fs::path& folder, const SE3& T_b_c) {
   return truth;
 }
 
-bool take_drop_unpaired(SourceParameters& parameters) {
-  const auto unpaired = parameters.take_text("unpaired");
-  if (unpaired && *unpaired != "drop") {
-    throw IoError(parameters.subject(), fmt::format("parameter unpaired='{}' can only be 'drop'", *unpaired));
-  }
-  return unpaired.has_value();
-}
-
 }  // namespace
 
 /// EuRoC / ASL layout: https://projects.asl.ethz.ch/datasets/doku.php?id=kmavvisualinertialdatasets
@@ -80,7 +72,7 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
                                SourceParameters& parameters) {
   const fs::path mav = fs::exists(folder / "mav0") ? folder / "mav0" : folder;
   const bool stereo = fs::exists(mav / "cam1");
-  const bool drop_unpaired = take_drop_unpaired(parameters);
+  const bool drop_unpaired = parameters.take_drop_unpaired();
   Recording recording;
   recording.folder = folder;
   recording.calibration_file = calibration.value_or(mav / "cam0" / "sensor.yaml");

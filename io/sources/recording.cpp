@@ -125,6 +125,11 @@ SourceReport PlaybackSource::report() const {
   if (grey_bits_ < 16)
     report.summary.push_back(fmt::format("{}: images of 16 bits hold {}: grey levels were taken from 0 to {}",
                                          recording_.folder.string(), grey_bits_, (1 << grey_bits_) - 1));
+  report.lost = recording_.alone;
+  if (report.lost > 0) {
+    report.summary.push_back(fmt::format("{}: {} images without a partner were left out",
+                                         recording_.folder.string(), report.lost));
+  }
   return report;
 }
 

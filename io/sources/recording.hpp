@@ -26,6 +26,7 @@ struct Recording {
   Calibration calibration;                 ///< a size of 0 x 0 is taken from the first image
   std::vector<RecordedFrame> frames;       ///< t_ns strictly increasing
   Trajectory ground_truth;                 ///< T_w_c of the raw left camera
+  std::uint64_t alone = 0;                 ///< images that were left out for want of a partner
 };
 
 /// The reader of one layout: a folder to a Recording. `calibration` overrides the file in the folder.

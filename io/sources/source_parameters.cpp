@@ -72,6 +72,13 @@ std::optional<double> SourceParameters::take_number(const std::string& key) {
   return number;
 }
 
+bool SourceParameters::take_drop_unpaired() {
+  const auto unpaired = take_text("unpaired");
+  if (unpaired && *unpaired != "drop")
+    throw IoError(subject_, fmt::format("parameter unpaired='{}' can only be 'drop'", *unpaired));
+  return unpaired.has_value();
+}
+
 void SourceParameters::expect_all_taken() const {
   if (values_.empty()) return;
   throw IoError(subject_, fmt::format("unknown parameter '{}'", values_.begin()->first));

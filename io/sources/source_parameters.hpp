@@ -32,6 +32,9 @@ class SourceParameters {
   /// Value of the key, if given; throws IoError when it is not a finite number.
   [[nodiscard]] std::optional<double> take_number(const std::string& key);
   [[nodiscard]] std::optional<std::string> take_text(const std::string& key);
+  /// unpaired=drop: images without a partner are left out instead of refused. Throws IoError for other
+  /// values.
+  [[nodiscard]] bool take_drop_unpaired();
   /// Throws IoError when a key was given that nobody took.
   void expect_all_taken() const;
 

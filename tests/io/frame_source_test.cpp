@@ -219,6 +219,58 @@ TEST(FrameSource, ImageFolderAndItsTimes) {
   EXPECT_EQ(drain(*source), "3");
 }
 
+/// What the frames of a source show: the number of each left image, and that of the other one.
+std::vector<std::pair<int, int>> numbers_of(FrameSource& source) {
+  std::vector<std::pair<int, int>> numbers;
+  for (Frame frame; source.next(frame) == FrameStatus::kFrame;) {
+    const int other = frame.depth.empty() ? frame.right.at<unsigned char>(0, 5)
+                                          : static_cast<int>(frame.depth.at<std::uint16_t>(0, 5));
+    numbers.emplace_back(frame.left.at<unsigned char>(0, 5), other);
+  }
+  return numbers;
+}
+
+using Numbers = std::vector<std::pair<int, int>>;
+
+/// As many images on both sides, but not the same ones: positions would pair images of different times.
+TEST(FrameSource, ImageFolderPairsByName) {
+  for (const auto& [left, right] :
+       {std::pair{"left/{}.png", "right/{}.png"}, {"left/l_{:03}.png", "right/r_{:03}.png"}}) {
+    const ScratchFolder folder;
+    for (int i = 0; i < 6; ++i) {
+      if (i != 1) folder.write_image(fmt::format(fmt::runtime(left), i), numbered_image(kWidth, kHeight, i));
+      if (i != 4)
+        folder.write_image(fmt::format(fmt::runtime(right), i), numbered_image(kWidth, kHeight, 100 + i));
+    }
+    const std::string spec =
+        "images:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24&baseline=0.1&fps=10";
+    EXPECT_IO_ERROR(open_source(spec), "right has no image of the same name or number (unpaired=drop");
+    const auto source = open_source(spec + "&unpaired=drop", {.calibration = {}, .preload = true});
+    EXPECT_EQ(numbers_of(*source), (Numbers{{0, 100}, {2, 102}, {3, 103}, {5, 105}}));
+    EXPECT_EQ(source->report().lost, 2U);
+    ASSERT_EQ(source->report().summary.size(), 1U);
+    EXPECT_NE(source->report().summary[0].find("2 images without a partner"), std::string::npos);
+    folder.write_image(fmt::format(fmt::runtime(left), 1), numbered_image(kWidth, kHeight, 1));
+    fs::remove(folder / fmt::format(fmt::runtime(left), 4));
+    EXPECT_IO_ERROR(open_source(spec + "&unpaired=keep"), "can only be 'drop'");
+    EXPECT_EQ(numbers_of(*open_source(spec)), (Numbers{{0, 100}, {1, 101}, {2, 102}, {3, 103}, {5, 105}}));
+    EXPECT_TRUE(open_source(spec)->report().summary.empty());
+  }
+}
+
+TEST(FrameSource, ImageFolderPairsByPositionWhereNamesSayNothing) {
+  const ScratchFolder folder;
+  for (int i = 0; i < 3; ++i) {
+    folder.write_image(fmt::format("left/0.{}0.png", i), numbered_image(kWidth, kHeight, i));
+    folder.write_image(fmt::format("depth/0.{}1.png", i),
+                       cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(1000 + i)));
+  }
+  const std::string spec = "images:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24&fps=10";
+  EXPECT_EQ(numbers_of(*open_source(spec)), (Numbers{{0, 1000}, {1, 1001}, {2, 1002}}));
+  fs::remove(folder / "depth/0.21.png");
+  EXPECT_IO_ERROR(open_source(spec), "left has 3 images, depth has 2");
+}
+
 TEST(RecordedImages, ShowAnyFrameOfAFolderByItsTime) {
   const ScratchFolder folder;
   for (int i = 0; i < 3; ++i)

@@ -1,0 +1,35 @@
+#include "io/files/image_pairs.hpp"
+
+#include <gtest/gtest.h>
+
+namespace twofold {
+namespace {
+
+using Files = std::vector<std::filesystem::path>;
+
+TEST(ImagePairs, AreOfTheSameName) {
+  const Files left{"l/a.png", "l/b.png", "l/d.png"}, right{"r/a.jpg", "r/c.jpg", "r/d.jpg"};
+  EXPECT_EQ(pairs_by_name(left, right), (ImagePairs{{0, 0}, {2, 2}}));
+}
+
+TEST(ImagePairs, OrOfTheSameNumber) {
+  const ImagePairs second_lacks_one{{0, 0}, {2, 1}};
+  EXPECT_EQ(pairs_by_name({"left_007.png", "left_008.png", "left_009.png"}, {"right_7.png", "right_9.png"}),
+            second_lacks_one);
+  EXPECT_EQ(pairs_by_name({"frame-000000.color.png", "frame-000001.color.png", "frame-000002.color.png"},
+                          {"frame-000000.depth.png", "frame-000002.depth.png"}),
+            second_lacks_one);
+  EXPECT_EQ(pairs_by_name({"cam0_1.png", "cam0_2.png", "cam0_3.png"}, {"cam1_1.png", "cam1_3.png"}),
+            second_lacks_one)
+      << "the camera's number counts no images";
+}
+
+TEST(ImagePairs, AreNotMadeByChance) {
+  const Files stamps{"0.1.png", "0.2.png", "0.3.png", "0.4.png", "0.5.png"};
+  EXPECT_TRUE(pairs_by_name(stamps, {"0.12.png", "0.22.png", "0.3.png", "0.42.png", "0.52.png"}).empty());
+  EXPECT_TRUE(pairs_by_name({"a.png", "b.png"}, {"c.png", "d.png"}).empty());
+  EXPECT_TRUE(pairs_by_name({"1.png", "01.png"}, {"r1.png", "r2.png"}).empty()) << "1 and 01 are the same";
+}
+
+}  // namespace
+}  // namespace twofold
