@@ -15,29 +15,51 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// times.txt (seconds, a line an image), or images i / fps.
-std::vector<std::int64_t> image_times(const fs::path& folder, std::size_t count,
-                                      SourceParameters& parameters) {
-  const auto fps = parameters.take_number("fps");
-  if (fps && *fps <= 0) throw IoError(parameters.subject(), fmt::format("fps={} must be positive", *fps));
-  const fs::path file = folder / "times.txt";
+std::vector<std::int64_t> even_times(std::size_t count, double fps) {
   std::vector<std::int64_t> times;
-  if (fps) {
-    for (std::size_t i = 0; i < count; ++i)
-      times.push_back(std::llround(static_cast<double>(i) / *fps * 1e9));
-    return times;
-  }
+  for (std::size_t i = 0; i < count; ++i) times.push_back(std::llround(static_cast<double>(i) / fps * 1e9));
+  return times;
+}
+
+/// The i-th line of times.txt, that of `image`: "time", or as recordings of one camera for DSO have it "image
+/// time ...", or as lists of TUM's layout "time image". The image is told by its name, or by its number,
+/// which counts from `first`.
+std::string_view time_in_line(const fs::path& file, const TextLine& line, const fs::path& image,
+                              std::int64_t i, std::optional<std::int64_t> first) {
+  const auto fields = split_fields(line.text);
+  const auto is_the_image = [&](std::string_view field) {
+    return field == image.stem().string() || fs::path(field).filename() == image.filename();
+  };
+  if (fields.size() == 1) return fields[0];
+  if (is_the_image(fields[1])) return fields[0];
+  if (is_the_image(fields[0]) || (first && to_integer(fields[0]) == *first + i)) return fields[1];
+  throw IoError(file, line.number,
+                fmt::format("is none of 'time', 'image time ...', 'time image', where the image is {}",
+                            image.filename().string()));
+}
+
+std::vector<std::int64_t> read_image_times(const fs::path& file, const std::vector<fs::path>& images) {
   if (!fs::exists(file))
     throw IoError(file, "no such file: give the images' times there, or the parameter fps");
+  const auto lines = read_text_lines(file);
+  if (lines.size() != images.size())
+    throw IoError(file, fmt::format("has {} time stamps for {} images", lines.size(), images.size()));
+  const auto first = to_integer(split_fields(lines[0].text)[0]);
+  std::vector<std::int64_t> times;
   std::int64_t previous = -1;
-  for (const TextLine& line : read_text_lines(file)) {
-    const auto fields = split_fields(line.text);
-    times.push_back(seconds_field(file, line.number, fields[0]));
-    expect_increasing(file, line.number, times.back(), &previous);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string_view time =
+        time_in_line(file, lines[i], images[i], static_cast<std::int64_t>(i), first);
+    times.push_back(seconds_field(file, lines[i].number, time));
+    expect_increasing(file, lines[i].number, times.back(), &previous);
   }
-  if (times.size() != count)
-    throw IoError(file, fmt::format("has {} time stamps for {} images", times.size(), count));
   return times;
+}
+
+std::optional<double> take_fps(SourceParameters& parameters) {
+  const auto fps = parameters.take_number("fps");
+  if (fps && *fps <= 0) throw IoError(parameters.subject(), fmt::format("fps={} must be positive", *fps));
+  return fps;
 }
 
 /// Image files of one camera beside the left one.
@@ -105,7 +127,8 @@ Recording read_image_folder(const fs::path& folder, const std::optional<fs::path
   const bool drop_unpaired = parameters.take_drop_unpaired();
   const auto left = list_images(has_sides ? folder / "left" : folder);
   const OtherCamera other = has_sides ? list_other_camera(folder) : OtherCamera();
-  const auto times = image_times(folder, left.size(), parameters);
+  const auto fps = take_fps(parameters);
+  const auto times = fps ? even_times(left.size(), *fps) : read_image_times(folder / "times.txt", left);
   if (other.kind == SensorKind::kMono) {
     for (std::size_t i = 0; i < left.size(); ++i) recording.frames.push_back({times[i], left[i], {}, {}});
   } else {

@@ -271,6 +271,29 @@ TEST(FrameSource, ImageFolderPairsByPositionWhereNamesSayNothing) {
   EXPECT_IO_ERROR(open_source(spec), "left has 3 images, depth has 2");
 }
 
+TEST(FrameSource, ImageFolderTellsTimesFromNumbersAndNames) {
+  const ScratchFolder folder;
+  for (int i = 0; i < 3; ++i)
+    folder.write_image(fmt::format("{:05}.png", 2 * i), numbered_image(kWidth, kHeight, i));
+  const auto times = [&](const std::string& text) {
+    folder.write("times.txt", text);
+    const auto source = open_source("images:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24");
+    std::vector<std::int64_t> stamps;
+    for (Frame frame; source->next(frame) == FrameStatus::kFrame;) stamps.push_back(frame.t_ns);
+    return stamps;
+  };
+  const std::vector<std::int64_t> expected{10'000'000'000, 10'100'000'000, 10'200'000'000};
+  EXPECT_EQ(times("10.0\n10.1\n10.2\n"), expected);
+  EXPECT_EQ(times("00000 10.0 0.3\n00001 10.1 0.5\n00002 10.2 0.4\n"), expected) << "numbers from 0";
+  EXPECT_EQ(times("1 10.0\n2 10.1\n3 10.2\n"), expected) << "from 1";
+  EXPECT_EQ(times("00000 10.0 0.3\n00002 10.1 0.3\n00004 10.2 0.3\n"), expected) << "stems";
+  EXPECT_EQ(times("00000.png 10.0\n00002.png 10.1\n00004.png 10.2\n"), expected) << "names";
+  EXPECT_EQ(times("10.0 rgb/00000.png\n10.1 rgb/00002.png\n10.2 rgb/00004.png\n"), expected) << "a list";
+  EXPECT_IO_ERROR(times("10.0 1 2 3\n10.1 1 2 3\n10.2 1 2 3\n"), "times.txt:1: is none of");
+  EXPECT_IO_ERROR(times("0 10.0\n1 10.1\n3 10.2\n"), "times.txt:3: is none of");
+  EXPECT_IO_ERROR(times("0 10.0\n1 10.1\n"), "has 2 time stamps for 3 images");
+}
+
 TEST(RecordedImages, ShowAnyFrameOfAFolderByItsTime) {
   const ScratchFolder folder;
   for (int i = 0; i < 3; ++i)
