@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <string>
 
 #include "base/check.hpp"
 #include "base/option_check.hpp"
@@ -11,6 +12,8 @@
 
 namespace twofold {
 namespace {
+
+constexpr std::size_t kFewestToAlign = 3;
 
 using IndexPair = std::pair<std::size_t, std::size_t>;
 
@@ -154,9 +157,10 @@ tl::expected<Evaluation, std::string> evaluate(std::vector<PosePair> pairs,
   if (pairs.empty()) return tl::unexpected<std::string>("no poses of the two trajectories are close in time");
   const auto S_w_e = align(pairs, options.alignment);
   if (!S_w_e) {
-    return tl::unexpected<std::string>(
-        "cannot be aligned: fewer than three poses, or all on one line (align none compares them as they "
-        "are)");
+    const std::string with_partner = std::to_string(pairs.size()) + " poses have a partner in time";
+    return tl::unexpected("cannot be aligned: " + with_partner +
+                          (pairs.size() < kFewestToAlign ? ", it takes three" : ", all on one line") +
+                          " (align none compares them as they are)");
   }
   Evaluation result;
   result.S_w_e = *S_w_e;

@@ -140,6 +140,7 @@ Recording read_image_folder(const fs::path& folder, const std::optional<fs::path
     }
     recording.alone = left.size() + other.files.size() - 2 * pairs.size();
   }
+  if (!fps) note_long_intervals(folder / "times.txt", recording);
   recording.calibration =
       folder_calibration(folder, calibration, other.kind, parameters, &recording.calibration_file);
   if (const fs::path truth = folder / "groundtruth.txt"; fs::exists(truth)) {

@@ -69,6 +69,7 @@ Recording read_kitti_recording(const fs::path& folder, const std::optional<fs::p
   for (std::size_t i = 0; i < left.size(); ++i) {
     recording.frames.push_back({times[i], left[i], stereo ? right[i] : fs::path(), {}});
   }
+  note_long_intervals(folder / "times.txt", recording);
   recording.ground_truth = read_poses(folder / "poses.txt", times);
   return recording;
 }

@@ -59,6 +59,22 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   return calibration;
 }
 
+void note_long_intervals(const std::filesystem::path& file, Recording& recording) {
+  constexpr std::size_t kFewest = 10;  // fewer may be photographs, taken one by one
+  constexpr double kLong = 10;         // [s]
+  const auto& frames = recording.frames;
+  if (frames.size() < kFewest) return;
+  std::vector<std::int64_t> intervals;
+  for (std::size_t i = 1; i < frames.size(); ++i) intervals.push_back(frames[i].t_ns - frames[i - 1].t_ns);
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  const double interval = static_cast<double>(*middle) * 1e-9;
+  if (interval <= kLong) return;
+  recording.notes.push_back(
+      fmt::format("{}: time stamps are taken as seconds, by which the frames are {:.6g} s apart",
+                  file.string(), interval));
+}
+
 Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_raw) {
   Trajectory rectified = raw;
   const SE3 T_raw_rectified(R_rectified_raw.inverse(), Vector3::Zero());
@@ -126,6 +142,7 @@ SourceReport PlaybackSource::report() const {
     report.summary.push_back(fmt::format("{}: images of 16 bits hold {}: grey levels were taken from 0 to {}",
                                          recording_.folder.string(), grey_bits_, (1 << grey_bits_) - 1));
   report.lost = recording_.alone;
+  report.summary = recording_.notes;
   if (report.lost > 0) {
     report.summary.push_back(fmt::format("{}: {} images without a partner were left out",
                                          recording_.folder.string(), report.lost));

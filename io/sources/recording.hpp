@@ -27,6 +27,7 @@ struct Recording {
   std::vector<RecordedFrame> frames;       ///< t_ns strictly increasing
   Trajectory ground_truth;                 ///< T_w_c of the raw left camera
   std::uint64_t alone = 0;                 ///< images that were left out for want of a partner
+  std::vector<std::string> notes;          ///< what people should know of it, a line each
 };
 
 /// The reader of one layout: a folder to a Recording. `calibration` overrides the file in the folder.
@@ -50,6 +51,10 @@ struct Recording {
 [[nodiscard]] Calibration with_parameters(Calibration base, bool from_file, SensorKind kind,
                                           SourceParameters& parameters);
 
+/// Notes when the frames are so far apart that `file`, which gives their times in seconds, may have them in
+/// another unit.
+void note_long_intervals(const std::filesystem::path& file, Recording& recording);
+
 /// T_w_c with the camera turned from raw to rectified axes.
 [[nodiscard]] Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_raw);
 
@@ -61,6 +66,7 @@ class PlaybackSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(recording_.frames.size());
   }
+  /// Of images that were left out, of grey levels, and the recording's notes.
   [[nodiscard]] SourceReport report() const override;
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
   /// The rectified left image of the frame with that time stamp, in colour if it has any, else grey; empty

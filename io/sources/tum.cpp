@@ -163,12 +163,14 @@ Recording read_tum_recording(const fs::path& folder, const std::optional<fs::pat
                              SourceParameters& parameters) {
   Recording recording;
   recording.folder = folder;
-  if (fs::exists(folder / "associations.txt")) {
+  const bool associated = fs::exists(folder / "associations.txt");
+  if (associated) {
     recording.frames = read_associations(folder);
   } else {
     recording.frames = associate(read_list(folder, "rgb.txt"), read_list(folder, "depth.txt"));
     if (recording.frames.empty()) throw IoError(folder, "no colour image has a depth image within 20 ms");
   }
+  note_long_intervals(folder / (associated ? "associations.txt" : "rgb.txt"), recording);
   recording.calibration = read_tum_calibration(folder, calibration, parameters, &recording.calibration_file);
   if (const fs::path truth = folder / "groundtruth.txt"; fs::exists(truth)) {
     recording.ground_truth = read_tum_trajectory(truth);

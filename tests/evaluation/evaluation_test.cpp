@@ -100,7 +100,18 @@ TEST(Evaluation, RelativeErrorOfAKnownDrift) {
   EXPECT_NEAR(result->path_length, 10.0, 1e-12);
   EXPECT_EQ(result->per_second.rotation_deg.max, 0.0);
   options.alignment = Alignment::kSe3;
-  EXPECT_FALSE(evaluate(associate(estimate, truth, 0), options)) << "the turn about a line is undetermined";
+  const auto line = evaluate(associate(estimate, truth, 0), options);
+  ASSERT_FALSE(line) << "the turn about a line is undetermined";
+  EXPECT_EQ(
+      line.error(),
+      "cannot be aligned: 101 poses have a partner in time, all on one line (align none compares them as "
+      "they are)");
+  truth.resize(2);
+  const auto few = evaluate(associate(estimate, truth, 0), options);
+  ASSERT_FALSE(few);
+  EXPECT_EQ(few.error(),
+            "cannot be aligned: 2 poses have a partner in time, it takes three (align none compares them as "
+            "they are)");
 }
 
 TEST(Evaluation, AssociatesTheNearestWithinTheLimit) {

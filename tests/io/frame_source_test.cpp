@@ -294,6 +294,29 @@ TEST(FrameSource, ImageFolderTellsTimesFromNumbersAndNames) {
   EXPECT_IO_ERROR(times("0 10.0\n1 10.1\n"), "has 2 time stamps for 3 images");
 }
 
+/// Milliseconds, most likely; they are not guessed at.
+TEST(FrameSource, StampsThatMayNotBeSecondsAreNoted) {
+  const ScratchFolder folder;
+  constexpr int kEnough = 10;
+  for (int i = 0; i < kEnough; ++i)
+    folder.write_image(fmt::format("{}.png", i), numbered_image(kWidth, kHeight, i));
+  const std::string spec = "images:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24";
+  const auto summary_at = [&](double interval) {
+    std::string times;
+    for (int i = 0; i < kEnough; ++i) times += fmt::format("{:.3f}\n", interval * i + (i > 7 ? 5000 : 0));
+    folder.write("times.txt", times);
+    return open_source(spec)->report().summary;
+  };
+  const auto notes = summary_at(33.3);
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_NE(
+      notes[0].find("times.txt: time stamps are taken as seconds, by which the frames are 33.3 s apart"),
+      std::string::npos)
+      << notes[0];
+  EXPECT_TRUE(open_source(spec + "&fps=0.05")->report().summary.empty()) << "that was asked for";
+  EXPECT_TRUE(summary_at(2).empty());
+}
+
 TEST(RecordedImages, ShowAnyFrameOfAFolderByItsTime) {
   const ScratchFolder folder;
   for (int i = 0; i < 3; ++i)
