@@ -4,9 +4,12 @@
 #include <cctype>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <string_view>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -87,6 +90,33 @@ bool file_precedes(const fs::path& a, const fs::path& b) {
   return !precedes(second, first) && first < second;
 }
 
+/// What compares decimal numbers by value: digits before the point, how many first, and those behind it.
+using Decimal = std::tuple<std::size_t, std::string, std::string>;
+
+std::optional<Decimal> decimal(const std::string& text) {
+  std::string_view rest = text;
+  const std::size_t point = rest.find('.');
+  const std::string_view whole = take_number(rest);
+  if (rest.empty()) return text.empty() ? std::nullopt : std::optional(Decimal{whole.size(), whole, ""});
+  if (point == 0 || point + 1 == text.size() || !rest.starts_with('.')) return std::nullopt;
+  std::string_view fraction = rest.substr(1);
+  if (!std::all_of(fraction.begin(), fraction.end(), is_digit)) return std::nullopt;
+  fraction = fraction.substr(0, fraction.find_last_not_of('0') + 1);
+  return Decimal{whole.size(), whole, fraction};
+}
+
+/// When all names are decimal numbers of different values, as times that are not padded are: 10.15.jpg before
+/// 10.5.jpg. Two of one value, 1.1 and 1.10, count something else.
+bool sort_by_decimals(std::vector<fs::path>& files) {
+  std::map<Decimal, fs::path> sorted;
+  for (const fs::path& file : files) {
+    const auto value = decimal(file.stem().string());
+    if (!value || !sorted.emplace(*value, file).second) return false;
+  }
+  std::transform(sorted.begin(), sorted.end(), files.begin(), [](const auto& entry) { return entry.second; });
+  return true;
+}
+
 }  // namespace
 
 cv::Mat read_grey_image(const fs::path& file, int bits) {
@@ -125,7 +155,7 @@ std::vector<fs::path> list_images(const fs::path& folder) {
     if (has_image_extension(entry.path())) files.push_back(entry.path());
   }
   if (files.empty()) throw IoError(folder, "the folder holds no images");
-  std::sort(files.begin(), files.end(), file_precedes);
+  if (!sort_by_decimals(files)) std::sort(files.begin(), files.end(), file_precedes);
   return files;
 }
 

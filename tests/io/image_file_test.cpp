@@ -1,5 +1,6 @@
 #include "io/files/image_file.hpp"
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
@@ -46,14 +47,30 @@ TEST(ImageFile, RowsAreThoseOfTheSensorWhateverExifSays) {
   EXPECT_GT(cv::mean(read_colour_image(turned).rowRange(0, 15))[0], 200);
 }
 
-TEST(ImageFile, NumbersInNamesAreInOrderOfTheirValue) {
+/// The order in which a folder with files of these names, written in another one, is listed.
+std::vector<std::string> listed(std::vector<std::string> names) {
   const ScratchFolder folder;
+  std::reverse(names.begin(), names.end());
+  for (const std::string& name : names) folder.write(name, "");
+  std::vector<std::string> list;
+  for (const auto& file : list_images(folder.path())) list.push_back(file.filename().string());
+  return list;
+}
+
+TEST(ImageFile, NumbersInNamesAreInOrderOfTheirValue) {
   const std::vector<std::string> names{"0.png",    "1.png",     "02.png",     "2.png",    "10.png",
                                        "a1b2.png", "a1b10.png", "a01b20.png", "a2b1.png", "b.png"};
-  for (auto name = names.rbegin(); name != names.rend(); ++name) folder.write(*name, "");
-  std::vector<std::string> listed;
-  for (const auto& file : list_images(folder.path())) listed.push_back(file.filename().string());
-  EXPECT_EQ(listed, names);
+  EXPECT_EQ(listed(names), names);
+}
+
+TEST(ImageFile, NamesThatAreDecimalNumbersToo) {
+  const std::vector<std::string> times{"9.95.jpg",  "10.0.jpg", "10.05.jpg", "10.1.jpg",
+                                       "10.15.jpg", "10.5.jpg", "11.jpg",    "100.25.png"};
+  EXPECT_EQ(listed(times), times);
+  const std::vector<std::string> chapters{"1.1.jpg", "1.2.jpg", "1.9.jpg", "1.10.jpg", "1.11.jpg"};
+  EXPECT_EQ(listed(chapters), chapters) << "1.1 and 1.10 are two";
+  const std::vector<std::string> versions{"1.2.3.jpg", "1.2.15.jpg", "1.10.jpg"};
+  EXPECT_EQ(listed(versions), versions);
 }
 
 /// However short an image file is cut, it is refused: no decoder gets to fill in the rest.
