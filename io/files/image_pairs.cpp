@@ -1,6 +1,7 @@
 #include "io/files/image_pairs.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <string>
 
@@ -79,6 +80,21 @@ ImagePairs pairs_by_name(const std::vector<fs::path>& left, const std::vector<fs
   ImagePairs pairs = pairs_of_equal(left_stems, right_stems);
   if (!pairs.empty()) return pairs;
   return pairs_of_equal(counting_numbers(left_stems), counting_numbers(right_stems));
+}
+
+ImagePairs pairs_by_time(const std::vector<std::int64_t>& left_ns, const std::vector<std::int64_t>& right_ns,
+                         std::int64_t max_gap_ns) {
+  ImagePairs pairs;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < left_ns.size(); ++i) {
+    const auto difference = [&](std::size_t j) { return std::abs(right_ns[j] - left_ns[i]); };
+    while (next + 1 < right_ns.size() && difference(next + 1) <= difference(next)) ++next;
+    if (next == right_ns.size()) break;
+    if (difference(next) > max_gap_ns) continue;
+    pairs.emplace_back(i, next);
+    ++next;
+  }
+  return pairs;
 }
 
 }  // namespace twofold

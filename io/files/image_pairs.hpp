@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <utility>
 #include <vector>
@@ -15,5 +16,10 @@ using ImagePairs = std::vector<std::pair<std::size_t, std::size_t>>;
 /// say nothing: fewer than half of the shorter list's have a partner, or two images of a side have the same.
 [[nodiscard]] ImagePairs pairs_by_name(const std::vector<std::filesystem::path>& left,
                                        const std::vector<std::filesystem::path>& right);
+
+/// Pairs images by time: for each left one the nearest of the others that is not taken yet, if it is no
+/// farther away than max_gap_ns. Both lists increase.
+[[nodiscard]] ImagePairs pairs_by_time(const std::vector<std::int64_t>& left_ns,
+                                       const std::vector<std::int64_t>& right_ns, std::int64_t max_gap_ns);
 
 }  // namespace twofold

@@ -1,7 +1,5 @@
 #include "io/sources/bag_source.hpp"
 
-#include <cmath>
-
 #include <fmt/format.h>
 
 #include "io/bags/bag_bytes.hpp"
@@ -45,9 +43,8 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   const WantedTopics wanted{parameters.take_text("left"), parameters.take_text("right"),
                             parameters.take_text("depth")};
   cameras_ = named([&] { return choose_cameras(reader_->topics(), wanted); });
-  const double gap = parameters.take_number("max_gap").value_or(cameras_.depth ? kDepthGap : kStereoGap);
-  if (gap < 0 || gap > 1) throw IoError(parameters.subject(), "max_gap must be from 0 to 1 s");
-  if (cameras_.kind() != SensorKind::kMono) pairer_.emplace(std::llround(gap * 1e9));
+  const std::int64_t max_gap_ns = parameters.take_max_gap_ns(cameras_.depth ? kDepthGap : kStereoGap);
+  if (cameras_.kind() != SensorKind::kMono) pairer_.emplace(max_gap_ns);
   Calibration used = find_calibration(calibration, parameters);
   const cv::Mat first = first_image();
   set_missing_size(first.cols, first.rows, &used);

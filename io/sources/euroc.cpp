@@ -1,8 +1,7 @@
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "io/files/calibration_file.hpp"
+#include "io/files/image_pairs.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/text_file.hpp"
 #include "io/files/trajectory_file.hpp"
@@ -12,6 +11,9 @@ namespace twofold {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kMaxGap =
+    0.001;  // [s]; cameras that one pulse triggers stamp their images that far apart at most
 
 struct StampedImage {
   std::int64_t t_ns = 0;
@@ -33,24 +35,43 @@ std::vector<StampedImage> read_image_list(const fs::path& camera_folder) {
   return images;
 }
 
-std::vector<RecordedFrame> pair_images(const fs::path& mav, const std::vector<StampedImage>& left,
-                                       const std::vector<StampedImage>& right, bool drop_unpaired) {
-  if (left.size() != right.size() && !drop_unpaired) {
+/// How the images of the two cameras find together.
+struct Pairing {
+  std::int64_t max_gap_ns = 0;
+  bool drop_unpaired = false;
+};
+
+std::vector<std::int64_t> times_of(const std::vector<StampedImage>& images) {
+  std::vector<std::int64_t> t_ns;
+  for (const StampedImage& image : images) t_ns.push_back(image.t_ns);
+  return t_ns;
+}
+
+/// The first place that the pairs leave out, of left ones.
+std::size_t first_alone(const ImagePairs& pairs) {
+  std::size_t place = 0;
+  while (place < pairs.size() && pairs[place].first == place) ++place;
+  return place;
+}
+
+void pair_images(const fs::path& mav, const std::vector<StampedImage>& left,
+                 const std::vector<StampedImage>& right, const Pairing& pairing, Recording& recording) {
+  if (left.size() != right.size() && !pairing.drop_unpaired) {
     throw IoError(mav, fmt::format("cam0 lists {} images, cam1 {} (unpaired=drop keeps the pairs)",
                                    left.size(), right.size()));
   }
-  std::vector<RecordedFrame> frames;
-  auto match = right.begin();
-  for (const StampedImage& image : left) {
-    match =
-        std::find_if(match, right.end(), [&](const StampedImage& other) { return other.t_ns >= image.t_ns; });
-    if (match != right.end() && match->t_ns == image.t_ns) {
-      frames.push_back({image.t_ns, image.file, match->file, {}});
-    } else if (!drop_unpaired) {
-      throw IoError(image.file, "cam1 has no image of the same time (unpaired=drop keeps the pairs)");
-    }
+  const ImagePairs pairs = pairs_by_time(times_of(left), times_of(right), pairing.max_gap_ns);
+  const auto gap = [&] {
+    return fmt::format("{:g} s (max_gap)", static_cast<double>(pairing.max_gap_ns) * 1e-9);
+  };
+  if (pairs.empty()) throw IoError(mav, "no images of cam0 and cam1 are within " + gap());
+  if (pairs.size() < left.size() && !pairing.drop_unpaired) {
+    throw IoError(left[first_alone(pairs)].file,
+                  "cam1 has no image within " + gap() + " of it (unpaired=drop keeps the pairs)");
   }
-  return frames;
+  for (const auto& [l, r] : pairs)
+    recording.frames.push_back({left[l].t_ns, left[l].file, right[r].file, {}});
+  recording.alone = left.size() + right.size() - 2 * pairs.size();
 }
 
 /// The ground truth is of its own sensor S; its sensor.yaml, if there, says where that sits in the body.
@@ -72,7 +93,7 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
                                SourceParameters& parameters) {
   const fs::path mav = fs::exists(folder / "mav0") ? folder / "mav0" : folder;
   const bool stereo = fs::exists(mav / "cam1");
-  const bool drop_unpaired = parameters.take_drop_unpaired();
+  const Pairing pairing{parameters.take_max_gap_ns(kMaxGap), parameters.take_drop_unpaired()};
   Recording recording;
   recording.folder = folder;
   recording.calibration_file = calibration.value_or(mav / "cam0" / "sensor.yaml");
@@ -90,7 +111,7 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
 
   const auto left = read_image_list(mav / "cam0");
   if (stereo) {
-    recording.frames = pair_images(mav, left, read_image_list(mav / "cam1"), drop_unpaired);
+    pair_images(mav, left, read_image_list(mav / "cam1"), pairing, recording);
   } else {
     recording.calibration.kind = SensorKind::kMono;
     for (const StampedImage& image : left) recording.frames.push_back({image.t_ns, image.file, {}, {}});

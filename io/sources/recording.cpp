@@ -104,6 +104,10 @@ int grey_bits_of(const std::vector<RecordedFrame>& frames) {
 PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recording)) {
   if (recording_.frames.empty()) throw IoError(recording_.folder, "the recording holds no frames");
   grey_bits_ = grey_bits_of(recording_.frames);
+  if (grey_bits_ < 16)
+    recording_.notes.push_back(
+        fmt::format("{}: images of 16 bits hold {}: grey levels were taken from 0 to {}",
+                    recording_.folder.string(), grey_bits_, (1 << grey_bits_) - 1));
   const cv::Mat first = read_grey_image(recording_.frames[0].left);
   set_missing_size(first.cols, first.rows, &recording_.calibration);
   expect_valid(recording_.calibration_file, recording_.calibration);
@@ -138,9 +142,6 @@ Frame PlaybackSource::decode(const RecordedFrame& files) const {
 
 SourceReport PlaybackSource::report() const {
   SourceReport report;
-  if (grey_bits_ < 16)
-    report.summary.push_back(fmt::format("{}: images of 16 bits hold {}: grey levels were taken from 0 to {}",
-                                         recording_.folder.string(), grey_bits_, (1 << grey_bits_) - 1));
   report.lost = recording_.alone;
   report.summary = recording_.notes;
   if (report.lost > 0) {

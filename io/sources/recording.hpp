@@ -66,7 +66,7 @@ class PlaybackSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(recording_.frames.size());
   }
-  /// Of images that were left out, of grey levels, and the recording's notes.
+  /// Of images that were left out, and the recording's notes.
   [[nodiscard]] SourceReport report() const override;
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
   /// The rectified left image of the frame with that time stamp, in colour if it has any, else grey; empty

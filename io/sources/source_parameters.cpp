@@ -1,6 +1,7 @@
 #include "io/sources/source_parameters.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -77,6 +78,12 @@ bool SourceParameters::take_drop_unpaired() {
   if (unpaired && *unpaired != "drop")
     throw IoError(subject_, fmt::format("parameter unpaired='{}' can only be 'drop'", *unpaired));
   return unpaired.has_value();
+}
+
+std::int64_t SourceParameters::take_max_gap_ns(double otherwise) {
+  const double gap = take_number("max_gap").value_or(otherwise);
+  if (gap < 0 || gap > 1) throw IoError(subject_, "max_gap must be from 0 to 1 s");
+  return std::llround(gap * 1e9);
 }
 
 void SourceParameters::expect_all_taken() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -35,6 +36,8 @@ class SourceParameters {
   /// unpaired=drop: images without a partner are left out instead of refused. Throws IoError for other
   /// values.
   [[nodiscard]] bool take_drop_unpaired();
+  /// max_gap in seconds: how far apart in time images of a pair may be. Throws IoError unless from 0 to 1.
+  [[nodiscard]] std::int64_t take_max_gap_ns(double otherwise);
   /// Throws IoError when a key was given that nobody took.
   void expect_all_taken() const;
 

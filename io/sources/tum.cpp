@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "io/files/calibration_file.hpp"
+#include "io/files/image_pairs.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/text_file.hpp"
 #include "io/files/trajectory_file.hpp"
@@ -62,19 +63,17 @@ std::vector<RecordedFrame> read_associations(const fs::path& folder) {
 }
 
 /// Nearest depth image in time for every colour image; each depth image is used once; colour images without
-/// are left out. Both lists are in order, so one pass does.
+/// are left out.
 std::vector<RecordedFrame> associate(const std::vector<StampedFile>& rgb,
                                      const std::vector<StampedFile>& depth) {
+  const auto times = [](const std::vector<StampedFile>& files) {
+    std::vector<std::int64_t> t_ns;
+    for (const StampedFile& file : files) t_ns.push_back(file.t_ns);
+    return t_ns;
+  };
   std::vector<RecordedFrame> frames;
-  std::size_t next = 0;
-  for (const StampedFile& colour : rgb) {
-    const auto difference = [&](std::size_t i) { return std::abs(depth[i].t_ns - colour.t_ns); };
-    while (next + 1 < depth.size() && difference(next + 1) <= difference(next)) ++next;
-    if (next == depth.size()) break;
-    if (difference(next) > kMaxDifferenceNs) continue;
-    frames.push_back({colour.t_ns, colour.file, {}, depth[next].file});
-    ++next;
-  }
+  for (const auto& [c, d] : pairs_by_time(times(rgb), times(depth), kMaxDifferenceNs))
+    frames.push_back({rgb[c].t_ns, rgb[c].file, {}, depth[d].file});
   return frames;
 }
 

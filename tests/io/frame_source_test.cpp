@@ -1,3 +1,4 @@
+#include <array>
 #include <cstdint>
 #include <fstream>
 #include <opencv2/videoio.hpp>
@@ -480,25 +481,51 @@ TEST(FrameSource, AVideoThatIsCutShortSaysSo) {
       << faults()[0];
 }
 
-TEST(FrameSource, EurocRefusesUnequalCounts) {
-  const ScratchFolder folder;
+/// A folder of EuRoC layout with images at these times [ns]: the left ones show 0, 1, ..., the right ones
+/// 100, 101, ...
+void write_euroc(const ScratchFolder& folder, const std::array<std::vector<std::int64_t>, 2>& times) {
   const char* sensor =
       "T_BS:\n  data: [1,0,0,{}, 0,1,0,0, 0,0,1,0, 0,0,0,1]\nresolution: [64, 48]\n"
       "camera_model: pinhole\nintrinsics: [50, 50, 32, 24]\n";
-  for (int c = 0; c < 2; ++c) {
+  for (std::size_t c = 0; c < 2; ++c) {
     std::string list = "#time,file\n";
-    for (int i = 0; i < 3 - c; ++i) {
-      folder.write_image(fmt::format("mav0/cam{}/data/{}.png", c, i), numbered_image(kWidth, kHeight, i));
-      list += fmt::format("{},{}.png\r\n", 1000 + i, i);
+    for (std::size_t i = 0; i < times[c].size(); ++i) {
+      folder.write_image(fmt::format("mav0/cam{}/data/{}.png", c, i),
+                         numbered_image(kWidth, kHeight, static_cast<int>(100 * c + i)));
+      list += fmt::format("{},{}.png\r\n", times[c][i], i);
     }
     folder.write(fmt::format("mav0/cam{}/data.csv", c), list);
     folder.write(fmt::format("mav0/cam{}/sensor.yaml", c),
                  fmt::format(fmt::runtime(sensor), c == 0 ? "0" : "0.1"));
   }
+}
+
+TEST(FrameSource, EurocRefusesUnequalCounts) {
+  const ScratchFolder folder;
+  write_euroc(folder, {{{1000, 1001, 1002}, {1000, 1001}}});
   EXPECT_IO_ERROR(open_source(folder.path().string()), "cam0 lists 3 images, cam1 2");
   const auto source = open_source("euroc:" + folder.path().string() + "?unpaired=drop");
   EXPECT_NEAR(source->rig().baseline, 0.1, 1e-12);
   EXPECT_EQ(drain(*source), "2");
+  EXPECT_EQ(source->report().lost, 1U);
+}
+
+/// Cameras that are triggered together do not stamp to the nanosecond.
+TEST(FrameSource, EurocPairsTheNearestInTime) {
+  constexpr std::int64_t kFrameNs = 50'000'000;
+  const ScratchFolder folder;
+  const std::string name = "euroc:" + folder.path().string();
+  write_euroc(folder, {{{kFrameNs, 2 * kFrameNs, 3 * kFrameNs},
+                        {kFrameNs + 1000, 2 * kFrameNs - 900'000, 3 * kFrameNs + 900'000}}});
+  const auto source = open_source(name);
+  EXPECT_EQ(numbers_of(*source), (Numbers{{0, 100}, {1, 101}, {2, 102}}));
+  EXPECT_TRUE(source->report().summary.empty());
+  EXPECT_IO_ERROR(open_source(name + "?max_gap=0.0001"),
+                  "data/1.png: cam1 has no image within 0.0001 s (max_gap) of it");
+  EXPECT_EQ(numbers_of(*open_source(name + "?max_gap=0.0001&unpaired=drop")), (Numbers{{0, 100}}));
+  EXPECT_IO_ERROR(open_source(name + "?max_gap=0&unpaired=drop"),
+                  "no images of cam0 and cam1 are within 0 s");
+  EXPECT_IO_ERROR(open_source(name + "?max_gap=2"), "max_gap must be from 0 to 1 s");
 }
 
 }  // namespace

@@ -31,5 +31,12 @@ TEST(ImagePairs, AreNotMadeByChance) {
   EXPECT_TRUE(pairs_by_name({"1.png", "01.png"}, {"r1.png", "r2.png"}).empty()) << "1 and 01 are the same";
 }
 
+TEST(ImagePairs, AreNearestInTimeAndUsedOnce) {
+  EXPECT_EQ(pairs_by_time({0, 100, 200, 300}, {4, 90, 104, 390}, 10), (ImagePairs{{0, 0}, {1, 2}}));
+  EXPECT_EQ(pairs_by_time({0, 6}, {5}, 10), (ImagePairs{{0, 0}})) << "whoever comes first";
+  EXPECT_TRUE(pairs_by_time({}, {5}, 10).empty());
+  EXPECT_TRUE(pairs_by_time({5}, {}, 10).empty());
+}
+
 }  // namespace
 }  // namespace twofold
