@@ -66,7 +66,7 @@ Calibration BagSource::find_calibration(const std::optional<std::filesystem::pat
   std::optional<Calibration> base;
   if (calibration) {
     base = read_calibration(*calibration);
-    if (cameras_.right && base->kind != SensorKind::kStereo)
+    if (cameras_.right && base->kind != SensorKind::kStereo && !parameters.left_only())
       throw IoError(*calibration, "is not for a stereo camera, but the bag has one");
   } else {
     base = recorded_calibration();
@@ -156,6 +156,7 @@ bool BagSource::read(Frame& frame) {
     if (index_ == 0) throw IoError(file_, "no two images belong together (parameter max_gap)");
     return false;
   }
+  if (rig_.kind == SensorKind::kMono) raw.right = cv::Mat();  // of a camera that is not known
   if (const auto reason = rectifier_->mismatch_reason(raw); !reason.empty()) throw IoError(file_, reason);
   frame = Frame();  // its old images may still be held elsewhere: never write into them
   rectifier_->rectify(raw, frame);

@@ -92,7 +92,9 @@ Trajectory read_truth(const fs::path& folder, const SE3& T_b_c) {
 Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::path>& calibration,
                                SourceParameters& parameters) {
   const fs::path mav = fs::exists(folder / "mav0") ? folder / "mav0" : folder;
-  const bool stereo = fs::exists(mav / "cam1");
+  const bool has_right = fs::exists(mav / "cam1");
+  const bool stereo = has_right && !parameters.left_only();
+  const bool right_known = stereo || (has_right && fs::exists(mav / "cam1" / "sensor.yaml"));
   const Pairing pairing{parameters.take_max_gap_ns(kMaxGap), parameters.take_drop_unpaired()};
   Recording recording;
   recording.folder = folder;
@@ -100,7 +102,7 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
 
   SE3 T_b_c;
   if (fs::exists(mav / "cam0" / "sensor.yaml")) T_b_c = read_euroc_camera(mav / "cam0" / "sensor.yaml").T_b_c;
-  if (!calibration && stereo) {
+  if (!calibration && right_known) {
     recording.calibration = read_euroc_calibration(recording.calibration_file, mav / "cam1" / "sensor.yaml");
   } else {
     recording.calibration = read_calibration(recording.calibration_file);
@@ -113,7 +115,7 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
   if (stereo) {
     pair_images(mav, left, read_image_list(mav / "cam1"), pairing, recording);
   } else {
-    recording.calibration.kind = SensorKind::kMono;
+    if (!has_right) recording.calibration.kind = SensorKind::kMono;
     for (const StampedImage& image : left) recording.frames.push_back({image.t_ns, image.file, {}, {}});
   }
   recording.ground_truth = read_truth(mav / "state_groundtruth_estimate0", T_b_c);

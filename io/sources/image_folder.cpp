@@ -65,12 +65,15 @@ std::optional<double> take_fps(SourceParameters& parameters) {
 /// Image files of one camera beside the left one.
 struct OtherCamera {
   SensorKind kind = SensorKind::kMono;  ///< of both together
-  std::vector<fs::path> files;
+  std::vector<fs::path> files;          ///< empty when nobody looks at them
 };
 
-OtherCamera list_other_camera(const fs::path& folder) {
-  if (fs::is_directory(folder / "right")) return {SensorKind::kStereo, list_images(folder / "right")};
-  if (fs::is_directory(folder / "depth")) return {SensorKind::kRgbd, list_images(folder / "depth")};
+OtherCamera list_other_camera(const fs::path& folder, bool left_only) {
+  const auto list = [&](const char* name) {
+    return left_only ? std::vector<fs::path>() : list_images(folder / name);
+  };
+  if (fs::is_directory(folder / "right")) return {SensorKind::kStereo, list("right")};
+  if (fs::is_directory(folder / "depth")) return {SensorKind::kRgbd, list("depth")};
   return {};
 }
 
@@ -110,7 +113,7 @@ Calibration folder_calibration(const fs::path& folder, const std::optional<fs::p
   Calibration base;
   if (from_file) {
     base = read_calibration(*source);
-    if (kind == SensorKind::kStereo && base.kind != SensorKind::kStereo) {
+    if (kind == SensorKind::kStereo && base.kind != SensorKind::kStereo && !parameters.left_only()) {
       throw IoError(*source, "is not for a stereo camera, but there is a folder right");
     }
   }
@@ -126,10 +129,10 @@ Recording read_image_folder(const fs::path& folder, const std::optional<fs::path
   const bool has_sides = fs::is_directory(folder / "left");
   const bool drop_unpaired = parameters.take_drop_unpaired();
   const auto left = list_images(has_sides ? folder / "left" : folder);
-  const OtherCamera other = has_sides ? list_other_camera(folder) : OtherCamera();
+  const OtherCamera other = has_sides ? list_other_camera(folder, parameters.left_only()) : OtherCamera();
   const auto fps = take_fps(parameters);
   const auto times = fps ? even_times(left.size(), *fps) : read_image_times(folder / "times.txt", left);
-  if (other.kind == SensorKind::kMono) {
+  if (other.files.empty()) {
     for (std::size_t i = 0; i < left.size(); ++i) recording.frames.push_back({times[i], left[i], {}, {}});
   } else {
     const auto pairs = pair_images(folder, left, other.files, drop_unpaired);

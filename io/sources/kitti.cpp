@@ -49,12 +49,13 @@ Trajectory read_poses(const fs::path& file, const std::vector<std::int64_t>& tim
 
 /// KITTI odometry: http://www.cvlibs.net/datasets/kitti/eval_odometry.php, one sequence's folder.
 Recording read_kitti_recording(const fs::path& folder, const std::optional<fs::path>& calibration,
-                               SourceParameters&) {
+                               SourceParameters& parameters) {
   Recording recording;
   recording.folder = folder;
   recording.calibration_file = calibration.value_or(folder / "calib.txt");
   const auto left = list_images(folder / "image_0");
-  const bool stereo = fs::exists(folder / "image_1");
+  const bool has_right = fs::exists(folder / "image_1");
+  const bool stereo = has_right && !parameters.left_only();
   const auto right = stereo ? list_images(folder / "image_1") : std::vector<fs::path>{};
   if (stereo) expect_pairs(folder, left, right);
 
@@ -63,7 +64,7 @@ Recording read_kitti_recording(const fs::path& folder, const std::optional<fs::p
     throw IoError(recording.calibration_file,
                   "key 'P1' is missing: there is a folder image_1, but no right camera");
   }
-  if (!stereo) recording.calibration.kind = SensorKind::kMono;
+  if (!has_right) recording.calibration.kind = SensorKind::kMono;
 
   const auto times = read_times(folder / "times.txt", left.size());
   for (std::size_t i = 0; i < left.size(); ++i) {

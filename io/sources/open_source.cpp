@@ -43,10 +43,11 @@ const std::map<std::string, RecordingReader>& readers() {
 }
 
 std::unique_ptr<PlaybackSource> open_folder(RecordingReader read, const SourceSpec& spec,
-                                            const std::optional<fs::path>& calibration, bool suppose_camera) {
+                                            const SourceOptions& options) {
   expect_folder(spec.argument);
-  SourceParameters parameters(spec.text, spec.parameters, suppose_camera);
-  Recording recording = read(spec.argument, calibration, parameters);
+  SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
+  Recording recording = read(spec.argument, options.calibration, parameters);
+  recording.left_only = options.left_only;
   parameters.expect_all_taken();
   return std::make_unique<PlaybackSource>(std::move(recording));
 }
@@ -54,14 +55,14 @@ std::unique_ptr<PlaybackSource> open_folder(RecordingReader read, const SourceSp
 Opener recording_opener(const std::string& scheme) {
   return [read = readers().at(scheme)](const SourceSpec& spec,
                                        const SourceOptions& options) -> std::unique_ptr<FrameSource> {
-    return open_folder(read, spec, options.calibration, options.suppose_camera);
+    return open_folder(read, spec, options);
   };
 }
 
 std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOptions& options) {
   std::error_code error;
   if (!fs::is_regular_file(spec.argument, error)) throw IoError(spec.argument, "no such video file");
-  SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera);
+  SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
   auto source = std::make_unique<VideoSource>(spec.argument, options.calibration, parameters);
   parameters.expect_all_taken();
   return source;
@@ -69,7 +70,7 @@ std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOpti
 
 Opener bag_opener(std::unique_ptr<BagReader> (*open)(const fs::path&)) {
   return [open](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
-    SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera);
+    SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
     auto source =
         std::make_unique<BagSource>(open(spec.argument), spec.argument, options.calibration, parameters);
     parameters.expect_all_taken();
@@ -130,7 +131,11 @@ std::unique_ptr<PlaybackSource> open_recording(const std::string& text,
   std::error_code error;
   if (spec.scheme.empty() && !fs::is_directory(spec.argument, error)) return nullptr;
   const auto reader = readers().find(spec.scheme.empty() ? recognise_layout(spec.argument) : spec.scheme);
-  return reader == readers().end() ? nullptr : open_folder(reader->second, spec, calibration, false);
+  if (reader == readers().end()) return nullptr;
+  SourceOptions options;
+  options.calibration = calibration;
+  options.left_only = true;
+  return open_folder(reader->second, spec, options);
 }
 
 std::unique_ptr<FrameSource> open_source(const std::string& text, const SourceOptions& options) {

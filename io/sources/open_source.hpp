@@ -20,8 +20,11 @@ struct SourceOptions {
   /// Where neither a file nor the recording has a calibration, some pinhole is supposed: images come as they
   /// are, and rig() means their size only.
   bool suppose_camera = false;
-  bool left_only = false;  ///< one camera: right and depth images are left out
-  bool preload = false;    ///< decode everything into memory before returning
+  /// One camera, with the left images as a pair's rectification turns them, if the pair is known: right and
+  /// depth images are left out. Folders and side-by-side videos need not have them, nor a calibration of
+  /// them.
+  bool left_only = false;
+  bool preload = false;  ///< decode everything into memory before returning
 };
 
 /// Opens a source of frames.
@@ -45,8 +48,8 @@ struct SourceOptions {
 
 class PlaybackSource;
 
-/// Of these only those that are folders of image files: kitti, euroc, tum, images. Null for all others, of
-/// which nothing is opened.
+/// Of these only those that are folders of image files: kitti, euroc, tum, images; their left camera. Null
+/// for all others, of which nothing is opened.
 [[nodiscard]] std::unique_ptr<PlaybackSource> open_recording(
     const std::string& text, const std::optional<std::filesystem::path>& calibration);
 

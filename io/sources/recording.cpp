@@ -16,9 +16,11 @@ constexpr double kSupposedFocalLength = 1000;  // [px]
 }  // namespace
 
 Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, SourceParameters& parameters) {
+  const SensorKind base_kind = base.kind;
   Calibration calibration = std::move(base);
   calibration.kind = kind;
   PinholeCamera& camera = calibration.left.pinhole;
+  const bool right_in_file = from_file && base_kind == SensorKind::kStereo;
   const bool supposed = !from_file && parameters.suppose_camera();
   if (supposed) camera.fx = camera.fy = kSupposedFocalLength;
   int taken = 0;
@@ -53,6 +55,8 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
     calibration.T_right_left = SE3(SO3(), Vector3(-*baseline, 0, 0));
     // Nothing is left to be done; resampling the images would take its time.
     calibration.already_rectified = calibration.left.distortion.is_identity();
+  } else if (kind == SensorKind::kStereo && !right_in_file && parameters.left_only()) {
+    calibration.kind = SensorKind::kMono;
   } else if (kind == SensorKind::kStereo && !from_file) {
     throw IoError(parameters.subject(), "no calibration: stereo needs the parameter 'baseline'");
   }
@@ -118,6 +122,10 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
     throw IoError(recording_.calibration_file, e.what());
   }
   rig_ = rectifier_->rig();
+  if (recording_.left_only && rig_.kind != SensorKind::kMono) {  // its images as the rig would have them
+    rig_.kind = SensorKind::kMono;
+    rig_.baseline = 0;
+  }
   R_rectified_raw_ = rectifier_->R_rectified_left();
   ground_truth_ = rectified_trajectory(recording_.ground_truth, rectifier_->R_rectified_left());
 }
@@ -128,6 +136,7 @@ Frame PlaybackSource::decode(const RecordedFrame& files) const {
   frame.t_ns = files.t_ns;
   frame.left = read_grey_image(files.left, grey_bits_);
   expect_size(files.left, frame.left, calibration.left.pinhole);
+  if (recording_.left_only) return frame;
   if (calibration.kind == SensorKind::kStereo) {
     frame.right = read_grey_image(files.right, grey_bits_);
     expect_size(files.right, frame.right, calibration.right.pinhole);

@@ -24,10 +24,11 @@ struct Recording {
   std::filesystem::path folder;
   std::filesystem::path calibration_file;  ///< named in messages about the calibration
   Calibration calibration;                 ///< a size of 0 x 0 is taken from the first image
-  std::vector<RecordedFrame> frames;       ///< t_ns strictly increasing
-  Trajectory ground_truth;                 ///< T_w_c of the raw left camera
-  std::uint64_t alone = 0;                 ///< images that were left out for want of a partner
-  std::vector<std::string> notes;          ///< what people should know of it, a line each
+  bool left_only = false;             ///< nobody looks at right and depth images, which need not be there
+  std::vector<RecordedFrame> frames;  ///< t_ns strictly increasing
+  Trajectory ground_truth;            ///< T_w_c of the raw left camera
+  std::uint64_t alone = 0;            ///< images that were left out for want of a partner
+  std::vector<std::string> notes;     ///< what people should know of it, a line each
 };
 
 /// The reader of one layout: a folder to a Recording. `calibration` overrides the file in the folder.
@@ -47,7 +48,7 @@ struct Recording {
 
 /// Lays the parameters fx fy cx cy baseline (RGB-D: virtual) depth_scale (units a metre) depth_min depth_max
 /// over `base`. When `base` was not read from a file, the intrinsics and, for stereo, the baseline must be
-/// given.
+/// given. Where only the left camera is wanted, and nothing is known of a right one, it is of one camera.
 [[nodiscard]] Calibration with_parameters(Calibration base, bool from_file, SensorKind kind,
                                           SourceParameters& parameters);
 

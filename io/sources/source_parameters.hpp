@@ -25,10 +25,13 @@ struct SourceSpec {
 class SourceParameters {
  public:
   /// subject names the source in messages.
-  /// @param suppose_camera  SourceOptions::suppose_camera
+  /// @param suppose_camera, left_only  as in SourceOptions
   SourceParameters(std::string subject, std::map<std::string, std::string> values,
-                   bool suppose_camera = false)
-      : subject_(std::move(subject)), values_(std::move(values)), suppose_camera_(suppose_camera) {}
+                   bool suppose_camera = false, bool left_only = false)
+      : subject_(std::move(subject)),
+        values_(std::move(values)),
+        suppose_camera_(suppose_camera),
+        left_only_(left_only) {}
 
   /// Value of the key, if given; throws IoError when it is not a finite number.
   [[nodiscard]] std::optional<double> take_number(const std::string& key);
@@ -43,11 +46,13 @@ class SourceParameters {
 
   [[nodiscard]] const std::string& subject() const { return subject_; }
   [[nodiscard]] bool suppose_camera() const { return suppose_camera_; }
+  [[nodiscard]] bool left_only() const { return left_only_; }
 
  private:
   std::string subject_;
   std::map<std::string, std::string> values_;
   bool suppose_camera_ = false;
+  bool left_only_ = false;
 };
 
 }  // namespace twofold

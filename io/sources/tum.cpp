@@ -165,6 +165,9 @@ Recording read_tum_recording(const fs::path& folder, const std::optional<fs::pat
   const bool associated = fs::exists(folder / "associations.txt");
   if (associated) {
     recording.frames = read_associations(folder);
+  } else if (parameters.left_only()) {
+    for (const StampedFile& colour : read_list(folder, "rgb.txt"))
+      recording.frames.push_back({colour.t_ns, colour.file, {}, {}});
   } else {
     recording.frames = associate(read_list(folder, "rgb.txt"), read_list(folder, "depth.txt"));
     if (recording.frames.empty()) throw IoError(folder, "no colour image has a depth image within 20 ms");

@@ -65,7 +65,7 @@ bool VideoSource::decode(Frame* raw) {
   const int half = image.cols / 2;
   // Clones: the halves become images of their own, and the decoder's buffer is reused for the next frame.
   raw->left = side_by_side_ ? image.colRange(0, half).clone() : image.clone();
-  if (side_by_side_) raw->right = image.colRange(half, 2 * half).clone();
+  if (rig_.kind == SensorKind::kStereo) raw->right = image.colRange(half, 2 * half).clone();
   return true;
 }
 

@@ -528,5 +528,79 @@ TEST(FrameSource, EurocPairsTheNearestInTime) {
   EXPECT_IO_ERROR(open_source(name + "?max_gap=2"), "max_gap must be from 0 to 1 s");
 }
 
+/// What the left camera alone of a source gives: how many frames, or the error.
+std::string left_alone(const std::string& name, const std::optional<fs::path>& calibration = {}) {
+  const auto source = open_source(name, {.calibration = calibration, .left_only = true});
+  EXPECT_EQ(source->rig().kind, SensorKind::kMono) << name;
+  EXPECT_EQ(source->rig().baseline, 0) << name;
+  return drain(*source);
+}
+
+const char* const kOneCamera = "sensor: mono\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n";
+
+TEST(LeftCameraAlone, OfEurocNeedsNothingOfTheRightOne) {
+  const ScratchFolder folder;
+  const std::string name = "euroc:" + folder.path().string();
+  write_euroc(folder, {{{1000, 1001, 1002}, {1000, 1001}}});
+  folder.write("mav0/cam1/data/0.png", "damaged");
+  EXPECT_EQ(left_alone(name), "3");
+  EXPECT_EQ(left_alone(name + "?unpaired=drop&max_gap=0"), "3");
+  EXPECT_EQ(left_alone(name, folder.write("mono.yaml", kOneCamera)), "3");
+  const RecordedImages images = images_of_recording(name, {});
+  EXPECT_FALSE(images(1002).empty());
+  fs::remove(folder / "mav0/cam1/data.csv");
+  fs::remove(folder / "mav0/cam1/sensor.yaml");
+  EXPECT_EQ(left_alone(name), "3");
+  EXPECT_IO_ERROR(open_source(name), "cam1/sensor.yaml");
+}
+
+TEST(LeftCameraAlone, OfKittiNeedsNothingOfTheRightOne) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  folder.write("image_1/000001.png", "damaged");
+  fs::remove(folder / "image_1/000004.png");
+  EXPECT_EQ(left_alone(folder.path().string()), "5");
+  EXPECT_EQ(left_alone(folder.path().string(), folder.write("mono.yaml", kOneCamera)), "5");
+}
+
+TEST(LeftCameraAlone, OfTumNeedsNoDepth) {
+  const ScratchFolder folder;
+  write_tum(folder);
+  fs::remove_all(folder / "depth");
+  const std::string name = "tum:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24";
+  EXPECT_EQ(left_alone(name), "5") << "one of them has no depth image near it";
+  fs::remove(folder / "depth.txt");
+  EXPECT_EQ(left_alone(name), "5");
+  EXPECT_IO_ERROR(open_source(name), "depth.txt: no such file");
+}
+
+TEST(LeftCameraAlone, OfAFolderNeedsNothingOfTheOtherOne) {
+  for (const std::string other : {"right", "depth"}) {
+    const ScratchFolder folder;
+    for (int i = 0; i < 3; ++i)
+      folder.write_image(fmt::format("left/{}.png", i), numbered_image(kWidth, kHeight, i));
+    folder.write(other + "/0.png", "damaged");
+    const std::string name = "images:" + folder.path().string() + "?fps=10";
+    EXPECT_EQ(left_alone(name + "&fx=50&fy=50&cx=32&cy=24"), "3");
+    EXPECT_EQ(left_alone(name, folder.write("mono.yaml", kOneCamera)), "3");
+    fs::remove(folder / (other + "/0.png"));
+    EXPECT_EQ(left_alone(name, folder / "mono.yaml"), "3");
+  }
+}
+
+TEST(LeftCameraAlone, OfASideBySideVideoNeedsOneCalibration) {
+  const ScratchFolder folder;
+  const std::string file = folder / "pair.avi";
+  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25,
+                         {2 * kWidth, kHeight});
+  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here cannot write MJPEG";
+  for (int i = 0; i < 4; ++i) writer.write(cv::Mat(kHeight, 2 * kWidth, CV_8UC3, cv::Scalar::all(40)));
+  writer.release();
+  const std::string name = "video:" + file + "?layout=side-by-side";
+  EXPECT_EQ(left_alone(name + "&fx=50&fy=50&cx=32&cy=24"), "4");
+  EXPECT_EQ(left_alone(name + "&fx=50&fy=50&cx=32&cy=24&baseline=0.1"), "4");
+  EXPECT_EQ(left_alone(name, folder.write("mono.yaml", kOneCamera)), "4");
+}
+
 }  // namespace
 }  // namespace twofold
