@@ -1,6 +1,7 @@
 #include "io/files/image_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <fstream>
@@ -12,6 +13,7 @@
 #include <tuple>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "io/files/image_integrity.hpp"
 #include "io/files/io_error.hpp"
@@ -44,14 +46,16 @@ cv::Mat decode(const fs::path& file, int flags) {
   return image;
 }
 
-bool has_image_extension(const fs::path& file) {
+constexpr std::array<const char*, 9> kExtensions{".png", ".jpg",  ".jpeg", ".pgm", ".ppm",
+                                                 ".tif", ".tiff", ".bmp",  ".webp"};
+
+/// Not the files "._NAME" that macOS lays beside those of other file systems.
+bool is_image_file(const fs::path& file) {
+  if (file.filename().string().starts_with("._")) return false;
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* known : {".png", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".bmp"}) {
-    if (extension == known) return true;
-  }
-  return false;
+  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
 bool is_digit(char c) {
@@ -152,9 +156,11 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   if (error) throw IoError(folder, "no such folder, or it cannot be read");
   std::vector<fs::path> files;
   for (const auto& entry : entries) {
-    if (has_image_extension(entry.path())) files.push_back(entry.path());
+    if (is_image_file(entry.path())) files.push_back(entry.path());
   }
-  if (files.empty()) throw IoError(folder, "the folder holds no images");
+  if (files.empty())
+    throw IoError(
+        folder, fmt::format("the folder holds no images (files ending in {})", fmt::join(kExtensions, ", ")));
   if (!sort_by_decimals(files)) std::sort(files.begin(), files.end(), file_precedes);
   return files;
 }

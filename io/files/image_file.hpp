@@ -36,9 +36,9 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 /// the recording's first image said.
 void expect_size(const std::filesystem::path& file, const cv::Mat& image, const PinholeCamera& camera);
 
-/// Files in `folder` with an image's extension (png, jpg, jpeg, pgm, tif, tiff, bmp), sorted by name: numbers
-/// in names by value, and names that are decimal numbers altogether by theirs. Throws IoError when the folder
-/// is missing or holds none.
+/// Files in `folder` with an image's extension (png, jpg, jpeg, pgm, ppm, tif, tiff, bmp, webp), sorted by
+/// name: numbers in names by value, and names that are decimal numbers altogether by theirs. Throws IoError
+/// when the folder is missing or holds none.
 [[nodiscard]] std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
 
 }  // namespace twofold

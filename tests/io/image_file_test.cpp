@@ -17,6 +17,13 @@ cv::Mat noise_image() {
   return image;
 }
 
+cv::Mat noise_in_colour() {
+  cv::Mat image;
+  const cv::Mat grey = noise_image();
+  cv::merge(std::vector<cv::Mat>{grey, grey, grey}, image);
+  return image;
+}
+
 TEST(ImageFile, ReadsGreyColourAndDepth) {
   const ScratchFolder folder;
   const cv::Mat image = noise_image();
@@ -73,13 +80,35 @@ TEST(ImageFile, NamesThatAreDecimalNumbersToo) {
   EXPECT_EQ(listed(versions), versions);
 }
 
+/// macOS lays "._NAME" beside each file on a stick or in an archive: no image, whatever its suffix.
+TEST(ImageFile, OfAppleDoublesAreNone) {
+  EXPECT_EQ(listed({"._1.png", "1.png", "_2.png"}), (std::vector<std::string>{"1.png", "_2.png"}));
+}
+
+TEST(ImageFile, SuffixesThatAreReadAreNamedWhereThereAreNone) {
+  EXPECT_IO_ERROR(listed({"1.raw", "._1.png"}), "holds no images (files ending in .png, .jpg,");
+}
+
+TEST(ImageFile, ReadsPpmAndWebp) {
+  for (const std::string name : {"a.ppm", "a.webp"}) {
+    if (!cv::haveImageWriter(name)) continue;  // OpenCV may have been built without WebP
+    const ScratchFolder folder;
+    folder.write_image(name, noise_in_colour());
+    const auto files = list_images(folder.path());
+    ASSERT_EQ(files.size(), 1U);
+    EXPECT_EQ(read_grey_image(files[0]).size(), noise_image().size());
+  }
+}
+
 /// However short an image file is cut, it is refused: no decoder gets to fill in the rest.
 TEST(ImageFile, RefusesEveryTruncation) {
   const ScratchFolder folder;
-  for (const char* name : {"a.png", "a.jpg"}) {
-    const std::string whole = bytes_of(folder.write_image(name, noise_image()));
+  for (const std::string name : {"a.png", "a.jpg", "a.pgm", "a.ppm"}) {
+    const cv::Mat image = name == "a.ppm" ? noise_in_colour() : noise_image();
+    const std::string whole = bytes_of(folder.write_image(name, image));
+    ASSERT_FALSE(whole.empty());
     for (std::size_t length = 0; length < whole.size(); length += 7) {
-      const auto cut = folder.write(std::string("cut_") + name, whole.substr(0, length));
+      const auto cut = folder.write("cut_" + name, whole.substr(0, length));
       EXPECT_THROW((void)read_grey_image(cut), IoError) << name << " cut to " << length;
     }
   }
