@@ -36,7 +36,7 @@ std::vector<StampedImage> read_image_list(const fs::path& camera_folder) {
 }
 
 /// How the images of the two cameras find together.
-struct Pairing {
+struct PairingRule {
   std::int64_t max_gap_ns = 0;
   bool drop_unpaired = false;
 };
@@ -55,7 +55,7 @@ std::size_t first_alone(const ImagePairs& pairs) {
 }
 
 void pair_images(const fs::path& mav, const std::vector<StampedImage>& left,
-                 const std::vector<StampedImage>& right, const Pairing& pairing, Recording& recording) {
+                 const std::vector<StampedImage>& right, const PairingRule& pairing, Recording& recording) {
   if (left.size() != right.size() && !pairing.drop_unpaired) {
     throw IoError(mav, fmt::format("cam0 lists {} images, cam1 {} (unpaired=drop keeps the pairs)",
                                    left.size(), right.size()));
@@ -95,7 +95,7 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
   const bool has_right = fs::exists(mav / "cam1");
   const bool stereo = has_right && !parameters.left_only();
   const bool right_known = stereo || (has_right && fs::exists(mav / "cam1" / "sensor.yaml"));
-  const Pairing pairing{parameters.take_max_gap_ns(kMaxGap), parameters.take_drop_unpaired()};
+  const PairingRule pairing{parameters.take_max_gap_ns(kMaxGap), parameters.take_drop_unpaired()};
   Recording recording;
   recording.folder = folder;
   recording.calibration_file = calibration.value_or(mav / "cam0" / "sensor.yaml");

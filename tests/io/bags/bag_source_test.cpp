@@ -159,6 +159,21 @@ TEST(BagSource, WithoutCameraInfoACalibrationIsNeeded) {
   EXPECT_EQ(drain(*open_source(folder / "a.mcap", options)), std::to_string(kCount));
 }
 
+TEST(BagSource, TheLeftCameraAloneNeedsNoCalibrationOfTheRightOne) {
+  const ScratchFolder folder;
+  folder.write("a.mcap", text_of(mcap_file(stereo_bag(MessageEncoding::kCdr), {})));
+  SourceOptions options;
+  options.calibration =
+      folder.write("mono.yaml",
+                   "sensor: mono\ncameras:\n  - size: [64, 48]\n    intrinsics: [50, 50, 32, 24]\n"
+                   "    distortion: {model: radtan, coefficients: [0.01, 0, 0, 0]}\n");
+  EXPECT_IO_ERROR(open_source(folder / "a.mcap", options), "is not for a stereo camera");
+  options.left_only = true;
+  const auto source = open_source(folder / "a.mcap", options);
+  EXPECT_EQ(source->rig().kind, SensorKind::kMono);
+  EXPECT_EQ(drain(*source), std::to_string(kCount));
+}
+
 /// As EuRoC and TUM-VI publish theirs: two cameras and an inertial sensor, no camera_info.
 WrittenBag bag_of_two_cameras(const std::string& pixels) {
   const MessageEncoding ros1 = MessageEncoding::kRos1;
