@@ -1,5 +1,6 @@
 #include "evaluation/evaluation.hpp"
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -128,6 +129,24 @@ std::optional<std::array<double, 2>> scales_of_halves(const std::vector<PosePair
 SE3 aligned_pose(const Sim3& S_w_e, const SE3& T_e_c) {
   return {S_w_e.so3() * T_e_c.so3(),
           S_w_e.scale() * (S_w_e.so3() * T_e_c.translation()) + S_w_e.translation()};
+}
+
+std::optional<double> constant_turn_deg(const std::vector<PosePair>& aligned) {
+  constexpr double kLeastDeg = 15, kMostSpread = 0.1;
+  Matrix3 sum = Matrix3::Zero();
+  for (const PosePair& pair : aligned) sum += (pair.T_w_c.so3().inverse() * pair.T_e_c.so3()).matrix();
+  // The rotation nearest to the sum is the mean in the chordal sense; where two of its singular values vanish
+  // the errors have no mean to speak of, and then they spread, too.
+  const Eigen::JacobiSVD<Matrix3> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  const SO3 mean(Matrix3(svd.matrixU() * Vector3(1, 1, handed).asDiagonal() * svd.matrixV().transpose()));
+  const double turn = angle_deg(mean);
+  if (turn < kLeastDeg) return std::nullopt;
+  std::vector<double> spread;
+  for (const PosePair& pair : aligned)
+    spread.push_back(angle_deg(mean.inverse() * pair.T_w_c.so3().inverse() * pair.T_e_c.so3()));
+  if (error_statistics(std::move(spread)).rmse > kMostSpread * turn) return std::nullopt;
+  return turn;
 }
 
 ErrorStatistics error_statistics(std::vector<double> errors) {

@@ -39,6 +39,12 @@ enum class Alignment : std::uint8_t { kNone, kSe3, kSim3 };
 /// Pose of the camera in the truth's world; the scale acts on the position only.
 [[nodiscard]] SE3 aligned_pose(const Sim3& S_w_e, const SE3& T_e_c);
 
+/// The turn that aligned and true orientations differ by at all poses, seen from the camera: R_w_c^-1 R_w_e_c
+/// is then the same throughout. As between a camera and the body that carries it.
+/// @return  its angle [deg]; nothing when it is less than 15 degrees, or the errors spread about it by more
+/// than a tenth of that (root mean square)
+[[nodiscard]] std::optional<double> constant_turn_deg(const std::vector<PosePair>& aligned);
+
 struct ErrorStatistics {
   std::size_t count = 0;
   double rmse = 0, mean = 0, median = 0, stddev = 0, min = 0, max = 0;  ///< stddev of the population

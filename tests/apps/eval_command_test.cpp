@@ -75,6 +75,18 @@ TEST(EvalCommand, ACutLastLineIsLeftOutAndSaid) {
                    "fields, 8 are needed");
 }
 
+TEST(EvalCommand, AConstantTurnOfTheOrientationsIsSaid) {
+  const ScratchFolder folder;
+  const auto truth = write_circle(folder, "truth.txt", 1);
+  Trajectory turned = read_trajectory(truth);
+  for (TimedPose& pose : turned) pose.T_w_c = pose.T_w_c * SE3(SO3::exp(Vector3(1, 0, 0)), Vector3::Zero());
+  write_tum_trajectory(folder.path() / "turned.txt", turned);
+  const auto outcome = run(folder, "eval " + (folder / "turned.txt") + " " + truth);
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.err.find("the orientations differ by a constant turn of 57 deg"), std::string::npos)
+      << outcome.err;
+}
+
 TEST(EvalCommand, BadInputIsOneLineAndExitCodeTwo) {
   const ScratchFolder folder;
   const auto truth = write_circle(folder, "truth.txt", 1);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
+#include <numbers>
 #include <random>
 
 #include "io/files/trajectory_file.hpp"
@@ -156,6 +158,44 @@ std::filesystem::path unpacked(const std::filesystem::path& data, const std::str
       "gzip -dc '" + (data / (name + ".gz")).string() + "' > '" + target.string() + "'";
   EXPECT_EQ(std::system(command.c_str()), 0);
   return target;
+}
+
+/// The estimate's orientations turned, at each of its poses, by some rotation of its camera.
+std::vector<PosePair> with_turned_cameras(const std::function<SO3(int)>& turn) {
+  std::vector<PosePair> pairs;
+  for (const TimedPose& pose : helix(200)) {
+    const SO3 R = pose.T_w_c.so3() * turn(static_cast<int>(pairs.size()));
+    pairs.push_back({pose.t_ns, SE3(R, pose.T_w_c.translation()), pose.T_w_c});
+  }
+  return pairs;
+}
+
+TEST(Evaluation, ATurnBetweenBodyAndCameraIsTold) {
+  const SO3 R_b_c = SO3::exp(Vector3(0, std::numbers::pi / 2, 0));
+  const auto turn = constant_turn_deg(with_turned_cameras([&](int) { return R_b_c; }));
+  ASSERT_TRUE(turn);
+  EXPECT_NEAR(*turn, 90, 1e-9);
+  const auto shaky = constant_turn_deg(
+      with_turned_cameras([&](int i) { return R_b_c * SO3::exp(Vector3(0.05 * std::sin(i), 0, 0)); }));
+  ASSERT_TRUE(shaky);
+  EXPECT_NEAR(*shaky, 90, 0.5);
+  const auto half =
+      constant_turn_deg(with_turned_cameras([](int) { return SO3::exp(Vector3(std::numbers::pi, 0, 0)); }));
+  ASSERT_TRUE(half);
+  EXPECT_NEAR(*half, 180, 1e-6);
+}
+
+TEST(Evaluation, OtherErrorsOfOrientationAreNoConstantTurn) {
+  EXPECT_FALSE(constant_turn_deg(with_turned_cameras([](int) { return SO3::exp(Vector3(0, 0.2, 0)); })))
+      << "11 degrees: a camera may be mounted so";
+  EXPECT_FALSE(constant_turn_deg(with_turned_cameras([](int i) {
+    return SO3::exp(Vector3(0, 0.01 * i, 0));
+  }))) << "it grows";
+  auto world_turned = with_turned_cameras([](int) { return SO3(); });  // as a wrong alignment would
+  for (PosePair& pair : world_turned)
+    pair.T_e_c = SE3(SO3::exp(Vector3(1, 0, 0)), Vector3::Zero()) * pair.T_e_c;
+  EXPECT_FALSE(constant_turn_deg(world_turned)) << "of the world, not of the camera";
+  EXPECT_FALSE(constant_turn_deg({}));
 }
 
 /// Figures of trajectories_evo/REFERENCE.txt to their printed digits, but for one: the mean of rgbdslam on
