@@ -15,6 +15,7 @@
 #include "io/files/trajectory_file.hpp"
 #include "io/plots/plot.hpp"
 #include "io/sources/open_source.hpp"
+#include "io/sources/recording.hpp"
 
 namespace twofold {
 namespace {
@@ -42,11 +43,25 @@ std::string name_of(Alignment alignment) {
   return "";
 }
 
+/// Files of EuRoC's form have the body's poses.
+Trajectory read_truth_of_body(const std::string& file) {
+  if (auto of_camera = read_euroc_truth_of_camera(file)) return *std::move(of_camera);
+  fmt::print(stderr,
+             "twofold: {}: these are poses of the body, not of the camera, and no cam0/sensor.yaml beside it "
+             "says how that sits in it: give groundtruth.txt of a run with --calib, or the recording's "
+             "folder, instead\n",
+             file);
+  return read_trajectory(file);
+}
+
 Trajectory read_truth(const std::string& text) {
-  if (fs::is_regular_file(text)) return read_trajectory(text);
-  Trajectory truth = open_source(text)->ground_truth();
-  if (truth.empty()) throw IoError(text, "the recording has no ground truth");
-  return truth;
+  if (fs::is_regular_file(text))
+    return trajectory_form(text) == TrajectoryForm::kEuroc ? read_truth_of_body(text) : read_trajectory(text);
+  const auto source = open_source(text);
+  if (!source->ground_truth().empty()) return source->ground_truth();
+  const std::vector<std::string> notes = source->report().notes;
+  if (!notes.empty()) throw IoError(notes.front());
+  throw IoError(text, "the recording has no ground truth");
 }
 
 /// Of a run that was killed, too.

@@ -187,6 +187,8 @@ RunResult run_engine(const RunArguments& arguments, const EngineOptions& options
                               : engine.run(feed, interrupted(), progress);
   line.end();
   result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+  const std::vector<std::string> of_source = source.report().notes;
+  result.notes.insert(result.notes.begin(), of_source.begin(), of_source.end());
   return result;
 }
 

@@ -84,6 +84,7 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   fmt::print("{} frames, {} tracked, {} restarts, {} points; {:.1f} ms a frame, slowest {:.1f}; {}\n", frames,
              smoothed.size(), filter.restarts(), points.size(), mean_ms, slowest_ms, folder.string());
+  for (const std::string& note : source.report().notes) fmt::print("note        {}\n", note);
   if (!source.error().empty()) throw IoError(source.error());
   if (smoothed.size() < 2) throw std::runtime_error(source_text + ": no frame could be tracked");
 }

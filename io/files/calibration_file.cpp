@@ -233,6 +233,16 @@ SE3 read_euroc_sensor_pose(const fs::path& file) {
   return YamlNode::load(file).at("T_BS").rigid_motion();
 }
 
+std::optional<SE3> read_camera_in_body(const fs::path& file) {
+  std::error_code ignored;
+  if (fs::is_directory(file, ignored)) return read_camera_in_body(euroc_sensor_file(file, "cam0"));
+  if (looks_like_kitti_calibration(file)) return std::nullopt;
+  const YamlNode root = YamlNode::load(file);
+  if (root.has("T_BS")) return root.at("T_BS").rigid_motion();
+  if (!root.has("cam0") || !root.at("cam0").has("T_cam_imu")) return std::nullopt;
+  return root.at("cam0").at("T_cam_imu").rigid_motion().inverse();
+}
+
 Calibration read_euroc_calibration(const fs::path& cam0, const fs::path& cam1) {
   const EurocCamera left = read_euroc_camera(cam0);
   const EurocCamera right = read_euroc_camera(cam1);

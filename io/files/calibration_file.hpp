@@ -39,6 +39,11 @@ struct EurocCamera {
 [[nodiscard]] SE3 read_euroc_sensor_pose(const std::filesystem::path& file);
 [[nodiscard]] EurocCamera read_euroc_camera(const std::filesystem::path& file);
 
+/// T_b_c of the left camera in the body (the IMU), from a file of one of the forms above: T_BS of EuRoC's
+/// sensor.yaml, or the inverse of T_cam_imu of Kalibr's camchain. Nothing where it is not said. Throws
+/// IoError.
+[[nodiscard]] std::optional<SE3> read_camera_in_body(const std::filesystem::path& file);
+
 /// A lens as `model` or `distortion_model` of these files names it: none, radtan, equidistant, rational; ds,
 /// which is a `camera_model`.
 [[nodiscard]] const char* distortion_name(DistortionModel model);

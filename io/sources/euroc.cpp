@@ -74,16 +74,53 @@ void pair_images(const fs::path& mav, const std::vector<StampedImage>& left,
   recording.alone = left.size() + right.size() - 2 * pairs.size();
 }
 
-/// The ground truth is of its own sensor S; its sensor.yaml, if there, says where that sits in the body.
-Trajectory read_truth(const fs::path& folder, const SE3& T_b_c) {
-  if (!fs::exists(folder / "data.csv")) return {};
+/// The truth is of its own sensor S; a sensor.yaml beside it, if there, says where that sits in the body.
+Trajectory read_truth_of_camera(const fs::path& file, const SE3& T_b_c) {
   SE3 T_b_s;
-  if (fs::exists(folder / "sensor.yaml")) {
-    T_b_s = read_euroc_sensor_pose(folder / "sensor.yaml");
-  }
-  Trajectory truth = read_euroc_trajectory(folder / "data.csv");
+  if (const fs::path sensor = file.parent_path() / "sensor.yaml"; fs::exists(sensor))
+    T_b_s = read_euroc_sensor_pose(sensor);
+  Trajectory truth = read_euroc_trajectory(file);
   for (TimedPose& pose : truth) pose.T_w_c = pose.T_w_c * T_b_s.inverse() * T_b_c;
   return truth;
+}
+
+std::optional<SE3> camera_in_body(const fs::path& mav, const std::optional<fs::path>& calibration) {
+  std::optional<SE3> T_b_c;
+  if (const fs::path sensor = mav / "cam0" / "sensor.yaml"; fs::exists(sensor))
+    T_b_c = read_camera_in_body(sensor);
+  if (!T_b_c && calibration) T_b_c = read_camera_in_body(*calibration);
+  return T_b_c;
+}
+
+SO3 rectifying_turn(const fs::path& mav, const Calibration& calibration) {
+  try {
+    return Rectifier(calibration).R_rectified_left();
+  } catch (const std::runtime_error& e) {
+    throw IoError(mav, e.what());
+  }
+}
+
+/// Empty: there is none.
+fs::path truth_file(const fs::path& mav) {
+  for (const char* sensor : {"state_groundtruth_estimate0", "mocap0"})
+    if (fs::exists(mav / sensor / "data.csv")) return mav / sensor / "data.csv";
+  return {};
+}
+
+/// state_groundtruth_estimate0/data.csv, or else TUM-VI's mocap0/data.csv. Their poses are the body's (the
+/// IMU's).
+void take_euroc_truth(const fs::path& mav, const std::optional<fs::path>& calibration, Recording* recording) {
+  const fs::path file = truth_file(mav);
+  if (file.empty()) return;
+  const auto read = [&] {
+    const auto T_b_c = camera_in_body(mav, calibration);
+    if (!T_b_c)
+      throw IoError(file,
+                    "its poses are the body's, and nothing says how the camera sits in it (T_BS of "
+                    "cam0/sensor.yaml, or --calib with T_cam_imu)");
+    return read_truth_of_camera(file, *T_b_c);
+  };
+  take_truth(read, recording);
 }
 
 }  // namespace
@@ -100,8 +137,6 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
   recording.folder = folder;
   recording.calibration_file = calibration.value_or(mav / "cam0" / "sensor.yaml");
 
-  SE3 T_b_c;
-  if (fs::exists(mav / "cam0" / "sensor.yaml")) T_b_c = read_euroc_camera(mav / "cam0" / "sensor.yaml").T_b_c;
   if (!calibration && right_known) {
     recording.calibration = read_euroc_calibration(recording.calibration_file, mav / "cam1" / "sensor.yaml");
   } else {
@@ -118,8 +153,17 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
     if (!has_right) recording.calibration.kind = SensorKind::kMono;
     for (const StampedImage& image : left) recording.frames.push_back({image.t_ns, image.file, {}, {}});
   }
-  recording.ground_truth = read_truth(mav / "state_groundtruth_estimate0", T_b_c);
+  take_euroc_truth(mav, calibration, &recording);
   return recording;
+}
+
+std::optional<Trajectory> read_euroc_truth_of_camera(const fs::path& file) {
+  const fs::path mav = fs::absolute(file).lexically_normal().parent_path().parent_path();
+  const auto T_b_c = camera_in_body(mav, {});
+  if (!T_b_c) return std::nullopt;
+  const Calibration calibration = read_calibration(mav);
+  expect_valid(mav, calibration);
+  return rectified_trajectory(read_truth_of_camera(file, *T_b_c), rectifying_turn(mav, calibration));
 }
 
 }  // namespace twofold

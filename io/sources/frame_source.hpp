@@ -19,11 +19,13 @@ enum class FrameStatus : std::uint8_t {
   kError   ///< the input is broken; FrameSource::error says how
 };
 
-/// What became of the frames that were not delivered. Recordings lose none.
+/// What became of the frames that were not delivered, and what the source goes without. Recordings lose none.
 struct SourceReport {
   std::uint64_t lost = 0;            ///< frames that the source knows to be missing
   std::vector<std::string> summary;  ///< a line a camera, for people
   std::vector<std::string> faults;   ///< a line a fault, in order of time; the first ones only
+  std::vector<std::string>
+      notes;  ///< a line each, known from the beginning: a truth that is left out, and why
 };
 
 /// Where frames come from: a recording, a video, a rendered scene, a camera.

@@ -147,7 +147,7 @@ Recording read_image_folder(const fs::path& folder, const std::optional<fs::path
   recording.calibration =
       folder_calibration(folder, calibration, other.kind, parameters, &recording.calibration_file);
   if (const fs::path truth = folder / "groundtruth.txt"; fs::exists(truth)) {
-    recording.ground_truth = read_tum_trajectory(truth);
+    take_truth([&] { return read_tum_trajectory(truth); }, &recording);
   }
   return recording;
 }

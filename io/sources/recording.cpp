@@ -79,6 +79,14 @@ void note_long_intervals(const std::filesystem::path& file, Recording& recording
                   file.string(), interval));
 }
 
+void take_truth(const std::function<Trajectory()>& read, Recording* recording) {
+  try {
+    recording->ground_truth = read();
+  } catch (const IoError& e) {
+    recording->notes.push_back(fmt::format("{}; the ground truth is left out", e.what()));
+  }
+}
+
 Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_raw) {
   Trajectory rectified = raw;
   const SE3 T_raw_rectified(R_rectified_raw.inverse(), Vector3::Zero());
@@ -152,7 +160,7 @@ Frame PlaybackSource::decode(const RecordedFrame& files) const {
 SourceReport PlaybackSource::report() const {
   SourceReport report;
   report.lost = recording_.alone;
-  report.summary = recording_.notes;
+  report.notes = recording_.notes;
   if (report.lost > 0) {
     report.summary.push_back(fmt::format("{}: {} images without a partner were left out",
                                          recording_.folder.string(), report.lost));

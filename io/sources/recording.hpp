@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "camera/calibration.hpp"
@@ -28,7 +30,7 @@ struct Recording {
   std::vector<RecordedFrame> frames;  ///< t_ns strictly increasing
   Trajectory ground_truth;            ///< T_w_c of the raw left camera
   std::uint64_t alone = 0;            ///< images that were left out for want of a partner
-  std::vector<std::string> notes;     ///< what people should know of it, a line each
+  std::vector<std::string> notes;     ///< SourceReport::notes
 };
 
 /// The reader of one layout: a folder to a Recording. `calibration` overrides the file in the folder.
@@ -46,6 +48,11 @@ struct Recording {
                                           const std::optional<std::filesystem::path>& calibration,
                                           SourceParameters& parameters);
 
+/// A file of EuRoC's form as FOLDER/state_groundtruth_estimate0/data.csv, as the poses of the rectified left
+/// camera that the source euroc:FOLDER has. Nothing when FOLDER/cam0/sensor.yaml does not say how that sits
+/// in the body. Throws IoError when a file that is there cannot be read.
+[[nodiscard]] std::optional<Trajectory> read_euroc_truth_of_camera(const std::filesystem::path& file);
+
 /// Lays the parameters fx fy cx cy baseline (RGB-D: virtual) depth_scale (units a metre) depth_min depth_max
 /// over `base`. When `base` was not read from a file, the intrinsics and, for stereo, the baseline must be
 /// given. Where only the left camera is wanted, and nothing is known of a right one, it is of one camera.
@@ -55,6 +62,10 @@ struct Recording {
 /// Notes when the frames are so far apart that `file`, which gives their times in seconds, may have them in
 /// another unit.
 void note_long_intervals(const std::filesystem::path& file, Recording& recording);
+
+/// Sets ground_truth to what `read` returns. No run needs one: where it throws IoError, a note says why, and
+/// the recording goes without.
+void take_truth(const std::function<Trajectory()>& read, Recording* recording);
 
 /// T_w_c with the camera turned from raw to rectified axes.
 [[nodiscard]] Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_raw);
@@ -67,7 +78,6 @@ class PlaybackSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(recording_.frames.size());
   }
-  /// Of images that were left out, and the recording's notes.
   [[nodiscard]] SourceReport report() const override;
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
   /// The rectified left image of the frame with that time stamp, in colour if it has any, else grey; empty

@@ -175,7 +175,7 @@ Recording read_tum_recording(const fs::path& folder, const std::optional<fs::pat
   note_long_intervals(folder / (associated ? "associations.txt" : "rgb.txt"), recording);
   recording.calibration = read_tum_calibration(folder, calibration, parameters, &recording.calibration_file);
   if (const fs::path truth = folder / "groundtruth.txt"; fs::exists(truth)) {
-    recording.ground_truth = read_tum_trajectory(truth);
+    take_truth([&] { return read_tum_trajectory(truth); }, &recording);
   }
   return recording;
 }

@@ -1,5 +1,8 @@
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <opencv2/imgcodecs.hpp>
+
+#include <fmt/format.h>
 
 #include "io/files/trajectory_file.hpp"
 #include "tests/apps/command.hpp"
@@ -73,6 +76,43 @@ TEST(EvalCommand, ACutLastLineIsLeftOutAndSaid) {
       whole.substr(0, whole.find("\n", 200) - 30) + whole.substr(whole.find("\n", 200));
   expect_bad_input(run(folder, "eval " + folder.write("middle.txt", middle).string() + " " + truth),
                    "fields, 8 are needed");
+}
+
+/// Of a camera that looks along the body's y axis.
+constexpr const char* kSensor =
+    "T_BS:\n  data: [1, 0, 0, 0.3,  0, 0, 1, 0,  0, -1, 0, 0.1,  0, 0, 0, 1]\n"
+    "resolution: [64, 48]\ncamera_model: pinhole\nintrinsics: [50, 50, 32, 24]\n";
+
+TEST(EvalCommand, PosesOfTheBodyAreTurnedIntoTheCamerasOrItIsSaid) {
+  const ScratchFolder folder;
+  std::string body;
+  const SE3 T_b_c(SO3::exp(Vector3(-std::numbers::pi / 2, 0, 0)), Vector3(0.3, 0, 0.1));
+  Trajectory estimate;
+  for (int i = 0; i < 60; ++i) {
+    const SE3 T_w_b(SO3::exp(Vector3(0, 0, 0.1 * i)),
+                    Vector3(std::cos(0.1 * i), std::sin(0.1 * i), 0.1 * std::sin(0.3 * i)));
+    const Eigen::Quaterniond& q = T_w_b.so3().quaternion();
+    const Vector3& t = T_w_b.translation();
+    body += fmt::format("{},{},{},{},{},{},{},{}\n", 1'000'000'000 + i * 100'000'000LL, t.x(), t.y(), t.z(),
+                        q.w(), q.x(), q.y(), q.z());
+    estimate.push_back({1'000'000'000 + i * 100'000'000LL, T_w_b * T_b_c});
+  }
+  write_tum_trajectory(folder.path() / "estimate.txt", estimate);
+  const std::string csv = folder.write("mav0/state_groundtruth_estimate0/data.csv", body).string();
+  const auto eval = [&] {
+    return run(folder, "eval " + (folder / "estimate.txt") + " " + csv + " --json " + (folder / "e.json"));
+  };
+  const auto alone = eval();
+  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  EXPECT_NE(alone.err.find("data.csv: these are poses of the body, not of the camera"), std::string::npos)
+      << alone.err;
+  folder.write("mav0/cam0/sensor.yaml", kSensor);
+  const auto known = eval();
+  EXPECT_EQ(known.exit_code, 0);
+  EXPECT_EQ(known.err, "");
+  const auto json = nlohmann::json::parse(content(folder / "e.json"));
+  EXPECT_LT(json["ate_m"]["rmse"].get<double>(), 1e-6);
+  EXPECT_LT(json["ate_rotation_deg"]["rmse"].get<double>(), 1e-4);
 }
 
 TEST(EvalCommand, AConstantTurnOfTheOrientationsIsSaid) {
