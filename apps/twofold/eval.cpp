@@ -60,8 +60,9 @@ Trajectory read_truth(const std::string& text) {
   const auto source = open_source(text);
   if (!source->ground_truth().empty()) return source->ground_truth();
   const std::vector<std::string> notes = source->report().notes;
-  if (!notes.empty()) throw IoError(notes.front());
-  throw IoError(text, "the recording has no ground truth");
+  std::string message = "the recording has no ground truth";
+  for (const std::string& note : notes) message += "; " + note;
+  throw IoError(text, message);
 }
 
 /// Of a run that was killed, too.
@@ -77,6 +78,15 @@ bool is_kitti(const std::string& file) {
   return fs::is_regular_file(file) && trajectory_form(file) == TrajectoryForm::kKitti;
 }
 
+/// What to give for a truth of KITTI's form, whose times are in another file.
+std::string with_times_instead(const fs::path& poses) {
+  const fs::path sequence =
+      poses.parent_path().parent_path() / "sequences" / poses.stem();  // the benchmark's own layout
+  std::error_code ignored;
+  return fmt::format("give the folder of the sequence instead ({})",
+                     fs::is_directory(sequence, ignored) ? sequence.string() : "with its times.txt");
+}
+
 /// Poses of the estimate that have a partner in the truth, and how many there are in all.
 struct Pairing {
   std::vector<PosePair> pairs;
@@ -90,7 +100,8 @@ Pairing pair_poses(const EvalArguments& arguments) {
   if (estimate_by_line != is_kitti(arguments.truth)) {
     throw IoError(
         estimate_by_line ? arguments.estimate : arguments.truth,
-        "has no time stamps (KITTI form), the other trajectory has: they cannot be brought together");
+        "has no time stamps (KITTI form), the other trajectory has: " +
+            (estimate_by_line ? "they cannot be brought together" : with_times_instead(arguments.truth)));
   }
   const Trajectory estimate = read_estimate(arguments.estimate);
   const Trajectory truth = read_truth(arguments.truth);

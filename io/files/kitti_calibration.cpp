@@ -14,12 +14,13 @@ namespace fs = std::filesystem;
 
 using Projection = Eigen::Matrix<double, 3, 4>;
 
-/// "P0: p11 p12 ... p34": the 3x4 projection matrix of a rectified camera; P1's last column is (-fx b, 0, 0).
+/// "P0: p11 p12 ... p34": the 3x4 projection matrix K (I | t) of a rectified camera, whose points are x_grey
+/// + t; P1's last column is (-fx b, 0, 0).
 std::map<std::string, Projection> read_kitti_projections(const fs::path& file) {
   std::map<std::string, Projection> projections;
   for (const TextLine& line : read_text_lines(file)) {
     const auto fields = split_fields(line.text);
-    if (fields[0] != "P0:" && fields[0] != "P1:") continue;
+    if (fields[0].size() != 3 || fields[0][0] != 'P' || fields[0][2] != ':') continue;
     if (fields.size() != 13) {
       throw IoError(file, line.number,
                     fmt::format("key {} has {} numbers, not 12", fields[0], fields.size() - 1));
@@ -32,30 +33,56 @@ std::map<std::string, Projection> read_kitti_projections(const fs::path& file) {
   return projections;
 }
 
+const Projection& projection(const fs::path& file, const std::map<std::string, Projection>& projections,
+                             const std::string& key) {
+  const auto found = projections.find(key);
+  if (found == projections.end()) throw IoError(file, fmt::format("key '{}' is missing", key));
+  return found->second;
+}
+
+/// K^-1 column, where K is that of P and `column` the last one of a projection or the difference of two.
+Vector3 shift_of(const Projection& P, const Vector3& column) {
+  const double z = column.z();
+  return {(column.x() - P(0, 2) * z) / P(0, 0), (column.y() - P(1, 2) * z) / P(1, 1), z};
+}
+
 }  // namespace
 
-Calibration read_kitti_calibration(const fs::path& file) {
+Calibration read_kitti_calibration(const fs::path& file, KittiPair pair) {
   const auto projections = read_kitti_projections(file);
-  const auto left = projections.find("P0");
-  if (left == projections.end()) throw IoError(file, "key 'P0' is missing");
-  const Projection& P0 = left->second;
+  const bool grey = pair == KittiPair::kGrey;
+  const std::string left_key = grey ? "P0" : "P2", right_key = grey ? "P1" : "P3";
+  const Projection& left = projection(file, projections, left_key);
   Calibration calibration;
   calibration.kind = SensorKind::kMono;
-  calibration.left.pinhole = {P0(0, 0), P0(1, 1), P0(0, 2), P0(1, 2), 0, 0};
+  calibration.left.pinhole = {left(0, 0), left(1, 1), left(0, 2), left(1, 2), 0, 0};
   calibration.already_rectified = true;
-  const auto right = projections.find("P1");
-  if (right == projections.end()) return calibration;
-  const Projection& P1 = right->second;
-  if ((P0.leftCols<3>() - P1.leftCols<3>()).norm() > 1e-6) {
-    throw IoError(file, "P0 and P1 differ in more than the baseline: this is no rectified pair");
+  if (!projections.contains(right_key)) return calibration;
+  const Projection& right = projections.at(right_key);
+  if ((left.leftCols<3>() - right.leftCols<3>()).norm() > 1e-6) {
+    throw IoError(file, fmt::format("{} and {} differ in more than the baseline: this is no rectified pair",
+                                    left_key, right_key));
   }
-  const double baseline = (P0(0, 3) - P1(0, 3)) / P0(0, 0);
-  if (!(baseline > 0))
-    throw IoError(file, fmt::format("key 'P1' gives a baseline of {} m, must be positive", baseline));
+  const Vector3 between = shift_of(left, left.col(3) - right.col(3));
+  const double baseline = between.x();
+  if (!(baseline > 0)) {
+    throw IoError(file,
+                  fmt::format("key '{}' gives a baseline of {} m, must be positive", right_key, baseline));
+  }
   calibration.kind = SensorKind::kStereo;
   calibration.right = calibration.left;
-  calibration.T_right_left = SE3(SO3(), Vector3(-baseline, 0, 0));
+  constexpr double kPure = 1e-4;  // of the baseline
+  calibration.already_rectified = between.tail<2>().norm() <= kPure * baseline;
+  calibration.T_right_left =
+      SE3(SO3(), calibration.already_rectified ? Vector3(-baseline, 0, 0) : Vector3(-between));
   return calibration;
+}
+
+SE3 read_kitti_colour_in_grey(const fs::path& file) {
+  const auto projections = read_kitti_projections(file);
+  const Projection& grey = projection(file, projections, "P0");
+  const Projection& colour = projection(file, projections, "P2");
+  return {SO3(), Vector3(-shift_of(colour, colour.col(3) - grey.col(3)))};
 }
 
 bool looks_like_kitti_calibration(const fs::path& file) {

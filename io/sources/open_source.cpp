@@ -108,13 +108,14 @@ std::string recognise_layout(const fs::path& path) {
   // Before EuRoC's: a rendered RGB-D recording has its images in mav0, where nothing tells of their depth.
   if (fs::exists(path / "associations.txt")) return "tum";
   if (fs::exists(path / "mav0") || fs::exists(path / "cam0" / "data.csv")) return "euroc";
-  if (fs::exists(path / "image_0")) return "kitti";
+  if (fs::exists(path / "image_0") || fs::exists(path / "image_2")) return "kitti";
   if (fs::exists(path / "rgb.txt")) return "tum";
   if (fs::exists(path / "times.txt") || fs::exists(path / "left") || fs::exists(path / "calibration.yaml")) {
     return "images";
   }
-  throw IoError(path,
-                "no known layout: none of mav0, image_0, rgb.txt, times.txt is there (images:DIR?fps=N?)");
+  throw IoError(
+      path,
+      "no known layout: none of mav0, image_0, image_2, rgb.txt, times.txt is there (images:DIR?fps=N?)");
 }
 
 std::string known_schemes() {

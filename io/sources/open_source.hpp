@@ -33,7 +33,9 @@ struct SourceOptions {
 /// ?key=value&key=value
 ///              (docs/sources.md has the keys)
 ///
-///   kitti:DIR        image_0, image_1 (stereo) or image_0 alone (mono); calib.txt, times.txt, poses.txt
+///   kitti:DIR        image_0, image_1 (stereo) or image_0 alone (mono), or 2, 3 in colour; calib.txt,
+///   times.txt,
+///                    poses.txt or ../../poses/DIR.txt
 ///   euroc:DIR        mav0/cam0, mav0/cam1 with data.csv and sensor.yaml; rectified here
 ///   tum:DIR          RGB-D; associations.txt or rgb.txt and depth.txt; groundtruth.txt if there
 ///   images:DIR       image files in the order of their names, or left/ with right/ or depth/; times.txt

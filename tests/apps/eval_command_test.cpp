@@ -127,6 +127,17 @@ TEST(EvalCommand, AConstantTurnOfTheOrientationsIsSaid) {
       << outcome.err;
 }
 
+TEST(EvalCommand, PosesWithoutTimesNameTheFolderThatHasThem) {
+  const ScratchFolder folder;
+  const auto estimate = write_circle(folder, "estimate.txt", 1);
+  const auto poses = folder.write("poses/06.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n").string();
+  expect_bad_input(run(folder, "eval " + estimate + " " + poses),
+                   "give the folder of the sequence instead (with its times.txt)");
+  std::filesystem::create_directories(folder.path() / "sequences/06");
+  expect_bad_input(run(folder, "eval " + estimate + " " + poses),
+                   "give the folder of the sequence instead (" + (folder / "sequences/06") + ")");
+}
+
 TEST(EvalCommand, BadInputIsOneLineAndExitCodeTwo) {
   const ScratchFolder folder;
   const auto truth = write_circle(folder, "truth.txt", 1);

@@ -467,10 +467,24 @@ TEST_F(RunCommand, BrokenRecordingsAreOneLineAndExitCodeTwo) {
   });
   damaged("calibration without a key", "calib.txt", [&] { replace_in("calib.txt", "P1:", "Q1:"); });
   damaged("negative focal length", "calib.txt", [&] { replace_in("calib.txt", "P0: 220", "P0: -220"); });
-  damaged("NaN in ground truth", "poses.txt", [&] { replace_in("poses.txt", "1.000000000", "nan"); });
   damaged("repeated time stamp", "times.txt", [&] { replace_in("times.txt", "0.100000", "0.050000"); });
   damaged("time stamps out of order", "times.txt", [&] { replace_in("times.txt", "0.100000", "0.010000"); });
   damaged("left and right counts differ", "", [&] { fs::remove(recording_ / "image_1/000023.png"); });
+}
+
+TEST_F(RunCommand, ATruthThatCannotBeReadStopsNoRun) {
+  replace_in("poses.txt", "1.000000000", "nan");
+  const Outcome outcome = run_recording("--deterministic");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("poses.txt:1: 'nan' is not a finite number; the ground truth is left out"),
+            std::string::npos)
+      << outcome.out;
+  EXPECT_FALSE(fs::exists(folder_.path() / "result/groundtruth.txt"));
+  const auto notes = nlohmann::json::parse(result("summary.json"))["notes"];
+  ASSERT_EQ(notes.size(), 1U);
+  expect_bad_input(
+      run(folder_, "eval '" + (folder_ / "result/trajectory.txt") + "' '" + recording_.string() + "'"),
+      "poses.txt:1: 'nan'");
 }
 
 TEST_F(RunCommand, PosesLeaveTheProgramWhileItRuns) {

@@ -4,6 +4,7 @@
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -139,8 +140,6 @@ TEST(FrameSource, KittiBrokenInput) {
   expect(error_after([&] { folder.write("times.txt", "0\n1\n1\n2\n3\n"); }), "times.txt:3: time stamp");
   expect(error_after([&] { folder.write("times.txt", "0\n1\n2\n3\n2.5\n"); }), "times.txt:5: time stamp");
   expect(error_after([&] { folder.write("times.txt", "0\n1\n"); }), "has 2 time stamps for 5 images");
-  expect(error_after([&] { folder.write("poses.txt", "1 0 0 0 0 1 0 nan 0 0 1 0\n"); }),
-         "poses.txt:1: 'nan'");
   expect(error_after([&] { folder.write("calib.txt", "P0: 50 0 32 0 0 50 24 0 0 0 1 0\n"); }),
          "key 'P1' is missing");
   expect(error_after([&] {
@@ -152,6 +151,24 @@ TEST(FrameSource, KittiBrokenInput) {
          "image_0 has 5 images, image_1 has 4");
   expect(error_after([&] { fs::remove(folder.path() / "calib.txt"); }),
          "calib.txt: no such calibration file");
+}
+
+TEST(FrameSource, ATruthThatCannotBeReadIsLeftOut) {
+  const ScratchFolder kitti, tum;
+  write_kitti(kitti);
+  kitti.write("poses.txt", "1 0 0 0 0 1 0 nan 0 0 1 0\n");
+  write_tum(tum);
+  tum.write("groundtruth.txt", "10.0 0 0 0 0 0 0 1\n10.1 nan 0 0 0 0 0 1\n");
+  for (const auto& [text, line, frames] :
+       {std::tuple{kitti.path().string(), "poses.txt:1: 'nan'", "5"},
+        {"tum:" + tum.path().string() + "?fx=50&fy=50&cx=32&cy=24", "groundtruth.txt:2: 'nan'", "4"}}) {
+    const auto source = open_source(text);
+    EXPECT_TRUE(source->ground_truth().empty());
+    ASSERT_EQ(source->report().notes.size(), 1U) << text;
+    EXPECT_NE(source->report().notes[0].find(line), std::string::npos) << source->report().notes[0];
+    EXPECT_NE(source->report().notes[0].find("the ground truth is left out"), std::string::npos);
+    EXPECT_EQ(drain(*source), frames);
+  }
 }
 
 TEST(FrameSource, TumAssociatesAndScales) {
