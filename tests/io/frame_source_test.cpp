@@ -319,20 +319,20 @@ TEST(FrameSource, StampsThatMayNotBeSecondsAreNoted) {
   for (int i = 0; i < kEnough; ++i)
     folder.write_image(fmt::format("{}.png", i), numbered_image(kWidth, kHeight, i));
   const std::string spec = "images:" + folder.path().string() + "?fx=50&fy=50&cx=32&cy=24";
-  const auto summary_at = [&](double interval) {
+  const auto notes_at = [&](double interval) {
     std::string times;
     for (int i = 0; i < kEnough; ++i) times += fmt::format("{:.3f}\n", interval * i + (i > 7 ? 5000 : 0));
     folder.write("times.txt", times);
-    return open_source(spec)->report().summary;
+    return open_source(spec)->report().notes;
   };
-  const auto notes = summary_at(33.3);
+  const auto notes = notes_at(33.3);
   ASSERT_EQ(notes.size(), 1U);
   EXPECT_NE(
       notes[0].find("times.txt: time stamps are taken as seconds, by which the frames are 33.3 s apart"),
       std::string::npos)
       << notes[0];
-  EXPECT_TRUE(open_source(spec + "&fps=0.05")->report().summary.empty()) << "that was asked for";
-  EXPECT_TRUE(summary_at(2).empty());
+  EXPECT_TRUE(open_source(spec + "&fps=0.05")->report().notes.empty()) << "that was asked for";
+  EXPECT_TRUE(notes_at(2).empty());
 }
 
 TEST(RecordedImages, ShowAnyFrameOfAFolderByItsTime) {
@@ -412,7 +412,7 @@ TEST(FrameSource, GreyLevelsOfTwelveBitsAreNotTakenForSixteen) {
     ASSERT_EQ(grey.size(), 8U);
     EXPECT_NEAR(grey.front(), 256 * 600 / white, 1);
     EXPECT_NEAR(grey.back(), 256 * (brightest / 2) / white, 1);
-    const auto told = source->report().summary;
+    const auto told = source->report().notes;
     ASSERT_EQ(told.size(), brightest == 60000 ? 0U : 1U);
     for (const std::string& line : told)
       EXPECT_NE(line.find("images of 16 bits hold 1"), std::string::npos) << line;
@@ -536,7 +536,7 @@ TEST(FrameSource, EurocPairsTheNearestInTime) {
                         {kFrameNs + 1000, 2 * kFrameNs - 900'000, 3 * kFrameNs + 900'000}}});
   const auto source = open_source(name);
   EXPECT_EQ(numbers_of(*source), (Numbers{{0, 100}, {1, 101}, {2, 102}}));
-  EXPECT_TRUE(source->report().summary.empty());
+  EXPECT_TRUE(source->report().notes.empty());
   EXPECT_IO_ERROR(open_source(name + "?max_gap=0.0001"),
                   "data/1.png: cam1 has no image within 0.0001 s (max_gap) of it");
   EXPECT_EQ(numbers_of(*open_source(name + "?max_gap=0.0001&unpaired=drop")), (Numbers{{0, 100}}));
