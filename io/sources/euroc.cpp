@@ -43,6 +43,7 @@ struct PairingRule {
 
 std::vector<std::int64_t> times_of(const std::vector<StampedImage>& images) {
   std::vector<std::int64_t> t_ns;
+  t_ns.reserve(images.size());
   for (const StampedImage& image : images) t_ns.push_back(image.t_ns);
   return t_ns;
 }

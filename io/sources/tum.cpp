@@ -68,6 +68,7 @@ std::vector<RecordedFrame> associate(const std::vector<StampedFile>& rgb,
                                      const std::vector<StampedFile>& depth) {
   const auto times = [](const std::vector<StampedFile>& files) {
     std::vector<std::int64_t> t_ns;
+    t_ns.reserve(files.size());
     for (const StampedFile& file : files) t_ns.push_back(file.t_ns);
     return t_ns;
   };
