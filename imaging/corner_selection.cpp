@@ -17,6 +17,21 @@ int share_of_level(int wanted, int level, int levels) {
   return std::max(1, wanted * (1 << (levels - 1 - level)) / parts);
 }
 
+/// Without the occupied cells.
+CellGrid grid_for(const cv::Mat& image, int wanted) {
+  const double cell = std::sqrt(static_cast<double>(image.total()) / (kCellsPerCorner * wanted));
+  CellGrid grid;
+  grid.cell_px = std::max(
+      {kSmallestCell, CellGrid::smallest_cell_px(image.cols), 4 * static_cast<int>(std::lround(cell / 4))});
+  grid.columns = image.cols / grid.cell_px + 1;
+  grid.rows = image.rows / grid.cell_px + 1;
+  return grid;
+}
+
+std::size_t cell_count(const CellGrid& grid) {
+  return static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows);
+}
+
 bool stronger(const Corner& a, const Corner& b) {
   return std::tuple(-a.score, a.v, a.u) < std::tuple(-b.score, b.v, b.u);
 }
@@ -27,6 +42,10 @@ CornerSelector::CornerSelector(const CornerSelectionOptions& options) : options_
 
 void CornerSelector::select(const ImagePyramid& pyramid, std::vector<DescribedCorner>& corners) {
   corners.clear();
+  // No pass has more cells than one for all corners: dark or not, no image of the same size allocates again.
+  const std::size_t most_cells = cell_count(grid_for(pyramid.level(0), options_.wanted));
+  occupied_.reserve(most_cells);
+  found_.reserve(most_cells);
   for (int level = 0; level < options_.levels; ++level) {
     const int wanted = share_of_level(options_.wanted, level, options_.levels);
     add(pyramid, level, wanted, {options_.threshold, options_.min_score}, corners);
@@ -39,24 +58,21 @@ void CornerSelector::select(const ImagePyramid& pyramid, std::vector<DescribedCo
 void CornerSelector::add_faint(const ImagePyramid& pyramid, std::vector<DescribedCorner>& corners) {
   const Bounds faint{std::max(options_.threshold / 2, 1), options_.min_score / 4};
   for (int level = 1; level < options_.levels; ++level) {
-    const int missing = options_.wanted - static_cast<int>(corners.size());
-    if (missing > 0) add(pyramid, level, missing, faint, corners);
+    const auto before = static_cast<std::ptrdiff_t>(corners.size());
+    if (before >= options_.wanted) return;
+    add(pyramid, level, options_.wanted - static_cast<int>(before), faint, corners);
+    const auto added = corners.begin() + before;
+    const auto next_level = std::find_if(corners.begin(), added,
+                                         [&](const DescribedCorner& corner) { return corner.level > level; });
+    std::rotate(next_level, added, corners.end());
   }
-  std::stable_sort(corners.begin(), corners.end(),
-                   [](const DescribedCorner& a, const DescribedCorner& b) { return a.level < b.level; });
 }
 
 /// The strongest corners of a level, `wanted` at most, in cells where none of that level was added before.
 void CornerSelector::add(const ImagePyramid& pyramid, int level, int wanted, const Bounds& bounds,
                          std::vector<DescribedCorner>& corners) {
-  const cv::Mat& base = pyramid.level(0);
-  const double cell = std::sqrt(static_cast<double>(base.total()) / (kCellsPerCorner * wanted));
-  CellGrid grid;
-  grid.cell_px = std::max(
-      {kSmallestCell, CellGrid::smallest_cell_px(base.cols), 4 * static_cast<int>(std::lround(cell / 4))});
-  grid.columns = base.cols / grid.cell_px + 1;
-  grid.rows = base.rows / grid.cell_px + 1;
-  occupied_.assign(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows), 0);
+  CellGrid grid = grid_for(pyramid.level(0), wanted);
+  occupied_.assign(cell_count(grid), 0);
   for (const DescribedCorner& corner : corners) {
     if (corner.level != level) continue;
     const int column = static_cast<int>(corner.uv.x()) / grid.cell_px;
@@ -65,7 +81,6 @@ void CornerSelector::add(const ImagePyramid& pyramid, int level, int wanted, con
   }
   grid.occupied = occupied_;
   found_.clear();
-  found_.reserve(occupied_.size());
   detect_corners(pyramid.level(level), level, bounds.threshold, bounds.min_score, kDescriptorBorder, grid,
                  found_);
   std::sort(found_.begin(), found_.end(), stronger);
