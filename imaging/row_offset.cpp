@@ -26,7 +26,8 @@ double quantile(std::vector<double>& values, double share) {
 
 RowOffsetMeter::RowOffsetMeter(const Rig& rig, int corners) : rig_(rig) {
   const double area = static_cast<double>(rig.camera.width) * rig.camera.height;
-  cell_px_ = std::max(8, 4 * static_cast<int>(std::lround(std::sqrt(area / corners) / 4)));
+  cell_px_ = std::max({8, CellGrid::smallest_cell_px(rig.camera.width),
+                       4 * static_cast<int>(std::lround(std::sqrt(area / corners) / 4))});
   columns_ = rig.camera.width / cell_px_ + 1;
   rows_ = rig.camera.height / cell_px_ + 1;
   occupied_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));

@@ -1,6 +1,7 @@
 #include "structure/stereo_features.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -47,13 +48,14 @@ struct Best {
 std::vector<StereoFeature> find_stereo_features(const FrameImages& images, const Rig& rig,
                                                 const StructureOptions& options) {
   const cv::Mat& image = images.left.level(0);
-  const int columns = (image.cols + options.corner_cell_px - 1) / options.corner_cell_px;
-  const int rows = (image.rows + options.corner_cell_px - 1) / options.corner_cell_px;
+  const int cell_px = std::max(options.corner_cell_px, CellGrid::smallest_cell_px(image.cols));
+  const int columns = (image.cols + cell_px - 1) / cell_px;
+  const int rows = (image.rows + cell_px - 1) / cell_px;
   const std::vector<std::uint8_t> free(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   std::vector<Corner> corners;
   corners.reserve(free.size());
   detect_corners(image, 0, options.corner_threshold, options.min_corner_score, kBorder,
-                 {options.corner_cell_px, columns, rows, free}, corners);
+                 {cell_px, columns, rows, free}, corners);
   std::vector<StereoFeature> features;
   for (const Corner& corner : corners) {
     StereoFeature feature;

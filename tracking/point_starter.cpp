@@ -34,8 +34,8 @@ TrackerOptions with_cells_of_one_camera(const Rig& rig, TrackerOptions options) 
 PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options)
     : rig_(rig), options_(options), quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
   options_.cell_px = std::max(options_.cell_px, CellGrid::smallest_cell_px(rig.camera.width));
-  columns_ = rig.camera.width / options.cell_px + 1;
-  rows_ = rig.camera.height / options.cell_px + 1;
+  columns_ = rig.camera.width / options_.cell_px + 1;
+  rows_ = rig.camera.height / options_.cell_px + 1;
   occupied_.resize(static_cast<std::size_t>(columns_ * rows_));
   corners_.reserve(kMaxCorners);
 }

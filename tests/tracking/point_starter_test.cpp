@@ -55,6 +55,18 @@ TEST_F(PointStarterTest, StartsOnePointACellWithTheDepthOfThePair) {
   }
 }
 
+TEST_F(PointStarterTest, TakesTheWidestImage) {
+  Rig wide = rig_;
+  wide.camera.width = 16384;
+  wide.camera.height = 64;
+  FrameImages images;
+  cv::Mat noise(64, 16384, CV_8UC1);
+  cv::randu(noise, 0, 255);
+  images.left.build(noise);
+  PointStarter starter(wide, options_);
+  EXPECT_TRUE(starter.sees_corners(images, 100));
+}
+
 TEST_F(PointStarterTest, StartsNothingWhereAPointIsTracked) {
   PointStarter starter(rig_, options_);
   const ImmaturePoints before = started(starter);
