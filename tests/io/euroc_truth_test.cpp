@@ -50,7 +50,7 @@ void write_sensors(const ScratchFolder& folder) {
 fs::path write_truth(const ScratchFolder& folder, const std::string& sensor) {
   std::string text = "#timestamp [ns], p_RS_R_x [m], ...\n";
   for (int i = 0; i < kTruePoses; ++i) {
-    const Eigen::Quaterniond& q = T_w_b(i).so3().quaternion();
+    const Eigen::Quaterniond q = T_w_b(i).so3().quaternion();
     const Vector3 t = T_w_b(i).translation();
     text += fmt::format("{},{},{},{},{:.12f},{:.12f},{:.12f},{:.12f}\n", 1000 + i, t.x(), t.y(), t.z(), q.w(),
                         q.x(), q.y(), q.z());
