@@ -143,6 +143,7 @@ std::optional<double> constant_turn_deg(const std::vector<PosePair>& aligned) {
   const double turn = angle_deg(mean);
   if (turn < kLeastDeg) return std::nullopt;
   std::vector<double> spread;
+  spread.reserve(aligned.size());
   for (const PosePair& pair : aligned)
     spread.push_back(angle_deg(mean.inverse() * pair.T_w_c.so3().inverse() * pair.T_e_c.so3()));
   if (error_statistics(std::move(spread)).rmse > kMostSpread * turn) return std::nullopt;
