@@ -82,14 +82,14 @@ ImagePairs pairs_by_name(const std::vector<fs::path>& left, const std::vector<fs
   return pairs_of_equal(counting_numbers(left_stems), counting_numbers(right_stems));
 }
 
-ImagePairs pairs_by_time(const std::vector<std::int64_t>& left_ns, const std::vector<std::int64_t>& right_ns,
+ImagePairs pairs_by_time(const std::vector<StampedFile>& left, const std::vector<StampedFile>& right,
                          std::int64_t max_gap_ns) {
   ImagePairs pairs;
   std::size_t next = 0;
-  for (std::size_t i = 0; i < left_ns.size(); ++i) {
-    const auto difference = [&](std::size_t j) { return std::abs(right_ns[j] - left_ns[i]); };
-    while (next + 1 < right_ns.size() && difference(next + 1) <= difference(next)) ++next;
-    if (next == right_ns.size()) break;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const auto difference = [&](std::size_t j) { return std::abs(right[j].t_ns - left[i].t_ns); };
+    while (next + 1 < right.size() && difference(next + 1) <= difference(next)) ++next;
+    if (next == right.size()) break;
     if (difference(next) > max_gap_ns) continue;
     pairs.emplace_back(i, next);
     ++next;

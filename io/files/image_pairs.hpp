@@ -17,9 +17,14 @@ using ImagePairs = std::vector<std::pair<std::size_t, std::size_t>>;
 [[nodiscard]] ImagePairs pairs_by_name(const std::vector<std::filesystem::path>& left,
                                        const std::vector<std::filesystem::path>& right);
 
+struct StampedFile {
+  std::int64_t t_ns = 0;
+  std::filesystem::path file;
+};
+
 /// Pairs images by time: for each left one the nearest of the others that is not taken yet, if it is no
-/// farther away than max_gap_ns. Both lists increase.
-[[nodiscard]] ImagePairs pairs_by_time(const std::vector<std::int64_t>& left_ns,
-                                       const std::vector<std::int64_t>& right_ns, std::int64_t max_gap_ns);
+/// farther away than max_gap_ns. Times increase in both lists.
+[[nodiscard]] ImagePairs pairs_by_time(const std::vector<StampedFile>& left,
+                                       const std::vector<StampedFile>& right, std::int64_t max_gap_ns);
 
 }  // namespace twofold

@@ -15,15 +15,10 @@ namespace fs = std::filesystem;
 constexpr double kMaxGap =
     0.001;  // [s]; cameras that one pulse triggers stamp their images that far apart at most
 
-struct StampedImage {
-  std::int64_t t_ns = 0;
-  fs::path file;
-};
-
 /// data.csv: lines "time [ns],file name in data/".
-std::vector<StampedImage> read_image_list(const fs::path& camera_folder) {
+std::vector<StampedFile> read_image_list(const fs::path& camera_folder) {
   const fs::path file = camera_folder / "data.csv";
-  std::vector<StampedImage> images;
+  std::vector<StampedFile> images;
   std::int64_t previous = -1;
   for (const TextLine& line : read_text_lines(file)) {
     const auto fields = split_fields(line.text, ", \t");
@@ -41,13 +36,6 @@ struct PairingRule {
   bool drop_unpaired = false;
 };
 
-std::vector<std::int64_t> times_of(const std::vector<StampedImage>& images) {
-  std::vector<std::int64_t> t_ns;
-  t_ns.reserve(images.size());
-  for (const StampedImage& image : images) t_ns.push_back(image.t_ns);
-  return t_ns;
-}
-
 /// The first place that the pairs leave out, of left ones.
 std::size_t first_alone(const ImagePairs& pairs) {
   std::size_t place = 0;
@@ -55,13 +43,13 @@ std::size_t first_alone(const ImagePairs& pairs) {
   return place;
 }
 
-void pair_images(const fs::path& mav, const std::vector<StampedImage>& left,
-                 const std::vector<StampedImage>& right, const PairingRule& pairing, Recording& recording) {
+void pair_images(const fs::path& mav, const std::vector<StampedFile>& left,
+                 const std::vector<StampedFile>& right, const PairingRule& pairing, Recording& recording) {
   if (left.size() != right.size() && !pairing.drop_unpaired) {
     throw IoError(mav, fmt::format("cam0 lists {} images, cam1 {} (unpaired=drop keeps the pairs)",
                                    left.size(), right.size()));
   }
-  const ImagePairs pairs = pairs_by_time(times_of(left), times_of(right), pairing.max_gap_ns);
+  const ImagePairs pairs = pairs_by_time(left, right, pairing.max_gap_ns);
   const auto gap = [&] {
     return fmt::format("{:g} s (max_gap)", static_cast<double>(pairing.max_gap_ns) * 1e-9);
   };
@@ -152,7 +140,7 @@ Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::p
     pair_images(mav, left, read_image_list(mav / "cam1"), pairing, recording);
   } else {
     if (!has_right) recording.calibration.kind = SensorKind::kMono;
-    for (const StampedImage& image : left) recording.frames.push_back({image.t_ns, image.file, {}, {}});
+    for (const StampedFile& image : left) recording.frames.push_back({image.t_ns, image.file, {}, {}});
   }
   take_euroc_truth(mav, calibration, &recording);
   return recording;

@@ -19,7 +19,8 @@ enum class FrameStatus : std::uint8_t {
   kError   ///< the input is broken; FrameSource::error says how
 };
 
-/// What became of the frames that were not delivered, and what the source goes without. Recordings lose none.
+/// What became of the frames that were not delivered, and what the source goes without. Recordings lose none
+/// but images that were asked to be left out for want of a partner.
 struct SourceReport {
   std::uint64_t lost = 0;            ///< frames that the source knows to be missing
   std::vector<std::string> summary;  ///< a line a camera, for people

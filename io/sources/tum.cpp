@@ -20,11 +20,6 @@ constexpr double kTumDepthUnit = 1.0 / 5000;  // the benchmark's depth images, w
 
 constexpr const char* kCameraText = "camera.txt";
 
-struct StampedFile {
-  std::int64_t t_ns = 0;
-  fs::path file;
-};
-
 /// Lines "time file".
 std::vector<StampedFile> read_list(const fs::path& folder, const char* name) {
   const fs::path file = folder / name;
@@ -66,14 +61,8 @@ std::vector<RecordedFrame> read_associations(const fs::path& folder) {
 /// are left out.
 std::vector<RecordedFrame> associate(const std::vector<StampedFile>& rgb,
                                      const std::vector<StampedFile>& depth) {
-  const auto times = [](const std::vector<StampedFile>& files) {
-    std::vector<std::int64_t> t_ns;
-    t_ns.reserve(files.size());
-    for (const StampedFile& file : files) t_ns.push_back(file.t_ns);
-    return t_ns;
-  };
   std::vector<RecordedFrame> frames;
-  for (const auto& [c, d] : pairs_by_time(times(rgb), times(depth), kMaxDifferenceNs))
+  for (const auto& [c, d] : pairs_by_time(rgb, depth, kMaxDifferenceNs))
     frames.push_back({rgb[c].t_ns, rgb[c].file, {}, depth[d].file});
   return frames;
 }

@@ -419,6 +419,15 @@ TEST(FrameSource, GreyLevelsOfTwelveBitsAreNotTakenForSixteen) {
   }
 }
 
+/// Of 25 numbered images a second; false when OpenCV cannot write that.
+bool write_video(const std::string& file, const char* codec, int frames) {
+  const int fourcc = cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]);
+  cv::VideoWriter writer(file, cv::CAP_FFMPEG, fourcc, 25, {kWidth, kHeight});
+  for (int i = 0; i < frames && writer.isOpened(); ++i)
+    writer.write(numbered_image(kWidth, kHeight, i, CV_8UC3));
+  return writer.isOpened();
+}
+
 /// Gives the frames of an MP4 file, all of the same length, lengths of their own: (frames, times as long).
 /// Its index is the last part of the file, so that it may grow.
 void stretch_frames(const std::string& file,
@@ -455,11 +464,7 @@ void stretch_frames(const std::string& file,
 TEST(FrameSource, FramesOfAVideoHaveTheTimesThatTheFileGivesThem) {
   const ScratchFolder folder;
   const std::string file = folder / "telephone.mp4";
-  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
-                         {kWidth, kHeight});
-  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here cannot write MPEG-4";
-  for (int i = 0; i < 8; ++i) writer.write(numbered_image(kWidth, kHeight, i, CV_8UC3));
-  writer.release();
+  if (!write_video(file, "mp4v", 8)) GTEST_SKIP() << "OpenCV here cannot write MPEG-4";
   stretch_frames(file, {{3, 1}, {1, 7}, {4, 3}});
   const auto times = [&](const std::string& parameters, const SourceOptions& options = {}) {
     const auto source = open_source("video:" + file + parameters, options);
@@ -480,11 +485,7 @@ TEST(FrameSource, FramesOfAVideoHaveTheTimesThatTheFileGivesThem) {
 TEST(FrameSource, AVideoThatIsCutShortSaysSo) {
   const ScratchFolder folder;
   const std::string file = folder / "cut.avi";
-  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25,
-                         {kWidth, kHeight});
-  if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here cannot write MJPEG";
-  for (int i = 0; i < 40; ++i) writer.write(numbered_image(kWidth, kHeight, i, CV_8UC3));
-  writer.release();
+  if (!write_video(file, "MJPG", 40)) GTEST_SKIP() << "OpenCV here cannot write MJPEG";
   const auto faults = [&] {
     const auto source = open_source("video:" + file + "?fx=50&fy=50&cx=32&cy=24");
     EXPECT_TRUE(source->report().faults.empty()) << "its end was not reached";

@@ -31,11 +31,17 @@ TEST(ImagePairs, AreNotMadeByChance) {
   EXPECT_TRUE(pairs_by_name({"1.png", "01.png"}, {"r1.png", "r2.png"}).empty()) << "1 and 01 are the same";
 }
 
+std::vector<StampedFile> at(const std::vector<std::int64_t>& t_ns) {
+  std::vector<StampedFile> files;
+  for (const std::int64_t t : t_ns) files.push_back({t, {}});
+  return files;
+}
+
 TEST(ImagePairs, AreNearestInTimeAndUsedOnce) {
-  EXPECT_EQ(pairs_by_time({0, 100, 200, 300}, {4, 90, 104, 390}, 10), (ImagePairs{{0, 0}, {1, 2}}));
-  EXPECT_EQ(pairs_by_time({0, 6}, {5}, 10), (ImagePairs{{0, 0}})) << "whoever comes first";
-  EXPECT_TRUE(pairs_by_time({}, {5}, 10).empty());
-  EXPECT_TRUE(pairs_by_time({5}, {}, 10).empty());
+  EXPECT_EQ(pairs_by_time(at({0, 100, 200, 300}), at({4, 90, 104, 390}), 10), (ImagePairs{{0, 0}, {1, 2}}));
+  EXPECT_EQ(pairs_by_time(at({0, 6}), at({5}), 10), (ImagePairs{{0, 0}})) << "whoever comes first";
+  EXPECT_TRUE(pairs_by_time(at({}), at({5}), 10).empty());
+  EXPECT_TRUE(pairs_by_time(at({5}), at({}), 10).empty());
 }
 
 }  // namespace
