@@ -12,7 +12,6 @@
 namespace twofold {
 namespace {
 
-constexpr float kLeastDepth = 0.05f;  // [m]
 constexpr float kColourBand = 2.0f * kDistanceSteps;
 constexpr float kReadingShare = 0.2f;  // of most_weight: what one reading, however near, weighs at most
 constexpr float kFreeShare = 0.1f;     // of most_weight: what the sight of free space weighs

@@ -10,6 +10,9 @@
 
 namespace twofold {
 
+/// What is nearer in front of the camera is not seen [m].
+constexpr float kLeastDepth = 0.05f;
+
 /// What fusion knows of the sensor and the view, as floats.
 struct FusionView {
   Eigen::Matrix3f R_c_v;

@@ -9,13 +9,13 @@
 namespace twofold::synthetic {
 namespace {
 
-constexpr double kSpeed = 2;     ///< [m/s]
-constexpr double kTexel = 0.03;  ///< of houses
-constexpr double kSpacing = 5;   ///< of the way's control points [m]
-constexpr double kAside = 7;     ///< of houses and trees from the way [m]
-constexpr double kClear = 4.5;   ///< no corner of a house is nearer to any way [m]
-constexpr double kHouse = 8;     ///< width of a house and its garden [m]
-constexpr double kGround = 115;  ///< half width of the ground [m]
+constexpr double kSpeed = 2;           ///< [m/s]
+constexpr double kCampusTexel = 0.03;  ///< of houses
+constexpr double kSpacing = 5;         ///< of the way's control points [m]
+constexpr double kAside = 7;           ///< of houses and trees from the way [m]
+constexpr double kClear = 4.5;         ///< no corner of a house is nearer to any way [m]
+constexpr double kHouse = 8;           ///< width of a house and its garden [m]
+constexpr double kGround = 115;        ///< half width of the ground [m]
 
 /// Along the corners, with control points kSpacing apart; the last corner is left to whoever goes on.
 void go(std::vector<Vector2>& way, const std::vector<Vector2>& corners) {
@@ -47,7 +47,7 @@ double distance_to(const std::vector<Vector2>& way, const Vector2& p) {
 void add_house(Scene& scene, Random& random, const Vector2& at, double yaw) {
   const Vector3 size = random_size(random, {5, 2.5, 3.5}, {6.6, 4, 6.5});
   const int style = random.below(4);
-  add_box(scene, standing(at.x(), at.y(), 0.5 * size.z(), yaw), size, kTexel, [&](Canvas& c) {
+  add_box(scene, standing(at.x(), at.y(), 0.5 * size.z(), yaw), size, kCampusTexel, [&](Canvas& c) {
     if (c.height() < 3.45) return;  // roof and floor
     paint_facade(c, random, style);
   });
@@ -112,7 +112,7 @@ Staging make_campus(std::uint64_t seed) {
   staging.path = walk(curve, style);
   staging.round_seconds = curve.length() / kSpeed;
   staging.object_size = {0.5, 0.35, 1.75};
-  staging.object_texture = add_box_textures(staging.scene, staging.object_size, kTexel,
+  staging.object_texture = add_box_textures(staging.scene, staging.object_size, kCampusTexel,
                                             [&](Canvas& c) { paint_plaster(c, random, 110); });
   staging.T_w_object = [curve](double t) {
     const Vector2 p = curve.position(kSpeed * t + 8 + 3 * std::sin(0.2 * t));

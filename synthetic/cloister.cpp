@@ -12,24 +12,24 @@ namespace {
 
 constexpr double kHalf = 13;  ///< inner half width of the square [m]
 constexpr double kHeight = 6;
-constexpr double kTexel = 0.012;
-constexpr double kWay = 8;       ///< half width of the square walked round
-constexpr double kSpeed = 1.3;   ///< [m/s]
-constexpr double kArcade = 1.6;  ///< of its columns from the wall [m]
+constexpr double kCloisterTexel = 0.012;
+constexpr double kWay = 8;              ///< half width of the square walked round
+constexpr double kCloisterSpeed = 1.3;  ///< [m/s]
+constexpr double kArcade = 1.6;         ///< of its columns from the wall [m]
 
 void add_side(Scene& scene, Random& random, int side) {
   const double turn = 0.5 * std::numbers::pi * side;
   const SO3 R(SO3::exp(Vector3(0, 0, turn)));
   const Vector3 left_top = R * Vector3(-kHalf, kHalf, kHeight);
   const Vector3 along = R * Vector3::UnitX();
-  Canvas canvas(2 * kHalf, kHeight, kTexel, 128);
+  Canvas canvas(2 * kHalf, kHeight, kCloisterTexel, 128);
   paint_facade(canvas, random, side);
   scene.quads.push_back({left_top, along, -Vector3::UnitZ(), 2 * kHalf, kHeight, scene.add(canvas.finish()),
                          0.85 + 0.05 * side});
   for (double x = -kHalf + 2; x < kHalf - 1; x += random.uniform(2.6, 3.8)) {
     const Vector3 foot = R * Vector3(x, kHalf - kArcade, 0);
     const double height = random.uniform(2.6, 3.4);
-    add_cylinder(scene, foot, random.uniform(0.12, 0.2), height, kTexel, [&](Canvas& c) {
+    add_cylinder(scene, foot, random.uniform(0.12, 0.2), height, kCloisterTexel, [&](Canvas& c) {
       paint_ashlar(c, random, 0.3, static_cast<float>(random.uniform(110, 190)));
     });
   }
@@ -61,13 +61,13 @@ Staging make_cloister(std::uint64_t seed) {
   }
   const ClosedCurve curve(ring);
   WalkStyle style;
-  style.speed = kSpeed;
+  style.speed = kCloisterSpeed;
   style.outward_deg = 90;
   style.look_aside_deg = 4;
   staging.path = walk(curve, style);
-  staging.round_seconds = curve.length() / kSpeed;
+  staging.round_seconds = curve.length() / kCloisterSpeed;
   staging.object_size = {0.5, 0.35, 1.75};
-  staging.object_texture = add_box_textures(staging.scene, staging.object_size, kTexel,
+  staging.object_texture = add_box_textures(staging.scene, staging.object_size, kCloisterTexel,
                                             [&](Canvas& c) { paint_plaster(c, random, 110); });
   staging.T_w_object = [](double t) { return standing(9.5 * std::sin(0.2 * t), 9.5, 0.875, 0.2 * t); };
   return staging;

@@ -13,8 +13,8 @@ constexpr double kHalfLength = 12;
 constexpr double kHalfWidth = 1.7;
 constexpr double kLane = 0.85;  ///< of the walk from the middle, and radius of its turns [m]
 constexpr double kCeiling = 2.8;
-constexpr double kTexel = 0.004;
-constexpr double kSpeed = 1.0;
+constexpr double kCorridorTexel = 0.004;
+constexpr double kCorridorSpeed = 1.0;
 
 void paint_wall(Canvas& canvas, Random& random) {
   paint_plaster(canvas, random, static_cast<float>(random.uniform(150, 190)));
@@ -46,16 +46,16 @@ void add_shell(Scene& scene, Random& random, const PlainPanels& plain) {
                                    {{l, -w, kCeiling}, -x, -z, 2 * l, kCeiling, 0, 1.0},
                                    {{-l, -w, kCeiling}, y, -z, 2 * w, kCeiling, 0, 0.85}}};
   for (Quad wall : walls) {
-    Canvas canvas(wall.width, wall.height, kTexel, 160);
+    Canvas canvas(wall.width, wall.height, kCorridorTexel, 160);
     paint_wall(canvas, random);
     plain.paint(canvas, scene.textures.size());
     wall.texture = scene.add(canvas.finish());
     scene.quads.push_back(wall);
   }
-  Canvas floor(2 * l, 2 * w, kTexel, 130);
+  Canvas floor(2 * l, 2 * w, kCorridorTexel, 130);
   paint_paving(floor, random, 0.33, 125);
   scene.quads.push_back({{-l, w, 0}, x, -y, 2 * l, 2 * w, scene.add(floor.finish()), 0.9});
-  Canvas ceiling(2 * l, 2 * w, kTexel, 190);
+  Canvas ceiling(2 * l, 2 * w, kCorridorTexel, 190);
   paint_paving(ceiling, random, 0.6, 185);
   for (double at = 0.8; at < 2 * l - 1.3; at += random.uniform(1.7, 2.4))
     ceiling.rectangle(at, w - 0.15, 1.2, 0.3, 250);  // lamps
@@ -101,17 +101,18 @@ Staging make_corridor(std::uint64_t seed, double plain) {
   turn(-9, 0.5 * std::numbers::pi);
   const ClosedCurve curve(ring);
   WalkStyle style;
-  style.speed = kSpeed;
+  style.speed = kCorridorSpeed;
   style.look_aside_deg = 12;
   staging.path = walk(curve, style);
-  staging.round_seconds = curve.length() / kSpeed;
-  staging.walking_speed = kSpeed;
+  staging.round_seconds = curve.length() / kCorridorSpeed;
+  staging.walking_speed = kCorridorSpeed;
 
   staging.object_size = {0.5, 0.35, 1.75};
-  staging.object_texture = add_box_textures(staging.scene, staging.object_size, kTexel, [&](Canvas& c) {
-    paint_plaster(c, random, 110);
-    draw_poster(c, random, 0.05, 0.1, 0.25, 0.2);
-  });
+  staging.object_texture =
+      add_box_textures(staging.scene, staging.object_size, kCorridorTexel, [&](Canvas& c) {
+        paint_plaster(c, random, 110);
+        draw_poster(c, random, 0.05, 0.1, 0.25, 0.2);
+      });
   staging.T_w_object = [](double t) {
     return standing(8 * std::sin(0.15 * t), 0.9, 0.875, 0.2 * std::sin(6 * t));
   };

@@ -13,7 +13,7 @@ namespace {
 constexpr double kHalfX = 9.5;  ///< inner half width of the court [m]
 constexpr double kHalfY = 7.5;
 constexpr double kWallHeight = 6.5;
-constexpr double kTexel = 0.005;
+constexpr double kCourtyardTexel = 0.005;
 constexpr double kRound = 30;  ///< once around [s]
 
 void add_walls(Scene& scene, Random& random, const PlainPanels& plain) {
@@ -31,7 +31,7 @@ void add_walls(Scene& scene, Random& random, const PlainPanels& plain) {
                                    {{-kHalfX, -kHalfY, h}, Vector3::UnitY(), 2 * kHalfY, 0.9}}};
   int style = 0;
   for (const Wall& wall : walls) {
-    Canvas canvas(wall.length, h, kTexel, 128);
+    Canvas canvas(wall.length, h, kCourtyardTexel, 128);
     paint_facade(canvas, random, style++);
     plain.paint(canvas, scene.textures.size());
     const int texture = scene.add(canvas.finish());
@@ -59,14 +59,15 @@ void add_ground(Scene& scene, Random& random) {
 }
 
 void add_column(Scene& scene, Random& random, double x, double y, double radius, double height) {
-  add_cylinder(scene, {x, y, 0}, radius, height, kTexel, [&](Canvas& c) {
+  add_cylinder(scene, {x, y, 0}, radius, height, kCourtyardTexel, [&](Canvas& c) {
     paint_ashlar(c, random, 0.3, static_cast<float>(random.uniform(120, 185)));
     if (random.chance(0.6)) draw_poster(c, random, random.uniform(0.1, 0.4), height - 2.1, 0.5, 0.7);
   });
   const auto grey = static_cast<float>(random.uniform(110, 180));
   const auto stone = [&](Canvas& c) { paint_plaster(c, random, grey); };
-  add_box(scene, standing(x, y, height + 0.12, 0), {2.6 * radius, 2.6 * radius, 0.24}, kTexel, stone);
-  add_box(scene, standing(x, y, 0.1, 0), {2.7 * radius, 2.7 * radius, 0.2}, kTexel, stone);
+  add_box(scene, standing(x, y, height + 0.12, 0), {2.6 * radius, 2.6 * radius, 0.24}, kCourtyardTexel,
+          stone);
+  add_box(scene, standing(x, y, 0.1, 0), {2.7 * radius, 2.7 * radius, 0.2}, kCourtyardTexel, stone);
 }
 
 void add_tree(Scene& scene, Random& random, double x, double y) {
@@ -86,7 +87,7 @@ void add_tree(Scene& scene, Random& random, double x, double y) {
 void add_centre(Scene& scene, Random& random, const PlainPanels& plain) {
   // A small pavilion with four different walls, columns around it, and benches and planters on the way.
   int style = 0;
-  add_box(scene, standing(0.3, -0.2, 1.5, 0.12), {4.2, 2.6, 3.0}, kTexel, [&](Canvas& canvas) {
+  add_box(scene, standing(0.3, -0.2, 1.5, 0.12), {4.2, 2.6, 3.0}, kCourtyardTexel, [&](Canvas& canvas) {
     paint_facade(canvas, random, (style++ * 3 + 1) % 4);
     plain.paint(canvas, scene.textures.size());
   });
@@ -108,7 +109,7 @@ void add_rim(Scene& scene, Random& random) {
       const double w = random.uniform(0.35, 0.6);
       const auto grey = static_cast<float>(random.uniform(100, 190));
       add_box(scene, standing(x + random.uniform(-0.4, 0.4), side * (kHalfY - 0.2), 2.4, 0), {w, 0.4, 4.8},
-              kTexel, [&](Canvas& c) { paint_ashlar(c, random, 0.3, grey); });
+              kCourtyardTexel, [&](Canvas& c) { paint_ashlar(c, random, 0.3, grey); });
     }
   }
   // Benches, planters, crates along the walls.

@@ -10,20 +10,20 @@ namespace twofold::synthetic {
 namespace {
 
 constexpr double kWidth = 6.0;  ///< of the surface [m]; 25 degrees see 4.4 m from 10 m
-constexpr double kDepth = 5.0;
-constexpr double kTexel = 0.0008;
-constexpr double kSpacing = 0.008;  ///< of the height samples
-constexpr double kSpeed = 1.5;      ///< 15 cm a frame at 10 frames a second
+constexpr double kDescentDepth = 5.0;
+constexpr double kDescentTexel = 0.0008;
+constexpr double kDescentSpacing = 0.008;  ///< of the height samples
+constexpr double kDescentSpeed = 1.5;      ///< 15 cm a frame at 10 frames a second
 constexpr double kTopHeight = 10.0;
 constexpr double kLastHeight = 1.0;
 
 void dig_crater(cv::Mat& heights, double x, double y, double radius) {
-  const int reach = static_cast<int>(2.2 * radius / kSpacing) + 1;
-  const int cx = static_cast<int>(x / kSpacing);
-  const int cy = static_cast<int>(y / kSpacing);
+  const int reach = static_cast<int>(2.2 * radius / kDescentSpacing) + 1;
+  const int cx = static_cast<int>(x / kDescentSpacing);
+  const int cy = static_cast<int>(y / kDescentSpacing);
   for (int j = std::max(0, cy - reach); j <= std::min(heights.rows - 1, cy + reach); ++j) {
     for (int i = std::max(0, cx - reach); i <= std::min(heights.cols - 1, cx + reach); ++i) {
-      const double r = std::hypot(i * kSpacing - x, j * kSpacing - y) / radius;
+      const double r = std::hypot(i * kDescentSpacing - x, j * kDescentSpacing - y) / radius;
       // A bowl with a raised rim that fades outwards; slopes stay below 0.6.
       const double bowl = -0.22 * std::exp(-2.2 * r * r);
       const double rim = 0.10 * std::exp(-9 * (r - 1) * (r - 1));
@@ -33,12 +33,12 @@ void dig_crater(cv::Mat& heights, double x, double y, double radius) {
 }
 
 cv::Mat make_heights(Random& random) {
-  Canvas relief(kWidth, kDepth, kSpacing, 0);
+  Canvas relief(kWidth, kDescentDepth, kDescentSpacing, 0);
   relief.add_noise(random.word(), 0.06f, 2.0, 0.08, 0.45f);
   cv::Mat heights = relief.image();
   for (int i = 0; i < 240; ++i) {
     const double radius = 0.03 * std::pow(0.45 / 0.03, std::pow(random.uniform(0, 1), 2.5));
-    const double y = random.uniform(0, kDepth);
+    const double y = random.uniform(0, kDescentDepth);
     dig_crater(heights, random.uniform(0, kWidth), y, radius);
   }
   return heights;
@@ -48,11 +48,11 @@ cv::Mat make_heights(Random& random) {
 void light(Canvas& canvas, const HeightField& ground) {
   const Vector3 sun = Vector3(-0.62, 0.4, 0.68).normalized();
   cv::Mat& image = canvas.image();
-  const auto h = static_cast<float>(kSpacing);
+  const auto h = static_cast<float>(kDescentSpacing);
   for (int j = 0; j < image.rows; ++j) {
-    const auto y = static_cast<float>((j + 0.5) * kTexel + ground.y0);
+    const auto y = static_cast<float>((j + 0.5) * kDescentTexel + ground.y0);
     for (int i = 0; i < image.cols; ++i) {
-      const auto x = static_cast<float>((i + 0.5) * kTexel + ground.x0);
+      const auto x = static_cast<float>((i + 0.5) * kDescentTexel + ground.x0);
       const float sx = (ground.height_at(x + h, y) - ground.height_at(x - h, y)) / (2 * h);
       const float sy = (ground.height_at(x, y + h) - ground.height_at(x, y - h)) / (2 * h);
       const auto lambert =
@@ -67,20 +67,20 @@ void light(Canvas& canvas, const HeightField& ground) {
 Staging make_descent(std::uint64_t seed) {
   Staging staging;
   Random random(mix64(seed) ^ 0x64657363ULL);
-  HeightField ground{-0.5 * kWidth, -0.5 * kDepth, kSpacing, make_heights(random), 0};
+  HeightField ground{-0.5 * kWidth, -0.5 * kDescentDepth, kDescentSpacing, make_heights(random), 0};
 
-  Canvas soil(kWidth, kDepth, kTexel, 125);
+  Canvas soil(kWidth, kDescentDepth, kDescentTexel, 125);
   soil.add_noise(random.word(), 26, 1.5, 0.002, 0.85f);
   scatter_specks(soil, random, 900, 0.003, 0.03, 45);  // pebbles
   light(soil, ground);
   ground.texture = staging.scene.add(soil.finish());
   staging.scene.height_fields.push_back(std::move(ground));
 
-  constexpr double kSeconds = (kTopHeight - kLastHeight) / kSpeed;
+  constexpr double kSeconds = (kTopHeight - kLastHeight) / kDescentSpeed;
   staging.round_seconds = kSeconds + 0.1;  // 61 frames: the first and the last height included
   staging.path = [](double t) {
     const double phase = std::fmod(t, 2 * kSeconds);  // down, then up again
-    const double z = kTopHeight - kSpeed * (phase <= kSeconds ? phase : 2 * kSeconds - phase);
+    const double z = kTopHeight - kDescentSpeed * (phase <= kSeconds ? phase : 2 * kSeconds - phase);
     // Optical axis down, x of the image along world x, with a little sway.
     Matrix3 R_w_c;
     R_w_c << 1, 0, 0, 0, -1, 0, 0, 0, -1;

@@ -9,10 +9,10 @@
 namespace twofold::synthetic {
 namespace {
 
-constexpr double kTexel = 0.0012;
-constexpr double kTop = 0.74;   ///< height of the desk [m]
-constexpr double kHalfX = 1.3;  ///< half its length
-constexpr double kRound = 24;   ///< [s] back and forth
+constexpr double kDeskTexel = 0.0012;
+constexpr double kTop = 0.74;       ///< height of the desk [m]
+constexpr double kDeskHalfX = 1.3;  ///< half its length
+constexpr double kDeskRound = 24;   ///< [s] back and forth
 
 void paint_cover(Canvas& canvas, Random& random) {
   canvas.rectangle(0, 0, canvas.width(), canvas.height(), static_cast<float>(random.uniform(60, 200)));
@@ -25,17 +25,17 @@ void paint_cover(Canvas& canvas, Random& random) {
 }
 
 void add_room(Scene& scene, Random& random) {
-  Canvas top(2 * kHalfX, 1.0, kTexel, 150);
+  Canvas top(2 * kDeskHalfX, 1.0, kDeskTexel, 150);
   paint_planks(top, random, 0.14, 150);
   for (int i = 0; i < 14; ++i) {  // sheets of paper with text
-    const double x = random.uniform(0, 2 * kHalfX - 0.3);
+    const double x = random.uniform(0, 2 * kDeskHalfX - 0.3);
     draw_poster(top, random, x, random.uniform(0.35, 0.8), 0.18, 0.24);
   }
   scatter_specks(top, random, 500, 0.002, 0.012, 45);
-  scene.quads.push_back({{-kHalfX, 0.5, kTop},
+  scene.quads.push_back({{-kDeskHalfX, 0.5, kTop},
                          Vector3::UnitX(),
                          -Vector3::UnitY(),
-                         2 * kHalfX,
+                         2 * kDeskHalfX,
                          1.0,
                          scene.add(top.finish()),
                          1.0});
@@ -74,7 +74,7 @@ void add_things(Scene& scene, Random& random) {
             const double width = random.uniform(0.13, 0.19);
             const double depth = random.uniform(0.1, 0.14);
             const double turn = random.uniform(-0.3, 0.3);
-            add_box(scene, standing(x, y, z + 0.5 * h, yaw + turn), {width, depth, h}, kTexel, cover);
+            add_box(scene, standing(x, y, z + 0.5 * h, yaw + turn), {width, depth, h}, kDeskTexel, cover);
             z += h;
           }
           break;
@@ -82,19 +82,19 @@ void add_things(Scene& scene, Random& random) {
         case 1: {  // tin or mug, with a lid
           const double r = random.uniform(0.03, 0.055);
           const double h = random.uniform(0.7, 1.2) * tall;
-          add_cylinder(scene, {x, y, kTop}, r, h, kTexel, cover);
-          add_box(scene, standing(x, y, kTop + h + 0.006, yaw), {1.2 * r, 1.2 * r, 0.012}, kTexel, cover);
+          add_cylinder(scene, {x, y, kTop}, r, h, kDeskTexel, cover);
+          add_box(scene, standing(x, y, kTop + h + 0.006, yaw), {1.2 * r, 1.2 * r, 0.012}, kDeskTexel, cover);
           break;
         }
         case 2: {
           const double r = random.uniform(0.03, 0.06);
-          add_ball(scene, {x, y, kTop + r}, r, kTexel, [&](Canvas& c) { paint_metal(c, random, tone); });
+          add_ball(scene, {x, y, kTop + r}, r, kDeskTexel, [&](Canvas& c) { paint_metal(c, random, tone); });
           break;
         }
         default: {
           Vector3 size = random_size(random, {0.07, 0.05, 0.7}, {0.15, 0.11, 1.5});
           size.z() *= tall;
-          add_box(scene, standing(x, y, kTop + 0.5 * size.z(), yaw), size, kTexel, cover);
+          add_box(scene, standing(x, y, kTop + 0.5 * size.z(), yaw), size, kDeskTexel, cover);
         }
       }
     }
@@ -102,7 +102,7 @@ void add_things(Scene& scene, Random& random) {
 }
 
 SE3 browse(double t) {
-  const double phase = 2 * std::numbers::pi * t / kRound;
+  const double phase = 2 * std::numbers::pi * t / kDeskRound;
   const double x = -0.75 * std::cos(phase);
   const Vector3 eye(x, -0.84 + 0.1 * std::sin(2.1 * phase), 1.17 + 0.06 * std::sin(1.7 * phase + 0.6));
   const double yaw = 0.5 * std::numbers::pi + 0.16 * std::sin(1.3 * phase) - 0.12 * std::cos(phase) +
@@ -121,9 +121,9 @@ Staging make_desk(std::uint64_t seed) {
   add_room(staging.scene, random);
   add_things(staging.scene, random);
   staging.path = browse;
-  staging.round_seconds = kRound;
+  staging.round_seconds = kDeskRound;
   staging.object_size = {0.11, 0.08, 0.15};  // a carton carried across the desk
-  staging.object_texture = add_box_textures(staging.scene, staging.object_size, kTexel,
+  staging.object_texture = add_box_textures(staging.scene, staging.object_size, kDeskTexel,
                                             [&](Canvas& c) { paint_cover(c, random); });
   staging.T_w_object = [](double t) {
     return standing(0.9 * std::sin(0.5 * t), -0.35 + 0.1 * std::cos(0.8 * t), kTop + 0.2, 0.4 * t);

@@ -10,13 +10,13 @@
 namespace twofold::synthetic {
 namespace {
 
-constexpr double kTexel = 0.0005;
-constexpr double kPlate = 0.34;       // edge of the plate that turns [m]
-constexpr double kTableBelow = 0.02;  // the plate [m]
-constexpr double kRound = 10;         // [s]: 36 degrees a second
-constexpr double kAway = 0.5;         // camera to the object's middle [m]
-constexpr double kMiddle = 0.07;      // of the object, above the plate [m]
-constexpr double kDown = 0.55;        // the camera looks down [rad]
+constexpr double kTurntableTexel = 0.0005;
+constexpr double kPlate = 0.34;         // edge of the plate that turns [m]
+constexpr double kTableBelow = 0.02;    // the plate [m]
+constexpr double kTurntableRound = 10;  // [s]: 36 degrees a second
+constexpr double kAway = 0.5;           // camera to the object's middle [m]
+constexpr double kMiddle = 0.07;        // of the object, above the plate [m]
+constexpr double kDown = 0.55;          // the camera looks down [rad]
 
 void paint_prints(Canvas& canvas, Random& random) {
   canvas.rectangle(0, 0, canvas.width(), canvas.height(), static_cast<float>(random.uniform(120, 200)));
@@ -45,16 +45,16 @@ void add_object(Scene& scene, Random& random, int shape, int texture) {
   constexpr std::array<Painter, kTurntableTextures> kPainters{paint_prints, paint_wood, paint_stone};
   const auto paint = [&](Canvas& c) { kPainters[static_cast<std::size_t>(texture)](c, random); };
   if (shape == 0) {  // a carton, not in the middle
-    add_box(scene, standing(0.012, -0.008, 0.075, 0.4), {0.1, 0.08, 0.15}, kTexel, paint);
+    add_box(scene, standing(0.012, -0.008, 0.075, 0.4), {0.1, 0.08, 0.15}, kTurntableTexel, paint);
   } else {  // a jar with a round lid
-    add_cylinder(scene, {0.006, 0.004, 0}, 0.05, 0.08, kTexel, paint);
-    add_ball(scene, {0.006, 0.004, 0.088}, 0.062, kTexel, paint);
+    add_cylinder(scene, {0.006, 0.004, 0}, 0.05, 0.08, kTurntableTexel, paint);
+    add_ball(scene, {0.006, 0.004, 0.088}, 0.062, kTurntableTexel, paint);
   }
 }
 
-/// Once around in kRound, the other way than the plate turns.
+/// Once around in kTurntableRound, the other way than the plate turns.
 double angle_at(double t) {
-  return -2 * std::numbers::pi * t / kRound;
+  return -2 * std::numbers::pi * t / kTurntableRound;
 }
 
 SE3 around(double t) {
@@ -97,7 +97,7 @@ Staging make_turntable(std::uint64_t seed, int shape, int texture) {
   surroundings.table = painted(staging.scene, 1.3, 1.6, random, 120);
   surroundings.wall = painted(staging.scene, 1.6, 0.92, random, 170);
   staging.path = around;
-  staging.round_seconds = kRound;
+  staging.round_seconds = kTurntableRound;
   staging.surroundings = [surroundings](double t, std::vector<Quad>& quads) {
     surroundings.append(t, quads);
   };

@@ -18,7 +18,7 @@ constexpr double kNextTurn = 5;    ///< until the next one's [s]
 constexpr double kFar = 10;        ///< from where they come, and to where they go [m]
 constexpr double kApproach = 3.5;  ///< for so long they come or go [s]
 constexpr double kPassAside = 0.55;
-constexpr double kTexel = 0.004;
+constexpr double kWalkerTexel = 0.004;
 constexpr double kStride = 1.4;  ///< two steps [m]
 
 /// A part of the body: a box, its centre while standing (x: ahead, y: left, z: up), and how it swings.
@@ -62,7 +62,7 @@ Walkers::Walkers(Scene& scene, CameraPath path, double speed, int count, std::ui
     first_textures_.push_back(static_cast<int>(scene.textures.size()));
     for (const BodyPart& part : body()) {
       const auto grey = static_cast<float>(random.uniform(70, 190));
-      add_box_textures(scene, part.size, kTexel, [&](Canvas& c) { paint_clothes(c, random, grey); });
+      add_box_textures(scene, part.size, kWalkerTexel, [&](Canvas& c) { paint_clothes(c, random, grey); });
     }
   }
 }

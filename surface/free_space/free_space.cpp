@@ -10,7 +10,6 @@
 namespace twofold {
 namespace {
 
-constexpr float kLeastDepth = 0.05f;  // [m]
 constexpr double kFarthestCell = 1e8;
 
 BlockPosition to_cell(const Vector3& in_cells) {
