@@ -114,7 +114,12 @@ bool BagSource::take_message() {
   const bool left = message.topic == cameras_.left.images.id;
   const BagCamera& camera = left ? cameras_.left : cameras_.right ? *cameras_.right : *cameras_.depth;
   Queue& queue = left ? left_ : other_;
-  queue.push_back(named([&] { return decode(camera, !left && cameras_.depth, message); }));
+  try {
+    queue.push_back(named([&] { return decode(camera, !left && cameras_.depth, message); }));
+  } catch (const IoError& error) {
+    damaged_.leave_out(error);
+    return true;
+  }
   if (queue.size() > kMostWaiting) {
     queue.pop_front();
     ++alone_;
@@ -142,6 +147,7 @@ void BagSource::take_left(Frame& raw) {
   raw.t_ns = left_.front().t_ns;
   raw.left = std::move(left_.front().image);
   left_.pop_front();
+  damaged_.frame_was_read();
 }
 
 bool BagSource::read(Frame& frame) {
@@ -153,6 +159,7 @@ bool BagSource::read(Frame& frame) {
       break;
     }
     if (take_message()) continue;
+    damaged_.expect_any_frame();
     if (index_ == 0) throw IoError(file_, "no two images belong together (parameter max_gap)");
     return false;
   }
@@ -165,7 +172,11 @@ bool BagSource::read(Frame& frame) {
 
 SourceReport BagSource::report() const {
   SourceReport report;
-  report.lost = alone_;
+  report.lost = alone_ + damaged_.count();
+  report.faults = damaged_.lines();
+  if (damaged_.count() > 0)
+    report.summary.push_back(
+        fmt::format("{}: {} damaged images were left out", file_.string(), damaged_.count()));
   if (alone_ > 0) report.summary.push_back(fmt::format("{}: {} images were alone", file_.string(), alone_));
   if (const std::string fault = reader_->fault(); !fault.empty()) report.faults.push_back(fault);
   return report;

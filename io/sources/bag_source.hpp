@@ -8,6 +8,7 @@
 #include "camera/rectifier.hpp"
 #include "io/bags/bag_cameras.hpp"
 #include "io/bags/bag_reader.hpp"
+#include "io/files/damaged_images.hpp"
 #include "io/sources/frame_source.hpp"
 #include "io/sources/source_parameters.hpp"
 #include "io/v4l2/pairing.hpp"
@@ -24,7 +25,8 @@ struct BagImage {
 ///
 /// Parameters: left, right, depth: names of topics (BagCameras says what is taken without); max_gap [s]
 /// between the images of a pair, 0.002 for stereo, 0.016 for depth; camera parameters (with_parameters). The
-/// calibration is the given file's, else CameraInfo's, else the parameters'.
+/// calibration is the given file's, else CameraInfo's, else the parameters'. Images that cannot be decoded
+/// are left out (DamagedImages).
 class BagSource final : public FrameSource {
  public:
   /// Throws IoError.
@@ -44,7 +46,7 @@ class BagSource final : public FrameSource {
   [[nodiscard]] std::optional<CameraInfoMessage> first_info(const BagCamera& camera);
   [[nodiscard]] cv::Mat first_image();
   void select_images();
-  /// Decodes the next image into its camera's queue; false at the end.
+  /// Decodes the next image that can be decoded into its camera's queue; false at the end.
   bool take_message();
   /// The oldest pair, if both are there.
   bool take_pair(Frame& raw);
@@ -61,6 +63,7 @@ class BagSource final : public FrameSource {
   Queue left_, other_;
   std::int64_t index_ = 0;
   std::uint64_t alone_ = 0;  // images without a partner
+  DamagedImages damaged_;
 };
 
 }  // namespace twofold

@@ -10,6 +10,7 @@
 #include "io/files/io_error.hpp"
 
 namespace twofold {
+namespace fs = std::filesystem;
 
 namespace {
 constexpr double kSupposedFocalLength = 1000;  // [px]
@@ -63,7 +64,7 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   return calibration;
 }
 
-void note_long_intervals(const std::filesystem::path& file, Recording& recording) {
+void note_long_intervals(const fs::path& file, Recording& recording) {
   constexpr std::size_t kFewest = 10;  // fewer may be photographs, taken one by one
   constexpr double kLong = 10;         // [s]
   const auto& frames = recording.frames;
@@ -97,15 +98,15 @@ Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_ra
 namespace {
 
 /// Bits of the grey levels: files of 16 bits often hold 10, 12 or 14. One image alone may be a dark one: some
-/// from all of the recording are looked at, if the first has more than 8.
-int grey_bits_of(const std::vector<RecordedFrame>& frames) {
+/// from all of the recording are looked at, if `first`, which can be read, has more than 8.
+int grey_bits_of(const std::vector<RecordedFrame>& frames, const fs::path& first) {
   constexpr std::size_t kLooks = 6;
-  int bits = bits_used(frames.front().left);
+  int bits = bits_used(first);
   if (bits <= 8) return 16;
   for (std::size_t k = 1; k < kLooks; ++k) {
     try {
       bits = std::max(bits, bits_used(frames[k * (frames.size() - 1) / (kLooks - 1)].left));
-    } catch (const IoError&) {  // is told when it is that frame's turn
+    } catch (const IoError&) {  // is left out when it is that frame's turn
     }
   }
   return (bits + 1) / 2 * 2;
@@ -115,15 +116,16 @@ int grey_bits_of(const std::vector<RecordedFrame>& frames) {
 
 PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recording)) {
   if (recording_.frames.empty()) throw IoError(recording_.folder, "the recording holds no frames");
-  grey_bits_ = grey_bits_of(recording_.frames);
+  const cv::Mat first = first_image();
+  const fs::path& first_file = recording_.frames[next_].left;
+  grey_bits_ = grey_bits_of(recording_.frames, first_file);
   if (grey_bits_ < 16)
     recording_.notes.push_back(
         fmt::format("{}: images of 16 bits hold {}: grey levels were taken from 0 to {}",
                     recording_.folder.string(), grey_bits_, (1 << grey_bits_) - 1));
-  const cv::Mat first = read_grey_image(recording_.frames[0].left);
   set_missing_size(first.cols, first.rows, &recording_.calibration);
   expect_valid(recording_.calibration_file, recording_.calibration);
-  expect_size(recording_.frames[0].left, first, recording_.calibration.left.pinhole);
+  expect_size(first_file, first, recording_.calibration.left.pinhole);
   try {
     rectifier_.emplace(recording_.calibration);
   } catch (const std::runtime_error& e) {
@@ -139,38 +141,43 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
 }
 
 Frame PlaybackSource::decode(const RecordedFrame& files) const {
-  const Calibration& calibration = recording_.calibration;
+  const SensorKind kind = recording_.left_only ? SensorKind::kMono : recording_.calibration.kind;
   Frame frame;
   frame.t_ns = files.t_ns;
   frame.left = read_grey_image(files.left, grey_bits_);
+  if (kind == SensorKind::kStereo) frame.right = read_grey_image(files.right, grey_bits_);
+  if (kind == SensorKind::kRgbd) frame.depth = read_depth_image(files.depth);
+  return frame;
+}
+
+void PlaybackSource::expect_sizes(const RecordedFrame& files, const Frame& frame) const {
+  const Calibration& calibration = recording_.calibration;
   expect_size(files.left, frame.left, calibration.left.pinhole);
-  if (recording_.left_only) return frame;
-  if (calibration.kind == SensorKind::kStereo) {
-    frame.right = read_grey_image(files.right, grey_bits_);
-    expect_size(files.right, frame.right, calibration.right.pinhole);
-  }
-  if (calibration.kind == SensorKind::kRgbd) {
-    frame.depth = read_depth_image(files.depth);
+  if (!frame.right.empty()) expect_size(files.right, frame.right, calibration.right.pinhole);
+  if (!frame.depth.empty()) {
     const CameraModel& camera = calibration.depth_apart ? calibration.depth_camera.model : calibration.left;
     expect_size(files.depth, frame.depth, camera.pinhole);
   }
-  return frame;
 }
 
 SourceReport PlaybackSource::report() const {
   SourceReport report;
-  report.lost = recording_.alone;
+  report.lost = recording_.alone + damaged_.count();
   report.notes = recording_.notes;
-  if (report.lost > 0) {
-    report.summary.push_back(fmt::format("{}: {} images without a partner were left out",
-                                         recording_.folder.string(), report.lost));
-  }
+  report.faults = damaged_.lines();
+  const std::string folder = recording_.folder.string();
+  if (recording_.alone > 0)
+    report.summary.push_back(
+        fmt::format("{}: {} images without a partner were left out", folder, recording_.alone));
+  if (damaged_.count() > 0)
+    report.summary.push_back(
+        fmt::format("{}: {} frames with a damaged image were left out", folder, damaged_.count()));
   return report;
 }
 
 cv::Mat PlaybackSource::colour_image(std::int64_t index) const {
   if (index < 0 || index >= static_cast<std::int64_t>(recording_.frames.size())) return {};
-  const std::filesystem::path& file = recording_.frames[static_cast<std::size_t>(index)].left;
+  const fs::path& file = recording_.frames[static_cast<std::size_t>(index)].left;
   const cv::Mat raw = read_colour_image(file);
   return raw.empty() ? raw : rectified_left(file, raw);
 }
@@ -184,7 +191,7 @@ cv::Mat PlaybackSource::left_image(std::int64_t t_ns) const {
   return rectified_left(at->left, raw);
 }
 
-cv::Mat PlaybackSource::rectified_left(const std::filesystem::path& file, const cv::Mat& raw) const {
+cv::Mat PlaybackSource::rectified_left(const fs::path& file, const cv::Mat& raw) const {
   expect_size(file, raw, recording_.calibration.left.pinhole);
   if (rectifier_->passes_through()) return raw;
   cv::Mat rectified;
@@ -192,11 +199,40 @@ cv::Mat PlaybackSource::rectified_left(const std::filesystem::path& file, const 
   return rectified;
 }
 
+cv::Mat PlaybackSource::first_image() {
+  for (; next_ < recording_.frames.size(); ++next_) {
+    try {
+      return read_grey_image(recording_.frames[next_].left);
+    } catch (const IoError& error) {
+      damaged_.leave_out(error);
+    }
+  }
+  damaged_.expect_any_frame();
+  return {};
+}
+
+bool PlaybackSource::read_raw(Frame& raw) {
+  while (next_ < recording_.frames.size()) {
+    const std::size_t index = next_++;
+    const RecordedFrame& files = recording_.frames[index];
+    try {
+      raw = decode(files);
+    } catch (const IoError& error) {
+      damaged_.leave_out(error);
+      continue;
+    }
+    damaged_.frame_was_read();
+    expect_sizes(files, raw);
+    raw.index = static_cast<std::int64_t>(index);
+    return true;
+  }
+  damaged_.expect_any_frame();
+  return false;
+}
+
 bool PlaybackSource::read(Frame& frame) {
-  if (next_ == recording_.frames.size()) return false;
-  Frame raw = decode(recording_.frames[next_]);
-  raw.index = static_cast<std::int64_t>(next_);
-  ++next_;
+  Frame raw;
+  if (!read_raw(raw)) return false;
   frame = Frame();  // its old images may still be held elsewhere: never write into them
   rectifier_->rectify(raw, frame);
   return true;

@@ -8,6 +8,7 @@
 
 #include "camera/calibration.hpp"
 #include "camera/rectifier.hpp"
+#include "io/files/damaged_images.hpp"
 #include "io/sources/frame_source.hpp"
 #include "io/sources/source_parameters.hpp"
 
@@ -70,10 +71,11 @@ void take_truth(const std::function<Trajectory()>& read, Recording* recording);
 /// T_w_c with the camera turned from raw to rectified axes.
 [[nodiscard]] Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_raw);
 
-/// Plays a Recording: decodes, checks sizes, rectifies where the calibration asks for it.
+/// Plays a Recording: decodes, checks sizes, rectifies where the calibration asks for it. Frames with files
+/// that cannot be read are left out (DamagedImages).
 class PlaybackSource final : public FrameSource {
  public:
-  /// Throws IoError when the calibration is invalid or the first image does not decode.
+  /// Throws IoError when the calibration is invalid or none of the first images decodes.
   explicit PlaybackSource(Recording recording);
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
     return static_cast<std::int64_t>(recording_.frames.size());
@@ -86,13 +88,19 @@ class PlaybackSource final : public FrameSource {
 
  private:
   bool read(Frame& frame) override;
+  /// The first left image that can be read; those before it are left out.
+  [[nodiscard]] cv::Mat first_image();
   [[nodiscard]] Frame decode(const RecordedFrame& files) const;
+  void expect_sizes(const RecordedFrame& files, const Frame& frame) const;
+  /// The next frame that can be read, not rectified; false at the end. Throws IoError.
+  [[nodiscard]] bool read_raw(Frame& raw);
   [[nodiscard]] cv::Mat rectified_left(const std::filesystem::path& file, const cv::Mat& raw) const;
 
   Recording recording_;
   std::optional<Rectifier> rectifier_;
   int grey_bits_ = 16;  ///< of images of 16 bits
   std::size_t next_ = 0;
+  DamagedImages damaged_;
 };
 
 }  // namespace twofold

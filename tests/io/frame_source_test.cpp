@@ -133,8 +133,10 @@ TEST(FrameSource, KittiBrokenInput) {
     EXPECT_NE(message.find(part), std::string::npos) << message;
   };
   expect(error_after([] {}), "5");
-  expect(error_after([&] { folder.write("image_0/000003.png", "broken"); }),
-         "000003.png: the image cannot be decoded");
+  expect(error_after([&] {
+           for (int i = 0; i < 5; ++i) folder.write(fmt::format("image_1/00000{}.png", i), "broken");
+         }),
+         "000004.png: the image cannot be decoded");
   expect(error_after([&] { folder.write_image("image_1/000002.png", numbered_image(60, 48, 1)); }),
          "000002.png: the image is 60x48");
   expect(error_after([&] { folder.write("times.txt", "0\n1\n1\n2\n3\n"); }), "times.txt:3: time stamp");
@@ -151,6 +153,48 @@ TEST(FrameSource, KittiBrokenInput) {
          "image_0 has 5 images, image_1 has 4");
   expect(error_after([&] { fs::remove(folder.path() / "calib.txt"); }),
          "calib.txt: no such calibration file");
+}
+
+TEST(FrameSource, ADamagedImageIsAGap) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  folder.write("image_0/000000.png", "broken");
+  fs::remove(folder / "image_1/000003.png");
+  fs::create_symlink(folder / "not there", folder / "image_1/000003.png");
+  const auto source = open_source(folder.path().string());
+  Frame frame;
+  for (const int index : {1, 2, 4}) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.index, index);
+  }
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+  const SourceReport report = source->report();
+  EXPECT_EQ(report.lost, 2U);
+  ASSERT_EQ(report.faults.size(), 2U);
+  EXPECT_NE(report.faults[0].find("000000.png: the image cannot be decoded; its frame is left out"),
+            std::string::npos)
+      << report.faults[0];
+  EXPECT_NE(report.faults[1].find("000003.png: "), std::string::npos) << report.faults[1];
+  EXPECT_EQ(report.summary.size(), 1U);
+}
+
+/// As where a download ended, or a disk is gone.
+TEST(FrameSource, ManyDamagedImagesInARowEndARecording) {
+  const ScratchFolder folder;
+  folder.write("mono.yaml", "sensor: mono\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n");
+  for (int i = 0; i < 30; ++i) {
+    const std::string name = fmt::format("left/{:02}.png", i);
+    if (i < 3 || (i >= 8 && i < 12))
+      folder.write_image(name, numbered_image(kWidth, kHeight, i));
+    else
+      folder.write(name, "broken");
+  }
+  const auto source =
+      open_source("images:" + folder.path().string() + "?fps=10", {.calibration = folder / "mono.yaml"});
+  Frame frame;
+  for (int i = 0; i < 7; ++i) ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+  EXPECT_EQ(source->next(frame), FrameStatus::kError);
+  EXPECT_NE(source->error().find("22.png: "), std::string::npos) << source->error();
 }
 
 TEST(FrameSource, ATruthThatCannotBeReadIsLeftOut) {

@@ -257,14 +257,32 @@ TEST(BagSource, AFileThatIsCutShortIsSaidToBe) {
   EXPECT_NE(source->report().faults[0].find("a.mcap: is cut short at byte"), std::string::npos);
 }
 
-TEST(BagSource, BrokenImagesAreNamed) {
+TEST(BagSource, ADamagedImageIsAGap) {
   const ScratchFolder folder;
   WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
   bag.messages[8].data.resize(200);  // the second left image
   folder.write("short.bag", text_of(rosbag_file(bag, {})));
-  EXPECT_NE(drain(*open_source(folder / "short.bag")).find("short.bag: ends in the middle"),
-            std::string::npos);
-  bag = stereo_bag(MessageEncoding::kRos1);
+  const auto source = open_source(folder / "short.bag");
+  EXPECT_EQ(drain(*source), std::to_string(kCount - 1));
+  const SourceReport report = source->report();
+  EXPECT_EQ(report.lost, 2U) << "that image, and its partner";
+  ASSERT_EQ(report.faults.size(), 1U);
+  EXPECT_NE(report.faults[0].find("short.bag: ends in the middle"), std::string::npos) << report.faults[0];
+}
+
+TEST(BagSource, ABagOfDamagedImagesIsRefused) {
+  const ScratchFolder folder;
+  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
+  for (std::size_t i = 1; i < bag.messages.size(); i += 5)  // all right images
+    bag.messages[i].data.resize(200);
+  folder.write("short.bag", text_of(rosbag_file(bag, {})));
+  const std::string end = drain(*open_source(folder / "short.bag"));
+  EXPECT_NE(end.find("short.bag: "), std::string::npos) << end;
+}
+
+TEST(BagSource, ImagesOfAnotherSizeAreNamed) {
+  const ScratchFolder folder;
+  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
   bag.messages[8].data =
       image_message(MessageEncoding::kRos1, time_of(1), numbered_image(32, 24, 1), "mono8");
   folder.write("small.bag", text_of(rosbag_file(bag, {})));
