@@ -44,6 +44,7 @@ std::string TrackerOptions::invalid_reason() const {
       .above("light_change", light_change, 1)
       .share("doubted_inlier_share", doubted_inlier_share)
       .share("doubted_searched_share", doubted_searched_share)
+      .within("settled_searched_share", settled_searched_share, 0, 1)
       .share("rough_inlier_share", rough_inlier_share)
       .share("rough_searched_share", rough_searched_share)
       .at_least("rough_min_inliers", rough_min_inliers, 0)

@@ -44,6 +44,9 @@ struct TrackerOptions {
   /// better pose.
   double doubted_inlier_share = 0.5;
   double doubted_searched_share = 0.12;
+  /// Where dense alignment and the motion so far disagree, both are tried, unless so many of the points
+  /// searched were found already; 0: never.
+  double settled_searched_share = 0.6;
   /// A pose from a rough start must explain so much of the points found from it...
   double rough_inlier_share = 0.6;
   double rough_searched_share = 0.2;  ///< ... and of those searched,

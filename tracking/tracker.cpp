@@ -53,7 +53,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   motion_.reserve(searches);
   anchors_.reserve(searches);
   inlier_ids_.reserve(searches);
-  samples_.reserve(std::max(searches, kMaxImmaturePoints));
+  samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   previous_points_.reserve(kMaxAlignmentPoints);
   if (rig.kind == SensorKind::kStereo) right_rows_.emplace(rig);
   if (!rig.readout) readout_.emplace(rig, searches);
@@ -117,7 +117,7 @@ bool Tracker::track(FrameStep& step) {
   const bool by_depth = corners_scarce_ && depth_can_place();
   start.placement.T_c_ref = by_depth ? align_to_depth(step) : aligned_pose(step);
   step.lap(TrackerStage::kAlignment);
-  LostCause cause = search_from(start, step);
+  LostCause cause = by_depth ? search_from(start, step) : search_from_either(start, step);
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
   const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
   if ((cause == LostCause::kNone && !doubted) || search_widely(step)) return true;

@@ -130,6 +130,8 @@ class Tracker {
 
   bool track(FrameStep& step);
   LostCause search_from(SearchStart start, FrameStep& step);
+  LostCause search_from_either(const SearchStart& aligned, FrameStep& step);
+  [[nodiscard]] bool leaves_motion(const SE3& T_c_ref);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
   bool search_widely(FrameStep& step);
   bool search_roughly_from(const Placement& placement, FrameStep& step);

@@ -19,6 +19,37 @@ constexpr double kUnknownReadout = 0.015;
 
 }  // namespace
 
+/// From the dense alignment's pose; where few points are found from there, and it is not where the camera
+/// would be had it gone on, from the latter, too. Dense alignment follows what has most gradient, which may
+/// be what moves itself, a train or the camera's own shadow: the map's points at rest are then not even
+/// searched where they are.
+LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& step) {
+  const LostCause cause = search_from(aligned, step);
+  const int found = cause == LostCause::kNone ? step.result.inliers : 0;
+  if (found >= options_.settled_searched_share * step.result.searched ||
+      !leaves_motion(aligned.placement.T_c_ref))
+    return cause;
+  const SearchStart going_on{.placement = {last_.reference, predicted_pose()}, .rough = false};
+  const LostCause other = search_from(going_on, step);
+  const bool enough = cause == LostCause::kNone || well_supported(step.result);
+  if (other == LostCause::kNone && step.result.inliers > found && enough) return other;
+  return search_from(aligned, step);
+}
+
+/// The pose is further from where the camera would be had it gone on, as the last frame's points show, than
+/// points are searched.
+bool Tracker::leaves_motion(const SE3& T_c_ref) {
+  if (loss_.lost_frames() > 0 || !last_velocity_) return false;
+  const SE3 T_cur_prev = T_c_ref * last_.T_c_ref.inverse();
+  samples_.clear();
+  for (const AlignmentPoint& point : previous_points_) {
+    const Vector3 here = T_cur_prev * point.x, there = T_cur_prev_ * point.x;
+    if (std::min(here.z(), there.z()) <= 0) continue;
+    samples_.push_back((rig_.camera.project(here) - rig_.camera.project(there)).norm());
+  }
+  return !samples_.empty() && median(std::span(samples_)) > options_.search.radius_px;
+}
+
 /// Points that should be visible  (thesis 6.2.5), into the quadtree.
 void Tracker::select_candidates(const SE3& T_c_ref, TrackResult& result) {
   quadtree_.clear();

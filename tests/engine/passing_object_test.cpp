@@ -63,5 +63,14 @@ TEST(PassingObject, DoesNotTakeTheCameraAlongWhenItIsFast) {
   }
 }
 
+/// A train that fills half of the image, so that dense alignment goes along with it from one frame to the
+/// next and the points at rest are not even searched where they are.
+TEST(PassingObject, DoesNotTakeTheCameraAlongWhenTheImageAsAWholeMoves) {
+  for (const double px_a_frame : {15.0, 20.0, 30.0, 40.0}) {
+    SCOPED_TRACE(px_a_frame);
+    EXPECT_LT(farthest({.share = 0.5, .px_a_frame = px_a_frame, .disparity_px = 6}), 0.1);
+  }
+}
+
 }  // namespace
 }  // namespace twofold
