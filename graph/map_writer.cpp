@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <mutex>
 #include <utility>
 
 #include "graph/map_file.hpp"
@@ -36,6 +37,7 @@ bool begins_as_map(const fs::path& file) {
 }
 
 /// A file that appears under its name only when it is complete, with the mode of the one that it replaces.
+/// Threads take turns: two that write the same map would share its temporary file.
 class ReplacedFile {
  public:
   explicit ReplacedFile(const fs::path& file) : file_(followed(file)), temporary_(file_.string() + ".tmp") {
@@ -79,6 +81,9 @@ class ReplacedFile {
     throw MapFileError(temporary_.string() + ": " + what + ": " + std::strerror(errno));
   }
 
+  static inline std::mutex one_at_a_time;
+
+  std::unique_lock<std::mutex> turn_{one_at_a_time};
   fs::path file_, temporary_;
   int fd_ = -1;
   bool done_ = false;

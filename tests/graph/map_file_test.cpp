@@ -7,10 +7,12 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "fixtures/graph_invariants.hpp"
 #include "fixtures/live_memory.hpp"
@@ -130,6 +132,26 @@ TEST_F(MapFileTest, ALinkIsWrittenThroughAndAModeStays) {
   }
   EXPECT_EQ(fs::status(file_).permissions(), fs::perms::owner_read | fs::perms::owner_write);
   fs::remove(link);
+}
+
+TEST_F(MapFileTest, ThreadsThatSaveToOneFileTakeTurns) {
+  const SavedMap map = sample_map(60, 900, 1);
+  save_map(file_, map);
+  std::atomic<int> failed{0};
+  const auto save_often = [&] {
+    for (int i = 0; i < 40; ++i) {
+      try {
+        save_map(file_, map);
+      } catch (const MapFileError&) {
+        failed.fetch_add(1, std::memory_order_relaxed);  // a number; join orders what is read
+      }
+    }
+  };
+  {
+    const std::jthread one(save_often), other(save_often);
+    for (int i = 0; i < 40; ++i) EXPECT_NO_THROW((void)load_map(file_));
+  }
+  EXPECT_EQ(failed.load(std::memory_order_relaxed), 0);
 }
 
 TEST_F(MapFileTest, OnlyAMapIsReplaced) {
