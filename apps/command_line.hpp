@@ -1,11 +1,18 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <string>
 
 namespace twofold {
 
 /// What a program ends with.
 enum ExitCode : int { kOk = 0, kFailedRun = 1, kBadInput = 2 };
+
+/// For options that name a file: an empty name, as an unset variable of a shell script leaves it, is not the
+/// same as no option.
+inline std::string empty_name(const std::string& text) {
+  return text.empty() ? "is empty" : "";
+}
 
 /// Parses the command line, which runs the subcommand that it names. An error becomes one line on the
 /// standard error output, after the program's name: kBadInput for a bad command line, an IoError or a

@@ -98,7 +98,9 @@ Vocabulary Vocabulary::parse(std::span<const std::uint8_t> bytes, const std::str
 Vocabulary Vocabulary::load(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
-  const auto size = std::filesystem::file_size(file);
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  if (error) throw std::runtime_error(file.string() + ": is not a file of bytes: " + error.message());
   if (size > kHeaderBytes + std::size_t{kMaxNodes} * kNodeBytes + 4) {
     throw std::runtime_error(file.string() + ": too large to be a vocabulary");
   }

@@ -16,7 +16,13 @@ namespace {
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Times = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 
-PoseList make_trajectory(const Times& t_ns, const Doubles& positions, const Doubles& orientations) {
+PoseList make_trajectory(const py::object& given_times, const Doubles& positions,
+                         const Doubles& orientations) {
+  const py::array times = py::array::ensure(given_times);
+  if (!times) throw py::type_error("t_ns must be an array");
+  if (times.size() > 0 && times.dtype().kind() != 'i' && times.dtype().kind() != 'u')
+    throw py::type_error("t_ns must be integers, nanoseconds");
+  const Times t_ns(times);
   const py::ssize_t count = t_ns.size();
   if (t_ns.ndim() != 1) throw py::value_error("t_ns must have shape (N,)");
   if (positions.ndim() != 2 || positions.shape(0) != count || positions.shape(1) != 3)

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/command_line.hpp"
 #include "graph/map_place.hpp"
 #include "graph/part_extraction.hpp"
 #include "io/files/io_error.hpp"
@@ -39,13 +40,17 @@ SavedMap open_map(const std::string& file) {
 }
 
 void add_map_options(CLI::App& command, MapArguments& arguments) {
-  command.add_option("--save-map", arguments.save,
-                     "Write the map to this file (.tfm) at the end; parts that never joined it to "
-                     "FILE-2.tfm, ...");
+  command
+      .add_option("--save-map", arguments.save,
+                  "Write the map to this file (.tfm) at the end; parts that never joined it to "
+                  "FILE-2.tfm, ...")
+      ->check(empty_name);
   command.add_option("--checkpoint", arguments.checkpoint,
                      "Seconds after which the map is written to it during the run, again and again");
-  command.add_option("--load-map", arguments.load,
-                     "Go on with the map in this file, once a place of it is recognised");
+  command
+      .add_option("--load-map", arguments.load,
+                  "Go on with the map in this file, once a place of it is recognised")
+      ->check(empty_name);
   command.add_flag("--localise-only", arguments.localise_only,
                    "Poses in the loaded map, which does not change");
 }

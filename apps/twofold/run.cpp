@@ -251,12 +251,21 @@ void print_results(const RunArguments& arguments, const EngineOptions& options, 
   for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
 }
 
+/// Known now, not after an hour of tracking.
+void expect_place_for_trace(const std::string& trace) {
+  const std::filesystem::path file(trace);
+  if (std::filesystem::is_directory(file)) throw IoError(file, "is a folder, no file for a trace");
+  if (file.has_parent_path() && !std::filesystem::is_directory(file.parent_path()))
+    throw IoError(file, "the folder is not there");
+}
+
 int run(const RunArguments& arguments) {
   if (arguments.estimator == "swf") return run_with_filter(arguments);
   EngineOptions options = engine_options(arguments);
   apply_map_options(arguments.map, options);
   options.logs.folder = arguments.out;
   std::optional<Schedule> schedule = schedule_of(arguments);
+  expect_place_for_trace(arguments.trace);
   expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   std::optional<AutoCalibration> calibration;

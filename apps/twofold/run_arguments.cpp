@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/command_line.hpp"
 #include "io/files/io_error.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 
@@ -79,6 +80,19 @@ void expect_options_of_filter(const RunArguments& given) {
     if (is_given) throw IoError(option, "is not for --estimator swf");
 }
 
+namespace {
+
+std::shared_ptr<const Vocabulary> vocabulary_of(const std::string& file) {
+  try {
+    return std::make_shared<const Vocabulary>(file.empty() ? load_default_vocabulary()
+                                                           : Vocabulary::load(file));
+  } catch (const std::runtime_error& error) {
+    throw IoError(error.what());
+  }
+}
+
+}  // namespace
+
 EngineOptions engine_options(const RunArguments& arguments) {
   expect_consistent(arguments);
   EngineOptions options;
@@ -105,10 +119,7 @@ EngineOptions engine_options(const RunArguments& arguments) {
   }
   if (arguments.real_time) options.fifo_priority = 50;
   options.mapper.loop.enabled = !arguments.no_metric_loops;
-  if (!arguments.no_places) {
-    options.vocabulary = std::make_shared<const Vocabulary>(
-        arguments.vocabulary.empty() ? load_default_vocabulary() : Vocabulary::load(arguments.vocabulary));
-  }
+  if (!arguments.no_places) options.vocabulary = vocabulary_of(arguments.vocabulary);
   return options;
 }
 
@@ -120,9 +131,11 @@ void add_frame_options(CLI::App& command, RunArguments& arguments) {
                   "Path, or scheme:ARGUMENT?key=value (kitti, euroc, tum, images, "
                   "video, mcap, bag, synthetic, v4l2)")
       ->required();
-  command.add_option("--calib", arguments.calibration,
-                     "Calibration file instead of the recording's own; auto: found from the video "
-                     "of one camera itself");
+  command
+      .add_option("--calib", arguments.calibration,
+                  "Calibration file instead of the recording's own; auto: found from the video "
+                  "of one camera itself")
+      ->check(empty_name);
   command
       .add_option("--camera", arguments.camera,
                   "all: what the source has; mono: its left camera alone, whose scale is arbitrary")
@@ -167,9 +180,12 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
   add_frame_options(command, arguments);
   add_estimator_options(command, arguments);
   add_pose_options(command, arguments);
-  command.add_option("--vocabulary", arguments.vocabulary, "Vocabulary file instead of the built-in one");
-  command.add_option("--record", arguments.record,
-                     "Record the frames into this folder: the run can be repeated from it and schedule.log");
+  command.add_option("--vocabulary", arguments.vocabulary, "Vocabulary file instead of the built-in one")
+      ->check(empty_name);
+  command
+      .add_option("--record", arguments.record,
+                  "Record the frames into this folder: the run can be repeated from it and schedule.log")
+      ->check(empty_name);
   add_view_options(command, arguments.view);
   add_live_surface_options(command, arguments.surface);
   add_map_options(command, arguments.map);
@@ -178,10 +194,13 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
                    "Close no small loops: for experiments with drift");
   command.add_flag("--deterministic", arguments.deterministic,
                    "One thread, one order: same input, same bytes");
-  command.add_option("--replay-schedule", arguments.replay_schedule,
-                     "Repeat the run that wrote this schedule.log");
+  command
+      .add_option("--replay-schedule", arguments.replay_schedule,
+                  "Repeat the run that wrote this schedule.log")
+      ->check(empty_name);
   command.add_flag("--preload", arguments.preload, "Decode everything into memory before the clock starts");
-  command.add_option("--trace", arguments.trace, "Write spans and counters for ui.perfetto.dev to this file");
+  command.add_option("--trace", arguments.trace, "Write spans and counters for ui.perfetto.dev to this file")
+      ->check(empty_name);
   command.add_option("--pin", arguments.pin, "CPUs of tracker, mapper, loop closer: 0,1,1");
   command.add_flag("--rt", arguments.real_time, "Tracker under SCHED_FIFO, memory locked, where permitted");
   command.add_flag("--quiet", arguments.quiet, "No progress line");

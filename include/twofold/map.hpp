@@ -25,6 +25,8 @@ class TWOFOLD_API MapSnapshot {
   struct Keyframe {
     std::uint32_t id = kNoId;
     std::uint32_t part = kNoId;  ///< first keyframe of its map part; each part has a world of its own
+    /// Number and time stamp of the frame it was made of. Keyframes of the map that a run went on with have
+    /// those of the recording that map was made from: frames of this run may have the same.
     std::int64_t frame = 0;
     std::int64_t t_ns = 0;
     Pose T_world_camera;

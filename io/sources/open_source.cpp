@@ -91,8 +91,12 @@ const std::map<std::string, Opener>& openers() {
        [](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
          return std::make_unique<V4l2Source>(spec, options);
        }},
-      {"synthetic", [](const SourceSpec& spec,
-                       const SourceOptions&) { return open_synthetic(spec.argument, spec.parameters); }},
+      {"synthetic",
+       [](const SourceSpec& spec, const SourceOptions& options) {
+         if (options.calibration)
+           throw IoError(*options.calibration, "is not asked for: a rendered scene has its calibration");
+         return open_synthetic(spec.argument, spec.parameters);
+       }},
   };
   return kOpeners;
 }

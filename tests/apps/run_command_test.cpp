@@ -267,6 +267,15 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
   expect_bad_input(run_recording("--calib /nonexistent.yaml"), "/nonexistent.yaml");
   folder_.write("noise.log", "this is no schedule");
   expect_bad_input(run_recording("--replay-schedule '" + (folder_ / "noise.log") + "'"), "noise.log");
+  for (const std::string option :
+       {"--load-map", "--save-map", "--replay-schedule", "--vocabulary", "--calib", "--trace"})
+    expect_bad_input(run_recording(option + " ''"), option + ": is empty");
+  expect_bad_input(run_recording("--vocabulary /nonexistent"), "/nonexistent: cannot be opened");
+  expect_bad_input(run_recording("--vocabulary " + folder_.path().string()), "is not a file of bytes");
+  expect_bad_input(run_recording("--trace /nonexistent/trace"),
+                   "/nonexistent/trace: the folder is not there");
+  expect_bad_input(run_recording("--trace " + folder_.path().string()), "is a folder");
+  expect_bad_input(run(folder_, "run synthetic:desk --calib c.yaml"), "c.yaml: is not asked for");
   expect_bad_input(run(folder_, "run nosuch:thing"), "nosuch");
   expect_bad_input(run(folder_, "run kitti:/nonexistent"), "/nonexistent");
   expect_bad_input(run(folder_, "run kitti:" + recording_.string() + " --out /proc/nothing/here"),
@@ -297,9 +306,12 @@ TEST_F(RunCommand, NothingOfAnotherEstimatorStays) {
 /// A walk that turns shows the focal length, and the file that is written gives the next run the same camera.
 TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   constexpr double kFocalLength = 256;
+  const Outcome rendered =
+      run(folder_, "render 'synthetic:courtyard?frames=160&width=320&height=240&f=256&noise=2' --out '" +
+                       (folder_ / "recording") + "'");
+  ASSERT_EQ(rendered.exit_code, 0) << rendered.err;
   const std::string source =
-      "run 'synthetic:courtyard?frames=160&width=320&height=240&f=256&noise=2' --camera mono "
-      "--deterministic --out '";
+      "run 'euroc:" + (folder_ / "recording") + "' --camera mono --deterministic --out '";
   const Outcome outcome = run(folder_, source + (folder_ / "auto") + "' --calib auto");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("calibration f "), std::string::npos) << outcome.out;
@@ -460,8 +472,10 @@ TEST_F(RunCommand, BrokenRecordingsAreOneLineAndExitCodeTwo) {
     fs::remove_all(recording_);
     fs::create_directory(recording_);
   });
-  damaged("undecodable image", "000005.png",
-          [&] { std::ofstream(recording_ / "image_0/000005.png") << "not an image"; });
+  damaged("images that cannot be decoded", "000015.png", [&] {
+    for (int i = 5; i < kFrames; ++i)
+      std::ofstream(recording_ / fmt::format("image_0/{:06}.png", i)) << "not an image";
+  });
   damaged("image of another size", "000007.png", [&] {
     cv::imwrite((recording_ / "image_1/000007.png").string(), cv::Mat(100, 100, CV_8UC1, cv::Scalar(9)));
   });
@@ -470,6 +484,17 @@ TEST_F(RunCommand, BrokenRecordingsAreOneLineAndExitCodeTwo) {
   damaged("repeated time stamp", "times.txt", [&] { replace_in("times.txt", "0.100000", "0.050000"); });
   damaged("time stamps out of order", "times.txt", [&] { replace_in("times.txt", "0.100000", "0.010000"); });
   damaged("left and right counts differ", "", [&] { fs::remove(recording_ / "image_1/000023.png"); });
+}
+
+TEST_F(RunCommand, ADamagedImageIsLeftOutAndTold) {
+  std::ofstream(recording_ / "image_1/000005.png") << "not an image";
+  const Outcome outcome = run_recording("--deterministic");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("1 frames with a damaged image were left out"), std::string::npos)
+      << outcome.out;
+  EXPECT_NE(outcome.out.find("000005.png: the image cannot be decoded"), std::string::npos) << outcome.out;
+  EXPECT_EQ(read_tum_trajectory(folder_.path() / "result/trajectory.txt").size(),
+            static_cast<std::size_t>(kFrames - 1));
 }
 
 TEST_F(RunCommand, ATruthThatCannotBeReadStopsNoRun) {

@@ -47,7 +47,7 @@ def test_what_the_source_raises_comes_at_the_end(tmp_path: object) -> None:
 
 
 def record(folder: str) -> None:
-    """Five image pairs, of which the fourth is damaged."""
+    """Five image pairs, of which the fourth is of another size."""
     cv2 = pytest.importorskip("cv2")
     from pathlib import Path
 
@@ -55,9 +55,7 @@ def record(folder: str) -> None:
         (Path(folder) / side).mkdir(parents=True)
         for i in range(5):
             file = Path(folder) / side / f"{i}.png"
-            cv2.imwrite(str(file), np.full((48, 64), 40 * i, np.uint8))
-            if i == 3:
-                file.write_bytes(file.read_bytes()[:60])
+            cv2.imwrite(str(file), np.full((48, 64 if i != 3 else 60), 40 * i, np.uint8))
 
 
 def python(script: str, *, interrupt: bool = False) -> subprocess.CompletedProcess[str]:
@@ -128,3 +126,8 @@ def test_poses_compose() -> None:
     assert not T_a_b.t.flags.writeable
     with pytest.raises(ValueError, match="length 1"):
         twofold.Pose([0, 0, 0], [0, 0, 0, 2])
+
+
+def test_times_of_a_trajectory_are_whole_nanoseconds() -> None:
+    with pytest.raises(TypeError, match="nanoseconds"):
+        twofold.Trajectory([1.5, 2.5], np.zeros((2, 3)), np.tile([0, 0, 0, 1], (2, 1)))

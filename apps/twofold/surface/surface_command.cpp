@@ -49,6 +49,7 @@ struct RunInput {
   std::string source;
   std::string calibration;  ///< file that the run was given; empty: none
   double row_offset = 0;    ///< of the right images, which the run took back [px]
+  bool went_on = false;     ///< with a loaded map, whose keyframes are of frames of another recording
 };
 
 RunInput input_of_run(const fs::path& folder) {
@@ -63,6 +64,7 @@ RunInput input_of_run(const fs::path& folder) {
     input.calibration = summary["calibration_file"].get<std::string>();
   if (summary.contains("row_offset_px") && summary["row_offset_px"].is_number())
     input.row_offset = summary["row_offset_px"].get<double>();
+  input.went_on = summary.value("loaded_map", nlohmann::json()).is_object();
   if (!(std::abs(input.row_offset) <= RowOffsetMeter::kMost))
     throw IoError(file, "row_offset_px is more than any run takes back");
   return input;
@@ -96,8 +98,9 @@ SurfaceJob surface_job(const SurfaceArguments& arguments) {
     job.poses_name = "the ground truth";
     if (job.poses.empty()) throw IoError(arguments.input, "has no ground truth");
   } else {
+    const char* const own = input.went_on ? "trajectory.txt" : "keyframes.txt";
     const fs::path file =
-        arguments.poses.empty() ? fs::path(arguments.input) / "keyframes.txt" : fs::path(arguments.poses);
+        arguments.poses.empty() ? fs::path(arguments.input) / own : fs::path(arguments.poses);
     job.poses = read_trajectory(file);
     job.poses_name = file.string();
     if (job.poses.empty()) throw IoError(file, "holds no poses");
@@ -227,8 +230,10 @@ void add_surface_command(CLI::App& app, int& exit_code) {
       ->required();
   command->add_option(
       "--poses", arguments->poses,
-      "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise. A frame has "
-      "a pose if their times differ by no more than 1 ms");
+      "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise, or its "
+      "trajectory.txt if it went on with a loaded map, whose keyframes are of another recording. A frame has "
+      "a "
+      "pose if their times differ by no more than 1 ms");
   command->add_option("--calib", arguments->calibration,
                       "Calibration file instead of the recording's own, or of that which the run was given");
   command->add_option("--out", arguments->out,
