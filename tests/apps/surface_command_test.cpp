@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -68,6 +69,22 @@ TEST(SurfaceCommand, ThreadedRunsAndFinishedRunsGiveSurfacesToo) {
   EXPECT_EQ(mesh.normals.size(), mesh.positions.size());
   EXPECT_FALSE(content(folder / "after/p.png").empty());
   EXPECT_EQ(content(folder / "after/s.obj").rfind("# metres\nv ", 0), 0u);
+}
+
+/// The loaded map's keyframes are of another recording, whose times may be those of this one's frames.
+TEST(SurfaceCommand, ARunInALoadedMapIsFusedAlongItsTrajectory) {
+  const ScratchFolder folder;
+  const std::string map = folder / "map.tfm";
+  const std::string track = "run " + kScene + " --deterministic --quiet --out '";
+  ASSERT_EQ(run(folder, track + (folder / "first") + "' --save-map '" + map + "'").exit_code, 0);
+  ASSERT_EQ(run(folder, track + (folder / "second") + "' --localise-only --load-map '" + map + "'").exit_code,
+            0);
+  const Outcome fused = run(folder, "surface '" + (folder / "second") + "' --voxel 0.02");
+  ASSERT_EQ(fused.exit_code, 0) << fused.err;
+  const std::string along = content(folder / "second/trajectory.txt");
+  const auto poses = std::count_if(along.begin(), along.end(), [](char c) { return c == '\n'; }) -
+                     (along.rfind('#', 0) == 0 ? 1 : 0);
+  EXPECT_NE(fused.out.find(std::to_string(poses) + " depth images fused"), std::string::npos) << fused.out;
 }
 
 TEST(SurfaceCommand, KeepsTheMeshUpToDateAndSaysHowFarItIsBehind) {
