@@ -7,7 +7,6 @@ namespace twofold::synthetic {
 namespace {
 
 constexpr int kAround = 96;  // corners of a circle
-constexpr double kPi = std::numbers::pi;
 
 class MeshBuilder {
  public:
@@ -45,14 +44,14 @@ TriangleMesh mesh_of(const Scene& scene) {
     });
   for (const Cylinder& c : scene.cylinders)
     builder.sheet(kAround, 1, [&](int i, int j) {
-      const double angle = 2 * kPi * i / kAround;
+      const double angle = 2 * std::numbers::pi * i / kAround;
       return Vector3(c.base +
                      Vector3(c.radius * std::cos(angle), c.radius * std::sin(angle), (1 - j) * c.height));
     });
   for (const Sphere& s : scene.spheres)
     builder.sheet(kAround, kAround / 2, [&](int i, int j) {
-      const double angle = 2 * kPi * i / kAround;
-      const double down = 2 * kPi * j / kAround;
+      const double angle = 2 * std::numbers::pi * i / kAround;
+      const double down = 2 * std::numbers::pi * j / kAround;
       return Vector3(s.centre + s.radius * Vector3(std::sin(down) * std::cos(angle),
                                                    std::sin(down) * std::sin(angle), std::cos(down)));
     });
