@@ -20,12 +20,12 @@ std::optional<SurfaceDistance> SurfaceVolume::distance(const Vector3& x_v) const
 }
 
 std::optional<BlockPosition> shift_in_blocks(const SE3& T, double edge) {
-  constexpr double kRounding = 1e-9;  // far less than a sample, however far away
+  constexpr double kNegligible = 1e-9;  // far less than a sample, however far away
   const Vector3 shift = T.translation() / edge;
   const Vector3 whole = shift.array().round();
   if (!(whole.cwiseAbs().maxCoeff() < 1e9)) return std::nullopt;
-  const bool is_turned = (T.rotation() - Matrix3::Identity()).cwiseAbs().maxCoeff() > kRounding;
-  if (is_turned || (shift - whole).cwiseAbs().maxCoeff() > kRounding) return std::nullopt;
+  const bool is_turned = (T.rotation() - Matrix3::Identity()).cwiseAbs().maxCoeff() > kNegligible;
+  if (is_turned || (shift - whole).cwiseAbs().maxCoeff() > kNegligible) return std::nullopt;
   return BlockPosition{static_cast<std::int32_t>(whole.x()), static_cast<std::int32_t>(whole.y()),
                        static_cast<std::int32_t>(whole.z())};
 }
@@ -37,17 +37,17 @@ std::vector<std::uint32_t> SurfaceVolume::add_overlapped(const BlockPosition& of
   // rests on both.
   constexpr double kHalf = 0.5 * (1 + 1.0 / kBlockEdge);
   constexpr double kOwnHalf = 0.5 * (1 - 1.0 / kBlockEdge);
-  constexpr double kRounding = 1e-6;
+  constexpr double kNegligible = 1e-6;
   const Vector3 shift = T_v_o.translation() / (kBlockEdge * options_.voxel);
   const Matrix3 R_v_o = T_v_o.rotation();
   const Vector3 middle_o = Vector3(of_other.x, of_other.y, of_other.z) + Vector3::Constant(1 - kHalf);
   const Vector3 middle = R_v_o * middle_o + shift;
-  const Vector3 half = R_v_o.cwiseAbs() * Vector3::Constant(kHalf + kRounding);
+  const Vector3 half = R_v_o.cwiseAbs() * Vector3::Constant(kHalf + kNegligible);
   const Eigen::Vector3i first = (middle - half).array().floor().cast<int>();
   const Eigen::Vector3i last = (middle + half).array().floor().cast<int>();
   // Two boxes are apart, too, when they are so along an axis of the turned one.
   const Vector3 reach_o =
-      (R_v_o.transpose().cwiseAbs() * Vector3::Constant(kOwnHalf)).array() + kHalf + kRounding;
+      (R_v_o.transpose().cwiseAbs() * Vector3::Constant(kOwnHalf)).array() + kHalf + kNegligible;
   std::vector<std::uint32_t> overlapped;
   for (int z = first.z(); z <= last.z(); ++z)
     for (int y = first.y(); y <= last.y(); ++y)
