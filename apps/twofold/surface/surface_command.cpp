@@ -64,9 +64,9 @@ RunInput input_of_run(const fs::path& folder) {
     input.calibration = summary["calibration_file"].get<std::string>();
   if (summary.contains("row_offset_px") && summary["row_offset_px"].is_number())
     input.row_offset = summary["row_offset_px"].get<double>();
-  input.went_on = summary.value("loaded_map", nlohmann::json()).is_object();
   if (!(std::abs(input.row_offset) <= RowOffsetMeter::kMost))
     throw IoError(file, "row_offset_px is more than any run takes back");
+  input.went_on = summary.value("loaded_map", nlohmann::json()).is_object();
   return input;
 }
 
@@ -231,9 +231,8 @@ void add_surface_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--poses", arguments->poses,
       "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise, or its "
-      "trajectory.txt if it went on with a loaded map, whose keyframes are of another recording. A frame has "
-      "a "
-      "pose if their times differ by no more than 1 ms");
+      "trajectory.txt if it went on with a loaded map, whose keyframes are of another recording. A frame "
+      "has a pose if their times differ by no more than 1 ms");
   command->add_option("--calib", arguments->calibration,
                       "Calibration file instead of the recording's own, or of that which the run was given");
   command->add_option("--out", arguments->out,
