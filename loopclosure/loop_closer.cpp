@@ -57,20 +57,17 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   }
   // How much this scene's neighbouring views look alike; 0 at the start of a map.
   const double likeness = previous_ ? bag_score(view.bag, *previous_) : 0;
-  auto candidates = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
-  if (candidates.empty()) candidates = in_older_parts(keyframe.id, view.bag, graph);
+  const auto consistent = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
+  const auto place = consistent.empty() ? only_place(in_older_parts(keyframe.id, view.bag, graph), view,
+                                                     keyframe.images, graph)
+                                        : first_place(consistent, view, keyframe.images, graph);
   std::optional<LoopConstraint> loop;
-  for (const PlaceCandidate& candidate : candidates) {
-    const auto verified = verify(candidate.keyframe, view, keyframe.images, graph);
-    if (!verified) continue;
-    const auto scale = scale_of(*verified);
-    if (!scale) continue;
-    const SE3 T_to_from(verified->T_c_k.so3(), *scale * verified->T_c_k.translation());
-    const LoopConstraint seen{graph.version(),   candidate.keyframe, keyframe.id, T_to_from,
-                              verified->inliers, verified->weight,   *scale};
+  if (const auto scale = place ? scale_of(*place) : std::nullopt) {
+    const SE3 T_to_from(place->T_c_k.so3(), *scale * place->T_c_k.translation());
+    const LoopConstraint seen{graph.version(), place->keyframe, keyframe.id, T_to_from,
+                              place->inliers,  place->weight,   *scale};
     if (probation_.confirms(seen, graph) && !(one_camera && redundant_.has(seen, refinement_.found(), graph)))
       loop = seen;
-    break;
   }
   if (one_camera) view.z.clear();  // the map may change
   remember(keyframe.id, std::move(view));
@@ -94,12 +91,39 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
     for (const DescribedCorner& corner : view.corners)
       view.z.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(Rig::kNoRight));
   }
-  const auto candidates = recogniser_.query_anywhere(
-      view.bag, static_cast<std::size_t>(options_.relocalisation_candidates), graph);
+  return only_place(recogniser_.query_anywhere(
+                        view.bag, static_cast<std::size_t>(options_.relocalisation_candidates), graph),
+                    view, images, graph);
+}
+
+/// The likeliest of the candidates that is verified.
+std::optional<Relocalisation> LoopCloser::first_place(const std::vector<PlaceCandidate>& candidates,
+                                                      const PlaceView& view, const FrameImages& images,
+                                                      const GraphSnapshot& graph) {
   for (const PlaceCandidate& candidate : candidates) {
-    if (auto verified = verify(candidate.keyframe, view, images, graph)) return verified;
+    auto verified = verify(candidate.keyframe, view, images, graph);
+    if (verified && scale_of(*verified)) return verified;
   }
   return std::nullopt;
+}
+
+/// The same, where nothing is known of where the camera may be: none if the view shows places that cannot be
+/// one, as in a street whose houses look alike.
+std::optional<Relocalisation> LoopCloser::only_place(const std::vector<PlaceCandidate>& candidates,
+                                                     const PlaceView& view, const FrameImages& images,
+                                                     const GraphSnapshot& graph) {
+  std::optional<Relocalisation> likeliest;
+  for (const PlaceCandidate& candidate : candidates) {
+    const auto verified = verify(candidate.keyframe, view, images, graph);
+    if (!verified) continue;
+    if (!likeliest)
+      likeliest = verified;
+    else if (probation_.contradicts(likeliest->keyframe, verified->keyframe,
+                                    Sim3(likeliest->T_c_k.inverse() * verified->T_c_k), graph))
+      return std::nullopt;
+  }
+  // Once more, so that what the refinement found last is the answer's.
+  return likeliest ? verify(likeliest->keyframe, view, images, graph) : std::nullopt;
 }
 
 std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& view,

@@ -73,6 +73,12 @@ class LoopCloser {
   /// Does the view show the place of keyframe k? First by corners, then by the map's points.
   [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
                                                      const FrameImages& images, const GraphSnapshot& graph);
+  [[nodiscard]] std::optional<Relocalisation> first_place(const std::vector<PlaceCandidate>& candidates,
+                                                          const PlaceView& view, const FrameImages& images,
+                                                          const GraphSnapshot& graph);
+  [[nodiscard]] std::optional<Relocalisation> only_place(const std::vector<PlaceCandidate>& candidates,
+                                                         const PlaceView& view, const FrameImages& images,
+                                                         const GraphSnapshot& graph);
   [[nodiscard]] std::vector<PlaceCandidate> in_older_parts(KeyframeId id, const BagOfWords& bag,
                                                            const GraphSnapshot& graph);
   void collect_views(KeyframeId k, const GraphSnapshot& graph);

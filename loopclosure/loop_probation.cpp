@@ -56,12 +56,15 @@ bool LoopProbation::same_pose(const Sim3& S_a, const Sim3& S_b, double depth) co
 bool LoopProbation::exclude_each_other(const LoopConstraint& held, const LoopConstraint& loop,
                                        const GraphSnapshot& graph) const {
   const auto T_to_to = pose_in_map(graph, loop.to, held.to);
-  const auto T_from_from = pose_in_map(graph, loop.from, held.from);
-  if (!T_to_to || !T_from_from) return false;
-  const Sim3 S_from_from = loop.S_to_from().inverse() * *T_to_to * held.S_to_from();
-  const double depth = graph.keyframe(loop.from).median_depth;
-  return !same_pose(*T_from_from, S_from_from, depth) &&
-         !drift_.explains(graph, held.from, loop.from, S_from_from);
+  if (!T_to_to) return false;
+  return contradicts(loop.from, held.from, loop.S_to_from().inverse() * *T_to_to * held.S_to_from(), graph);
+}
+
+bool LoopProbation::contradicts(KeyframeId b, KeyframeId a, const Sim3& S_b_a,
+                                const GraphSnapshot& graph) const {
+  const auto as_mapped = pose_in_map(graph, b, a);
+  return as_mapped && !same_pose(*as_mapped, S_b_a, graph.keyframe(b).median_depth) &&
+         !drift_.explains(graph, a, b, S_b_a);
 }
 
 }  // namespace twofold

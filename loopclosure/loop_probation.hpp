@@ -43,6 +43,11 @@ class LoopProbation {
   /// @return whether it may join the map now; else it is held as a witness
   [[nodiscard]] bool confirms(const LoopConstraint& loop, const GraphSnapshot& graph);
 
+  /// Whether the map has two of its keyframes elsewhere to each other than p_b = S_b_a * p_a, and the way
+  /// between them does not explain it. Of two parts it says nothing.
+  [[nodiscard]] bool contradicts(KeyframeId b, KeyframeId a, const Sim3& S_b_a,
+                                 const GraphSnapshot& graph) const;
+
  private:
   struct Held {
     LoopConstraint loop;

@@ -79,6 +79,33 @@ TEST_F(LoopCloserTest, RelocalisesInTheMapAndNotElsewhere) {
   }
 }
 
+/// The same views a second time, from where the map says, so far away from the first.
+TEST_F(LoopCloserTest, IsNotPlacedWhereTwoPlacesLookTheSame) {
+  constexpr int kViews = 4;
+  const auto relocalised = [this](double away) {
+    GraphWriter writer;
+    GraphSnapshot graph;
+    LoopCloser closer(rig_, vocabulary(), options());
+    for (int k = 0; k < 2 * kViews; ++k) {
+      KeyframeProposal view = keyframe(k % kViews);
+      view.id = KeyframeId{static_cast<std::uint32_t>(k)};
+      Keyframe added;
+      added.id = view.id;
+      added.part = KeyframeId{0};
+      added.T_k_w = truth(k % kViews) * SE3(SO3(), Vector3(k < kViews ? 0 : away, 0, 0));
+      added.median_depth = 3;
+      writer.add_keyframe(added);
+      writer.set_reference(added.id);
+      graph = writer.publish();
+      (void)closer.step(view, graph);
+    }
+    return closer.relocalise(keyframe(1).images, graph).has_value();
+  };
+  EXPECT_TRUE(relocalised(0));
+  EXPECT_TRUE(relocalised(0.2)) << "drift explains it";
+  EXPECT_FALSE(relocalised(40));
+}
+
 TEST_F(LoopCloserTest, CulledKeyframesAreForgotten) {
   LoopCloser closer(rig_, vocabulary(), options());
   for (int k = 0; k < 6; ++k) {
@@ -110,6 +137,7 @@ TEST_F(LoopCloserTest, EveryPlaceIsFoundAfterHundredsOfThousandsOfKeyframes) {
     added.id = KeyframeId{next++};
     added.part = KeyframeId{kBefore};
     added.T_k_w = truth(kTurn / kPlaces * view);
+    added.median_depth = 3;
     writer_.add_keyframe(added);
     writer_.set_reference(added.id);
     graph_ = writer_.publish();
