@@ -26,6 +26,7 @@ std::string SyntheticOptions::invalid_reason() const {
                                  outside("frames", frames, 0, 1e8),
                                  outside("noise", noise, 0, 50),
                                  outside("depth_noise", depth_noise, 0, 10),
+                                 outside("depth_max", depth_max, 0.5, 100),
                                  outside("blur", blur, 0, 1),
                                  outside("exposure", exposure, 0, 0.9),
                                  outside("flight", flight, 0, 3),

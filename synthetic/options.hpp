@@ -24,6 +24,7 @@ struct SyntheticOptions {
   std::uint64_t seed = 1;  ///< of textures and noise
   double noise = 2;        ///< standard deviation [grey levels] 0 .. 50
   double depth_noise = 1;  ///< RGB-D: factor on the sensor's depth noise, 0 .. 10
+  double depth_max = 8;    ///< RGB-D: the sensor's reach [m], 0.5 .. 100
   double blur = 0;         ///< exposure time as a share of the frame interval, 0 .. 1
   double exposure = 0;     ///< amplitude of the changes of gain, 0 .. 0.9
   double flight = 0;       ///< the camera swings about its path (flown in camera_path.hpp) by so much, 0 .. 3

@@ -67,6 +67,7 @@ SyntheticSequence::SyntheticSequence(const SyntheticOptions& options)
   rig_.camera = lens_;
   rig_.camera.fx = rig_.camera.fy = options.f * (1 + options.f_error);
   rig_.baseline = options.sensor == SensorKind::kMono ? 0 : options.baseline;
+  rig_.depth_max = options.depth_max;
   const std::int64_t frames =
       options.frames > 0 ? options.frames
                          : std::max(1L, std::lround(options.rounds * staging_.round_seconds * options.fps));

@@ -109,6 +109,8 @@ const char* describe(LostCause cause) {
     case LostCause::kRowsMisaligned:
       return "too few corners with depth: rows of the right image lie higher or lower than the left's; "
              "rectify the pair";
+    case LostCause::kRightCovered:
+      return "too few corners with depth: the right camera sees hardly anything; is it covered, or dark?";
     case LostCause::kTooFewCandidates:
       return "hardly any map point should be visible";
     case LostCause::kTooFewMatches:

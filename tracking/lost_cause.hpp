@@ -12,6 +12,7 @@ enum class LostCause : std::uint8_t {
   kNoTexture,            ///< too few corners with depth to start a map
   kImagesSwapped,        ///< likewise, but the swapped pair has them
   kRowsMisaligned,       ///< likewise, but rows further apart than can be taken back have them
+  kRightCovered,         ///< likewise: the left image shows something, the right one hardly anything
   kTooFewCandidates,     ///< hardly any map point projects into the image
   kTooFewMatches,        ///< points should be visible but were not found (occlusion, wrong prediction)
   kInconsistentMatches,  ///< found points do not agree on a pose

@@ -70,6 +70,7 @@ std::string TrackerOptions::invalid_reason() const {
       .at_least("max_new_points", max_new_points, 1)
       .at_least("min_corner_score", min_corner_score, 0)
       .at_least("scarce_points", scarce_points, 0)
+      .at_least("seeded_points", seeded_points, 0)
       .at_least("max_failures", max_failures, 1)
       .at_least("max_immature_age", max_immature_age, 0)
       .nested("first_structure", first_structure.invalid_reason())

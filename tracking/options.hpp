@@ -57,7 +57,7 @@ struct TrackerOptions {
   int trusted_after = 3;
   int moving_after = 2;  ///< times in a row that an immature point is found elsewhere: it is said to move
   /// While lost, so long after the last pose, the camera is looked for first where it is if it went on as it
-  /// moved [s].
+  /// moved [s]; later, if it is within reach of where it then was.
   double coast_for = 1.5;
   /// A pose from a rough start, in metres, may be so far from where the camera would be had it gone on: by
   /// what an acceleration adds [m/s^2], and by what the poses themselves err [m].
@@ -87,9 +87,11 @@ struct TrackerOptions {
   int max_failures = 4;      ///< immature points not found so many frames in a row are given up
   int max_immature_age = 3;  ///< keyframes after which an immature point is given up
 
-  // One camera only.
-  FirstStructureOptions first_structure;
-  DepthSeedOptions seeds;
+  FirstStructureOptions first_structure;  ///< one camera only
+  DepthSeedOptions seeds;                 ///< corners whose depth is not measured
+  /// Where most new corners have no depth, a rig that measures it starts some without, as one camera does:
+  /// as many as are missing to so many points in view; 0: never.
+  int seeded_points = 120;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

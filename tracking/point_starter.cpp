@@ -81,6 +81,7 @@ void PointStarter::spread_corners(const FrameImages& images, const CornerBounds&
 
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                         ImmaturePoints& immature) {
+  with_depth_ = without_depth_ = 0;
   int started = start_at(usual_corners(), options_.max_new_points, images, anchor, shutter, immature);
   if (tracked_ < options_.scarce_points && is_dark(images.left))
     started +=
@@ -97,7 +98,12 @@ int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameIm
     const Eigen::Vector2f uv = at_level_zero(corner);
     ImmaturePoint point;
     point.anchor = anchor;
-    if (occupied_[cell_of(uv)] != 0 || !measure(images, corner, point)) continue;
+    if (occupied_[cell_of(uv)] != 0) continue;
+    if (!measure(images, corner, point)) {
+      ++without_depth_;
+      continue;
+    }
+    ++with_depth_;
     if (!shutter.at_rest()) move_to_mid_exposure(shutter, point);
     if (!immature.add(point)) break;
     occupy(uv);
@@ -106,11 +112,12 @@ int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameIm
   return started;
 }
 
-void PointStarter::choose_corners(const FrameImages& images, std::vector<PointAppearance>& appearances) {
+void PointStarter::choose_corners(const FrameImages& images, int wanted,
+                                  std::vector<PointAppearance>& appearances) {
+  if (wanted <= 0) return;
   spread_corners(images, usual_corners());
   const std::size_t room = appearances.capacity() - appearances.size();
-  const std::size_t full =
-      appearances.size() + std::min(room, static_cast<std::size_t>(options_.max_new_points));
+  const std::size_t full = appearances.size() + std::min(room, static_cast<std::size_t>(wanted));
   PointAppearance appearance;
   for (std::int64_t i = quadtree_.next(); i >= 0 && appearances.size() < full; i = quadtree_.next()) {
     const Corner& corner = corners_[static_cast<std::size_t>(i)];
@@ -123,18 +130,20 @@ void PointStarter::choose_corners(const FrameImages& images, std::vector<PointAp
   }
 }
 
-bool PointStarter::sees_corners(const FrameImages& images, int wanted) {
+bool PointStarter::sees_corners(const ImagePyramid& image, int wanted) {
   clear();
   corners_.clear();
   constexpr int level = 1;
-  detect_corners(images.left.level(level), level, options_.corner_threshold, options_.min_corner_score,
-                 kBorder, {options_.cell_px, columns_, rows_, occupied_}, corners_);
+  detect_corners(image.level(level), level, options_.corner_threshold, options_.min_corner_score, kBorder,
+                 {options_.cell_px, columns_, rows_, occupied_}, corners_);
   return static_cast<int>(corners_.size()) >= wanted;
 }
 
 LostCause PointStarter::explain_missing_depth(const FrameImages& images, int wanted) {
   const cv::Mat& left = images.left.level(0);
   const cv::Mat& right = images.right.level(0);
+  if (sees_corners(images.left, wanted) && !sees_corners(images.right, wanted / kClearly))
+    return LostCause::kRightCovered;
   const int enough = std::max(wanted, kClearly * count_depths(left, right));
   if (count_depths(right, left) >= enough) return LostCause::kImagesSwapped;
   for (int shift = RowOffsetMeter::kMost; shift <= kMaxRowShift; ++shift) {

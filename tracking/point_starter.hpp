@@ -35,14 +35,18 @@ class PointStarter {
   /// many. The anchor's pose is that at mid-exposure.
   int start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
             ImmaturePoints& immature);
-  /// For one camera: patches where nothing is tracked, evenly over the image, appended to `appearances` up to
-  /// its capacity and TrackerOptions::max_new_points. Marks their places as occupied.
-  void choose_corners(const FrameImages& images, std::vector<PointAppearance>& appearances);
+  /// In the last start more corners had no depth than had one.
+  [[nodiscard]] bool depth_is_scarce() const { return without_depth_ > with_depth_; }
+  /// Points that were told of as tracked, or started, since all was empty.
+  [[nodiscard]] int points_in_view() const { return tracked_; }
+  /// Patches where nothing is tracked, evenly over the image: at most `wanted` are appended to `appearances`,
+  /// as its capacity allows. Marks their places as occupied.
+  void choose_corners(const FrameImages& images, int wanted, std::vector<PointAppearance>& appearances);
   /// Whether corners are seen in so many cells: a quick look at level 1, where noise makes none.
-  [[nodiscard]] bool sees_corners(const FrameImages& images, int wanted);
+  [[nodiscard]] bool sees_corners(const ImagePyramid& image, int wanted);
 
-  /// Of a stereo pair that gives too few points: kImagesSwapped or kRowsMisaligned if the pair would give
-  /// them that way, else kNoTexture. Bounded, but as much work as several starts.
+  /// Of a stereo pair that gives too few points: kRightCovered, or kImagesSwapped or kRowsMisaligned if the
+  /// pair would give them that way, else kNoTexture. Bounded, but as much work as several starts.
   [[nodiscard]] LostCause explain_missing_depth(const FrameImages& images, int wanted);
 
  private:
@@ -67,7 +71,8 @@ class PointStarter {
   int columns_ = 0;
   int rows_ = 0;
   std::vector<std::uint8_t> occupied_;
-  int tracked_ = 0;  ///< points that `occupy` was told of
+  int tracked_ = 0;                         ///< points that `occupy` was told of
+  int with_depth_ = 0, without_depth_ = 0;  ///< corners of the last start
   std::vector<Corner> corners_;
   Quadtree quadtree_;
 };

@@ -46,7 +46,8 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
       uncertainty_(rig),
       immature_points_(kMaxImmaturePoints, kMaxPending),
-      starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options) {
+      starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options),
+      seeds_(rig, options.search, options.seeds, kMaxSeeds) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   matches_.reserve(searches);
   missed_.reserve(searches);
@@ -55,14 +56,11 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   inlier_ids_.reserve(searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   previous_points_.reserve(kMaxAlignmentPoints);
+  new_corners_.reserve(static_cast<std::size_t>(options.max_new_points));
   if (rig.kind == SensorKind::kStereo) right_rows_.emplace(rig);
   if (!rig.readout) readout_.emplace(rig, searches);
   if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
-  if (rig.kind == SensorKind::kMono) {
-    monocular_start_.emplace(rig, options);
-    seeds_.emplace(rig, options.search, options.seeds, kMaxSeeds);
-    new_corners_.reserve(static_cast<std::size_t>(options.max_new_points));
-  }
+  if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
   allocate_images(rig, current_);
   allocate_images(rig, previous_);
   wide_search_.prepare(previous_corners_);
@@ -87,7 +85,7 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   const bool map_exists = last_.reference != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
   step.tracked = map_exists && track(step);
-  if (step.tracked && seeds_) observe_seeds(step);
+  if (step.tracked && seeds_.size() > 0) observe_seeds(step);
   if (step.tracked) step.result.proposed = keyframe_is_due(step);
   step.started = !step.tracked && (map_exists ? start_part(step) : start_map(step));
   step.lap(TrackerStage::kKeyframe);
@@ -118,6 +116,8 @@ bool Tracker::track(FrameStep& step) {
   start.placement.T_c_ref = by_depth ? align_to_depth(step) : aligned_pose(step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = by_depth ? search_from(start, step) : search_from_either(start, step);
+  if (cause == LostCause::kNone && loss_.lost_frames() > 0 && !is_within_reach(options_.coast_for, step))
+    cause = LostCause::kInconsistentMatches;
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
   const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
   if ((cause == LostCause::kNone && !doubted) || search_widely(step)) return true;

@@ -134,11 +134,11 @@ class Tracker {
   [[nodiscard]] bool leaves_motion(const SE3& T_c_ref);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
   bool search_widely(FrameStep& step);
-  bool search_roughly_from(const Placement& placement, FrameStep& step);
-  [[nodiscard]] bool is_within_reach(const FrameStep& step) const;
+  bool search_roughly_from(const Placement& placement, double longest, FrameStep& step);
+  [[nodiscard]] bool is_within_reach(double longest, const FrameStep& step) const;
   bool search_ahead(FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
-                        const Placement& view, FrameStep& step);
+                        const Placement& view, double longest, FrameStep& step);
   [[nodiscard]] int mapped_inliers() const;
   [[nodiscard]] bool well_supported(const TrackResult& result) const;
   [[nodiscard]] SE3 predicted_motion() const;
@@ -213,9 +213,8 @@ class Tracker {
   std::optional<DepthAlignment> depth_alignment_;  ///< RGB-D only
   std::optional<ReadoutEstimator> readout_;        ///< if the calibration leaves it open
   bool corners_scarce_ = false;                    ///< the last good frame was placed by depth
-  // One camera only: where its depths come from.
-  std::optional<MonocularStart> monocular_start_;
-  std::optional<DepthSeeds> seeds_;
+  DepthSeeds seeds_;
+  std::optional<MonocularStart> monocular_start_;  ///< one camera only, as the next
   std::vector<EarlierFrame> earlier_frames_;
 
   std::int64_t last_t_ns_ = 0;            ///< of the last good frame

@@ -135,8 +135,8 @@ void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
   }
   const bool enough_found = static_cast<int>(matches_.size()) >= step.bounds.wanted_matches;
   if (enough_found && rig_.kind != SensorKind::kRgbd) occupy_unsearched(step.result.T_c_ref);
-  if (seeds_) return start_seeds(anchor);
-  starter_.start(current_, anchor, step.shutter, immature_points_);
+  if (rig_.kind != SensorKind::kMono) starter_.start(current_, anchor, step.shutter, immature_points_);
+  start_seeds(anchor);
 }
 
 /// Where the map has points that nobody looked for, because enough others had been found: a place seen again

@@ -1,5 +1,7 @@
 // Where tracking starts, stops and starts again: a new map, a loaded one, a new part of it, a place
 // recognised.
+#include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "tracking/tracker.hpp"
@@ -38,10 +40,11 @@ std::optional<Placement> Tracker::recognised(const GraphSnapshot& graph) {
 bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   local_map_.update(step.graph, asked.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
-  if (search_roughly_from(asked, step)) return true;
+  constexpr double kAnyTime = std::numeric_limits<double>::infinity();
+  if (search_roughly_from(asked, kAnyTime, step)) return true;
   if (!options_.wide_search.enabled) return false;
   wide_search_.look_at(current_);
-  return search_from_view(asked_.images, asked_.corners, asked, step);
+  return search_from_view(asked_.images, asked_.corners, asked, kAnyTime, step);
 }
 
 /// A keyframe as the map has it: itself, or the one that was left in its place.
@@ -55,32 +58,36 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
 bool Tracker::search_widely(FrameStep& step) {
   if (!options_.wide_search.enabled || last_.reference == kNoKeyframe) return false;
   wide_search_.look_at(current_);
-  if (!previous_is_keyframe_ && search_from_view(previous_, previous_corners_, last_, step)) return true;
+  if (!previous_is_keyframe_ &&
+      search_from_view(previous_, previous_corners_, last_, options_.coast_for, step))
+    return true;
   const KeyframeId part = part_of(step.graph, immature_points_, last_.reference);
   for (std::size_t age = 0; age < recent_views_.size(); ++age) {
     RecentView& view = recent_views_[age];
     const auto placement = placement_of(step.graph, view.id);
     if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
-    if (search_from_view(view.images, view.corners, *placement, step)) return true;
+    if (search_from_view(view.images, view.corners, *placement, options_.coast_for, step)) return true;
   }
   return false;
 }
 
-bool Tracker::search_roughly_from(const Placement& placement, FrameStep& step) {
+bool Tracker::search_roughly_from(const Placement& placement, double longest, FrameStep& step) {
   return search_from({.placement = placement, .rough = true}, step) == LostCause::kNone &&
-         is_within_reach(step);
+         is_within_reach(longest, step);
 }
 
 /// Streets repeat themselves, and what looks alike may be the next house but four: the camera must have got
 /// there from where it was last, as fast as it moved then, and no other than by what accelerates things that
 /// carry cameras.
-bool Tracker::is_within_reach(const FrameStep& step) const {
+/// @param longest  time that this is said of [s]: however long a car was out of sight, where it was last it
+///                 is not, whatever the street looks like. Where a place was recognised, any time.
+bool Tracker::is_within_reach(double longest, const FrameStep& step) const {
   const KeyframeId here = step.result.reference;
   const bool knows_way = rig_.kind != SensorKind::kMono && last_velocity_;  // one camera's unit is no metre
   if (!knows_way ||
       part_of(step.graph, immature_points_, here) != part_of(step.graph, immature_points_, last_.reference))
     return true;
-  const double seconds = 1e-9 * static_cast<double>(step.frame.t_ns - last_t_ns_);
+  const double seconds = std::min(longest, 1e-9 * static_cast<double>(step.frame.t_ns - last_t_ns_));
   const SE3 T_here_last = relative_pose(step.graph, immature_points_, here, last_.reference);
   const SE3 T_c_last = step.result.T_c_ref * T_here_last * last_.T_c_ref.inverse();
   const SE3 went_on = SE3::exp(seconds * *last_velocity_);
@@ -94,20 +101,21 @@ bool Tracker::search_ahead(FrameStep& step) {
   const double seconds = 1e-9 * static_cast<double>(step.frame.t_ns - last_t_ns_);
   if (loss_.lost_frames() < 2 || !last_velocity_ || !(seconds <= options_.coast_for)) return false;
   const SE3 motion = SE3::exp(seconds * *last_velocity_);
-  if (search_roughly_from({last_.reference, motion * last_.T_c_ref}, step)) return true;
+  if (search_roughly_from({last_.reference, motion * last_.T_c_ref}, options_.coast_for, step)) return true;
   const std::optional<SE3> aligned = align_to_previous(motion, step);
   step.lap(TrackerStage::kAlignment);
-  return aligned && search_roughly_from({last_.reference, *aligned * last_.T_c_ref}, step);
+  return aligned &&
+         search_roughly_from({last_.reference, *aligned * last_.T_c_ref}, options_.coast_for, step);
 }
 
 /// What looks alike proposes a pose, the map's points around there decide.
 bool Tracker::search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
-                               const Placement& view, FrameStep& step) {
+                               const Placement& view, double longest, FrameStep& step) {
   const auto T_c_view = wide_search_.find(images, corners, options_.search);
   step.lap(TrackerStage::kAlignment);
   if (!T_c_view) return false;
   local_map_.update(step.graph, view.reference, immature_points_, options_.neighbour_keyframes);
-  return search_roughly_from({view.reference, *T_c_view * view.T_c_ref}, step);
+  return search_roughly_from({view.reference, *T_c_view * view.T_c_ref}, longest, step);
 }
 
 bool Tracker::start_map(FrameStep& step) {
@@ -123,7 +131,7 @@ bool Tracker::start_map(FrameStep& step) {
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
   const bool something_in_view =
-      starter_.sees_corners(current_, options_.min_corners_seen) || sees_structure(step);
+      starter_.sees_corners(current_.left, options_.min_corners_seen) || sees_structure(step);
   if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.new_part_after || !something_in_view ||
       loss_.lost_frames() < options_.new_part_frames) {
     return false;
@@ -142,6 +150,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   const KeyframeId id{next_.keyframe};
   step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();
+  seeds_.clear();
   starter_.clear();
   if (starter_.start(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
     const LostCause open = judge_structure(step);
@@ -155,6 +164,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   motion_.clear();
   last_keyframe_ = {step.result.by_depth ? depth_alignment_->typical_depth() : median_depth(SE3()), 0};
   begin_proposal({kNoKeyframe, SE3()}, step);
+  start_seeds(id);
   hand_over_images(*step.free_proposal);
   next_.first_of_part = index(id);
   step.result.status = TrackStatus::kTracking;

@@ -85,6 +85,7 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
                                    {"rounds", &options.rounds},
                                    {"noise", &options.noise},
                                    {"depth_noise", &options.depth_noise},
+                                   {"depth_max", &options.depth_max},
                                    {"blur", &options.blur},
                                    {"exposure", &options.exposure},
                                    {"exposure_steps", &options.exposure_steps},

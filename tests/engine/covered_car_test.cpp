@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstdio>
+#include <memory>
 
+#include "loopclosure/default_vocabulary.hpp"
 #include "tests/engine/whole_run.hpp"
 
 namespace twofold {
@@ -30,13 +32,15 @@ SyntheticOptions street(std::uint64_t seed, double fps, double cover_at, double 
 
 struct Drive {
   int lost_in_view = 0;  ///< frames
+  int in_new_part = 0;   ///< likewise
   double astray = 0;     ///< the farthest that the camera seems from where it was last, beside the truth [m]
 };
 
-Drive drive(const SyntheticOptions& scene) {
+Drive drive(const SyntheticOptions& scene, EngineOptions options = {}) {
   const SyntheticSequence sequence(scene);
   const Trajectory truth = testing::true_path(sequence);
-  const auto [result, path] = testing::run_whole(sequence.rig(), testing::frames_of(sequence));
+  const auto [result, path] =
+      testing::run_whole(sequence.rig(), testing::frames_of(sequence), std::move(options));
   Drive drive;
   const FrameRecord* before = nullptr;  // the last with a pose before the hand
   const auto true_t = [&](const FrameRecord& record) {
@@ -52,20 +56,24 @@ Drive drive(const SyntheticOptions& scene) {
       before = &record;
       continue;
     }
-    EXPECT_EQ(record.part_causal, before->part_causal) << record.frame_index;
+    if (record.part_causal != before->part_causal) {
+      ++drive.in_new_part;
+      continue;
+    }
     const double went = (record.T_c_w_causal.unpacked().inverse().translation() -
                          before->T_c_w_causal.unpacked().inverse().translation())
                             .norm();
     drive.astray = std::max(drive.astray, std::abs(went - (true_t(record) - true_t(*before)).norm()));
   }
-  std::printf("seed %d: %d frames lost in view, %.3f m astray\n", static_cast<int>(scene.seed),
-              drive.lost_in_view, drive.astray);
+  std::printf("seed %d: %d frames lost in view, %d in a new part, %.3f m astray\n",
+              static_cast<int>(scene.seed), drive.lost_in_view, drive.in_new_part, drive.astray);
   return drive;
 }
 
 TEST(CoveredCar, IsWhereItWouldBeAfterASecond) {
   const Drive found = drive(street(1, 15, 3, 1.2));
   EXPECT_EQ(found.lost_in_view, 0);
+  EXPECT_EQ(found.in_new_part, 0);
   EXPECT_LT(found.astray, 0.1);
 }
 
@@ -76,6 +84,15 @@ TEST(CoveredCar, RatherStaysLostThanBeACopyOfTheHouseFurtherOn) {
   scene.height = 120;
   scene.f = 190.7;
   const Drive found = drive(scene);
+  EXPECT_EQ(found.in_new_part, 0);
+  EXPECT_LT(found.astray, 1);
+}
+
+/// By looks it is at each copy of the house that it has passed: that is no place to be found at.
+TEST(CoveredCar, IsNotRecognisedAtOneOfSeveralCopiesOfTheHouse) {
+  EngineOptions options;
+  options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  const Drive found = drive(street(1, 15, 12, 3), std::move(options));
   EXPECT_LT(found.astray, 1);
 }
 

@@ -64,7 +64,7 @@ TEST_F(PointStarterTest, TakesTheWidestImage) {
   cv::randu(noise, 0, 255);
   images.left.build(noise);
   PointStarter starter(wide, options_);
-  EXPECT_TRUE(starter.sees_corners(images, 100));
+  EXPECT_TRUE(starter.sees_corners(images.left, 100));
 }
 
 TEST_F(PointStarterTest, StartsNothingWhereAPointIsTracked) {
@@ -98,7 +98,7 @@ TEST_F(PointStarterTest, ChoosesCornersUpToTheRoomThereIs) {
   PointStarter starter(rig_, options_);
   std::vector<PointAppearance> appearances;
   appearances.reserve(20);
-  starter.choose_corners(images_, appearances);
+  starter.choose_corners(images_, 100, appearances);
   EXPECT_EQ(appearances.size(), 20U);
   std::set<std::pair<int, int>> cells;
   for (const PointAppearance& appearance : appearances)
@@ -107,10 +107,10 @@ TEST_F(PointStarterTest, ChoosesCornersUpToTheRoomThereIs) {
 
 TEST_F(PointStarterTest, SeesCornersOnlyWhereThereAreSome) {
   PointStarter starter(rig_, options_);
-  EXPECT_TRUE(starter.sees_corners(images_, 20));
+  EXPECT_TRUE(starter.sees_corners(images_.left, 20));
   FrameImages grey;
   grey.left.build(cv::Mat(240, 320, CV_8UC1, cv::Scalar(120)));
-  EXPECT_FALSE(starter.sees_corners(grey, 1));
+  EXPECT_FALSE(starter.sees_corners(grey.left, 1));
 }
 
 TEST_F(PointStarterTest, SaysThatThePairIsSwapped) {

@@ -118,6 +118,9 @@ TEST(Tracker, SaysWhatIsWrongWithThePair) {
   Frame swapped = good;
   std::swap(swapped.left, swapped.right);
   EXPECT_EQ(cause_of(swapped), LostCause::kImagesSwapped);
+  Frame covered = good;
+  covered.right = cv::Mat(good.right.size(), CV_8UC1, cv::Scalar(9));
+  EXPECT_EQ(cause_of(covered), LostCause::kRightCovered);
   for (const int shift : {-8, -6, 6, 8})
     EXPECT_EQ(cause_of(with_rows_shifted(good, shift)), LostCause::kRowsMisaligned) << shift;
 }

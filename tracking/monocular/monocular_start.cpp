@@ -185,7 +185,7 @@ void MonocularStart::fill(StartCandidate& candidate, const FrameImages& images, 
   candidate.images.left.copy_from(images.left);
   starter_.clear();
   appearances_.clear();
-  starter_.choose_corners(images, appearances_);
+  starter_.choose_corners(images, static_cast<int>(appearances_.capacity()), appearances_);
   candidate.corners.clear();
   candidate.between.clear();
   candidate.stride = 1;
