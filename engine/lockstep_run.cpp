@@ -18,7 +18,8 @@ std::size_t pool_size(const EngineOptions& options) {
 }  // namespace
 
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options, std::optional<Schedule> schedule)
-    : localise_only_(options.localise_only),
+    : rig_(rig),
+      localise_only_(options.localise_only),
       mapping_paused_(options.mapping_paused),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       pool_(pool_size(options)),
@@ -34,6 +35,9 @@ LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options, std::opti
 }
 
 void LockstepRun::push(Frame frame) {
+  const bool is_first = !logs_.schedule().input;
+  logs_.note_input(rig_, frame);
+  if (is_first) expect_input_of_schedule();
   if (schedule_)
     replay(frame);
   else
@@ -55,6 +59,16 @@ void LockstepRun::run_deterministically(const Frame& frame) {
   }
   checkpoint_if_due(frame.t_ns);
   count();
+}
+
+void LockstepRun::expect_input_of_schedule() {
+  if (!schedule_ || !schedule_->input) return;
+  const InputFingerprint& expected = *schedule_->input;
+  const InputFingerprint& given = *logs_.schedule().input;
+  if (given.rig != expected.rig)
+    fail("the schedule belongs to another rig than that of these frames");
+  else if (given.first_frame != expected.first_frame)
+    fail("the schedule belongs to another recording: its first frame was another one");
 }
 
 void LockstepRun::replay(const Frame& frame) {

@@ -72,6 +72,10 @@ class LockstepRun final : public Pipeline {
     return localise_only_ || (mapping_paused_ != nullptr && mapping_paused_->load(std::memory_order_relaxed));
   }
 
+  /// Of a replay, with its first frame: fails when the schedule is of another input.
+  void expect_input_of_schedule();
+
+  const Rig rig_;
   const bool localise_only_;
   const std::atomic<bool>* const mapping_paused_;
   std::unique_ptr<Trace> trace_;

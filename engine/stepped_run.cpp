@@ -34,6 +34,7 @@ const char* name_of(PipelineStep step) {
 
 SteppedRun::SteppedRun(const Rig& rig, const EngineOptions& options, PacingClock* clock)
     : options_(options),
+      rig_(rig),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       tracking_(rig, options, trace_.get()),
       mapping_(rig, options, trace_.get()),
@@ -77,6 +78,7 @@ bool SteppedRun::must_hold_back() const {
 
 void SteppedRun::push(Frame frame) {
   TWOFOLD_CHECK(has_buffer(), "there is a buffer for the frame");
+  logs_.note_input(rig_, frame);
   free_slot_->frame = std::move(frame);
   TWOFOLD_CHECK(frames_.try_push(std::move(free_slot_)), "the ring holds every slot of the pool");
   tracker_parking_.wake();

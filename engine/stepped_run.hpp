@@ -116,6 +116,7 @@ class SteppedRun : public Pipeline {
   void send_loops(std::span<LoopMessage> messages, LoopStep& step);
   void publish_places();
 
+  const Rig rig_;
   std::unique_ptr<Trace> trace_;
   Progress progress_;
 

@@ -35,6 +35,10 @@ void expect_sensible(const SlamOptions& options) {
   expect_sensible_pace(options);
   expect(options.schedule.empty() == (options.mode != RunMode::kReplay),
          "options.schedule and RunMode::kReplay belong together");
+  std::error_code ignored;
+  expect(options.run_folder.empty() ||
+             !std::filesystem::equivalent(options.schedule, options.run_folder / "schedule.log", ignored),
+         "options.schedule is in options.run_folder, where the replay would overwrite it");
   expect(!options.localise_only || !options.map.empty(), "options.localise_only needs options.map");
   expect(options.map.empty() || options.places,
          "options.map needs options.places, by which the camera finds itself in the map");

@@ -20,8 +20,8 @@ namespace twofold {
 /// others are missing, and the file goes on behind them. The schedule ends there: each step builds on the one
 /// before it. On disk, not in reserve: what the operating system has not written yet is lost with its power.
 ///
-/// Roles: add by the thread that takes frames back; each stream of the schedule and the replacement log by
-/// one thread each; close when these are joined.
+/// Roles: note_input and add by the thread that pushes frames and takes them back; each stream of the
+/// schedule and the replacement log by one thread each; close when these are joined.
 class RunLogs {
  public:
   /// Throws std::runtime_error when a file cannot be made.
@@ -30,6 +30,10 @@ class RunLogs {
   /// A frame that is done with, and the correction that was seen first by it, if it has a reason.
   void add(const FrameRecord& record, const PoseCorrection& correction);
   [[nodiscard]] ScheduleStreams& schedule() { return schedule_; }
+  /// Before a frame is pushed: of the first, the schedule gets the fingerprint.
+  void note_input(const Rig& rig, const Frame& frame) {
+    if (!schedule_.input) schedule_.note_input(fingerprint_of(rig, frame));
+  }
 
   /// The disk is slower than the run; any thread.
   [[nodiscard]] bool behind() const { return writer_ && writer_->behind(); }

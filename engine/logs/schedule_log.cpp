@@ -13,9 +13,10 @@ namespace twofold {
 namespace {
 
 constexpr std::string_view kMagic = "TWFSCHED";
-constexpr std::uint8_t kFormatVersion = 4;
-constexpr std::array<const char*, 3> kSectionNames = {"tracker", "mapper", "loop closer"};
-constexpr std::uint8_t kEnd = 0;             // id of the end section; the others are 1, 2, 3
+constexpr std::uint8_t kFormatVersion = 5;
+constexpr std::array<const char*, 4> kSectionNames = {"tracker", "mapper", "loop closer", "input"};
+constexpr std::uint8_t kEnd = 0;  // id of the end section; the others are 1, 2, 3, 4
+constexpr std::uint8_t kInput = 4;
 constexpr std::uint64_t kLargestTorn = 128;  // [bytes] one record's section is shorter
 constexpr std::size_t kLargestFile = std::size_t{256} << 20;
 
@@ -68,6 +69,18 @@ void put_section(std::vector<std::uint8_t>& file, const ScheduleStream<Step>& st
   const std::size_t begin = file.size();
   begin_section(file, section_id(Step()), stream.records(), stream.bytes().size());
   for (const auto& chunk : stream.bytes().chunks()) file.insert(file.end(), chunk.begin(), chunk.end());
+  end_section(file, begin);
+}
+
+void put_number(std::vector<std::uint8_t>& file, std::uint64_t number) {
+  for (unsigned shift = 0; shift < 64; shift += 8) file.push_back(static_cast<std::uint8_t>(number >> shift));
+}
+
+void put_input(std::vector<std::uint8_t>& file, const InputFingerprint& input) {
+  const std::size_t begin = file.size();
+  begin_section(file, kInput, 1, 2 * sizeof(std::uint64_t));
+  put_number(file, input.rig);
+  put_number(file, input.first_frame);
   end_section(file, begin);
 }
 
@@ -157,6 +170,35 @@ std::string parse_steps(const Section& section, Step& last, std::vector<Step>& s
   return in.ok() ? "" : ScheduleSectionReader::name_of(section.id) + " " + in.failure() + " of its records";
 }
 
+std::uint64_t number_at(std::span<const std::uint8_t> bytes) {
+  std::uint64_t number = 0;
+  for (unsigned i = 0; i < 8; ++i) number |= static_cast<std::uint64_t>(bytes[i]) << (8 * i);
+  return number;
+}
+
+/// Empty, or what is wrong with it.
+std::string parse_input(const Section& section, std::optional<InputFingerprint>& input) {
+  if (input) return ScheduleSectionReader::name_of(kInput) + " is there twice";
+  if (section.records != 1 || section.bytes.size() != 2 * sizeof(std::uint64_t))
+    return ScheduleSectionReader::name_of(kInput) + " is not one record of 16 bytes";
+  input = {number_at(section.bytes), number_at(section.bytes.subspan(sizeof(std::uint64_t)))};
+  return "";
+}
+
+std::string parse_section(const Section& section, TrackerStep& tracker, MapperStep& mapper,
+                          LoopStep& loop_closer, Schedule& schedule) {
+  switch (section.id) {
+    case 1:
+      return parse_steps(section, tracker, schedule.tracker);
+    case 2:
+      return parse_steps(section, mapper, schedule.mapper);
+    case 3:
+      return parse_steps(section, loop_closer, schedule.loop_closer);
+    default:
+      return parse_input(section, schedule.input);
+  }
+}
+
 }  // namespace
 
 template <class Step>
@@ -183,9 +225,18 @@ void ScheduleStreams::keep_in(const std::shared_ptr<LogFile>& file) {
   std::vector<std::uint8_t> header;
   put_header(header);
   file->append(header);
+  file_ = file;
   tracker.keep_in(file);
   mapper.keep_in(file);
   loop_closer.keep_in(file);
+}
+
+void ScheduleStreams::note_input(const InputFingerprint& fingerprint) {
+  input = fingerprint;
+  if (!file_) return;
+  std::vector<std::uint8_t> section;
+  put_input(section, fingerprint);
+  file_->append(section);
 }
 
 void ScheduleStreams::end(LogFile& file) {
@@ -200,6 +251,7 @@ bool write_schedule(std::ostream& out, const ScheduleStreams& schedule) {
   put_section(file, schedule.tracker);
   put_section(file, schedule.mapper);
   put_section(file, schedule.loop_closer);
+  if (schedule.input) put_input(file, *schedule.input);
   put_end(file);
   out.write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
   return static_cast<bool>(out.flush());
@@ -212,9 +264,7 @@ tl::expected<Schedule, std::string> parse_schedule(std::span<const std::uint8_t>
   MapperStep mapper;
   LoopStep loop_closer;
   for (Section section; reader.next(section);) {
-    const std::string wrong = section.id == 1   ? parse_steps(section, tracker, schedule.tracker)
-                              : section.id == 2 ? parse_steps(section, mapper, schedule.mapper)
-                                                : parse_steps(section, loop_closer, schedule.loop_closer);
+    const std::string wrong = parse_section(section, tracker, mapper, loop_closer, schedule);
     if (!wrong.empty()) reader.fail(wrong);
   }
   if (!reader.error().empty()) return tl::make_unexpected(reader.error());
@@ -235,6 +285,7 @@ tl::expected<std::vector<std::uint8_t>, std::string> merge_schedule(std::span<co
   std::vector<std::uint8_t> merged;
   put_header(merged);
   for (std::size_t n = 0; n < bytes.size(); ++n) {
+    if (n + 1 == kInput && records[n] == 0) continue;
     const std::size_t begin = merged.size();
     begin_section(merged, static_cast<std::uint8_t>(n + 1), records[n], bytes[n].size());
     merged.insert(merged.end(), bytes[n].begin(), bytes[n].end());

@@ -6,12 +6,14 @@
 #include <filesystem>
 #include <iosfwd>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
 
 #include "engine/logs/chunked_vector.hpp"
+#include "engine/logs/input_fingerprint.hpp"
 #include "engine/logs/log_file.hpp"
 
 namespace twofold {
@@ -52,6 +54,7 @@ struct Schedule {
   std::vector<TrackerStep> tracker;
   std::vector<MapperStep> mapper;
   std::vector<LoopStep> loop_closer;
+  std::optional<InputFingerprint> input = {};  ///< nothing: of a run without a frame
   bool ended = true;  ///< false: of a run that was killed; the threads' last steps may not fit together
   bool operator==(const Schedule&) const = default;
 };
@@ -60,8 +63,9 @@ struct Schedule {
 //   "TWFSCHED", format version (1 byte)
 //   sections of tracker (1), mapper (2), loop closer (3), any number in any order: id (1 byte), records
 //   (varint), bytes (varint), the bytes, CRC-32 of all of the section before it (4 bytes)
+//   likewise, once at most, the input (4): one record, InputFingerprint's two numbers of 8 bytes
 //   an end section: id 0, no records, no bytes, its CRC-32
-// While a run goes on each record is appended as a section. In the end they are merged into three.
+// While a run goes on each record is appended as a section. In the end they are merged into one a thread.
 
 /// Records of one thread, each about three to five bytes: differences to the record before as
 /// variable-length integers. Used by one thread at a time, without locks, and read when the run is over.
@@ -90,11 +94,17 @@ struct ScheduleStreams {
   ScheduleStream<TrackerStep> tracker;
   ScheduleStream<MapperStep> mapper;
   ScheduleStream<LoopStep> loop_closer;
+  std::optional<InputFingerprint> input;
 
+  /// Before the first record, by the thread that pushes frames.
+  void note_input(const InputFingerprint& fingerprint);
   /// Begins the file, to which all of them append from here on.
   void keep_in(const std::shared_ptr<LogFile>& file);
   /// After the last record: ends the file.
   static void end(LogFile& file);
+
+ private:
+  std::shared_ptr<LogFile> file_;
 };
 
 /// Writes streams that were kept in memory. False when the stream failed.

@@ -73,7 +73,9 @@ struct SlamOptions {
   /// From one checkpoint to the next [s] > 0; in kDeterministic and kReplay by the frames' times.
   double checkpoint_period = 60;
 
-  /// Of RunMode::kReplay: schedule.log of a run (run_folder), the other options being that run's.
+  /// Of RunMode::kReplay: schedule.log of a run (run_folder), the other options being that run's. One of
+  /// another rig, or over other frames, fails with the first push, and errors() says so. Not in the
+  /// run_folder of the replay, which would overwrite it.
   std::filesystem::path schedule = {};
 
   int inner_window = 25;   ///< keyframes optimised with their points, >= 1

@@ -40,6 +40,28 @@ TEST_F(EngineTest, DeterministicRunsAreEqual) {
   expect_same(first, run(options));
 }
 
+TEST_F(EngineTest, AScheduleIsFollowedOverItsOwnInputOnly) {
+  EngineOptions options;
+  options.deterministic = true;
+  const Schedule schedule = schedule_of(run(options));
+  const auto error_over = [&](const Rig& rig, const FrameFeed& frames) {
+    const std::atomic<bool> interrupted{false};
+    return Engine(rig, {}).replay(frames, schedule, interrupted).error;
+  };
+  const FrameFeed same = feed();
+  EXPECT_EQ(error_over(small_rig(), same), "");
+  const FrameFeed other = [frames = feed()](Frame& frame) {
+    const FeedStatus status = frames(frame);
+    frame.left = frame.left.clone();
+    frame.left.at<std::uint8_t>(10, 10) ^= 1;
+    return status;
+  };
+  EXPECT_NE(error_over(small_rig(), other).find("another recording"), std::string::npos);
+  Rig rig = small_rig();
+  rig.camera.fx += 0.01;
+  EXPECT_NE(error_over(rig, feed()).find("another rig"), std::string::npos);
+}
+
 TEST_F(EngineTest, ScheduleReplaysAThreadedRun) {
   for (const double speed : {0.0, 3.0}) {
     EngineOptions options;

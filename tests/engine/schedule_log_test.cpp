@@ -15,6 +15,7 @@ namespace twofold {
 namespace {
 
 void append_all(const Schedule& schedule, ScheduleStreams& streams) {
+  if (schedule.input) streams.note_input(*schedule.input);
   for (const auto& step : schedule.tracker) streams.tracker.append(step);
   for (const auto& step : schedule.mapper) streams.mapper.append(step);
   for (const auto& step : schedule.loop_closer) streams.loop_closer.append(step);
@@ -35,6 +36,7 @@ Schedule plausible(int frames, unsigned seed) {
   const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(rng()) % n; };
   const auto one_in = [&](std::uint32_t n) { return below(n) == 0; };
   Schedule s;
+  if (frames > 0) s.input = {0x0123456789abcdef, 0xfedcba9876543210 + seed};
   std::uint64_t version = 1;
   for (int i = 0; i < frames; ++i) {
     if (one_in(6)) {
@@ -119,7 +121,7 @@ TEST(ScheduleLog, NoTruncationAndNoChangedByteIsTakenForAWholeSchedule) {
 }
 
 TEST(ScheduleLog, ErrorsNameTheSection) {
-  constexpr int kEndBytes = 7;
+  constexpr int kEndBytes = 7, kInputBytes = 3 + 16 + 4;
   const Schedule schedule = plausible(400, 5);
   const auto good = bytes_of(schedule);
   const auto error = [](std::vector<std::uint8_t> bytes) {
@@ -135,13 +137,19 @@ TEST(ScheduleLog, ErrorsNameTheSection) {
   EXPECT_NE(error(damaged).find("section 'tracker'"), std::string::npos) << error(damaged);
   damaged = good;
   damaged[good.size() - 1 - kEndBytes] ^= 1;
+  EXPECT_NE(error(damaged).find("section 'input' is damaged"), std::string::npos) << error(damaged);
+  damaged = good;
+  damaged[good.size() - 1 - kInputBytes - kEndBytes] ^= 1;
   EXPECT_NE(error(damaged).find("section 'loop closer' is damaged"), std::string::npos) << error(damaged);
-  const std::vector<std::uint8_t> cut(good.begin(), good.end() - kEndBytes - 2);
+  const std::vector<std::uint8_t> cut(good.begin(), good.end() - kInputBytes - kEndBytes - 2);
   EXPECT_NE(error(cut).find("section 'loop closer'"), std::string::npos) << error(cut);
+  std::vector<std::uint8_t> twice(good.begin(), good.end() - kEndBytes);
+  twice.insert(twice.end(), good.end() - kInputBytes - kEndBytes, good.end());
+  EXPECT_NE(error(twice).find("section 'input' is there twice"), std::string::npos) << error(twice);
 }
 
 TEST(ScheduleLog, OversizedCountsAreRefusedBeforeMemoryIsTaken) {
-  const std::string header("TWFSCHED\4\1");
+  const std::string header("TWFSCHED\5\1");
   std::vector<std::uint8_t> file(header.begin(), header.end());
   file.reserve(64);
   for (int i = 0; i < 2; ++i) {  // 2^63 - 1 records in as many bytes
