@@ -126,10 +126,11 @@ struct MappingTotals {
 /// A loop that was closed by appearance.
 struct ClosedLoop {
   LoopConstraint constraint;
-  SE3 T_to_from_before;      ///< as the map had it: the difference is the drift
-  std::int64_t t_ns = 0;     ///< of the frame that came back
-  bool joins_parts = false;  ///< there is no drift then: the keyframes had different worlds
-  double travelled = 0;      ///< along the keyframes between both, in the unit of T_to_from
+  SE3 T_to_from_before;        ///< as the map had it: the difference is the drift
+  std::int64_t t_ns = 0;       ///< of the frame that came back
+  bool joins_parts = false;    ///< there is no drift then: the keyframes had different worlds
+  double travelled = 0;        ///< along the keyframes between both, in the unit of T_to_from
+  std::int64_t from_t_ns = 0;  ///< of the older keyframe, which the final map need not have
 
   /// (translation, rotation) by which the map was wrong; of loops within a part.
   [[nodiscard]] Vector6 drift() const { return (constraint.T_to_from * T_to_from_before.inverse()).log(); }

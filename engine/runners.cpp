@@ -23,6 +23,11 @@ double distance_travelled(const GraphSnapshot& graph, KeyframeId a, KeyframeId b
   return distance;
 }
 
+/// Of a keyframe, or of the one that stands for it, if it was culled. It must not be forgotten.
+std::int64_t time_of(const GraphSnapshot& graph, KeyframeId id) {
+  return graph.keyframe(graph.live_replacement(id)->id).t_ns;
+}
+
 std::int16_t narrow(int count) {
   return static_cast<std::int16_t>(std::min<int>(count, std::numeric_limits<std::int16_t>::max()));
 }
@@ -255,7 +260,8 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
     messages_.emplace_back(*loop);
     const bool joins = graph.part(loop->from) != graph.part(loop->to);
     loops_.push_back({*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins,
-                      joins ? 0 : distance_travelled(graph, loop->from, loop->to)});
+                      joins ? 0 : distance_travelled(graph, loop->from, loop->to),
+                      time_of(graph, loop->from)});
     if (on_loop_) on_loop_(loops_.back());
     (one_camera ? awaited_ : not_optimised_) = loop;
   }

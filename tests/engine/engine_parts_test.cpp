@@ -77,6 +77,12 @@ TEST_F(MapPartsTest, ALostCameraStartsAPartThatJoinsWhenAPlaceOfBothIsRecognised
   EXPECT_LE(lost, 5);
   EXPECT_TRUE(std::any_of(result.loops.begin(), result.loops.end(),
                           [](const ClosedLoop& loop) { return loop.joins_parts; }));
+  for (const ClosedLoop& loop : result.loops) {
+    EXPECT_LT(loop.from_t_ns, loop.t_ns) << "whatever stands for the older keyframe in the final map";
+    EXPECT_TRUE(std::any_of(result.frames.begin(), result.frames.end(), [&](const FrameRecord& record) {
+      return record.keyframe && record.t_ns == loop.from_t_ns;
+    }));
+  }
   for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k) {
     EXPECT_EQ(result.graph.part(KeyframeId{k}), result.graph.part(KeyframeId{0}));
   }

@@ -57,6 +57,7 @@ inline void expect_same_loops(const RunResult& a, const RunResult& b) {
     EXPECT_EQ(p.constraint.inliers, q.constraint.inliers) << n;
     EXPECT_EQ(p.T_to_from_before.matrix(), q.T_to_from_before.matrix()) << n;
     EXPECT_EQ(p.t_ns, q.t_ns) << n;
+    EXPECT_EQ(p.from_t_ns, q.from_t_ns) << n;
   }
   ASSERT_EQ(a.corrections.size(), b.corrections.size());
   for (std::size_t n = 0; n < a.corrections.size(); ++n) {
