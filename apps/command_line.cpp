@@ -1,6 +1,7 @@
 #include "apps/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <opencv2/core/utility.hpp>
@@ -33,7 +34,26 @@ int report(const CLI::App& app, const std::string& what, int exit_code) {
   return exit_code;
 }
 
+/// `rule` in words after "must be".
+CLI::Validator number_check(bool (*holds)(double), const std::string& rule, const std::string& description) {
+  const auto check = [=](const std::string& text) {
+    char* end = nullptr;
+    const double number = std::strtod(text.c_str(), &end);
+    const bool whole = !text.empty() && *end == '\0' && std::isfinite(number);
+    return whole && holds(number) ? "" : fmt::format("must be {}, is {}", rule, text);
+  };
+  return {check, description};
+}
+
 }  // namespace
+
+CLI::Validator at_least_zero() {
+  return number_check([](double number) { return number >= 0; }, "a number >= 0", "NONNEGATIVE");
+}
+
+CLI::Validator above_zero() {
+  return number_check([](double number) { return number > 0; }, "a number > 0", "POSITIVE");
+}
 
 int run_command_line(CLI::App& app, int argc, char** argv, const int& exit_code) {
   silence_decoders();

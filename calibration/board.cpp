@@ -19,6 +19,10 @@ const std::map<std::string, MarkerFamily> kFamilies{{"4x4", MarkerFamily::k4x4},
                                                     {"6x6", MarkerFamily::k6x6},
                                                     {"apriltag", MarkerFamily::kAprilTag36h11}};
 
+// What can be printed and seen [m]. Sides in millimetres or centimetres are beyond.
+constexpr double kSmallestSquare = 0.001;
+constexpr double kLargestSquare = 0.9;
+
 std::vector<std::string> split(const std::string& text, char separator) {
   std::vector<std::string> parts;
   std::istringstream stream(text);
@@ -127,6 +131,9 @@ tl::expected<Board, std::string> parse_board(const std::string& text) {
   board.rows = static_cast<int>(*rows);
   const auto square = number(parts[2]);
   if (!square || !(*square > 0)) return fail(fmt::format("'{}' is no side of a square [m]", parts[2]));
+  if (*square < kSmallestSquare || *square > kLargestSquare)
+    return fail(fmt::format("squares of {} m: sides are in metres, from {} to {}, as 0.03 for 30 mm",
+                            parts[2], kSmallestSquare, kLargestSquare));
   board.square = *square;
   if (!charuco) return board;
   const auto marker = number(parts[3]);

@@ -28,7 +28,7 @@ struct Board {
 };
 
 /// "chessboard:9x6:0.025" (inner corners, square [m]) or "charuco:8x6:0.03:0.022[:4x4|5x5|6x6|apriltag]"
-/// (squares, square and marker [m]). Error: what is wrong with the text.
+/// (squares, square and marker [m], a square from 0.001 to 0.9). Error: what is wrong with the text.
 [[nodiscard]] tl::expected<Board, std::string> parse_board(const std::string& text);
 
 /// Corners of a board found in one image; ids ascending and different.

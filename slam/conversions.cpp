@@ -61,8 +61,9 @@ CameraRig to_camera_rig(const Rig& rig) {
 }
 
 Rig to_rig(const CameraRig& rig) {
-  expect(rig.width > 0, "width", "> 0", rig.width);
-  expect(rig.height > 0, "height", "> 0", rig.height);
+  constexpr int kMost = 16384;  // more than any camera has, and far from what OpenCV's images can hold
+  expect(rig.width > 0 && rig.width <= kMost, "width", "1 to 16384", rig.width);
+  expect(rig.height > 0 && rig.height <= kMost, "height", "1 to 16384", rig.height);
   expect(positive(rig.fx), "fx", "> 0", rig.fx);
   expect(positive(rig.fy), "fy", "> 0", rig.fy);
   expect(std::isfinite(rig.cx), "cx", "a number", rig.cx);

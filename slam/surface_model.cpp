@@ -1,5 +1,6 @@
 #include "twofold/surface.hpp"
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
@@ -13,7 +14,8 @@
 namespace twofold {
 namespace {
 
-constexpr double kFarthest = 1e5;  // [m]
+constexpr double kFarthest = 1e5;     // [m]
+constexpr double kUnitLength = 1e-3;  // that a quaternion's squared length may differ from one, as of a file
 
 Rig depth_rig(const CameraRig& rig) {
   if (rig.sensor == Sensor::kMono)
@@ -76,6 +78,9 @@ SurfaceModel& SurfaceModel::operator=(SurfaceModel&&) noexcept = default;
 
 int SurfaceModel::add(const FrameView& frame, const Pose& T_world_camera) {
   const Rig& rig = impl_->rig;
+  const auto& q = T_world_camera.q;
+  if (!(std::abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1) < kUnitLength))
+    throw std::invalid_argument("T_world_camera.q is no unit quaternion");
   const SE3 T_w_c = to_se3(T_world_camera);
   if (!(T_w_c.translation().norm() < kFarthest) || !T_w_c.matrix().allFinite())
     throw std::invalid_argument("T_world_camera is not finite, or farther than 100 km from the origin");

@@ -245,7 +245,7 @@ void add_eval_command(CLI::App& app, int& exit_code) {
   CLI::Option* difference = command
                                 ->add_option("--max-difference", arguments->max_difference_s,
                                              "largest difference of time stamps [s]")
-                                ->check(CLI::NonNegativeNumber)
+                                ->check(at_least_zero())
                                 ->capture_default_str();
   command->add_option("--json", arguments->json, "write all figures to this file");
   command->add_option("--plot", arguments->plot,

@@ -77,9 +77,9 @@ void add_record_command(CLI::App& app, int& exit_code) {
   command->add_option("OUT", arguments->out, "Folder of the recording; must not hold one yet")->required();
   command->add_option("--calib", arguments->calibration, "Calibration to store with a camera's recording");
   command->add_option("--frames", arguments->frames, "Stop after so many (0: at Ctrl-C or the end)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(at_least_zero());
   command->add_option("--queue", arguments->queue, "Frames that may wait to be written")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command->add_flag("--quiet", arguments->quiet, "No counter");
   command->callback([arguments, &exit_code] { exit_code = record(*arguments); });

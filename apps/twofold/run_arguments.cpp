@@ -161,7 +161,7 @@ void add_estimator_options(CLI::App& command, RunArguments& arguments) {
       ->check(CLI::IsMember({"engine", "swf"}))
       ->capture_default_str();
   command.add_option("--window", arguments.window, "Poses the sliding window filter keeps (0: all)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->capture_default_str();
 }
 

@@ -92,7 +92,7 @@ void add_train(CLI::App& parent, int& exit_code) {
       ->required();
   command->add_option("-o,--out", arguments->out, "File to write")->required();
   command->add_option("--every", arguments->every, "Take each Nth image of folders and sources")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command->add_option("--branching", arguments->options.branching, "Children of a node of the tree")
       ->check(CLI::Range(2, 64))
@@ -123,7 +123,7 @@ void add_evaluate(CLI::App& parent, const std::shared_ptr<std::string>& file, in
       ->capture_default_str();
   command->add_option("--max-angle", arguments->max_angle_deg, "Between their optical axes [deg]")
       ->capture_default_str();
-  command->add_option("--every", arguments->every, "Take each Nth frame")->check(CLI::PositiveNumber);
+  command->add_option("--every", arguments->every, "Take each Nth frame")->check(above_zero());
   command->add_option("--plot", arguments->plot, "Draw precision over recall to this PNG file");
   command->add_option("--csv", arguments->csv, "Write what became of each candidate, stage by stage");
   command->callback([arguments, file, &exit_code] {

@@ -44,8 +44,8 @@ enum class Sensor : std::uint8_t { kStereo, kRgbd, kMono };
 /// along x, so that corresponding points lie in the same row.
 struct CameraRig {
   Sensor sensor = Sensor::kStereo;
-  int width = 0;        ///< [px] > 0
-  int height = 0;       ///< [px] > 0
+  int width = 0;        ///< [px] 1 .. 16384
+  int height = 0;       ///< [px] likewise
   double fx = 0;        ///< [px] > 0
   double fy = 0;        ///< [px] > 0
   double cx = 0;        ///< [px]

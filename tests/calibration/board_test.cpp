@@ -27,6 +27,9 @@ TEST(Board, TextIsReadOrRefusedWithTheReason) {
         "charuco:8x6:0.03", "charuco:8x6:0.03:0.04", "charuco:8x6:0.03:0.02:7x7", "charuco:60x60:0.03:0.02",
         "chessboard::0.02", "chessboard:x:0.02"})
     EXPECT_FALSE(parse_board(text).has_value()) << text;
+  for (const char* text :
+       {"chessboard:9x6:25", "chessboard:9x6:2.5", "charuco:8x6:30:22", "chessboard:9x6:0.0002"})
+    EXPECT_NE(parse_board(text).error().find("sides are in metres"), std::string::npos) << text;
   EXPECT_NE(parse_board("aprilgrid:6x6:0.088:0.3").error().find("no AprilGrid"), std::string::npos);
 }
 

@@ -211,6 +211,33 @@ TEST_F(SlamTest, ARunOfTheLibraryIsReplayedByTheLibrary) {
   EXPECT_NE(failed.errors.front().find("schedule"), std::string::npos) << failed.errors.front();
 }
 
+TEST_F(SlamTest, AReplayIsOfTheSameInputAndKeepsItsSchedule) {
+  const ScratchFolder folder;
+  const auto schedule = folder.path() / "schedule.log";
+  Slam recorded(rig(), {.mode = RunMode::kDeterministic, .run_folder = folder.path()});
+  push_all(recorded);
+  (void)recorded.finish();
+  EXPECT_THROW(Slam(rig(), {.mode = RunMode::kReplay, .schedule = schedule, .run_folder = folder.path()}),
+               std::invalid_argument);
+  const auto error_of_replay = [&](const CameraRig& its_rig, std::size_t first) {
+    Slam replay(its_rig, {.mode = RunMode::kReplay, .schedule = schedule});
+    (void)replay.push(view(first));
+    const SlamSummary summary = replay.finish();
+    return summary.errors.empty() ? "" : summary.errors.front();
+  };
+  EXPECT_EQ(error_of_replay(rig(), 0), "");
+  EXPECT_NE(error_of_replay(rig(), 1).find("another recording"), std::string::npos);
+  CameraRig other = rig();
+  other.baseline *= 1.001;
+  EXPECT_NE(error_of_replay(other, 0).find("another rig"), std::string::npos);
+}
+
+TEST_F(SlamTest, ARigLargerThanAnyCameraIsRefused) {
+  CameraRig large = rig();
+  large.width = large.height = 100'000;
+  EXPECT_THROW(Slam(large, {}), std::invalid_argument);
+}
+
 TEST_F(SlamTest, AProgramDrivesTheStepsItself) {
   Slam slam(rig(), {.mode = RunMode::kStepped, .frame_buffers = 3});
   std::thread::id told_by;

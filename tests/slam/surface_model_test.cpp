@@ -241,6 +241,8 @@ TEST(SurfaceModel, RefusesWhatMakesNoSense) {
   EXPECT_THROW(model.add(frame, {}), std::invalid_argument);
   EXPECT_THROW(model.add(wall.view(), Pose{{0, 0, 0, 1}, {NAN, 0, 0}}), std::invalid_argument);
   EXPECT_THROW(model.add(wall.view(), Pose{{0, 0, 0, 1}, {1e9, 0, 0}}), std::invalid_argument);
+  EXPECT_THROW(model.add(wall.view(), Pose{{0, 0, 0, 0}, {0, 0, 0}}), std::invalid_argument);
+  EXPECT_THROW(model.add(wall.view(), Pose{{0, 0, 0, 2}, {0, 0, 0}}), std::invalid_argument);
   wall.depth.assign(wall.depth.size(), 0);
   EXPECT_EQ(model.add(wall.view(), {}), 0);
   EXPECT_EQ(model.memory_bytes(), 0u);

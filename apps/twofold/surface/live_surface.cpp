@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/command_line.hpp"
 #include "base/check.hpp"
 #include "base/processor_time.hpp"
 #include "engine/listeners.hpp"
@@ -28,12 +29,12 @@ void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments
                              .add_option("--surface", arguments.voxel,
                                          "Fuse the keyframes' depth into a mesh (surface.ply, surface.glb), "
                                          "with samples this far apart [m]")
-                             ->check(CLI::PositiveNumber);
+                             ->check(above_zero());
   command
       .add_option("--surface-memory", arguments.memory_mb,
                   "No more keyframes are fused once samples and depth images take this much [MiB]; the mesh "
                   "takes as much again")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str()
       ->needs(surface);
   command

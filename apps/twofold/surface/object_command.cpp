@@ -172,13 +172,13 @@ void run_object(ObjectArguments& arguments) {
 void add_mask_options(CLI::App& command, ObjectArguments& arguments) {
   ObjectMaskOptions& mask = arguments.frames.mask;
   command.add_option("--depth-cut", mask.farthest, "Nothing farther than this belongs to the object [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command
       .add_option("--above", mask.above,
                   "The object begins this far above the plane that it stands on, or four standard deviations "
                   "of the depth [m]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->capture_default_str();
   command.add_option("--erode", mask.erode, "Pixels taken away from the rim of what is left")
       ->check(CLI::Range(0, 20))
@@ -186,7 +186,7 @@ void add_mask_options(CLI::App& command, ObjectArguments& arguments) {
   command
       .add_option("--depth-noise", arguments.surface.depth_noise,
                   "Standard deviation of a depth z over z^2 [1/m]; 0: the sensor's usual one")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->capture_default_str();
 }
 
@@ -206,7 +206,7 @@ void add_object_command(CLI::App& app, int& exit_code) {
   command->add_option("--voxel", arguments->surface.voxel, "Distance of two samples of the surface [m]")
       ->capture_default_str();
   command->add_option("--every", arguments->frames.keep_every, "Fuse every so many-th frame")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   add_mask_options(*command, *arguments);
   command->add_flag("--deterministic", arguments->deterministic, "One thread: equal input, equal bytes");

@@ -240,19 +240,19 @@ void add_surface_command(CLI::App& app, int& exit_code) {
   command->add_option("--voxel", arguments->options.voxel, "Distance of two samples of the surface [m]")
       ->capture_default_str();
   command->add_option("--every", arguments->every, "Fuse every so many-th frame that has a pose")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command
       ->add_option("--max-depth", arguments->options.max_depth,
                    "Readings farther than this begin no surface [m]; 0: only those beyond the calibration's "
                    "depth: max (8 "
                    "m by default)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->capture_default_str();
   command
       ->add_option("--depth-noise", arguments->options.depth_noise,
                    "Standard deviation of a depth z over z^2 [1/m]; 0: the sensor's usual one")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->capture_default_str();
   command->add_flag("--grey", arguments->grey, "Brightness instead of the recording's colours");
   command->add_option("--obj", arguments->obj, "Write the mesh to this OBJ file, too");
