@@ -30,7 +30,8 @@ py::array lazily(const py::object& self, MapRows::Lazy<Row> MapRows::*member, co
 
 void register_rows() {
   using Map = MapSnapshot;
-  PYBIND11_NUMPY_DTYPE(Map::Keyframe, id, part, frame, t_ns, T_world_camera, points, window, has_place);
+  PYBIND11_NUMPY_DTYPE(Map::Keyframe, id, part, frame, t_ns, T_world_camera, points, window, has_place,
+                       loaded);
   PYBIND11_NUMPY_DTYPE(Map::Point, id, anchor, observers, part, position, covariance);
   PYBIND11_NUMPY_DTYPE(Map::Edge, from, to, kind, shared_points, T_to_from);
   PYBIND11_NUMPY_DTYPE(Map::Loop, from, to, t_ns, inliers, scale, joins_parts, drift, turned, travelled);
@@ -59,7 +60,10 @@ void bind_map(py::module_& module) {
           },
           "(N,) with fields id, part, frame, t_ns [ns], T_world_camera (q: x y z w, t [m]), points (it "
           "sees), window (1, 2:\n"
-          "in W1, W2; 0: in neither), has_place (it can be recognised).")
+          "in W1, W2; 0: in neither), has_place (it can be recognised), loaded (it was in the map that the "
+          "run "
+          "went on with:\n"
+          "frame and t_ns are of another recording).")
       .def(
           "points",
           [](const py::object& self, bool covariance) {

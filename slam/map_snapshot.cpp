@@ -83,6 +83,7 @@ std::vector<MapSnapshot::Keyframe> MapSnapshot::keyframes() const {
     keyframe.points = static_cast<std::uint32_t>(from.observations->size());
     keyframe.window = window[index(from.id)];
     keyframe.has_place = map.places.find(from.id) != nullptr;
+    keyframe.loaded = keyframe.id < impl_->loaded_keyframes;
   });
   return keyframes;
 }

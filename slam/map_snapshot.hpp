@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "camera/rig.hpp"
@@ -12,6 +13,7 @@ namespace twofold {
 struct TWOFOLD_HIDDEN MapSnapshot::Impl {
   Rig rig;
   std::shared_ptr<const MapVersion> map;
+  std::uint32_t loaded_keyframes = 0;  ///< of the map that the run went on with, which has the first ids
 };
 
 }  // namespace twofold

@@ -91,6 +91,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
     engine.on_places = [this](const KeyframeDatabase& places) { maps.publish(places); };
     engine.on_loop = [this](const ClosedLoop& loop) { maps.publish(loop); };
     engine.mapping_paused = &mapping_paused_;
+    if (engine.map) loaded_keyframes_ = engine.map->graph.keyframe_count();
     reporter_.listen(engine);
     pipeline_ = options.mode == RunMode::kReplay ? make_replay(rig_, engine, schedule_to_replay(options))
                                                  : make_pipeline(rig_, engine);
@@ -125,7 +126,10 @@ class TWOFOLD_HIDDEN Slam::Impl {
   GuardedCallback<PoseEstimate, FrameDetails> on_frame{"on_frame"};
   LatestValue<PoseEstimate> latest;
   MapLender maps;
-  [[nodiscard]] const Rig& rig() const { return rig_; }
+  [[nodiscard]] MapSnapshot newest_map() {
+    return MapSnapshot(
+        std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps.newest(), loaded_keyframes_}));
+  }
 
  private:
   void tell(const PoseReport& report);
@@ -150,6 +154,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
   const bool live_;
   const int frame_buffers_;
   const std::filesystem::path trace_;
+  std::uint32_t loaded_keyframes_ = 0;       // of the map that the run went on with: the first ids
   std::atomic<bool> mapping_paused_{false};  // relaxed: a wish
   PoseReporter reporter_;                    // tracker's
   PoseEstimate estimate_;                    // likewise: of the frame in hand
@@ -370,8 +375,7 @@ std::optional<PoseEstimate> Slam::latest() const {
 }
 
 MapSnapshot Slam::map() const {
-  return MapSnapshot(
-      std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{impl_->rig(), impl_->maps.newest()}));
+  return impl_->newest_map();
 }
 
 HeldMaps Slam::held_maps() const {

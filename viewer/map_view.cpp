@@ -16,8 +16,10 @@ ViewKeyframe view_of(const MapSnapshot::Keyframe& keyframe, std::int64_t start_n
   ViewKeyframe view;
   view.id = keyframe.id;
   view.part = keyframe.part;
-  view.frame = static_cast<std::uint32_t>(keyframe.frame);
-  view.t = static_cast<float>(1e-9 * static_cast<double>(keyframe.t_ns - start_ns));
+  if (!keyframe.loaded) {  // else it was there from the first moment on
+    view.frame = static_cast<std::uint32_t>(keyframe.frame);
+    view.t = static_cast<float>(1e-9 * static_cast<double>(keyframe.t_ns - start_ns));
+  }
   std::copy_n(keyframe.T_world_camera.t.begin(), 3, view.position);
   std::copy_n(keyframe.T_world_camera.q.begin(), 4, view.orientation);
   view.points = keyframe.points;

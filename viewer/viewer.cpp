@@ -123,7 +123,8 @@ KeyframeImages::Find find_images(const std::function<MapSnapshot()>& map, const 
     const auto at = std::lower_bound(
         keyframes.begin(), keyframes.end(), id,
         [](const MapSnapshot::Keyframe& keyframe, std::uint32_t wanted) { return keyframe.id < wanted; });
-    return at != keyframes.end() && at->id == id ? recorded(at->t_ns) : ViewedImage();
+    const bool is_own = at != keyframes.end() && at->id == id && !at->loaded;  // others' times are not
+    return is_own ? recorded(at->t_ns) : ViewedImage();                        // of this recording
   };
 }
 

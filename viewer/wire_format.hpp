@@ -92,8 +92,8 @@ static_assert(sizeof(ViewPoint) == 28);
 struct ViewKeyframe {
   std::uint32_t id = 0;
   std::uint32_t part = 0;
-  std::uint32_t frame = 0;
-  float t = 0;  ///< [s]
+  std::uint32_t frame = kViewNotKnown;  ///< not known: of the map that the run went on with
+  float t = 0;                          ///< [s]
   float position[3] = {};
   float orientation[4] = {0, 0, 0, 1};  ///< x, y, z, w
   std::uint32_t points = 0;             ///< it sees

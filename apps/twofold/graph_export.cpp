@@ -38,14 +38,26 @@ std::string information_text(int weight) {
 
 }  // namespace
 
+std::size_t live_keyframes(const GraphSnapshot& graph) {
+  std::size_t live = 0;
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k)
+    live += graph.keyframe(KeyframeId{k}).culled() ? 0 : 1;
+  return live;
+}
+
 Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part) {
-  Trajectory trajectory;
+  return loaded_and_own_keyframes(graph, part, 0).second;
+}
+
+std::pair<Trajectory, Trajectory> loaded_and_own_keyframes(const GraphSnapshot& graph, KeyframeId part,
+                                                           std::uint32_t loaded) {
+  std::pair<Trajectory, Trajectory> lists;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
     if (keyframe.part == part && !keyframe.culled())
-      trajectory.push_back({keyframe.t_ns, keyframe.T_k_w.inverse()});
+      (k < loaded ? lists.first : lists.second).push_back({keyframe.t_ns, keyframe.T_k_w.inverse()});
   }
-  return trajectory;
+  return lists;
 }
 
 std::vector<MapSnapshot::Point> points_with_covariance(const Rig& rig, const GraphSnapshot& graph) {

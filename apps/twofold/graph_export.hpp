@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "camera/rig.hpp"
@@ -11,8 +14,18 @@
 
 namespace twofold {
 
+/// Keyframes that were not culled, of all parts.
+[[nodiscard]] std::size_t live_keyframes(const GraphSnapshot& graph);
+
 /// Poses of the keyframes that were not culled, of one part of the map.
 [[nodiscard]] Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
+
+/// The same in two lists: first those that were in the map that the run went on with, whose times are of
+/// other recordings, then the run's own.
+/// @param loaded  keyframes of that map, culled ones included, which have the first ids
+[[nodiscard]] std::pair<Trajectory, Trajectory> loaded_and_own_keyframes(const GraphSnapshot& graph,
+                                                                         KeyframeId part,
+                                                                         std::uint32_t loaded);
 
 /// All that is known of the points. O(their observations).
 [[nodiscard]] std::vector<MapSnapshot::Point> points_with_covariance(const Rig& rig,
@@ -27,7 +40,9 @@ namespace twofold {
 [[nodiscard]] std::string edge_list(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
 
 /// The pose graph in g2o's text form: VERTEX_SE3:QUAT with T_w_k, EDGE_SE3:QUAT with T_i_j of each edge and
-/// an information that is the edge's weight times the identity. The oldest keyframe is fixed.
+/// an information that is the edge's weight (points that both keyframes see, at least 1) times the identity:
+/// metres and radians weigh alike, and no standard deviation can be read off it. The oldest keyframe is
+/// fixed.
 [[nodiscard]] std::string g2o_text(const GraphSnapshot& graph);
 
 }  // namespace twofold

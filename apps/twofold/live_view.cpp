@@ -6,7 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/interrupt.hpp"
+#include "apps/twofold/map_options.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "engine/clock.hpp"
 #include "engine/listeners.hpp"
@@ -118,10 +120,14 @@ ViewedImage viewed_image(const cv::Mat& image) {
 LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
                    const std::filesystem::path& folder, const FrameSource& source,
                    const RecordedImages& images, EngineOptions& options)
-    : rig_(source.rig()), map_file_(folder / "map.tfm"), source_(source) {
+    : rig_(source.rig()),
+      loaded_keyframes_(loaded_keyframe_ids(options)),
+      map_file_(folder / "map.tfm"),
+      source_(source) {
   if (!arguments.port) return;
   const auto newest_map = [this] {
-    return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps_.newest()}));
+    return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(
+        MapSnapshot::Impl{rig_, maps_.newest(), loaded_keyframes_}));
   };
   ViewerOptions viewer = viewer_options(arguments, title, source, options);
   if (arguments.control) viewer.on_command = [this](ViewCommand command) { return obey(command); };
@@ -173,7 +179,7 @@ std::string LiveView::obey(ViewCommand command) {
     case ViewCommand::kSaveMap: {
       const auto map = maps_.newest();
       save_map(map_file_, rig_, map->graph, map->places);
-      return fmt::format("{}, {} keyframes", map_file_.string(), map->graph.keyframe_count());
+      return fmt::format("{}, {} keyframes", map_file_.string(), live_keyframes(map->graph));
     }
     case ViewCommand::kStop:
       interrupt();

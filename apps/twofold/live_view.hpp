@@ -72,6 +72,7 @@ class LiveView {
   [[nodiscard]] std::string obey(ViewCommand command);
 
   const Rig rig_;
+  const std::uint32_t loaded_keyframes_;
   const std::filesystem::path map_file_;
   const FrameSource& source_;
   std::int64_t losses_due_ns_ = 0;  // reader's

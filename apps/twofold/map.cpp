@@ -24,10 +24,10 @@ const char* name_of(SensorKind kind) {
 void print_info(const std::string& file) {
   const SavedMap map = open_map(file);
   const GraphSnapshot& graph = map.graph;
-  std::size_t keyframes = 0, points = 0, observations = 0, edges = 0, marginalised = 0;
+  const std::size_t keyframes = live_keyframes(graph);
+  std::size_t points = 0, observations = 0, edges = 0, marginalised = 0;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
-    keyframes += keyframe.culled() ? 0 : 1;
     observations += keyframe.observations->size();
     for (const Edge& edge : *keyframe.edges) {
       if (edge.other > keyframe.id) continue;
@@ -92,7 +92,9 @@ void add_map_command(CLI::App& app, int& exit_code) {
   CLI::App* out = command->add_subcommand("export", "Write parts of it in common forms");
   out->add_option("FILE", arguments->file, "map file")->required();
   out->add_option("--ply", arguments->ply, "points");
-  out->add_option("--g2o", arguments->g2o, "keyframe poses and edges (VERTEX_SE3:QUAT)");
+  out->add_option("--g2o", arguments->g2o,
+                  "keyframe poses and edges (VERTEX_SE3:QUAT, EDGE_SE3:QUAT); an edge's information is the "
+                  "number of points that both keyframes see, times the identity");
   out->add_option("--tum", arguments->tum, "keyframe poses");
   out->callback([arguments, &exit_code] {
     export_map(*arguments);

@@ -85,6 +85,10 @@ void expect_rig_of_map(const MapArguments& arguments, const std::string& source,
   throw IoError(arguments.load, "made with another camera than that of " + source + ": " + difference);
 }
 
+std::uint32_t loaded_keyframe_ids(const EngineOptions& options) {
+  return options.map ? options.map->graph.keyframe_count() : 0;
+}
+
 std::optional<std::int64_t> recognised_at(const EngineOptions& options, const RunResult& result) {
   if (!options.map) return std::nullopt;
   const GraphSnapshot& graph = result.graph;

@@ -38,6 +38,9 @@ void apply_map_options(const MapArguments& arguments, EngineOptions& options);
 void expect_rig_of_map(const MapArguments& arguments, const std::string& source, const Rig& rig,
                        const EngineOptions& options);
 
+/// Keyframes of the loaded map, culled ones included: in the run's map they have the first ids. 0: none was.
+[[nodiscard]] std::uint32_t loaded_keyframe_ids(const EngineOptions& options);
+
 /// Index of the first frame that was tracked in the loaded map.
 [[nodiscard]] std::optional<std::int64_t> recognised_at(const EngineOptions& options,
                                                         const RunResult& result);

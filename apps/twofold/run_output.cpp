@@ -91,10 +91,13 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   replace_causal_trajectory(folder / "trajectory_causal.txt", causal_poses);
   remove_part_files(folder, parts.size());
   const auto points = points_with_covariance(source.rig(), result.graph);
+  const std::uint32_t loaded = loaded_keyframe_ids(options);
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (n > 0) write_tum_trajectory(folder / part_file("trajectory", n, ".txt"), parts[n].trajectory);
-    write_tum_trajectory(folder / part_file("keyframes", n, ".txt"),
-                         keyframe_trajectory(result.graph, parts[n].id));
+    const auto [of_loaded_map, own] = loaded_and_own_keyframes(result.graph, parts[n].id, loaded);
+    write_tum_trajectory(folder / part_file("keyframes", n, ".txt"), own);
+    if (!of_loaded_map.empty())
+      write_tum_trajectory(folder / part_file("keyframes_loaded", n, ".txt"), of_loaded_map);
     write_ply(folder / part_file("map", n, ".ply"), map_points(points, result.graph, parts[n].id));
     write_file(folder / part_file("edges", n, ".txt"), edge_list(result.graph, parts[n].id));
   }
@@ -163,7 +166,7 @@ void print_other_maps(const EngineOptions& options, const RunResult& result,
                       const std::vector<MapPart>& parts) {
   if (options.map) {
     const auto frame = recognised_at(options, result);
-    fmt::print("loaded map  {} keyframes, {}\n", options.map->graph.keyframe_count(),
+    fmt::print("loaded map  {} keyframes, {}\n", live_keyframes(options.map->graph),
                frame ? fmt::format("recognised at frame {}", *frame)
                      : std::string("no place of it was recognised: poses are not in its frame"));
   }
@@ -199,7 +202,7 @@ void print_summary(const std::filesystem::path& folder, const EngineOptions& opt
   fmt::print("frames      {} ({} tracked, {}{} lost, {} dropped){}\n", counts.frames, counts.tracked, later,
              counts.lost, counts.dropped, result.interrupted ? ", interrupted" : "");
   fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
-             result.graph.keyframe_count(), result.mapping.rounds, result.mapping.metric_loops,
+             live_keyframes(result.graph), result.mapping.rounds, result.mapping.metric_loops,
              result.loops.size());
   print_loops(result);
   if (result.readout && result.readout->significant) {

@@ -22,7 +22,8 @@ struct RunFrames {
   std::vector<std::string> errors = {};  ///< of the run: what it failed of, and what was lost
 };
 
-/// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, groundtruth.txt if
+/// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, with a loaded map
+/// keyframes_loaded.txt, groundtruth.txt if
 /// known (all TUM form), map.ply, timing.json, loop_latency.txt, summary.json, trajectory.png
 /// (schedule.log is there already: RunLogs); trajectory, keyframes and map of parts that never joined the
 /// first (map_parts) as trajectory-2.txt and so on. Throws IoError when it cannot.

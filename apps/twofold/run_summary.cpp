@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/loop_latency.hpp"
 #include "apps/twofold/map_options.hpp"
 #include "apps/twofold/recoveries.hpp"
@@ -71,15 +72,15 @@ Json late_and_lost(const PacingOptions& pacing, const RunResult& result) {
   return {{"why_lost", lost}, {"why_late", late}};
 }
 
-Json loops_json(const RunResult& result) {
+Json loops_json(const EngineOptions& options, const RunResult& result) {
   Json loops = Json::array();
   for (const ClosedLoop& loop : result.loops) {
     const Vector6 drift = loop.drift();
     const Json travelled = loop.joins_parts ? Json() : Json(loop.travelled);
-    const auto older = result.graph.live_replacement(loop.constraint.from);
     loops.push_back({{"t_ns", loop.t_ns},
                      {"from", index(loop.constraint.from)},
-                     {"from_t_ns", older ? Json(result.graph.keyframe(older->id).t_ns) : Json()},
+                     {"from_t_ns", loop.from_t_ns},
+                     {"from_loaded", index(loop.constraint.from) < loaded_keyframe_ids(options)},
                      {"to", index(loop.constraint.to)},
                      {"inliers", loop.constraint.inliers},
                      {"scale", loop.constraint.scale},
@@ -108,7 +109,7 @@ Json corrections_json(const RunResult& result) {
 /// Where the lost camera was placed again; null where there is no way between the two places.
 Json relocalisations_json(const EngineOptions& options, const RunResult& result) {
   Json json = Json::array();
-  for (const Recovery& r : recoveries(result, options.map ? options.map->graph.keyframe_count() : 0)) {
+  for (const Recovery& r : recoveries(result, loaded_keyframe_ids(options))) {
     json.push_back({{"frame", r.frame},
                     {"t_ns", r.t_ns},
                     {"lost_frames", r.lost_frames},
@@ -122,7 +123,7 @@ Json relocalisations_json(const EngineOptions& options, const RunResult& result)
 /// What became of the map the run started with.
 Json loaded_map_json(const EngineOptions& options, const RunResult& result) {
   if (!options.map) return nullptr;
-  Json json{{"keyframes", options.map->graph.keyframe_count()},
+  Json json{{"keyframes", live_keyframes(options.map->graph)},
             {"localise_only", options.localise_only},
             {"recognised", false}};
   if (const auto frame = recognised_at(options, result)) {
@@ -181,10 +182,7 @@ Json readout_json(const std::optional<ReadoutEstimate>& readout) {
 
 Json summary_json(const std::string& source_text, const EngineOptions& options, const RunResult& result,
                   const std::vector<MapPart>& parts) {
-  std::size_t keyframes = 0;
   std::size_t points = 0;
-  for (std::uint32_t k = 0; k < result.graph.keyframe_count(); ++k)
-    keyframes += !result.graph.keyframe(KeyframeId{k}).culled();
   for (std::uint32_t p = 0; p < result.graph.point_count(); ++p)
     points += result.graph.point(PointId{p}).alive();
   const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
@@ -197,7 +195,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"placed_later", result.counts.placed_later},
             {"lost", result.counts.lost},
             {"dropped", result.counts.dropped},
-            {"keyframes", keyframes},
+            {"keyframes", live_keyframes(result.graph)},
             {"points", points},
             {"loaded_map", loaded_map_json(options, result)},
             {"checkpoints", checkpoints_json(result.checkpoints)},
@@ -207,7 +205,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
             {"rolling_shutter", readout_json(result.readout)},
             {"mapper_rounds", result.mapping.rounds},
             {"metric_loop_edges", result.mapping.metric_loops},
-            {"closed_loops", loops_json(result)},
+            {"closed_loops", loops_json(options, result)},
             {"loops_too_late", result.mapping.late_loops},
             {"pose_corrections", corrections_json(result)},
             {"relocalisations", relocalisations_json(options, result)},

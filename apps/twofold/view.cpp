@@ -73,7 +73,8 @@ KeyframeImages::Find images_of_run(const std::filesystem::path& folder) {
     if (!images) return {};
     std::map<std::uint32_t, std::int64_t> t_ns;
     for (const RunPart& part : read_run_parts(folder))
-      for (std::size_t k = 0; k < part.ids.size(); ++k) t_ns.emplace(part.ids[k], part.keyframes[k].t_ns);
+      for (std::size_t k = part.loaded; k < part.ids.size(); ++k)
+        t_ns.emplace(part.ids[k], part.keyframes[k].t_ns);
     return [images, t_ns](std::uint32_t keyframe) {
       const auto at = t_ns.find(keyframe);
       return at != t_ns.end() ? viewed_image(images(at->second)) : ViewedImage();

@@ -25,8 +25,8 @@ class TWOFOLD_API MapSnapshot {
   struct Keyframe {
     std::uint32_t id = kNoId;
     std::uint32_t part = kNoId;  ///< first keyframe of its map part; each part has a world of its own
-    /// Number and time stamp of the frame it was made of. Keyframes of the map that a run went on with have
-    /// those of the recording that map was made from: frames of this run may have the same.
+    /// Number and time stamp of the frame it was made of; of another recording's if it is `loaded`: frames of
+    /// this run may have the same.
     std::int64_t frame = 0;
     std::int64_t t_ns = 0;
     Pose T_world_camera;
@@ -34,6 +34,7 @@ class TWOFOLD_API MapSnapshot {
     std::uint8_t window =
         0;                   ///< 1, 2: in the inner or outer window of the mapper's last round; 0: in neither
     bool has_place = false;  ///< described, so that it can be recognised
+    bool loaded = false;     ///< it was in the map that the run went on with (SlamOptions::map)
   };
 
   struct Point {

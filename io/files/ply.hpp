@@ -14,8 +14,8 @@ struct PlyPoint {
   Vector3 x_w;  ///< [m]
   std::array<std::uint8_t, 3> rgb = {255, 255, 255};
   float stddev = 0;  ///< of the position, along its worst axis [m]; 0 = unknown
-  /// Line of keyframes.txt, from 0, of the keyframe that it was first seen in, or of the one before, if that
-  /// is gone; kUnknown if there is none.
+  /// Line, from 0, of the keyframe that it was first seen in, or of the one before, if that is gone, in
+  /// keyframes_loaded.txt, if there is one, and keyframes.txt after it; kUnknown if there is none.
   std::uint32_t first_keyframe = kUnknown;
   std::uint32_t observers = 0;  ///< keyframes that see it; 0: unknown
 

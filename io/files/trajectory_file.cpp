@@ -68,7 +68,7 @@ bool is_cut(const std::vector<TextLine>& lines) {
 
 }  // namespace
 
-Trajectory read_tum_trajectory(const fs::path& file, CutLine cut, std::string* note) {
+Trajectory read_tum_trajectory(const fs::path& file, CutLine cut, std::string* note, TimeOrder order) {
   std::vector<TextLine> lines = read_text_lines(file);
   if (cut == CutLine::kLeftOut && is_cut(lines)) {
     if (note != nullptr)
@@ -84,8 +84,10 @@ Trajectory read_tum_trajectory(const fs::path& file, CutLine cut, std::string* n
     const Eigen::Quaterniond q(number_field(file, line.number, fields[7]), q_xyz.x(), q_xyz.y(), q_xyz.z());
     const TimedPose pose{
         t_ns, SE3(checked_rotation(file, line.number, q), vector_at(file, line.number, fields, 1))};
-    if (!trajectory.empty() && rounded_to_same_time(trajectory.back(), pose)) continue;
-    expect_increasing(file, line.number, t_ns, &previous);
+    if (order == TimeOrder::kIncreasing) {
+      if (!trajectory.empty() && rounded_to_same_time(trajectory.back(), pose)) continue;
+      expect_increasing(file, line.number, t_ns, &previous);
+    }
     trajectory.push_back(pose);
   }
   return trajectory;

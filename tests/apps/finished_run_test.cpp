@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "apps/twofold/view/run_frames.hpp"
@@ -137,6 +138,37 @@ TEST_F(FinishedRunTest, PartsAreParts) {
   EXPECT_EQ(edges[1].loop, kJoinsParts);
   EXPECT_EQ(edges[2].key(), (ViewEdge{.from = 2, .to = 3}.key()));
   EXPECT_EQ(edges[2].marginalised, 1);
+}
+
+/// Whose times are of other recordings: some are those of this run's frames, and they need not ascend.
+TEST_F(FinishedRunTest, KeyframesOfALoadedMapAreNoFramesOfThisRun) {
+  write_tum_trajectory(folder_.path() / "keyframes_loaded.txt", poses({5, 3, 90}));
+  folder_.write("edges.txt", "0 1 12 covisible\n2 3 5 covisible\n");
+  write_frames();
+  show();
+  const auto keyframes = records<ViewKeyframe>(scene_, ViewBlock::kKeyframes);
+  ASSERT_EQ(keyframes.size(), 7U);
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(keyframes[k].id, k);
+    EXPECT_EQ(keyframes[k].frame, kViewNotKnown);
+    EXPECT_EQ(keyframes[k].t, 0) << "it was there from the first moment on";
+  }
+  EXPECT_EQ(keyframes[3].frame, 2U);
+  EXPECT_EQ(path()[5].reference, 4U) << "keyframe 90 is of another recording";
+  EXPECT_EQ(path()[5].keyframe, 0);
+  const auto edges = records<ViewEdge>(scene_, ViewBlock::kEdges);
+  EXPECT_TRUE(std::any_of(edges.begin(), edges.end(),
+                          [](const ViewEdge& edge) { return edge.from == 2 && edge.to == 3; }));
+  const auto points = records<ViewPoint>(scene_, ViewBlock::kPoints);
+  EXPECT_EQ(points[0].anchor, 1U) << "lines of the loaded map's keyframes come first";
+}
+
+TEST_F(FinishedRunTest, AllKeyframesMayBeOfTheLoadedMap) {
+  write_tum_trajectory(folder_.path() / "keyframes_loaded.txt", poses({50, 60}));
+  write_tum_trajectory(folder_.path() / "keyframes.txt", {});
+  show();
+  EXPECT_EQ(path()[3].reference, 0U);
+  EXPECT_EQ(path()[3].keyframe, 0);
 }
 
 TEST_F(FinishedRunTest, RelocalisationsAndNewPartsAreEvents) {

@@ -105,6 +105,28 @@ TEST_F(MapCommand, GoingOnTwiceGivesTheSameBytes) {
   EXPECT_EQ(maps[0], maps[1]);
 }
 
+/// Their times are of another recording: of the same scene, they are even the same ones.
+TEST_F(MapCommand, KeyframesOfTheLoadedMapAreKeptApart) {
+  const Outcome outcome = run_in_map("--deterministic", "'synthetic:desk?frames=150&width=320&height=240'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto lines = [&](const char* name) {
+    const std::string text = content(folder_ / (std::string("result/") + name));
+    return std::count(text.begin(), text.end(), '\n') - 1;  // a line says what stands where
+  };
+  const auto own = lines("keyframes.txt"), loaded = lines("keyframes_loaded.txt");
+  EXPECT_GT(own, 1);
+  EXPECT_GT(loaded, 1);
+  EXPECT_EQ(own + loaded, summary()["keyframes"]);
+  EXPECT_NE(outcome.out.find("map         " + std::to_string(own + loaded) + " keyframes"), std::string::npos)
+      << outcome.out;
+  const Outcome eval = run(folder_, "eval '" + (folder_ / "result/keyframes.txt") + "' '" +
+                                        (folder_ / "result/groundtruth.txt") + "'");
+  ASSERT_EQ(eval.exit_code, 0) << eval.err;
+  EXPECT_NE(eval.out.find(std::to_string(own) + " poses of " + std::to_string(own) + " have a partner"),
+            std::string::npos)
+      << eval.out;
+}
+
 TEST_F(MapCommand, PartsThatNeverJoinedAreMapsOfTheirOwn) {
   const std::string file = folder_ / "parts.tfm", second = folder_ / "parts-2.tfm";
   const Outcome outcome =

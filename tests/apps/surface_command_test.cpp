@@ -71,7 +71,7 @@ TEST(SurfaceCommand, ThreadedRunsAndFinishedRunsGiveSurfacesToo) {
   EXPECT_EQ(content(folder / "after/s.obj").rfind("# metres\nv ", 0), 0u);
 }
 
-/// The loaded map's keyframes are of another recording, whose times may be those of this one's frames.
+/// Localised in the loaded map, it has no keyframe of its own.
 TEST(SurfaceCommand, ARunInALoadedMapIsFusedAlongItsTrajectory) {
   const ScratchFolder folder;
   const std::string map = folder / "map.tfm";

@@ -35,6 +35,7 @@ TEST_F(SlamMapTest, TheMapHasItsKeyframesPointsEdgesAndWindows) {
     EXPECT_EQ(keyframe.part, keyframes[0].id);
     EXPECT_GT(keyframe.points, 20U);
     EXPECT_TRUE(keyframe.has_place);
+    EXPECT_FALSE(keyframe.loaded);
   }
   const auto in_window = [&](int window) {
     return std::count_if(keyframes.begin(), keyframes.end(),
@@ -179,6 +180,7 @@ TEST_F(SlamMapTest, ACameraFindsItselfInASavedMap) {
   EXPECT_EQ(events[0].kind, MapEventKind::kRelocalisation);
   EXPECT_EQ(events[0].map_part_before, kNoId);
   EXPECT_EQ(slam.map().keyframes().size(), keyframes);
+  for (const auto& keyframe : slam.map().keyframes()) EXPECT_TRUE(keyframe.loaded) << keyframe.id;
   EXPECT_GE(slam.map().version(), loaded);
   EXPECT_THROW(slam.save_map("/nowhere/at.all"), std::runtime_error);
 }

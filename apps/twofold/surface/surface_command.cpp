@@ -49,7 +49,7 @@ struct RunInput {
   std::string source;
   std::string calibration;  ///< file that the run was given; empty: none
   double row_offset = 0;    ///< of the right images, which the run took back [px]
-  bool went_on = false;     ///< with a loaded map, whose keyframes are of frames of another recording
+  bool went_on = false;     ///< with a loaded map, in which it makes few keyframes of its own, or none
 };
 
 RunInput input_of_run(const fs::path& folder) {
@@ -231,7 +231,7 @@ void add_surface_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--poses", arguments->poses,
       "Trajectory to fuse along, or truth: the recording's own; a run's keyframes.txt otherwise, or its "
-      "trajectory.txt if it went on with a loaded map, whose keyframes are of another recording. A frame "
+      "trajectory.txt if it went on with a loaded map, in which it makes few or none. A frame "
       "has a pose if their times differ by no more than 1 ms");
   command->add_option("--calib", arguments->calibration,
                       "Calibration file instead of the recording's own, or of that which the run was given");

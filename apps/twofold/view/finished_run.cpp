@@ -54,7 +54,7 @@ class FinishedRun {
   [[nodiscard]] std::vector<ViewKeyframe> keyframes() const;
   [[nodiscard]] std::vector<MapSnapshot::Loop> loops() const;
   /// Keyframe at that time or before; kNoId: none, or none is meant.
-  [[nodiscard]] std::uint32_t keyframe_at(const RunJson& loop, const char* t_ns) const;
+  [[nodiscard]] std::uint32_t keyframe_at(const RunJson& loop, const char* t_ns, bool loaded = false) const;
   void place(const PlacedPose& placed, ViewPathFrame& frame) const;
   void add_path(ViewScene& scene) const;
   void add_truth(const std::filesystem::path& file, ViewScene& scene) const;
@@ -110,9 +110,11 @@ std::vector<ViewKeyframe> FinishedRun::keyframes() const {
       ViewKeyframe& keyframe = keyframes.emplace_back();
       keyframe.id = part.ids[k];
       keyframe.part = part.name();
-      keyframe.t = seconds(pose.t_ns);
-      if (const auto number = numbers.find(pose.t_ns); number != numbers.end())
-        keyframe.frame = number->second;
+      if (k >= part.loaded) {  // others were there from the first moment on
+        keyframe.t = seconds(pose.t_ns);
+        const auto number = numbers.find(pose.t_ns);
+        keyframe.frame = number != numbers.end() ? number->second : 0;
+      }
       copy_position(pose.T_w_c.translation(), keyframe.position);
       for (int i = 0; i < 4; ++i)
         keyframe.orientation[i] = static_cast<float>(pose.T_w_c.so3().quaternion().coeffs()[i]);
@@ -145,14 +147,16 @@ ViewMap FinishedRun::map() const {
   return map;
 }
 
-std::uint32_t FinishedRun::keyframe_at(const RunJson& loop, const char* t_ns) const {
+std::uint32_t FinishedRun::keyframe_at(const RunJson& loop, const char* t_ns, bool loaded) const {
   const auto value = loop.find(t_ns);
   if (value == loop.end() || !value->is_number_integer()) return kNoId;
   std::pair<std::int64_t, std::uint32_t> newest{std::numeric_limits<std::int64_t>::min(), kNoId};
-  for (const RunPart& part : parts_)
-    for (std::size_t k = 0; k < part.keyframes.size() && part.keyframes[k].t_ns <= value->get<std::int64_t>();
-         ++k)
-      newest = std::max(newest, {part.keyframes[k].t_ns, part.ids[k]});
+  for (const RunPart& part : parts_) {
+    const std::size_t end = loaded ? part.loaded : part.keyframes.size();
+    for (std::size_t k = loaded ? 0 : part.loaded; k < end; ++k)
+      if (part.keyframes[k].t_ns <= value->get<std::int64_t>())
+        newest = std::max(newest, {part.keyframes[k].t_ns, part.ids[k]});
+  }
   return newest.second;
 }
 
@@ -162,7 +166,7 @@ std::vector<MapSnapshot::Loop> FinishedRun::loops() const {
     MapSnapshot::Loop& loop = loops.emplace_back();
     loop.t_ns = from.value("t_ns", start_ns_);
     // The page numbers the keyframes that are left, the run numbered all.
-    loop.from = keyframe_at(from, "from_t_ns");
+    loop.from = keyframe_at(from, "from_t_ns", from.value("from_loaded", false));
     loop.to = keyframe_at(from, "t_ns");
     loop.inliers = from.value("inliers", 0);
     loop.scale = from.value("scale", 1.0);
@@ -174,18 +178,20 @@ std::vector<MapSnapshot::Loop> FinishedRun::loops() const {
   return loops;
 }
 
-/// Hangs the frame on the keyframe before it.
+/// Hangs the frame on the keyframe before it, or, if the run has none, on the loaded map's first.
 void FinishedRun::place(const PlacedPose& placed, ViewPathFrame& frame) const {
   const auto& [pose, part] = placed;
   frame.part = part->name();
   const auto causal = causal_.find(pose.t_ns);
   copy_position(causal == causal_.end() ? pose.T_w_c.translation() : causal->second, frame.causal);
   if (part->keyframes.empty()) return;
-  const auto after = std::upper_bound(part->keyframes.begin(), part->keyframes.end(), pose.t_ns,
+  const auto own = part->keyframes.begin() + static_cast<std::ptrdiff_t>(part->loaded);
+  const auto after = std::upper_bound(own, part->keyframes.end(), pose.t_ns,
                                       [](std::int64_t t_ns, const TimedPose& k) { return t_ns < k.t_ns; });
-  const auto reference = after == part->keyframes.begin() ? after : std::prev(after);
+  const auto first = own == part->keyframes.end() ? part->keyframes.begin() : own;
+  const auto reference = after == own ? first : std::prev(after);
   frame.reference = part->ids[static_cast<std::size_t>(reference - part->keyframes.begin())];
-  frame.keyframe = reference->t_ns == pose.t_ns ? 1 : 0;
+  frame.keyframe = reference >= own && reference->t_ns == pose.t_ns ? 1 : 0;
   set_pose_in_reference(to_pose(reference->T_w_c.inverse() * pose.T_w_c), frame);
 }
 

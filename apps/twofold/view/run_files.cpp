@@ -32,14 +32,24 @@ std::vector<ViewEdge> read_edges(const std::filesystem::path& file, const std::v
   return edges;
 }
 
-/// Keyframes of all parts by their times; two parts may not share one.
+/// Keyframes of all parts: the loaded map's as they come, then the run's by their times, of which two parts
+/// may not share one.
 void number_keyframes(std::vector<RunPart>& parts) {
+  std::uint32_t next = 0;
   std::map<std::int64_t, std::uint32_t> numbers;
-  for (const RunPart& part : parts)
-    for (const TimedPose& keyframe : part.keyframes) numbers.emplace(keyframe.t_ns, 0);
-  for (std::uint32_t next = 0; auto& [t_ns, number] : numbers) number = next++;
+  for (RunPart& part : parts) {
+    for (std::size_t k = 0; k < part.loaded; ++k) part.ids.push_back(next++);
+    for (const TimedPose& keyframe : part.own_keyframes()) numbers.emplace(keyframe.t_ns, 0);
+  }
+  for (auto& [t_ns, number] : numbers) number = next++;
   for (RunPart& part : parts)
-    for (const TimedPose& keyframe : part.keyframes) part.ids.push_back(numbers.at(keyframe.t_ns));
+    for (const TimedPose& keyframe : part.own_keyframes()) part.ids.push_back(numbers.at(keyframe.t_ns));
+}
+
+/// Of whatever recordings: a map that was gone on with twice has keyframes of two.
+Trajectory read_loaded_keyframes(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return {};
+  return read_tum_trajectory(file, CutLine::kRefused, nullptr, TimeOrder::kAny);
 }
 
 }  // namespace
@@ -52,7 +62,10 @@ std::vector<RunPart> read_run_parts(const std::filesystem::path& folder) {
   for (std::size_t n = 0; n == 0 || std::filesystem::exists(file("trajectory", n, ".txt")); ++n) {
     RunPart& part = parts.emplace_back();
     part.poses = read_tum_trajectory(file("trajectory", n, ".txt"));
-    part.keyframes = read_tum_trajectory(file("keyframes", n, ".txt"));
+    part.keyframes = read_loaded_keyframes(file("keyframes_loaded", n, ".txt"));
+    part.loaded = part.keyframes.size();
+    const Trajectory own = read_tum_trajectory(file("keyframes", n, ".txt"));
+    part.keyframes.insert(part.keyframes.end(), own.begin(), own.end());
     part.points = read_ply(file("map", n, ".ply"));
   }
   number_keyframes(parts);

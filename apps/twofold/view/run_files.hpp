@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <vector>
 
 #include "evaluation/trajectory.hpp"
@@ -17,13 +19,20 @@ using RunJson = nlohmann::json;
 
 /// What a run wrote of one part of its map.
 struct RunPart {
-  Trajectory poses;      ///< of frames
-  Trajectory keyframes;  ///< in the order of time
-  /// Numbers of the keyframes among those of all parts, in the order of time.
+  Trajectory poses;  ///< of frames
+  /// First those of the map that the run went on with, whose times are of other recordings, then its own, in
+  /// the order of time.
+  Trajectory keyframes;
+  std::size_t loaded = 0;  ///< the former
+  /// Numbers of the keyframes among those of all parts, in the same order.
   std::vector<std::uint32_t> ids;
   std::vector<PlyPoint> points;
   std::vector<ViewEdge> edges;  ///< between these numbers
 
+  /// The run's own keyframes.
+  [[nodiscard]] std::span<const TimedPose> own_keyframes() const {
+    return std::span(keyframes).subspan(loaded);
+  }
   /// Its first keyframe.
   [[nodiscard]] std::uint32_t name() const { return ids.empty() ? 0 : ids.front(); }
 };

@@ -9,7 +9,7 @@ import {Sight} from './sight.ts';
 import {Stage, contextOf, type Layer, type View} from './stage.ts';
 import {Strip} from './strip.ts';
 import {Timeline, clock, describe, lateStretches, lateTally, length, lostStretches, tally, type Tally} from './timeline.ts';
-import {PROTOCOL, State, type Binary, type Keyframe, type KeyframeImage, type LiveFrame, type MapEvent, type Text} from './wire.ts';
+import {NO_ID, PROTOCOL, State, type Binary, type Keyframe, type KeyframeImage, type LiveFrame, type MapEvent, type Text} from './wire.ts';
 
 const $ = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
@@ -453,7 +453,8 @@ class Page {
       return button;
     });
     const isLive = this.model.hello?.kind === 'live';  // others may not know all of it
-    const rows = [row('frame', `${keyframe.frame}, ${clock(keyframe.t)}`), row('position', keyframe.position.map((x) => x.toFixed(2)).join(', ')),
+    const frame = keyframe.frame === NO_ID ? 'of the loaded map' : `${keyframe.frame}, ${clock(keyframe.t)}`;
+    const rows = [row('frame', frame), row('position', keyframe.position.map((x) => x.toFixed(2)).join(', ')),
       row('map part', String(keyframe.part)), row('neighbours', String(neighbours.length))];
     if (isLive) rows.push(row('window', ['neither', 'inner', 'outer'][keyframe.window]));
     if (isLive || keyframe.points > 0) rows.push(row('points it sees', String(keyframe.points)), row('can be recognised', keyframe.hasPlace ? 'yes' : 'no'));
