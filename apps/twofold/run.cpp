@@ -75,6 +75,9 @@ std::vector<std::string> real_time_notes(const RunArguments& arguments) {
 std::optional<Schedule> schedule_of(const RunArguments& arguments) {
   const std::string& file = arguments.replay_schedule;
   if (file.empty()) return std::nullopt;
+  std::error_code ignored;
+  if (std::filesystem::equivalent(file, std::filesystem::path(arguments.out) / "schedule.log", ignored))
+    throw IoError(file, "is in the folder that the replay would write to: name another one for --out");
   auto schedule = load_schedule(file);
   if (!schedule) throw IoError(file, schedule.error());
   return *std::move(schedule);
@@ -103,8 +106,7 @@ int run_with_filter(const RunArguments& arguments) {
   expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
-  remove_results(arguments.out, calibration_file_of(arguments));
-  remove_logs(arguments.out);
+  remove_earlier_run(arguments.out, calibration_file_of(arguments));
   catch_interrupts();
   run_filter(*source, arguments.source, arguments.window, arguments.out, interrupted());
   return kOk;
@@ -120,22 +122,28 @@ std::unique_ptr<FrameSource> open_frames(const RunArguments& arguments,
   return source;
 }
 
+/// Known with the source alone: a camera keeps a pace of its own.
+void expect_pace_for_late(const RunArguments& arguments, const EngineOptions& options) {
+  const bool repeats = !arguments.replay_schedule.empty();  // whose frames were late is in the schedule
+  if (arguments.late.empty() || options.pacing.keeps_pace() || repeats) return;
+  throw IoError("--late", "needs a pace, of --speed or of a camera: without one no frame is late");
+}
+
 struct PreparedSource {
   std::unique_ptr<FrameSource> source;
   RecordingTee* recorder = nullptr;  ///< the source itself, with --record
 };
 
-/// The source as the run takes it, and what `options` need to say of it. Only once it is known to fit, what
-/// an earlier run left in the folder goes.
+/// The source as the run takes it, known to fit, and what `options` need to say of it.
 PreparedSource prepared(std::unique_ptr<FrameSource> source, const RunArguments& arguments,
-                        const std::filesystem::path& calibration, EngineOptions& options) {
+                        EngineOptions& options) {
   if (source->is_live()) {
     options.pacing.live = true;
     if (arguments.late.empty()) options.pacing.late = LatePolicy::kNewest;
   }
   source = resampled_for_map(std::move(source), options);
   expect_rig_of_map(arguments.map, arguments.source, source->rig(), options);
-  remove_results(arguments.out, calibration);
+  expect_pace_for_late(arguments, options);
   if (arguments.record.empty()) return {std::move(source)};
   auto recording = std::make_unique<RecordingTee>(std::move(source), arguments.record);
   RecordingTee* const recorder = recording.get();
@@ -272,7 +280,7 @@ int run(const RunArguments& arguments) {
   auto opened = open_frames(arguments, calibration);
   const std::filesystem::path calibrated_by =
       calibration ? calibration->file : std::filesystem::path(calibration_file_of(arguments));
-  const PreparedSource frames = prepared(std::move(opened), arguments, calibrated_by, options);
+  const PreparedSource frames = prepared(std::move(opened), arguments, options);
   const auto& source = frames.source;
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
@@ -282,6 +290,7 @@ int run(const RunArguments& arguments) {
   const bool one_thread = options.deterministic || schedule.has_value();
   LiveSurface surface(arguments.surface, *source, options, one_thread,
                       mesh_listener(view, arguments.surface.voxel));
+  remove_earlier_run(arguments.out, calibrated_by);  // nothing refuses this one any more
   const RunResult result = run_engine(arguments, options, std::move(schedule), *source, view, surface);
   poses.finish();
   view.finish();

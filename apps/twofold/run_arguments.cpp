@@ -148,7 +148,7 @@ void add_frame_options(CLI::App& command, RunArguments& arguments) {
       ->capture_default_str();
   command
       .add_option("--late", arguments.late,
-                  "Frames that are late: queue (recordings do), drop, or newest (cameras do)")
+                  "Frames that are late, at a pace: queue (recordings do), drop, or newest (cameras do)")
       ->check(CLI::IsMember(kLatePolicies));
 }
 
@@ -196,7 +196,7 @@ void add_run_options(CLI::App& command, RunArguments& arguments) {
                    "One thread, one order: same input, same bytes");
   command
       .add_option("--replay-schedule", arguments.replay_schedule,
-                  "Repeat the run that wrote this schedule.log")
+                  "Repeat the run that wrote this schedule.log, over the same recording, into another --out")
       ->check(empty_name);
   command.add_flag("--preload", arguments.preload, "Decode everything into memory before the clock starts");
   command.add_option("--trace", arguments.trace, "Write spans and counters for ui.perfetto.dev to this file")

@@ -263,6 +263,9 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
   expect_bad_input(run_recording("--deterministic --replay-schedule x"), "--replay-schedule: repeats");
   expect_bad_input(run_recording("--poses-form tum"), "--poses-form: needs --poses");
   expect_bad_input(run_recording("--window 20"), "--window: is for --estimator swf");
+  expect_bad_input(run_recording("--estimator swf --window -1"), "--window: must be a number >= 0, is -1");
+  expect_bad_input(run_recording("--late drop"), "--late: needs a pace");
+  expect_bad_input(run_recording("--late drop --deterministic"), "--late: needs a pace");
   expect_bad_input(run_recording("--replay-schedule /nonexistent"), "/nonexistent");
   expect_bad_input(run_recording("--calib /nonexistent.yaml"), "/nonexistent.yaml");
   folder_.write("noise.log", "this is no schedule");
@@ -290,6 +293,48 @@ TEST_F(RunCommand, TheFilterRefusesWhatItDoesNotDo) {
     expect_bad_input(run_recording("--estimator swf " + option),
                      option.substr(0, option.find(' ')) + (option == "--calib auto" ? " auto" : "") +
                          ": is not for --estimator swf");
+}
+
+TEST_F(RunCommand, AReplayDoesNotOverwriteItsSchedule) {
+  ASSERT_EQ(run_recording().exit_code, 0);
+  const std::string schedule = result("schedule.log"), poses = result("trajectory.txt");
+  expect_bad_input(run_recording("--replay-schedule '" + (folder_ / "result/../result/schedule.log") + "'"),
+                   "is in the folder that the replay would write to");
+  EXPECT_EQ(result("schedule.log"), schedule);
+  EXPECT_EQ(result("trajectory.txt"), poses);
+}
+
+TEST_F(RunCommand, AScheduleOfAnotherRunsInputIsAFailure) {
+  ASSERT_EQ(run_recording().exit_code, 0);
+  const std::string schedule = folder_ / "first.log";
+  fs::rename(folder_ / "result/schedule.log", schedule);
+  fs::remove_all(recording_ / "image_1");
+  fs::copy(recording_ / "image_0", recording_ / "image_1");
+  fs::remove(recording_ / "image_1/000000.png");
+  fs::copy(master_->path() / "image_1/000001.png", recording_ / "image_1/000000.png");
+  const Outcome other = run_recording("--replay-schedule '" + schedule + "'");
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_NE(other.err.find("the schedule belongs to another recording"), std::string::npos) << other.err;
+  replace_in("calib.txt", "P1: 220 0 159.5 -26.4", "P1: 220 0 159.5 -26.5");
+  const Outcome rig = run_recording("--replay-schedule '" + schedule + "'");
+  EXPECT_EQ(rig.exit_code, 1);
+  EXPECT_NE(rig.err.find("the schedule belongs to another rig"), std::string::npos) << rig.err;
+}
+
+/// What an earlier run left goes when this one begins, not when it is refused.
+TEST_F(RunCommand, AFolderHoldsOneRun) {
+  ASSERT_EQ(run_recording().exit_code, 0);
+  const std::string summary = result("summary.json"), schedule = result("schedule.log");
+  expect_bad_input(run_recording("--poses unix:/nonexistent/socket"), "/nonexistent");
+  EXPECT_EQ(result("summary.json"), summary);
+  EXPECT_EQ(result("schedule.log"), schedule);
+  folder_.write("result/schedule.log.new", "of a run that was killed");
+  folder_.write("result/keyframes_loaded.txt", "of a run in a loaded map");
+  folder_.write("result/map.tfm", "saved by whoever looked");
+  ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "result/schedule.log.new"));
+  EXPECT_FALSE(fs::exists(folder_ / "result/keyframes_loaded.txt"));
+  EXPECT_EQ(result("map.tfm"), "saved by whoever looked");
 }
 
 /// Each estimator leaves a folder that holds its own files alone.

@@ -15,10 +15,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array kLogs{"trajectory_causal.txt", "schedule.log"};
-constexpr std::array kResults{"trajectory.txt", "keyframes.txt",    "frames.txt",   "edges.txt",
-                              "map.ply",        "groundtruth.txt",  "timing.json",  "summary.json",
-                              "trajectory.png", "loop_latency.txt", "surface.ply",  "surface.glb",
-                              "cloud.ply",      "object.json",      "structure.ply"};
+constexpr std::array kResults{"trajectory.txt",   "keyframes.txt",  "keyframes_loaded.txt", "frames.txt",
+                              "edges.txt",        "map.ply",        "groundtruth.txt",      "timing.json",
+                              "summary.json",     "trajectory.png", "surface.ply",          "surface.glb",
+                              "loop_latency.txt", "cloud.ply",      "object.json",          "structure.ply"};
 
 /// summary.json of a run of whatever estimator; null: there is none.
 nlohmann::json earlier_summary(const fs::path& folder) {
@@ -57,7 +57,7 @@ void expect_output_folder(const fs::path& folder, const std::string& source) {
   for (const char* name : kResults) expect_free(name);
 }
 
-void remove_results(const fs::path& folder, const fs::path& calibration) {
+void remove_earlier_run(const fs::path& folder, const fs::path& calibration) {
   std::error_code error;
   const nlohmann::json summary = earlier_summary(folder);
   const fs::path own = folder / "calibration.yaml";  // a run's only if it calibrated itself
@@ -65,6 +65,10 @@ void remove_results(const fs::path& folder, const fs::path& calibration) {
       !fs::equivalent(own, calibration, error))
     fs::remove(own, error);
   for (const char* name : kResults) fs::remove(folder / name, error);
+  for (const std::string name : kLogs) {
+    fs::remove(folder / name, error);
+    fs::remove(folder / (name + ".new"), error);  // of a run that was killed while it replaced it
+  }
   remove_part_files(folder, 1);
 }
 
@@ -75,14 +79,10 @@ void remove_part_files(const fs::path& folder, std::size_t parts) {
   };
   for (std::size_t n = parts; remove("trajectory", n, ".txt"); ++n) {
     remove("keyframes", n, ".txt");
+    remove("keyframes_loaded", n, ".txt");
     remove("map", n, ".ply");
     remove("edges", n, ".txt");
   }
-}
-
-void remove_logs(const fs::path& folder) {
-  std::error_code error;
-  for (const char* name : kLogs) fs::remove(folder / name, error);
 }
 
 }  // namespace twofold

@@ -12,15 +12,13 @@ namespace twofold {
 /// Nothing is changed.
 void expect_output_folder(const std::filesystem::path& folder, const std::string& source);
 
-/// Of an earlier run into the folder, what is written at the end only: should this run be killed, its folder
-/// holds nothing of another one's. For folders that expect_output_folder has let through.
+/// What an earlier run into the folder wrote there by itself: should this one be killed, or end before it has
+/// anything to write, its folder holds nothing of another one's. Files that the user named, as maps, stay.
+/// For folders that expect_output_folder has let through.
 /// @param calibration  the file that this run was given, or has written: it stays
-void remove_results(const std::filesystem::path& folder, const std::filesystem::path& calibration);
+void remove_earlier_run(const std::filesystem::path& folder, const std::filesystem::path& calibration);
 
 /// The files of further map parts, from that of index `parts` on: an earlier run had more.
 void remove_part_files(const std::filesystem::path& folder, std::size_t parts);
-
-/// What an earlier run wrote as it went, for a run that writes no such files.
-void remove_logs(const std::filesystem::path& folder);
 
 }  // namespace twofold

@@ -133,7 +133,7 @@ void run_object(ObjectArguments& arguments) {
   expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   const std::unique_ptr<ObjectSource> source = object_source(arguments);
-  remove_results(arguments.out, arguments.calibration);
+  remove_earlier_run(arguments.out, arguments.calibration);
   EngineOptions options = options_for_object(source->rig());
   options.deterministic = arguments.deterministic;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
