@@ -35,6 +35,12 @@ std::vector<PlyPoint> surface_points(const StructureFilter& filter) {
   return points;
 }
 
+/// Empty: none.
+std::string failure_of(const FrameSource& source, const std::string& source_text, std::size_t tracked) {
+  if (!source.error().empty()) return source.error();
+  return tracked < 2 ? source_text + ": no frame could be tracked" : "";
+}
+
 }  // namespace
 
 void run_filter(FrameSource& source, const std::string& source_text, int window,
@@ -71,22 +77,29 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_ply(folder / "structure.ply", points);
   const double mean_ms = busy_ms / static_cast<double>(std::max<std::size_t>(1, frames));
-  const nlohmann::ordered_json summary{{"source", absolute_source(source_text)},
-                                       {"estimator", "swf"},
-                                       {"window", window},
-                                       {"frames", frames},
-                                       {"tracked", smoothed.size()},
-                                       {"restarts", filter.restarts()},
-                                       {"points", points.size()},
-                                       {"wall_seconds", wall.count()},
-                                       {"mean_ms", mean_ms},
-                                       {"slowest_ms", slowest_ms}};
+  const std::string error = failure_of(source, source_text, smoothed.size());
+  using Json = nlohmann::ordered_json;
+  const Json summary{{"source", absolute_source(source_text)},
+                     {"estimator", "swf"},
+                     {"window", window},
+                     {"interrupted", stop.load(std::memory_order_relaxed)},
+                     {"error", error},
+                     {"errors", error.empty() ? Json::array() : Json::array({error})},
+                     {"frames", frames},
+                     {"tracked", smoothed.size()},
+                     {"lost", frames - smoothed.size()},
+                     {"restarts", filter.restarts()},
+                     {"points", points.size()},
+                     {"wall_seconds", wall.count()},
+                     {"mean_ms", mean_ms},
+                     {"slowest_ms", slowest_ms},
+                     {"notes", source.report().notes}};
   write_file(folder / "summary.json", summary.dump(2) + "\n");
   fmt::print("{} frames, {} tracked, {} restarts, {} points; {:.1f} ms a frame, slowest {:.1f}; {}\n", frames,
              smoothed.size(), filter.restarts(), points.size(), mean_ms, slowest_ms, folder.string());
   for (const std::string& note : source.report().notes) fmt::print("note        {}\n", note);
-  if (!source.error().empty()) throw IoError(source.error());
-  if (smoothed.size() < 2) throw std::runtime_error(source_text + ": no frame could be tracked");
+  if (!source.error().empty()) throw IoError(error);
+  if (!error.empty()) throw std::runtime_error(error);
 }
 
 }  // namespace twofold

@@ -43,6 +43,10 @@ with tempfile.TemporaryDirectory() as folder:
         if "--deterministic" in options:
             assert json.loads((out / "summary.json").read_text())["why_lost"], "the scene has lost frames"
 
+with tempfile.TemporaryDirectory() as folder:
+    subprocess.run([sys.argv[1], "run", "synthetic:desk?frames=10&width=320&height=240", "--estimator", "swf", "--out", folder], check=True, stdout=subprocess.DEVNULL)
+    check(Path(folder), "summary")
+
 for frames, turns in (30, True), (8, False):
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([sys.argv[1], "object", OBJECT.format(frames), "--deterministic", "--out", folder], check=True, stdout=subprocess.DEVNULL)
