@@ -77,6 +77,7 @@ class SlamWithUpdates {
   }
   /// Whoever reads comes to the end.
   ~SlamWithUpdates() {
+    slam.end_pace();
     finish();
     view.close();
   }
@@ -340,6 +341,12 @@ void bind_slam_class(py::module_& module) {
           py::arg("paused"),
           "While paused, the map gets no keyframe: the camera is localised in what there is. Waits for "
           "nobody.")
+      .def(
+          "end_pace", [](SlamWithUpdates& self) { self.slam.end_pace(); }, Unlocked(),
+          "With `speed`: from now on no frame waits for its time, so that finish() returns soon, also when "
+          "it "
+          "is called by\n"
+          "another thread already.")
       .def("errors", [](const SlamWithUpdates& self) { return self.slam.errors(); })
       .def("finish", &finish)
       .def("view", &view, py::kw_only(), py::arg("title") = "Twofold", py::arg("port") = ViewerOptions{}.port,

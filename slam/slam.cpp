@@ -116,6 +116,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
     return !summary_ && !failed() && !pipeline_->ended() && has_room_now();
   }
   bool step(SlamStep step);
+  void end_pace();
   void pause_mapping(bool paused) { mapping_paused_.store(paused, std::memory_order_relaxed); }
   [[nodiscard]] std::vector<std::string> errors() const;
   void save_map(const std::filesystem::path& file);
@@ -132,6 +133,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
   }
 
  private:
+  void let_pipeline_go();
   void tell(const PoseReport& report);
   void tell_details(const PoseReport& report);
   void expect_no_callback(const char* function) const;
@@ -171,7 +173,9 @@ class TWOFOLD_HIDDEN Slam::Impl {
   mutable std::mutex errors_;  // guards what follows
   std::string engine_error_;
   std::vector<std::string> file_errors_;
-  std::unique_ptr<Pipeline> pipeline_;  // late: its threads end before what they use is destroyed
+  // Changes with both pushing_ and pipeline_goes_. Late: its threads end before what they use is destroyed.
+  std::unique_ptr<Pipeline> pipeline_;
+  std::mutex pipeline_goes_;  // never held for long: finish must not keep end_pace waiting
   std::jthread caretaker_;
 };
 
@@ -311,6 +315,17 @@ void Slam::Impl::save_map(const std::filesystem::path& file) {
   twofold::save_map(file, rig_, map->graph, map->places);
 }
 
+void Slam::Impl::end_pace() {
+  const std::scoped_lock lock(pipeline_goes_);
+  if (pipeline_) pipeline_->end_pace();
+}
+
+void Slam::Impl::let_pipeline_go() {
+  std::unique_ptr<Pipeline> gone;
+  const std::scoped_lock lock(pipeline_goes_);
+  gone = std::move(pipeline_);
+}
+
 const SlamSummary& Slam::Impl::finish() {
   expect_no_callback("finish");
   const std::scoped_lock turn(pushing_);
@@ -323,7 +338,7 @@ const SlamSummary& Slam::Impl::finish() {
   std::vector<std::string> wrong = result.losses;
   for (std::string why : {checkpoint_error(), write_trace(result)})
     if (!why.empty()) wrong.push_back(std::move(why));
-  if (mode_ != RunMode::kStepped) pipeline_.reset();  // else other threads may still ask it for a step
+  if (mode_ != RunMode::kStepped) let_pipeline_go();  // else other threads may still ask it for a step
   {
     const std::scoped_lock lock(errors_);
     engine_error_ = result.error;
@@ -337,6 +352,7 @@ Slam::Slam(const CameraRig& rig, const SlamOptions& options) : impl_(std::make_u
 
 Slam::~Slam() {
   try {
+    impl_->end_pace();
     impl_->finish();
   } catch (...) {  // nobody is left to be told
   }
@@ -389,6 +405,10 @@ void Slam::save_map(const std::filesystem::path& file) const {
 
 void Slam::pause_mapping(bool paused) {
   impl_->pause_mapping(paused);
+}
+
+void Slam::end_pace() {
+  impl_->end_pace();
 }
 
 std::vector<std::string> Slam::errors() const {

@@ -185,18 +185,18 @@ class TWOFOLD_API Slam {
   /// when a file cannot be used, an option of the engine is out of range or the rig is not the map's. A
   /// processor or priority that the system refuses is no error: SlamSummary::notes tells.
   Slam(const CameraRig& rig, const SlamOptions& options);
-  /// Finishes.
+  /// Finishes, after end_pace.
   ~Slam();
   Slam(const Slam&) = delete;
   Slam& operator=(const Slam&) = delete;
 
   /// Called for every frame that was looked at, on the tracker's thread (where the tracker's steps are taken
   /// by the caller's: on that one), which waits for it: it must not block, and may call latest, map,
-  /// held_maps, pause_mapping and errors only; push, has_room, wait_for_room, step, save_map and finish would
-  /// wait, and throw std::logic_error there. What it uses must live until finish has returned. The time it
-  /// takes is a stage of its own among SlamSummary::timings ("pose listener"), and in the next frame's
-  /// latency. A callback that throws is not called again; tracking goes on, and errors() says what it threw.
-  /// To be set before the first push, else std::logic_error is thrown.
+  /// held_maps, pause_mapping, end_pace and errors only; push, has_room, wait_for_room, step, save_map and
+  /// finish would wait, and throw std::logic_error there. What it uses must live until finish has returned.
+  /// The time it takes is a stage of its own among SlamSummary::timings ("pose listener"), and in the next
+  /// frame's latency. A callback that throws is not called again; tracking goes on, and errors() says what it
+  /// threw. To be set before the first push, else std::logic_error is thrown.
   void on_pose(PoseCallback callback);
   /// The same for corrections of the map; called before the pose of the frame that saw them.
   void on_event(EventCallback callback);
@@ -244,11 +244,17 @@ class TWOFOLD_API Slam {
   /// thread, callbacks included. A replay pauses where its run did.
   void pause_mapping(bool paused);
 
+  /// With `speed`: from now on no frame waits for its time, so that what is queued is tracked at once. For
+  /// who wants finish to return soon, before it or while another thread is in it. Also in callbacks; the
+  /// destructor does it by itself.
+  void end_pace();
+
   /// What went wrong so far; tracking goes on unless it says otherwise. A thread that ended and a file that
   /// lost something or cannot be written are in it within a second, whether frames come or not.
   [[nodiscard]] std::vector<std::string> errors() const;
 
-  /// Tracks what is queued, makes all poses agree globally and ends the threads. A second call gives the same
+  /// Tracks what is queued, with `speed` when its time has come (end_pace), makes all poses agree globally
+  /// and ends the threads. A second call gives the same
   /// answer. map() and save_map() then have the final map. The answer is a copy with all poses of the run (or
   /// those kept), and the Slam keeps one: the one place where memory grows with the time.
   SlamSummary finish();

@@ -75,6 +75,7 @@ class Run:
         """Ends the run, wherever it is, and says what it came to."""
         self.source.stop()
         self.slam._updates.close()
+        self.slam.end_pace()
         if self._feeder is not None:
             self._feeder.join()
         return self.slam.finish()

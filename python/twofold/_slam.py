@@ -141,7 +141,9 @@ class Slam(_core.Slam):
         return [*super().errors(), *own]
 
     def finish(self) -> _core.Summary:
-        """Tracks what is queued, makes all poses agree globally and ends the threads. A second call: the same answer."""
+        """Tracks what is queued, with `speed` when its time has come (end_pace), makes all poses agree globally and ends the
+        threads. A second call: the same answer.
+        """
         summary = super().finish()
         if self._dispatcher is not None:
             self._dispatcher.join()
@@ -154,6 +156,8 @@ class Slam(_core.Slam):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if kind is not None:  # as Ctrl-C: nobody waits for the rest
+            self.end_pace()
         self.finish()
 
     def _dispatch(self) -> _Dispatcher:
@@ -171,5 +175,6 @@ _open: weakref.WeakSet[Slam] = weakref.WeakSet()
 def _finish_all() -> None:
     # A thread that comes back from libtwofold after the interpreter's end would bring the process down.
     for slam in list(_open):
+        end_quietly(slam.end_pace)
         end_quietly(slam.finish)
         end_quietly(slam.close_view)

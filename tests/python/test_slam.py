@@ -169,6 +169,7 @@ def test_maps_are_read_only_views_that_hold_their_version(finished: twofold.Run)
     assert set(edges["from"]) <= set(keyframes["id"])
     assert (edges["from"] < edges["to"]).all()
     assert parts["keyframes"].sum() == len(keyframes)
+    assert not keyframes["loaded"].any()
     assert len(loops) == 0  # a desk, seen once
     columns = {"from", "to", "t_ns", "inliers", "scale", "joins_parts", "drift", "turned", "travelled"}
     assert set(loops.dtype.names or ()) == columns
@@ -240,6 +241,18 @@ def test_a_recording_is_played_at_its_own_pace_and_leaves_checkpoints_and_a_trac
     assert "traceEvents" in (tmp_path / "trace.json").read_text()
     with pytest.raises(ValueError, match="options.late"):
         twofold.Slam(rig, late=twofold.LateFrames.DROP)
+
+
+def test_the_pace_ends_for_who_does_not_want_to_wait(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:
+    begin = time.monotonic()
+    slam = twofold.Slam(rig, speed=0.002)  # frames are due half a minute after each other
+    push_all(slam, frames[:4])
+    slam.end_pace()
+    assert slam.finish().tracked == 4
+    with pytest.raises(KeyboardInterrupt), twofold.Slam(rig, speed=0.002) as slam:
+        push_all(slam, frames[:4])
+        raise KeyboardInterrupt
+    assert time.monotonic() - begin < 20
 
 
 def test_while_mapping_is_paused_no_keyframe_is_made(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:

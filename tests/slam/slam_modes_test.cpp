@@ -62,6 +62,30 @@ TEST_F(SlamModesTest, ARecordingIsTrackedAtItsOwnPace) {
   }
 }
 
+/// At this speed they are due half a minute after each other.
+TEST_F(SlamModesTest, WhoWantsTheEndWaitsForNoPace) {
+  constexpr double kSlow = 0.002;
+  constexpr std::size_t kPushed = 5;
+  using Clock = std::chrono::steady_clock;
+  const auto begin = Clock::now();
+  {
+    Slam slam(rig(), {.speed = kSlow});
+    push_all(slam, 0, kPushed);
+    std::thread other([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(300));  // by then finish waits
+      slam.end_pace();
+    });
+    EXPECT_EQ(slam.finish().tracked, kPushed);
+    other.join();
+    slam.end_pace();  // with nothing left to be paced
+  }
+  {
+    Slam slam(rig(), {.speed = kSlow});
+    push_all(slam, 0, kPushed);
+  }
+  EXPECT_LT(Clock::now() - begin, std::chrono::seconds(20));
+}
+
 TEST_F(SlamModesTest, WhatBecomesOfLateFramesIsTheUsersChoice) {
   for (const bool live : {true, false}) {
     const SlamOptions paced{.live = live, .speed = live ? 0 : 100.0};
