@@ -104,7 +104,8 @@ void bind_source(py::module_& module) {
       .def_property_readonly(
           "ground_truth", [](const Source& source) { return PoseList{source.ground_truth()}; },
           "Trajectory of the rig's camera; empty when there is none.")
-      .def("next", &next_frame, "The next frame, or None at the end.")
+      .def("next", &next_frame,
+           "The next frame, or None at the end. Any thread: those that ask at once take turns.")
       .def("stop", &Source::stop, "A camera ends; of recordings, no more frames are given. From any thread.")
       .def("__iter__", [](const py::object& self) { return self; })
       .def("__next__",

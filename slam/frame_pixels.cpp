@@ -1,6 +1,7 @@
 #include "slam/frame_pixels.hpp"
 
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -98,6 +99,17 @@ cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owne
   return ours;
 }
 
+cv::Mat bgr_pixels_of(const ImageView& view) {
+  const cv::Mat theirs(view.height, view.width, CV_8UC3, const_cast<void*>(view.data),
+                       static_cast<std::size_t>(view.stride));
+  cv::Mat ours;
+  if (view.format == ImageFormat::kRgb8)
+    cv::cvtColor(theirs, ours, cv::COLOR_RGB2BGR);
+  else
+    theirs.copyTo(ours);
+  return ours;
+}
+
 FrameView view_of(Sensor sensor, const Frame& frame) {
   switch (sensor) {
     case Sensor::kStereo:
@@ -108,6 +120,14 @@ FrameView view_of(Sensor sensor, const Frame& frame) {
       break;
   }
   return mono_frame(frame.t_ns, frame.left);
+}
+
+FrameView with_colour(const FrameView& frame, const cv::Mat& left) {
+  if (left.empty()) return frame;
+  FrameView coloured = frame;
+  coloured.left = view(left);
+  coloured.owner = std::make_shared<const std::pair<cv::Mat, std::shared_ptr<const void>>>(left, frame.owner);
+  return coloured;
 }
 
 }  // namespace twofold

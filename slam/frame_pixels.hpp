@@ -22,7 +22,13 @@ namespace twofold {
 /// copied. Colour is turned to grey.
 [[nodiscard]] cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owner);
 
+/// A copy of the pixels of a colour image, CV_8UC3 (blue, green, red).
+[[nodiscard]] cv::Mat bgr_pixels_of(const ImageView& view);
+
 /// The other way round: a frame's images, which the view keeps.
 [[nodiscard]] FrameView view_of(Sensor sensor, const Frame& frame);
+
+/// The frame with this left image, CV_8UC3 (blue, green, red), which it keeps; without one, as it is.
+[[nodiscard]] FrameView with_colour(const FrameView& frame, const cv::Mat& left);
 
 }  // namespace twofold

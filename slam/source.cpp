@@ -2,6 +2,8 @@
 
 #include <array>
 #include <atomic>
+#include <map>
+#include <mutex>
 #include <stdexcept>
 
 #include "io/sources/open_source.hpp"
@@ -23,9 +25,11 @@ struct TWOFOLD_HIDDEN Source::Impl {
   }
 
   std::atomic<bool> stop{false};  // relaxed: it carries nothing else
+  std::mutex frames;              // guards the source's frames: who asks for one has his turn
   std::unique_ptr<FrameSource> source;
   CameraRig rig;
   std::vector<StampedPose> truth;
+  std::map<std::int64_t, std::int64_t> index_at;  // of a recording's frames, by their times
 };
 
 Source::Source(const std::string& name, const SourceSettings& settings)
@@ -55,6 +59,7 @@ const std::vector<StampedPose>& Source::ground_truth() const {
 }
 
 bool Source::next(FrameView& view) {
+  const std::scoped_lock turn(impl_->frames);
   Frame frame;
   if (impl_->stop.load(std::memory_order_relaxed)) return false;
   switch (impl_->source->next(frame)) {
@@ -65,8 +70,20 @@ bool Source::next(FrameView& view) {
     case FrameStatus::kError:
       throw std::runtime_error(impl_->source->error());
   }
+  if (!impl_->source->is_live()) impl_->index_at.emplace(frame.t_ns, frame.index);
   view = view_of(impl_->rig.sensor, frame);
   return true;
+}
+
+FrameView Source::in_colour(const FrameView& frame) const {
+  std::int64_t index = -1;
+  {
+    const std::scoped_lock turn(impl_->frames);
+    const auto at = impl_->index_at.find(frame.t_ns);
+    if (at == impl_->index_at.end()) return frame;
+    index = at->second;
+  }
+  return with_colour(frame, impl_->source->colour_image(index));
 }
 
 void Source::stop() {

@@ -41,17 +41,10 @@ void expect_pixels(const char* name, const ImageView& view, bool depth) {
     throw std::invalid_argument(refusal);
 }
 
-/// As fusion takes it; red and blue change places where they must.
+/// As fusion takes it.
 cv::Mat colour_of(const ImageView& view) {
-  if (view.data == nullptr || view.format == ImageFormat::kGrey8) return pixels_of(view, nullptr);
-  const cv::Mat pixels(view.height, view.width, CV_8UC3, const_cast<void*>(view.data),
-                       static_cast<std::size_t>(view.stride));
-  cv::Mat image = pixels.clone();
-  if (view.format == ImageFormat::kRgb8) {
-    const int swap[] = {0, 2, 1, 1, 2, 0};
-    cv::mixChannels(&pixels, 1, &image, 1, swap, 3);
-  }
-  return image;
+  const bool is_grey = view.data == nullptr || view.format == ImageFormat::kGrey8;
+  return is_grey ? pixels_of(view, nullptr) : bgr_pixels_of(view);
 }
 
 }  // namespace

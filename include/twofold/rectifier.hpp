@@ -39,6 +39,9 @@ class TWOFOLD_API FrameRectifier {
   /// @return  grey images, and depth, with an owner; those of `raw` themselves when they are rectified
   ///          already. Throws std::invalid_argument when `raw` is not of the calibrated cameras.
   [[nodiscard]] FrameView rectify(const FrameView& raw) const;
+  /// The same, with the left image in colour (kBgr8) if `raw` has it so: what a SurfaceModel takes its
+  /// colours from.
+  [[nodiscard]] FrameView rectify_in_colour(const FrameView& raw) const;
 
  private:
   struct Impl;

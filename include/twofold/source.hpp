@@ -26,8 +26,10 @@ struct SourceSettings {
 /// Frames of a recording, a video, a rendered scene or a camera, rectified.
 ///
 /// Named as on the command line (docs/sources.md): a path, or euroc:DIR, kitti:DIR, tum:DIR, images:DIR,
-/// video:FILE, mcap:FILE, bag:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. One thread at a
-/// time; stop() by any.
+/// video:FILE, mcap:FILE, bag:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value.
+///
+/// Threads: every function may be called by any thread; those that ask for frames take turns. A move is
+/// nobody else's moment.
 class TWOFOLD_API Source {
  public:
   /// Throws std::runtime_error naming the file and what is wrong with it.
@@ -52,6 +54,10 @@ class TWOFOLD_API Source {
   /// The next frame, with an owner: it may be pushed and kept. False at the end. Throws std::runtime_error
   /// when the input breaks.
   bool next(FrameView& frame);
+  /// A frame that next gave, with its left image in colour (kBgr8) if the recording has it, else as it is:
+  /// what a SurfaceModel takes its colours from; Slam takes the frame itself. Decoded when it is asked for,
+  /// as for keyframes, so that others cost nothing. Cameras have none. Throws as next.
+  [[nodiscard]] FrameView in_colour(const FrameView& frame) const;
   /// A camera ends; for recordings, the next call of next() is the last.
   void stop();
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +89,17 @@ def test_sources_give_frames_and_truth() -> None:
     np.testing.assert_array_equal(source.ground_truth.t_ns, [frame.t_ns for frame in frames])
     with pytest.raises(RuntimeError, match="/nowhere"):
         twofold.Source("euroc:/nowhere")
+
+
+def test_threads_that_ask_a_source_for_frames_take_turns() -> None:
+    source = twofold.Source("synthetic:desk?frames=60&sensor=rgbd&width=64&height=48")
+    taken: list[list[int]] = [[], [], [], []]
+    threads = [threading.Thread(target=lambda times=times: times.extend(frame.t_ns for frame in source)) for times in taken]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(t_ns for times in taken for t_ns in times) == list(source.ground_truth.t_ns)
 
 
 def test_rectifiers_follow_the_calibration(stereo_yaml: Path) -> None:

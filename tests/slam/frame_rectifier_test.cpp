@@ -51,6 +51,54 @@ TEST(FrameRectifier, RectifiedImagesAreTheSameOnes) {
   EXPECT_TRUE(frame.owner);
 }
 
+/// Blue, green and red of a pixel.
+cv::Vec3b colour_at(const ImageView& view, int u, int v) {
+  const auto* row = static_cast<const std::uint8_t*>(view.data) + v * view.stride;
+  return {row[3 * u], row[3 * u + 1], row[3 * u + 2]};
+}
+
+const cv::Vec3b kColour{10, 100, 200};
+
+TEST(FrameRectifier, TheLeftImageKeepsItsColoursForWhoWantsThem) {
+  for (const char* calibration : {kRectifiedPair, kTurnedPair}) {
+    const ScratchFolder folder;
+    folder.write("stereo.yaml", calibration);
+    const FrameRectifier rectifier(folder / "stereo.yaml");
+    const cv::Mat image(48, 64, CV_8UC3, cv::Scalar(kColour));
+    FrameView raw = stereo_frame(7, image, image);
+    raw.left.format = raw.right.format = ImageFormat::kRgb8;
+    const FrameView frame = rectifier.rectify_in_colour(raw);
+    ASSERT_EQ(frame.left.format, ImageFormat::kBgr8);
+    ASSERT_EQ(frame.left.width, rectifier.rig().width);
+    EXPECT_EQ(colour_at(frame.left, 32, 24), cv::Vec3b(kColour[2], kColour[1], kColour[0]));
+    EXPECT_EQ(frame.right.format, ImageFormat::kGrey8);
+    const cv::Mat grey = ramp();
+    EXPECT_EQ(rectifier.rectify_in_colour(stereo_frame(8, grey, grey)).left.format, ImageFormat::kGrey8);
+  }
+}
+
+TEST(PublicSource, AFrameIsToBeHadInColourIfTheRecordingIs) {
+  const ScratchFolder folder;
+  for (const char* camera : {"image_2", "image_3"}) {
+    std::filesystem::create_directory(folder.path() / camera);
+    for (const char* name : {"000000.png", "000001.png"})
+      cv::imwrite(folder / (std::string(camera) + "/" + name), cv::Mat(48, 64, CV_8UC3, cv::Scalar(kColour)));
+  }
+  folder.write("times.txt", "0.0\n0.1\n");
+  folder.write("calib.txt", "P2: 50 0 31.5 0 0 50 23.5 0 0 0 1 0\nP3: 50 0 31.5 -5 0 50 23.5 0 0 0 1 0\n");
+  Source source("kitti:" + folder.path().string());
+  FrameView first, second;
+  ASSERT_TRUE(source.next(first) && source.next(second));
+  EXPECT_EQ(first.left.format, ImageFormat::kGrey8);
+  const FrameView coloured = source.in_colour(first);
+  first = {};
+  ASSERT_EQ(coloured.left.format, ImageFormat::kBgr8);
+  EXPECT_EQ(coloured.t_ns, 0);
+  EXPECT_EQ(colour_at(coloured.left, 5, 7), kColour);
+  ASSERT_NE(coloured.right.data, nullptr);
+  EXPECT_GT(static_cast<const std::uint8_t*>(coloured.right.data)[0], 0) << "the frame's pixels are kept";
+}
+
 TEST(FrameRectifier, ATurnedCameraIsTurnedBack) {
   const ScratchFolder folder;
   folder.write("stereo.yaml", kTurnedPair);

@@ -1,7 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 #include <stdexcept>
+#include <thread>
+#include <vector>
 
 #include "tests/io/scratch_folder.hpp"
 #include "twofold/evaluation.hpp"
@@ -42,6 +47,25 @@ TEST(PublicSource, StopsWhenAsked) {
   ASSERT_TRUE(source.next(frame));
   source.stop();
   EXPECT_FALSE(source.next(frame));
+}
+
+TEST(PublicSource, ThreadsThatAskForFramesTakeTurns) {
+  constexpr int kFrames = 60;
+  Source source("synthetic:desk?frames=60&sensor=rgbd&width=64&height=48");
+  std::array<std::vector<std::int64_t>, 4> taken;
+  std::vector<std::thread> threads;
+  for (auto& times : taken) {
+    threads.emplace_back([&source, &times] {
+      for (FrameView frame; source.next(frame);) times.push_back(frame.t_ns);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  std::set<std::int64_t> all;
+  for (const auto& times : taken) {
+    EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
+    all.insert(times.begin(), times.end());
+  }
+  EXPECT_EQ(all.size(), static_cast<std::size_t>(kFrames));
 }
 
 TEST(PublicSource, SaysWhatIsWrong) {
