@@ -1,5 +1,7 @@
 // Is the way ahead free? A surface of the keyframes' depth, asked as a planner asks, and written as a mesh.
 //   07_surface_for_a_planner [SOURCE [MESH.obj]]
+// The mesh has the axes of the map, that of its first camera: y points down. Programs that take y for up show
+// it upside down; (x, -y, -z) stands upright there.
 // The source has depth: RGB-D, or stereo.
 #include <algorithm>
 #include <cstdint>

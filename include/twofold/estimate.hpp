@@ -47,11 +47,12 @@ struct PoseEstimate {
   /// 6x6 row by row, of delta in T_reference_camera * exp(delta), delta = (translation [m], rotation [rad])
   /// in the camera's axes: how well the camera is known relative to the reference keyframe. Where that
   /// keyframe is in the world, and the drift on the way there, is not in it. It is as large as the residuals
-  /// of the last frames say, and allows for a rolling shutter's readout as long as that is not known; what no
-  /// residual shows, a wrong focal length or clock, is not in it. Honest within a factor of two in standard
-  /// deviations where that was measured (docs/results.md). All zero, and known, for the frame that starts a
-  /// map part: that frame defines the world. Not known (covariance_known is false: the measurements leave a
-  /// direction open): all NaN.
+  /// of the last frames say, and allows for a rolling shutter's readout as long as that is not known: of a
+  /// global shutter that CameraRig::readout does not name (0), single axes are up to 15 times too wide. What
+  /// no residual shows, a wrong focal length or clock, is not in it. Otherwise honest within a factor of two
+  /// in standard deviations where that was measured (docs/results.md). All zero, and known, for the frame
+  /// that starts a map part: that frame defines the world. Not known (covariance_known is false: the
+  /// measurements leave a direction open): all NaN.
   std::array<double, 36> covariance = unknown_covariance();
   /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
   /// none.

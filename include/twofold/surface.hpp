@@ -42,7 +42,7 @@ struct SpacePoint {
 
 /// Triangles go round anticlockwise seen from outside.
 struct SurfaceMesh {
-  std::vector<std::array<float, 3>> positions;       ///< in the world [m]
+  std::vector<std::array<float, 3>> positions;       ///< in the world [m]: of a run, y points down
   std::vector<std::array<float, 3>> normals;         ///< unit, pointing outside
   std::vector<std::array<std::uint8_t, 3>> colours;  ///< red, green, blue
   std::vector<std::array<std::uint32_t, 3>> triangles;

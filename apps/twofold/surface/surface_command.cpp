@@ -255,7 +255,10 @@ void add_surface_command(CLI::App& app, int& exit_code) {
       ->check(at_least_zero())
       ->capture_default_str();
   command->add_flag("--grey", arguments->grey, "Brightness instead of the recording's colours");
-  command->add_option("--obj", arguments->obj, "Write the mesh to this OBJ file, too");
+  command->add_option(
+      "--obj", arguments->obj,
+      "Write the mesh to this OBJ file, too; its axes are surface.ply's: y points down, where many "
+      "programs take it for up");
   command->add_option("--picture", arguments->picture, "Draw the mesh to this PNG file");
   command->callback([arguments, &exit_code] {
     run_surface(*arguments);
