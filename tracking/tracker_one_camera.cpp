@@ -1,5 +1,5 @@
-// What one camera does otherwise: it starts when its motion shows depth, and points ripen before they are
-// used.
+// What one camera does otherwise, it starts when its motion shows depth, and what all do where none is
+// measured: points ripen before they are used.
 #include "geometry/inverse_depth.hpp"
 #include "tracking/tracker.hpp"
 
@@ -65,7 +65,9 @@ void Tracker::observe_seeds(const FrameStep& step) {
   const auto T_c_anchor = [&](KeyframeId anchor) {
     return result.T_c_ref * relative_pose(step.graph, immature_points_, result.reference, anchor);
   };
-  seeds_.observe(current_.left, median_depth(result.T_c_ref), T_c_anchor, immature_points_);
+  // A frame placed by its depth image may have no point that says how far the scene is.
+  const double depth = result.by_depth ? depth_alignment_->typical_depth() : median_depth(result.T_c_ref);
+  if (depth > 0) seeds_.observe(current_.left, depth, T_c_anchor, immature_points_);
 }
 
 /// Corners where no point is tracked or known, and none waits for its depth. All that one camera has; for the
