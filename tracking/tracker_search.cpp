@@ -25,14 +25,15 @@ constexpr double kUnknownReadout = 0.015;
 /// searched where they are.
 LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& step) {
   const LostCause cause = search_from(aligned, step);
-  const int found = cause == LostCause::kNone ? step.result.inliers : 0;
-  if (found >= options_.settled_searched_share * step.result.searched ||
-      !leaves_motion(aligned.placement.T_c_ref))
-    return cause;
+  const bool placed = cause == LostCause::kNone;
+  const bool settled =
+      placed && step.result.matches >= options_.settled_searched_share * step.result.searched;
+  if (settled || !leaves_motion(aligned.placement.T_c_ref)) return cause;
+  const int inliers = placed ? step.result.inliers : 0;
   const SearchStart going_on{.placement = {last_.reference, predicted_pose()}, .rough = false};
   const LostCause other = search_from(going_on, step);
-  const bool enough = cause == LostCause::kNone || well_supported(step.result);
-  if (other == LostCause::kNone && step.result.inliers > found && enough) return other;
+  const bool enough = placed || well_supported(step.result);
+  if (other == LostCause::kNone && step.result.inliers > inliers && enough) return other;
   return search_from(aligned, step);
 }
 
