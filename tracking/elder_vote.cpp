@@ -33,30 +33,30 @@ ElderVote::ElderVote(const Rig& rig, std::size_t capacity, const ElderVoteOption
   chi2_.reserve(capacity);
 }
 
-std::optional<MotionOnlyResult> ElderVote::overrule(std::span<MotionObservation> observations,
-                                                    std::span<const KeyframeId> anchors,
-                                                    const MotionOnlyResult& by_all,
-                                                    const MotionOnlyOptions& solver) {
-  difference_.reset();
+ElderVote::Verdict ElderVote::ask(std::span<MotionObservation> observations,
+                                  std::span<const KeyframeId> anchors, const MotionOnlyResult& by_all,
+                                  const MotionOnlyOptions& solver) {
   const bool mistrusted = mistrusts_the_young();
-  if (mistrusted) --mistrusted_for_;
-  if (!choose_elders(observations, anchors)) return std::nullopt;
+  Verdict verdict;
+  if (mistrusted) verdict.mistrusted_for = mistrusted_for_ - 1;
+  if (!choose_elders(observations, anchors)) return verdict;
   MotionOnlyResult by_elders = optimise_motion(rig_, elders_, by_all.T_c_ref, solver);
-  if (by_elders.inliers < options_.min_agreeing * static_cast<double>(elders_.size())) return std::nullopt;
+  if (by_elders.inliers < options_.min_agreeing * static_cast<double>(elders_.size())) return verdict;
 
   if (mistrusted) by_elders = settle_elders(by_elders, solver);
   const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
-  difference_ = split_factor(by_all.information, by_elders.information, apart);
+  verdict.difference = split_factor(by_all.information, by_elders.information, apart);
   const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent &&
                        elders_nearer_to(by_elders.T_c_ref, by_all.T_c_ref) >= options_.min_convinced;
-  if (!dissent && !mistrusted) return std::nullopt;  // nearly always
+  if (!dissent && !mistrusted) return verdict;  // nearly always
   const int with_elders = young_inliers(observations, anchors, by_elders.T_c_ref, solver);
   const int with_all = young_inliers(observations, anchors, by_all.T_c_ref, solver);
   const bool misled = dissent && with_elders < options_.min_loyal * with_all;
-  if (misled) mistrusted_for_ = options_.mistrusted_frames;
-  if (!misled && !mistrusted) return std::nullopt;
+  if (misled) verdict.mistrusted_for = options_.mistrusted_frames;
+  if (!misled && !mistrusted) return verdict;
   by_elders.inliers = classify_observations(rig_, observations, by_elders.T_c_ref, solver);
-  return by_elders;
+  verdict.by_elders = by_elders;
+  return verdict;
 }
 
 /// Elders that what passes hides are looked for all the same, and some are found on it, by chance and near to

@@ -37,22 +37,27 @@ struct ElderVoteOptions {
 /// One instance a tracker: it remembers whom it mistrusts. No allocation after construction.
 class ElderVote {
  public:
+  /// Of one frame.
+  struct Verdict {
+    std::optional<MotionOnlyResult> by_elders;  ///< the pose that the elders give, when it counts instead
+    /// By how much the elders' pose and that of all differ, over what independent errors of the rig's noise
+    /// let expect: a variance factor (PoseUncertainty::add_split). Nothing when nobody was asked, or nobody
+    /// could say.
+    std::optional<double> difference;
+    int mistrusted_for = 0;  ///< frames for which nobody asks the young, from the next one on
+  };
+
   ElderVote(const Rig& rig, std::size_t capacity, const ElderVoteOptions& options);
 
   /// @param observations  of one frame, at most `capacity`, which say who agrees with by_all; they then say
   /// who agrees with the pose that counts
   /// @param anchors       the keyframe that each of the points was seen in first; numbers grow with time
   /// @param by_all        the pose that all of them give
-  /// @return              the pose that the elders give, when it counts instead
-  [[nodiscard]] std::optional<MotionOnlyResult> overrule(std::span<MotionObservation> observations,
-                                                         std::span<const KeyframeId> anchors,
-                                                         const MotionOnlyResult& by_all,
-                                                         const MotionOnlyOptions& solver);
+  [[nodiscard]] Verdict ask(std::span<MotionObservation> observations, std::span<const KeyframeId> anchors,
+                            const MotionOnlyResult& by_all, const MotionOnlyOptions& solver);
 
-  /// By how much the elders' pose and that of all differed last, over what independent errors of the rig's
-  /// noise let expect: a variance factor (PoseUncertainty::add_split). Nothing when nobody was asked, or
-  /// nobody could say.
-  [[nodiscard]] std::optional<double> difference() const { return difference_; }
+  /// Once for each frame that has a pose: what its verdict means for the next ones.
+  void remember(const Verdict& verdict) { mistrusted_for_ = verdict.mistrusted_for; }
 
   /// The young were overruled lately.
   [[nodiscard]] bool mistrusts_the_young() const { return mistrusted_for_ > 0; }
@@ -68,8 +73,7 @@ class ElderVote {
 
   Rig rig_;
   ElderVoteOptions options_;
-  int mistrusted_for_ = 0;  ///< [frames]
-  std::optional<double> difference_;
+  int mistrusted_for_ = 0;                   ///< [frames]
   KeyframeId youngest_elder_ = kNoKeyframe;  ///< anchor
   std::vector<KeyframeId> by_age_;
   std::vector<MotionObservation> elders_;

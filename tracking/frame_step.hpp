@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 
 #include "camera/frame.hpp"
 #include "camera/rolling_shutter.hpp"
@@ -19,10 +20,16 @@ struct Placement {
 
 /// Where the search for one frame's pose begins.
 struct SearchStart {
+  enum class Kind : std::uint8_t {
+    kAligned,    ///< to the last good frame
+    kRough,      ///< by appearance, or by depth alignment alone: far points are found from there, and lead to
+                 ///< where near ones are
+    kRecognised  ///< likewise, where the loop closer recognised the camera: it may be anywhere
+  };
   Placement placement;
-  /// By appearance, maybe of an earlier frame, or by depth alignment alone: far points are found from there,
-  /// and lead to where near ones are. Else: aligned to the last good frame.
-  bool rough = false;
+  Kind kind = Kind::kAligned;
+
+  [[nodiscard]] bool rough() const { return kind != Kind::kAligned; }
 };
 
 /// What belongs to one frame only: handed from stage to stage of the tracker, which writes the result.
@@ -50,6 +57,12 @@ class FrameStep {
     const auto now = std::chrono::steady_clock::now();
     result.stage_ns[static_cast<std::size_t>(stage)] += (now - last_lap_).count();
     last_lap_ = now;
+  }
+  /// The result is again what it was, but for the time that passed.
+  void restore(const TrackResult& earlier) {
+    const auto stage_ns = result.stage_ns;
+    result = earlier;
+    result.stage_ns = stage_ns;
   }
   /// The time since the last lap was not the tracker's.
   void resume() { last_lap_ = std::chrono::steady_clock::now(); }

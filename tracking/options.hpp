@@ -5,7 +5,7 @@
 #include "estimation/motion_only.hpp"
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
-#include "tracking/depth_alignment.hpp"
+#include "tracking/depth/depth_alignment.hpp"
 #include "tracking/elder_vote.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/first_structure.hpp"

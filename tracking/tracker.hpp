@@ -13,18 +13,19 @@
 #include "graph/snapshot.hpp"
 #include "imaging/right_rows.hpp"
 #include "tracking/dense_alignment.hpp"
-#include "tracking/depth_alignment.hpp"
+#include "tracking/depth/depth_alignment.hpp"
 #include "tracking/effort.hpp"
 #include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
 #include "tracking/keyframe_decision.hpp"
+#include "tracking/last_frame.hpp"
 #include "tracking/local_map.hpp"
+#include "tracking/local_map_search.hpp"
 #include "tracking/lost_cause.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/monocular_start.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
-#include "tracking/quadtree.hpp"
 #include "tracking/recent_views.hpp"
 #include "tracking/track_result.hpp"
 
@@ -44,6 +45,8 @@ namespace twofold {
 class Tracker {
  public:
   Tracker(const Rig& rig, const TrackerOptions& options);
+  Tracker(const Tracker&) = delete;
+  Tracker& operator=(const Tracker&) = delete;
 
   /// Makes room in a buffer for the largest keyframe proposal that this tracker can fill it with.
   void prepare(KeyframeProposal& proposal) const;
@@ -91,7 +94,7 @@ class Tracker {
   /// Hint of the loop closer: the frame that `ask_where` was called for was recognised at T_c_k relative to
   /// keyframe `id`. The next step, if its graph has the keyframe, looks for points around there, then for
   /// what that frame shows, and forgets the hint. Ignored while tracking.
-  void relocalise(KeyframeId id, const SE3& T_c_k) { hint_ = Placement{id, T_c_k}; }
+  void relocalise(KeyframeId id, const SE3& T_c_k) { asked_.answer = Placement{id, T_c_k}; }
 
   /// Rows that a stereo pair's right images lie lower than its left ones, taken back by the tracker [px].
   [[nodiscard]] double row_offset() const { return right_rows_ ? right_rows_->offset() : 0; }
@@ -103,73 +106,75 @@ class Tracker {
 
   /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
   /// and diagnosis. Valid until the next step.
-  [[nodiscard]] std::span<const MotionObservation> last_observations() const { return motion_; }
+  [[nodiscard]] std::span<const MotionObservation> last_observations() const { return search_.observations; }
 
  private:
-  struct Match {
-    std::uint32_t point;  ///< position in local_map_.points()
-    PointMatch found;
-  };
   /// Of keyframes and points: the next ones.
   struct Numbers {
     std::uint32_t keyframe = 0;
     std::uint32_t first_of_part = 0;  ///< the newest part's
     std::uint32_t point = 0;
   };
+  /// A lost frame that the loop closer was shown.
+  struct Question {
+    RecentView view;
+    std::optional<Placement> answer;  ///< of relocalise
+  };
 
+  // tracker.cpp: the stages of a frame
   void load_images(const Frame& frame);
   void follow(const GraphSnapshot& graph);
-
-  bool start_map(FrameStep& step);
-  bool start_part(FrameStep& step);
-  LostCause make_first_keyframe(FrameStep& step);
-  LostCause start_from_motion(FrameStep& step);
-  LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
-  [[nodiscard]] std::optional<Placement> recognised(const GraphSnapshot& graph);
-  bool search_from_recognised(const Placement& asked, FrameStep& step);
-
   bool track(FrameStep& step);
-  LostCause search_from(SearchStart start, FrameStep& step);
-  LostCause search_from_either(const SearchStart& aligned, FrameStep& step);
-  [[nodiscard]] bool leaves_motion(const SE3& T_c_ref);
-  [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
-  bool search_widely(FrameStep& step);
-  bool search_roughly_from(const Placement& placement, double longest, FrameStep& step);
-  [[nodiscard]] bool is_within_reach(double longest, const FrameStep& step) const;
-  bool search_ahead(FrameStep& step);
-  bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
-                        const Placement& view, double longest, FrameStep& step);
-  [[nodiscard]] int mapped_inliers() const;
-  [[nodiscard]] bool well_supported(const TrackResult& result) const;
+  void settle(FrameStep& step);
   [[nodiscard]] SE3 predicted_motion() const;
   [[nodiscard]] SE3 predicted_pose() const;
   std::optional<SE3> align_to_previous(const SE3& start, FrameStep& step);
   SE3 aligned_pose(FrameStep& step);
-  [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
-  void select_candidates(const SE3& T_c_ref, TrackResult& result);
+  void remember_frame(const FrameStep& step);
+
+  // tracker_search.cpp: a pose from points
+  LostCause search_from(SearchStart start, FrameStep& step);
+  LostCause search_from_either(const SearchStart& aligned, FrameStep& step);
+  [[nodiscard]] bool leaves_motion(const SE3& T_c_ref);
+  void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
+  LostCause estimate_pose(const Placement& start, FrameStep& step);
+  void ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
+  [[nodiscard]] MotionOnlyOptions solver(const FrameStep& step) const;
+  [[nodiscard]] int mapped_inliers() const;
+  [[nodiscard]] bool well_supported(const TrackResult& result) const;
+  int judge_immature_points();
+  [[nodiscard]] Matrix6 honest_information(const FrameStep& step);
   /// One that the tracker started; null: the map has it.
   [[nodiscard]] ImmaturePoint* immature_point(const TrackedPoint& point) {
     return point.immature < 0 ? nullptr
                               : &immature_points_.points()[static_cast<std::size_t>(point.immature)];
   }
-  void search_points(const SE3& T_c_ref, double radius_px, FrameStep& step);
-  bool search_point(std::uint32_t point, const SE3& T_c_ref, const GuidedSearchOptions& search,
-                    const FrameStep& step);
-  void search_in_other_light(const SE3& T_c_ref, GuidedSearchOptions search, const FrameStep& step);
-  void count_misses();
+
+  // tracker_shutter.cpp: rows that are read one after the other
+  [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, const Frame& frame) const;
+  [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
   void learn_readout(const FrameStep& step, bool goes_on);
-  void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
-  int ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
-  LostCause estimate_pose(const Placement& start, FrameStep& step);
+  [[nodiscard]] double readout_sigma() const;
   [[nodiscard]] Matrix6 shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
                                            const FrameStep& step) const;
-  [[nodiscard]] Matrix6 honest_information(const MotionOnlyResult& motion, const MotionOnlyOptions& solver,
-                                           const FrameStep& step);
-  [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, const Frame& frame) const;
-  [[nodiscard]] double readout_sigma() const;
-  void give_up_frame(LostCause cause, TrackResult& result);
-  void remember_frame(const FrameStep& step);
 
+  // tracker_loss.cpp: where a lost camera is looked for
+  [[nodiscard]] std::optional<Placement> recognised(const GraphSnapshot& graph);
+  bool search_from_recognised(const Placement& asked, FrameStep& step);
+  [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
+  bool search_widely(FrameStep& step);
+  bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
+                        const SearchStart& view, FrameStep& step);
+  bool search_ahead(FrameStep& step);
+  [[nodiscard]] bool is_within_reach(SearchStart::Kind kind, const FrameStep& step) const;
+  void give_up_frame(LostCause cause, TrackResult& result);
+
+  // tracker_start.cpp: a new map, and new parts of it
+  bool start_map(FrameStep& step);
+  bool start_part(FrameStep& step);
+  LostCause make_first_keyframe(FrameStep& step);
+
+  // tracker_depth.cpp: a depth camera where there are hardly any corners
   [[nodiscard]] bool depth_can_place() const;
   void read_depth(FrameStep& step);
   tl::expected<DepthAlignment::Result, LostCause> align_depth(const SE3& T_c_ref,
@@ -183,6 +188,13 @@ class Tracker {
   LostCause judge_structure(FrameStep& step);
   bool sees_structure(FrameStep& step);
 
+  // tracker_one_camera.cpp: depth from motion
+  LostCause start_from_motion(FrameStep& step);
+  LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
+  void observe_seeds(const FrameStep& step);
+  void start_seeds(KeyframeId anchor);
+
+  // tracker_keyframes.cpp
   [[nodiscard]] bool keyframe_is_due(const FrameStep& step) const;
   void propose_keyframe(FrameStep& step);
   void begin_proposal(const Placement& placement, FrameStep& step);
@@ -190,54 +202,44 @@ class Tracker {
   void collect_observations(KeyframeProposal& proposal);
   void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
   void start_points(KeyframeId anchor, const FrameStep& step);
-  void observe_seeds(const FrameStep& step);
   void occupy_unsearched(const SE3& T_c_ref);
-  void start_seeds(KeyframeId anchor);
   void revisit_reference(const GraphSnapshot& graph);
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
 
   Rig rig_;  ///< constant but for the readout, once that is found
   const TrackerOptions options_;
-  FrameImages current_, previous_;  ///< of the frame at hand, and of the last good one
-  DenseAlignment dense_alignment_;
+
+  FrameImages current_;
+  LastFrame last_;
   LocalMap local_map_;
-  Quadtree quadtree_;
-  WideSearch wide_search_;
-  RecentViews recent_views_;
+  DenseAlignment dense_alignment_;
+  LocalMapSearch local_map_search_;
+  SearchOutcome search_, tried_;  ///< of the newest frame, and of another start for it
   ElderVote elder_vote_;
   PoseUncertainty uncertainty_;
-  ImmaturePoints immature_points_;
-  PointStarter starter_;
+  std::optional<ReadoutEstimator> readout_;        ///< if the calibration leaves it open
   std::optional<RightRows> right_rows_;            ///< stereo only
   std::optional<DepthAlignment> depth_alignment_;  ///< RGB-D only
-  std::optional<ReadoutEstimator> readout_;        ///< if the calibration leaves it open
-  bool corners_scarce_ = false;                    ///< the last good frame was placed by depth
+
+  LossHistory loss_;
+  WideSearch wide_search_;
+  RecentViews recent_views_;
+  Question asked_;
+  bool unplaced_ = false;
+
+  ImmaturePoints immature_points_;
+  PointStarter starter_;
   DepthSeeds seeds_;
   std::optional<MonocularStart> monocular_start_;  ///< one camera only, as the next
   std::vector<EarlierFrame> earlier_frames_;
-
-  std::int64_t last_t_ns_ = 0;            ///< of the last good frame
-  Placement last_;                        ///< of the last good frame
-  SE3 T_cur_prev_;                        ///< last good motion, the prediction of the next
-  std::optional<Vector6> last_velocity_;  ///< in the last good frame, if the one before says
-  LossHistory loss_;
-  std::optional<Placement> hint_;  ///< of relocalise
-  RecentView asked_;               ///< the frame that ask_where was called for
-  bool unplaced_ = false;
-  std::uint32_t frames_ = 0;
-  Numbers next_;
   KeyframeView last_keyframe_;
+  Numbers next_;
+  std::uint32_t frames_ = 0;
 
-  // Of the last frame searched.
-  std::vector<Match> matches_;         ///< in the order of the search, which mixes map points and young ones
-  std::vector<std::uint32_t> missed_;  ///< positions in local_map_.points()
-  std::vector<MotionObservation> motion_;  ///< of matches_, one each
-  std::vector<AlignmentPoint> previous_points_;
-  std::vector<KeyframeId> anchors_;                ///< of the points of matches_, one each
-  std::vector<DescribedCorner> previous_corners_;  ///< empty: not described yet
-  bool previous_is_keyframe_ = false;              ///< then its images are among the recent views
-  std::vector<PointId> inlier_ids_;                ///< scratch, as the next
+  // Scratch.
+  std::vector<KeyframeId> anchors_;
+  std::vector<PointId> inlier_ids_;
   std::vector<double> samples_;
   std::vector<PointAppearance> new_corners_;
 };

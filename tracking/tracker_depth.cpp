@@ -6,22 +6,12 @@
 #include "tracking/tracker.hpp"
 
 namespace twofold {
-namespace {
-
-/// The result is again what it was, but for the time that passed.
-void restore(const TrackResult& earlier, TrackResult& result) {
-  const auto stage_ns = result.stage_ns;
-  result = earlier;
-  result.stage_ns = stage_ns;
-}
-
-}  // namespace
 
 /// From shape alone the camera is placed only beside where it was: after some frames the last good one shows
 /// something else, and one corner of a room looks like the next.
 bool Tracker::depth_can_place() const {
   constexpr int kPatience = 5;  // lost frames
-  return depth_alignment_ && last_.reference != kNoKeyframe && loss_.lost_frames() <= kPatience;
+  return depth_alignment_ && last_.placement.reference != kNoKeyframe && loss_.lost_frames() <= kPatience;
 }
 
 /// The frame's depth image, once.
@@ -34,13 +24,13 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
     const SE3& T_c_ref, std::span<const MotionObservation> corners, FrameStep& step) {
   read_depth(step);
   depth_alignment_->clear_views();
-  const KeyframeId part = part_of(step.graph, immature_points_, last_.reference);
+  const KeyframeId part = part_of(step.graph, immature_points_, last_.placement.reference);
   for (std::size_t age = 0; age < recent_views_.size(); ++age) {
     const RecentView& view = recent_views_[age];
     const auto placement = placement_of(step.graph, view.id);
     if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
     const SE3 T_placed_ref =
-        relative_pose(step.graph, immature_points_, placement->reference, last_.reference);
+        relative_pose(step.graph, immature_points_, placement->reference, last_.placement.reference);
     depth_alignment_->add_view(view.id, view.images.depth, placement->T_c_ref * T_placed_ref);
   }
   return depth_alignment_->align(T_c_ref, corners);
@@ -56,15 +46,15 @@ SE3 Tracker::align_to_depth(FrameStep& step) {
 /// @param found  what the search came to
 bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step) {
   const bool points_placed = found == LostCause::kNone;
-  const bool few = points_placed ? step.result.inliers < options_.scarce_inliers : corners_scarce_;
+  const bool few = points_placed ? step.result.inliers < options_.scarce_inliers : last_.by_depth;
   if (!few || !depth_can_place()) return false;
   const TrackResult by_points = step.result;
   if (place_by_depth(points_placed ? by_points.T_c_ref : T_c_ref, step) != LostCause::kNone) return false;
   if (loss_.lost_frames() == 0) return true;
   // After a loss depth may have found another place of the same shape: what points say counts.
   if (points_placed ? 2 * step.result.inliers >= by_points.inliers : points_allow(step)) return true;
-  restore(by_points, step.result);
-  classify_observations(rig_, motion_, by_points.T_c_ref, options_.motion);
+  step.restore(by_points);
+  classify_observations(rig_, search_.observations, by_points.T_c_ref, options_.motion);
   return false;
 }
 
@@ -72,8 +62,7 @@ bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step
 /// @return kNone, or why that is not enough
 LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
   if (!depth_can_place()) return found;
-  matches_.clear();
-  motion_.clear();
+  search_.clear();
   const LostCause open = place_by_depth(predicted_pose(), step);
   if (open != LostCause::kNone) return open == LostCause::kTooFewMatches ? found : open;
   return points_allow(step) ? LostCause::kNone : found;
@@ -87,11 +76,12 @@ bool Tracker::points_allow(FrameStep& step) {
   const TrackResult by_depth = result;
   result.by_depth = false;
   const Placement placement{by_depth.reference, by_depth.T_c_ref};
-  if (search_from({.placement = placement, .rough = true}, step) == LostCause::kNone) return true;
+  local_map_.update(step.graph, placement.reference, immature_points_, options_.neighbour_keyframes);
+  const SearchStart start{.placement = placement, .kind = SearchStart::Kind::kRough};
+  if (search_from(start, step) == LostCause::kNone) return true;
   if (loss_.lost_frames() > 0 && result.candidates >= options_.telling_candidates) return false;
-  restore(by_depth, result);
-  matches_.clear();
-  motion_.clear();
+  step.restore(by_depth);
+  search_.clear();
   result.matches = result.inliers = 0;
   return true;
 }
@@ -99,20 +89,20 @@ bool Tracker::points_allow(FrameStep& step) {
 /// By depth and the points found, of which there may be none.
 /// @return kNone, or why that cannot be: the result is then as it was
 LostCause Tracker::place_by_depth(const SE3& T_c_ref, FrameStep& step) {
-  const auto placed = align_depth(T_c_ref, motion_, step);
+  const auto placed = align_depth(T_c_ref, search_.observations, step);
   step.lap(TrackerStage::kAlignment);
   if (!placed) return placed.error();
   TrackResult& result = step.result;
   result.status = TrackStatus::kTracking;
   result.by_depth = true;
   result.cause = LostCause::kNone;
-  result.reference = last_.reference;
+  result.reference = last_.placement.reference;
   result.T_c_ref = placed->T_c_ref;
   step.information_of_planes = placed->information;
   result.information =
       inverse_symmetric(placed->covariance + shutter_covariance(placed->all, placed->by_rows, step));
-  result.matches = static_cast<int>(matches_.size());
-  result.inliers = classify_observations(rig_, motion_, result.T_c_ref, options_.motion);
+  result.matches = static_cast<int>(search_.matches.size());
+  result.inliers = classify_observations(rig_, search_.observations, result.T_c_ref, options_.motion);
   return LostCause::kNone;
 }
 

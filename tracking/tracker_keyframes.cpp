@@ -19,17 +19,17 @@ constexpr std::uint32_t kRevisitInterval = 3;  // frames between looks for a bet
 
 void Tracker::prepare(KeyframeProposal& proposal) const {
   // Every match is an observation, and a new point at most.
-  proposal.observations.reserve(matches_.capacity());
-  proposal.new_points.reserve(matches_.capacity());
+  proposal.observations.reserve(search_.matches.capacity());
+  proposal.new_points.reserve(search_.matches.capacity());
   allocate_images(rig_, proposal.images);
 }
 
 /// Number of parts of the image, of 8 x 6, in which a point is tracked.
 int Tracker::occupied_regions() const {
   std::uint64_t occupied = 0;
-  for (std::size_t m = 0; m < matches_.size(); ++m) {
-    if (!motion_[m].inlier) continue;
-    const Vector3& z = matches_[m].found.z;
+  for (std::size_t m = 0; m < search_.matches.size(); ++m) {
+    if (!search_.observations[m].inlier) continue;
+    const Vector3& z = search_.matches[m].found.z;
     const int column =
         std::clamp(static_cast<int>(z.x() * kRegionColumns / rig_.camera.width), 0, kRegionColumns - 1);
     const int row =
@@ -41,7 +41,7 @@ int Tracker::occupied_regions() const {
 
 double Tracker::median_depth(const SE3& T_c_ref) {
   samples_.clear();
-  for (const MotionObservation& observation : motion_) {
+  for (const MotionObservation& observation : search_.observations) {
     if (observation.inlier) samples_.push_back((T_c_ref * observation.x_ref).z());
   }
   if (samples_.empty()) {
@@ -99,9 +99,9 @@ void Tracker::hand_over_images(KeyframeProposal& proposal) {
 }
 
 void Tracker::collect_observations(KeyframeProposal& proposal) {
-  for (std::size_t m = 0; m < matches_.size(); ++m) {
-    if (!motion_[m].inlier) continue;
-    const TrackedPoint& point = local_map_.points()[matches_[m].point];
+  for (std::size_t m = 0; m < search_.matches.size(); ++m) {
+    if (!search_.observations[m].inlier) continue;
+    const TrackedPoint& point = local_map_.points()[search_.matches[m].point];
     PointId id = point.id;
     if (ImmaturePoint* young = immature_point(point)) {
       if (young->id == kNoPoint && elder_vote_.mistrusts_the_young() &&
@@ -111,8 +111,8 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
       if (young->id == kNoPoint) confirm(*young, proposal);
       id = young->id;
     }
-    const auto level = static_cast<std::uint8_t>(matches_[m].found.level);
-    proposal.observations.push_back({id, motion_[m].z, level});
+    const auto level = static_cast<std::uint8_t>(search_.matches[m].found.level);
+    proposal.observations.push_back({id, search_.observations[m].z, level});
   }
   std::sort(proposal.observations.begin(), proposal.observations.end(),
             [](const Observation& a, const Observation& b) { return a.point < b.point; });
@@ -130,10 +130,10 @@ void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
 /// New points where nothing is tracked or known.
 void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
   starter_.clear();
-  for (std::size_t m = 0; m < matches_.size(); ++m) {
-    if (motion_[m].inlier) starter_.occupy(matches_[m].found.z.head<2>().cast<float>());
+  for (std::size_t m = 0; m < search_.matches.size(); ++m) {
+    if (search_.observations[m].inlier) starter_.occupy(search_.matches[m].found.z.head<2>().cast<float>());
   }
-  const bool enough_found = static_cast<int>(matches_.size()) >= step.bounds.wanted_matches;
+  const bool enough_found = static_cast<int>(search_.matches.size()) >= step.bounds.wanted_matches;
   if (enough_found && rig_.kind != SensorKind::kRgbd) occupy_unsearched(step.result.T_c_ref);
   if (rig_.kind != SensorKind::kMono) starter_.start(current_, anchor, step.shutter, immature_points_);
   start_seeds(anchor);
@@ -144,7 +144,7 @@ void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
 /// they gained nothing by it, and had fewer fresh points when frames blurred (docs/results.md, seldom
 /// frames).
 void Tracker::occupy_unsearched(const SE3& T_c_ref) {
-  for (std::int64_t i = quadtree_.next(); i >= 0; i = quadtree_.next()) {
+  for (std::int64_t i = search_.candidates.next(); i >= 0; i = search_.candidates.next()) {
     const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
     if (point.immature >= 0) continue;  // few of these will ever be points of the map
     const auto uv = rig_.camera.find_in_view(T_c_ref * point.x_ref);
@@ -156,13 +156,13 @@ void Tracker::occupy_unsearched(const SE3& T_c_ref) {
 /// a place, the reference comes back too, and no keyframe is needed  (thesis 6.2.2: V_ref may be an older,
 /// revisited keyframe).
 void Tracker::revisit_reference(const GraphSnapshot& graph) {
-  if (frames_ % kRevisitInterval != 0 || !graph.contains(last_.reference) ||
+  if (frames_ % kRevisitInterval != 0 || !graph.contains(last_.placement.reference) ||
       !immature_points_.pending().empty())
     return;
   inlier_ids_.clear();
-  for (std::size_t m = 0; m < matches_.size(); ++m) {
-    const PointId id = local_map_.points()[matches_[m].point].id;
-    if (motion_[m].inlier && id != kNoPoint) inlier_ids_.push_back(id);
+  for (std::size_t m = 0; m < search_.matches.size(); ++m) {
+    const PointId id = local_map_.points()[search_.matches[m].point].id;
+    if (search_.observations[m].inlier && id != kNoPoint) inlier_ids_.push_back(id);
   }
   std::sort(inlier_ids_.begin(), inlier_ids_.end());
   const auto shared = [&](KeyframeId id) {
@@ -172,9 +172,9 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
     }
     return count;
   };
-  KeyframeId best = last_.reference;
+  KeyframeId best = last_.placement.reference;
   // Changing back and forth helps nobody: a new reference must be clearly better.
-  int best_count = shared(last_.reference) * 6 / 5;
+  int best_count = shared(last_.placement.reference) * 6 / 5;
   for (const KeyframeId id : local_map_.neighbours()) {
     const int count = shared(id);
     if (count > best_count) {
@@ -182,8 +182,9 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
       best_count = count;
     }
   }
-  if (best == last_.reference) return;
-  last_ = {best, last_.T_c_ref * relative_pose(graph, immature_points_, last_.reference, best)};
+  if (best == last_.placement.reference) return;
+  const SE3 T_last_best = relative_pose(graph, immature_points_, last_.placement.reference, best);
+  last_.placement = {best, last_.placement.T_c_ref * T_last_best};
 }
 
 }  // namespace twofold

@@ -28,7 +28,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   next_.first_of_part = index(proposal.id);
   // As if the camera had moved evenly since: that is the next frame's prediction.
   const double share = static_cast<double>(first.age - 1) / first.age;
-  last_ = {here.reference, SE3::exp(share * here.T_c_ref.log())};
+  last_.placement = {here.reference, SE3::exp(share * here.T_c_ref.log())};
   return LostCause::kNone;
 }
 
@@ -50,10 +50,10 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   }
   const Placement placement{id, start.structure.T_last_first};
   local_map_.update(step.graph, id, immature_points_, options_.neighbour_keyframes);
-  select_candidates(placement.T_c_ref, step.result);
-  search_points(placement.T_c_ref, options_.lost_radius_px, step);
+  local_map_search_.run(current_, placement.T_c_ref, options_.lost_radius_px, step, search_);
   const LostCause cause = estimate_pose(placement, step);
   if (cause != LostCause::kNone) return cause;
+  settle(step);
   step.result.cause = LostCause::kNone;
   last_keyframe_ = {median_depth(SE3()), occupied_regions()};
   return LostCause::kNone;

@@ -1,4 +1,4 @@
-#include "tracking/depth_alignment.hpp"
+#include "tracking/depth/depth_alignment.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "tracking/depth_planes.hpp"
+#include "tracking/depth/depth_planes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -25,7 +25,9 @@ class ElderVoteTest : public ::testing::Test {
   }
   std::optional<MotionOnlyResult> ask() {
     const MotionOnlyResult by_all = optimise_motion(rig_, observations_, SE3(), {});
-    return vote_.overrule(observations_, anchors_, by_all, {});
+    const ElderVote::Verdict verdict = vote_.ask(observations_, anchors_, by_all, {});
+    vote_.remember(verdict);
+    return verdict.by_elders;
   }
 
   const Rig rig_ = test_rig(SensorKind::kStereo, 320, 240);
@@ -43,6 +45,15 @@ TEST_F(ElderVoteTest, TheOldestAreBelievedThoughTheYoungAreMore) {
   EXPECT_LT(pose->T_c_ref.translation().norm(), 1e-3);
   EXPECT_LE(pose->inliers, 70);
   EXPECT_TRUE(vote_.mistrusts_the_young());
+}
+
+/// The frame may be searched from another start, too: only the verdict on the pose that it is given counts.
+TEST_F(ElderVoteTest, AVerdictThatIsNotRememberedChangesNothing) {
+  add(60, KeyframeId{0}, Vector3::Zero());
+  add(100, KeyframeId{7}, Vector3(0.1, 0, 0));
+  const MotionOnlyResult by_all = optimise_motion(rig_, observations_, SE3(), {});
+  EXPECT_TRUE(vote_.ask(observations_, anchors_, by_all, {}).by_elders);
+  EXPECT_FALSE(vote_.mistrusts_the_young());
 }
 
 TEST_F(ElderVoteTest, NobodyIsOverruledWhereAllAgree) {

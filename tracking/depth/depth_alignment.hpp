@@ -10,7 +10,7 @@
 #include "estimation/motion_only.hpp"
 #include "estimation/region_sums.hpp"
 #include "graph/ids.hpp"
-#include "tracking/depth_planes.hpp"
+#include "tracking/depth/depth_planes.hpp"
 #include "tracking/lost_cause.hpp"
 
 namespace twofold {

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "imaging/described_corner.hpp"
+#include "imaging/image_pyramid.hpp"
+#include "tracking/dense_alignment.hpp"
+#include "tracking/frame_step.hpp"
+
+namespace twofold {
+
+/// What the tracker remembers of the last frame that had a pose.
+struct LastFrame {
+  FrameImages images;  ///< right and depth only if it became no keyframe
+  std::vector<AlignmentPoint> points;
+  std::vector<DescribedCorner> corners;  ///< empty: not described yet
+  std::int64_t t_ns = 0;
+  Placement placement;
+  SE3 T_this_previous;              ///< its motion, the prediction of the next; none after a loss
+  std::optional<Vector6> velocity;  ///< (v, omega) [1/s], if the frame before it says
+  bool is_keyframe = false;         ///< then its images are among the recent views
+  bool by_depth = false;            ///< TrackResult::by_depth
+};
+
+}  // namespace twofold

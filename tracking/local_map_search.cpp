@@ -1,0 +1,116 @@
+#include "tracking/local_map_search.hpp"
+
+#include <algorithm>
+#include <span>
+
+#include "base/median.hpp"
+#include "imaging/view_change.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr std::size_t kMaxCandidates = 3000;
+constexpr std::size_t kFewestInLight = 15;  // points that say by how much the light changed
+
+}  // namespace
+
+SearchOutcome::SearchOutcome(const Rig& rig, const TrackerOptions& options)
+    : candidates(rig.camera.width, rig.camera.height, kMaxCandidates) {
+  const auto searches = static_cast<std::size_t>(options.max_searches);
+  matches.reserve(searches);
+  missed.reserve(searches);
+  observations.reserve(searches);
+}
+
+void SearchOutcome::clear() {
+  candidates.clear();
+  matches.clear();
+  missed.clear();
+  observations.clear();
+  motion = {};
+  verdict = {};
+}
+
+LocalMapSearch::LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map)
+    : rig_(rig), options_(options), local_map_(local_map) {
+  gains_.reserve(static_cast<std::size_t>(options.max_searches));
+}
+
+void LocalMapSearch::run(const FrameImages& images, const SE3& T_c_ref, double radius_px, FrameStep& step,
+                         SearchOutcome& outcome) {
+  TrackResult& result = step.result;
+  outcome.clear();
+  select_candidates(T_c_ref, result, outcome.candidates);
+  step.lap(TrackerStage::kCandidates);
+  result.searched = 0;
+  result.T_c_ref_predicted = T_c_ref;
+  result.search_radius_px = radius_px;
+  View view{images, T_c_ref, step.shutter, options_.search};
+  view.options.refine_iterations = step.bounds.refine_iterations;
+  view.options.radius_px = radius_px;
+  for (std::int64_t i = outcome.candidates.next(); i >= 0; i = outcome.candidates.next()) {
+    if (static_cast<int>(outcome.matches.size()) >= step.bounds.wanted_matches ||
+        result.searched >= step.bounds.max_searches) {
+      break;
+    }
+    ++result.searched;
+    const auto point = static_cast<std::uint32_t>(i);
+    if (!search_point(point, view, outcome)) outcome.missed.push_back(point);
+  }
+  search_in_other_light(view, result.searched, outcome);
+  result.matches = static_cast<int>(outcome.matches.size());
+  step.lap(TrackerStage::kSearch);
+}
+
+void LocalMapSearch::select_candidates(const SE3& T_c_ref, TrackResult& result, Quadtree& candidates) const {
+  std::size_t reference_points_in_view = 0;
+  const Matrix3 R_c_ref = T_c_ref.rotation();
+  const auto points = local_map_.points();
+  const auto [reference_begin, reference_end] = local_map_.reference_range();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3 x_c = R_c_ref * points[i].x_ref + T_c_ref.translation();
+    const auto uv = rig_.camera.find_in_view(x_c, options_.border_px);
+    if (!uv) continue;
+    const SE3& T_ref_a = local_map_.T_ref_a(points[i]);
+    const Vector3 from_anchor = points[i].x_ref - T_ref_a.translation();
+    const Vector3 from_here = R_c_ref.transpose() * x_c;
+    if (ViewChange::between(from_anchor, from_here).cosine < options_.min_view_cosine) continue;
+    if (i >= reference_begin && i < reference_end) ++reference_points_in_view;
+    candidates.insert(uv->cast<float>(), static_cast<std::uint32_t>(i));
+  }
+  result.candidates = static_cast<int>(candidates.size());
+  const auto reference_points = static_cast<double>(reference_end - reference_begin);
+  result.reference_in_view =
+      reference_points > 0 ? static_cast<double>(reference_points_in_view) / reference_points : 0.0;
+}
+
+/// @param point  position in the local map's points
+bool LocalMapSearch::search_point(std::uint32_t point, const View& view, SearchOutcome& outcome) const {
+  const TrackedPoint& tracked = local_map_.points()[point];
+  const SE3 T_c_a = view.shutter.seen_from(rig_, view.T_c_ref, tracked.x_ref) * local_map_.T_ref_a(tracked);
+  const auto found = find_point(view.images, rig_, *tracked.appearance, tracked.psi, T_c_a, view.options);
+  if (found) outcome.matches.push_back({point, *found});
+  return found.has_value();
+}
+
+/// Where many points were missed and the view is brighter or darker there than their patches are, the light
+/// has changed, and they are looked for as they look in it. Patches are not made as bright as the view one by
+/// one: before another surface than theirs that would make them look alike.
+void LocalMapSearch::search_in_other_light(View& view, int searched, SearchOutcome& outcome) {
+  if (static_cast<double>(outcome.missed.size()) < options_.light_missed_share * searched) return;
+  gains_.clear();
+  for (const std::uint32_t i : outcome.missed) {
+    const TrackedPoint& point = local_map_.points()[i];
+    const SE3 T_c_a = view.T_c_ref * local_map_.T_ref_a(point);
+    const auto ratio =
+        brightness_since_anchor(view.images.left, rig_.camera, *point.appearance, point.psi, T_c_a);
+    if (ratio) gains_.push_back(*ratio);
+  }
+  if (gains_.size() < kFewestInLight) return;
+  const double gain = median(std::span(gains_));
+  if (std::max(gain, 1 / gain) < options_.light_change) return;
+  view.options.gain = static_cast<float>(gain);
+  std::erase_if(outcome.missed, [&](std::uint32_t i) { return search_point(i, view, outcome); });
+}
+
+}  // namespace twofold

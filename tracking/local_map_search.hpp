@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "estimation/motion_only.hpp"
+#include "imaging/guided_search.hpp"
+#include "tracking/elder_vote.hpp"
+#include "tracking/frame_step.hpp"
+#include "tracking/local_map.hpp"
+#include "tracking/options.hpp"
+#include "tracking/quadtree.hpp"
+
+namespace twofold {
+
+/// What one search for the local map's points came to: where they were found, and the pose that fits. As long
+/// as other starts may be tried this is all that a search changes.
+struct SearchOutcome {
+  struct Match {
+    std::uint32_t point;  ///< position in the local map's points
+    PointMatch found;
+  };
+
+  SearchOutcome(const Rig& rig, const TrackerOptions& options);
+  void clear();
+
+  Quadtree candidates;                ///< points that should be visible; those not searched are left
+  std::vector<Match> matches;         ///< in the order of the search
+  std::vector<std::uint32_t> missed;  ///< positions in the local map's points
+  std::vector<MotionObservation> observations;  ///< of matches, one each
+  MotionOnlyResult motion;                      ///< by all of them
+  ElderVote::Verdict verdict;
+};
+
+/// From where the camera should be to where points of the local map are found. No allocation after
+/// construction.
+class LocalMapSearch {
+ public:
+  /// All must outlive this; the rig may learn its readout meanwhile.
+  LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map);
+
+  /// Points that should be visible from T_c_ref (thesis 6.2.5), by guided search in equi-distributed order
+  /// (thesis 3.4.3) until enough were found. Observations, motion and verdict are left to the caller.
+  /// @param radius_px  around the predictions, in pixels of each point's pyramid level
+  void run(const FrameImages& images, const SE3& T_c_ref, double radius_px, FrameStep& step,
+           SearchOutcome& outcome);
+
+ private:
+  /// Where all points of one search are looked for.
+  struct View {
+    const FrameImages& images;
+    const SE3& T_c_ref;
+    const RollingShutter& shutter;
+    GuidedSearchOptions options;
+  };
+
+  void select_candidates(const SE3& T_c_ref, TrackResult& result, Quadtree& candidates) const;
+  [[nodiscard]] bool search_point(std::uint32_t point, const View& view, SearchOutcome& outcome) const;
+  void search_in_other_light(View& view, int searched, SearchOutcome& outcome);
+
+  const Rig& rig_;
+  const TrackerOptions& options_;
+  const LocalMap& local_map_;
+  std::vector<double> gains_;
+};
+
+}  // namespace twofold

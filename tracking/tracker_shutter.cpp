@@ -1,0 +1,80 @@
+// Where rows are read one after the other: how the camera moves within a frame, how long its readout takes,
+// and what of that stays uncertain.
+#include <cmath>
+
+#include "geometry/symmetric_solve.hpp"
+#include "tracking/tracker.hpp"
+
+namespace twofold {
+namespace {
+
+/// Cameras either read all rows at once or take up to a frame's period: while nobody knows [s].
+constexpr double kUnknownReadout = 0.015;
+
+}  // namespace
+
+/// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on. None after a
+/// loss.
+std::optional<Vector6> Tracker::velocity_at(const SE3& T_c_ref, const Frame& frame) const {
+  const double seconds = static_cast<double>(frame.t_ns - last_.t_ns) * 1e-9;
+  if (loss_.lost_frames() > 0 || !(seconds > 0)) return std::nullopt;
+  return (T_c_ref * last_.placement.T_c_ref.inverse()).log() / seconds;
+}
+
+RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const {
+  if (rig_.readout.value_or(0) == 0) return {};
+  const auto velocity = velocity_at(T_c_ref, frame);
+  return velocity ? RollingShutter(rig_, *velocity) : RollingShutter();
+}
+
+/// From what was found in this frame and the ones before, whether it fitted the map or not.
+void Tracker::learn_readout(const FrameStep& step, bool goes_on) {
+  if (!goes_on) readout_->interrupt();
+  std::vector<ReadoutPoint>* seen = readout_->begin_frame(step.frame.t_ns, last_.T_this_previous);
+  if (seen == nullptr) return;
+  for (const SearchOutcome::Match& match : search_.matches) {
+    const TrackedPoint& point = local_map_.points()[match.point];
+    const Vector3& z = match.found.z;
+    const bool measured = rig_.kind != SensorKind::kMono && z.x() > z.z();
+    const double depth =
+        measured ? rig_.depth_from_disparity(z.x() - z.z()) : (step.result.T_c_ref * point.x_ref).z();
+    // By where it was seen first, which it keeps when the map takes it over.
+    const Eigen::Vector2f& uv = point.appearance->uv;
+    const std::uint64_t key = std::uint64_t{index(local_map_.anchor(point))} << 32U |
+                              std::uint64_t(2 * uv.x() + 1) << 16U | std::uint64_t(2 * uv.y() + 1);
+    seen->push_back({key, z.head<2>(), depth, std::ldexp(rig_.noise.sigma_px, match.found.level)});
+  }
+  readout_->end_frame();
+  if (readout_->estimate().significant) rig_.readout = readout_->estimate().seconds;
+}
+
+/// By how much the readout that frames are tracked with may be wrong [s]; 0 where the calibration has it.
+double Tracker::readout_sigma() const {
+  if (!readout_) return 0;
+  const ReadoutEstimate& estimate = readout_->estimate();
+  const double prior = kUnknownReadout * kUnknownReadout;
+  const double trust = prior / (prior + estimate.sigma * estimate.sigma);  // 0 before the first pair
+  const double unused = rig_.readout ? 0 : trust * estimate.seconds;
+  return std::hypot(std::sqrt(prior * (1 - trust)), unused);
+}
+
+/// What a rolling shutter adds to the covariance. Its readout is known with an error, if at all; and the
+/// motion within a frame is taken to be that since the frame before, which is wrong by half of what the
+/// motion changed by, or by all of it where the frame before knew none.
+/// @param by_rows  RegionSums::by_rows of the measurements that `information` is of
+Matrix6 Tracker::shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
+                                    const FrameStep& step) const {
+  Matrix6 covariance = Matrix6::Zero();
+  const auto velocity = velocity_at(step.result.T_c_ref, step.frame);
+  if (!velocity || step.result.reference != last_.placement.reference) return covariance;
+  const Vector6 change = last_.velocity ? 0.5 * (*velocity - *last_.velocity) : *velocity;
+  for (const Vector6& bent :
+       {Vector6(readout_sigma() * *velocity), Vector6(rig_.readout.value_or(0) * change)}) {
+    if (bent.isZero(0)) continue;
+    const Vector6 pushed = solve_symmetric(information, by_rows * bent);
+    covariance += 2 * pushed * pushed.transpose();  // the reference keyframe moved as well, and alike
+  }
+  return covariance;
+}
+
+}  // namespace twofold
