@@ -16,7 +16,7 @@ Matrix7 similarity_information(const Keyframe& from, const Keyframe& to, const E
                                const EdgeInformationOptions& options) {
   Matrix7 information = Matrix7::Zero();
   information.topLeftCorner<6, 6>() = edge_information(from, to, edge, rig, options);
-  const double depth = 0.5 * (from.median_depth + to.median_depth);
+  const double depth = mean_depth(from, to);
   information(6, 6) = depth * depth * information(0, 0);
   return information;
 }
@@ -54,6 +54,7 @@ class Factors {
   explicit Factors(const std::vector<KeyframeScaling>& moved) : moved_(moved) {
     for (std::size_t n = 0; n < moved.size(); ++n) position_.set(moved[n].id, static_cast<int>(n));
   }
+  [[nodiscard]] bool moves(KeyframeId id) const { return position_.find(id) >= 0; }
   [[nodiscard]] double of(KeyframeId id) const {
     const int at = position_.find(id);
     return at < 0 ? 1 : moved_[static_cast<std::size_t>(at)].factor;
@@ -68,7 +69,7 @@ class Factors {
 void scale_edges(GraphWriter& writer, KeyframeId id, const Factors& factors) {
   const EdgeList edges = *writer.graph().keyframe(id).edges;
   for (Edge edge : edges) {
-    const bool met_from_the_other_end = edge.other < id && factors.of(edge.other) != 1;
+    const bool met_from_the_other_end = edge.other < id && factors.moves(edge.other);
     if (!edge.marginalised || met_from_the_other_end) continue;
     edge.T_other_this = scaled(edge.T_other_this, std::sqrt(factors.of(id) * factors.of(edge.other)));
     writer.set_edge(id, edge);

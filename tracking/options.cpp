@@ -1,13 +1,14 @@
 #include "tracking/options.hpp"
 
 #include "base/option_check.hpp"
+#include "imaging/image_pyramid.hpp"
 
 namespace twofold {
 
 std::string DenseAlignmentOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("finest_level", finest_level, 0)
-      .that(coarsest_level >= finest_level, "coarsest_level", ">= finest_level", coarsest_level)
+      .within("coarsest_level", coarsest_level, finest_level, ImagePyramid::kLevels - 1)
       .at_least("max_iterations", max_iterations, 1)
       .above("huber_grey", huber_grey, 0)
       .at_least("settled_px", settled_px, 0)
@@ -65,7 +66,7 @@ std::string TrackerOptions::invalid_reason() const {
       .within("urgent_share", urgent_share, 0, keyframe_share)
       .at_least("max_pending", max_pending, 1)
       .at_least("corner_threshold", corner_threshold, 1)
-      .at_least("corner_levels", corner_levels, 1)
+      .within("corner_levels", corner_levels, 1, ImagePyramid::kLevels)
       .at_least("cell_px", cell_px, 1)
       .at_least("max_new_points", max_new_points, 1)
       .at_least("min_corner_score", min_corner_score, 0)

@@ -117,10 +117,12 @@ bool Tracker::track(FrameStep& step) {
   LostCause cause = by_depth ? search_from(start, step) : search_from_either(start, step);
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
   const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
-  if ((cause == LostCause::kNone && !doubted) || search_widely(step)) return true;
+  if (cause == LostCause::kNone && !doubted) return true;
+  const Attempt first = set_aside(step);
+  if (search_widely(step)) return true;
   if (doubted) {  // nothing better
     local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
-    cause = search_from(start, step);
+    take_back(first, step);
   }
   if (cause != LostCause::kNone) cause = place_by_depth_alone(cause, step);
   if (cause != LostCause::kNone) give_up_frame(cause, step.result);

@@ -35,9 +35,9 @@ namespace twofold {
 /// (6.5.3). One camera differs in where a point's depth comes from: at the start from its motion
 /// (MonocularStart), later from filters along epipolar lines (DepthSeeds); its unit of length is its own.
 ///
-/// Single-threaded and deterministic. After construction (one camera: once it has started) nothing is
-/// allocated, keyframes included if their buffers were prepared, and no reference count of a snapshot is
-/// touched. Work per frame is bounded by the options.
+/// Single-threaded and deterministic. After construction (one camera: until it has started, and while it is
+/// lost and may start again, it does) nothing is allocated, keyframes included if their buffers were
+/// prepared, and no reference count of a snapshot is touched. Work per frame is bounded by the options.
 ///
 /// The tracker numbers keyframes when it proposes them and points when a later keyframe finds them again. Its
 /// own pose is relative to a reference keyframe, so that it moves along when a newer snapshot moves that
@@ -115,6 +115,11 @@ class Tracker {
     std::uint32_t first_of_part = 0;  ///< the newest part's
     std::uint32_t point = 0;
   };
+  /// What one start came to; its SearchOutcome is tried_ while another start is tried.
+  struct Attempt {
+    TrackResult result;
+    RollingShutter shutter;
+  };
   /// A lost frame that the loop closer was shown.
   struct Question {
     RecentView view;
@@ -136,6 +141,8 @@ class Tracker {
   LostCause search_from(SearchStart start, FrameStep& step);
   LostCause search_from_either(const SearchStart& aligned, FrameStep& step);
   [[nodiscard]] bool leaves_motion(const SE3& T_c_ref);
+  [[nodiscard]] Attempt set_aside(const FrameStep& step);
+  void take_back(const Attempt& attempt, FrameStep& step);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
   LostCause estimate_pose(const Placement& start, FrameStep& step);
   void ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
@@ -162,6 +169,10 @@ class Tracker {
   [[nodiscard]] std::optional<Placement> recognised(const GraphSnapshot& graph);
   bool search_from_recognised(const Placement& asked, FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
+  /// It takes depth in both frames, which one camera does not measure.
+  [[nodiscard]] bool searches_widely() const {
+    return options_.wide_search.enabled && rig_.kind != SensorKind::kMono;
+  }
   bool search_widely(FrameStep& step);
   bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
                         const SearchStart& view, FrameStep& step);

@@ -29,7 +29,7 @@ bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   step.lap(TrackerStage::kCandidates);
   const SearchStart start{.placement = asked, .kind = SearchStart::Kind::kRecognised};
   if (search_from(start, step) == LostCause::kNone) return true;
-  if (!options_.wide_search.enabled) return false;
+  if (!searches_widely()) return false;
   wide_search_.look_at(current_);
   return search_from_view(asked_.view.images, asked_.view.corners, start, step);
 }
@@ -43,7 +43,7 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
 
 /// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
 bool Tracker::search_widely(FrameStep& step) {
-  if (!options_.wide_search.enabled || last_.placement.reference == kNoKeyframe) return false;
+  if (!searches_widely() || last_.placement.reference == kNoKeyframe) return false;
   wide_search_.look_at(current_);
   SearchStart start{.placement = last_.placement, .kind = SearchStart::Kind::kRough};
   if (!last_.is_keyframe && search_from_view(last_.images, last_.corners, start, step)) return true;

@@ -44,19 +44,27 @@ LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
 LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& step) {
   const LostCause cause = search_from(aligned, step);
   const bool placed = cause == LostCause::kNone;
-  const bool settled =
-      placed && step.result.matches >= options_.settled_searched_share * step.result.searched;
+  const int found = placed ? step.result.matches : 0;
+  const bool settled = found >= options_.settled_searched_share * step.result.searched;
   if (settled || !leaves_motion(aligned.placement.T_c_ref)) return cause;
-  std::swap(search_, tried_);
-  const TrackResult by_aligned = step.result;
-  const RollingShutter shutter = step.shutter;
+  const Attempt by_aligned = set_aside(step);
   const LostCause other = search_from({.placement = {last_.placement.reference, predicted_pose()}}, step);
-  const bool better = placed ? step.result.inliers > by_aligned.inliers : well_supported(step.result);
+  const bool better = placed ? step.result.inliers > by_aligned.result.inliers : well_supported(step.result);
   if (other == LostCause::kNone && better) return other;
-  std::swap(search_, tried_);
-  step.restore(by_aligned);
-  step.shutter = shutter;
+  take_back(by_aligned, step);
   return cause;
+}
+
+Tracker::Attempt Tracker::set_aside(const FrameStep& step) {
+  std::swap(search_, tried_);
+  return {step.result, step.shutter};
+}
+
+/// Of the attempt set aside last. The local map must be the one that it searched.
+void Tracker::take_back(const Attempt& attempt, FrameStep& step) {
+  std::swap(search_, tried_);
+  step.restore(attempt.result);
+  step.shutter = attempt.shutter;
 }
 
 /// The pose is further from where the camera would be had it gone on, as the last frame's points show, than

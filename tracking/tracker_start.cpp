@@ -38,7 +38,8 @@ bool Tracker::start_part(FrameStep& step) {
 }
 
 /// The frame becomes the first keyframe of a map or map part, at identity.
-/// @return kNone, or why that cannot be: the result is then as it was
+/// @return kNone, or why that cannot be: the result is then as it was, but points that the map does not have
+///         are forgotten
 LostCause Tracker::make_first_keyframe(FrameStep& step) {
   if (step.free_proposal == nullptr || !immature_points_.room_for_keyframe()) {
     return LostCause::kNoKeyframeBuffer;
@@ -52,7 +53,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   if (starter_.start(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
     const LostCause open = judge_structure(step);
     if (open != LostCause::kNone) {
-      immature_points_.clear_points();  // there were none but these
+      immature_points_.clear_points();
       return open == LostCause::kNoStructure ? open : LostCause::kNoTexture;
     }
     step.result.by_depth = true;

@@ -27,7 +27,8 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
 }
 
 TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
-  expect_rules<TrackerOptions>({{"alignment.coarsest_level", [](auto& o) { o.alignment.finest_level = 5; }},
+  expect_rules<TrackerOptions>({{"alignment.coarsest_level", [](auto& o) { o.alignment.coarsest_level = 5; }},
+                                {"corner_levels", [](auto& o) { o.corner_levels = 6; }},
                                 {"search.radius_px", [](auto& o) { o.search.radius_px = -1; }},
                                 {"wide_search.min_agreeing", [](auto& o) { o.wide_search.min_agreeing = 2; }},
                                 {"motion.rounds", [](auto& o) { o.motion.rounds = 0; }},
