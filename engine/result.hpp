@@ -90,7 +90,7 @@ struct FrameRecord {
 [[nodiscard]] inline bool has_final_pose(const FrameRecord& record) {
   return record.state == FrameState::kTracked || record.state == FrameState::kPlacedLater;
 }
-static_assert(sizeof(FrameRecord) == 176, "docs/results.md, Constant time");
+static_assert(sizeof(FrameRecord) == 176, "docs/results/constant_time.md");
 
 /// Where a frame's points were searched: around where this pose, relative to the reference keyframe, puts
 /// them.

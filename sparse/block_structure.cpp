@@ -59,8 +59,8 @@ void try_dissection(cholmod_sparse& A, double flops, std::vector<int>& order) {
 
 std::vector<int> choose_order(int nodes, std::span<const std::pair<int, int>> edges, int block_size) {
   // Nested dissection takes some twenty times as long as minimum degree and saves a tenth to a fifth of the
-  // flops of sphere2500 and torus3D (docs/results.md): it pays where a factorisation has more of them than
-  // these.
+  // flops of sphere2500 and torus3D (docs/results/solvers.md): it pays where a factorisation has more of them
+  // than these.
   constexpr double kWorthDissecting = 2e9;
   std::vector<int> order(nodes);
   if (nodes == 0) return order;

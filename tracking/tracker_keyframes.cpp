@@ -141,8 +141,8 @@ void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
 
 /// Where the map has points that nobody looked for, because enough others had been found: a place seen again
 /// would get new ones for ever. Uses up the candidates of this frame's search. Depth cameras are left out:
-/// they gained nothing by it, and had fewer fresh points when frames blurred (docs/results.md, seldom
-/// frames).
+/// they gained nothing by it, and had fewer fresh points when frames blurred (docs/results/variations.md,
+/// seldom frames).
 void Tracker::occupy_unsearched(const SE3& T_c_ref) {
   for (std::int64_t i = search_.candidates.next(); i >= 0; i = search_.candidates.next()) {
     const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];

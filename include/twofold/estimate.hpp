@@ -50,9 +50,9 @@ struct PoseEstimate {
   /// of the last frames say, and allows for a rolling shutter's readout as long as that is not known: of a
   /// global shutter that CameraRig::readout does not name (0), single axes are up to 15 times too wide. What
   /// no residual shows, a wrong focal length or clock, is not in it. Otherwise honest within a factor of two
-  /// in standard deviations where that was measured (docs/results.md). All zero, and known, for the frame
-  /// that starts a map part: that frame defines the world. Not known (covariance_known is false: the
-  /// measurements leave a direction open): all NaN.
+  /// in standard deviations where that was measured (docs/results/covariance.md). All zero, and known, for
+  /// the frame that starts a map part: that frame defines the world. Not known (covariance_known is false:
+  /// the measurements leave a direction open): all NaN.
   std::array<double, 36> covariance = unknown_covariance();
   /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
   /// none.

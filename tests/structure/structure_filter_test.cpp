@@ -88,7 +88,7 @@ TEST(StructureFilter, RealStereoRecording) {
     matches += frame.matches;
   }
   RecordProperty("tracked", tracked);
-  // How many frames are tracked is recorded, not demanded: docs/results.md says where it falls short.
+  // How many frames are tracked is recorded, not demanded: docs/results/experiments.md.
   EXPECT_LT(consistent, matches);  // someone moves, and some matches are wrong
   EXPECT_GT(consistent, matches / 2);
 }

@@ -1,4 +1,4 @@
-// The figures of docs/results.md: node measure.mjs run|map|hour OUTPUT_FOLDER
+// The figures of docs/results/viewer.md: node measure.mjs run|map|hour OUTPUT_FOLDER
 import {existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync} from 'node:fs';
 import {connect} from 'node:net';
 import {join} from 'node:path';
