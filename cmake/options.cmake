@@ -40,13 +40,15 @@ set(twofold_core_headers
   <algorithm> <array> <atomic> <cmath> <cstdint> <filesystem> <functional> <limits> <map> <memory> <optional> <span> <string>
   <utility> <vector> <Eigen/Core> <Eigen/Cholesky> <Eigen/Geometry> <Eigen/LU> <fmt/format.h>
   <opencv2/core.hpp>)
-# twofold_headers(name HEADERS ... LIBS ...): those above and more; twofold_use_headers(target name) then takes them.
+# twofold_headers(name HEADERS ... LIBS ... OPTIONS ...): those above and more; twofold_use_headers(target name) then takes
+# them.
 function(twofold_headers name)
-  cmake_parse_arguments(ARG "" "" "HEADERS;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "HEADERS;LIBS;OPTIONS" ${ARGN})
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/precompiled/${name}.cpp CONTENT "// carries precompiled headers\n")
   add_library(twofold_headers_${name} OBJECT ${CMAKE_BINARY_DIR}/precompiled/${name}.cpp)
   target_link_libraries(twofold_headers_${name} PRIVATE twofold::options Eigen3::Eigen opencv_core ${ARG_LIBS})
   target_precompile_headers(twofold_headers_${name} PRIVATE ${twofold_core_headers} ${ARG_HEADERS})
+  target_compile_options(twofold_headers_${name} PRIVATE ${ARG_OPTIONS})
 endfunction()
 function(twofold_use_headers target name)
   if(TWOFOLD_PCH)
@@ -110,6 +112,10 @@ function(twofold_command target variable)
   set(${variable} ${command} PARENT_SCOPE)
 endfunction()
 
+# What a test adds to the libraries runs once: -O3 keeps its compiler busy for half as long again. Libraries, fixtures and programs
+# are what they are for users; only of a template's function that a library does not inline the linker may take the test's copy.
+set(twofold_test_options $<$<CONFIG:Release>:-O1>)
+
 # twofold_test(name [ALONE] SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case. ALONE: cameras play
 # in real time in it; no other test runs beside it.
 function(twofold_test name)
@@ -119,6 +125,7 @@ function(twofold_test name)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE twofold::options ${ARG_LIBS} GTest::gtest GTest::gtest_main)
+  target_compile_options(${name} PRIVATE ${twofold_test_options})
   twofold_use_headers(${name} tests)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${TWOFOLD_UNITY})
   # It replaces operator new of the whole program, and stays by itself.
