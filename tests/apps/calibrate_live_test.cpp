@@ -84,7 +84,7 @@ std::string all(const std::vector<std::string>& said) {
 
 TEST_F(CalibrateLive, WhoDoesWhatItSaysGetsAGoodCalibrationOfOneCamera) {
   ObedientPerson person;
-  Scene scene(kLeft, SE3(), [&](std::uint64_t) { return person.next().T_l_b(); });
+  Scene scene(left_camera(), SE3(), [&](std::uint64_t) { return person.next().T_l_b(); });
   set_up(driver_->devices["/dev/video0"], kWidth, [&](std::uint64_t k) {
     interrupt_at(150 * Scene::kFramesAHold, k);
     return grey(scene.image(k));
@@ -110,7 +110,7 @@ TEST_F(CalibrateLive, TwoCamerasAreCalibratedTogether) {
     while (holds.size() <= hold) holds.push_back(person.next().T_l_b());
     return holds[hold];
   };
-  Scene left(kLeft, SE3(), holder), right(kRight, kT_right_left, holder);
+  Scene left(left_camera(), SE3(), holder), right(right_camera(), kT_right_left, holder);
   const auto add = [&](const std::string& path, Scene& scene) {
     set_up(driver_->devices[path], kWidth, [&](std::uint64_t k) {
       interrupt_at(150 * Scene::kFramesAHold, k);
@@ -137,7 +137,7 @@ TEST_F(CalibrateLive, BothImagesInOneStreamAreAPair) {
     while (holds.size() <= hold) holds.push_back(person.next().T_l_b());
     return holds[hold];
   };
-  Scene left(kLeft, SE3(), holder), right(kRight, kT_right_left, holder);
+  Scene left(left_camera(), SE3(), holder), right(right_camera(), kT_right_left, holder);
   set_up(driver_->devices["/dev/video0"], 2 * kWidth, [&](std::uint64_t k) {
     interrupt_at(14 * Scene::kFramesAHold, k);
     cv::Mat both;
@@ -155,7 +155,7 @@ TEST_F(CalibrateLive, BothImagesInOneStreamAreAPair) {
 TEST_F(CalibrateLive, ABoardThatIsNeverTiltedIsRefusedAndNothingWritten) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> unit(-1, 1);
-  Scene scene(kLeft, SE3(), [&](std::uint64_t) {
+  Scene scene(left_camera(), SE3(), [&](std::uint64_t) {
     return Hold{1.1 * unit(random), 1.1 * unit(random), 0.4}.T_l_b();
   });
   set_up(driver_->devices["/dev/video0"], kWidth, [&](std::uint64_t k) {
@@ -182,14 +182,13 @@ TEST_F(CalibrateLive, WithoutABoardItSaysSo) {
 }
 
 TEST_F(CalibrateLive, ABoardThatIsWavedAboutIsNotTaken) {
-  const BoardCamera camera(kLeft);
   const cv::Mat print = print_chessboard(kBoard);
   set_up(driver_->devices["/dev/video0"], kWidth, [&](std::uint64_t k) {
     interrupt_at(40, k);
     std::mt19937 noise(static_cast<unsigned>(k));
-    return grey(camera.see(print, kPrintSquarePx / kBoard.square,
-                           {2.0 * kPrintSquarePx, 2.0 * kPrintSquarePx},
-                           Hold{k % 2 == 0 ? -0.2 : 0.2, 0, 0.45}.T_l_b(), noise));
+    return grey(left_camera().see(print, kPrintSquarePx / kBoard.square,
+                                  {2.0 * kPrintSquarePx, 2.0 * kPrintSquarePx},
+                                  Hold{k % 2 == 0 ? -0.2 : 0.2, 0, 0.45}.T_l_b(), noise));
   });
   const Outcome outcome = calibrate("v4l2:/dev/video0");
   EXPECT_TRUE(any_says(outcome.said, "Hold the board still"));

@@ -16,6 +16,16 @@ inline const CameraModel kLeft = test_camera(460, 324.3, 237.1, -0.28, 0.074, 0.
 inline const CameraModel kRight = test_camera(457, 315.6, 243.8, -0.27, 0.069, -0.0003, 0.0003);
 inline const SE3 kT_right_left(SO3::exp(Vector3(0.004, -0.012, 0.006)), Vector3(-0.06, 0.0011, -0.0007));
 
+/// The cameras, made once: each undistorts five million rays.
+inline const BoardCamera& left_camera() {
+  static const BoardCamera camera(kLeft);
+  return camera;
+}
+inline const BoardCamera& right_camera() {
+  static const BoardCamera camera(kRight);
+  return camera;
+}
+
 inline bool both_see(const SE3& T_l_b) {
   return sees(kLeft, kBoard, T_l_b) && sees(kRight, kBoard, kT_right_left * T_l_b);
 }
@@ -81,8 +91,9 @@ class Scene {
   static constexpr std::uint64_t kFramesAHold = 3;
   using Holder = std::function<SE3(std::uint64_t hold)>;  // T_l_b
 
-  Scene(const CameraModel& model, SE3 T_c_l, Holder holder)
-      : camera_(model), T_c_l_(T_c_l), holder_(std::move(holder)) {}
+  /// `camera` must outlive the scene.
+  Scene(const BoardCamera& camera, SE3 T_c_l, Holder holder)
+      : camera_(camera), T_c_l_(T_c_l), holder_(std::move(holder)) {}
 
   const cv::Mat& image(std::uint64_t frame) {
     const std::uint64_t hold = frame / kFramesAHold;
@@ -96,7 +107,7 @@ class Scene {
   }
 
  private:
-  BoardCamera camera_;
+  const BoardCamera& camera_;
   SE3 T_c_l_;
   Holder holder_;
   cv::Mat print_ = print_chessboard(kBoard);
