@@ -116,10 +116,11 @@ endfunction()
 # are what they are for users; only of a template's function that a library does not inline the linker may take the test's copy.
 set(twofold_test_options $<$<CONFIG:Release>:-O1>)
 
-# twofold_test(name [ALONE] SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case. ALONE: cameras play
-# in real time in it; no other test runs beside it.
+# twofold_test(name [ALONE] [COST seconds] SOURCES ... LIBS ...): one GoogleTest program, registered as one ctest case. ALONE:
+# cameras play in real time in it; no other test runs beside it. COST: about how long it takes, for tests that take longest: they
+# begin first, so that none is left at the end to run beside nothing.
 function(twofold_test name)
-  cmake_parse_arguments(ARG "ALONE" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE" "TIMEOUT;COST" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -138,6 +139,10 @@ function(twofold_test name)
   endif()
   twofold_sanitizer_environment(${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} RUN_SERIAL ${ARG_ALONE})
+  if(ARG_COST)
+    set_tests_properties(${name} PROPERTIES COST ${ARG_COST})
+  endif()
+  add_dependencies(tests ${name})
   if(ARG_ALONE)
     set_tests_properties(${name} PROPERTIES LABELS real_time)
   endif()
