@@ -186,7 +186,14 @@ struct RunResult {
 /// Latencies of all frames that were looked at.
 [[nodiscard]] LatencyHistogram exposure_to_pose(const RunResult& result);
 
-/// Pose of a tracked frame in the final map.
+/// There is a place for it in this map. A keyframe that the mapper never got to leaves its frames without
+/// one, and so does a culled one whose replacement was lost, as on a disk that is full.
+[[nodiscard]] inline bool has_final_pose(const FrameRecord& record, const GraphSnapshot& graph) {
+  return has_final_pose(record) && graph.contains(record.reference) &&
+         graph.live_replacement(record.reference).has_value();
+}
+
+/// Pose in the final map of a frame that has one there.
 [[nodiscard]] inline SE3 final_T_c_w(const FrameRecord& record, const GraphSnapshot& graph) {
   return record.T_c_ref.unpacked() * graph.T_k_w(record.reference);
 }

@@ -136,10 +136,7 @@ PoseReport TrackerRunner::report(const FrameRecord& record) const {
 /// Where the last tracked frame is in the map of this one, if that is elsewhere than it was said to be.
 void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecord& record) {
   correction_.reason = CorrectionReason::kNone;
-  if (last_.state != FrameState::kTracked || last_.snapshot_version == graph.version() ||
-      !graph.contains(last_.reference) || !graph.live_replacement(last_.reference)) {
-    return;
-  }
+  if (last_.snapshot_version == graph.version() || !has_final_pose(last_, graph)) return;
   const SE3 T_c_w = final_T_c_w(last_, graph);
   const SE3 T_c_w_before = last_.T_c_w_causal.unpacked();
   const SE3 change = T_c_w * T_c_w_before.inverse();  // of the camera itself, wherever the world's origin is

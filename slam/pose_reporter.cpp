@@ -123,7 +123,7 @@ PoseEstimate PoseReporter::next(const PoseReport& report, Events& events) {
 std::optional<SE3> PoseReporter::last_T_c_w(const PoseReport& report) const {
   if (last_.state != FrameState::kTracked) return std::nullopt;
   const GraphSnapshot& graph = report.graph;
-  const bool known = graph.contains(last_.reference) && graph.live_replacement(last_.reference);
+  const bool known = has_final_pose(last_, graph);
   const KeyframeId part = known ? graph.part(last_.reference) : last_.part_causal;
   if (part != report.record.part_causal) return std::nullopt;
   return known ? final_T_c_w(last_, graph) : last_.T_c_w_causal.unpacked();

@@ -25,9 +25,7 @@ SlamSummary summarise(const RunResult& result) {
   summary.lost = result.counts.lost;
   summary.dropped = result.counts.dropped;
   for (const FrameRecord& record : result.frames) {
-    if (!has_final_pose(record)) continue;
-    // A keyframe the mapper never got to leaves its frames without a place in the map.
-    if (!result.graph.contains(record.reference)) continue;
+    if (!has_final_pose(record, result.graph)) continue;
     summary.trajectory.push_back({record.t_ns, index(result.graph.part(record.reference)),
                                   to_pose(final_T_c_w(record, result.graph).inverse())});
   }

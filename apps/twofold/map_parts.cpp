@@ -20,9 +20,7 @@ std::vector<MapPart> map_parts(const RunResult& result, const EngineOptions& opt
     ++part.keyframes;
   }
   for (const FrameRecord& record : result.frames) {
-    // A keyframe the mapper never got to (the run was cut short) leaves its frames without a place in the
-    // map.
-    if (!has_final_pose(record) || !graph.contains(record.reference)) continue;
+    if (!has_final_pose(record, graph)) continue;
     found[graph.part(record.reference)].trajectory.push_back(
         {record.t_ns, final_T_c_w(record, graph).inverse()});
   }

@@ -5,12 +5,8 @@
 namespace twofold {
 namespace {
 
-bool has_place(const FrameRecord& record, const GraphSnapshot& graph) {
-  return has_final_pose(record) && graph.contains(record.reference);
-}
-
 std::optional<SE3> T_last_now(const FrameRecord& last, const FrameRecord& now, const GraphSnapshot& graph) {
-  const bool together = has_place(last, graph) && has_place(now, graph) &&
+  const bool together = has_final_pose(last, graph) && has_final_pose(now, graph) &&
                         graph.part(last.reference) == graph.part(now.reference);
   if (!together) return std::nullopt;
   return final_T_c_w(last, graph) * final_T_c_w(now, graph).inverse();

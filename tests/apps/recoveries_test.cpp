@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "apps/twofold/map_parts.hpp"
 #include "graph/graph_writer.hpp"
 
 namespace twofold {
@@ -69,6 +70,24 @@ TEST_F(RecoveriesTest, ANewPartHasAWorldOfItsOwnUntilItJoins) {
   EXPECT_TRUE(found[0].new_part && found[1].new_part);
   EXPECT_FALSE(found[2].new_part) << "it has been there before";
   for (const Recovery& one : found) EXPECT_FALSE(one.T_last_now) << "two parts of the final map";
+}
+
+// The replacements of a run whose disk was full may be lost.
+TEST_F(RecoveriesTest, WhoseKeyframeWasForgottenHasNoPlace) {
+  writer_.set_part(KeyframeId{1}, KeyframeId{0});
+  writer_.set_reference(KeyframeId{0});
+  writer_.cull_keyframe(KeyframeId{1}, KeyframeId{0});
+  writer_.forget_replacements(0);
+  result_.graph = writer_.publish();
+  add_tracked(1, 1, 0);
+  add(FrameState::kLost);
+  add_tracked(4, 1, 0);
+  const auto found = recoveries(result_, 0);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_FALSE(found[0].T_last_now);
+  const auto parts = map_parts(result_, {});
+  ASSERT_EQ(parts.size(), 1U);
+  EXPECT_TRUE(parts[0].trajectory.empty());
 }
 
 TEST_F(RecoveriesTest, TheStartOfTheFirstMapIsNone) {

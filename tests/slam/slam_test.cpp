@@ -16,6 +16,7 @@
 
 #include "engine/logs/schedule_log.hpp"
 #include "engine/pipeline.hpp"
+#include "graph/graph_writer.hpp"
 #include "io/files/trajectory_file.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "slam/slam_options.hpp"
@@ -460,6 +461,30 @@ TEST(SlamSummary, SaysWhatWasMeasuredOfTheCamera) {
   EXPECT_EQ(summary.readout->seconds, 0.02);
   EXPECT_EQ(summary.readout->sigma, 0.001);
   EXPECT_EQ(summary.readout->pairs, 12);
+}
+
+TEST(SlamSummary, LeavesOutFramesWhoseKeyframeWasCulledAndForgotten) {
+  GraphWriter writer;
+  Keyframe first, culled;
+  first.id = KeyframeId{0};
+  culled.id = KeyframeId{1};
+  writer.add_keyframe(std::move(first));
+  writer.add_keyframe(std::move(culled));
+  writer.set_reference(KeyframeId{0});
+  writer.cull_keyframe(KeyframeId{1}, KeyframeId{0});
+  writer.forget_replacements(0);
+  RunResult result;
+  result.graph = writer.publish();
+  for (const std::uint32_t reference : {0U, 1U, 2U}) {  // of the last one the mapper never heard
+    FrameRecord record;
+    record.t_ns = reference;
+    record.state = FrameState::kTracked;
+    record.reference = KeyframeId{reference};
+    result.frames.push_back(record);
+  }
+  const SlamSummary summary = summarise(result);
+  ASSERT_EQ(summary.trajectory.size(), 1U);
+  EXPECT_EQ(summary.trajectory[0].t_ns, 0);
 }
 
 TEST_F(SlamTest, ASlowCallbackIsAStageOfItsOwn) {
