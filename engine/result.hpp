@@ -57,8 +57,8 @@ enum class CorrectionReason : std::uint8_t {
 inline constexpr double kCorrection = 0.01;         // [m]
 inline constexpr double kCorrectionAngle = 0.0035;  // [rad]
 
-/// Announced with the first frame that is tracked against the corrected map: the frame before it, in the map
-/// it was tracked against and in the new one.
+/// Announced once, with the first frame that is looked at in the corrected map, tracked or lost: the last one
+/// tracked before it, where it was said to be and where the new map has it.
 struct PoseCorrection {
   CorrectionReason reason = CorrectionReason::kNone;
   std::int64_t frame_index = 0;  ///< of the frame that saw the corrected map first

@@ -145,6 +145,8 @@ void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecor
   const bool jumped = jump.version > last_.snapshot_version;
   const CorrectionReason reason = jumped ? reason_of(jump.kind) : CorrectionReason::kOptimisation;
   correction_ = {reason, record.frame_index, record.t_ns, last_.T_c_w_causal, PackedPose(T_c_w)};
+  last_.snapshot_version = graph.version();  // said: a lost camera's next frames see the same map
+  last_.T_c_w_causal = correction_.T_c_w_after;
 }
 
 bool TrackerRunner::wants_relocalisation() const {

@@ -79,7 +79,7 @@ class TrackerRunner {
   std::vector<StageId> stages_;
   TraceName version_counter_, effort_counter_;
   PoseListener on_pose_, on_frame_;
-  FrameRecord last_;  // the last frame that was tracked
+  FrameRecord last_;  // the last frame that was tracked, with the pose and map it was last said to be in
   struct PlacedFrame {
     KeyframeId reference = kNoKeyframe;
     EarlierFrame frame;

@@ -137,6 +137,8 @@ void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now
     set_poses(report.correction.T_c_w_before.unpacked().inverse(),
               report.correction.T_c_w_after.unpacked().inverse(), event);
     set_movement(movements_.take(report.record.snapshot_version), event);
+    last_.T_c_w_causal = report.correction.T_c_w_after;
+    last_.part_causal = report.graph.part(last_.reference);
   } else if (now.state == TrackingState::kTracked) {
     (void)movements_.take(report.record.snapshot_version);  // too small to be told of
   }

@@ -41,7 +41,9 @@ class PoseReporter {
   [[nodiscard]] std::optional<SE3> last_T_c_w(const PoseReport& report) const;
 
   MapMovements movements_;
-  FrameRecord last_;  // the last frame that was tracked; of state kLost before the first
+  // The last frame that was tracked, with the pose and part it was last said to have; of state kLost before
+  // the first.
+  FrameRecord last_;
   bool was_lost_ = false;
 };
 

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "engine/lockstep_run.hpp"
+#include "engine/runners.hpp"
 #include "engine/threaded_run.hpp"
+#include "graph/graph_writer.hpp"
 #include "tests/engine/swaying_camera.hpp"
 
 namespace twofold {
@@ -242,6 +244,67 @@ TEST_F(EnginePushTest, ALockstepRunTakesOneFrameAtATime) {
   }
   EXPECT_EQ(collected, kFrames);
   expect_same(run.finish(), testing::run_engine(options, feed()));
+}
+
+/// Tracker and mapper by turns.
+class PoseCorrectionTest : public testing::SwayingCamera {
+ protected:
+  PoseCorrection look(const Frame& frame) {
+    FrameRecord record;
+    ProposalHandle proposal = pool_.try_acquire();
+    tracking_.locate(frame, graph_, EffortLevel::kEverything, proposal, record);
+    tracking_.tell(0, 0, record);
+    const bool proposed = tracking_.prepare_next(record);
+    state_ = record.state;
+    if (proposed) {
+      (void)mapping_.step({&proposal, 1});
+      graph_ = mapping_.publish();
+    }
+    return tracking_.correction();
+  }
+  /// A hand over the lens.
+  PoseCorrection look_at_nothing(int index) {
+    Frame frame;
+    frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(12));
+    frame.right = frame.left;
+    testing::number_frame(frame, index);
+    return look(frame);
+  }
+  /// A version of the map in which all keyframes stand farther to the right.
+  void move_map(double distance) {
+    GraphWriter writer(graph_);
+    for (std::uint32_t k = 0; k < graph_.keyframe_count(); ++k) {
+      const SE3 T_k_w = graph_.keyframe(KeyframeId{k}).T_k_w;
+      writer.set_pose(KeyframeId{k}, T_k_w * SE3(SO3(), Vector3(-distance, 0, 0)));
+    }
+    graph_ = writer.publish();
+  }
+
+  EngineOptions options_;
+  TrackerRunner tracking_{small_rig(), options_, nullptr};
+  MapperRunner mapping_{small_rig(), options_, nullptr};
+  ProposalPool pool_{6};
+  GraphSnapshot graph_ = mapping_.publish();
+  FrameState state_ = FrameState::kLost;
+};
+
+TEST_F(PoseCorrectionTest, ALostCameraIsToldOfEachCorrectionOnce) {
+  constexpr int kTracked = 5;
+  for (std::size_t i = 0; i < kTracked; ++i) (void)look((*frames_)[i]);
+  ASSERT_EQ(state_, FrameState::kTracked);
+  move_map(0.05);
+  const PoseCorrection first = look_at_nothing(kTracked);
+  ASSERT_EQ(state_, FrameState::kLost);
+  EXPECT_EQ(first.reason, CorrectionReason::kOptimisation);
+  EXPECT_EQ(look_at_nothing(kTracked + 1).reason, CorrectionReason::kNone) << "the map is the same";
+  move_map(0.03);
+  const PoseCorrection second = look_at_nothing(kTracked + 2);
+  EXPECT_EQ(second.reason, CorrectionReason::kOptimisation);
+  EXPECT_EQ(second.T_c_w_before, first.T_c_w_after);
+  const Vector3 moved = second.T_c_w_after.unpacked().inverse().translation() -
+                        second.T_c_w_before.unpacked().inverse().translation();
+  EXPECT_NEAR(moved.norm(), 0.03, 1e-6);
+  EXPECT_EQ(look_at_nothing(kTracked + 3).reason, CorrectionReason::kNone);
 }
 
 }  // namespace

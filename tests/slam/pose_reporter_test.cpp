@@ -134,6 +134,24 @@ TEST_F(PoseReporterTest, ACorrectionSaysWhatItDidToTheMap) {
   EXPECT_NEAR(events_.correction->farthest_moved, 5, 1e-12);
 }
 
+TEST_F(PoseReporterTest, ALostCamerasPartIsTheOneThatWasToldLast) {
+  (void)report(tracked(0, SE3()));
+  Keyframe older;
+  older.id = KeyframeId{1};
+  writer_.add_keyframe(std::move(older));
+  writer_.set_part(KeyframeId{0}, KeyframeId{1});
+  graph_ = writer_.publish();
+  correction_ = {CorrectionReason::kPartsJoined, 1, kPeriod, PackedPose(), PackedPose()};
+  (void)report(lost(1));
+  ASSERT_TRUE(events_.correction);
+  EXPECT_EQ(events_.correction->map_part_before, 0U);
+  EXPECT_EQ(events_.correction->map_part, 1U);
+  correction_.reason = CorrectionReason::kPoseGraph;
+  (void)report(lost(2));
+  ASSERT_TRUE(events_.correction);
+  EXPECT_EQ(events_.correction->map_part_before, 1U);
+}
+
 TEST_F(PoseReporterTest, ALostCameraThatFindsItselfIsAnEvent) {
   (void)report(tracked(0, SE3()));
   const PoseEstimate gone = report(lost(1));
