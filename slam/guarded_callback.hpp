@@ -20,6 +20,7 @@ class GuardedCallback {
 
   explicit GuardedCallback(std::string name) : name_(std::move(name)) {}
 
+  [[nodiscard]] const std::string& name() const { return name_; }
   void set(Function function) { function_ = std::move(function); }
 
   void operator()(const Arguments&... arguments) {

@@ -101,6 +101,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
 
   template <class Callback, class Function>
   void set(Callback& callback, Function function) {
+    expect_no_callback(callback.name().c_str());
     const std::scoped_lock turn(pushing_);
     if (pushed_ || summary_) throw std::logic_error("callbacks are set before the first push");
     callback.set(std::move(function));

@@ -509,6 +509,17 @@ TEST_F(SlamTest, CallbacksAreSetBeforeTheFirstPush) {
   EXPECT_THROW(slam.on_event({}), std::logic_error);
 }
 
+TEST_F(SlamTest, ACallbackSetsNoCallback) {
+  for (const RunMode mode : {RunMode::kThreaded, RunMode::kDeterministic}) {
+    Slam slam(rig(), {.mode = mode});
+    slam.on_pose([&](const PoseEstimate&) { slam.on_event({}); });
+    push_all(slam, 0, 3);
+    const SlamSummary summary = slam.finish();
+    ASSERT_EQ(summary.errors.size(), 1U);
+    EXPECT_NE(summary.errors[0].find("on_event was called from a callback"), std::string::npos);
+  }
+}
+
 TEST_F(SlamTest, AFrameWithoutRoomIsDroppedAndPushDoesNotWait) {
   std::atomic<bool> may_go_on{false};
   SlamOptions options;
