@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "engine/thrown.hpp"
+
 namespace twofold {
 namespace {
 
@@ -35,6 +37,16 @@ LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options, std::opti
 }
 
 void LockstepRun::push(Frame frame) {
+  if (failed()) return;
+  try {
+    take(frame);
+  } catch (...) {
+    fail(what_was_thrown());  // what the step had taken is gone: no other one may follow
+    throw;
+  }
+}
+
+void LockstepRun::take(const Frame& frame) {
   const bool is_first = !logs_.schedule().input;
   logs_.note_input(rig_, frame);
   if (is_first) expect_input_of_schedule();

@@ -23,6 +23,7 @@ class LockstepRun final : public Pipeline {
   [[nodiscard]] bool has_buffer() override { return true; }
   [[nodiscard]] bool has_room() override { return true; }
   /// Of a replay: frames that the schedule leaves out, as one that found no buffer then, count as dropped.
+  /// What a step throws comes out, and the run has failed.
   void push(Frame frame) override;
   void collect(const FrameSink& sink) override;
   void wait(std::chrono::steady_clock::time_point) override {}
@@ -38,6 +39,7 @@ class LockstepRun final : public Pipeline {
   [[nodiscard]] RunResult finish() override;
 
  private:
+  void take(const Frame& frame);
   void run_deterministically(const Frame& frame);
   void replay(const Frame& frame);
   /// Rounds of the mapper until the tracker sees this version. False when the schedule lacks one, or has one

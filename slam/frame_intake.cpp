@@ -37,18 +37,17 @@ std::string FrameIntake::refusal(const FrameView& view) const {
 
 Frame FrameIntake::take(const FrameView& view) {
   Frame frame;
-  frame.index = next_index_;
   frame.t_ns = view.t_ns;
   frame.left = pixels_of(view.left, view.owner);
   if (rig_.kind == SensorKind::kRgbd) frame.depth = pixels_of(view.depth, view.owner);
   if (rig_.kind == SensorKind::kStereo) frame.right = pixels_of(view.right, view.owner);
-  skip(view);
+  frame.index = skip(view);
   return frame;
 }
 
-void FrameIntake::skip(const FrameView& view) {
-  ++next_index_;
+std::int64_t FrameIntake::skip(const FrameView& view) {
   last_t_ns_ = view.t_ns;
+  return next_index_++;
 }
 
 }  // namespace twofold

@@ -18,8 +18,9 @@ class FrameIntake {
   /// Of a frame that is not refused. It gets the next number. Grey images and depth stay where they are if
   /// the view has an owner, which the frame then keeps; else they are copied.
   [[nodiscard]] Frame take(const FrameView& view);
-  /// A frame that could be used but found no room: it has its number, and its time has passed.
-  void skip(const FrameView& view);
+  /// A frame that could be used but found no room: its number, which no other frame gets, and its time has
+  /// passed.
+  std::int64_t skip(const FrameView& view);
 
  private:
   Rig rig_;

@@ -167,7 +167,6 @@ class TWOFOLD_HIDDEN Slam::Impl {
   FairMutex pushing_;  // guards what follows: whoever pushes or finishes has his turn
   FrameIntake intake_;
   bool pushed_ = false;
-  std::int64_t frames_ = 0;   // that have a number, dropped ones included
   std::int64_t no_room_ = 0;  // frames dropped on the way in
   std::optional<SlamSummary> summary_;
 
@@ -260,14 +259,21 @@ PushResult Slam::Impl::push(const FrameView& frame) {
   maps.catch_up();
   pipeline_->collect({});
   if (!pipeline_->has_buffer()) {
-    intake_.skip(frame);
     ++no_room_;
     return {PushStatus::kDropped,
-            fmt::format("the tracker is behind: all {} frame buffers are in use", frame_buffers_), frames_++};
+            fmt::format("the tracker is behind: all {} frame buffers are in use", frame_buffers_),
+            intake_.skip(frame)};
   }
-  pipeline_->push(intake_.take(frame));
+  Frame taken = intake_.take(frame);
+  const std::int64_t number = taken.index;
+  try {
+    pipeline_->push(std::move(taken));
+  } catch (...) {
+    (void)failed();
+    throw;
+  }
   if (mode_ == RunMode::kReplay) (void)failed();  // within the push
-  return {PushStatus::kQueued, "", frames_++};
+  return {PushStatus::kQueued, "", number};
 }
 
 bool Slam::Impl::wait_for_room(std::int64_t timeout_ns) {

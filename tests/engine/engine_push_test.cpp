@@ -229,6 +229,23 @@ TEST_F(EnginePushTest, AStepThatFailsEndsASteppedRunAndTellsWhoTookIt) {
   EXPECT_EQ(result.counts.tracked, 1);
 }
 
+TEST_F(EnginePushTest, AStepThatFailsEndsALockstepRun) {
+  EngineOptions options;
+  options.deterministic = true;
+  int versions = 0;
+  options.on_map = [&versions](const GraphSnapshot&, const DoubleWindow&) {
+    if (++versions == 2) throw std::runtime_error("out of order");  // with the first keyframe
+  };
+  LockstepRun run(small_rig(), options);
+  EXPECT_THROW(run.push(frame(0)), std::runtime_error);
+  EXPECT_TRUE(run.failed());
+  for (std::size_t i = 1; i < kFrames; ++i) run.push(frame(i));
+  run.stop();
+  const RunResult result = run.finish();
+  EXPECT_EQ(result.error, "out of order");
+  EXPECT_EQ(result.counts.frames, 1) << "what came after the failure was not tracked";
+}
+
 TEST_F(EnginePushTest, ALockstepRunTakesOneFrameAtATime) {
   EngineOptions options;
   options.deterministic = true;
