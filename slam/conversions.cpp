@@ -75,12 +75,14 @@ Rig to_rig(const CameraRig& rig) {
     expect(positive(rig.baseline), "baseline", "> 0", rig.baseline);
     inside.baseline = rig.baseline;
   }
-  if (rig.readout) expect(*rig.readout >= 0, "readout", ">= 0", *rig.readout);
+  if (rig.readout)
+    expect(std::isfinite(*rig.readout) && *rig.readout >= 0, "readout", "finite and >= 0", *rig.readout);
   inside.readout = rig.readout;
   if (rig.sensor == Sensor::kMono) return inside;
   expect(positive(rig.depth_unit), "depth_unit", "> 0", rig.depth_unit);
   expect(positive(rig.depth_min), "depth_min", "> 0", rig.depth_min);
-  expect(rig.depth_max > rig.depth_min, "depth_max", "> depth_min", rig.depth_max);
+  expect(std::isfinite(rig.depth_max) && rig.depth_max > rig.depth_min, "depth_max", "finite and > depth_min",
+         rig.depth_max);
   inside.depth_unit = rig.depth_unit;
   inside.depth_min = rig.depth_min;
   inside.depth_max = rig.depth_max;

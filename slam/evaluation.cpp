@@ -43,8 +43,9 @@ void save_trajectory(const std::filesystem::path& file, const std::vector<Stampe
 
 TrajectoryError compare(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truth,
                         const ComparisonOptions& options) {
-  if (!(options.max_time_difference_s > 0))
-    throw std::invalid_argument("options.max_time_difference_s must be > 0");
+  constexpr double kLongest = 9e9;  // [s] that fit into nanoseconds of 64 bit
+  if (!(options.max_time_difference_s > 0 && options.max_time_difference_s <= kLongest))
+    throw std::invalid_argument("options.max_time_difference_s must be > 0 and <= 9e9");
   const auto farthest = static_cast<std::int64_t>(options.max_time_difference_s * 1e9);
   EvaluationOptions inside;
   inside.alignment = alignment_of(options.align);

@@ -27,8 +27,19 @@ void expect_sensible_pace(const SlamOptions& options) {
   expect(!options.late || options.live || options.speed > 0, "options.late needs options.live or speed");
 }
 
+void expect_sensible_threads(const SlamOptions& options) {
+  const auto is_cpu = [](const std::optional<int>& cpu) { return !cpu || *cpu >= 0; };
+  expect(is_cpu(options.tracker_cpu), "options.tracker_cpu must be >= 0");
+  expect(is_cpu(options.mapper_cpu), "options.mapper_cpu must be >= 0");
+  expect(is_cpu(options.loop_closer_cpu), "options.loop_closer_cpu must be >= 0");
+  const auto& priority = options.fifo_priority;
+  expect(!priority || (*priority >= 1 && *priority <= 99), "options.fifo_priority must be in [1, 99]");
+}
+
 void expect_sensible(const SlamOptions& options) {
-  expect(options.frame_buffers >= 2, "options.frame_buffers must be >= 2");
+  expect(options.frame_buffers >= 2 && options.frame_buffers <= 65536,
+         "options.frame_buffers must be in [2, 65536]");
+  expect_sensible_threads(options);
   expect(options.kept_frames >= 1, "options.kept_frames must be >= 1");
   expect(options.run_folder.empty() || std::filesystem::is_directory(options.run_folder),
          "options.run_folder must be a folder");
@@ -44,8 +55,8 @@ void expect_sensible(const SlamOptions& options) {
          "options.map needs options.places, by which the camera finds itself in the map");
   expect(options.checkpoint.empty() || options.mode != RunMode::kStepped,
          "options.checkpoint is not for RunMode::kStepped: call save_map");
-  expect(std::isfinite(options.checkpoint_period) && options.checkpoint_period > 0,
-         "options.checkpoint_period must be finite and > 0");
+  expect(options.checkpoint_period > 0 && options.checkpoint_period <= 1e9,
+         "options.checkpoint_period must be > 0 and <= 1e9");
   expect(has_folder(options.checkpoint), "options.checkpoint is in a folder that is not there");
   expect(has_folder(options.trace), "options.trace is in a folder that is not there");
 }
@@ -80,7 +91,7 @@ EngineOptions engine_options(const SlamOptions& options) {
   engine.mapper.inner_window = options.inner_window;
   engine.mapper.outer_window = options.outer_window;
   if (const std::string why = engine.mapper.invalid_reason(); !why.empty())
-    throw std::invalid_argument("options: " + why);
+    throw std::invalid_argument("options." + why);
   engine.frame_slots = static_cast<std::size_t>(options.frame_buffers);
   engine.logs.folder = options.run_folder;
   engine.logs.frames_in_memory = static_cast<std::size_t>(options.kept_frames);

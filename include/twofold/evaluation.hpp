@@ -20,7 +20,7 @@ enum class AlignBy : std::uint8_t { kNothing, kRigidMotion, kSimilarity };
 
 struct ComparisonOptions {
   AlignBy align = AlignBy::kRigidMotion;  ///< how the estimate is brought onto the truth first
-  double max_time_difference_s = 0.01;    ///< between a pose and the true one nearest in time, > 0
+  double max_time_difference_s = 0.01;    ///< between a pose and the true one nearest in time, in (0, 9e9]
 };
 
 /// How far an estimate is from the truth.

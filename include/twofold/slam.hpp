@@ -70,7 +70,7 @@ struct SlamOptions {
   /// checkpoint. The last map is yours to save (Slam::save_map). One that fails is tried again, and
   /// Slam::errors says why as long as it does. Empty: none. Not with kStepped: call save_map there.
   std::filesystem::path checkpoint = {};
-  /// From one checkpoint to the next [s] > 0; in kDeterministic and kReplay by the frames' times.
+  /// From one checkpoint to the next [s], in (0, 1e9]; in kDeterministic and kReplay by the frames' times.
   double checkpoint_period = 60;
 
   /// Of RunMode::kReplay: schedule.log of a run (run_folder), the other options being that run's. One of
@@ -80,7 +80,7 @@ struct SlamOptions {
 
   int inner_window = 25;   ///< keyframes optimised with their points, >= 1
   int outer_window = 175;  ///< keyframes around them optimised by relative poses, >= 0
-  int frame_buffers = 8;   ///< frames on their way at most, >= 2; a push beyond them is dropped
+  int frame_buffers = 8;   ///< frames on their way at most, in [2, 65536]; a push beyond them is dropped
 
   std::optional<int> tracker_cpu = {};  ///< pin the threads to these, >= 0
   std::optional<int> mapper_cpu = {};
@@ -182,8 +182,8 @@ class TWOFOLD_API Slam {
   using FrameCallback = std::function<void(const PoseEstimate&, const FrameDetails&)>;
 
   /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
-  /// when a file cannot be used, an option of the engine is out of range or the rig is not the map's. A
-  /// processor or priority that the system refuses is no error: SlamSummary::notes tells.
+  /// when a file cannot be used or the rig is not the map's. A processor or priority that the system refuses
+  /// is no error: SlamSummary::notes tells.
   Slam(const CameraRig& rig, const SlamOptions& options);
   /// Finishes, after end_pace.
   ~Slam();

@@ -56,11 +56,11 @@ struct CameraRig {
   /// 65535 of them.
   double depth_unit = 0.001;
   double depth_min = 0.3;  ///< nearer readings are holes [m] > 0; stereo: of surfaces only
-  double depth_max = 8.0;  ///< farther ones likewise, > depth_min
-  /// Rolling shutter: from the exposure of the first row to that of the last [s], >= 0; 0: all rows at once.
-  /// Nothing: not known, and found out while a camera turns to and fro; until then PoseEstimate::covariance
-  /// allows for any usual readout, which makes standard deviations of single axes several times too wide, up
-  /// to 15, if the shutter is a global one. Whoever knows that it is says 0.
+  double depth_max = 8.0;  ///< farther ones likewise, finite and > depth_min
+  /// Rolling shutter: from the exposure of the first row to that of the last [s], finite and >= 0; 0: all
+  /// rows at once. Nothing: not known, and found out while a camera turns to and fro; until then
+  /// PoseEstimate::covariance allows for any usual readout, which makes standard deviations of single axes
+  /// several times too wide, up to 15, if the shutter is a global one. Whoever knows that it is says 0.
   std::optional<double> readout = std::nullopt;
 };
 

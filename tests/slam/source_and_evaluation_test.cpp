@@ -109,6 +109,14 @@ TEST(PublicEvaluation, MeasuresTheDistanceFromTheTruth) {
   EXPECT_GT(some.path_length, 6);
   EXPECT_THROW((void)compare({}, truth), std::invalid_argument);
   EXPECT_THROW((void)compare(truth, truth, {.max_time_difference_s = 0}), std::invalid_argument);
+  const double for_ever = std::numeric_limits<double>::infinity();
+  try {
+    (void)compare(truth, truth, {.max_time_difference_s = for_ever});
+    ADD_FAILURE() << "taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("options.max_time_difference_s"), std::string::npos)
+        << error.what();
+  }
 }
 
 TEST(PublicEvaluation, FindsScaleWhenAsked) {
