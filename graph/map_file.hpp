@@ -37,10 +37,11 @@ struct SavedMap {
 /// a keyframe's whole entry for culled ones too; both are still read.
 inline constexpr std::uint16_t kMapFormatVersion = 3;
 
-/// Writes to FILE.tmp in the same folder, syncs it, renames it over `file`, syncs the folder: whenever the
-/// program is killed or the disk is full, `file` is the old map or the new one. Memory: one slice. Throws
-/// MapFileError; the temporary file is then removed. Threads that save maps take turns. A graph with more
-/// keyframes or points, culled ones included, than load_map takes is refused before anything is written.
+/// Writes to FILE.tmp (FILE.tmp1 while another program writes that one) in the same folder, syncs it, renames
+/// it over `file`, syncs the folder: whenever the program is killed or the disk is full, `file` is the old
+/// map or the new one. Memory: one slice. Throws MapFileError; the temporary file is then removed. Threads
+/// that save maps take turns. A graph with more keyframes or points, culled ones included, than load_map
+/// takes is refused before anything is written.
 ///
 /// Only a map is replaced, or an empty file: links are followed and stay, modes are kept, and what else has
 /// the name, or is no regular file, is refused (graph/map_place.hpp).

@@ -1,4 +1,5 @@
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
@@ -37,21 +38,26 @@ bool begins_as_map(const fs::path& file) {
 }
 
 /// A file that appears under its name only when it is complete, with the mode of the one that it replaces.
-/// Threads take turns: two that write the same map would share its temporary file.
+///
+/// Threads take turns. Programs that write the same map have a temporary file each: whoever writes one holds
+/// its lock until it has the map's name. One that a killed program left has no lock any more, and is used
+/// again.
 class ReplacedFile {
  public:
-  explicit ReplacedFile(const fs::path& file) : file_(followed(file)), temporary_(file_.string() + ".tmp") {
-    ::unlink(temporary_.c_str());  // of a program that was killed
-    fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-    if (fd_ < 0) fail("cannot be opened for writing");
+  explicit ReplacedFile(const fs::path& file) : file_(followed(file)) {
+    for (int n = 0; fd_ < 0; ++n) {
+      temporary_ = file_.string() + (n == 0 ? ".tmp" : ".tmp" + std::to_string(n));
+      fd_ = open_temporary();
+    }
     struct stat before {};
     if (::stat(file_.c_str(), &before) == 0) (void)::fchmod(fd_, before.st_mode & 07777);
   }
   ReplacedFile(const ReplacedFile&) = delete;
   ReplacedFile& operator=(const ReplacedFile&) = delete;
   ~ReplacedFile() {
-    if (fd_ >= 0) ::close(fd_);
+    if (fd_ < 0) return;
     if (!done_) ::unlink(temporary_.c_str());
+    ::close(fd_);
   }
 
   void write(std::span<const std::uint8_t> bytes) {
@@ -66,9 +72,9 @@ class ReplacedFile {
   /// The data must be on the disk before the name points to it, and the name before we say so.
   void commit() {
     if (::fsync(fd_) != 0) fail("cannot be written");
-    if (::close(std::exchange(fd_, -1)) != 0) fail("cannot be written");
     if (::rename(temporary_.c_str(), file_.c_str()) != 0) fail("cannot be renamed");
     done_ = true;
+    ::close(std::exchange(fd_, -1));  // gives up the lock; after the sync nothing is left to fail
     const fs::path folder = file_.has_parent_path() ? file_.parent_path() : fs::path(".");
     const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return;  // the map is there; not every file system lets its folders be opened
@@ -77,10 +83,33 @@ class ReplacedFile {
   }
 
  private:
+  /// Opens the temporary file, empty; -1: another program is writing it.
+  int open_temporary() const {
+    for (int tries = 0; tries < kMostTries; ++tries) {
+      const int fd =
+          ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0644);
+      if (fd < 0) fail("cannot be opened for writing");
+      // Not every file system has locks; without, programs must not write one map at once.
+      const bool is_locked = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+      // Between open and lock it may have become the map, or gone.
+      if (!is_locked && is_temporary(fd) && ::ftruncate(fd, 0) == 0) return fd;
+      ::close(fd);
+      if (is_locked) return -1;
+    }
+    throw MapFileError(temporary_.string() + ": is no file, or others replace it all the time");
+  }
+  [[nodiscard]] bool is_temporary(int fd) const {
+    struct stat opened {
+    }, named{};
+    return ::fstat(fd, &opened) == 0 && ::lstat(temporary_.c_str(), &named) == 0 && S_ISREG(named.st_mode) &&
+           opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+  }
+
   [[noreturn]] void fail(const char* what) const {
     throw MapFileError(temporary_.string() + ": " + what + ": " + std::strerror(errno));
   }
 
+  static constexpr int kMostTries = 1000;  // each is lost to another program's map
   static inline std::mutex one_at_a_time;
 
   std::unique_lock<std::mutex> turn_{one_at_a_time};

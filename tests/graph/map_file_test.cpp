@@ -154,6 +154,39 @@ TEST_F(MapFileTest, ThreadsThatSaveToOneFileTakeTurns) {
   EXPECT_EQ(failed.load(std::memory_order_relaxed), 0);
 }
 
+TEST_F(MapFileTest, ProgramsThatSaveToOneFileLeaveItWhole) {
+  constexpr int kPrograms = 3;
+  const SavedMap map = sample_map(60, 900, 1);
+  save_map(file_, map);
+  std::vector<pid_t> programs;
+  for (int n = 0; n < kPrograms; ++n) {
+    programs.push_back(fork());
+    ASSERT_GE(programs.back(), 0);
+    if (programs.back() != 0) continue;
+    try {
+      for (int i = 0; i < 60; ++i) save_map(file_, map);
+    } catch (const MapFileError&) {
+      _exit(7);
+    }
+    _exit(0);
+  }
+  for (const pid_t program : programs) {
+    int status = 0;
+    while (waitpid(program, &status, WNOHANG) == 0) EXPECT_NO_THROW((void)load_map(file_));
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+  }
+  expect_same(map, load_map(file_));
+  for (const auto& left : fs::directory_iterator(folder_)) EXPECT_EQ(left.path(), file_);
+}
+
+TEST_F(MapFileTest, WhatAKilledProgramLeftIsUsedAgain) {
+  const SavedMap map = sample_map(2, 2, 1);
+  std::ofstream(file_.string() + ".tmp") << std::string(100'000, 'x');
+  save_map(file_, map);
+  expect_same(map, load_map(file_));
+  EXPECT_FALSE(fs::exists(file_.string() + ".tmp"));
+}
+
 TEST_F(MapFileTest, OnlyAMapIsReplaced) {
   const SavedMap map = sample_map(2, 2, 1);
   fs::remove(file_);
