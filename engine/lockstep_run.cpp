@@ -175,6 +175,7 @@ void LockstepRun::close_loops(const KeyframeProposal& keyframe, const GraphSnaps
                               std::size_t refused) {
   const std::span<LoopMessage> messages = loop_closing_.step(keyframe, graph);
   const std::size_t sent = messages.size() - std::min(refused, messages.size());
+  loop_closing_.sending(sent);
   for (LoopMessage& message : messages.first(sent)) {
     if (!mapper_inbox_.try_send(std::move(message))) fail("the schedule leaves too many loops waiting");
   }

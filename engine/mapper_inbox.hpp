@@ -26,6 +26,8 @@ class MapperInbox {
   void send(ProposalHandle proposal) {
     TWOFOLD_CHECK(proposals_.try_push(std::move(proposal)), "the ring holds every proposal of the pool");
   }
+  /// Loop closer: so many messages are taken for sure.
+  [[nodiscard]] std::size_t room_for_loops() const { return loops_.capacity() - loops_.size_approx(); }
   /// Loop closer. False when full; then `message` still holds what it held.
   [[nodiscard]] bool try_send(LoopMessage&& message) { return loops_.try_push(std::move(message)); }
 

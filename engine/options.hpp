@@ -34,7 +34,7 @@ using PoseListener = std::function<void(const PoseReport&)>;
 using MapListener = std::function<void(const GraphSnapshot& graph, const DoubleWindow& window)>;
 /// The same for how places look, on the loop closer's thread.
 using PlacesListener = std::function<void(const KeyframeDatabase& places)>;
-/// Told of each loop that was recognised, when the mapper is: on the loop closer's thread, too.
+/// Told of each loop that the mapper is told of, just before: on the loop closer's thread, too.
 using LoopListener = std::function<void(const ClosedLoop& loop)>;
 
 /// The map as it stands, saved again and again during a run.

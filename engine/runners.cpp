@@ -246,6 +246,7 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
 
 std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
   messages_.clear();
+  found_.reset();
   if (!closer_) return messages_;
   optimise_if_due(graph);
   const ScopedStage timed(times_, place_stage_);
@@ -258,14 +259,18 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
     if (one_camera) messages_.emplace_back(close_over_sim3(graph, *loop, rig_, mapper_options_));
     messages_.emplace_back(*loop);
     const bool joins = graph.part(loop->from) != graph.part(loop->to);
-    loops_.push_back({*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins,
-                      joins ? 0 : distance_travelled(graph, loop->from, loop->to),
-                      time_of(graph, loop->from)});
-    if (on_loop_) on_loop_(loops_.back());
+    found_.emplace(*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins,
+                   joins ? 0 : distance_travelled(graph, loop->from, loop->to), time_of(graph, loop->from));
     (one_camera ? awaited_ : not_optimised_) = loop;
   }
   if (on_places_) on_places_(closer_->places());
   return messages_;
+}
+
+void LoopCloserRunner::sending(std::size_t count) {
+  if (!found_ || count < messages_.size()) return;
+  loops_.push_back(*found_);
+  if (on_loop_) on_loop_(loops_.back());
 }
 
 RelocalisationAnswer LoopCloserRunner::relocalise(const RelocalisationRequest& request,

@@ -136,6 +136,9 @@ class LoopCloserRunner {
 
   /// @return what the mapper should know, in order; valid until the next step
   std::span<LoopMessage> step(const KeyframeProposal& keyframe, const GraphSnapshot& graph);
+  /// Before the first `count` of these are sent, which the others are not: a loop that the mapper gets is
+  /// closed, and the listener is told.
+  void sending(std::size_t count);
 
   [[nodiscard]] RelocalisationAnswer relocalise(const RelocalisationRequest& request,
                                                 const GraphSnapshot& graph);
@@ -159,6 +162,7 @@ class LoopCloserRunner {
   StageRecorder times_;
   StageId place_stage_, place_cpu_stage_, pose_graph_stage_, relocalise_stage_;
   std::vector<LoopMessage> messages_;
+  std::optional<ClosedLoop> found_;  // whose constraint is the last of the messages
   std::vector<ClosedLoop> loops_;
   std::optional<LoopConstraint> not_optimised_;  // newest loop that no pose graph optimisation has seen
   std::optional<LoopConstraint> awaited_;        // one camera: sent, but not seen in the map yet

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 
 #include "engine/thrown.hpp"
@@ -329,12 +330,16 @@ void SteppedRun::send_answer(RelocalisationAnswer answer, const LoopStep& step) 
   logs_.schedule().loop_closer.append(step);
 }
 
-/// A ring that is full takes nothing more of this step; a loop that is lost is found again.
+/// A ring that is full takes nothing more of this step; a loop that is lost is found again. The mapper may
+/// have the loop in the map as soon as it is sent: whoever is told of it is told before.
 void SteppedRun::send_loops(std::span<LoopMessage> messages, LoopStep& step) {
-  std::size_t sent = 0;
-  while (sent < messages.size() && mapper_inbox_.try_send(std::move(messages[sent]))) ++sent;
-  step.refused = static_cast<std::uint32_t>(messages.size() - sent);
-  if (sent > 0) mapper_parking_.wake();
+  const std::span<LoopMessage> sent =
+      messages.first(std::min(messages.size(), mapper_inbox_.room_for_loops()));
+  loop_closing_.sending(sent.size());
+  for (LoopMessage& message : sent)
+    TWOFOLD_CHECK(mapper_inbox_.try_send(std::move(message)), "only the mapper changes what room there is");
+  step.refused = static_cast<std::uint32_t>(messages.size() - sent.size());
+  if (!sent.empty()) mapper_parking_.wake();
 }
 
 void SteppedRun::publish_places() {

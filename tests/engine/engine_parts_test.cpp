@@ -88,6 +88,21 @@ TEST_F(MapPartsTest, ALostCameraStartsAPartThatJoinsWhenAPlaceOfBothIsRecognised
   }
 }
 
+TEST_F(MapPartsTest, ALoopThatTheMapperNeverGetsIsNotClosed) {
+  Schedule schedule = testing::schedule_of(run_engine(impatient(), frames()));
+  for (LoopStep& step : schedule.loop_closer) {
+    if (step.keyframe >= 0) step.refused = 9;  // more than there are
+  }
+  schedule.ended = false;  // it goes on as far as it can without a loop
+  EngineOptions engine = impatient();
+  std::size_t loops_told = 0;
+  engine.on_loop = [&loops_told](const ClosedLoop&) { ++loops_told; };
+  const RunResult replayed = testing::replay_engine(engine, frames(), schedule);
+  EXPECT_EQ(replayed.mapping.loops, 0);
+  EXPECT_TRUE(replayed.loops.empty());
+  EXPECT_EQ(loops_told, 0U);
+}
+
 TEST_F(MapPartsTest, TheWiderSearchPlacesItWhereItIsOrNotAtAll) {
   EngineOptions patient = options(false);
   patient.tracker.new_part_after = 10;
