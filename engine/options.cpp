@@ -18,7 +18,7 @@ std::string EngineOptions::invalid_reason() const {
       .nested("effort", effort.invalid_reason())
       .at_least("logs.frames_in_memory", static_cast<double>(logs.frames_in_memory), 1)
       .at_least("frame_slots", static_cast<double>(frame_slots), 1)
-      .at_least("proposal_slots", static_cast<double>(proposal_slots), 1);
+      .within("proposal_slots", static_cast<double>(proposal_slots), 1, 16);
   check.that(!stepped || !deterministic, "stepped", "false where deterministic is true", 1)
       .that(!stepped || checkpoint.period == 0, "checkpoint.period", "0 where stepped is true",
             checkpoint.period);

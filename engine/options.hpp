@@ -79,8 +79,11 @@ struct EngineOptions {
   PacingOptions pacing{.speed = 0};  ///< of threaded and stepped runs
   EffortOptions effort;              ///< likewise, if they keep a pace
 
-  std::size_t frame_slots = 8;     ///< frames decoded ahead, or waiting, at most
-  std::size_t proposal_slots = 4;  ///< proposals waiting for the mapper at most, rounded up to a power of two
+  std::size_t frame_slots = 8;  ///< frames decoded ahead, or waiting, at most
+  /// Proposals waiting for the mapper, and keyframes for the loop closer, at most; rounded up to a power of
+  /// two, in [1, 16]: while a proposal waits, so many others may cull keyframes, and the map still knows what
+  /// replaced its reference (CullingOptions::keep_replacements).
+  std::size_t proposal_slots = 4;
 
   std::optional<int> tracker_cpu;  ///< pin the threads to these, >= 0
   std::optional<int> mapper_cpu;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <stdexcept>
 #include <stop_token>
+#include <string>
 
 #include "engine/parking.hpp"
 #include "engine/spsc_ring.hpp"
@@ -74,6 +75,9 @@ bool PoseQueue::closed() const {
 
 bool PoseQueue::wait_for_room(std::size_t items, std::int64_t timeout_ns) {
   const auto& ring = impl_->ring;
+  if (items > ring.capacity())
+    throw std::invalid_argument("a pose queue of " + std::to_string(ring.capacity()) +
+                                " items never has room for " + std::to_string(items));
   const auto has_room = [&] { return ring.size_approx() + items <= ring.capacity(); };
   return wait(impl_->pacer, impl_->closed, timeout_ns, has_room) && !closed();
 }

@@ -48,7 +48,7 @@ class TWOFOLD_API PoseQueue {
   [[nodiscard]] bool closed() const;
 
   /// For whoever paces the putting: waits until `items` more fit, at most for `timeout_ns`. Returns early,
-  /// with false, when the queue is closed.
+  /// with false, when the queue is closed. Throws std::invalid_argument for more than the queue holds.
   [[nodiscard]] bool wait_for_room(std::size_t items, std::int64_t timeout_ns = kForEver);
   /// How many were left out since the last call.
   [[nodiscard]] std::uint64_t take_missed();

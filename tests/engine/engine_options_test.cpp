@@ -76,6 +76,7 @@ TEST(Options, OfTheEngineSayWhyTheyAreInvalid) {
        {"pacing.speed", [](auto& o) { o.pacing.speed = -1; }},
        {"effort.patience", [](auto& o) { o.effort.patience = 0; }},
        {"frame_slots", [](auto& o) { o.frame_slots = 0; }},
+       {"proposal_slots", [](auto& o) { o.proposal_slots = 17; }},
        {"tracker_cpu", [](auto& o) { o.tracker_cpu = -1; }},
        {"fifo_priority", [](auto& o) { o.fifo_priority = 100; }}});
 }

@@ -73,6 +73,15 @@ TEST(PoseQueue, AnyCapacityIsRoundedUpButNoneAndTooMany) {
   EXPECT_THROW(PoseQueue(std::size_t{1} << 40), std::invalid_argument);
 }
 
+TEST(PoseQueue, NoneWaitsForRoomThatIsNeverThere) {
+  PoseQueue queue(3);
+  EXPECT_TRUE(queue.wait_for_room(4, 0)) << "the capacity is rounded up";
+  queue.put(numbered(0));
+  EXPECT_FALSE(queue.wait_for_room(4, 0));
+  EXPECT_THROW((void)queue.wait_for_room(5, 0), std::invalid_argument);
+  EXPECT_THROW((void)queue.wait_for_room(std::numeric_limits<std::size_t>::max(), 0), std::invalid_argument);
+}
+
 TEST(PoseQueue, TheLongestTimeIsForEver) {
   PoseQueue queue;
   std::thread closer([&] {
