@@ -151,11 +151,6 @@ void LockstepRun::replay_loop_steps() {
       answer_request(history_.front(), step.refused > 0);
       continue;
     }
-    const auto is_older = [&](const ProposalHandle& p) {
-      return static_cast<std::int64_t>(index(p->id)) < step.keyframe;
-    };
-    for (; !mapped_.empty() && is_older(mapped_.front()); mapped_.pop_front())
-      ++result_.keyframes_not_described;  // found the ring full
     if (mapped_.empty() || static_cast<std::int64_t>(index(mapped_.front()->id)) != step.keyframe) {
       fail("the schedule does not fit the input: the loop closer would need another keyframe");
       return;
@@ -217,13 +212,26 @@ void LockstepRun::drop(const Frame& frame, const TrackerStep& step) {
 void LockstepRun::map(std::size_t proposals, std::size_t loop_messages) {
   (void)mapper_inbox_.take(proposals, loop_messages);
   const std::uint64_t version = mapping_.step(mapper_inbox_.proposals(), mapper_inbox_.loops());
-  for (ProposalHandle& keyframe : mapper_inbox_.proposals()) mapped_.push_back(std::move(keyframe));
+  for (ProposalHandle& keyframe : mapper_inbox_.proposals()) {
+    ProposalHandle mapped = std::move(keyframe);  // goes back to its pool here if nobody describes it
+    if (is_described(mapped->id)) mapped_.push_back(std::move(mapped));
+  }
   {
     const ScopedStage timed = mapping_.timed_publication();
     snapshot_ = mapping_.publish();
   }
   logs_.schedule().mapper.append(
       {version, static_cast<std::uint32_t>(proposals), static_cast<std::uint32_t>(loop_messages)});
+}
+
+bool LockstepRun::is_described(KeyframeId id) {
+  if (!schedule_) return true;
+  const std::vector<LoopStep>& steps = schedule_->loop_closer;
+  const auto keyframe = static_cast<std::int64_t>(index(id));
+  while (next_described_ < steps.size() && steps[next_described_].keyframe < keyframe) ++next_described_;
+  if (next_described_ < steps.size() && steps[next_described_].keyframe == keyframe) return true;
+  ++result_.keyframes_not_described;
+  return false;
 }
 
 void LockstepRun::checkpoint_if_due(std::int64_t t_ns) {

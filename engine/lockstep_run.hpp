@@ -54,6 +54,9 @@ class LockstepRun final : public Pipeline {
   /// `refused`: with nothing, as a loop closer does that has failed.
   void answer_request(const GraphSnapshot& graph, bool refused = false);
   void map(std::size_t proposals, std::size_t loop_messages);
+  /// Whether the loop closer gets to know this keyframe: one that found its ring full in the run of the
+  /// schedule does not wait for it here either. To be asked in the order of ids.
+  [[nodiscard]] bool is_described(KeyframeId id);
   /// One step of the loop closer for a keyframe; the last `refused` of its messages found the ring full.
   void close_loops(const KeyframeProposal& keyframe, const GraphSnapshot& graph, std::size_t refused);
   /// Takes all steps of the loop closer whose inputs are there. It does not matter when within the replay a
@@ -90,10 +93,11 @@ class LockstepRun final : public Pipeline {
   PoseCorrection correction_;  // likewise
   bool collected_ = true;      // likewise
   MapperInbox mapper_inbox_;
-  std::deque<ProposalHandle> mapped_;  // keyframes the loop closer has not seen
+  std::deque<ProposalHandle> mapped_;  // keyframes that the loop closer is going to see
   // Of a replay: the schedule, what of it comes next, and versions that loop closer steps may still need.
   std::optional<Schedule> schedule_;
   std::size_t next_frame_ = 0, next_round_ = 0, next_loop_step_ = 0;
+  std::size_t next_described_ = 0;  // of the loop closer's steps, for the keyframe mapped next
   std::deque<GraphSnapshot> history_;
   std::optional<RelocalisationRequest> request_;
   std::optional<RelocalisationAnswer> answer_;

@@ -210,6 +210,37 @@ TEST_F(EnginePushTest, StepsInOneOrderGiveTheSameBytes) {
   expect_same(results[0], results[1]);
 }
 
+// Keyframes that found the loop closer's ring full must not keep the buffers of a replay.
+TEST_F(EnginePushTest, ARunWhoseLoopCloserRestsForManyKeyframesReplays) {
+  constexpr int kLong = 160;
+  EngineOptions options = stepped();
+  options.tracker.keyframe_share = 1;                // nearly every frame is one
+  options.mapper.culling.keep_replacements = 1'000;  // the maps are compared whole
+  const auto there_and_back = [](int i) {
+    const int n = i % (2 * kFrames - 2);
+    Frame seen = frame(static_cast<std::size_t>(n < kFrames ? n : 2 * kFrames - 2 - n));
+    testing::number_frame(seen, i);
+    return seen;
+  };
+  SteppedRun run(small_rig(), options);
+  for (int i = 0; i < kLong; ++i) {
+    run.collect({});
+    run.push(there_and_back(i));
+    (void)run.step(PipelineStep::kTrack);
+    (void)run.step(PipelineStep::kMap);
+  }
+  run.stop();
+  const RunResult result = run.finish();
+  ASSERT_GT(result.keyframes_not_described, 70U);
+  const FrameFeed again = [&, next = 0](Frame& seen) mutable {
+    if (next == kLong) return FeedStatus::kEnd;
+    seen = there_and_back(next++);
+    return FeedStatus::kFrame;
+  };
+  const RunResult replayed = expect_replay(options, again, result);
+  EXPECT_EQ(replayed.keyframes_not_described, result.keyframes_not_described);
+}
+
 TEST_F(EnginePushTest, AStepThatFailsEndsASteppedRunAndTellsWhoTookIt) {
   EngineOptions options = stepped();
   options.before_step = [](std::string_view step) {
