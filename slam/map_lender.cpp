@@ -14,9 +14,7 @@ void MapLender::publish(const GraphSnapshot& graph, const DoubleWindow& window) 
 }
 
 void MapLender::publish(const ClosedLoop& loop) {
-  std::vector<ClosedLoop> all = *all_loops_.loops;
-  all.push_back(loop);
-  all_loops_.loops = std::make_shared<const std::vector<ClosedLoop>>(std::move(all));
+  all_loops_.loops.push_back(loop);
   loops_.publish(all_loops_);
 }
 

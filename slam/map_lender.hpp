@@ -9,16 +9,17 @@
 #include "engine/result.hpp"
 #include "engine/snapshot_mailbox.hpp"
 #include "graph/keyframe_database.hpp"
+#include "graph/persistent_vector.hpp"
 #include "graph/snapshot.hpp"
 #include "mapping/double_window.hpp"
 
 namespace twofold {
 
-/// The loops of a run, in the order they were found. A handle: copies share the list, which never changes.
+/// The loops of a run, in the order they were found. Copies share what they have in common.
 struct LoopList {
-  std::shared_ptr<const std::vector<ClosedLoop>> loops = std::make_shared<std::vector<ClosedLoop>>();
+  PersistentVector<ClosedLoop, 5, 3> loops;
 
-  [[nodiscard]] std::uint64_t version() const { return loops->size() + 1; }
+  [[nodiscard]] std::uint64_t version() const { return loops.size() + 1; }
 };
 
 /// A map as it is lent out: handles of the versions that were newest then. Never changes.
@@ -48,7 +49,7 @@ class MapLender {
   void publish(const KeyframeDatabase& places) {
     if (places.version() > places_.newest()) places_.publish(places);
   }
-  /// Loop closer. O(loops).
+  /// Loop closer. O(log(loops)).
   void publish(const ClosedLoop& loop);
 
   /// Borrowers. O(1). The same object as before, while that is held and nothing newer was published.

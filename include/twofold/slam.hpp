@@ -90,8 +90,9 @@ struct SlamOptions {
   /// A folder that exists. trajectory_causal.txt (TUM form) and schedule.log (for `twofold run
   /// --replay-schedule`) grow in it and are whole, but for the last 0.1 s, however the process ends; what is
   /// remembered of each frame goes to its disk, so that memory does not grow with the time: not before
-  /// finish, which reads the poses into SlamSummary::trajectory. A disk that is full or too slow is no reason
-  /// to stop: Slam::errors says, while it runs, which file lost what. Empty: all in memory.
+  /// finish, which reads the poses into SlamSummary::trajectory. What stays in memory for the whole run are
+  /// the loops that were closed, some hundred bytes each (MapSnapshot::loops). A disk that is full or too
+  /// slow is no reason to stop: Slam::errors says, while it runs, which file lost what. Empty: all in memory.
   std::filesystem::path run_folder = {};
   /// Without a folder: how many of the newest frames have a pose in SlamSummary::trajectory, >= 1, at 176
   /// bytes each; older ones are forgotten. A million are nine hours at 30 Hz.

@@ -118,7 +118,7 @@ TEST(MapLender, LendsTheLoopsThatWereClosedSoFar) {
   lender.publish(loop);
   loop.joins_parts = true;
   lender.publish(loop);
-  EXPECT_TRUE(before->loops.loops->empty());
+  EXPECT_TRUE(before->loops.loops.empty());
   const MapSnapshot map(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{{}, lender.newest()}));
   const auto loops = map.loops();
   ASSERT_EQ(loops.size(), 2U);
@@ -134,14 +134,31 @@ TEST(MapLender, LendsTheLoopsThatWereClosedSoFar) {
 // A program that looked at the map once must not keep that version for the rest of its run.
 TEST(MapLender, CatchingUpLetsGoOfWhatWasLentLast) {
   MapLender lender;
-  lender.publish(ClosedLoop{});
-  const std::weak_ptr<const std::vector<ClosedLoop>> lent = lender.newest()->loops.loops;
-  lender.publish(ClosedLoop{});
-  lender.publish(ClosedLoop{});
+  GraphWriter writer = writer_with_keyframes();
+  writer.set_reference(KeyframeId{0});
+  Edge edge;
+  edge.other = KeyframeId{0};
+  writer.set_edge(KeyframeId{1}, edge);
+  lender.publish(writer.publish(), {});
+  const std::weak_ptr<const EdgeList> lent = lender.newest()->graph.keyframe(KeyframeId{1}).edges;
+  writer.cull_keyframe(KeyframeId{1}, KeyframeId{0});
+  lender.publish(writer.publish(), {});
+  lender.publish(writer.publish(), {});
   ASSERT_FALSE(lent.expired()) << "the reader's end still has it: that is what catch_up is for";
   lender.catch_up();
-  lender.publish(ClosedLoop{});  // the writer destroys what no reader looks at
+  lender.publish(writer.publish(), {});  // the writer destroys what no reader looks at
   EXPECT_TRUE(lent.expired());
+}
+
+TEST(MapLender, VersionsShareTheLoopsTheyHaveInCommon) {
+  MapLender lender;
+  for (int n = 0; n < 20; ++n) lender.publish(ClosedLoop{});
+  const auto before = lender.newest();
+  lender.publish(ClosedLoop{});
+  const auto after = lender.newest();
+  EXPECT_EQ(before->loops.loops.size(), 20U);
+  EXPECT_EQ(after->loops.loops.size(), 21U);
+  EXPECT_EQ(&before->loops.loops[0], &after->loops.loops[0]);
 }
 
 }  // namespace
