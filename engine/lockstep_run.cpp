@@ -21,8 +21,6 @@ std::size_t pool_size(const EngineOptions& options) {
 
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options, std::optional<Schedule> schedule)
     : rig_(rig),
-      localise_only_(options.localise_only),
-      mapping_paused_(options.mapping_paused),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
       pool_(pool_size(options)),
       tracking_(rig, options, trace_.get()),
@@ -61,7 +59,7 @@ void LockstepRun::collect(const FrameSink& sink) {
 }
 
 void LockstepRun::run_deterministically(const Frame& frame) {
-  track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = keyframes_withheld()});
+  track(frame, {.messages = answer_ ? 1U : 0U, .keyframe_withheld = !tracking_.may_propose()});
   if (request_) answer_request(snapshot_);
   if (const std::size_t proposals = mapper_inbox_.proposals_approx(); proposals > 0) {
     map(proposals, 0);

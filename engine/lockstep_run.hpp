@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <deque>
 #include <limits>
 #include <optional>
@@ -71,18 +70,10 @@ class LockstepRun final : public Pipeline {
   void count();
   void fail(const std::string& why) { result_.error = why; }
 
-  /// Whether there is no buffer for a keyframe, by the options.
-  [[nodiscard]] bool keyframes_withheld() const {
-    // Relaxed: a wish, which takes effect with one frame or the next.
-    return localise_only_ || (mapping_paused_ != nullptr && mapping_paused_->load(std::memory_order_relaxed));
-  }
-
   /// Of a replay, with its first frame: fails when the schedule is of another input.
   void expect_input_of_schedule();
 
   const Rig rig_;
-  const bool localise_only_;
-  const std::atomic<bool>* const mapping_paused_;
   std::unique_ptr<Trace> trace_;
   ProposalPool pool_;
   TrackerRunner tracking_;

@@ -51,7 +51,9 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
       times_("tracker", trace),
       on_pose_(options.on_pose),
       on_frame_(options.on_frame),
-      can_relocalise_(options.vocabulary != nullptr) {
+      can_relocalise_(options.vocabulary != nullptr),
+      localise_only_(options.localise_only),
+      paused_(options.mapping_paused) {
   frame_stage_ = times_.add_stage("frame");
   latency_stage_ = times_.add_stage("exposure to pose");
   listener_stage_ = times_.add_stage("pose listener");

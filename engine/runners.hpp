@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -41,6 +42,11 @@ class TrackerRunner {
 
   /// Makes room in a pooled buffer before the tracker thread starts, so that it allocates nothing.
   void prepare(KeyframeProposal& proposal) const { tracker_.prepare(proposal); }
+  /// Whether the options, and who pauses the map, allow of a keyframe now. Any other frame gets no buffer.
+  [[nodiscard]] bool may_propose() const {
+    // Relaxed: a wish, which takes effect with one frame or the next.
+    return !localise_only_ && (paused_ == nullptr || !paused_->load(std::memory_order_relaxed));
+  }
   /// First of three parts of a step: where the camera is. `frame`, `graph` and `proposal` stay as they are
   /// until the last.
   /// @param proposal  free buffer or empty; stays with the caller
@@ -92,6 +98,8 @@ class TrackerRunner {
   std::int64_t exposed_ns_ = 0;
   bool answer_awaited_ = false;
   const bool can_relocalise_;
+  const bool localise_only_;
+  const std::atomic<bool>* const paused_;
 };
 
 /// The mapper's step as every kind of run takes it.

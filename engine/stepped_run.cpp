@@ -231,10 +231,7 @@ void SteppedRun::track(FrameSlot& slot, const Arrival& arrival, const GraphSnaps
 
 /// A buffer for a keyframe, if there may be one.
 void SteppedRun::prepare_spare() {
-  // Relaxed: a wish, which takes effect with one frame or the next.
-  const bool paused =
-      options_.mapping_paused != nullptr && options_.mapping_paused->load(std::memory_order_relaxed);
-  if (paused || options_.localise_only) {
+  if (!tracking_.may_propose()) {
     spare_.reset();
   } else if (!spare_) {
     spare_ = proposals_pool_.try_acquire();

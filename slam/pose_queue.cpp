@@ -2,13 +2,13 @@
 
 #include <atomic>
 #include <bit>
-#include <chrono>
 #include <stdexcept>
 #include <stop_token>
 #include <string>
 
 #include "engine/parking.hpp"
 #include "engine/spsc_ring.hpp"
+#include "slam/deadline.hpp"
 
 namespace twofold {
 
@@ -27,12 +27,7 @@ constexpr std::size_t kMostItems = std::size_t{1} << 24;
 
 template <class Ready>
 bool wait(Parking& parking, const std::stop_source& closed, std::int64_t timeout_ns, Ready&& ready) {
-  using Clock = std::chrono::steady_clock;
-  const auto now = Clock::now();
-  const std::chrono::nanoseconds timeout(timeout_ns);
-  if (timeout_ns < 0 || timeout > Clock::time_point::max() - now)
-    return parking.wait(closed.get_token(), ready);
-  return parking.wait_until(closed.get_token(), now + timeout, ready);
+  return parking.wait_until(closed.get_token(), deadline_of(timeout_ns), ready);
 }
 
 }  // namespace

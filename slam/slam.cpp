@@ -15,6 +15,7 @@
 #include "engine/pipeline.hpp"
 #include "graph/map_file.hpp"
 #include "slam/conversions.hpp"
+#include "slam/deadline.hpp"
 #include "slam/fair_mutex.hpp"
 #include "slam/frame_details.hpp"
 #include "slam/frame_intake.hpp"
@@ -61,15 +62,6 @@ class Telling {
  private:
   std::atomic<std::thread::id>& by_;
 };
-
-/// Negative: never.
-std::chrono::steady_clock::time_point deadline_of(std::int64_t timeout_ns) {
-  using Clock = std::chrono::steady_clock;
-  const auto now = Clock::now();
-  const std::chrono::nanoseconds timeout(timeout_ns);
-  return timeout_ns < 0 || timeout > Clock::time_point::max() - now ? Clock::time_point::max()
-                                                                    : now + timeout;
-}
 
 }  // namespace
 
