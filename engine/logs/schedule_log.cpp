@@ -158,7 +158,7 @@ class ScheduleSectionReader {
 template <class Step>
 std::string parse_steps(const Section& section, Step& last, std::vector<Step>& steps) {
   ByteCursor in(section.bytes);
-  // Every record has at least one byte: a false count cannot make us reserve more than the file is long.
+  // Every record has at least one byte: a false count is found before any record is looked at.
   if (section.records > section.bytes.size()) in.fail("announces more records than it has bytes");
   for (std::uint64_t i = 0; i < section.records && in.ok(); ++i) {
     const Step step = decode_step(in, last);

@@ -4,10 +4,11 @@
 
 namespace twofold {
 
-// Tracker record: flags (fate, has messages, 4 is free, keyframe withheld, level in the upper half), frame
-// and version as differences, then the number of messages if the flags announce it.
+// Tracker record: flags (1 fate, 2 has messages, 8 keyframe withheld, effort level in the upper half; 4 was
+// of format 2 and is free), frame and version as differences, then the number of messages if the flags
+// announce it.
 void encode_step(std::vector<std::uint8_t>& bytes, const TrackerStep& step, const TrackerStep& last) {
-  TWOFOLD_CHECK(step.effort_level <= 15, "degrade level");
+  TWOFOLD_CHECK(step.effort_level <= 15, "effort level");
   const unsigned flags = static_cast<unsigned>(step.fate) | (step.messages ? 2U : 0U) |
                          (step.keyframe_withheld ? 8U : 0U) | static_cast<unsigned>(step.effort_level) << 4;
   bytes.push_back(static_cast<std::uint8_t>(flags));

@@ -41,7 +41,9 @@ struct PoseEstimate {
   /// Of the left camera as the frames show it: rectified ones are turned against the lens that took them
   /// (FrameRectifier::T_rectified_raw). In the world of `map_part`, as the map has it now.
   Pose T_world_camera;
-  std::uint32_t map_part = kNoId;  ///< first keyframe of the part; parts have worlds of their own
+  /// Name of the part, whose world is its own: the keyframe it began with, which may be gone. Parts that join
+  /// bear one name, and keyframes older than it may be among them.
+  std::uint32_t map_part = kNoId;
   std::uint32_t reference_keyframe = kNoId;
   Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
   /// 6x6 row by row, of delta in T_reference_camera * exp(delta), delta = (translation [m], rotation [rad])
@@ -85,7 +87,7 @@ struct MapEvent {
   std::int64_t frame = 0;  ///< that saw it first
   std::int64_t t_ns = 0;
   std::uint64_t map_version = 0;
-  std::uint32_t keyframe = kNoId;  ///< reference keyframe of that frame
+  std::uint32_t keyframe = kNoId;  ///< reference keyframe of that frame; kNoId: it is lost
   std::uint32_t map_part_before = kNoId;
   std::uint32_t map_part = kNoId;
   Pose T_world_camera_before;

@@ -24,7 +24,7 @@ class TWOFOLD_API MapSnapshot {
  public:
   struct Keyframe {
     std::uint32_t id = kNoId;
-    std::uint32_t part = kNoId;  ///< first keyframe of its map part; each part has a world of its own
+    std::uint32_t part = kNoId;  ///< name of its map part (PoseEstimate::map_part), whose world is its own
     /// Number and time stamp of the frame it was made of; of another recording's if it is `loaded`: frames of
     /// this run may have the same.
     std::int64_t frame = 0;

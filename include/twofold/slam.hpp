@@ -163,6 +163,7 @@ struct SlamSummary {
 
 /// Versions of the map that somebody holds.
 struct HeldMaps {
+  /// Distinct snapshots: one version with newer places or loops counts again.
   std::size_t versions = 0;
   std::uint64_t oldest = 0;  ///< number of the oldest of them; 0: none
 };
@@ -206,10 +207,12 @@ class TWOFOLD_API Slam {
   void on_frame(FrameCallback callback);
 
   /// In a threaded run it waits for no thread of the engine, only for another caller inside push, has_room,
-  /// wait_for_room or finish; in a deterministic one or a replay it returns when the frame is tracked and
-  /// mapped. Refused are images that do not fit the rig, time stamps that do not increase, and frames after
-  /// finish(). An exception of the engine, as std::bad_alloc, comes out of push in a deterministic run; in a
-  /// threaded one it ends the thread it arose on, and errors() says so.
+  /// wait_for_room or finish, and for the library's own look at what is done, 20 times a second at most: as
+  /// long as it takes to copy the records of the frames done since, no more than there are buffers; in a
+  /// deterministic one or a replay it returns when the frame is tracked and mapped. Refused are images that
+  /// do not fit the rig, time stamps that do not increase, and frames after finish(). An exception of the
+  /// engine, as std::bad_alloc, comes out of push in a deterministic run; in a threaded one it ends the
+  /// thread it arose on, and errors() says so.
   PushResult push(const FrameView& frame);
   /// Whether a push would find room now; without another pushing thread, it will. Without a pace (`live`,
   /// `speed`), also whether map and disk follow: a push is not dropped for their sake.
