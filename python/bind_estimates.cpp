@@ -158,8 +158,9 @@ void bind_estimate(py::module_& module) {
                     "Those over the points looked for, 0 to 1.")
       .def_readonly("T_world_camera", &PoseEstimate::T_world_camera,
                     "Pose of the left camera [m] in the world of `map_part`.")
-      .def_readonly("map_part", &PoseEstimate::map_part,
-                    "First keyframe of the part; parts have worlds of their own.")
+      .def_readonly(
+          "map_part", &PoseEstimate::map_part,
+          "Name of the part: the keyframe it began with, which may be gone. Parts have worlds of their own.")
       .def_readonly("reference_keyframe", &PoseEstimate::reference_keyframe,
                     "Id of the keyframe that the pose is known against.")
       .def_readonly("T_reference_camera", &PoseEstimate::T_reference_camera,

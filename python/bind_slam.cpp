@@ -56,6 +56,11 @@ class Updates {
   std::mutex readers_;  // never held by a thread that wants the interpreter's lock
 };
 
+/// Of options that Slam takes; others it refuses, naming the field.
+std::size_t frame_buffers_of(const SlamOptions& options) {
+  return static_cast<std::size_t>(std::clamp(options.frame_buffers, 1, 65536));
+}
+
 /// Slam, the queue that its tracker puts poses and events into, and its viewer: no Python runs on the
 /// tracker's thread.
 class SlamWithUpdates {
@@ -64,7 +69,7 @@ class SlamWithUpdates {
       : rig(camera_rig),
         live(options.live),
         keeps_pace(options.live || options.speed > 0),
-        items_in_flight(kItemsAFrame * static_cast<std::size_t>(std::max(options.frame_buffers, 1) + 1)),
+        items_in_flight(kItemsAFrame * (frame_buffers_of(options) + 1)),
         updates(std::make_shared<Updates>(std::bit_ceil(std::max<std::size_t>(512, 4 * items_in_flight)))),
         slam(camera_rig, options) {
     slam.on_pose([queue = &updates->queue](const PoseEstimate& pose) { queue->put(pose); });
