@@ -109,8 +109,8 @@ struct MotionEquations {
 
   [[gnu::always_inline]] void add(const ObservationModel& m, const ObservationBatch& b,
                                   const BatchProjection& p, double delta) {
-    // Huber: with s = sqrt(chi2) and c = min(s, delta), rho = c (2 s - c) and the weight is delta / max(s,
-    // delta).
+    // HuberKernel without branches: with s = sqrt(chi2) and c = min(s, delta), rho = c (2 s - c) and the
+    // weight is delta / max(s, delta).
     const Lanes s = p.chi2.sqrt();
     const Lanes clipped = s.min(delta);
     const double clipped_behind = std::min(kSigmasBehind, delta);

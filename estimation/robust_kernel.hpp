@@ -5,7 +5,8 @@
 namespace twofold {
 
 /// Huber's kernel on a whitened residual norm r = sqrt(chi2): rho = r^2 inside delta, 2 delta r - delta^2
-/// outside. (thesis 3.3.7; SWF 3). delta <= 0 or infinite switches it off.
+/// outside. (thesis 3.3.7; SWF 3). delta <= 0 or infinite switches it off. Motion-only adjustment has the
+/// same, for several observations at a time, in estimation/motion_equations.hpp.
 struct HuberKernel {
   double delta = 0;
 

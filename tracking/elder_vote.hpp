@@ -31,8 +31,9 @@ struct ElderVoteOptions {
 ///
 /// What passes before the camera gives ever new points, whose depths are right and which agree with each
 /// other, maybe more of them than of all others; but each of them is young. Elders are the observations of
-/// the oldest points. When most elders fit their own pose better and nearly all young points contradict it,
-/// the young move: they are overruled, and for a while their votes do not count.
+/// the oldest points. When most elders fit their own pose better and most of the young points that agree with
+/// the pose of all contradict it, the young move: they are overruled, and for a while their votes do not
+/// count.
 ///
 /// One instance a tracker: it remembers whom it mistrusts. No allocation after construction.
 class ElderVote {
@@ -56,7 +57,7 @@ class ElderVote {
   [[nodiscard]] Verdict ask(std::span<MotionObservation> observations, std::span<const KeyframeId> anchors,
                             const MotionOnlyResult& by_all, const MotionOnlyOptions& solver);
 
-  /// Once for each frame that has a pose: what its verdict means for the next ones.
+  /// Once for each frame that points gave a pose: what its verdict means for the next ones.
   void remember(const Verdict& verdict) { mistrusted_for_ = verdict.mistrusted_for; }
 
   /// The young were overruled lately.

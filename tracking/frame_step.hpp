@@ -21,15 +21,15 @@ struct Placement {
 /// Where the search for one frame's pose begins.
 struct SearchStart {
   enum class Kind : std::uint8_t {
-    kAligned,    ///< to the last good frame
-    kRough,      ///< by appearance, or by depth alignment alone: far points are found from there, and lead to
-                 ///< where near ones are
+    kNear,       ///< aligned to the last good frame, or where the camera is had it gone on as it moved
+    kRough,      ///< by appearance, by depth alignment alone, or by going on through several lost frames: far
+                 ///< points are found from there, and lead to where near ones are
     kRecognised  ///< likewise, where the loop closer recognised the camera: it may be anywhere
   };
   Placement placement;
-  Kind kind = Kind::kAligned;
+  Kind kind = Kind::kNear;
 
-  [[nodiscard]] bool rough() const { return kind != Kind::kAligned; }
+  [[nodiscard]] bool rough() const { return kind != Kind::kNear; }
 };
 
 /// What belongs to one frame only: handed from stage to stage of the tracker, which writes the result.
@@ -48,8 +48,8 @@ class FrameStep {
   bool started = false;     ///< a map or map part, with this frame
   RollingShutter shutter;   ///< as the camera moves in this frame, as far as known
   TrackResult result;
-  /// Of a pose that depth alignment gave, as if each plane erred by itself: so edges of points are weighed,
-  /// too.
+  /// Of a pose that depth alignment gave, the errors of planes taken as independent, as the weights of the
+  /// edges that points make take those of points.
   Matrix6 information_of_planes = Matrix6::Zero();
 
   /// Attributes the time since the last lap to a stage.

@@ -15,7 +15,8 @@
 namespace twofold {
 
 /// What one search for the local map's points came to: where they were found, and the pose that fits. As long
-/// as other starts may be tried this is all that a search changes.
+/// as other starts may be tried, a search changes this and the frame's step, nothing else of the tracker but
+/// which points its local map holds.
 struct SearchOutcome {
   struct Match {
     std::uint32_t point;  ///< position in the local map's points

@@ -40,8 +40,9 @@ struct TrackerOptions {
   /// The light has changed when so large a share of the points searched was missed ...
   double light_missed_share = 0.5;
   double light_change = 1.5;  ///< ... and the view is by so much brighter or darker there, > 1
-  /// With fewer of the matches, of those not many, or of the points searched, a wider search may find a
-  /// better pose.
+  /// A pose is doubted, and a wider search may find a better one, with inliers below doubted_searched_share
+  /// of the points searched; or below doubted_inlier_share of the matches and rough_searched_share of the
+  /// points searched.
   double doubted_inlier_share = 0.5;
   double doubted_searched_share = 0.12;
   /// Where dense alignment and the motion so far disagree, both are tried, unless so many of the points
@@ -68,10 +69,10 @@ struct TrackerOptions {
   int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see
   double max_alignment_rms = 25;  ///< the dense pose is not trusted above this [grey]
 
-  double keyframe_parallax = 0.09;  ///< |t| over median depth since the reference keyframe
+  double keyframe_parallax = 0.09;  ///< |t| since the reference keyframe over the newest one's median depth
   double keyframe_share = 0.65;     ///< of the reference's points still tracked: below it a keyframe is due
-  /// A keyframe is due when fewer than 1 - keyframe_empty of the image regions that held a tracked point at
-  /// the last keyframe still hold one.
+  /// A keyframe is due when fewer than 1 - keyframe_empty times as many image regions hold a tracked point as
+  /// at the last keyframe.
   double keyframe_empty = 0.5;
   double urgent_share = 0.35;  ///< as keyframe_share; below it a keyframe is due whatever max_pending says
   int max_pending = 2;         ///< with so many proposals on their way to the map no further one is made

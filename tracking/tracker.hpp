@@ -35,8 +35,8 @@ namespace twofold {
 /// (6.5.3). One camera differs in where a point's depth comes from: at the start from its motion
 /// (MonocularStart), later from filters along epipolar lines (DepthSeeds); its unit of length is its own.
 ///
-/// Single-threaded and deterministic. After construction (one camera: until it has started, and while it is
-/// lost and may start again, it does) nothing is allocated, keyframes included if their buffers were
+/// Single-threaded and deterministic. Nothing is allocated after construction, except with one camera before
+/// it has started, or while it is lost and may start again; keyframes included if their buffers were
 /// prepared, and no reference count of a snapshot is touched. Work per frame is bounded by the options.
 ///
 /// The tracker numbers keyframes when it proposes them and points when a later keyframe finds them again. Its
@@ -86,7 +86,7 @@ class Tracker {
   [[nodiscard]] const FrameImages& ask_where();
   /// Frames since the last one with a pose.
   [[nodiscard]] int lost_frames() const { return loss_.lost_frames(); }
-  /// Map part of a frame that was just located, as the map has it that it was tracked against.
+  /// Map part of a frame that was just located, in the map that it was tracked against.
   [[nodiscard]] KeyframeId part(const FrameStep& step) const {
     return part_of(step.graph, immature_points_, step.result.reference);
   }

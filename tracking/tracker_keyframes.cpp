@@ -1,3 +1,4 @@
+// When a frame becomes a keyframe, and what it then hands to the map.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -103,13 +104,13 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
     if (!search_.observations[m].inlier) continue;
     const TrackedPoint& point = local_map_.points()[search_.matches[m].point];
     PointId id = point.id;
-    if (ImmaturePoint* young = immature_point(point)) {
-      if (young->id == kNoPoint && elder_vote_.mistrusts_the_young() &&
-          young->agreed < options_.trusted_after) {
+    if (ImmaturePoint* immature = immature_point(point)) {
+      if (immature->id == kNoPoint && elder_vote_.mistrusts_the_young() &&
+          immature->agreed < options_.trusted_after) {
         continue;  // chance finds what moves near where it was
       }
-      if (young->id == kNoPoint) confirm(*young, proposal);
-      id = young->id;
+      if (immature->id == kNoPoint) confirm(*immature, proposal);
+      id = immature->id;
     }
     const auto level = static_cast<std::uint8_t>(search_.matches[m].found.level);
     proposal.observations.push_back({id, search_.observations[m].z, level});

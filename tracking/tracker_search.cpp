@@ -136,21 +136,21 @@ void Tracker::ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solv
 /// @return how many of them move
 int Tracker::judge_immature_points() {
   for (const std::uint32_t i : search_.missed) {
-    ImmaturePoint* young = immature_point(local_map_.points()[i]);
-    if (young == nullptr) continue;
-    young->failures = static_cast<std::uint8_t>(std::min(young->failures + 1, 255));
-    young->agreed = 0;
+    ImmaturePoint* immature = immature_point(local_map_.points()[i]);
+    if (immature == nullptr) continue;
+    immature->failures = static_cast<std::uint8_t>(std::min(immature->failures + 1, 255));
+    immature->agreed = 0;
   }
   int moving = 0;
   for (std::size_t m = 0; m < search_.matches.size(); ++m) {
-    ImmaturePoint* young = immature_point(local_map_.points()[search_.matches[m].point]);
-    if (young == nullptr) continue;
+    ImmaturePoint* immature = immature_point(local_map_.points()[search_.matches[m].point]);
+    if (immature == nullptr) continue;
     const bool agrees = search_.observations[m].inlier;
-    young->agreed = static_cast<std::uint8_t>(agrees ? std::min(young->agreed + 1, 255) : 0);
-    young->moved = static_cast<std::uint8_t>(agrees ? 0 : std::min(young->moved + 1, 255));
+    immature->agreed = static_cast<std::uint8_t>(agrees ? std::min(immature->agreed + 1, 255) : 0);
+    immature->moved = static_cast<std::uint8_t>(agrees ? 0 : std::min(immature->moved + 1, 255));
     const bool expelled = search_.verdict.by_elders && !agrees;  // found, but it is something that moves
-    young->failures = expelled ? 255 : 0;
-    moving += expelled || young->moved >= options_.moving_after ? 1 : 0;
+    immature->failures = expelled ? 255 : 0;
+    moving += expelled || immature->moved >= options_.moving_after ? 1 : 0;
   }
   return moving;
 }

@@ -34,7 +34,7 @@ struct ExplorationResult {
 
 /// Monocular exploration with known association  (thesis chapter 3, as in 5.4): every frame is a keyframe;
 /// its pose comes from motion-only bundle adjustment, new points from triangulation, then bundle adjustment
-/// of the last `window` frames with the first two of them held (3.3.3). The two-view start is not simulated.
+/// of the last `window` frames with the first two of them fixed (3.3.3). The two-view start is not simulated.
 ///
 /// @param T_first, T_second  poses given to the first two frames, which fix the gauge
 /// @return  nullopt when a frame cannot be placed
