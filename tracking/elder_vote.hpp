@@ -57,7 +57,7 @@ class ElderVote {
   [[nodiscard]] Verdict ask(std::span<MotionObservation> observations, std::span<const KeyframeId> anchors,
                             const MotionOnlyResult& by_all, const MotionOnlyOptions& solver);
 
-  /// Once for each frame that points gave a pose: what its verdict means for the next ones.
+  /// What a verdict means for the next ones.
   void remember(const Verdict& verdict) { mistrusted_for_ = verdict.mistrusted_for; }
 
   /// The young were overruled lately.

@@ -18,7 +18,7 @@ struct ImmaturePoint {
   PointAppearance appearance;
   PointId id = kNoPoint;                 ///< given when it is proposed to the map
   KeyframeId proposed_in = kNoKeyframe;  ///< the keyframe that found it again
-  std::uint8_t failures = 0;             ///< frames in a row without a match
+  std::uint8_t failures = 0;             ///< searches in a row without a match
   std::uint8_t agreed = 0;               ///< frames in a row in which it was where it should be
   std::uint8_t moved = 0;                ///< times in a row that it was found where it should not be
 };

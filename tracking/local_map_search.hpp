@@ -14,9 +14,8 @@
 
 namespace twofold {
 
-/// What one search for the local map's points came to: where they were found, and the pose that fits. As long
-/// as other starts may be tried, a search changes this and the frame's step, nothing else of the tracker but
-/// which points its local map holds.
+/// What one search for the local map's points came to: where they were found, and the pose that fits. Kept
+/// while another start is tried (Tracker::set_aside).
 struct SearchOutcome {
   struct Match {
     std::uint32_t point;  ///< position in the local map's points

@@ -85,7 +85,7 @@ struct TrackerOptions {
   /// In the dark, with fewer points in view, tracked and started, faint corners will do: half the threshold,
   /// a quarter of the score, where the pyramid has averaged the noise away.
   int scarce_points = 90;
-  int max_failures = 3;      ///< immature points not found in so many placed frames in a row are given up
+  int max_failures = 4;      ///< immature points not found so many searches in a row are given up
   int max_immature_age = 3;  ///< keyframes after which an immature point is given up
 
   FirstStructureOptions first_structure;  ///< one camera only

@@ -83,7 +83,6 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   const bool map_exists = last_.placement.reference != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
   step.tracked = map_exists && track(step);
-  if (step.tracked) settle(step);
   if (step.tracked && seeds_.size() > 0) observe_seeds(step);
   if (step.tracked) step.result.proposed = keyframe_is_due(step);
   step.started = !step.tracked && (map_exists ? start_part(step) : start_map(step));
@@ -127,16 +126,6 @@ bool Tracker::track(FrameStep& step) {
   if (cause != LostCause::kNone) cause = place_by_depth_alone(cause, step);
   if (cause != LostCause::kNone) give_up_frame(cause, step.result);
   return cause == LostCause::kNone;
-}
-
-/// The frame has its pose: what that says of the tracker's own points, of whom to believe, and how well the
-/// pose is known. Searches from other starts, which came to nothing, leave no trace.
-void Tracker::settle(FrameStep& step) {
-  step.result.moving = judge_immature_points();
-  if (step.result.by_depth) return;
-  elder_vote_.remember(search_.verdict);
-  step.result.information = honest_information(step);
-  step.lap(TrackerStage::kMotion);
 }
 
 void Tracker::load_images(const Frame& frame) {

@@ -130,7 +130,6 @@ class Tracker {
   void load_images(const Frame& frame);
   void follow(const GraphSnapshot& graph);
   bool track(FrameStep& step);
-  void settle(FrameStep& step);
   [[nodiscard]] SE3 predicted_motion() const;
   [[nodiscard]] SE3 predicted_pose() const;
   std::optional<SE3> align_to_previous(const SE3& start, FrameStep& step);

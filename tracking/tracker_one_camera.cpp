@@ -55,7 +55,6 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   local_map_search_.run(current_, placement.T_c_ref, options_.lost_radius_px, step, search_);
   const LostCause cause = estimate_pose(placement, step);
   if (cause != LostCause::kNone) return cause;
-  settle(step);
   step.result.cause = LostCause::kNone;
   last_keyframe_ = {median_depth(SE3()), occupied_regions()};
   return LostCause::kNone;

@@ -44,15 +44,13 @@ LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
 LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& step) {
   const LostCause cause = search_from(aligned, step);
   const bool placed = cause == LostCause::kNone;
-  const int found = placed ? step.result.matches : 0;
-  const bool settled = found >= options_.settled_searched_share * step.result.searched;
+  const int inliers = placed ? step.result.inliers : 0;
+  const bool settled = inliers >= options_.settled_searched_share * step.result.searched;
   if (settled || !leaves_motion(aligned.placement.T_c_ref)) return cause;
-  const Attempt by_aligned = set_aside(step);
   const LostCause other = search_from({.placement = {last_.placement.reference, predicted_pose()}}, step);
-  const bool better = placed ? step.result.inliers > by_aligned.result.inliers : well_supported(step.result);
+  const bool better = placed ? step.result.inliers > inliers : well_supported(step.result);
   if (other == LostCause::kNone && better) return other;
-  take_back(by_aligned, step);
-  return cause;
+  return search_from(aligned, step);
 }
 
 Tracker::Attempt Tracker::set_aside(const FrameStep& step) {
@@ -110,6 +108,8 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
     if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step.frame);
   }
   ask_elders(motion, solver(step));
+  result.moving = judge_immature_points();
+  elder_vote_.remember(search_.verdict);
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) return LostCause::kTooFewCandidates;
   if (result.matches < options_.min_inliers) return LostCause::kTooFewMatches;
@@ -119,6 +119,7 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   result.status = TrackStatus::kTracking;
   result.reference = start.reference;
   result.T_c_ref = motion.T_c_ref;
+  result.information = honest_information(step);
   return LostCause::kNone;
 }
 
@@ -132,7 +133,8 @@ void Tracker::ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solv
   if (search_.verdict.by_elders) motion = *search_.verdict.by_elders;
 }
 
-/// Which of the tracker's own points are where they should be, now that the frame's pose is decided.
+/// Which of the tracker's own points are where they should be. A frame that is searched from several starts
+/// counts several times: where it is in doubt, points that are not found are given up sooner.
 /// @return how many of them move
 int Tracker::judge_immature_points() {
   for (const std::uint32_t i : search_.missed) {
