@@ -261,8 +261,9 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
     if (one_camera) messages_.emplace_back(close_over_sim3(graph, *loop, rig_, mapper_options_));
     messages_.emplace_back(*loop);
     const bool joins = graph.part(loop->from) != graph.part(loop->to);
-    found_.emplace(*loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(), keyframe.t_ns, joins,
-                   joins ? 0 : distance_travelled(graph, loop->from, loop->to), time_of(graph, loop->from));
+    found_ = ClosedLoop{
+        *loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(),   keyframe.t_ns,
+        joins, joins ? 0 : distance_travelled(graph, loop->from, loop->to), time_of(graph, loop->from)};
     (one_camera ? awaited_ : not_optimised_) = loop;
   }
   if (on_places_) on_places_(closer_->places());
