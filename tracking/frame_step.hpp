@@ -21,7 +21,7 @@ struct Placement {
 /// Where the search for one frame's pose begins.
 struct SearchStart {
   enum class Kind : std::uint8_t {
-    kNear,       ///< aligned to the last good frame, or where the camera is had it gone on as it moved
+    kNear,       ///< aligned to the last good frame, or where it would be had it gone on as it moved
     kRough,      ///< by appearance, by depth alignment alone, or by going on through several lost frames: far
                  ///< points are found from there, and lead to where near ones are
     kRecognised  ///< likewise, where the loop closer recognised the camera: it may be anywhere

@@ -117,11 +117,11 @@ bool Tracker::track(FrameStep& step) {
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
   const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
   if (cause == LostCause::kNone && !doubted) return true;
-  const Attempt first = set_aside(step);
+  const auto first = doubted ? std::optional(set_aside(step)) : std::nullopt;
   if (search_widely(step)) return true;
-  if (doubted) {  // nothing better
+  if (first) {  // nothing better
     local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
-    take_back(first, step);
+    take_back(*first, step);
   }
   if (cause != LostCause::kNone) cause = place_by_depth_alone(cause, step);
   if (cause != LostCause::kNone) give_up_frame(cause, step.result);
