@@ -18,15 +18,15 @@ auto find_entry(Entries& entries, Id id) -> decltype(entries.data()) {
 
 }  // namespace
 
-void MapBuilder::take_head(ByteReader in) {
+void MapBuilder::take_head(EntryReader in) {
   map_.rig = take_rig(in);
-  (void)in.take<std::uint64_t>();  // version: of use to people only, a loaded map starts anew
-  reference_ = KeyframeId{in.take<std::uint32_t>()};
-  keyframe_count_ = in.take<std::uint32_t>();
-  point_count_ = in.take<std::uint32_t>();
+  (void)in.u64();  // version: of use to people only, a loaded map starts anew
+  reference_ = KeyframeId{in.u32()};
+  keyframe_count_ = in.u32();
+  point_count_ = in.u32();
   in.expect_end();
   if (keyframe_count_ > kMaxKeyframes || point_count_ > kMaxPoints)
-    throw FormatError{"announces too large a map"};
+    throw MalformedBytes("announces too large a map");
 }
 
 const KeyframeEntry* MapBuilder::find(KeyframeId id) const {
@@ -39,41 +39,41 @@ MapBuilder::PointEntry* MapBuilder::find(PointId id) {
   return find_entry(points_, id);
 }
 
-void MapBuilder::take_keyframes(ByteReader in) {
+void MapBuilder::take_keyframes(EntryReader in) {
   for (std::uint32_t n = 0; n < kKeyframesPerSection && !in.at_end(); ++n) {
     const KeyframeId id{next_keyframe_};
     KeyframeEntry entry = version_ == 1 ? take_keyframe_1(in, id) : take_keyframe(in, id);
-    const std::uint32_t run = version_ >= 3 && entry.forgotten() ? in.take_run() : 1;
-    if (run > keyframe_count_ - next_keyframe_) throw FormatError{"holds more keyframes than announced"};
+    const std::uint32_t run = version_ >= 3 && entry.forgotten() ? in.run() : 1;
+    if (run > keyframe_count_ - next_keyframe_) throw MalformedBytes("holds more keyframes than announced");
     next_keyframe_ += run;
     const ObservationList& observations = *entry.keyframe.observations;
     if (!observations.empty() && index(observations.back().point) >= point_count_) {
-      throw FormatError{"observes a point that is not there"};
+      throw MalformedBytes("observes a point that is not there");
     }
     if (entry.culled() && (!observations.empty() || !entry.edges.empty())) {
-      throw FormatError{"holds a culled keyframe with observations or edges"};
+      throw MalformedBytes("holds a culled keyframe with observations or edges");
     }
     if (!entry.forgotten()) keyframes_.push_back(std::move(entry));
   }
   in.expect_end();
 }
 
-void MapBuilder::take_points(ByteReader in) {
+void MapBuilder::take_points(EntryReader in) {
   for (std::uint32_t n = 0; n < kPointsPerSection && !in.at_end(); ++n) {
     PointEntry entry{PointId{next_point_}, take_point(in), {}};
-    const std::uint32_t run = version_ >= 3 && !entry.point.alive() ? in.take_run() : 1;
-    if (run > point_count_ - next_point_) throw FormatError{"holds more points than announced"};
+    const std::uint32_t run = version_ >= 3 && !entry.point.alive() ? in.run() : 1;
+    if (run > point_count_ - next_point_) throw MalformedBytes("holds more points than announced");
     next_point_ += run;
     if (entry.point.alive()) points_.push_back(std::move(entry));
   }
   in.expect_end();
 }
 
-void MapBuilder::take_places(ByteReader in) {
+void MapBuilder::take_places(EntryReader in) {
   for (std::uint32_t n = 0; n < kPlacesPerSection && !in.at_end(); ++n) {
-    const KeyframeId id{in.take<std::uint32_t>()};
-    if (index(id) < map_.places.size()) throw FormatError{"places out of order"};
-    if (index(id) >= keyframe_count_) throw FormatError{"holds the place of a keyframe that is not there"};
+    const KeyframeId id{in.u32()};
+    if (index(id) < map_.places.size()) throw MalformedBytes("places out of order");
+    if (index(id) >= keyframe_count_) throw MalformedBytes("holds the place of a keyframe that is not there");
     map_.places.set(id, take_place(in, map_.rig));
     places_.push_back(id);
   }
@@ -91,15 +91,15 @@ SavedMap MapBuilder::finish() {
 }
 
 void MapBuilder::check_keyframes() const {
-  if (next_keyframe_ != keyframe_count_) throw FormatError{"keyframes: fewer than announced"};
-  if (next_point_ != point_count_) throw FormatError{"points: fewer than announced"};
+  if (next_keyframe_ != keyframe_count_) throw MalformedBytes("keyframes: fewer than announced");
+  if (next_point_ != point_count_) throw MalformedBytes("points: fewer than announced");
   if (reference_ == kNoKeyframe ? keyframe_count_ > 0 : index(reference_) >= keyframe_count_) {
-    throw FormatError{"head: the reference keyframe is not there"};
+    throw MalformedBytes("head: the reference keyframe is not there");
   }
   if (reference_ == kNoKeyframe) return;
   const KeyframeEntry* reference = find(reference_);
   if (reference == nullptr || reference->culled())
-    throw FormatError{"head: the reference keyframe was culled"};
+    throw MalformedBytes("head: the reference keyframe was culled");
 }
 
 /// Each chain of replacements that is known must end in a keyframe that was not culled.
@@ -110,12 +110,12 @@ void MapBuilder::check_replacements() const {
   for (std::size_t k = 0; k < keyframes_.size(); ++k) {
     chain.clear();
     for (std::size_t at = k; state[at] != kGood;) {
-      if (state[at] == kOnTheWay) throw FormatError{"keyframes: replacements go round in a circle"};
+      if (state[at] == kOnTheWay) throw MalformedBytes("keyframes: replacements go round in a circle");
       state[at] = kOnTheWay;
       chain.push_back(at);
       if (!keyframes_[at].culled()) break;
       const KeyframeEntry* next = find(keyframes_[at].replacement.id);
-      if (next == nullptr) throw FormatError{"keyframes: a replacement is not there"};
+      if (next == nullptr) throw MalformedBytes("keyframes: a replacement is not there");
       at = static_cast<std::size_t>(next - keyframes_.data());
     }
     for (const std::size_t at : chain) state[at] = kGood;
@@ -124,16 +124,16 @@ void MapBuilder::check_replacements() const {
 
 void MapBuilder::check_points() const {
   for (const PointEntry& entry : points_) {
-    if (find(entry.point.anchor) == nullptr) throw FormatError{"points: an anchor is not there"};
-    if (!(entry.point.psi.z() > 0)) throw FormatError{"points: a point is not in front of its anchor"};
-    if (entry.point.appearance == nullptr) throw FormatError{"points: a point has no appearance"};
+    if (find(entry.point.anchor) == nullptr) throw MalformedBytes("points: an anchor is not there");
+    if (!(entry.point.psi.z() > 0)) throw MalformedBytes("points: a point is not in front of its anchor");
+    if (entry.point.appearance == nullptr) throw MalformedBytes("points: a point has no appearance");
   }
 }
 
 void MapBuilder::check_places() const {
   for (const KeyframeId id : places_) {
     const KeyframeEntry* entry = find(id);
-    if (entry == nullptr || entry->culled()) throw FormatError{"places: a culled keyframe has a place"};
+    if (entry == nullptr || entry->culled()) throw MalformedBytes("places: a culled keyframe has a place");
   }
 }
 
@@ -141,14 +141,14 @@ void MapBuilder::register_observers() {
   for (const KeyframeEntry& entry : keyframes_) {
     for (const Observation& observation : *entry.keyframe.observations) {
       PointEntry* point = find(observation.point);
-      if (point == nullptr) throw FormatError{"keyframes: a culled point is observed"};
+      if (point == nullptr) throw MalformedBytes("keyframes: a culled point is observed");
       point->observers.push_back(entry.id);
     }
   }
   for (const PointEntry& entry : points_) {
     if (find(entry.point.anchor)->culled()) continue;
     if (!std::binary_search(entry.observers.begin(), entry.observers.end(), entry.point.anchor)) {
-      throw FormatError{"points: an anchor does not observe its point"};
+      throw MalformedBytes("points: an anchor does not observe its point");
     }
   }
 }
@@ -160,7 +160,8 @@ void MapBuilder::mirror_edges() {
     for (std::size_t n = 0; n < own && entry.edges[n].other < entry.id; ++n) {
       const Edge edge = entry.edges[n];
       KeyframeEntry* other = find(edge.other);
-      if (other == nullptr || other->culled()) throw FormatError{"keyframes: an edge to a culled keyframe"};
+      if (other == nullptr || other->culled())
+        throw MalformedBytes("keyframes: an edge to a culled keyframe");
       Edge back = edge;
       back.other = entry.id;
       back.T_other_this = edge.T_other_this.inverse();

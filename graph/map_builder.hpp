@@ -10,15 +10,15 @@ namespace twofold::map_format {
 
 /// Puts a map together from the sections of its file, in any order after the head. Cross references are
 /// checked when everything is there. Keyframes that are forgotten and points that are culled are counted and
-/// not kept. All functions throw FormatError.
+/// not kept. All functions throw MalformedBytes.
 class MapBuilder {
  public:
   /// Of the file, before anything is taken.
   void read_version(std::uint16_t version) { version_ = version; }
-  void take_head(ByteReader in);
-  void take_keyframes(ByteReader in);
-  void take_points(ByteReader in);
-  void take_places(ByteReader in);
+  void take_head(EntryReader in);
+  void take_keyframes(EntryReader in);
+  void take_points(EntryReader in);
+  void take_places(EntryReader in);
 
   /// To be called once, after all sections.
   [[nodiscard]] SavedMap finish();

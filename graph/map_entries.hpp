@@ -11,9 +11,9 @@
 namespace twofold::map_format {
 
 /// What stands in a map file's sections, each taken on its own: numbers are finite and within their ranges;
-/// whether they fit each other is MapBuilder's affair. All functions throw FormatError.
+/// whether they fit each other is MapBuilder's affair. All functions throw MalformedBytes.
 
-[[nodiscard]] Rig take_rig(ByteReader& in);
+[[nodiscard]] Rig take_rig(EntryReader& in);
 /// A keyframe, or the replacement of one that was culled if that is known.
 struct KeyframeEntry {
   KeyframeId id = kNoKeyframe;
@@ -24,12 +24,12 @@ struct KeyframeEntry {
   [[nodiscard]] bool culled() const { return keyframe.culled(); }
   [[nodiscard]] bool forgotten() const { return culled() && replacement.id == kNoKeyframe; }
 };
-[[nodiscard]] KeyframeEntry take_keyframe(ByteReader& in, KeyframeId id);
+[[nodiscard]] KeyframeEntry take_keyframe(EntryReader& in, KeyframeId id);
 /// The same in format version 1.
-[[nodiscard]] KeyframeEntry take_keyframe_1(ByteReader& in, KeyframeId id);
+[[nodiscard]] KeyframeEntry take_keyframe_1(EntryReader& in, KeyframeId id);
 /// A culled point, of which nothing follows, if it has no anchor.
-[[nodiscard]] MapPoint take_point(ByteReader& in);
+[[nodiscard]] MapPoint take_point(EntryReader& in);
 /// Corners are in the image; z stays empty for a monocular rig.
-[[nodiscard]] PlaceAppearance take_place(ByteReader& in, const Rig& rig);
+[[nodiscard]] PlaceAppearance take_place(EntryReader& in, const Rig& rig);
 
 }  // namespace twofold::map_format

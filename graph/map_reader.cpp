@@ -13,25 +13,25 @@ using namespace map_format;
 /// @return false at the end section
 bool take_section(const RawSection& raw, bool first, MapBuilder& builder) {
   const auto section = static_cast<Section>(raw.id);
-  if (first != (section == Section::kHead)) throw FormatError{"is not where it belongs"};
+  if (first != (section == Section::kHead)) throw MalformedBytes("is not where it belongs");
   switch (section) {
     case Section::kHead:
-      builder.take_head(ByteReader(raw.bytes));
+      builder.take_head(EntryReader(raw.bytes));
       return true;
     case Section::kKeyframes:
-      builder.take_keyframes(ByteReader(raw.bytes));
+      builder.take_keyframes(EntryReader(raw.bytes));
       return true;
     case Section::kPoints:
-      builder.take_points(ByteReader(raw.bytes));
+      builder.take_points(EntryReader(raw.bytes));
       return true;
     case Section::kPlaces:
-      builder.take_places(ByteReader(raw.bytes));
+      builder.take_places(EntryReader(raw.bytes));
       return true;
     case Section::kEnd:
-      ByteReader(raw.bytes).expect_end();
+      EntryReader(raw.bytes).expect_end();
       return false;
   }
-  if ((raw.id & kSkippable) == 0) throw FormatError{"is of a kind this program does not know"};
+  if ((raw.id & kSkippable) == 0) throw MalformedBytes("is of a kind this program does not know");
   return true;
 }
 
@@ -50,13 +50,13 @@ SavedMap read_map(std::istream& in, std::uint64_t size, const std::string& name)
       reader.next(section);
     } while (take_section(section, number == 1, builder));
     number = 0;
-    if (reader.left() > 0) throw FormatError{"bytes follow after the end section"};
+    if (reader.left() > 0) throw MalformedBytes("bytes follow after the end section");
     return builder.finish();
-  } catch (const FormatError& error) {
-    if (number == 0) throw MapFileError(name + ": " + error.what);
+  } catch (const MalformedBytes& error) {
+    if (number == 0) throw MapFileError(name + ": " + error.what());
     const std::string which =
         section.id == ~0U ? "" : std::string(" (") + name_of(static_cast<Section>(section.id)) + ")";
-    throw MapFileError(name + ": section " + std::to_string(number) + which + ": " + error.what);
+    throw MapFileError(name + ": section " + std::to_string(number) + which + ": " + error.what());
   }
 }
 

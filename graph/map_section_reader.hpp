@@ -13,7 +13,7 @@ struct RawSection {
 };
 
 /// Reads a map file's sections from a stream whose size is known, so that a length that is too large is found
-/// before memory is asked for. All functions throw FormatError.
+/// before memory is asked for. All functions throw MalformedBytes.
 class SectionReader {
  public:
   SectionReader(std::istream& in, std::uint64_t size) : in_(in), left_(size) {}

@@ -2,7 +2,6 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <zlib.h>
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -11,6 +10,7 @@
 #include <mutex>
 #include <utility>
 
+#include "base/checksum.hpp"
 #include "graph/map_file.hpp"
 #include "graph/map_format.hpp"
 #include "graph/map_place.hpp"
@@ -122,16 +122,14 @@ void write_section(ReplacedFile& file, Section section, std::span<const std::uin
   ByteWriter head;
   head.put(section);
   head.put(std::uint64_t{bytes.size()});
-  uLong crc = crc32(0, head.bytes().data(), static_cast<uInt>(head.bytes().size()));
-  if (!bytes.empty()) crc = crc32_z(crc, bytes.data(), bytes.size());  // a null pointer would start it anew
   file.write(head.bytes());
   file.write(bytes);
   ByteWriter tail;
-  tail.put(static_cast<std::uint32_t>(crc));
+  tail.put(crc32_of(bytes, crc32_of(head.bytes())));
   file.write(tail.bytes());
 }
 
-void put_head(ByteWriter& out, const Rig& rig, const GraphSnapshot& graph) {
+void put_head(EntryWriter& out, const Rig& rig, const GraphSnapshot& graph) {
   out.put(rig.kind);
   const PinholeCamera& c = rig.camera;
   for (const double value : {c.fx, c.fy, c.cx, c.cy}) out.put(value);
@@ -145,7 +143,7 @@ void put_head(ByteWriter& out, const Rig& rig, const GraphSnapshot& graph) {
 }
 
 /// Edges are written by their newer keyframe.
-void put_edges(ByteWriter& out, const Keyframe& keyframe) {
+void put_edges(EntryWriter& out, const Keyframe& keyframe) {
   std::uint32_t count = 0;
   for (const Edge& edge : *keyframe.edges) count += edge.other < keyframe.id ? 1 : 0;
   out.put(count);
@@ -175,13 +173,13 @@ std::uint32_t run_length(std::uint32_t begin, std::uint32_t end, Like&& like) {
   return i - begin;
 }
 
-void put_culled(ByteWriter& out, const Replacement& replacement) {
+void put_culled(EntryWriter& out, const Replacement& replacement) {
   out.put(EntryKind::kCulled);
   out.put(replacement.id);
   out.put(replacement.T_this_replacement.unpacked());
 }
 
-void put_keyframe(ByteWriter& out, const Keyframe& keyframe) {
+void put_keyframe(EntryWriter& out, const Keyframe& keyframe) {
   out.put(EntryKind::kKeyframe);
   out.put(keyframe.frame_index);
   out.put(keyframe.t_ns);
@@ -198,7 +196,7 @@ void put_keyframe(ByteWriter& out, const Keyframe& keyframe) {
 
 /// Keyframe k, or all forgotten ones from there on.
 /// @return how many
-std::uint32_t put_keyframes(ByteWriter& out, const GraphSnapshot& graph, std::uint32_t k) {
+std::uint32_t put_keyframes(EntryWriter& out, const GraphSnapshot& graph, std::uint32_t k) {
   const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
   const auto count = static_cast<std::uint32_t>(graph.keyframe_count());
   if (const std::uint32_t run = run_length(k, count, [&](auto n) { return is_forgotten(graph, n); })) {
@@ -215,7 +213,7 @@ std::uint32_t put_keyframes(ByteWriter& out, const GraphSnapshot& graph, std::ui
 }
 
 /// Observers follow from the keyframes' observations.
-void put_point(ByteWriter& out, const MapPoint& point) {
+void put_point(EntryWriter& out, const MapPoint& point) {
   out.put(point.anchor);
   out.put_vector(point.psi);
   out.put(static_cast<std::uint8_t>(point.appearance != nullptr));
@@ -227,7 +225,7 @@ void put_point(ByteWriter& out, const MapPoint& point) {
 
 /// Point p, or all culled ones from there on.
 /// @return how many
-std::uint32_t put_points(ByteWriter& out, const GraphSnapshot& graph, std::uint32_t p) {
+std::uint32_t put_points(EntryWriter& out, const GraphSnapshot& graph, std::uint32_t p) {
   const auto count = static_cast<std::uint32_t>(graph.point_count());
   if (const std::uint32_t run = run_length(p, count, [&](auto n) { return is_culled_point(graph, n); })) {
     out.put(kNoKeyframe);  // as the anchor
@@ -238,7 +236,7 @@ std::uint32_t put_points(ByteWriter& out, const GraphSnapshot& graph, std::uint3
   return 1;
 }
 
-void put_place(ByteWriter& out, KeyframeId id, const PlaceAppearance& place) {
+void put_place(EntryWriter& out, KeyframeId id, const PlaceAppearance& place) {
   out.put(id);
   out.put(static_cast<std::uint32_t>(place.corners.size()));
   for (std::size_t n = 0; n < place.corners.size(); ++n) {
@@ -253,12 +251,12 @@ void put_place(ByteWriter& out, KeyframeId id, const PlaceAppearance& place) {
 }
 
 /// Writes what there is of [0, count) in sections of up to `per_section` entries.
-/// @param put  puts one entry, for i and maybe for what follows, into a ByteWriter, or nothing, if there is
+/// @param put  puts one entry, for i and maybe for what follows, into an EntryWriter, or nothing, if there is
 ///             nothing to put for i; returns for how many it did, at least 1
 template <class Put>
 void write_slices(ReplacedFile& file, Section section, std::uint32_t count, std::uint32_t per_section,
                   Put&& put) {
-  ByteWriter bytes;
+  EntryWriter bytes;
   std::uint32_t entries = 0;
   for (std::uint32_t i = 0; i < count;) {
     const std::size_t before = bytes.bytes().size();
@@ -303,7 +301,7 @@ void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph,
   expect_loadable(file, graph);
   expect_replaceable(file);
   ReplacedFile out(file);
-  ByteWriter bytes;
+  EntryWriter bytes;
   for (const char c : kMagic) bytes.put(c);
   bytes.put(kMapFormatVersion);
   bytes.put(std::uint8_t{0});
@@ -313,12 +311,12 @@ void save_map(const fs::path& file, const Rig& rig, const GraphSnapshot& graph,
   write_section(out, Section::kHead, bytes.bytes());
   write_slices(out, Section::kKeyframes, static_cast<std::uint32_t>(graph.keyframe_count()),
                kKeyframesPerSection,
-               [&](ByteWriter& to, std::uint32_t k) { return put_keyframes(to, graph, k); });
+               [&](EntryWriter& to, std::uint32_t k) { return put_keyframes(to, graph, k); });
   write_slices(out, Section::kPoints, static_cast<std::uint32_t>(graph.point_count()), kPointsPerSection,
-               [&](ByteWriter& to, std::uint32_t p) { return put_points(to, graph, p); });
+               [&](EntryWriter& to, std::uint32_t p) { return put_points(to, graph, p); });
   const std::size_t described = std::min(places.size(), graph.keyframe_count());
   write_slices(out, Section::kPlaces, static_cast<std::uint32_t>(described), kPlacesPerSection,
-               [&](ByteWriter& to, std::uint32_t k) {
+               [&](EntryWriter& to, std::uint32_t k) {
                  const PlaceAppearance* place = places.find(KeyframeId{k});
                  if (place != nullptr && !graph.keyframe(KeyframeId{k}).culled())
                    put_place(to, KeyframeId{k}, *place);

@@ -1,13 +1,15 @@
 #include "engine/logs/schedule_log.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <istream>
 #include <iterator>
 #include <ostream>
 #include <string_view>
 
-#include "engine/logs/byte_cursor.hpp"
+#include "base/checksum.hpp"
 #include "engine/logs/schedule_records.hpp"
+#include "engine/logs/varint.hpp"
 
 namespace twofold {
 namespace {
@@ -30,57 +32,41 @@ constexpr std::uint8_t section_id(const LoopStep&) {
   return 3;
 }
 
-/// CRC-32 of IEEE 802.3, bit by bit: a log is small and read once.
-std::uint32_t crc32(std::span<const std::uint8_t> bytes) {
-  std::uint32_t crc = ~0U;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (0xEDB88320U & (0U - (crc & 1U)));
-  }
-  return ~crc;
-}
-
-void put_header(std::vector<std::uint8_t>& file) {
-  file.insert(file.end(), kMagic.begin(), kMagic.end());
-  file.push_back(kFormatVersion);
+void put_header(ByteWriter& file) {
+  for (const char c : kMagic) file.put(c);
+  file.put(kFormatVersion);
 }
 
 /// What comes before a section's bytes.
-void begin_section(std::vector<std::uint8_t>& file, std::uint8_t id, std::uint64_t records,
-                   std::uint64_t bytes) {
-  file.push_back(id);
+void begin_section(ByteWriter& file, std::uint8_t id, std::uint64_t records, std::uint64_t bytes) {
+  file.put(id);
   put_varint(file, records);
   put_varint(file, bytes);
 }
 
-void end_section(std::vector<std::uint8_t>& file, std::size_t begin) {
-  const std::uint32_t crc = crc32(std::span(file).subspan(begin));
-  for (unsigned shift = 0; shift < 32; shift += 8) file.push_back(static_cast<std::uint8_t>(crc >> shift));
+void end_section(ByteWriter& file, std::size_t begin) {
+  file.put(crc32_of(file.bytes().subspan(begin)));
 }
 
-void put_end(std::vector<std::uint8_t>& file) {
+void put_end(ByteWriter& file) {
   const std::size_t begin = file.size();
   begin_section(file, kEnd, 0, 0);
   end_section(file, begin);
 }
 
 template <class Step>
-void put_section(std::vector<std::uint8_t>& file, const ScheduleStream<Step>& stream) {
+void put_section(ByteWriter& file, const ScheduleStream<Step>& stream) {
   const std::size_t begin = file.size();
   begin_section(file, section_id(Step()), stream.records(), stream.bytes().size());
-  for (const auto& chunk : stream.bytes().chunks()) file.insert(file.end(), chunk.begin(), chunk.end());
+  for (const auto& chunk : stream.bytes().chunks()) file.put_bytes(chunk);
   end_section(file, begin);
 }
 
-void put_number(std::vector<std::uint8_t>& file, std::uint64_t number) {
-  for (unsigned shift = 0; shift < 64; shift += 8) file.push_back(static_cast<std::uint8_t>(number >> shift));
-}
-
-void put_input(std::vector<std::uint8_t>& file, const InputFingerprint& input) {
+void put_input(ByteWriter& file, const InputFingerprint& input) {
   const std::size_t begin = file.size();
   begin_section(file, kInput, 1, 2 * sizeof(std::uint64_t));
-  put_number(file, input.rig);
-  put_number(file, input.first_frame);
+  file.put(input.rig);
+  file.put(input.first_frame);
   end_section(file, begin);
 }
 
@@ -89,6 +75,11 @@ struct Section {
   std::uint64_t records = 0;
   std::span<const std::uint8_t> bytes;
 };
+
+/// Where reading stopped, for people.
+std::string place_of(const ByteReader& in) {
+  return " (byte " + std::to_string(in.at()) + ")";
+}
 
 /// Walks over a file's sections. `ended` becomes true with the end section.
 class ScheduleSectionReader {
@@ -101,25 +92,24 @@ class ScheduleSectionReader {
   bool next(Section& section) {
     if (!error_.empty() || ended_ || in_.at_end()) return false;
     const std::size_t begin = in_.at();
-    section.id = in_.byte();
-    section.records = in_.varint();
-    const std::uint64_t size = in_.varint();
-    section.bytes = in_.take(size);
-    const std::size_t end = in_.at();
-    const auto stored = in_.take(4);
+    section.id = in_.u8();
     if (section.id > kSectionNames.size())
       return fail("an unknown section (byte " + std::to_string(begin) + ")");
-    if (!in_.ok()) {
+    std::uint64_t size = 0;
+    try {
+      section.records = take_varint(in_);
+      size = take_varint(in_);
+      if (size > in_.remaining()) throw MalformedBytes("is longer than the file");
+      section.bytes = in_.take(size);
+      const std::uint32_t crc = crc32_of(file_.subspan(begin, in_.at() - begin));
+      if (in_.u32() != crc) return fail(name_of(section.id) + " is damaged: its checksum does not fit");
+    } catch (const MalformedBytes& error) {
       const bool torn = file_.size() - begin < kLargestTorn && size < kLargestTorn;
-      return torn ? false : fail(name_of(section.id) + " " + in_.failure());
+      return torn ? false : fail(name_of(section.id) + " " + error.what() + place_of(in_));
     }
-    std::uint32_t crc = 0;
-    for (unsigned i = 0; i < 4; ++i) crc |= static_cast<std::uint32_t>(stored[i]) << (8 * i);
-    if (crc != crc32(file_.subspan(begin, end - begin)))
-      return fail(name_of(section.id) + " is damaged: its checksum does not fit");
     if (section.id != kEnd) return true;
     ended_ = true;
-    if (!in_.at_end()) return fail("has bytes after its end (byte " + std::to_string(in_.at()) + ")");
+    if (!in_.at_end()) return fail("has bytes after its end" + place_of(in_));
     return false;
   }
   [[nodiscard]] bool ended() const { return ended_; }
@@ -135,21 +125,19 @@ class ScheduleSectionReader {
 
  private:
   void read_header() {
-    const auto magic = in_.take(kMagic.size());
-    const std::string_view text(reinterpret_cast<const char*>(magic.data()), magic.size());
-    const std::uint8_t version = in_.byte();
-    if (text != kMagic) {
+    const auto magic = in_.take(std::min(kMagic.size(), in_.remaining()));
+    if (std::string_view(reinterpret_cast<const char*>(magic.data()), magic.size()) != kMagic) {
       fail("header: this is no schedule log");
-    } else if (!in_.ok()) {
-      fail("header " + in_.failure());
-    } else if (version != kFormatVersion) {
+    } else if (in_.at_end()) {
+      fail("header ends in the middle" + place_of(in_));
+    } else if (const std::uint8_t version = in_.u8(); version != kFormatVersion) {
       fail("header: format version " + std::to_string(version) + ", this program reads " +
            std::to_string(kFormatVersion));
     }
   }
 
   std::span<const std::uint8_t> file_;
-  ByteCursor in_;
+  ByteReader in_;
   bool ended_ = false;
   std::string error_;
 };
@@ -157,23 +145,22 @@ class ScheduleSectionReader {
 /// Empty, or what is wrong with the records.
 template <class Step>
 std::string parse_steps(const Section& section, Step& last, std::vector<Step>& steps) {
-  ByteCursor in(section.bytes);
-  // Every record has at least one byte: a false count is found before any record is looked at.
-  if (section.records > section.bytes.size()) in.fail("announces more records than it has bytes");
-  for (std::uint64_t i = 0; i < section.records && in.ok(); ++i) {
-    const Step step = decode_step(in, last);
-    check_order(in, step, steps.empty() ? nullptr : &last);
-    steps.push_back(step);
-    last = step;
+  ByteReader in(section.bytes);
+  try {
+    // Every record has at least one byte: a false count is found before any record is looked at.
+    if (section.records > section.bytes.size())
+      throw MalformedBytes("announces more records than it has bytes");
+    for (std::uint64_t i = 0; i < section.records; ++i) {
+      const Step step = decode_step(in, last);
+      check_order(step, steps.empty() ? nullptr : &last);
+      steps.push_back(step);
+      last = step;
+    }
+    if (!in.at_end()) throw MalformedBytes("has bytes left over");
+  } catch (const MalformedBytes& error) {
+    return ScheduleSectionReader::name_of(section.id) + " " + error.what() + place_of(in) + " of its records";
   }
-  if (in.ok() && !in.at_end()) in.fail("has bytes left over");
-  return in.ok() ? "" : ScheduleSectionReader::name_of(section.id) + " " + in.failure() + " of its records";
-}
-
-std::uint64_t number_at(std::span<const std::uint8_t> bytes) {
-  std::uint64_t number = 0;
-  for (unsigned i = 0; i < 8; ++i) number |= static_cast<std::uint64_t>(bytes[i]) << (8 * i);
-  return number;
+  return "";
 }
 
 /// Empty, or what is wrong with it.
@@ -181,7 +168,8 @@ std::string parse_input(const Section& section, std::optional<InputFingerprint>&
   if (input) return ScheduleSectionReader::name_of(kInput) + " is there twice";
   if (section.records != 1 || section.bytes.size() != 2 * sizeof(std::uint64_t))
     return ScheduleSectionReader::name_of(kInput) + " is not one record of 16 bytes";
-  input = {number_at(section.bytes), number_at(section.bytes.subspan(sizeof(std::uint64_t)))};
+  ByteReader in(section.bytes);
+  input = {in.u64(), in.u64()};
   return "";
 }
 
@@ -208,11 +196,11 @@ void ScheduleStream<Step>::append(const Step& step) {
   if (file_) {
     section_.clear();
     begin_section(section_, section_id(step), 1, record_.size());
-    section_.insert(section_.end(), record_.begin(), record_.end());
+    section_.put_bytes(record_.bytes());
     end_section(section_, 0);
-    file_->append(section_);
+    file_->append(section_.bytes());
   } else {
-    for (const std::uint8_t byte : record_) bytes_.push_back(byte);
+    for (const std::uint8_t byte : record_.bytes()) bytes_.push_back(byte);
   }
   last_ = step;
   ++records_;
@@ -222,9 +210,9 @@ template class ScheduleStream<MapperStep>;
 template class ScheduleStream<LoopStep>;
 
 void ScheduleStreams::keep_in(const std::shared_ptr<LogFile>& file) {
-  std::vector<std::uint8_t> header;
+  ByteWriter header;
   put_header(header);
-  file->append(header);
+  file->append(header.bytes());
   file_ = file;
   tracker.keep_in(file);
   mapper.keep_in(file);
@@ -234,26 +222,26 @@ void ScheduleStreams::keep_in(const std::shared_ptr<LogFile>& file) {
 void ScheduleStreams::note_input(const InputFingerprint& fingerprint) {
   input = fingerprint;
   if (!file_) return;
-  std::vector<std::uint8_t> section;
+  ByteWriter section;
   put_input(section, fingerprint);
-  file_->append(section);
+  file_->append(section.bytes());
 }
 
 void ScheduleStreams::end(LogFile& file) {
-  std::vector<std::uint8_t> section;
+  ByteWriter section;
   put_end(section);
-  file.append(section);
+  file.append(section.bytes());
 }
 
 bool write_schedule(std::ostream& out, const ScheduleStreams& schedule) {
-  std::vector<std::uint8_t> file;
+  ByteWriter file;
   put_header(file);
   put_section(file, schedule.tracker);
   put_section(file, schedule.mapper);
   put_section(file, schedule.loop_closer);
   if (schedule.input) put_input(file, *schedule.input);
   put_end(file);
-  out.write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(file.size()));
+  out.write(reinterpret_cast<const char*>(file.bytes().data()), static_cast<std::streamsize>(file.size()));
   return static_cast<bool>(out.flush());
 }
 
@@ -282,17 +270,17 @@ tl::expected<std::vector<std::uint8_t>, std::string> merge_schedule(std::span<co
     records.at(section.id - 1U) += section.records;
   }
   if (!reader.error().empty()) return tl::make_unexpected(reader.error());
-  std::vector<std::uint8_t> merged;
+  ByteWriter merged;
   put_header(merged);
   for (std::size_t n = 0; n < bytes.size(); ++n) {
     if (n + 1 == kInput && records[n] == 0) continue;
     const std::size_t begin = merged.size();
     begin_section(merged, static_cast<std::uint8_t>(n + 1), records[n], bytes[n].size());
-    merged.insert(merged.end(), bytes[n].begin(), bytes[n].end());
+    merged.put_bytes(bytes[n]);
     end_section(merged, begin);
   }
   if (reader.ended()) put_end(merged);
-  return merged;
+  return merged.release();
 }
 
 tl::expected<Schedule, std::string> read_schedule(std::istream& in) {

@@ -12,6 +12,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "base/bytes.hpp"
 #include "engine/logs/chunked_vector.hpp"
 #include "engine/logs/input_fingerprint.hpp"
 #include "engine/logs/log_file.hpp"
@@ -84,7 +85,7 @@ class ScheduleStream {
  private:
   ChunkedVector<std::uint8_t, 65536> bytes_;
   std::shared_ptr<LogFile> file_;
-  std::vector<std::uint8_t> record_, section_;  // what is being appended
+  ByteWriter record_, section_;  // what is being appended
   std::uint64_t records_ = 0;
   Step last_;
 };

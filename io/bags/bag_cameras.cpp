@@ -4,8 +4,8 @@
 #include <array>
 #include <string_view>
 
+#include "base/bytes.hpp"
 #include "camera/opencv_distortion.hpp"
-#include "io/bags/bag_bytes.hpp"
 
 namespace twofold {
 namespace {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
 
 namespace twofold {
 namespace {

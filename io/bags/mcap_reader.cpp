@@ -1,12 +1,11 @@
 // MCAP: https://mcap.dev/spec
-#include <zlib.h>
-
 #include <algorithm>
 #include <map>
 #include <optional>
 #include <string_view>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
+#include "base/checksum.hpp"
 #include "io/bags/bag_file.hpp"
 #include "io/bags/bag_reader.hpp"
 #include "io/bags/chunk_compression.hpp"
@@ -35,20 +34,16 @@ struct McapRecord {
   std::span<const std::uint8_t> content;
 };
 
-McapRecord next_record(BagBytes& in) {
+McapRecord next_record(ByteReader& in) {
   const std::uint8_t opcode = in.u8();
   return {opcode, in.take(in.u64())};
-}
-
-std::uint32_t crc_of(std::span<const std::uint8_t> bytes) {
-  return static_cast<std::uint32_t>(crc32_z(0, bytes.data(), bytes.size()));
 }
 
 /// Schemas and channels, wherever they stand: in the summary, in chunks, between them.
 class Channels {
  public:
   void take(const McapRecord& record) {
-    BagBytes in(record.content);
+    ByteReader in(record.content);
     if (record.opcode == kSchema) {
       const std::uint16_t id = in.u16();
       types_[id] = in.text();
@@ -113,7 +108,7 @@ class McapReader final : public BagReader {
   }
   void rewind() {
     at_ = kMagic.size();
-    chunk_ = BagBytes({});
+    chunk_ = ByteReader({});
     fault_.clear();
   }
 
@@ -134,7 +129,7 @@ class McapReader final : public BagReader {
   std::set<std::uint32_t> wanted_;
   std::uint64_t at_ = 0;
   std::vector<std::uint8_t> unpacked_;
-  BagBytes chunk_{{}};
+  ByteReader chunk_{{}};
   std::string note_;   // of the summary
   std::string fault_;  // of the data
 };
@@ -155,10 +150,10 @@ bool McapReader::read_summary() {
   if (file_.size() < 2 * kMagic.size() + kFooter || !begins_with_magic(file_.size() - kMagic.size()))
     return false;
   const std::uint64_t footer_at = file_.size() - kMagic.size() - kFooter;
-  BagBytes in(file_.part(footer_at, kFooter));
+  ByteReader in(file_.part(footer_at, kFooter));
   const McapRecord footer = next_record(in);
   if (footer.opcode != kFooterRecord) return false;
-  BagBytes fields(footer.content);
+  ByteReader fields(footer.content);
   const std::uint64_t begin = fields.u64();
   (void)fields.u64();
   const std::uint32_t crc = fields.u32();
@@ -166,18 +161,18 @@ bool McapReader::read_summary() {
   if (begin > footer_at) throw MalformedBytes("the summary is not where the footer says");
   const auto summary = file_.part(begin, footer_at - begin);
   // The checksum is of the summary and of the footer up to itself.
-  if (crc != 0 && crc != crc_of(file_.part(begin, file_.size() - kMagic.size() - 4 - begin)))
+  if (crc != 0 && crc != crc32_of(file_.part(begin, file_.size() - kMagic.size() - 4 - begin)))
     throw MalformedBytes("the summary is damaged: its checksum does not fit");
-  for (BagBytes records(summary); !records.at_end();) {
+  for (ByteReader records(summary); !records.at_end();) {
     const McapRecord record = next_record(records);
     channels_.take(record);
     if (record.opcode != kChunkIndex) continue;
-    BagBytes index(record.content);
+    ByteReader index(record.content);
     (void)index.take(16);
     const std::uint64_t chunk = index.u64();
     (void)index.u64();
     // A file may do without: then nothing is known of the chunk.
-    for (BagBytes offsets(index.block()); !offsets.at_end(); (void)offsets.u64())
+    for (ByteReader offsets(index.block()); !offsets.at_end(); (void)offsets.u64())
       chunk_topics_[chunk].insert(offsets.u16());
   }
   return !channels_.topics().empty();
@@ -198,7 +193,7 @@ std::optional<McapRecord> McapReader::next_of_file() {
     return std::nullopt;
   };
   if (file_.size() - at_ < kRecordHeader) return cut();
-  BagBytes head(file_.part(at_, kRecordHeader));
+  ByteReader head(file_.part(at_, kRecordHeader));
   const std::uint8_t opcode = head.u8();
   const std::uint64_t length = head.u64();
   if (opcode == kDataEnd || opcode == kFooterRecord) return std::nullopt;
@@ -209,7 +204,7 @@ std::optional<McapRecord> McapReader::next_of_file() {
 }
 
 void McapReader::open_chunk(const McapRecord& record) {
-  BagBytes in(record.content);
+  ByteReader in(record.content);
   (void)in.take(16);
   const std::uint64_t size = in.u64();
   const std::uint32_t crc = in.u32();
@@ -219,9 +214,9 @@ void McapReader::open_chunk(const McapRecord& record) {
     unpack_chunk(compression, records, size, unpacked_);
     records = unpacked_;
   }
-  if (crc != 0 && crc != crc_of(records))
+  if (crc != 0 && crc != crc32_of(records))
     throw MalformedBytes("a chunk is damaged: its checksum does not fit");
-  chunk_ = BagBytes(records);
+  chunk_ = ByteReader(records);
 }
 
 bool McapReader::is_wanted_chunk(std::uint64_t begin) const {
@@ -246,7 +241,7 @@ bool McapReader::find_next(BagMessage& message) {
 
 bool McapReader::take_message(const McapRecord& record, BagMessage& message) const {
   if (record.opcode != kMessage) return false;
-  BagBytes in(record.content);
+  ByteReader in(record.content);
   message.topic = in.u16();
   if (!wanted_.contains(message.topic)) return false;
   (void)in.u32();

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
 #include "io/files/image_file.hpp"
 #include "io/files/image_integrity.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
 
 namespace twofold {
 namespace {
@@ -20,7 +20,7 @@ class FieldReader {
     const auto kind = in_.take(4);
     if (kind[0] != 0 || kind[1] > 1) throw MalformedBytes("a message that is no plain CDR");
     big_endian_ = kind[1] == 0;
-    in_ = BagBytes(in_.rest());
+    in_ = ByteReader(in_.rest());
   }
 
   template <class T>
@@ -61,7 +61,7 @@ class FieldReader {
   }
 
  private:
-  BagBytes in_;
+  ByteReader in_;
   bool cdr_, big_endian_ = false;
 };
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string_view>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
 #include "io/bags/bag_file.hpp"
 #include "io/bags/bag_reader.hpp"
 #include "io/bags/chunk_compression.hpp"
@@ -23,7 +23,7 @@ using Fields = std::map<std::string, std::span<const std::uint8_t>, std::less<>>
 /// "name=value", each with its length before it.
 Fields fields_of(std::span<const std::uint8_t> header) {
   Fields fields;
-  for (BagBytes in(header); !in.at_end();) {
+  for (ByteReader in(header); !in.at_end();) {
     const auto field = in.block();
     const auto equals = std::find(field.begin(), field.end(), '=');
     if (equals == field.end()) throw MalformedBytes("a header field without '='");
@@ -38,7 +38,7 @@ T number(const Fields& fields, const char* name) {
   const auto field = fields.find(name);
   if (field == fields.end() || field->second.size() != sizeof(T))
     throw MalformedBytes(std::string("a record without a valid field '") + name + "'");
-  return BagBytes(field->second).number<T>();
+  return ByteReader(field->second).number<T>();
 }
 
 std::string text(const Fields& fields, const char* name) {
@@ -53,7 +53,7 @@ struct RosbagRecord {
   std::span<const std::uint8_t> data;
 };
 
-RosbagRecord next_record(BagBytes& in) {
+RosbagRecord next_record(ByteReader& in) {
   RosbagRecord record;
   record.fields = fields_of(in.block());
   record.operation = number<std::uint8_t>(record.fields, "op");
@@ -94,7 +94,7 @@ class RosbagReader final : public BagReader {
   }
   void rewind() {
     at_ = kMagic.size();
-    chunk_ = BagBytes({});
+    chunk_ = ByteReader({});
     fault_.clear();
   }
   /// From the connections that are repeated behind the chunks; without an index from all chunks.
@@ -110,7 +110,7 @@ class RosbagReader final : public BagReader {
   std::set<std::uint32_t> wanted_;
   std::uint64_t at_ = kMagic.size();
   std::vector<std::uint8_t> unpacked_;
-  BagBytes chunk_{{}};
+  ByteReader chunk_{{}};
   std::string fault_;
 };
 
@@ -146,14 +146,14 @@ std::optional<RosbagRecord> RosbagReader::next_of_file() {
   std::uint64_t end = at_;
   for (int block = 0; block < 2; ++block) {  // header, data
     const std::uint64_t left = file_.size() - end;
-    const std::uint64_t size = left < 4 ? left : BagBytes(file_.part(end, 4)).u32();
+    const std::uint64_t size = left < 4 ? left : ByteReader(file_.part(end, 4)).u32();
     if (left < 4 || size > left - 4) {
       fault_ = file_.name() + ": is cut short at byte " + std::to_string(at_);
       return std::nullopt;
     }
     end += 4 + size;
   }
-  BagBytes in(file_.part(at_, end - at_));
+  ByteReader in(file_.part(at_, end - at_));
   const RosbagRecord record = next_record(in);
   at_ = end;
   return record;
@@ -163,11 +163,11 @@ void RosbagReader::open_chunk(const RosbagRecord& record) {
   const std::string compression = text(record.fields, "compression");
   const auto size = number<std::uint32_t>(record.fields, "size");
   if (compression == "none") {
-    chunk_ = BagBytes(record.data);
+    chunk_ = ByteReader(record.data);
     return;
   }
   unpack_chunk(compression, record.data, size, unpacked_);
-  chunk_ = BagBytes(unpacked_);
+  chunk_ = ByteReader(unpacked_);
 }
 
 bool RosbagReader::find_next(BagMessage& message) {

@@ -6,8 +6,8 @@
 #include <cstring>
 
 #include <fmt/format.h>
-#include <zlib.h>
 
+#include "base/checksum.hpp"
 #include "io/files/image_file.hpp"
 
 namespace twofold {
@@ -34,8 +34,8 @@ std::string png_defect(Bytes bytes) {
     const std::uint32_t length = big_endian(bytes, at, 4);
     if (length > bytes.size() - at - kOverhead) return "is cut short";
     const unsigned char* type = &bytes[at + 4];
-    const auto crc = static_cast<std::uint32_t>(crc32(crc32(0, nullptr, 0), type, length + 4));
-    if (crc != big_endian(bytes, at + 8 + length, 4)) return "is damaged (check sum)";
+    if (crc32_of(bytes.subspan(at + 4, std::size_t{length} + 4)) != big_endian(bytes, at + 8 + length, 4))
+      return "is damaged (check sum)";
     if (std::memcmp(type, "IHDR", 4) == 0 && length >= 8) {
       if (auto defect = size_defect(big_endian(bytes, at + 8, 4), big_endian(bytes, at + 12, 4));
           !defect.empty()) {

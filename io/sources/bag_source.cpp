@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
 #include "io/bags/ros_images.hpp"
 #include "io/files/calibration_file.hpp"
 #include "io/files/image_file.hpp"

@@ -2,8 +2,8 @@
 // messages are taken for each type that can be parsed, and cameras for what they say of their lens.
 #include <span>
 
+#include "base/bytes.hpp"
 #include "base/check.hpp"
-#include "io/bags/bag_bytes.hpp"
 #include "io/bags/bag_cameras.hpp"
 #include "io/bags/bag_reader.hpp"
 #include "io/bags/ros_messages.hpp"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
 #include "tests/io/bags/small_bag.hpp"
 
 namespace twofold {

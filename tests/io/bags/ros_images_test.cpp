@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "io/bags/bag_bytes.hpp"
+#include "base/bytes.hpp"
 #include "tests/io/bags/small_bag.hpp"
 
 namespace twofold {
