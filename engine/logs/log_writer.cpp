@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <thread>
 
 namespace twofold {
 namespace {
@@ -12,21 +11,28 @@ constexpr auto kPeriod = std::chrono::milliseconds(100);
 }  // namespace
 
 LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files) : files_(std::move(files)) {
-  thread_.emplace(
-      WorkerOptions{.name = "log writer", .time_slice = kPatientSlice}, [this](const std::stop_token& stop) {
-        while (!stop.stop_requested()) {
-          (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + kPeriod, [] { return false; });
-          for (const auto& file : files_) file->write_waiting();
-        }
-      });
+  thread_.emplace(WorkerOptions{.name = "log writer", .time_slice = kPatientSlice},
+                  [this](const std::stop_token& stop) {
+                    while (!stop.stop_requested()) {
+                      (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + kPeriod,
+                                                [this] { return behind(); });
+                      for (const auto& file : files_) file->write_waiting();
+                      // Whoever looked at the files before this round sleeps by now, and hears it.
+                      { const std::scoped_lock lock(round_); }
+                      written_.notify_all();
+                    }
+                  });
 }
 
 bool LogWriter::behind() const {
   return std::any_of(files_.begin(), files_.end(), [](const auto& file) { return file->behind(); });
 }
 
-void LogWriter::wait_for_room() const {
-  while (behind()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+void LogWriter::wait_for_room() {
+  if (!behind()) return;
+  parking_.wake();
+  std::unique_lock lock(round_);
+  written_.wait(lock, [this] { return !behind(); });
 }
 
 std::vector<std::string> LogWriter::errors() const {

@@ -38,7 +38,7 @@ class RunLogs {
   /// The disk is slower than the run; any thread.
   [[nodiscard]] bool behind() const { return writer_ && writer_->behind(); }
   /// Returns when it is not. For runs without a pace.
-  void wait_for_room() const {
+  void wait_for_room() {
     if (writer_) writer_->wait_for_room();
   }
 

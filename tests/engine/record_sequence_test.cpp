@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -10,6 +11,7 @@
 #include "engine/logs/log_writer.hpp"
 #include "tests/io/scratch_folder.hpp"
 #include "tests/io/small_files.hpp"
+#include "tests/sanitized.hpp"
 
 namespace twofold {
 namespace {
@@ -83,6 +85,26 @@ TEST(LogWriter, WritesSoonWithoutBeingAsked) {
   file->append("last\n");
   EXPECT_TRUE(writer.finish().empty());
   EXPECT_EQ(content(folder / "log.txt"), "first\nlast\n");
+}
+
+/// Who waits does not wait for the writer's next turn, a tenth of a second away.
+TEST(LogWriter, WhoWaitsForRoomHasItAtOnce) {
+  const auto file = std::make_shared<LogFile>("/dev/null");  // takes no time
+  LogWriter writer({file});
+  const std::string line(LogFile::kMostWaiting / 2 + 1, 'x');
+  constexpr int kTurns = 20;
+  const auto begin = std::chrono::steady_clock::now();
+  for (int turn = 0; turn < kTurns; ++turn) {
+    EXPECT_TRUE(file->append(line));
+    writer.wait_for_room();
+    EXPECT_FALSE(file->behind());
+  }
+  const auto took = std::chrono::steady_clock::now() - begin;
+  if (!testing::kSanitized) {
+    EXPECT_LT(took, std::chrono::milliseconds(50) * kTurns);
+  }
+  EXPECT_TRUE(writer.finish().empty());
+  EXPECT_EQ(file->written(), kTurns * line.size());
 }
 
 /// Nobody writes: the bound holds, what is beyond it is counted, and nothing later is let in.
