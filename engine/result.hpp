@@ -132,8 +132,10 @@ struct ClosedLoop {
   double travelled = 0;        ///< along the keyframes between both, in the unit of T_to_from
   std::int64_t from_t_ns = 0;  ///< of the older keyframe, which the final map need not have
 
-  /// (translation, rotation) by which the map was wrong; of loops within a part.
-  [[nodiscard]] Vector6 drift() const { return (constraint.T_to_from * T_to_from_before.inverse()).log(); }
+  /// What the loop corrects, within a part: the pose of the keyframe that came back, where the map had it, in
+  /// that keyframe where it is. The translation is by how much its position was wrong, seen from the older
+  /// one.
+  [[nodiscard]] SE3 drift() const { return constraint.T_to_from * T_to_from_before.inverse(); }
 };
 
 /// What became of EngineOptions::checkpoint.

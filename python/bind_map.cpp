@@ -93,7 +93,9 @@ void bind_map(py::module_& module) {
           "keyframe; may be gone by now), to (that came back), t_ns (of it), inliers, scale (lengths around "
           "to "
           "over those around\n"
-          "from; 1 but for one camera), joins_parts, drift [m], turned [rad], travelled [m].")
+          "from; 1 but for one camera), joins_parts, drift [m] and turned [rad] (by how much the map had "
+          "position and orientation\n"
+          "of the keyframe that came back wrong, relative to the older one), travelled [m].")
       .def(
           "parts",
           [](const py::object& self) {

@@ -134,9 +134,9 @@ std::vector<MapSnapshot::Loop> MapSnapshot::loops() const {
     loop.scale = from.constraint.scale;
     loop.joins_parts = from.joins_parts;
     if (from.joins_parts) continue;
-    const Vector6 drift = from.drift();
-    loop.drift = drift.head<3>().norm();
-    loop.turned = drift.tail<3>().norm();
+    const SE3 drift = from.drift();
+    loop.drift = drift.translation().norm();
+    loop.turned = drift.so3().log().norm();
     loop.travelled = from.travelled;
   }
   return loops;

@@ -150,13 +150,13 @@ void print_loops(const RunResult& result) {
       fmt::print("loop        keyframes {} and {}: joins two map parts\n", from, to);
       continue;
     }
-    const Vector6 drift = loop.drift();
-    const double moved = drift.head<3>().norm();
+    const SE3 drift = loop.drift();
+    const double moved = drift.translation().norm();
     fmt::print(
         "loop        keyframes {} and {}: drift {:.4f} ({:.3f} % of {:.1f} travelled), {:.2f} degrees, "
         "scale {:.4f}\n",
         from, to, moved, 100 * moved / std::max(loop.travelled, 1e-9), loop.travelled,
-        drift.tail<3>().norm() * 180 / std::numbers::pi, loop.constraint.scale);
+        drift.so3().log().norm() * 180 / std::numbers::pi, loop.constraint.scale);
   }
   if (result.loops.size() > kMost) fmt::print("loop        {} more\n", result.loops.size() - kMost);
 }

@@ -75,7 +75,7 @@ Json late_and_lost(const PacingOptions& pacing, const RunResult& result) {
 Json loops_json(const EngineOptions& options, const RunResult& result) {
   Json loops = Json::array();
   for (const ClosedLoop& loop : result.loops) {
-    const Vector6 drift = loop.drift();
+    const SE3 drift = loop.drift();
     const Json travelled = loop.joins_parts ? Json() : Json(loop.travelled);
     loops.push_back({{"t_ns", loop.t_ns},
                      {"from", index(loop.constraint.from)},
@@ -85,8 +85,8 @@ Json loops_json(const EngineOptions& options, const RunResult& result) {
                      {"inliers", loop.constraint.inliers},
                      {"scale", loop.constraint.scale},
                      {"joins_parts", loop.joins_parts},
-                     {"drift_m", loop.joins_parts ? Json() : Json(drift.head<3>().norm())},
-                     {"drift_rad", loop.joins_parts ? Json() : Json(drift.tail<3>().norm())},
+                     {"drift_m", loop.joins_parts ? Json() : Json(drift.translation().norm())},
+                     {"drift_rad", loop.joins_parts ? Json() : Json(drift.so3().log().norm())},
                      {"travelled_m", travelled}});
   }
   return loops;

@@ -142,7 +142,7 @@ void compare_pose_graphs(const ClosedRun& run, const Trajectory& truth) {
 
 void print_loops(const RunResult& result) {
   for (const ClosedLoop& loop : result.loops) {
-    const SE3 drift = loop.constraint.T_to_from * loop.T_to_from_before.inverse();
+    const SE3 drift = loop.drift();
     fmt::print("  loop of keyframes {} and {}: scale {:.4f}, drift {:.2f} % of the way, {:.2f} degrees\n",
                index(loop.constraint.from), index(loop.constraint.to), loop.constraint.scale,
                100 * drift.translation().norm() / std::max(loop.travelled, 1e-9),

@@ -131,6 +131,24 @@ TEST(MapLender, LendsTheLoopsThatWereClosedSoFar) {
   EXPECT_EQ(loops[1].drift, 0) << "two worlds have nothing to do with each other";
 }
 
+/// A keyframe that looks somewhere else than the older one: how it was turned wrongly must not be told as a
+/// way.
+TEST(MapLender, DriftIsByHowMuchAPositionWasWrong) {
+  const auto stands = [](double turned, const Vector3& centre) {
+    const SE3 T_from_to(SO3::exp(Vector3(0, turned, 0)), centre);
+    return T_from_to.inverse();
+  };
+  ClosedLoop loop;
+  loop.constraint.T_to_from = stands(2.0, Vector3(4, 0, -3));
+  loop.T_to_from_before = stands(0.8, Vector3(4.3, 0, -2.6));
+  MapLender lender;
+  lender.publish(loop);
+  const MapSnapshot map(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{{}, lender.newest()}));
+  ASSERT_EQ(map.loops().size(), 1U);
+  EXPECT_NEAR(map.loops()[0].drift, 0.5, 1e-12);
+  EXPECT_NEAR(map.loops()[0].turned, 1.2, 1e-12);
+}
+
 // A program that looked at the map once must not keep that version for the rest of its run.
 TEST(MapLender, CatchingUpLetsGoOfWhatWasLentLast) {
   MapLender lender;
