@@ -6,6 +6,7 @@
 
 #include "estimation/motion_only.hpp"
 #include "estimation/observation_model.hpp"
+#include "estimation/robust_kernel.hpp"
 
 namespace twofold {
 
@@ -108,15 +109,11 @@ struct MotionEquations {
   }
 
   [[gnu::always_inline]] void add(const ObservationModel& m, const ObservationBatch& b,
-                                  const BatchProjection& p, double delta) {
-    // HuberKernel without branches: with s = sqrt(chi2) and c = min(s, delta), rho = c (2 s - c) and the
-    // weight is delta / max(s, delta).
-    const Lanes s = p.chi2.sqrt();
-    const Lanes clipped = s.min(delta);
-    const double clipped_behind = std::min(kSigmasBehind, delta);
-    const double behind = clipped_behind * (2 * kSigmasBehind - clipped_behind);
-    cost += b.used * (p.front * clipped * (2 * s - clipped) + (1 - p.front) * behind);
-    const Lanes weight = b.used * p.front * delta / s.max(delta);
+                                  const BatchProjection& p, const HuberKernel& kernel) {
+    const Lanes norm = p.chi2.sqrt();
+    const Lanes behind = kernel.rho_of_norms(Lanes(Lanes::Constant(kSigmasBehind)));
+    cost += b.used * (p.front * kernel.rho_of_norms(norm) + (1 - p.front) * behind);
+    const Lanes weight = b.used * p.front * kernel.weights_of_norms(norm);
 
     const Lanes a = m.fx * p.inv_z, c = m.fy * p.inv_z;
     const Lanes u = p.x * p.inv_z, v = p.y * p.inv_z, r = (p.x - m.baseline) * p.inv_z;

@@ -18,7 +18,7 @@ class MotionCost {
   MotionCost(const Rig& rig, Observations observations, double huber_sigmas)
       : model_(rig),
         observations_(observations),
-        delta_(huber_sigmas > 0 && huber_sigmas < kNoKernel ? huber_sigmas : kNoKernel) {}
+        kernel_{huber_sigmas > 0 && huber_sigmas < kNoKernel ? huber_sigmas : kNoKernel} {}
 
   [[nodiscard]] MotionEquations evaluate(const SE3& T, bool inliers_only) const {
     const Matrix3 R = T.rotation();
@@ -27,7 +27,7 @@ class MotionCost {
     for (std::size_t first = 0; first < observations_.size(); first += kLanes) {
       const ObservationBatch batch(observations_, first, inliers_only);
       const BatchProjection projection(model_, R, T.translation(), batch);
-      sum.add(model_, batch, projection, delta_);
+      sum.add(model_, batch, projection, kernel_);
       used += batch.used * projection.front;
     }
     sum.used = used.sum();
@@ -54,7 +54,7 @@ class MotionCost {
   static constexpr double kNoKernel = 1e100;  // as good as infinite, and its square is still a number
   ObservationModel model_;
   Observations observations_;
-  double delta_;
+  HuberKernel kernel_;
 };
 
 constexpr int kMinObservations = 3;

@@ -44,6 +44,16 @@ TEST(ObservationModel, RobustForceIsHalfTheGradientOfRho) {
   }
 }
 
+TEST(HuberKernel, SideBySideIsAsOneByOne) {
+  const HuberKernel kernel{1.5};
+  const Eigen::Array4d norms(0, 1.2, 1.6, 80);
+  const Eigen::Array4d rho = kernel.rho_of_norms(norms), weights = kernel.weights_of_norms(norms);
+  for (int n = 0; n < 4; ++n) {
+    EXPECT_NEAR(rho[n], kernel.rho(norms[n] * norms[n]), 1e-12 * (1 + rho[n])) << norms[n];
+    EXPECT_NEAR(weights[n], kernel.weight(norms[n] * norms[n]), 1e-15) << norms[n];
+  }
+}
+
 TEST(ObservationModel, NormalMatrixIsJacobianSquared) {
   const Rig rig = synthetic_window_detail::make_rig(SensorKind::kStereo);
   const ObservationModel model(rig);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/option_check.hpp"
+#include "estimation/robust_kernel.hpp"
 #include "geometry/so3.hpp"
 #include "geometry/symmetric_solve.hpp"
 
@@ -151,7 +152,7 @@ void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObser
     if (information.z() == 0) residual.z() = 0;  // there is no third component
     const double chi2 = residual.dot(information.cwiseProduct(residual));
     if (settling && chi2 > kCornerChi2) continue;
-    const double robust = std::min(1.0, kCornerHuber / std::sqrt(std::max(chi2, 1e-12)));
+    const double robust = HuberKernel{kCornerHuber}.weight(chi2);
     Eigen::Matrix<double, 3, 6> J;
     J << Matrix3::Identity(), -hat(x);
     J = rig_.project_jacobian(x) * J;
