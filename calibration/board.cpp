@@ -102,6 +102,47 @@ cv::Point3f Board::corner(int id) const {
   return {static_cast<float>(column * square), static_cast<float>(row * square), 0};
 }
 
+namespace {
+
+/// Columns and rows, as "9x6". Empty, or what is wrong, as below.
+std::string read_counts(const std::string& text, Board* board) {
+  const auto counts = split(text, 'x');
+  const auto columns = number(counts.empty() ? "" : counts[0]),
+             rows = number(counts.size() == 2 ? counts[1] : "");
+  if (!columns || !rows || *columns < 3 || *rows < 3 || *columns > 100 || *rows > 100 ||
+      *columns != std::floor(*columns) || *rows != std::floor(*rows))
+    return fmt::format("'{}' is not two whole numbers from 3 to 100 like 9x6", text);
+  board->columns = static_cast<int>(*columns);
+  board->rows = static_cast<int>(*rows);
+  return "";
+}
+
+std::string read_square(const std::string& text, Board* board) {
+  const auto square = number(text);
+  if (!square || !(*square > 0)) return fmt::format("'{}' is no side of a square [m]", text);
+  if (*square < kSmallestSquare || *square > kLargestSquare)
+    return fmt::format("squares of {} m: sides are in metres, from {} to {}, as 0.03 for 30 mm", text,
+                       kSmallestSquare, kLargestSquare);
+  board->square = *square;
+  return "";
+}
+
+/// @param parts  behind the first three: side, and the family, which may be left out
+std::string read_markers(const std::vector<std::string>& parts, Board* board) {
+  const auto marker = number(parts[3]);
+  if (!marker || !(*marker > 0 && *marker < board->square))
+    return fmt::format("'{}' is no side of a marker smaller than a square [m]", parts[3]);
+  board->marker = *marker;
+  if (parts.size() == 5) {
+    const auto family = kFamilies.find(parts[4]);
+    if (family == kFamilies.end()) return fmt::format("'{}' is not 4x4, 5x5, 6x6 or apriltag", parts[4]);
+    board->family = family->second;
+  }
+  return board->columns * board->rows / 2 > 250 ? "there are only 250 different markers" : "";
+}
+
+}  // namespace
+
 tl::expected<Board, std::string> parse_board(const std::string& text) {
   const auto fail = [&](const std::string& problem) {
     return tl::make_unexpected(fmt::format("'{}': {}", text, problem));
@@ -121,32 +162,10 @@ tl::expected<Board, std::string> parse_board(const std::string& text) {
   }
   Board board;
   board.kind = charuco ? BoardKind::kCharuco : BoardKind::kChessboard;
-  const auto counts = split(parts[1], 'x');
-  const auto columns = number(counts.empty() ? "" : counts[0]),
-             rows = number(counts.size() == 2 ? counts[1] : "");
-  if (!columns || !rows || *columns < 3 || *rows < 3 || *columns > 100 || *rows > 100 ||
-      *columns != std::floor(*columns) || *rows != std::floor(*rows))
-    return fail(fmt::format("'{}' is not two whole numbers from 3 to 100 like 9x6", parts[1]));
-  board.columns = static_cast<int>(*columns);
-  board.rows = static_cast<int>(*rows);
-  const auto square = number(parts[2]);
-  if (!square || !(*square > 0)) return fail(fmt::format("'{}' is no side of a square [m]", parts[2]));
-  if (*square < kSmallestSquare || *square > kLargestSquare)
-    return fail(fmt::format("squares of {} m: sides are in metres, from {} to {}, as 0.03 for 30 mm",
-                            parts[2], kSmallestSquare, kLargestSquare));
-  board.square = *square;
-  if (!charuco) return board;
-  const auto marker = number(parts[3]);
-  if (!marker || !(*marker > 0 && *marker < *square))
-    return fail(fmt::format("'{}' is no side of a marker smaller than a square [m]", parts[3]));
-  board.marker = *marker;
-  if (parts.size() == 5) {
-    const auto family = kFamilies.find(parts[4]);
-    if (family == kFamilies.end())
-      return fail(fmt::format("'{}' is not 4x4, 5x5, 6x6 or apriltag", parts[4]));
-    board.family = family->second;
-  }
-  if (board.columns * board.rows / 2 > 250) return fail("there are only 250 different markers");
+  std::string wrong = read_counts(parts[1], &board);
+  if (wrong.empty()) wrong = read_square(parts[2], &board);
+  if (wrong.empty() && charuco) wrong = read_markers(parts, &board);
+  if (!wrong.empty()) return fail(wrong);
   return board;
 }
 

@@ -24,59 +24,76 @@ std::string WideSearchOptions::invalid_reason() const {
       .reason();
 }
 
+namespace {
+
+/// What is searched in a frame, and which pose is believed.
+void check_search(const TrackerOptions& o, OptionCheck& check) {
+  check.at_least("max_searches", o.max_searches, 1)
+      .within("wanted_matches", o.wanted_matches, 1, o.max_searches)
+      .at_least("neighbour_keyframes", o.neighbour_keyframes, 1)
+      .at_least("border_px", o.border_px, 0)
+      .within("min_view_cosine", o.min_view_cosine, -1, 1)
+      .at_least("min_inliers", o.min_inliers, 3)
+      .at_least("scarce_inliers", o.scarce_inliers, 0)
+      .at_least("telling_candidates", o.telling_candidates, 0)
+      .within("min_inlier_share", o.min_inlier_share, 0, 1)
+      .share("light_missed_share", o.light_missed_share)
+      .above("light_change", o.light_change, 1)
+      .share("doubted_inlier_share", o.doubted_inlier_share)
+      .share("doubted_searched_share", o.doubted_searched_share)
+      .within("settled_searched_share", o.settled_searched_share, 0, 1)
+      .share("rough_inlier_share", o.rough_inlier_share)
+      .share("rough_searched_share", o.rough_searched_share)
+      .at_least("rough_min_inliers", o.rough_min_inliers, 0)
+      .at_least("rough_min_mapped", o.rough_min_mapped, 0)
+      .within("trusted_after", o.trusted_after, 0, 255)
+      .at_least("moving_after", o.moving_after, 1)
+      .above("max_alignment_rms", o.max_alignment_rms, 0);
+}
+
+/// Where a lost camera is looked for, and when it starts anew.
+void check_loss(const TrackerOptions& o, OptionCheck& check) {
+  check.above("lost_radius_px", o.lost_radius_px, 0)
+      .at_least("coast_for", o.coast_for, 0)
+      .above("max_acceleration", o.max_acceleration, 0)
+      .above("reach_slack", o.reach_slack, 0)
+      .at_least("new_part_after", o.new_part_after, 0)
+      .at_least("new_part_frames", o.new_part_frames, 0)
+      .at_least("min_corners_seen", o.min_corners_seen, 0);
+}
+
+void check_keyframes_and_points(const TrackerOptions& o, OptionCheck& check) {
+  check.above("keyframe_parallax", o.keyframe_parallax, 0)
+      .within("keyframe_share", o.keyframe_share, 0, 1)
+      .within("keyframe_empty", o.keyframe_empty, 0, 1)
+      .within("urgent_share", o.urgent_share, 0, o.keyframe_share)
+      .at_least("max_pending", o.max_pending, 1)
+      .at_least("corner_threshold", o.corner_threshold, 1)
+      .within("corner_levels", o.corner_levels, 1, ImagePyramid::kLevels)
+      .at_least("cell_px", o.cell_px, 1)
+      .at_least("max_new_points", o.max_new_points, 1)
+      .at_least("min_corner_score", o.min_corner_score, 0)
+      .at_least("scarce_points", o.scarce_points, 0)
+      .at_least("seeded_points", o.seeded_points, 0)
+      .at_least("max_failures", o.max_failures, 1)
+      .at_least("max_immature_age", o.max_immature_age, 0);
+}
+
+}  // namespace
+
 std::string TrackerOptions::invalid_reason() const {
-  return OptionCheck()
-      .nested("alignment", alignment.invalid_reason())
+  OptionCheck check;
+  check.nested("alignment", alignment.invalid_reason())
       .nested("search", search.invalid_reason())
       .nested("wide_search", wide_search.invalid_reason())
       .nested("elders", elders.invalid_reason())
       .nested("depth", depth.invalid_reason())
-      .nested("motion", motion.invalid_reason())
-      .at_least("max_searches", max_searches, 1)
-      .within("wanted_matches", wanted_matches, 1, max_searches)
-      .at_least("neighbour_keyframes", neighbour_keyframes, 1)
-      .at_least("border_px", border_px, 0)
-      .within("min_view_cosine", min_view_cosine, -1, 1)
-      .at_least("min_inliers", min_inliers, 3)
-      .at_least("scarce_inliers", scarce_inliers, 0)
-      .at_least("telling_candidates", telling_candidates, 0)
-      .within("min_inlier_share", min_inlier_share, 0, 1)
-      .share("light_missed_share", light_missed_share)
-      .above("light_change", light_change, 1)
-      .share("doubted_inlier_share", doubted_inlier_share)
-      .share("doubted_searched_share", doubted_searched_share)
-      .within("settled_searched_share", settled_searched_share, 0, 1)
-      .share("rough_inlier_share", rough_inlier_share)
-      .share("rough_searched_share", rough_searched_share)
-      .at_least("rough_min_inliers", rough_min_inliers, 0)
-      .at_least("rough_min_mapped", rough_min_mapped, 0)
-      .within("trusted_after", trusted_after, 0, 255)
-      .at_least("moving_after", moving_after, 1)
-      .above("lost_radius_px", lost_radius_px, 0)
-      .at_least("coast_for", coast_for, 0)
-      .above("max_acceleration", max_acceleration, 0)
-      .above("reach_slack", reach_slack, 0)
-      .at_least("new_part_after", new_part_after, 0)
-      .at_least("new_part_frames", new_part_frames, 0)
-      .at_least("min_corners_seen", min_corners_seen, 0)
-      .above("max_alignment_rms", max_alignment_rms, 0)
-      .above("keyframe_parallax", keyframe_parallax, 0)
-      .within("keyframe_share", keyframe_share, 0, 1)
-      .within("keyframe_empty", keyframe_empty, 0, 1)
-      .within("urgent_share", urgent_share, 0, keyframe_share)
-      .at_least("max_pending", max_pending, 1)
-      .at_least("corner_threshold", corner_threshold, 1)
-      .within("corner_levels", corner_levels, 1, ImagePyramid::kLevels)
-      .at_least("cell_px", cell_px, 1)
-      .at_least("max_new_points", max_new_points, 1)
-      .at_least("min_corner_score", min_corner_score, 0)
-      .at_least("scarce_points", scarce_points, 0)
-      .at_least("seeded_points", seeded_points, 0)
-      .at_least("max_failures", max_failures, 1)
-      .at_least("max_immature_age", max_immature_age, 0)
-      .nested("first_structure", first_structure.invalid_reason())
-      .nested("seeds", seeds.invalid_reason())
-      .reason();
+      .nested("motion", motion.invalid_reason());
+  check_search(*this, check);
+  check_loss(*this, check);
+  check_keyframes_and_points(*this, check);
+  check.nested("first_structure", first_structure.invalid_reason()).nested("seeds", seeds.invalid_reason());
+  return check.reason();
 }
 
 }  // namespace twofold

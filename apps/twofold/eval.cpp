@@ -225,6 +225,32 @@ void run_eval(const EvalArguments& arguments) {
   if (!arguments.plot.empty()) write_png(arguments.plot, draw(arguments, *evaluation));
 }
 
+void add_surface_options(CLI::App* command, CLI::Option* max_difference,
+                         const std::shared_ptr<EvalArguments>& arguments) {
+  CLI::Option* surface =
+      command
+          ->add_flag("--surface", arguments->surface,
+                     "compare meshes; moved as the estimate's trajectory.txt onto groundtruth.txt beside it, "
+                     "if they are there, unless --align none")
+          ->excludes(max_difference);
+  command
+      ->add_flag("--fit", arguments->fit,
+                 "--surface: then moves the estimate so that the surfaces fit best (iterated closest "
+                 "points); they must "
+                 "lie within 25 cm before")
+      ->needs(surface);
+  command
+      ->add_option("--seen", arguments->seen,
+                   "--surface: mesh of what a camera saw (render --seen): completeness is asked of it")
+      ->needs(surface);
+  command
+      ->add_option("--threshold", arguments->threshold,
+                   "--surface: distance of surfaces that counts as near [m]")
+      ->check(CLI::Range(1e-4, 10.0))
+      ->capture_default_str()
+      ->needs(surface);
+}
+
 }  // namespace
 
 void add_eval_command(CLI::App& app, int& exit_code) {
@@ -250,28 +276,7 @@ void add_eval_command(CLI::App& app, int& exit_code) {
   command->add_option("--json", arguments->json, "write all figures to this file");
   command->add_option("--plot", arguments->plot,
                       "draw both paths from above, or the surface, coloured by error, to this PNG file");
-  CLI::Option* surface =
-      command
-          ->add_flag("--surface", arguments->surface,
-                     "compare meshes; moved as the estimate's trajectory.txt onto groundtruth.txt beside it, "
-                     "if they are there, unless --align none")
-          ->excludes(difference);
-  command
-      ->add_flag("--fit", arguments->fit,
-                 "--surface: then moves the estimate so that the surfaces fit best (iterated closest "
-                 "points); they must "
-                 "lie within 25 cm before")
-      ->needs(surface);
-  command
-      ->add_option("--seen", arguments->seen,
-                   "--surface: mesh of what a camera saw (render --seen): completeness is asked of it")
-      ->needs(surface);
-  command
-      ->add_option("--threshold", arguments->threshold,
-                   "--surface: distance of surfaces that counts as near [m]")
-      ->check(CLI::Range(1e-4, 10.0))
-      ->capture_default_str()
-      ->needs(surface);
+  add_surface_options(command, difference, arguments);
   command->callback([arguments, &exit_code] {
     run_eval(*arguments);
     exit_code = kOk;

@@ -267,6 +267,30 @@ void expect_place_for_trace(const std::string& trace) {
     throw IoError(file, "the folder is not there");
 }
 
+/// What is left of a run that is over: files and figures. What cannot be written stops nothing else, and is
+/// told at the end.
+void write_results(const RunArguments& arguments, const EngineOptions& options, const PreparedSource& frames,
+                   const std::optional<AutoCalibration>& calibration, const RunResult& result,
+                   const PoseStreaming& poses, LiveSurface& surface) {
+  const FrameSource& source = *frames.source;
+  const std::vector<MapPart> parts = map_parts(result, options);
+  RunFailures failures = failures_of(arguments.source, frames, options, result, poses);
+  std::vector<std::string> maps;
+  if (!arguments.map.save.empty())
+    failures.attempt([&] { maps = save_parts(arguments.map.save, source.rig(), result, parts); });
+  std::optional<SurfaceFigures> figures;
+  if (surface.wanted())
+    failures.attempt(
+        [&] { figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id); });
+  failures.attempt([&] {
+    write_run_output(arguments.out, frames_of(arguments, calibration, failures), source, options, result,
+                     parts, figures ? surface_json(*figures) : nullptr);
+  });
+  if (!arguments.trace.empty()) failures.attempt([&] { write_trace(arguments.trace, result); });
+  print_results(arguments, options, source, result, parts, maps, figures);
+  failures.expect_none();
+}
+
 int run(const RunArguments& arguments) {
   if (arguments.estimator == "swf") return run_with_filter(arguments);
   EngineOptions options = engine_options(arguments);
@@ -295,22 +319,7 @@ int run(const RunArguments& arguments) {
   poses.finish();
   view.finish();
 
-  const std::vector<MapPart> parts = map_parts(result, options);
-  RunFailures failures = failures_of(arguments.source, frames, options, result, poses);
-  std::vector<std::string> maps;
-  if (!arguments.map.save.empty())
-    failures.attempt([&] { maps = save_parts(arguments.map.save, source->rig(), result, parts); });
-  std::optional<SurfaceFigures> figures;
-  if (surface.wanted())
-    failures.attempt(
-        [&] { figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id); });
-  failures.attempt([&] {
-    write_run_output(arguments.out, frames_of(arguments, calibration, failures), *source, options, result,
-                     parts, figures ? surface_json(*figures) : nullptr);
-  });
-  if (!arguments.trace.empty()) failures.attempt([&] { write_trace(arguments.trace, result); });
-  print_results(arguments, options, *source, result, parts, maps, figures);
-  failures.expect_none();
+  write_results(arguments, options, frames, calibration, result, poses, surface);
   return kOk;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -14,14 +15,8 @@ namespace fs = std::filesystem;
 
 namespace {
 constexpr double kSupposedFocalLength = 1000;  // [px]
-}  // namespace
 
-Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, SourceParameters& parameters) {
-  const SensorKind base_kind = base.kind;
-  Calibration calibration = std::move(base);
-  calibration.kind = kind;
-  PinholeCamera& camera = calibration.left.pinhole;
-  const bool right_in_file = from_file && base_kind == SensorKind::kStereo;
+void take_intrinsics(bool from_file, SourceParameters& parameters, PinholeCamera& camera) {
   const bool supposed = !from_file && parameters.suppose_camera();
   if (supposed) camera.fx = camera.fy = kSupposedFocalLength;
   int taken = 0;
@@ -39,17 +34,28 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   }
   if (from_file && taken > 0 && taken < 4)  // a camera half of the one, half of the other
     throw IoError(parameters.subject(), "beside a calibration file: all of fx, fy, cx, cy, or none");
-  const auto take_positive = [&](const char* key) {
-    const auto given = parameters.take_number(key);
-    if (given && *given <= 0)
-      throw IoError(parameters.subject(), fmt::format("{}={} must be positive", key, *given));
-    return given;
-  };
-  if (const auto scale = take_positive("depth_scale")) calibration.depth_unit = 1.0 / *scale;
-  if (const auto depth = take_positive("depth_min")) calibration.depth_min = *depth;
-  if (const auto depth = take_positive("depth_max")) calibration.depth_max = *depth;
+}
+
+std::optional<double> take_positive(const char* key, SourceParameters& parameters) {
+  const auto given = parameters.take_number(key);
+  if (given && *given <= 0)
+    throw IoError(parameters.subject(), fmt::format("{}={} must be positive", key, *given));
+  return given;
+}
+
+}  // namespace
+
+Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, SourceParameters& parameters) {
+  const SensorKind base_kind = base.kind;
+  Calibration calibration = std::move(base);
+  calibration.kind = kind;
+  const bool right_in_file = from_file && base_kind == SensorKind::kStereo;
+  take_intrinsics(from_file, parameters, calibration.left.pinhole);
+  if (const auto scale = take_positive("depth_scale", parameters)) calibration.depth_unit = 1.0 / *scale;
+  if (const auto depth = take_positive("depth_min", parameters)) calibration.depth_min = *depth;
+  if (const auto depth = take_positive("depth_max", parameters)) calibration.depth_max = *depth;
   if (const auto readout = parameters.take_number("readout")) calibration.readout = *readout;
-  const auto baseline = take_positive("baseline");
+  const auto baseline = take_positive("baseline", parameters);
   if (kind == SensorKind::kRgbd && baseline) calibration.virtual_baseline = *baseline;
   if (kind == SensorKind::kStereo && baseline) {
     calibration.right = calibration.left;

@@ -216,6 +216,26 @@ void run_surface(const SurfaceArguments& arguments) {
   fmt::print("written to  {}\n", job.out.string());
 }
 
+void add_fusion_options(CLI::App* command, const std::shared_ptr<SurfaceArguments>& arguments) {
+  command->add_option("--voxel", arguments->options.voxel, "Distance of two samples of the surface [m]")
+      ->capture_default_str();
+  command->add_option("--every", arguments->every, "Fuse every so many-th frame that has a pose")
+      ->check(above_zero())
+      ->capture_default_str();
+  command
+      ->add_option("--max-depth", arguments->options.max_depth,
+                   "Readings farther than this begin no surface [m]; 0: only those beyond the calibration's "
+                   "depth: max (8 "
+                   "m by default)")
+      ->check(at_least_zero())
+      ->capture_default_str();
+  command
+      ->add_option("--depth-noise", arguments->options.depth_noise,
+                   "Standard deviation of a depth z over z^2 [1/m]; 0: the sensor's usual one")
+      ->check(at_least_zero())
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_surface_command(CLI::App& app, int& exit_code) {
@@ -237,23 +257,7 @@ void add_surface_command(CLI::App& app, int& exit_code) {
                       "Calibration file instead of the recording's own, or of that which the run was given");
   command->add_option("--out", arguments->out,
                       "Folder for surface.ply and surface.glb; the run's otherwise, whose own are replaced");
-  command->add_option("--voxel", arguments->options.voxel, "Distance of two samples of the surface [m]")
-      ->capture_default_str();
-  command->add_option("--every", arguments->every, "Fuse every so many-th frame that has a pose")
-      ->check(above_zero())
-      ->capture_default_str();
-  command
-      ->add_option("--max-depth", arguments->options.max_depth,
-                   "Readings farther than this begin no surface [m]; 0: only those beyond the calibration's "
-                   "depth: max (8 "
-                   "m by default)")
-      ->check(at_least_zero())
-      ->capture_default_str();
-  command
-      ->add_option("--depth-noise", arguments->options.depth_noise,
-                   "Standard deviation of a depth z over z^2 [1/m]; 0: the sensor's usual one")
-      ->check(at_least_zero())
-      ->capture_default_str();
+  add_fusion_options(command, arguments);
   command->add_flag("--grey", arguments->grey, "Brightness instead of the recording's colours");
   command->add_option(
       "--obj", arguments->obj,
