@@ -156,13 +156,4 @@ void write_tum_trajectory(const fs::path& file, const Trajectory& trajectory) {
   output.close();
 }
 
-void write_kitti_trajectory(const fs::path& file, const Trajectory& trajectory) {
-  std::string text;
-  for (const TimedPose& pose : trajectory) {
-    const Matrix4 M = pose.T_w_c.matrix();
-    for (int i = 0; i < 12; ++i) text += fmt::format("{:.9e}{}", M(i / 4, i % 4), i == 11 ? '\n' : ' ');
-  }
-  write_file(file, text);
-}
-
 }  // namespace twofold

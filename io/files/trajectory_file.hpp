@@ -36,9 +36,8 @@ enum class TrajectoryForm : std::uint8_t { kTum, kKitti, kEuroc };
 [[nodiscard]] TrajectoryForm trajectory_form(const std::filesystem::path& file);
 [[nodiscard]] Trajectory read_trajectory(const std::filesystem::path& file);
 
-/// The same poses always give the same bytes. Throw IoError when the file cannot be written in full (disk
+/// The same poses always give the same bytes. Throws IoError when the file cannot be written in full (disk
 /// full).
 void write_tum_trajectory(const std::filesystem::path& file, const Trajectory& trajectory);
-void write_kitti_trajectory(const std::filesystem::path& file, const Trajectory& trajectory);
 
 }  // namespace twofold
