@@ -45,9 +45,9 @@ struct TrackerOptions {
   /// points searched.
   double doubted_inlier_share = 0.5;
   double doubted_searched_share = 0.12;
-  /// Where dense alignment and the motion so far disagree, both are tried, unless so many of the points
-  /// searched were found already; 0: never.
-  double settled_searched_share = 0.6;
+  /// Where dense alignment and the motion so far disagree, both are tried, unless so large a share of the
+  /// points searched agrees on a pose already; 0: never. Poses that a passing object gave have up to 0.31.
+  double settled_searched_share = 0.35;
   /// A pose from a rough start must explain so much of the points found from it...
   double rough_inlier_share = 0.6;
   double rough_searched_share = 0.2;  ///< ... and of those searched,

@@ -47,10 +47,12 @@ LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& ste
   const int inliers = placed ? step.result.inliers : 0;
   const bool settled = inliers >= options_.settled_searched_share * step.result.searched;
   if (settled || !leaves_motion(aligned.placement.T_c_ref)) return cause;
+  const Attempt first = set_aside(step);
   const LostCause other = search_from({.placement = {last_.placement.reference, predicted_pose()}}, step);
   const bool better = placed ? step.result.inliers > inliers : well_supported(step.result);
   if (other == LostCause::kNone && better) return other;
-  return search_from(aligned, step);
+  take_back(first, step);
+  return estimate_pose(aligned.placement, step);  // again: what the other start did not find was counted
 }
 
 Tracker::Attempt Tracker::set_aside(const FrameStep& step) {

@@ -66,42 +66,67 @@ INSTANTIATE_TEST_SUITE_P(
         Recording{"mh01_left", "euroc", "stereo_euroc_mh01_300", 300, 0.0049, true}),
     [](const auto& test) { return std::string(test.param.name); });
 
-/// Every so many frames of fr1_rpy, a depth camera that turns by 65 degrees a second. Blurred frames are lost
-/// then, and surfaces alone place the next ones, as they look from where the camera was or from elsewhere.
-class SeldomFrames : public ::testing::TestWithParam<std::pair<int, double>> {};
+struct Seldom {
+  int every;
+  double tracked;  ///< share of all frames, at least
+  double ate;      ///< [m], at most, mean over the runs
+};
+
+/// Every so many-th frame of fr1_rpy, a depth camera that turns by 65 degrees a second, from each of the
+/// first ones on. Blurred frames are lost then, and surfaces alone place the next ones, as they look from
+/// where the camera was or from elsewhere. One run says little: errors of a few frames that hardly show
+/// anything differ.
+class SeldomFrames : public ::testing::TestWithParam<Seldom> {
+ protected:
+  static SourceOptions with_lens(int every) {
+    const auto lens =
+        std::filesystem::path(::testing::TempDir()) / ("lens_" + std::to_string(every) + ".yaml");
+    std::ofstream(lens)
+        << "sensor: rgbd\n"
+           "cameras:\n"
+           "  - {size: [640, 480], intrinsics: [517.306408, 516.469215, 318.64304, 255.313989],\n"
+           "     distortion: {model: radtan, coefficients: [0.262383, -0.953104, -0.005358, "
+           "0.002628, 1.163314]}}\n"
+           "depth: {unit: 0.0002}\n";
+    SourceOptions options;
+    options.calibration = lens;
+    return options;
+  }
+  static FrameFeed seldom(FrameSource& source, int every, int first) {
+    return [&source, every, next = every - first](Frame& frame) mutable {
+      while (source.next(frame) == FrameStatus::kFrame)
+        if (next++ % every == 0) return FeedStatus::kFrame;
+      return FeedStatus::kEnd;
+    };
+  }
+};
 
 TEST_P(SeldomFrames, OfATurningCameraAreNotPlacedWhereTheMapsPointsAreNotSeen) {
   const char* data = std::getenv("TWOFOLD_DATA");
   if (data == nullptr) GTEST_SKIP() << "TWOFOLD_DATA is not set";
-  const auto [every, most] = GetParam();
-  const auto lens = std::filesystem::path(::testing::TempDir()) / ("lens_" + std::to_string(every) + ".yaml");
-  std::ofstream(lens)
-      << "sensor: rgbd\n"
-         "cameras:\n"
-         "  - {size: [640, 480], intrinsics: [517.306408, 516.469215, 318.64304, 255.313989],\n"
-         "     distortion: {model: radtan, coefficients: [0.262383, -0.953104, -0.005358, "
-         "0.002628, 1.163314]}}\n"
-         "depth: {unit: 0.0002}\n";
-  SourceOptions source_options;
-  source_options.calibration = lens;
-  const auto source = open_source("tum:" + std::string(data) + "/rgbd_tum_fr1_rpy_200", source_options);
-  const FrameFeed seldom = [&source, every = every, next = 0](Frame& frame) mutable {
-    while (source->next(frame) == FrameStatus::kFrame)
-      if (next++ % every == 0) return FeedStatus::kFrame;
-    return FeedStatus::kEnd;
-  };
+  const int every = GetParam().every;
   EngineOptions options;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  const auto [result, path] = testing::run_whole(source->rig(), seldom, options);
-  EXPECT_GE(static_cast<int>(path.size()), 0.95 * static_cast<double>(result.frames.size()));
-  const auto evaluation = evaluate(associate(path, source->ground_truth(), 20'000'000), {});
-  ASSERT_TRUE(evaluation);
-  EXPECT_LT(evaluation->absolute.rmse, most);
+  double frames = 0, tracked = 0, sum = 0;
+  for (int first = 0; first < every; ++first) {
+    SCOPED_TRACE("from frame " + std::to_string(first));
+    const auto source = open_source("tum:" + std::string(data) + "/rgbd_tum_fr1_rpy_200", with_lens(every));
+    const auto [result, path] = testing::run_whole(source->rig(), seldom(*source, every, first), options);
+    const auto evaluation = evaluate(associate(path, source->ground_truth(), 20'000'000), {});
+    ASSERT_TRUE(evaluation);
+    EXPECT_LT(evaluation->absolute.rmse, 0.12);
+    frames += static_cast<double>(result.frames.size());
+    tracked += static_cast<double>(path.size());
+    sum += evaluation->absolute.rmse;
+  }
+  EXPECT_GE(tracked, GetParam().tracked * frames);
+  EXPECT_LT(sum / every, GetParam().ate);
 }
 
-// 0.083 and 0.029 m; 0.211 and 0.107 m when such poses were believed.
-INSTANTIATE_TEST_SUITE_P(All, SeldomFrames, ::testing::Values(std::pair(4, 0.12), std::pair(6, 0.06)),
-                         [](const auto& test) { return "Every" + std::to_string(test.param.first); });
+// 0.031 and 0.040 m. With two starts for nearly each frame 0.042 and 0.066 m, one run at 0.21; at 0.21 and
+// 0.11 was the first run of each when poses were believed where the map's points are not seen.
+INSTANTIATE_TEST_SUITE_P(All, SeldomFrames, ::testing::Values(Seldom{4, 0.95, 0.04}, Seldom{6, 0.78, 0.06}),
+                         [](const auto& test) { return "Every" + std::to_string(test.param.every); });
 
 /// Seven black frames of a car at 12 m/s: two parts of the map, and ten more frames lost, when it was looked
 /// for only where it had been.
