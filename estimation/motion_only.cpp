@@ -141,6 +141,7 @@ MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> ob
     result.inliers = cost.classify(result.T_c_ref, options);
     judge();
   }
+  result.determined = round.usable;
   result.converged = round.usable && round.converged;
   return result;
 }

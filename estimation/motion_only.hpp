@@ -34,12 +34,13 @@ struct MotionOnlyResult {
                                           ///< invert for the covariance
   double chi2 = 0;                        ///< robustified, over inliers
   int inliers = 0;
+  bool determined = false;  ///< the inliers do; otherwise T_c_ref is the start value
   bool converged = false;
 };
 
 /// Motion-only bundle adjustment: pose of one frame from matched points  (thesis eq. 3.34 / 4.15), robust.
 /// No allocation; at most rounds * max_iterations passes over the observations. Fewer than three usable
-/// observations, or a singular system: converged is false and T_c_ref is the start value.
+/// observations, or a singular system: the pose is not determined.
 [[nodiscard]] MotionOnlyResult optimise_motion(const Rig& rig, std::span<MotionObservation> observations,
                                                const SE3& T_c_ref_start, const MotionOnlyOptions& options);
 

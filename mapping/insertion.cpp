@@ -43,6 +43,7 @@ int add_new_points(GraphWriter& writer, const KeyframeProposal& proposal) {
     const GraphSnapshot& graph = writer.graph();
     if (index(point.id) < graph.point_count() || !graph.contains(point.anchor)) continue;
     if (graph.keyframe(point.anchor).culled() || point.anchor == proposal.id) continue;
+    if (graph.part(point.anchor) != graph.part(proposal.id)) continue;
     if (!point.psi.allFinite() || !(point.psi.z() > 0) || !measured(point.anchor_observation)) continue;
     const Observation* found = observation_of(proposal, point.id);
     if (!found || !measured(*found)) continue;
@@ -76,7 +77,8 @@ void add_proposed_observations(GraphWriter& writer, const KeyframeProposal& prop
   for (const Observation& observation : proposal.observations) {
     const GraphSnapshot& graph = writer.graph();
     const bool alive = graph.contains(observation.point) && graph.point(observation.point).alive();
-    if (alive && measured(observation)) {
+    const bool here = alive && graph.part(graph.point(observation.point).anchor) == graph.part(proposal.id);
+    if (here && measured(observation)) {
       accepted.push_back(observation);
     } else {
       ++report.dropped_observations;

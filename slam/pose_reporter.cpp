@@ -144,7 +144,8 @@ void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now
   }
   if (now.state != TrackingState::kTracked || !was_lost_) return;
   // The tracker has started a part whose first keyframe the mapper has not seen yet.
-  const bool new_part = !report.graph.contains(report.record.part_causal);
+  const bool known = last_.state == FrameState::kTracked && last_.part_causal == report.record.part_causal;
+  const bool new_part = !known && !report.graph.contains(report.record.part_causal);
   const bool first_map = new_part && report.graph.keyframe_count() == 0;
   if (first_map) return;
   MapEvent& event = events.placing.emplace(

@@ -12,7 +12,8 @@ namespace twofold {
 enum class EffortLevel : std::uint8_t {
   kEverything,
   kFewerPoints,      ///< half of the points are searched
-  kCoarseAlignment,  ///< dense alignment stops two levels above the finest, and starts once only
+  kCoarseAlignment,  ///< dense alignment stops two levels above the finest, and starts once only; a pose that
+                     ///< few points agree on is taken as it is
   kFewerIterations,  ///< a third of the solver's and the patch search's iterations; keyframes, unless
                      ///< tracking would soon be lost without one: they are the most expensive frames, and the
                      ///< mapper, which works on them, needs the same processors
@@ -45,15 +46,20 @@ struct EffortBounds {
   int max_searches = 0;
   int finest_alignment_level = 0;
   bool align_from_rest = true;  ///< a second time, when the first start did not fit
+  bool doubts_poses = true;     ///< and looks for better ones by appearance, which costs most of all
   int motion_iterations = 0;
   int refine_iterations = 0;
   bool urgent_keyframes_only = false;  ///< see TrackerOptions::urgent_share
 };
 
 [[nodiscard]] inline EffortBounds bounds_of(EffortLevel effort, const TrackerOptions& options) {
-  EffortBounds bounds{options.wanted_matches,         options.max_searches,
-                      options.alignment.finest_level, true,
-                      options.motion.max_iterations,  options.search.refine_iterations};
+  EffortBounds bounds{options.wanted_matches,
+                      options.max_searches,
+                      options.alignment.finest_level,
+                      true,
+                      true,
+                      options.motion.max_iterations,
+                      options.search.refine_iterations};
   if (effort >= EffortLevel::kFewerPoints) {
     bounds.wanted_matches = std::max(options.wanted_matches / 2, options.min_inliers);
     bounds.max_searches = std::max(options.max_searches / 2, bounds.wanted_matches);
@@ -62,9 +68,10 @@ struct EffortBounds {
     bounds.finest_alignment_level =
         std::min(options.alignment.finest_level + 2, options.alignment.coarsest_level);
     bounds.align_from_rest = false;
+    bounds.doubts_poses = false;
   }
   if (effort >= EffortLevel::kFewerIterations) {
-    bounds.motion_iterations = std::max(options.motion.max_iterations / 3, 1);
+    bounds.motion_iterations = std::max(options.motion.max_iterations / 3, 2);
     bounds.refine_iterations = std::max(options.search.refine_iterations / 3, 1);
     bounds.urgent_keyframes_only = true;
   }

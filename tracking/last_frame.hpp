@@ -19,6 +19,7 @@ struct LastFrame {
   std::int64_t t_ns = 0;
   Placement placement;
   SE3 T_this_previous;              ///< its motion, the prediction of the next; none after a loss
+  double interval = 0;              ///< between the two [s]; 0 after a loss
   std::optional<Vector6> velocity;  ///< (v, omega) [m/s, rad/s], if the frame before it says
   bool is_keyframe = false;         ///< with two cameras or depth its images are then among the recent views
   bool by_depth = false;            ///< TrackResult::by_depth

@@ -50,6 +50,7 @@ bool LocalMap::first_sight(PointId id) {
     slot = (slot + 1) % kTable;
   }
   met_[slot] = entry;
+  ++met_count_;
   return true;
 }
 
@@ -59,14 +60,15 @@ int LocalMap::anchor_position(const GraphSnapshot& graph, KeyframeId id, const I
     if (anchors_[i].id == id) return static_cast<int>(i);
   }
   if (anchors_.size() == anchors_.capacity()) return -1;
+  const auto part = [&](KeyframeId k) { return part_of(graph, immature, k); };
+  if (id != origin_.reference && part(id) != part(origin_.reference)) return -1;
   anchors_.push_back({id, relative_pose(graph, immature, origin_.reference, id)});
   return static_cast<int>(anchors_.size()) - 1;
 }
 
 void LocalMap::add_neighbour(const GraphSnapshot& graph, KeyframeId id, const ImmaturePoints& immature) {
   for (const Observation& observation : *graph.keyframe(id).observations) {
-    // The table stays sparse because the points do.
-    if (points_.size() == points_.capacity()) return;
+    if (points_.size() == points_.capacity() || met_count_ == kMaxMet) return;
     const MapPoint& point = graph.point(observation.point);
     if (!point.alive() || !first_sight(observation.point)) continue;
     const int anchor = anchor_position(graph, point.anchor, immature);
@@ -91,6 +93,7 @@ void LocalMap::rebuild(const GraphSnapshot& graph, const ImmaturePoints& immatur
   anchors_.clear();
   neighbours_.clear();
   ++round_;
+  met_count_ = 0;
   for (std::size_t i = 0; i < immature.points().size() && points_.size() < points_.capacity(); ++i) {
     const ImmaturePoint& point = immature.points()[i];
     const int anchor = anchor_position(graph, point.anchor, immature);

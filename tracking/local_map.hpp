@@ -54,6 +54,7 @@ class LocalMap {
 
  private:
   static constexpr std::size_t kTable = 1U << 14;  ///< slots of the set of points met; a power of two
+  static constexpr std::size_t kMaxMet = kTable / 2;
 
   /// What the points were collected from.
   struct Origin {
@@ -73,6 +74,7 @@ class LocalMap {
   std::vector<KeyframeId> neighbours_;
   std::vector<std::uint64_t> met_;  // open addressing: round in the high half, point in the low half
   std::uint32_t round_ = 0;
+  std::size_t met_count_ = 0;  ///< in this round
   Origin origin_;
   std::pair<std::size_t, std::size_t> reference_range_{0, 0};
 };

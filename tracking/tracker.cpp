@@ -16,6 +16,7 @@ constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxSeeds = 600;
 constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr std::size_t kRecentViews = 4;
+constexpr double kJitter = 0.3;  // of the interval between two frames
 
 /// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
 /// better one.
@@ -101,7 +102,10 @@ void Tracker::prepare_next(FrameStep& step) {
 /// Pose of the frame relative to a reference keyframe, from the points of the map around that.
 bool Tracker::track(FrameStep& step) {
   const auto asked = recognised(step.graph);
-  if (asked && search_from_recognised(*asked, step)) return true;
+  if (asked && search_from_recognised(*asked, step)) {
+    leave_other_part(step);
+    return true;
+  }
   if (last_.placement.reference == kNoKeyframe) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
@@ -115,7 +119,8 @@ bool Tracker::track(FrameStep& step) {
   step.lap(TrackerStage::kAlignment);
   LostCause cause = by_depth ? search_from(start, step) : search_from_either(start, step);
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
-  const bool doubted = cause == LostCause::kNone && hardly_supported(step.result, options_);
+  const bool doubted =
+      cause == LostCause::kNone && step.bounds.doubts_poses && hardly_supported(step.result, options_);
   if (cause == LostCause::kNone && !doubted) return true;
   const auto first = doubted ? std::optional(set_aside(step)) : std::nullopt;
   if (search_widely(step)) return true;
@@ -138,12 +143,15 @@ void Tracker::load_images(const Frame& frame) {
   if (rig_.kind == SensorKind::kRgbd) frame.depth.copyTo(current_.depth);
 }
 
-/// A newer map: take over what it confirmed, and move the reference to the newest own keyframe in it.
+/// A newer map: take over what it confirmed, and move the reference to the newest own keyframe in it. That
+/// may be of a part that the camera has left meanwhile, because it was recognised elsewhere.
 void Tracker::follow(const GraphSnapshot& graph) {
   if (graph.version() == local_map_.version()) return;
   const PendingKeyframe* newest = nullptr;
   for (const PendingKeyframe& pending : immature_points_.pending()) {
-    if (graph.contains(pending.id) && !graph.keyframe(pending.id).culled()) newest = &pending;
+    if (graph.contains(pending.id) && !graph.keyframe(pending.id).culled() &&
+        graph.part(pending.id) == part_of(graph, immature_points_, last_.placement.reference))
+      newest = &pending;
   }
   if (newest != nullptr && newest->id != last_.placement.reference) {
     // As it was tracked, not as the map has it now: both frames were placed by the same points.
@@ -160,13 +168,18 @@ void Tracker::follow(const GraphSnapshot& graph) {
   }
 }
 
-/// Since the last good frame: constant velocity, none after a loss.
-SE3 Tracker::predicted_motion() const {
-  return loss_.lost_frames() > 0 ? SE3() : last_.T_this_previous;
+/// Since the last good frame: constant velocity, none after a loss. Frames may be missing between the two;
+/// but stamps jitter by more than a camera's clock does, and what little they differ by says nothing.
+SE3 Tracker::predicted_motion(const Frame& frame) const {
+  if (loss_.lost_frames() > 0) return {};
+  const double seconds = 1e-9 * static_cast<double>(frame.t_ns - last_.t_ns);
+  const double intervals = last_.interval > 0 ? seconds / last_.interval : 1;
+  if (!last_.velocity || std::abs(intervals - 1) < kJitter) return last_.T_this_previous;
+  return seconds <= options_.coast_for ? SE3::exp(seconds * *last_.velocity) : SE3();
 }
 
-SE3 Tracker::predicted_pose() const {
-  return predicted_motion() * last_.placement.T_c_ref;
+SE3 Tracker::predicted_pose(const Frame& frame) const {
+  return predicted_motion(frame) * last_.placement.T_c_ref;
 }
 
 /// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from the motion since, then from rest.
@@ -187,7 +200,7 @@ std::optional<SE3> Tracker::align_to_previous(const SE3& start, FrameStep& step)
 }
 
 SE3 Tracker::aligned_pose(FrameStep& step) {
-  const SE3 start = predicted_motion();
+  const SE3 start = predicted_motion(step.frame);
   return align_to_previous(start, step).value_or(start) * last_.placement.T_c_ref;
 }
 
@@ -197,6 +210,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   const bool goes_on = loss_.lost_frames() == 0 && result.reference == last_.placement.reference;
   last_.velocity = goes_on ? velocity_at(result.T_c_ref, step.frame) : std::nullopt;
   last_.T_this_previous = goes_on ? result.T_c_ref * last_.placement.T_c_ref.inverse() : SE3();
+  last_.interval = goes_on ? 1e-9 * static_cast<double>(step.frame.t_ns - last_.t_ns) : 0;
   last_.placement = {result.reference, result.T_c_ref};
   last_.t_ns = step.frame.t_ns;
   if (readout_) learn_readout(step, goes_on);

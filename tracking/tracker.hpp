@@ -130,8 +130,8 @@ class Tracker {
   void load_images(const Frame& frame);
   void follow(const GraphSnapshot& graph);
   bool track(FrameStep& step);
-  [[nodiscard]] SE3 predicted_motion() const;
-  [[nodiscard]] SE3 predicted_pose() const;
+  [[nodiscard]] SE3 predicted_motion(const Frame& frame) const;
+  [[nodiscard]] SE3 predicted_pose(const Frame& frame) const;
   std::optional<SE3> align_to_previous(const SE3& start, FrameStep& step);
   SE3 aligned_pose(FrameStep& step);
   void remember_frame(const FrameStep& step);
@@ -139,7 +139,7 @@ class Tracker {
   // tracker_search.cpp: a pose from points
   LostCause search_from(SearchStart start, FrameStep& step);
   LostCause search_from_either(const SearchStart& aligned, FrameStep& step);
-  [[nodiscard]] bool leaves_motion(const SE3& T_c_ref);
+  [[nodiscard]] bool leaves_motion(const SE3& T_c_ref, const Frame& frame);
   [[nodiscard]] Attempt set_aside(const FrameStep& step);
   void take_back(const Attempt& attempt, FrameStep& step);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
@@ -167,6 +167,7 @@ class Tracker {
   // tracker_loss.cpp: where a lost camera is looked for
   [[nodiscard]] std::optional<Placement> recognised(const GraphSnapshot& graph);
   bool search_from_recognised(const Placement& asked, FrameStep& step);
+  void leave_other_part(const FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
   /// It takes depth in both frames, which one camera does not measure.
   [[nodiscard]] bool searches_widely() const {

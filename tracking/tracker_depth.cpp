@@ -38,7 +38,7 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
 
 /// In place of the alignment to the last frame's points, of which there were too few.
 SE3 Tracker::align_to_depth(FrameStep& step) {
-  const auto aligned = align_depth(predicted_pose(), {}, step);
+  const auto aligned = align_depth(predicted_pose(step.frame), {}, step);
   return aligned ? aligned->T_c_ref : aligned_pose(step);
 }
 
@@ -63,7 +63,7 @@ bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step
 LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
   if (!depth_can_place()) return found;
   search_.clear();
-  const LostCause open = place_by_depth(predicted_pose(), step);
+  const LostCause open = place_by_depth(predicted_pose(step.frame), step);
   if (open != LostCause::kNone) return open == LostCause::kTooFewMatches ? found : open;
   return points_allow(step) ? LostCause::kNone : found;
 }

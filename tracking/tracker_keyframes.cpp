@@ -53,9 +53,10 @@ double Tracker::median_depth(const SE3& T_c_ref) {
 
 bool Tracker::keyframe_is_due(const FrameStep& step) const {
   if (step.free_proposal == nullptr) return false;
+  const bool one_keyframe =
+      next_.keyframe == next_.first_of_part + 1 && part(step) == KeyframeId{next_.first_of_part};
   const KeyframeBacklog backlog{immature_points_.room_for_keyframe(),
-                                static_cast<int>(immature_points_.pending().size()),
-                                next_.keyframe == next_.first_of_part + 1};
+                                static_cast<int>(immature_points_.pending().size()), one_keyframe};
   return step.result.by_depth
              ? keyframe_due_by_motion(step.result.T_c_ref, last_keyframe_, backlog, options_)
              : keyframe_due(step.result, last_keyframe_, occupied_regions(), backlog, options_, step.bounds);

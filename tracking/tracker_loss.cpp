@@ -34,6 +34,16 @@ bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   return search_from_view(asked_.view.images, asked_.view.corners, start, step);
 }
 
+/// Points and seeds of the part in which the camera was, if it was recognised in another one: how the two lie
+/// to each other nobody knows, and none of them can be seen from here.
+void Tracker::leave_other_part(const FrameStep& step) {
+  const auto part = [&](KeyframeId id) { return part_of(step.graph, immature_points_, id); };
+  const KeyframeId before = last_.placement.reference;
+  if (before == kNoKeyframe || part(before) == part(step.result.reference)) return;
+  immature_points_.clear_points();
+  seeds_.clear();
+}
+
 /// A keyframe as the map has it: itself, or the one that was left in its place.
 std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, KeyframeId id) const {
   if (immature_points_.find_pending(id) != nullptr) return Placement{id, SE3()};
@@ -108,6 +118,7 @@ bool Tracker::search_from_view(const FrameImages& images, std::vector<DescribedC
 
 void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
   result.status = TrackStatus::kLost;
+  result.reference = kNoKeyframe;
   result.cause = explain_loss(cause, current_.left, last_.images.left, loss_.gap_before());
   result.inliers = 0;
   loss_.lost();

@@ -13,7 +13,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   if (!start) return start.error();
   const TrackResult before = step.result;
   if (const LostCause cause = confirm_start(*start, step); cause != LostCause::kNone) {
-    step.result = before;
+    step.restore(before);
     immature_points_.clear_points();
     return cause;
   }

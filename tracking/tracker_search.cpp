@@ -46,9 +46,10 @@ LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& ste
   const bool placed = cause == LostCause::kNone;
   const int inliers = placed ? step.result.inliers : 0;
   const bool settled = inliers >= options_.settled_searched_share * step.result.searched;
-  if (settled || !leaves_motion(aligned.placement.T_c_ref)) return cause;
+  if (settled || !leaves_motion(aligned.placement.T_c_ref, step.frame)) return cause;
   const Attempt first = set_aside(step);
-  const LostCause other = search_from({.placement = {last_.placement.reference, predicted_pose()}}, step);
+  const LostCause other =
+      search_from({.placement = {last_.placement.reference, predicted_pose(step.frame)}}, step);
   const bool better = placed ? step.result.inliers > inliers : well_supported(step.result);
   if (other == LostCause::kNone && better) return other;
   take_back(first, step);
@@ -69,12 +70,13 @@ void Tracker::take_back(const Attempt& attempt, FrameStep& step) {
 
 /// The pose is further from where the camera would be had it gone on, as the last frame's points show, than
 /// points are searched.
-bool Tracker::leaves_motion(const SE3& T_c_ref) {
+bool Tracker::leaves_motion(const SE3& T_c_ref, const Frame& frame) {
   if (loss_.lost_frames() > 0 || !last_.velocity) return false;
   const SE3 T_cur_prev = T_c_ref * last_.placement.T_c_ref.inverse();
+  const SE3 T_cur_prev_predicted = predicted_motion(frame);
   samples_.clear();
   for (const AlignmentPoint& point : last_.points) {
-    const Vector3 here = T_cur_prev * point.x, there = last_.T_this_previous * point.x;
+    const Vector3 here = T_cur_prev * point.x, there = T_cur_prev_predicted * point.x;
     if (std::min(here.z(), there.z()) <= 0) continue;
     samples_.push_back((rig_.camera.project(here) - rig_.camera.project(there)).norm());
   }
@@ -115,7 +117,8 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   result.inliers = motion.inliers;
   if (result.candidates < options_.min_inliers) return LostCause::kTooFewCandidates;
   if (result.matches < options_.min_inliers) return LostCause::kTooFewMatches;
-  if (motion.inliers < options_.min_inliers || motion.inliers < options_.min_inlier_share * result.matches) {
+  if (!motion.determined || motion.inliers < options_.min_inliers ||
+      motion.inliers < options_.min_inlier_share * result.matches) {
     return LostCause::kInconsistentMatches;
   }
   result.status = TrackStatus::kTracking;

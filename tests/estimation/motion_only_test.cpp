@@ -133,12 +133,14 @@ TEST(MotionOnly, ReportsFailureAndKeepsTheStart) {
   const SE3 start = SE3::exp(0.01 * Vector6::Ones());
   auto result = optimise_motion(scene.rig, scene.observations, start, {});
   EXPECT_FALSE(result.converged);
+  EXPECT_FALSE(result.determined);
   EXPECT_EQ(result.T_c_ref.matrix(), start.matrix());
 
   Scene all_equal = make_scene(1, 0, 0, 1);  // one direction five times: rank two
   all_equal.observations.assign(5, all_equal.observations[0]);
   result = optimise_motion(all_equal.rig, all_equal.observations, start, {});
   EXPECT_FALSE(result.converged);
+  EXPECT_FALSE(result.determined) << result.inliers << " inliers";
   EXPECT_EQ(result.T_c_ref.matrix(), start.matrix());
 
   std::vector<MotionObservation> none;

@@ -105,6 +105,19 @@ TEST_F(InsertionTest, WhatWasNotMeasuredIsDropped) {
   EXPECT_EQ(writer_.graph().keyframe(proposal_.id).observations->size(), 1U);
 }
 
+TEST_F(InsertionTest, WhatHangsOnAnotherPartIsDropped) {
+  share(2, {KeyframeId{0}});
+  share(1, {KeyframeId{2}});
+  start(3, 0);
+  start(4, 2);
+  writer_.set_part(KeyframeId{0}, KeyframeId{0});
+  for (std::uint32_t k = 1; k < 4; ++k) writer_.set_part(KeyframeId{k}, KeyframeId{1});
+  const InsertionReport report = insert();
+  EXPECT_EQ(report.new_points, 1);
+  EXPECT_EQ(report.observations, 2);
+  EXPECT_EQ(report.dropped_observations, 3);
+}
+
 TEST_F(InsertionTest, EdgesJoinKeyframesThatShareEnoughPoints) {
   share(14, {KeyframeId{0}});
   share(15, {KeyframeId{1}});

@@ -179,6 +179,12 @@ TEST_F(PoseReporterTest, APartThatTheMapDoesNotHaveYetIsNew) {
   EXPECT_EQ(pose.velocity, (std::array<double, 6>{})) << "worlds of different parts have nothing in common";
   ASSERT_TRUE(events_.placing);
   EXPECT_EQ(events_.placing->kind, MapEventKind::kNewPart);
+  (void)report(lost(3));
+  record = tracked(4, SE3());
+  record.reference = record.part_causal = KeyframeId{1};
+  (void)report(record);
+  ASSERT_TRUE(events_.placing);
+  EXPECT_EQ(events_.placing->kind, MapEventKind::kRelocalisation) << "the part is not new any more";
 }
 
 }  // namespace

@@ -9,11 +9,83 @@ namespace {
 using namespace testing;
 
 /// A view of a room that no other test sequence shows.
-Frame another_place() {
-  RenderedScene scene(test_rig(SensorKind::kStereo, 320, 240), {3, 2, 5}, 1234);
+Frame another_view(const SE3& T_c_w) {
+  static RenderedScene scene(test_rig(SensorKind::kStereo, 320, 240), {3, 2, 5}, 1234);
   FrameImages images;
-  scene.render(SE3(), 2, images);
+  scene.render(T_c_w, 2, images);
   return {0, 0, images.left.level(0).clone(), images.right.level(0).clone(), {}};
+}
+
+/// A camera that is carried to another room, starts a part there, and is recognised in the first one before
+/// the mapper has the newest keyframes.
+class LateMapper : public ::testing::Test {
+ protected:
+  /// @param keyframes  of the second part
+  void go_to_another_part(int keyframes) {
+    for (std::size_t i = 0; i < 20; ++i) step(frames(SensorKind::kStereo)[i]);
+    for (int i = 0; i < 60 && !step(another_view(SE3())).proposed; ++i) continue;
+    for (int i = 1, made = 1; i < 40 && made < keyframes; ++i)
+      made += step(another_view(true_T_c_w(i))).proposed ? 1 : 0;
+    waits_ = true;
+    step(covered(frames(SensorKind::kStereo)[0]));
+  }
+  TrackResult step(Frame frame) {
+    frame.index = next_++;
+    frame.t_ns = frame.index * 33'000'000;
+    if (!waits_) map(proposed_.size());
+    KeyframeProposal& proposal = proposals_[used_];
+    tracker_.prepare(proposal);
+    const TrackResult result = tracker_.step(frame, snapshot_, &proposal);
+    if (result.proposed) proposed_.push_back(used_++);
+    return result;
+  }
+  void map(std::size_t proposals) {
+    for (; proposals > 0; --proposals) {
+      map_.insert(proposals_[proposed_.front()]);
+      proposed_.erase(proposed_.begin());
+    }
+    snapshot_ = map_.publish();
+  }
+  /// The camera is back in the first room, and goes on there.
+  void expect_that_it_stays_in_the_first_part() {
+    tracker_.relocalise(KeyframeId{0}, true_T_c_w(2));
+    ASSERT_EQ(step(frames(SensorKind::kStereo)[2]).status, TrackStatus::kTracking);
+    ASSERT_FALSE(proposed_.empty());
+    map(1);  // the newest keyframe of the other part
+    for (std::size_t i = 3; i < 12; ++i) {
+      const TrackResult found = step(frames(SensorKind::kStereo)[i]);
+      ASSERT_EQ(found.status, TrackStatus::kTracking) << i << " " << describe(found.cause);
+      waits_ = false;
+      map(proposed_.size());
+      EXPECT_EQ(snapshot_.part(found.reference), KeyframeId{0}) << i;
+      const SE3 T_c_w = found.T_c_ref * snapshot_.T_k_w(found.reference);
+      EXPECT_LT((T_c_w * true_T_c_w(static_cast<int>(i)).inverse()).translation().norm(), 0.02) << i;
+    }
+    for (std::uint32_t k = 0; k < snapshot_.keyframe_count(); ++k)
+      for (const Observation& seen : *snapshot_.keyframe(KeyframeId{k}).observations)
+        ASSERT_EQ(snapshot_.part(snapshot_.point(seen.point).anchor), snapshot_.part(KeyframeId{k})) << k;
+  }
+
+  Tracker tracker_{test_rig(SensorKind::kStereo, 320, 240), TrackerOptions{}};
+  PlainMap map_;
+  GraphSnapshot snapshot_ = map_.publish();
+  std::vector<KeyframeProposal> proposals_{64};
+  std::size_t used_ = 0;
+  std::vector<std::size_t> proposed_;  ///< and not in the map yet
+  std::int64_t next_ = 0;
+  bool waits_ = false;  ///< the mapper, with what was proposed
+};
+
+TEST_F(LateMapper, DoesNotTakeTheCameraToAPartThatItHasLeft) {
+  go_to_another_part(2);
+  ASSERT_EQ(proposed_.size(), 1u);
+  expect_that_it_stays_in_the_first_part();
+}
+
+TEST_F(LateMapper, MayGetToKnowAPartAfterTheCameraHasLeftIt) {
+  go_to_another_part(1);
+  ASSERT_EQ(proposed_.size(), 1u);
+  expect_that_it_stays_in_the_first_part();
 }
 
 /// The right image so many rows lower.
@@ -40,10 +112,36 @@ TEST(Tracker, FindsOnAfterAStepTooWideForItsPrediction) {
   EXPECT_LT((odometry.T_c_w(found) * T_c_w.inverse()).translation().norm(), 0.02);
 }
 
+/// A turning camera, every third frame on whose way is followed by so many that are missing.
+int lost_where_frames_are_missing(int missing) {
+  TrackerOptions options;
+  options.wide_search.enabled = false;  // the prediction alone
+  const Rig rig = test_rig(SensorKind::kStereo, 320, 240);
+  Odometry odometry(rig, options);
+  RenderedScene scene(rig, {3, 2, 5}, 21);
+  int lost = 0, now = 0;
+  for (int i = 0; i < 24; ++i) {
+    const SE3 T_c_w(SO3::exp(Vector3(0, 0.8 * std::sin(0.12 * now), 0)),
+                    Vector3(0.02 * std::sin(0.1 * now), 0, 0));
+    FrameImages images;
+    scene.render(T_c_w, 2, images);
+    const TrackResult result = odometry.step(
+        {i, now * std::int64_t{50'000'000}, images.left.level(0).clone(), images.right.level(0).clone(), {}});
+    lost += result.status == TrackStatus::kTracking ? 0 : 1;
+    now += 1 + (i >= 10 && i % 3 == 0 ? missing : 0);
+  }
+  return lost;
+}
+
+TEST(Tracker, GoesOnAsFastAsItMovedWhereFramesAreMissing) {
+  EXPECT_EQ(lost_where_frames_are_missing(0), 0);
+  EXPECT_EQ(lost_where_frames_are_missing(2), 0);
+}
+
 TEST(Tracker, StartsNoPartForAFewLostFramesHoweverLongTheyTake) {
   Odometry odometry(SensorKind::kStereo);
   for (std::size_t i = 0; i < 15; ++i) odometry.step(frames(SensorKind::kStereo)[i]);
-  Frame elsewhere = another_place();
+  Frame elsewhere = another_view(SE3());
   for (int i = 0; i < TrackerOptions{}.new_part_frames; ++i) {
     elsewhere.index = 15 + i;
     elsewhere.t_ns = (10 + 3 * i) * std::int64_t{1'000'000'000};  // three seconds apart
@@ -83,7 +181,7 @@ TEST(Tracker, NeverAllocatesWhenLostOrRelocalisedOrStartingAPart) {
   ASSERT_EQ(odometry.step(sequence[2]).status, TrackStatus::kTracking);
   EXPECT_EQ(odometry.allocations(), 0u);
   // Carried elsewhere, and nobody says so: a new part is started after a while.
-  const Frame other = another_place();
+  const Frame other = another_view(SE3());
   bool started = false;
   for (int i = 0; i < 40 && !started; ++i) {
     Frame frame = other;
