@@ -1,5 +1,7 @@
 #include "estimation/pose_consensus.hpp"
 
+#include <limits>
+
 #include "base/option_check.hpp"
 #include "geometry/absolute_orientation.hpp"
 #include "geometry/ransac.hpp"
@@ -17,9 +19,11 @@ std::string PoseConsensusOptions::invalid_reason() const {
 
 namespace {
 
+constexpr double kFarOff = 1e12;  // variances of a point that is not in front of the camera
+
 /// In the left image, in variances.
 double squared_error(const PinholeCamera& camera, const Vector3& x_c, const Vector2& uv, double information) {
-  if (!in_front_of_camera(x_c)) return 1e12;
+  if (!in_front_of_camera(x_c)) return kFarOff;
   return information * (camera.project(x_c) - uv).squaredNorm();
 }
 
@@ -31,44 +35,88 @@ class PoseConsensus::ThreePoints {
   using Model = SE3;
   static constexpr int kSampleSize = 3;
 
-  ThreePoints(const PinholeCamera& camera, std::span<const Pair> pairs) : camera_(camera), pairs_(pairs) {}
+  ThreePoints(const PinholeCamera& camera, std::span<const Pair> pairs, std::span<const Batch> batches)
+      : camera_(camera), pairs_(pairs), batches_(batches) {}
   [[nodiscard]] int size() const { return static_cast<int>(pairs_.size()); }
   void fit(std::span<const int, 3> sample, std::vector<SE3>& models) const {
     std::array<Vector3, 3> x_c;
     std::array<Vector3, 3> x_ref;
     for (std::size_t i = 0; i < 3; ++i) {
-      x_c[i] = pair(sample[i]).x_c;
-      x_ref[i] = pair(sample[i]).x_ref;
+      const Pair& pair = pairs_[static_cast<std::size_t>(sample[i])];
+      x_c[i] = pair.x_c;
+      x_ref[i] = pair.x_ref;
     }
     if (const auto T_c_ref = align_rigid(x_c, x_ref)) models.push_back(*T_c_ref);
   }
-  [[nodiscard]] double squared_residual(const SE3& T_c_ref, int i) const {
-    return squared_error(camera_, T_c_ref * pair(i).x_ref, pair(i).uv, pair(i).information);
+  [[nodiscard]] ModelScore score(const SE3& T_c_ref, double threshold2, double enough) const {
+    constexpr std::size_t kBetweenLooks = 8;  // batches: a look at the sum costs as much as one of them
+    const Matrix3 R = T_c_ref.rotation();
+    const std::size_t filled_up = kLanes * batches_.size() - pairs_.size();
+    Lanes inliers{}, score{};
+    score[0] = -threshold2 * static_cast<double>(filled_up);
+    for (std::size_t b = 0; b < batches_.size(); ++b) {
+      Lanes error;
+      measure(R, T_c_ref.translation(), batches_[b], error);
+      const auto within = error <= threshold2;
+      score += within ? error : Lanes{} + threshold2;
+      inliers += within ? Lanes{} + 1 : Lanes{};
+      if (b % kBetweenLooks == kBetweenLooks - 1 && sum(score) >= enough) break;
+    }
+    return {sum(score), static_cast<int>(sum(inliers))};
   }
 
  private:
-  [[nodiscard]] const Pair& pair(int i) const { return pairs_[static_cast<std::size_t>(i)]; }
+  static double sum(const Lanes& lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
+
+  /// As squared_error.
+  [[gnu::always_inline]] void measure(const Matrix3& R, const Vector3& t, const Batch& b,
+                                      Lanes& squared_errors) const {
+    const Lanes x = R(0, 0) * b.x + R(0, 1) * b.y + R(0, 2) * b.z + t.x();
+    const Lanes y = R(1, 0) * b.x + R(1, 1) * b.y + R(1, 2) * b.z + t.y();
+    const Lanes z = R(2, 0) * b.x + R(2, 1) * b.y + R(2, 2) * b.z + t.z();
+    const Lanes inv_z = 1.0 / z;
+    const Lanes du = camera_.fx * x * inv_z + (camera_.cx - b.u);
+    const Lanes dv = camera_.fy * y * inv_z + (camera_.cy - b.v);
+    squared_errors = z > kNearestDepth ? b.information * (du * du + dv * dv) : Lanes{} + kFarOff;
+  }
 
   const PinholeCamera& camera_;
   std::span<const Pair> pairs_;
+  std::span<const Batch> batches_;
 };
 
 PoseConsensus::PoseConsensus(const Rig& rig, std::size_t capacity, const PoseConsensusOptions& options)
     : rig_(rig), options_(options) {
   pairs_.reserve(capacity);
+  batches_.reserve((capacity + kLanes - 1) / kLanes);
   models_.reserve(1);
+}
+
+void PoseConsensus::add(const MotionObservation& match, const Vector3& x_c) {
+  const std::size_t lane = pairs_.size() % kLanes;
+  if (lane == 0) {
+    const Lanes nowhere = Lanes{} + std::numeric_limits<double>::quiet_NaN();
+    batches_.push_back({nowhere, nowhere, nowhere, nowhere, nowhere, nowhere});
+  }
+  Batch& batch = batches_.back();
+  batch.x[lane] = match.x_ref.x();
+  batch.y[lane] = match.x_ref.y();
+  batch.z[lane] = match.x_ref.z();
+  batch.u[lane] = match.z.x();
+  batch.v[lane] = match.z.y();
+  batch.information[lane] = match.information.x();
+  pairs_.push_back({match.x_ref, x_c});
 }
 
 std::optional<SE3> PoseConsensus::find(std::span<const MotionObservation> matches, int min_inliers) {
   pairs_.clear();
+  batches_.clear();
   for (const MotionObservation& match : matches) {
     const Vector3 z = match.z.cast<double>();
     if (pairs_.size() == pairs_.capacity()) break;
-    if (match.information.z() > 0 && z.x() - z.z() > options_.min_disparity_px) {
-      pairs_.push_back({match.x_ref, rig_.unproject(z), z.head<2>(), match.information.x()});
-    }
+    if (match.information.z() > 0 && z.x() - z.z() > options_.min_disparity_px) add(match, rig_.unproject(z));
   }
-  const ThreePoints estimator(rig_.camera, pairs_);
+  const ThreePoints estimator(rig_.camera, pairs_, batches_);
   const auto best = best_model(estimator,
                                {.threshold = options_.inlier_sigmas,
                                 .confidence = options_.confidence,

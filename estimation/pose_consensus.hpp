@@ -40,14 +40,22 @@ class PoseConsensus {
   /// A point in both frames.
   struct Pair {
     Vector3 x_ref, x_c;
-    Vector2 uv;
-    double information;
+  };
+  static constexpr std::size_t kLanes = 4;
+  using Lanes = double __attribute__((vector_size(sizeof(double) * kLanes)));
+  /// What four pairs' residuals are computed from, side by side.
+  struct Batch {
+    Lanes x, y, z;            ///< in the reference frame
+    Lanes u, v, information;  ///< in the left image
   };
   class ThreePoints;
+
+  void add(const MotionObservation& match, const Vector3& x_c);
 
   Rig rig_;
   PoseConsensusOptions options_;
   std::vector<Pair> pairs_;
+  std::vector<Batch> batches_;  ///< of the pairs; the last one is filled up with points behind any camera
   std::vector<SE3> models_;
 };
 

@@ -67,15 +67,40 @@ struct BestModel {
   int iterations = 0;  ///< samples drawn
 };
 
-/// Fits models to a sample; the best of them takes the place of `best` if it is better: by the truncated
-/// quadratic score of MSAC (Torr & Zisserman, 2000), which prefers, among models with the same inliers, the
-/// one that fits them better. It must have as many inliers as a sample has data.
+/// How well a model explains the data: by the truncated quadratic score of MSAC (Torr & Zisserman, 2000),
+/// which prefers, among models with the same inliers, the one that fits them better.
+struct ModelScore {
+  double score = 0;  ///< sum of the squared residuals, each cut off at the squared threshold
+  int inliers = 0;
+};
+
+/// @param enough  a score from which on nobody wants to know: it may be that of a part of the data then
+template <class Estimator>
+ModelScore score_of(const Estimator& estimator, const typename Estimator::Model& model, double threshold2,
+                    double enough) {
+  if constexpr (requires { estimator.score(model, threshold2, enough); }) {
+    return estimator.score(model, threshold2, enough);
+  } else {
+    ModelScore sum;
+    for (int i = 0; i < estimator.size() && sum.score < enough; ++i) {
+      const double r2 = estimator.squared_residual(model, i);
+      if (r2 <= threshold2) ++sum.inliers;
+      sum.score += r2 <= threshold2 ? r2 : threshold2;
+    }
+    return sum;
+  }
+}
+
+/// Fits models to a sample; the best of them takes the place of `best` if it has the better score. It must
+/// have as many inliers as a sample has data.
 ///
 /// Estimator:
 ///   using Model;  static constexpr int kSampleSize;
 ///   int size() const;                                                          number of data
 ///   void fit(std::span<const int, kSampleSize>, std::vector<Model>&) const;    appends none or some models
 ///   double squared_residual(const Model&, int i) const;                        may be infinite
+/// or, instead of the last, all data at once:
+///   ModelScore score(const Model&, double threshold2, double enough) const;    as score_of
 ///
 /// @param models  scratch: with room for what one sample yields, nothing is allocated
 /// @return  whether one was better
@@ -89,13 +114,7 @@ bool try_sample(const Estimator& estimator, std::span<const int, Estimator::kSam
   models.clear();
   estimator.fit(sample, models);
   for (const auto& model : models) {
-    double score = 0;
-    int inliers = 0;
-    for (int i = 0; i < estimator.size() && score < best_score; ++i) {
-      const double r2 = estimator.squared_residual(model, i);
-      if (r2 <= threshold2) ++inliers;
-      score += r2 <= threshold2 ? r2 : threshold2;
-    }
+    const auto [score, inliers] = score_of(estimator, model, threshold2, best_score);
     if (score >= best_score || inliers < Estimator::kSampleSize) continue;
     best_score = score;
     best = {model, inliers, score};
