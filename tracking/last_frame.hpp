@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "imaging/described_corner.hpp"
 #include "imaging/image_pyramid.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/frame_step.hpp"
+#include "tracking/wide_search.hpp"
 
 namespace twofold {
 
@@ -15,7 +15,7 @@ namespace twofold {
 struct LastFrame {
   FrameImages images;  ///< right and depth only if it became no keyframe
   std::vector<AlignmentPoint> points;
-  std::vector<DescribedCorner> corners;  ///< empty: not described yet
+  FrameCorners corners;
   std::int64_t t_ns = 0;
   Placement placement;
   SE3 T_this_previous;              ///< its motion, the prediction of the next; none after a loss

@@ -7,7 +7,8 @@ namespace twofold {
 RecentViews::RecentViews(std::size_t views, const RecentView& room) : views_(views) {
   for (RecentView& view : views_) {
     view.images.copy_from(room.images);
-    view.corners.reserve(room.corners.capacity());
+    view.corners.corners.reserve(room.corners.corners.capacity());
+    view.corners.right.reserve(room.corners.right.capacity());
   }
 }
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "graph/ids.hpp"
-#include "imaging/described_corner.hpp"
 #include "imaging/image_pyramid.hpp"
+#include "tracking/wide_search.hpp"
 
 namespace twofold {
 
@@ -13,7 +13,7 @@ namespace twofold {
 struct RecentView {
   KeyframeId id = kNoKeyframe;
   FrameImages images;
-  std::vector<DescribedCorner> corners;  ///< empty: not described yet
+  FrameCorners corners;
 };
 
 /// The keyframes made last, as the tracker saw them: where a lost camera may still be near. A ring.

@@ -96,6 +96,7 @@ void Tracker::prepare_next(FrameStep& step) {
   if (step.tracked && step.result.proposed) propose_keyframe(step);
   if (step.tracked || step.started) remember_frame(step);
   if (step.tracked && !step.result.proposed && !step.result.by_depth) revisit_reference(step.graph);
+  describe_views();
   step.lap(TrackerStage::kKeyframe);
 }
 
@@ -232,7 +233,7 @@ void Tracker::remember_frame(const FrameStep& step) {
     const Vector3 x_c = from_inverse_depth(point.psi);
     last_.points.push_back({point.appearance.uv, step.shutter.seen_from(rig_, SE3(), x_c) * x_c});
   }
-  last_.corners.clear();
+  take_corners(last_.corners);
   last_.is_keyframe = result.proposed;
   last_.by_depth = result.by_depth;
   std::swap(current_, last_.images);

@@ -173,9 +173,12 @@ class Tracker {
   [[nodiscard]] bool searches_widely() const {
     return options_.wide_search.enabled && rig_.kind != SensorKind::kMono;
   }
+  void look_widely();
+  void take_corners(FrameCorners& corners) const;
+  void describe_views();
   bool search_widely(FrameStep& step);
-  bool search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
-                        const SearchStart& view, FrameStep& step);
+  bool search_from_view(const FrameImages& images, FrameCorners& corners, const SearchStart& view,
+                        FrameStep& step);
   bool search_ahead(FrameStep& step);
   [[nodiscard]] bool is_within_reach(SearchStart::Kind kind, const FrameStep& step) const;
   void give_up_frame(LostCause cause, TrackResult& result);
@@ -247,6 +250,7 @@ class Tracker {
   KeyframeView last_keyframe_;
   Numbers next_;
   std::uint32_t frames_ = 0;
+  std::uint32_t looked_at_ = 0;  ///< frames_ at the last wider search
 
   // Scratch.
   std::vector<KeyframeId> anchors_;

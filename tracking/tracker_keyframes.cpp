@@ -98,6 +98,7 @@ void Tracker::hand_over_images(KeyframeProposal& proposal) {
   std::swap(proposal.images.right, current_.right);
   cv::swap(proposal.images.depth, current_.depth);
   recent_views_.add(proposal.id, proposal.images);
+  take_corners(recent_views_[0].corners);
 }
 
 void Tracker::collect_observations(KeyframeProposal& proposal) {

@@ -9,8 +9,30 @@ namespace twofold {
 
 const FrameImages& Tracker::ask_where() {
   asked_.view.images.copy_from(current_);
-  asked_.view.corners.clear();
+  take_corners(asked_.view.corners);
   return asked_.view.images;
+}
+
+/// The corners of this frame, once in a frame.
+void Tracker::look_widely() {
+  if (looked_at_ == frames_) return;
+  looked_at_ = frames_;
+  wide_search_.look_at(current_);
+}
+
+/// Of this frame, if a wider search has found them.
+void Tracker::take_corners(FrameCorners& corners) const {
+  corners.clear();
+  if (looked_at_ == frames_) corners = wide_search_.corners();
+}
+
+/// Once the pose has left: where one frame needed a wider search the next may, and has no time to describe
+/// what it is compared with.
+void Tracker::describe_views() {
+  if (looked_at_ != frames_) return;
+  if (!last_.is_keyframe) wide_search_.describe(last_.images, last_.corners);
+  for (std::size_t age = 0; age < recent_views_.size(); ++age)
+    wide_search_.describe(recent_views_[age].images, recent_views_[age].corners);
 }
 
 /// Where the loop closer recognised the lost camera.
@@ -30,7 +52,7 @@ bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   const SearchStart start{.placement = asked, .kind = SearchStart::Kind::kRecognised};
   if (search_from(start, step) == LostCause::kNone) return true;
   if (!searches_widely()) return false;
-  wide_search_.look_at(current_);
+  look_widely();
   return search_from_view(asked_.view.images, asked_.view.corners, start, step);
 }
 
@@ -54,7 +76,7 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
 /// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
 bool Tracker::search_widely(FrameStep& step) {
   if (!searches_widely() || last_.placement.reference == kNoKeyframe) return false;
-  wide_search_.look_at(current_);
+  look_widely();
   SearchStart start{.placement = last_.placement, .kind = SearchStart::Kind::kRough};
   if (!last_.is_keyframe && search_from_view(last_.images, last_.corners, start, step)) return true;
   const KeyframeId part = part_of(step.graph, immature_points_, last_.placement.reference);
@@ -105,8 +127,8 @@ bool Tracker::search_ahead(FrameStep& step) {
 
 /// What looks alike proposes a pose, the map's points around there decide.
 /// @param view  of the images
-bool Tracker::search_from_view(const FrameImages& images, std::vector<DescribedCorner>& corners,
-                               const SearchStart& view, FrameStep& step) {
+bool Tracker::search_from_view(const FrameImages& images, FrameCorners& corners, const SearchStart& view,
+                               FrameStep& step) {
   const auto T_c_view = wide_search_.find(images, corners, options_.search);
   step.lap(TrackerStage::kAlignment);
   if (!T_c_view) return false;

@@ -25,36 +25,43 @@ WideSearch::WideSearch(const Rig& rig, const WideSearchOptions& options)
       selector_(options.corners),
       consensus_(rig, static_cast<std::size_t>(options.corners.wanted), options.consensus) {
   prepare(corners_);
-  of_earlier_.reserve(corners_.capacity());
-  of_corners_.reserve(corners_.capacity());
-  matches_.reserve(corners_.capacity());
+  of_earlier_.reserve(corners_.corners.capacity());
+  of_corners_.reserve(corners_.corners.capacity());
+  matches_.reserve(corners_.corners.capacity());
   // Noise has more corners than anything that is seen: all scratch has its full size after it.
   FrameImages noise;
   allocate_images(rig, noise);
   noise.left.build(noise_image(rig.camera.width, rig.camera.height));
-  selector_.select(noise.left, corners_);
   describer_.prepare(noise.left);
-  describer_.describe(noise.left, corners_);
-  find_nearest(corners_, corners_, of_earlier_, of_corners_);
+  describe(noise, corners_);
+  find_nearest(corners_.corners, corners_.corners, of_earlier_, of_corners_);
 }
 
-void WideSearch::prepare(std::vector<DescribedCorner>& corners) const {
-  corners.reserve(static_cast<std::size_t>(options_.corners.wanted + options_.corners.levels));
+void WideSearch::prepare(FrameCorners& corners) const {
+  const auto most = static_cast<std::size_t>(options_.corners.wanted + options_.corners.levels);
+  corners.corners.reserve(most);
+  corners.right.reserve(most);
 }
 
 void WideSearch::look_at(const FrameImages& images) {
   now_ = &images;
+  described_ = 0;
+  corners_.clear();
   describe(images, corners_);
 }
 
-void WideSearch::describe(const FrameImages& images, std::vector<DescribedCorner>& corners) {
-  selector_.select(images.left, corners);
-  describer_.describe(images.left, corners);
+void WideSearch::describe(const FrameImages& images, FrameCorners& corners) {
+  if (corners.described) return;
+  selector_.select(images.left, corners.corners);
+  describer_.describe(images.left, corners.corners);
+  corners.right.assign(corners.corners.size(), std::nullopt);
+  corners.described = true;
 }
 
-std::optional<SE3> WideSearch::find(const FrameImages& earlier, std::vector<DescribedCorner>& corners,
+std::optional<SE3> WideSearch::find(const FrameImages& earlier, FrameCorners& corners,
                                     const GuidedSearchOptions& search) {
-  if (corners.empty()) describe(earlier, corners);
+  if (!corners.described && described_++ >= options_.max_described) return std::nullopt;
+  describe(earlier, corners);
   match(earlier, corners, search);
   const auto agreed = consensus_.find(matches_, options_.min_agreeing);
   if (!agreed) return std::nullopt;
@@ -65,25 +72,30 @@ std::optional<SE3> WideSearch::find(const FrameImages& earlier, std::vector<Desc
 }
 
 /// Corners that look alike, each more than any other, and have depth in both frames.
-void WideSearch::match(const FrameImages& earlier, std::span<const DescribedCorner> corners,
-                       const GuidedSearchOptions& search) {
-  find_nearest(corners, corners_, of_earlier_, of_corners_);
+void WideSearch::match(const FrameImages& earlier, FrameCorners& corners, const GuidedSearchOptions& search) {
+  find_nearest(corners.corners, corners_.corners, of_earlier_, of_corners_);
   matches_.clear();
-  const auto measure = [&](const FrameImages& images, const DescribedCorner& corner) {
-    const Vector2 uv = corner.uv.cast<double>();
-    return Vector3(uv.x(), uv.y(), right_of_corner(images, rig_, uv, corner.level, search));
-  };
-  for (std::size_t i = 0; i < corners.size(); ++i) {
+  for (std::size_t i = 0; i < corners.corners.size(); ++i) {
     const NearestDescriptor& nearest = of_earlier_[i];
     if (nearest.distance > options_.max_distance) continue;
     const auto j = static_cast<std::size_t>(nearest.best);
     if (of_corners_[j].best != static_cast<int>(i)) continue;
-    const Vector3 z_earlier = measure(earlier, corners[i]);
+    const Vector3 z_earlier = measure(earlier, corners, i, search);
     if (std::isnan(z_earlier.z())) continue;
-    const Eigen::Vector3f z = measure(*now_, corners_[j]).cast<float>();
+    const Eigen::Vector3f z = measure(*now_, corners_, j, search).cast<float>();
     if (std::isnan(z.z())) continue;
-    matches_.push_back({rig_.unproject(z_earlier), z, rig_.information(z, corners_[j].level)});
+    matches_.push_back({rig_.unproject(z_earlier), z, rig_.information(z, corners_.corners[j].level)});
   }
+}
+
+/// A corner is matched with several frames', but looked for in the right image once.
+Vector3 WideSearch::measure(const FrameImages& images, FrameCorners& corners, std::size_t i,
+                            const GuidedSearchOptions& search) const {
+  const DescribedCorner& corner = corners.corners[i];
+  const Vector2 uv = corner.uv.cast<double>();
+  std::optional<double>& right = corners.right[i];
+  if (!right) right = right_of_corner(images, rig_, uv, corner.level, search);
+  return {uv.x(), uv.y(), *right};
 }
 
 }  // namespace twofold

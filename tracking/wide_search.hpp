@@ -20,6 +20,7 @@ struct WideSearchOptions {
   CornerSelectionOptions corners{.wanted = 700};
   int max_distance = 64;  ///< of a match's descriptors [bits]
   int min_agreeing = 8;   ///< matches that the motion must explain
+  int max_described = 1;  ///< earlier frames whose corners are found anew for one frame
   /// Corners are found to a whole pixel of their level only.
   PoseConsensusOptions consensus{.inlier_sigmas = 8, .max_samples = 2000};
 
@@ -27,10 +28,26 @@ struct WideSearchOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
+/// The corners of a frame, and of those that somebody asked for, where the right camera sees them.
+struct FrameCorners {
+  bool described = false;  ///< else they were not looked for yet
+  std::vector<DescribedCorner> corners;
+  std::vector<std::optional<double>> right;  ///< of each corner, NaN where there is none [px]
+
+  void clear() {
+    described = false;
+    corners.clear();
+    right.clear();
+  }
+};
+
 /// Finds the camera again after a step that was too wide for the guided search: corners of an earlier frame
 /// are matched with those of this one by what they look like, wherever they are; matches with depth in both
 /// frames give the motion that most of them agree on (three-point RANSAC). That is a proposal: only a guided
 /// search of the map's points from there tells whether it is right.
+///
+/// To describe a frame takes longer than to compare it: what was described is kept, and only a few of the
+/// earlier frames are described for one frame; the others wait until there is time for `describe`.
 ///
 /// Work is bounded by corners and samples. No allocation after construction.
 class WideSearch {
@@ -38,27 +55,36 @@ class WideSearch {
   WideSearch(const Rig& rig, const WideSearchOptions& options);
 
   /// Makes room for the corners of a frame.
-  void prepare(std::vector<DescribedCorner>& corners) const;
+  void prepare(FrameCorners& corners) const;
 
   /// The frame whose pose is sought: its images must stay until the last `find`.
   void look_at(const FrameImages& images);
+  /// That frame's.
+  [[nodiscard]] const FrameCorners& corners() const { return corners_; }
 
-  /// @param corners  of the earlier frame; filled if empty. Made by `prepare`.
-  /// @return T_now_earlier; nothing when too few matches agree on one
-  [[nodiscard]] std::optional<SE3> find(const FrameImages& earlier, std::vector<DescribedCorner>& corners,
+  /// Finds the corners of a frame, unless they are known. Made by `prepare`.
+  void describe(const FrameImages& images, FrameCorners& corners);
+
+  /// @param corners  of the earlier frame
+  /// @param search   the same for all searches
+  /// @return T_now_earlier; nothing when too few matches agree on one, or when the earlier frame would have
+  /// to be
+  ///         described and others were for this one
+  [[nodiscard]] std::optional<SE3> find(const FrameImages& earlier, FrameCorners& corners,
                                         const GuidedSearchOptions& search);
 
  private:
-  void describe(const FrameImages& images, std::vector<DescribedCorner>& corners);
-  void match(const FrameImages& earlier, std::span<const DescribedCorner> corners,
-             const GuidedSearchOptions& search);
+  void match(const FrameImages& earlier, FrameCorners& corners, const GuidedSearchOptions& search);
+  [[nodiscard]] Vector3 measure(const FrameImages& images, FrameCorners& corners, std::size_t i,
+                                const GuidedSearchOptions& search) const;
 
   Rig rig_;
   WideSearchOptions options_;
   const FrameImages* now_ = nullptr;
   CornerSelector selector_;
   CornerDescriber describer_;
-  std::vector<DescribedCorner> corners_;                    ///< of the frame whose pose is sought
+  FrameCorners corners_;                                    ///< of the frame whose pose is sought
+  int described_ = 0;                                       ///< earlier frames, for that one
   std::vector<NearestDescriptor> of_earlier_, of_corners_;  ///< in the other frame each
   std::vector<MotionObservation> matches_;
   PoseConsensus consensus_;

@@ -2,7 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <vector>
+#include <array>
+#include <string>
 
 #include "fixtures/rendered_scene.hpp"
 
@@ -21,7 +22,7 @@ TEST_P(WideSearchTest, FindsAMotionThatNothingForetold) {
   FrameImages previous, current;
   scene.render(SE3(), 2, previous);
   WideSearch search(rig_, {});
-  std::vector<DescribedCorner> corners;
+  FrameCorners corners;
   for (const double yaw : {-0.3, -0.15, 0.15, 0.3}) {
     const SE3 T_cur_prev(SO3::exp(Vector3(0.05, yaw, 0.04)), Vector3(0.1, -0.05, 0.15));
     scene.render(T_cur_prev, 2, current);
@@ -40,9 +41,54 @@ TEST_P(WideSearchTest, FindsNothingInAnotherPlace) {
   scene.render(SE3(), 2, previous);
   other.render(SE3(), 2, current);
   WideSearch search(rig_, {});
-  std::vector<DescribedCorner> corners;
+  FrameCorners corners;
   search.look_at(current);
   EXPECT_FALSE(search.find(previous, corners, {}));
+}
+
+// The frame sought for is an earlier one in its turn: its corners need not be found again.
+TEST_P(WideSearchTest, KnownCornersGiveWhatFreshOnesDo) {
+  RenderedScene scene(rig_, {3, 2, 5}, 21);
+  FrameImages first, second, third;
+  scene.render(SE3(), 2, first);
+  scene.render(SE3(SO3::exp(Vector3(0, 0.1, 0)), Vector3(0.1, 0, 0)), 2, second);
+  scene.render(SE3(SO3::exp(Vector3(0, 0.2, 0)), Vector3(0.2, 0, 0)), 2, third);
+  WideSearch search(rig_, {});
+  FrameCorners of_first, fresh;
+  search.look_at(second);
+  ASSERT_TRUE(search.find(first, of_first, {}));
+  FrameCorners kept = search.corners();
+  search.look_at(third);
+  const auto with_kept = search.find(second, kept, {});
+  const auto with_fresh = search.find(second, fresh, {});
+  ASSERT_TRUE(with_kept && with_fresh);
+  EXPECT_EQ(with_kept->matrix(), with_fresh->matrix());
+  EXPECT_EQ(search.find(second, kept, {})->matrix(), with_fresh->matrix());
+}
+
+TEST_P(WideSearchTest, DescribesNoMoreEarlierFramesThanItMayForOneFrame) {
+  RenderedScene scene(rig_, {3, 2, 5}, 21);
+  FrameImages previous, current;
+  scene.render(SE3(), 2, previous);
+  scene.render(SE3(SO3::exp(Vector3(0, 0.15, 0)), Vector3(0.1, 0, 0)), 2, current);
+  WideSearch search(rig_, {.max_described = 2});
+  std::array<FrameCorners, 4> corners;  // of the same frame, as if they were four
+  search.look_at(current);
+  EXPECT_TRUE(search.find(previous, corners[0], {}));
+  EXPECT_TRUE(search.find(previous, corners[1], {}));
+  EXPECT_FALSE(search.find(previous, corners[2], {}));
+  EXPECT_FALSE(corners[2].described);
+  EXPECT_TRUE(search.find(previous, corners[0], {})) << "what is known costs nothing";
+  search.describe(previous, corners[3]);
+  EXPECT_TRUE(search.find(previous, corners[3], {})) << "nor what was described when there was time";
+  search.look_at(current);
+  EXPECT_TRUE(search.find(previous, corners[2], {})) << "the next frame has its own";
+}
+
+TEST(WideSearchOptions, OneEarlierFrameCanBeDescribed) {
+  EXPECT_EQ(WideSearchOptions{.max_described = 1}.invalid_reason(), "");
+  const std::string reason = WideSearchOptions{.max_described = 0}.invalid_reason();
+  EXPECT_NE(reason.find("max_described"), std::string::npos) << reason;
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, WideSearchTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd),
