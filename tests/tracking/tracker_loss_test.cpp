@@ -138,6 +138,28 @@ TEST(Tracker, GoesOnAsFastAsItMovedWhereFramesAreMissing) {
   EXPECT_EQ(lost_where_frames_are_missing(2), 0);
 }
 
+// Of what a frame is compared with, one view is described before its pose leaves, the others after it: the
+// next frame is compared with all of them.
+TEST(Tracker, FindsBackToWhatOnlyAnOlderKeyframeShowsOneFrameLater) {
+  const Rig rig = test_rig(SensorKind::kStereo, 320, 240);
+  RenderedScene scene(rig, {3, 2, 5}, 21);
+  Odometry odometry(rig);
+  int index = 0;
+  const auto step = [&](double yaw) {
+    FrameImages images;
+    scene.render(SE3(SO3::exp(Vector3(0, yaw, 0)), Vector3::Zero()), 2, images);
+    const std::int64_t t_ns = index * std::int64_t{33'000'000};
+    return odometry.step({index++, t_ns, images.left.level(0).clone(), images.right.level(0).clone(), {}});
+  };
+  for (int i = 0; i <= 25; ++i) ASSERT_NE(step(0.06 * i).status, TrackStatus::kLost) << i;
+  const TrackResult lost = step(0.18);  // the last frame shows nothing of it, the fourth keyframe back does
+  EXPECT_EQ(lost.status, TrackStatus::kLost);
+  const TrackResult found = step(0.18);
+  EXPECT_EQ(odometry.allocations(), 0u);
+  ASSERT_EQ(found.status, TrackStatus::kTracking) << describe(found.cause);
+  EXPECT_LT((odometry.T_c_w(found).so3().log() - Vector3(0, 0.18, 0)).norm(), 0.01);
+}
+
 TEST(Tracker, StartsNoPartForAFewLostFramesHoweverLongTheyTake) {
   Odometry odometry(SensorKind::kStereo);
   for (std::size_t i = 0; i < 15; ++i) odometry.step(frames(SensorKind::kStereo)[i]);
