@@ -1,5 +1,7 @@
 #include "estimation/pose_consensus.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "base/option_check.hpp"
@@ -19,7 +21,8 @@ std::string PoseConsensusOptions::invalid_reason() const {
 
 namespace {
 
-constexpr double kFarOff = 1e12;  // variances of a point that is not in front of the camera
+constexpr double kSideSigmas = 4;  // by which a side of a right sample may differ
+constexpr double kFarOff = 1e12;   // variances of a point that is not in front of the camera
 
 /// In the left image, in variances.
 double squared_error(const PinholeCamera& camera, const Vector3& x_c, const Vector2& uv, double information) {
@@ -35,8 +38,12 @@ class PoseConsensus::ThreePoints {
   using Model = SE3;
   static constexpr int kSampleSize = 3;
 
-  ThreePoints(const PinholeCamera& camera, std::span<const Pair> pairs, std::span<const Batch> batches)
-      : camera_(camera), pairs_(pairs), batches_(batches) {}
+  ThreePoints(const Rig& rig, std::span<const Pair> pairs, std::span<const Batch> batches)
+      : camera_(rig.camera),
+        inv_f_(1 / rig.camera.fx),
+        inv_fb_(inv_f_ / rig.baseline),
+        pairs_(pairs),
+        batches_(batches) {}
   [[nodiscard]] int size() const { return static_cast<int>(pairs_.size()); }
   void fit(std::span<const int, 3> sample, std::vector<SE3>& models) const {
     std::array<Vector3, 3> x_c;
@@ -45,6 +52,9 @@ class PoseConsensus::ThreePoints {
       const Pair& pair = pairs_[static_cast<std::size_t>(sample[i])];
       x_c[i] = pair.x_c;
       x_ref[i] = pair.x_ref;
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!agree_on_side(sample[i], sample[(i + 1) % 3])) return;
     }
     if (const auto T_c_ref = align_rigid(x_c, x_ref)) models.push_back(*T_c_ref);
   }
@@ -66,6 +76,35 @@ class PoseConsensus::ThreePoints {
   }
 
  private:
+  /// Whether two points are as far from each other in both frames, up to what their measurements leave open:
+  /// most samples have a wrong match, and need be neither aligned nor scored.
+  [[nodiscard]] bool agree_on_side(int first, int second) const {
+    const auto i = static_cast<std::size_t>(first), j = static_cast<std::size_t>(second);
+    const double sigma_i = sigma(i), sigma_j = sigma(j);
+    const Side ref = side(pairs_[i].x_ref, sigma_i, pairs_[j].x_ref, sigma_j);
+    const Side now = side(pairs_[i].x_c, sigma_i, pairs_[j].x_c, sigma_j);
+    const double difference = now.length - ref.length;
+    // Where the reference frame is no camera's, but the map's, a place in it says nothing of its error.
+    const double variance = now.variance + std::max(now.variance, ref.variance);
+    return difference * difference <= kSideSigmas * kSideSigmas * variance;
+  }
+  struct Side {
+    double length, variance;
+  };
+  /// Disparity errs along the point's ray, the place in the image across it.
+  [[nodiscard]] Side side(const Vector3& a, double sigma_a, const Vector3& b, double sigma_b) const {
+    const Vector3 ab = b - a;
+    const double squared = std::max(ab.squaredNorm(), 1e-12);
+    const double scale_a = a.z() * sigma_a, scale_b = b.z() * sigma_b;
+    const double along_a = scale_a * ab.dot(a), along_b = scale_b * ab.dot(b);
+    const double along = (along_a * along_a + along_b * along_b) / squared;
+    return {std::sqrt(squared),
+            2 * along * inv_fb_ * inv_fb_ + (scale_a * scale_a + scale_b * scale_b) * inv_f_ * inv_f_};
+  }
+  /// Of where a point is seen [px].
+  [[nodiscard]] double sigma(std::size_t i) const {
+    return 1 / std::sqrt(batches_[i / kLanes].information[i % kLanes]);
+  }
   static double sum(const Lanes& lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
 
   /// As squared_error.
@@ -81,6 +120,7 @@ class PoseConsensus::ThreePoints {
   }
 
   const PinholeCamera& camera_;
+  double inv_f_, inv_fb_;  // of the focal length, and of its product with the baseline
   std::span<const Pair> pairs_;
   std::span<const Batch> batches_;
 };
@@ -116,7 +156,7 @@ std::optional<SE3> PoseConsensus::find(std::span<const MotionObservation> matche
     if (pairs_.size() == pairs_.capacity()) break;
     if (match.information.z() > 0 && z.x() - z.z() > options_.min_disparity_px) add(match, rig_.unproject(z));
   }
-  const ThreePoints estimator(rig_.camera, pairs_, batches_);
+  const ThreePoints estimator(rig_, pairs_, batches_);
   const auto best = best_model(estimator,
                                {.threshold = options_.inlier_sigmas,
                                 .confidence = options_.confidence,
