@@ -1,6 +1,7 @@
 #include "io/files/image_pairs.hpp"
 
 #include <algorithm>
+#include <compare>
 #include <cstdlib>
 #include <map>
 #include <string>
@@ -73,6 +74,32 @@ ImagePairs pairs_of_equal(const Names& left, const Names& right) {
   return 2 * pairs.size() >= std::min(left.size(), right.size()) ? pairs : ImagePairs();
 }
 
+/// A left and a right image without another image of either side between them in time.
+struct Neighbours {
+  std::int64_t gap_ns = 0;
+  std::size_t left = 0, right = 0;
+  friend auto operator<=>(const Neighbours&, const Neighbours&) = default;
+};
+
+/// Those not farther apart than max_gap_ns, closest first; of equal ones the earlier. No others need be
+/// looked at: with a second left image between the two, the right one is closer to that, and the other way
+/// round.
+std::vector<Neighbours> neighbours_in_time(const std::vector<StampedFile>& left,
+                                           const std::vector<StampedFile>& right, std::int64_t max_gap_ns) {
+  std::vector<Neighbours> neighbours;
+  std::size_t l = 0, r = 0;
+  while (l < left.size() && r < right.size()) {
+    const std::int64_t gap_ns = right[r].t_ns - left[l].t_ns;
+    const bool next_left = l + 1 < left.size() && left[l + 1].t_ns <= right[r].t_ns;
+    const bool next_right = r + 1 < right.size() && right[r + 1].t_ns <= left[l].t_ns;
+    if (!next_left && !next_right && std::abs(gap_ns) <= max_gap_ns)
+      neighbours.push_back({std::abs(gap_ns), l, r});
+    ++(gap_ns >= 0 ? l : r);
+  }
+  std::sort(neighbours.begin(), neighbours.end());
+  return neighbours;
+}
+
 }  // namespace
 
 ImagePairs pairs_by_name(const std::vector<fs::path>& left, const std::vector<fs::path>& right) {
@@ -84,16 +111,15 @@ ImagePairs pairs_by_name(const std::vector<fs::path>& left, const std::vector<fs
 
 ImagePairs pairs_by_time(const std::vector<StampedFile>& left, const std::vector<StampedFile>& right,
                          std::int64_t max_gap_ns) {
+  const std::vector<Neighbours> neighbours = neighbours_in_time(left, right, max_gap_ns);
+  std::vector<bool> left_taken(left.size()), right_taken(right.size());
   ImagePairs pairs;
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    const auto difference = [&](std::size_t j) { return std::abs(right[j].t_ns - left[i].t_ns); };
-    while (next + 1 < right.size() && difference(next + 1) <= difference(next)) ++next;
-    if (next == right.size()) break;
-    if (difference(next) > max_gap_ns) continue;
-    pairs.emplace_back(i, next);
-    ++next;
+  for (const auto& [gap_ns, l, r] : neighbours) {
+    if (left_taken[l] || right_taken[r]) continue;
+    left_taken[l] = right_taken[r] = true;
+    pairs.emplace_back(l, r);
   }
+  std::sort(pairs.begin(), pairs.end());
   return pairs;
 }
 

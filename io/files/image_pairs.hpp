@@ -22,8 +22,9 @@ struct StampedFile {
   std::filesystem::path file;
 };
 
-/// Pairs images by time: for each left one the nearest of the others that is not taken yet, if it is no
-/// farther away than max_gap_ns. Times increase in both lists.
+/// Pairs images by time, those closest to each other first, if they are no farther apart than max_gap_ns: an
+/// image whose own partner is missing stays alone rather than take its neighbour's. Times increase in both
+/// lists. O(n log n).
 [[nodiscard]] ImagePairs pairs_by_time(const std::vector<StampedFile>& left,
                                        const std::vector<StampedFile>& right, std::int64_t max_gap_ns);
 

@@ -57,8 +57,8 @@ std::vector<RecordedFrame> read_associations(const fs::path& folder) {
   return frames;
 }
 
-/// Nearest depth image in time for every colour image; each depth image is used once; colour images without
-/// are left out.
+/// Pairs of a colour and a depth image, closest in time first; each image is used once; colour images without
+/// a depth image are left out.
 std::vector<RecordedFrame> associate(const std::vector<StampedFile>& rgb,
                                      const std::vector<StampedFile>& depth) {
   std::vector<RecordedFrame> frames;

@@ -39,9 +39,34 @@ std::vector<StampedFile> at(const std::vector<std::int64_t>& t_ns) {
 
 TEST(ImagePairs, AreNearestInTimeAndUsedOnce) {
   EXPECT_EQ(pairs_by_time(at({0, 100, 200, 300}), at({4, 90, 104, 390}), 10), (ImagePairs{{0, 0}, {1, 2}}));
-  EXPECT_EQ(pairs_by_time(at({0, 6}), at({5}), 10), (ImagePairs{{0, 0}})) << "whoever comes first";
+  EXPECT_EQ(pairs_by_time(at({0, 6}), at({5}), 10), (ImagePairs{{1, 0}})) << "whoever is nearer";
+  EXPECT_EQ(pairs_by_time(at({0, 10}), at({5}), 10), (ImagePairs{{0, 0}})) << "of two as near the earlier";
+  EXPECT_EQ(pairs_by_time(at({5, 20}), at({0, 5, 10, 20}), 10), (ImagePairs{{0, 1}, {1, 3}}));
   EXPECT_TRUE(pairs_by_time(at({}), at({5}), 10).empty());
   EXPECT_TRUE(pairs_by_time(at({5}), at({}), 10).empty());
+}
+
+/// Depth is stamped 15 ms before colour, and 18 ms after the colour image before: within the tolerance, too.
+TEST(ImagePairs, OneWithoutPartnerTakesNobodyElses) {
+  constexpr std::int64_t kInterval = 33, kOffset = 15, kMaxGap = 20;
+  std::vector<std::int64_t> colour, depth;
+  ImagePairs expected;
+  for (std::int64_t i = 0; i < 300; ++i) {
+    colour.push_back(i * kInterval + kOffset);
+    if (i == 20 || i == 150 || i == 151) continue;
+    expected.emplace_back(i, depth.size());
+    depth.push_back(i * kInterval);
+  }
+  EXPECT_EQ(pairs_by_time(at(colour), at(depth), kMaxGap), expected);
+  ImagePairs swapped;
+  for (const auto& [c, d] : expected) swapped.emplace_back(d, c);
+  EXPECT_EQ(pairs_by_time(at(depth), at(colour), kMaxGap), swapped);
+}
+
+/// As when a long gap is allowed: every image is near several others.
+TEST(ImagePairs, KeepTheOrderOfTime) {
+  EXPECT_EQ(pairs_by_time(at({0, 50, 100}), at({55, 105, 155}), 200), (ImagePairs{{1, 0}, {2, 1}}))
+      << "the first is not paired with the last";
 }
 
 }  // namespace
