@@ -50,24 +50,26 @@ std::vector<IndexPair> pairs_by_time(const std::vector<PosePair>& pairs, double 
 /// one.
 std::vector<IndexPair> pairs_by_path(const std::vector<double>& lengths, double delta_m) {
   std::vector<IndexPair> result;
-  std::optional<std::size_t> begin;
-  double from = 0;
+  std::size_t begin = 0;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
-    if (lengths[i] - from < delta_m) continue;
-    if (begin) result.emplace_back(*begin, i);
+    if (lengths[i] - lengths[begin] < delta_m) continue;
+    result.emplace_back(begin, i);
     begin = i;
-    from = lengths[i];
   }
   return result;
+}
+
+SE3 step_error(const PosePair& from, const PosePair& to) {
+  const SE3 truth_i_j = from.T_w_c.inverse() * to.T_w_c;
+  const SE3 estimate_i_j = from.T_e_c.inverse() * to.T_e_c;
+  return truth_i_j.inverse() * estimate_i_j;
 }
 
 RelativeError relative_error(const std::vector<PosePair>& pairs, const std::vector<IndexPair>& steps,
                              const std::vector<double>& lengths) {
   std::vector<double> translation, rotation, percent;
   for (const auto& [i, j] : steps) {
-    const SE3 truth_i_j = pairs[i].T_w_c.inverse() * pairs[j].T_w_c;
-    const SE3 estimate_i_j = pairs[i].T_e_c.inverse() * pairs[j].T_e_c;
-    const SE3 E = truth_i_j.inverse() * estimate_i_j;
+    const SE3 E = step_error(pairs[i], pairs[j]);
     translation.push_back(E.translation().norm());
     rotation.push_back(angle_deg(E.so3()));
     if (lengths[j] > lengths[i]) percent.push_back(100.0 * translation.back() / (lengths[j] - lengths[i]));
@@ -76,7 +78,45 @@ RelativeError relative_error(const std::vector<PosePair>& pairs, const std::vect
           error_statistics(std::move(percent))};
 }
 
+/// Sums of the errors, each over the length: means once they are divided by the count.
+SegmentErrors segment_sums(const std::vector<PosePair>& pairs, const std::vector<double>& lengths,
+                           double length) {
+  constexpr std::size_t kEvery = 10;  // poses; the benchmark's frames come at 10 Hz
+  SegmentErrors sums{.length = length};
+  for (std::size_t i = 0; i < pairs.size(); i += kEvery) {
+    const auto end = std::upper_bound(lengths.begin(), lengths.end(), lengths[i] + length);
+    if (end == lengths.end()) break;
+    const SE3 E = step_error(pairs[i], pairs[static_cast<std::size_t>(end - lengths.begin())]);
+    ++sums.count;
+    sums.translation_percent += 100 * E.translation().norm() / length;
+    sums.rotation_deg_per_100_m += 100 * angle_deg(E.so3()) / length;
+  }
+  return sums;
+}
+
+void divide_by_count(SegmentErrors* sums) {
+  if (sums->count == 0) return;
+  sums->translation_percent /= static_cast<double>(sums->count);
+  sums->rotation_deg_per_100_m /= static_cast<double>(sums->count);
+}
+
 }  // namespace
+
+KittiErrors kitti_errors(const std::vector<PosePair>& pairs) {
+  const std::vector<double> lengths = path_lengths(pairs);
+  KittiErrors errors;
+  for (const double length : {100, 200, 300, 400, 500, 600, 700, 800}) {
+    SegmentErrors sums = segment_sums(pairs, lengths, length);
+    if (sums.count == 0) break;
+    errors.mean.count += sums.count;
+    errors.mean.translation_percent += sums.translation_percent;
+    errors.mean.rotation_deg_per_100_m += sums.rotation_deg_per_100_m;
+    divide_by_count(&sums);
+    errors.by_length.push_back(sums);
+  }
+  divide_by_count(&errors.mean);
+  return errors;
+}
 
 std::vector<PosePair> associate(const Trajectory& estimate, const Trajectory& truth,
                                 std::int64_t max_difference_ns) {
@@ -198,6 +238,7 @@ tl::expected<Evaluation, std::string> evaluate(std::vector<PosePair> pairs,
   result.per_second =
       relative_error(pairs, pairs_by_time(pairs, options.delta_s, options.time_tolerance_s), lengths);
   result.per_metre = relative_error(pairs, pairs_by_path(lengths, options.delta_m), lengths);
+  result.kitti = kitti_errors(pairs);
   result.pairs = std::move(pairs);
   return result;
 }

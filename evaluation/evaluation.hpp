@@ -19,7 +19,8 @@ struct PosePair {
 };
 
 /// For every estimated pose the true one nearest in time, unless farther than max_difference_ns; no
-/// interpolation. Both in the order of time. O(n + m).
+/// interpolation, and one true pose may be the nearest to several: as evo, so that figures compare with
+/// published ones. Both in the order of time. O(n + m).
 [[nodiscard]] std::vector<PosePair> associate(const Trajectory& estimate, const Trajectory& truth,
                                               std::int64_t max_difference_ns);
 
@@ -61,6 +62,24 @@ struct RelativeError {
       translation_percent;  ///< |trans(E)| over the true path between i and j, where that is not zero
 };
 
+/// As the KITTI odometry benchmark states them: means over segments of the true path, each error over the
+/// segment's nominal length.
+struct SegmentErrors {
+  double length = 0;  ///< of each segment [m]; 0: of several lengths
+  std::size_t count = 0;
+  double translation_percent = 0;     ///< t_rel: |trans(E)|, E as in RelativeError
+  double rotation_deg_per_100_m = 0;  ///< r_rel: angle of rot(E)
+};
+
+struct KittiErrors {
+  SegmentErrors mean;                    ///< over the segments of all lengths
+  std::vector<SegmentErrors> by_length;  ///< of 100, 200, .. 800 m those that the path is long enough for
+};
+
+/// A segment of each length begins at every tenth pose and ends at the first one farther along than that, if
+/// there is one (Geiger, Lenz, Urtasun, CVPR 2012, and the benchmark's development kit).
+[[nodiscard]] KittiErrors kitti_errors(const std::vector<PosePair>& pairs);
+
 struct EvaluationOptions {
   Alignment alignment = Alignment::kSe3;
   double delta_s = 1.0;            ///< step of the error per time
@@ -79,9 +98,10 @@ struct Evaluation {
   ErrorStatistics absolute;                          ///< ATE: |t_truth - t_aligned|  [m]
   ErrorStatistics absolute_rotation_deg;             ///< angle between true and aligned orientation
   RelativeError per_second;                          ///< every i with the j nearest to delta_s later
-  RelativeError per_metre;  ///< consecutive pieces of the true path of at least delta_m, as evo's
-                            ///< default ("-d 1 -u m --pairs_from_reference")
-  double path_length = 0;   ///< of the truth over the pairs  [m]
+  RelativeError per_metre;  ///< consecutive pieces of the true path of at least delta_m, from its beginning;
+                            ///< evo's default ("-d 1 -u m --pairs_from_reference") leaves out the first
+  KittiErrors kitti;
+  double path_length = 0;  ///< of the truth over the pairs  [m]
 };
 
 /// @return  why there is nothing to evaluate, when the alignment is undetermined or there are no pairs

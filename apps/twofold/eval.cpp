@@ -119,6 +119,19 @@ void print_row(const char* name, const char* unit, const ErrorStatistics& s) {
              s.rmse, s.mean, s.median, s.stddev, s.max);
 }
 
+/// "100 m", "100 and 200 m", "100, 200, .. 800 m".
+std::string lengths_text(const std::vector<SegmentErrors>& by_length) {
+  switch (by_length.size()) {
+    case 1:
+      return fmt::format("{:g} m", by_length[0].length);
+    case 2:
+      return fmt::format("{:g} and {:g} m", by_length[0].length, by_length[1].length);
+    default:
+      return fmt::format("{:g}, {:g}, .. {:g} m", by_length[0].length, by_length[1].length,
+                         by_length.back().length);
+  }
+}
+
 void print_table(const EvalArguments& arguments, const Evaluation& e, std::size_t of, bool has_times) {
   fmt::print(
       "{} against {}\n{} poses of {} have a partner, path {:.3f} m, align {}, scale {:.6f}, ATE {:.4f} % of "
@@ -142,6 +155,11 @@ void print_table(const EvalArguments& arguments, const Evaluation& e, std::size_
   print_row("RPE over 1 m", "m", e.per_metre.translation);
   print_row("RPE over 1 m", "deg", e.per_metre.rotation_deg);
   print_row("RPE over 1 m / path", "%", e.per_metre.translation_percent);
+  if (const SegmentErrors& mean = e.kitti.mean; mean.count > 0) {
+    fmt::print("\nKITTI's t_rel {:.4f} %, r_rel {:.4f} deg/100 m: means over {} segments of {}\n",
+               mean.translation_percent, mean.rotation_deg_per_100_m, mean.count,
+               lengths_text(e.kitti.by_length));
+  }
 }
 
 nlohmann::ordered_json to_json(const ErrorStatistics& s) {
@@ -153,6 +171,21 @@ nlohmann::ordered_json to_json(const RelativeError& e) {
   return {{"translation_m", to_json(e.translation)},
           {"rotation_deg", to_json(e.rotation_deg)},
           {"translation_percent", to_json(e.translation_percent)}};
+}
+
+nlohmann::ordered_json to_json(const SegmentErrors& e) {
+  nlohmann::ordered_json json;
+  if (e.length > 0) json["length_m"] = e.length;
+  json["count"] = e.count;
+  json["t_rel_percent"] = e.translation_percent;
+  json["r_rel_deg_per_100_m"] = e.rotation_deg_per_100_m;
+  return json;
+}
+
+nlohmann::ordered_json to_json(const KittiErrors& e) {
+  nlohmann::ordered_json json = to_json(e.mean);
+  for (const SegmentErrors& one : e.by_length) json["by_length"].push_back(to_json(one));
+  return json;
 }
 
 std::string json_text(const EvalArguments& arguments, const Evaluation& e, std::size_t of, bool has_times) {
@@ -173,6 +206,7 @@ std::string json_text(const EvalArguments& arguments, const Evaluation& e, std::
   if (e.half_scales) json["half_scales"] = *e.half_scales;
   if (has_times) json["rpe_1s"] = to_json(e.per_second);
   json["rpe_1m"] = to_json(e.per_metre);
+  if (e.kitti.mean.count > 0) json["kitti"] = to_json(e.kitti);
   return json.dump(2) + "\n";
 }
 
@@ -268,11 +302,14 @@ void add_eval_command(CLI::App& app, int& exit_code) {
           "what the estimate may be moved by: nothing, a rigid motion, or with scale")
       ->check(CLI::IsMember({"none", "se3", "sim3"}))
       ->default_str("se3");
-  CLI::Option* difference = command
-                                ->add_option("--max-difference", arguments->max_difference_s,
-                                             "largest difference of time stamps [s]")
-                                ->check(at_least_zero())
-                                ->capture_default_str();
+  CLI::Option* difference =
+      command
+          ->add_option("--max-difference", arguments->max_difference_s,
+                       "largest difference of time stamps [s]: each pose is compared with the "
+                       "true one nearest in time, without interpolation; one true pose may "
+                       "serve several")
+          ->check(at_least_zero())
+          ->capture_default_str();
   command->add_option("--json", arguments->json, "write all figures to this file");
   command->add_option("--plot", arguments->plot,
                       "draw both paths from above, or the surface, coloured by error, to this PNG file");

@@ -38,6 +38,31 @@ TEST(EvalCommand, WritesTableJsonAndPlot) {
   EXPECT_EQ(cv::imread(folder / "e.png").empty(), false);
 }
 
+TEST(EvalCommand, LongPathsHaveKittisFigures) {
+  const ScratchFolder folder;
+  const auto figures = [&](double truth_scale, double estimate_scale) {
+    const auto truth = write_circle(folder, "truth.txt", truth_scale);
+    const auto estimate = write_circle(folder, "estimate.txt", estimate_scale);
+    const auto outcome =
+        run(folder, "eval " + estimate + " " + truth + " --align none --json " + (folder / "e.json"));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.out;
+  };
+  const std::string out = figures(40, 40.4);  // 236 m, 1 % too long
+  EXPECT_NE(out.find("KITTI's t_rel "), std::string::npos) << out;
+  EXPECT_NE(out.find("segments of 100 and 200 m"), std::string::npos) << out;
+  const auto kitti = nlohmann::json::parse(content(folder / "e.json"))["kitti"];
+  EXPECT_EQ(kitti["count"], 5) << "from poses 0, 10, 20 and 30 over 100 m, from pose 0 over 200 m";
+  ASSERT_EQ(kitti["by_length"].size(), 2U);
+  EXPECT_EQ(kitti["by_length"][1]["length_m"], 200);
+  EXPECT_NEAR(kitti["r_rel_deg_per_100_m"].get<double>(), 0, 1e-5);
+  // 25 poses are the first to be more than 100 m apart: of what lies straight between, 1 % is wrong.
+  const double chord = std::hypot(2 * 40 * std::sin(2.5 / 2), 40 * 0.01 * 25);
+  EXPECT_NEAR(kitti["by_length"][0]["t_rel_percent"].get<double>(), 0.01 * chord, 1e-5);
+  EXPECT_EQ(figures(10, 10.1).find("KITTI"), std::string::npos) << "59 m";
+  EXPECT_FALSE(nlohmann::json::parse(content(folder / "e.json")).contains("kitti"));
+}
+
 TEST(EvalCommand, HowManyPosesHaveAPartnerIsSaid) {
   const ScratchFolder folder;
   const auto estimate = write_circle(folder, "estimate.txt", 1);

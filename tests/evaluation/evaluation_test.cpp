@@ -116,6 +116,55 @@ TEST(Evaluation, RelativeErrorOfAKnownDrift) {
             "they are)");
 }
 
+/// Along x a metre apart, the estimate `too_long` by that share and turned about z by `turn_deg` a metre.
+std::vector<PosePair> straight_way(int metres, double too_long, double turn_deg) {
+  std::vector<PosePair> pairs;
+  for (int i = 0; i <= metres; ++i) {
+    const SO3 R = SO3::exp(Vector3(0, 0, turn_deg * i * std::numbers::pi / 180));
+    pairs.push_back(
+        {i * 100'000'000LL, SE3(R, Vector3((1 + too_long) * i, 0, 0)), SE3(SO3(), Vector3(i, 0, 0))});
+  }
+  return pairs;
+}
+
+TEST(Evaluation, RelativeErrorPerMetreBeginsAtTheFirstPose) {
+  Trajectory truth, estimate;
+  for (int i = 0; i <= 40; ++i) {
+    const double x = 0.25 * i, wrong = 0.1 * std::min(x, 1.0);  // in the first metre only
+    truth.push_back({i * 100'000'000LL, SE3(SO3(), Vector3(x, 0, 0))});
+    estimate.push_back({i * 100'000'000LL, SE3(SO3(), Vector3(x + wrong, 0, 0))});
+  }
+  const auto result = evaluate(associate(estimate, truth, 0), {.alignment = Alignment::kNone});
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->per_metre.translation.count, 10u);
+  EXPECT_NEAR(result->per_metre.translation.max, 0.1, 1e-12);
+}
+
+TEST(Evaluation, KittiErrorsOfAKnownDrift) {
+  const KittiErrors errors = kitti_errors(straight_way(1000, 0.02, 0));
+  ASSERT_EQ(errors.by_length.size(), 8u);
+  std::size_t segments = 0;
+  for (const SegmentErrors& e : errors.by_length) {
+    // The last pose is the first one beyond the length: a metre more than that lies between.
+    EXPECT_NEAR(e.translation_percent, 2 * (e.length + 1) / e.length, 1e-9) << e.length;
+    EXPECT_EQ(e.rotation_deg_per_100_m, 0) << e.length;
+    EXPECT_EQ(e.count, static_cast<std::size_t>((1000 - e.length) / 10)) << e.length;
+    segments += e.count;
+  }
+  EXPECT_EQ(errors.mean.count, segments);
+  EXPECT_GT(errors.mean.translation_percent, 2 * 801.0 / 800);
+  EXPECT_LT(errors.mean.translation_percent, 2 * 101.0 / 100);
+}
+
+TEST(Evaluation, KittiErrorsOfATurn) {
+  const KittiErrors errors = kitti_errors(straight_way(150, 0, 0.1));
+  ASSERT_EQ(errors.by_length.size(), 1u) << "no 200 m";
+  EXPECT_EQ(errors.by_length[0].count, 5u);
+  EXPECT_NEAR(errors.mean.rotation_deg_per_100_m, 10.1, 1e-9);
+  EXPECT_TRUE(kitti_errors(straight_way(100, 0, 0.1)).by_length.empty()) << "none is beyond 100 m";
+  EXPECT_EQ(kitti_errors({}).mean.count, 0u);
+}
+
 TEST(Evaluation, AssociatesTheNearestWithinTheLimit) {
   const auto at = [](std::int64_t t_ms) {
     return TimedPose{t_ms * 1'000'000, SE3(SO3(), Vector3(double(t_ms), 0, 0))};
@@ -237,6 +286,29 @@ TEST(Evaluation, AgreesWithReferenceOnPublishedTrajectories) {
       EXPECT_NEAR(result->S_w_e.scale(), r.scale, 5e-5) << r.estimate;
     }
   }
+}
+
+/// ORB-SLAM2's published figures for this sequence are 0.70 % and 0.25 deg/100 m; the digits beyond are those
+/// of a program written apart from this, after the development kit's description.
+TEST(Evaluation, KittiErrorsAgreeWithPublishedOnes) {
+  const char* root = std::getenv("TWOFOLD_DATA");
+  if (!root) GTEST_SKIP() << "TWOFOLD_DATA is not set";
+  const auto data = std::filesystem::path(root) / "trajectories_evo";
+  const ScratchFolder scratch;
+  const auto errors_of = [&](const char* estimate) {
+    return kitti_errors(associate(read_trajectory(unpacked(data, estimate, scratch)),
+                                  read_trajectory(unpacked(data, "KITTI_00_gt.txt", scratch)), 0));
+  };
+  const KittiErrors orb = errors_of("KITTI_00_ORB.txt");
+  EXPECT_EQ(orb.mean.count, 3283u);
+  EXPECT_NEAR(orb.mean.translation_percent, 0.699729, 1e-6);
+  EXPECT_NEAR(orb.mean.rotation_deg_per_100_m, 0.253323, 1e-6);
+  ASSERT_EQ(orb.by_length.size(), 8u);
+  EXPECT_EQ(orb.by_length[7].count, 375u);
+  EXPECT_NEAR(orb.by_length[7].translation_percent, 0.415861, 1e-6);
+  const KittiErrors sptam = errors_of("KITTI_00_SPTAM.txt");
+  EXPECT_NEAR(sptam.mean.translation_percent, 1.486961, 1e-6);
+  EXPECT_NEAR(sptam.mean.rotation_deg_per_100_m, 0.557706, 1e-6);
 }
 
 }  // namespace
