@@ -6,7 +6,10 @@
 #include <arm_neon.h>
 #endif
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
+#include <opencv2/core.hpp>
 
 namespace twofold {
 
@@ -48,10 +51,20 @@ void halve(const cv::Mat& image, cv::Mat& half) {
   }
 }
 
+/// Mean of the middle two of its four neighbours, of which one may be on the other side of an edge, or dead.
+std::uint8_t from_neighbours(const cv::Mat& image, const cv::Point& at) {
+  const std::uint8_t* p = image.ptr<std::uint8_t>(at.y) + at.x;
+  const auto stride = static_cast<std::ptrdiff_t>(image.step);
+  std::array<int, 4> around{p[-1], p[1], p[-stride], p[stride]};
+  std::sort(around.begin(), around.end());
+  return static_cast<std::uint8_t>((around[1] + around[2]) / 2);
+}
+
 }  // namespace
 
-void ImagePyramid::build(const cv::Mat& image) {
+void ImagePyramid::build(const cv::Mat& image, std::span<const cv::Point> dead) {
   image.copyTo(levels_[0]);
+  for (const cv::Point& at : dead) levels_[0].at<std::uint8_t>(at) = from_neighbours(levels_[0], at);
   for (std::size_t l = 1; l < kLevels; ++l) halve(levels_[l - 1], levels_[l]);
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <opencv2/core/mat.hpp>
+#include <span>
 
 namespace twofold {
 
@@ -14,7 +15,8 @@ class ImagePyramid {
   static constexpr int kLevels = 5;
 
   /// Refills all levels from `image` (CV_8UC1, copied).
-  void build(const cv::Mat& image);
+  /// @param dead  pixels that show nothing, not on the image's edge: their neighbours take their place
+  void build(const cv::Mat& image, std::span<const cv::Point> dead = {});
   /// Deep copy into existing buffers of the same size, if there are any.
   void copy_from(const ImagePyramid& other);
 

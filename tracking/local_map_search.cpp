@@ -31,8 +31,9 @@ void SearchOutcome::clear() {
   verdict = {};
 }
 
-LocalMapSearch::LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map)
-    : rig_(rig), options_(options), local_map_(local_map) {
+LocalMapSearch::LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map,
+                               const FixedPixels& fixed)
+    : rig_(rig), options_(options), local_map_(local_map), fixed_(fixed) {
   gains_.reserve(static_cast<std::size_t>(options.max_searches));
 }
 
@@ -70,7 +71,7 @@ void LocalMapSearch::select_candidates(const SE3& T_c_ref, TrackResult& result, 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector3 x_c = R_c_ref * points[i].x_ref + T_c_ref.translation();
     const auto uv = rig_.camera.find_in_view(x_c, options_.border_px);
-    if (!uv) continue;
+    if (!uv || fixed_.covers(*uv)) continue;
     const SE3& T_ref_a = local_map_.T_ref_a(points[i]);
     const Vector3 from_anchor = points[i].x_ref - T_ref_a.translation();
     const Vector3 from_here = R_c_ref.transpose() * x_c;

@@ -7,6 +7,7 @@
 #include "estimation/motion_only.hpp"
 #include "imaging/guided_search.hpp"
 #include "tracking/elder_vote.hpp"
+#include "tracking/fixed/fixed_pixels.hpp"
 #include "tracking/frame_step.hpp"
 #include "tracking/local_map.hpp"
 #include "tracking/options.hpp"
@@ -38,7 +39,8 @@ struct SearchOutcome {
 class LocalMapSearch {
  public:
   /// All must outlive this; the rig may learn its readout meanwhile.
-  LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map);
+  LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map,
+                 const FixedPixels& fixed);
 
   /// Points that should be visible from T_c_ref (thesis 6.2.5), by guided search in equi-distributed order
   /// (thesis 3.4.3) until enough were found. Observations, motion and verdict are left to the caller.
@@ -62,6 +64,7 @@ class LocalMapSearch {
   const Rig& rig_;
   const TrackerOptions& options_;
   const LocalMap& local_map_;
+  const FixedPixels& fixed_;  ///< of the left camera
   std::vector<double> gains_;
 };
 

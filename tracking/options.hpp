@@ -7,6 +7,7 @@
 #include "tracking/dense_alignment.hpp"
 #include "tracking/depth/depth_alignment.hpp"
 #include "tracking/elder_vote.hpp"
+#include "tracking/fixed/fixed_pixels.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/first_structure.hpp"
 #include "tracking/wide_search.hpp"
@@ -19,6 +20,7 @@ struct TrackerOptions {
   WideSearchOptions wide_search;
   ElderVoteOptions elders;
   DepthAlignmentOptions depth;
+  FixedPixelOptions fixed;
   /// A step of 1e-5 moves no projection by a hundredth of a pixel. Outliers: beyond 99 % of chi-square,
   /// because real errors (rolling shutter, calibration, depth of a point seen from one place only) have long
   /// tails.

@@ -31,8 +31,11 @@ TrackerOptions with_cells_of_one_camera(const Rig& rig, TrackerOptions options) 
   return options;
 }
 
-PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options)
-    : rig_(rig), options_(options), quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
+PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options, const FixedPixels* fixed)
+    : rig_(rig),
+      options_(options),
+      fixed_(fixed),
+      quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
   options_.cell_px = std::max(options_.cell_px, CellGrid::smallest_cell_px(rig.camera.width));
   columns_ = rig.camera.width / options_.cell_px + 1;
   rows_ = rig.camera.height / options_.cell_px + 1;
@@ -65,7 +68,7 @@ PointStarter::CornerBounds PointStarter::faint_corners() const {
   return {1, std::max(options_.corner_threshold / 2, 1), options_.min_corner_score / 4};
 }
 
-/// Corners of the free cells, into the quadtree.
+/// Corners of the free cells, into the quadtree; none of what moves with the camera.
 void PointStarter::spread_corners(const FrameImages& images, const CornerBounds& bounds) {
   corners_.clear();
   const CellGrid grid{options_.cell_px, columns_, rows_, occupied_};
@@ -75,7 +78,9 @@ void PointStarter::spread_corners(const FrameImages& images, const CornerBounds&
   }
   quadtree_.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
-    quadtree_.insert(at_level_zero(corners_[i]), static_cast<std::uint32_t>(i));
+    const Eigen::Vector2f uv = at_level_zero(corners_[i]);
+    if (fixed_ != nullptr && fixed_->touches(uv, corners_[i].level)) continue;
+    quadtree_.insert(uv, static_cast<std::uint32_t>(i));
   }
 }
 

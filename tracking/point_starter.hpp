@@ -8,6 +8,7 @@
 #include "imaging/fast_corners.hpp"
 #include "imaging/image_pyramid.hpp"
 #include "imaging/point_appearance.hpp"
+#include "tracking/fixed/fixed_pixels.hpp"
 #include "tracking/immature_points.hpp"
 #include "tracking/lost_cause.hpp"
 #include "tracking/options.hpp"
@@ -24,7 +25,8 @@ namespace twofold {
 /// image (thesis 3.4.3, 6.3). Buffers are reserved at construction.
 class PointStarter {
  public:
-  PointStarter(const Rig& rig, const TrackerOptions& options);
+  /// @param fixed  of the left camera; must outlive this. Null: nothing is known of it
+  PointStarter(const Rig& rig, const TrackerOptions& options, const FixedPixels* fixed = nullptr);
 
   /// Marks the whole image as empty.
   void clear();
@@ -68,6 +70,7 @@ class PointStarter {
 
   Rig rig_;
   TrackerOptions options_;
+  const FixedPixels* fixed_;
   int columns_ = 0;
   int rows_ = 0;
   std::vector<std::uint8_t> occupied_;

@@ -17,6 +17,10 @@ constexpr std::size_t kMaxSeeds = 600;
 constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr std::size_t kRecentViews = 4;
 constexpr double kJitter = 0.3;  // of the interval between two frames
+// Of what moves with the camera:
+constexpr double kTrustedShare = 0.5;  // of the matches, inliers: else the pose is in doubt
+constexpr double kFar = 0.1;           // share of the points that may be farther than what moves in the image
+constexpr double kNearer = 2;          // times: what is not tracked may be so much nearer than what is
 
 /// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
 /// better one.
@@ -38,9 +42,11 @@ RecentView room_for_view(const Rig& rig, const WideSearch& search) {
 Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
+      image_motion_(rig.camera),
+      fixed_(rig.camera.width, rig.camera.height, options.fixed),
       local_map_(kMaxLocalPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
-      local_map_search_(rig_, options_, local_map_),
+      local_map_search_(rig_, options_, local_map_, fixed_),
       search_(rig, options),
       tried_(rig, options),
       elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
@@ -48,7 +54,8 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       wide_search_(rig, options.wide_search),
       recent_views_(kRecentViews, room_for_view(rig, wide_search_)),
       immature_points_(kMaxImmaturePoints, kMaxPending),
-      starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options),
+      starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options,
+               &fixed_),
       seeds_(rig, options.search, options.seeds, kMaxSeeds) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   anchors_.reserve(searches);
@@ -56,7 +63,10 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);
   new_corners_.reserve(static_cast<std::size_t>(options.max_new_points));
-  if (rig.kind == SensorKind::kStereo) right_rows_.emplace(rig);
+  if (rig.kind == SensorKind::kStereo) {
+    right_rows_.emplace(rig);
+    fixed_right_.emplace(rig.camera.width, rig.camera.height, options.fixed);
+  }
   if (!rig.readout) readout_.emplace(rig, searches);
   if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
@@ -95,6 +105,7 @@ void Tracker::prepare_next(FrameStep& step) {
   step.resume();
   if (step.tracked && step.result.proposed) propose_keyframe(step);
   if (step.tracked || step.started) remember_frame(step);
+  if (step.tracked) learn_fixed_pixels(step);
   if (step.tracked && !step.result.proposed && !step.result.by_depth) revisit_reference(step.graph);
   describe_views();
   step.lap(TrackerStage::kKeyframe);
@@ -135,11 +146,16 @@ bool Tracker::track(FrameStep& step) {
 }
 
 void Tracker::load_images(const Frame& frame) {
-  current_.left.build(frame.left);
+  current_.left.build(frame.left, fixed_.dead());
   if (right_rows_) {
-    current_.right.build(right_rows_->aligned(frame.right));
-    if (right_rows_->look_at_start(frame.left, current_.right.level(0)))
-      current_.right.build(right_rows_->aligned(frame.right));
+    const auto build_right = [&] {
+      // Moving rows by part of one has spread dead pixels over their neighbours.
+      const bool as_taken = right_rows_->offset() == 0;
+      current_.right.build(right_rows_->aligned(frame.right),
+                           as_taken ? fixed_right_->dead() : std::span<const cv::Point>());
+    };
+    build_right();
+    if (right_rows_->look_at_start(frame.left, current_.right.level(0))) build_right();
   }
   if (rig_.kind == SensorKind::kRgbd) frame.depth.copyTo(current_.depth);
 }
@@ -212,6 +228,11 @@ void Tracker::remember_frame(const FrameStep& step) {
   last_.velocity = goes_on ? velocity_at(result.T_c_ref, step.frame) : std::nullopt;
   last_.T_this_previous = goes_on ? result.T_c_ref * last_.placement.T_c_ref.inverse() : SE3();
   last_.interval = goes_on ? 1e-9 * static_cast<double>(step.frame.t_ns - last_.t_ns) : 0;
+  if (goes_on) {
+    image_motion_.advance(last_.T_this_previous);
+  } else {
+    image_motion_.restart();
+  }
   last_.placement = {result.reference, result.T_c_ref};
   last_.t_ns = step.frame.t_ns;
   if (readout_) learn_readout(step, goes_on);
@@ -238,6 +259,27 @@ void Tracker::remember_frame(const FrameStep& step) {
   last_.by_depth = result.by_depth;
   std::swap(current_, last_.images);
   if (monocular_start_) monocular_start_->reset();
+}
+
+/// What stays the same in the image while the camera moves. A pose that is in doubt is no witness: where
+/// something that passes has taken it along, it is the scene that seems fixed.
+void Tracker::learn_fixed_pixels(const FrameStep& step) {
+  if (step.result.by_depth) return;  // no points say how far the scene is
+  samples_.clear();
+  for (const MotionObservation& observation : search_.observations) {
+    if (observation.inlier) samples_.push_back(1 / (step.result.T_c_ref * observation.x_ref).z());
+  }
+  const bool agreed = step.result.inliers >= kTrustedShare * step.result.matches;
+  if (!agreed || samples_.empty() || elder_vote_.mistrusts_the_young()) {
+    image_motion_.restart();
+    return;
+  }
+  const auto far =
+      samples_.begin() + static_cast<std::ptrdiff_t>(kFar * static_cast<double>(samples_.size()));
+  std::nth_element(samples_.begin(), far, samples_.end());
+  image_motion_.set_inverse_depths(*far, kNearer * *std::max_element(far, samples_.end()));
+  fixed_.look_at(step.frame.left, step.frame.t_ns, image_motion_);
+  if (fixed_right_) fixed_right_->look_at(step.frame.right, step.frame.t_ns, image_motion_);
 }
 
 }  // namespace twofold

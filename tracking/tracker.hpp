@@ -15,6 +15,8 @@
 #include "tracking/dense_alignment.hpp"
 #include "tracking/depth/depth_alignment.hpp"
 #include "tracking/effort.hpp"
+#include "tracking/fixed/fixed_pixels.hpp"
+#include "tracking/fixed/image_motion.hpp"
 #include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
 #include "tracking/keyframe_decision.hpp"
@@ -135,6 +137,7 @@ class Tracker {
   std::optional<SE3> align_to_previous(const SE3& start, FrameStep& step);
   SE3 aligned_pose(FrameStep& step);
   void remember_frame(const FrameStep& step);
+  void learn_fixed_pixels(const FrameStep& step);
 
   // tracker_search.cpp: a pose from points
   LostCause search_from(SearchStart start, FrameStep& step);
@@ -225,6 +228,9 @@ class Tracker {
   const TrackerOptions options_;
 
   FrameImages current_;
+  ImageMotion image_motion_;
+  FixedPixels fixed_;
+  std::optional<FixedPixels> fixed_right_;  ///< stereo only
   LastFrame last_;
   LocalMap local_map_;
   DenseAlignment dense_alignment_;

@@ -1,0 +1,189 @@
+#include "tracking/fixed/fixed_pixels.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include "base/option_check.hpp"
+#include "imaging/byte_run.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr int kRim = 4;                 // [px] along the image's edge that is not looked at
+constexpr double kAside = kRim;         // [px] along the motion: what a pixel is compared with
+constexpr int kMostVotes = 2;           // times as many as are believed are kept
+constexpr int kAgainst = 4;             // votes that a change takes back
+constexpr int kFewestInQuarter = 16;    // fixed pixels that cover a quarter of a block ...
+constexpr int kMostTelling = 2;         // ... unless more than so many times as many are telling
+constexpr int kTouching = 3;            // fixed pixels, of those of a 5x5 patch
+constexpr std::size_t kAllDead = 8192;  // of an image
+
+ByteRun difference(ByteRun a, ByteRun b) {
+  return larger(a, b) - smaller(a, b);
+}
+
+void store_run(ByteRun bytes, std::uint8_t* p) {
+  std::memcpy(p, &bytes, sizeof bytes);
+}
+
+/// How many of the 3x3 pixels around bit x of row y are set.
+int count_around(const std::array<std::uint32_t, kByteRun>& rows, int x, int y) {
+  int count = 0;
+  for (int row = std::max(y - 1, 0); row <= std::min(y + 1, kByteRun - 1); ++row) {
+    const std::uint64_t bits = std::uint64_t{rows[static_cast<std::size_t>(row)]} << 1;
+    count += std::popcount((bits >> x) & 7U);
+  }
+  return count;
+}
+
+}  // namespace
+
+std::string FixedPixelOptions::invalid_reason() const {
+  return OptionCheck()
+      .above("min_motion_px", min_motion_px, 0)
+      .within("same_grey", same_grey, 0, 254)
+      .within("min_contrast", min_contrast, same_grey, 254)
+      .within("believed", believed, 1, 100)
+      .above("round", round, 0)
+      .share("most_of_it", most_of_it)
+      .reason();
+}
+
+FixedPixels::FixedPixels(int width, int height, const FixedPixelOptions& options) : options_(options) {
+  static_assert(kSide == kByteRun, "a row of a block is a run");
+  if (!options.enabled || std::min(width, height) < kSide + 2 * kRim) return;
+  columns_ = (width - 2 * kRim + kSide - 1) / kSide;
+  rows_ = (height - 2 * kRim + kSide - 1) / kSide;
+  blocks_.resize(static_cast<std::size_t>(columns_ * rows_));
+  for (int i = 0; i < columns_ * rows_; ++i) {
+    Block& block = blocks_[static_cast<std::size_t>(i)];
+    // The last of a row or column overlaps the one before it.
+    block.u = std::min(kRim + i % columns_ * kSide, width - kRim - kSide);
+    block.v = std::min(kRim + i / columns_ * kSide, height - kRim - kSide);
+  }
+  dead_.reserve(kAllDead);
+}
+
+void FixedPixels::look_at(const cv::Mat& image, std::int64_t t_ns, ImageMotion& motion) {
+  const double rounds = 1e-9 * static_cast<double>(t_ns - last_ns_) / options_.round;
+  last_ns_ = t_ns;
+  const auto blocks = static_cast<double>(blocks_.size());
+  const auto looks = static_cast<std::size_t>(std::ceil(std::clamp(rounds, 0.0, 1.0) * blocks));
+  for (std::size_t i = 0; i < looks; ++i) {
+    look_at_block(image, motion, blocks_[next_]);
+    if (++next_ < blocks_.size()) continue;
+    next_ = 0;
+    list_dead();
+  }
+}
+
+void FixedPixels::look_at_block(const cv::Mat& image, ImageMotion& motion, Block& block) {
+  const auto moved = motion.least_since(block.taken, {block.u + kSide / 2, block.v + kSide / 2});
+  if (moved && moved->norm() < options_.min_motion_px) return;
+  if (moved) vote(image, *moved, block);
+  for (int y = 0; y < kSide; ++y)
+    std::memcpy(&block.before[static_cast<std::size_t>(y * kSide)],
+                image.ptr<std::uint8_t>(block.v + y) + block.u, kSide);
+  block.taken = motion.frame();
+}
+
+void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& block) {
+  const Vector2 along = kAside * motion_px.normalized();
+  const auto aside =
+      static_cast<std::ptrdiff_t>(image.step) * std::lround(along.y()) + std::lround(along.x());
+  const auto same = static_cast<std::uint8_t>(options_.same_grey);
+  const auto believed = static_cast<std::uint8_t>(options_.believed);
+  Rows fixed{}, telling{};
+  for (int y = 0; y < kSide; ++y) {
+    const std::uint8_t* p = image.ptr<std::uint8_t>(block.v + y) + block.u;
+    std::uint8_t* votes = &block.votes[static_cast<std::size_t>(y * kSide)];
+    const ByteRun now = load_run(p);
+    const ByteRun change = difference(now, load_run(&block.before[static_cast<std::size_t>(y * kSide)]));
+    const ByteRun contrast =
+        larger(difference(now, load_run(p + aside)), difference(now, load_run(p - aside)));
+    const ByteRun tells = above(contrast, run_of(static_cast<std::uint8_t>(options_.min_contrast - 1)));
+    const ByteRun stays = above(run_of(static_cast<std::uint8_t>(same + 1)), change) & tells;
+    const ByteRun goes = above(change, run_of(same));
+    ByteRun count = load_run(votes);
+    count = count - smaller(count, goes & run_of(kAgainst));
+    // A byte of `stays` is 255, which is -1; what is believed and more is enough.
+    count = smaller(count - stays, run_of(static_cast<std::uint8_t>(kMostVotes * believed)));
+    store_run(count, votes);
+    fixed[static_cast<std::size_t>(y)] =
+        mask_of(above(count, run_of(static_cast<std::uint8_t>(believed - 1))));
+    telling[static_cast<std::size_t>(y)] = mask_of(tells);
+  }
+  sum_up(fixed, telling, block);
+}
+
+/// What a block's votes come to.
+void FixedPixels::sum_up(const Rows& fixed, const Rows& telling, Block& block) {
+  covered_ -= std::popcount(block.covered);
+  block.covered = 0;
+  block.dead_count = 0;
+  int all_fixed = 0;
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    const std::uint32_t half = quarter % 2 == 0 ? 0xffffU : 0xffff0000U;
+    int count = 0, could_be = 0;
+    for (int y = quarter / 2 * (kSide / 2); y < (quarter / 2 + 1) * (kSide / 2); ++y) {
+      count += std::popcount(fixed[static_cast<std::size_t>(y)] & half);
+      could_be += std::popcount(telling[static_cast<std::size_t>(y)] & half);
+    }
+    if (count >= kFewestInQuarter && could_be <= kMostTelling * count)
+      block.covered = static_cast<std::uint8_t>(block.covered | 1U << quarter);
+    all_fixed += count;
+  }
+  covered_ += std::popcount(block.covered);
+  if (all_fixed > static_cast<int>(kMostDead)) return;
+  for (int y = 0; y < kSide; ++y) {
+    for (std::uint32_t left = fixed[static_cast<std::size_t>(y)]; left != 0; left &= left - 1) {
+      const int x = std::countr_zero(left);
+      if (count_around(fixed, x, y) >= kTouching) continue;
+      block.dead[block.dead_count++] = static_cast<std::uint16_t>(y * kSide + x);
+    }
+  }
+}
+
+void FixedPixels::list_dead() {
+  dead_.clear();
+  for (const Block& block : blocks_) {
+    for (std::size_t i = 0; i < block.dead_count && dead_.size() < dead_.capacity(); ++i)
+      dead_.emplace_back(block.u + block.dead[i] % kSide, block.v + block.dead[i] / kSide);
+  }
+}
+
+const FixedPixels::Block* FixedPixels::block_at(int u, int v) const {
+  const int column = (u - kRim) / kSide, row = (v - kRim) / kSide;
+  if (u < kRim || v < kRim || column >= columns_ || row >= rows_) return nullptr;
+  const Block& block = blocks_[static_cast<std::size_t>(row * columns_ + column)];
+  return u < block.u + kSide && v < block.v + kSide ? &block : nullptr;
+}
+
+bool FixedPixels::covers(const Vector2& uv) const {
+  if (covered_ == 0 || !is_believable()) return false;
+  const int u = static_cast<int>(uv.x()), v = static_cast<int>(uv.y());
+  const Block* block = block_at(u, v);
+  if (block == nullptr) return false;
+  const int quarter = (v - block->v) / (kSide / 2) * 2 + (u - block->u) / (kSide / 2);
+  return (block->covered >> quarter & 1) != 0;
+}
+
+bool FixedPixels::touches(const Eigen::Vector2f& uv, int level) const {
+  if (blocks_.empty() || !is_believable()) return false;
+  int fixed = 0;
+  for (int dy = -2; dy <= 2; ++dy) {
+    for (int dx = -2; dx <= 2; ++dx) {
+      const int u = static_cast<int>(uv.x()) + dx * (1 << level);
+      const int v = static_cast<int>(uv.y()) + dy * (1 << level);
+      const Block* block = block_at(u, v);
+      if (block == nullptr) continue;
+      const auto at = static_cast<std::size_t>((v - block->v) * kSide + u - block->u);
+      fixed += block->votes[at] >= options_.believed ? 1 : 0;
+    }
+  }
+  return fixed >= kTouching;
+}
+
+}  // namespace twofold

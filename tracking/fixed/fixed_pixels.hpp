@@ -1,0 +1,86 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "geometry/types.hpp"
+#include "tracking/fixed/image_motion.hpp"
+
+namespace twofold {
+
+struct FixedPixelOptions {
+  bool enabled = true;
+  double min_motion_px = 8;  ///< by which the scene must have moved at a pixel between two looks, > 0
+  int same_grey = 3;         ///< a pixel that has changed by more shows the scene, >= 0
+  /// A pixel is telling if it differs by so much from what lies along the motion, >= same_grey.
+  int min_contrast = 12;
+  int believed = 5;         ///< looks at which a telling pixel must have stayed the same, in [1, 100]
+  double round = 0.2;       ///< time in which all of the image is looked at once [s], > 0
+  double most_of_it = 0.5;  ///< of the image: when more seems fixed, nothing is believed to be, in (0, 1]
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Learns which pixels show what moves with the camera: a bonnet, a robot's own arm, a caption, dirt, dead
+/// pixels. They stay the same while the camera's motion moves the scene behind them.
+///
+/// The image is looked at in blocks, some in each frame, in turn. Where the scene has moved far enough since
+/// a block was looked at last, whatever its depth, each of its pixels votes: one that differs from what lies
+/// along the motion, and is the same as before, for being fixed; one that has changed against it, several
+/// times as much. A camera at rest, the direction of travel and plain surfaces give no votes.
+///
+/// One instance a camera. No allocation after construction; bounded work.
+class FixedPixels {
+ public:
+  FixedPixels(int width, int height, const FixedPixelOptions& options);
+
+  /// The newest frame's image (CV_8UC1) as the camera gave it, nothing repaired. How much of it is looked at
+  /// follows from the time since the last one, so that all of it costs the same share of the time at any
+  /// rate.
+  void look_at(const cv::Mat& image, std::int64_t t_ns, ImageMotion& motion);
+
+  /// What is seen around this pixel is fixed: nothing of the scene is found there.
+  [[nodiscard]] bool covers(const Vector2& uv) const;
+  /// A patch of pyramid level `level` at this level-0 pixel has several fixed pixels.
+  [[nodiscard]] bool touches(const Eigen::Vector2f& uv, int level) const;
+  /// Fixed pixels that stand alone: dead ones.
+  [[nodiscard]] std::span<const cv::Point> dead() const { return dead_; }
+
+ private:
+  static constexpr int kSide = 32;  ///< of a block [px]
+  static constexpr int kArea = kSide * kSide;
+  static constexpr std::size_t kMostDead = 24;  ///< in a block; more are no single ones
+  using Rows = std::array<std::uint32_t, kSide>;
+  struct Block {
+    int u = 0, v = 0;         ///< its first pixel
+    std::int64_t taken = -1;  ///< frame that `before` is of
+    std::array<std::uint8_t, kArea> before{}, votes{};
+    std::uint8_t covered = 0;  ///< quarters of it that are fixed, a bit each
+    std::uint8_t dead_count = 0;
+    std::array<std::uint16_t, kMostDead> dead{};  ///< positions
+  };
+
+  void look_at_block(const cv::Mat& image, ImageMotion& motion, Block& block);
+  void vote(const cv::Mat& image, const Vector2& motion_px, Block& block);
+  void sum_up(const Rows& fixed, const Rows& telling, Block& block);
+  void list_dead();
+  [[nodiscard]] const Block* block_at(int u, int v) const;
+  [[nodiscard]] bool is_believable() const {
+    return covered_ <= options_.most_of_it * 4 * static_cast<double>(blocks_.size());
+  }
+
+  FixedPixelOptions options_;
+  int columns_ = 0, rows_ = 0;
+  std::vector<Block> blocks_;
+  std::size_t next_ = 0;  ///< block to be looked at
+  std::int64_t last_ns_ = 0;
+  int covered_ = 0;  ///< quarters of blocks
+  std::vector<cv::Point> dead_;
+};
+
+}  // namespace twofold
