@@ -48,6 +48,7 @@ std::unique_ptr<PlaybackSource> open_folder(RecordingReader read, const SourceSp
   SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
   Recording recording = read(spec.argument, options.calibration, parameters);
   recording.left_only = options.left_only;
+  recording.range = parameters.take_range();
   parameters.expect_all_taken();
   return std::make_unique<PlaybackSource>(std::move(recording));
 }
@@ -59,22 +60,59 @@ Opener recording_opener(const std::string& scheme) {
   };
 }
 
+/// Some of another source's frames, which keep their numbers and times. Those before are read and dropped:
+/// for recordings that can only be read from their beginning.
+class RangedSource final : public FrameSource {
+ public:
+  RangedSource(std::unique_ptr<FrameSource> source, const FrameRange& range, std::string file)
+      : source_(std::move(source)), range_(range), file_(std::move(file)) {
+    rig_ = source_->rig();
+    R_rectified_raw_ = source_->R_rectified_raw();
+  }
+  [[nodiscard]] SourceReport report() const override { return source_->report(); }
+
+ private:
+  bool read(Frame& frame) override {
+    do {
+      if (taken_ - range_.first >= range_.most) return false;
+      if (!next_or_throw(*source_, frame)) {
+        range_.expect_within(file_, taken_);
+        return false;
+      }
+    } while (taken_++ < range_.first);
+    return true;
+  }
+
+  std::unique_ptr<FrameSource> source_;  // without truth and colour: no video or bag has them
+  const FrameRange range_;
+  const std::string file_;
+  std::int64_t taken_ = 0;  // of source_, the dropped ones, too
+};
+
+std::unique_ptr<FrameSource> part_of(std::unique_ptr<FrameSource> source, const FrameRange& range,
+                                     const std::string& file) {
+  if (range.is_whole()) return source;
+  return std::make_unique<RangedSource>(std::move(source), range, file);
+}
+
 std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOptions& options) {
   std::error_code error;
   if (!fs::is_regular_file(spec.argument, error)) throw IoError(spec.argument, "no such video file");
   SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
+  const FrameRange range = parameters.take_range();
   auto source = std::make_unique<VideoSource>(spec.argument, options.calibration, parameters);
   parameters.expect_all_taken();
-  return source;
+  return part_of(std::move(source), range, spec.argument);
 }
 
 Opener bag_opener(std::unique_ptr<BagReader> (*open)(const fs::path&)) {
   return [open](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
     SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
+    const FrameRange range = parameters.take_range();
     auto source =
         std::make_unique<BagSource>(open(spec.argument), spec.argument, options.calibration, parameters);
     parameters.expect_all_taken();
-    return source;
+    return part_of(std::move(source), range, spec.argument);
   };
 }
 

@@ -122,6 +122,11 @@ int grey_bits_of(const std::vector<RecordedFrame>& frames, const fs::path& first
 
 PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recording)) {
   if (recording_.frames.empty()) throw IoError(recording_.folder, "the recording holds no frames");
+  const auto count = static_cast<std::int64_t>(recording_.frames.size());
+  const FrameRange& range = recording_.range;
+  range.expect_within(recording_.folder.string(), count);
+  next_ = static_cast<std::size_t>(range.first);
+  end_ = static_cast<std::size_t>(range.first + std::min(range.most, count - range.first));
   const cv::Mat first = first_image();
   const fs::path& first_file = recording_.frames[next_].left;
   grey_bits_ = grey_bits_of(recording_.frames, first_file);
@@ -206,7 +211,7 @@ cv::Mat PlaybackSource::rectified_left(const fs::path& file, const cv::Mat& raw)
 }
 
 cv::Mat PlaybackSource::first_image() {
-  for (; next_ < recording_.frames.size(); ++next_) {
+  for (; next_ < end_; ++next_) {
     try {
       return read_grey_image(recording_.frames[next_].left);
     } catch (const IoError& error) {
@@ -218,7 +223,7 @@ cv::Mat PlaybackSource::first_image() {
 }
 
 bool PlaybackSource::read_raw(Frame& raw) {
-  while (next_ < recording_.frames.size()) {
+  while (next_ < end_) {
     const std::size_t index = next_++;
     const RecordedFrame& files = recording_.frames[index];
     try {

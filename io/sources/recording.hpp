@@ -29,6 +29,7 @@ struct Recording {
   Calibration calibration;                 ///< a size of 0 x 0 is taken from the first image
   bool left_only = false;             ///< nobody looks at right and depth images, which need not be there
   std::vector<RecordedFrame> frames;  ///< t_ns strictly increasing
+  FrameRange range;                   ///< of these, what is played
   Trajectory ground_truth;            ///< T_w_c of the raw left camera
   std::uint64_t alone = 0;            ///< images that were left out for want of a partner
   std::vector<std::string> notes;     ///< SourceReport::notes
@@ -78,7 +79,7 @@ class PlaybackSource final : public FrameSource {
   /// Throws IoError when the calibration is invalid or none of the first images decodes.
   explicit PlaybackSource(Recording recording);
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override {
-    return static_cast<std::int64_t>(recording_.frames.size());
+    return static_cast<std::int64_t>(end_) - recording_.range.first;
   }
   [[nodiscard]] SourceReport report() const override;
   [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
@@ -99,7 +100,7 @@ class PlaybackSource final : public FrameSource {
   Recording recording_;
   std::optional<Rectifier> rectifier_;
   int grey_bits_ = 16;  ///< of images of 16 bits
-  std::size_t next_ = 0;
+  std::size_t next_ = 0, end_ = 0;
   DamagedImages damaged_;
 };
 

@@ -86,6 +86,29 @@ std::int64_t SourceParameters::take_max_gap_ns(double otherwise) {
   return std::llround(gap * 1e9);
 }
 
+std::optional<std::int64_t> SourceParameters::take_count(const std::string& key, std::int64_t least) {
+  const auto text = take_text(key);
+  if (!text) return std::nullopt;
+  const auto count = to_integer(*text);
+  if (!count || *count < least)
+    throw IoError(subject_,
+                  fmt::format("parameter {}='{}' is not a whole number from {} on", key, *text, least));
+  return count;
+}
+
+FrameRange SourceParameters::take_range() {
+  FrameRange range;
+  range.first = take_count("first", 0).value_or(range.first);
+  range.most = take_count("frames", 1).value_or(range.most);
+  return range;
+}
+
+void FrameRange::expect_within(const std::string& subject, std::int64_t count) const {
+  if (first == 0 || first < count) return;
+  throw IoError(subject,
+                fmt::format("first={}: the recording has {} frames, which count from 0", first, count));
+}
+
 void SourceParameters::expect_all_taken() const {
   if (values_.empty()) return;
   throw IoError(subject_, fmt::format("unknown parameter '{}'", values_.begin()->first));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,6 +20,16 @@ struct SourceSpec {
 /// Splits a source text. An existing path is never split. Throws IoError on a parameter without '=', an empty
 /// or repeated key, or an empty argument.
 [[nodiscard]] SourceSpec parse_source_spec(const std::string& text);
+
+/// A part of a recording: its frames number first, first + 1, .., as many as `most` or as there are.
+struct FrameRange {
+  std::int64_t first = 0;
+  std::int64_t most = std::numeric_limits<std::int64_t>::max();
+
+  [[nodiscard]] bool is_whole() const { return first == 0 && most == FrameRange().most; }
+  /// Throws IoError unless some of `count` frames are in it, or it is the whole.
+  void expect_within(const std::string& subject, std::int64_t count) const;
+};
 
 /// Typed access to the parameters of a source that remembers what was asked for, so that a misspelt key is an
 /// error.
@@ -41,6 +52,8 @@ class SourceParameters {
   [[nodiscard]] bool take_drop_unpaired();
   /// max_gap in seconds: how far apart in time images of a pair may be. Throws IoError unless from 0 to 1.
   [[nodiscard]] std::int64_t take_max_gap_ns(double otherwise);
+  /// first and frames. Throws IoError unless they are whole numbers, from 0 and from 1.
+  [[nodiscard]] FrameRange take_range();
   /// Throws IoError when a key was given that nobody took.
   void expect_all_taken() const;
 
@@ -49,6 +62,9 @@ class SourceParameters {
   [[nodiscard]] bool left_only() const { return left_only_; }
 
  private:
+  /// Throws IoError when it is given and not a whole number of at least `least`.
+  [[nodiscard]] std::optional<std::int64_t> take_count(const std::string& key, std::int64_t least);
+
   std::string subject_;
   std::map<std::string, std::string> values_;
   bool suppose_camera_ = false;

@@ -161,6 +161,34 @@ TEST_F(RunCommand, LiveRunIsReplayedByteForByte) {
   for (std::size_t i = 0; i < files.size(); ++i) EXPECT_EQ(result(files[i]), live[i]) << files[i];
 }
 
+TEST_F(RunCommand, APartOfARecordingIsRunReplayedAndEvaluated) {
+  const std::string source = "'kitti:" + recording_.string() + "?first=10&frames=8'";
+  const auto run_part = [&](const std::string& out, const std::string& options) {
+    const Outcome outcome = run(folder_, "run " + source + " --out '" + out + "' " + options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  };
+  run_part(folder_ / "live", "--speed 2 --preload");
+  const Trajectory estimate = read_trajectory(folder_ / "live/trajectory.txt");
+  ASSERT_EQ(estimate.size(), 8U);
+  EXPECT_EQ(estimate.front().t_ns, 500'000'000);
+  EXPECT_EQ(estimate.back().t_ns, 850'000'000);
+  std::string frames = content(folder_ / "live/frames.txt");
+  frames = frames.substr(frames.find("\n") + 1);
+  EXPECT_TRUE(frames.starts_with("10 ")) << frames;
+  EXPECT_EQ(nlohmann::json::parse(content(folder_ / "live/summary.json"))["tracked"], 8);
+
+  run_part(folder_ / "again", "--replay-schedule '" + (folder_ / "live/schedule.log") + "'");
+  for (const char* file : {"/trajectory.txt", "/keyframes.txt", "/map.ply"})
+    EXPECT_EQ(content(folder_ / "again" + file), content(folder_ / "live" + file)) << file;
+
+  const Outcome evaluated = run(folder_, "eval '" + (folder_ / "live/trajectory.txt") + "' " + source +
+                                             " --json '" + (folder_ / "e.json") + "'");
+  ASSERT_EQ(evaluated.exit_code, 0) << evaluated.err;
+  const auto json = nlohmann::json::parse(content(folder_ / "e.json"));
+  EXPECT_EQ(json["poses"], 8);
+  EXPECT_LT(json["ate_m"]["rmse"], 0.005);
+}
+
 TEST_F(RunCommand, InterruptedRunKeepsItsResults) {
   for (const std::string signal : {"INT", "TERM", "HUP"}) {
     SCOPED_TRACE(signal);

@@ -89,6 +89,48 @@ TEST(FrameSource, KittiStereo) {
   EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
 }
 
+std::vector<std::int64_t> frame_numbers_of(FrameSource& source) {
+  std::vector<std::int64_t> numbers;
+  for (Frame frame; source.next(frame) == FrameStatus::kFrame;) numbers.push_back(frame.index);
+  return numbers;
+}
+
+TEST(FrameSource, APartOfARecordingKeepsNumbersAndTimes) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  const auto source = open_source(folder.path().string() + "?first=1&frames=3");
+  EXPECT_EQ(source->frame_count(), 3);
+  EXPECT_EQ(source->ground_truth().size(), std::size_t{kCount}) << "is of the whole";
+  Frame frame;
+  for (int i = 1; i <= 3; ++i) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.index, i);
+    EXPECT_EQ(frame.t_ns, i * 100'000'000LL);
+    EXPECT_EQ(frame.left.at<unsigned char>(0, 5), i);
+    EXPECT_EQ(frame.right.at<unsigned char>(0, 5), 100 + i);
+  }
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+  using Numbers = std::vector<std::int64_t>;
+  EXPECT_EQ(frame_numbers_of(*open_source(folder.path().string() + "?first=3")), (Numbers{3, 4}));
+  EXPECT_EQ(frame_numbers_of(*open_source(folder.path().string() + "?frames=2")), (Numbers{0, 1}));
+  EXPECT_EQ(frame_numbers_of(*open_source(folder.path().string() + "?first=4&frames=1000")), (Numbers{4}));
+  folder.write("image_0/000000.png", "broken");
+  EXPECT_EQ(frame_numbers_of(*open_source(folder.path().string() + "?first=1")), (Numbers{1, 2, 3, 4}))
+      << "what comes before is not read";
+}
+
+TEST(FrameSource, PartsThatNoRecordingHasAreRefused) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  const std::string path = folder.path().string();
+  EXPECT_IO_ERROR(open_source(path + "?first=5"), "first=5: the recording has 5 frames, which count from 0");
+  EXPECT_IO_ERROR(open_source(path + "?first=-1"), "parameter first='-1' is not a whole number from 0 on");
+  EXPECT_IO_ERROR(open_source(path + "?first=1.5"), "parameter first='1.5' is not a whole number");
+  EXPECT_IO_ERROR(open_source(path + "?frames=0"), "parameter frames='0' is not a whole number from 1 on");
+  EXPECT_IO_ERROR(open_source(path + "?frames=all"), "parameter frames='all' is not a whole number");
+  EXPECT_IO_ERROR(open_source("synthetic:desk?first=3"), "first");
+}
+
 TEST(FrameSource, EarlierFramesSurviveLaterOnes) {
   const ScratchFolder folder;
   write_kitti(folder);
@@ -524,6 +566,24 @@ TEST(FrameSource, FramesOfAVideoHaveTheTimesThatTheFileGivesThem) {
   with_rate.calibration = folder.write(
       "lens.yaml", "sensor: mono\nfps: 60\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n");
   EXPECT_EQ(times("", with_rate), of_file) << "the rate is what the camera was asked for";
+}
+
+TEST(FrameSource, APartOfAVideoKeepsNumbersAndTimes) {
+  const ScratchFolder folder;
+  const std::string file = folder / "part.avi";
+  if (!write_video(file, "MJPG", 8)) GTEST_SKIP() << "OpenCV here cannot write MJPEG";
+  const std::string camera = "?fx=50&fy=50&cx=32&cy=24";
+  const auto source = open_source("video:" + file + camera + "&first=5&frames=2");
+  Frame frame;
+  for (int i = 5; i < 7; ++i) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.index, i);
+    EXPECT_EQ(frame.t_ns, i * 40'000'000LL);
+  }
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+  EXPECT_TRUE(source->report().faults.empty()) << "it is not cut short";
+  const std::string beyond = drain(*open_source("video:" + file + camera + "&first=8"));
+  EXPECT_NE(beyond.find("part.avi: first=8: the recording has 8 frames"), std::string::npos) << beyond;
 }
 
 TEST(FrameSource, AVideoThatIsCutShortSaysSo) {

@@ -44,6 +44,24 @@ TEST(BagSource, GivesStereoPairsWithTheCalibrationOfTheBag) {
   }
 }
 
+TEST(BagSource, APartKeepsNumbersAndTimes) {
+  const ScratchFolder folder;
+  folder.write("a.mcap", text_of(mcap_file(stereo_bag(MessageEncoding::kCdr), {})));
+  const auto source = open_source("mcap:" + (folder / "a.mcap") + "?first=1&frames=2");
+  EXPECT_NEAR(source->rig().baseline, 0.2, 1e-12);
+  Frame frame;
+  for (int i = 1; i < 3; ++i) {
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    EXPECT_EQ(frame.index, i);
+    EXPECT_EQ(frame.t_ns, time_of(i));
+    EXPECT_EQ(frame.right.at<unsigned char>(0, 1), 100 + i);
+  }
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+  const std::string beyond =
+      drain(*open_source("mcap:" + (folder / "a.mcap") + "?first=" + std::to_string(kCount)));
+  EXPECT_NE(beyond.find("frames, which count from 0"), std::string::npos) << beyond;
+}
+
 TEST(BagSource, OneCameraOfAPair) {
   const ScratchFolder folder;
   folder.write("a.mcap", text_of(mcap_file(stereo_bag(MessageEncoding::kCdr), {})));
