@@ -19,6 +19,8 @@ constexpr int kFewestInQuarter = 16;    // fixed pixels that cover a quarter of 
 constexpr int kMostTelling = 2;         // ... unless more than so many times as many are telling
 constexpr int kTouching = 3;            // fixed pixels, of those of a 5x5 patch
 constexpr std::size_t kAllDead = 8192;  // of an image
+constexpr std::uint8_t kRest = 3;       // rounds in which what clearly shows the scene is not looked at
+constexpr std::uint8_t kChance = 1;     // votes that a pixel of the scene gets now and then
 
 ByteRun difference(ByteRun a, ByteRun b) {
   return larger(a, b) - smaller(a, b);
@@ -80,6 +82,10 @@ void FixedPixels::look_at(const cv::Mat& image, std::int64_t t_ns, ImageMotion& 
 }
 
 void FixedPixels::look_at_block(const cv::Mat& image, ImageMotion& motion, Block& block) {
+  if (block.rest > 0) {
+    --block.rest;
+    return;
+  }
   const auto moved = motion.least_since(block.taken, {block.u + kSide / 2, block.v + kSide / 2});
   if (moved && moved->norm() < options_.min_motion_px) return;
   if (moved) vote(image, *moved, block);
@@ -96,6 +102,8 @@ void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& bl
   const auto same = static_cast<std::uint8_t>(options_.same_grey);
   const auto believed = static_cast<std::uint8_t>(options_.believed);
   Rows fixed{}, telling{};
+  ByteRun most{};
+  int staying = 0;
   for (int y = 0; y < kSide; ++y) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(block.v + y) + block.u;
     std::uint8_t* votes = &block.votes[static_cast<std::size_t>(y * kSide)];
@@ -111,11 +119,15 @@ void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& bl
     // A byte of `stays` is 255, which is -1; what is believed and more is enough.
     count = smaller(count - stays, run_of(static_cast<std::uint8_t>(kMostVotes * believed)));
     store_run(count, votes);
+    most = larger(most, count);
+    staying += std::popcount(mask_of(stays));
     fixed[static_cast<std::size_t>(y)] =
         mask_of(above(count, run_of(static_cast<std::uint8_t>(believed - 1))));
     telling[static_cast<std::size_t>(y)] = mask_of(tells);
   }
   sum_up(fixed, telling, block);
+  const bool shows_scene = mask_of(above(most, run_of(kChance))) == 0 && staying < kFewestInQuarter;
+  block.rest = shows_scene ? kRest : 0;
 }
 
 /// What a block's votes come to.
@@ -136,6 +148,7 @@ void FixedPixels::sum_up(const Rows& fixed, const Rows& telling, Block& block) {
     all_fixed += count;
   }
   covered_ += std::popcount(block.covered);
+  block.has_fixed = all_fixed > 0;
   if (all_fixed > static_cast<int>(kMostDead)) return;
   for (int y = 0; y < kSide; ++y) {
     for (std::uint32_t left = fixed[static_cast<std::size_t>(y)]; left != 0; left &= left - 1) {
@@ -172,11 +185,17 @@ bool FixedPixels::covers(const Vector2& uv) const {
 
 bool FixedPixels::touches(const Eigen::Vector2f& uv, int level) const {
   if (blocks_.empty() || !is_believable()) return false;
+  const int u0 = static_cast<int>(uv.x()), v0 = static_cast<int>(uv.y()), step = 1 << level;
+  // Most corners are nowhere near; a patch of the levels that points are started on is smaller than a block.
+  const auto has_fixed = [&](int dx, int dy) {
+    const Block* block = block_at(u0 + dx * step, v0 + dy * step);
+    return block != nullptr && block->has_fixed;
+  };
+  if (!has_fixed(-2, -2) && !has_fixed(2, -2) && !has_fixed(-2, 2) && !has_fixed(2, 2)) return false;
   int fixed = 0;
   for (int dy = -2; dy <= 2; ++dy) {
     for (int dx = -2; dx <= 2; ++dx) {
-      const int u = static_cast<int>(uv.x()) + dx * (1 << level);
-      const int v = static_cast<int>(uv.y()) + dy * (1 << level);
+      const int u = u0 + dx * step, v = v0 + dy * step;
       const Block* block = block_at(u, v);
       if (block == nullptr) continue;
       const auto at = static_cast<std::size_t>((v - block->v) * kSide + u - block->u);

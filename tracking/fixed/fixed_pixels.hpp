@@ -32,7 +32,8 @@ struct FixedPixelOptions {
 /// The image is looked at in blocks, some in each frame, in turn. Where the scene has moved far enough since
 /// a block was looked at last, whatever its depth, each of its pixels votes: one that differs from what lies
 /// along the motion, and is the same as before, for being fixed; one that has changed against it, several
-/// times as much. A camera at rest, the direction of travel and plain surfaces give no votes.
+/// times as much. A camera at rest, the direction of travel and plain surfaces give no votes. A block in
+/// which nothing seems fixed is looked at in one round of four only.
 ///
 /// One instance a camera. No allocation after construction; bounded work.
 class FixedPixels {
@@ -59,7 +60,9 @@ class FixedPixels {
   struct Block {
     int u = 0, v = 0;         ///< its first pixel
     std::int64_t taken = -1;  ///< frame that `before` is of
+    std::uint8_t rest = 0;    ///< rounds until it is looked at again
     std::array<std::uint8_t, kArea> before{}, votes{};
+    bool has_fixed = false;
     std::uint8_t covered = 0;  ///< quarters of it that are fixed, a bit each
     std::uint8_t dead_count = 0;
     std::array<std::uint16_t, kMostDead> dead{};  ///< positions
