@@ -55,7 +55,7 @@ class PoseConsensus {
   Rig rig_;
   PoseConsensusOptions options_;
   std::vector<Pair> pairs_;
-  std::vector<Batch> batches_;  ///< of the pairs; the last one is filled up with points behind any camera
+  std::vector<Batch> batches_;  ///< of the pairs; the last one is filled up with points that are nowhere
   std::vector<SE3> models_;
 };
 

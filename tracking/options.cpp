@@ -20,7 +20,6 @@ std::string WideSearchOptions::invalid_reason() const {
       .nested("corners", corners.invalid_reason())
       .at_least("max_distance", max_distance, 1)
       .at_least("min_agreeing", min_agreeing, 3)
-      .at_least("max_described", max_described, 1)
       .nested("consensus", consensus.invalid_reason())
       .reason();
 }

@@ -107,7 +107,6 @@ void Tracker::prepare_next(FrameStep& step) {
   if (step.tracked || step.started) remember_frame(step);
   if (step.tracked) learn_fixed_pixels(step);
   if (step.tracked && !step.result.proposed && !step.result.by_depth) revisit_reference(step.graph);
-  describe_views();
   step.lap(TrackerStage::kKeyframe);
 }
 

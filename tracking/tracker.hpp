@@ -178,7 +178,6 @@ class Tracker {
   }
   void look_widely();
   void take_corners(FrameCorners& corners) const;
-  void describe_views();
   bool search_widely(FrameStep& step);
   bool search_from_view(const FrameImages& images, FrameCorners& corners, const SearchStart& view,
                         FrameStep& step);

@@ -26,15 +26,6 @@ void Tracker::take_corners(FrameCorners& corners) const {
   if (looked_at_ == frames_) corners = wide_search_.corners();
 }
 
-/// Once the pose has left: where one frame needed a wider search the next may, and has no time to describe
-/// what it is compared with.
-void Tracker::describe_views() {
-  if (looked_at_ != frames_) return;
-  if (!last_.is_keyframe) wide_search_.describe(last_.images, last_.corners);
-  for (std::size_t age = 0; age < recent_views_.size(); ++age)
-    wide_search_.describe(recent_views_[age].images, recent_views_[age].corners);
-}
-
 /// Where the loop closer recognised the lost camera.
 std::optional<Placement> Tracker::recognised(const GraphSnapshot& graph) {
   const std::optional<Placement> hint = std::exchange(asked_.answer, std::nullopt);

@@ -45,7 +45,6 @@ void WideSearch::prepare(FrameCorners& corners) const {
 
 void WideSearch::look_at(const FrameImages& images) {
   now_ = &images;
-  described_ = 0;
   corners_.clear();
   describe(images, corners_);
 }
@@ -60,7 +59,6 @@ void WideSearch::describe(const FrameImages& images, FrameCorners& corners) {
 
 std::optional<SE3> WideSearch::find(const FrameImages& earlier, FrameCorners& corners,
                                     const GuidedSearchOptions& search) {
-  if (!corners.described && described_++ >= options_.max_described) return std::nullopt;
   describe(earlier, corners);
   match(earlier, corners, search);
   const auto agreed = consensus_.find(matches_, options_.min_agreeing);

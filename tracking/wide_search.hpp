@@ -20,10 +20,6 @@ struct WideSearchOptions {
   CornerSelectionOptions corners{.wanted = 700};
   int max_distance = 64;  ///< of a match's descriptors [bits]
   int min_agreeing = 8;   ///< matches that the motion must explain
-  /// Earlier frames whose corners are found anew for one frame, at 2 ms each; those left out are compared
-  /// with the next one. With one, every fourth frame of fr1_rpy was at 157 instead of 29 mm, because depth
-  /// alone placed what a keyframe's view would have.
-  int max_described = 5;
   /// Corners are found to a whole pixel of their level only.
   PoseConsensusOptions consensus{.inlier_sigmas = 8, .max_samples = 2000};
 
@@ -49,8 +45,7 @@ struct FrameCorners {
 /// frames give the motion that most of them agree on (three-point RANSAC). That is a proposal: only a guided
 /// search of the map's points from there tells whether it is right.
 ///
-/// To describe a frame takes longer than to compare it: what was described is kept, and only a few of the
-/// earlier frames are described for one frame; the others wait until there is time for `describe`.
+/// To describe a frame takes longer than to compare it: what was described is kept.
 ///
 /// Work is bounded by corners and samples. No allocation after construction.
 class WideSearch {
@@ -68,11 +63,9 @@ class WideSearch {
   /// Finds the corners of a frame, unless they are known. Made by `prepare`.
   void describe(const FrameImages& images, FrameCorners& corners);
 
-  /// @param corners  of the earlier frame
+  /// @param corners  of the earlier frame; found if they are not known. Made by `prepare`.
   /// @param search   the same for all searches
-  /// @return T_now_earlier; nothing when too few matches agree on one, or when the earlier frame would have
-  /// to be
-  ///         described and others were for this one
+  /// @return T_now_earlier; nothing when too few matches agree on one
   [[nodiscard]] std::optional<SE3> find(const FrameImages& earlier, FrameCorners& corners,
                                         const GuidedSearchOptions& search);
 
@@ -87,7 +80,6 @@ class WideSearch {
   CornerSelector selector_;
   CornerDescriber describer_;
   FrameCorners corners_;                                    ///< of the frame whose pose is sought
-  int described_ = 0;                                       ///< earlier frames, for that one
   std::vector<NearestDescriptor> of_earlier_, of_corners_;  ///< in the other frame each
   std::vector<MotionObservation> matches_;
   PoseConsensus consensus_;

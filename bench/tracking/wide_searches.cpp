@@ -92,8 +92,7 @@ struct FrameTimes {
   }
 };
 
-/// Nothing is known of the views but, for the tracker describes the others when it has time, all corners save
-/// those of WideSearchOptions::max_described views.
+/// Nothing is known of the views: a frame's time is that of the first one that needs them all.
 void compare(const std::vector<std::unique_ptr<View>>& views, std::size_t now, WideSearch& search,
              const Arguments& arguments, Times& times, std::array<Findings, kViews>& findings) {
   const std::size_t count = std::min(now, kViews);
@@ -118,9 +117,7 @@ void compare(const std::vector<std::unique_ptr<View>>& views, std::size_t now, W
     if (arguments.verbose) fmt::print("{} {} {}\n", now, age + 1, found[age] ? "found" : "-");
   }
   if (count < kViews) return;
-  const auto described = static_cast<std::ptrdiff_t>(WideSearchOptions{}.max_described);
-  times.frame.push_back(least.look +
-                        std::accumulate(least.describe.begin(), least.describe.begin() + described, 0.0) +
+  times.frame.push_back(least.look + std::accumulate(least.describe.begin(), least.describe.end(), 0.0) +
                         std::accumulate(least.find.begin(), least.find.end(), 0.0));
 }
 

@@ -89,8 +89,8 @@ class RangedSource final : public FrameSource {
   std::int64_t taken_ = 0;  // of source_, the dropped ones, too
 };
 
-std::unique_ptr<FrameSource> part_of(std::unique_ptr<FrameSource> source, const FrameRange& range,
-                                     const std::string& file) {
+std::unique_ptr<FrameSource> only_range(std::unique_ptr<FrameSource> source, const FrameRange& range,
+                                        const std::string& file) {
   if (range.is_whole()) return source;
   return std::make_unique<RangedSource>(std::move(source), range, file);
 }
@@ -102,7 +102,7 @@ std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOpti
   const FrameRange range = parameters.take_range();
   auto source = std::make_unique<VideoSource>(spec.argument, options.calibration, parameters);
   parameters.expect_all_taken();
-  return part_of(std::move(source), range, spec.argument);
+  return only_range(std::move(source), range, spec.argument);
 }
 
 Opener bag_opener(std::unique_ptr<BagReader> (*open)(const fs::path&)) {
@@ -112,7 +112,7 @@ Opener bag_opener(std::unique_ptr<BagReader> (*open)(const fs::path&)) {
     auto source =
         std::make_unique<BagSource>(open(spec.argument), spec.argument, options.calibration, parameters);
     parameters.expect_all_taken();
-    return part_of(std::move(source), range, spec.argument);
+    return only_range(std::move(source), range, spec.argument);
   };
 }
 

@@ -70,6 +70,7 @@ struct Seldom {
   int every;
   double tracked;  ///< share of all frames, at least
   double ate;      ///< [m], at most, mean over the runs
+  double worst;    ///< [m], at most, of each
 };
 
 /// Every so many-th frame of fr1_rpy, a depth camera that turns by 65 degrees a second, from each of the
@@ -114,7 +115,7 @@ TEST_P(SeldomFrames, OfATurningCameraAreNotPlacedWhereTheMapsPointsAreNotSeen) {
     const auto [result, path] = testing::run_whole(source->rig(), seldom(*source, every, first), options);
     const auto evaluation = evaluate(associate(path, source->ground_truth(), 20'000'000), {});
     ASSERT_TRUE(evaluation);
-    EXPECT_LT(evaluation->absolute.rmse, 0.12);
+    EXPECT_LT(evaluation->absolute.rmse, GetParam().worst);
     frames += static_cast<double>(result.frames.size());
     tracked += static_cast<double>(path.size());
     sum += evaluation->absolute.rmse;
@@ -125,7 +126,8 @@ TEST_P(SeldomFrames, OfATurningCameraAreNotPlacedWhereTheMapsPointsAreNotSeen) {
 
 // 0.031 and 0.043 m. With two starts for nearly each frame 0.042 and 0.066 m, one run at 0.21; at 0.21 and
 // 0.11 was the first run of each when poses were believed where the map's points are not seen.
-INSTANTIATE_TEST_SUITE_P(All, SeldomFrames, ::testing::Values(Seldom{4, 0.95, 0.04}, Seldom{6, 0.78, 0.06}),
+INSTANTIATE_TEST_SUITE_P(All, SeldomFrames,
+                         ::testing::Values(Seldom{4, 0.95, 0.04, 0.06}, Seldom{6, 0.78, 0.06, 0.07}),
                          [](const auto& test) { return "Every" + std::to_string(test.param.every); });
 
 /// Seven black frames of a car at 12 m/s: two parts of the map, and ten more frames lost, when it was looked

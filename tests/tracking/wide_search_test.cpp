@@ -66,31 +66,6 @@ TEST_P(WideSearchTest, KnownCornersGiveWhatFreshOnesDo) {
   EXPECT_EQ(search.find(second, kept, {})->matrix(), with_fresh->matrix());
 }
 
-TEST_P(WideSearchTest, DescribesNoMoreEarlierFramesThanItMayForOneFrame) {
-  RenderedScene scene(rig_, {3, 2, 5}, 21);
-  FrameImages previous, current;
-  scene.render(SE3(), 2, previous);
-  scene.render(SE3(SO3::exp(Vector3(0, 0.15, 0)), Vector3(0.1, 0, 0)), 2, current);
-  WideSearch search(rig_, {.max_described = 2});
-  std::array<FrameCorners, 4> corners;  // of the same frame, as if they were four
-  search.look_at(current);
-  EXPECT_TRUE(search.find(previous, corners[0], {}));
-  EXPECT_TRUE(search.find(previous, corners[1], {}));
-  EXPECT_FALSE(search.find(previous, corners[2], {}));
-  EXPECT_FALSE(corners[2].described);
-  EXPECT_TRUE(search.find(previous, corners[0], {})) << "what is known costs nothing";
-  search.describe(previous, corners[3]);
-  EXPECT_TRUE(search.find(previous, corners[3], {})) << "nor what was described when there was time";
-  search.look_at(current);
-  EXPECT_TRUE(search.find(previous, corners[2], {})) << "the next frame has its own";
-}
-
-TEST(WideSearchOptions, OneEarlierFrameCanBeDescribed) {
-  EXPECT_EQ(WideSearchOptions{.max_described = 1}.invalid_reason(), "");
-  const std::string reason = WideSearchOptions{.max_described = 0}.invalid_reason();
-  EXPECT_NE(reason.find("max_described"), std::string::npos) << reason;
-}
-
 INSTANTIATE_TEST_SUITE_P(Sensors, WideSearchTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd),
                          [](const auto& sensor) {
                            return sensor.param == SensorKind::kStereo ? "Stereo" : "Rgbd";
