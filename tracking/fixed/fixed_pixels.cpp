@@ -17,6 +17,7 @@ constexpr int kMostVotes = 2;           // times as many as are believed are kep
 constexpr int kAgainst = 4;             // votes that a change takes back
 constexpr int kFewestInQuarter = 16;    // fixed pixels that cover a quarter of a block ...
 constexpr int kMostTelling = 2;         // ... unless more than so many times as many are telling
+constexpr int kMoreAlone = 2;           // votes that a pixel needs of which no neighbour says the same
 constexpr int kTouching = 3;            // fixed pixels, of those of a 5x5 patch
 constexpr std::size_t kAllDead = 8192;  // of an image
 constexpr std::uint8_t kRest = 3;       // rounds in which what clearly shows the scene is not looked at
@@ -154,6 +155,7 @@ void FixedPixels::sum_up(const Rows& fixed, const Rows& telling, Block& block) {
     for (std::uint32_t left = fixed[static_cast<std::size_t>(y)]; left != 0; left &= left - 1) {
       const int x = std::countr_zero(left);
       if (count_around(fixed, x, y) >= kTouching) continue;
+      if (block.votes[static_cast<std::size_t>(y * kSide + x)] < options_.believed + kMoreAlone) continue;
       block.dead[block.dead_count++] = static_cast<std::uint16_t>(y * kSide + x);
     }
   }
