@@ -8,15 +8,10 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/effort.hpp"
+#include "tracking/placement.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
-
-/// Where the camera is.
-struct Placement {
-  KeyframeId reference = kNoKeyframe;
-  SE3 T_c_ref;
-};
 
 /// Where the search for one frame's pose begins.
 struct SearchStart {
@@ -36,13 +31,18 @@ struct SearchStart {
 class FrameStep {
  public:
   FrameStep(const Frame& new_frame, const GraphSnapshot& map, KeyframeProposal* buffer,
-            const EffortBounds& limits)
-      : frame(new_frame), graph(map), free_proposal(buffer), bounds(limits) {}
+            const EffortBounds& limits, int frames_without_pose)
+      : frame(new_frame),
+        graph(map),
+        free_proposal(buffer),
+        bounds(limits),
+        lost_frames(frames_without_pose) {}
 
   const Frame& frame;
   const GraphSnapshot& graph;
   KeyframeProposal* const free_proposal;  ///< null: no keyframe can be made
   const EffortBounds bounds;
+  const int lost_frames;    ///< between the last one with a pose and this one
   bool depth_read = false;  ///< the frame's depth image, by the depth alignment
   bool tracked = false;     ///< in the map that there was
   bool started = false;     ///< a map or map part, with this frame
@@ -52,6 +52,8 @@ class FrameStep {
   /// edges that points make take those of points.
   Matrix6 information_of_planes = Matrix6::Zero();
 
+  /// The frame before this one has no pose.
+  [[nodiscard]] bool after_loss() const { return lost_frames > 0; }
   /// Attributes the time since the last lap to a stage.
   void lap(TrackerStage stage) {
     const auto now = std::chrono::steady_clock::now();

@@ -1,7 +1,6 @@
 #include "tracking/tracker.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "geometry/inverse_depth.hpp"
@@ -16,7 +15,6 @@ constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxSeeds = 600;
 constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr std::size_t kRecentViews = 4;
-constexpr double kJitter = 0.3;  // of the interval between two frames
 // Of what moves with the camera:
 constexpr double kTrustedShare = 0.5;  // of the matches, inliers: else the pose is in doubt
 constexpr double kFar = 0.1;           // share of the points that may be farther than what moves in the image
@@ -42,6 +40,7 @@ RecentView room_for_view(const Rig& rig, const WideSearch& search) {
 Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
+      motion_(options_),
       image_motion_(rig.camera),
       fixed_(rig.camera.width, rig.camera.height, options.fixed),
       local_map_(kMaxLocalPoints),
@@ -85,13 +84,13 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
 
 FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
                           EffortLevel effort) {
-  FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_));
+  FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_), loss_.lost_frames());
   ++frames_;
   earlier_frames_.clear();
   loss_.begin_frame(frame.index, frame.t_ns);
   load_images(frame);
   step.lap(TrackerStage::kPyramid);
-  const bool map_exists = last_.placement.reference != kNoKeyframe || unplaced_;
+  const bool map_exists = motion_.reference() != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
   step.tracked = map_exists && track(step);
   if (step.tracked && seeds_.size() > 0) observe_seeds(step);
@@ -112,20 +111,20 @@ void Tracker::prepare_next(FrameStep& step) {
 
 /// Pose of the frame relative to a reference keyframe, from the points of the map around that.
 bool Tracker::track(FrameStep& step) {
-  const auto asked = recognised(step.graph);
+  const auto asked = recognised(step);
   if (asked && search_from_recognised(*asked, step)) {
     leave_other_part(step);
     return true;
   }
-  if (last_.placement.reference == kNoKeyframe) {
+  if (motion_.reference() == kNoKeyframe) {
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }
-  SearchStart start{.placement = last_.placement};
+  SearchStart start{.placement = motion_.placement()};
   local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
   if (search_ahead(step)) return true;
-  const bool by_depth = last_.by_depth && depth_can_place();
+  const bool by_depth = last_.by_depth && depth_can_place(step);
   start.placement.T_c_ref = by_depth ? align_to_depth(step) : aligned_pose(step);
   step.lap(TrackerStage::kAlignment);
   LostCause cause = by_depth ? search_from(start, step) : search_from_either(start, step);
@@ -166,36 +165,21 @@ void Tracker::follow(const GraphSnapshot& graph) {
   const PendingKeyframe* newest = nullptr;
   for (const PendingKeyframe& pending : immature_points_.pending()) {
     if (graph.contains(pending.id) && !graph.keyframe(pending.id).culled() &&
-        graph.part(pending.id) == part_of(graph, immature_points_, last_.placement.reference))
+        graph.part(pending.id) == part_of(graph, immature_points_, motion_.reference()))
       newest = &pending;
   }
-  if (newest != nullptr && newest->id != last_.placement.reference) {
+  if (newest != nullptr && newest->id != motion_.reference()) {
     // As it was tracked, not as the map has it now: both frames were placed by the same points.
-    const SE3 T_ref_new =
-        relative_pose(graph, immature_points_, last_.placement.reference, newest->reference) *
-        newest->T_k_ref.inverse();
-    last_.placement = {newest->id, last_.placement.T_c_ref * T_ref_new};
+    const SE3 T_ref_new = relative_pose(graph, immature_points_, motion_.reference(), newest->reference) *
+                          newest->T_k_ref.inverse();
+    motion_.refer_to(newest->id, T_ref_new);
   }
   immature_points_.adopt(graph);
-  if (graph.contains(last_.placement.reference) && graph.keyframe(last_.placement.reference).culled()) {
-    const auto replacement = graph.live_replacement(last_.placement.reference);
+  if (graph.contains(motion_.reference()) && graph.keyframe(motion_.reference()).culled()) {
+    const auto replacement = graph.live_replacement(motion_.reference());
     TWOFOLD_CHECK(replacement, "the reference was culled too long ago");
-    last_.placement = {replacement->id, last_.placement.T_c_ref * replacement->T_this_live};
+    motion_.refer_to(replacement->id, replacement->T_this_live);
   }
-}
-
-/// Since the last good frame: constant velocity, none after a loss. Frames may be missing between the two;
-/// but stamps jitter by more than a camera's clock does, and what little they differ by says nothing.
-SE3 Tracker::predicted_motion(const Frame& frame) const {
-  if (loss_.lost_frames() > 0) return {};
-  const double seconds = 1e-9 * static_cast<double>(frame.t_ns - last_.t_ns);
-  const double intervals = last_.interval > 0 ? seconds / last_.interval : 1;
-  if (!last_.velocity || std::abs(intervals - 1) < kJitter) return last_.T_this_previous;
-  return seconds <= options_.coast_for ? SE3::exp(seconds * *last_.velocity) : SE3();
-}
-
-SE3 Tracker::predicted_pose(const Frame& frame) const {
-  return predicted_motion(frame) * last_.placement.T_c_ref;
 }
 
 /// Dense 3D Lucas-Kanade from the last good frame (eq. 6.7), started from the motion since, then from rest.
@@ -216,33 +200,27 @@ std::optional<SE3> Tracker::align_to_previous(const SE3& start, FrameStep& step)
 }
 
 SE3 Tracker::aligned_pose(FrameStep& step) {
-  const SE3 start = predicted_motion(step.frame);
-  return align_to_previous(start, step).value_or(start) * last_.placement.T_c_ref;
+  const SE3 start = motion_.predicted_motion(step.frame.t_ns, step.after_loss());
+  return align_to_previous(start, step).value_or(start) * motion_.T_c_ref();
 }
 
 /// What the next frame starts from.
 void Tracker::remember_frame(const FrameStep& step) {
   const TrackResult& result = step.result;
-  const bool goes_on = loss_.lost_frames() == 0 && result.reference == last_.placement.reference;
-  last_.velocity = goes_on ? velocity_at(result.T_c_ref, step.frame) : std::nullopt;
-  last_.T_this_previous = goes_on ? result.T_c_ref * last_.placement.T_c_ref.inverse() : SE3();
-  last_.interval = goes_on ? 1e-9 * static_cast<double>(step.frame.t_ns - last_.t_ns) : 0;
-  if (goes_on) {
-    image_motion_.advance(last_.T_this_previous);
+  motion_.advance({result.reference, result.T_c_ref}, step.frame.t_ns, loss_.lost_frames() > 0);
+  if (motion_.since_previous()) {
+    image_motion_.advance(*motion_.since_previous());
   } else {
     image_motion_.restart();
   }
-  last_.placement = {result.reference, result.T_c_ref};
-  last_.t_ns = step.frame.t_ns;
-  if (readout_) learn_readout(step, goes_on);
+  if (readout_) learn_readout(step);
   loss_.placed();
   unplaced_ = false;
   last_.points.clear();
   for (std::size_t m = 0; m < search_.matches.size() && last_.points.size() < last_.points.capacity(); ++m) {
     if (!search_.observations[m].inlier) continue;
     const Vector3& z = search_.matches[m].found.z;
-    const SE3 T_row_ref =
-        step.shutter.seen_from(rig_, last_.placement.T_c_ref, search_.observations[m].x_ref);
+    const SE3 T_row_ref = step.shutter.seen_from(rig_, result.T_c_ref, search_.observations[m].x_ref);
     last_.points.push_back({z.head<2>().cast<float>(), T_row_ref * search_.observations[m].x_ref});
   }
   for (const ImmaturePoint& point : immature_points_.points()) {

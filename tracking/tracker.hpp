@@ -26,6 +26,7 @@
 #include "tracking/lost_cause.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/monocular_start.hpp"
+#include "tracking/motion/motion_model.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/recent_views.hpp"
@@ -132,8 +133,6 @@ class Tracker {
   void load_images(const Frame& frame);
   void follow(const GraphSnapshot& graph);
   bool track(FrameStep& step);
-  [[nodiscard]] SE3 predicted_motion(const Frame& frame) const;
-  [[nodiscard]] SE3 predicted_pose(const Frame& frame) const;
   std::optional<SE3> align_to_previous(const SE3& start, FrameStep& step);
   SE3 aligned_pose(FrameStep& step);
   void remember_frame(const FrameStep& step);
@@ -142,7 +141,7 @@ class Tracker {
   // tracker_search.cpp: a pose from points
   LostCause search_from(SearchStart start, FrameStep& step);
   LostCause search_from_either(const SearchStart& aligned, FrameStep& step);
-  [[nodiscard]] bool leaves_motion(const SE3& T_c_ref, const Frame& frame);
+  [[nodiscard]] bool leaves_motion(const SE3& T_c_ref, const FrameStep& step);
   [[nodiscard]] Attempt set_aside(const FrameStep& step);
   void take_back(const Attempt& attempt, FrameStep& step);
   void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
@@ -160,15 +159,14 @@ class Tracker {
   }
 
   // tracker_shutter.cpp: rows that are read one after the other
-  [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, const Frame& frame) const;
-  [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const Frame& frame) const;
-  void learn_readout(const FrameStep& step, bool goes_on);
+  [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const FrameStep& step) const;
+  void learn_readout(const FrameStep& step);
   [[nodiscard]] double readout_sigma() const;
   [[nodiscard]] Matrix6 shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
                                            const FrameStep& step) const;
 
   // tracker_loss.cpp: where a lost camera is looked for
-  [[nodiscard]] std::optional<Placement> recognised(const GraphSnapshot& graph);
+  [[nodiscard]] std::optional<Placement> recognised(const FrameStep& step);
   bool search_from_recognised(const Placement& asked, FrameStep& step);
   void leave_other_part(const FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
@@ -191,7 +189,7 @@ class Tracker {
   LostCause make_first_keyframe(FrameStep& step);
 
   // tracker_depth.cpp: a depth camera where there are hardly any corners
-  [[nodiscard]] bool depth_can_place() const;
+  [[nodiscard]] bool depth_can_place(const FrameStep& step) const;
   void read_depth(FrameStep& step);
   tl::expected<DepthAlignment::Result, LostCause> align_depth(const SE3& T_c_ref,
                                                               std::span<const MotionObservation> corners,
@@ -226,6 +224,7 @@ class Tracker {
   Rig rig_;  ///< constant but for the readout, once that is found
   const TrackerOptions options_;
 
+  MotionModel motion_;
   FrameImages current_;
   ImageMotion image_motion_;
   FixedPixels fixed_;

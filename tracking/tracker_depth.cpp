@@ -9,9 +9,9 @@ namespace twofold {
 
 /// From shape alone the camera is placed only beside where it was: after some frames the last good one shows
 /// something else, and one corner of a room looks like the next.
-bool Tracker::depth_can_place() const {
+bool Tracker::depth_can_place(const FrameStep& step) const {
   constexpr int kPatience = 5;  // lost frames
-  return depth_alignment_ && last_.placement.reference != kNoKeyframe && loss_.lost_frames() <= kPatience;
+  return depth_alignment_ && motion_.reference() != kNoKeyframe && step.lost_frames <= kPatience;
 }
 
 /// The frame's depth image, once.
@@ -24,13 +24,13 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
     const SE3& T_c_ref, std::span<const MotionObservation> corners, FrameStep& step) {
   read_depth(step);
   depth_alignment_->clear_views();
-  const KeyframeId part = part_of(step.graph, immature_points_, last_.placement.reference);
+  const KeyframeId part = part_of(step.graph, immature_points_, motion_.reference());
   for (std::size_t age = 0; age < recent_views_.size(); ++age) {
     const RecentView& view = recent_views_[age];
     const auto placement = placement_of(step.graph, view.id);
     if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
     const SE3 T_placed_ref =
-        relative_pose(step.graph, immature_points_, placement->reference, last_.placement.reference);
+        relative_pose(step.graph, immature_points_, placement->reference, motion_.reference());
     depth_alignment_->add_view(view.id, view.images.depth, placement->T_c_ref * T_placed_ref);
   }
   return depth_alignment_->align(T_c_ref, corners);
@@ -38,7 +38,7 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
 
 /// In place of the alignment to the last frame's points, of which there were too few.
 SE3 Tracker::align_to_depth(FrameStep& step) {
-  const auto aligned = align_depth(predicted_pose(step.frame), {}, step);
+  const auto aligned = align_depth(motion_.predicted_pose(step.frame.t_ns, step.after_loss()), {}, step);
   return aligned ? aligned->T_c_ref : aligned_pose(step);
 }
 
@@ -47,10 +47,10 @@ SE3 Tracker::align_to_depth(FrameStep& step) {
 bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step) {
   const bool points_placed = found == LostCause::kNone;
   const bool few = points_placed ? step.result.inliers < options_.scarce_inliers : last_.by_depth;
-  if (!few || !depth_can_place()) return false;
+  if (!few || !depth_can_place(step)) return false;
   const TrackResult by_points = step.result;
   if (place_by_depth(points_placed ? by_points.T_c_ref : T_c_ref, step) != LostCause::kNone) return false;
-  if (loss_.lost_frames() == 0) return true;
+  if (!step.after_loss()) return true;
   // After a loss depth may have found another place of the same shape: what points say counts.
   if (points_placed ? 2 * step.result.inliers >= by_points.inliers : points_allow(step)) return true;
   step.restore(by_points);
@@ -61,9 +61,9 @@ bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step
 /// Before the frame is given up: what it measures, and no points.
 /// @return kNone, or why that is not enough
 LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
-  if (!depth_can_place()) return found;
+  if (!depth_can_place(step)) return found;
   search_.clear();
-  const LostCause open = place_by_depth(predicted_pose(step.frame), step);
+  const LostCause open = place_by_depth(motion_.predicted_pose(step.frame.t_ns, step.after_loss()), step);
   if (open != LostCause::kNone) return open == LostCause::kTooFewMatches ? found : open;
   return points_allow(step) ? LostCause::kNone : found;
 }
@@ -79,7 +79,7 @@ bool Tracker::points_allow(FrameStep& step) {
   local_map_.update(step.graph, placement.reference, immature_points_, options_.neighbour_keyframes);
   const SearchStart start{.placement = placement, .kind = SearchStart::Kind::kRough};
   if (search_from(start, step) == LostCause::kNone) return true;
-  if (loss_.lost_frames() > 0 && result.candidates >= options_.telling_candidates) return false;
+  if (step.after_loss() && result.candidates >= options_.telling_candidates) return false;
   step.restore(by_depth);
   search_.clear();
   result.matches = result.inliers = 0;
@@ -96,7 +96,7 @@ LostCause Tracker::place_by_depth(const SE3& T_c_ref, FrameStep& step) {
   result.status = TrackStatus::kTracking;
   result.by_depth = true;
   result.cause = LostCause::kNone;
-  result.reference = last_.placement.reference;
+  result.reference = motion_.reference();
   result.T_c_ref = placed->T_c_ref;
   step.information_of_planes = placed->information;
   result.information =

@@ -159,7 +159,7 @@ void Tracker::occupy_unsearched(const SE3& T_c_ref) {
 /// a place, the reference comes back too, and no keyframe is needed  (thesis 6.2.2: V_ref may be an older,
 /// revisited keyframe).
 void Tracker::revisit_reference(const GraphSnapshot& graph) {
-  if (frames_ % kRevisitInterval != 0 || !graph.contains(last_.placement.reference) ||
+  if (frames_ % kRevisitInterval != 0 || !graph.contains(motion_.reference()) ||
       !immature_points_.pending().empty())
     return;
   inlier_ids_.clear();
@@ -175,9 +175,9 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
     }
     return count;
   };
-  KeyframeId best = last_.placement.reference;
+  KeyframeId best = motion_.reference();
   // Changing back and forth helps nobody: a new reference must be clearly better.
-  int best_count = shared(last_.placement.reference) * 6 / 5;
+  int best_count = shared(motion_.reference()) * 6 / 5;
   for (const KeyframeId id : local_map_.neighbours()) {
     const int count = shared(id);
     if (count > best_count) {
@@ -185,9 +185,8 @@ void Tracker::revisit_reference(const GraphSnapshot& graph) {
       best_count = count;
     }
   }
-  if (best == last_.placement.reference) return;
-  const SE3 T_last_best = relative_pose(graph, immature_points_, last_.placement.reference, best);
-  last_.placement = {best, last_.placement.T_c_ref * T_last_best};
+  if (best == motion_.reference()) return;
+  motion_.refer_to(best, relative_pose(graph, immature_points_, motion_.reference(), best));
 }
 
 }  // namespace twofold

@@ -27,10 +27,10 @@ void Tracker::take_corners(FrameCorners& corners) const {
 }
 
 /// Where the loop closer recognised the lost camera.
-std::optional<Placement> Tracker::recognised(const GraphSnapshot& graph) {
+std::optional<Placement> Tracker::recognised(const FrameStep& step) {
   const std::optional<Placement> hint = std::exchange(asked_.answer, std::nullopt);
-  if (!hint || loss_.lost_frames() == 0 || !graph.contains(hint->reference)) return std::nullopt;
-  const auto place = placement_of(graph, hint->reference);
+  if (!hint || !step.after_loss() || !step.graph.contains(hint->reference)) return std::nullopt;
+  const auto place = placement_of(step.graph, hint->reference);
   if (!place) return std::nullopt;  // a late answer: the keyframe was culled long ago
   return Placement{place->reference, hint->T_c_ref * place->T_c_ref};
 }
@@ -51,7 +51,7 @@ bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
 /// to each other nobody knows, and none of them can be seen from here.
 void Tracker::leave_other_part(const FrameStep& step) {
   const auto part = [&](KeyframeId id) { return part_of(step.graph, immature_points_, id); };
-  const KeyframeId before = last_.placement.reference;
+  const KeyframeId before = motion_.reference();
   if (before == kNoKeyframe || part(before) == part(step.result.reference)) return;
   immature_points_.clear_points();
   seeds_.clear();
@@ -66,11 +66,11 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
 
 /// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
 bool Tracker::search_widely(FrameStep& step) {
-  if (!searches_widely() || last_.placement.reference == kNoKeyframe) return false;
+  if (!searches_widely() || motion_.reference() == kNoKeyframe) return false;
   look_widely();
-  SearchStart start{.placement = last_.placement, .kind = SearchStart::Kind::kRough};
+  SearchStart start{.placement = motion_.placement(), .kind = SearchStart::Kind::kRough};
   if (!last_.is_keyframe && search_from_view(last_.images, last_.corners, start, step)) return true;
-  const KeyframeId part = part_of(step.graph, immature_points_, last_.placement.reference);
+  const KeyframeId part = part_of(step.graph, immature_points_, motion_.reference());
   for (std::size_t age = 0; age < recent_views_.size(); ++age) {
     RecentView& view = recent_views_[age];
     const auto placement = placement_of(step.graph, view.id);
@@ -81,38 +81,31 @@ bool Tracker::search_widely(FrameStep& step) {
   return false;
 }
 
-/// Streets repeat themselves, and what looks alike may be the next house but four: the camera must have got
-/// there from where it was last, as fast as it moved then, and no other than by what accelerates things that
-/// carry cameras. However long a car was out of sight, it went on for no longer than coast_for: whatever the
-/// street looks like, where it was last it is not. Only where a place was recognised it had all that time.
+/// MotionModel::reaches. One camera's unit is no metre, and where parts of the map lie to each other nobody
+/// knows. Only where a place was recognised the camera had all the time since it was seen.
 bool Tracker::is_within_reach(SearchStart::Kind kind, const FrameStep& step) const {
   const KeyframeId here = step.result.reference;
-  const bool knows_way = rig_.kind != SensorKind::kMono && last_.velocity;  // one camera's unit is no metre
+  const bool knows_way = rig_.kind != SensorKind::kMono && motion_.velocity();
   if (!knows_way || part_of(step.graph, immature_points_, here) !=
-                        part_of(step.graph, immature_points_, last_.placement.reference))
+                        part_of(step.graph, immature_points_, motion_.reference()))
     return true;
-  double seconds = 1e-9 * static_cast<double>(step.frame.t_ns - last_.t_ns);
-  if (kind != SearchStart::Kind::kRecognised) seconds = std::min(options_.coast_for, seconds);
-  const SE3 T_here_last = relative_pose(step.graph, immature_points_, here, last_.placement.reference);
-  const SE3 T_c_last = step.result.T_c_ref * T_here_last * last_.placement.T_c_ref.inverse();
-  const SE3 went_on = SE3::exp(seconds * *last_.velocity);
-  const double off = (T_c_last.inverse().translation() - went_on.inverse().translation()).norm();
-  return off <= options_.reach_slack + 0.5 * options_.max_acceleration * seconds * seconds;
+  const SE3 T_here_last = relative_pose(step.graph, immature_points_, here, motion_.reference());
+  const SE3 T_c_last = step.result.T_c_ref * T_here_last * motion_.T_c_ref().inverse();
+  return motion_.reaches(T_c_last, step.frame.t_ns, kind == SearchStart::Kind::kRecognised);
 }
 
 /// After several frames without a pose: where the camera is if it went on as it moved. First of all, because
 /// a street may look the same from where the camera was last, too.
 bool Tracker::search_ahead(FrameStep& step) {
-  const double seconds = 1e-9 * static_cast<double>(step.frame.t_ns - last_.t_ns);
-  if (loss_.lost_frames() < 2 || !last_.velocity || !(seconds <= options_.coast_for)) return false;
-  const SE3 motion = SE3::exp(seconds * *last_.velocity);
-  SearchStart start{.placement = last_.placement, .kind = SearchStart::Kind::kRough};
-  start.placement.T_c_ref = motion * last_.placement.T_c_ref;
+  const std::optional<SE3> motion = motion_.coasted(step.frame.t_ns);
+  if (step.lost_frames < 2 || !motion) return false;
+  SearchStart start{.placement = motion_.placement(), .kind = SearchStart::Kind::kRough};
+  start.placement.T_c_ref = *motion * motion_.T_c_ref();
   if (search_from(start, step) == LostCause::kNone) return true;
-  const std::optional<SE3> aligned = align_to_previous(motion, step);
+  const std::optional<SE3> aligned = align_to_previous(*motion, step);
   step.lap(TrackerStage::kAlignment);
   if (!aligned) return false;
-  start.placement.T_c_ref = *aligned * last_.placement.T_c_ref;
+  start.placement.T_c_ref = *aligned * motion_.T_c_ref();
   return search_from(start, step) == LostCause::kNone;
 }
 
@@ -135,7 +128,7 @@ void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
   result.cause = explain_loss(cause, current_.left, last_.images.left, loss_.gap_before());
   result.inliers = 0;
   loss_.lost();
-  // last_ stays at the last good frame, from where the next one tries again.
+  // last_ and motion_ stay at the last good frame, from where the next one tries again.
 }
 
 }  // namespace twofold

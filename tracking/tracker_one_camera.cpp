@@ -28,9 +28,9 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   next_.first_of_part = index(proposal.id);
   // As if the camera had moved evenly since: that is the next frame's prediction.
   const double share = static_cast<double>(first.age - 1) / first.age;
-  last_.placement = {here.reference, SE3::exp(share * here.T_c_ref.log())};
-  last_.t_ns =
-      first.t_ns + static_cast<std::int64_t>(share * static_cast<double>(step.frame.t_ns - first.t_ns));
+  const auto since_first = static_cast<double>(step.frame.t_ns - first.t_ns);
+  motion_.place({here.reference, SE3::exp(share * here.T_c_ref.log())},
+                first.t_ns + static_cast<std::int64_t>(share * since_first));
   return LostCause::kNone;
 }
 

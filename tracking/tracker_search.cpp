@@ -19,12 +19,11 @@ constexpr int kShutterRounds = 3;
 /// from a rough one.
 LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
   SE3& T_c_ref = start.placement.T_c_ref;
-  const bool lost = loss_.lost_frames() > 0;
-  step.shutter = start.rough() ? RollingShutter() : shutter_at(T_c_ref, step.frame);
+  step.shutter = start.rough() ? RollingShutter() : shutter_at(T_c_ref, step);
   LostCause cause = LostCause::kNone;
   const int rounds = start.rough() ? kRoundsFromRough : 1;
   for (int round = 0; cause == LostCause::kNone && round < rounds; ++round) {
-    const bool wide = start.rough() ? round + 1 < rounds : lost;
+    const bool wide = start.rough() ? round + 1 < rounds : step.after_loss();
     const double radius_px = wide ? options_.lost_radius_px : options_.search.radius_px;
     local_map_search_.run(current_, T_c_ref, radius_px, step, search_);
     cause = estimate_pose(start.placement, step);
@@ -33,7 +32,7 @@ LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
   }
   if (cause != LostCause::kNone) return cause;
   const bool supported = !start.rough() || well_supported(step.result);
-  const bool reachable = !(start.rough() || lost) || is_within_reach(start.kind, step);
+  const bool reachable = !(start.rough() || step.after_loss()) || is_within_reach(start.kind, step);
   return supported && reachable ? LostCause::kNone : LostCause::kInconsistentMatches;
 }
 
@@ -46,10 +45,10 @@ LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& ste
   const bool placed = cause == LostCause::kNone;
   const int inliers = placed ? step.result.inliers : 0;
   const bool settled = inliers >= options_.settled_searched_share * step.result.searched;
-  if (settled || !leaves_motion(aligned.placement.T_c_ref, step.frame)) return cause;
+  if (settled || !leaves_motion(aligned.placement.T_c_ref, step)) return cause;
   const Attempt first = set_aside(step);
-  const LostCause other =
-      search_from({.placement = {last_.placement.reference, predicted_pose(step.frame)}}, step);
+  const LostCause other = search_from(
+      {.placement = {motion_.reference(), motion_.predicted_pose(step.frame.t_ns, step.after_loss())}}, step);
   const bool better = placed ? step.result.inliers > inliers : well_supported(step.result);
   if (other == LostCause::kNone && better) return other;
   take_back(first, step);
@@ -70,10 +69,10 @@ void Tracker::take_back(const Attempt& attempt, FrameStep& step) {
 
 /// The pose is further from where the camera would be had it gone on, as the last frame's points show, than
 /// points are searched.
-bool Tracker::leaves_motion(const SE3& T_c_ref, const Frame& frame) {
-  if (loss_.lost_frames() > 0 || !last_.velocity) return false;
-  const SE3 T_cur_prev = T_c_ref * last_.placement.T_c_ref.inverse();
-  const SE3 T_cur_prev_predicted = predicted_motion(frame);
+bool Tracker::leaves_motion(const SE3& T_c_ref, const FrameStep& step) {
+  if (step.after_loss() || !motion_.velocity()) return false;
+  const SE3 T_cur_prev = T_c_ref * motion_.T_c_ref().inverse();
+  const SE3 T_cur_prev_predicted = motion_.predicted_motion(step.frame.t_ns, false);
   samples_.clear();
   for (const AlignmentPoint& point : last_.points) {
     const Vector3 here = T_cur_prev * point.x, there = T_cur_prev_predicted * point.x;
@@ -109,7 +108,7 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   for (int round = 0; round < rounds; ++round) {
     observe_matches(motion.T_c_ref, step.shutter);
     motion = optimise_motion(rig_, search_.observations, motion.T_c_ref, solver(step));
-    if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step.frame);
+    if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step);
   }
   ask_elders(motion, solver(step));
   result.moving = judge_immature_points();

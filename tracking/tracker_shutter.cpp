@@ -13,24 +13,17 @@ constexpr double kUnknownReadout = 0.015;
 
 }  // namespace
 
-/// The camera's motion in this frame, if it is at T_c_ref: that since the last one goes on. None after a
-/// loss.
-std::optional<Vector6> Tracker::velocity_at(const SE3& T_c_ref, const Frame& frame) const {
-  const double seconds = static_cast<double>(frame.t_ns - last_.t_ns) * 1e-9;
-  if (loss_.lost_frames() > 0 || !(seconds > 0)) return std::nullopt;
-  return (T_c_ref * last_.placement.T_c_ref.inverse()).log() / seconds;
-}
-
-RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const Frame& frame) const {
+RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const FrameStep& step) const {
   if (rig_.readout.value_or(0) == 0) return {};
-  const auto velocity = velocity_at(T_c_ref, frame);
+  const auto velocity = motion_.velocity_at(T_c_ref, step.frame.t_ns, step.after_loss());
   return velocity ? RollingShutter(rig_, *velocity) : RollingShutter();
 }
 
 /// From what was found in this frame and the ones before, whether it fitted the map or not.
-void Tracker::learn_readout(const FrameStep& step, bool goes_on) {
-  if (!goes_on) readout_->interrupt();
-  std::vector<ReadoutPoint>* seen = readout_->begin_frame(step.frame.t_ns, last_.T_this_previous);
+void Tracker::learn_readout(const FrameStep& step) {
+  const std::optional<SE3>& T_this_previous = motion_.since_previous();
+  if (!T_this_previous) readout_->interrupt();
+  std::vector<ReadoutPoint>* seen = readout_->begin_frame(step.frame.t_ns, T_this_previous.value_or(SE3()));
   if (seen == nullptr) return;
   for (const SearchOutcome::Match& match : search_.matches) {
     const TrackedPoint& point = local_map_.points()[match.point];
@@ -65,9 +58,9 @@ double Tracker::readout_sigma() const {
 Matrix6 Tracker::shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
                                     const FrameStep& step) const {
   Matrix6 covariance = Matrix6::Zero();
-  const auto velocity = velocity_at(step.result.T_c_ref, step.frame);
-  if (!velocity || step.result.reference != last_.placement.reference) return covariance;
-  const Vector6 change = last_.velocity ? 0.5 * (*velocity - *last_.velocity) : *velocity;
+  const auto velocity = motion_.velocity_at(step.result.T_c_ref, step.frame.t_ns, step.after_loss());
+  if (!velocity || step.result.reference != motion_.reference()) return covariance;
+  const Vector6 change = motion_.velocity() ? 0.5 * (*velocity - *motion_.velocity()) : *velocity;
   for (const Vector6& bent :
        {Vector6(readout_sigma() * *velocity), Vector6(rig_.readout.value_or(0) * change)}) {
     if (bent.isZero(0)) continue;
