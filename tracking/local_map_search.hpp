@@ -38,7 +38,7 @@ struct SearchOutcome {
 /// construction.
 class LocalMapSearch {
  public:
-  /// All must outlive this; the rig may learn its readout meanwhile.
+  /// All must outlive this.
   LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map,
                  const FixedPixels& fixed);
 

@@ -41,6 +41,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
       motion_(options_),
+      shutter_(rig_, motion_, static_cast<std::size_t>(options.max_searches)),
       image_motion_(rig.camera),
       fixed_(rig.camera.width, rig.camera.height, options.fixed),
       local_map_(kMaxLocalPoints),
@@ -66,7 +67,6 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     right_rows_.emplace(rig);
     fixed_right_.emplace(rig.camera.width, rig.camera.height, options.fixed);
   }
-  if (!rig.readout) readout_.emplace(rig, searches);
   if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
   allocate_images(rig, current_);
@@ -213,7 +213,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   } else {
     image_motion_.restart();
   }
-  if (readout_) learn_readout(step);
+  shutter_.learn(step, search_, local_map_);
   loss_.placed();
   unplaced_ = false;
   last_.points.clear();

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "camera/frame.hpp"
-#include "camera/readout_estimator.hpp"
 #include "camera/rig.hpp"
 #include "estimation/pose_uncertainty.hpp"
 #include "graph/keyframe_proposal.hpp"
@@ -27,6 +26,7 @@
 #include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/monocular_start.hpp"
 #include "tracking/motion/motion_model.hpp"
+#include "tracking/motion/shutter_model.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
 #include "tracking/recent_views.hpp"
@@ -101,11 +101,8 @@ class Tracker {
 
   /// Rows that a stereo pair's right images lie lower than its left ones, taken back by the tracker [px].
   [[nodiscard]] double row_offset() const { return right_rows_ ? right_rows_->offset() : 0; }
-  /// The readout of a rolling shutter as far as it is known by now; once it is significant, later frames are
-  /// tracked with it. Nothing if the rig has it.
-  [[nodiscard]] std::optional<ReadoutEstimate> readout() const {
-    return readout_ ? std::optional(readout_->estimate()) : std::nullopt;
-  }
+  /// ShutterModel::readout.
+  [[nodiscard]] std::optional<ReadoutEstimate> readout() const { return shutter_.readout(); }
 
   /// What the last step measured, points in the reference keyframe's frame, outliers included: for drawing
   /// and diagnosis. Valid until the next step.
@@ -157,13 +154,6 @@ class Tracker {
     return point.immature < 0 ? nullptr
                               : &immature_points_.points()[static_cast<std::size_t>(point.immature)];
   }
-
-  // tracker_shutter.cpp: rows that are read one after the other
-  [[nodiscard]] RollingShutter shutter_at(const SE3& T_c_ref, const FrameStep& step) const;
-  void learn_readout(const FrameStep& step);
-  [[nodiscard]] double readout_sigma() const;
-  [[nodiscard]] Matrix6 shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
-                                           const FrameStep& step) const;
 
   // tracker_loss.cpp: where a lost camera is looked for
   [[nodiscard]] std::optional<Placement> recognised(const FrameStep& step);
@@ -221,10 +211,11 @@ class Tracker {
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
 
-  Rig rig_;  ///< constant but for the readout, once that is found
+  const Rig rig_;
   const TrackerOptions options_;
 
   MotionModel motion_;
+  ShutterModel shutter_;
   FrameImages current_;
   ImageMotion image_motion_;
   FixedPixels fixed_;
@@ -236,7 +227,6 @@ class Tracker {
   SearchOutcome search_, tried_;  ///< of the newest frame, and of another start for it
   ElderVote elder_vote_;
   PoseUncertainty uncertainty_;
-  std::optional<ReadoutEstimator> readout_;        ///< if the calibration leaves it open
   std::optional<RightRows> right_rows_;            ///< stereo only
   std::optional<DepthAlignment> depth_alignment_;  ///< RGB-D only
 

@@ -100,7 +100,7 @@ LostCause Tracker::place_by_depth(const SE3& T_c_ref, FrameStep& step) {
   result.T_c_ref = placed->T_c_ref;
   step.information_of_planes = placed->information;
   result.information =
-      inverse_symmetric(placed->covariance + shutter_covariance(placed->all, placed->by_rows, step));
+      inverse_symmetric(placed->covariance + shutter_.covariance(placed->all, placed->by_rows, step));
   result.matches = static_cast<int>(search_.matches.size());
   result.inliers = classify_observations(rig_, search_.observations, result.T_c_ref, options_.motion);
   return LostCause::kNone;

@@ -19,7 +19,7 @@ constexpr int kShutterRounds = 3;
 /// from a rough one.
 LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
   SE3& T_c_ref = start.placement.T_c_ref;
-  step.shutter = start.rough() ? RollingShutter() : shutter_at(T_c_ref, step);
+  step.shutter = start.rough() ? RollingShutter() : shutter_.at(T_c_ref, step);
   LostCause cause = LostCause::kNone;
   const int rounds = start.rough() ? kRoundsFromRough : 1;
   for (int round = 0; cause == LostCause::kNone && round < rounds; ++round) {
@@ -108,7 +108,7 @@ LostCause Tracker::estimate_pose(const Placement& start, FrameStep& step) {
   for (int round = 0; round < rounds; ++round) {
     observe_matches(motion.T_c_ref, step.shutter);
     motion = optimise_motion(rig_, search_.observations, motion.T_c_ref, solver(step));
-    if (rounds > 1) step.shutter = shutter_at(motion.T_c_ref, step);
+    if (rounds > 1) step.shutter = shutter_.at(motion.T_c_ref, step);
   }
   ask_elders(motion, solver(step));
   result.moving = judge_immature_points();
@@ -170,7 +170,7 @@ Matrix6 Tracker::honest_information(const FrameStep& step) {
   const auto difference = search_.verdict.difference;
   if (all_agree && difference) uncertainty_.add_split(*difference);
   const Matrix6 covariance = uncertainty_.covariance(motion.information) +
-                             shutter_covariance(motion.information, uncertainty_.by_rows(), step);
+                             shutter_.covariance(motion.information, uncertainty_.by_rows(), step);
   const Matrix6 information = inverse_symmetric(covariance);
   return information.allFinite() ? information : motion.information / uncertainty_.variance_factor();
 }

@@ -1,9 +1,8 @@
-// Where rows are read one after the other: how the camera moves within a frame, how long its readout takes,
-// and what of that stays uncertain.
+#include "tracking/motion/shutter_model.hpp"
+
 #include <cmath>
 
 #include "geometry/symmetric_solve.hpp"
-#include "tracking/tracker.hpp"
 
 namespace twofold {
 namespace {
@@ -13,50 +12,19 @@ constexpr double kUnknownReadout = 0.015;
 
 }  // namespace
 
-RollingShutter Tracker::shutter_at(const SE3& T_c_ref, const FrameStep& step) const {
+ShutterModel::ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points)
+    : rig_(rig), motion_(motion) {
+  if (!rig.readout) readout_.emplace(rig, max_points);
+}
+
+RollingShutter ShutterModel::at(const SE3& T_c_ref, const FrameStep& step) const {
   if (rig_.readout.value_or(0) == 0) return {};
   const auto velocity = motion_.velocity_at(T_c_ref, step.frame.t_ns, step.after_loss());
   return velocity ? RollingShutter(rig_, *velocity) : RollingShutter();
 }
 
-/// From what was found in this frame and the ones before, whether it fitted the map or not.
-void Tracker::learn_readout(const FrameStep& step) {
-  const std::optional<SE3>& T_this_previous = motion_.since_previous();
-  if (!T_this_previous) readout_->interrupt();
-  std::vector<ReadoutPoint>* seen = readout_->begin_frame(step.frame.t_ns, T_this_previous.value_or(SE3()));
-  if (seen == nullptr) return;
-  for (const SearchOutcome::Match& match : search_.matches) {
-    const TrackedPoint& point = local_map_.points()[match.point];
-    const Vector3& z = match.found.z;
-    const bool measured = rig_.kind != SensorKind::kMono && z.x() > z.z();
-    const double depth =
-        measured ? rig_.depth_from_disparity(z.x() - z.z()) : (step.result.T_c_ref * point.x_ref).z();
-    // By where it was seen first, which it keeps when the map takes it over.
-    const Eigen::Vector2f& uv = point.appearance->uv;
-    const std::uint64_t key = std::uint64_t{index(local_map_.anchor(point))} << 32U |
-                              std::uint64_t(2 * uv.x() + 1) << 16U | std::uint64_t(2 * uv.y() + 1);
-    seen->push_back({key, z.head<2>(), depth, std::ldexp(rig_.noise.sigma_px, match.found.level)});
-  }
-  readout_->end_frame();
-  if (readout_->estimate().significant) rig_.readout = readout_->estimate().seconds;
-}
-
-/// By how much the readout that frames are tracked with may be wrong [s]; 0 where the calibration has it.
-double Tracker::readout_sigma() const {
-  if (!readout_) return 0;
-  const ReadoutEstimate& estimate = readout_->estimate();
-  const double prior = kUnknownReadout * kUnknownReadout;
-  const double trust = prior / (prior + estimate.sigma * estimate.sigma);  // 0 before the first pair
-  const double unused = rig_.readout ? 0 : trust * estimate.seconds;
-  return std::hypot(std::sqrt(prior * (1 - trust)), unused);
-}
-
-/// What a rolling shutter adds to the covariance. Its readout is known with an error, if at all; and the
-/// motion within a frame is taken to be that since the frame before, which is wrong by half of what the
-/// motion changed by, or by all of it where the frame before knew none.
-/// @param by_rows  RegionSums::by_rows of the measurements that `information` is of
-Matrix6 Tracker::shutter_covariance(const Matrix6& information, const Matrix6& by_rows,
-                                    const FrameStep& step) const {
+Matrix6 ShutterModel::covariance(const Matrix6& information, const Matrix6& by_rows,
+                                 const FrameStep& step) const {
   Matrix6 covariance = Matrix6::Zero();
   const auto velocity = motion_.velocity_at(step.result.T_c_ref, step.frame.t_ns, step.after_loss());
   if (!velocity || step.result.reference != motion_.reference()) return covariance;
@@ -68,6 +36,38 @@ Matrix6 Tracker::shutter_covariance(const Matrix6& information, const Matrix6& b
     covariance += 2 * pushed * pushed.transpose();  // the reference keyframe moved as well, and alike
   }
   return covariance;
+}
+
+void ShutterModel::learn(const FrameStep& step, const SearchOutcome& found, const LocalMap& local_map) {
+  if (!readout_) return;
+  const std::optional<SE3>& T_this_previous = motion_.since_previous();
+  if (!T_this_previous) readout_->interrupt();
+  std::vector<ReadoutPoint>* seen = readout_->begin_frame(step.frame.t_ns, T_this_previous.value_or(SE3()));
+  if (seen == nullptr) return;
+  for (const SearchOutcome::Match& match : found.matches) {
+    const TrackedPoint& point = local_map.points()[match.point];
+    const Vector3& z = match.found.z;
+    const bool measured = rig_.kind != SensorKind::kMono && z.x() > z.z();
+    const double depth =
+        measured ? rig_.depth_from_disparity(z.x() - z.z()) : (step.result.T_c_ref * point.x_ref).z();
+    // By where it was seen first, which it keeps when the map takes it over.
+    const Eigen::Vector2f& uv = point.appearance->uv;
+    const std::uint64_t key = std::uint64_t{index(local_map.anchor(point))} << 32U |
+                              std::uint64_t(2 * uv.x() + 1) << 16U | std::uint64_t(2 * uv.y() + 1);
+    seen->push_back({key, z.head<2>(), depth, std::ldexp(rig_.noise.sigma_px, match.found.level)});
+  }
+  readout_->end_frame();
+  if (readout_->estimate().significant) rig_.readout = readout_->estimate().seconds;
+}
+
+/// By how much the readout that frames are tracked with may be wrong [s]; 0 where the calibration has it.
+double ShutterModel::readout_sigma() const {
+  if (!readout_) return 0;
+  const ReadoutEstimate& estimate = readout_->estimate();
+  const double prior = kUnknownReadout * kUnknownReadout;
+  const double trust = prior / (prior + estimate.sigma * estimate.sigma);  // 0 before the first pair
+  const double unused = rig_.readout ? 0 : trust * estimate.seconds;
+  return std::hypot(std::sqrt(prior * (1 - trust)), unused);
 }
 
 }  // namespace twofold
