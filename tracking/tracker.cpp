@@ -15,10 +15,7 @@ constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxSeeds = 600;
 constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr std::size_t kRecentViews = 4;
-// Of what moves with the camera:
-constexpr double kTrustedShare = 0.5;  // of the matches, inliers: else the pose is in doubt
-constexpr double kFar = 0.1;           // share of the points that may be farther than what moves in the image
-constexpr double kNearer = 2;          // times: what is not tracked may be so much nearer than what is
+constexpr double kTrustedShare = 0.5;  // of the matches, inliers: else a pose is no witness of fixed pixels
 
 /// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
 /// better one.
@@ -42,11 +39,10 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       options_(options),
       motion_(options_),
       shutter_(rig_, motion_, static_cast<std::size_t>(options.max_searches)),
-      image_motion_(rig.camera),
-      fixed_(rig.camera.width, rig.camera.height, options.fixed),
+      correction_(rig, options.fixed),
       local_map_(kMaxLocalPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
-      local_map_search_(rig_, options_, local_map_, fixed_),
+      local_map_search_(rig_, options_, local_map_, correction_.fixed()),
       search_(rig, options),
       tried_(rig, options),
       elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
@@ -55,7 +51,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       recent_views_(kRecentViews, room_for_view(rig, wide_search_)),
       immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options,
-               &fixed_),
+               &correction_.fixed()),
       seeds_(rig, options.search, options.seeds, kMaxSeeds) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   anchors_.reserve(searches);
@@ -63,10 +59,6 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);
   new_corners_.reserve(static_cast<std::size_t>(options.max_new_points));
-  if (rig.kind == SensorKind::kStereo) {
-    right_rows_.emplace(rig);
-    fixed_right_.emplace(rig.camera.width, rig.camera.height, options.fixed);
-  }
   if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
   allocate_images(rig, current_);
@@ -88,7 +80,7 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   ++frames_;
   earlier_frames_.clear();
   loss_.begin_frame(frame.index, frame.t_ns);
-  load_images(frame);
+  correction_.load(frame, current_);
   step.lap(TrackerStage::kPyramid);
   const bool map_exists = motion_.reference() != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
@@ -143,21 +135,6 @@ bool Tracker::track(FrameStep& step) {
   return cause == LostCause::kNone;
 }
 
-void Tracker::load_images(const Frame& frame) {
-  current_.left.build(frame.left, fixed_.dead());
-  if (right_rows_) {
-    const auto build_right = [&] {
-      // Moving rows by part of one has spread dead pixels over their neighbours.
-      const bool as_taken = right_rows_->offset() == 0;
-      current_.right.build(right_rows_->aligned(frame.right),
-                           as_taken ? fixed_right_->dead() : std::span<const cv::Point>());
-    };
-    build_right();
-    if (right_rows_->look_at_start(frame.left, current_.right.level(0))) build_right();
-  }
-  if (rig_.kind == SensorKind::kRgbd) frame.depth.copyTo(current_.depth);
-}
-
 /// A newer map: take over what it confirmed, and move the reference to the newest own keyframe in it. That
 /// may be of a part that the camera has left meanwhile, because it was recognised elsewhere.
 void Tracker::follow(const GraphSnapshot& graph) {
@@ -208,11 +185,7 @@ SE3 Tracker::aligned_pose(FrameStep& step) {
 void Tracker::remember_frame(const FrameStep& step) {
   const TrackResult& result = step.result;
   motion_.advance({result.reference, result.T_c_ref}, step.frame.t_ns, loss_.lost_frames() > 0);
-  if (motion_.since_previous()) {
-    image_motion_.advance(*motion_.since_previous());
-  } else {
-    image_motion_.restart();
-  }
+  correction_.advance(motion_.since_previous());
   shutter_.learn(step, search_, local_map_);
   loss_.placed();
   unplaced_ = false;
@@ -238,25 +211,17 @@ void Tracker::remember_frame(const FrameStep& step) {
   if (monocular_start_) monocular_start_->reset();
 }
 
-/// What stays the same in the image while the camera moves. A pose that is in doubt is no witness: where
-/// something that passes has taken it along, it is the scene that seems fixed.
+/// Only from a pose that most matches agree on, and that is not the elders' against the others'.
 void Tracker::learn_fixed_pixels(const FrameStep& step) {
   if (step.result.by_depth) return;  // no points say how far the scene is
   samples_.clear();
-  for (const MotionObservation& observation : search_.observations) {
-    if (observation.inlier) samples_.push_back(1 / (step.result.T_c_ref * observation.x_ref).z());
-  }
   const bool agreed = step.result.inliers >= kTrustedShare * step.result.matches;
-  if (!agreed || samples_.empty() || elder_vote_.mistrusts_the_young()) {
-    image_motion_.restart();
-    return;
+  if (agreed && !elder_vote_.mistrusts_the_young()) {
+    for (const MotionObservation& observation : search_.observations) {
+      if (observation.inlier) samples_.push_back(1 / (step.result.T_c_ref * observation.x_ref).z());
+    }
   }
-  const auto far =
-      samples_.begin() + static_cast<std::ptrdiff_t>(kFar * static_cast<double>(samples_.size()));
-  std::nth_element(samples_.begin(), far, samples_.end());
-  image_motion_.set_inverse_depths(*far, kNearer * *std::max_element(far, samples_.end()));
-  fixed_.look_at(step.frame.left, step.frame.t_ns, image_motion_);
-  if (fixed_right_) fixed_right_->look_at(step.frame.right, step.frame.t_ns, image_motion_);
+  correction_.learn(step.frame, samples_);
 }
 
 }  // namespace twofold

@@ -10,12 +10,10 @@
 #include "estimation/pose_uncertainty.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
-#include "imaging/right_rows.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/depth/depth_alignment.hpp"
 #include "tracking/effort.hpp"
-#include "tracking/fixed/fixed_pixels.hpp"
-#include "tracking/fixed/image_motion.hpp"
+#include "tracking/fixed/image_correction.hpp"
 #include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
 #include "tracking/keyframe_decision.hpp"
@@ -100,7 +98,7 @@ class Tracker {
   void relocalise(KeyframeId id, const SE3& T_c_k) { asked_.answer = Placement{id, T_c_k}; }
 
   /// Rows that a stereo pair's right images lie lower than its left ones, taken back by the tracker [px].
-  [[nodiscard]] double row_offset() const { return right_rows_ ? right_rows_->offset() : 0; }
+  [[nodiscard]] double row_offset() const { return correction_.row_offset(); }
   /// ShutterModel::readout.
   [[nodiscard]] std::optional<ReadoutEstimate> readout() const { return shutter_.readout(); }
 
@@ -127,7 +125,6 @@ class Tracker {
   };
 
   // tracker.cpp: the stages of a frame
-  void load_images(const Frame& frame);
   void follow(const GraphSnapshot& graph);
   bool track(FrameStep& step);
   std::optional<SE3> align_to_previous(const SE3& start, FrameStep& step);
@@ -216,10 +213,8 @@ class Tracker {
 
   MotionModel motion_;
   ShutterModel shutter_;
+  ImageCorrection correction_;
   FrameImages current_;
-  ImageMotion image_motion_;
-  FixedPixels fixed_;
-  std::optional<FixedPixels> fixed_right_;  ///< stereo only
   LastFrame last_;
   LocalMap local_map_;
   DenseAlignment dense_alignment_;
@@ -227,7 +222,6 @@ class Tracker {
   SearchOutcome search_, tried_;  ///< of the newest frame, and of another start for it
   ElderVote elder_vote_;
   PoseUncertainty uncertainty_;
-  std::optional<RightRows> right_rows_;            ///< stereo only
   std::optional<DepthAlignment> depth_alignment_;  ///< RGB-D only
 
   LossHistory loss_;

@@ -71,7 +71,7 @@ void Tracker::propose_keyframe(FrameStep& step) {
   if (!step.result.by_depth) collect_observations(proposal);
   start_points(proposal.id, step);
   last_keyframe_.occupied_regions = occupied_regions();
-  if (right_rows_) right_rows_->look_at_keyframe(current_.left.level(0), current_.right.level(0));
+  correction_.look_at_keyframe(current_);
   hand_over_images(proposal);
   immature_points_.drop_stale(proposal.id, options_.max_failures, options_.max_immature_age);
 }
