@@ -14,7 +14,6 @@ constexpr std::size_t kMaxImmaturePoints = 1200;
 constexpr std::size_t kMaxPending = 12;
 constexpr std::size_t kMaxSeeds = 600;
 constexpr std::size_t kMaxAlignmentPoints = 240;
-constexpr std::size_t kRecentViews = 4;
 constexpr double kTrustedShare = 0.5;  // of the matches, inliers: else a pose is no witness of fixed pixels
 
 /// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
@@ -23,13 +22,6 @@ bool hardly_supported(const TrackResult& result, const TrackerOptions& options) 
   return result.inliers < options.doubted_searched_share * result.searched ||
          (result.inliers < options.doubted_inlier_share * result.matches &&
           result.inliers < options.rough_searched_share * result.searched);
-}
-
-RecentView room_for_view(const Rig& rig, const WideSearch& search) {
-  RecentView view;
-  allocate_images(rig, view.images);
-  search.prepare(view.corners);
-  return view;
 }
 
 }  // namespace
@@ -47,8 +39,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       tried_(rig, options),
       elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
       uncertainty_(rig),
-      wide_search_(rig, options.wide_search),
-      recent_views_(kRecentViews, room_for_view(rig, wide_search_)),
+      views_(rig, options),
       immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options,
                &correction_.fixed()),
@@ -63,8 +54,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
   allocate_images(rig, current_);
   allocate_images(rig, last_.images);
-  wide_search_.prepare(last_.corners);
-  asked_.view = room_for_view(rig, wide_search_);
+  views_.prepare(last_.corners);
 }
 
 TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
@@ -78,6 +68,7 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
                           EffortLevel effort) {
   FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_), loss_.lost_frames());
   ++frames_;
+  views_.begin_frame();
   earlier_frames_.clear();
   loss_.begin_frame(frame.index, frame.t_ns);
   correction_.load(frame, current_);
@@ -204,7 +195,7 @@ void Tracker::remember_frame(const FrameStep& step) {
     const Vector3 x_c = from_inverse_depth(point.psi);
     last_.points.push_back({point.appearance.uv, step.shutter.seen_from(rig_, SE3(), x_c) * x_c});
   }
-  take_corners(last_.corners);
+  views_.copy_corners(last_.corners);
   last_.is_keyframe = result.proposed;
   last_.by_depth = result.by_depth;
   std::swap(current_, last_.images);

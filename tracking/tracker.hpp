@@ -20,6 +20,7 @@
 #include "tracking/last_frame.hpp"
 #include "tracking/local_map.hpp"
 #include "tracking/local_map_search.hpp"
+#include "tracking/loss/earlier_views.hpp"
 #include "tracking/lost_cause.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/monocular_start.hpp"
@@ -27,7 +28,6 @@
 #include "tracking/motion/shutter_model.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
-#include "tracking/recent_views.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
@@ -84,7 +84,7 @@ class Tracker {
 
   /// Images of the last step's frame, which was lost: for the loop closer. They are kept until the next call,
   /// because the answer to `relocalise` says where this frame was taken, and the camera moves on.
-  [[nodiscard]] const FrameImages& ask_where();
+  [[nodiscard]] const FrameImages& ask_where() { return views_.ask(current_); }
   /// Frames since the last one with a pose.
   [[nodiscard]] int lost_frames() const { return loss_.lost_frames(); }
   /// Map part of a frame that was just located, in the map that it was tracked against.
@@ -95,7 +95,7 @@ class Tracker {
   /// Hint of the loop closer: the frame that `ask_where` was called for was recognised at T_c_k relative to
   /// keyframe `id`. The next step, if its graph has the keyframe, looks for points around there, then for
   /// what that frame shows, and forgets the hint. Ignored while tracking.
-  void relocalise(KeyframeId id, const SE3& T_c_k) { asked_.answer = Placement{id, T_c_k}; }
+  void relocalise(KeyframeId id, const SE3& T_c_k) { views_.answer({id, T_c_k}); }
 
   /// Rows that a stereo pair's right images lie lower than its left ones, taken back by the tracker [px].
   [[nodiscard]] double row_offset() const { return correction_.row_offset(); }
@@ -117,11 +117,6 @@ class Tracker {
   struct Attempt {
     TrackResult result;
     RollingShutter shutter;
-  };
-  /// A lost frame that the loop closer was shown.
-  struct Question {
-    RecentView view;
-    std::optional<Placement> answer;  ///< of relocalise
   };
 
   // tracker.cpp: the stages of a frame
@@ -157,12 +152,6 @@ class Tracker {
   bool search_from_recognised(const Placement& asked, FrameStep& step);
   void leave_other_part(const FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
-  /// It takes depth in both frames, which one camera does not measure.
-  [[nodiscard]] bool searches_widely() const {
-    return options_.wide_search.enabled && rig_.kind != SensorKind::kMono;
-  }
-  void look_widely();
-  void take_corners(FrameCorners& corners) const;
   bool search_widely(FrameStep& step);
   bool search_from_view(const FrameImages& images, FrameCorners& corners, const SearchStart& view,
                         FrameStep& step);
@@ -225,9 +214,7 @@ class Tracker {
   std::optional<DepthAlignment> depth_alignment_;  ///< RGB-D only
 
   LossHistory loss_;
-  WideSearch wide_search_;
-  RecentViews recent_views_;
-  Question asked_;
+  EarlierViews views_;
   bool unplaced_ = false;
 
   ImmaturePoints immature_points_;
@@ -238,7 +225,6 @@ class Tracker {
   KeyframeView last_keyframe_;
   Numbers next_;
   std::uint32_t frames_ = 0;
-  std::uint32_t looked_at_ = 0;  ///< frames_ at the last wider search
 
   // Scratch.
   std::vector<KeyframeId> anchors_;

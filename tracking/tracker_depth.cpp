@@ -25,8 +25,8 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
   read_depth(step);
   depth_alignment_->clear_views();
   const KeyframeId part = part_of(step.graph, immature_points_, motion_.reference());
-  for (std::size_t age = 0; age < recent_views_.size(); ++age) {
-    const RecentView& view = recent_views_[age];
+  for (std::size_t age = 0; age < views_.keyframes().size(); ++age) {
+    const RecentView& view = views_.keyframes()[age];
     const auto placement = placement_of(step.graph, view.id);
     if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
     const SE3 T_placed_ref =

@@ -97,8 +97,7 @@ void Tracker::hand_over_images(KeyframeProposal& proposal) {
   proposal.images.left.copy_from(current_.left);
   std::swap(proposal.images.right, current_.right);
   cv::swap(proposal.images.depth, current_.depth);
-  recent_views_.add(proposal.id, proposal.images);
-  take_corners(recent_views_[0].corners);
+  views_.add_keyframe(proposal.id, proposal.images);
 }
 
 void Tracker::collect_observations(KeyframeProposal& proposal) {

@@ -1,34 +1,12 @@
 // Where a lost camera is looked for: where it would be had it gone on, by what the last keyframes saw, and
 // where the loop closer recognised it.
-#include <algorithm>
-#include <utility>
-
 #include "tracking/tracker.hpp"
 
 namespace twofold {
 
-const FrameImages& Tracker::ask_where() {
-  asked_.view.images.copy_from(current_);
-  take_corners(asked_.view.corners);
-  return asked_.view.images;
-}
-
-/// The corners of this frame, once in a frame.
-void Tracker::look_widely() {
-  if (looked_at_ == frames_) return;
-  looked_at_ = frames_;
-  wide_search_.look_at(current_);
-}
-
-/// Of this frame, if a wider search has found them.
-void Tracker::take_corners(FrameCorners& corners) const {
-  corners.clear();
-  if (looked_at_ == frames_) corners = wide_search_.corners();
-}
-
 /// Where the loop closer recognised the lost camera.
 std::optional<Placement> Tracker::recognised(const FrameStep& step) {
-  const std::optional<Placement> hint = std::exchange(asked_.answer, std::nullopt);
+  const std::optional<Placement> hint = views_.take_answer();
   if (!hint || !step.after_loss() || !step.graph.contains(hint->reference)) return std::nullopt;
   const auto place = placement_of(step.graph, hint->reference);
   if (!place) return std::nullopt;  // a late answer: the keyframe was culled long ago
@@ -42,9 +20,9 @@ bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   step.lap(TrackerStage::kCandidates);
   const SearchStart start{.placement = asked, .kind = SearchStart::Kind::kRecognised};
   if (search_from(start, step) == LostCause::kNone) return true;
-  if (!searches_widely()) return false;
-  look_widely();
-  return search_from_view(asked_.view.images, asked_.view.corners, start, step);
+  if (!views_.can_find()) return false;
+  views_.look_at(current_);
+  return search_from_view(views_.asked().images, views_.asked().corners, start, step);
 }
 
 /// Points and seeds of the part in which the camera was, if it was recognised in another one: how the two lie
@@ -66,13 +44,13 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
 
 /// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
 bool Tracker::search_widely(FrameStep& step) {
-  if (!searches_widely() || motion_.reference() == kNoKeyframe) return false;
-  look_widely();
+  if (!views_.can_find() || motion_.reference() == kNoKeyframe) return false;
+  views_.look_at(current_);
   SearchStart start{.placement = motion_.placement(), .kind = SearchStart::Kind::kRough};
   if (!last_.is_keyframe && search_from_view(last_.images, last_.corners, start, step)) return true;
   const KeyframeId part = part_of(step.graph, immature_points_, motion_.reference());
-  for (std::size_t age = 0; age < recent_views_.size(); ++age) {
-    RecentView& view = recent_views_[age];
+  for (std::size_t age = 0; age < views_.keyframes().size(); ++age) {
+    RecentView& view = views_.keyframes()[age];
     const auto placement = placement_of(step.graph, view.id);
     if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
     start.placement = *placement;
@@ -113,7 +91,7 @@ bool Tracker::search_ahead(FrameStep& step) {
 /// @param view  of the images
 bool Tracker::search_from_view(const FrameImages& images, FrameCorners& corners, const SearchStart& view,
                                FrameStep& step) {
-  const auto T_c_view = wide_search_.find(images, corners, options_.search);
+  const auto T_c_view = views_.find(images, corners);
   step.lap(TrackerStage::kAlignment);
   if (!T_c_view) return false;
   SearchStart start = view;

@@ -1,4 +1,4 @@
-#include "tracking/recent_views.hpp"
+#include "tracking/loss/recent_views.hpp"
 
 #include <algorithm>
 

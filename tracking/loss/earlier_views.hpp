@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+
+#include "camera/rig.hpp"
+#include "tracking/loss/recent_views.hpp"
+#include "tracking/options.hpp"
+#include "tracking/placement.hpp"
+#include "tracking/wide_search.hpp"
+
+namespace twofold {
+
+/// What a lost camera is compared with: what the newest keyframes saw, and a lost frame of which the loop
+/// closer was asked where it was taken. What looks alike proposes where the camera is (WideSearch); others
+/// decide.
+///
+/// No allocation after construction.
+class EarlierViews {
+ public:
+  EarlierViews(const Rig& rig, const TrackerOptions& options);
+
+  /// A new frame: its corners are not known yet.
+  void begin_frame() { looked_ = false; }
+  /// Finds the frame's corners, once. Its images must stay until the last `find`.
+  void look_at(const FrameImages& now);
+  /// Pose of the frame looked at relative to an earlier one.
+  /// @param corners  of the earlier frame; found if they are not known. Made by `prepare`.
+  [[nodiscard]] std::optional<SE3> find(const FrameImages& earlier, FrameCorners& corners);
+  /// It takes depth in both frames, which one camera does not measure.
+  [[nodiscard]] bool can_find() const { return can_find_; }
+
+  /// Makes room for a frame's corners.
+  void prepare(FrameCorners& corners) const { search_.prepare(corners); }
+  /// Those of this frame, if it was looked at; else none.
+  void copy_corners(FrameCorners& corners) const;
+
+  /// The frame became a keyframe.
+  void add_keyframe(KeyframeId id, const FrameImages& images);
+  [[nodiscard]] RecentViews& keyframes() { return keyframes_; }
+
+  /// Keeps this frame, which is lost, until the next one is kept: the answer says where it was taken, and the
+  /// camera moves on.
+  const FrameImages& ask(const FrameImages& now);
+  void answer(const Placement& placement) { answer_ = placement; }
+  /// The answer, once.
+  [[nodiscard]] std::optional<Placement> take_answer();
+  /// The frame kept.
+  [[nodiscard]] RecentView& asked() { return asked_; }
+
+ private:
+  bool can_find_;
+  GuidedSearchOptions guided_;
+  WideSearch search_;
+  bool looked_ = false;
+  RecentViews keyframes_;
+  RecentView asked_;
+  std::optional<Placement> answer_;
+};
+
+}  // namespace twofold
