@@ -40,6 +40,10 @@ class ImmaturePoints {
 
   [[nodiscard]] std::vector<ImmaturePoint>& points() { return points_; }
   [[nodiscard]] const std::vector<ImmaturePoint>& points() const { return points_; }
+  /// The point that TrackedPoint::immature says; null: the map has it.
+  [[nodiscard]] ImmaturePoint* at(int position) {
+    return position < 0 ? nullptr : &points_[static_cast<std::size_t>(position)];
+  }
   [[nodiscard]] const std::vector<PendingKeyframe>& pending() const { return pending_; }
   [[nodiscard]] bool room_for_keyframe() const { return pending_.size() < pending_.capacity(); }
   [[nodiscard]] const PendingKeyframe* find_pending(KeyframeId id) const;

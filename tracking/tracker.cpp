@@ -35,17 +35,15 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       local_map_(kMaxLocalPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
       local_map_search_(rig_, options_, local_map_, correction_.fixed()),
+      immature_points_(kMaxImmaturePoints, kMaxPending),
+      pose_estimator_(rig_, options_, local_map_, shutter_, immature_points_),
       search_(rig, options),
       tried_(rig, options),
-      elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
-      uncertainty_(rig),
       views_(rig, options),
-      immature_points_(kMaxImmaturePoints, kMaxPending),
       starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options,
                &correction_.fixed()),
       seeds_(rig, options.search, options.seeds, kMaxSeeds) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
-  anchors_.reserve(searches);
   inlier_ids_.reserve(searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);
@@ -207,7 +205,7 @@ void Tracker::learn_fixed_pixels(const FrameStep& step) {
   if (step.result.by_depth) return;  // no points say how far the scene is
   samples_.clear();
   const bool agreed = step.result.inliers >= kTrustedShare * step.result.matches;
-  if (agreed && !elder_vote_.mistrusts_the_young()) {
+  if (agreed && !pose_estimator_.mistrusts_the_young()) {
     for (const MotionObservation& observation : search_.observations) {
       if (observation.inlier) samples_.push_back(1 / (step.result.T_c_ref * observation.x_ref).z());
     }

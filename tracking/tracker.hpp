@@ -7,7 +7,6 @@
 
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
-#include "estimation/pose_uncertainty.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/dense_alignment.hpp"
@@ -28,6 +27,7 @@
 #include "tracking/motion/shutter_model.hpp"
 #include "tracking/options.hpp"
 #include "tracking/point_starter.hpp"
+#include "tracking/pose/pose_estimator.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
@@ -133,19 +133,6 @@ class Tracker {
   [[nodiscard]] bool leaves_motion(const SE3& T_c_ref, const FrameStep& step);
   [[nodiscard]] Attempt set_aside(const FrameStep& step);
   void take_back(const Attempt& attempt, FrameStep& step);
-  void observe_matches(const SE3& T_c_ref, const RollingShutter& shutter);
-  LostCause estimate_pose(const Placement& start, FrameStep& step);
-  void ask_elders(MotionOnlyResult& motion, const MotionOnlyOptions& solver);
-  [[nodiscard]] MotionOnlyOptions solver(const FrameStep& step) const;
-  [[nodiscard]] int mapped_inliers() const;
-  [[nodiscard]] bool well_supported(const TrackResult& result) const;
-  int judge_immature_points();
-  [[nodiscard]] Matrix6 honest_information(const FrameStep& step);
-  /// One that the tracker started; null: the map has it.
-  [[nodiscard]] ImmaturePoint* immature_point(const TrackedPoint& point) {
-    return point.immature < 0 ? nullptr
-                              : &immature_points_.points()[static_cast<std::size_t>(point.immature)];
-  }
 
   // tracker_loss.cpp: where a lost camera is looked for
   [[nodiscard]] std::optional<Placement> recognised(const FrameStep& step);
@@ -208,16 +195,15 @@ class Tracker {
   LocalMap local_map_;
   DenseAlignment dense_alignment_;
   LocalMapSearch local_map_search_;
-  SearchOutcome search_, tried_;  ///< of the newest frame, and of another start for it
-  ElderVote elder_vote_;
-  PoseUncertainty uncertainty_;
+  ImmaturePoints immature_points_;
+  PoseEstimator pose_estimator_;
+  SearchOutcome search_, tried_;                   ///< of the newest frame, and of another start for it
   std::optional<DepthAlignment> depth_alignment_;  ///< RGB-D only
 
   LossHistory loss_;
   EarlierViews views_;
   bool unplaced_ = false;
 
-  ImmaturePoints immature_points_;
   PointStarter starter_;
   DepthSeeds seeds_;
   std::optional<MonocularStart> monocular_start_;  ///< one camera only, as the next
@@ -227,7 +213,6 @@ class Tracker {
   std::uint32_t frames_ = 0;
 
   // Scratch.
-  std::vector<KeyframeId> anchors_;
   std::vector<PointId> inlier_ids_;
   std::vector<double> samples_;
   std::vector<PointAppearance> new_corners_;

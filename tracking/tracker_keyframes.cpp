@@ -105,8 +105,8 @@ void Tracker::collect_observations(KeyframeProposal& proposal) {
     if (!search_.observations[m].inlier) continue;
     const TrackedPoint& point = local_map_.points()[search_.matches[m].point];
     PointId id = point.id;
-    if (ImmaturePoint* immature = immature_point(point)) {
-      if (immature->id == kNoPoint && elder_vote_.mistrusts_the_young() &&
+    if (ImmaturePoint* immature = immature_points_.at(point.immature)) {
+      if (immature->id == kNoPoint && pose_estimator_.mistrusts_the_young() &&
           immature->agreed < options_.trusted_after) {
         continue;  // chance finds what moves near where it was
       }

@@ -53,7 +53,7 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   const Placement placement{id, start.structure.T_last_first};
   local_map_.update(step.graph, id, immature_points_, options_.neighbour_keyframes);
   local_map_search_.run(current_, placement.T_c_ref, options_.lost_radius_px, step, search_);
-  const LostCause cause = estimate_pose(placement, step);
+  const LostCause cause = pose_estimator_.estimate(placement, step, search_);
   if (cause != LostCause::kNone) return cause;
   step.result.cause = LostCause::kNone;
   last_keyframe_ = {median_depth(SE3()), occupied_regions()};
