@@ -12,7 +12,6 @@ namespace {
 constexpr std::size_t kMaxLocalPoints = 3000;
 constexpr std::size_t kMaxImmaturePoints = 1200;
 constexpr std::size_t kMaxPending = 12;
-constexpr std::size_t kMaxSeeds = 600;
 constexpr std::size_t kMaxAlignmentPoints = 240;
 constexpr double kTrustedShare = 0.5;  // of the matches, inliers: else a pose is no witness of fixed pixels
 
@@ -40,14 +39,11 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       search_(rig, options),
       tried_(rig, options),
       views_(rig, options),
-      starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options,
-               &correction_.fixed()),
-      seeds_(rig, options.search, options.seeds, kMaxSeeds) {
+      new_points_(rig_, options_, correction_.fixed()) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   inlier_ids_.reserve(searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);
-  new_corners_.reserve(static_cast<std::size_t>(options.max_new_points));
   if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
   if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
   allocate_images(rig, current_);
@@ -74,7 +70,7 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   const bool map_exists = motion_.reference() != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
   step.tracked = map_exists && track(step);
-  if (step.tracked && seeds_.size() > 0) observe_seeds(step);
+  if (step.tracked && new_points_.has_seeds()) observe_seeds(step);
   if (step.tracked) step.result.proposed = keyframe_is_due(step);
   step.started = !step.tracked && (map_exists ? start_part(step) : start_map(step));
   step.lap(TrackerStage::kKeyframe);

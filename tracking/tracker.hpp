@@ -16,17 +16,16 @@
 #include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
 #include "tracking/keyframe_decision.hpp"
+#include "tracking/keyframes/new_points.hpp"
 #include "tracking/last_frame.hpp"
 #include "tracking/local_map.hpp"
 #include "tracking/local_map_search.hpp"
 #include "tracking/loss/earlier_views.hpp"
 #include "tracking/lost_cause.hpp"
-#include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/monocular_start.hpp"
 #include "tracking/motion/motion_model.hpp"
 #include "tracking/motion/shutter_model.hpp"
 #include "tracking/options.hpp"
-#include "tracking/point_starter.hpp"
 #include "tracking/pose/pose_estimator.hpp"
 #include "tracking/track_result.hpp"
 
@@ -169,7 +168,6 @@ class Tracker {
   LostCause start_from_motion(FrameStep& step);
   LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
   void observe_seeds(const FrameStep& step);
-  void start_seeds(KeyframeId anchor);
 
   // tracker_keyframes.cpp
   [[nodiscard]] bool keyframe_is_due(const FrameStep& step) const;
@@ -178,8 +176,6 @@ class Tracker {
   void hand_over_images(KeyframeProposal& proposal);
   void collect_observations(KeyframeProposal& proposal);
   void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
-  void start_points(KeyframeId anchor, const FrameStep& step);
-  void occupy_unsearched(const SE3& T_c_ref);
   void revisit_reference(const GraphSnapshot& graph);
   [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
@@ -204,8 +200,7 @@ class Tracker {
   EarlierViews views_;
   bool unplaced_ = false;
 
-  PointStarter starter_;
-  DepthSeeds seeds_;
+  NewPoints new_points_;
   std::optional<MonocularStart> monocular_start_;  ///< one camera only, as the next
   std::vector<EarlierFrame> earlier_frames_;
   KeyframeView last_keyframe_;
@@ -215,7 +210,6 @@ class Tracker {
   // Scratch.
   std::vector<PointId> inlier_ids_;
   std::vector<double> samples_;
-  std::vector<PointAppearance> new_corners_;
 };
 
 }  // namespace twofold

@@ -69,7 +69,7 @@ void Tracker::propose_keyframe(FrameStep& step) {
   begin_proposal({step.result.reference, step.result.T_c_ref}, step);
   // Where corners are few, most lie on bare edges, along which they slide: the map takes none of them.
   if (!step.result.by_depth) collect_observations(proposal);
-  start_points(proposal.id, step);
+  new_points_.start(current_, proposal.id, local_map_, step, search_, immature_points_);
   last_keyframe_.occupied_regions = occupied_regions();
   correction_.look_at_keyframe(current_);
   hand_over_images(proposal);
@@ -127,31 +127,6 @@ void Tracker::confirm(ImmaturePoint& point, KeyframeProposal& proposal) {
   Observation anchor_observation = point.anchor_observation;
   anchor_observation.point = point.id;
   proposal.new_points.push_back({point.id, point.anchor, point.psi, anchor_observation, point.appearance});
-}
-
-/// New points where nothing is tracked or known.
-void Tracker::start_points(KeyframeId anchor, const FrameStep& step) {
-  starter_.clear();
-  for (std::size_t m = 0; m < search_.matches.size(); ++m) {
-    if (search_.observations[m].inlier) starter_.occupy(search_.matches[m].found.z.head<2>().cast<float>());
-  }
-  const bool enough_found = static_cast<int>(search_.matches.size()) >= step.bounds.wanted_matches;
-  if (enough_found && rig_.kind != SensorKind::kRgbd) occupy_unsearched(step.result.T_c_ref);
-  if (rig_.kind != SensorKind::kMono) starter_.start(current_, anchor, step.shutter, immature_points_);
-  start_seeds(anchor);
-}
-
-/// Where the map has points that nobody looked for, because enough others had been found: a place seen again
-/// would get new ones for ever. Uses up the candidates of this frame's search. Depth cameras are left out:
-/// they gained nothing by it, and had fewer fresh points when frames blurred (docs/results/variations.md,
-/// seldom frames).
-void Tracker::occupy_unsearched(const SE3& T_c_ref) {
-  for (std::int64_t i = search_.candidates.next(); i >= 0; i = search_.candidates.next()) {
-    const TrackedPoint& point = local_map_.points()[static_cast<std::size_t>(i)];
-    if (point.immature >= 0) continue;  // few of these will ever be points of the map
-    const auto uv = rig_.camera.find_in_view(T_c_ref * point.x_ref);
-    if (uv) starter_.occupy(uv->cast<float>());
-  }
 }
 
 /// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to

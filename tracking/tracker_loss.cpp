@@ -32,7 +32,7 @@ void Tracker::leave_other_part(const FrameStep& step) {
   const KeyframeId before = motion_.reference();
   if (before == kNoKeyframe || part(before) == part(step.result.reference)) return;
   immature_points_.clear_points();
-  seeds_.clear();
+  new_points_.forget_seeds();
 }
 
 /// A keyframe as the map has it: itself, or the one that was left in its place.

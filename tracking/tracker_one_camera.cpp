@@ -38,7 +38,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
 LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& step) {
   const KeyframeId id{next_.keyframe};
   immature_points_.clear_points();
-  seeds_.clear();
+  new_points_.forget_seeds();
   for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
     const auto corner = static_cast<std::size_t>(start.structure.corners[n]);
     ImmaturePoint point;
@@ -68,21 +68,7 @@ void Tracker::observe_seeds(const FrameStep& step) {
   };
   // A frame placed by its depth image may have no point that says how far the scene is.
   const double depth = result.by_depth ? depth_alignment_->typical_depth() : median_depth(result.T_c_ref);
-  if (depth > 0) seeds_.observe(current_.left, depth, T_c_anchor, immature_points_);
-}
-
-/// Corners where no point is tracked or known, and none waits for its depth. All that one camera has; for the
-/// others what there is to live on where depth is out of reach, or the right camera sees nothing.
-void Tracker::start_seeds(KeyframeId anchor) {
-  seeds_.drop_stale(anchor);
-  const bool one_camera = rig_.kind == SensorKind::kMono;
-  if (!one_camera && !starter_.depth_is_scarce()) return;
-  seeds_.for_places([&](const Eigen::Vector2f& uv) { starter_.occupy(uv); });
-  const int wanted =
-      one_camera ? options_.max_new_points : options_.seeded_points - starter_.points_in_view();
-  new_corners_.clear();
-  starter_.choose_corners(current_, wanted, new_corners_);
-  for (const PointAppearance& appearance : new_corners_) seeds_.add(anchor, appearance);
+  if (depth > 0) new_points_.observe_seeds(current_.left, depth, T_c_anchor, immature_points_);
 }
 
 }  // namespace twofold

@@ -18,7 +18,7 @@ void Tracker::continue_from(const GraphSnapshot& graph) {
 bool Tracker::start_map(FrameStep& step) {
   step.result.cause = make_first_keyframe(step);
   if (step.result.cause == LostCause::kNoTexture && rig_.kind == SensorKind::kStereo) {
-    step.result.cause = starter_.explain_missing_depth(current_, kMinStartPoints);
+    step.result.cause = new_points_.explain_missing_depth(current_, kMinStartPoints);
   }
   return step.result.cause == LostCause::kNone;
 }
@@ -28,7 +28,7 @@ bool Tracker::start_map(FrameStep& step) {
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
   const bool something_in_view =
-      starter_.sees_corners(current_.left, options_.min_corners_seen) || sees_structure(step);
+      new_points_.sees_corners(current_.left, options_.min_corners_seen) || sees_structure(step);
   if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.new_part_after || !something_in_view ||
       loss_.lost_frames() < options_.new_part_frames) {
     return false;
@@ -48,9 +48,8 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   const KeyframeId id{next_.keyframe};
   step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();
-  seeds_.clear();
-  starter_.clear();
-  if (starter_.start(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
+  new_points_.forget_seeds();
+  if (new_points_.start_first(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
     const LostCause open = judge_structure(step);
     if (open != LostCause::kNone) {
       immature_points_.clear_points();
@@ -61,7 +60,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   search_.clear();
   last_keyframe_ = {step.result.by_depth ? depth_alignment_->typical_depth() : median_depth(SE3()), 0};
   begin_proposal({kNoKeyframe, SE3()}, step);
-  start_seeds(id);
+  new_points_.start_seeds(current_, id);
   hand_over_images(*step.free_proposal);
   next_.first_of_part = index(id);
   step.result.status = TrackStatus::kTracking;

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <vector>
+
+#include "camera/rig.hpp"
+#include "tracking/frame_step.hpp"
+#include "tracking/immature_points.hpp"
+#include "tracking/local_map.hpp"
+#include "tracking/local_map_search.hpp"
+#include "tracking/monocular/depth_seeds.hpp"
+#include "tracking/point_starter.hpp"
+
+namespace twofold {
+
+/// Where the tracker's own points come from: corners whose depth is measured become immature points at once,
+/// others wait as seeds until frames have shown how deep they are.
+///
+/// No allocation after construction.
+class NewPoints {
+ public:
+  /// All must outlive this.
+  /// @param fixed  of the left camera
+  NewPoints(const Rig& rig, const TrackerOptions& options, const FixedPixels& fixed);
+
+  /// In a keyframe before which there is nothing. Seeds are left to `start_seeds`.
+  /// @return how many points were started
+  int start_first(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
+                  ImmaturePoints& immature_points);
+  /// In a keyframe, where nothing is tracked or known. Uses up the candidates of the frame's search.
+  void start(const FrameImages& images, KeyframeId anchor, const LocalMap& local_map, const FrameStep& step,
+             SearchOutcome& found, ImmaturePoints& immature_points);
+  /// Corners where no point is tracked or known, and none waits for its depth. All that one camera has; for
+  /// the others what there is to live on where depth is out of reach, or the right camera sees nothing.
+  void start_seeds(const FrameImages& images, KeyframeId anchor);
+
+  /// DepthSeeds::observe.
+  template <class PoseOfAnchor>
+  void observe_seeds(const ImagePyramid& image, double median_depth, PoseOfAnchor&& T_c_anchor,
+                     ImmaturePoints& ready) {
+    seeds_.observe(image, median_depth, T_c_anchor, ready);
+  }
+  void forget_seeds() { seeds_.clear(); }
+  [[nodiscard]] bool has_seeds() const { return seeds_.size() > 0; }
+
+  /// PointStarter::sees_corners.
+  [[nodiscard]] bool sees_corners(const ImagePyramid& image, int wanted) {
+    return starter_.sees_corners(image, wanted);
+  }
+  /// PointStarter::explain_missing_depth.
+  [[nodiscard]] LostCause explain_missing_depth(const FrameImages& images, int wanted) {
+    return starter_.explain_missing_depth(images, wanted);
+  }
+
+ private:
+  void occupy_unsearched(const LocalMap& local_map, const SE3& T_c_ref, Quadtree& candidates);
+
+  const Rig& rig_;
+  const TrackerOptions& options_;
+  PointStarter starter_;
+  DepthSeeds seeds_;
+  std::vector<PointAppearance> corners_;  ///< scratch
+};
+
+}  // namespace twofold
