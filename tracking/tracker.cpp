@@ -39,7 +39,8 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       search_(rig, options),
       tried_(rig, options),
       views_(rig, options),
-      new_points_(rig_, options_, correction_.fixed()) {
+      new_points_(rig_, options_, correction_.fixed()),
+      proposer_(options_) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
   inlier_ids_.reserve(searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
@@ -71,7 +72,8 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   if (map_exists) follow(graph);
   step.tracked = map_exists && track(step);
   if (step.tracked && new_points_.has_seeds()) observe_seeds(step);
-  if (step.tracked) step.result.proposed = keyframe_is_due(step);
+  if (step.tracked)
+    step.result.proposed = proposer_.due(step, occupied_regions(rig_.camera, search_), immature_points_);
   step.started = !step.tracked && (map_exists ? start_part(step) : start_map(step));
   step.lap(TrackerStage::kKeyframe);
   return step;
@@ -184,7 +186,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   for (const ImmaturePoint& point : immature_points_.points()) {
     if (last_.points.size() == last_.points.capacity()) break;
     if (rig_.kind == SensorKind::kMono) break;  // it has no depth where it starts a point
-    const bool started_in_this_frame = result.proposed && index(point.anchor) + 1 == next_.keyframe;
+    const bool started_in_this_frame = result.proposed && proposer_.is_newest(point.anchor);
     if (!started_in_this_frame) continue;
     const Vector3 x_c = from_inverse_depth(point.psi);
     last_.points.push_back({point.appearance.uv, step.shutter.seen_from(rig_, SE3(), x_c) * x_c});

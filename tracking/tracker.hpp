@@ -15,7 +15,7 @@
 #include "tracking/fixed/image_correction.hpp"
 #include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
-#include "tracking/keyframe_decision.hpp"
+#include "tracking/keyframes/keyframe_proposer.hpp"
 #include "tracking/keyframes/new_points.hpp"
 #include "tracking/last_frame.hpp"
 #include "tracking/local_map.hpp"
@@ -39,9 +39,8 @@ namespace twofold {
 /// it has started, or while it is lost and may start again; keyframes included if their buffers were
 /// prepared, and no reference count of a snapshot is touched. Work per frame is bounded by the options.
 ///
-/// The tracker numbers keyframes when it proposes them and points when a later keyframe finds them again. Its
-/// own pose is relative to a reference keyframe, so that it moves along when a newer snapshot moves that
-/// keyframe.
+/// The tracker's own pose is relative to a reference keyframe, so that it moves along when a newer snapshot
+/// moves that keyframe.
 class Tracker {
  public:
   Tracker(const Rig& rig, const TrackerOptions& options);
@@ -106,12 +105,6 @@ class Tracker {
   [[nodiscard]] std::span<const MotionObservation> last_observations() const { return search_.observations; }
 
  private:
-  /// Of keyframes and points: the next ones.
-  struct Numbers {
-    std::uint32_t keyframe = 0;
-    std::uint32_t first_of_part = 0;  ///< the newest part's
-    std::uint32_t point = 0;
-  };
   /// What one start came to; its SearchOutcome is tried_ while another start is tried.
   struct Attempt {
     TrackResult result;
@@ -170,14 +163,10 @@ class Tracker {
   void observe_seeds(const FrameStep& step);
 
   // tracker_keyframes.cpp
-  [[nodiscard]] bool keyframe_is_due(const FrameStep& step) const;
+  [[nodiscard]] KeyframeView view_of(const FrameStep& step);
   void propose_keyframe(FrameStep& step);
-  void begin_proposal(const Placement& placement, FrameStep& step);
   void hand_over_images(KeyframeProposal& proposal);
-  void collect_observations(KeyframeProposal& proposal);
-  void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
   void revisit_reference(const GraphSnapshot& graph);
-  [[nodiscard]] int occupied_regions() const;
   [[nodiscard]] double median_depth(const SE3& T_c_ref);
 
   const Rig rig_;
@@ -203,8 +192,7 @@ class Tracker {
   NewPoints new_points_;
   std::optional<MonocularStart> monocular_start_;  ///< one camera only, as the next
   std::vector<EarlierFrame> earlier_frames_;
-  KeyframeView last_keyframe_;
-  Numbers next_;
+  KeyframeProposer proposer_;
   std::uint32_t frames_ = 0;
 
   // Scratch.

@@ -20,12 +20,12 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   earlier_frames_ = monocular_start_->earlier_frames(*start);
   const StartCandidate& first = *start->first;
   const Placement here{step.result.reference, step.result.T_c_ref};
-  begin_proposal({kNoKeyframe, SE3()}, step);
+  proposer_.begin({kNoKeyframe, SE3()}, {median_depth(SE3()), occupied_regions(rig_.camera, search_)}, step,
+                  immature_points_);
   KeyframeProposal& proposal = *step.free_proposal;
   proposal.frame_index = first.frame_index;
   proposal.t_ns = first.t_ns;
   proposal.images.left.copy_from(first.images.left);
-  next_.first_of_part = index(proposal.id);
   // As if the camera had moved evenly since: that is the next frame's prediction.
   const double share = static_cast<double>(first.age - 1) / first.age;
   const auto since_first = static_cast<double>(step.frame.t_ns - first.t_ns);
@@ -36,7 +36,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
 
 /// A start counts when the tracker's own search finds its points from where it says the camera is.
 LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& step) {
-  const KeyframeId id{next_.keyframe};
+  const KeyframeId id = proposer_.next();
   immature_points_.clear_points();
   new_points_.forget_seeds();
   for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
@@ -56,7 +56,6 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   const LostCause cause = pose_estimator_.estimate(placement, step, search_);
   if (cause != LostCause::kNone) return cause;
   step.result.cause = LostCause::kNone;
-  last_keyframe_ = {median_depth(SE3()), occupied_regions()};
   return LostCause::kNone;
 }
 

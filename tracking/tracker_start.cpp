@@ -10,8 +10,7 @@ constexpr int kMinStartPoints = 40;
 
 void Tracker::continue_from(const GraphSnapshot& graph) {
   if (graph.keyframe_count() == 0) return;
-  next_.keyframe = static_cast<std::uint32_t>(graph.keyframe_count());
-  next_.point = static_cast<std::uint32_t>(graph.point_count());
+  proposer_.continue_from(graph);
   unplaced_ = true;
 }
 
@@ -45,7 +44,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
     return LostCause::kNoKeyframeBuffer;
   }
   if (monocular_start_) return start_from_motion(step);
-  const KeyframeId id{next_.keyframe};
+  const KeyframeId id = proposer_.next();
   step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();
   new_points_.forget_seeds();
@@ -58,15 +57,13 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
     step.result.by_depth = true;
   }
   search_.clear();
-  last_keyframe_ = {step.result.by_depth ? depth_alignment_->typical_depth() : median_depth(SE3()), 0};
-  begin_proposal({kNoKeyframe, SE3()}, step);
+  step.result.T_c_ref = SE3();
+  proposer_.begin({kNoKeyframe, SE3()}, view_of(step), step, immature_points_);
   new_points_.start_seeds(current_, id);
   hand_over_images(*step.free_proposal);
-  next_.first_of_part = index(id);
   step.result.status = TrackStatus::kTracking;
   step.result.cause = LostCause::kNone;
   step.result.reference = id;
-  step.result.T_c_ref = SE3();
   return LostCause::kNone;
 }
 
