@@ -40,9 +40,9 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       tried_(rig, options),
       views_(rig, options),
       new_points_(rig_, options_, correction_.fixed()),
-      proposer_(options_) {
+      proposer_(options_),
+      reference_choice_(static_cast<std::size_t>(options.max_searches)) {
   const auto searches = static_cast<std::size_t>(options.max_searches);
-  inlier_ids_.reserve(searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);
   if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
@@ -62,7 +62,7 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
 FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
                           EffortLevel effort) {
   FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_), loss_.lost_frames());
-  ++frames_;
+  reference_choice_.begin_frame();
   views_.begin_frame();
   earlier_frames_.clear();
   loss_.begin_frame(frame.index, frame.t_ns);

@@ -17,6 +17,7 @@
 #include "tracking/immature_points.hpp"
 #include "tracking/keyframes/keyframe_proposer.hpp"
 #include "tracking/keyframes/new_points.hpp"
+#include "tracking/keyframes/reference_choice.hpp"
 #include "tracking/last_frame.hpp"
 #include "tracking/local_map.hpp"
 #include "tracking/local_map_search.hpp"
@@ -193,10 +194,9 @@ class Tracker {
   std::optional<MonocularStart> monocular_start_;  ///< one camera only, as the next
   std::vector<EarlierFrame> earlier_frames_;
   KeyframeProposer proposer_;
-  std::uint32_t frames_ = 0;
+  ReferenceChoice reference_choice_;
 
   // Scratch.
-  std::vector<PointId> inlier_ids_;
   std::vector<double> samples_;
 };
 

@@ -1,5 +1,4 @@
 // When a frame becomes a keyframe, and what it then hands to the map.
-#include <algorithm>
 #include <span>
 
 #include "base/median.hpp"
@@ -8,11 +7,6 @@
 #include "tracking/tracker.hpp"
 
 namespace twofold {
-namespace {
-
-constexpr std::uint32_t kRevisitInterval = 3;  // frames between looks for a better reference
-
-}  // namespace
 
 void Tracker::prepare(KeyframeProposal& proposal) const {
   // Every match is an observation, and a new point at most.
@@ -61,38 +55,10 @@ void Tracker::hand_over_images(KeyframeProposal& proposal) {
   views_.add_keyframe(proposal.id, proposal.images);
 }
 
-/// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to
-/// a place, the reference comes back too, and no keyframe is needed  (thesis 6.2.2: V_ref may be an older,
-/// revisited keyframe).
 void Tracker::revisit_reference(const GraphSnapshot& graph) {
-  if (frames_ % kRevisitInterval != 0 || !graph.contains(motion_.reference()) ||
-      !immature_points_.pending().empty())
-    return;
-  inlier_ids_.clear();
-  for (std::size_t m = 0; m < search_.matches.size(); ++m) {
-    const PointId id = local_map_.points()[search_.matches[m].point].id;
-    if (search_.observations[m].inlier && id != kNoPoint) inlier_ids_.push_back(id);
-  }
-  std::sort(inlier_ids_.begin(), inlier_ids_.end());
-  const auto shared = [&](KeyframeId id) {
-    int count = 0;
-    for (const Observation& observation : *graph.keyframe(id).observations) {
-      count += std::binary_search(inlier_ids_.begin(), inlier_ids_.end(), observation.point) ? 1 : 0;
-    }
-    return count;
-  };
-  KeyframeId best = motion_.reference();
-  // Changing back and forth helps nobody: a new reference must be clearly better.
-  int best_count = shared(motion_.reference()) * 6 / 5;
-  for (const KeyframeId id : local_map_.neighbours()) {
-    const int count = shared(id);
-    if (count > best_count) {
-      best = id;
-      best_count = count;
-    }
-  }
-  if (best == motion_.reference()) return;
-  motion_.refer_to(best, relative_pose(graph, immature_points_, motion_.reference(), best));
+  if (!graph.contains(motion_.reference()) || !immature_points_.pending().empty()) return;
+  const auto better = reference_choice_.better(graph, motion_.reference(), local_map_, search_);
+  if (better) motion_.refer_to(*better, relative_pose(graph, immature_points_, motion_.reference(), *better));
 }
 
 }  // namespace twofold

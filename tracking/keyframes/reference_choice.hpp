@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "tracking/local_map.hpp"
+#include "tracking/local_map_search.hpp"
+
+namespace twofold {
+
+/// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to
+/// a place, the reference comes back too, and no keyframe is needed  (thesis 6.2.2: V_ref may be an older,
+/// revisited keyframe). No allocation after construction.
+class ReferenceChoice {
+ public:
+  /// @param max_points  found in a frame at most
+  explicit ReferenceChoice(std::size_t max_points) { found_.reserve(max_points); }
+
+  /// A new frame: only some of them are looked at.
+  void begin_frame() { ++frames_; }
+  /// @param reference  the present one, of the graph, around which the local map is
+  /// @return a keyframe that is clearly better, if one is looked for in this frame
+  [[nodiscard]] std::optional<KeyframeId> better(const GraphSnapshot& graph, KeyframeId reference,
+                                                 const LocalMap& local_map, const SearchOutcome& found);
+
+ private:
+  [[nodiscard]] int shared(const GraphSnapshot& graph, KeyframeId id) const;
+
+  std::uint32_t frames_ = 0;
+  std::vector<PointId> found_;  ///< sorted
+};
+
+}  // namespace twofold
