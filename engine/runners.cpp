@@ -79,8 +79,7 @@ void TrackerRunner::locate(const Frame& frame, const GraphSnapshot& graph, Effor
   record.snapshot_version = graph.version();
   record.reference = result.reference;
   record.T_c_ref = PackedPose(result.T_c_ref);
-  for (const EarlierFrame& earlier : tracker_.earlier_frames())
-    earlier_.push_back({result.reference, earlier});
+  for (const EarlierFrame& earlier : step_->earlier_frames) earlier_.push_back({result.reference, earlier});
   if (record.state == FrameState::kTracked) {
     record.T_c_w_causal = PackedPose(tracker_.T_c_w(*step_));
     record.part_causal = tracker_.part(*step_);

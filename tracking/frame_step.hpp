@@ -2,12 +2,14 @@
 
 #include <chrono>
 #include <cstdint>
+#include <vector>
 
 #include "camera/frame.hpp"
 #include "camera/rolling_shutter.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
 #include "tracking/effort.hpp"
+#include "tracking/monocular/monocular_start.hpp"
 #include "tracking/placement.hpp"
 #include "tracking/track_result.hpp"
 
@@ -48,6 +50,8 @@ class FrameStep {
   bool started = false;     ///< a map or map part, with this frame
   RollingShutter shutter;   ///< as the camera moves in this frame, as far as known
   TrackResult result;
+  /// One camera: frames before this one whose poses its start found out, relative to the reference keyframe.
+  std::vector<EarlierFrame> earlier_frames;
   /// Of a pose that depth alignment gave, the errors of planes taken as independent, as the weights of the
   /// edges that points make take those of points.
   Matrix6 information_of_planes = Matrix6::Zero();

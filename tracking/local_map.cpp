@@ -31,7 +31,8 @@ KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& immature, K
   return graph.part(k);
 }
 
-SE3 relative_pose(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k, KeyframeId ref) {
+SE3 pose_relative_to(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k,
+                     KeyframeId ref) {
   if (k == ref) return {};
   return pose_in_world(graph, immature, k) * pose_in_world(graph, immature, ref).inverse();
 }
@@ -62,7 +63,7 @@ int LocalMap::anchor_position(const GraphSnapshot& graph, KeyframeId id, const I
   if (anchors_.size() == anchors_.capacity()) return -1;
   const auto part = [&](KeyframeId k) { return part_of(graph, immature, k); };
   if (id != origin_.reference && part(id) != part(origin_.reference)) return -1;
-  anchors_.push_back({id, relative_pose(graph, immature, origin_.reference, id)});
+  anchors_.push_back({id, pose_relative_to(graph, immature, origin_.reference, id)});
   return static_cast<int>(anchors_.size()) - 1;
 }
 

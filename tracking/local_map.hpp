@@ -84,7 +84,7 @@ class LocalMap {
 /// Map part of a keyframe in the graph or pending.
 [[nodiscard]] KeyframeId part_of(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k);
 /// T_k_ref of two keyframes of one part, each in the graph or pending.
-[[nodiscard]] SE3 relative_pose(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k,
-                                KeyframeId ref);
+[[nodiscard]] SE3 pose_relative_to(const GraphSnapshot& graph, const ImmaturePoints& immature, KeyframeId k,
+                                   KeyframeId ref);
 
 }  // namespace twofold

@@ -64,7 +64,6 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_), loss_.lost_frames());
   reference_choice_.begin_frame();
   views_.begin_frame();
-  earlier_frames_.clear();
   loss_.begin_frame(frame.index, frame.t_ns);
   correction_.load(frame, current_);
   step.lap(TrackerStage::kPyramid);
@@ -134,7 +133,7 @@ void Tracker::follow(const GraphSnapshot& graph) {
   }
   if (newest != nullptr && newest->id != motion_.reference()) {
     // As it was tracked, not as the map has it now: both frames were placed by the same points.
-    const SE3 T_ref_new = relative_pose(graph, immature_points_, motion_.reference(), newest->reference) *
+    const SE3 T_ref_new = pose_relative_to(graph, immature_points_, motion_.reference(), newest->reference) *
                           newest->T_k_ref.inverse();
     motion_.refer_to(newest->id, T_ref_new);
   }

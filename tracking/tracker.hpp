@@ -77,10 +77,6 @@ class Tracker {
     return step.result.T_c_ref * pose_in_world(step.graph, immature_points_, step.result.reference);
   }
 
-  /// One camera: frames before that of the last step whose poses its start found out, relative to the
-  /// reference keyframe. Empty after any other step.
-  [[nodiscard]] std::span<const EarlierFrame> earlier_frames() const { return earlier_frames_; }
-
   /// Images of the last step's frame, which was lost: for the loop closer. They are kept until the next call,
   /// because the answer to `relocalise` says where this frame was taken, and the camera moves on.
   [[nodiscard]] const FrameImages& ask_where() { return views_.ask(current_); }
@@ -191,8 +187,7 @@ class Tracker {
   bool unplaced_ = false;
 
   NewPoints new_points_;
-  std::optional<MonocularStart> monocular_start_;  ///< one camera only, as the next
-  std::vector<EarlierFrame> earlier_frames_;
+  std::optional<MonocularStart> monocular_start_;  ///< one camera only
   KeyframeProposer proposer_;
   ReferenceChoice reference_choice_;
 

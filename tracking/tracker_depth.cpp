@@ -30,7 +30,7 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
     const auto placement = placement_of(step.graph, view.id);
     if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
     const SE3 T_placed_ref =
-        relative_pose(step.graph, immature_points_, placement->reference, motion_.reference());
+        pose_relative_to(step.graph, immature_points_, placement->reference, motion_.reference());
     depth_alignment_->add_view(view.id, view.images.depth, placement->T_c_ref * T_placed_ref);
   }
   return depth_alignment_->align(T_c_ref, corners);

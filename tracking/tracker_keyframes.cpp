@@ -58,7 +58,8 @@ void Tracker::hand_over_images(KeyframeProposal& proposal) {
 void Tracker::revisit_reference(const GraphSnapshot& graph) {
   if (!graph.contains(motion_.reference()) || !immature_points_.pending().empty()) return;
   const auto better = reference_choice_.better(graph, motion_.reference(), local_map_, search_);
-  if (better) motion_.refer_to(*better, relative_pose(graph, immature_points_, motion_.reference(), *better));
+  if (better)
+    motion_.refer_to(*better, pose_relative_to(graph, immature_points_, motion_.reference(), *better));
 }
 
 }  // namespace twofold

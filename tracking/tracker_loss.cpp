@@ -67,7 +67,7 @@ bool Tracker::is_within_reach(SearchStart::Kind kind, const FrameStep& step) con
   if (!knows_way || part_of(step.graph, immature_points_, here) !=
                         part_of(step.graph, immature_points_, motion_.reference()))
     return true;
-  const SE3 T_here_last = relative_pose(step.graph, immature_points_, here, motion_.reference());
+  const SE3 T_here_last = pose_relative_to(step.graph, immature_points_, here, motion_.reference());
   const SE3 T_c_last = step.result.T_c_ref * T_here_last * motion_.T_c_ref().inverse();
   return motion_.reaches(T_c_last, step.frame.t_ns, kind == SearchStart::Kind::kRecognised);
 }

@@ -17,7 +17,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
     immature_points_.clear_points();
     return cause;
   }
-  earlier_frames_ = monocular_start_->earlier_frames(*start);
+  step.earlier_frames = monocular_start_->earlier_frames(*start);
   const StartCandidate& first = *start->first;
   const Placement here{step.result.reference, step.result.T_c_ref};
   proposer_.begin({kNoKeyframe, SE3()}, {median_depth(SE3()), occupied_regions(rig_.camera, search_)}, step,
@@ -63,7 +63,7 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
 void Tracker::observe_seeds(const FrameStep& step) {
   const TrackResult& result = step.result;
   const auto T_c_anchor = [&](KeyframeId anchor) {
-    return result.T_c_ref * relative_pose(step.graph, immature_points_, result.reference, anchor);
+    return result.T_c_ref * pose_relative_to(step.graph, immature_points_, result.reference, anchor);
   };
   // A frame placed by its depth image may have no point that says how far the scene is.
   const double depth = result.by_depth ? depth_alignment_->typical_depth() : median_depth(result.T_c_ref);
