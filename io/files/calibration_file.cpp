@@ -1,5 +1,6 @@
 #include "io/files/calibration_file.hpp"
 
+#include <array>
 #include <map>
 
 #include <fmt/format.h>
@@ -7,6 +8,8 @@
 #include "camera/opencv_distortion.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/kitti_calibration.hpp"
+#include "io/files/openloris_files.hpp"
+#include "io/files/text_file.hpp"
 #include "io/files/yaml_node.hpp"
 
 namespace twofold {
@@ -262,6 +265,23 @@ fs::path euroc_sensor_file(const fs::path& folder, const std::string& sensor) {
   return (fs::is_directory(inside, ignored) ? inside : folder) / sensor / "sensor.yaml";
 }
 
+std::optional<Calibration> read_plain_intrinsics(const fs::path& file) {
+  const auto lines = read_text_lines(file);
+  if (lines.size() != 1) return std::nullopt;
+  const auto fields = split_fields(lines[0].text);
+  if (fields.size() != 4) return std::nullopt;
+  std::array<double, 4> values{};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto value = to_number(fields[i]);
+    if (!value) return std::nullopt;
+    values[i] = *value;
+  }
+  Calibration calibration;
+  calibration.kind = SensorKind::kMono;
+  calibration.left.pinhole = {values[0], values[1], values[2], values[3], 0, 0};
+  return calibration;
+}
+
 Calibration read_calibration(const fs::path& file) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) {
@@ -270,10 +290,12 @@ Calibration read_calibration(const fs::path& file) {
   }
   if (!fs::is_regular_file(file, ignored)) throw IoError(file, "no such calibration file");
   if (looks_like_kitti_calibration(file)) return read_kitti_calibration(file);
+  if (const auto plain = read_plain_intrinsics(file)) return *plain;
   const YamlNode root = YamlNode::load(file);
   if (root.has("cameras")) return read_own(root);
   if (root.has("cam0")) return read_kalibr(root);
   if (root.has("camera_matrix")) return read_opencv(root);
+  if (root.has(kOpenLorisColour)) return read_openloris_sensors(root);
   if (root.has("camera_model") || root.has("T_BS")) {
     const EurocCamera camera = read_euroc_camera(file);
     Calibration calibration;

@@ -14,12 +14,18 @@ namespace twofold {
 ///   Kalibr camchain   top-level keys cam0, cam1
 ///   EuRoC sensor.yaml top-level key camera_model or T_BS: one camera
 ///   OpenCV, ROS       top-level key camera_matrix: one camera
+///   OpenLORIS         top-level key d400_color_optical_frame, of sensors.yaml: one camera
 ///   KITTI calib.txt   lines "P0: twelve numbers"; has no image size: width and height stay 0
+///   ETH3D SLAM        one line "fx fy cx cy"; without an image size, too
 ///   EuRoC folder      cam0/sensor.yaml, and cam1/sensor.yaml of a pair, in it or in mav0 in it
 ///
 /// The result is not yet checked as a whole (see expect_valid), because a size may have to come from the
 /// images. Throws IoError naming file, key and what is wrong; keys the own form does not know are errors.
 [[nodiscard]] Calibration read_calibration(const std::filesystem::path& file);
+
+/// The one line "fx fy cx cy" of ETH3D SLAM's calibration.txt; nothing when the file has anything else.
+/// Throws IoError when it cannot be read.
+[[nodiscard]] std::optional<Calibration> read_plain_intrinsics(const std::filesystem::path& file);
 
 /// FOLDER/mav0/SENSOR/sensor.yaml where there is such a folder, else FOLDER/SENSOR/sensor.yaml.
 [[nodiscard]] std::filesystem::path euroc_sensor_file(const std::filesystem::path& folder,

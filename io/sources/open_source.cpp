@@ -151,7 +151,7 @@ std::string recognise_layout(const fs::path& path) {
   if (fs::exists(path / "associations.txt")) return "tum";
   if (fs::exists(path / "mav0") || fs::exists(path / "cam0" / "data.csv")) return "euroc";
   if (fs::exists(path / "image_0") || fs::exists(path / "image_2")) return "kitti";
-  if (fs::exists(path / "rgb.txt")) return "tum";
+  if (fs::exists(path / "rgb.txt") || fs::exists(path / "color.txt")) return "tum";
   if (fs::exists(path / "times.txt") || fs::exists(path / "left") || fs::exists(path / "calibration.yaml")) {
     return "images";
   }

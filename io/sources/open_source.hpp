@@ -37,7 +37,8 @@ struct SourceOptions {
 ///   times.txt,
 ///                    poses.txt or ../../poses/DIR.txt
 ///   euroc:DIR        mav0/cam0, mav0/cam1 with data.csv and sensor.yaml; rectified here
-///   tum:DIR          RGB-D; associations.txt or rgb.txt and depth.txt; groundtruth.txt if there
+///   tum:DIR          RGB-D; associations.txt, rgb.txt and depth.txt, or color.txt and aligned_depth.txt;
+///                    groundtruth.txt if there
 ///   images:DIR       image files in the order of their names, or left/ with right/ or depth/; times.txt
 ///   video:FILE       one image, or two side by side
 ///   mcap:FILE        a recording of ROS 1 or 2; bag:FILE one of ROS 1

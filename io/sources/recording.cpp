@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -29,6 +30,11 @@ void take_intrinsics(bool from_file, SourceParameters& parameters, PinholeCamera
           fmt::format("no calibration: give --calib FILE or fx, fy, cx, cy ('{}' is missing)", key));
     }
     if (!given) continue;
+    if (std::string_view(key) == "fy" && *given < 0)
+      throw IoError(parameters.subject(),
+                    fmt::format("fy={} is of axes whose y points up, as a renderer has them; images begin at "
+                                "their top row: take fy={}",
+                                *given, -*given));
     *value = *given;
     ++taken;
   }

@@ -44,6 +44,8 @@ class SourceParameters {
         suppose_camera_(suppose_camera),
         left_only_(left_only) {}
 
+  /// Whether the key was given and is not taken yet.
+  [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
   /// Value of the key, if given; throws IoError when it is not a finite number.
   [[nodiscard]] std::optional<double> take_number(const std::string& key);
   [[nodiscard]] std::optional<std::string> take_text(const std::string& key);

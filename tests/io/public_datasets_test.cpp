@@ -1,0 +1,289 @@
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "io/files/calibration_file.hpp"
+#include "io/sources/open_source.hpp"
+#include "tests/io/scratch_folder.hpp"
+
+namespace twofold {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kWidth = 640, kHeight = 480, kLength = 3;
+
+/// A recording that lists its images as TUM's benchmark does, or under OpenLORIS' names.
+void write_listed(const ScratchFolder& folder, const std::string& name, const std::string& colour = "rgb",
+                  const std::string& depth = "depth") {
+  std::string colour_list, depth_list;
+  for (int i = 0; i < kLength; ++i) {
+    const std::string file = fmt::format("{:.6f}.png", 10 + 0.1 * i);
+    cv::Mat image = numbered_image(kWidth, kHeight, 50 + i, CV_8UC3);
+    folder.write_image(fmt::format("{}/{}/{}", name, colour, file), image);
+    folder.write_image(fmt::format("{}/{}/{}", name, depth, file),
+                       cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(1000 + i)));
+    colour_list += fmt::format("{:.6f} {}/{}\n", 10 + 0.1 * i, colour, file);
+    depth_list += fmt::format("{:.6f} {}/{}\n", 10 + 0.1 * i, depth, file);
+  }
+  folder.write(name + "/" + (colour == "rgb" ? "rgb" : "color") + ".txt", colour_list);
+  folder.write(name + "/" + depth + ".txt", depth_list);
+}
+
+std::string lens_file(const std::string& intrinsics, const std::string& coefficients) {
+  return "sensor: rgbd\ncameras:\n  - size: [640, 480]\n    intrinsics: [" + intrinsics + "]\n" +
+         (coefficients.empty() ? ""
+                               : "    distortion: {model: radtan, coefficients: [" + coefficients + "]}\n");
+}
+
+std::string all_notes(const FrameSource& source) {
+  std::string text;
+  for (const std::string& note : source.report().notes) text += note + "\n";
+  return text;
+}
+
+Frame first_frame(FrameSource& source) {
+  Frame frame;
+  EXPECT_EQ(source.next(frame), FrameStatus::kFrame) << source.error();
+  return frame;
+}
+
+void expect_same_camera(FrameSource& source, FrameSource& expected) {
+  const PinholeCamera &a = source.rig().camera, &b = expected.rig().camera;
+  EXPECT_EQ((std::vector{a.fx, a.fy, a.cx, a.cy}), (std::vector{b.fx, b.fy, b.cx, b.cy}));
+  EXPECT_EQ(source.rig().depth_unit, expected.rig().depth_unit);
+  EXPECT_EQ(cv::norm(first_frame(source).left, first_frame(expected).left, cv::NORM_INF), 0);
+}
+
+struct Published {
+  const char* folder;
+  const char* dataset;
+  const char* intrinsics;
+  const char* coefficients;
+};
+
+class PublishedCalibration : public ::testing::TestWithParam<Published> {};
+
+TEST_P(PublishedCalibration, IsTakenByTheNameOfTheFolder) {
+  const Published& published = GetParam();
+  const ScratchFolder folder;
+  write_listed(folder, published.folder);
+  const auto lens = folder.write("lens.yaml", lens_file(published.intrinsics, published.coefficients));
+  for (const std::string end : {"", "/", "/."}) {
+    const auto source = open_source((folder / published.folder) + end);
+    EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
+    EXPECT_NE(all_notes(*source).find(fmt::format("calibration as published for {} (", published.dataset)),
+              std::string::npos)
+        << all_notes(*source);
+    expect_same_camera(*source, *open_source(folder / published.folder, {.calibration = lens}));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Benchmarks, PublishedCalibration,
+    ::testing::Values(Published{"rgbd_dataset_freiburg1_desk", "TUM RGB-D, Freiburg 1",
+                                "517.306408, 516.469215, 318.643040, 255.313989",
+                                "0.262383, -0.953104, -0.005358, 0.002628, 1.163314"},
+                      Published{"rgbd_dataset_freiburg2_pioneer_slam", "TUM RGB-D, Freiburg 2",
+                                "520.908620, 521.007327, 325.141442, 249.701764",
+                                "0.231222, -0.784899, -0.003257, -0.000105, 0.917205"},
+                      Published{"rgbd_dataset_freiburg3_walking_xyz_validation", "TUM RGB-D, Freiburg 3",
+                                "535.4, 539.2, 320.1, 247.6", ""},
+                      Published{"rgbd_bonn_balloon", "Bonn RGB-D Dynamic",
+                                "542.822841, 542.576870, 315.593520, 237.756098",
+                                "0.039903, -0.099343, -0.000730, -0.000144, 0"}));
+
+/// Focal length, and whether the published calibration was said to be in use.
+std::pair<double, bool> focal_length_of(const std::string& text, const SourceOptions& options = {}) {
+  const auto source = open_source(text, options);
+  return {source->rig().camera.fx, all_notes(*source).find("as published") != std::string::npos};
+}
+
+TEST(PublicDatasets, WhatUserAndFolderSayGoesBeforeWhatWasPublished) {
+  using Found = std::pair<double, bool>;
+  const ScratchFolder folder;
+  const std::string path = folder / "freiburg3_mine";
+  write_listed(folder, "freiburg3_mine");
+  EXPECT_EQ(focal_length_of(path), Found(535.4, true));
+  EXPECT_EQ(focal_length_of("tum:" + path, {.calibration = {}, .left_only = true}), Found(535.4, true));
+  EXPECT_EQ(focal_length_of(path + "?fx=500&fy=500&cx=320&cy=240"), Found(500, false));
+  EXPECT_IO_ERROR(open_source(path + "?fx=500"), "'fy' is missing");
+  EXPECT_EQ(open_source(path + "?depth_scale=1000")->rig().depth_unit, 0.001);
+  const SourceOptions found_from_the_video{.calibration = {}, .suppose_camera = true, .left_only = true};
+  EXPECT_EQ(focal_length_of(path, found_from_the_video), Found(1000, false));
+  folder.write("freiburg3_mine/camera.txt", "fx 510\nfy 510\ncx 320\ncy 240\n");
+  EXPECT_EQ(focal_length_of(path), Found(510, false));
+  folder.write("freiburg3_mine/calibration.yaml", lens_file("520, 520, 320, 240", ""));
+  EXPECT_EQ(focal_length_of(path), Found(520, false));
+  const auto given = folder.write("lens.yaml", lens_file("530, 530, 320, 240", ""));
+  EXPECT_EQ(focal_length_of(path, {.calibration = given}), Found(530, false));
+}
+
+TEST(PublicDatasets, PublishedCamerasAreForPublishedSizes) {
+  const ScratchFolder folder;
+  write_listed(folder, "freiburg3_small");
+  for (const auto& entry : fs::directory_iterator(folder.path() / "freiburg3_small" / "rgb"))
+    cv::imwrite(entry.path().string(), numbered_image(320, 240, 1, CV_8UC3));
+  EXPECT_IO_ERROR(open_source(folder / "freiburg3_small"), "the image is 320x240");
+}
+
+TEST(PublicDatasets, OthersOfThatLayoutAreAskedFor) {
+  const ScratchFolder folder;
+  write_listed(folder, "rgbd_dataset_mine");
+  EXPECT_IO_ERROR(open_source(folder / "rgbd_dataset_mine"), "no calibration: give --calib FILE");
+}
+
+TEST(PublicDatasets, Eth3dSaysItsCameraInOneLine) {
+  const ScratchFolder folder;
+  const std::string path = folder / "cables_1";
+  write_listed(folder, "cables_1");
+  const auto file =
+      folder.write("cables_1/calibration.txt", "726.28741455 726.28741455 354.6496887 186.46566772\n");
+  const auto source = open_source(path);
+  EXPECT_EQ(source->rig().camera.fx, 726.28741455);
+  EXPECT_EQ(source->rig().camera.cy, 186.46566772);
+  EXPECT_EQ(source->rig().camera.width, kWidth);
+  EXPECT_EQ(source->rig().depth_unit, 1.0 / 5000);
+  EXPECT_EQ(read_calibration(file).left.pinhole.cx, 354.6496887) << "by --calib, too";
+  for (const std::string damaged :
+       {"726.3 726.3 354.6\n", "726.3 726.3 354.6 nan\n", "a b c d\n", "", "726.3 726.3 354.6 186.5 0\n"}) {
+    folder.write("cables_1/calibration.txt", damaged);
+    EXPECT_IO_ERROR(open_source(path), "calibration.txt");
+    EXPECT_EQ(open_source(path + "?fx=500&fy=500&cx=320&cy=240")->rig().camera.fx, 500);
+  }
+  folder.write("cables_1/calibration.txt", "-726.3 726.3 354.6 186.5\n");
+  EXPECT_IO_ERROR(open_source(path), "calibration.txt: left camera");
+  folder.write("cables_1/calibration.txt", "726.3 726.3 354.6 186.5\n");
+  fs::remove(folder.path() / "cables_1" / "depth.txt");
+  EXPECT_IO_ERROR(open_source(path), "depth.txt: no such file (--camera mono runs the colour camera alone)");
+  EXPECT_EQ(open_source(path, {.calibration = {}, .left_only = true})->frame_count(), kLength);
+}
+
+constexpr const char* kOpenLorisSensors =
+    "%YAML:1.0\n---\nd400_color_optical_frame:\n   sensor_type: camera\n   fps: 30\n   width: 640\n   "
+    "height: 480\n"
+    "   model: pinhole\n   intrinsics: !!opencv-matrix\n      rows: 1\n      cols: 4\n      dt: d\n"
+    "      data: [ 6.11e+02, 3.23e+02, 6.12e+02,\n          2.49e+02 ]\n"
+    "   distortion_coefficients: !!opencv-matrix\n      rows: 1\n      cols: 5\n      dt: d\n"
+    "      data: [ 0., 0., 0., 0., 0. ]\n";
+
+std::string mount(const std::string& parent, const std::string& child, const std::string& matrix) {
+  return fmt::format(
+      "  -\n    parent_frame: {}\n    child_frame: {}\n    matrix: !!opencv-matrix\n      rows: 4\n"
+      "      cols: 4\n      dt: d\n      data: [{}, 0., 0., 0., 1.]\n",
+      parent, child, matrix);
+}
+
+TEST(PublicDatasets, OpenLorisWithoutLinks) {
+  const ScratchFolder folder;
+  const std::string path = folder / "home1-1";
+  write_listed(folder, "home1-1", "color", "aligned_depth");
+  EXPECT_IO_ERROR(open_source(path), "no calibration: give --calib FILE");
+  folder.write("home1-1/sensors.yaml", kOpenLorisSensors);
+  // The camera looks along the base's x axis, 0.5 m ahead of it and 0.9 m up.
+  folder.write("home1-1/trans_matrix.yaml",
+               "%YAML:1.0\n---\ntrans_matrix:\n" +
+                   mount("laser", "d400_color_optical_frame", "0, 0, 1, 0.3, -1, 0, 0, 0, 0, -1, 0, 0.4") +
+                   mount("base_link", "laser", "1, 0, 0, 0.2, 0, 1, 0, 0, 0, 0, 1, 0.5"));
+  // Turned to the left by 90 degrees.
+  folder.write("home1-1/groundtruth.txt",
+               "#Time px py pz qx qy qz qw:\n10.0 1 2 0 0 0 0.70710678 0.70710678\n");
+  const auto source = open_source(path);
+  const PinholeCamera& camera = source->rig().camera;
+  EXPECT_EQ((std::vector{camera.fx, camera.fy, camera.cx, camera.cy}), (std::vector{611., 612., 323., 249.}));
+  EXPECT_EQ(source->rig().depth_unit, 0.001);
+  EXPECT_EQ(first_frame(*source).depth.at<std::uint16_t>(7, 7), 1000);
+  ASSERT_EQ(source->ground_truth().size(), 1U);
+  const SE3& T_w_c = source->ground_truth()[0].T_w_c;
+  EXPECT_LT((T_w_c.translation() - Vector3(1, 2.5, 0.9)).norm(), 1e-6);
+  EXPECT_LT((T_w_c.rotation().col(2) - Vector3(0, 1, 0)).norm(), 1e-6) << "looks along the world's y";
+  EXPECT_LT((T_w_c.rotation().col(1) - Vector3(0, 0, -1)).norm(), 1e-6) << "its y axis points down";
+}
+
+TEST(PublicDatasets, OpenLorisWithDamagedFiles) {
+  const ScratchFolder folder;
+  const std::string path = folder / "home1-1";
+  write_listed(folder, "home1-1", "color", "aligned_depth");
+  folder.write("home1-1/sensors.yaml", kOpenLorisSensors);
+  folder.write("home1-1/groundtruth.txt", "10.0 1 2 0 0 0 0 1\n");
+  const auto note_with = [&](const std::string& transforms) {
+    folder.write("home1-1/trans_matrix.yaml", transforms);
+    const auto source = open_source(path);
+    EXPECT_TRUE(source->ground_truth().empty()) << "it would be the base's";
+    return all_notes(*source);
+  };
+  const std::string unit = "1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0";
+  for (const std::string& transforms : {"trans_matrix:\n" + mount("base_link", "laser", unit),
+                                        "trans_matrix:\n" + mount("laser", "d400_color_optical_frame", unit) +
+                                            mount("d400_color_optical_frame", "laser", unit)})
+    EXPECT_NE(note_with(transforms).find("does not say how d400_color_optical_frame sits in base_link"),
+              std::string::npos);
+  EXPECT_NE(note_with("trans_matrix:\n" + mount("base_link", "d400_color_optical_frame", "1, 0, 0"))
+                .find("has 7 numbers"),
+            std::string::npos);
+  EXPECT_NE(note_with("nothing: 1\n").find("key 'trans_matrix' is missing"), std::string::npos);
+  folder.write("home1-1/sensors.yaml",
+               "d400_color_optical_frame: {width: 640, height: 480, intrinsics: {data: [1, 2, 3]}}\n");
+  EXPECT_IO_ERROR(open_source(path),
+                  "sensors.yaml:1: key 'd400_color_optical_frame.intrinsics.data' has 3 numbers");
+  fs::remove(folder.path() / "home1-1" / "aligned_depth.txt");
+  EXPECT_IO_ERROR(open_source(path), "aligned_depth.txt: no such file (--camera mono");
+}
+
+void write_icl_nuim(const ScratchFolder& folder, const std::string& name) {
+  std::string associations;
+  for (int i = 1; i <= kLength; ++i) {
+    folder.write_image(fmt::format("{}/rgb/{}.png", name, i),
+                       numbered_image(kWidth, kHeight, 50 + i, CV_8UC3));
+    folder.write_image(fmt::format("{}/depth/{}.png", name, i),
+                       cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(10000 + i)));
+    associations += fmt::format("{} depth/{}.png {} rgb/{}.png\n", i, i, i, i);
+  }
+  folder.write(name + "/associations.txt", associations);
+}
+
+TEST(PublicDatasets, IclNuimCountsFramesAndMirrorsItsTruth) {
+  const ScratchFolder folder;
+  write_icl_nuim(folder, "traj2");
+  EXPECT_IO_ERROR(open_source(folder / "traj2"), "no calibration");
+  folder.write("traj2/livingRoom2.gt.freiburg",
+               "1 0 0 -2.25 0 0 0 1\n2 0.5 0.25 -2 0.1 0.2 0.3 0.927361849549570\n");
+  const auto source = open_source(folder / "traj2");
+  EXPECT_NE(all_notes(*source).find("as published for ICL-NUIM"), std::string::npos);
+  EXPECT_EQ(source->rig().depth_unit, 1.0 / 5000);
+  const Frame frame = first_frame(*source);
+  EXPECT_EQ(frame.t_ns, 33'333'333) << "the first frame's number is 1";
+  ASSERT_EQ(source->ground_truth().size(), 2U);
+  EXPECT_EQ(source->ground_truth()[0].t_ns, frame.t_ns);
+  // A point as the renderer projects it, whose y points up, is where the source's camera sees it.
+  const SE3 T_w_c_renderer(SO3(Eigen::Quaterniond(0.927361849549570, 0.1, 0.2, 0.3)), Vector3(0.5, 0.25, -2));
+  const Vector3 p_renderer(0.4, 0.9, 1.5), p_w(0.4, -0.9, 1.5);
+  const Vector3 p_c = T_w_c_renderer.inverse() * p_renderer;
+  const Vector2 pixel(481.2 * p_c.x() / p_c.z() + 319.5, -480.0 * p_c.y() / p_c.z() + 239.5);
+  const SE3 T_c_w = source->ground_truth()[1].T_w_c.inverse();
+  EXPECT_LT((source->rig().camera.project(T_c_w * p_w) - pixel).norm(), 1e-9);
+}
+
+TEST(PublicDatasets, IclNuimByTheNameOfItsFolder) {
+  const ScratchFolder folder;
+  write_icl_nuim(folder, "living_room_traj2_frei_png");
+  const auto source = open_source(folder / "living_room_traj2_frei_png");
+  EXPECT_EQ(source->rig().camera.fy, 480);
+  EXPECT_TRUE(source->ground_truth().empty());
+  EXPECT_EQ(first_frame(*source).t_ns, 33'333'333);
+}
+
+TEST(PublicDatasets, AFocalLengthOfAxesThatPointUpIsExplained) {
+  const ScratchFolder folder;
+  write_icl_nuim(folder, "traj2");
+  EXPECT_IO_ERROR(
+      open_source((folder / "traj2") + "?fx=481.2&fy=-480&cx=319.5&cy=239.5"),
+      "fy=-480 is of axes whose y points up, as a renderer has them; images begin at their top row: "
+      "take fy=480");
+}
+
+}  // namespace
+}  // namespace twofold
