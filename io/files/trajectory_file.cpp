@@ -93,21 +93,45 @@ Trajectory read_tum_trajectory(const fs::path& file, CutLine cut, std::string* n
   return trajectory;
 }
 
+namespace {
+
+/// From the first twelve numbers of a matrix, row by row.
+SE3 pose_of_rows(const fs::path& file, int line, const Fields& fields) {
+  Eigen::Matrix<double, 3, 4> M;
+  for (int i = 0; i < 12; ++i)
+    M(i / 4, i % 4) = number_field(file, line, fields[static_cast<std::size_t>(i)]);
+  const Matrix3 R = M.leftCols<3>();
+  constexpr double kTolerance = 0.01;
+  if ((R * R.transpose() - Matrix3::Identity()).norm() > kTolerance || R.determinant() < 0) {
+    throw IoError(file, line, "the 3x3 part is not a rotation");
+  }
+  return {R, Vector3(M.col(3))};
+}
+
+}  // namespace
+
 Trajectory read_kitti_trajectory(const fs::path& file) {
   Trajectory trajectory;
   for (const TextLine& line : read_text_lines(file)) {
     const Fields fields = fields_of(file, line, 12, " \t");
-    Eigen::Matrix<double, 3, 4> M;
-    for (int i = 0; i < 12; ++i)
-      M(i / 4, i % 4) = number_field(file, line.number, fields[static_cast<std::size_t>(i)]);
-    const Matrix3 R = M.leftCols<3>();
-    constexpr double kTolerance = 0.01;
-    if ((R * R.transpose() - Matrix3::Identity()).norm() > kTolerance || R.determinant() < 0) {
-      throw IoError(file, line.number, "the 3x3 part is not a rotation");
-    }
-    trajectory.push_back({static_cast<std::int64_t>(trajectory.size()), SE3(R, Vector3(M.col(3)))});
+    trajectory.push_back(
+        {static_cast<std::int64_t>(trajectory.size()), pose_of_rows(file, line.number, fields)});
   }
   return trajectory;
+}
+
+std::optional<SE3> read_pose_matrix(const fs::path& file) {
+  const auto lines = read_text_lines(file);
+  Fields fields;
+  for (const TextLine& line : lines)
+    for (const std::string_view field : split_fields(line.text)) fields.push_back(field);
+  if (fields.size() != 16)
+    throw IoError(file, fmt::format("has {} numbers, a 4x4 matrix has 16", fields.size()));
+  for (std::string_view field : fields) {
+    if (field.starts_with('-')) field.remove_prefix(1);
+    if (field == "inf" || field == "nan") return std::nullopt;
+  }
+  return pose_of_rows(file, lines.front().number, fields);
 }
 
 Trajectory read_euroc_trajectory(const fs::path& file) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "evaluation/trajectory.hpp"
@@ -26,6 +27,11 @@ enum class TimeOrder : std::uint8_t { kIncreasing, kAny };
 /// KITTI form: lines of the 12 numbers of the 3x4 matrix T_w_c, row by row. There are no time stamps: t_ns
 /// counts lines.
 [[nodiscard]] Trajectory read_kitti_trajectory(const std::filesystem::path& file);
+
+/// A file of one 4x4 matrix T_w_c, as 7-Scenes and ScanNet have one an image. Nothing where it has an
+/// infinity or no number (nan), as those of images whose pose nobody knows. Throws IoError for all other than
+/// 16 numbers, and for what is no rigid motion.
+[[nodiscard]] std::optional<SE3> read_pose_matrix(const std::filesystem::path& file);
 
 /// EuRoC state_groundtruth_estimate0/data.csv: "time[ns],px,py,pz,qw,qx,qy,qz,..." of T_w_s.
 [[nodiscard]] Trajectory read_euroc_trajectory(const std::filesystem::path& file);

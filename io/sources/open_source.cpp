@@ -8,6 +8,7 @@
 #include "io/bags/bag_reader.hpp"
 #include "io/files/io_error.hpp"
 #include "io/sources/bag_source.hpp"
+#include "io/sources/layouts/numbered_frames.hpp"
 #include "io/sources/left_camera_source.hpp"
 #include "io/sources/preloaded_source.hpp"
 #include "io/sources/recording.hpp"
@@ -38,6 +39,7 @@ const std::map<std::string, RecordingReader>& readers() {
   static const std::map<std::string, RecordingReader> kReaders{{"kitti", read_kitti_recording},
                                                                {"euroc", read_euroc_recording},
                                                                {"tum", read_tum_recording},
+                                                               {"7scenes", read_seven_scenes},
                                                                {"images", read_image_folder}};
   return kReaders;
 }
@@ -121,6 +123,7 @@ const std::map<std::string, Opener>& openers() {
       {"kitti", recording_opener("kitti")},
       {"euroc", recording_opener("euroc")},
       {"tum", recording_opener("tum")},
+      {"7scenes", recording_opener("7scenes")},
       {"images", recording_opener("images")},
       {"video", open_video},
       {"mcap", bag_opener(open_mcap)},
@@ -152,6 +155,8 @@ std::string recognise_layout(const fs::path& path) {
   if (fs::exists(path / "mav0") || fs::exists(path / "cam0" / "data.csv")) return "euroc";
   if (fs::exists(path / "image_0") || fs::exists(path / "image_2")) return "kitti";
   if (fs::exists(path / "rgb.txt") || fs::exists(path / "color.txt")) return "tum";
+  // Before a folder of images: theirs are of both kinds.
+  if (is_seven_scenes(path)) return "7scenes";
   if (fs::exists(path / "times.txt") || fs::exists(path / "left") || fs::exists(path / "calibration.yaml")) {
     return "images";
   }

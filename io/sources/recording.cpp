@@ -42,13 +42,6 @@ void take_intrinsics(bool from_file, SourceParameters& parameters, PinholeCamera
     throw IoError(parameters.subject(), "beside a calibration file: all of fx, fy, cx, cy, or none");
 }
 
-std::optional<double> take_positive(const char* key, SourceParameters& parameters) {
-  const auto given = parameters.take_number(key);
-  if (given && *given <= 0)
-    throw IoError(parameters.subject(), fmt::format("{}={} must be positive", key, *given));
-  return given;
-}
-
 }  // namespace
 
 Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, SourceParameters& parameters) {
@@ -57,11 +50,11 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   calibration.kind = kind;
   const bool right_in_file = from_file && base_kind == SensorKind::kStereo;
   take_intrinsics(from_file, parameters, calibration.left.pinhole);
-  if (const auto scale = take_positive("depth_scale", parameters)) calibration.depth_unit = 1.0 / *scale;
-  if (const auto depth = take_positive("depth_min", parameters)) calibration.depth_min = *depth;
-  if (const auto depth = take_positive("depth_max", parameters)) calibration.depth_max = *depth;
+  if (const auto scale = parameters.take_positive("depth_scale")) calibration.depth_unit = 1.0 / *scale;
+  if (const auto depth = parameters.take_positive("depth_min")) calibration.depth_min = *depth;
+  if (const auto depth = parameters.take_positive("depth_max")) calibration.depth_max = *depth;
   if (const auto readout = parameters.take_number("readout")) calibration.readout = *readout;
-  const auto baseline = take_positive("baseline", parameters);
+  const auto baseline = parameters.take_positive("baseline");
   if (kind == SensorKind::kRgbd && baseline) calibration.virtual_baseline = *baseline;
   if (kind == SensorKind::kStereo && baseline) {
     calibration.right = calibration.left;

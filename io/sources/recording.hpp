@@ -46,6 +46,9 @@ struct Recording {
 [[nodiscard]] Recording read_tum_recording(const std::filesystem::path& folder,
                                            const std::optional<std::filesystem::path>& calibration,
                                            SourceParameters& parameters);
+[[nodiscard]] Recording read_seven_scenes(const std::filesystem::path& folder,
+                                          const std::optional<std::filesystem::path>& calibration,
+                                          SourceParameters& parameters);
 [[nodiscard]] Recording read_image_folder(const std::filesystem::path& folder,
                                           const std::optional<std::filesystem::path>& calibration,
                                           SourceParameters& parameters);

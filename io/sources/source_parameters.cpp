@@ -73,6 +73,12 @@ std::optional<double> SourceParameters::take_number(const std::string& key) {
   return number;
 }
 
+std::optional<double> SourceParameters::take_positive(const std::string& key) {
+  const auto number = take_number(key);
+  if (number && *number <= 0) throw IoError(subject_, fmt::format("{}={} must be positive", key, *number));
+  return number;
+}
+
 bool SourceParameters::take_drop_unpaired() {
   const auto unpaired = take_text("unpaired");
   if (unpaired && *unpaired != "drop")

@@ -44,10 +44,15 @@ class SourceParameters {
         suppose_camera_(suppose_camera),
         left_only_(left_only) {}
 
-  /// Whether the key was given and is not taken yet.
-  [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
+  /// Whether the user says something of the camera, which goes together with no half of what others say.
+  [[nodiscard]] bool has_intrinsics() const {
+    return values_.contains("fx") || values_.contains("fy") || values_.contains("cx") ||
+           values_.contains("cy");
+  }
   /// Value of the key, if given; throws IoError when it is not a finite number.
   [[nodiscard]] std::optional<double> take_number(const std::string& key);
+  /// Throws IoError when it is not positive, too.
+  [[nodiscard]] std::optional<double> take_positive(const std::string& key);
   [[nodiscard]] std::optional<std::string> take_text(const std::string& key);
   /// unpaired=drop: images without a partner are left out instead of refused. Throws IoError for other
   /// values.

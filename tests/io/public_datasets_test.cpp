@@ -285,5 +285,84 @@ TEST(PublicDatasets, AFocalLengthOfAxesThatPointUpIsExplained) {
       "take fy=480");
 }
 
+/// A sequence of 7-Scenes: the camera moves by 0.1 m a frame, along the world's x.
+void write_seven_scenes(const ScratchFolder& folder, const std::string& name,
+                        const std::vector<int>& numbers) {
+  for (const int n : numbers) {
+    const std::string frame = fmt::format("{}/frame-{:06d}.", name, n);
+    folder.write_image(frame + "color.png", numbered_image(kWidth, kHeight, 50 + n, CV_8UC3));
+    cv::Mat depth(kHeight, kWidth, CV_16UC1, cv::Scalar(1000 + n));
+    depth.row(3).setTo(65535);
+    folder.write_image(frame + "depth.png", depth);
+    folder.write(frame + "pose.txt", fmt::format("0.0 0.0 1.0 {} \n1.0 0.0 0.0 2.0\t\n0.0 1.0 0.0 3.0\n"
+                                                 "0.0000000e+000 0.0 0.0 1.0\n",
+                                                 0.1 * n));
+  }
+}
+
+TEST(PublicDatasets, SevenScenesAsUnpacked) {
+  const ScratchFolder folder;
+  write_seven_scenes(folder, "seq-01", {0, 1, 2, 9, 10});
+  for (const std::string scheme : {"", "7scenes:"}) {
+    const auto source = open_source(scheme + (folder / "seq-01"));
+    EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
+    const PinholeCamera& camera = source->rig().camera;
+    EXPECT_EQ((std::vector{camera.fx, camera.fy, camera.cx, camera.cy}),
+              (std::vector{585., 585., 320., 240.}));
+    EXPECT_EQ(source->rig().depth_unit, 0.001);
+    EXPECT_NE(all_notes(*source).find("as published for 7-Scenes"), std::string::npos);
+    EXPECT_EQ(source->frame_count(), 5);
+    ASSERT_EQ(source->ground_truth().size(), 5U);
+    EXPECT_EQ(source->ground_truth()[4].t_ns, 333'333'333);
+    const SE3& T_w_c = source->ground_truth()[4].T_w_c;
+    EXPECT_LT((T_w_c * Vector3(1, 0, 0) - Vector3(1, 3, 3)).norm(), 1e-12);
+    std::vector<std::int64_t> times;
+    for (Frame frame; source->next(frame) == FrameStatus::kFrame;) {
+      times.push_back(frame.t_ns);
+      EXPECT_EQ(frame.depth.at<std::uint16_t>(7, 7) - 1000, frame.left.at<unsigned char>(0, 5) - 50);
+    }
+    EXPECT_EQ(times, (std::vector<std::int64_t>{0, 33'333'333, 66'666'667, 300'000'000, 333'333'333}))
+        << "frames that are not there are gaps";
+  }
+  const auto believed = open_source((folder / "seq-01") + "?depth_max=100&fps=10");
+  EXPECT_LT(believed->rig().depth_max, 65.535) << "no reading remains none";
+  EXPECT_EQ(believed->ground_truth()[1].t_ns, 100'000'000);
+  EXPECT_EQ(open_source((folder / "seq-01") + "?fx=525&fy=525&cx=320&cy=240")->rig().camera.fx, 525);
+  const auto lens = folder.write("lens.yaml", lens_file("530, 530, 320, 240", ""));
+  const auto given = open_source(folder / "seq-01", {.calibration = lens});
+  EXPECT_EQ(given->rig().camera.fx, 530);
+  EXPECT_EQ(all_notes(*given), "");
+}
+
+TEST(PublicDatasets, SevenScenesWithoutAllOfIt) {
+  const ScratchFolder folder;
+  const std::string path = folder / "seq-01";
+  write_seven_scenes(folder, "seq-01", {0, 1, 2, 3});
+  const auto file = [&](const std::string& name) { return folder.path() / "seq-01" / name; };
+  fs::remove(file("frame-000001.pose.txt"));
+  folder.write("seq-01/frame-000002.pose.txt", "nan -inf inf 0 0 0 0 0 0 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(open_source(path)->ground_truth().size(), 2U);
+  for (const std::string damaged : {"1 0 0 0 0 1 0 0 0 0 1 0 0 0 0\n", "2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n",
+                                    "1 0 0 x 0 1 0 0 0 0 1 0 0 0 0 1\n", ""}) {
+    folder.write("seq-01/frame-000002.pose.txt", damaged);
+    const auto source = open_source(path);
+    EXPECT_TRUE(source->ground_truth().empty()) << damaged;
+    EXPECT_NE(all_notes(*source).find("frame-000002.pose.txt"), std::string::npos);
+  }
+  EXPECT_IO_ERROR(open_source(path + "?fps=1e-9"), "beyond all times");
+  fs::remove(file("frame-000003.color.png"));
+  EXPECT_IO_ERROR(open_source(path), "frame-000003.depth.png: no colour image has its number (unpaired=drop");
+  fs::remove(file("frame-000001.depth.png"));
+  EXPECT_IO_ERROR(open_source(path), "frame-000001.color.png: no depth image has its number");
+  EXPECT_EQ(open_source(path, {.calibration = {}, .left_only = true})->frame_count(), 3);
+  const auto source = open_source(path + "?unpaired=drop");
+  EXPECT_EQ(source->frame_count(), 2);
+  EXPECT_EQ(source->report().lost, 2U);
+  folder.write("seq-01/frame-02.color.png", "");
+  EXPECT_IO_ERROR(open_source(path), "has the same number as");
+  EXPECT_IO_ERROR(open_source("7scenes:" + folder.path().string()),
+                  "no images called frame-NUMBER.color.png");
+}
+
 }  // namespace
 }  // namespace twofold

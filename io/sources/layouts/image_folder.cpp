@@ -56,12 +56,6 @@ std::vector<std::int64_t> read_image_times(const fs::path& file, const std::vect
   return times;
 }
 
-std::optional<double> take_fps(SourceParameters& parameters) {
-  const auto fps = parameters.take_number("fps");
-  if (fps && *fps <= 0) throw IoError(parameters.subject(), fmt::format("fps={} must be positive", *fps));
-  return fps;
-}
-
 /// Image files of one camera beside the left one.
 struct OtherCamera {
   SensorKind kind = SensorKind::kMono;  ///< of both together
@@ -130,7 +124,7 @@ Recording read_image_folder(const fs::path& folder, const std::optional<fs::path
   const bool drop_unpaired = parameters.take_drop_unpaired();
   const auto left = list_images(has_sides ? folder / "left" : folder);
   const OtherCamera other = has_sides ? list_other_camera(folder, parameters.left_only()) : OtherCamera();
-  const auto fps = take_fps(parameters);
+  const auto fps = parameters.take_positive("fps");
   const auto times = fps ? even_times(left.size(), *fps) : read_image_times(folder / "times.txt", left);
   if (other.files.empty()) {
     for (std::size_t i = 0; i < left.size(); ++i) recording.frames.push_back({times[i], left[i], {}, {}});

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 namespace twofold {
 namespace {
 
@@ -22,7 +24,7 @@ Distortion radtan(double k1, double k2, double p1, double p2, double k3) {
 
 const PublishedCamera& published_camera(PublicDataset dataset) {
   // In the order of PublicDataset.
-  static const std::array<PublishedCamera, 5> kCameras{{
+  static const std::array<PublishedCamera, 6> kCameras{{
       {"TUM RGB-D, Freiburg 1",
        kTumPage,
        {517.306408, 516.469215, 318.643040, 255.313989, 640, 480},
@@ -46,8 +48,26 @@ const PublishedCamera& published_camera(PublicDataset dataset) {
        {481.2, 480.0, 319.5, 239.5, 640, 480},
        {},
        0.0},
+      // The depth camera's; nothing is published of the colour camera, whose images it does not fit to the
+      // pixel.
+      {"7-Scenes",
+       "www.microsoft.com/en-us/research/project/rgb-d-dataset-7-scenes",
+       {585, 585, 320, 240, 640, 480},
+       {},
+       {}},
   }};
   return kCameras.at(static_cast<std::size_t>(dataset));
+}
+
+Calibration take_published_camera(PublicDataset dataset, Recording* recording) {
+  const PublishedCamera& camera = published_camera(dataset);
+  Calibration calibration;
+  calibration.left = {camera.pinhole, camera.distortion};
+  calibration.readout = camera.readout;
+  recording->notes.push_back(fmt::format(
+      "{}: calibration as published for {} ({}); --calib FILE or ?fx=..&fy=..&cx=..&cy=.. instead",
+      recording->folder.string(), camera.dataset, camera.where));
+  return calibration;
 }
 
 std::optional<PublicDataset> dataset_by_name(const fs::path& folder) {

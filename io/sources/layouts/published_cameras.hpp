@@ -5,11 +5,12 @@
 #include <optional>
 
 #include "camera/calibration.hpp"
+#include "io/sources/recording.hpp"
 
 namespace twofold {
 
 /// Datasets whose recordings come without a calibration: it stands on the dataset's page, or in its paper.
-enum class PublicDataset : std::uint8_t { kFreiburg1, kFreiburg2, kFreiburg3, kBonn, kIclNuim };
+enum class PublicDataset : std::uint8_t { kFreiburg1, kFreiburg2, kFreiburg3, kBonn, kIclNuim, kSevenScenes };
 
 struct PublishedCamera {
   const char* dataset;    ///< for people
@@ -21,6 +22,9 @@ struct PublishedCamera {
 
 /// The one place of the figures that others published.
 [[nodiscard]] const PublishedCamera& published_camera(PublicDataset dataset);
+
+/// The same as a recording's calibration; a note says where it was published.
+[[nodiscard]] Calibration take_published_camera(PublicDataset dataset, Recording* recording);
 
 /// Of a recording whose folder keeps the name that its archive gives it (rgbd_dataset_freiburg1_desk,
 /// rgbd_bonn_balloon, living_room_traj2_frei_png). The folder need not be there.

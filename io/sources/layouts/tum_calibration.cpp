@@ -89,17 +89,6 @@ std::optional<PublicDataset> dataset_of(const fs::path& folder) {
   return !dataset && !icl_nuim_truth_file(folder).empty() ? PublicDataset::kIclNuim : dataset;
 }
 
-Calibration take_published(PublicDataset dataset, Recording* recording) {
-  const PublishedCamera& camera = published_camera(dataset);
-  Calibration calibration;
-  calibration.left = {camera.pinhole, camera.distortion};
-  calibration.readout = camera.readout;
-  recording->notes.push_back(fmt::format(
-      "{}: calibration as published for {} ({}); --calib FILE or ?fx=..&fy=..&cx=..&cy=.. instead",
-      recording->folder.string(), camera.dataset, camera.where));
-  return calibration;
-}
-
 /// Nothing: neither a file nor a publication says it.
 std::optional<Calibration> find_calibration(const std::optional<fs::path>& given,
                                             const SourceParameters& parameters, Recording* recording) {
@@ -116,16 +105,14 @@ std::optional<Calibration> find_calibration(const std::optional<fs::path>& given
     return calibration;
   }
   file = parameters.subject();
-  // What the user says of the camera does not go together with half of what others say.
-  for (const char* key : {"fx", "fy", "cx", "cy"})
-    if (parameters.has(key)) return std::nullopt;
+  if (parameters.has_intrinsics()) return std::nullopt;
   if (const fs::path own = file_of_dataset(folder); !own.empty()) {
     file = own;
     return read_calibration(own);
   }
   const auto dataset = dataset_of(folder);
   if (!dataset || parameters.suppose_camera()) return std::nullopt;
-  return take_published(*dataset, recording);
+  return take_published_camera(*dataset, recording);
 }
 
 }  // namespace
