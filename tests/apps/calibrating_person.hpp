@@ -16,7 +16,7 @@ inline const CameraModel kLeft = test_camera(460, 324.3, 237.1, -0.28, 0.074, 0.
 inline const CameraModel kRight = test_camera(457, 315.6, 243.8, -0.27, 0.069, -0.0003, 0.0003);
 inline const SE3 kT_right_left(SO3::exp(Vector3(0.004, -0.012, 0.006)), Vector3(-0.06, 0.0011, -0.0007));
 
-/// The cameras, made once: each undistorts five million rays.
+/// The cameras, made once: each undistorts 300,000 rays.
 inline const BoardCamera& left_camera() {
   static const BoardCamera camera(kLeft);
   return camera;
