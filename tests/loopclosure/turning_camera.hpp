@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <memory>
+#include <utility>
 
 #include "fixtures/rendered_scene.hpp"
 #include "graph/graph_writer.hpp"
@@ -34,10 +36,12 @@ class TurningCamera : public ::testing::Test {
   static SE3 truth(int k) { return pose(2 * M_PI * k / kTurn, {0.2 * std::sin(0.4 * k), 0, 0}); }
 
   KeyframeProposal keyframe(int k, std::uint32_t room = 1) {
-    RenderedScene scene(rig_, Vector3(3, 2, 4), room);
+    static std::map<std::pair<int, std::uint32_t>, FrameImages> rendered;  // most tests take the same turn
+    const auto [images, is_new] = rendered.try_emplace({k, room});
+    if (is_new) RenderedScene(rig_, Vector3(3, 2, 4), room).render(truth(k), 1.5, images->second);
     KeyframeProposal proposal;
     proposal.id = KeyframeId{static_cast<std::uint32_t>(k)};
-    scene.render(truth(k), 1.5, proposal.images);
+    proposal.images.copy_from(images->second);
     return proposal;
   }
 
