@@ -90,26 +90,25 @@ TEST(HardPlaces, FlightThroughTheCourtyard) {
 }
 
 /// By one stop and two thirds, and half of that: a frame later the same walls are three times as bright.
-void expect_found_in_other_light(const char* place) {
+/// @param max_ate  thrice that of the same walk alone in steady light [m]
+void expect_found_in_other_light(const char* place, double max_ate) {
   SyntheticOptions scene = small(place, 700);
   scene.fps = 30;
-  const Walk steady = walk(scene);
   scene.walkers = 4;
   scene.plain = 0.5;
   scene.exposure_steps = 1.7;
   scene.flicker = 0.1;
   const Walk changing = walk(scene);
-  std::printf("%s: ATE %.4f m alone in steady light, %.4f m among people while it changes\n", place,
-              steady.ate, changing.ate);
-  EXPECT_LT(changing.ate, 3 * steady.ate) << place;
+  std::printf("%s: ATE %.4f m among people while the light changes\n", place, changing.ate);
+  EXPECT_LT(changing.ate, max_ate) << place;
 }
 
 TEST(HardPlaces, TheCourtyardIsFoundWhenTheLightChanges) {
-  expect_found_in_other_light("courtyard");
+  expect_found_in_other_light("courtyard", 0.041);
 }
 
 TEST(HardPlaces, TheCorridorIsFoundWhenTheLightChanges) {
-  expect_found_in_other_light("corridor");
+  expect_found_in_other_light("corridor", 0.042);
 }
 
 TEST(HardPlaces, ABareCorridorIsTrackedByItsDepth) {
