@@ -15,15 +15,22 @@ using testing::PassingStrip;
 
 constexpr int kFrames = 200;
 
+/// Made once for all cases.
+const synthetic::SyntheticSequence& courtyard() {
+  static const synthetic::SyntheticSequence sequence = [] {
+    synthetic::SyntheticOptions scene;
+    scene.width = 320;
+    scene.height = 240;
+    scene.f = 210;
+    scene.noise = 0;
+    return synthetic::SyntheticSequence(scene);
+  }();
+  return sequence;
+}
+
 /// Farthest that the camera is said to have been from where it stands [m]; each frame must be tracked.
 double farthest(const PassingStrip::Look& look) {
-  synthetic::SyntheticOptions scene;
-  scene.width = 320;
-  scene.height = 240;
-  scene.f = 210;
-  scene.noise = 0;
-  const synthetic::SyntheticSequence courtyard(scene);
-  PassingStrip strip(courtyard.render(0), look);
+  PassingStrip strip(courtyard().render(0), look);
   const FrameFeed feed = [&, next = 0](Frame& frame) mutable {
     if (next++ == kFrames) return FeedStatus::kEnd;
     frame = strip.next();
@@ -32,7 +39,7 @@ double farthest(const PassingStrip::Look& look) {
   EngineOptions options;
   options.deterministic = true;
   std::atomic<bool> interrupted{false};
-  const RunResult result = Engine(courtyard.rig(), options).run(feed, interrupted);
+  const RunResult result = Engine(courtyard().rig(), options).run(feed, interrupted);
   double farthest = 0;
   for (const FrameRecord& record : result.frames) {
     EXPECT_EQ(record.state, FrameState::kTracked) << record.frame_index << ": " << describe(record.cause);
