@@ -250,14 +250,14 @@ TEST_F(MapFileTest, WhatIsGoneTakesNoSpace) {
   save_map(file_, map);
   const auto before = fs::file_size(file_);
   GraphWriter writer(map.graph);
-  writer.add_forgotten_keyframes(1'000'000);
-  writer.fill_with_culled_points(2'000'000);
+  writer.add_forgotten_keyframes(200'000);  // whatever each takes, the file shows
+  writer.fill_with_culled_points(400'000);
   map.graph = writer.publish();
   save_map(file_, map);
   EXPECT_LE(fs::file_size(file_), before + (1 + 4) + (4 + 4));
   const SavedMap loaded = load_map(file_);
-  EXPECT_EQ(loaded.graph.keyframe_count(), 1'000'060U);
-  EXPECT_EQ(loaded.graph.point_count(), 2'000'000U);
+  EXPECT_EQ(loaded.graph.keyframe_count(), 200'060U);
+  EXPECT_EQ(loaded.graph.point_count(), 400'000U);
   expect_same(map, loaded);
 }
 
