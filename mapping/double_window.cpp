@@ -26,6 +26,13 @@ int present_weight(const Keyframe& from, const Keyframe& to) {
   return edge.marginalised ? std::max(shared, edge.weight) : std::max(shared, 1);
 }
 
+/// The present relative pose becomes the edge's constraint.
+void marginalise(GraphWriter& writer, KeyframeId i, KeyframeId j) {
+  const Keyframe& from = writer.graph().keyframe(i);
+  const Keyframe& to = writer.graph().keyframe(j);
+  link_marginalised(writer, i, j, present_weight(from, to), to.T_k_w * from.T_k_w.inverse());
+}
+
 void add_anchors(const GraphSnapshot& graph, std::size_t max_anchors, IdMap& met, DoubleWindow& window) {
   met.clear();
   std::size_t added = 0;
@@ -127,12 +134,25 @@ int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, cons
     }
   }
   for (const auto& [i, j] : left) {
-    const Keyframe& from = graph.keyframe(i);
-    const Keyframe& to = graph.keyframe(j);
     if (leaves) leaves(i, j);
-    link_marginalised(writer, i, j, present_weight(from, to), to.T_k_w * from.T_k_w.inverse());
+    marginalise(writer, i, j);
   }
   return static_cast<int>(left.size());
+}
+
+int marginalise_all_edges(GraphWriter& writer) {
+  int count = 0;
+  const GraphSnapshot& graph = writer.graph();
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
+    const KeyframeId i{k};
+    const std::shared_ptr<const EdgeList> edges = graph.keyframe(i).edges;
+    for (const Edge& edge : *edges) {
+      if (edge.marginalised || edge.other < i) continue;  // each edge once
+      marginalise(writer, i, edge.other);
+      ++count;
+    }
+  }
+  return count;
 }
 
 int enter_window(GraphWriter& writer, const IdMap& consistent, const DoubleWindow& window) {

@@ -45,6 +45,11 @@ void select_double_window(const GraphSnapshot& graph, const MapperOptions& optio
 int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now,
                            const std::function<void(KeyframeId from, KeyframeId to)>& leaves = {});
 
+/// The same as if W1 had left every keyframe: all edges without a constraint of their own get one. Poses that
+/// such an edge joins must agree. Cost grows with the map.
+/// @return  number of edges
+int marginalise_all_edges(GraphWriter& writer);
+
 /// Window entry, eq. 6.3: the poses of keyframes outside of `consistent`, and of all their children in the
 /// spanning tree, are set along the relative poses of the tree's edges. If the edges of a loop contradict
 /// each other, the contradiction thus appears at the rim of the window and not near the reference. Returns

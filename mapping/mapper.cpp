@@ -47,6 +47,9 @@ Mapper::Mapper(const Rig& rig, const MapperOptions& options)
 
 void Mapper::continue_from(const GraphSnapshot& graph) {
   writer_ = GraphWriter(graph);
+  // The windows that they were in are gone, and the new ones may form elsewhere: edges without a constraint
+  // would never get one, and whatever does not fit together would be put on them alone.
+  marginalise_all_edges(writer_);
   // Nothing is known about which absolute poses agree: the first window is set along edges from its
   // reference.
   window_ = next_window_ = DoubleWindow();

@@ -3,6 +3,7 @@
 
 #include "fixtures/graph_invariants.hpp"
 #include "mapping/mapper.hpp"
+#include "tests/mapping/small_graphs.hpp"
 #include "tests/mapping/spiral_rounds.hpp"
 
 namespace twofold {
@@ -103,6 +104,80 @@ TEST(Mapper, ContinuesFromAnotherGraph) {
   EXPECT_EQ(broken_invariant(second.graph(), 2), "");
   EXPECT_EQ(component_count(second.graph()), 1);
   EXPECT_LT(inner_error(second, simulation), 0.03);
+}
+
+SE3 relative(const GraphSnapshot& graph, KeyframeId from, KeyframeId to) {
+  return graph.T_k_w(to) * graph.T_k_w(from).inverse();
+}
+
+/// A row of keyframes, saved while the last of them were in W1. The next session begins elsewhere, walks
+/// beside the row with a drift of 2 % of the way, and meets one of those last.
+class SecondSession {
+ public:
+  SecondSession() : mapper_(simulation::thesis_rig(), {}) {
+    GraphWriter writer = chain(kSaved, kStep, kWeight);
+    for (std::uint32_t k = 0; k < kFirstInner; ++k) {
+      const KeyframeId from{k}, to{k + 1};
+      link_marginalised(writer, from, to, kWeight, relative(writer.graph(), from, to));
+    }
+    for (std::uint32_t k = kFirstInner; k + 1 < kSaved; ++k) {
+      for (int n = 0; n < kWeight; ++n)
+        add_point(writer, simulation::thesis_rig(),
+                  {kStep * (k + 0.5), 0.02 * (n - kWeight / 2), 2 + 0.01 * (n % 7)},
+                  {KeyframeId{k}, KeyframeId{k + 1}});
+    }
+    mapper_.continue_from(writer.publish());
+    KeyframeId newest{kStart};
+    for (std::uint32_t k = kSaved; k < kSaved + kEnd - kStart; ++k) newest = walk(KeyframeId{k}, newest);
+    LoopConstraint loop;
+    loop.from = KeyframeId{kEnd};
+    loop.to = newest;
+    loop.weight = kWeight;
+    mapper_.step({}, std::span(&loop, 1));
+    mapper_.optimise_all_poses();
+  }
+
+  [[nodiscard]] const GraphSnapshot& graph() const { return mapper_.graph(); }
+  /// That a link between two keyframes of the row has on average [m].
+  [[nodiscard]] double error_of_a_link(std::uint32_t from, std::uint32_t to) const {
+    return relative(graph(), KeyframeId{from}, KeyframeId{to}).translation().x() / (to - from) + kStep;
+  }
+
+  static constexpr std::uint32_t kSaved = 120, kFirstInner = 95, kStart = 20, kEnd = 108;
+
+ private:
+  /// As a pose that was measured as a whole, so that it counts like the row's links.
+  KeyframeId walk(KeyframeId id, KeyframeId reference) {
+    KeyframeProposal proposal;
+    proposal.id = id;
+    proposal.reference = reference;
+    proposal.median_depth = 1;
+    proposal.T_k_ref = SE3(SO3(), {-1.02 * kStep, 0, 0});
+    Keyframe one_metre_deep;
+    one_metre_deep.median_depth = 1;
+    Edge edge;
+    edge.weight = kWeight;
+    proposal.pose_information = 1.01 * edge_information(one_metre_deep, one_metre_deep, edge,
+                                                        simulation::thesis_rig(), mapper_.options().edge);
+    KeyframeProposal* only = &proposal;
+    mapper_.step(std::span(&only, 1));
+    return id;
+  }
+
+  static constexpr int kWeight = 30;
+  static constexpr double kStep = 0.5;
+  Mapper mapper_;
+};
+
+TEST(Mapper, ALoopOfALaterSessionIsSpreadOverAllThatWasSaved) {
+  const SecondSession session;
+  const GraphSnapshot& graph = session.graph();
+  for (std::uint32_t k = 0; k + 1 < SecondSession::kSaved; ++k)
+    EXPECT_TRUE(find_edge(graph.keyframe(KeyframeId{k}), KeyframeId{k + 1})->marginalised) << k;
+  const double before = session.error_of_a_link(SecondSession::kStart, SecondSession::kFirstInner);
+  const double in_last_window = session.error_of_a_link(SecondSession::kFirstInner, SecondSession::kEnd);
+  EXPECT_LT(before, -0.004) << "about half of the drift of 0.88 m is the row's";
+  EXPECT_NEAR(in_last_window, before, 0.1 * std::abs(before));
 }
 
 TEST(Mapper, RelaxingTheWholeMapKeepsTheReferenceAndTheAccuracy) {
