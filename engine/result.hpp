@@ -120,7 +120,7 @@ struct MappingTotals {
   std::int64_t rounds = 0;        ///< each a version of the map
   std::int64_t metric_loops = 0;  ///< edges added by metric loop closure
   std::int64_t loops = 0;         ///< edges added by large-scale loop closure
-  std::int64_t late_loops = 0;    ///< that came after the map had forgotten their keyframes
+  std::int64_t late_loops = 0;    ///< whose keyframes the map had forgotten, or never had
 };
 
 /// A loop that was closed by appearance.

@@ -85,7 +85,10 @@ void Mapper::insert(const KeyframeProposal& proposal, MapperReport& report) {
 }
 
 void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
-  if (!graph().contains(loop.from) || !graph().contains(loop.to)) return;
+  if (!graph().contains(loop.from) || !graph().contains(loop.to)) {
+    ++report.late_loops;
+    return;
+  }
   // A constraint of a keyframe that was culled in the meantime passes to its replacement.
   const auto live_from = graph().live_replacement(loop.from), live_to = graph().live_replacement(loop.to);
   if (!live_from || !live_to) {

@@ -24,7 +24,7 @@ struct MapperReport {
   int new_points = 0;
   int dropped_observations = 0;  ///< of points culled or unknown
   int loops = 0;                 ///< loop constraints accepted
-  int late_loops = 0;            ///< dropped: the map has forgotten what became of their keyframes
+  int late_loops = 0;            ///< dropped: the map has forgotten, or never had, their keyframes
   int joined = 0;                ///< keyframes of parts that were moved to join others
 
   int inner_window = 0;  ///< |W1|

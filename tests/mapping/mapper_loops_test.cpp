@@ -70,6 +70,19 @@ TEST(Mapper, ALoopOfKeyframesThatAreForgottenIsDroppedAndCounted) {
   EXPECT_EQ(broken_invariant(mapper.graph(), 2), "");
 }
 
+/// E.g. of a replay over other frames, or of a proposal that never arrived.
+TEST(Mapper, ALoopOfAKeyframeThatTheMapNeverHadIsDroppedAndCounted) {
+  Simulation simulation = spiral(30, 9);
+  Mapper mapper(simulation::thesis_rig(), small_windows());
+  for (int k = 0; k < 3; ++k) map_next(simulation, mapper);
+  LoopConstraint loop;
+  loop.from = KeyframeId{0};
+  loop.to = KeyframeId{3};
+  const MapperReport report = mapper.step({}, std::span(&loop, 1));
+  EXPECT_EQ(report.loops, 0);
+  EXPECT_EQ(report.late_loops, 1);
+}
+
 TEST(Mapper, TheWindowFormsAroundTheReference) {
   Simulation simulation = spiral(90, 10);
   MapperOptions options = small_windows();
