@@ -23,6 +23,11 @@ void ReplacementLog::keep_newest(std::size_t frames) {
   // A frame proposes one keyframe at most; before the first frame kept there was the map of then.
   constexpr std::size_t kLargestMap = 100'000;
   entries_.keep_newest(frames > kAll - kLargestMap ? kAll : frames + kLargestMap);
+  // A keyframe makes a round of the mapper, and the loop closer's messages about it, which are three at most,
+  // as many again. Some keyframes of frames that are older still are under way.
+  constexpr std::size_t kVersionsOfAFrame = 4, kUnderWay = 128;
+  if (frames < kAll / kVersionsOfAFrame - kUnderWay)
+    versions_kept_ = kVersionsOfAFrame * (frames + kUnderWay);
 }
 
 void ReplacementLog::read_back() {
@@ -39,10 +44,19 @@ void ReplacementLog::add(KeyframeId culled, const GraphSnapshot& graph) {
 
 void ReplacementLog::add_scaling(std::uint64_t version, std::vector<KeyframeScaling> scaled) {
   if (scaled.empty()) return;
+  make_room(version, scaled.size());
   const std::size_t first = scaled_count_;
   for (const KeyframeScaling& keyframe : scaled) scaled_.push_back(keyframe);
   scaled_count_ += scaled.size();
   scalings_.push_back({version, entry_count_, first, scaled_count_});
+}
+
+/// For `count` keyframes that are scaled in `version`: scalings before all frames that are kept go.
+void ReplacementLog::make_room(std::uint64_t version, std::size_t count) {
+  if (version <= versions_kept_) return;
+  while (!scalings_.empty() && scalings_.front().version < version - versions_kept_) scalings_.pop_front();
+  const std::size_t kept = scalings_.empty() ? 0 : scaled_count_ - scalings_.front().first;
+  scaled_.keep_newest(kept + count);
 }
 
 namespace {
@@ -94,7 +108,7 @@ class FinalKeyframes {
 
 void ReplacementLog::hang_on_live_keyframes(RecordSequence<FrameRecord>& frames) const {
   FinalKeyframes keyframes;
-  const std::size_t forgotten = entries_.forgotten();
+  const std::size_t forgotten = entries_.forgotten(), scales_forgotten = scaled_.forgotten();
   std::size_t entry = forgotten + entries_.size(), frame = frames.size();
   const auto take_back_culled = [&](std::size_t first) {
     while (entry > std::max(first, forgotten)) {
@@ -117,8 +131,8 @@ void ReplacementLog::hang_on_live_keyframes(RecordSequence<FrameRecord>& frames)
     const Scaling& scaling = scalings_[n];
     take_back_culled(scaling.entries_before);
     hang(scaling.version);
-    for (std::size_t k = scaling.first; k < std::min(scaling.last, scaled_.size()); ++k)
-      keyframes.was_scaled(scaled_[k]);
+    const std::size_t last = std::min(scaling.last, scales_forgotten + scaled_.size());
+    for (std::size_t k = scaling.first; k < last; ++k) keyframes.was_scaled(scaled_[k - scales_forgotten]);
   }
   take_back_culled(0);
   hang(0);

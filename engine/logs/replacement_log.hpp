@@ -1,5 +1,7 @@
 #pragma once
 
+#include <deque>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -21,6 +23,8 @@ class ReplacementLog {
   void keep_in(std::shared_ptr<LogFile> culled, std::shared_ptr<LogFile> scaled);
   /// Without files: enough for so many of the newest frames, in maps of up to 100,000 keyframes.
   void keep_newest(std::size_t frames);
+  /// Keyframes scaled by loops that are not forgotten, each as often as it was.
+  [[nodiscard]] std::size_t scales_in_memory() const { return scaled_.size(); }
   /// When the files are written: hang_on_live_keyframes may be called.
   void read_back();
 
@@ -36,6 +40,8 @@ class ReplacementLog {
   void hang_on_live_keyframes(RecordSequence<FrameRecord>& frames) const;
 
  private:
+  void make_room(std::uint64_t version, std::size_t count);
+
   struct Entry {
     KeyframeId id = kNoKeyframe;
     KeyframeId replacement = kNoKeyframe;  ///< in the map when `id` was culled
@@ -45,12 +51,13 @@ class ReplacementLog {
   struct Scaling {
     std::uint64_t version = 0;
     std::size_t entries_before = 0;
-    std::size_t first = 0, last = 0;  ///< of scaled_
+    std::size_t first = 0, last = 0;  ///< of scaled_, those forgotten included
   };
   RecordSequence<Entry> entries_;
   RecordSequence<KeyframeScaling> scaled_;
   std::size_t entry_count_ = 0, scaled_count_ = 0;
-  std::vector<Scaling> scalings_;
+  std::deque<Scaling> scalings_;
+  std::uint64_t versions_kept_ = std::numeric_limits<std::uint64_t>::max();
 };
 
 }  // namespace twofold

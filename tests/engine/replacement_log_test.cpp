@@ -105,6 +105,34 @@ TEST(ReplacementLog, FramesAreScaledWithTheirKeyframes) {
   }
 }
 
+/// A library's run without an end: a loop every hundred versions, ten frames a version.
+TEST(ReplacementLog, ScalesOlderThanTheFramesThatAreKeptAreForgotten) {
+  constexpr std::size_t kFrames = 1000;
+  constexpr std::uint32_t kKeyframes = 500;
+  ReplacementLog log;
+  log.keep_newest(kFrames);
+  RecordSequence<FrameRecord> frames;
+  frames.keep_newest(kFrames);
+  std::vector<KeyframeScaling> scaling;
+  for (std::uint32_t k = 0; k < kKeyframes; ++k) scaling.push_back({KeyframeId{k}, 2});
+  std::size_t most = 0;
+  for (std::uint64_t version = 1; version <= 100'000; ++version) {
+    FrameRecord frame;
+    frame.state = FrameState::kTracked;
+    frame.reference = KeyframeId{0};
+    frame.snapshot_version = version;
+    frame.T_c_ref = PackedPose(SE3(SO3(), Vector3(0, 0, 1)));
+    for (int n = 0; n < 10; ++n) frames.push_back(frame);
+    if (version % 100 != 0) continue;
+    log.add_scaling(version + 1, scaling);
+    most = std::max(most, log.scales_in_memory());
+  }
+  EXPECT_LE(most, 60 * kKeyframes) << "of a thousand loops";
+  log.hang_on_live_keyframes(frames);
+  EXPECT_EQ(frames.back().T_c_ref.unpacked().translation().z(), 2) << "one loop since";
+  EXPECT_EQ(frames.front().T_c_ref.unpacked().translation().z(), 4) << "two: that of version 99,901, too";
+}
+
 TEST(ReplacementLogDeathTest, TakesDownOnlyWhatTheMapStillKnows) {
   GraphWriter writer;
   for (std::uint32_t k = 0; k < 2; ++k) {
