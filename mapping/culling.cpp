@@ -87,11 +87,18 @@ bool is_redundant(const GraphSnapshot& graph, KeyframeId id, const CullingOption
   return true;
 }
 
-int remove_keyframe(GraphWriter& writer, KeyframeId id) {
+int remove_keyframe(GraphWriter& writer, KeyframeId id, const DoubleWindow& window) {
   TWOFOLD_CHECK(!writer.graph().keyframe(id).edges->empty(),
                 "a keyframe without neighbours has no replacement");
-  const KeyframeId replacement = strongest_edge(writer.graph().keyframe(id)).other;
+  const Edge to_replacement = strongest_edge(writer.graph().keyframe(id));
+  const KeyframeId replacement = to_replacement.other;
   keep_connected(writer, id, replacement);
+  // As after a loop, until the pose graph is optimised: nothing but the edge joins what is in the windows to
+  // what is not.
+  if (!window.contains(replacement)) {
+    const SE3 T_replacement_id = relative_pose(writer.graph(), id, to_replacement);
+    writer.set_pose(id, T_replacement_id.inverse() * writer.graph().keyframe(replacement).T_k_w);
+  }
   const std::shared_ptr<const ObservationList> observations = writer.graph().keyframe(id).observations;
   writer.cull_keyframe(id, replacement);
   int culled = 0;
@@ -117,7 +124,7 @@ std::vector<KeyframeId> cull_redundant_keyframes(GraphWriter& writer, const Doub
     if (index(id) + static_cast<std::size_t>(options.keep_recent) >= graph.keyframe_count()) continue;
     if (id == graph.reference() || graph.keyframe(id).culled() || graph.keyframe(id).edges->empty()) continue;
     if (!is_redundant(graph, id, options)) continue;
-    culled_points += remove_keyframe(writer, id);
+    culled_points += remove_keyframe(writer, id, window);
     culled.push_back(id);
   }
   return culled;

@@ -24,7 +24,8 @@ int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuild
 /// lose touch with the replacement get an edge to it, composed along the culled keyframe, so that the graph
 /// stays connected; points left with fewer than two observers are culled. Returns the number of points
 /// culled.
-int remove_keyframe(GraphWriter& writer, KeyframeId id);
+/// @param window  whose absolute poses agree with one another; to a replacement outside, the edge tells
+int remove_keyframe(GraphWriter& writer, KeyframeId id, const DoubleWindow& window = {});
 
 /// Culls redundant keyframes of the inner window, newest first, so that what is already mapped stays and
 /// moving in a mapped place does not grow the map.

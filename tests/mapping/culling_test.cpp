@@ -69,6 +69,21 @@ TEST(RemoveKeyframe, KeepsTheGraphConnectedAndRelativePosesKnown) {
   }
 }
 
+/// After a loop, absolute poses in the windows and outside of them do not agree.
+TEST(RemoveKeyframe, HangsOnAReplacementOutsideOfTheWindowsByTheirEdge) {
+  GraphWriter writer = chain(4);
+  const SE3 T_2_1 = SE3::exp((Vector6() << 0.1, -0.2, 0.05, 0.03, -0.02, 0.09).finished());
+  link_marginalised(writer, k(1), k(2), 60, T_2_1);
+  link_marginalised(writer, k(0), k(1), 30, SE3(SO3(), {-0.1, 0, 0}));
+  remove_keyframe(writer, k(1));
+  const SE3 T_1_2 = writer.graph().replacement(k(1)).T_this_replacement.unpacked();
+  EXPECT_LT((T_1_2 * T_2_1).log().norm(), 1e-12);
+  const Edge* composed = find_edge(writer.graph().keyframe(k(0)), k(2));
+  ASSERT_NE(composed, nullptr);
+  const SE3 T_1_0 = T_1_2 * composed->T_other_this;
+  EXPECT_LT((T_1_0 * SE3(SO3(), {-0.1, 0, 0}).inverse()).log().norm(), 1e-12) << "pose and edge agree";
+}
+
 TEST(PointCuller, CullsWeakPointsThatAreInViewAndNeverSeenAgain) {
   const Rig rig = simulation::thesis_rig();
   CullingOptions options;
@@ -107,6 +122,26 @@ TEST(CullRedundantKeyframes, KeepsUpWithAMapperThatInsertsSeveralAtATime) {
     EXPECT_EQ(culled.front(), k(11)) << "newest first, but for the eight that are too new";
     EXPECT_EQ(points, 0);
   }
+}
+
+/// What the points have just said there is newer than an edge's constraint.
+TEST(CullRedundantKeyframes, WithinTheWindowsPosesStayAsOptimised) {
+  const Rig rig = simulation::thesis_rig();
+  GraphWriter writer = chain(20);
+  link_marginalised(writer, k(11), k(12), 60, SE3(SO3(), {-0.3, 0, 0}));
+  std::vector<KeyframeId> all;
+  for (std::uint32_t i = 0; i < 20; ++i) all.push_back(k(i));
+  for (int n = 0; n < 20; ++n) add_point(writer, rig, {0.2, 0.01 * n, 1}, all);
+  DoubleWindow window;
+  for (const KeyframeId id : all) {
+    window.position.set(id, static_cast<int>(window.nodes.size()));
+    window.nodes.push_back({.id = id});
+  }
+  window.inner = window.nodes.size();
+  int points = 0;
+  ASSERT_EQ(cull_redundant_keyframes(writer, window, {}, 1, points).front(), k(11));
+  EXPECT_EQ(writer.graph().replacement(k(11)).id, k(12));
+  EXPECT_NEAR(writer.graph().T_k_w(k(11)).translation().x(), -1.1, 1e-12);
 }
 
 /// The tracker's proposals hang on the reference.
