@@ -34,7 +34,7 @@ enum class CorrectionReason : std::uint8_t {
   kOptimisation,  ///< the double window, metric closures included
   kLoopClosure,   ///< a place was recognised
   kPoseGraph,     ///< the whole pose graph was optimised
-  kPartsJoined,   ///< the map part of the camera joined another one
+  kPartsJoined,   ///< the map part of the camera moved to join another one
 };
 [[nodiscard]] constexpr const char* describe(CorrectionReason reason) {
   switch (reason) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <functional>
 #include <stdexcept>
+#include <utility>
 
 #include "mapping/edges.hpp"
 #include "mapping/map_parts.hpp"
@@ -61,6 +62,7 @@ void Mapper::continue_from(const GraphSnapshot& graph) {
 MapperReport Mapper::step(std::span<KeyframeProposal* const> proposals,
                           std::span<const LoopConstraint> loops) {
   MapperReport report;
+  report.joined = std::exchange(joined_, 0);
   inserted_.clear();
   for (const KeyframeProposal* proposal : proposals) insert(*proposal, report);
   for (const LoopConstraint& loop : loops) add_loop(loop, report);
@@ -207,6 +209,18 @@ int Mapper::take_pose_graph(const PoseGraphUpdate& update) {
     ++moved;
   }
   if (moved > 0) writer_.announce_jump(MapChange::Kind::kPoseGraph);
+  return moved;
+}
+
+std::vector<KeyframeScaling> Mapper::take_similarities(const SimilarityUpdate& update) {
+  const GraphSnapshot before = graph();
+  std::vector<KeyframeScaling> moved = apply_similarities(writer_, update);
+  joined_ += static_cast<int>(std::count_if(moved.begin(), moved.end(), [&](const KeyframeScaling& keyframe) {
+    return before.part(keyframe.id) != update.part;
+  }));
+  // Whether the loop follows, or comes too late.
+  if (!moved.empty())
+    writer_.announce_jump(joined_ > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
   return moved;
 }
 

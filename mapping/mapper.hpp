@@ -25,7 +25,7 @@ struct MapperReport {
   int dropped_observations = 0;  ///< of points culled or unknown
   int loops = 0;                 ///< loop constraints accepted
   int late_loops = 0;            ///< dropped: the map has forgotten, or never had, their keyframes
-  int joined = 0;                ///< keyframes of parts that were moved to join others
+  int joined = 0;                ///< keyframes of parts that were moved to join others, since the last round
 
   int inner_window = 0;  ///< |W1|
   int outer_window = 0;  ///< |W2|, anchors included
@@ -82,9 +82,7 @@ class Mapper {
   /// Before a loop of another scale is added: keyframes move into one unit (apply_similarities). To be
   /// followed by a step.
   /// @return what has changed its unit
-  std::vector<KeyframeScaling> take_similarities(const SimilarityUpdate& update) {
-    return apply_similarities(writer_, update);
-  }
+  std::vector<KeyframeScaling> take_similarities(const SimilarityUpdate& update);
 
   /// Makes all poses agree globally, e.g. at the end of a run. Cost grows with the map.
   PoseGraphReport optimise_all_poses();
@@ -113,6 +111,7 @@ class Mapper {
 
   DoubleWindow window_;       ///< of the last round
   DoubleWindow next_window_;  ///< being formed
+  int joined_ = 0;            ///< keyframes, by similarities that no round has reported yet
   IdMap consistent_;          ///< keyframes whose absolute poses agree: the last window and what joined since
   std::vector<KeyframeId> inserted_;  ///< in this round
   SelectionScratch selection_;

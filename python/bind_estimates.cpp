@@ -206,7 +206,8 @@ void bind_event(py::module_& module) {
       .value("OPTIMISATION", MapEventKind::kOptimisation, "a round of the double window")
       .value("LOOP_CLOSURE", MapEventKind::kLoopClosure, "a place was recognised")
       .value("POSE_GRAPH", MapEventKind::kPoseGraph, "the whole pose graph was optimised")
-      .value("PARTS_JOINED", MapEventKind::kPartsJoined, "the camera's part took another one's world")
+      .value("PARTS_JOINED", MapEventKind::kPartsJoined,
+             "the camera's part took another one's world, or another moved into its")
       .value("RELOCALISATION", MapEventKind::kRelocalisation, "the lost camera found itself")
       .value("NEW_PART", MapEventKind::kNewPart, "the lost camera began another part");
   py::class_<MapEvent>(module, "MapEvent", "Why poses given out before are no longer what the map says.")

@@ -10,6 +10,7 @@ namespace {
 void add(const MapMovement& later, MapMovement& all) {
   all.version = later.version;
   all.keyframes = std::max(all.keyframes, later.keyframes);
+  all.joined = std::max(all.joined, later.joined);
   all.farthest = std::max(all.farthest, later.farthest);
   all.most_turned = std::max(all.most_turned, later.most_turned);
   if (later.loop_to == kNoKeyframe) return;
@@ -47,6 +48,7 @@ void MapMovements::compare(const GraphSnapshot& graph, KeyframeId id, MapMovemen
   if (old.culled() || now.culled()) return;
   if (old.part != now.part) {
     ++movement.keyframes;
+    ++movement.joined;
     return;
   }
   const SE3 change = now.T_k_w * old.T_k_w.inverse();  // of the keyframe itself, wherever the origin is

@@ -16,6 +16,7 @@ namespace twofold {
 struct MapMovement {
   std::uint64_t version = 0;
   std::uint32_t keyframes = 0;  ///< that moved by a centimetre or 0.2 degrees, or joined another part
+  std::uint32_t joined = 0;     ///< of these, joined another part
   double farthest = 0;          ///< that a keyframe moved [m], of those that kept their part
   double most_turned = 0;       ///< likewise [rad]
   KeyframeId loop_from =

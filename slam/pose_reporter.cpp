@@ -129,6 +129,16 @@ std::optional<SE3> PoseReporter::last_T_c_w(const PoseReport& report) const {
   return known ? final_T_c_w(last_, graph) : last_.T_c_w_causal.unpacked();
 }
 
+/// The camera stays where it is, but its world has more in it, or what was there has moved.
+void PoseReporter::tell_joined(const PoseReport& report, const MapMovement& movement, const PoseEstimate& now,
+                               Events& events) const {
+  MapEvent& event = events.correction.emplace(event_of(MapEventKind::kPartsJoined, now));
+  event.map_part_before = event.map_part;
+  const SE3 T_w_c = last_T_c_w(report).value_or(report.record.T_c_w_causal.unpacked()).inverse();
+  set_poses(T_w_c, T_w_c, event);
+  set_movement(movement, event);
+}
+
 void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now, Events& events) {
   if (report.correction.reason != CorrectionReason::kNone) {
     MapEvent& event = events.correction.emplace(event_of(kind_of(report.correction.reason), now));
@@ -140,7 +150,9 @@ void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now
     last_.T_c_w_causal = report.correction.T_c_w_after;
     last_.part_causal = report.graph.part(last_.reference);
   } else if (now.state == TrackingState::kTracked) {
-    (void)movements_.take(report.record.snapshot_version);  // too small to be told of
+    const MapMovement movement = movements_.take(report.record.snapshot_version);
+    if (movement.joined > 0)
+      tell_joined(report, movement, now, events);  // others are too small to be told of
   }
   if (now.state != TrackingState::kTracked || !was_lost_) return;
   // The tracker has started a part whose first keyframe the mapper has not seen yet.

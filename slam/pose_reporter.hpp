@@ -37,6 +37,8 @@ class PoseReporter {
 
  private:
   void find_events(const PoseReport& report, const PoseEstimate& now, Events& events);
+  void tell_joined(const PoseReport& report, const MapMovement& movement, const PoseEstimate& now,
+                   Events& events) const;
   /// Where the last tracked frame is in the map of this one; none if that is unknown, or in another part.
   [[nodiscard]] std::optional<SE3> last_T_c_w(const PoseReport& report) const;
 

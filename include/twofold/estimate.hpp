@@ -69,12 +69,12 @@ struct PoseEstimate {
 static_assert(std::is_trivially_copyable_v<PoseEstimate>);
 
 /// Why poses given out before are no longer what the map says. Corrections below a centimetre and 0.2 degrees
-/// are not announced.
+/// are not announced, except where parts of the map were joined.
 enum class MapEventKind : std::uint8_t {
   kOptimisation,    ///< a round of the double window moved the camera's surroundings
   kLoopClosure,     ///< a place was recognised
   kPoseGraph,       ///< the whole pose graph was optimised
-  kPartsJoined,     ///< the camera's map part joined another one, and took its world
+  kPartsJoined,     ///< the camera's map part took another one's world, or another one moved into its world
   kRelocalisation,  ///< the lost camera found itself in the map
   kNewPart          ///< the lost camera began a map part with a world of its own
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "mapping/mapper.hpp"
+#include "mapping/similarity_loop.hpp"
 #include "tests/mapping/small_graphs.hpp"
 
 namespace twofold {
@@ -108,6 +109,34 @@ TEST(MapParts, AProposalWithoutReferenceStartsOneAndALoopJoinsIt) {
   for (std::uint32_t k = 0; k < 7; ++k) EXPECT_EQ(mapper.graph().keyframe(KeyframeId{k}).part, KeyframeId{0});
   EXPECT_LT((relative(mapper.graph(), 6, 1) * kConstraint.inverse()).log().norm(), 1e-9);
   EXPECT_NE(find_edge(mapper.graph().keyframe(KeyframeId{6}), KeyframeId{1}), nullptr);
+}
+
+/// Its other part has moved into the camera's before the loop is added.
+TEST(MapParts, ThoseOfOneCameraAreSaidToBeJoined) {
+  Rig rig;
+  rig.kind = SensorKind::kMono;
+  rig.camera = {420, 420, 320, 240, 640, 480};
+  GraphWriter writer = chain(5);
+  const KeyframeId cameras = add_part(writer, 2);
+  writer.set_reference(KeyframeId{6});
+  Mapper mapper(rig, {});
+  mapper.continue_from(writer.publish());
+  const auto close = [&](std::uint32_t from, std::uint32_t to) {
+    LoopConstraint loop;
+    loop.from = KeyframeId{from};
+    loop.to = KeyframeId{to};
+    loop.weight = 40;
+    loop.scale = 0.5;
+    loop.T_to_from = kConstraint;
+    (void)mapper.take_similarities(close_over_sim3(mapper.graph(), loop, rig, mapper.options()));
+    return mapper.step({}, std::span(&loop, 1));
+  };
+  EXPECT_EQ(close(2, 6).joined, 5);
+  EXPECT_EQ(mapper.graph().last_jump().kind, MapChange::Kind::kPartsJoined);
+  EXPECT_EQ(mapper.graph().part(KeyframeId{0}), cameras);
+  EXPECT_EQ(mapper.step({}).joined, 0);
+  EXPECT_EQ(close(0, 6).joined, 0);
+  EXPECT_EQ(mapper.graph().last_jump().kind, MapChange::Kind::kLoopClosure);
 }
 
 }  // namespace

@@ -134,6 +134,37 @@ TEST_F(PoseReporterTest, ACorrectionSaysWhatItDidToTheMap) {
   EXPECT_NEAR(events_.correction->farthest_moved, 5, 1e-12);
 }
 
+/// Of the two, the other part has moved: the camera stays where it is, but what is in its world does not.
+TEST_F(PoseReporterTest, APartThatJoinsTheCamerasIsToldWithoutACorrection) {
+  EngineOptions options;
+  reporter_.listen(options);
+  Keyframe other;
+  other.id = KeyframeId{1};
+  other.part = KeyframeId{1};
+  writer_.add_keyframe(std::move(other));
+  const auto publish = [&] {
+    graph_ = writer_.publish();
+    options.on_map(graph_, {});
+  };
+  publish();
+  const SE3 T_c_w(SO3(), Vector3(0, 0, 2));
+  (void)report(tracked(0, T_c_w));
+  EXPECT_FALSE(events_.correction);
+  writer_.set_part(KeyframeId{1}, KeyframeId{0});
+  writer_.announce_jump(MapChange::Kind::kPartsJoined);
+  publish();
+  (void)report(tracked(1, T_c_w));
+  ASSERT_TRUE(events_.correction);
+  EXPECT_EQ(events_.correction->kind, MapEventKind::kPartsJoined);
+  EXPECT_EQ(events_.correction->keyframes_moved, 1U);
+  EXPECT_EQ(events_.correction->map_part_before, 0U);
+  EXPECT_EQ(events_.correction->map_part, 0U);
+  EXPECT_EQ(events_.correction->moved, 0);
+  EXPECT_EQ(events_.correction->T_world_camera_after, to_pose(T_c_w.inverse()));
+  (void)report(tracked(2, T_c_w));
+  EXPECT_FALSE(events_.correction) << "told once";
+}
+
 TEST_F(PoseReporterTest, ALostCamerasPartIsTheOneThatWasToldLast) {
   (void)report(tracked(0, SE3()));
   Keyframe older;
