@@ -26,24 +26,41 @@ constexpr std::size_t kMaxReaders = 16;
 
 class UdpOutput final : public PoseOutput {
  public:
-  UdpOutput(FileDescriptor socket, PoseForm form) : socket_(std::move(socket)), form_(form) {}
+  UdpOutput(std::vector<FileDescriptor> sockets, PoseForm form) : sockets_(std::move(sockets)), form_(form) {}
 
   /// A line that cannot be sent is gone, as those are that are lost on the way: an error says as often as not
   /// that nobody listened to the line before.
   void offer(const std::string& lines) override {
     if (missed_ > 0 && send(missed_line(missed_, form_))) missed_ = 0;
     (void)send(lines);
+    last_ = lines;
   }
   void miss(std::uint64_t lines) override { missed_ += lines; }
 
  private:
   bool send(const std::string& lines) {
-    return ::send(socket_.get(), lines.data(), lines.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
+    for (std::size_t refusals = 0; refusals <= sockets_.size(); ++refusals) {
+      if (send_once(lines)) return true;
+      if (errno != ECONNREFUSED && errno != ENETUNREACH && errno != EHOSTUNREACH) return false;
+      try_next_address();
+    }
+    return false;
+  }
+  bool send_once(const std::string& lines) {
+    return ::send(sockets_[at_].get(), lines.data(), lines.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
+  }
+  /// What was refused is the line before, which nobody has had: it is sent again.
+  void try_next_address() {
+    if (sockets_.size() == 1) return;
+    at_ = (at_ + 1) % sockets_.size();
+    if (!last_.empty()) (void)send_once(last_);
   }
 
-  FileDescriptor socket_;
+  std::vector<FileDescriptor> sockets_;  // each connected to another address of one name
+  std::size_t at_ = 0;                   // where lines go, until nobody listens there
   PoseForm form_;
   std::uint64_t missed_ = 0;
+  std::string last_;
 };
 
 class UnixOutput final : public PoseOutput {
@@ -118,12 +135,18 @@ std::unique_ptr<PoseOutput> open_udp(const std::string& address, PoseForm form) 
   if (const int error = ::getaddrinfo(host.c_str(), address.c_str() + colon + 1, &hints, &found))
     fail(target, ::gai_strerror(error));
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> list(found, &::freeaddrinfo);
+  std::vector<FileDescriptor> sockets;
   for (const addrinfo* at = found; at != nullptr; at = at->ai_next) {
     FileDescriptor socket(::socket(at->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     if (socket && ::connect(socket.get(), at->ai_addr, at->ai_addrlen) == 0)
-      return std::make_unique<UdpOutput>(std::move(socket), form);
+      sockets.push_back(std::move(socket));
   }
-  fail(target, std::strerror(errno));
+  if (sockets.empty()) fail(target, std::strerror(errno));
+  return udp_output(std::move(sockets), form);
+}
+
+std::unique_ptr<PoseOutput> udp_output(std::vector<FileDescriptor> sockets, PoseForm form) {
+  return std::make_unique<UdpOutput>(std::move(sockets), form);
 }
 
 std::unique_ptr<PoseOutput> open_unix(const std::string& path, PoseForm form) {

@@ -11,9 +11,10 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
 
 #include "engine/logs/file_descriptor.hpp"
-#include "streams/pose_output.hpp"
+#include "streams/network_outputs.hpp"
 #include "tests/io/scratch_folder.hpp"
 #include "tests/io/small_files.hpp"
 #include "tests/streams/numbered_poses.hpp"
@@ -219,46 +220,93 @@ TEST(PoseOutputs, AUnixReaderTooManyIsToldAndGoes) {
   EXPECT_EQ(by_next.frames, std::vector<std::int64_t>{4}) << "there is a place again";
 }
 
-TEST(PoseOutputs, UdpCountsNothingThatNobodyListenedTo) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const auto bound = [&] {
+/// Listens on this machine, at the port that is given, or at one that is free.
+class UdpListener {
+ public:
+  explicit UdpListener(std::uint16_t port = 0) : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    address_.sin_family = AF_INET;
+    address_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address_.sin_port = htons(port);
+    auto* const address = reinterpret_cast<sockaddr*>(&address_);
+    EXPECT_EQ(::bind(socket_.get(), address, sizeof address_), 0);
+    socklen_t size = sizeof address_;
+    EXPECT_EQ(::getsockname(socket_.get(), address, &size), 0);
+  }
+  [[nodiscard]] std::uint16_t port() const { return ntohs(address_.sin_port); }
+  [[nodiscard]] std::string target() const { return "udp:127.0.0.1:" + std::to_string(port()); }
+  [[nodiscard]] FileDescriptor connected() const {
     FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-    EXPECT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-    socklen_t size = sizeof address;
-    ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
+    EXPECT_EQ(::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address_), sizeof address_), 0);
     return socket;
-  };
-  (void)bound();  // takes a port that is free, and is closed
-  const auto output =
-      open_pose_output("udp:127.0.0.1:" + std::to_string(ntohs(address.sin_port)), PoseForm::kJson);
+  }
+  [[nodiscard]] Heard heard() const {
+    Heard heard;
+    heard.take(receive(socket_));
+    return heard;
+  }
+  void leave() { const FileDescriptor closed = std::exchange(socket_, FileDescriptor()); }
+
+ private:
+  FileDescriptor socket_;
+  sockaddr_in address_{};
+};
+
+TEST(PoseOutputs, UdpCountsNothingThatNobodyListenedTo) {
+  UdpListener absent;
+  absent.leave();
+  const auto output = open_pose_output(absent.target(), PoseForm::kJson);
   for (int i = 0; i < 9; ++i) output->offer(line(i));
-  const FileDescriptor socket = bound();
+  const UdpListener listener(absent.port());
   for (int i = 9; i < 12; ++i) output->offer(line(i));
-  Heard heard;
-  heard.take(receive(socket));
+  const Heard heard = listener.heard();
   EXPECT_EQ(heard.missed, 0) << "a count that is wrong is worse than none";
-  ASSERT_FALSE(heard.frames.empty());
-  EXPECT_EQ(heard.frames.back(), 11);
+  EXPECT_EQ(heard.frames, (std::vector<std::int64_t>{9, 10, 11})) << "from his coming on";
 }
 
 TEST(PoseOutputs, UdpSendsALineADatagram) {
-  const FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  ASSERT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  socklen_t size = sizeof address;
-  ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
-  const auto output =
-      open_pose_output("udp:127.0.0.1:" + std::to_string(ntohs(address.sin_port)), PoseForm::kJson);
+  const UdpListener listener;
+  const auto output = open_pose_output(listener.target(), PoseForm::kJson);
   output->miss(3);
   for (int i = 0; i < 4; ++i) output->offer(line(i));
-  Heard heard;
-  heard.take(receive(socket));
+  const Heard heard = listener.heard();
   EXPECT_EQ(heard.frames, (std::vector<std::int64_t>{0, 1, 2, 3}));
   EXPECT_EQ(heard.missed, 3);
+}
+
+std::vector<FileDescriptor> sockets_of(const UdpListener& first, const UdpListener& second) {
+  std::vector<FileDescriptor> sockets;
+  sockets.push_back(first.connected());
+  sockets.push_back(second.connected());
+  return sockets;
+}
+
+TEST(PoseOutputs, UdpFindsWhicheverAddressOfANameIsListenedAt) {
+  UdpListener absent;
+  absent.leave();
+  const UdpListener listener;
+  const auto output = udp_output(sockets_of(absent, listener), PoseForm::kJson);
+  for (int i = 0; i < 30; ++i) output->offer(line(i));
+  std::vector<std::int64_t> all(30);
+  std::iota(all.begin(), all.end(), 0);
+  EXPECT_EQ(listener.heard().frames, all) << "the line that found nobody at the first address, too";
+}
+
+TEST(PoseOutputs, UdpSendsToOneAddressOfANameAsLongAsItIsListenedAt) {
+  UdpListener first, second;
+  const auto output = udp_output(sockets_of(first, second), PoseForm::kJson);
+  for (int i = 0; i < 4; ++i) output->offer(line(i));
+  EXPECT_EQ(first.heard().frames, (std::vector<std::int64_t>{0, 1, 2, 3}));
+  EXPECT_TRUE(second.heard().frames.empty());
+  first.leave();
+  for (int i = 4; i < 8; ++i) output->offer(line(i));
+  EXPECT_EQ(second.heard().frames, (std::vector<std::int64_t>{4, 5, 6, 7}));
+  second.leave();
+  for (int i = 8; i < 13; ++i) output->offer(line(i));
+  const UdpListener back(first.port());
+  for (int i = 13; i < 16; ++i) output->offer(line(i));
+  const std::vector<std::int64_t> heard = back.heard().frames;
+  ASSERT_GE(heard.size(), 2U);
+  EXPECT_EQ(std::vector(heard.end() - 2, heard.end()), (std::vector<std::int64_t>{14, 15})) << "each once";
 }
 
 TEST(PoseOutputs, WhatCannotBeOpenedIsNamed) {
