@@ -349,7 +349,7 @@ TEST(PublicDatasets, SevenScenesWithoutAllOfIt) {
     EXPECT_TRUE(source->ground_truth().empty()) << damaged;
     EXPECT_NE(all_notes(*source).find("frame-000002.pose.txt"), std::string::npos);
   }
-  EXPECT_IO_ERROR(open_source(path + "?fps=1e-9"), "beyond all times");
+  EXPECT_IO_ERROR(open_source(path + "?fps=1e-10"), "beyond all times");
   fs::remove(file("frame-000003.color.png"));
   EXPECT_IO_ERROR(open_source(path), "frame-000003.depth.png: no colour image has its number (unpaired=drop");
   fs::remove(file("frame-000001.depth.png"));
