@@ -128,7 +128,7 @@ namespace {
 void add_frame_options(CLI::App& command, RunArguments& arguments) {
   command
       .add_option("SOURCE", arguments.source,
-                  "Path, or scheme:ARGUMENT?key=value (kitti, euroc, tum, 7scenes, images, "
+                  "Path, or scheme:ARGUMENT?key=value (kitti, euroc, tum, 7scenes, replica, scannet, images, "
                   "video, mcap, bag, synthetic, v4l2); '...?first=N&frames=M': M frames of a recording, from "
                   "number N on")
       ->required();

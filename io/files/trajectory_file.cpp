@@ -108,16 +108,23 @@ SE3 pose_of_rows(const fs::path& file, int line, const Fields& fields) {
   return {R, Vector3(M.col(3))};
 }
 
-}  // namespace
-
-Trajectory read_kitti_trajectory(const fs::path& file) {
+Trajectory read_matrices(const fs::path& file, std::size_t numbers) {
   Trajectory trajectory;
   for (const TextLine& line : read_text_lines(file)) {
-    const Fields fields = fields_of(file, line, 12, " \t");
+    const Fields fields = fields_of(file, line, numbers, " \t");
     trajectory.push_back(
         {static_cast<std::int64_t>(trajectory.size()), pose_of_rows(file, line.number, fields)});
   }
   return trajectory;
+}
+
+}  // namespace
+
+Trajectory read_kitti_trajectory(const fs::path& file) {
+  return read_matrices(file, 12);
+}
+Trajectory read_matrix_trajectory(const fs::path& file) {
+  return read_matrices(file, 16);
 }
 
 std::optional<SE3> read_pose_matrix(const fs::path& file) {

@@ -28,6 +28,9 @@ enum class TimeOrder : std::uint8_t { kIncreasing, kAny };
 /// counts lines.
 [[nodiscard]] Trajectory read_kitti_trajectory(const std::filesystem::path& file);
 
+/// The same with 16 numbers a line: the 4x4 matrix T_w_c.
+[[nodiscard]] Trajectory read_matrix_trajectory(const std::filesystem::path& file);
+
 /// A file of one 4x4 matrix T_w_c, as 7-Scenes and ScanNet have one an image. Nothing where it has an
 /// infinity or no number (nan), as those of images whose pose nobody knows. Throws IoError for all other than
 /// 16 numbers, and for what is no rigid motion.

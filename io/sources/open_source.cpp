@@ -8,7 +8,7 @@
 #include "io/bags/bag_reader.hpp"
 #include "io/files/io_error.hpp"
 #include "io/sources/bag_source.hpp"
-#include "io/sources/layouts/numbered_frames.hpp"
+#include "io/sources/layouts/recognise_layout.hpp"
 #include "io/sources/left_camera_source.hpp"
 #include "io/sources/preloaded_source.hpp"
 #include "io/sources/recording.hpp"
@@ -26,21 +26,12 @@ namespace fs = std::filesystem;
 using Opener = std::function<std::unique_ptr<FrameSource>(const SourceSpec&, const SourceOptions&)>;
 using RecordingReader = Recording (*)(const fs::path&, const std::optional<fs::path>&, SourceParameters&);
 
-void expect_folder(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::exists(folder, error)) throw IoError(folder, "no such folder");
-  if (!fs::is_directory(folder, error)) throw IoError(folder, "is not a folder");
-  if (fs::is_empty(folder, error) || error)
-    throw IoError(folder, error ? "cannot be read" : "the folder is empty");
-}
-
 /// Readers of folders of image files.
 const std::map<std::string, RecordingReader>& readers() {
-  static const std::map<std::string, RecordingReader> kReaders{{"kitti", read_kitti_recording},
-                                                               {"euroc", read_euroc_recording},
-                                                               {"tum", read_tum_recording},
-                                                               {"7scenes", read_seven_scenes},
-                                                               {"images", read_image_folder}};
+  static const std::map<std::string, RecordingReader> kReaders{
+      {"kitti", read_kitti_recording}, {"euroc", read_euroc_recording}, {"tum", read_tum_recording},
+      {"7scenes", read_seven_scenes},  {"replica", read_replica},       {"scannet", read_scannet},
+      {"images", read_image_folder}};
   return kReaders;
 }
 
@@ -124,6 +115,8 @@ const std::map<std::string, Opener>& openers() {
       {"euroc", recording_opener("euroc")},
       {"tum", recording_opener("tum")},
       {"7scenes", recording_opener("7scenes")},
+      {"replica", recording_opener("replica")},
+      {"scannet", recording_opener("scannet")},
       {"images", recording_opener("images")},
       {"video", open_video},
       {"mcap", bag_opener(open_mcap)},
@@ -140,29 +133,6 @@ const std::map<std::string, Opener>& openers() {
        }},
   };
   return kOpeners;
-}
-
-/// Scheme for a bare path, from what is in the folder.
-std::string recognise_layout(const fs::path& path) {
-  std::error_code error;
-  if (fs::is_regular_file(path, error))
-    return path.extension() == ".mcap" ? "mcap" : path.extension() == ".bag" ? "bag" : "video";
-  if (fs::is_character_file(path, error)) return "v4l2";
-  if (!fs::exists(path, error)) throw IoError(path, "no such file or folder");
-  expect_folder(path);
-  // Before EuRoC's: a rendered RGB-D recording has its images in mav0, where nothing tells of their depth.
-  if (fs::exists(path / "associations.txt")) return "tum";
-  if (fs::exists(path / "mav0") || fs::exists(path / "cam0" / "data.csv")) return "euroc";
-  if (fs::exists(path / "image_0") || fs::exists(path / "image_2")) return "kitti";
-  if (fs::exists(path / "rgb.txt") || fs::exists(path / "color.txt")) return "tum";
-  // Before a folder of images: theirs are of both kinds.
-  if (is_seven_scenes(path)) return "7scenes";
-  if (fs::exists(path / "times.txt") || fs::exists(path / "left") || fs::exists(path / "calibration.yaml")) {
-    return "images";
-  }
-  throw IoError(
-      path,
-      "no known layout: none of mav0, image_0, image_2, rgb.txt, times.txt is there (images:DIR?fps=N?)");
 }
 
 std::string known_schemes() {

@@ -40,6 +40,8 @@ struct SourceOptions {
 ///   tum:DIR          RGB-D; associations.txt, rgb.txt and depth.txt, or color.txt and aligned_depth.txt;
 ///                    groundtruth.txt if there
 ///   7scenes:DIR      frame-000000.color.png, .depth.png, .pose.txt
+///   replica:DIR      results/frame000000.jpg, results/depth000000.png, traj.txt
+///   scannet:DIR      color/0.jpg, depth/0.png, pose/0.txt, intrinsic/
 ///   images:DIR       image files in the order of their names, or left/ with right/ or depth/; times.txt
 ///   video:FILE       one image, or two side by side
 ///   mcap:FILE        a recording of ROS 1 or 2; bag:FILE one of ROS 1
@@ -52,8 +54,8 @@ struct SourceOptions {
 
 class PlaybackSource;
 
-/// Of these only those that are folders of image files: kitti, euroc, tum, 7scenes, images; their left
-/// camera. Null for all others, of which nothing is opened.
+/// Of these only those that are folders of image files: kitti, euroc, tum, 7scenes, replica, scannet, images;
+/// their left camera. Null for all others, of which nothing is opened.
 [[nodiscard]] std::unique_ptr<PlaybackSource> open_recording(
     const std::string& text, const std::optional<std::filesystem::path>& calibration);
 

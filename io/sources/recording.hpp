@@ -49,6 +49,12 @@ struct Recording {
 [[nodiscard]] Recording read_seven_scenes(const std::filesystem::path& folder,
                                           const std::optional<std::filesystem::path>& calibration,
                                           SourceParameters& parameters);
+[[nodiscard]] Recording read_replica(const std::filesystem::path& folder,
+                                     const std::optional<std::filesystem::path>& calibration,
+                                     SourceParameters& parameters);
+[[nodiscard]] Recording read_scannet(const std::filesystem::path& folder,
+                                     const std::optional<std::filesystem::path>& calibration,
+                                     SourceParameters& parameters);
 [[nodiscard]] Recording read_image_folder(const std::filesystem::path& folder,
                                           const std::optional<std::filesystem::path>& calibration,
                                           SourceParameters& parameters);

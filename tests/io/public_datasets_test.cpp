@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -362,6 +363,135 @@ TEST(PublicDatasets, SevenScenesWithoutAllOfIt) {
   EXPECT_IO_ERROR(open_source(path), "has the same number as");
   EXPECT_IO_ERROR(open_source("7scenes:" + folder.path().string()),
                   "no images called frame-NUMBER.color.png");
+}
+
+constexpr const char* kReplicaCamera =
+    R"({"camera": {"w": 120, "h": 68, "fx": 60.0, "fy": 60.0, "cx": 59.5, "cy": 33.5, "scale": 6553.5}})";
+
+/// A scene of Replica as NICE-SLAM hands it on, smaller; the camera moves by 0.1 m a frame.
+void write_replica(const ScratchFolder& folder, int width, int height) {
+  std::string path;
+  for (int i = 0; i < kLength; ++i) {
+    folder.write_image(fmt::format("office0/results/frame{:06d}.jpg", i),
+                       numbered_image(width, height, 50, CV_8UC3));
+    folder.write_image(fmt::format("office0/results/depth{:06d}.png", i),
+                       cv::Mat(height, width, CV_16UC1, cv::Scalar(6000 + i)));
+    path += fmt::format("0 0 1 {} 1 0 0 2 0 1 0 3 0 0 0 1\n", 0.1 * i);
+  }
+  folder.write("office0/traj.txt", path);
+}
+
+TEST(PublicDatasets, ReplicaAsHandedOn) {
+  const ScratchFolder folder;
+  const std::string path = folder / "office0";
+  write_replica(folder, 120, 68);
+  EXPECT_IO_ERROR(open_source(path), "the image is 120x68, the calibration or the first image says 1200x680");
+  folder.write("cam_params.json", kReplicaCamera);
+  for (const std::string& text : {path, path + "/", "replica:" + path}) {
+    const auto source = open_source(text);
+    EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
+    EXPECT_EQ(source->rig().camera.fx, 60);
+    EXPECT_EQ(source->rig().camera.cy, 33.5);
+    EXPECT_EQ(source->rig().depth_unit, 1 / 6553.5);
+    EXPECT_EQ(source->rig().readout, 0.0);
+    ASSERT_EQ(source->ground_truth().size(), std::size_t{kLength});
+    EXPECT_EQ(source->ground_truth()[2].t_ns, 66'666'667);
+    EXPECT_LT((source->ground_truth()[2].T_w_c * Vector3(1, 0, 0) - Vector3(0.2, 3, 3)).norm(), 1e-12);
+    EXPECT_EQ(first_frame(*source).depth.at<std::uint16_t>(7, 7), 6000);
+  }
+  EXPECT_EQ(open_source(path + "?fx=61&fy=61&cx=60&cy=34")->rig().depth_unit, 1 / 6553.5);
+}
+
+TEST(PublicDatasets, ReplicaWithItsPublishedCamera) {
+  const ScratchFolder folder;
+  write_replica(folder, 1200, 680);
+  const auto source = open_source(folder / "office0");
+  EXPECT_EQ(source->rig().camera.fx, 600);
+  EXPECT_EQ(source->rig().depth_unit, 1 / 6553.5);
+  EXPECT_NE(all_notes(*source).find("as published for Replica"), std::string::npos);
+}
+
+TEST(PublicDatasets, ReplicaWithDamagedFiles) {
+  const ScratchFolder folder;
+  const std::string path = folder / "office0";
+  write_replica(folder, 120, 68);
+  const std::string whole = kReplicaCamera;
+  const auto without = [&](const std::string& part, const std::string& by) {
+    return std::string(whole).replace(whole.find(part), part.size(), by);
+  };
+  for (const std::string& damaged :
+       {std::string(), std::string("[1]"), std::string("{}"), whole.substr(0, 40), without("60.0", "\"60\""),
+        without("6553.5", "0"), without("120", "-120"), without("120", "1e300"),
+        without("\"cx\"", "\"x\"")}) {
+    folder.write("office0/cam_params.json", damaged);
+    EXPECT_IO_ERROR(open_source(path), "cam_params.json");
+  }
+  folder.write("office0/cam_params.json", whole);
+  folder.write("office0/traj.txt", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
+  const auto source = open_source(path);
+  EXPECT_TRUE(source->ground_truth().empty());
+  EXPECT_NE(all_notes(*source).find("traj.txt: has 1 poses, none for frame000001.jpg"), std::string::npos);
+  fs::remove(folder.path() / "office0/results/depth000001.png");
+  EXPECT_IO_ERROR(open_source(path), "frame000001.jpg: no depth image has its number");
+}
+
+std::string matrix_of(double f, double cx, double cy) {
+  return fmt::format("{} 0 {} 0\n0 {} {} 0\n0 0 1 0\n0 0 0 1\n", f, cx, f, cy);
+}
+
+/// A scene of ScanNet as its program exports it, smaller: numbers are not filled up, and colour images are
+/// larger than depth images.
+void write_scannet(const ScratchFolder& folder) {
+  for (const int n : {0, 9, 10, 11}) {
+    folder.write_image(fmt::format("scene0/color/{}.jpg", n), numbered_image(324, 242, 50, CV_8UC3));
+    folder.write_image(fmt::format("scene0/depth/{}.png", n),
+                       cv::Mat(120, 160, CV_16UC1, cv::Scalar(2000 + n)));
+    folder.write(fmt::format("scene0/pose/{}.txt", n),
+                 "1 0 0 " + std::to_string(n) + "\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  }
+  folder.write("scene0/pose/10.txt",
+               "-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n-inf -inf -inf -inf\n");
+  folder.write("scene0/intrinsic/intrinsic_color.txt", matrix_of(290, 162, 121));
+  folder.write("scene0/intrinsic/intrinsic_depth.txt", matrix_of(145, 80, 60));
+  folder.write("scene0/intrinsic/extrinsic_color.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+}
+
+TEST(PublicDatasets, ScanNetWithImagesOfTwoSizes) {
+  const ScratchFolder folder;
+  write_scannet(folder);
+  for (const std::string scheme : {"", "scannet:"}) {
+    const auto source = open_source(scheme + (folder / "scene0"));
+    EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
+    EXPECT_EQ(source->rig().camera.fx, 290);
+    EXPECT_EQ(source->rig().camera.width, 324);
+    ASSERT_EQ(source->ground_truth().size(), 3U) << "nobody knows the pose of one";
+    EXPECT_EQ(source->ground_truth()[2].T_w_c.translation().x(), 11);
+    std::vector<std::int64_t> times;
+    for (Frame frame; source->next(frame) == FrameStatus::kFrame;) {
+      times.push_back(std::llround(static_cast<double>(frame.t_ns) * 30e-9));
+      ASSERT_EQ(frame.depth.size(), cv::Size(324, 242)) << "drawn as the colour camera would have it";
+      EXPECT_NEAR(frame.depth.at<std::uint16_t>(121, 162), 2000, 12);
+    }
+    EXPECT_EQ(times, (std::vector<std::int64_t>{0, 9, 10, 11}));
+  }
+  EXPECT_EQ(open_source(folder / "scene0", {.calibration = {}, .left_only = true})->frame_count(), 4);
+}
+
+TEST(PublicDatasets, ScanNetThatDoesNotFitItsMatrices) {
+  const ScratchFolder folder;
+  const std::string path = folder / "scene0";
+  write_scannet(folder);
+  folder.write("scene0/intrinsic/intrinsic_color.txt", matrix_of(1170, 648, 484));
+  EXPECT_IO_ERROR(
+      open_source(path),
+      "intrinsic_color.txt: is of images about 1296x968 large, but they are 324x242: give --calib");
+  for (const std::string damaged : {"1 2 3\n", "a 0 0 0 b 0 0 0 1\n", ""}) {
+    folder.write("scene0/intrinsic/intrinsic_color.txt", damaged);
+    EXPECT_IO_ERROR(open_source(path), "intrinsic_color.txt");
+  }
+  folder.write("scene0/intrinsic/intrinsic_color.txt", matrix_of(290, 162, 121));
+  folder.write("scene0/intrinsic/extrinsic_depth.txt", "1 0 0 0.1\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  EXPECT_IO_ERROR(open_source(path), "extrinsic_depth.txt: is not the unit matrix");
 }
 
 }  // namespace

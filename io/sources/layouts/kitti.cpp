@@ -14,6 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 std::vector<std::int64_t> read_times(const fs::path& file, std::size_t image_count) {
+  if (!fs::exists(file))
+    throw IoError(file, "no such file: data_odometry_calib.zip of KITTI has it beside calib.txt");
   std::vector<std::int64_t> times;
   std::int64_t previous = -1;
   for (const TextLine& line : read_text_lines(file)) {
@@ -109,6 +111,10 @@ Recording read_kitti_recording(const fs::path& folder, const std::optional<fs::p
   const auto right = stereo ? list_images(folder / cameras.right) : std::vector<fs::path>{};
   if (stereo) expect_pairs(folder, cameras, left, right);
 
+  if (!calibration && !fs::exists(recording.calibration_file))
+    throw IoError(
+        recording.calibration_file,
+        "no such calibration file: data_odometry_calib.zip of KITTI has it, and times.txt; or --calib");
   recording.calibration = read_cameras(recording.calibration_file, cameras);
   if (stereo && recording.calibration.kind != SensorKind::kStereo) {
     throw IoError(recording.calibration_file,

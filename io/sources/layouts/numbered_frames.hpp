@@ -49,7 +49,9 @@ void take_numbered_calibration(const std::optional<std::filesystem::path>& given
                                const std::function<std::optional<Calibration>()>& otherwise,
                                double usual_depth_unit, SourceParameters& parameters, Recording* recording);
 
-/// 7-Scenes' images, by which a folder of them is known.
+/// Whether a folder has the images of such a recording, where they lie in it.
 [[nodiscard]] bool is_seven_scenes(const std::filesystem::path& folder);
+[[nodiscard]] bool is_replica(const std::filesystem::path& folder);
+[[nodiscard]] bool is_scannet(const std::filesystem::path& folder);
 
 }  // namespace twofold

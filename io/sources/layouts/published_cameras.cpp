@@ -24,7 +24,7 @@ Distortion radtan(double k1, double k2, double p1, double p2, double k3) {
 
 const PublishedCamera& published_camera(PublicDataset dataset) {
   // In the order of PublicDataset.
-  static const std::array<PublishedCamera, 6> kCameras{{
+  static const std::array<PublishedCamera, 7> kCameras{{
       {"TUM RGB-D, Freiburg 1",
        kTumPage,
        {517.306408, 516.469215, 318.643040, 255.313989, 640, 480},
@@ -55,6 +55,11 @@ const PublishedCamera& published_camera(PublicDataset dataset) {
        {585, 585, 320, 240, 640, 480},
        {},
        {}},
+      {"Replica",
+       "github.com/cvg/nice-slam, configs/Replica/replica.yaml",
+       {600, 600, 599.5, 339.5, 1200, 680},
+       {},
+       0.0},
   }};
   return kCameras.at(static_cast<std::size_t>(dataset));
 }

@@ -10,7 +10,15 @@
 namespace twofold {
 
 /// Datasets whose recordings come without a calibration: it stands on the dataset's page, or in its paper.
-enum class PublicDataset : std::uint8_t { kFreiburg1, kFreiburg2, kFreiburg3, kBonn, kIclNuim, kSevenScenes };
+enum class PublicDataset : std::uint8_t {
+  kFreiburg1,
+  kFreiburg2,
+  kFreiburg3,
+  kBonn,
+  kIclNuim,
+  kSevenScenes,
+  kReplica
+};
 
 struct PublishedCamera {
   const char* dataset;    ///< for people
