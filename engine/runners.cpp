@@ -23,6 +23,11 @@ double distance_travelled(const GraphSnapshot& graph, KeyframeId a, KeyframeId b
   return distance;
 }
 
+bool share_a_neighbour(const Keyframe& a, const Keyframe& b) {
+  return std::any_of(a.edges->begin(), a.edges->end(),
+                     [&](const Edge& edge) { return find_edge(b, edge.other) != nullptr; });
+}
+
 /// Of a keyframe, or of the one that stands for it, if it was culled. It must not be forgotten.
 std::int64_t time_of(const GraphSnapshot& graph, KeyframeId id) {
   return graph.keyframe(graph.live_replacement(id)->id).t_ns;
@@ -45,6 +50,18 @@ CorrectionReason reason_of(MapChange::Kind kind) {
 }
 
 }  // namespace
+
+bool has_arrived(const GraphSnapshot& graph, const LoopConstraint& loop) {
+  constexpr std::uint64_t kPatience = 32;  // versions
+  if (graph.version() > loop.snapshot_version + kPatience) return true;
+  const auto from = graph.live_replacement(loop.from), to = graph.live_replacement(loop.to);
+  if (!from || !to || from->id == to->id) return true;
+  const Keyframe& a = graph.keyframe(from->id);
+  const Keyframe& b = graph.keyframe(to->id);
+  if (find_edge(a, b.id) != nullptr) return true;
+  const bool culled = a.id != loop.from || b.id != loop.to;
+  return culled && share_a_neighbour(a, b);
+}
 
 TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
     : tracker_(rig, options.tracker),
@@ -281,25 +298,15 @@ RelocalisationAnswer LoopCloserRunner::relocalise(const RelocalisationRequest& r
   return closer_ ? closer_->relocalise(request.images, graph) : std::nullopt;
 }
 
-/// A loop may be lost on its way, or its keyframes culled: it is not awaited for ever.
 bool LoopCloserRunner::awaits_similarities(const GraphSnapshot& graph) {
-  constexpr std::uint64_t kPatience = 32;  // versions
-  if (!awaited_) return false;
-  const Keyframe& from = graph.keyframe(awaited_->from);
-  const bool taken = from.culled() || find_edge(from, awaited_->to) != nullptr;
-  if (taken || graph.version() > awaited_->snapshot_version + kPatience) awaited_.reset();
+  if (awaited_ && has_arrived(graph, *awaited_)) awaited_.reset();
   return awaited_.has_value();
 }
 
 /// One pose graph optimisation for a run of loops: when the newest of them is in the map.
 void LoopCloserRunner::optimise_if_due(const GraphSnapshot& graph) {
   if (!not_optimised_ || graph.version() == not_optimised_->snapshot_version) return;
-  const Keyframe& from = graph.keyframe(not_optimised_->from);
-  if (from.culled() || graph.keyframe(not_optimised_->to).culled()) {
-    not_optimised_.reset();
-    return;
-  }
-  if (find_edge(from, not_optimised_->to) == nullptr) return;  // not taken yet
+  if (!has_arrived(graph, *not_optimised_)) return;
   const ScopedStage timed(times_, pose_graph_stage_);
   PoseGraphReport report;
   messages_.emplace_back(optimise_component(graph, graph.reference(), rig_, mapper_options_, report));

@@ -136,6 +136,12 @@ class MapperRunner {
   std::vector<LoopConstraint> loops_;
 };
 
+/// Whether the map has taken a loop that the mapper was sent: its keyframes, or those that stand for them by
+/// now, share an edge or, when one was culled since, a neighbour: the edges of what is culled pass on as far
+/// as that. So it is with a loop that there is nothing more to be waited for of: its keyframes are forgotten
+/// or one, or it seems to have been lost on its way.
+[[nodiscard]] bool has_arrived(const GraphSnapshot& graph, const LoopConstraint& loop);
+
 /// The loop closer's step as every kind of run takes it: recognise, verify, and, once the map has taken a
 /// loop, optimise all of it beside the mapper. With one camera all of it is optimised over Sim(3) first, and
 /// the next loop waits until the map has taken that: its scale would be of a unit that is gone.

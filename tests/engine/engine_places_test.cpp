@@ -2,7 +2,10 @@
 
 #include <algorithm>
 
+#include "engine/runners.hpp"
+#include "mapping/culling.hpp"
 #include "tests/engine/kidnapped_camera.hpp"
+#include "tests/mapping/small_graphs.hpp"
 #include "tests/sanitized.hpp"
 
 namespace twofold {
@@ -69,6 +72,78 @@ TEST_F(EnginePlacesTest, AThreadedRunWithRequestsAndAnswersReplays) {
   };
   EXPECT_GT(asked(schedule), 0);
   expect_replay(threaded, kidnapped(false, kUntilFound), live);
+}
+
+// When the loop closer takes a loop that it sent for one that the map has: only then is all of the map
+// optimised, and, with one camera, the next loop sent.
+
+constexpr KeyframeId kTo{2}, kFrom{18};
+
+struct ChainWithLoop {
+  GraphWriter writer = chain(22);
+  LoopConstraint loop;
+
+  ChainWithLoop() {
+    loop.snapshot_version = writer.publish().version();
+    loop.from = kFrom;
+    loop.to = kTo;
+  }
+  /// As the mapper does, between the keyframes that stand for the loop's.
+  void take() {
+    const KeyframeId from = writer.graph().live_replacement(kFrom)->id;
+    const KeyframeId to = writer.graph().live_replacement(kTo)->id;
+    link_marginalised(writer, from, to, 10, SE3());
+  }
+  [[nodiscard]] bool arrived() { return has_arrived(writer.publish(), loop); }
+};
+
+TEST(ArrivedLoop, IsSeenByItsEdge) {
+  ChainWithLoop map;
+  EXPECT_FALSE(map.arrived());
+  map.take();
+  EXPECT_TRUE(map.arrived());
+}
+
+TEST(ArrivedLoop, IsSeenWhenEitherKeyframeIsCulledAfterwards) {
+  for (const std::vector<KeyframeId>& culled : {std::vector{kFrom}, {kTo}, {kFrom, kTo}, {kTo, kFrom}}) {
+    ChainWithLoop map;
+    map.take();
+    for (const KeyframeId id : culled) (void)remove_keyframe(map.writer, id);
+    EXPECT_TRUE(map.arrived()) << culled.size() << " culled, " << index(culled.front()) << " first";
+  }
+}
+
+TEST(ArrivedLoop, IsSeenWhereItsEdgeEndedBesideOthers) {
+  ChainWithLoop map;
+  map.take();
+  const KeyframeId before{index(kFrom) - 1}, after{index(kFrom) + 1}, beside{index(kTo) + 1};
+  for (const KeyframeId neighbour : {before, after}) link(map.writer, neighbour, beside, 5);
+  (void)remove_keyframe(map.writer, kFrom);
+  const KeyframeId replacement = map.writer.graph().live_replacement(kFrom)->id;
+  ASSERT_EQ(find_edge(map.writer.graph().keyframe(replacement), kTo), nullptr);
+  EXPECT_TRUE(map.arrived());
+}
+
+/// The mapper was at work on a version that it began without the loop.
+TEST(ArrivedLoop, IsWaitedForWhenItsKeyframesAreCulledBefore) {
+  for (const KeyframeId culled : {kFrom, kTo}) {
+    ChainWithLoop map;
+    (void)remove_keyframe(map.writer, culled);
+    EXPECT_FALSE(map.arrived()) << index(culled);
+    map.take();
+    EXPECT_TRUE(map.arrived()) << index(culled);
+  }
+}
+
+TEST(ArrivedLoop, IsNotWaitedForForEver) {
+  ChainWithLoop lost;
+  int versions = 1;
+  while (!lost.arrived()) ASSERT_LT(++versions, 100);
+  EXPECT_GT(versions, 10);
+  ChainWithLoop forgotten;
+  (void)remove_keyframe(forgotten.writer, kTo);
+  forgotten.writer.keep_needed_replacements();
+  EXPECT_TRUE(forgotten.arrived());
 }
 
 }  // namespace
