@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -159,6 +160,11 @@ class SlidingWindowFilter {
     bool valid = false;
   };
 
+  struct WhitenedError {
+    double chi2 = 0;
+    int rows = 0;  ///< components: 3, 2 of the left image alone, 0 behind the camera
+  };
+
   void remove_oldest(const FilterFrame& frame);
   void delete_oldest(const std::vector<bool>& drop);
   void marginalise_oldest(const std::vector<bool>& drop);
@@ -175,7 +181,9 @@ class SlidingWindowFilter {
   void fit_newest_pose(const FilterFrame& frame);
   [[nodiscard]] ObservationTerm linearise(int pose, const Observation& observation) const;
   [[nodiscard]] MotionError linearise_motion(int pose) const;
-  [[nodiscard]] double whitened_chi2(int pose, const Observation& observation) const;
+  [[nodiscard]] WhitenedError whitened_error(int pose, const Observation& observation) const;
+  /// Threshold on the norm of a whitened residual with so many components; 0: none.
+  [[nodiscard]] double huber(int rows) const { return huber_ * std::sqrt(rows / 3.0); }
   void build_equations();
   void add_prior();
   void add_measurements(int pose);
@@ -219,7 +227,7 @@ class SlidingWindowFilter {
   bool oldest_fixed_ = false;
   std::int64_t next_frame_ = 0;
   SE3 first_T_c_w_;
-  double huber_ = 0;  ///< threshold on the whitened residual norm; 0: none
+  double huber_ = 0;  ///< threshold on the norm of three whitened components; 0: none
   FilterSummary summary_;
   FilterEquations equations_;
   FilterFactor factor_;

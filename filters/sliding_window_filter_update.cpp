@@ -12,7 +12,10 @@ namespace twofold {
 namespace {
 
 constexpr double kUnknownLandmark = 1e-6;  // [1/m^2]: keeps the system regular, and moves nothing
-constexpr double kMedianChi2 = 2.366;      // of three degrees of freedom
+
+double median_chi2(int dof) {
+  return dof == 2 ? 1.386 : 2.366;
+}
 
 }  // namespace
 
@@ -30,13 +33,14 @@ const Vector3& SlidingWindowFilter::landmark_lin(int landmark) const {
   return first_estimates() && landmark < prior_.landmark_count() ? prior_.landmarks_lin[l] : points_[l];
 }
 
-double SlidingWindowFilter::whitened_chi2(int pose, const Observation& observation) const {
+SlidingWindowFilter::WhitenedError SlidingWindowFilter::whitened_error(int pose,
+                                                                       const Observation& observation) const {
   const Vector3 x_c =
       poses_[static_cast<std::size_t>(pose)].T_c_l * points_[static_cast<std::size_t>(observation.landmark)];
-  if (!in_front_of_camera(x_c)) return -1;
-  Vector3 r = observation.z - rig_.project(x_c);
-  if (std::isnan(r.z())) return r.head<2>().dot(observation.information.topLeftCorner<2, 2>() * r.head<2>());
-  return r.dot(observation.information * r);
+  if (!in_front_of_camera(x_c)) return {};
+  const Vector3 r = observation.z - rig_.project(x_c);
+  if (!std::isnan(r.z())) return {r.dot(observation.information * r), 3};
+  return {r.head<2>().dot(observation.information.topLeftCorner<2, 2>() * r.head<2>()), 2};
 }
 
 SlidingWindowFilter::ObservationTerm SlidingWindowFilter::linearise(int pose,
@@ -52,14 +56,15 @@ SlidingWindowFilter::ObservationTerm SlidingWindowFilter::linearise(int pose,
   term.r = observation.z - rig_.project(x_c);
   Matrix3 J = rig_.project_jacobian(x_lin);
   term.information = observation.information;
-  if (std::isnan(term.r.z())) {
+  const int rows = std::isnan(term.r.z()) ? 2 : 3;
+  if (rows == 2) {
     term.r.z() = 0;
     J.row(2).setZero();
     term.information.row(2).setZero();
     term.information.col(2).setZero();
   }
   const double chi2 = term.r.dot(term.information * term.r);
-  term.information *= HuberKernel{huber_}.weight(chi2);
+  term.information *= HuberKernel{huber(rows)}.weight(chi2);
   if (pose == 0 && oldest_fixed_) {
     term.J_pose.setZero();
   } else {
@@ -158,12 +163,11 @@ double SlidingWindowFilter::cost() const {
     const VectorX half = 0.5 * (prior_.information * d) - prior_.vector;
     sum += d.dot(half);
   }
-  const HuberKernel kernel{huber_};
   for (int j = 0; j < pose_count(); ++j) {
     const Pose& pose = poses_[static_cast<std::size_t>(j)];
     for (const Observation& observation : pose.observations) {
-      const double chi2 = whitened_chi2(j, observation);
-      if (chi2 >= 0) sum += 0.5 * kernel.rho(chi2);
+      const auto [chi2, rows] = whitened_error(j, observation);
+      if (rows > 0) sum += 0.5 * HuberKernel{huber(rows)}.rho(chi2);
     }
     if (j == 0 || !pose.motion) continue;
     const Vector6 e = motion_error(*pose.motion, poses_[static_cast<std::size_t>(j) - 1].T_c_l, pose.T_c_l).e;
@@ -173,35 +177,39 @@ double SlidingWindowFilter::cost() const {
 }
 
 void SlidingWindowFilter::update_threshold() {
-  std::vector<double> chi2s;
+  std::vector<WhitenedError> errors;
+  std::vector<double> variances;  // of one component, as each error says if it is of the middle
   for (int j = 0; j < pose_count(); ++j) {
     for (const Observation& observation : poses_[static_cast<std::size_t>(j)].observations) {
-      const double chi2 = whitened_chi2(j, observation);
-      if (chi2 >= 0) chi2s.push_back(chi2);
+      const WhitenedError error = whitened_error(j, observation);
+      if (error.rows == 0) continue;
+      errors.push_back(error);
+      variances.push_back(error.chi2 / median_chi2(error.rows));
     }
   }
   summary_.outliers = 0;
   summary_.inlier_sigma = 0;
-  if (chi2s.empty()) return;
-  double limit2 = huber_ * huber_;
+  if (errors.empty()) return;
+  double limit2 = huber_ * huber_ / 3.0;  // a component
   if (huber_ == 0) {  // no threshold yet: three times the robust spread given by the median
     const double least = options_.min_inlier_sigma * options_.min_inlier_sigma;
-    limit2 = 9.0 * 3.0 * std::max(median(std::span(chi2s)) / kMedianChi2, least);
+    limit2 = 9.0 * std::max(median(std::span(variances)), least);
   }
   double sum = 0;
-  int inliers = 0;
-  for (const double chi2 : chi2s) {
-    if (chi2 > limit2) continue;
+  int inliers = 0, measured = 0;
+  for (const auto [chi2, rows] : errors) {
+    if (chi2 > limit2 * rows) continue;
     sum += chi2;
     ++inliers;
+    measured += rows;
   }
-  summary_.outliers = static_cast<int>(chi2s.size()) - inliers;
+  summary_.outliers = static_cast<int>(errors.size()) - inliers;
   // Free landmarks and poses without process model take up as many residuals as they have unknowns.
   int unknowns = 3 * (landmark_count() - prior_.landmark_count());
   for (int j = oldest_fixed_ ? 1 : 0; j < pose_count(); ++j) {
     if (!poses_[static_cast<std::size_t>(j)].motion) unknowns += 6;
   }
-  const int dof = 3 * inliers - unknowns;
+  const int dof = measured - unknowns;
   summary_.inlier_sigma = std::sqrt(sum / std::max(1, dof));
   if (options_.robust) {
     // Too few surplus residuals to estimate a spread from: the stated variances stand.

@@ -172,6 +172,27 @@ TEST(SwfFilter, LeftOnlyMeasurementsContributeAndCannotStartALandmark) {
   EXPECT_LT((filter.newest_T_c_w() * scene.T_c_w.back().inverse()).log().norm(), 0.1);
 }
 
+/// A measurement of the left image alone has two components, not three.
+TEST(SwfFilter, SpreadOfLeftOnlyMeasurementsIsThatOfTheOthers) {
+  double mean = 0;
+  constexpr int kScenes = 6;
+  for (int n = 0; n < kScenes; ++n) {
+    SwfScene scene =
+        make_swf_scene({.frames = 8, .points = 60, .seed = 20U + static_cast<unsigned>(n), .motion = false});
+    for (std::size_t j = 1; j < scene.frames.size(); ++j) {
+      for (auto& o : scene.frames[j].observations) o.z.z() = Rig::kNoRight;
+    }
+    SlidingWindowOptions options = exact_options(0);
+    SlidingWindowFilter filter(scene.rig, options);
+    filter.set_first_pose(SE3(), std::nullopt);
+    FilterSummary summary;
+    for (const FilterFrame& frame : scene.frames) summary = filter.step(frame);
+    EXPECT_LE(summary.outliers, 1);
+    mean += summary.inlier_sigma / kScenes;
+  }
+  EXPECT_NEAR(mean, 1, 0.04);
+}
+
 TEST(SwfFilter, StateStaysBoundedAndRunsAreReproducible) {
   const SwfScene scene =
       make_swf_scene({.frames = 40, .points = 300, .seed = 14, .step = 0.5, .visible = 2.0});
