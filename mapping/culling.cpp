@@ -32,6 +32,11 @@ const Edge& strongest_edge(const Keyframe& keyframe) {
   });
 }
 
+/// Variances of links in a row add up.
+int weight_in_series(double a, double b) {
+  return a > 0 && b > 0 ? std::max(1, static_cast<int>(std::lround(a * b / (a + b)))) : 1;
+}
+
 /// Edges from the replacement to neighbours of `id` that reach it through `id` alone.
 void keep_connected(GraphWriter& writer, KeyframeId id, KeyframeId replacement) {
   const GraphSnapshot& graph = writer.graph();
@@ -42,8 +47,8 @@ void keep_connected(GraphWriter& writer, KeyframeId id, KeyframeId replacement) 
     if (edge.other == replacement || in_touch(graph.keyframe(edge.other), graph.keyframe(replacement), id))
       continue;
     const SE3 T_other_replacement = relative_pose(graph, id, edge) * T_id_replacement;
-    link_marginalised(writer, replacement, edge.other,
-                      std::max(1, std::min(edge.weight, to_replacement.weight)), T_other_replacement);
+    link_marginalised(writer, replacement, edge.other, weight_in_series(edge.weight, to_replacement.weight),
+                      T_other_replacement);
   }
 }
 

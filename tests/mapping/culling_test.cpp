@@ -69,6 +69,19 @@ TEST(RemoveKeyframe, KeepsTheGraphConnectedAndRelativePosesKnown) {
   }
 }
 
+/// Links in a row tell as little as all their errors together leave of them.
+TEST(RemoveKeyframe, AnEdgeComposedOfTwoWeighsLessThanEither) {
+  GraphWriter writer = chain(11, 0.1, 100);
+  for (std::uint32_t n = 1; n < 10; ++n) remove_keyframe(writer, k(n));
+  const Edge* edge = find_edge(writer.graph().keyframe(k(0)), k(10));
+  ASSERT_NE(edge, nullptr);
+  EXPECT_NEAR(edge->weight, 100 / 10, 1);
+
+  GraphWriter weak = chain(3, 0.1, 1);
+  remove_keyframe(weak, k(1));
+  EXPECT_EQ(find_edge(weak.graph().keyframe(k(0)), k(2))->weight, 1);
+}
+
 /// After a loop, absolute poses in the windows and outside of them do not agree.
 TEST(RemoveKeyframe, HangsOnAReplacementOutsideOfTheWindowsByTheirEdge) {
   GraphWriter writer = chain(4);
