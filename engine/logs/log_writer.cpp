@@ -10,12 +10,14 @@ constexpr auto kPeriod = std::chrono::milliseconds(100);
 
 }  // namespace
 
-LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files) : files_(std::move(files)) {
+LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round)
+    : files_(std::move(files)) {
   thread_.emplace(WorkerOptions{.name = "log writer", .time_slice = kPatientSlice},
-                  [this](const std::stop_token& stop) {
+                  [this, before_round = std::move(before_round)](const std::stop_token& stop) {
                     while (!stop.stop_requested()) {
                       (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + kPeriod,
-                                                [this] { return behind(); });
+                                                [this] { return file_is_behind(); });
+                      if (before_round) before_round();
                       for (const auto& file : files_) file->write_waiting();
                       // Whoever looked at the files before this round sleeps by now, and hears it.
                       { const std::scoped_lock lock(round_); }
@@ -25,6 +27,10 @@ LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files) : files_(std::
 }
 
 bool LogWriter::behind() const {
+  return file_is_behind() && !thread_->finished();
+}
+
+bool LogWriter::file_is_behind() const {
   return std::any_of(files_.begin(), files_.end(), [](const auto& file) { return file->behind(); });
 }
 
@@ -32,7 +38,9 @@ void LogWriter::wait_for_room() {
   if (!behind()) return;
   parking_.wake();
   std::unique_lock lock(round_);
-  written_.wait(lock, [this] { return !behind(); });
+  // A thread that fails wakes nobody.
+  while (!written_.wait_for(lock, kPeriod, [this] { return !behind(); })) {
+  }
 }
 
 std::vector<std::string> LogWriter::errors() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -18,12 +19,13 @@ namespace twofold {
 class LogWriter {
  public:
   /// Throws std::system_error when no thread can be made.
-  explicit LogWriter(std::vector<std::shared_ptr<LogFile>> files);
+  /// @param before_round  called on the thread before it looks what waits; tests let it fail
+  explicit LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round = {});
 
-  /// Whether a file is behind; any thread.
+  /// Whether a file is behind, and somebody there who will write it; any thread.
   [[nodiscard]] bool behind() const;
-  /// Has what waits written at once if a file is behind, and returns when none is. For those who have time;
-  /// any thread.
+  /// Has what waits written at once if a file is behind, and returns when none is, or when the thread has
+  /// failed, which finish reports. For those who have time; any thread.
   void wait_for_room();
   /// What was lost so far, and what waits for room on the disk, a sentence a file; any thread.
   [[nodiscard]] std::vector<std::string> errors() const;
@@ -31,6 +33,8 @@ class LogWriter {
   [[nodiscard]] std::vector<std::string> finish();
 
  private:
+  [[nodiscard]] bool file_is_behind() const;
+
   std::vector<std::shared_ptr<LogFile>> files_;
   Parking parking_;
   std::mutex round_;  // guards nothing: whoever waits holds it between looking at the files and sleeping

@@ -5,7 +5,9 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 
 #include "engine/logs/log_writer.hpp"
@@ -105,6 +107,22 @@ TEST(LogWriter, WhoWaitsForRoomHasItAtOnce) {
   }
   EXPECT_TRUE(writer.finish().empty());
   EXPECT_EQ(file->written(), kTurns * line.size());
+}
+
+/// Nobody waits for a thread that is gone, whether it went before or meanwhile; and the run is told.
+TEST(LogWriter, WhoWaitsForRoomGoesOnWhenTheThreadHasFailed) {
+  const auto file = std::make_shared<LogFile>("/dev/null");
+  LogWriter writer({file}, [] { throw std::runtime_error("no memory"); });
+  EXPECT_TRUE(file->append(std::string(LogFile::kMostWaiting / 2 + 1, 'x')));
+  auto waiting = std::async(std::launch::async, [&] {
+    writer.wait_for_room();
+    writer.wait_for_room();
+  });
+  ASSERT_EQ(waiting.wait_for(std::chrono::seconds(20)), std::future_status::ready);
+  EXPECT_FALSE(writer.behind()) << "a run without a pace would hold its frames back for ever";
+  const std::vector<std::string> lost = writer.finish();
+  ASSERT_FALSE(lost.empty());
+  EXPECT_EQ(lost.back(), "log writer: no memory");
 }
 
 /// Nobody writes: the bound holds, what is beyond it is counted, and nothing later is let in.
