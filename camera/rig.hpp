@@ -10,7 +10,8 @@ namespace twofold {
 
 enum class SensorKind : std::uint8_t { kMono, kStereo, kRgbd };
 
-/// Standard deviations of what is measured in images: the only place that says so.
+/// Standard deviations of what is measured in images, for tracker, mapper and loop closer alike; filters that
+/// follow patches in other ways have their own.
 struct MeasurementNoise {
   double sigma_px =
       0.5;  ///< of a sub-pixel match on pyramid level 0, as found on rendered views; doubles a level

@@ -96,10 +96,10 @@ struct EngineOptions {
   RightOfWay* right_of_way = nullptr;
 
   PoseListener on_pose;      ///< as soon as the pose is known; may be empty
-  PoseListener on_frame;     ///< once the tracker is done with the frame, all stages timed; likewise
-  MapListener on_map;        ///< likewise
-  PlacesListener on_places;  ///< likewise
-  LoopListener on_loop;      ///< likewise
+  PoseListener on_frame;     ///< once the tracker is done with the frame, all stages timed; may be empty
+  MapListener on_map;        ///< a new version of the map; may be empty
+  PlacesListener on_places;  ///< what the loop closer has described; may be empty
+  LoopListener on_loop;      ///< a loop was closed by appearance; may be empty
 
   /// For tests of failures: called by the thread of that name ("tracker", "mapper", "loop closer",
   /// "checkpoints") of a threaded run before each of its steps, which fails with what this throws.

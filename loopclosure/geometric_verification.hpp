@@ -25,11 +25,11 @@ struct VerificationOptions {
   double guided_radius_px = 8;    ///< of the first round of guided matching, pixels of the corner's level;
                                   ///< the later rounds take half of it
   int guided_distance = 64;       ///< descriptors in guided matching [bits]
-  int min_inliers = 30;           ///< Theta
+  int min_inliers = 30;           ///< corners, as min_covisible points make an edge
   double min_inlier_share = 0.4;  ///< of the guided matches: what is near by chance seldom fits
   /// Inliers in the upper, lower, left and right half of either view, so that the pose does not hang on one
-  /// corner of the image. Theta / 2, as for metric loops (6.4.1), would refuse views that share half of what
-  /// they see (docs/places.md).
+  /// corner of the image. Half of min_inliers, as for metric loops (6.4.1), would refuse views that share
+  /// half of what they see (docs/places.md).
   int min_in_half = 4;
   double min_disparity_px = 1;  ///< corners with less tell nothing about translation
 
@@ -63,8 +63,8 @@ struct VerificationReport {
 /// that keep their lengths, as a rigid body does, and turn alike, the pose that fits most 3D-3D matches
 /// (eq. 5.11 - 5.14 with s = 1, eq. 6.9), errors measured where they arise, in pixels. From the pose found
 /// on, the corners of all views of the place are looked for in b: what one view missed, its neighbours may
-/// have. A corner whose direction is not the one that the pose says is another. At least Theta inliers, well
-/// spread. Deterministic.
+/// have. A corner whose direction is not the one that the pose says is another. At least min_inliers of them,
+/// well spread. Deterministic.
 ///
 /// With one camera (rig.kind) depths come from the map (DepthRegression; rig.baseline is the one they were
 /// written with), those of b in a unit that may have drifted: three points give a similarity (eq. 5.14), and

@@ -18,7 +18,7 @@ struct RefinementOptions {
   double border_px = 8;  ///< a point nearer than this to the image's border is not looked for
   double radius_px = 8;  ///< of the first search, pixels of the searched level
   double second_radius_px = 8.0 / 3;  ///< of the second one, from the pose the first one found
-  int min_inliers = 20;               ///< Theta
+  int min_inliers = 20;               ///< points
   double min_inlier_share = 0.6;      ///< of the points found
   double min_visible_share = 0.1;     ///< ... and of those looked for: the others should be seen and are not
 

@@ -162,8 +162,8 @@ void MetricLoopCloser::prune(const SE3& T_loop_w) {
   motion_.resize(kept);
 }
 
-/// At least Theta / 2 matches in the upper, lower, left and right half of the reference image: constraints
-/// held by a corner of the image alone are weak.
+/// At least half of min_covisible matches in the upper, lower, left and right half of the reference image:
+/// constraints held by a corner of the image alone are weak.
 bool MetricLoopCloser::well_spread(const std::vector<std::size_t>& matches) const {
   int left = 0, upper = 0;
   for (const std::size_t n : matches) {

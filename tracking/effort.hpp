@@ -7,17 +7,18 @@
 
 namespace twofold {
 
-/// How much work the tracker does on a frame, from most to least. Each level leaves out what is listed beside
-/// it, and all that the levels above it leave out.
+/// How much work the tracker does on a frame, from most to least. Each level does less, as said beside it,
+/// and as the levels above it do.
 enum class EffortLevel : std::uint8_t {
   kEverything,
   kFewerPoints,      ///< half of the points are searched
   kCoarseAlignment,  ///< dense alignment stops two levels above the finest, and starts once only; a pose that
                      ///< few points agree on is taken as it is
-  kFewerIterations,  ///< a third of the solver's and the patch search's iterations; keyframes, unless
-                     ///< tracking would soon be lost without one: they are the most expensive frames, and the
-                     ///< mapper, which works on them, needs the same processors
-  kDropFrames,       ///< frames whose successor is due, if LatePolicy allows it
+  kFewerIterations,  ///< a third of the solver's and the patch search's iterations; no keyframes of frames
+                     ///< that points placed, unless tracking would soon be lost without one or the map has
+                     ///< one keyframe only: they are the most expensive frames, and the mapper, which works
+                     ///< on them, needs the same processors
+  kDropFrames,  ///< frames whose successor is due, if LatePolicy allows it
   kCount
 };
 inline constexpr int kEffortLevels = static_cast<int>(EffortLevel::kCount);

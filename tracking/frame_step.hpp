@@ -52,8 +52,8 @@ class FrameStep {
   TrackResult result;
   /// One camera: frames before this one whose poses its start found out, relative to the reference keyframe.
   std::vector<EarlierFrame> earlier_frames;
-  /// Of a pose that depth alignment gave, the errors of planes taken as independent, as the weights of the
-  /// edges that points make take those of points.
+  /// Information of a pose that depth alignment gave if each plane erred by itself, as the weights of edges
+  /// assume of points.
   Matrix6 information_of_planes = Matrix6::Zero();
 
   /// The frame before this one has no pose.

@@ -58,7 +58,8 @@ class ImmaturePoints {
   void clear_points();
   /// Forgets what the map has taken over.
   void adopt(const GraphSnapshot& graph);
-  /// Forgets points that failed too often or that `newest - anchor` keyframes did not confirm.
+  /// Forgets points that failed too often, or that no keyframe has confirmed for more than `max_age`
+  /// keyframes.
   void drop_stale(KeyframeId newest, int max_failures, int max_age);
 
  private:

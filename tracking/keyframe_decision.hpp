@@ -6,10 +6,10 @@
 
 namespace twofold {
 
-/// What a keyframe is judged by: how the scene looked when it was made.
+/// What later frames are judged by: how the scene looked from the newest keyframe.
 struct KeyframeView {
   double median_depth = 0;   ///< [m]
-  int occupied_regions = 0;  ///< parts of the image in which a point was tracked
+  int occupied_regions = 0;  ///< regions of the image in which a point was tracked
 };
 
 /// What stands in the way of a keyframe, or makes one welcome.

@@ -37,7 +37,7 @@ struct TrackerOptions {
   /// After a loss, a pose from the depth image alone is rejected when so many points should be seen from it
   /// and the search does not confirm it.
   int telling_candidates = 40;
-  double min_inlier_share = 0.25;  ///< of the matches found: fewer: lost
+  double min_inlier_share = 0.25;  ///< of the matches found; with fewer inliers the frame is lost
   double lost_radius_px = 8;       ///< search radius while lost
   /// The light has changed when so large a share of the points searched was missed ...
   double light_missed_share = 0.5;

@@ -74,6 +74,7 @@ LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
 bool Tracker::points_allow(FrameStep& step) {
   TrackResult& result = step.result;
   const TrackResult by_depth = result;
+  const RollingShutter shutter = step.shutter;
   result.by_depth = false;
   const Placement placement{by_depth.reference, by_depth.T_c_ref};
   local_map_.update(step.graph, placement.reference, immature_points_, options_.neighbour_keyframes);
@@ -81,6 +82,7 @@ bool Tracker::points_allow(FrameStep& step) {
   if (search_from(start, step) == LostCause::kNone) return true;
   if (step.after_loss() && result.candidates >= options_.telling_candidates) return false;
   step.restore(by_depth);
+  step.shutter = shutter;
   search_.clear();
   result.matches = result.inliers = 0;
   return true;

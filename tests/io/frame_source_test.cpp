@@ -622,14 +622,16 @@ void write_euroc(const ScratchFolder& folder, const std::array<std::vector<std::
   }
 }
 
-TEST(FrameSource, EurocRefusesUnequalCounts) {
+TEST(FrameSource, EurocLeavesOutAndCountsImagesWithoutPartner) {
+  constexpr std::int64_t kFrameNs = 50'000'000;
   const ScratchFolder folder;
-  write_euroc(folder, {{{1000, 1001, 1002}, {1000, 1001}}});
-  EXPECT_IO_ERROR(open_source(folder.path().string()), "cam0 lists 3 images, cam1 2");
-  const auto source = open_source("euroc:" + folder.path().string() + "?unpaired=drop");
+  write_euroc(folder, {{{0, kFrameNs, 2 * kFrameNs, 3 * kFrameNs}, {0, 2 * kFrameNs, 4 * kFrameNs}}});
+  const auto source = open_source(folder.path().string());
   EXPECT_NEAR(source->rig().baseline, 0.1, 1e-12);
-  EXPECT_EQ(drain(*source), "2");
-  EXPECT_EQ(source->report().lost, 1U);
+  EXPECT_EQ(numbers_of(*source), (Numbers{{0, 100}, {2, 101}}));
+  EXPECT_EQ(source->report().lost, 3U);
+  ASSERT_EQ(source->report().summary.size(), 1U);
+  EXPECT_NE(source->report().summary[0].find("3 images without a partner"), std::string::npos);
 }
 
 /// Cameras that are triggered together do not stamp to the nanosecond.
@@ -643,7 +645,7 @@ TEST(FrameSource, EurocPairsTheNearestInTime) {
   EXPECT_EQ(numbers_of(*source), (Numbers{{0, 100}, {1, 101}, {2, 102}}));
   EXPECT_TRUE(source->report().notes.empty());
   EXPECT_IO_ERROR(open_source(name + "?max_gap=0.0001"),
-                  "data/1.png: cam1 has no image within 0.0001 s (max_gap) of it");
+                  "of 3 images of cam0 and 3 of cam1 only 1 are within 0.0001 s (max_gap)");
   EXPECT_EQ(numbers_of(*open_source(name + "?max_gap=0.0001&unpaired=drop")), (Numbers{{0, 100}}));
   EXPECT_IO_ERROR(open_source(name + "?max_gap=0&unpaired=drop"),
                   "no images of cam0 and cam1 are within 0 s");

@@ -47,8 +47,8 @@ std::string FixedPixelOptions::invalid_reason() const {
   return OptionCheck()
       .above("min_motion_px", min_motion_px, 0)
       .within("same_grey", same_grey, 0, 254)
-      .within("min_contrast", min_contrast, same_grey, 254)
-      .within("believed", believed, 1, 100)
+      .within("min_contrast", min_contrast, same_grey + 1, 254)
+      .within("believed", believed, 2, 100)
       .above("round", round, 0)
       .share("most_of_it", most_of_it)
       .reason();

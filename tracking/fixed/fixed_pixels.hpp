@@ -14,13 +14,14 @@ namespace twofold {
 
 struct FixedPixelOptions {
   bool enabled = true;
-  double min_motion_px = 8;  ///< by which the scene must have moved at a pixel between two looks, > 0
-  int same_grey = 3;         ///< a pixel that has changed by more shows the scene, >= 0
-  /// A pixel is telling if it differs by so much from what lies along the motion, >= same_grey.
+  /// By which the scene must have moved at a pixel between two looks, whatever its depth, > 0.
+  double min_motion_px = 8;
+  int same_grey = 3;  ///< a pixel that has changed by more shows the scene, >= 0
+  /// A pixel is telling if it differs by so much from what lies along the motion, > same_grey.
   int min_contrast = 12;
-  int believed = 5;         ///< looks at which a telling pixel must have stayed the same, in [1, 100]
+  int believed = 5;         ///< looks at which a telling pixel must have stayed the same, in [2, 100]
   double round = 0.2;       ///< time in which all of the image is looked at once [s], > 0
-  double most_of_it = 0.5;  ///< of the image: when more seems fixed, nothing is believed to be, in (0, 1]
+  double most_of_it = 0.5;  ///< of the image: when more seems fixed, no region is believed to be, in (0, 1]
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -13,7 +13,8 @@
 namespace twofold {
 
 /// What images go through before they are tracked: rows of a right image are moved to those of the left one,
-/// dead pixels repaired. Both, and what moves with the camera, are learnt from the frames that were tracked.
+/// dead pixels repaired. How rows lie is learnt from the first frames and from keyframes, which pixels are
+/// dead or move with the camera from the frames that were tracked.
 ///
 /// No allocation after construction.
 class ImageCorrection {
@@ -27,9 +28,9 @@ class ImageCorrection {
   /// @param T_this_previous  its motion since the frame before; nothing if that is not known
   void advance(const std::optional<SE3>& T_this_previous);
   /// What stays the same in the frame advanced to, while the camera moves, moves with it.
-  /// @param inverse_depths  of points that are tracked [1/m], reordered. Empty: the pose is in doubt and no
-  ///                        witness. Where something that passes has taken it along, it is the scene that
-  ///                        seems fixed.
+  /// @param inverse_depths  of points that are tracked [1/m], reordered. Empty: the pose is in doubt and
+  ///                        proves nothing; if something that passes has taken it along, the scene itself
+  ///                        would seem fixed.
   void learn(const Frame& frame, std::span<double> inverse_depths);
   /// A keyframe: whether the rows still fit.
   void look_at_keyframe(const FrameImages& images);

@@ -27,7 +27,8 @@ class ImageMotion {
   /// Number of the newest frame.
   [[nodiscard]] std::int64_t frame() const { return frame_; }
   /// The shortest of the displacements that a point seen at `uv` in frame `then` may have had since, over all
-  /// depths within bounds [px]; nothing if the way since then is not known.
+  /// depths within bounds [px]: (0, 0) if it may be behind the camera by now; nothing if the way since then
+  /// is not known.
   [[nodiscard]] std::optional<Vector2> least_since(std::int64_t then, const Vector2& uv);
 
  private:

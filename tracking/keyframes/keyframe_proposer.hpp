@@ -29,16 +29,16 @@ class KeyframeProposer {
   [[nodiscard]] bool due(const FrameStep& step, int regions, const ImmaturePoints& immature_points) const;
   /// The number of the keyframe to be proposed next.
   [[nodiscard]] KeyframeId next() const { return KeyframeId{next_keyframe_}; }
-  /// That proposed last, if any was.
+  /// Whether this is the keyframe proposed last.
   [[nodiscard]] bool is_newest(KeyframeId id) const { return index(id) + 1 == next_keyframe_; }
 
-  /// Fills the step's free proposal with all but observations, points and images.
+  /// Fills the step's free proposal with all but observations, points and images, and sets result.proposed.
   /// @param placement  of the frame, relative to its reference; none for the first of a map part
   /// @param view       what later frames are judged by
   void begin(const Placement& placement, const KeyframeView& view, FrameStep& step,
              ImmaturePoints& immature_points);
-  /// What was found, by the pose that counts, and immature points that were found again: they get their
-  /// numbers and go to the map.
+  /// Adds the inliers as observations. Immature points that were found again get their numbers and join the
+  /// proposal.
   /// @param mistrusts_the_young  those found in a few frames only are left out: chance finds what moves near
   ///                             where it was
   void add_observations(const SearchOutcome& found, const LocalMap& local_map, bool mistrusts_the_young,
@@ -54,7 +54,7 @@ class KeyframeProposer {
   std::uint32_t next_point_ = 0;
 };
 
-/// Number of parts of the image, of 8 x 6, in which a point is tracked.
+/// Number of regions of the image, of 8 x 6, in which a point is tracked.
 [[nodiscard]] int occupied_regions(const PinholeCamera& camera, const SearchOutcome& found);
 
 }  // namespace twofold

@@ -22,15 +22,17 @@ class NewPoints {
   /// @param fixed  of the left camera
   NewPoints(const Rig& rig, const TrackerOptions& options, const FixedPixels& fixed);
 
-  /// In a keyframe before which there is nothing. Seeds are left to `start_seeds`.
+  /// Starts points in the first keyframe of a map or map part. Seeds are left to `start_seeds`.
   /// @return how many points were started
   int start_first(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                   ImmaturePoints& immature_points);
-  /// In a keyframe, where nothing is tracked or known. Uses up the candidates of the frame's search.
+  /// Starts points and seeds in a later keyframe, where nothing is tracked or known. Where enough was found,
+  /// cameras without a depth image leave out what the frame's search had no time for, too, and the candidates
+  /// of `found` are used up.
   void start(const FrameImages& images, KeyframeId anchor, const LocalMap& local_map, const FrameStep& step,
              SearchOutcome& found, ImmaturePoints& immature_points);
-  /// Corners where no point is tracked or known, and none waits for its depth. All that one camera has; for
-  /// the others what there is to live on where depth is out of reach, or the right camera sees nothing.
+  /// Starts seeds at corners where no point is tracked or known, and none waits for its depth. One camera has
+  /// nothing else; other rigs live on them where depth is out of reach, or the right camera is covered.
   void start_seeds(const FrameImages& images, KeyframeId anchor);
 
   /// DepthSeeds::observe.

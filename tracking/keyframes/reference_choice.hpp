@@ -9,17 +9,17 @@
 
 namespace twofold {
 
-/// Moves the reference to the keyframe of N1 that sees most of what is tracked: when the camera comes back to
-/// a place, the reference comes back too, and no keyframe is needed  (thesis 6.2.2: V_ref may be an older,
-/// revisited keyframe). No allocation after construction.
+/// Chooses the keyframe of N1 that sees most of what is tracked as the new reference: when the camera comes
+/// back to a place, the reference comes back too, and no keyframe is needed (thesis 6.2.2: V_ref may be an
+/// older, revisited keyframe). No allocation after construction.
 class ReferenceChoice {
  public:
   /// @param max_points  found in a frame at most
   explicit ReferenceChoice(std::size_t max_points) { found_.reserve(max_points); }
 
-  /// A new frame: only some of them are looked at.
+  /// Counts frames: a better keyframe is looked for in some of them only.
   void begin_frame() { ++frames_; }
-  /// @param reference  the present one, of the graph, around which the local map is
+  /// @param reference  the present one, which the graph has; the local map is the one around it
   /// @return a keyframe that is clearly better, if one is looked for in this frame
   [[nodiscard]] std::optional<KeyframeId> better(const GraphSnapshot& graph, KeyframeId reference,
                                                  const LocalMap& local_map, const SearchOutcome& found);

@@ -10,9 +10,9 @@
 
 namespace twofold {
 
-/// What a lost camera is compared with: what the newest keyframes saw, and a lost frame of which the loop
-/// closer was asked where it was taken. What looks alike proposes where the camera is (WideSearch); others
-/// decide.
+/// What a lost camera is compared with, and what depth alignment aligns to: what the newest keyframes saw,
+/// and the lost frame that the loop closer was asked about. A likeness only proposes a pose (WideSearch); the
+/// map's points decide.
 ///
 /// No allocation after construction.
 class EarlierViews {
@@ -26,7 +26,7 @@ class EarlierViews {
   /// Pose of the frame looked at relative to an earlier one.
   /// @param corners  of the earlier frame; found if they are not known. Made by `prepare`.
   [[nodiscard]] std::optional<SE3> find(const FrameImages& earlier, FrameCorners& corners);
-  /// It takes depth in both frames, which one camera does not measure.
+  /// False for one camera, which measures no depth, and where the wide search is off.
   [[nodiscard]] bool can_find() const { return can_find_; }
 
   /// Makes room for a frame's corners.
@@ -38,8 +38,8 @@ class EarlierViews {
   void add_keyframe(KeyframeId id, const FrameImages& images);
   [[nodiscard]] RecentViews& keyframes() { return keyframes_; }
 
-  /// Keeps this frame, which is lost, until the next one is kept: the answer says where it was taken, and the
-  /// camera moves on.
+  /// Keeps this lost frame until the next call, because the camera moves on before the answer comes.
+  /// @return the images kept
   const FrameImages& ask(const FrameImages& now);
   void answer(const Placement& placement) { answer_ = placement; }
   /// The answer, once.

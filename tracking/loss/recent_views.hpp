@@ -9,7 +9,7 @@
 
 namespace twofold {
 
-/// What a keyframe saw.
+/// What a keyframe saw, or a lost frame, which has no id.
 struct RecentView {
   KeyframeId id = kNoKeyframe;
   FrameImages images;

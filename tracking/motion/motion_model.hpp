@@ -21,9 +21,9 @@ class MotionModel {
   [[nodiscard]] const Placement& placement() const { return placement_; }
   [[nodiscard]] const SE3& T_c_ref() const { return placement_.T_c_ref; }
   [[nodiscard]] KeyframeId reference() const { return placement_.reference; }  ///< kNoKeyframe: none yet
-  /// Its motion (v, omega), left perturbation [m/s, rad/s], if the frame before it says.
+  /// Its motion (v, omega), left perturbation [m/s, rad/s], if the frame before it had a pose.
   [[nodiscard]] const std::optional<Vector6>& velocity() const { return velocity_; }
-  /// Its pose relative to the frame before it, if that one's successor it is.
+  /// Its pose relative to the frame before it, if that one's is relative to the same keyframe.
   [[nodiscard]] const std::optional<SE3>& since_previous() const { return T_this_previous_; }
 
   /// A frame has a pose: it is now the last one.
@@ -35,21 +35,21 @@ class MotionModel {
   void place(const Placement& placement, std::int64_t t_ns);
 
   /// Motion from the last frame to one at `t_ns`: constant velocity, none after a loss. Frames may be missing
-  /// between the two; but stamps jitter by more than a camera's clock does, and what little they differ by
-  /// says nothing.
+  /// between the two; small differences of the interval are taken for jitter of the stamps.
   [[nodiscard]] SE3 predicted_motion(std::int64_t t_ns, bool lost) const;
   /// Pose relative to the reference, likewise.
   [[nodiscard]] SE3 predicted_pose(std::int64_t t_ns, bool lost) const;
   /// Motion from the last frame to one that may be far from it: nothing if nobody knows how fast the camera
   /// was, or where it went since (TrackerOptions::coast_for).
   [[nodiscard]] std::optional<SE3> coasted(std::int64_t t_ns) const;
-  /// The camera's motion in a frame that is at T_c_ref: that since the last one goes on. None after a loss.
+  /// The camera's velocity [m/s, rad/s] in a frame that is at T_c_ref, as since the last one; nothing after a
+  /// loss.
   [[nodiscard]] std::optional<Vector6> velocity_at(const SE3& T_c_ref, std::int64_t t_ns, bool lost) const;
 
-  /// Streets repeat themselves, and what looks alike may be the next house but four: the camera must have got
-  /// there from where it was last, as fast as it moved then, and no other than by what accelerates things
-  /// that carry cameras. However long a car was out of sight, it went on for no longer than coast_for:
-  /// whatever the street looks like, where it was last it is not.
+  /// Whether the camera can have got from the last pose to this one: as fast as it moved then, give or take
+  /// what accelerates things that carry cameras. Streets repeat themselves, and what looks alike farther away
+  /// is another place; so is, to a car that moved on, the place where it was last. Unless `all_the_time`, it
+  /// is taken to have gone on for coast_for at most.
   /// @param T_c_last  pose of the frame relative to the last one
   /// @param all_the_time  it may have gone on for longer than that
   /// @return also true if nobody knows how fast the camera was

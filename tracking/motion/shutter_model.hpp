@@ -22,12 +22,13 @@ class ShutterModel {
   /// @param max_points  found in a frame at most
   ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points);
 
-  /// Of a frame, if it is at T_c_ref.
+  /// The shutter of a frame whose pose is T_c_ref.
   [[nodiscard]] RollingShutter at(const SE3& T_c_ref, const FrameStep& step) const;
 
-  /// What it adds to the covariance of the frame's pose. Its readout is known with an error, if at all; and
-  /// the motion within a frame is taken to be that since the frame before, which is wrong by half of what the
-  /// motion changed by, or by all of it where the frame before knew none.
+  /// What the shutter adds to the covariance of the frame's pose: the readout is known with an error, if at
+  /// all, and the motion within a frame is taken to be that since the frame before, which is wrong by half of
+  /// what the motion changed by, or by all of it where the frame before knew none. Zero when the reference
+  /// has changed.
   /// @param by_rows  RegionSums::by_rows of the measurements that `information` is of
   [[nodiscard]] Matrix6 covariance(const Matrix6& information, const Matrix6& by_rows,
                                    const FrameStep& step) const;

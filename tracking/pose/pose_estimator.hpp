@@ -25,9 +25,11 @@ class PoseEstimator {
   PoseEstimator(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map,
                 const ShutterModel& shutter, ImmaturePoints& immature_points);
 
-  /// Motion-only bundle adjustment  (eq. 3.34), and whether its result can be trusted. Judges the tracker's
-  /// own points either way: a frame that is searched from several starts counts several times, and where it
-  /// is in doubt, points that are not found are given up sooner.
+  /// Motion-only bundle adjustment (eq. 3.34), and whether its result can be trusted. Counts matches and
+  /// misses of the tracker's immature points in either case: a frame that is searched from several starts
+  /// counts several times, so that doubtful points are given up sooner. Where rows are read one after the
+  /// other, the step's shutter becomes that of the pose.
+  /// @param start  where the search looked from; its reference is the result's
   /// @param found  what the search came to, whose observations, motion and verdict are filled in
   /// @return kNone, and the step's result has the pose; or why there is none
   LostCause estimate(const Placement& start, FrameStep& step, SearchOutcome& found);

@@ -81,7 +81,7 @@ void expect_all_taken(const std::vector<fs::path>& files, const std::vector<bool
       fmt::format("{} has no image of the same name or number (unpaired=drop keeps the pairs)", others));
 }
 
-/// By name; by position only where the names say nothing and the numbers of images agree.
+/// By name; by position only where the names say nothing and there are as many of each.
 ImagePairs pair_images(const fs::path& folder, const std::vector<fs::path>& left,
                        const std::vector<fs::path>& other, bool drop_unpaired) {
   ImagePairs pairs = pairs_by_name(left, other);

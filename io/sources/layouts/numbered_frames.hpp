@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <initializer_list>
 #include <optional>
 #include <string_view>
@@ -18,8 +19,8 @@ struct NumberedFile {
   std::filesystem::path file;
 };
 
-/// The files of a folder that are called `before`, the digits of a number, and one of `after`; in the order
-/// of their numbers. None: there are none. Throws IoError when the folder cannot be read, and for a number
+/// Files in a folder whose names are `before`, a number, and one of `after`, by number; empty if there are
+/// none. Throws IoError when the folder cannot be read, and for a number
 /// that two of them have.
 [[nodiscard]] std::vector<NumberedFile> list_numbered(const std::filesystem::path& folder,
                                                       std::string_view before,

@@ -28,7 +28,7 @@ struct PublishedCamera {
   std::optional<double> readout;  ///< 0 of rendered images; else unknown, and found while the camera turns
 };
 
-/// The one place of the figures that others published.
+/// The one place of the cameras that others published.
 [[nodiscard]] const PublishedCamera& published_camera(PublicDataset dataset);
 
 /// The same as a recording's calibration; a note says where it was published.

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What an order of the questions decides: a folder may have files of several layouts.
+/// The order of these questions decides: a folder may have files of several layouts.
 std::optional<std::string> layout_in(const fs::path& folder) {
   const auto has = [&](const fs::path& name) {
     std::error_code ignored;
@@ -94,8 +94,7 @@ std::string advice_for(const fs::path& folder) {
   constexpr int kLevels = 2;
   if (is_folder(folder / "image_00" / "data"))
     return "is of KITTI's raw data, which is not read whole: 'images:DIR/image_00/data?fps=10&fx=..' runs "
-           "one "
-           "camera of it, KITTI odometry has many of these drives as pairs";
+           "one camera of it, KITTI odometry has many of these drives as pairs";
   if (const auto found = recordings_in(folder, kLevels); found.size() == 1)
     return fmt::format("is no recording, but {} in it is: give that folder", found[0]);
   else if (!found.empty())
@@ -107,7 +106,7 @@ std::string advice_for(const fs::path& folder) {
                        archives[0]);
   if (!names_in(folder, is_image).empty())
     return "has images, but nothing says when they were taken: 'images:DIR?fps=N', or a times.txt";
-  return "no known layout: none of mav0, image_0, image_2, rgb.txt, times.txt is there (images:DIR?fps=N?)";
+  return "no known layout (docs/sources.md has them); a folder of images: images:DIR?fps=N";
 }
 
 }  // namespace

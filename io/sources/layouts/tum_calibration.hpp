@@ -12,9 +12,8 @@ namespace twofold {
 /// calibration.txt or OpenLORIS' sensors.yaml; what the dataset's authors published, by the folder's name,
 /// which a note says.
 ///
-/// @param usual_depth_unit  of the layout, where neither the calibration, calibration.yaml nor camera.txt
-/// says
-///                          it [m]
+/// @param usual_depth_unit  of the layout [m], where neither the calibration, calibration.yaml nor camera.txt
+///                          says it
 /// @param recording  its folder; takes calibration, calibration_file and notes
 /// Throws IoError.
 void take_tum_calibration(const std::optional<std::filesystem::path>& given, double usual_depth_unit,
