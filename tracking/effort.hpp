@@ -18,7 +18,7 @@ enum class EffortLevel : std::uint8_t {
                      ///< that points placed, unless tracking would soon be lost without one or the map has
                      ///< one keyframe only: they are the most expensive frames, and the mapper, which works
                      ///< on them, needs the same processors
-  kDropFrames,  ///< frames whose successor is due, if LatePolicy allows it
+  kDropFrames,       ///< frames whose successor is due, if LatePolicy allows it
   kCount
 };
 inline constexpr int kEffortLevels = static_cast<int>(EffortLevel::kCount);
