@@ -205,7 +205,8 @@ cv::Mat draw_top_down(const std::vector<PlotTrack>& tracks, const PlotOptions& o
   }
   draw_legend(canvas, axes, tracks);
   if (has_bar) draw_colour_bar(canvas, axes, largest(coloured->values), options.value_label);
-  put_text(canvas, options.title, {kSuper * kLeftMargin, kSuper * 32}, 0.7, Anchor::kLeft, {20, 20, 20}, 1);
+  put_text(canvas, shortened(options.title, 0.7, width / kSuper - kLeftMargin - kRightMargin),
+           {kSuper * kLeftMargin, kSuper * 32}, 0.7, Anchor::kLeft, {20, 20, 20}, 1);
   put_text(canvas, options.subtitle, {kSuper * kLeftMargin, kSuper * 54}, 0.45, Anchor::kLeft,
            {110, 110, 110});
   return shrink(canvas);

@@ -15,6 +15,10 @@ enum class Anchor { kLeft, kCentre, kRight };
 void put_text(cv::Mat& canvas, const std::string& text, cv::Point at, double size, Anchor anchor,
               const cv::Scalar& colour = kInk, int weight = 1);
 
+/// `text` with its middle left out where it is wider than `width` of the picture at the end: a source's path
+/// tells most at its two ends.
+[[nodiscard]] std::string shortened(const std::string& text, double size, int width);
+
 /// The picture: the large canvas averaged down.
 [[nodiscard]] cv::Mat shrink(const cv::Mat& canvas);
 

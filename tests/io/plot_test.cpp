@@ -1,8 +1,12 @@
 #include "io/plots/plot.hpp"
 
+#include <gtest/gtest.h>
+
 #include <cstring>
+#include <opencv2/core.hpp>
 
 #include "io/files/ply.hpp"
+#include "io/plots/plot_ink.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {
@@ -13,6 +17,23 @@ TEST(Plot, LooksAlongTheCamerasVertical) {
   const SE3 room(SO3::exp(Vector3(-1.5707963, 0, 0)), Vector3::Zero());  // camera level in a room with z up
   EXPECT_EQ(up_axis_of({{0, camera_world}}), 1);
   EXPECT_EQ(up_axis_of({{0, room}}), 2);
+}
+
+TEST(Plot, ATitleThatIsTooLongLosesItsMiddle) {
+  const std::string path = "tum:" + std::string(200, 'a') + "/sequence?fx=585";
+  PlotOptions options;
+  options.title = path;
+  PlotTrack track;
+  track.x_w = {Vector3(0, 0, 0), Vector3(1, 0, 1)};
+  const cv::Mat image = draw_top_down({track}, options);
+  // The right margin of the title's rows stays white.
+  const cv::Mat margin = image(cv::Rect(image.cols - 36, 0, 36, 40));
+  EXPECT_EQ(cv::countNonZero(margin.reshape(1) < 250), 0);
+
+  const std::string title = plot_ink::shortened(path, 0.7, 400);
+  EXPECT_EQ(title.substr(0, 6), "tum:aa");
+  EXPECT_EQ(title.substr(title.size() - 8), "e?fx=585");
+  EXPECT_EQ(plot_ink::shortened("short", 0.7, 400), "short");
 }
 
 TEST(Plot, DrawsEveryTrackAndCopesWithDegenerateOnes) {
