@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
@@ -70,6 +71,8 @@ int run_command_line(CLI::App& app, int argc, char** argv, const int& exit_code)
     return report(app, e.what(), kBadInput);
   } catch (const MapFileError& e) {
     return report(app, e.what(), kBadInput);
+  } catch (const std::filesystem::filesystem_error& e) {
+    return report(app, e.path1().string() + ": " + e.code().message(), kBadInput);
   } catch (const std::exception& e) {
     return report(app, e.what(), kFailedRun);
   }

@@ -9,12 +9,13 @@
 #include <utility>
 
 #include "base/check.hpp"
+#include "base/text_of_json.hpp"
 
 namespace twofold {
 namespace {
 
 std::string quoted(const std::string& text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return text_of_json(nlohmann::json(text));
 }
 
 /// Microseconds with all three decimals: a double in JSON would round stamps of a long run.
@@ -74,8 +75,7 @@ bool Trace::write(std::ostream& out) const {
     write_track(out, tracks_[thread], thread, origin_ns);
     overwritten[tracks_[thread].thread_name_] = tracks_[thread].overwritten();
   }
-  out << "\n],\"otherData\":{\"overwritten_events\":"
-      << overwritten.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "}}\n";
+  out << "\n],\"otherData\":{\"overwritten_events\":" << text_of_json(overwritten) << "}}\n";
   return static_cast<bool>(out.flush());
 }
 

@@ -15,7 +15,7 @@ twofold::SlamSummary track_all(twofold::Slam& slam, const std::string& name) {
   twofold::FrameView frame;
   while (source.next(frame)) {
     while (!slam.wait_for_room(1'000'000'000)) {
-      if (!slam.errors().empty()) return slam.finish();
+      if (slam.ended()) return slam.finish();
     }
     slam.push(frame);
   }

@@ -109,8 +109,9 @@ void bind_error(py::module_& module) {
       .def_readonly("ate_median", &TrajectoryError::ate_median, "[m].")
       .def_readonly("ate_max", &TrajectoryError::ate_max, "[m].")
       .def_readonly("rotation_rmse", &TrajectoryError::rotation_rmse, "[rad].")
-      .def_readonly("rpe_rmse", &TrajectoryError::rpe_rmse,
-                    "Relative error over one second, translation [m].")
+      .def_readonly(
+          "rpe_rmse", &TrajectoryError::rpe_rmse,
+          "Relative error over one second, translation [m]; nan: no two poses are one second apart.")
       .def_readonly("scale", &TrajectoryError::scale, "The estimate's lengths times this are the truth's.")
       .def("__repr__", [](const TrajectoryError& error) {
         return fmt::format("<TrajectoryError over {} poses: ATE {:.4f} m rmse, {:.4f} m at most>",

@@ -130,7 +130,7 @@ void feed(Source& source, SlamWithUpdates& to) {
     if (!source.is_live()) {
       if (!to.keeps_pace && !queue.wait_for_room(to.items_in_flight)) return;
       while (!to.slam.wait_for_room(to_ns(0.1))) {
-        if (queue.closed() || !to.slam.errors().empty()) return;
+        if (queue.closed() || to.slam.ended()) return;
       }
     }
     const PushResult pushed = to.push(frame);
@@ -312,6 +312,15 @@ void bind_slam_class(py::module_& module) {
           [](SlamWithUpdates& self, double timeout) { return self.slam.wait_for_room(to_ns(timeout)); },
           py::arg("timeout"), Unlocked(),
           "Waits at most for timeout [s]; for recordings, of which no frame should be dropped.")
+      .def_property_readonly(
+          "ended",
+          [](const SlamWithUpdates& self) {
+            const py::gil_scoped_release unlocked;  // a deterministic push may be under way
+            return self.slam.ended();
+          },
+          "Whether no frame will be taken any more: finish was called, a thread of the engine has failed, or "
+          "the "
+          "schedule of a replay has no more frames.")
       .def(
           "step", [](SlamWithUpdates& self, SlamStep step) { return self.slam.step(step); }, py::arg("step"),
           Unlocked(),

@@ -2,6 +2,7 @@
 #include "base/angles.hpp"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "evaluation/evaluation.hpp"
@@ -59,7 +60,8 @@ TrajectoryError compare(const std::vector<StampedPose>& estimate, const std::vec
   error.ate_median = result->absolute.median;
   error.ate_max = result->absolute.max;
   error.rotation_rmse = result->absolute_rotation_deg.rmse * kDegree;
-  error.rpe_rmse = result->per_second.translation.rmse;
+  const ErrorStatistics& per_second = result->per_second.translation;
+  error.rpe_rmse = per_second.count > 0 ? per_second.rmse : std::numeric_limits<double>::quiet_NaN();
   error.scale = result->S_w_e.scale();
   return error;
 }

@@ -103,10 +103,15 @@ class TWOFOLD_HIDDEN Slam::Impl {
   /// Empty when the frame can be tracked.
   [[nodiscard]] std::string refusal(const FrameView& frame);
   bool wait_for_room(std::int64_t timeout_ns);
+  [[nodiscard]] bool ended() {
+    expect_no_callback("ended");
+    const std::scoped_lock turn(pushing_);
+    return over();
+  }
   [[nodiscard]] bool has_room() {
     expect_no_callback("has_room");
     const std::scoped_lock turn(pushing_);
-    return !summary_ && !failed() && !pipeline_->ended() && has_room_now();
+    return !over() && has_room_now();
   }
   bool step(SlamStep step);
   void end_pace();
@@ -130,6 +135,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
   void tell(const PoseReport& report);
   void tell_details(const PoseReport& report);
   void expect_no_callback(const char* function) const;
+  [[nodiscard]] bool over() { return summary_ || failed() || pipeline_->ended(); }
   void look_now_and_then(const std::stop_token& stop);
   [[nodiscard]] const char* why_it_failed() const {
     return mode_ == RunMode::kThreaded ? kThreadEnded : kStepFailed;
@@ -274,7 +280,7 @@ bool Slam::Impl::wait_for_room(std::int64_t timeout_ns) {
   constexpr auto kTurn = std::chrono::milliseconds(10);  // then others have theirs; failures are looked for
   for (;;) {
     const std::scoped_lock turn(pushing_);
-    if (summary_ || failed() || pipeline_->ended()) return false;
+    if (over()) return false;
     if (has_room_now()) return true;
     const auto now = std::chrono::steady_clock::now();
     if (now >= deadline) return false;
@@ -375,6 +381,10 @@ PushResult Slam::push(const FrameView& frame) {
 
 bool Slam::has_room() const {
   return impl_->has_room();
+}
+
+bool Slam::ended() const {
+  return impl_->ended();
 }
 
 bool Slam::wait_for_room(std::int64_t timeout_ns) {

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/text_of_json.hpp"
+
 namespace twofold {
 namespace {
 
@@ -45,9 +47,8 @@ const char* word_of(ViewKind kind) {
   return "map";
 }
 
-/// Names of files may hold bytes that are no UTF-8.
 std::string text_of(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return text_of_json(json);
 }
 
 }  // namespace

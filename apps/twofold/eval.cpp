@@ -9,6 +9,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/surface/eval_surface.hpp"
+#include "base/text_of_json.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -207,7 +208,7 @@ std::string json_text(const EvalArguments& arguments, const Evaluation& e, std::
   if (has_times) json["rpe_1s"] = to_json(e.per_second);
   json["rpe_1m"] = to_json(e.per_metre);
   if (e.kitti.mean.count > 0) json["kitti"] = to_json(e.kitti);
-  return json.dump(2) + "\n";
+  return text_of_json(json, 2) + "\n";
 }
 
 cv::Mat draw(const EvalArguments& arguments, const Evaluation& e) {

@@ -18,7 +18,7 @@ namespace twofold {
 [[nodiscard]] std::size_t live_keyframes(const GraphSnapshot& graph);
 
 /// Poses of the keyframes that were not culled, of one part of the map.
-[[nodiscard]] Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
+[[nodiscard]] Trajectory keyframe_trajectory(const GraphSnapshot& graph, KeyframeId part);
 
 /// The same in two lists: first those that were in the map that the run went on with, whose times are of
 /// other recordings, then the run's own.
@@ -33,11 +33,11 @@ namespace twofold {
 
 /// Those of one part of the map, in the grey of their corner; they name lines of keyframe_trajectory.
 [[nodiscard]] std::vector<PlyPoint> map_points(const std::vector<MapSnapshot::Point>& points,
-                                               const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
+                                               const GraphSnapshot& graph, KeyframeId part);
 
 /// A line for each edge of the part: two keyframes by their places in keyframe_trajectory, the points that
 /// both see, and "covisible" or "marginalised". Ascending.
-[[nodiscard]] std::string edge_list(const GraphSnapshot& graph, KeyframeId part = KeyframeId{0});
+[[nodiscard]] std::string edge_list(const GraphSnapshot& graph, KeyframeId part);
 
 /// The pose graph in g2o's text form: VERTEX_SE3:QUAT with T_w_k, EDGE_SE3:QUAT with T_i_j of each edge and
 /// an information that is the edge's weight (points that both keyframes see, at least 1) times the identity:

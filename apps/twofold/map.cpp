@@ -8,6 +8,7 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/graph_export.hpp"
 #include "apps/twofold/map_options.hpp"
+#include "apps/twofold/map_parts.hpp"
 #include "graph/part_extraction.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -63,9 +64,17 @@ void export_map(const ExportArguments& arguments) {
     throw IoError("map export", "name at least one of --ply, --g2o, --tum");
   }
   const SavedMap map = open_map(arguments.file);
-  if (!arguments.ply.empty())
-    write_ply(arguments.ply, map_points(points_with_covariance(map.rig, map.graph), map.graph));
-  if (!arguments.tum.empty()) write_tum_trajectory(arguments.tum, keyframe_trajectory(map.graph));
+  std::vector<KeyframeId> parts = parts_of(map.graph);
+  if (parts.empty()) parts.push_back(KeyframeId{0});  // of an empty map: files with nothing in them
+  std::vector<MapSnapshot::Point> points;
+  if (!arguments.ply.empty()) points = points_with_covariance(map.rig, map.graph);
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    if (!arguments.ply.empty())
+      write_ply(part_file(std::filesystem::path(arguments.ply), n), map_points(points, map.graph, parts[n]));
+    if (!arguments.tum.empty())
+      write_tum_trajectory(part_file(std::filesystem::path(arguments.tum), n),
+                           keyframe_trajectory(map.graph, parts[n]));
+  }
   if (!arguments.g2o.empty()) write_file(arguments.g2o, g2o_text(map.graph));
 }
 
@@ -91,11 +100,12 @@ void add_map_command(CLI::App& app, int& exit_code) {
   });
   CLI::App* out = command->add_subcommand("export", "Write parts of it in common forms");
   out->add_option("FILE", arguments->file, "map file")->required();
-  out->add_option("--ply", arguments->ply, "points");
+  out->add_option("--ply", arguments->ply,
+                  "points, a file for each part: FILE, then its name with -2, -3, ...");
   out->add_option("--g2o", arguments->g2o,
                   "keyframe poses and edges (VERTEX_SE3:QUAT, EDGE_SE3:QUAT); an edge's information is the "
                   "number of points that both keyframes see, times the identity");
-  out->add_option("--tum", arguments->tum, "keyframe poses");
+  out->add_option("--tum", arguments->tum, "keyframe poses, a file for each part");
   out->callback([arguments, &exit_code] {
     export_map(*arguments);
     exit_code = kOk;

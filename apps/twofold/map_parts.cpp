@@ -40,8 +40,7 @@ std::vector<std::string> save_parts(const std::filesystem::path& file, const Rig
   std::vector<std::string> written;
   for (const MapPart& part : parts) {
     if (!written.empty() && part.keyframes < 2) continue;
-    const std::filesystem::path to =
-        file.parent_path() / part_file(file.stem().string(), written.size(), file.extension().string());
+    const std::filesystem::path to = part_file(file, written.size());
     if (parts.size() == 1) {
       save_map(to, rig, result.graph, result.places);
     } else {
@@ -54,6 +53,10 @@ std::vector<std::string> save_parts(const std::filesystem::path& file, const Rig
 
 std::string part_file(const std::string& stem, std::size_t n, const std::string& extension) {
   return n == 0 ? stem + extension : fmt::format("{}-{}{}", stem, n + 1, extension);
+}
+
+std::filesystem::path part_file(const std::filesystem::path& file, std::size_t n) {
+  return file.parent_path() / part_file(file.stem().string(), n, file.extension().string());
 }
 
 }  // namespace twofold

@@ -30,5 +30,7 @@ std::vector<std::string> save_parts(const std::filesystem::path& file, const Rig
 
 /// Name of part n's file, n from 0: "map.ply", "map-2.ply", "map-3.ply".
 [[nodiscard]] std::string part_file(const std::string& stem, std::size_t n, const std::string& extension);
+/// The same of a file with its folder.
+[[nodiscard]] std::filesystem::path part_file(const std::filesystem::path& file, std::size_t n);
 
 }  // namespace twofold

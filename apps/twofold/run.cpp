@@ -227,7 +227,7 @@ RunFailures failures_of(const std::string& name, const PreparedSource& frames, c
     failures.add(source.error(), source.is_live() ? kFailedRun : kBadInput);
   } else if (!result.error.empty()) {
     failures.add(result.error);
-  } else if (result.counts.tracked == 0) {
+  } else if (result.counts.tracked == 0 && !result.interrupted) {
     failures.add(name + (options.map ? ": no place of the loaded map was recognised"
                                      : ": no frame could be tracked" + main_cause(result)));
   }

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text_of_json.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 #include "io/files/ply.hpp"
@@ -94,7 +95,7 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
                      {"mean_ms", mean_ms},
                      {"slowest_ms", slowest_ms},
                      {"notes", source.report().notes}};
-  write_file(folder / "summary.json", summary.dump(2) + "\n");
+  write_file(folder / "summary.json", text_of_json(summary, 2) + "\n");
   fmt::print("{} frames, {} tracked, {} restarts, {} points; {:.1f} ms a frame, slowest {:.1f}; {}\n", frames,
              smoothed.size(), filter.restarts(), points.size(), mean_ms, slowest_ms, folder.string());
   for (const std::string& note : source.report().notes) fmt::print("note        {}\n", note);

@@ -15,6 +15,7 @@
 #include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/run_summary.hpp"
 #include "apps/twofold/view/run_frames.hpp"
+#include "base/text_of_json.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -103,7 +104,7 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   }
   write_run_frames(folder / "frames.txt", result, options.pacing.keeps_pace());
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
-  write_file(folder / "timing.json", timing_json(result).dump(1) + "\n");
+  write_file(folder / "timing.json", text_of_json(timing_json(result), 1) + "\n");
   const bool no_scale = scale_is_arbitrary(source.rig(), options);
   nlohmann::ordered_json summary = summary_json(frames.source, options, result, parts);
   summary["errors"] = frames.errors;
@@ -117,7 +118,7 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   };
   summary["calibration_file"] = path_or_null(frames.calibration_file);
   summary["recording"] = path_or_null(frames.recording);
-  write_file(folder / "summary.json", summary.dump(2) + "\n");
+  write_file(folder / "summary.json", text_of_json(summary, 2) + "\n");
   write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",

@@ -32,8 +32,9 @@ struct TrajectoryError {
   double ate_median = 0;     ///< [m]
   double ate_max = 0;        ///< [m]
   double rotation_rmse = 0;  ///< angle between true and aligned orientation [rad]
-  double rpe_rmse = 0;       ///< relative error over one second: translation [m]
-  double scale = 1;          ///< the estimate's lengths times this are the truth's; 1 unless kSimilarity
+  double rpe_rmse =
+      0;  ///< relative error over one second: translation [m]; NaN: no two poses are one second apart
+  double scale = 1;  ///< the estimate's lengths times this are the truth's; 1 unless kSimilarity
 };
 
 /// Throws std::invalid_argument when there is nothing to compare or the alignment is undetermined.

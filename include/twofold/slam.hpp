@@ -194,8 +194,9 @@ class TWOFOLD_API Slam {
 
   /// Called for every frame that was looked at, on the tracker's thread (where the tracker's steps are taken
   /// by the caller's: on that one), which waits for it: it must not block, and may call latest, map,
-  /// held_maps, pause_mapping, end_pace and errors only; push, has_room, wait_for_room, step, save_map and
-  /// finish would wait, and throw std::logic_error there. What it uses must live until finish has returned.
+  /// held_maps, pause_mapping, end_pace and errors only; push, has_room, wait_for_room, ended, step,
+  /// save_map and finish would wait, and throw std::logic_error there. What it uses must live until finish
+  /// has returned.
   /// The time it takes is a stage of its own among SlamSummary::timings ("pose listener"), and in the next
   /// frame's latency. A callback that throws is not called again; tracking goes on, and errors() says what it
   /// threw. To be set before the first push, else std::logic_error is thrown.
@@ -221,6 +222,9 @@ class TWOFOLD_API Slam {
   /// should be dropped, and which the map should follow.
   /// @return false after that time, when the run is over, or when a thread of the engine has failed
   [[nodiscard]] bool wait_for_room(std::int64_t timeout_ns);
+  /// Whether no frame will be taken any more: finish() was called, a thread of the engine has failed
+  /// (errors() has why), or the schedule of a replay has no more frames.
+  [[nodiscard]] bool ended() const;
 
   /// Of RunMode::kStepped: takes one step on this thread. Any thread may take any step, different ones at
   /// once: the tracker on a thread that is never late, the others where there is time. A map that waits for

@@ -229,6 +229,7 @@ EurocCamera read_euroc_camera(const fs::path& file) {
   camera.model = read_camera(root, "distortion_coefficients");
   if (root.has("T_BS")) camera.T_b_c = root.at("T_BS").rigid_motion();
   if (root.has("rate_hz")) camera.rate_hz = root.at("rate_hz").number();
+  if (root.has("readout")) camera.readout = root.at("readout").number();
   return camera;
 }
 
@@ -254,6 +255,7 @@ Calibration read_euroc_calibration(const fs::path& cam0, const fs::path& cam1) {
   calibration.right = right.model;
   calibration.T_right_left = read_euroc_sensor_pose(cam1).inverse() * read_euroc_sensor_pose(cam0);
   calibration.fps = left.rate_hz;
+  calibration.readout = left.readout;
   calibration.already_rectified = true;
   if (!calibration.invalid_reason().empty()) calibration.already_rectified = false;
   return calibration;
@@ -302,6 +304,7 @@ Calibration read_calibration(const fs::path& file) {
     calibration.kind = SensorKind::kMono;
     calibration.left = camera.model;
     calibration.fps = camera.rate_hz;
+    calibration.readout = camera.readout;
     return calibration;
   }
   throw IoError(

@@ -40,6 +40,7 @@ struct EurocCamera {
   CameraModel model;
   SE3 T_b_c;
   double rate_hz = 0;
+  std::optional<double> readout;  ///< as of Calibration
 };
 /// T_BS alone, of a sensor that need not be a camera.
 [[nodiscard]] SE3 read_euroc_sensor_pose(const std::filesystem::path& file);

@@ -135,7 +135,8 @@ void draw_track(cv::Mat& canvas, const Axes& axes, const PlotTrack& track, int u
 }
 
 /// One row above the axes: a line and a name a track, then what the marks mean.
-void draw_legend(cv::Mat& canvas, const Axes& axes, const std::vector<PlotTrack>& tracks) {
+/// @return  where it ends, from the left
+int draw_legend(cv::Mat& canvas, const Axes& axes, const std::vector<PlotTrack>& tracks) {
   int x = axes.origin.x + kSuper * 70;
   const int y = axes.origin.y - axes.inside.height - kSuper * 16;
   const auto advance = [&](const std::string& text) {
@@ -156,6 +157,7 @@ void draw_legend(cv::Mat& canvas, const Axes& axes, const std::vector<PlotTrack>
   cv::rectangle(canvas, {x - 4 * kSuper, y - 4 * kSuper}, {x + 4 * kSuper, y + 4 * kSuper}, kInk, cv::FILLED);
   x += kSuper * 12;
   advance("end");
+  return x;
 }
 
 void draw_colour_bar(cv::Mat& canvas, const Axes& axes, double top, const std::string& label) {
@@ -196,14 +198,17 @@ cv::Mat draw_top_down(const std::vector<PlotTrack>& tracks, const PlotOptions& o
   const auto coloured =
       std::find_if(tracks.begin(), tracks.end(), [](const auto& t) { return !t.values.empty(); });
   const bool has_bar = coloured != tracks.end();
-  const int width = axes.inside.width + kSuper * (kLeftMargin + (has_bar ? kBarMargin : kRightMargin));
+  cv::Mat nowhere(1, 1, CV_8UC3);  // to know how wide the legend is
+  const int width =
+      std::max(draw_legend(nowhere, axes, tracks),
+               axes.inside.width + kSuper * (kLeftMargin + (has_bar ? kBarMargin : kRightMargin)));
   const int height = axes.inside.height + kSuper * (kTopMargin + kBottomMargin);
   cv::Mat canvas(height, width, CV_8UC3, kWhite);
   draw_grid(canvas, axes, options.up_axis);
   for (const PlotTrack& track : tracks) {
     if (!track.x_w.empty()) draw_track(canvas, axes, track, options.up_axis);
   }
-  draw_legend(canvas, axes, tracks);
+  (void)draw_legend(canvas, axes, tracks);
   if (has_bar) draw_colour_bar(canvas, axes, largest(coloured->values), options.value_label);
   put_text(canvas, shortened(options.title, 0.7, width / kSuper - kLeftMargin - kRightMargin),
            {kSuper * kLeftMargin, kSuper * 32}, 0.7, Anchor::kLeft, {20, 20, 20}, 1);

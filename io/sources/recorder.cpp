@@ -24,7 +24,7 @@ std::string distortion_lines(const Distortion& distortion) {
 }
 
 /// fmt writes the shortest text that reads back as the same number.
-std::string sensor_yaml(const CameraModel& camera, const SE3& T_b_c, double fps) {
+std::string sensor_yaml(const CameraModel& camera, const SE3& T_b_c, const Calibration& calibration) {
   const PinholeCamera& p = camera.pinhole;
   const Eigen::Matrix4d T = T_b_c.matrix();
   std::vector<double> rows;
@@ -32,7 +32,8 @@ std::string sensor_yaml(const CameraModel& camera, const SE3& T_b_c, double fps)
   for (int i = 0; i < 16; ++i) rows.push_back(T(i / 4, i % 4));
   std::string text = "sensor_type: camera\n";
   text += fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", fmt::join(rows, ", "));
-  if (fps > 0) text += fmt::format("rate_hz: {}\n", fps);
+  if (calibration.fps > 0) text += fmt::format("rate_hz: {}\n", calibration.fps);
+  if (calibration.readout) text += fmt::format("readout: {}\n", *calibration.readout);
   text += fmt::format("resolution: [{}, {}]\n", p.width, p.height);
   if (camera.distortion.model == DistortionModel::kDoubleSphere) {
     const auto& k = camera.distortion.coefficients;
@@ -51,6 +52,7 @@ Calibration calibration_of(const Rig& rig) {
   calibration.left.pinhole = rig.camera;
   calibration.right = calibration.left;
   calibration.T_right_left = SE3(SO3(), Vector3(-rig.baseline, 0, 0));
+  calibration.readout = rig.readout;
   return calibration;
 }
 
@@ -74,7 +76,7 @@ Recorder::Recorder(const fs::path& folder, SensorKind kind, const std::optional<
       // The body frame is the left camera's.
       const SE3 T_b_c = c == 0 ? SE3() : calibration->T_right_left.inverse();
       write_file(camera / "sensor.yaml",
-                 sensor_yaml(c == 0 ? calibration->left : calibration->right, T_b_c, calibration->fps));
+                 sensor_yaml(c == 0 ? calibration->left : calibration->right, T_b_c, *calibration));
     }
     lists_[c].rdbuf()->pubsetbuf(nullptr, 0);  // or a line that failed would be tried again at the end
     lists_[c].open(camera / "data.csv", std::ios::binary);

@@ -26,6 +26,7 @@ VideoSource::VideoSource(const std::filesystem::path& file,
 
   if (!capture_.open(file.string(), cv::CAP_FFMPEG))
     throw IoError(file, "is not a video that can be decoded");
+  capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);  // a rolling shutter reads the sensor's rows
   const int width = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)) / (side_by_side_ ? 2 : 1);
   const int height = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT));
   announced_ = capture_.get(cv::CAP_PROP_FRAME_COUNT);

@@ -38,6 +38,22 @@ TEST(EvalCommand, WritesTableJsonAndPlot) {
   EXPECT_EQ(cv::imread(folder / "e.png").empty(), false);
 }
 
+/// As of folders that come out of old archives.
+TEST(EvalCommand, NamesMayHoldBytesThatAreNoText) {
+  const ScratchFolder folder;
+  const auto truth = write_circle(folder, "w\xe4hr.txt", 1);
+  const auto outcome = run(folder, "eval " + truth + " " + truth + " --json " + (folder / "e.json"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(content(folder / "e.json"))["poses"], 60);
+}
+
+TEST(EvalCommand, ANameThatNoFileCanHaveIsBadInput) {
+  const ScratchFolder folder;
+  const auto truth = write_circle(folder, "truth.txt", 1);
+  expect_bad_input(run(folder, "eval " + std::string(300, 'a') + " " + truth), "too long");
+  expect_bad_input(run(folder, "eval " + truth + " " + std::string(300, 'a')), "too long");
+}
+
 TEST(EvalCommand, LongPathsHaveKittisFigures) {
   const ScratchFolder folder;
   const auto figures = [&](double truth_scale, double estimate_scale) {

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "tests/apps/command.hpp"
+#include "tests/graph/sample_map.hpp"
 
 namespace twofold {
 namespace {
@@ -57,6 +58,31 @@ TEST_F(MapCommand, InfoCheckAndExport) {
                                        (folder_ / "a.txt") + "' --g2o '" + (folder_ / "a.g2o") + "'");
   ASSERT_EQ(out.exit_code, 0) << out.err;
   for (const char* name : {"a.ply", "a.txt", "a.g2o"}) EXPECT_FALSE(content(folder_ / name).empty()) << name;
+}
+
+TEST_F(MapCommand, ExportHasAFileForEachPart) {
+  const SavedMap two = testing::two_parts(testing::sample_map(20, 120, 1), testing::sample_map(11, 60, 2));
+  const std::string file = folder_ / "two.tfm";
+  save_map(file, two);
+  const Outcome out = run(folder_, "map export '" + file + "' --ply '" + (folder_ / "p.ply") + "' --tum '" +
+                                       (folder_ / "p.txt") + "' --g2o '" + (folder_ / "p.g2o") + "'");
+  ASSERT_EQ(out.exit_code, 0) << out.err;
+  const auto count = [](const std::string& text, const std::string& what) {
+    std::size_t found = 0;
+    for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
+    return found;
+  };
+  const auto poses = [&](const std::string& name) {
+    const std::string text = content(folder_ / name);
+    return count(text, "\n") - count(text, "#");
+  };
+  const std::size_t first = poses("p.txt"), second = poses("p-2.txt");
+  EXPECT_GT(first, second);
+  EXPECT_GT(second, 5U);
+  EXPECT_EQ(first + second, count(content(folder_ / "p.g2o"), "VERTEX_SE3:QUAT"));
+  for (const char* name : {"p.ply", "p-2.ply"})
+    EXPECT_EQ(count(content(folder_ / name), "element vertex 0"), 0U) << name;
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "p-3.txt"));
 }
 
 TEST_F(MapCommand, LocalisingLeavesTheMapAndSaysWhereItBegan) {

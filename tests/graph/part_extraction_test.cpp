@@ -8,46 +8,6 @@
 namespace twofold {
 namespace {
 
-/// Two maps in one graph, the second one's numbers behind the first one's.
-SavedMap two_parts(const SavedMap& first, const SavedMap& second) {
-  GraphWriter writer(first.graph);
-  SavedMap both = first;
-  const auto keyframes = static_cast<std::uint32_t>(first.graph.keyframe_count());
-  const auto points = static_cast<std::uint32_t>(first.graph.point_count());
-  const auto shifted = [&](KeyframeId id) { return KeyframeId{index(id) + keyframes}; };
-  for (std::uint32_t k = 0; k < second.graph.keyframe_count(); ++k) {
-    Keyframe keyframe = second.graph.keyframe(KeyframeId{k});
-    if (keyframe.culled()) {
-      const Replacement& replacement = second.graph.replacement(KeyframeId{k});
-      writer.add_culled_keyframe({shifted(replacement.id), 0, replacement.T_this_replacement});
-      continue;
-    }
-    keyframe.id = shifted(keyframe.id);
-    ObservationList observations = *keyframe.observations;
-    for (Observation& o : observations) o.point = PointId{index(o.point) + points};
-    keyframe.observations = std::make_shared<const ObservationList>(std::move(observations));
-    EdgeList edges = *keyframe.edges;
-    for (Edge& edge : edges) edge.other = shifted(edge.other);
-    keyframe.edges = std::make_shared<const EdgeList>(std::move(edges));
-    writer.add_keyframe(keyframe);
-    if (const PlaceAppearance* place = second.places.find(KeyframeId{k}))
-      both.places.set(keyframe.id, *place);
-  }
-  for (std::uint32_t p = 0; p < second.graph.point_count(); ++p) {
-    MapPoint point = second.graph.point(PointId{p});
-    if (!point.alive()) continue;
-    point.anchor = shifted(point.anchor);
-    ObserverList observers = *point.observers;
-    for (KeyframeId& observer : observers) observer = shifted(observer);
-    point.observers = std::make_shared<const ObserverList>(std::move(observers));
-    writer.add_point(PointId{p + points}, point);
-  }
-  writer.set_reference(shifted(second.graph.reference()));
-  name_parts(writer);
-  both.graph = writer.publish();
-  return both;
-}
-
 /// Same keyframes, and the same living points in the same order.
 void expect_same(const SavedMap& a, const SavedMap& b) {
   ASSERT_EQ(a.graph.keyframe_count(), b.graph.keyframe_count());
@@ -79,7 +39,7 @@ void expect_same(const SavedMap& a, const SavedMap& b) {
 
 TEST(PartExtraction, PartsComeOutAsTheyWentIn) {
   const SavedMap first = testing::sample_map(20, 120, 1), second = testing::sample_map(11, 60, 2);
-  const SavedMap both = two_parts(first, second);
+  const SavedMap both = testing::two_parts(first, second);
   ASSERT_EQ(broken_invariant(both.graph), "");
   EXPECT_EQ(parts_of(both.graph), (std::vector<KeyframeId>{KeyframeId{0}, KeyframeId{20}}));
   const SavedMap a = extract_part(both.rig, both.graph, both.places, KeyframeId{0});

@@ -36,6 +36,17 @@ TEST(Plot, ATitleThatIsTooLongLosesItsMiddle) {
   EXPECT_EQ(plot_ink::shortened("short", 0.7, 400), "short");
 }
 
+TEST(Plot, ALegendThatIsLongerThanAStraightRoadIsWideMakesRoomForItself) {
+  PlotTrack track;
+  track.x_w = {Vector3(0, 0, 0), Vector3(0, 0, 60)};
+  const cv::Mat short_names = draw_top_down({track}, PlotOptions());
+  track.name = std::string(60, 'm');
+  const cv::Mat image = draw_top_down({track}, PlotOptions());
+  EXPECT_GT(image.cols, short_names.cols + 100);
+  // Behind "end", the last word, the legend's rows stay white.
+  EXPECT_EQ(cv::countNonZero(image(cv::Rect(image.cols - 8, 60, 8, 24)).clone().reshape(1) < 250), 0);
+}
+
 TEST(Plot, DrawsEveryTrackAndCopesWithDegenerateOnes) {
   const cv::Scalar magenta(255, 0, 255);
   const auto count = [&](const std::vector<Vector3>& x) {

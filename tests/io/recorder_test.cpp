@@ -81,6 +81,23 @@ TEST(RecorderTest, TheLensIsKeptDigitByDigit) {
   }
 }
 
+/// A schedule belongs to a rig, of which the readout is a part: without it no recording could be replayed.
+TEST(RecorderTest, TheReadoutOfARollingShutterIsKept) {
+  const ScratchFolder scratch;
+  for (const std::optional<double> readout :
+       {std::optional<double>(), std::optional(0.0), std::optional(1.0 / 55)}) {
+    Rig rig = test_rig(SensorKind::kStereo);
+    rig.readout = readout;
+    const fs::path folder = scratch.path() / (readout ? std::to_string(*readout) : "unknown");
+    {
+      Recorder recorder(folder, rig.kind, calibration_of(rig));
+      ASSERT_TRUE(recorder.offer(test_frame(0), true));
+    }
+    EXPECT_EQ(open_source(folder.string())->rig().readout, readout);
+    EXPECT_EQ(read_calibration(folder / "mav0/cam0/sensor.yaml").readout, readout);
+  }
+}
+
 TEST(RecorderTest, EveryFrameThatDoesNotFitTheQueueIsCounted) {
   const ScratchFolder scratch;
   RecorderOptions options;

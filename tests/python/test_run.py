@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import weakref
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,18 @@ def test_a_recording_waits_for_who_iterates() -> None:
         frames = [pose.frame for pose in run]
         assert frames == list(range(700))
         assert run.slam.missed() == 0
+
+
+def test_a_replay_ends_with_its_schedule(tmp_path: Path) -> None:
+    """As of a run that was killed."""
+    short = "synthetic:desk?frames=20&width=64&height=48"
+    with twofold.run(short, mode=twofold.RunMode.DETERMINISTIC, run_folder=tmp_path) as run:
+        assert len(list(run)) == 20
+    schedule = tmp_path / "schedule.log"
+    source = twofold.Source(short.replace("20", "30"))
+    with twofold.run(source, mode=twofold.RunMode.REPLAY, schedule=schedule) as run:
+        assert len(list(run)) == 20
+        assert run.slam.ended
 
 
 def test_a_loop_may_be_left() -> None:

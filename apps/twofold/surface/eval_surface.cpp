@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text_of_json.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/mesh_file.hpp"
@@ -94,7 +95,7 @@ void eval_surface(const SurfaceEvalArguments& arguments) {
                                       {"accuracy", to_json(found.accuracy)},
                                       {"completeness", to_json(found.completeness)},
                                       {"f_score", found.f_score}};
-    write_file(arguments.json, json.dump(2) + "\n");
+    write_file(arguments.json, text_of_json(json, 2) + "\n");
   }
   if (!arguments.plot.empty())
     write_png(arguments.plot, heat_map(estimate, T_w_e.value_or(SE3()), found, arguments.threshold));

@@ -16,6 +16,7 @@
 #include "apps/twofold/surface/object_model.hpp"
 #include "apps/twofold/surface/object_source.hpp"
 #include "base/angles.hpp"
+#include "base/text_of_json.hpp"
 #include "engine/engine.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/mesh_file.hpp"
@@ -125,7 +126,7 @@ void write_object(const ObjectArguments& arguments, const ObjectModel& model, co
   TriangleMesh cloud = model.mesh;
   cloud.triangles.clear();
   write_ply_mesh(out / "cloud.ply", cloud);
-  write_file(out / "object.json", object_json(model, result).dump(2) + "\n");
+  write_file(out / "object.json", text_of_json(object_json(model, result), 2) + "\n");
   if (!arguments.picture.empty()) write_png(arguments.picture, draw_object(model));
 }
 
