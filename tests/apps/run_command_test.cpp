@@ -204,6 +204,15 @@ TEST_F(RunCommand, InterruptedRunKeepsItsResults) {
   }
 }
 
+TEST_F(RunCommand, AnInterruptionBeforeOneCameraHasStartedIsNoFailure) {
+  const Outcome outcome =
+      run_recording("--camera mono --speed 0.02 --preload", "timeout --preserve-status -s INT 2");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto summary = nlohmann::json::parse(result("summary.json"));
+  EXPECT_EQ(summary["interrupted"], true);
+  EXPECT_EQ(summary["tracked"], 0);
+}
+
 TEST_F(RunCommand, TheFolderOfTheSourceIsNoOutputFolder) {
   const std::string truth = recording_.string() + "/groundtruth.txt";
   std::ofstream(truth) << "mine\n";

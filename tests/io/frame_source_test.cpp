@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <fstream>
@@ -514,6 +515,20 @@ bool write_video(const std::string& file, const char* codec, int frames) {
   return writer.isOpened();
 }
 
+/// Marks an MP4 file's frames as to be shown turned by 90 degrees, as telephones do that are held upright.
+void turn_when_shown(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::size_t header = bytes.find("tkhd");
+  ASSERT_NE(header, std::string::npos);
+  constexpr std::size_t kMatrix = 44;  // from the box's name, in its version 0
+  const std::array<unsigned char, 36> turned{0,    0,       0, 0, 0, 1, 0, 0, 0,    0, 0, 0,
+                                             0xff, 0xff,    0, 0, 0, 0, 0, 0, 0,    0, 0, 0,
+                                             0,    kHeight, 0, 0, 0, 0, 0, 0, 0x40, 0, 0, 0};
+  std::copy(turned.begin(), turned.end(), bytes.begin() + static_cast<std::ptrdiff_t>(header + kMatrix));
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
 /// Gives the frames of an MP4 file, all of the same length, lengths of their own: (frames, times as long).
 /// Its index is the last part of the file, so that it may grow.
 void stretch_frames(const std::string& file,
@@ -710,6 +725,22 @@ TEST(LeftCameraAlone, OfAFolderNeedsNothingOfTheOtherOne) {
     fs::remove(folder / (other + "/0.png"));
     EXPECT_EQ(left_alone(name, folder / "mono.yaml"), "3");
   }
+}
+
+/// A rolling shutter reads the sensor's rows, and a calibration is of the sensor.
+TEST(FrameSource, AVideoComesAsTheSensorHasIt) {
+  const ScratchFolder folder;
+  const std::string file = folder / "upright.mp4";
+  if (!write_video(file, "mp4v", 3)) GTEST_SKIP() << "OpenCV here cannot write MPEG-4";
+  turn_when_shown(file);
+  cv::VideoCapture shown(file, cv::CAP_FFMPEG);
+  cv::Mat image;
+  ASSERT_TRUE(shown.read(image));
+  ASSERT_EQ(image.cols, kHeight) << "the file is not marked";
+  const auto source = open_source("video:" + file + "?fx=50&fy=50&cx=32&cy=24");
+  Frame frame;
+  ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+  EXPECT_EQ(frame.left.size(), cv::Size(kWidth, kHeight));
 }
 
 TEST(LeftCameraAlone, OfASideBySideVideoNeedsOneCalibration) {
