@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
+
+#include <fmt/format.h>
 
 #include "base/bytes.hpp"
 #include "camera/opencv_distortion.hpp"
@@ -10,7 +13,19 @@
 namespace twofold {
 namespace {
 
-bool is_image(const BagTopic& topic) {
+std::vector<MergedTopic> merge_topics(const std::vector<BagTopic>& topics) {
+  std::vector<MergedTopic> merged;
+  for (const BagTopic& topic : topics) {
+    auto same = std::find_if(merged.begin(), merged.end(), [&](const MergedTopic& other) {
+      return other.name == topic.name && other.type == topic.type;
+    });
+    if (same == merged.end()) same = merged.insert(merged.end(), {topic.name, topic.type, {}});
+    same->encodings[topic.id] = topic.encoding;
+  }
+  return merged;
+}
+
+bool is_image(const MergedTopic& topic) {
   return topic.type == "sensor_msgs/Image" || topic.type == "sensor_msgs/CompressedImage";
 }
 
@@ -29,38 +44,38 @@ bool names_rectified(std::string_view topic) {
   return false;
 }
 
-bool is_depth(const BagTopic& topic) {
+bool is_depth(const MergedTopic& topic) {
   return contains(topic.name, "depth");
 }
 
 /// Smaller is taken first.
-int rank(const BagTopic& topic) {
+int rank(const MergedTopic& topic) {
   const bool compressed = topic.type == "sensor_msgs/CompressedImage";
   return (compressed ? 2 : 0) + (names_rectified(topic.name) ? 0 : 1);
 }
 
-std::string list(const std::vector<BagTopic>& topics) {
+std::string list(const std::vector<MergedTopic>& topics) {
   std::string names;
-  for (const BagTopic& topic : topics) {
+  for (const MergedTopic& topic : topics) {
     if (is_image(topic)) names += (names.empty() ? "" : ", ") + topic.name;
   }
   return names.empty() ? "none" : names;
 }
 
-const BagTopic& named(const std::vector<BagTopic>& topics, const std::string& name) {
-  for (const BagTopic& topic : topics) {
+const MergedTopic& named(const std::vector<MergedTopic>& topics, const std::string& name) {
+  for (const MergedTopic& topic : topics) {
     if (topic.name == name && is_image(topic)) return topic;
   }
   throw MalformedBytes("no image topic '" + name + "'; there are: " + list(topics));
 }
 
 /// ROS puts a camera's info beside its images: /cam/image_raw, /cam/image_raw/compressed, /cam/camera_info.
-BagCamera camera_of(const std::vector<BagTopic>& topics, const BagTopic& images) {
+BagCamera camera_of(const std::vector<MergedTopic>& topics, const MergedTopic& images) {
   BagCamera camera{images, {}};
   for (std::string folder = images.name; !camera.info && !folder.empty();) {
     const auto slash = folder.rfind('/');
     folder.resize(slash == std::string::npos ? 0 : slash);
-    for (const BagTopic& topic : topics) {
+    for (const MergedTopic& topic : topics) {
       if (topic.type == "sensor_msgs/CameraInfo" && topic.name == folder + "/camera_info")
         camera.info = topic;
     }
@@ -89,23 +104,23 @@ std::vector<std::string> partners(const std::string& left) {
 }
 
 struct Choice {
-  std::vector<BagTopic> colour, depth;  // best first
+  std::vector<MergedTopic> colour, depth;  // best first
 };
 
-Choice sorted_images(const std::vector<BagTopic>& topics) {
+Choice sorted_images(const std::vector<MergedTopic>& topics) {
   Choice choice;
-  for (const BagTopic& topic : topics) {
+  for (const MergedTopic& topic : topics) {
     if (is_image(topic)) (is_depth(topic) ? choice.depth : choice.colour).push_back(topic);
   }
   for (auto* list : {&choice.colour, &choice.depth}) {
     std::stable_sort(list->begin(), list->end(),
-                     [](const BagTopic& a, const BagTopic& b) { return rank(a) < rank(b); });
+                     [](const MergedTopic& a, const MergedTopic& b) { return rank(a) < rank(b); });
   }
   return choice;
 }
 
 /// The same images packed in another way, or those that ROS makes of them: /cam/image_raw, /cam/image_rect.
-bool same_camera(const BagTopic& a, const BagTopic& b) {
+bool same_camera(const MergedTopic& a, const MergedTopic& b) {
   const auto plain = [](std::string name) {
     if (name.ends_with("/compressed")) name.resize(name.size() - std::string_view("/compressed").size());
     return name;
@@ -116,10 +131,10 @@ bool same_camera(const BagTopic& a, const BagTopic& b) {
                           of_b.rfind("/image") == folder && of_a.substr(0, folder) == of_b.substr(0, folder));
 }
 
-std::optional<std::pair<BagTopic, BagTopic>> find_pair(const std::vector<BagTopic>& colour) {
-  for (const BagTopic& left : colour) {
+std::optional<std::pair<MergedTopic, MergedTopic>> find_pair(const std::vector<MergedTopic>& colour) {
+  for (const MergedTopic& left : colour) {
     for (const std::string& name : partners(left.name)) {
-      const auto right = std::find_if(colour.begin(), colour.end(), [&](const BagTopic& topic) {
+      const auto right = std::find_if(colour.begin(), colour.end(), [&](const MergedTopic& topic) {
         return topic.name == name && topic.type == left.type;
       });
       if (right != colour.end()) return std::pair(left, *right);
@@ -128,8 +143,8 @@ std::optional<std::pair<BagTopic, BagTopic>> find_pair(const std::vector<BagTopi
   return std::nullopt;
 }
 
-bool all_of_one_camera(const std::vector<BagTopic>& topics) {
-  return !topics.empty() && std::all_of(topics.begin(), topics.end(), [&](const BagTopic& topic) {
+bool all_of_one_camera(const std::vector<MergedTopic>& topics) {
+  return !topics.empty() && std::all_of(topics.begin(), topics.end(), [&](const MergedTopic& topic) {
     return same_camera(topic, topics.front());
   });
 }
@@ -189,9 +204,16 @@ SO3 rotation_of(const CameraInfoMessage& info) {
   return SO3(R);
 }
 
-/// The right camera's rectified image is shifted: P of it has -fx * baseline in its last column.
-double baseline_of(const CameraInfoMessage& right) {
-  const double baseline = -right.P[3] / right.P[0];
+/// Rectified images are shifted: their P have -fx * x in the last column, x being where the camera stands on
+/// the line through both, which need not begin at the left one.
+double baseline_of(const CameraInfoMessage& left, const CameraInfoMessage& right) {
+  constexpr double kTolerance = 1e-3;  // of the focal length
+  if (!(std::abs(left.P[0] - right.P[0]) <= kTolerance * std::abs(right.P[0])))
+    throw MalformedBytes(
+        fmt::format("camera_info of a pair whose focal lengths differ (P[0]: {:.6g} and {:.6g}), which no "
+                    "rectified pair's do: give --calib",
+                    left.P[0], right.P[0]));
+  const double baseline = (left.P[3] - right.P[3]) / right.P[0];
   if (!(baseline > 0) || baseline > 100)
     throw MalformedBytes("camera_info of the right camera states no baseline (P[3]): give --calib");
   return baseline;
@@ -203,9 +225,10 @@ bool BagCamera::rectified() const {
   return names_rectified(images.name);
 }
 
-BagCameras choose_cameras(const std::vector<BagTopic>& topics, const WantedTopics& wanted) {
+BagCameras choose_cameras(const std::vector<BagTopic>& all, const WantedTopics& wanted) {
+  const std::vector<MergedTopic> topics = merge_topics(all);
   BagCameras cameras;
-  const auto camera = [&](const BagTopic& topic) { return camera_of(topics, topic); };
+  const auto camera = [&](const MergedTopic& topic) { return camera_of(topics, topic); };
   if (wanted.left) {
     cameras.left = camera(named(topics, *wanted.left));
     if (wanted.right) cameras.right = camera(named(topics, *wanted.right));
@@ -235,7 +258,7 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
     throw MalformedBytes("camera_info of '" + cameras.left.images.name + "' is not calibrated: give --calib");
   if (!right) return calibration;
   calibration.right = model_of(*cameras.right, *right);
-  const SE3 T_rectified(SO3(), Vector3(-baseline_of(*right), 0, 0));
+  const SE3 T_rectified(SO3(), Vector3(-baseline_of(left, *right), 0, 0));
   calibration.already_rectified = cameras.left.rectified() && cameras.right->rectified();
   if (calibration.already_rectified) {
     calibration.T_right_left = T_rectified;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,10 +12,17 @@
 
 namespace twofold {
 
+/// All of one name and type in a bag, as a subscriber would get it: a driver that starts again, and a merge
+/// of bags, give the topic another id.
+struct MergedTopic {
+  std::string name, type;
+  std::map<std::uint32_t, MessageEncoding> encodings;  ///< by the messages' id
+};
+
 /// A camera's topic in a bag.
 struct BagCamera {
-  BagTopic images;  ///< sensor_msgs/Image or CompressedImage
-  std::optional<BagTopic> info;
+  MergedTopic images;  ///< sensor_msgs/Image or CompressedImage
+  std::optional<MergedTopic> info;
 
   [[nodiscard]] bool compressed() const { return images.type == "sensor_msgs/CompressedImage"; }
   /// Images that were rectified before they were recorded, as ROS names them.
@@ -39,10 +48,11 @@ struct WantedTopics {
 /// cam0/cam1, ...; one with "depth" in its name beside another; or the only one. Of the same camera rectified
 /// images are taken before raw ones, and these before compressed ones. Throws MalformedBytes listing the
 /// image topics when that does not decide, or when a given one is not there.
-[[nodiscard]] BagCameras choose_cameras(const std::vector<BagTopic>& topics, const WantedTopics& wanted);
+[[nodiscard]] BagCameras choose_cameras(const std::vector<BagTopic>& all, const WantedTopics& wanted);
 
 /// What the cameras' CameraInfo says; `right` for stereo. Throws MalformedBytes when it says nothing (K is
-/// zero), names a distortion that is not known, or has more coefficients than are supported.
+/// zero), names a distortion that is not known, has more coefficients than are supported, or the focal
+/// lengths of a pair's P differ.
 [[nodiscard]] Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& left,
                                          const std::optional<CameraInfoMessage>& right);
 

@@ -16,8 +16,14 @@ constexpr double kStereoGap = 0.002, kDepthGap = 0.016;  // [s]
 // Images of one camera that wait for the other's: beyond that its topic has ended or is another recording's.
 constexpr std::size_t kMostWaiting = 64;
 
+std::set<std::uint32_t> ids_of(const MergedTopic& topic) {
+  std::set<std::uint32_t> ids;
+  for (const auto& [id, encoding] : topic.encodings) ids.insert(id);
+  return ids;
+}
+
 BagImage decode(const BagCamera& camera, bool depth, const BagMessage& message) {
-  const MessageEncoding encoding = camera.images.encoding;
+  const MessageEncoding encoding = camera.images.encodings.at(message.topic);
   if (camera.compressed()) {
     const CompressedImageMessage image = parse_compressed_image(message.data, encoding);
     return {image.t_ns, depth ? depth_image(image) : grey_image(image)};
@@ -88,30 +94,30 @@ std::optional<Calibration> BagSource::recorded_calibration() {
 
 std::optional<CameraInfoMessage> BagSource::first_info(const BagCamera& camera) {
   if (!camera.info) return std::nullopt;
-  reader_->select({camera.info->id});
+  reader_->select(ids_of(*camera.info));
   BagMessage message;
   if (!reader_->next(message)) return std::nullopt;
-  return named([&] { return parse_camera_info(message.data, camera.info->encoding); });
+  return named([&] { return parse_camera_info(message.data, camera.info->encodings.at(message.topic)); });
 }
 
 cv::Mat BagSource::first_image() {
-  reader_->select({cameras_.left.images.id});
+  reader_->select(ids_of(cameras_.left.images));
   BagMessage message;
   if (!reader_->next(message)) throw IoError(file_, "holds no image of '" + cameras_.left.images.name + "'");
   return named([&] { return decode(cameras_.left, false, message).image; });
 }
 
 void BagSource::select_images() {
-  std::set<std::uint32_t> topics{cameras_.left.images.id};
-  if (cameras_.right) topics.insert(cameras_.right->images.id);
-  if (cameras_.depth) topics.insert(cameras_.depth->images.id);
+  std::set<std::uint32_t> topics = ids_of(cameras_.left.images);
+  if (cameras_.right) topics.merge(ids_of(cameras_.right->images));
+  if (cameras_.depth) topics.merge(ids_of(cameras_.depth->images));
   reader_->select(std::move(topics));
 }
 
 bool BagSource::take_message() {
   BagMessage message;
   if (!reader_->next(message)) return false;
-  const bool left = message.topic == cameras_.left.images.id;
+  const bool left = cameras_.left.images.encodings.contains(message.topic);
   const BagCamera& camera = left ? cameras_.left : cameras_.right ? *cameras_.right : *cameras_.depth;
   Queue& queue = left ? left_ : other_;
   try {

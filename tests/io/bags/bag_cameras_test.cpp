@@ -99,6 +99,16 @@ TEST(BagCameras, RectifiedPairsAreTakenAsTheyAre) {
   EXPECT_LT((calibration.T_right_left.translation() - Vector3(-0.2, 0, 0)).norm(), 1e-12);
 }
 
+/// A pair of which neither is where the rectified images' coordinates begin, as KITTI's in colour.
+TEST(BagCameras, TheBaselineIsFromTheLeftCameraToTheRightOne) {
+  WrittenCameraInfo left = rectified_info(false), right = rectified_info(true);
+  left.P[3] = 3;
+  for (const char* images : {"image_rect", "image_raw"}) {
+    const Calibration calibration = calibration_of(stereo(images), message_of(left), message_of(right));
+    EXPECT_LT((calibration.T_right_left.translation() - Vector3(-0.26, 0, 0)).norm(), 1e-12) << images;
+  }
+}
+
 /// The cameras are turned towards each other by what their R say.
 TEST(BagCameras, RawPairsKeepTheirLensAndTheirTurn) {
   WrittenCameraInfo left = rectified_info(false), right = rectified_info(true);
@@ -171,6 +181,9 @@ TEST(BagCameras, SayWhatTheInfoLacks) {
   uncalibrated.K = {};
   EXPECT_NE(why(uncalibrated, right).find("not calibrated"), std::string::npos);
   EXPECT_NE(why(left, left).find("no baseline"), std::string::npos);
+  WrittenCameraInfo longer = right;
+  longer.P[0] = 51;
+  EXPECT_NE(why(left, longer).find("focal lengths differ (P[0]: 50 and 51)"), std::string::npos);
   WrittenCameraInfo strange = left;
   const auto why_strange = [&](const std::string& model, const std::vector<double>& D) {
     strange.model = model;

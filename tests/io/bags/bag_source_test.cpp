@@ -10,16 +10,6 @@ namespace {
 
 using namespace testing;
 
-/// What a source ends with: its error, or how many frames it gave.
-std::string drain(FrameSource& source) {
-  Frame frame;
-  for (int count = 0;; ++count) {
-    const FrameStatus status = source.next(frame);
-    if (status == FrameStatus::kEnd) return std::to_string(count);
-    if (status == FrameStatus::kError) return source.error();
-  }
-}
-
 TEST(BagSource, GivesStereoPairsWithTheCalibrationOfTheBag) {
   const ScratchFolder folder;
   folder.write("ros2.mcap", text_of(mcap_file(stereo_bag(MessageEncoding::kCdr), {.compression = "zstd"})));

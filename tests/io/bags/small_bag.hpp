@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "fixtures/bag_writer.hpp"
+#include "io/sources/frame_source.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold::testing {
@@ -46,6 +47,16 @@ inline WrittenBag stereo_bag(MessageEncoding encoding) {
 
 inline std::string text_of(const Bytes& bytes) {
   return {bytes.begin(), bytes.end()};
+}
+
+/// What a source ends with: its error, or how many frames it gave.
+inline std::string drain(FrameSource& source) {
+  Frame frame;
+  for (int count = 0;; ++count) {
+    const FrameStatus status = source.next(frame);
+    if (status == FrameStatus::kEnd) return std::to_string(count);
+    if (status == FrameStatus::kError) return source.error();
+  }
 }
 
 }  // namespace twofold::testing
