@@ -219,6 +219,16 @@ double baseline_of(const CameraInfoMessage& left, const CameraInfoMessage& right
   return baseline;
 }
 
+/// By how much of its width at most an image's corner is elsewhere in the other camera's image.
+double largest_shift(const PinholeCamera& camera, const PinholeCamera& other) {
+  double largest = 0;
+  for (const Vector2& corner : {Vector2(0, 0), Vector2(camera.width, camera.height)}) {
+    const Vector2 seen = other.project(camera.unproject(corner));
+    largest = std::max(largest, (seen - corner).cwiseAbs().maxCoeff());
+  }
+  return largest / camera.width;
+}
+
 }  // namespace
 
 bool BagCamera::rectified() const {
@@ -271,6 +281,21 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
   const SE3 T_rect_left = rotation(cameras.left, left), T_rect_right = rotation(*cameras.right, *right);
   calibration.T_right_left = T_rect_right.inverse() * T_rectified * T_rect_left;
   return calibration;
+}
+
+std::string depth_mismatch(const CameraInfoMessage& left, const CameraInfoMessage& depth) {
+  constexpr double kTolerance = 0.01;  // drivers' defaults differ from what the same camera was calibrated to
+  const PinholeCamera K_left = pinhole_of(left.K.data(), 3, left), K = pinhole_of(depth.K.data(), 3, depth);
+  const PinholeCamera P_left = pinhole_of(left.P.data(), 4, left), P = pinhole_of(depth.P.data(), 4, depth);
+  const auto says_nothing = [](const PinholeCamera& camera) {
+    return !(camera.fx > 0 && camera.fy > 0 && camera.width > 0 && camera.height > 0);
+  };
+  if (says_nothing(K_left) || says_nothing(K)) return {};
+  if (K.width != K_left.width || K.height != K_left.height)
+    return fmt::format("{}x{} pixels against {}x{}", K.width, K.height, K_left.width, K_left.height);
+  if (largest_shift(K_left, K) <= kTolerance) return {};
+  if (!says_nothing(P_left) && !says_nothing(P) && largest_shift(P_left, P) <= kTolerance) return {};
+  return fmt::format("fx {:.5g}, cx {:.5g} against {:.5g}, {:.5g}", K.fx, K.cx, K_left.fx, K_left.cx);
 }
 
 }  // namespace twofold

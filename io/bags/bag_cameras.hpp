@@ -56,4 +56,8 @@ struct WantedTopics {
 [[nodiscard]] Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& left,
                                          const std::optional<CameraInfoMessage>& right);
 
+/// Empty when depth images can be the left camera's, pixel by pixel; else by what their CameraInfo differ, as
+/// those of depth that nobody registered do.
+[[nodiscard]] std::string depth_mismatch(const CameraInfoMessage& left, const CameraInfoMessage& depth);
+
 }  // namespace twofold

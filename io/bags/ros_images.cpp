@@ -120,7 +120,7 @@ cv::Mat grey_image(const CompressedImageMessage& image) {
   return decode(image.file, cv::IMREAD_GRAYSCALE);
 }
 
-cv::Mat depth_image(const ImageMessage& image) {
+cv::Mat depth_image(const ImageMessage& image, double unit) {
   Encoding encoding;
   cv::Mat depth = native_copy(view_of(image, encoding), image.big_endian);
   if (encoding.type == CV_16UC1) return depth;
@@ -128,7 +128,7 @@ cv::Mat depth_image(const ImageMessage& image) {
   cv::Mat units(depth.size(), CV_16UC1);
   for (int y = 0; y < depth.rows; ++y) {
     for (int x = 0; x < depth.cols; ++x) {
-      const double value = std::round(depth.at<float>(y, x) / kRosDepthUnit);
+      const double value = std::round(depth.at<float>(y, x) / unit);
       units.at<std::uint16_t>(y, x) = value > 0 && value < 65536 ? static_cast<std::uint16_t>(value) : 0;
     }
   }

@@ -6,7 +6,7 @@
 
 namespace twofold {
 
-/// [m] a unit of the depth images below.
+/// [m] a unit of depth images of 16 bits, where nobody says otherwise (REP 118).
 inline constexpr double kRosDepthUnit = 0.001;
 
 // Copies: nothing of the message is kept. All throw MalformedBytes naming the encoding that is not known, or
@@ -16,9 +16,9 @@ inline constexpr double kRosDepthUnit = 0.001;
 [[nodiscard]] cv::Mat grey_image(const ImageMessage& image);
 /// Of a JPEG, PNG, ... file.
 [[nodiscard]] cv::Mat grey_image(const CompressedImageMessage& image);
-/// CV_16UC1 in units of kRosDepthUnit, 0 where there is none, of 16UC1, mono16 [mm] and 32FC1 [m].
-[[nodiscard]] cv::Mat depth_image(const ImageMessage& image);
-/// Of a PNG file with 16 bits [mm], with or without the header of ROS's compressedDepth.
+/// CV_16UC1, 0 where there is none: 16UC1 and mono16 as they are, 32FC1 [m] in units of `unit` [m].
+[[nodiscard]] cv::Mat depth_image(const ImageMessage& image, double unit = kRosDepthUnit);
+/// Of a PNG file with 16 bits, as it is, with or without the header of ROS's compressedDepth.
 [[nodiscard]] cv::Mat depth_image(const CompressedImageMessage& image);
 
 }  // namespace twofold

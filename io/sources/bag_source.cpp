@@ -22,14 +22,14 @@ std::set<std::uint32_t> ids_of(const MergedTopic& topic) {
   return ids;
 }
 
-BagImage decode(const BagCamera& camera, bool depth, const BagMessage& message) {
+BagImage decode(const BagCamera& camera, std::optional<double> depth_unit, const BagMessage& message) {
   const MessageEncoding encoding = camera.images.encodings.at(message.topic);
   if (camera.compressed()) {
     const CompressedImageMessage image = parse_compressed_image(message.data, encoding);
-    return {image.t_ns, depth ? depth_image(image) : grey_image(image)};
+    return {image.t_ns, depth_unit ? depth_image(image) : grey_image(image)};
   }
   const ImageMessage image = parse_image(message.data, encoding);
-  return {image.t_ns, depth ? depth_image(image) : grey_image(image)};
+  return {image.t_ns, depth_unit ? depth_image(image, *depth_unit) : grey_image(image)};
 }
 
 }  // namespace
@@ -64,6 +64,7 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   }
   rig_ = rectifier_->rig();
   R_rectified_raw_ = rectifier_->R_rectified_left();
+  if (cameras_.depth) depth_unit_ = used.depth_unit;
   select_images();
 }
 
@@ -77,11 +78,27 @@ Calibration BagSource::find_calibration(const std::optional<std::filesystem::pat
   } else {
     base = recorded_calibration();
   }
-  if (cameras_.depth && base) base->depth_unit = kRosDepthUnit;
+  // The user's own numbers stand against those of the bag.
+  if (!(base && base->depth_apart) && !parameters.has_intrinsics() && !parameters.left_only())
+    expect_registered_depth();
   const bool known = base.has_value();
-  Calibration used = with_parameters(base.value_or(Calibration()), known, cameras_.kind(), parameters);
-  if (cameras_.depth && !known) used.depth_unit = kRosDepthUnit;
-  return used;
+  Calibration used = base.value_or(Calibration());
+  if (cameras_.depth && !used.depth_unit_stated) used.depth_unit = kRosDepthUnit;
+  return with_parameters(std::move(used), known, cameras_.kind(), parameters);
+}
+
+void BagSource::expect_registered_depth() {
+  if (!cameras_.depth) return;
+  const auto left = first_info(cameras_.left), depth = first_info(*cameras_.depth);
+  if (!left || !depth) return;
+  const std::string mismatch = depth_mismatch(*left, *depth);
+  if (mismatch.empty()) return;
+  throw IoError(file_,
+                fmt::format("the depth images of '{}' are of another camera by their camera_info ({}): "
+                            "take a topic of depth that is registered to the colour camera (depth=/TOPIC; "
+                            "its name has 'registered' or 'aligned' mostly), or give --calib with the depth "
+                            "camera; where camera_info is wrong, fx, fy, cx, cy",
+                            cameras_.depth->images.name, mismatch));
 }
 
 std::optional<Calibration> BagSource::recorded_calibration() {
@@ -104,7 +121,7 @@ cv::Mat BagSource::first_image() {
   reader_->select(ids_of(cameras_.left.images));
   BagMessage message;
   if (!reader_->next(message)) throw IoError(file_, "holds no image of '" + cameras_.left.images.name + "'");
-  return named([&] { return decode(cameras_.left, false, message).image; });
+  return named([&] { return decode(cameras_.left, std::nullopt, message).image; });
 }
 
 void BagSource::select_images() {
@@ -121,7 +138,7 @@ bool BagSource::take_message() {
   const BagCamera& camera = left ? cameras_.left : cameras_.right ? *cameras_.right : *cameras_.depth;
   Queue& queue = left ? left_ : other_;
   try {
-    queue.push_back(named([&] { return decode(camera, !left && cameras_.depth, message); }));
+    queue.push_back(named([&] { return decode(camera, left ? std::nullopt : depth_unit_, message); }));
   } catch (const IoError& error) {
     damaged_.leave_out(error);
     return true;

@@ -44,6 +44,8 @@ class BagSource final : public FrameSource {
   /// From the CameraInfo messages; nothing when a camera has none.
   [[nodiscard]] std::optional<Calibration> recorded_calibration();
   [[nodiscard]] std::optional<CameraInfoMessage> first_info(const BagCamera& camera);
+  /// Throws IoError when CameraInfo says that depth images are not the left camera's, pixel by pixel.
+  void expect_registered_depth();
   [[nodiscard]] cv::Mat first_image();
   void select_images();
   /// Decodes the next image that can be decoded into its camera's queue; false at the end.
@@ -60,6 +62,7 @@ class BagSource final : public FrameSource {
   BagCameras cameras_;
   std::optional<FramePairer> pairer_;  // none: one camera
   std::optional<Rectifier> rectifier_;
+  std::optional<double> depth_unit_;  // [m], of depth images
   Queue left_, other_;
   std::int64_t index_ = 0;
   std::uint64_t alone_ = 0;  // images without a partner
