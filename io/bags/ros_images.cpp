@@ -81,7 +81,8 @@ cv::Mat decode(std::span<const std::uint8_t> file, int flags) {
   cv::Mat image;
   try {
     image = cv::imdecode(
-        cv::Mat(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data())), flags);
+        cv::Mat(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data())),
+        flags | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {  // empty image below
   }
   if (image.empty()) throw MalformedBytes("a compressed image that cannot be decoded");

@@ -14,7 +14,7 @@ inline constexpr double kRosDepthUnit = 0.001;
 
 /// CV_8UC1 of mono8, 8UC1, mono16, 16UC1, rgb8, bgr8, rgba8, bgra8, bayer_*8 and 8UC3.
 [[nodiscard]] cv::Mat grey_image(const ImageMessage& image);
-/// Of a JPEG, PNG, ... file.
+/// Of a JPEG, PNG, ... file; rows are the file's, whatever EXIF says.
 [[nodiscard]] cv::Mat grey_image(const CompressedImageMessage& image);
 /// CV_16UC1, 0 where there is none: 16UC1 and mono16 as they are, 32FC1 [m] in units of `unit` [m].
 [[nodiscard]] cv::Mat depth_image(const ImageMessage& image, double unit = kRosDepthUnit);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cmath>
 #include <fstream>
 #include <map>
 #include <opencv2/core.hpp>
@@ -15,6 +14,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "io/files/grey_levels.hpp"
 #include "io/files/image_integrity.hpp"
 #include "io/files/io_error.hpp"
 
@@ -125,15 +125,11 @@ bool sort_by_decimals(std::vector<fs::path>& files) {
 
 cv::Mat read_grey_image(const fs::path& file, int bits) {
   if (bits >= 16) return decode(file, cv::IMREAD_GRAYSCALE);
-  cv::Mat image = decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
-  if (image.depth() != CV_8U) image.convertTo(image, CV_8U, std::ldexp(1.0, 8 - bits));
-  return image;
+  return eight_bits(decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH), bits);
 }
 
-int bits_used(const fs::path& file) {
-  double brightest = 0;
-  cv::minMaxLoc(decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH), nullptr, &brightest);
-  return std::ilogb(std::max(brightest, 0.5)) + 1;
+std::optional<int> bits_used(const fs::path& file) {
+  return wide_bits(decode(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH));
 }
 
 cv::Mat read_colour_image(const fs::path& file) {

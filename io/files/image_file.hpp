@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <vector>
 
 #include "camera/pinhole.hpp"
@@ -22,9 +23,9 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 /// `bits` of an image of 16 bits: the grey levels that it can hold are 2^bits; brighter ones become white.
 [[nodiscard]] cv::Mat read_grey_image(const std::filesystem::path& file, int bits = 16);
 
-/// Bits that the brightest pixel of a grey image takes: 8 or fewer but for files of 16 bits, of which many
-/// cameras use 10 or 12. Throws as above.
-[[nodiscard]] int bits_used(const std::filesystem::path& file);
+/// Bits that the brightest pixel of a file of 16 bits takes, of which many cameras use 10 or 12; nothing for
+/// files of 8. Throws as above.
+[[nodiscard]] std::optional<int> bits_used(const std::filesystem::path& file);
 
 /// An image file as CV_8UC3 (blue, green, red); empty when it has no colour. Throws as above.
 [[nodiscard]] cv::Mat read_colour_image(const std::filesystem::path& file);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "io/files/calibration_file.hpp"
+#include "io/files/grey_levels.hpp"
 #include "io/files/image_file.hpp"
 #include "io/files/io_error.hpp"
 
@@ -102,19 +103,20 @@ Trajectory rectified_trajectory(const Trajectory& raw, const SO3& R_rectified_ra
 
 namespace {
 
-/// Bits of the grey levels: files of 16 bits often hold 10, 12 or 14. One image alone may be a dark one: some
-/// from all of the recording are looked at, if `first`, which can be read, has more than 8.
+/// Bits of the grey levels: files of 16 bits often hold 8, 10, 12 or 14. One image alone may be a dark one:
+/// some from all of the recording are looked at, if `first`, which can be read, is of 16.
 int grey_bits_of(const std::vector<RecordedFrame>& frames, const fs::path& first) {
   constexpr std::size_t kLooks = 6;
-  int bits = bits_used(first);
-  if (bits <= 8) return 16;
+  const std::optional<int> of_first = bits_used(first);
+  if (!of_first) return 16;
+  int bits = *of_first;
   for (std::size_t k = 1; k < kLooks; ++k) {
     try {
-      bits = std::max(bits, bits_used(frames[k * (frames.size() - 1) / (kLooks - 1)].left));
+      bits = std::max(bits, bits_used(frames[k * (frames.size() - 1) / (kLooks - 1)].left).value_or(0));
     } catch (const IoError&) {  // is left out when it is that frame's turn
     }
   }
-  return (bits + 1) / 2 * 2;
+  return camera_bits(bits);
 }
 
 }  // namespace
@@ -129,10 +131,7 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
   const cv::Mat first = first_image();
   const fs::path& first_file = recording_.frames[next_].left;
   grey_bits_ = grey_bits_of(recording_.frames, first_file);
-  if (grey_bits_ < 16)
-    recording_.notes.push_back(
-        fmt::format("{}: images of 16 bits hold {}: grey levels were taken from 0 to {}",
-                    recording_.folder.string(), grey_bits_, (1 << grey_bits_) - 1));
+  if (grey_bits_ < 16) recording_.notes.push_back(grey_levels_note(recording_.folder.string(), grey_bits_));
   set_missing_size(first.cols, first.rows, &recording_.calibration);
   expect_valid(recording_.calibration_file, recording_.calibration);
   expect_size(first_file, first, recording_.calibration.left.pinhole);

@@ -506,6 +506,27 @@ TEST(FrameSource, GreyLevelsOfTwelveBitsAreNotTakenForSixteen) {
   }
 }
 
+/// A recording may begin in the dark, and may keep eight bits in sixteen.
+TEST(FrameSource, ADarkFirstImageOfSixteenBitsSaysNothingOfTheOthers) {
+  for (const int brightest : {255, 4000}) {
+    const ScratchFolder folder;
+    for (int i = 0; i < 8; ++i)
+      folder.write_image(fmt::format("{:03d}.png", i),
+                         cv::Mat(kHeight, kWidth, CV_16UC1, cv::Scalar(i < 2 ? 160 : brightest)));
+    const auto source =
+        open_source("images:" + folder.path().string() + "?fps=10&fx=50&fy=50&cx=31.5&cy=23.5");
+    std::vector<double> grey;
+    for (Frame frame; source->next(frame) == FrameStatus::kFrame;) grey.push_back(cv::mean(frame.left)[0]);
+    ASSERT_EQ(grey.size(), 8U);
+    EXPECT_NEAR(grey.front(), brightest == 255 ? 160 : 10, 1);
+    EXPECT_NEAR(grey.back(), brightest == 255 ? 255 : 250, 1);
+    ASSERT_EQ(source->report().notes.size(), 1U);
+    EXPECT_NE(source->report().notes[0].find(brightest == 255 ? "16 bits hold 8:" : "16 bits hold 12:"),
+              std::string::npos)
+        << source->report().notes[0];
+  }
+}
+
 /// Of 25 numbered images a second; false when OpenCV cannot write that.
 bool write_video(const std::string& file, const char* codec, int frames) {
   const int fourcc = cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]);

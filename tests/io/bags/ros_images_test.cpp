@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include <string_view>
 
 #include "base/bytes.hpp"
 #include "tests/io/bags/small_bag.hpp"
@@ -164,6 +165,25 @@ TEST(RosImages, CompressedOnesAreDecoded) {
     EXPECT_NE(malformed([&] { (void)depth_image(parsed(inverse)); }).find("16UC1 can be read"),
               std::string::npos);
   }
+}
+
+/// A telephone that was held upside down: camera_info is of the sensor's rows.
+TEST(RosImages, RowsAreThoseOfTheSensorWhateverExifSays) {
+  cv::Mat image(kHeight, kWidth, CV_8UC1, cv::Scalar(20));
+  image.rowRange(0, kHeight / 2).setTo(220);
+  Bytes jpeg;
+  cv::imencode(".jpg", image, jpeg);
+  // One entry in big-endian TIFF: orientation (0x0112), short, 3.
+  constexpr std::string_view kExif(
+      "\xff\xe1\0\x22"
+      "Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x03\0\0\0\0\0\0",
+      36);
+  jpeg.insert(jpeg.begin() + 2, kExif.begin(), kExif.end());
+  ASSERT_LT(cv::mean(cv::imdecode(jpeg, cv::IMREAD_GRAYSCALE).rowRange(0, 15))[0], 40)
+      << "the file says that it is upside down";
+  const Bytes message = compressed_image_message(MessageEncoding::kRos1, 0, "jpeg", jpeg);
+  const cv::Mat grey = grey_image(parse_compressed_image(message, MessageEncoding::kRos1));
+  EXPECT_GT(cv::mean(grey.rowRange(0, 15))[0], 200);
 }
 
 TEST(RosImages, SizesAreNotBelieved) {
