@@ -109,8 +109,6 @@ cv::Mat grey_image(const ImageMessage& image) {
   cv::Mat grey;
   if (encoding.conversion >= 0) {
     cv::cvtColor(view, grey, encoding.conversion);
-  } else if (encoding.type == CV_16UC1) {
-    native_copy(view, image.big_endian).convertTo(grey, CV_8U, 1.0 / 256);
   } else {
     grey = native_copy(view, image.big_endian);
   }
@@ -118,7 +116,10 @@ cv::Mat grey_image(const ImageMessage& image) {
 }
 
 cv::Mat grey_image(const CompressedImageMessage& image) {
-  return decode(image.file, cv::IMREAD_GRAYSCALE);
+  cv::Mat grey = decode(image.file, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  if (grey.type() != CV_8UC1 && grey.type() != CV_16UC1)
+    throw MalformedBytes("a compressed image that has neither 8 nor 16 bits");
+  return grey;
 }
 
 cv::Mat depth_image(const ImageMessage& image, double unit) {

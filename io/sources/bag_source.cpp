@@ -1,12 +1,16 @@
 #include "io/sources/bag_source.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "base/bytes.hpp"
 #include "io/bags/ros_images.hpp"
 #include "io/files/calibration_file.hpp"
+#include "io/files/grey_levels.hpp"
 #include "io/files/image_file.hpp"
 #include "io/files/io_error.hpp"
+#include "io/sources/bag_survey.hpp"
 #include "io/sources/recording.hpp"
 
 namespace twofold {
@@ -16,12 +20,6 @@ constexpr double kStereoGap = 0.002, kDepthGap = 0.016;  // [s]
 // Images of one camera that wait for the other's: beyond that its topic has ended or is another recording's.
 constexpr std::size_t kMostWaiting = 64;
 
-std::set<std::uint32_t> ids_of(const MergedTopic& topic) {
-  std::set<std::uint32_t> ids;
-  for (const auto& [id, encoding] : topic.encodings) ids.insert(id);
-  return ids;
-}
-
 BagImage decode(const BagCamera& camera, std::optional<double> depth_unit, const BagMessage& message) {
   const MessageEncoding encoding = camera.images.encodings.at(message.topic);
   if (camera.compressed()) {
@@ -30,6 +28,17 @@ BagImage decode(const BagCamera& camera, std::optional<double> depth_unit, const
   }
   const ImageMessage image = parse_image(message.data, encoding);
   return {image.t_ns, depth_unit ? depth_image(image, *depth_unit) : grey_image(image)};
+}
+
+/// At high rates the image before or after lies within the usual gap, too.
+double usual_gap(const BagCameras& cameras, const BagSurvey& survey) {
+  const double usual = cameras.depth ? kDepthGap : kStereoGap;
+  return survey.interval_ns == 0 ? usual : std::min(usual, 0.5e-9 * static_cast<double>(survey.interval_ns));
+}
+
+std::string seconds(std::int64_t t_ns) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  return t_ns < 0 ? fmt::format("{} ns", t_ns) : fmt::format("{}.{:09} s", t_ns / kSecond, t_ns % kSecond);
 }
 
 }  // namespace
@@ -49,14 +58,16 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   const WantedTopics wanted{parameters.take_text("left"), parameters.take_text("right"),
                             parameters.take_text("depth")};
   cameras_ = named([&] { return choose_cameras(reader_->topics(), wanted); });
-  const std::int64_t max_gap_ns = parameters.take_max_gap_ns(cameras_.depth ? kDepthGap : kStereoGap);
-  if (cameras_.kind() != SensorKind::kMono) pairer_.emplace(max_gap_ns);
   Calibration used = find_calibration(calibration, parameters);
-  const cv::Mat first = first_image();
-  set_missing_size(first.cols, first.rows, &used);
+  const BagSurvey survey = survey_bag(*reader_, cameras_, file_);
+  const std::int64_t max_gap_ns = parameters.take_max_gap_ns(usual_gap(cameras_, survey));
+  if (cameras_.kind() != SensorKind::kMono) pairer_.emplace(max_gap_ns);
+  grey_bits_ = survey.grey_bits;
+  if (grey_bits_ < 16) notes_.push_back(grey_levels_note(file_.string(), grey_bits_));
+  set_missing_size(survey.first.cols, survey.first.rows, &used);
   const std::filesystem::path calibration_file = calibration.value_or(file_);
   expect_valid(calibration_file, used);
-  expect_size(file_, first, used.left.pinhole);
+  expect_size(file_, survey.first, used.left.pinhole);
   try {
     rectifier_.emplace(used);
   } catch (const std::runtime_error& error) {
@@ -65,7 +76,7 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   rig_ = rectifier_->rig();
   R_rectified_raw_ = rectifier_->R_rectified_left();
   if (cameras_.depth) depth_unit_ = used.depth_unit;
-  select_images();
+  reader_->select(image_ids(cameras_));
 }
 
 Calibration BagSource::find_calibration(const std::optional<std::filesystem::path>& calibration,
@@ -117,32 +128,22 @@ std::optional<CameraInfoMessage> BagSource::first_info(const BagCamera& camera) 
   return named([&] { return parse_camera_info(message.data, camera.info->encodings.at(message.topic)); });
 }
 
-cv::Mat BagSource::first_image() {
-  reader_->select(ids_of(cameras_.left.images));
-  BagMessage message;
-  if (!reader_->next(message)) throw IoError(file_, "holds no image of '" + cameras_.left.images.name + "'");
-  return named([&] { return decode(cameras_.left, std::nullopt, message).image; });
-}
-
-void BagSource::select_images() {
-  std::set<std::uint32_t> topics = ids_of(cameras_.left.images);
-  if (cameras_.right) topics.merge(ids_of(cameras_.right->images));
-  if (cameras_.depth) topics.merge(ids_of(cameras_.depth->images));
-  reader_->select(std::move(topics));
-}
-
 bool BagSource::take_message() {
   BagMessage message;
   if (!reader_->next(message)) return false;
   const bool left = cameras_.left.images.encodings.contains(message.topic);
   const BagCamera& camera = left ? cameras_.left : cameras_.right ? *cameras_.right : *cameras_.depth;
-  Queue& queue = left ? left_ : other_;
+  BagImage image;
   try {
-    queue.push_back(named([&] { return decode(camera, left ? std::nullopt : depth_unit_, message); }));
+    image = named([&] { return decode(camera, left ? std::nullopt : depth_unit_, message); });
   } catch (const IoError& error) {
     damaged_.leave_out(error);
     return true;
   }
+  if (!is_later(camera, image.t_ns, left ? last_left_ns_ : last_other_ns_)) return true;
+  if (left || !cameras_.depth) look_at_grey_levels(image);
+  Queue& queue = left ? left_ : other_;
+  queue.push_back(std::move(image));
   if (queue.size() > kMostWaiting) {
     queue.pop_front();
     ++alone_;
@@ -150,12 +151,45 @@ bool BagSource::take_message() {
   return true;
 }
 
+bool BagSource::is_later(const BagCamera& camera, std::int64_t t_ns, std::optional<std::int64_t>& last_ns) {
+  if (last_ns && t_ns <= *last_ns) {
+    unordered_.leave_out(
+        IoError(file_, fmt::format("an image of '{}' is of {}, not after the one before it, of {}",
+                                   camera.images.name, seconds(t_ns), seconds(*last_ns))));
+    return false;
+  }
+  last_ns = t_ns;
+  return true;
+}
+
+void BagSource::look_at_grey_levels(const BagImage& image) {
+  if (grey_bits_ >= 16) return;
+  const int bits = camera_bits(wide_bits(image.image).value_or(0));
+  if (bits <= grey_bits_) return;
+  brighter_.push_back(
+      fmt::format("{}: images of 16 bits use {} bits, not {}, from {} on: grey levels are taken "
+                  "from 0 to {}",
+                  file_.string(), bits, grey_bits_, seconds(image.t_ns), (1 << bits) - 1));
+  grey_bits_ = bits;
+}
+
+bool BagSource::next_may_be_nearer() const {
+  const std::int64_t t_left = left_.front().t_ns, t_other = other_.front().t_ns;
+  const bool left_first = t_left < t_other;
+  return !ended_ && pairer_->depends_on_next(t_left, t_other) && (left_first ? left_ : other_).size() == 1 &&
+         (left_first ? other_ : left_).size() < kMostWaiting;
+}
+
 bool BagSource::take_pair(Frame& raw) {
   while (!left_.empty() && !other_.empty()) {
-    const PairingStep step = pairer_->step(left_.front().t_ns, other_.front().t_ns);
+    if (next_may_be_nearer()) return false;
+    const Queue& earlier = left_.front().t_ns < other_.front().t_ns ? left_ : other_;
+    const auto next = earlier.size() > 1 ? std::optional(earlier[1].t_ns) : std::nullopt;
+    const PairingStep step = pairer_->step(left_.front().t_ns, other_.front().t_ns, next);
     if (step == PairingStep::kPair) {
       take_left(raw);
-      (cameras_.depth ? raw.depth : raw.right) = std::move(other_.front().image);
+      if (cameras_.depth) raw.depth = std::move(other_.front().image);
+      if (cameras_.right) raw.right = eight_bits(other_.front().image, grey_bits_);
       other_.pop_front();
       return true;
     }
@@ -168,9 +202,10 @@ bool BagSource::take_pair(Frame& raw) {
 void BagSource::take_left(Frame& raw) {
   raw.index = index_++;
   raw.t_ns = left_.front().t_ns;
-  raw.left = std::move(left_.front().image);
+  raw.left = eight_bits(left_.front().image, grey_bits_);
   left_.pop_front();
   damaged_.frame_was_read();
+  unordered_.frame_was_read();
 }
 
 bool BagSource::read(Frame& frame) {
@@ -181,7 +216,10 @@ bool BagSource::read(Frame& frame) {
       take_left(raw);
       break;
     }
-    if (take_message()) continue;
+    if (!ended_) {  // at the end, what waited for more is taken
+      ended_ = !take_message();
+      continue;
+    }
     damaged_.expect_any_frame();
     if (index_ == 0) throw IoError(file_, "no two images belong together (parameter max_gap)");
     return false;
@@ -195,11 +233,16 @@ bool BagSource::read(Frame& frame) {
 
 SourceReport BagSource::report() const {
   SourceReport report;
-  report.lost = alone_ + damaged_.count();
-  report.faults = damaged_.lines();
+  report.lost = alone_ + damaged_.count() + unordered_.count();
+  report.notes = notes_;
+  for (const auto* lines : {&damaged_.lines(), &unordered_.lines(), &brighter_})
+    report.faults.insert(report.faults.end(), lines->begin(), lines->end());
   if (damaged_.count() > 0)
     report.summary.push_back(
         fmt::format("{}: {} damaged images were left out", file_.string(), damaged_.count()));
+  if (unordered_.count() > 0)
+    report.summary.push_back(fmt::format("{}: {} images whose times do not increase were left out",
+                                         file_.string(), unordered_.count()));
   if (alone_ > 0) report.summary.push_back(fmt::format("{}: {} images were alone", file_.string(), alone_));
   if (const std::string fault = reader_->fault(); !fault.empty()) report.faults.push_back(fault);
   return report;

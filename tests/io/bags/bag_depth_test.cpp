@@ -65,6 +65,62 @@ std::vector<std::pair<int, int>> pairs(FrameSource& source) {
   return list;
 }
 
+/// At such rates the image before lies within the usual gap, too.
+TEST(BagDepth, OneMoreDepthImageAtTheBeginningShiftsNoPair) {
+  constexpr int kImages = 40;
+  for (const double rate : {60.0, 90.0, 200.0}) {
+    for (const double late : {0.0, 0.3, -0.3}) {
+      SCOPED_TRACE(fmt::format("{} Hz, late by {} of it", rate, late));
+      const ScratchFolder folder;
+      RgbdBag bag;
+      bag.depth(1000, at((late - 1) / rate));
+      for (int i = 0; i < kImages; ++i) {
+        bag.depth(i, at((i + late) / rate));
+        bag.colour(i, at(i / rate));
+      }
+      const std::string text = bag.write(folder);
+      for (const std::string query : {"", "?max_gap=0.016"}) {
+        const auto source = open_source(text + query);
+        const auto list = pairs(*source);
+        EXPECT_EQ(list.size(), static_cast<std::size_t>(kImages)) << query;
+        for (const auto& [colour, depth] : list) EXPECT_EQ(colour, depth) << query;
+        EXPECT_EQ(source->report().lost, 1U);
+      }
+    }
+  }
+}
+
+/// Of a colour image and the depth image after it that both lack their partners no pair is made, in the
+/// middle and at the end.
+TEST(BagDepth, ImagesWithoutAPartnerAreNoPairAtHighRates) {
+  const ScratchFolder folder;
+  RgbdBag bag;
+  for (int i = 0; i < 40; ++i) {
+    if (i != 21 && i != 39) bag.colour(i, at(i / 90.0));
+    if (i != 20 && i != 38) bag.depth(i, at(i / 90.0));
+  }
+  const auto source = open_source(bag.write(folder));
+  const auto list = pairs(*source);
+  EXPECT_EQ(list.size(), 36U);
+  for (const auto& [colour, depth] : list) EXPECT_EQ(colour, depth);
+}
+
+/// A recorder may write one topic's images well behind the other's.
+TEST(BagDepth, ATopicThatIsWrittenLaterIsPairedAllTheSame) {
+  const ScratchFolder folder;
+  RgbdBag bag;
+  constexpr int kBehind = 63, kImages = 150;
+  for (int i = 0; i < kImages + kBehind; ++i) {
+    if (i < kImages) bag.colour(i, at(i / 30.0));
+    if (i >= kBehind) bag.depth(i - kBehind, at((i - kBehind) / 30.0 - 0.005));
+  }
+  const auto source = open_source(bag.write(folder));
+  const auto list = pairs(*source);
+  EXPECT_EQ(list.size(), static_cast<std::size_t>(kImages));
+  for (const auto& [colour, depth] : list) EXPECT_EQ(colour, depth);
+  EXPECT_EQ(source->report().lost, 0U);
+}
+
 TEST(BagDepth, TheUnitIsWhatTheCalibrationSays) {
   const ScratchFolder folder;
   RgbdBag bag;

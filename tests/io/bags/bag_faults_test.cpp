@@ -39,5 +39,86 @@ TEST(BagFaults, TopicsThatBeginAnewAreReadToTheirEnd) {
   }
 }
 
+TEST(BagFaults, ADamagedFirstImageIsAGapToo) {
+  const ScratchFolder folder;
+  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
+  bag.messages[3].data.resize(200);  // the first left image
+  folder.write("short.bag", text_of(rosbag_file(bag, {})));
+  const auto source = open_source(folder / "short.bag");
+  EXPECT_EQ(drain(*source), std::to_string(kCount - 1));
+  const SourceReport report = source->report();
+  EXPECT_EQ(report.lost, 2U) << "that image, and its partner";
+  ASSERT_EQ(report.faults.size(), 1U);
+  EXPECT_NE(report.faults[0].find("short.bag: ends in the middle"), std::string::npos) << report.faults[0];
+}
+
+TEST(BagFaults, WithoutAWholeLeftImageABagIsRefused) {
+  const ScratchFolder folder;
+  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
+  for (std::size_t i = 3; i < bag.messages.size(); i += 5) bag.messages[i].data.resize(200);
+  folder.write("short.bag", text_of(rosbag_file(bag, {})));
+  EXPECT_IO_ERROR(open_source(folder / "short.bag"), "short.bag: ends in the middle");
+}
+
+/// Images of one camera, one each at these times.
+std::string write_images(const ScratchFolder& folder, const std::vector<int>& times) {
+  WrittenBag bag;
+  bag.topics = {{"/cam/image_raw", "sensor_msgs/Image"}};
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const std::int64_t t = time_of(times[i]);
+    bag.messages.push_back({0, time_of(static_cast<int>(i)),
+                            image_message(MessageEncoding::kRos1, t,
+                                          numbered_image(kWidth, kHeight, static_cast<int>(i)), "mono8")});
+  }
+  folder.write("a.bag", text_of(rosbag_file(bag, {})));
+  return "bag:" + (folder / "a.bag") + "?fx=50&fy=50&cx=32&cy=24";
+}
+
+TEST(BagFaults, RepeatedAndSwappedTimesEndNoRun) {
+  const ScratchFolder folder;
+  const auto source = open_source(write_images(folder, {0, 1, 1, 2, 4, 3, 5, 6}));
+  std::vector<int> numbers;
+  std::int64_t index = 0;
+  for (Frame frame; source->next(frame) == FrameStatus::kFrame;) {
+    EXPECT_EQ(frame.index, index++);
+    numbers.push_back(frame.left.at<unsigned char>(0, 1));
+  }
+  EXPECT_EQ(source->error(), "");
+  EXPECT_EQ(numbers, (std::vector<int>{0, 1, 3, 4, 6, 7}));
+  const SourceReport report = source->report();
+  EXPECT_EQ(report.lost, 2U);
+  ASSERT_EQ(report.faults.size(), 2U);
+  EXPECT_NE(report.faults[0].find("a.bag: an image of '/cam/image_raw' is of 1700000000.100000000 s, not "
+                                  "after the one before it"),
+            std::string::npos)
+      << report.faults[0];
+  ASSERT_EQ(report.summary.size(), 1U);
+  EXPECT_NE(report.summary[0].find("2 images whose times do not increase were left out"), std::string::npos)
+      << report.summary[0];
+}
+
+TEST(BagFaults, ManyInARowWhoseTimesDoNotIncreaseEndTheRun) {
+  const ScratchFolder folder;
+  std::vector<int> times(15);
+  for (int i = 0; i < 15; ++i) times[static_cast<std::size_t>(i)] = i < 3 ? 20 + i : i;
+  const auto source = open_source(write_images(folder, times));
+  const std::string end = drain(*source);
+  EXPECT_NE(end.find("not after the one before it"), std::string::npos) << end;
+  times.resize(13);  // ten
+  EXPECT_EQ(drain(*open_source(write_images(folder, times))), "3");
+}
+
+/// The right camera's driver sends an image twice.
+TEST(BagFaults, ARepeatedRightImageTakesNoPartner) {
+  const ScratchFolder folder;
+  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
+  const WrittenMessage right = bag.messages[6];
+  bag.messages.insert(bag.messages.begin() + 7, right);
+  folder.write("a.bag", text_of(rosbag_file(bag, {})));
+  const auto source = open_source(folder / "a.bag");
+  EXPECT_EQ(drain(*source), std::to_string(kCount));
+  EXPECT_EQ(source->report().lost, 1U);
+}
+
 }  // namespace
 }  // namespace twofold
