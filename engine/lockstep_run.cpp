@@ -22,8 +22,13 @@ std::size_t pool_size(const EngineOptions& options) {
 LockstepRun::LockstepRun(const Rig& rig, const EngineOptions& options, std::optional<Schedule> schedule)
     : rig_(rig),
       trace_(options.trace ? std::make_unique<Trace>() : nullptr),
-      pool_(pool_size(options)),
       tracking_(rig, options, trace_.get()),
+      // As large as the threaded run's, so that frames take as long as there; those of a replay are many, and
+      // few of them are ever used.
+      pool_(pool_size(options),
+            [&](KeyframeProposal& proposal) {
+              if (options.deterministic) tracking_.prepare(proposal);
+            }),
       mapping_(rig, options, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
       logs_(options.logs, mapping_.replacement_log()),

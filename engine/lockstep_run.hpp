@@ -75,8 +75,8 @@ class LockstepRun final : public Pipeline {
 
   const Rig rig_;
   std::unique_ptr<Trace> trace_;
-  ProposalPool pool_;
   TrackerRunner tracking_;
+  ProposalPool pool_;
   MapperRunner mapping_;
   LoopCloserRunner loop_closing_;
   RunLogs logs_;

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "engine/effort_controller.hpp"
+#include "engine/pipeline.hpp"
 #include "engine/runners.hpp"
 #include "fixtures/rendered_scene.hpp"
 #include "imaging/image_buffers.hpp"
@@ -14,24 +15,32 @@ namespace {
 
 using testing::allocations;
 
-/// All that the tracker thread does with a frame, with recorders and trace on: tracked frames, keyframes,
-/// lost frames, the question where it is, and its answer.
-TEST(TrackerThread, NeverAllocates) {
-  if (!testing::allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
-  const Rig rig = testing::test_rig(SensorKind::kStereo, 320, 240);
-  testing::RenderedScene scene(rig, {3, 2, 5}, 21);
-  const auto T_c_w = [](int i) {
-    return SE3(SO3::exp(Vector3(0, 0.02 * i, 0)), Vector3(-0.02 * i, 0, -0.02 * i));
-  };
-  const auto frame_at = [&](int i, bool covered) {
+/// The camera goes ahead and turns.
+class Walk {
+ public:
+  [[nodiscard]] const Rig& rig() const { return rig_; }
+
+  Frame frame(int i, bool covered = false) {
+    const SE3 T_c_w(SO3::exp(Vector3(0, 0.02 * i, 0)), Vector3(-0.02 * i, 0, -0.02 * i));
     FrameImages images;
-    scene.render(T_c_w(i), 1.5, images);
+    scene_.render(T_c_w, 1.5, images);
     Frame frame{
         i, i * std::int64_t{33'000'000}, images.left.level(0).clone(), images.right.level(0).clone(), {}};
     if (covered) frame.left.setTo(5), frame.right.setTo(5);
     return frame;
-  };
+  }
 
+ private:
+  Rig rig_ = testing::test_rig(SensorKind::kStereo, 320, 240);
+  testing::RenderedScene scene_{rig_, {3, 2, 5}, 21};
+};
+
+/// All that the tracker thread does with a frame, with recorders and trace on: tracked frames, keyframes,
+/// lost frames, the question where it is, and its answer.
+TEST(TrackerThread, NeverAllocates) {
+  if (!testing::allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
+  Walk walk;
+  const Rig& rig = walk.rig();
   EngineOptions options;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   Trace trace;
@@ -48,7 +57,7 @@ TEST(TrackerThread, NeverAllocates) {
   std::vector<ProposalHandle> sent;
   std::optional<RelocalisationAnswer> answer;
   for (int i = 0; i < 36; ++i) {
-    const Frame frame = frame_at(i, i >= 20 && i < 25);
+    const Frame frame = walk.frame(i, i >= 20 && i < 25);
     const std::uint64_t before = allocations();
     FrameRecord record;
     if (answer) tracking.take_answer(*answer);
@@ -80,6 +89,25 @@ TEST(TrackerThread, NeverAllocates) {
   EXPECT_GE(keyframes, 3);
   EXPECT_GE(lost, 3);
   EXPECT_GE(asked, 1);
+}
+
+/// Its first keyframes neither: what their images go to is there when it begins, as in a threaded run. The
+/// listeners are called before and after what is done about a keyframe.
+TEST(DeterministicRun, HasRoomForKeyframesWhenItBegins) {
+  if (!testing::allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
+  Walk walk;
+  EngineOptions options;
+  options.deterministic = true;
+  std::uint64_t before = 0;
+  int keyframes = 0;
+  options.on_pose = [&](const PoseReport&) { before = allocations(); };
+  options.on_frame = [&](const PoseReport& report) {
+    EXPECT_EQ(allocations(), before) << "frame " << report.record.frame_index;
+    keyframes += report.record.keyframe && report.record.frame_index > 0;
+  };
+  const auto run = make_pipeline(walk.rig(), options);
+  for (int i = 0; i < 12; ++i) run->push(walk.frame(i));
+  EXPECT_GE(keyframes, 1);
 }
 
 }  // namespace
