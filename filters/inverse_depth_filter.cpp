@@ -6,6 +6,8 @@
 #include <limits>
 #include <optional>
 
+#include "camera/measurement.hpp"
+
 namespace twofold {
 
 // In units of the point's depth in its anchor frame, h = q x_c = R (x/z, y/z, 1) + q t, nothing is divided by
@@ -67,7 +69,7 @@ std::optional<Innovation> innovation(const Rig& rig, const SE3& T_c_a, const Vec
   const auto p = project_inverse_depth(rig, T_c_a, psi);
   if (!p) return std::nullopt;
   Innovation result{z - p->z_hat, p->J_psi};
-  if (!std::isnan(z.z())) return result;
+  if (has_right(z)) return result;
   result.d.z() = 0;
   result.J.row(2).setZero();
   return result;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/measurement.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "filters/sliding_window_filter.hpp"
 #include "geometry/symmetric_solve.hpp"
@@ -86,7 +87,7 @@ void SlidingWindowFilter::fit_newest_pose(const FilterFrame& frame) {
   std::vector<KnownLandmark> known;
   for (const LandmarkObservation& o : frame.observations) {
     const auto found = index_.find(o.landmark);
-    if (found == index_.end() || std::isnan(o.z.z())) continue;
+    if (found == index_.end() || !has_right(o.z)) continue;
     known.push_back({points_[static_cast<std::size_t>(found->second)], o.z, o.information});
   }
   if (known.size() < 3 && !frame.motion) return;

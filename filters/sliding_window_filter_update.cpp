@@ -4,6 +4,7 @@
 #include <span>
 
 #include "base/median.hpp"
+#include "camera/measurement.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "filters/sliding_window_filter.hpp"
 #include "geometry/cbh.hpp"
@@ -39,7 +40,7 @@ SlidingWindowFilter::WhitenedError SlidingWindowFilter::whitened_error(int pose,
       poses_[static_cast<std::size_t>(pose)].T_c_l * points_[static_cast<std::size_t>(observation.landmark)];
   if (!in_front_of_camera(x_c)) return {};
   const Vector3 r = observation.z - rig_.project(x_c);
-  if (!std::isnan(r.z())) return {r.dot(observation.information * r), 3};
+  if (has_right(r)) return {r.dot(observation.information * r), 3};
   return {r.head<2>().dot(observation.information.topLeftCorner<2, 2>() * r.head<2>()), 2};
 }
 
@@ -56,7 +57,7 @@ SlidingWindowFilter::ObservationTerm SlidingWindowFilter::linearise(int pose,
   term.r = observation.z - rig_.project(x_c);
   Matrix3 J = rig_.project_jacobian(x_lin);
   term.information = observation.information;
-  const int rows = std::isnan(term.r.z()) ? 2 : 3;
+  const int rows = has_right(term.r) ? 3 : 2;
   if (rows == 2) {
     term.r.z() = 0;
     J.row(2).setZero();

@@ -11,7 +11,7 @@ SE3 fit_pose_to_corners(const Rig& rig, const PlaceAppearance& b, const std::vec
   for (const CornerMatch& match : matches) {
     const Eigen::Vector3f& z_b = b.z[static_cast<std::size_t>(match.b)];
     const int level = b.corners[static_cast<std::size_t>(match.b)].level;
-    observations.push_back({match.x_a, z_b, rig.information(z_b, level)});
+    observations.push_back(observe_point(rig, match.x_a, z_b, level));
   }
   const MotionOnlyResult result = optimise_motion(rig, observations, T_b_a, {});
   return result.converged ? result.T_c_ref : T_b_a;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/angles.hpp"
+#include "camera/measurement.hpp"
 #include "loopclosure/corner_grid.hpp"
 #include "loopclosure/corner_match.hpp"
 #include "loopclosure/pose_hypothesis.hpp"
@@ -75,8 +76,7 @@ std::vector<CornerMatch> keep_inliers(const Rig& rig, const PlaceAppearance& b,
     const Vector3 x_b = T_b_a * match.x_a;
     Eigen::Vector3f z_b = b.z[j];
     // A corner without depth in b is judged by its place in the left image alone.
-    if (!std::isfinite(z_b.z()) && in_front_of_camera(x_b))
-      z_b.z() = static_cast<float>(rig.project(x_b).z());
+    if (!has_right(z_b) && in_front_of_camera(x_b)) z_b.z() = static_cast<float>(rig.project(x_b).z());
     const double bound = options.max_error_px * options.max_error_px;
     if (squared_error(rig, x_b, z_b, per_squared_pixel(b.corners[j].level)) <= bound) kept.push_back(match);
   }

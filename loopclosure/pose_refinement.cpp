@@ -58,10 +58,10 @@ void PoseRefinement::search(const GraphSnapshot& graph, KeyframeId place, const 
     const SE3 T_c_a = T_c_k * T_k_w * graph.T_k_w(point.anchor).inverse();
     const auto match = find_point(images, rig_, *point.appearance, point.psi, T_c_a, options);
     if (!match) continue;
-    const Eigen::Vector3f z = match->z.cast<float>();
-    const Eigen::Vector3f of_pixels = rig_.information(z, match->level);
-    const Eigen::Vector3f left = information(graph, id, T_c_k * T_k_w, of_pixels);
-    found_.push_back({T_k_w * graph.position(id), z, left});
+    MotionObservation& found = found_.emplace_back(
+        observe_point(rig_, T_k_w * graph.position(id), match->z.cast<float>(), match->level));
+    const Eigen::Vector3f of_pixels = found.information;
+    const Eigen::Vector3f left = found.information = information(graph, id, T_c_k * T_k_w, of_pixels);
     known_.push_back(std::min(1.0f, left.x() / of_pixels.x() + left.y() / of_pixels.y()));
   }
 }

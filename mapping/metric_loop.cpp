@@ -131,7 +131,7 @@ void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const Frame
     observation.z = match->z.cast<float>();
     observation.level = static_cast<std::uint8_t>(match->level);
     found_.push_back(observation);
-    motion_.push_back({candidate.x_w, observation.z, rig_.information(observation.z, match->level)});
+    motion_.push_back(observe_point(rig_, candidate.x_w, observation.z, match->level));
   }
 }
 

@@ -4,11 +4,14 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "camera/measurement.hpp"
 #include "estimation/motion_only.hpp"
 #include "geometry/absolute_orientation.hpp"
 
 namespace twofold {
 namespace {
+
+constexpr double kCornerSigma = 1;  // of corners on whole pixels, their matches' errors included [px]
 
 /// Cells that hold a track need no other one.
 class Occupancy {
@@ -82,16 +85,15 @@ std::optional<SE3> StructureFilter::estimate_motion(const std::vector<StereoFeat
   report.matches = static_cast<int>(matches.size());
   report.consistent = static_cast<int>(consistent.size());
   if (report.consistent < options_.min_matches) return std::nullopt;
+  Rig corner_rig = rig_;
+  corner_rig.noise.sigma_px = kCornerSigma;
   std::vector<MotionObservation> observations;
   std::vector<Vector3> x_previous, x_current;
   for (const FeatureMatch& match : consistent) {
     const Vector3& z = current[static_cast<std::size_t>(match.current)].z;
     x_previous.push_back(rig_.unproject(previous_[static_cast<std::size_t>(match.previous)].z));
     x_current.push_back(rig_.unproject(z));
-    MotionObservation o;
-    o.x_ref = x_previous.back();
-    o.z = z.cast<float>();
-    observations.push_back(o);
+    observations.push_back(observe_point(corner_rig, x_previous.back(), z.cast<float>(), 0));
   }
   const auto T_start = align_rigid(x_current, x_previous);
   if (!T_start) return std::nullopt;
@@ -168,7 +170,7 @@ void StructureFilter::update(const StructureFrame& report, int found_again) {
       const SE3& T_a_w = anchors_.at(track.anchor_frame);
       const SE3 T_c_a = filter_->newest_T_c_w() * T_a_w.inverse();
       const auto z = measure_track(track, images_, rig_, T_a_w * *x_w, T_c_a, options_);
-      if (!z || std::isnan(z->z()) != std::isnan(track.z.z())) continue;
+      if (!z || has_right(*z) != has_right(track.z)) continue;
       track.z = *z;
       filter_->set_measurement(newest, track.id, *z);
     }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "camera/measurement.hpp"
 #include "imaging/image_buffers.hpp"
 
 namespace twofold {
@@ -79,10 +80,10 @@ void WideSearch::match(const FrameImages& earlier, FrameCorners& corners, const 
     const auto j = static_cast<std::size_t>(nearest.best);
     if (of_corners_[j].best != static_cast<int>(i)) continue;
     const Vector3 z_earlier = measure(earlier, corners, i, search);
-    if (std::isnan(z_earlier.z())) continue;
+    if (!has_right(z_earlier)) continue;
     const Eigen::Vector3f z = measure(*now_, corners_, j, search).cast<float>();
-    if (std::isnan(z.z())) continue;
-    matches_.push_back({rig_.unproject(z_earlier), z, rig_.information(z, corners_.corners[j].level)});
+    if (!has_right(z)) continue;
+    matches_.push_back(observe_point(rig_, rig_.unproject(z_earlier), z, corners_.corners[j].level));
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "tests/numeric_derivative.hpp"
 
@@ -53,6 +54,17 @@ TEST(Pinhole, FindsInViewWhatIsInFrontAndInside) {
   const Vector3 near_rim = kCamera.unproject({5, 100});
   EXPECT_TRUE(kCamera.find_in_view(near_rim, 4));
   EXPECT_FALSE(kCamera.find_in_view(near_rim, 6));
+}
+
+TEST(Measurement, OneOfTheLeftImageAloneHasNoRightCoordinate) {
+  const Rig rig = stereo_rig();
+  Vector3 z = rig.project({0.1, 0.2, 3});
+  EXPECT_TRUE(has_right(z));
+  EXPECT_TRUE(has_right(z.cast<float>()));
+  z.z() = Rig::kNoRight;
+  EXPECT_FALSE(has_right(z));
+  EXPECT_FALSE(has_right(z.cast<float>()));
+  EXPECT_EQ(rig.information(z.cast<float>(), 0).z(), 0);
 }
 
 TEST(MeasurementNoise, FallsByFourALevelAndIsNoneWithoutARightCoordinate) {

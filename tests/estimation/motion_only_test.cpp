@@ -45,6 +45,22 @@ Scene make_scene(int count, double noise, double outliers, double missing_right,
   return scene;
 }
 
+TEST(MotionOnly, APointsMeasurementWeighsAsTheRigsNoiseSays) {
+  Rig rig;
+  rig.noise.sigma_px = 0.7;
+  const Eigen::Vector3f z(300, 200, 290);
+  const MotionObservation fine = observe_point(rig, {1, 2, 3}, z, 0),
+                          coarse = observe_point(rig, {1, 2, 3}, z, 2);
+  EXPECT_EQ(fine.x_ref, Vector3(1, 2, 3));
+  EXPECT_EQ(fine.z, z);
+  EXPECT_TRUE(fine.inlier);
+  EXPECT_TRUE(fine.information.isApprox(Eigen::Vector3f::Constant(1 / 0.49F)));
+  EXPECT_TRUE(coarse.information.isApprox(fine.information / 16));
+  const MotionObservation left = observe_point(rig, {1, 2, 3}, {300, 200, std::nanf("")}, 0);
+  EXPECT_EQ(left.information.x(), fine.information.x());
+  EXPECT_EQ(left.information.z(), 0);
+}
+
 TEST(MotionOnly, FindsTruthForAnyCount) {
   for (const int count : {3, 4, 5, 7, 8, 50, 201}) {
     for (const double missing_right : {0.0, 0.5, 1.0}) {

@@ -29,7 +29,7 @@ class PoseConsensusTest : public ::testing::Test {
     std::uniform_real_distribution<double> u(20, 620), v(20, 460), depth(1, 5);
     const Vector3 x_c = rig_.camera.unproject(Vector2(u(random_), v(random_))) * depth(random_);
     const Eigen::Vector3f z = rig_.project(x_c).cast<float>();
-    return {T_c_ref_.inverse() * x_c, z, rig_.information(z, 0)};
+    return observe_point(rig_, T_c_ref_.inverse() * x_c, z, 0);
   }
   std::vector<MotionObservation> matches(int right, int wrong) {
     std::vector<MotionObservation> all;

@@ -38,7 +38,7 @@ class PoseUncertaintyTest : public ::testing::Test {
       const Vector3& error = shared[static_cast<int>(z.y()) / 120][static_cast<int>(z.x() * 6) / 640];
       z += error + own * Vector3(normal(random_), normal(random_), normal(random_));
       const Eigen::Vector3f measured = z.cast<float>();
-      observations_.push_back({x, measured, rig_.information(measured, 0)});
+      observations_.push_back(observe_point(rig_, x, measured, 0));
     }
   }
   MotionOnlyResult solve() { return optimise_motion(rig_, observations_, SE3(), options_); }
@@ -127,7 +127,7 @@ TEST_F(PoseUncertaintyTest, OnePointThatThePoseHangsOnDoesNotMakeItExact) {
       const Vector3 x = rig_.camera.unproject(Vector2(u(random_), v(random_))) * 60;
       const Vector3 z = rig_.project(x) + Vector3(noise(random_), noise(random_), noise(random_));
       const Eigen::Vector3f measured = z.cast<float>();
-      observations_.push_back({x, measured, rig_.information(measured, 0)});
+      observations_.push_back(observe_point(rig_, x, measured, 0));
     }
   };
   for (int frame = 0; frame < 30; ++frame) {
@@ -137,7 +137,7 @@ TEST_F(PoseUncertaintyTest, OnePointThatThePoseHangsOnDoesNotMakeItExact) {
   make_far_frame();
   const Vector3 near(0.4, 0.2, 1.5), seen = near + Vector3(0.1, -0.05, 0);
   const Eigen::Vector3f z = rig_.project(seen).cast<float>();
-  observations_.push_back({near, z, rig_.information(z, 0)});
+  observations_.push_back(observe_point(rig_, near, z, 0));
   const MotionOnlyResult motion = solve();
   const Vector6 error = motion.T_c_ref.log();
   ASSERT_GT(error.head<3>().norm(), 0.05);

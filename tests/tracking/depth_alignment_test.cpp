@@ -50,7 +50,7 @@ class DepthAlignmentTest : public ::testing::Test {
       const Vector3 x_c = rig_.camera.unproject(uv) * scene_.depth(T_c_w, uv);
       Eigen::Vector3f z = rig_.project(x_c).cast<float>();
       for (int k = 0; k < 3; ++k) z[k] += noise(random_);
-      found.push_back({T_ref_w * (T_c_w.inverse() * x_c), z, rig_.information(z, 0)});
+      found.push_back(observe_point(rig_, T_ref_w * (T_c_w.inverse() * x_c), z, 0));
     }
     return found;
   }

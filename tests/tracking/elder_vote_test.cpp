@@ -19,7 +19,7 @@ class ElderVoteTest : public ::testing::Test {
     for (int n = 0; n < count; ++n) {
       const Vector3 x(side(random_), side(random_), depth(random_));
       const Eigen::Vector3f z = rig_.project(x + moved).cast<float>();
-      observations_.push_back({x, z, rig_.information(z, 0)});
+      observations_.push_back(observe_point(rig_, x, z, 0));
       anchors_.push_back(anchor);
     }
   }
@@ -127,7 +127,7 @@ TEST_F(ElderVoteTest, MistakesAmongFarEldersDoNotOverruleWhatTheMostOfThemSee) {
       const Vector3 x(z * side(random_), z * side(random_), z);
       Eigen::Vector3f measured = rig_.project(x).cast<float>();
       if (n < kMistakes) measured.y() += x.x() > 0 ? 1.5F : -1.5F;
-      observations_.push_back({x, measured, rig_.information(measured, 0)});
+      observations_.push_back(observe_point(rig_, x, measured, 0));
       anchors_.push_back(KeyframeId{0});
     }
     add(80, KeyframeId{7}, Vector3::Zero());

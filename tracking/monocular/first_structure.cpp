@@ -67,6 +67,7 @@ class Attempt {
         last_(bearings(rig.camera, views.last)) {
     rig_.kind = SensorKind::kMono;
     rig_.baseline = 0;
+    rig_.noise.sigma_px = options.sigma_px;
   }
 
   tl::expected<FirstStructure, LostCause> run() {
@@ -219,7 +220,6 @@ class Attempt {
     Trial trial{{}, inliers_};
     AnchoredViews& views = trial.views;
     views.rig = rig_;
-    views.rig.noise.sigma_px = options_.sigma_px;
     std::vector<char> usable;  // of the inliers, in step: its depth is known
     int in_front = 0, behind = 0;
     for (const int i : inliers_) {
@@ -264,12 +264,9 @@ class Attempt {
     std::vector<MotionObservation> observations;
     for (std::size_t k = 0; k < inliers_.size(); ++k) {
       if (!usable[k]) continue;
-      MotionObservation o;
-      o.x_ref = from_inverse_depth(points[k].psi);
-      o.z << pixels[static_cast<std::size_t>(inliers_[k])].cast<float>(), 0;
-      o.information.setConstant(static_cast<float>(1 / (options_.sigma_px * options_.sigma_px)));
-      o.information.z() = 0;
-      observations.push_back(o);
+      const Vector2& uv = pixels[static_cast<std::size_t>(inliers_[k])];
+      const Vector3 z(uv.x(), uv.y(), Rig::kNoRight);
+      observations.push_back(observe_point(rig_, from_inverse_depth(points[k].psi), z.cast<float>(), 0));
     }
     return optimise_motion(rig_, observations, start, {.inlier_chi2_mono = kOutlierChi2}).T_c_ref;
   }

@@ -33,6 +33,7 @@ MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
       options_(options),
       starter_(rig, with_cells_of_one_camera(rig, options)),
       candidates_(kCandidates) {
+  rig_.noise.sigma_px = options.first_structure.sigma_px;
   const auto corners = static_cast<std::size_t>(options.max_new_points);
   for (StartCandidate& candidate : candidates_) {
     allocate_images(rig, candidate.images);
@@ -126,16 +127,13 @@ void MonocularStart::remember_path(std::int64_t frame_index, StartCandidate& can
 
 std::vector<EarlierFrame> MonocularStart::earlier_frames(const MonocularStartResult& start) const {
   const StartCandidate& first = *start.first;
-  const double sigma_px = options_.first_structure.sigma_px;
   std::vector<EarlierFrame> frames{{first.frame_index, SE3()}};
   for (const PathFrame& frame : first.path) {
     std::vector<MotionObservation> observations;
     for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
-      MotionObservation& o = observations.emplace_back();
-      o.x_ref = from_inverse_depth(start.structure.psi[n]);
-      o.z << frame.places[static_cast<std::size_t>(start.structure.corners[n])], 0;
-      o.information.setConstant(static_cast<float>(1 / (sigma_px * sigma_px)));
-      o.information.z() = 0;
+      const Eigen::Vector2f& uv = frame.places[static_cast<std::size_t>(start.structure.corners[n])];
+      const Eigen::Vector3f z(uv.x(), uv.y(), static_cast<float>(Rig::kNoRight));
+      observations.push_back(observe_point(rig_, from_inverse_depth(start.structure.psi[n]), z, 0));
     }
     const MotionOnlyResult motion = optimise_motion(rig_, observations, frames.back().T_c_first, {});
     if (motion.inliers < kPlacedShare * static_cast<double>(observations.size())) continue;

@@ -81,7 +81,7 @@ void Feeder::track(const GraphSnapshot& graph) {
     MotionObservation& motion = seen.emplace_back();
     motion.x_ref = x_ref;
     motion.z = observation.z;
-    if (mono) motion.z.z() = motion.information.z() = 0;
+    if (mono) motion.information.z() = 0;
   };
   for (const Observation& observation : proposal_.observations) {
     add(T_ref_w * graph.position(observation.point), observation);
