@@ -135,21 +135,11 @@ std::vector<KeyframeId> cull_redundant_keyframes(GraphWriter& writer, const Doub
   return culled;
 }
 
-bool PointCuller::in_view(const GraphSnapshot& graph, const MapPoint& point, PointId id,
-                          KeyframeId newest) const {
-  const SE3& T_k_w = graph.keyframe(newest).T_k_w;
-  const SE3 T_w_a = graph.T_k_w(point.anchor).inverse();
-  const Vector3 x_w = graph.position(id);
-  const Vector3 x_k = T_k_w * x_w;
-  if (!rig_.camera.find_in_view(x_k, options_.view_border_px)) return false;
-  const Vector3 from_anchor = x_w - T_w_a.translation();
-  const Vector3 from_here = x_w - T_k_w.inverse().translation();
-  const auto [cosine, ratio] = ViewChange::between(from_anchor, from_here);
-  return ratio < options_.max_scale_change && ratio * options_.max_scale_change > 1 &&
-         cosine > options_.min_view_cosine;
-}
-
 int PointCuller::cull(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const {
+  const SimilarView view(rig_.camera, writer.graph().keyframe(newest).T_k_w,
+                         {.border_px = options_.view_border_px,
+                          .min_cosine = options_.min_view_cosine,
+                          .max_scale_change = options_.max_scale_change});
   int culled = 0;
   for (const PointId id : points) {
     const MapPoint& point = writer.graph().point(id);
@@ -158,7 +148,8 @@ int PointCuller::cull(GraphWriter& writer, KeyframeId newest, std::span<const Po
       if (point.misses > 0) writer.set_misses(id, 0);
       continue;
     }
-    if (!in_view(writer.graph(), point, id, newest)) continue;
+    const Vector3 anchor_w = writer.graph().T_k_w(point.anchor).inverse().translation();
+    if (!view.find(writer.graph().position(id), anchor_w)) continue;
     const int misses = point.misses + 1;
     if (misses < options_.max_misses) {
       writer.set_misses(id, static_cast<std::uint8_t>(misses));

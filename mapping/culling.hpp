@@ -46,9 +46,6 @@ class PointCuller {
   int cull(GraphWriter& writer, KeyframeId newest, std::span<const PointId> points) const;
 
  private:
-  [[nodiscard]] bool in_view(const GraphSnapshot& graph, const MapPoint& point, PointId id,
-                             KeyframeId newest) const;
-
   Rig rig_;
   CullingOptions options_;
 };

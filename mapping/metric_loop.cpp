@@ -88,6 +88,8 @@ void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
   near_points_.clear();
   candidates_.clear();
   visible_points(graph, near_, visited_, near_points_);
+  const SimilarView view(rig_.camera, graph.keyframe(reference_).T_k_w,
+                         {.border_px = options_.border_px, .min_cosine = options_.min_view_cosine});
   const int cells = options_.columns * options_.rows;
   const int per_cell = (options_.max_searches + cells - 1) / cells;
   taken_.assign(static_cast<std::size_t>(cells), 0);
@@ -96,7 +98,7 @@ void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
       if (!visited_.insert(index(observation.point))) continue;
       const MapPoint& point = graph.point(observation.point);
       const Vector3 x_w = graph.position(observation.point);
-      const auto uv = find_in_view(graph, point, x_w);
+      const auto uv = view.find(x_w, graph.T_k_w(point.anchor).inverse().translation());
       if (!uv) continue;
       const int column = static_cast<int>(uv->x() * options_.columns / rig_.camera.width);
       const int row = static_cast<int>(uv->y() * options_.rows / rig_.camera.height);
@@ -106,16 +108,6 @@ void MetricLoopCloser::collect_candidates(const GraphSnapshot& graph) {
       candidates_.push_back({observation.point, x_w});
     }
   }
-}
-
-/// Pixel of a point that should look in the reference keyframe much as it did in its anchor.
-std::optional<Vector2> MetricLoopCloser::find_in_view(const GraphSnapshot& graph, const MapPoint& point,
-                                                      const Vector3& x_w) const {
-  const SE3& T_ref_w = graph.keyframe(reference_).T_k_w;
-  const Vector3 from_anchor = x_w - graph.T_k_w(point.anchor).inverse().translation();
-  const Vector3 from_here = x_w - T_ref_w.inverse().translation();
-  if (ViewChange::between(from_anchor, from_here).cosine < options_.min_view_cosine) return std::nullopt;
-  return rig_.camera.find_in_view(T_ref_w * x_w, options_.border_px);
 }
 
 void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const FrameImages& images) {

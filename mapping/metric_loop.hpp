@@ -57,8 +57,6 @@ class MetricLoopCloser {
   void split_neighbourhoods(const GraphSnapshot& graph, const DoubleWindow& window);
   void measure_ways(const GraphSnapshot& graph, const DoubleWindow& window, std::size_t count);
   void collect_candidates(const GraphSnapshot& graph);
-  [[nodiscard]] std::optional<Vector2> find_in_view(const GraphSnapshot& graph, const MapPoint& point,
-                                                    const Vector3& x_w) const;
   void search_candidates(const GraphSnapshot& graph, const FrameImages& images);
   [[nodiscard]] std::optional<SE3> estimate_pose(const SE3& T_ref_w);
   void prune(const SE3& T_loop_w);

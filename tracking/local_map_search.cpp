@@ -65,17 +65,13 @@ void LocalMapSearch::run(const FrameImages& images, const SE3& T_c_ref, double r
 
 void LocalMapSearch::select_candidates(const SE3& T_c_ref, TrackResult& result, Quadtree& candidates) const {
   std::size_t reference_points_in_view = 0;
-  const Matrix3 R_c_ref = T_c_ref.rotation();
+  const SimilarView view(rig_.camera, T_c_ref,
+                         {.border_px = options_.border_px, .min_cosine = options_.min_view_cosine});
   const auto points = local_map_.points();
   const auto [reference_begin, reference_end] = local_map_.reference_range();
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vector3 x_c = R_c_ref * points[i].x_ref + T_c_ref.translation();
-    const auto uv = rig_.camera.find_in_view(x_c, options_.border_px);
+    const auto uv = view.find(points[i].x_ref, local_map_.T_ref_a(points[i]).translation());
     if (!uv || fixed_.covers(*uv)) continue;
-    const SE3& T_ref_a = local_map_.T_ref_a(points[i]);
-    const Vector3 from_anchor = points[i].x_ref - T_ref_a.translation();
-    const Vector3 from_here = R_c_ref.transpose() * x_c;
-    if (ViewChange::between(from_anchor, from_here).cosine < options_.min_view_cosine) continue;
     if (i >= reference_begin && i < reference_end) ++reference_points_in_view;
     candidates.insert(uv->cast<float>(), static_cast<std::uint32_t>(i));
   }
