@@ -36,6 +36,11 @@ OptionCheck& OptionCheck::that(bool holds, std::string_view field, std::string_v
   return *this;
 }
 
+OptionCheck& OptionCheck::rule(bool holds, std::string_view sentence) {
+  if (!holds && reason_.empty()) reason_ = sentence;
+  return *this;
+}
+
 OptionCheck& OptionCheck::nested(std::string_view field, const std::string& reason) {
   if (!reason.empty() && reason_.empty()) reason_ = std::string(field).append(".").append(reason);
   return *this;

@@ -19,6 +19,8 @@ class OptionCheck {
   OptionCheck& share(std::string_view field, double value);
   /// Any other rule, in words after "must be".
   OptionCheck& that(bool holds, std::string_view field, std::string_view rule, double value);
+  /// A rule about options of which a number says nothing: `sentence` is what is wrong, when it does not hold.
+  OptionCheck& rule(bool holds, std::string_view sentence);
   /// Options within these: `reason` is why they are invalid, if they are.
   OptionCheck& nested(std::string_view field, const std::string& reason);
 

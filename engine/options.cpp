@@ -8,6 +8,10 @@ std::string CheckpointOptions::invalid_reason() const {
   return OptionCheck().at_least("period", period, 0).reason();
 }
 
+std::string RunLogOptions::invalid_reason() const {
+  return OptionCheck().at_least("frames_in_memory", static_cast<double>(frames_in_memory), 1).reason();
+}
+
 std::string EngineOptions::invalid_reason() const {
   OptionCheck check;
   check.nested("tracker", tracker.invalid_reason())
@@ -16,7 +20,7 @@ std::string EngineOptions::invalid_reason() const {
       .nested("checkpoint", checkpoint.invalid_reason())
       .nested("pacing", pacing.invalid_reason())
       .nested("effort", effort.invalid_reason())
-      .at_least("logs.frames_in_memory", static_cast<double>(logs.frames_in_memory), 1)
+      .nested("logs", logs.invalid_reason())
       .at_least("frame_slots", static_cast<double>(frame_slots), 1)
       .within("proposal_slots", static_cast<double>(proposal_slots), 1, 16);
   check.that(!stepped || !deterministic, "stepped", "false where deterministic is true", 1)

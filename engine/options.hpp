@@ -53,6 +53,9 @@ struct RunLogOptions {
   std::filesystem::path folder;
   /// Without a folder: at least so many of the newest frames are kept, >= 1; 176 bytes each.
   std::size_t frames_in_memory = std::numeric_limits<std::size_t>::max();
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct EngineOptions {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/option_check.hpp"
 #include "calibration/calibrate.hpp"
 #include "calibration/view_collector.hpp"
 #include "io/files/calibration_file.hpp"
@@ -44,14 +45,9 @@ double focal_std(const CalibratedCamera& camera) {
 }
 
 Board board_of(const BoardCalibrator::Options& options) {
-  const auto board = parse_board(options.board);
-  if (!board) throw std::invalid_argument("options.board: " + board.error());
-  const auto expect = [](bool rule, const char* what) {
-    if (!rule) throw std::invalid_argument(what);
-  };
-  expect(options.width > 0 && options.height > 0, "options.width and options.height must be > 0");
-  expect(options.views >= 10 && options.views <= 200, "options.views must be between 10 and 200");
-  return *board;
+  if (const std::string why = options.invalid_reason(); !why.empty())
+    throw std::invalid_argument("options." + why);
+  return *parse_board(options.board);
 }
 
 ViewGuideOptions guide_options(int views) {
@@ -71,6 +67,16 @@ cv::Mat image_of(const char* name, const FrameView& frame, const ImageView& view
 }
 
 }  // namespace
+
+std::string BoardCalibrator::Options::invalid_reason() const {
+  const auto its_board = parse_board(board);
+  return OptionCheck()
+      .rule(its_board.has_value(), its_board ? "" : "board: " + its_board.error())
+      .at_least("width", width, 1)
+      .at_least("height", height, 1)
+      .within("views", views, 10, 200)
+      .reason();
+}
 
 struct TWOFOLD_HIDDEN BoardCalibrator::Impl {
   explicit Impl(const Options& given)

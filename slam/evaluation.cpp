@@ -1,10 +1,11 @@
 #include "twofold/evaluation.hpp"
-#include "base/angles.hpp"
 
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "base/angles.hpp"
+#include "base/option_check.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/trajectory_file.hpp"
 #include "slam/conversions.hpp"
@@ -42,11 +43,18 @@ void save_trajectory(const std::filesystem::path& file, const std::vector<Stampe
   write_tum_trajectory(file, to_trajectory(trajectory));
 }
 
+std::string ComparisonOptions::invalid_reason() const {
+  constexpr double kLongest = 9e9;  // [s] that fit into nanoseconds of 64 bit
+  return OptionCheck()
+      .that(max_time_difference_s > 0 && max_time_difference_s <= kLongest, "max_time_difference_s",
+            "in (0, 9e9]", max_time_difference_s)
+      .reason();
+}
+
 TrajectoryError compare(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truth,
                         const ComparisonOptions& options) {
-  constexpr double kLongest = 9e9;  // [s] that fit into nanoseconds of 64 bit
-  if (!(options.max_time_difference_s > 0 && options.max_time_difference_s <= kLongest))
-    throw std::invalid_argument("options.max_time_difference_s must be > 0 and <= 9e9");
+  if (const std::string why = options.invalid_reason(); !why.empty())
+    throw std::invalid_argument("options." + why);
   const auto farthest = static_cast<std::int64_t>(options.max_time_difference_s * 1e9);
   EvaluationOptions inside;
   inside.alignment = alignment_of(options.align);

@@ -3,14 +3,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "base/option_check.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 
 namespace twofold {
 namespace {
-
-void expect(bool rule, const char* what) {
-  if (!rule) throw std::invalid_argument(what);
-}
 
 /// That of the file that a run is going to write: known now, not after an hour of mapping.
 bool has_folder(const std::filesystem::path& file) {
@@ -18,47 +15,41 @@ bool has_folder(const std::filesystem::path& file) {
   return folder.empty() || std::filesystem::is_directory(folder);
 }
 
-void expect_sensible_pace(const SlamOptions& options) {
-  const bool one_thread = options.mode == RunMode::kDeterministic || options.mode == RunMode::kReplay;
-  expect(!options.live || !one_thread, "options.live needs RunMode::kThreaded or kStepped");
-  expect(std::isfinite(options.speed) && options.speed >= 0, "options.speed must be finite and >= 0");
-  expect(options.speed == 0 || (options.mode == RunMode::kThreaded && !options.live),
-         "options.speed needs RunMode::kThreaded, without options.live");
-  expect(!options.late || options.live || options.speed > 0, "options.late needs options.live or speed");
+void check_pace(const SlamOptions& o, OptionCheck& check) {
+  const bool one_thread = o.mode == RunMode::kDeterministic || o.mode == RunMode::kReplay;
+  check.rule(!o.live || !one_thread, "live needs RunMode::kThreaded or kStepped")
+      .that(std::isfinite(o.speed) && o.speed >= 0, "speed", "finite and >= 0", o.speed)
+      .rule(o.speed == 0 || (o.mode == RunMode::kThreaded && !o.live),
+            "speed needs RunMode::kThreaded, without options.live")
+      .rule(!o.late || o.live || o.speed > 0, "late needs options.live or speed");
 }
 
-void expect_sensible_threads(const SlamOptions& options) {
-  const auto is_cpu = [](const std::optional<int>& cpu) { return !cpu || *cpu >= 0; };
-  expect(is_cpu(options.tracker_cpu), "options.tracker_cpu must be >= 0");
-  expect(is_cpu(options.mapper_cpu), "options.mapper_cpu must be >= 0");
-  expect(is_cpu(options.loop_closer_cpu), "options.loop_closer_cpu must be >= 0");
-  const auto& priority = options.fifo_priority;
-  expect(!priority || (*priority >= 1 && *priority <= 99), "options.fifo_priority must be in [1, 99]");
+void check_threads(const SlamOptions& o, OptionCheck& check) {
+  if (o.tracker_cpu) check.at_least("tracker_cpu", *o.tracker_cpu, 0);
+  if (o.mapper_cpu) check.at_least("mapper_cpu", *o.mapper_cpu, 0);
+  if (o.loop_closer_cpu) check.at_least("loop_closer_cpu", *o.loop_closer_cpu, 0);
+  if (o.fifo_priority) check.within("fifo_priority", *o.fifo_priority, 1, 99);
 }
 
-void expect_sensible(const SlamOptions& options) {
-  expect(options.frame_buffers >= 2 && options.frame_buffers <= 65536,
-         "options.frame_buffers must be in [2, 65536]");
-  expect_sensible_threads(options);
-  expect(options.kept_frames >= 1, "options.kept_frames must be >= 1");
-  expect(options.run_folder.empty() || std::filesystem::is_directory(options.run_folder),
-         "options.run_folder must be a folder");
-  expect_sensible_pace(options);
-  expect(options.schedule.empty() == (options.mode != RunMode::kReplay),
-         "options.schedule and RunMode::kReplay belong together");
+void check_files(const SlamOptions& o, OptionCheck& check) {
   std::error_code ignored;
-  expect(options.run_folder.empty() ||
-             !std::filesystem::equivalent(options.schedule, options.run_folder / "schedule.log", ignored),
-         "options.schedule is in options.run_folder, where the replay would overwrite it");
-  expect(!options.localise_only || !options.map.empty(), "options.localise_only needs options.map");
-  expect(options.map.empty() || options.places,
-         "options.map needs options.places, by which the camera finds itself in the map");
-  expect(options.checkpoint.empty() || options.mode != RunMode::kStepped,
-         "options.checkpoint is not for RunMode::kStepped: call save_map");
-  expect(options.checkpoint_period > 0 && options.checkpoint_period <= 1e9,
-         "options.checkpoint_period must be > 0 and <= 1e9");
-  expect(has_folder(options.checkpoint), "options.checkpoint is in a folder that is not there");
-  expect(has_folder(options.trace), "options.trace is in a folder that is not there");
+  check
+      .rule(o.run_folder.empty() || std::filesystem::is_directory(o.run_folder),
+            "run_folder must be a folder")
+      .rule(o.schedule.empty() == (o.mode != RunMode::kReplay),
+            "schedule and RunMode::kReplay belong together")
+      .rule(o.run_folder.empty() ||
+                !std::filesystem::equivalent(o.schedule, o.run_folder / "schedule.log", ignored),
+            "schedule is in options.run_folder, where the replay would overwrite it")
+      .rule(!o.localise_only || !o.map.empty(), "localise_only needs options.map")
+      .rule(o.map.empty() || o.places,
+            "map needs options.places, by which the camera finds itself in the map")
+      .rule(o.checkpoint.empty() || o.mode != RunMode::kStepped,
+            "checkpoint is not for RunMode::kStepped: call save_map")
+      .that(o.checkpoint_period > 0 && o.checkpoint_period <= 1e9, "checkpoint_period", "in (0, 1e9]",
+            o.checkpoint_period)
+      .rule(has_folder(o.checkpoint), "checkpoint is in a folder that is not there")
+      .rule(has_folder(o.trace), "trace is in a folder that is not there");
 }
 
 LatePolicy late_policy(const SlamOptions& options) {
@@ -81,8 +72,21 @@ Schedule schedule_to_replay(const SlamOptions& options) {
   return *std::move(schedule);
 }
 
+std::string SlamOptions::invalid_reason() const {
+  OptionCheck check;
+  check.within("frame_buffers", frame_buffers, 2, 65536)
+      .at_least("kept_frames", static_cast<double>(kept_frames), 1)
+      .at_least("inner_window", inner_window, 1)
+      .at_least("outer_window", outer_window, 0);
+  check_threads(*this, check);
+  check_pace(*this, check);
+  check_files(*this, check);
+  return check.reason();
+}
+
 EngineOptions engine_options(const SlamOptions& options) {
-  expect_sensible(options);
+  if (const std::string why = options.invalid_reason(); !why.empty())
+    throw std::invalid_argument("options." + why);
   EngineOptions engine;
   engine.deterministic = options.mode == RunMode::kDeterministic;
   engine.stepped = options.mode == RunMode::kStepped;
@@ -90,8 +94,6 @@ EngineOptions engine_options(const SlamOptions& options) {
   engine.localise_only = options.localise_only;
   engine.mapper.inner_window = options.inner_window;
   engine.mapper.outer_window = options.outer_window;
-  if (const std::string why = engine.mapper.invalid_reason(); !why.empty())
-    throw std::invalid_argument("options." + why);
   engine.frame_slots = static_cast<std::size_t>(options.frame_buffers);
   engine.logs.folder = options.run_folder;
   engine.logs.frames_in_memory = static_cast<std::size_t>(options.kept_frames);

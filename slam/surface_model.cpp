@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
+#include "base/option_check.hpp"
 #include "slam/conversions.hpp"
 #include "slam/frame_pixels.hpp"
 #include "slam/surface_pieces.hpp"
@@ -24,15 +25,12 @@ Rig depth_rig(const CameraRig& rig) {
 }
 
 SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& options) {
+  if (const std::string why = options.invalid_reason(); !why.empty())
+    throw std::invalid_argument("options." + why);
   SurfaceOptions surface;
   surface.voxel = options.voxel;
   surface.max_depth = options.max_depth;
   surface.depth_noise = usual_depth_noise(rig);
-  if (const std::string reason = surface.invalid_reason(); !reason.empty())
-    throw std::invalid_argument("options: " + reason);
-  if (!(options.max_free_depth >= 0))
-    throw std::invalid_argument("options: max_free_depth must be at least 0");
-  if (!(options.nearest_stereo > 0)) throw std::invalid_argument("options: nearest_stereo must be above 0");
   return surface;
 }
 
@@ -48,6 +46,15 @@ cv::Mat colour_of(const ImageView& view) {
 }
 
 }  // namespace
+
+std::string SurfaceModelOptions::invalid_reason() const {
+  return OptionCheck()
+      .within("voxel", voxel, 1e-4, 10)
+      .at_least("max_depth", max_depth, 0)
+      .at_least("max_free_depth", max_free_depth, 0)
+      .above("nearest_stereo", nearest_stereo, 0)
+      .reason();
+}
 
 struct SurfaceModel::Impl {
   Impl(const Rig& its_rig, const SurfaceModelOptions& its_options)

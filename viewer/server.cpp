@@ -21,6 +21,7 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 
+#include "base/check.hpp"
 #include "twofold/viewer.hpp"
 #include "viewer/door.hpp"
 #include "viewer/page_files.hpp"
@@ -268,6 +269,7 @@ std::string machine_name() {
 }
 
 tcp::acceptor listen(asio::io_context& context, const ViewServerOptions& options) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "server options");
   const auto fail = [&](const Error& error) {
     throw std::runtime_error(fmt::format("{}, port {}: {}", options.bind, options.port, error.message()));
   };
@@ -277,8 +279,6 @@ tcp::acceptor listen(asio::io_context& context, const ViewServerOptions& options
     throw std::runtime_error(
         fmt::format("{}: an address of this machine is needed, such as 127.0.0.1, or 0.0.0.0 for all of them",
                     options.bind));
-  if (options.port < 0 || options.port > 65535)
-    throw std::runtime_error(fmt::format("port {}: ports are 0 to 65535", options.port));
   const tcp::endpoint endpoint(address, static_cast<std::uint16_t>(options.port));
   tcp::acceptor acceptor(context);
   acceptor.open(endpoint.protocol(), error);

@@ -19,6 +19,9 @@ struct ViewServerOptions {
   int port = 0;     ///< 0: any that is free
   std::filesystem::path secrets = {};                                ///< ViewerOptions::secrets
   std::chrono::milliseconds request_time = std::chrono::seconds(5);  ///< for a request to come in
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Serves page and scene over HTTP and WebSocket to those who know the token. One thread does everything,
@@ -30,8 +33,8 @@ struct ViewServerOptions {
 /// out. What exceeds a bound is refused, or its connection closed.
 class ViewServer {
  public:
-  /// Listens from here on. Throws std::runtime_error when the address cannot be had, or the program was built
-  /// without the page (no_server.cpp).
+  /// Listens from here on. Options must be valid. Throws std::runtime_error when the address cannot be had,
+  /// or the program was built without the page (no_server.cpp).
   ViewServer(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title);
   ~ViewServer();
   ViewServer(const ViewServer&) = delete;

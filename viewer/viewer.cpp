@@ -78,6 +78,12 @@ HeldImage own_copy(std::int64_t frame, const ImageView& image) {
           pixels};
 }
 
+const ViewerOptions& valid(const ViewerOptions& options) {
+  if (const std::string why = options.invalid_reason(); !why.empty())
+    throw std::invalid_argument("options." + why);
+  return options;
+}
+
 ViewTitle title_of(const CameraRig& rig, const ViewerOptions& options) {
   ViewTitle title;
   title.title = options.title;
@@ -152,7 +158,7 @@ class TWOFOLD_HIDDEN Viewer::Impl {
  public:
   Impl(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options)
       : map_(std::move(map)),
-        options_(options),
+        options_(valid(options)),
         title_(title_of(rig, options)),
         keyframe_images_(find_images(map_, options_)),
         truth_(options.truth, options.truth_t_ns, !title_.metres),

@@ -134,7 +134,7 @@ LiveView::LiveView(const ViewArguments& arguments, const std::string& title,
   if (images) viewer.recorded_image = [images](std::int64_t t_ns) { return viewed_image(images(t_ns)); };
   try {
     viewer_ = std::make_unique<Viewer>(to_camera_rig(rig_), newest_map, viewer);
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
     throw IoError("--view", error.what());
   }
   listen(options);

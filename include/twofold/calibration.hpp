@@ -67,6 +67,9 @@ class TWOFOLD_API BoardCalibrator {
     bool stereo = false;        ///< the board is looked for in both images
     bool live = false;          ///< somebody moves the board: views are taken while it rests
     int views = 20;             ///< different ones that are wanted, 10 to 200
+
+    /// Empty when valid; otherwise names the field, the rule and, where it is a number, the value.
+    [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
   };
 
   /// Throws std::invalid_argument naming the option that makes no sense.

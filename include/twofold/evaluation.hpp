@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "twofold/source.hpp"
@@ -21,6 +22,9 @@ enum class AlignBy : std::uint8_t { kNothing, kRigidMotion, kSimilarity };
 struct ComparisonOptions {
   AlignBy align = AlignBy::kRigidMotion;  ///< how the estimate is brought onto the truth first
   double max_time_difference_s = 0.01;    ///< between a pose and the true one nearest in time, in (0, 9e9]
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
 };
 
 /// How far an estimate is from the truth.

@@ -102,6 +102,10 @@ struct SlamOptions {
   /// the map it saw, to be opened in ui.perfetto.dev. The newest 262,144 spans and values a thread, 6 MiB.
   /// Empty: none.
   std::filesystem::path trace = {};
+
+  /// Empty when valid; otherwise names the field, the rule and, where it is a number, the value. Folders that
+  /// files are to be written into are looked for.
+  [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
 };
 
 enum class PushStatus : std::uint8_t {

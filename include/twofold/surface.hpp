@@ -19,6 +19,9 @@ struct SurfaceModelOptions {
   double max_free_depth = 0;
   double nearest_stereo = 0.4;  ///< stereo: the nearest depth that is looked for [m] > 0; the nearer, the
                                 ///< longer `add` takes
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
 };
 
 enum class SpaceState : std::uint8_t {

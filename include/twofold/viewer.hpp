@@ -61,6 +61,9 @@ struct ViewerOptions {
   /// asked on the viewer's thread, four times a second at most. What it throws means that there is none.
   /// Empty: no keyframe has one.
   std::function<ViewedImage(std::int64_t t_ns)> recorded_image = {};
+
+  /// Empty when valid; otherwise names the field, the rule and, where it is a number, the value.
+  [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
 };
 
 /// Shows a run in a browser while it runs: map, windows, path, events, times (docs/viewer.md).
@@ -94,7 +97,8 @@ struct ViewerOptions {
 class TWOFOLD_API Viewer {
  public:
   /// @param map  asked for the newest map now and then, by the viewer's thread; may be empty
-  /// Throws std::runtime_error when the port is not to be had, or the library was built without the page.
+  /// Throws std::invalid_argument naming the option that makes no sense, std::runtime_error when the port is
+  /// not to be had, or the library was built without the page.
   Viewer(const CameraRig& rig, std::function<MapSnapshot()> map, const ViewerOptions& options = {});
   /// Finishes.
   ~Viewer();

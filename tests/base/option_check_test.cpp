@@ -28,6 +28,12 @@ TEST(OptionCheck, NamesWhereNestedOptionsAre) {
   EXPECT_EQ(OptionCheck().nested("search", "").reason(), "");
 }
 
+TEST(OptionCheck, SaysASentenceWhereANumberSaysNothing) {
+  EXPECT_EQ(OptionCheck().rule(true, "a needs b").at_least("c", 0, 1).reason(), "c must be >= 1, is 0");
+  EXPECT_EQ(OptionCheck().rule(false, "a needs b").at_least("c", 0, 1).reason(), "a needs b");
+  EXPECT_EQ(OptionCheck().at_least("c", 0, 1).rule(false, "a needs b").reason(), "c must be >= 1, is 0");
+}
+
 TEST(OptionCheck, NanKeepsNoRule) {
   EXPECT_NE(OptionCheck().at_least("a", kNan, 0).reason(), "");
   EXPECT_NE(OptionCheck().above("a", kNan, 0).reason(), "");

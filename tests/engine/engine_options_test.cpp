@@ -67,12 +67,17 @@ TEST(Options, OfTheLoopCloserSayWhyTheyAreInvalid) {
       {{"branching", [](auto& o) { o.branching = 1; }}, {"levels", [](auto& o) { o.levels = 7; }}});
 }
 
+TEST(Options, OfRunLogsSayWhyTheyAreInvalid) {
+  expect_rules<RunLogOptions>({{"frames_in_memory", [](auto& o) { o.frames_in_memory = 0; }}});
+}
+
 TEST(Options, OfTheEngineSayWhyTheyAreInvalid) {
   expect_rules<EngineOptions>(
       {{"tracker.min_inliers", [](auto& o) { o.tracker.min_inliers = 0; }},
        {"mapper.inner_window", [](auto& o) { o.mapper.inner_window = 0; }},
        {"loop_closer.corners.wanted", [](auto& o) { o.loop_closer.corners.wanted = 0; }},
        {"checkpoint.period", [](auto& o) { o.checkpoint.period = -1; }},
+       {"logs.frames_in_memory", [](auto& o) { o.logs.frames_in_memory = 0; }},
        {"pacing.speed", [](auto& o) { o.pacing.speed = -1; }},
        {"effort.patience", [](auto& o) { o.effort.patience = 0; }},
        {"frame_slots", [](auto& o) { o.frame_slots = 0; }},

@@ -100,6 +100,8 @@ TEST(BoardCalibrator, OptionsAndFramesThatMakeNoSenseAreNamed) {
       EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
     }
   };
+  const BoardCalibrator::Options valid{.board = kBoardText, .width = 640, .height = 480};
+  EXPECT_EQ(valid.invalid_reason(), "");
   expect_refused({.board = "paper", .width = 640, .height = 480}, "options.board");
   expect_refused({.board = kBoardText, .width = 0, .height = 480}, "options.width");
   expect_refused({.board = kBoardText, .width = 640, .height = 480, .views = 3}, "options.views");

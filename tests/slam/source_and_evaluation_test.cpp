@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "fixtures/option_rules.hpp"
 #include "tests/io/scratch_folder.hpp"
 #include "twofold/evaluation.hpp"
 #include "twofold/source.hpp"
@@ -128,6 +129,12 @@ TEST(PublicEvaluation, MeasuresTheDistanceFromTheTruth) {
     EXPECT_NE(std::string(error.what()).find("options.max_time_difference_s"), std::string::npos)
         << error.what();
   }
+}
+
+TEST(PublicEvaluation, OptionsSayWhyTheyAreInvalid) {
+  testing::expect_rules<ComparisonOptions>(
+      {{"max_time_difference_s", [](auto& o) { o.max_time_difference_s = -1; }},
+       {"max_time_difference_s", [](auto& o) { o.max_time_difference_s = 1e10; }}});
 }
 
 TEST(PublicEvaluation, FindsScaleWhenAsked) {

@@ -8,6 +8,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "fixtures/option_rules.hpp"
+
 namespace twofold {
 namespace {
 
@@ -223,6 +225,13 @@ TEST(SurfaceModel, KnowsNothingOfPositionsThatAreNoNumbers) {
       EXPECT_EQ(model.at(position).state, SpaceState::kUnknown) << none << " along axis " << axis;
     }
   }
+}
+
+TEST(SurfaceModel, OptionsSayWhyTheyAreInvalid) {
+  testing::expect_rules<SurfaceModelOptions>({{"voxel", [](auto& o) { o.voxel = 11; }},
+                                              {"max_depth", [](auto& o) { o.max_depth = -1; }},
+                                              {"max_free_depth", [](auto& o) { o.max_free_depth = -1; }},
+                                              {"nearest_stereo", [](auto& o) { o.nearest_stereo = 0; }}});
 }
 
 TEST(SurfaceModel, RefusesWhatMakesNoSense) {

@@ -5,14 +5,17 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <limits>
 #include <thread>
 
 #include <fmt/format.h>
 
+#include "fixtures/option_rules.hpp"
 #include "graph/graph_writer.hpp"
 #include "slam/map_snapshot.hpp"
 #include "tests/viewer/local_client.hpp"
 #include "tests/viewer/small_map.hpp"
+#include "viewer/server.hpp"
 
 namespace twofold {
 namespace {
@@ -261,13 +264,30 @@ TEST_F(ViewerTest, RefusesPortsThatThereAreNotAndNames) {
   const auto refusal = [](const ViewerOptions& options) {
     try {
       const Viewer viewer(kRig, {}, options);
-    } catch (const std::runtime_error& error) {
+    } catch (const std::exception& error) {
       return std::string(error.what());
     }
     return std::string();
   };
-  EXPECT_NE(refusal({.port = 70000}).find("port 70000: ports are 0 to 65535"), std::string::npos);
+  EXPECT_EQ(refusal({.port = 70000}), "options.port must be in [0, 65535], is 70000");
   EXPECT_NE(refusal({.bind = "localhost", .port = 0}).find("such as 127.0.0.1"), std::string::npos);
+}
+
+TEST(ViewerOptionsTest, SayWhyTheyAreInvalid) {
+  testing::expect_rules<ViewerOptions>(
+      {{"bind", [](auto& o) { o.bind.clear(); }},
+       {"port", [](auto& o) { o.port = -1; }},
+       {"port", [](auto& o) { o.port = 65536; }},
+       {"stages", [](auto& o) { o.stages.resize(9); }},
+       {"frame_period", [](auto& o) { o.frame_period = -0.1; }},
+       {"frame_period", [](auto& o) { o.frame_period = std::numeric_limits<double>::infinity(); }},
+       {"paced_by", [](auto& o) { o.paced_by = "moon"; }},
+       {"truth_t_ns", [](auto& o) {
+          o.truth_t_ns = {2, 1};
+        }}});
+  testing::expect_rules<ViewServerOptions>({{"bind", [](auto& o) { o.bind.clear(); }},
+                                            {"port", [](auto& o) { o.port = 65536; }},
+                                            {"request_time", [](auto& o) { o.request_time = {}; }}});
 }
 
 TEST_F(ViewerTest, LoopbackAddressesAreNotTheNetwork) {

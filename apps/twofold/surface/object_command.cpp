@@ -49,8 +49,7 @@ std::unique_ptr<ObjectSource> object_source(ObjectArguments& arguments) {
     throw IoError(arguments.source, "is one camera, which gives no depth: an object needs stereo or RGB-D");
   if (arguments.surface.depth_noise == 0) arguments.surface.depth_noise = usual_depth_noise(source->rig());
   arguments.frames.mask.depth_noise = arguments.surface.depth_noise;
-  for (const std::string& reason :
-       {arguments.frames.mask.invalid_reason(), arguments.surface.invalid_reason()})
+  for (const std::string& reason : {arguments.frames.invalid_reason(), arguments.surface.invalid_reason()})
     if (!reason.empty()) throw IoError("twofold object", reason);
   return std::make_unique<ObjectSource>(std::move(source), arguments.frames);
 }

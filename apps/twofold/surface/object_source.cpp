@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 #include "io/files/io_error.hpp"
 #include "surface/stereo/stereo_depth.hpp"
 
@@ -12,8 +14,17 @@ constexpr int kPatience = 150;  // frames of a source that may show no object be
 
 }  // namespace
 
+std::string ObjectSourceOptions::invalid_reason() const {
+  return OptionCheck()
+      .nested("mask", mask.invalid_reason())
+      .above("nearest_stereo", nearest_stereo, 0)
+      .at_least("keep_every", keep_every, 1)
+      .reason();
+}
+
 ObjectSource::ObjectSource(std::unique_ptr<FrameSource> source, const ObjectSourceOptions& options)
     : source_(std::move(source)), options_(options), masker_(source_->rig(), options.mask) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "object source options");
   rig_ = source_->rig();
   R_rectified_raw_ = source_->R_rectified_raw();
   ground_truth_ = source_->ground_truth();

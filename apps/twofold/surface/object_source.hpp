@@ -16,6 +16,9 @@ struct ObjectSourceOptions {
   double nearest_stereo = 0.3;       ///< disparities are searched for up to that of this depth [m] > 0
   int keep_every = 5;                ///< frames whose depth is kept for the surface >= 1
   std::size_t most_bytes = 1 << 30;  ///< of kept depth and colour
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// Another source's frames, of which nothing is left but an object: images are filled, depth is empty outside
@@ -29,7 +32,7 @@ class ObjectSource final : public FrameSource {
     KeyframeDepth images;
   };
 
-  /// options.mask must be valid; the source stereo or RGB-D.
+  /// Options must be valid; the source stereo or RGB-D.
   ObjectSource(std::unique_ptr<FrameSource> source, const ObjectSourceOptions& options);
 
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override { return source_->frame_count(); }
