@@ -46,6 +46,8 @@ void check_search(const TrackerOptions& o, OptionCheck& check) {
       .share("rough_searched_share", o.rough_searched_share)
       .at_least("rough_min_inliers", o.rough_min_inliers, 0)
       .at_least("rough_min_mapped", o.rough_min_mapped, 0)
+      .at_least("rough_rounds", o.rough_rounds, 1)
+      .share("fixed_inlier_share", o.fixed_inlier_share)
       .within("trusted_after", o.trusted_after, 0, 255)
       .at_least("moving_after", o.moving_after, 1)
       .above("max_alignment_rms", o.max_alignment_rms, 0);
@@ -59,13 +61,18 @@ void check_loss(const TrackerOptions& o, OptionCheck& check) {
       .above("reach_slack", o.reach_slack, 0)
       .at_least("new_part_after", o.new_part_after, 0)
       .at_least("new_part_frames", o.new_part_frames, 0)
-      .at_least("min_corners_seen", o.min_corners_seen, 0);
+      .at_least("min_corners_seen", o.min_corners_seen, 0)
+      .at_least("min_start_points", o.min_start_points, 1)
+      .within("recent_keyframes", o.recent_keyframes, 1, static_cast<double>(DepthAlignment::kViews))
+      .at_least("depth_patience", o.depth_patience, 0);
 }
 
 void check_keyframes_and_points(const TrackerOptions& o, OptionCheck& check) {
   check.above("keyframe_parallax", o.keyframe_parallax, 0)
       .within("keyframe_share", o.keyframe_share, 0, 1)
       .within("keyframe_empty", o.keyframe_empty, 0, 1)
+      .above("keyframe_turn", o.keyframe_turn, 0)
+      .within("young_map_share", o.young_map_share, 0, 1)
       .within("urgent_share", o.urgent_share, 0, o.keyframe_share)
       .at_least("max_pending", o.max_pending, 1)
       .at_least("corner_threshold", o.corner_threshold, 1)

@@ -21,6 +21,8 @@ struct TrackerOptions {
   ElderVoteOptions elders;
   DepthAlignmentOptions depth;
   FixedPixelOptions fixed;
+  double fixed_inlier_share =
+      0.5;  ///< of the matches: with fewer inliers a pose is no witness of fixed pixels
   /// A step of 1e-5 moves no projection by a hundredth of a pixel. Outliers: beyond 99 % of chi-square,
   /// because real errors (rolling shutter, calibration, depth of a point seen from one place only) have long
   /// tails.
@@ -55,6 +57,7 @@ struct TrackerOptions {
   double rough_searched_share = 0.2;  ///< ... and of those searched,
   int rough_min_inliers = 40;         ///< and so many points, or
   int rough_min_mapped = 10;          ///< so many that the map has, seen from two places
+  int rough_rounds = 3;               ///< searches, each from the pose that the one before gave
   /// While young points are mistrusted: frames in a row in which an immature point must agree to be
   /// confirmed.
   int trusted_after = 3;
@@ -69,6 +72,9 @@ struct TrackerOptions {
   double new_part_after = 1;      ///< lost for so long while corners are seen: a new map part is started [s]
   int new_part_frames = 5;        ///< ... and for so many frames
   int min_corners_seen = 40;      ///< fewer: the lens is covered, or there is nothing to see
+  int min_start_points = 40;      ///< with measured depth; a map or map part starts with no fewer, > 0
+  int recent_keyframes = 4;       ///< whose images a lost camera is compared with, and depth aligned to
+  int depth_patience = 5;         ///< lost frames, beyond which the depth image alone places nothing, >= 0
   double max_alignment_rms = 25;  ///< the dense pose is not trusted above this [grey]
 
   double keyframe_parallax = 0.09;  ///< |t| since the reference keyframe over the newest one's median depth
@@ -76,6 +82,10 @@ struct TrackerOptions {
   /// A keyframe is due when fewer than 1 - keyframe_empty times as many image regions hold a tracked point as
   /// at the last keyframe.
   double keyframe_empty = 0.5;
+  double keyframe_turn = 0.2;  ///< since the last keyframe, where depth alone says how the camera moved [rad]
+  /// Share of keyframe_parallax at which a map's second keyframe is due: it confirms the points of the first,
+  /// and until then there is no map.
+  double young_map_share = 0.2;
   double urgent_share = 0.35;  ///< as keyframe_share; below it a keyframe is due whatever max_pending says
   int max_pending = 2;         ///< with so many proposals on their way to the map no further one is made
 

@@ -11,9 +11,8 @@ namespace {
 
 constexpr std::size_t kMaxLocalPoints = 3000;
 constexpr std::size_t kMaxImmaturePoints = 1200;
-constexpr std::size_t kMaxPending = 12;
+constexpr std::size_t kMostPendingKeyframes = 12;  // beyond TrackerOptions::max_pending: urgent ones
 constexpr std::size_t kMaxAlignmentPoints = 240;
-constexpr double kTrustedShare = 0.5;  // of the matches, inliers: else a pose is no witness of fixed pixels
 
 /// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
 /// better one.
@@ -34,7 +33,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       local_map_(kMaxLocalPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
       local_map_search_(rig_, options_, local_map_, correction_.fixed()),
-      immature_points_(kMaxImmaturePoints, kMaxPending),
+      immature_points_(kMaxImmaturePoints, kMostPendingKeyframes),
       pose_estimator_(rig_, options_, local_map_, shutter_, immature_points_),
       search_(rig, options),
       tried_(rig, options),
@@ -201,7 +200,7 @@ void Tracker::remember_frame(const FrameStep& step) {
 void Tracker::learn_fixed_pixels(const FrameStep& step) {
   if (step.result.by_depth) return;  // no points say how far the scene is
   samples_.clear();
-  const bool agreed = step.result.inliers >= kTrustedShare * step.result.matches;
+  const bool agreed = step.result.inliers >= options_.fixed_inlier_share * step.result.matches;
   if (agreed && !pose_estimator_.mistrusts_the_young()) {
     for (const MotionObservation& observation : search_.observations) {
       if (observation.inlier) samples_.push_back(1 / (step.result.T_c_ref * observation.x_ref).z());

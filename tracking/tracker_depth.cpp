@@ -10,8 +10,8 @@ namespace twofold {
 /// From shape alone the camera is placed only beside where it was: after some frames the last good one shows
 /// something else, and one corner of a room looks like the next.
 bool Tracker::depth_can_place(const FrameStep& step) const {
-  constexpr int kPatience = 5;  // lost frames
-  return depth_alignment_ && motion_.reference() != kNoKeyframe && step.lost_frames <= kPatience;
+  return depth_alignment_ && motion_.reference() != kNoKeyframe &&
+         step.lost_frames <= options_.depth_patience;
 }
 
 /// The frame's depth image, once.

@@ -7,19 +7,13 @@
 #include "tracking/tracker.hpp"
 
 namespace twofold {
-namespace {
-
-constexpr int kRoundsFromRough = 3;
-
-}  // namespace
-
 /// Points where they should be, where they are, and the pose that fits: once from a good start, a few times
 /// from a rough one.
 LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
   SE3& T_c_ref = start.placement.T_c_ref;
   step.shutter = start.rough() ? RollingShutter() : shutter_.at(T_c_ref, step);
   LostCause cause = LostCause::kNone;
-  const int rounds = start.rough() ? kRoundsFromRough : 1;
+  const int rounds = start.rough() ? options_.rough_rounds : 1;
   for (int round = 0; cause == LostCause::kNone && round < rounds; ++round) {
     const bool wide = start.rough() ? round + 1 < rounds : step.after_loss();
     const double radius_px = wide ? options_.lost_radius_px : options_.search.radius_px;

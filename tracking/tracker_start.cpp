@@ -2,12 +2,6 @@
 #include "tracking/tracker.hpp"
 
 namespace twofold {
-namespace {
-
-constexpr int kMinStartPoints = 40;
-
-}  // namespace
-
 void Tracker::continue_from(const GraphSnapshot& graph) {
   if (graph.keyframe_count() == 0) return;
   proposer_.continue_from(graph);
@@ -17,7 +11,7 @@ void Tracker::continue_from(const GraphSnapshot& graph) {
 bool Tracker::start_map(FrameStep& step) {
   step.result.cause = make_first_keyframe(step);
   if (step.result.cause == LostCause::kNoTexture && rig_.kind == SensorKind::kStereo) {
-    step.result.cause = new_points_.explain_missing_depth(current_, kMinStartPoints);
+    step.result.cause = new_points_.explain_missing_depth(current_, options_.min_start_points);
   }
   return step.result.cause == LostCause::kNone;
 }
@@ -48,7 +42,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();
   new_points_.forget_seeds();
-  if (new_points_.start_first(current_, id, step.shutter, immature_points_) < kMinStartPoints) {
+  if (new_points_.start_first(current_, id, step.shutter, immature_points_) < options_.min_start_points) {
     const LostCause open = judge_structure(step);
     if (open != LostCause::kNone) {
       immature_points_.clear_points();

@@ -35,6 +35,13 @@ TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
                                 {"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
                                 {"min_inliers", [](auto& o) { o.min_inliers = 2; }},
                                 {"new_part_frames", [](auto& o) { o.new_part_frames = -1; }},
+                                {"rough_rounds", [](auto& o) { o.rough_rounds = 0; }},
+                                {"fixed_inlier_share", [](auto& o) { o.fixed_inlier_share = 0; }},
+                                {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
+                                {"recent_keyframes", [](auto& o) { o.recent_keyframes = 5; }},
+                                {"depth_patience", [](auto& o) { o.depth_patience = -1; }},
+                                {"keyframe_turn", [](auto& o) { o.keyframe_turn = 0; }},
+                                {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
                                 {"keyframe_share", [](auto& o) { o.keyframe_share = 1.1; }},
                                 {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
                                 {"cell_px", [](auto& o) { o.cell_px = 0; }}});

@@ -100,5 +100,19 @@ TEST_F(KeyframeDecisionTest, ByDepthWhenTheCameraHasTurned) {
   EXPECT_TRUE(due_by_motion());
 }
 
+TEST_F(KeyframeDecisionTest, AsTheOptionsSay) {
+  TrackerOptions patient;
+  patient.keyframe_turn = 0.3;
+  patient.young_map_share = 0.5;
+  result_.T_c_ref = SE3(SO3::exp({0, 0.25, 0}), Vector3::Zero());
+  EXPECT_FALSE(keyframe_due_by_motion(result_.T_c_ref, last_, backlog_, patient));
+  backlog_.map_is_young = true;
+  const EffortBounds bounds = bounds_of(EffortLevel::kEverything, patient);
+  move(0.45 * patient.keyframe_parallax);
+  EXPECT_FALSE(keyframe_due(result_, last_, occupied_, backlog_, patient, bounds));
+  move(0.55 * patient.keyframe_parallax);
+  EXPECT_TRUE(keyframe_due(result_, last_, occupied_, backlog_, patient, bounds));
+}
+
 }  // namespace
 }  // namespace twofold

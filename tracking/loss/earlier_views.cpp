@@ -7,8 +7,6 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kKeyframes = 4;
-
 RecentView room_for_view(const Rig& rig, const WideSearch& search) {
   RecentView view;
   allocate_images(rig, view.images);
@@ -22,7 +20,7 @@ EarlierViews::EarlierViews(const Rig& rig, const TrackerOptions& options)
     : can_find_(options.wide_search.enabled && rig.kind != SensorKind::kMono),
       guided_(options.search),
       search_(rig, options.wide_search),
-      keyframes_(kKeyframes, room_for_view(rig, search_)),
+      keyframes_(static_cast<std::size_t>(options.recent_keyframes), room_for_view(rig, search_)),
       asked_(room_for_view(rig, search_)) {}
 
 void EarlierViews::look_at(const FrameImages& now) {
