@@ -24,6 +24,17 @@ std::string WideSearchOptions::invalid_reason() const {
       .reason();
 }
 
+std::string MonocularStartOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("candidates", candidates, 1)
+      .at_least("frames_between", frames_between, 2)
+      .at_least("longest_path", longest_path, 2)
+      .share("placed_share", placed_share)
+      .at_least("next_flow", next_flow, 0)
+      .share("min_left_share", min_left_share)
+      .reason();
+}
+
 namespace {
 
 /// What is searched in a frame, and which pose is believed.
@@ -100,7 +111,9 @@ std::string TrackerOptions::invalid_reason() const {
   check_search(*this, check);
   check_loss(*this, check);
   check_keyframes_and_points(*this, check);
-  check.nested("first_structure", first_structure.invalid_reason()).nested("seeds", seeds.invalid_reason());
+  check.nested("monocular_start", monocular_start.invalid_reason())
+      .nested("first_structure", first_structure.invalid_reason())
+      .nested("seeds", seeds.invalid_reason());
   return check.reason();
 }
 

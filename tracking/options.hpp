@@ -14,6 +14,21 @@
 
 namespace twofold {
 
+/// Which earlier frames one camera's first motion is looked for from
+/// (tracking/monocular/monocular_start.hpp).
+struct MonocularStartOptions {
+  int candidates = 4;           ///< earlier frames tried, the oldest being left out, >= 1
+  int frames_between = 4;       ///< of a candidate and now, that tell motions apart, >= 2
+  int longest_path = 64;        ///< frames since a candidate that get their poses afterwards, >= 2
+  double placed_share = 0.6;    ///< of the start's points, that must agree on such a pose, in (0, 1]
+  double next_flow = 0.03;      ///< share of the image's width that corners have moved by: a new candidate is
+                                ///< worth its place, >= 0
+  double min_left_share = 0.4;  ///< of its corners: a candidate with fewer is given up, in (0, 1]
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 struct TrackerOptions {
   DenseAlignmentOptions alignment;
   GuidedSearchOptions search;
@@ -100,7 +115,8 @@ struct TrackerOptions {
   int max_failures = 4;      ///< immature points not found so many searches in a row are given up
   int max_immature_age = 3;  ///< keyframes after which an immature point is given up
 
-  FirstStructureOptions first_structure;  ///< one camera only
+  MonocularStartOptions monocular_start;  ///< one camera only
+  FirstStructureOptions first_structure;  ///< likewise
   DepthSeedOptions seeds;                 ///< corners whose depth is not measured
   /// Where most new corners have no depth, a rig that measures it starts some without, as one camera does:
   /// as many as are missing to so many points in view; 0: never.

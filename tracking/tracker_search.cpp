@@ -7,6 +7,7 @@
 #include "tracking/tracker.hpp"
 
 namespace twofold {
+
 /// Points where they should be, where they are, and the pose that fits: once from a good start, a few times
 /// from a rough one.
 LostCause Tracker::search_from(SearchStart start, FrameStep& step) {

@@ -27,24 +27,32 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
 }
 
 TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
-  expect_rules<TrackerOptions>({{"alignment.coarsest_level", [](auto& o) { o.alignment.coarsest_level = 5; }},
-                                {"corner_levels", [](auto& o) { o.corner_levels = 6; }},
-                                {"search.radius_px", [](auto& o) { o.search.radius_px = -1; }},
-                                {"wide_search.min_agreeing", [](auto& o) { o.wide_search.min_agreeing = 2; }},
-                                {"motion.rounds", [](auto& o) { o.motion.rounds = 0; }},
-                                {"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
-                                {"min_inliers", [](auto& o) { o.min_inliers = 2; }},
-                                {"new_part_frames", [](auto& o) { o.new_part_frames = -1; }},
-                                {"rough_rounds", [](auto& o) { o.rough_rounds = 0; }},
-                                {"fixed_inlier_share", [](auto& o) { o.fixed_inlier_share = 0; }},
-                                {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
-                                {"recent_keyframes", [](auto& o) { o.recent_keyframes = 5; }},
-                                {"depth_patience", [](auto& o) { o.depth_patience = -1; }},
-                                {"keyframe_turn", [](auto& o) { o.keyframe_turn = 0; }},
-                                {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
-                                {"keyframe_share", [](auto& o) { o.keyframe_share = 1.1; }},
-                                {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
-                                {"cell_px", [](auto& o) { o.cell_px = 0; }}});
+  expect_rules<TrackerOptions>(
+      {{"alignment.coarsest_level", [](auto& o) { o.alignment.coarsest_level = 5; }},
+       {"corner_levels", [](auto& o) { o.corner_levels = 6; }},
+       {"search.radius_px", [](auto& o) { o.search.radius_px = -1; }},
+       {"wide_search.min_agreeing", [](auto& o) { o.wide_search.min_agreeing = 2; }},
+       {"motion.rounds", [](auto& o) { o.motion.rounds = 0; }},
+       {"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
+       {"min_inliers", [](auto& o) { o.min_inliers = 2; }},
+       {"new_part_frames", [](auto& o) { o.new_part_frames = -1; }},
+       {"rough_rounds", [](auto& o) { o.rough_rounds = 0; }},
+       {"fixed_inlier_share", [](auto& o) { o.fixed_inlier_share = 0; }},
+       {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
+       {"recent_keyframes", [](auto& o) { o.recent_keyframes = 5; }},
+       {"depth_patience", [](auto& o) { o.depth_patience = -1; }},
+       {"keyframe_turn", [](auto& o) { o.keyframe_turn = 0; }},
+       {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
+       {"keyframe_share", [](auto& o) { o.keyframe_share = 1.1; }},
+       {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
+       {"monocular_start.candidates", [](auto& o) { o.monocular_start.candidates = 0; }},
+       {"monocular_start.frames_between", [](auto& o) { o.monocular_start.frames_between = 1; }},
+       {"first_structure.max_behind_share", [](auto& o) { o.first_structure.max_behind_share = 1.1; }},
+       {"first_structure.decisive_chi2", [](auto& o) { o.first_structure.decisive_chi2 = -1; }},
+       {"first_structure.finest_sigma", [](auto& o) { o.first_structure.finest_sigma = 0; }},
+       {"first_structure.max_point_error", [](auto& o) { o.first_structure.max_point_error = 0; }},
+       {"first_structure.near_share", [](auto& o) { o.first_structure.near_share = 0; }},
+       {"cell_px", [](auto& o) { o.cell_px = 0; }}});
 }
 
 TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {

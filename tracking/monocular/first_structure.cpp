@@ -18,14 +18,8 @@ namespace twofold {
 namespace {
 
 constexpr double kSignificant = 2;     // standard deviations
-constexpr double kMostBehind = 0.1;    // share of significant depths that may have the wrong sign
-constexpr double kPlaneShare = 0.6;    // explained by a homography: the scene may be a plane
 constexpr double kOutlierChi2 = 9.21;  // 99 % of chi-square with 2 degrees of freedom
 constexpr double kGrossChi2 = 50;      // beyond this before the adjustment, a corner follows something else
-constexpr double kUsableDepthError = 0.25;  // of a point that joins the first map
-constexpr double kDecisiveChi2 = 32;        // by which one motion must explain all better than another
-constexpr double kFinestSigma = 0.35;       // times sigma_px: no corner is followed more exactly
-constexpr double kNearShare = 0.3;  // of the corners that must be near enough: those far off veto nothing
 constexpr int kAdjustmentSteps = 15;
 
 std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vector2>& pixels) {
@@ -85,7 +79,7 @@ class Attempt {
     inliers_ = epipolar->inliers;
     std::vector<SE3> motions{epipolar->T_b_a};
     const auto plane = estimate_homography(first_, last_, ransac_options(options_.rotation_px));
-    if (plane && static_cast<double>(common(inliers_, plane->inliers)) > kPlaneShare * moving) {
+    if (plane && static_cast<double>(common(inliers_, plane->inliers)) > options_.min_plane_share * moving) {
       const auto any = static_cast<std::size_t>(plane->inliers.front());
       for (const SE3& motion : decompose_homography(plane->H_b_a, first_[any], last_[any]))
         motions.push_back(motion);
@@ -132,7 +126,7 @@ class Attempt {
     const Trial& best =
         *std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) { return a.cost < b.cost; });
     for (const Trial& other : trials) {
-      if (other.cost < best.cost + kDecisiveChi2 && differ(other.views, best.views))
+      if (other.cost < best.cost + options_.decisive_chi2 && differ(other.views, best.views))
         return tl::unexpected(LostCause::kPlaneUndecided);
     }
     return collect(best);
@@ -199,8 +193,8 @@ class Attempt {
     const auto points = static_cast<double>(views.points.size());
     const auto frames = static_cast<double>(views.views.size());
     const double freedom = std::max(1.0, 2 * points * (frames + 1) - 3 * points - 6 * frames);
-    return std::clamp(options_.sigma_px * std::sqrt(views.cost() / freedom), kFinestSigma * options_.sigma_px,
-                      options_.sigma_px);
+    return std::clamp(options_.sigma_px * std::sqrt(views.cost() / freedom),
+                      options_.finest_sigma * options_.sigma_px, options_.sigma_px);
   }
 
   /// Over the inliers, the squared error of each in the frame that it fits least, whitened by sigma_px. One
@@ -236,7 +230,7 @@ class Attempt {
       views.points.push_back({own.psi, own.psi, own.information});
       usable.push_back(q > kSignificant * sigma);
     }
-    if (behind > kMostBehind * (in_front + behind)) return std::nullopt;
+    if (behind > options_.max_behind_share * (in_front + behind)) return std::nullopt;
     views.views.push_back({T_last_first, seen(views_.last)});
     const auto pieces = static_cast<double>(views_.between.size() + 1);
     for (std::size_t b = 0; b < views_.between.size(); ++b) {
@@ -296,7 +290,7 @@ class Attempt {
       const double error = depth_error(views, k, trial.sigma_px);
       if (!std::isfinite(error)) continue;
       errors.push_back(error);
-      if (error > kUsableDepthError) continue;
+      if (error > options_.max_point_error) continue;
       structure.corners.push_back(trial.corners[k]);
       structure.psi.push_back(views.points[k].psi);
       depths.push_back(1 / views.points[k].psi.z());
@@ -304,7 +298,7 @@ class Attempt {
     if (static_cast<int>(errors.size()) < options_.min_points)
       return tl::unexpected(LostCause::kNoCommonMotion);
     if (static_cast<int>(depths.size()) < options_.min_points ||
-        quantile(std::move(errors), kNearShare) > options_.max_depth_error)
+        quantile(std::move(errors), options_.near_share) > options_.max_depth_error)
       return tl::unexpected(LostCause::kTooLittleParallax);
     const double unit = median(std::span(depths));
     const SE3& T_last_first = views.views[0].T_c_a;
@@ -333,6 +327,12 @@ std::string FirstStructureOptions::invalid_reason() const {
       .within("max_rotation_share", max_rotation_share, 0, 1)
       .above("max_depth_error", max_depth_error, 0)
       .at_least("max_samples", max_samples, 1)
+      .within("max_behind_share", max_behind_share, 0, 1)
+      .within("min_plane_share", min_plane_share, 0, 1)
+      .at_least("decisive_chi2", decisive_chi2, 0)
+      .share("finest_sigma", finest_sigma)
+      .above("max_point_error", max_point_error, 0)
+      .share("near_share", near_share)
       .reason();
 }
 

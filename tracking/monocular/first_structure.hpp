@@ -18,8 +18,17 @@ struct FirstStructureOptions {
   double min_share = 0.6;           ///< of the corners that agree with the motion, in (0, 1]
   double max_rotation_share = 0.5;  ///< of those that a rotation explains as well, in (0, 1]
   double max_depth_error =
-      0.1;                ///< of inverse depth, as a share of it, of the nearest 30 % of the corners, > 0
+      0.1;                ///< of inverse depth, as a share of it, of the nearest corners (near_share), > 0
   int max_samples = 120;  ///< of RANSAC, >= 1
+  double max_behind_share = 0.1;  ///< of the depths beyond noise, that may have the wrong sign, in [0, 1]
+  double min_plane_share = 0.6;   ///< of those that moved: a homography explains so many, so that two motions
+                                  ///< are asked, in [0, 1]
+  double decisive_chi2 = 32;      ///< by which one motion must explain all better than another, >= 0
+  double finest_sigma = 0.35;  ///< times sigma_px: no corner is followed more exactly, on the sharpest image,
+                               ///< in (0, 1]
+  double max_point_error = 0.25;  ///< of inverse depth, as a share of it, of a point that joins the map, > 0
+  double near_share = 0.3;  ///< of the corners, the nearest, that max_depth_error is of: those far off veto
+                            ///< nothing, in (0, 1]
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -12,13 +12,6 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kCandidates = 4;
-constexpr std::size_t kMostBetween = 4;      // frames between a candidate and now that tell motions apart
-constexpr std::size_t kLongestPath = 64;     // frames since a candidate that get their poses afterwards
-constexpr double kPlacedShare = 0.6;         // of the points of the start, that must agree on such a pose
-constexpr double kNextCandidateFlow = 0.03;  // of the image's width: a new candidate is worth its place
-constexpr double kFewestLeft = 0.4;          // share of its corners below which a candidate is given up
-
 double median_flow(const StartCandidate& candidate) {
   std::vector<float> flow;
   for (const FollowedCorner& corner : candidate.corners)
@@ -32,7 +25,7 @@ MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
       starter_(rig, with_cells_of_one_camera(rig, options)),
-      candidates_(kCandidates) {
+      candidates_(static_cast<std::size_t>(options.monocular_start.candidates)) {
   rig_.noise.sigma_px = options.first_structure.sigma_px;
   const auto corners = static_cast<std::size_t>(options.max_new_points);
   for (StartCandidate& candidate : candidates_) {
@@ -40,7 +33,7 @@ MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
     candidate.corners.reserve(corners);
   }
   allocate_images(rig, last_);
-  order_.reserve(kCandidates);
+  order_.reserve(candidates_.size());
   appearances_.reserve(corners);
 }
 
@@ -104,10 +97,10 @@ void thin_out(Frames& frames) {
 }  // namespace
 
 /// Every stride-th frame is one between. When they are too many, every second one goes.
-void MonocularStart::remember_place(StartCandidate& candidate) {
+void MonocularStart::remember_place(StartCandidate& candidate) const {
   if (candidate.age == 0 || candidate.age % candidate.stride != 0) return;
   auto& between = candidate.between;
-  if (between.size() == kMostBetween) {
+  if (between.size() == static_cast<std::size_t>(options_.monocular_start.frames_between)) {
     thin_out(between);
     candidate.stride *= 2;
     if (candidate.age % candidate.stride != 0) return;
@@ -115,9 +108,9 @@ void MonocularStart::remember_place(StartCandidate& candidate) {
   between.push_back(places_of(candidate.corners));
 }
 
-void MonocularStart::remember_path(std::int64_t frame_index, StartCandidate& candidate) {
+void MonocularStart::remember_path(std::int64_t frame_index, StartCandidate& candidate) const {
   if (candidate.age == 0 || candidate.age % candidate.path_stride != 0) return;
-  if (candidate.path.size() == kLongestPath) {
+  if (candidate.path.size() == static_cast<std::size_t>(options_.monocular_start.longest_path)) {
     thin_out(candidate.path);
     candidate.path_stride *= 2;
     if (candidate.age % candidate.path_stride != 0) return;
@@ -136,7 +129,8 @@ std::vector<EarlierFrame> MonocularStart::earlier_frames(const MonocularStartRes
       observations.push_back(observe_point(rig_, from_inverse_depth(start.structure.psi[n]), z, 0));
     }
     const MotionOnlyResult motion = optimise_motion(rig_, observations, frames.back().T_c_first, {});
-    if (motion.inliers < kPlacedShare * static_cast<double>(observations.size())) continue;
+    if (motion.inliers < options_.monocular_start.placed_share * static_cast<double>(observations.size()))
+      continue;
     frames.push_back({frame.frame_index, motion.T_c_ref});
   }
   return frames;
@@ -163,13 +157,14 @@ tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandi
 void MonocularStart::renew_candidates(const FrameImages& images, const Frame& frame) {
   std::erase_if(order_, [&](std::size_t c) {
     const StartCandidate& candidate = candidates_[c];
-    const auto fewest =
-        static_cast<std::size_t>(kFewestLeft * static_cast<double>(candidate.corners_at_first));
+    const auto fewest = static_cast<std::size_t>(options_.monocular_start.min_left_share *
+                                                 static_cast<double>(candidate.corners_at_first));
     return candidate.corners.size() < std::max<std::size_t>(fewest, 1);
   });
-  if (!order_.empty() && median_flow(candidates_[order_.back()]) < kNextCandidateFlow * rig_.camera.width)
+  if (!order_.empty() &&
+      median_flow(candidates_[order_.back()]) < options_.monocular_start.next_flow * rig_.camera.width)
     return;
-  if (order_.size() == kCandidates) order_.erase(order_.begin());
+  if (order_.size() == candidates_.size()) order_.erase(order_.begin());
   std::size_t free = 0;
   while (std::find(order_.begin(), order_.end(), free) != order_.end()) ++free;
   fill(candidates_[free], images, frame);

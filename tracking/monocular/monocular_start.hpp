@@ -66,8 +66,8 @@ class MonocularStart {
 
  private:
   void follow(const FrameImages& images, StartCandidate& candidate) const;
-  static void remember_place(StartCandidate& candidate);
-  static void remember_path(std::int64_t frame_index, StartCandidate& candidate);
+  void remember_place(StartCandidate& candidate) const;
+  void remember_path(std::int64_t frame_index, StartCandidate& candidate) const;
   [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
   void renew_candidates(const FrameImages& images, const Frame& frame);
   void fill(StartCandidate& candidate, const FrameImages& images, const Frame& frame);
