@@ -12,16 +12,11 @@
 namespace twofold {
 namespace {
 
-constexpr double kFarApart = 0.1;  // two surfaces, not one [share of the depth]
-constexpr double kFacing = 0.8;    // cosine between the planes of one surface
+// How it is solved: neither changes the pose by as much as a tenth of what that is uncertain by.
 constexpr double kNearlySettled = 1e-3;
-constexpr double kSettled = 2e-5;  // a step [m, rad]
-constexpr std::size_t kFirstStride = 4;
-constexpr double kWidestKernel = 30;  // [standard deviations]
-constexpr double kFarDeviation = 30;  // counts as no farther [standard deviations]
-constexpr double kCornerHuber = 1.5;  // [standard deviations]
-constexpr double kCornerChi2 = 30;    // farther ones are mistakes
-constexpr double kOfRegions = 0.5;    // share of the jackknife in the covariance
+constexpr double kSettled = 2e-5;        // a step [m, rad]
+constexpr std::size_t kFirstStride = 4;  // planes of the frame that are looked at until nearly settled
+constexpr double kFarDeviation = 30;     // counts as no farther [standard deviations]
 
 }  // namespace
 
@@ -37,6 +32,12 @@ std::string DepthAlignmentOptions::invalid_reason() const {
       .above("max_sigma_m", max_sigma_m, 0)
       .above("max_sigma_rad", max_sigma_rad, 0)
       .at_least("min_corners", min_corners, 3)
+      .above("max_apart", max_apart, 0)
+      .within("min_facing", min_facing, -1, 1)
+      .above("corner_huber", corner_huber, 0)
+      .above("max_corner_chi2", max_corner_chi2, 0)
+      .at_least("widest_kernel", widest_kernel, kernel)
+      .within("jackknife_share", jackknife_share, 0, 1)
       .reason();
 }
 
@@ -70,8 +71,8 @@ std::optional<DepthAlignment::Pair> DepthAlignment::pair_up(const DepthPlanes::P
   const double residual = plane.m.dot(x) - 1;
   const Vector3 m_c = R.transpose() * plane.m;
   const double length = plane.m.norm();
-  if (std::abs(residual) > kFarApart * length * x.norm()) return std::nullopt;
-  if (m_c.dot(seen.m) < kFacing * length * seen.m.norm()) return std::nullopt;
+  if (std::abs(residual) > options_.max_apart * length * x.norm()) return std::nullopt;
+  if (m_c.dot(seen.m) < options_.min_facing * length * seen.m.norm()) return std::nullopt;
   const double of_plane = plane.sigma * x.z();
   return Pair{m_c, &plane, R, residual, of_plane * of_plane};
 }
@@ -151,8 +152,8 @@ void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObser
     const Vector3 information = corner.information.cast<double>();
     if (information.z() == 0) residual.z() = 0;  // there is no third component
     const double chi2 = residual.dot(information.cwiseProduct(residual));
-    if (settling && chi2 > kCornerChi2) continue;
-    const double robust = HuberKernel{kCornerHuber}.weight(chi2);
+    if (settling && chi2 > options_.max_corner_chi2) continue;
+    const double robust = HuberKernel{options_.corner_huber}.weight(chi2);
     Eigen::Matrix<double, 3, 6> J;
     J << Matrix3::Identity(), -hat(x);
     J = rig_.project_jacobian(x) * J;
@@ -190,7 +191,7 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
   if (static_cast<int>(current_.planes().size()) < options_.min_planes || views_ == 0)
     return tl::unexpected(LostCause::kTooFewMatches);
   SE3 T_c_ref = T_c_ref_start;
-  Pass pass{kWidestKernel, kFirstStride, false};
+  Pass pass{options_.widest_kernel, kFirstStride, false};
   if (static_cast<int>(corners.size()) < options_.min_corners) corners = {};
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     Equations equations = linearise(T_c_ref, pass);
@@ -202,7 +203,8 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
     T_c_ref = SE3::exp(step) * T_c_ref;
     if (pass.stride == 1 && step.norm() < kSettled) break;
     if (step.norm() < kNearlySettled) pass.stride = 1;
-    pass.kernel = std::clamp(2 * equations.deviations / equations.pairs, options_.kernel, kWidestKernel);
+    pass.kernel =
+        std::clamp(2 * equations.deviations / equations.pairs, options_.kernel, options_.widest_kernel);
   }
   return judge(T_c_ref, corners);
 }
@@ -226,7 +228,8 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::judge(
   const auto of_regions = regions.jackknife(result.all);
   const double factor = std::max(1.0, regions.variance_factor(result.all).value_or(1));
   const Matrix6 usual = factor * inverse_symmetric(*information);
-  result.covariance = of_regions ? Matrix6(kOfRegions * *of_regions + (1 - kOfRegions) * usual) : usual;
+  const double share = options_.jackknife_share;
+  result.covariance = of_regions ? Matrix6(share * *of_regions + (1 - share) * usual) : usual;
   return result;
 }
 

@@ -28,6 +28,14 @@ struct DepthAlignmentOptions {
   double max_sigma_m = 0.02;    ///< the pose is refused when it is known worse than this in some direction
   double max_sigma_rad = 0.01;  ///< likewise
   int min_corners = 8;          ///< with fewer they are left out
+  // Which planes of frame and view are one surface.
+  double max_apart = 0.1;   ///< [share of the depth] > 0
+  double min_facing = 0.8;  ///< cosine between their normals, in [-1, 1]
+  // Corners err like planes, but some are found somewhere else.
+  double corner_huber = 1.5;     ///< [standard deviations] > 0
+  double max_corner_chi2 = 30;   ///< farther ones are mistakes, > 0
+  double widest_kernel = 30;     ///< that it begins with, >= kernel [standard deviations]
+  double jackknife_share = 0.5;  ///< of the covariance, that is from leaving regions out, in [0, 1]
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
