@@ -4,29 +4,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.hpp"
+#include "base/option_check.hpp"
+
 namespace twofold {
 namespace {
 
-constexpr std::size_t kPairPoints = 160;  // of those that both frames see
-constexpr std::size_t kFewestPairPoints = 20;
+constexpr std::size_t kPairPoints = 160;  // of those that both frames see: bounds the work
 constexpr int kPoseIterations = 3;
-constexpr double kHuberSigmas = 1.5;
-constexpr double kGrossSigmas = 15;     // found somewhere else
-constexpr double kChangeOfTurn = 0.05;  // between frames [rad/s]: less is no pair to learn from
-constexpr double kPairSigma = 0.003;    // of one pair's answer beside its points' noise [s]
-constexpr double kPairHuber = 2;        // standard deviations beyond which a pair counts less
-constexpr int kFirstGuess = 8;          // pairs after which pairs are linearised at the estimate
-constexpr int kFewestPairs = 8;         // for a belief: what is mapped before is bent and stays so
-constexpr int kFewestToKnow = 20;       // for the last word
-constexpr double kFloor = 0.001;        // [s] no camera is known better than that
-/// Beyond which the readout is not zero. A camera has a global shutter or one that takes a share of the
-/// period T, and neither is the likelier before: at 3.5 sigma the odds are sqrt(2 pi) sigma / T exp(3.5^2 /
-/// 2), 300 to one at sigma = T / 4.
-constexpr double kSigmas = 3.5;
-constexpr double kExactEnough = 0.0015;  // [s]
-constexpr int kEnoughPairs = 600;        // without finding anything
-constexpr int kMeanIntervals = 32;
-constexpr double kIrregular = 0.35;  // share of the period
+constexpr int kFirstGuess = 8;      // pairs after which pairs are linearised at the estimate
+constexpr int kMeanIntervals = 32;  // the usual interval is the mean of about so many
 
 /// exp(s xi) x to second order: a frame's time is short.
 Vector3 moved(const Vector6& xi, double s, const Vector3& x) {
@@ -54,7 +41,27 @@ struct ReadoutEstimator::PairEquations {
   }
 };
 
-ReadoutEstimator::ReadoutEstimator(const Rig& rig, std::size_t max_points) : rig_(rig) {
+std::string ReadoutOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("min_points", min_points, 6)
+      .above("gross_sigmas", gross_sigmas, 0)
+      .above("huber_sigmas", huber_sigmas, 0)
+      .at_least("min_turn_change", min_turn_change, 0)
+      .share("max_jitter", max_jitter)
+      .at_least("pair_sigma", pair_sigma, 0)
+      .above("pair_huber", pair_huber, 0)
+      .at_least("min_pairs", min_pairs, 1)
+      .above("significant_sigmas", significant_sigmas, 0)
+      .at_least("finest_sigma", finest_sigma, 0)
+      .above("exact_enough", exact_enough, 0)
+      .at_least("pairs_to_know", pairs_to_know, 1)
+      .at_least("pairs_to_give_up", pairs_to_give_up, 1)
+      .reason();
+}
+
+ReadoutEstimator::ReadoutEstimator(const Rig& rig, std::size_t max_points, const ReadoutOptions& options)
+    : rig_(rig), options_(options) {
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "readout options");
   for (SeenFrame& seen : frames_) seen.points.reserve(max_points);
   pair_.reserve(max_points);
 }
@@ -63,7 +70,7 @@ ReadoutEstimator::ReadoutEstimator(const Rig& rig, std::size_t max_points) : rig
 bool ReadoutEstimator::regular(std::int64_t interval_ns) {
   const double interval = 1e-9 * static_cast<double>(interval_ns);
   if (!(interval > 0)) return false;
-  const bool usual = intervals_ == 0 || std::abs(interval - period_) < kIrregular * period_;
+  const bool usual = intervals_ == 0 || std::abs(interval - period_) < options_.max_jitter * period_;
   // The first interval may have been the unusual one.
   if (!usual && intervals_ < kMeanIntervals / 4) intervals_ = 0;
   if (!usual && intervals_ > 0) return false;
@@ -73,9 +80,9 @@ bool ReadoutEstimator::regular(std::int64_t interval_ns) {
 }
 
 std::vector<ReadoutPoint>* ReadoutEstimator::begin_frame(std::int64_t t_ns, const SE3& T_cur_prev) {
-  const bool known =
-      estimate_.significant && estimate_.sigma < kExactEnough && estimate_.pairs >= kFewestToKnow;
-  if (known || estimate_.pairs >= kEnoughPairs) return nullptr;
+  const bool known = estimate_.significant && estimate_.sigma < options_.exact_enough &&
+                     estimate_.pairs >= options_.pairs_to_know;
+  if (known || estimate_.pairs >= options_.pairs_to_give_up) return nullptr;
   const bool follows = linked_ > 0 && regular(t_ns - frame(0).t_ns);
   linked_ = follows ? std::min(linked_ + 1, kFrames) : 1;
   newest_ = (newest_ + 1) % kFrames;
@@ -102,7 +109,7 @@ ReadoutEstimator::Velocity ReadoutEstimator::velocity(std::size_t age) {
 }
 
 bool ReadoutEstimator::turn_changes() {
-  return (velocity(1) - velocity(2)).tail<3>().norm() > kChangeOfTurn;
+  return (velocity(1) - velocity(2)).tail<3>().norm() > options_.min_turn_change;
 }
 
 /// What a frame and the one before both see.
@@ -149,8 +156,8 @@ ReadoutEstimator::PairEquations ReadoutEstimator::equations(const SE3& T_cur_pre
     const Vector3 early = point.row_prev * (before.head<3>() + before.tail<3>().cross(x_prev));
     const Vector2 J_r = J.leftCols<3>() * (late - R * early);
     const double sigmas = r.norm() * std::sqrt(point.weight);
-    if (sigmas > kGrossSigmas) continue;
-    sum.add(J, J_r, r, point.weight * std::min(1.0, kHuberSigmas / std::max(sigmas, 1e-9)));
+    if (sigmas > options_.gross_sigmas) continue;
+    sum.add(J, J_r, r, point.weight * std::min(1.0, options_.huber_sigmas / std::max(sigmas, 1e-9)));
   }
   return sum;
 }
@@ -161,7 +168,7 @@ void ReadoutEstimator::solve_pair(std::size_t age) {
   SeenFrame& seen = frame(age);
   seen.solved = true;
   join_points(age);
-  if (pair_.size() < kFewestPairPoints) return;
+  if (pair_.size() < static_cast<std::size_t>(options_.min_points)) return;
   const Velocity xi = frame(age + 1).T_cur_prev.log() / period_;
   for (int i = 0; i < kPoseIterations; ++i) {
     const PairEquations sum = equations(seen.T_cur_prev, xi, xi);
@@ -187,9 +194,9 @@ void ReadoutEstimator::add_pair() {
   const double gradient = sum.g_r - solved.dot(sum.g);
   if (!(h > 0) || !std::isfinite(h) || !std::isfinite(gradient)) return;
   const double readout = readout_ - gradient / h;
-  h /= 1 + h * kPairSigma * kPairSigma;
+  h /= 1 + h * options_.pair_sigma * options_.pair_sigma;
   if (estimate_.pairs >= kFirstGuess) {
-    h *= std::min(1.0, kPairHuber / (1e-9 + std::abs(readout - estimate_.seconds) * std::sqrt(h)));
+    h *= std::min(1.0, options_.pair_huber / (1e-9 + std::abs(readout - estimate_.seconds) * std::sqrt(h)));
   }
   const double b = h * readout;
   h_ += h, b_ += b, hh_ += h * h, hb_ += h * b, bb_ += b * b;
@@ -197,8 +204,9 @@ void ReadoutEstimator::add_pair() {
   estimate_.seconds = b_ / h_;
   const double scatter = bb_ + estimate_.seconds * (estimate_.seconds * hh_ - 2 * hb_);
   estimate_.sigma = std::max(std::sqrt(std::max(scatter, 0.0)) / h_, 1 / std::sqrt(h_));
-  estimate_.significant = estimate_.pairs >= kFewestPairs && estimate_.seconds < (1 + kIrregular) * period_ &&
-                          estimate_.seconds > kSigmas * std::hypot(estimate_.sigma, kFloor);
+  estimate_.significant =
+      estimate_.pairs >= options_.min_pairs && estimate_.seconds < (1 + options_.max_jitter) * period_ &&
+      estimate_.seconds > options_.significant_sigmas * std::hypot(estimate_.sigma, options_.finest_sigma);
   if (estimate_.pairs >= kFirstGuess) readout_ = std::clamp(estimate_.seconds, 0.0, period_);
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "camera/rig.hpp"
@@ -25,6 +26,34 @@ struct ReadoutEstimate {
   double sigma = std::numeric_limits<double>::infinity();  ///< its standard deviation [s]
   int pairs = 0;                                           ///< of frames that it rests on
   bool significant = false;                                ///< beyond doubt that it is not zero
+};
+
+/// When a readout is learnt from two frames, and when it is believed.
+struct ReadoutOptions {
+  // A pair of frames.
+  int min_points = 20;        ///< that both see, >= 6
+  double gross_sigmas = 15;   ///< a point farther off was found somewhere else, > 0
+  double huber_sigmas = 1.5;  ///< of a point, > 0
+  double min_turn_change =
+      0.05;  ///< of the angular velocity [rad/s]: with less there is nothing to learn, >= 0
+  double max_jitter =
+      0.35;  ///< of the time between frames, as a share of it: beyond, one is missing, in (0, 1]
+  // All pairs together.
+  double pair_sigma = 0.003;  ///< of one pair's answer, beside its points' noise [s] >= 0
+  double pair_huber = 2;      ///< standard deviations beyond which a pair counts less, > 0
+  int min_pairs = 8;          ///< for a belief, >= 1: what is mapped before is bent and stays so
+  /// Standard deviations beyond which the readout is not zero, > 0. A camera has a global shutter or one that
+  /// takes a share of the period T, and neither is the likelier before: at 3.5 sigma the odds are sqrt(2 pi)
+  /// sigma / T exp(3.5^2 / 2), 300 to one at sigma = T / 4.
+  double significant_sigmas = 3.5;
+  double finest_sigma = 0.001;  ///< [s] no camera is known better than that, >= 0
+  // The end of learning.
+  double exact_enough = 0.0015;  ///< [s] > 0: known so well ...
+  int pairs_to_know = 20;        ///< ... from so many pairs
+  int pairs_to_give_up = 600;    ///< with so many, whatever was found
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 /// How long a rolling shutter takes to read a frame out, from pairs of consecutive frames and without the
@@ -50,7 +79,7 @@ struct ReadoutEstimate {
 class ReadoutEstimator {
  public:
   /// @param max_points  that a frame sees at most
-  ReadoutEstimator(const Rig& rig, std::size_t max_points);
+  ReadoutEstimator(const Rig& rig, std::size_t max_points, const ReadoutOptions& options = {});
 
   /// The next frame, which the last one's successor is.
   /// @param T_cur_prev  its pose relative to the last one, roughly
@@ -96,6 +125,7 @@ class ReadoutEstimator {
   void add_pair();
 
   const Rig rig_;
+  const ReadoutOptions options_;
   std::array<SeenFrame, kFrames> frames_;
   std::size_t newest_ = 0;
   std::size_t linked_ = 0;  ///< newest frames that follow each other

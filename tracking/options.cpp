@@ -106,6 +106,7 @@ std::string TrackerOptions::invalid_reason() const {
       .nested("wide_search", wide_search.invalid_reason())
       .nested("elders", elders.invalid_reason())
       .nested("depth", depth.invalid_reason())
+      .nested("readout", readout.invalid_reason())
       .nested("fixed", fixed.invalid_reason())
       .nested("motion", motion.invalid_reason());
   check_search(*this, check);

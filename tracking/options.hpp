@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "camera/readout_estimator.hpp"
 #include "estimation/motion_only.hpp"
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
@@ -35,6 +36,7 @@ struct TrackerOptions {
   WideSearchOptions wide_search;
   ElderVoteOptions elders;
   DepthAlignmentOptions depth;
+  ReadoutOptions readout;  ///< of a rolling shutter, where the calibration does not have it
   FixedPixelOptions fixed;
   double fixed_inlier_share =
       0.5;  ///< of the matches: with fewer inliers a pose is no witness of fixed pixels

@@ -28,7 +28,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
       motion_(options_),
-      shutter_(rig_, motion_, static_cast<std::size_t>(options.max_searches)),
+      shutter_(rig_, motion_, static_cast<std::size_t>(options.max_searches), options.readout),
       correction_(rig, options.fixed),
       local_map_(kMaxLocalPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "fixtures/option_rules.hpp"
 #include "tests/allocation_counter.hpp"
 
 namespace twofold {
@@ -149,6 +150,30 @@ TEST(ReadoutEstimator, IsDoneWhenItKnows) {
   for (int i = 0; i < 150; ++i) camera.show(i, estimator);
   ASSERT_TRUE(estimator.estimate().significant);
   EXPECT_EQ(estimator.begin_frame(std::int64_t{100'000'000'000}, SE3()), nullptr);
+}
+
+TEST(ReadoutEstimator, BelievesAndEndsAsTheOptionsSay) {
+  ShakenCamera camera(0.026);
+  ReadoutEstimator usual(camera_rig(), 150), careful(camera_rig(), 150, {.min_pairs = 45});
+  ReadoutEstimator brief(camera_rig(), 150, {.pairs_to_give_up = 10});
+  for (int i = 0; i < 40; ++i) {
+    camera.show(i, usual);
+    camera.show(i, careful);
+    camera.show(i, brief);
+  }
+  EXPECT_TRUE(usual.estimate().significant);
+  EXPECT_FALSE(careful.estimate().significant);
+  EXPECT_EQ(brief.estimate().pairs, 10);
+  for (int i = 40; i < 120; ++i) camera.show(i, careful);
+  EXPECT_TRUE(careful.estimate().significant);
+}
+
+TEST(ReadoutOptionsTest, SayWhyTheyAreInvalid) {
+  testing::expect_rules<ReadoutOptions>({{"min_points", [](auto& o) { o.min_points = 5; }},
+                                         {"max_jitter", [](auto& o) { o.max_jitter = 0; }},
+                                         {"min_pairs", [](auto& o) { o.min_pairs = 0; }},
+                                         {"significant_sigmas", [](auto& o) { o.significant_sigmas = 0; }},
+                                         {"exact_enough", [](auto& o) { o.exact_enough = 0; }}});
 }
 
 TEST(ReadoutEstimator, AllocatesNothing) {

@@ -47,6 +47,8 @@ TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
        {"depth.min_facing", [](auto& o) { o.depth.min_facing = 1.1; }},
        {"depth.widest_kernel", [](auto& o) { o.depth.widest_kernel = o.depth.kernel / 2; }},
        {"depth.jackknife_share", [](auto& o) { o.depth.jackknife_share = -0.1; }},
+       {"readout.min_points", [](auto& o) { o.readout.min_points = 5; }},
+       {"readout.significant_sigmas", [](auto& o) { o.readout.significant_sigmas = 0; }},
        {"keyframe_share", [](auto& o) { o.keyframe_share = 1.1; }},
        {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
        {"monocular_start.candidates", [](auto& o) { o.monocular_start.candidates = 0; }},

@@ -12,9 +12,10 @@ constexpr double kUnknownReadout = 0.015;
 
 }  // namespace
 
-ShutterModel::ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points)
+ShutterModel::ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points,
+                           const ReadoutOptions& options)
     : rig_(rig), motion_(motion) {
-  if (!rig.readout) readout_.emplace(rig, max_points);
+  if (!rig.readout) readout_.emplace(rig, max_points, options);
 }
 
 RollingShutter ShutterModel::at(const SE3& T_c_ref, const FrameStep& step) const {

@@ -20,7 +20,8 @@ class ShutterModel {
  public:
   /// @param motion      of the camera up to the frame that is asked for; must outlive this
   /// @param max_points  found in a frame at most
-  ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points);
+  ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points,
+               const ReadoutOptions& options = {});
 
   /// The shutter of a frame whose pose is T_c_ref.
   [[nodiscard]] RollingShutter at(const SE3& T_c_ref, const FrameStep& step) const;
