@@ -8,9 +8,7 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kNeighbours = 3;
-constexpr double kFarthestShare = 0.04;  // of the image's width: a farther point says nothing
-constexpr double kSteepest = 1.25;       // ratio of the neighbours' depths
-constexpr double kSamePlace = 1.0;       // [px] distances below this weigh alike
+constexpr double kSamePlace = 1.0;  // [px] distances below this weigh alike
 
 }  // namespace
 
@@ -40,7 +38,7 @@ std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
   double sum = 0, weights = 0;
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const Neighbour& neighbour : nearest) {
-    if (neighbour.distance > kFarthestShare * camera_.width) break;
+    if (neighbour.distance > options_.max_distance_share * camera_.width) break;
     const double distance = std::max(neighbour.distance, kSamePlace);
     const double weight = 1 / (distance * distance);
     sum += weight * neighbour.inverse_depth;
@@ -48,7 +46,7 @@ std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
     least = std::min(least, neighbour.inverse_depth);
     most = std::max(most, neighbour.inverse_depth);
   }
-  if (!(sum > 0) || most > kSteepest * least) return std::nullopt;
+  if (!(sum > 0) || most > options_.max_depth_ratio * least) return std::nullopt;
   return weights / sum;
 }
 

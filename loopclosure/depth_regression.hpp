@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "camera/rig.hpp"
@@ -9,6 +10,15 @@
 
 namespace twofold {
 
+/// Which map points say how deep a corner is.
+struct DepthRegressionOptions {
+  double max_distance_share = 0.04;  ///< of the image's width: a farther point says nothing, in (0, 1]
+  double max_depth_ratio = 1.25;     ///< of the points asked; beyond there is an edge between them, >= 1
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 /// Depths where one camera measures none: of image positions near map points  (thesis 5.3.1).
 ///
 /// k-nearest-neighbour regression: the inverse depth of a corner is the mean of the map points seen nearest
@@ -16,7 +26,8 @@ namespace twofold {
 /// the mean says nothing. As the map is now: a corner's depth follows every change of the map's unit.
 class DepthRegression {
  public:
-  explicit DepthRegression(const PinholeCamera& camera) : camera_(camera) {}
+  explicit DepthRegression(const PinholeCamera& camera, const DepthRegressionOptions& options = {})
+      : camera_(camera), options_(options) {}
 
   /// Forgets what it knew, and learns the points that keyframe k, which must not be culled, observes.
   void learn(const GraphSnapshot& graph, KeyframeId k);
@@ -36,6 +47,7 @@ class DepthRegression {
   };
 
   PinholeCamera camera_;
+  DepthRegressionOptions options_;
   std::vector<Sample> samples_;
 };
 

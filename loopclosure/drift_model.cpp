@@ -77,7 +77,6 @@ double DriftModel::bend(std::vector<Step>& steps, Vector7& placement, const Vect
 /// what a head or a car nods is no turn.
 std::vector<DriftModel::Step> DriftModel::steps_between(const GraphSnapshot& graph, KeyframeId from,
                                                         KeyframeId to) const {
-  constexpr double kDistance = 1, kTurn = 0.3;  // [depths], [rad]
   const KeyframeId part = graph.part(to);
   std::vector<Step> steps;
   SE3 T_begin_w = graph.T_k_w(from);  // of the step under way
@@ -87,7 +86,7 @@ std::vector<DriftModel::Step> DriftModel::steps_between(const GraphSnapshot& gra
     distance += depth > 0 ? (T_k_w * T_before_w.inverse()).translation().norm() / depth : 0;
     T_before_w = T_k_w;
     const SE3 D = T_k_w * T_begin_w.inverse();
-    if (!last && distance < kDistance && D.so3().log().norm() < kTurn) return;
+    if (!last && distance < options_.step_distance && D.so3().log().norm() < options_.step_turn) return;
     steps.push_back(step(D, distance, depth));
     T_begin_w = T_k_w;
     distance = 0;

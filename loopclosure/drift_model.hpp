@@ -26,8 +26,11 @@ struct DriftOptions {
   double turn_gain = 0.02;               ///< share of all turns
   double turn_gain_of_one_camera = 0.1;  ///< whose focal length may be wrong by a fifth
   double log_scale_gain = 0.007;         ///< of one camera: logarithm of the scale per way
-  double max_chi2 = 24.3;                ///< 99.9 % of chi-square with 7 degrees of freedom; where the
-                                         ///< scale is known 6 count, and it is 99.95 %
+  // Keyframes so near to each other make one step of the way: what a head or a car nods is no turn.
+  double step_distance = 1;  ///< [depths] > 0
+  double step_turn = 0.3;    ///< [rad] > 0
+  double max_chi2 = 24.3;    ///< 99.9 % of chi-square with 7 degrees of freedom; where the
+                             ///< scale is known 6 count, and it is 99.95 %
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -34,8 +34,8 @@ LoopCloser::LoopCloser(const Rig& rig, std::shared_ptr<const Vocabulary> vocabul
       refinement_(rig, options.refinement),
       probation_(rig.kind, options.probation),
       redundant_(rig.camera, options.redundant),
-      depths_(rig.camera),
-      place_depths_(rig.camera) {}
+      depths_(rig.camera, options.depths),
+      place_depths_(rig.camera, options.depths) {}
 
 void LoopCloser::continue_from(const KeyframeDatabase& places) {
   places_ = places;
@@ -150,13 +150,12 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& 
 /// place have from here. Their median.
 std::optional<double> LoopCloser::scale_of(const Relocalisation& seen) const {
   if (rig_.kind != SensorKind::kMono) return 1.0;
-  constexpr std::size_t kFewest = 12;
   std::vector<double> ratios;
   for (const MotionObservation& found : refinement_.found()) {
     const auto depth = found.inlier ? depths_.depth_at(found.z.head<2>().cast<double>()) : std::nullopt;
     if (depth) ratios.push_back(*depth / (seen.T_c_k * found.x_ref).z());
   }
-  if (ratios.size() < kFewest) return std::nullopt;
+  if (ratios.size() < static_cast<std::size_t>(options_.min_scale_points)) return std::nullopt;
   return median(std::span(ratios));
 }
 

@@ -26,6 +26,8 @@ struct LoopCloserOptions {
   RedundantLoopOptions redundant;
   int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included
   int relocalisation_candidates = 10;  ///< places tried for a lost camera
+  DepthRegressionOptions depths;       ///< of one camera's corners
+  int min_scale_points = 12;  ///< that say how one camera's units differ; with fewer nobody knows, >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

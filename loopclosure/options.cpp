@@ -1,6 +1,5 @@
 #include "base/option_check.hpp"
 #include "loopclosure/loop_closer.hpp"
-#include "loopclosure/vocabulary_trainer.hpp"
 
 namespace twofold {
 
@@ -46,6 +45,14 @@ std::string RefinementOptions::invalid_reason() const {
       .at_least("min_inliers", min_inliers, 3)
       .within("min_inlier_share", min_inlier_share, 0, 1)
       .within("min_visible_share", min_visible_share, 0, 1)
+      .nested("solver", solver.invalid_reason())
+      .reason();
+}
+
+std::string DepthRegressionOptions::invalid_reason() const {
+  return OptionCheck()
+      .share("max_distance_share", max_distance_share)
+      .at_least("max_depth_ratio", max_depth_ratio, 1)
       .reason();
 }
 
@@ -61,6 +68,8 @@ std::string DriftOptions::invalid_reason() const {
       .at_least("turn_gain", turn_gain, 0)
       .at_least("turn_gain_of_one_camera", turn_gain_of_one_camera, 0)
       .at_least("log_scale_gain", log_scale_gain, 0)
+      .above("step_distance", step_distance, 0)
+      .above("step_turn", step_turn, 0)
       .above("max_chi2", max_chi2, 0)
       .reason();
 }
@@ -94,14 +103,8 @@ std::string LoopCloserOptions::invalid_reason() const {
       .nested("redundant", redundant.invalid_reason())
       .at_least("place_views", place_views, 1)
       .at_least("relocalisation_candidates", relocalisation_candidates, 1)
-      .reason();
-}
-
-std::string VocabularyTrainerOptions::invalid_reason() const {
-  return OptionCheck()
-      .at_least("branching", branching, 2)
-      .within("levels", levels, 1, 6)
-      .at_least("iterations", iterations, 1)
+      .nested("depths", depths.invalid_reason())
+      .at_least("min_scale_points", min_scale_points, 1)
       .reason();
 }
 

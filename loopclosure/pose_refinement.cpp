@@ -7,12 +7,6 @@
 #include "imaging/guided_search.hpp"
 
 namespace twofold {
-namespace {
-
-/// Far below a hundredth of a pixel the iterations need not settle: with many outliers they take long to.
-constexpr MotionOnlyOptions kSolver{.max_iterations = 15, .stop_step = 1e-5};
-
-}  // namespace
 
 RefinementOutcome PoseRefinement::refine(const GraphSnapshot& graph, KeyframeId place,
                                          const FrameImages& images, const SE3& T_c_k, RefinedPlace& result) {
@@ -21,7 +15,7 @@ RefinementOutcome PoseRefinement::refine(const GraphSnapshot& graph, KeyframeId 
   result.T_c_k = T_c_k;
   for (const double radius_px : {options_.radius_px, options_.second_radius_px}) {
     search(graph, place, images, result.T_c_k, radius_px);
-    const MotionOnlyResult motion = optimise_motion(rig_, found_, result.T_c_k, kSolver);
+    const MotionOnlyResult motion = optimise_motion(rig_, found_, result.T_c_k, options_.solver);
     result.inliers = motion.inliers;
     if (!motion.converged || motion.inliers < options_.min_inliers) return RefinementOutcome::kContradicted;
     result.T_c_k = motion.T_c_ref;

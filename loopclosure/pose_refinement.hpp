@@ -21,6 +21,8 @@ struct RefinementOptions {
   int min_inliers = 20;               ///< points
   double min_inlier_share = 0.6;      ///< of the points found
   double min_visible_share = 0.1;     ///< ... and of those looked for: the others should be seen and are not
+  /// Far below a hundredth of a pixel the iterations need not settle: with many outliers they take long to.
+  MotionOnlyOptions solver{.max_iterations = 15, .stop_step = 1e-5};
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

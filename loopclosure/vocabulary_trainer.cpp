@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "base/check.hpp"
+#include "base/option_check.hpp"
 
 namespace twofold {
 namespace {
@@ -116,6 +117,14 @@ std::vector<Vocabulary::Node> grow_tree(const Members& all, const VocabularyTrai
 }
 
 }  // namespace
+
+std::string VocabularyTrainerOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("branching", branching, 2)
+      .within("levels", levels, 1, 6)
+      .at_least("iterations", iterations, 1)
+      .reason();
+}
 
 Vocabulary train_vocabulary(const std::vector<std::vector<BinaryDescriptor>>& images,
                             const VocabularyTrainerOptions& options) {

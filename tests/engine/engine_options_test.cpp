@@ -83,6 +83,12 @@ TEST(Options, OfTheLoopCloserSayWhyTheyAreInvalid) {
        {"recogniser.consistency", [](auto& o) { o.recogniser.consistency = 0; }},
        {"verification.min_inliers", [](auto& o) { o.verification.min_inliers = 3; }},
        {"refinement.min_inlier_share", [](auto& o) { o.refinement.min_inlier_share = 1.5; }},
+       {"refinement.solver.rounds", [](auto& o) { o.refinement.solver.rounds = 0; }},
+       {"probation.drift.step_distance", [](auto& o) { o.probation.drift.step_distance = 0; }},
+       {"probation.drift.step_turn", [](auto& o) { o.probation.drift.step_turn = 0; }},
+       {"depths.max_distance_share", [](auto& o) { o.depths.max_distance_share = 0; }},
+       {"depths.max_depth_ratio", [](auto& o) { o.depths.max_depth_ratio = 0.9; }},
+       {"min_scale_points", [](auto& o) { o.min_scale_points = 0; }},
        {"relocalisation_candidates", [](auto& o) { o.relocalisation_candidates = 0; }}});
   expect_rules<VocabularyTrainerOptions>(
       {{"branching", [](auto& o) { o.branching = 1; }}, {"levels", [](auto& o) { o.levels = 7; }}});
