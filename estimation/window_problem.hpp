@@ -20,7 +20,7 @@ struct WindowProblem {
     SE3 T_k_w;
     bool fixed = false;  ///< does not move during the optimisation
   };
-  /// One measurement of a point; those of one point stand together.
+  /// That a pose sees a point, with the measurement; those of one point stand together.
   struct Observation {
     int pose = 0;
     Eigen::Vector3f z{0, 0, 0};  ///< (u_l, v_l, u_r) [px]; u_r is ignored where its information is 0

@@ -7,7 +7,8 @@
 
 namespace twofold {
 
-/// A measurement of the point with this index: (u_l, v_l, u_r) [px]; u_r is ignored by monocular rigs.
+/// That a view sees the point with this index, with the measurement (u_l, v_l, u_r) [px]; monocular rigs
+/// ignore u_r.
 struct SeenPoint {
   int point = 0;
   Vector3 z = Vector3::Zero();

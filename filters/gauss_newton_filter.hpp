@@ -33,7 +33,7 @@ struct GaussNewtonFilterOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// Measurement of one point; z.z() is ignored by monocular rigs.
+/// That a frame sees a point, with the measurement; monocular rigs ignore u_r.
 struct PointObservation {
   std::int64_t point = 0;
   Vector3 z = Vector3::Zero();  ///< (u_l, v_l, u_r) [px]

@@ -52,7 +52,7 @@ struct SlidingWindowOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// One stereo measurement; z.z() NaN: seen in the left image only (cannot start a landmark).
+/// That a frame sees a landmark, with the measurement; one of the left image alone cannot start a landmark.
 struct LandmarkObservation {
   std::int64_t landmark = 0;
   Vector3 z = Vector3::Zero();  ///< (u_l, v_l, u_r) [px]

@@ -10,7 +10,7 @@
 
 namespace twofold {
 
-/// Measurement z_ik of point y_k in keyframe V_i  (thesis 6.2.2).
+/// That keyframe V_i sees point y_k, and its measurement z_ik  (thesis 6.2.2).
 struct Observation {
   PointId point = kNoPoint;
   Eigen::Vector3f z{0, 0, 0};  ///< (u_l, v_l, u_r) level-0 pixels; u_r is NaN without right-image information

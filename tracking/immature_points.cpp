@@ -26,7 +26,7 @@ bool ImmaturePoints::add(const ImmaturePoint& point) {
   return true;
 }
 
-void ImmaturePoints::adopt(const GraphSnapshot& graph) {
+void ImmaturePoints::forget_mapped(const GraphSnapshot& graph) {
   ++revision_;
   std::erase_if(pending_, [&](const PendingKeyframe& keyframe) { return graph.contains(keyframe.id); });
   std::erase_if(points_, [&](const ImmaturePoint& point) {

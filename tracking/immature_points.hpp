@@ -30,7 +30,8 @@ struct PendingKeyframe {
   SE3 T_k_ref;
 };
 
-/// The tracker's own points and proposals, until the map has them. Never grows beyond its capacity.
+/// The immature points, and the keyframes that were proposed, until the map has them. Never grows beyond its
+/// capacity.
 class ImmaturePoints {
  public:
   ImmaturePoints(std::size_t point_capacity, std::size_t keyframe_capacity) {
@@ -56,8 +57,8 @@ class ImmaturePoints {
   bool add(const ImmaturePoint& point);
   /// Forgets all points.
   void clear_points();
-  /// Forgets what the map has taken over.
-  void adopt(const GraphSnapshot& graph);
+  /// Forgets what the map has.
+  void forget_mapped(const GraphSnapshot& graph);
   /// Forgets points that failed too often, or that no keyframe has confirmed for more than `max_age`
   /// keyframes.
   void drop_stale(KeyframeId newest, int max_failures, int max_age);

@@ -27,7 +27,7 @@ struct AnchorPose {
 };
 
 /// The candidate set for top-down tracking  (thesis 6.2.5): points seen from N1 of the reference keyframe
-/// (eq. 6.5), and the tracker's own points. Pointers are valid until map, reference or own points change.
+/// (eq. 6.5), and the immature points. Pointers are valid until map, reference or immature points change.
 class LocalMap {
  public:
   explicit LocalMap(std::size_t capacity);
@@ -59,7 +59,7 @@ class LocalMap {
   /// What the points were collected from.
   struct Origin {
     std::uint64_t version = 0;   ///< of the map
-    std::uint64_t revision = 0;  ///< of the tracker's own points
+    std::uint64_t revision = 0;  ///< of the immature points
     KeyframeId reference = kNoKeyframe;
     friend bool operator==(const Origin&, const Origin&) = default;
   };

@@ -46,7 +46,7 @@ void LocalMapSearch::run(const FrameImages& images, const SE3& T_c_ref, double r
   result.searched = 0;
   result.T_c_ref_predicted = T_c_ref;
   result.search_radius_px = radius_px;
-  View view{images, T_c_ref, step.shutter, options_.search};
+  SearchedView view{images, T_c_ref, step.shutter, options_.search};
   view.options.refine_iterations = step.bounds.refine_iterations;
   view.options.radius_px = radius_px;
   for (std::int64_t i = outcome.candidates.next(); i >= 0; i = outcome.candidates.next()) {
@@ -82,7 +82,8 @@ void LocalMapSearch::select_candidates(const SE3& T_c_ref, TrackResult& result, 
 }
 
 /// @param point  position in the local map's points
-bool LocalMapSearch::search_point(std::uint32_t point, const View& view, SearchOutcome& outcome) const {
+bool LocalMapSearch::search_point(std::uint32_t point, const SearchedView& view,
+                                  SearchOutcome& outcome) const {
   const TrackedPoint& tracked = local_map_.points()[point];
   const SE3 T_c_a = view.shutter.seen_from(rig_, view.T_c_ref, tracked.x_ref) * local_map_.T_ref_a(tracked);
   const auto found = find_point(view.images, rig_, *tracked.appearance, tracked.psi, T_c_a, view.options);
@@ -93,7 +94,7 @@ bool LocalMapSearch::search_point(std::uint32_t point, const View& view, SearchO
 /// Where many points were missed and the view is brighter or darker there than their patches are, the light
 /// has changed, and they are looked for as they look in it. Patches are not made as bright as the view one by
 /// one: before another surface than theirs that would make them look alike.
-void LocalMapSearch::search_in_other_light(View& view, int searched, SearchOutcome& outcome) {
+void LocalMapSearch::search_in_other_light(SearchedView& view, int searched, SearchOutcome& outcome) {
   if (static_cast<double>(outcome.missed.size()) < options_.light_missed_share * searched) return;
   gains_.clear();
   for (const std::uint32_t i : outcome.missed) {

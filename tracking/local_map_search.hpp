@@ -50,7 +50,7 @@ class LocalMapSearch {
 
  private:
   /// Where all points of one search are looked for.
-  struct View {
+  struct SearchedView {
     const FrameImages& images;
     const SE3& T_c_ref;
     const RollingShutter& shutter;
@@ -58,8 +58,9 @@ class LocalMapSearch {
   };
 
   void select_candidates(const SE3& T_c_ref, TrackResult& result, Quadtree& candidates) const;
-  [[nodiscard]] bool search_point(std::uint32_t point, const View& view, SearchOutcome& outcome) const;
-  void search_in_other_light(View& view, int searched, SearchOutcome& outcome);
+  [[nodiscard]] bool search_point(std::uint32_t point, const SearchedView& view,
+                                  SearchOutcome& outcome) const;
+  void search_in_other_light(SearchedView& view, int searched, SearchOutcome& outcome);
 
   const Rig& rig_;
   const TrackerOptions& options_;

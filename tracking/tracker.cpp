@@ -136,7 +136,7 @@ void Tracker::follow(const GraphSnapshot& graph) {
                           newest->T_k_ref.inverse();
     motion_.refer_to(newest->id, T_ref_new);
   }
-  immature_points_.adopt(graph);
+  immature_points_.forget_mapped(graph);
   if (graph.contains(motion_.reference()) && graph.keyframe(motion_.reference()).culled()) {
     const auto replacement = graph.live_replacement(motion_.reference());
     TWOFOLD_CHECK(replacement, "the reference was culled too long ago");

@@ -95,7 +95,7 @@ TEST(ImmaturePoints, AreForgottenWhenTheMapHasTakenThemOver) {
   for (const ImmaturePoint& point : {taken, under_way, unproposed}) ASSERT_TRUE(points.add(point));
   const std::uint64_t before = points.revision();
 
-  points.adopt(map_with(2));
+  points.forget_mapped(map_with(2));
 
   EXPECT_GT(points.revision(), before);
   ASSERT_EQ(points.pending().size(), 1U);

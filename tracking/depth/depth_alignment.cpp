@@ -49,10 +49,10 @@ DepthAlignment::DepthAlignment(const Rig& rig, const DepthAlignmentOptions& opti
 
 void DepthAlignment::add_view(KeyframeId id, const cv::Mat& depth, const SE3& T_view_ref) {
   if (views_ == kViews) return;
-  const auto has = [&](const View& view) { return view.id == id; };
+  const auto has = [&](const ViewPlanes& view) { return view.id == id; };
   auto slot = std::find_if(slots_.begin(), slots_.end(), has);
   if (slot == slots_.end()) {  // in place of the oldest
-    slot = std::min_element(slots_.begin(), slots_.end(), [](const View& a, const View& b) {
+    slot = std::min_element(slots_.begin(), slots_.end(), [](const ViewPlanes& a, const ViewPlanes& b) {
       return a.id != b.id && (a.id == kNoKeyframe || (b.id != kNoKeyframe && a.id < b.id));
     });
     slot->id = id;

@@ -94,8 +94,8 @@ class DepthAlignment {
   [[nodiscard]] double typical_depth() const { return current_.typical_depth(); }
 
  private:
-  struct View {
-    explicit View(const Rig& rig) : planes(rig) {}
+  struct ViewPlanes {
+    explicit ViewPlanes(const Rig& rig) : planes(rig) {}
     KeyframeId id = kNoKeyframe;
     SE3 T_view_ref;
     DepthPlanes planes;
@@ -140,7 +140,7 @@ class DepthAlignment {
 
   Rig rig_;
   DepthAlignmentOptions options_;
-  std::vector<View> slots_;
+  std::vector<ViewPlanes> slots_;
   std::size_t views_ = 0;                    ///< in use
   std::array<std::size_t, kViews> order_{};  ///< slots of those
   DepthPlanes current_;

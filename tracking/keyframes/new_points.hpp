@@ -12,7 +12,7 @@
 
 namespace twofold {
 
-/// Where the tracker's own points come from: corners whose depth is measured become immature points at once,
+/// Where immature points come from: corners whose depth is measured become immature points at once,
 /// others wait as seeds until frames have shown how deep they are.
 ///
 /// No allocation after construction.

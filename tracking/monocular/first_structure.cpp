@@ -51,9 +51,9 @@ std::size_t common(const std::vector<int>& a, const std::vector<int>& b) {
 }
 
 /// Everything about one attempt to start.
-class Attempt {
+class FirstStructureEstimator {
  public:
-  Attempt(const Rig& rig, const CornerViews& views, const FirstStructureOptions& options)
+  FirstStructureEstimator(const Rig& rig, const CornerViews& views, const FirstStructureOptions& options)
       : rig_(rig),
         views_(views),
         options_(options),
@@ -338,7 +338,7 @@ std::string FirstStructureOptions::invalid_reason() const {
 
 tl::expected<FirstStructure, LostCause> first_structure(const Rig& rig, const CornerViews& views,
                                                         const FirstStructureOptions& options) {
-  return Attempt(rig, views, options).run();
+  return FirstStructureEstimator(rig, views, options).run();
 }
 
 }  // namespace twofold

@@ -61,7 +61,7 @@ void PoseEstimator::ask_elders(const MotionOnlyOptions& solver, SearchOutcome& f
   if (found.verdict.by_elders) found.motion = *found.verdict.by_elders;
 }
 
-/// Which of the tracker's own points are where they should be.
+/// Which of the immature points are where they should be.
 /// @return how many of them move
 int PoseEstimator::judge_immature_points(const SearchOutcome& found) {
   for (const std::uint32_t i : found.missed) {

@@ -15,7 +15,7 @@
 namespace twofold {
 
 /// A frame's pose from the points of the local map that were found in it, how well it is known, and what it
-/// says about the tracker's own points.
+/// says about the immature points.
 ///
 /// One instance a tracker: it remembers whom it mistrusts, and how residuals were. No allocation after
 /// construction.
