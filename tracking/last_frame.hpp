@@ -4,7 +4,7 @@
 
 #include "imaging/image_pyramid.hpp"
 #include "tracking/dense_alignment.hpp"
-#include "tracking/wide_search.hpp"
+#include "tracking/loss/wide_search.hpp"
 
 namespace twofold {
 

@@ -2,11 +2,9 @@
 
 #include <cstdint>
 
-#include "camera/usual_interval.hpp"
-#include "imaging/image_pyramid.hpp"
-
 namespace twofold {
 
+/// Why a frame has no pose.
 enum class LostCause : std::uint8_t {
   kNone,
   kNoTexture,            ///< too few corners with depth to start a map
@@ -31,48 +29,5 @@ enum class LostCause : std::uint8_t {
   kNoStructure         ///< a depth camera: few corners, and surfaces along which it could have slid
 };
 [[nodiscard]] const char* describe(LostCause cause);
-
-/// What images and time stamps say about why points were not found, when that is what happened; otherwise
-/// `found` again. Bounded work, no allocation.
-///
-/// @param gap  kFramesMissing or kGapInTime when the first lost frame came after one, else kNone
-/// @param last_good  images of the last frame that had a pose; may be empty
-[[nodiscard]] LostCause explain_loss(LostCause found, const ImagePyramid& now, const ImagePyramid& last_good,
-                                     LostCause gap);
-
-/// Watches numbers and time stamps of frames for gaps.
-class FrameIntervals {
- public:
-  /// kNone, kFramesMissing or kGapInTime between the frame before and this one.
-  LostCause next(std::int64_t index, std::int64_t t_ns);
-
- private:
-  bool any_ = false;
-  std::int64_t index_ = 0;
-  std::int64_t t_ns_ = 0;
-  UsualInterval usual_;
-};
-
-/// Since when the camera has been lost, and after what.
-class LossHistory {
- public:
-  /// Before a frame is tracked.
-  void begin_frame(std::int64_t index, std::int64_t t_ns);
-  void lost() { ++lost_frames_; }
-  void placed();
-  /// @return for how long there has been something in view of the lost camera [s]
-  double seeing_for(bool something_in_view, std::int64_t t_ns);
-
-  /// Frames since the last one with a pose.
-  [[nodiscard]] int lost_frames() const { return lost_frames_; }
-  /// Between the last good frame and the one after it: kFramesMissing, kGapInTime or kNone.
-  [[nodiscard]] LostCause gap_before() const { return gap_before_; }
-
- private:
-  FrameIntervals intervals_;
-  int lost_frames_ = 0;
-  LostCause gap_before_ = LostCause::kNone;
-  std::int64_t seeing_since_ns_ = 0;  ///< 0: not
-};
 
 }  // namespace twofold

@@ -9,9 +9,9 @@
 #include "tracking/depth/depth_alignment.hpp"
 #include "tracking/elder_vote.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
+#include "tracking/loss/wide_search.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
 #include "tracking/monocular/first_structure.hpp"
-#include "tracking/wide_search.hpp"
 
 namespace twofold {
 

@@ -22,6 +22,7 @@
 #include "tracking/local_map.hpp"
 #include "tracking/local_map_search.hpp"
 #include "tracking/loss/earlier_views.hpp"
+#include "tracking/loss/loss_history.hpp"
 #include "tracking/lost_cause.hpp"
 #include "tracking/monocular/monocular_start.hpp"
 #include "tracking/motion/motion_model.hpp"

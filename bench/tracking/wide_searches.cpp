@@ -13,7 +13,7 @@
 #include "base/processor_time.hpp"
 #include "imaging/image_buffers.hpp"
 #include "io/sources/open_source.hpp"
-#include "tracking/wide_search.hpp"
+#include "tracking/loss/wide_search.hpp"
 
 // The wider search alone: each frame of a recording is compared with the frames before it, all of them, as a
 // lost camera's is in the worst case. What that takes, and how often the motion is found and is the true one.

@@ -1,4 +1,4 @@
-#include "tracking/keyframe_decision.hpp"
+#include "tracking/keyframes/keyframe_decision.hpp"
 
 #include <gtest/gtest.h>
 

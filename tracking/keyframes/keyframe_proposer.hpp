@@ -6,7 +6,7 @@
 #include "graph/snapshot.hpp"
 #include "tracking/frame_step.hpp"
 #include "tracking/immature_points.hpp"
-#include "tracking/keyframe_decision.hpp"
+#include "tracking/keyframes/keyframe_decision.hpp"
 #include "tracking/local_map.hpp"
 #include "tracking/local_map_search.hpp"
 

@@ -4,9 +4,9 @@
 
 #include "camera/rig.hpp"
 #include "tracking/loss/recent_views.hpp"
+#include "tracking/loss/wide_search.hpp"
 #include "tracking/options.hpp"
 #include "tracking/placement.hpp"
-#include "tracking/wide_search.hpp"
 
 namespace twofold {
 

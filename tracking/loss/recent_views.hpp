@@ -5,7 +5,7 @@
 
 #include "graph/ids.hpp"
 #include "imaging/image_pyramid.hpp"
-#include "tracking/wide_search.hpp"
+#include "tracking/loss/wide_search.hpp"
 
 namespace twofold {
 

@@ -1,4 +1,4 @@
-#include "tracking/wide_search.hpp"
+#include "tracking/loss/wide_search.hpp"
 
 #include <cmath>
 #include <random>

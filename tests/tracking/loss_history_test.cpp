@@ -1,4 +1,4 @@
-#include "tracking/lost_cause.hpp"
+#include "tracking/loss/loss_history.hpp"
 
 #include <gtest/gtest.h>
 
