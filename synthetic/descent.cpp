@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "synthetic/furniture.hpp"
 #include "synthetic/materials.hpp"
@@ -44,20 +46,77 @@ cv::Mat make_heights(Random& random) {
   return heights;
 }
 
+/// Heights along one row of samples, at every texel's x and one spacing to either side of it.
+struct Profile {
+  int row = -1;
+  std::vector<float> left, here, right;
+};
+
+/// Profiles of the rows around the texels that are being lit: a row of samples lasts for ten rows of texels.
+class Profiles {
+ public:
+  Profiles(const HeightField& ground, int texels) : ground_(ground) {
+    const auto h = static_cast<float>(kDescentSpacing);
+    for (int i = 0; i < texels; ++i) {
+      const auto x = static_cast<float>((i + 0.5) * kDescentTexel + ground.x0);
+      left_.push_back(ground.columns_at(x - h));
+      here_.push_back(ground.columns_at(x));
+      right_.push_back(ground.columns_at(x + h));
+    }
+  }
+
+  const Profile& operator[](int row) {
+    Profile& profile = kept_[static_cast<std::size_t>(row) % kept_.size()];
+    if (profile.row != row) {
+      profile.row = row;
+      const auto* heights = ground_.heights.ptr<float>(row);
+      fill(profile.left, left_, heights);
+      fill(profile.here, here_, heights);
+      fill(profile.right, right_, heights);
+    }
+    return profile;
+  }
+
+ private:
+  static void fill(std::vector<float>& profile, const std::vector<HeightField::Between>& at,
+                   const float* heights) {
+    profile.resize(at.size());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const float* p = heights + at[i].first;
+      profile[i] = p[0] + at[i].weight * (p[1] - p[0]);
+    }
+  }
+
+  const HeightField& ground_;
+  std::vector<HeightField::Between> left_, here_, right_;
+  std::array<Profile, 8> kept_;  ///< more than one row of texels looks at
+};
+
 /// Albedo times the light of a low sun on the slope.
 void light(Canvas& canvas, const HeightField& ground) {
   const Vector3 sun = Vector3(-0.62, 0.4, 0.68).normalized();
   cv::Mat& image = canvas.image();
   const auto h = static_cast<float>(kDescentSpacing);
+  Profiles profiles(ground, image.cols);
   for (int j = 0; j < image.rows; ++j) {
     const auto y = static_cast<float>((j + 0.5) * kDescentTexel + ground.y0);
-    for (int i = 0; i < image.cols; ++i) {
-      const auto x = static_cast<float>((i + 0.5) * kDescentTexel + ground.x0);
-      const float sx = (ground.height_at(x + h, y) - ground.height_at(x - h, y)) / (2 * h);
-      const float sy = (ground.height_at(x, y + h) - ground.height_at(x, y - h)) / (2 * h);
+    const auto [a, a_weight] = ground.rows_at(y - h);
+    const auto [b, b_weight] = ground.rows_at(y);
+    const auto [c, c_weight] = ground.rows_at(y + h);
+    const Profile &a0 = profiles[a], &a1 = profiles[a + 1], &b0 = profiles[b], &b1 = profiles[b + 1],
+                  &c0 = profiles[c], &c1 = profiles[c + 1];
+    const auto mix = [](float weight, float first, float second) {
+      return (1 - weight) * first + weight * second;
+    };
+    auto* grey = image.ptr<float>(j);
+    for (std::size_t i = 0; i < a0.here.size(); ++i) {
+      const float sx =
+          (mix(b_weight, b0.right[i], b1.right[i]) - mix(b_weight, b0.left[i], b1.left[i])) / (2 * h);
+      const float sy =
+          (mix(c_weight, c0.here[i], c1.here[i]) - mix(a_weight, a0.here[i], a1.here[i])) / (2 * h);
       const auto lambert =
           static_cast<float>(-sx * sun.x() - sy * sun.y() + sun.z()) / std::sqrt(sx * sx + sy * sy + 1);
-      image.at<float>(j, i) *= std::max(0.12f, 0.15f + 1.25f * lambert);
+      grey[i] *= std::max(0.12f, 0.15f + 1.25f * lambert);
     }
   }
 }

@@ -5,14 +5,28 @@
 
 namespace twofold::synthetic {
 
-float HeightField::height_at(float x, float y) const {
+namespace {
+
+HeightField::Between between(float at, double origin, double spacing, int samples) {
   const auto inv = static_cast<float>(1.0 / spacing);
-  const float u = std::clamp((x - static_cast<float>(x0)) * inv, 0.0f, static_cast<float>(heights.cols - 1));
-  const float v = std::clamp((y - static_cast<float>(y0)) * inv, 0.0f, static_cast<float>(heights.rows - 1));
-  const int i = std::min(static_cast<int>(u), heights.cols - 2);
-  const int j = std::min(static_cast<int>(v), heights.rows - 2);
-  const float a = u - static_cast<float>(i);
-  const float b = v - static_cast<float>(j);
+  const float u = std::clamp((at - static_cast<float>(origin)) * inv, 0.0f, static_cast<float>(samples - 1));
+  const int first = std::min(static_cast<int>(u), samples - 2);
+  return {first, u - static_cast<float>(first)};
+}
+
+}  // namespace
+
+HeightField::Between HeightField::columns_at(float x) const {
+  return between(x, x0, spacing, heights.cols);
+}
+
+HeightField::Between HeightField::rows_at(float y) const {
+  return between(y, y0, spacing, heights.rows);
+}
+
+float HeightField::height_at(float x, float y) const {
+  const auto [i, a] = columns_at(x);
+  const auto [j, b] = rows_at(y);
   const auto* p = heights.ptr<float>(j) + i;
   const auto* q = heights.ptr<float>(j + 1) + i;
   return (1 - b) * (p[0] + a * (p[1] - p[0])) + b * (q[0] + a * (q[1] - q[0]));

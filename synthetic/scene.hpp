@@ -49,7 +49,15 @@ struct HeightField {
   cv::Mat heights;        ///< CV_32FC1 [m], rows along y
   int texture = 0;
 
-  /// (x, y) in metres; clamps at the rim.
+  /// Between which two samples a coordinate lies (the second is first + 1), and how near the second.
+  struct Between {
+    int first;
+    float weight;
+  };
+
+  /// x or y in metres; clamps at the rim.
+  [[nodiscard]] Between columns_at(float x) const;
+  [[nodiscard]] Between rows_at(float y) const;
   [[nodiscard]] float height_at(float x, float y) const;
 };
 
