@@ -73,7 +73,10 @@ TEST_P(PublishedCalibration, IsTakenByTheNameOfTheFolder) {
   const ScratchFolder folder;
   write_listed(folder, published.folder);
   const auto lens = folder.write("lens.yaml", lens_file(published.intrinsics, published.coefficients));
-  for (const std::string end : {"", "/", "/."}) {
+  // A lens costs seconds a source under AddressSanitizer: how a folder may end is tried where there is none.
+  std::vector<std::string> ends = {""};
+  if (*published.coefficients == 0) ends.insert(ends.end(), {"/", "/."});
+  for (const std::string& end : ends) {
     const auto source = open_source((folder / published.folder) + end);
     EXPECT_EQ(source->rig().kind, SensorKind::kRgbd);
     EXPECT_NE(all_notes(*source).find(fmt::format("calibration as published for {} (", published.dataset)),
