@@ -6,13 +6,21 @@
 
 #include "synthetic/view_geometry.hpp"
 
+#ifdef __SANITIZE_THREAD__
+#define TWOFOLD_ROWS_IN_TURN
+#elif defined(__has_feature)  // clang++ 14 defines no macro
+#if __has_feature(thread_sanitizer)
+#define TWOFOLD_ROWS_IN_TURN
+#endif
+#endif
+
 namespace twofold::synthetic {
 namespace {
 
 /// Rows at once; in turn under ThreadSanitizer, which knows nothing of how libtbb hands work over.
 template <class Body>
 void for_each_row(int rows, const Body& body) {
-#ifdef __SANITIZE_THREAD__
+#ifdef TWOFOLD_ROWS_IN_TURN
   for (int row = 0; row < rows; ++row) body(row);
 #else
   tbb::parallel_for(0, rows, body);

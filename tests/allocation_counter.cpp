@@ -3,7 +3,9 @@
 #include <cerrno>
 #include <cstddef>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#include "tests/sanitized.hpp"
+
+#if defined(TWOFOLD_TEST_SANITIZED) || !defined(__GLIBC__)
 #define TWOFOLD_COUNT_ALLOCATIONS 0
 #else
 #define TWOFOLD_COUNT_ALLOCATIONS 1
