@@ -24,7 +24,7 @@ std::optional<std::uint32_t> keyframe_of(std::string_view message) {
   message.remove_prefix(kWord.size());
   std::uint32_t id = 0;
   const auto [end, error] = std::from_chars(message.data(), message.data() + message.size(), id);
-  if (error != std::errc() || end != message.data() + message.size()) return std::nullopt;
+  if (error != std::errc() || end != message.data() + message.size() || id == kNoId) return std::nullopt;
   return id;
 }
 
@@ -38,7 +38,7 @@ std::optional<ViewMessage> ClientFeed::next(const ViewSight& sight) {
   }
   if (unacknowledged_ >= kUnacknowledged) return std::nullopt;
   std::optional<ViewMessage> message = next_text();
-  if (!message && wanted_keyframe_ && sight.keyframe == *wanted_keyframe_) {
+  if (!message && wanted_keyframe_ && sight.keyframe == *wanted_keyframe_ && sight.keyframe_image.bytes) {
     wanted_keyframe_.reset();
     message = ViewMessage{sight.keyframe_image.bytes};
   }

@@ -167,13 +167,15 @@ TEST_F(ClientFeedTest, AKeyframesImageGoesToWhoAskedForIt) {
   title_.keyframe_images = true;
   for (const std::string_view nonsense :
        {"keyframe", "keyframe ", "keyframe -1", "keyframe +1", "keyframe 3 ", "keyframe 0x3",
-        "keyframe 4294967296", "keyframe ../3", "keyframe  3"})
+        "keyframe 4294967296", "keyframe 4294967295", "keyframe ../3", "keyframe  3"})
     EXPECT_FALSE(ClientFeed(scene_, title_).take(nonsense)) << nonsense;
   ClientFeed feed(scene_, title_), other(scene_, title_);
   EXPECT_TRUE(feed.take("keyframe 4294967294"));
   EXPECT_TRUE(feed.take("keyframe 3"));
   EXPECT_EQ(feed.wanted_keyframe(), 3U) << "the last one";
   drain(feed);
+  sight_.keyframe = 3;  // with no image yet
+  EXPECT_TRUE(drain(feed).empty());
   sight_.keyframe = 2;
   sight_.keyframe_image.put("another's");
   EXPECT_TRUE(drain(feed).empty());
