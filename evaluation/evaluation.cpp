@@ -1,5 +1,6 @@
 #include "evaluation/evaluation.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -188,6 +189,20 @@ std::optional<double> constant_turn_deg(const std::vector<PosePair>& aligned) {
     spread.push_back(angle_deg(mean.inverse() * pair.T_w_c.so3().inverse() * pair.T_e_c.so3()));
   if (error_statistics(std::move(spread)).rmse > kMostSpread * turn) return std::nullopt;
   return turn;
+}
+
+bool is_straight(const std::vector<PosePair>& pairs, double error) {
+  if (pairs.empty()) return true;
+  const auto count = static_cast<double>(pairs.size());
+  Vector3 mean = Vector3::Zero();
+  for (const PosePair& pair : pairs) mean += pair.T_w_c.translation() / count;
+  Matrix3 spread = Matrix3::Zero();
+  for (const PosePair& pair : pairs) {
+    const Vector3 d = pair.T_w_c.translation() - mean;
+    spread += d * d.transpose() / count;
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(spread, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()[1])) < 3 * error;  // ascending: [2] is along the path
 }
 
 ErrorStatistics error_statistics(std::vector<double> errors) {

@@ -46,6 +46,10 @@ enum class Alignment : std::uint8_t { kNone, kSe3, kSim3 };
 /// than a tenth of that (root mean square)
 [[nodiscard]] std::optional<double> constant_turn_deg(const std::vector<PosePair>& aligned);
 
+/// Whether the true path is so straight that positions leave the turn about it open: across it, it spreads by
+/// less than three times `error` (root mean square) [m].
+[[nodiscard]] bool is_straight(const std::vector<PosePair>& pairs, double error);
+
 struct ErrorStatistics {
   std::size_t count = 0;
   double rmse = 0, mean = 0, median = 0, stddev = 0, min = 0, max = 0;  ///< stddev of the population

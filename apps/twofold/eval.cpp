@@ -229,13 +229,13 @@ cv::Mat draw(const EvalArguments& arguments, const Evaluation& e) {
       options);
 }
 
-void warn_of_constant_turn(const std::vector<PosePair>& aligned) {
-  if (const auto turn = constant_turn_deg(aligned))
-    fmt::print(
-        stderr,
-        "twofold: the orientations differ by a constant turn of {:.0f} deg: is one of them the body's, "
-        "the other the camera's?\n",
-        *turn);
+void warn_of_constant_turn(const Evaluation& evaluation) {
+  const auto turn = constant_turn_deg(evaluation.pairs);
+  if (!turn) return;
+  const char* why = is_straight(evaluation.pairs, evaluation.absolute.rmse)
+                        ? "the path is so straight that aligned positions leave the turn about it open"
+                        : "is one of them the body's, the other the camera's?";
+  fmt::print(stderr, "twofold: the orientations differ by a constant turn of {:.0f} deg: {}\n", *turn, why);
 }
 
 void run_eval(const EvalArguments& arguments) {
@@ -254,7 +254,7 @@ void run_eval(const EvalArguments& arguments) {
   if (!evaluation) throw IoError(arguments.estimate, evaluation.error());
   const bool has_times = !is_kitti(arguments.estimate);
   print_table(arguments, *evaluation, pairing.of, has_times);
-  if (arguments.alignment != Alignment::kNone) warn_of_constant_turn(evaluation->pairs);
+  if (arguments.alignment != Alignment::kNone) warn_of_constant_turn(*evaluation);
   if (!arguments.json.empty())
     write_file(arguments.json, json_text(arguments, *evaluation, pairing.of, has_times));
   if (!arguments.plot.empty()) write_png(arguments.plot, draw(arguments, *evaluation));

@@ -168,6 +168,24 @@ TEST(EvalCommand, AConstantTurnOfTheOrientationsIsSaid) {
       << outcome.err;
 }
 
+/// As of a car on a straight road: which way is up no position tells.
+TEST(EvalCommand, OfAStraightPathTheTurnAboutItIsLeftOpen) {
+  const ScratchFolder folder;
+  Trajectory truth, estimate;
+  for (int i = 0; i < 60; ++i) {
+    const Vector3 x(0.01 * (i % 3), 0.01 * (i % 2), i), error(0.02 * (i % 2), 0.02 * (i % 3), 0);
+    truth.push_back({i * 100'000'000LL, SE3(SO3(), x)});
+    const SE3 rolled(SO3::exp(Vector3(0, 0, 0.5)), Vector3::Zero());
+    estimate.push_back({i * 100'000'000LL, SE3(SO3(), rolled * x + error)});
+  }
+  write_tum_trajectory(folder.path() / "truth.txt", truth);
+  write_tum_trajectory(folder.path() / "estimate.txt", estimate);
+  const auto outcome = run(folder, "eval " + (folder / "estimate.txt") + " " + (folder / "truth.txt"));
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err.find("the camera's"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("so straight"), std::string::npos) << outcome.err;
+}
+
 TEST(EvalCommand, PosesWithoutTimesNameTheFolderThatHasThem) {
   const ScratchFolder folder;
   const auto estimate = write_circle(folder, "estimate.txt", 1);
