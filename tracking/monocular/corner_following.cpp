@@ -1,5 +1,6 @@
 #include "tracking/monocular/corner_following.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,7 +14,9 @@ namespace {
 constexpr int kCoarsest = 3;      // coarser patches cover what moves differently
 constexpr int kFirstRadius = 8;   // [px of the coarsest level] of a corner whose motion is not known
 constexpr int kCoarseRadius = 4;  // [px of the coarsest level]
-constexpr int kRadius = 2;        // [px of a finer level]
+constexpr int kRadius = 2;        // [px of a level] around what a coarser one said
+constexpr int kLargestRadius =
+    12;  // [px of a level] bounds the work where no coarser level could be searched
 constexpr int kMaxIterations = 12;
 
 struct LevelPatch {
@@ -29,20 +32,20 @@ bool cut_at(const ImagePyramid& images, int level, const Eigen::Vector2f& uv, Le
                    cut.patch);
 }
 
-/// Most similar whole pixel of a square around `centre`; the centre itself when the square leaves the image.
-Eigen::Vector2f search_square(const Patch& patch, const cv::Mat& image, const Eigen::Vector2f& centre,
-                              int radius) {
+/// Most similar whole pixel of a square around `centre`; nothing when the square is outside the image.
+std::optional<Eigen::Vector2f> search_square(const Patch& patch, const cv::Mat& image,
+                                             const Eigen::Vector2f& centre, int radius) {
   const int u0 = static_cast<int>(std::lround(centre.x()));
   const int v0 = static_cast<int>(std::lround(centre.y()));
-  constexpr int kMargin = Patch::kSize;
+  constexpr int kMargin = Patch::kCentre;
   int best = std::numeric_limits<int>::max();
-  Eigen::Vector2f result = centre;
-  for (int v = std::max(v0 - radius, kMargin); v <= std::min(v0 + radius, image.rows - 1 - kMargin); ++v) {
-    for (int u = std::max(u0 - radius, kMargin); u <= std::min(u0 + radius, image.cols - 1 - kMargin); ++u) {
+  std::optional<Eigen::Vector2f> result;
+  for (int v = std::max(v0 - radius, kMargin); v <= std::min(v0 + radius, image.rows - kMargin); ++v) {
+    for (int u = std::max(u0 - radius, kMargin); u <= std::min(u0 + radius, image.cols - kMargin); ++u) {
       const int ssd = zero_mean_ssd(patch, image, u, v);
       if (ssd >= best) continue;
       best = ssd;
-      result = {static_cast<float>(u), static_cast<float>(v)};
+      result = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
     }
   }
   return result;
@@ -53,13 +56,18 @@ Eigen::Vector2f search_square(const Patch& patch, const cv::Mat& image, const Ei
 bool follow_corner(const ImagePyramid& previous, const ImagePyramid& current, FollowedCorner& corner) {
   const int finest = corner.appearance.level;
   Eigen::Vector2f motion = corner.motion.value_or(Eigen::Vector2f::Zero());
+  const int whole_radius = corner.motion ? kCoarseRadius : kFirstRadius;
+  bool searched = false;
   LevelPatch cut;
   for (int level = kCoarsest; level >= finest; --level) {
     if (!cut_at(previous, level, corner.uv, cut)) continue;
     const float s = std::ldexp(1.0F, -level);
-    int radius = kRadius;
-    if (level == kCoarsest) radius = corner.motion ? kCoarseRadius : kFirstRadius;
-    motion = (search_square(cut.patch, current.level(level), cut.whole + s * motion, radius) - cut.whole) / s;
+    // Near the border the coarse levels have no patch: what is searched widely is the first that has one.
+    const int radius = searched ? kRadius : std::min(whole_radius << (kCoarsest - level), kLargestRadius);
+    const auto found = search_square(cut.patch, current.level(level), cut.whole + s * motion, radius);
+    if (!found) continue;
+    searched = true;
+    motion = (*found - cut.whole) / s;
   }
   // The corner's own patch, so that errors do not add up; once it looks otherwise, that of the last frame.
   Patch own;

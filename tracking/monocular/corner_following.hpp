@@ -15,8 +15,8 @@ struct FollowedCorner {
 };
 
 /// Finds a corner of the previous frame in the current one: coarse to fine, patches of the previous frame
-/// (Lucas-Kanade on a pyramid), and at last the patch of the corner's own frame, so that errors do not add
-/// up. No allocation, bounded work.
+/// (Lucas-Kanade on a pyramid; near the border from the coarsest level on that the patch lies in), and at
+/// last the patch of the corner's own frame, so that errors do not add up. No allocation, bounded work.
 ///
 /// @return false when it is not found; the corner is then as it was
 [[nodiscard]] bool follow_corner(const ImagePyramid& previous, const ImagePyramid& current,
