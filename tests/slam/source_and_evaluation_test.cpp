@@ -46,7 +46,7 @@ TEST(PublicEvaluation, HasNoRelativeErrorWhereNoPosesAreASecondApart) {
   std::vector<StampedPose> poses(10);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     poses[i].t_ns = static_cast<std::int64_t>(i) * 10'000'000;
-    poses[i].T_world_camera.translation = {0.1 * static_cast<double>(i * i), static_cast<double>(i), 0};
+    poses[i].T_world_camera.t = {0.1 * static_cast<double>(i * i), static_cast<double>(i), 0};
   }
   EXPECT_TRUE(std::isnan(compare(poses, poses).rpe_rmse));
   for (StampedPose& pose : poses) pose.t_ns *= 100;
