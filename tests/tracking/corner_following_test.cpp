@@ -63,5 +63,17 @@ TEST_F(CornerFollowingTest, LooksLessFarWhereTheMotionIsKnown) {
   EXPECT_LT(found_ - with_motion, 0.1 * asked_) << "72 px from where it should be";
 }
 
+TEST(CornerFollowing, WhatRepeatsStandsStillWhereItMay) {
+  cv::Mat board(120, 160, CV_8UC1);
+  for (int v = 0; v < board.rows; ++v)
+    for (int u = 0; u < board.cols; ++u) board.at<std::uint8_t>(v, u) = (u / 7 + v / 5) % 2 == 0 ? 60 : 180;
+  ImagePyramid images;
+  images.build(board);
+  FollowedCorner corner{{}, {77, 60}, std::nullopt};
+  ASSERT_TRUE(cut_appearance(images.level(0), 77, 60, 0, corner.appearance));
+  ASSERT_TRUE(follow_corner(images, images, corner));
+  EXPECT_LT((corner.uv - Eigen::Vector2f(77, 60)).norm(), 0.1F);
+}
+
 }  // namespace
 }  // namespace twofold

@@ -32,7 +32,8 @@ bool cut_at(const ImagePyramid& images, int level, const Eigen::Vector2f& uv, Le
                    cut.patch);
 }
 
-/// Most similar whole pixel of a square around `centre`; nothing when the square is outside the image.
+/// Most similar whole pixel of a square around `centre`, which itself is taken before others that are as
+/// similar, as where texture repeats; nothing when the square is outside the image.
 std::optional<Eigen::Vector2f> search_square(const Patch& patch, const cv::Mat& image,
                                              const Eigen::Vector2f& centre, int radius) {
   const int u0 = static_cast<int>(std::lround(centre.x()));
@@ -40,13 +41,16 @@ std::optional<Eigen::Vector2f> search_square(const Patch& patch, const cv::Mat& 
   constexpr int kMargin = Patch::kCentre;
   int best = std::numeric_limits<int>::max();
   std::optional<Eigen::Vector2f> result;
-  for (int v = std::max(v0 - radius, kMargin); v <= std::min(v0 + radius, image.rows - kMargin); ++v) {
-    for (int u = std::max(u0 - radius, kMargin); u <= std::min(u0 + radius, image.cols - kMargin); ++u) {
-      const int ssd = zero_mean_ssd(patch, image, u, v);
-      if (ssd >= best) continue;
-      best = ssd;
-      result = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
-    }
+  const auto look_at = [&](int u, int v) {
+    const int ssd = zero_mean_ssd(patch, image, u, v);
+    if (ssd >= best) return;
+    best = ssd;
+    result = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
+  };
+  const int u_end = image.cols - kMargin, v_end = image.rows - kMargin;
+  if (u0 >= kMargin && u0 <= u_end && v0 >= kMargin && v0 <= v_end) look_at(u0, v0);
+  for (int v = std::max(v0 - radius, kMargin); v <= std::min(v0 + radius, v_end); ++v) {
+    for (int u = std::max(u0 - radius, kMargin); u <= std::min(u0 + radius, u_end); ++u) look_at(u, v);
   }
   return result;
 }
