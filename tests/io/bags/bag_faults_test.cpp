@@ -39,17 +39,20 @@ TEST(BagFaults, TopicsThatBeginAnewAreReadToTheirEnd) {
   }
 }
 
-TEST(BagFaults, ADamagedFirstImageIsAGapToo) {
-  const ScratchFolder folder;
-  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
-  bag.messages[3].data.resize(200);  // the first left image
-  folder.write("short.bag", text_of(rosbag_file(bag, {})));
-  const auto source = open_source(folder / "short.bag");
-  EXPECT_EQ(drain(*source), std::to_string(kCount - 1));
-  const SourceReport report = source->report();
-  EXPECT_EQ(report.lost, 2U) << "that image, and its partner";
-  ASSERT_EQ(report.faults.size(), 1U);
-  EXPECT_NE(report.faults[0].find("short.bag: ends in the middle"), std::string::npos) << report.faults[0];
+TEST(BagFaults, ADamagedImageIsAGapTheFirstOneToo) {
+  for (const std::size_t left_image : {3, 8}) {
+    SCOPED_TRACE(left_image);
+    const ScratchFolder folder;
+    WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
+    bag.messages[left_image].data.resize(200);
+    folder.write("short.bag", text_of(rosbag_file(bag, {})));
+    const auto source = open_source(folder / "short.bag");
+    EXPECT_EQ(drain(*source), std::to_string(kCount - 1));
+    const SourceReport report = source->report();
+    EXPECT_EQ(report.lost, 2U) << "that image, and its partner";
+    ASSERT_EQ(report.faults.size(), 1U);
+    EXPECT_NE(report.faults[0].find("short.bag: ends in the middle"), std::string::npos) << report.faults[0];
+  }
 }
 
 TEST(BagFaults, WithoutAWholeLeftImageABagIsRefused) {

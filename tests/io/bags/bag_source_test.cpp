@@ -265,19 +265,6 @@ TEST(BagSource, AFileThatIsCutShortIsSaidToBe) {
   EXPECT_NE(source->report().faults[0].find("a.mcap: is cut short at byte"), std::string::npos);
 }
 
-TEST(BagSource, ADamagedImageIsAGap) {
-  const ScratchFolder folder;
-  WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
-  bag.messages[8].data.resize(200);  // the second left image
-  folder.write("short.bag", text_of(rosbag_file(bag, {})));
-  const auto source = open_source(folder / "short.bag");
-  EXPECT_EQ(drain(*source), std::to_string(kCount - 1));
-  const SourceReport report = source->report();
-  EXPECT_EQ(report.lost, 2U) << "that image, and its partner";
-  ASSERT_EQ(report.faults.size(), 1U);
-  EXPECT_NE(report.faults[0].find("short.bag: ends in the middle"), std::string::npos) << report.faults[0];
-}
-
 TEST(BagSource, ABagOfDamagedImagesIsRefused) {
   const ScratchFolder folder;
   WrittenBag bag = stereo_bag(MessageEncoding::kRos1);
