@@ -43,10 +43,9 @@ const HalfNormalTable& half_normal_table() {
   return kTable;
 }
 
-/// Standard normal number of a random word.
-float normal(std::uint64_t word) {
+/// Standard normal number of a random word, from half_normal_table().
+float normal(const HalfNormalTable& table, std::uint64_t word) {
   constexpr std::uint64_t kMask = (1 << kTableBits) - 1;
-  const auto& table = half_normal_table();
   return table[word & kMask] + table[(word >> 32) & kMask];
 }
 
@@ -61,12 +60,13 @@ cv::Mat expose(const cv::Mat& intensity, double gain, double sigma, const NoiseK
   const std::uint64_t base = image_key(key);
   const auto g = static_cast<float>(gain);
   const auto s = static_cast<float>(sigma);
+  const HalfNormalTable& table = half_normal_table();
   std::uint64_t counter = base;
   for (int y = 0; y < image.rows; ++y) {
     const auto* in = intensity.ptr<float>(y);
     auto* out = image.ptr<std::uint8_t>(y);
     for (int x = 0; x < image.cols; ++x) {
-      const float value = g * in[x] + (s > 0 ? s * normal(mix64(counter++)) : 0.0f);
+      const float value = g * in[x] + (s > 0 ? s * normal(table, mix64(counter++)) : 0.0f);
       out[x] = static_cast<std::uint8_t>(std::clamp(value + 0.5f, 0.0f, 255.0f));
     }
   }
@@ -77,6 +77,7 @@ cv::Mat sense_depth(const cv::Mat& inverse_depth, const Rig& rig, double noise_s
   cv::Mat depth = cv::Mat::zeros(inverse_depth.size(), CV_16UC1);
   const std::uint64_t base = image_key(key);
   const std::uint64_t spots = mix64(base);
+  const HalfNormalTable& table = half_normal_table();
   const auto at = [&](int y, int x) {
     y = std::clamp(y, 0, depth.rows - 1);
     x = std::clamp(x, 0, depth.cols - 1);
@@ -97,7 +98,7 @@ cv::Mat sense_depth(const cv::Mat& inverse_depth, const Rig& rig, double noise_s
           (static_cast<std::uint64_t>(y / 4) << 32) | static_cast<std::uint64_t>(x / 4);
       if (unit_interval(mix64(spots ^ block)) < kSpotProbability) continue;
       const std::uint64_t pixel = static_cast<std::uint64_t>(y) * depth.cols + x;
-      const double noisy = z + noise_scale * kDepthSigma * z * z * normal(mix64(base + pixel));
+      const double noisy = z + noise_scale * kDepthSigma * z * z * normal(table, mix64(base + pixel));
       depth.at<std::uint16_t>(y, x) =
           static_cast<std::uint16_t>(std::clamp(std::lround(noisy / rig.depth_unit), 0L, 65535L));
     }

@@ -109,9 +109,10 @@ class ImageCaster {
       rays.y[k] = ray_y(static_cast<float>(y) + kSubY[k]);
     }
     trace(tile(x, y), rays);
+    std::array<float, RayPacket::kSize> grey;
+    geometry_.shade(rays, kSubFootprint, grey);
     float sum = 0;
-    for (int k = 0; k < RayPacket::kSize; ++k)
-      sum += geometry_.shade(rays.id[k], rays.x[k], rays.y[k], rays.inverse_depth[k], kSubFootprint);
+    for (const float value : grey) sum += value;
     return sum / RayPacket::kSize;
   }
 
@@ -119,41 +120,21 @@ class ImageCaster {
     const auto* ids = ids_.ptr<std::int32_t>(y);
     const auto* inverse_depth = view.inverse_depth.ptr<float>(y);
     auto* out = view.intensity.ptr<float>(y);
-    for (int x = 0; x < width_;) {
-      if (inside_quad(x, y)) {
-        shade_inside_quad(x, y, inverse_depth, out);
-        x += RayPacket::kSize;
-        continue;
-      }
-      out[x] = at_rim(x, y) ? supersample(x, y)
-                            : geometry_.shade(ids[x], ray_x(static_cast<float>(x)),
-                                              ray_y(static_cast<float>(y)), inverse_depth[x], 1.0f);
-      ++x;
-    }
-  }
-
-  /// The next pixels, as many as a packet has rays, show one quad, and so do all that touch them.
-  [[nodiscard]] bool inside_quad(int x, int y) const {
-    if (x == 0 || x + RayPacket::kSize >= width_ || y == 0 || y + 1 >= height_) return false;
-    const auto* row = ids_.ptr<std::int32_t>(y);
-    const std::int32_t id = row[x];
-    if (!ViewGeometry::is_quad(id)) return false;
-    const auto *above = ids_.ptr<std::int32_t>(y - 1), *below = ids_.ptr<std::int32_t>(y + 1);
-    std::int32_t others = (row[x - 1] ^ id) | (row[x + RayPacket::kSize] ^ id);
-    for (int k = x; k < x + RayPacket::kSize; ++k)
-      others |= (row[k] ^ id) | (above[k] ^ id) | (below[k] ^ id);
-    return others == 0;
-  }
-
-  void shade_inside_quad(int x, int y, const float* inverse_depth, float* out) const {
     RayPacket rays;
-    for (int k = 0; k < RayPacket::kSize; ++k) {
-      rays.x[k] = ray_x(static_cast<float>(x + k));
-      rays.y[k] = ray_y(static_cast<float>(y));
-      rays.inverse_depth[k] = inverse_depth[x + k];
+    std::array<bool, RayPacket::kSize> rim;
+    std::array<float, RayPacket::kSize> grey;
+    for (int x = 0; x < width_; x += RayPacket::kSize) {
+      const int n = std::min(RayPacket::kSize, width_ - x);
+      for (int k = 0; k < RayPacket::kSize; ++k) {
+        rim[k] = k < n && at_rim(x + k, y);
+        rays.x[k] = ray_x(static_cast<float>(x + k));
+        rays.y[k] = ray_y(static_cast<float>(y));
+        rays.inverse_depth[k] = k < n ? inverse_depth[x + k] : 0;
+        rays.id[k] = k < n && !rim[k] ? ids[x + k] : RayPacket::kSky;
+      }
+      geometry_.shade(rays, 1.0f, grey);
+      for (int k = 0; k < n; ++k) out[x + k] = rim[k] ? supersample(x + k, y) : grey[k];
     }
-    geometry_.shade_quad(ids_.at<std::int32_t>(y, x), rays,
-                         std::span<float, RayPacket::kSize>(out + x, RayPacket::kSize));
   }
 
   const ViewGeometry& geometry_;

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
-#include <span>
 #include <vector>
 
 namespace twofold::synthetic {
@@ -19,6 +18,12 @@ struct TexturePoints {
   using Floats = float __attribute__((vector_size(kSize * sizeof(float))));
   Floats u, v;
   Floats u_x, u_y, v_x, v_y;  ///< TexelFootprint
+
+  void set(int k, float at_u, float at_v, const TexelFootprint& footprint) {
+    u[k] = at_u, v[k] = at_v;
+    u_x[k] = footprint.u_x, u_y[k] = footprint.u_y;
+    v_x[k] = footprint.v_x, v_y[k] = footprint.v_y;
+  }
 };
 
 /// Grey-level texture with its pyramid of 2x2 means, read through an elliptical footprint.
@@ -34,37 +39,31 @@ class Texture {
   /// canvas: CV_32FC1 in grey levels, at least 2x2; clamped to [0, 255] and stored with eight bits.
   explicit Texture(const cv::Mat& canvas);
 
-  /// Mean grey level under the footprint around (u, v); texel (0, 0) has its centre at (0, 0). Clamps at the
-  /// rim.
-  [[nodiscard]] float sample(float u, float v, const TexelFootprint& footprint) const;
-
-  /// The same at eight places, to the last bit.
-  void sample(const TexturePoints& points, std::span<float, TexturePoints::kSize> grey) const;
+  /// Mean grey levels under the footprints around (u, v); texel (0, 0) has its centre at (0, 0). Clamps at
+  /// the rim.
+  [[nodiscard]] TexturePoints::Floats sample(const TexturePoints& points) const;
 
   [[nodiscard]] float mean() const;
 
-  [[nodiscard]] int width() const { return levels_.front().width; }
-  [[nodiscard]] int height() const { return levels_.front().height; }
+  [[nodiscard]] int width() const { return widths_.front(); }
+  [[nodiscard]] int height() const { return heights_.front(); }
 
  private:
-  /// All probes of a footprint side by side; of those after the first `count` nobody looks at the value. Each
-  /// is computed as a single one is, to the last bit.
-  using Probes = float __attribute__((vector_size(kMaxProbes * sizeof(float))));
+  using Floats = TexturePoints::Floats;
+  using Ints = std::int32_t __attribute__((vector_size(sizeof(Floats))));
 
-  struct Level {
-    int width = 0;
-    int height = 0;
-    std::vector<std::uint8_t> texels;
-
-    [[nodiscard]] float bilinear(float u, float v) const;
-    [[nodiscard]] Probes bilinear(Probes u, Probes v, int count) const;
+  /// Which levels of the pyramid eight probes read: `level` and, with the share `blend`, the next one.
+  struct Detail {
+    Ints level;
+    Floats blend;
   };
-  /// Mean over `count` probes that lie along (along_u, along_v), each `width` texels wide.
-  [[nodiscard]] float probe(float u, float v, int count, float width, float along_u, float along_v) const;
-  [[nodiscard]] float trilinear(float u, float v, int level, float blend) const;
-  [[nodiscard]] Probes trilinear(Probes u, Probes v, int level, float blend, int count) const;
+  [[nodiscard]] Detail detail_of(Floats width) const;
+  [[nodiscard]] Floats bilinear(Floats u, Floats v, Ints level) const;
+  [[nodiscard]] Floats trilinear(Floats u, Floats v, const Detail& detail) const;
 
-  std::vector<Level> levels_;
+  /// By level; texel (0, 0) of each is at texels_[starts_[level]].
+  std::vector<std::int32_t> widths_, heights_, starts_;
+  std::vector<std::uint8_t> texels_;  ///< and three bytes that may be read with the last one
 };
 
 }  // namespace twofold::synthetic

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace twofold::synthetic {
 namespace {
@@ -12,6 +13,19 @@ constexpr float kHeightTolerance = 1e-5f;  ///< [m]
 
 RayForm form_of(const Vector3& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+/// Of whatever is not nearer than z: its largest inverse depth, and a little more than rounding could add.
+float nearest_beyond(double z) {
+  return z > kNear ? static_cast<float>(1.001 / z) : std::numeric_limits<float>::infinity();
+}
+
+/// All rays have met something in front of the inverse depth `nearest`.
+bool hidden(float nearest, const RayPacket& rays) {
+  float farthest = rays.inverse_depth[0];
+  for (const float inverse_depth : rays.inverse_depth)
+    farthest = inverse_depth < farthest ? inverse_depth : farthest;
+  return farthest >= nearest;
 }
 
 /// Part of a convex polygon at depth >= kNear  (Sutherland and Hodgman, 1974).
@@ -92,12 +106,14 @@ void ViewGeometry::add_cylinder(const Scene& scene, const Cylinder& cylinder) {
   std::vector<Vector3> corners;
   bool in_front = true;
   bool any = false;
+  double nearest = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 8; ++i) {
     const Vector3 offset((i & 1 ? 1 : -1) * cylinder.radius, (i & 2 ? 1 : -1) * cylinder.radius,
                          i & 4 ? cylinder.height : 0);
     corners.push_back(T_c_w_ * (cylinder.base + offset));
     in_front = in_front && corners.back().z() > kNear;
     any = any || corners.back().z() > kNear;
+    nearest = std::min(nearest, corners.back().z());
   }
   if (!any) return;
   const std::int32_t id = make_id(kCylinder, cylinders_.size());
@@ -111,7 +127,8 @@ void ViewGeometry::add_cylinder(const Scene& scene, const Cylinder& cylinder) {
   const Vector3 o = T_w_c_.translation() - cylinder.base;
   cylinders_.push_back({static_cast<float>(o.x()), static_cast<float>(o.y()), static_cast<float>(o.z()),
                         static_cast<float>(cylinder.radius), static_cast<float>(cylinder.height),
-                        &scene.textures[cylinder.texture], static_cast<float>(cylinder.brightness)});
+                        nearest_beyond(nearest), &scene.textures[cylinder.texture],
+                        static_cast<float>(cylinder.brightness)});
 }
 
 void ViewGeometry::add_sphere(const Scene& scene, const Sphere& sphere) {
@@ -129,8 +146,8 @@ void ViewGeometry::add_sphere(const Scene& scene, const Sphere& sphere) {
     visible_.push_back({id, {0, 0, camera_.width - 1, camera_.height - 1}});
   }
   spheres_.push_back({static_cast<float>(c.x()), static_cast<float>(c.y()), static_cast<float>(c.z()),
-                      static_cast<float>(sphere.radius), &scene.textures[sphere.texture],
-                      static_cast<float>(sphere.brightness)});
+                      static_cast<float>(sphere.radius), nearest_beyond(c.z() - sphere.radius),
+                      &scene.textures[sphere.texture], static_cast<float>(sphere.brightness)});
 }
 
 void ViewGeometry::intersect(std::int32_t id, RayPacket& rays) const {
@@ -162,6 +179,7 @@ void ViewGeometry::intersect_quad(const QuadForm& f, std::int32_t id, RayPacket&
 }
 
 void ViewGeometry::intersect_cylinder(const CylinderForm& f, std::int32_t id, RayPacket& rays) const {
+  if (hidden(f.nearest, rays)) return;
   for (int k = 0; k < RayPacket::kSize; ++k) {
     const float dx = dx_(rays.x[k], rays.y[k]);
     const float dy = dy_(rays.x[k], rays.y[k]);
@@ -182,6 +200,7 @@ void ViewGeometry::intersect_cylinder(const CylinderForm& f, std::int32_t id, Ra
 }
 
 void ViewGeometry::intersect_sphere(const SphereForm& f, std::int32_t id, RayPacket& rays) const {
+  if (hidden(f.nearest, rays)) return;
   for (int k = 0; k < RayPacket::kSize; ++k) {
     const float x = rays.x[k];
     const float y = rays.y[k];

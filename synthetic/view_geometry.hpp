@@ -50,12 +50,9 @@ class ViewGeometry {
   /// Keeps the nearer of what each ray has met and primitive `id`.
   void intersect(std::int32_t id, RayPacket& rays) const;
 
-  /// Grey level at the hit of ray (x, y, 1). footprint: edge of the area to average over [px].
-  [[nodiscard]] float shade(std::int32_t id, float x, float y, float inverse_depth, float footprint) const;
-
-  /// The same at eight hits of one quad, to the last bit; footprint: one pixel.
-  void shade_quad(std::int32_t id, const RayPacket& rays, std::span<float, RayPacket::kSize> grey) const;
-  [[nodiscard]] static bool is_quad(std::int32_t id) { return id >> kKindShift == kQuad; }
+  /// Grey levels where the rays have met something, of the sky elsewhere. footprint: edge of the area to
+  /// average over [px].
+  void shade(const RayPacket& rays, float footprint, std::span<float, RayPacket::kSize> grey) const;
 
  private:
   /// Kind in the upper bits of an id, index below.
@@ -76,12 +73,14 @@ class ViewGeometry {
   struct CylinderForm {
     float ox, oy, oz;  ///< camera relative to the centre of the base, world axes
     float radius, height;
+    float nearest;  ///< no point of it has a larger inverse depth [1/m]
     const Texture* texture;
     float brightness;
   };
   struct SphereForm {
     float cx, cy, cz;  ///< centre in the camera's frame
     float radius;
+    float nearest;  ///< as above
     const Texture* textures;
     float brightness;
   };
@@ -102,7 +101,6 @@ class ViewGeometry {
   void intersect_sphere(const SphereForm& f, std::int32_t id, RayPacket& rays) const;
   void intersect_height_field(const HeightField& f, std::int32_t id, RayPacket& rays) const;
 
-  [[nodiscard]] SurfacePoint on_quad(const QuadForm& f, float x, float y, float t) const;
   [[nodiscard]] SurfacePoint on_cylinder(const CylinderForm& f, float x, float y, float t) const;
   [[nodiscard]] SurfacePoint on_sphere(const SphereForm& f, float x, float y, float t) const;
   [[nodiscard]] SurfacePoint on_height_field(const HeightField& f, float x, float y, float t) const;
@@ -110,6 +108,13 @@ class ViewGeometry {
   [[nodiscard]] TexelFootprint project_footprint(const Eigen::Vector3f& normal, const Eigen::Vector3f& grad_u,
                                                  const Eigen::Vector3f& grad_v, float x, float y,
                                                  float t) const;
+  [[nodiscard]] SurfacePoint on_curved(std::int32_t id, float x, float y, float t) const;
+  /// shade() for `those` rays (a bit for each), all of which have met `id`.
+  void shade_quad(std::int32_t id, const RayPacket& rays, unsigned those, float footprint,
+                  std::span<float, RayPacket::kSize> grey) const;
+  void shade_curved(std::int32_t id, const RayPacket& rays, unsigned those, float footprint,
+                    std::span<float, RayPacket::kSize> grey) const;
+  void shade_sky(const RayPacket& rays, unsigned those, std::span<float, RayPacket::kSize> grey) const;
   [[nodiscard]] float sky(float x, float y) const;
 
   PinholeCamera camera_;

@@ -1,22 +1,21 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 
 #include "synthetic/view_geometry.hpp"
 
 namespace twofold::synthetic {
+namespace {
 
-ViewGeometry::SurfacePoint ViewGeometry::on_quad(const QuadForm& f, float x, float y, float t) const {
-  const float s = t * f.s(x, y);
-  const float q = t * f.q(x, y);
-  const float ku = static_cast<float>(f.texture->width()) / f.width;
-  const float kv = static_cast<float>(f.texture->height()) / f.height;
-  // d(S/w) = (dS - (S/w) dw) / w: the homography's exact derivative.
-  const TexelFootprint footprint{ku * t * (f.s.x - s * f.w.x), ku * t * (f.s.y - s * f.w.y),
-                                 kv * t * (f.q.x - q * f.w.x), kv * t * (f.q.y - q * f.w.y)};
-  return {f.texture, ku * (s - f.s0) - 0.5f, kv * (q - f.q0) - 0.5f, footprint, f.brightness};
+constexpr unsigned kAllRays = (1U << RayPacket::kSize) - 1;
+
+/// What was found for `those` rays takes its place among all.
+void place(TexturePoints::Floats found, unsigned those, std::span<float, RayPacket::kSize> grey) {
+  for (int k = 0; k < RayPacket::kSize; ++k) grey[k] = (those >> k & 1) != 0 ? found[k] : grey[k];
 }
+
+}  // namespace
 
 TexelFootprint ViewGeometry::project_footprint(const Eigen::Vector3f& normal, const Eigen::Vector3f& grad_u,
                                                const Eigen::Vector3f& grad_v, float x, float y,
@@ -77,52 +76,94 @@ ViewGeometry::SurfacePoint ViewGeometry::on_height_field(const HeightField& f, f
           project_footprint({-slope_x, -slope_y, 1}, {ku, 0, 0}, {0, kv, 0}, x, y, t), 1.0f};
 }
 
-float ViewGeometry::shade(std::int32_t id, float x, float y, float inverse_depth, float footprint) const {
-  if (id == RayPacket::kSky) return sky(x, y);
-  const std::int32_t index = id & kIndexMask;
-  const float t = 1 / inverse_depth;
-  const SurfacePoint point = [&] {
-    switch (id >> kKindShift) {
-      case kQuad:
-        return on_quad(quads_[index], x, y, t);
-      case kCylinder:
-        return on_cylinder(cylinders_[index], x, y, t);
-      case kSphere:
-        return on_sphere(spheres_[index], x, y, t);
-      default:
-        return on_height_field((*height_fields_)[index], x, y, t);
-    }
-  }();
-  const float sx = footprint / static_cast<float>(camera_.fx);
-  const float sy = footprint / static_cast<float>(camera_.fy);
-  const TexelFootprint& r = point.per_ray;
-  return point.brightness *
-         point.texture->sample(point.u, point.v, {r.u_x * sx, r.u_y * sy, r.v_x * sx, r.v_y * sy});
+void ViewGeometry::shade(const RayPacket& rays, float footprint,
+                         std::span<float, RayPacket::kSize> grey) const {
+  for (unsigned left = kAllRays; left != 0;) {
+    const std::int32_t id = rays.id[std::countr_zero(left)];
+    unsigned those = 0;
+    for (int k = 0; k < RayPacket::kSize; ++k) those |= static_cast<unsigned>(rays.id[k] == id) << k;
+    if (id == RayPacket::kSky)
+      shade_sky(rays, those, grey);
+    else if (id >> kKindShift == kQuad)
+      shade_quad(id, rays, those, footprint, grey);
+    else
+      shade_curved(id, rays, those, footprint, grey);
+    left &= ~those;
+  }
 }
 
-void ViewGeometry::shade_quad(std::int32_t id, const RayPacket& rays,
+ViewGeometry::SurfacePoint ViewGeometry::on_curved(std::int32_t id, float x, float y, float t) const {
+  const std::int32_t index = id & kIndexMask;
+  switch (id >> kKindShift) {
+    case kCylinder:
+      return on_cylinder(cylinders_[index], x, y, t);
+    case kSphere:
+      return on_sphere(spheres_[index], x, y, t);
+    default:
+      return on_height_field((*height_fields_)[index], x, y, t);
+  }
+}
+
+void ViewGeometry::shade_curved(std::int32_t id, const RayPacket& rays, unsigned those, float footprint,
+                                std::span<float, RayPacket::kSize> grey) const {
+  const float sx = footprint / static_cast<float>(camera_.fx);
+  const float sy = footprint / static_cast<float>(camera_.fy);
+  while (those != 0) {  // a sphere has six textures
+    TexturePoints points{};
+    const Texture* texture = nullptr;
+    float brightness = 0;
+    unsigned on_it = 0;
+    for (unsigned left = those; left != 0; left &= left - 1) {
+      const int k = std::countr_zero(left);
+      const SurfacePoint p = on_curved(id, rays.x[k], rays.y[k], 1 / rays.inverse_depth[k]);
+      if (texture == nullptr) texture = p.texture;
+      if (p.texture != texture) continue;
+      on_it |= 1U << k;
+      brightness = p.brightness;
+      const TexelFootprint& r = p.per_ray;
+      points.set(k, p.u, p.v, {r.u_x * sx, r.u_y * sy, r.v_x * sx, r.v_y * sy});
+    }
+    place(texture->sample(points) * brightness, on_it, grey);
+    those &= ~on_it;
+  }
+}
+
+void ViewGeometry::shade_sky(const RayPacket& rays, unsigned those,
+                             std::span<float, RayPacket::kSize> grey) const {
+  for (; those != 0; those &= those - 1) {
+    const int k = std::countr_zero(those);
+    grey[k] = sky(rays.x[k], rays.y[k]);
+  }
+}
+
+void ViewGeometry::shade_quad(std::int32_t id, const RayPacket& rays, unsigned those, float footprint,
                               std::span<float, RayPacket::kSize> grey) const {
   static_assert(RayPacket::kSize == TexturePoints::kSize);
   const QuadForm& f = quads_[id & kIndexMask];
+  // Rays that met something else are in the place of the first.
+  const int first = std::countr_zero(those);
   TexturePoints::Floats x, y, inverse_depth;
-  std::memcpy(&x, rays.x.data(), sizeof x);
-  std::memcpy(&y, rays.y.data(), sizeof y);
-  std::memcpy(&inverse_depth, rays.inverse_depth.data(), sizeof inverse_depth);
+  for (int k = 0; k < RayPacket::kSize; ++k) {
+    const int from = (those >> k & 1) != 0 ? k : first;
+    x[k] = rays.x[from];
+    y[k] = rays.y[from];
+    inverse_depth[k] = rays.inverse_depth[from];
+  }
   const auto t = 1 / inverse_depth;
   const auto s = t * (f.s.x * x + f.s.y * y + f.s.one);
   const auto q = t * (f.q.x * x + f.q.y * y + f.q.one);
   const float ku = static_cast<float>(f.texture->width()) / f.width;
   const float kv = static_cast<float>(f.texture->height()) / f.height;
-  const float sx = 1.0f / static_cast<float>(camera_.fx);
-  const float sy = 1.0f / static_cast<float>(camera_.fy);
+  const float sx = footprint / static_cast<float>(camera_.fx);
+  const float sy = footprint / static_cast<float>(camera_.fy);
+  // d(S/w) = (dS - (S/w) dw) / w: the homography's exact derivative.
   const TexturePoints points{ku * (s - f.s0) - 0.5f,
                              kv * (q - f.q0) - 0.5f,
                              ku * t * (f.s.x - s * f.w.x) * sx,
                              ku * t * (f.s.y - s * f.w.y) * sy,
                              kv * t * (f.q.x - q * f.w.x) * sx,
                              kv * t * (f.q.y - q * f.w.y) * sy};
-  f.texture->sample(points, grey);
-  for (float& value : grey) value *= f.brightness;
+  place(f.texture->sample(points) * f.brightness, those, grey);
 }
 
 float ViewGeometry::sky(float x, float y) const {

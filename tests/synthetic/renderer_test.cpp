@@ -27,6 +27,12 @@ Vector3 world_point(const View& view, const SE3& T_w_c, int u, int v) {
   return T_w_c * Vector3(kCamera.unproject(Vector2(u, v)) / w);
 }
 
+float sample_alone(const Texture& texture, float u, float v, const TexelFootprint& footprint) {
+  TexturePoints points;
+  for (int k = 0; k < TexturePoints::kSize; ++k) points.set(k, u, v, footprint);
+  return texture.sample(points)[0];
+}
+
 TEST(Renderer, QuadHasTheDepthOfItsPlaneAndItsOutline) {
   Scene scene;
   const int texture = scene.add(grey(64, 64, 100));
@@ -137,7 +143,8 @@ TEST(Texture, PyramidKeepsTheMeanAndHidesWhatIsTooFine) {
     const float s = std::sin(angle);
     for (const float squeeze : {1.0f, 3.0f, 6.0f}) {
       const TexelFootprint footprint{4 * squeeze * c, -4 * s, 4 * squeeze * s, 4 * c};
-      for (float u = 100; u < 110; u += 0.37f) EXPECT_NEAR(texture.sample(u, 90.3f, footprint), 110, 1.0);
+      for (float u = 100; u < 110; u += 0.37f)
+        EXPECT_NEAR(sample_alone(texture, u, 90.3f, footprint), 110, 1.0);
     }
   }
 }
@@ -150,19 +157,17 @@ TEST(Texture, EightPlacesAreSampledAsEachIsAlone) {
     for (int x = 0; x < noise.cols; ++x) noise.at<float>(y, x) = grey(rng);
   const Texture texture(noise);
   for (int trial = 0; trial < 500; ++trial) {
+    std::array<TexelFootprint, TexturePoints::kSize> footprints;
     TexturePoints points;
     for (int k = 0; k < TexturePoints::kSize; ++k) {
-      points.u[k] = place(rng), points.v[k] = place(rng);
-      points.u_x[k] = width(rng), points.u_y[k] = width(rng);
-      points.v_x[k] = width(rng), points.v_y[k] = width(rng);
+      footprints[static_cast<std::size_t>(k)] = {width(rng), width(rng), width(rng), width(rng)};
+      points.set(k, place(rng), place(rng), footprints[static_cast<std::size_t>(k)]);
     }
-    std::array<float, TexturePoints::kSize> together;
-    texture.sample(points, together);
-    for (int k = 0; k < TexturePoints::kSize; ++k) {
-      const TexelFootprint footprint{points.u_x[k], points.u_y[k], points.v_x[k], points.v_y[k]};
-      ASSERT_EQ(together[static_cast<std::size_t>(k)], texture.sample(points.u[k], points.v[k], footprint))
+    const TexturePoints::Floats together = texture.sample(points);
+    for (int k = 0; k < TexturePoints::kSize; ++k)
+      ASSERT_EQ(together[k],
+                sample_alone(texture, points.u[k], points.v[k], footprints[static_cast<std::size_t>(k)]))
           << trial;
-    }
   }
 }
 
@@ -172,9 +177,9 @@ TEST(Texture, InterpolatesBetweenTexels) {
     for (int x = 0; x < ramp.cols; ++x) ramp.at<float>(y, x) = static_cast<float>(3 * x + 10);
   const Texture texture(ramp);
   const TexelFootprint close{0.3f, 0, 0, 0.3f};
-  for (float u = 1; u < 60; u += 0.31f) EXPECT_NEAR(texture.sample(u, 4.2f, close), 3 * u + 10, 1e-2);
+  for (float u = 1; u < 60; u += 0.31f) EXPECT_NEAR(sample_alone(texture, u, 4.2f, close), 3 * u + 10, 1e-2);
   const TexelFootprint slanted{6, 0, 0, 0.8f};  // probes along u are centred
-  for (float u = 8; u < 50; u += 0.31f) EXPECT_NEAR(texture.sample(u, 4.2f, slanted), 3 * u + 10, 0.5);
+  for (float u = 8; u < 50; u += 0.31f) EXPECT_NEAR(sample_alone(texture, u, 4.2f, slanted), 3 * u + 10, 0.5);
 }
 
 TEST(CameraPath, LookingAlongXHasImageAxesRightAndDown) {
