@@ -21,6 +21,18 @@ struct CommonCorners {
   std::vector<int> used;
 };
 
+/// Corners in one line leave the board free to turn about it.
+bool in_one_line(const std::vector<cv::Point3f>& points) {
+  const auto of = [&](const cv::Point3f& p) { return p - points.front(); };
+  const auto longest = std::max_element(points.begin(), points.end(), [&](const auto& a, const auto& b) {
+    return of(a).dot(of(a)) < of(b).dot(of(b));
+  });
+  const cv::Point3f line = of(*longest);
+  return std::all_of(points.begin(), points.end(), [&](const cv::Point3f& p) {
+    return cv::norm(of(p).cross(line)) < 1e-3 * line.dot(line);
+  });
+}
+
 CommonCorners common_corners(const std::vector<ViewPair>& pairs, const Board& board,
                              const std::vector<int>& used) {
   CommonCorners common;
@@ -35,8 +47,9 @@ CommonCorners common_corners(const std::vector<ViewPair>& pairs, const Board& bo
       left.push_back(pair.left.pixels[i]);
       right.push_back(pair.right.pixels[static_cast<std::size_t>(at - pair.right.ids.begin())]);
     }
-    if (ids.size() < 8) continue;
-    common.points.push_back(board_points(board, ids));
+    std::vector<cv::Point3f> points = board_points(board, ids);
+    if (ids.size() < 8 || in_one_line(points)) continue;
+    common.points.push_back(std::move(points));
     common.left.push_back(std::move(left));
     common.right.push_back(std::move(right));
     common.used.push_back(v);

@@ -50,7 +50,7 @@ std::string refusal_of_fit(const CameraFit& fit, const CalibrationOptions& optio
         "more tilt, nearer to the camera",
         100 * worst, 100 * options.max_focal_std);
   }
-  if (auto reason = fit.model.distortion.invalid_reason(); !reason.empty()) return reason;
+  if (auto reason = fit.model.invalid_reason(); !reason.empty()) return reason;
   return "";
 }
 

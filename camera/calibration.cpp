@@ -10,6 +10,8 @@ std::string invalid_stereo(const Calibration& c) {
   if (!c.T_right_left.translation().allFinite() || !c.T_right_left.so3().quaternion().coeffs().allFinite()) {
     return "T_right_left is not finite";
   }
+  if (!((c.T_right_left.so3() * Vector3::UnitZ()).z() > 0))
+    return "T_right_left: the right camera must look the same way as the left one";
   const Vector3 right_in_left = c.T_right_left.inverse().translation();
   if (!(right_in_left.norm() > 1e-4)) return "T_right_left: the baseline must be longer than 0.1 mm";
   if (right_in_left.x() < 0.5 * right_in_left.norm()) {
@@ -18,6 +20,17 @@ std::string invalid_stereo(const Calibration& c) {
            std::to_string(right_in_left.x()) + ", " + std::to_string(right_in_left.y()) + ", " +
            std::to_string(right_in_left.z()) + ") m";
   }
+  return {};
+}
+
+std::string invalid_readout(double readout, double fps) {
+  if (!(readout >= 0 && readout <= kLongestReadout))
+    return "readout must be within 0 and " + std::to_string(kLongestReadout) + " s, is " +
+           std::to_string(readout);
+  constexpr double kRounding = 1.05;  // rates are stated as 30 for 29.97
+  if (readout * fps > kRounding)
+    return "readout must not be longer than a frame takes (" + std::to_string(1 / fps) + " s), is " +
+           std::to_string(readout);
   return {};
 }
 
@@ -58,12 +71,13 @@ std::string Calibration::invalid_reason() const {
     if (auto reason = invalid_rectified(*this); !reason.empty()) return reason;
   }
   if (!(fps >= 0) || !std::isfinite(fps)) return "fps must not be negative, is " + std::to_string(fps);
-  if (readout && (!(*readout >= 0) || !std::isfinite(*readout))) {
-    return "readout must not be negative, is " + std::to_string(*readout);
+  if (readout) {
+    if (auto reason = invalid_readout(*readout, fps); !reason.empty()) return reason;
   }
   if (kind != SensorKind::kMono) {
     if (!(depth_unit > 0)) return "depth_unit must be positive, is " + std::to_string(depth_unit);
-    if (!(depth_min >= 0 && depth_max > depth_min)) return "depth_min, depth_max must satisfy 0 <= min < max";
+    // At 0, pixels without a reading would be readings.
+    if (!(depth_min > 0 && depth_max > depth_min)) return "depth_min, depth_max must satisfy 0 < min < max";
   }
   if (kind == SensorKind::kRgbd) {
     if (!(virtual_baseline > 0))

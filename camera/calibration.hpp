@@ -9,6 +9,9 @@
 
 namespace twofold {
 
+/// No rolling shutter takes longer from the first row to the last [s].
+constexpr double kLongestReadout = 0.5;
+
 /// A camera that takes depth images beside the one that takes the others.
 struct DepthCamera {
   CameraModel model;
@@ -27,13 +30,14 @@ struct Calibration {
   /// distortion and T_right_left a pure shift along -x.
   bool already_rectified = false;
   double fps = 0;  ///< nominal frame rate [Hz]; 0 = unknown
-  /// Rolling shutter: from the exposure of the first row to that of the last [s], >= 0; 0: all rows at once.
+  /// Rolling shutter: from the exposure of the first row to that of the last [s], 0 to kLongestReadout, and
+  /// not longer than a frame takes where `fps` is known; 0: all rows at once.
   /// Nothing: nobody knows, and the tracker finds out.
   std::optional<double> readout;
 
   double depth_unit = 0.001;       ///< metres per unit of the 16-bit depth image, > 0; stereo: of a surface's
   bool depth_unit_stated = false;  ///< the file says it; else a layout may know better
-  double depth_min = 0.3;          ///< nearer readings are holes [m]; stereo: of surfaces only
+  double depth_min = 0.3;          ///< nearer readings are holes [m], > 0; stereo: of surfaces only
   double depth_max = 8.0;          ///< farther readings likewise [m]
   double virtual_baseline = 0.08;  ///< RGB-D: baseline of the virtual right camera (thesis 6.5.3) [m], > 0
   /// RGB-D: depth images are depth_camera's; else they are the left camera's, pixel by pixel.

@@ -35,11 +35,17 @@ std::string CameraModel::invalid_reason() const {
     return "image size must be within " + std::to_string(kLargestSide) + " a side, is " +
            std::to_string(pinhole.width) + " x " + std::to_string(pinhole.height);
   }
+  // Outside of a part that was cut out of a larger image, but not far from it.
+  const auto near = [](double c, int size) { return c >= -size && c <= 2.0 * size; };
+  if (!near(pinhole.cx, pinhole.width) || !near(pinhole.cy, pinhole.height)) {
+    return "cx, cy must be in or near the image [px], are " + std::to_string(pinhole.cx) + ", " +
+           std::to_string(pinhole.cy);
+  }
   if (auto reason = distortion.invalid_reason(); !reason.empty()) return reason;
-  // Its coefficients are large and nearly cancel each other: in another order they make no lens.
-  if (distortion.model == DistortionModel::kRational && !sees_its_middle(*this)) {
-    return "the lens folds the middle of the image over: are its coefficients k1 k2 p1 p2 k3 k4 k5 k6, "
-           "in this order and with all their digits?";
+  const bool rational = distortion.model == DistortionModel::kRational;
+  if ((rational || distortion.model == DistortionModel::kRadTan) && !sees_its_middle(*this)) {
+    return std::string("the lens folds the middle of the image over: are its coefficients k1 k2 p1 p2") +
+           (rational ? " k3 k4 k5 k6" : "") + ", in this order and with all their digits?";
   }
   return {};
 }

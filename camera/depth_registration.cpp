@@ -37,12 +37,13 @@ void draw_triangle(cv::Mat& registered, const Sight& a, const Sight& b, const Si
   const float area = (b.u - a.u) * (c.v - a.v) - (b.v - a.v) * (c.u - a.u);
   if (!(area > 0)) return;
   constexpr float kRim = 1e-3f;  // pixels on an edge belong to both sides
-  const int left = static_cast<int>(std::ceil(std::max(std::min({a.u, b.u, c.u}) - kRim, 0.0f)));
-  const int top = static_cast<int>(std::ceil(std::max(std::min({a.v, b.v, c.v}) - kRim, 0.0f)));
-  const auto right =
-      static_cast<int>(std::min(std::max({a.u, b.u, c.u}) + kRim, static_cast<float>(registered.cols - 1)));
-  const auto bottom =
-      static_cast<int>(std::min(std::max({a.v, b.v, c.v}) + kRim, static_cast<float>(registered.rows - 1)));
+  // Points almost in the camera's own plane are seen farther out than whole numbers reach.
+  const auto column = [&](float u) { return std::clamp(u, 0.0f, static_cast<float>(registered.cols)); };
+  const auto row = [&](float v) { return std::clamp(v, 0.0f, static_cast<float>(registered.rows)); };
+  const int left = static_cast<int>(std::ceil(column(std::min({a.u, b.u, c.u}) - kRim)));
+  const int top = static_cast<int>(std::ceil(row(std::min({a.v, b.v, c.v}) - kRim)));
+  const int right = std::min(static_cast<int>(column(std::max({a.u, b.u, c.u}) + kRim)), registered.cols - 1);
+  const int bottom = std::min(static_cast<int>(row(std::max({a.v, b.v, c.v}) + kRim)), registered.rows - 1);
   for (int v = top; v <= bottom; ++v) {
     for (int u = left; u <= right; ++u) {
       const float x = static_cast<float>(u), y = static_cast<float>(v);

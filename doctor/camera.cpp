@@ -38,7 +38,7 @@ std::optional<double> usb_speed(const fs::path& root, const std::string& device)
 std::optional<PixelFormat> chosen_format(const std::vector<FormatEntry>& offered,
                                          const CaptureFormat& wanted) {
   for (const PixelFormat format : pixel_formats()) {
-    if (format == PixelFormat::kZ16 || (wanted.format && *wanted.format != format)) continue;
+    if (wanted.format ? *wanted.format != format : format == PixelFormat::kZ16) continue;
     for (const FormatEntry& entry : offered) {
       if (entry.format == format && entry.offers(wanted.width, wanted.height, wanted.fps)) return format;
     }

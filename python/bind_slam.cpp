@@ -95,9 +95,11 @@ class SlamWithUpdates {
 
   SlamSummary finish() {
     finishing.store(true, std::memory_order_relaxed);  // it carries nothing else
-    SlamSummary summary = slam.finish();
-    updates->queue.close();
-    return summary;
+    struct Close {  // also when finish throws: who waits for updates must learn that there are no more
+      PoseQueue& queue;
+      ~Close() { queue.close(); }
+    } close{updates->queue};
+    return slam.finish();
   }
 
   const CameraRig rig;
@@ -309,9 +311,14 @@ void bind_slam_class(py::module_& module) {
           "Whether a push would find room now.")
       .def(
           "wait_for_room",
-          [](SlamWithUpdates& self, double timeout) { return self.slam.wait_for_room(to_ns(timeout)); },
+          [](SlamWithUpdates& self, double timeout) {
+            if (std::isnan(timeout)) throw std::invalid_argument("timeout is not a number");
+            return self.slam.wait_for_room(to_ns(std::max(timeout, 0.0)));
+          },
           py::arg("timeout"), Unlocked(),
-          "Waits at most for timeout [s]; for recordings, of which no frame should be dropped.")
+          "Waits at most for timeout [s] (infinity: for ever; not at all when it is negative); for "
+          "recordings, of "
+          "which no frame should be dropped.")
       .def_property_readonly(
           "ended",
           [](const SlamWithUpdates& self) {

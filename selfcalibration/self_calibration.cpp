@@ -183,7 +183,7 @@ SharedLens coarse_search(const std::vector<Clip>& clips, const LensPrior& prior,
   for (const double trial : kTrials) {
     const SharedLens lens = supposed_lens(prior, trial * width, height);
     const double cost = solve_motions(clips, lens, adjustments);
-    if (cost >= best) continue;
+    if (!(cost < best) && !best_motions.empty()) continue;  // also when it is not a number
     best = cost;
     best_lens = lens;
     best_motions = motions_of(adjustments);

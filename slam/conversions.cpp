@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "camera/calibration.hpp"
+
 namespace twofold {
 namespace {
 
@@ -76,7 +78,7 @@ Rig to_rig(const CameraRig& rig) {
     inside.baseline = rig.baseline;
   }
   if (rig.readout)
-    expect(std::isfinite(*rig.readout) && *rig.readout >= 0, "readout", "finite and >= 0", *rig.readout);
+    expect(*rig.readout >= 0 && *rig.readout <= kLongestReadout, "readout", "0 to 0.5", *rig.readout);
   inside.readout = rig.readout;
   if (rig.sensor == Sensor::kMono) return inside;
   expect(positive(rig.depth_unit), "depth_unit", "> 0", rig.depth_unit);

@@ -19,9 +19,10 @@ constexpr double kFarthest = 1e5;     // [m]
 constexpr double kUnitLength = 1e-3;  // that a quaternion's squared length may differ from one, as of a file
 
 Rig depth_rig(const CameraRig& rig) {
-  if (rig.sensor == Sensor::kMono)
-    throw std::invalid_argument("rig.sensor is one camera: a surface needs a stereo or RGB-D rig");
-  return to_rig(rig);
+  Rig inside = to_rig(rig);
+  if (const std::string why = no_surface_reason(inside); !why.empty())
+    throw std::invalid_argument("the rig " + why);
+  return inside;
 }
 
 SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& options) {

@@ -28,4 +28,7 @@ struct SurfaceOptions {
 /// it.
 [[nodiscard]] double usual_depth_noise(const Rig& rig);
 
+/// Empty, or why a sensor's depth makes no surface: words that follow its name.
+[[nodiscard]] std::string no_surface_reason(const Rig& rig);
+
 }  // namespace twofold

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include <fmt/format.h>
 #include <Eigen/Geometry>
 
 namespace twofold {
@@ -27,6 +28,30 @@ float distance_to_triangle(const Vector3f& x, const Vector3f& a, const Vector3f&
                        normal.dot((c - b).cross(x - b)) >= 0 && normal.dot((a - c).cross(x - c)) >= 0;
   if (over_it) return std::abs(normal.dot(x - a)) / doubled_area;
   return std::min({distance_to_segment(x, a, b), distance_to_segment(x, b, c), distance_to_segment(x, c, a)});
+}
+
+std::string too_large_reason(const TriangleMesh& mesh, double spacing) {
+  constexpr double kMostPoints = 2e8;
+  double points = 0, most = 0;
+  std::size_t largest = 0;
+  for (std::size_t n = 0; n < mesh.triangles.size(); ++n) {
+    const auto& t = mesh.triangles[n];
+    const Eigen::Vector3d a = mesh.positions[t[0]].cast<double>();
+    const Eigen::Vector3d ab = mesh.positions[t[1]].cast<double>() - a;
+    const Eigen::Vector3d ac = mesh.positions[t[2]].cast<double>() - a;
+    // A sliver is a row of points.
+    const double length = std::max({ab.norm(), ac.norm(), (ac - ab).norm()}) / spacing;
+    const double here = std::max(length, ab.cross(ac).norm() / (spacing * spacing));
+    points += here;
+    if (!(here > most)) continue;
+    most = here;
+    largest = n;
+  }
+  if (points <= kMostPoints) return {};
+  const Eigen::Vector3f x = mesh.positions[mesh.triangles[largest][0]];
+  return fmt::format(
+      "is too large to be compared every {:g} m; its largest triangle is number {}, at ({:g}, {:g}, {:g})",
+      spacing, largest, x.x(), x.y(), x.z());
 }
 
 TriangleMesh subdivided(const TriangleMesh& mesh, float longest) {

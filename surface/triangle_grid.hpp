@@ -2,12 +2,17 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "geometry/triangle_mesh.hpp"
 
 namespace twofold {
+
+/// Empty, or which triangle makes a surface too large to be looked at every `spacing` [m]: a stray vertex far
+/// away would take all memory.
+[[nodiscard]] std::string too_large_reason(const TriangleMesh& mesh, double spacing);
 
 /// Splits triangles at the middle of their longest side until no side is longer than `longest` [m] > 0; keeps
 /// positions only.

@@ -49,8 +49,10 @@ Wanted wanted_of(const std::string& text) {
   wanted.bytes_per_second = 0;
   for (CameraOptions& camera : wanted.cameras) {
     camera.format = with_defaults(camera.format);
-    wanted.bytes_per_second += stream_bytes_per_second(PixelFormat::kGrey, camera.format.width,
-                                                       camera.format.height, camera.format.fps);
+    const bool depth = camera.format.format == PixelFormat::kZ16;  // the others are recorded in grey
+    wanted.bytes_per_second +=
+        stream_bytes_per_second(depth ? PixelFormat::kZ16 : PixelFormat::kGrey, camera.format.width,
+                                camera.format.height, camera.format.fps);
   }
   return wanted;
 }
@@ -60,6 +62,18 @@ void print(const Finding& finding) {
   fmt::print("{:<4}  {:<15} {}\n", kNames[static_cast<std::size_t>(finding.health)], finding.subject,
              finding.state);
   if (!finding.remedy.empty()) fmt::print("      {:<15} -> {}\n", "", finding.remedy);
+}
+
+/// @param faults  of images that were left out
+/// @param error   that ended the recording; empty: none
+Finding check_images(const std::vector<std::string>& faults, const std::string& error) {
+  const std::string subject = "images";
+  if (!error.empty()) return {Health::kBad, subject, error, "copy the recording anew"};
+  if (faults.empty()) return {Health::kOk, subject, "can be read", ""};
+  const std::string others =
+      faults.size() > 1 ? fmt::format(", and {} other{}", faults.size() - 1, faults.size() > 2 ? "s" : "")
+                        : "";
+  return {Health::kWarn, subject, faults.front() + others, "copy the recording anew; runs leave them out"};
 }
 
 /// Looks at some pairs of a recording, or of a camera whose calibration is known.
@@ -76,11 +90,13 @@ std::vector<Finding> look_at_pairs(const DoctorArguments& arguments) {
   RowOffsetMeter meter(source->rig(), kCorners);
   std::vector<RowOffset> offsets;
   Frame frame;
-  for (int i = 0; i < kPairs * kApart && source->next(frame) == FrameStatus::kFrame; ++i) {
+  FrameStatus status = FrameStatus::kFrame;
+  for (int i = 0; i < kPairs * kApart && (status = source->next(frame)) == FrameStatus::kFrame; ++i) {
     if (i % kApart != 0) continue;
     if (const auto offset = meter.search(frame.left, frame.right)) offsets.push_back(*offset);
   }
-  return {check_rows(offsets)};
+  if (status == FrameStatus::kError) return {check_images(source->report().faults, source->error())};
+  return {check_images(source->report().faults, ""), check_rows(offsets)};
 }
 
 int examine(const DoctorArguments& arguments) {

@@ -59,10 +59,20 @@ struct ExportArguments {
   std::string file, ply, g2o, tum;
 };
 
+/// None of them is written over another.
+void expect_distinct(const std::vector<std::filesystem::path>& files) {
+  for (std::size_t i = 0; i < files.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (!files[i].empty() &&
+          std::filesystem::weakly_canonical(files[i]) == std::filesystem::weakly_canonical(files[j]))
+        throw IoError(files[i], "is named twice: every file needs a name of its own");
+}
+
 void export_map(const ExportArguments& arguments) {
   if (arguments.ply.empty() && arguments.g2o.empty() && arguments.tum.empty()) {
     throw IoError("map export", "name at least one of --ply, --g2o, --tum");
   }
+  expect_distinct({arguments.file, arguments.ply, arguments.g2o, arguments.tum});
   const SavedMap map = open_map(arguments.file);
   std::vector<KeyframeId> parts = parts_of(map.graph);
   if (parts.empty()) parts.push_back(KeyframeId{0});  // of an empty map: files with nothing in them

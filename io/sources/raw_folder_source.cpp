@@ -1,6 +1,7 @@
 #include "io/sources/raw_folder_source.hpp"
 
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -25,21 +26,42 @@ Layout layout_of(const fs::path& folder) {
   return {folder / "left", fs::is_directory(folder / "right") ? folder / "right" : fs::path()};
 }
 
+/// Files of a single camera. Two cameras' images that lie in one folder would be calibrated as one.
+void expect_one_camera(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const fs::path& file : list_images(folder)) names.insert(file.stem());
+  for (const std::string& name : names) {
+    const auto at = name.find("left");
+    if (at == std::string::npos) continue;
+    const std::string partner = std::string(name).replace(at, 4, "right");
+    if (names.contains(partner))
+      throw IoError(
+          folder,
+          fmt::format("holds the images of two cameras ({}, {}): move them into folders left/ and right/",
+                      name, partner));
+  }
+}
+
 }  // namespace
 
 RawFolderSource::RawFolderSource(const fs::path& folder) {
   if (!fs::is_directory(folder)) throw IoError(folder, "no such folder");
   const Layout layout = layout_of(folder);
   const bool stereo = !layout.right.empty();
+  if (!stereo) expect_one_camera(layout.left);
   std::map<std::string, fs::path> right;
   if (stereo) {
     for (const fs::path& file : list_images(layout.right)) right[file.stem()] = file;
   }
   for (const fs::path& file : list_images(layout.left)) {
     const auto partner = right.find(file.stem());
-    if (stereo && partner == right.end()) continue;
+    if (stereo && partner == right.end()) {
+      ++unpaired_;
+      continue;
+    }
     pairs_.push_back({file, stereo ? partner->second : fs::path()});
   }
+  unpaired_ += stereo ? right.size() - pairs_.size() : 0;
   if (pairs_.empty()) throw IoError(folder, "no image of the left camera has a partner of the same name");
   const cv::Mat first = read_grey_image(pairs_[0].left);
   rig_.kind = stereo ? SensorKind::kStereo : SensorKind::kMono;
@@ -49,6 +71,14 @@ RawFolderSource::RawFolderSource(const fs::path& folder) {
 
 std::optional<std::int64_t> RawFolderSource::frame_count() const {
   return static_cast<std::int64_t>(pairs_.size());
+}
+
+SourceReport RawFolderSource::report() const {
+  SourceReport report;
+  if (unpaired_ > 0)
+    report.notes.push_back(
+        fmt::format("{} images without a partner of the same name are left out", unpaired_));
+  return report;
 }
 
 bool RawFolderSource::read(Frame& frame) {

@@ -73,6 +73,14 @@ TEST(CalibrateCommand, BadInputIsOneLineAndExitCodeTwo) {
   expect_bad_input(run(folder, "calibrate " + folder.path().string() + out + " --board chessboard:9x6"),
                    "the form is");
   expect_bad_input(run(folder, "calibrate " + folder.path().string() + out), "--board");
+  expect_bad_input(run(folder, "calibrate " + folder.path().string() + " -o " + (folder / "cal.png") +
+                                   " --board chessboard:9x6:0.025"),
+                   "name it .yaml");
+  std::filesystem::create_directory(folder.path() / "both");
+  for (const char* name : {"both/left01.png", "both/right01.png", "both/left02.png"})
+    cv::imwrite(folder / name, cv::Mat(48, 64, CV_8UC1, cv::Scalar(90)));
+  expect_bad_input(run(folder, "calibrate " + (folder / "both") + out + " --board chessboard:9x6:0.025"),
+                   "holds the images of two cameras (left01, right01)");
 }
 
 TEST(DoctorCommand, ReportsLineByLine) {
@@ -84,6 +92,26 @@ TEST(DoctorCommand, ReportsLineByLine) {
   EXPECT_EQ(absent.exit_code, 1);
   EXPECT_NE(absent.out.find("bad   /dev/video97"), std::string::npos) << absent.out;
   expect_bad_input(run(folder, "doctor 'v4l2:/dev/video97?size=huge'"), "size='huge'");
+}
+
+TEST(DoctorCommand, SaysThatImagesCannotBeRead) {
+  const ScratchFolder folder;
+  const std::string recording = folder / "recording";
+  ASSERT_EQ(run(folder, "record 'synthetic:desk?frames=14&width=64&height=48' " + recording).exit_code, 0);
+  std::vector<std::filesystem::path> images;
+  for (const auto& entry : std::filesystem::directory_iterator(recording + "/mav0/cam1/data"))
+    images.push_back(entry.path());
+  std::sort(images.begin(), images.end());
+  ASSERT_EQ(images.size(), 14U);
+  EXPECT_NE(run(folder, "doctor " + recording).out.find("ok    images"), std::string::npos);
+  std::filesystem::resize_file(images[3], 50);
+  const Outcome one = run(folder, "doctor " + recording);
+  EXPECT_NE(one.out.find("warn  images"), std::string::npos) << one.out;
+  EXPECT_NE(one.out.find(images[3].filename().string()), std::string::npos) << one.out;
+  for (const auto& image : images) std::filesystem::resize_file(image, 50);
+  const Outcome all = run(folder, "doctor " + recording);
+  EXPECT_EQ(all.exit_code, 1);
+  EXPECT_NE(all.out.find("bad   images"), std::string::npos) << all.out;
 }
 
 }  // namespace

@@ -193,6 +193,12 @@ TEST_F(MapCommand, ElsewhereItSaysThatNothingWasRecognised) {
 TEST_F(MapCommand, WrongUseIsOneLineAndExitCodeTwo) {
   const std::string folder = folder_.path().string();
   expect_bad_input(run_in_map("", "'synthetic:desk?frames=6'"), "images are 640x480, the map's are 320x240");
+  const auto before = content(map());
+  expect_bad_input(run(folder_, "map export '" + map() + "' --tum '" + map() + "'"), "is named twice");
+  EXPECT_EQ(content(map()), before);
+  expect_bad_input(
+      run(folder_, "map export '" + map() + "' --tum '" + folder + "/x' --ply '" + folder + "/./x'"),
+      "is named twice");
   expect_bad_input(run_in_map("--no-places"), "--load-map: needs places");
   expect_bad_input(run_in_map("--localise-only --save-map '" + folder + "/a.tfm'"), "--localise-only");
   expect_bad_input(run_in_map("--checkpoint 5"), "--checkpoint: needs --save-map");

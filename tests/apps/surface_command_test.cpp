@@ -196,7 +196,29 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
   const ScratchFolder folder;
   const std::string to = " --out '" + (folder / "result") + "'";
   expect_bad_input(run(folder, "run 'synthetic:desk?sensor=mono&frames=5' --surface 0.01 --quiet" + to),
-                   "one camera gives no depth");
+                   "is one camera, which gives no depth");
+  folder.write("tiny.yaml",
+               "sensor: stereo\nalready_rectified: true\ncameras:\n  - {size: [320, 240], intrinsics: [200, "
+               "200, 160, 120]}\n"
+               "  - {size: [320, 240], intrinsics: [200, 200, 160, 120]}\n"
+               "T_right_left: [1, 0, 0, -0.0002,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]\n");
+  ASSERT_EQ(run(folder, "record 'synthetic:desk?frames=3&width=320&height=240' '" + (folder / "pair") + "'")
+                .exit_code,
+            0);
+  folder.write("far.txt", "0 500000 4500000 100 0 0 0 1\n");
+  expect_bad_input(run(folder, "surface '" + (folder / "pair") + "' --calib '" + (folder / "tiny.yaml") +
+                                   "' --poses '" + (folder / "far.txt") + "'" + to),
+                   "is that in metres?");
+  expect_bad_input(
+      run(folder, "surface '" + (folder / "pair") + "' --poses '" + (folder / "far.txt") + "'" + to),
+      "shift the trajectory");
+  std::ofstream(folder / "stray.ply")
+      << "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+         "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1e9 0\n3 0 1 "
+         "2\n";
+  expect_bad_input(
+      run(folder, "eval --surface '" + (folder / "stray.ply") + "' '" + (folder / "stray.ply") + "'"),
+      "its largest triangle is number 0");
   expect_bad_input(run(folder, "run " + kScene + " --surface 0.00001 --quiet" + to), "voxel must be");
   for (const char* option : {"--surface-memory 100", "--surface-load 0.3", "--surface-live"})
     expect_bad_input(run(folder, "run " + kScene + " --quiet " + option + to), "requires --surface");

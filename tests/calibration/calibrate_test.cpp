@@ -117,6 +117,30 @@ TEST(Calibrate, RecoversTheBaselineFromRenderedPairs) {
   EXPECT_EQ(fit->calibration.invalid_reason(), "");
 }
 
+/// What both see of a ChArUco board may be one row, which says nothing of how the board is turned about it.
+TEST(Calibrate, LeavesOutAPairWhoseCommonCornersLieInOneLine) {
+  std::vector<ViewPair> pairs = rendered_pairs();
+  const auto keep = [](int first_row, int last_row, BoardView& view) {
+    BoardView part;
+    for (std::size_t i = 0; i < view.ids.size(); ++i) {
+      const int row = view.ids[i] / kBoard.corners_a_row();
+      if (row < first_row || row > last_row) continue;
+      part.ids.push_back(view.ids[i]);
+      part.pixels.push_back(view.pixels[i]);
+    }
+    view = part;
+  };
+  for (const std::size_t v : {4U, 12U, 17U}) {
+    keep(0, 2, pairs[v].left);
+    keep(2, 5, pairs[v].right);
+  }
+  const auto fit = calibrate_stereo(pairs, kBoard, kImageSize);
+  ASSERT_TRUE(fit.has_value()) << fit.error();
+  const double baseline = T_right_left().translation().norm();
+  EXPECT_NEAR(fit->calibration.T_right_left.translation().norm() / baseline, 1, 0.005);
+  EXPECT_LT(fit->rms_px, 0.2);
+}
+
 TEST(Calibrate, LeavesOutAViewThatIsWrong) {
   std::vector<BoardView> views = projected_views(20, 0.6, 0.05);
   for (std::size_t i = 0; i < views[7].pixels.size(); i += 2) views[7].pixels[i].x += 4;

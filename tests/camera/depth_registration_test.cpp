@@ -142,6 +142,16 @@ TEST(DepthRegistration, ReadingsThatAreNoneGiveNone) {
   }
 }
 
+/// Seen farther out than whole numbers of pixels reach; this must end, and write nothing outside.
+TEST(DepthRegistration, EndsForReadingsAlmostInTheOthersPlane) {
+  Calibration calibration = kinect();
+  calibration.depth_camera.T_left_depth = SE3(SO3(), Vector3(0.3, 0.2, -500 * kUnit + 1e-8));
+  const DepthRegistration registration(calibration.depth_camera, SE3(), calibration.left.pinhole, kUnit);
+  cv::Mat registered;
+  registration.apply(cv::Mat(240, 320, CV_16UC1, cv::Scalar(500)), registered);
+  EXPECT_EQ(registered.size(), cv::Size(320, 240));
+}
+
 TEST(DepthRegistration, IsTheRectifiersWhenTheCalibrationHasADepthCamera) {
   Calibration calibration = kinect();
   calibration.left.distortion.model = DistortionModel::kRadTan;

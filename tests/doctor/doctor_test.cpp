@@ -155,6 +155,15 @@ TEST_F(DoctorCamera, WhatIsNotThereOrNotOfferedIsBad) {
             Health::kBad);
 }
 
+TEST_F(DoctorCamera, ADepthCameraOffersDepth) {
+  auto& device = calls_.devices["/dev/video0"];
+  device.formats = {V4L2_PIX_FMT_Z16};
+  device.bytes_per_pixel = 2;
+  EXPECT_EQ(check_camera(calls_, folder_.path(), "/dev/video0", {PixelFormat::kZ16, 640, 480, 30})[0].health,
+            Health::kOk);
+  EXPECT_EQ(check_camera(calls_, folder_.path(), "/dev/video0", {{}, 640, 480, 30})[0].health, Health::kBad);
+}
+
 TEST(Doctor, DiskIsMeasured) {
   const ScratchFolder folder;
   EXPECT_EQ(check_disk(folder.path(), 1, 1U << 20U).health, Health::kOk);

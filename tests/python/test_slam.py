@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -17,6 +18,14 @@ def push_all(slam: twofold.Slam, frames: list[twofold.Frame]) -> None:
         assert slam.wait_for_room(60)
         pushed = slam.push(frame)
         assert pushed, pushed.reason
+
+
+def test_waiting_for_room_ends(rig: twofold.CameraRig, frames: list[twofold.Frame]) -> None:
+    with twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+        assert slam.wait_for_room(0)
+        assert slam.wait_for_room(-0.001)
+        with pytest.raises(ValueError, match="timeout"):
+            slam.wait_for_room(math.nan)
 
 
 def test_deterministic_runs_repeat_themselves(frames: list[twofold.Frame], rig: twofold.CameraRig) -> None:

@@ -211,6 +211,10 @@ TEST(SurfaceModel, OfAPairEndsWhereTheRigSays) {
   EXPECT_EQ(SurfaceModel(rig).add(frame, {}), 0);
   rig.depth_min = 9;
   EXPECT_THROW(SurfaceModel{rig}, std::invalid_argument);
+  rig.depth_min = 0.3;
+  ASSERT_NO_THROW(SurfaceModel{rig});
+  rig.baseline = 0.1 / rig.fx;  // in another unit
+  EXPECT_THROW(SurfaceModel{rig}, std::invalid_argument);
 }
 
 TEST(SurfaceModel, KnowsNothingOfPositionsThatAreNoNumbers) {

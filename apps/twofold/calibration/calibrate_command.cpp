@@ -36,9 +36,12 @@ int calibrate(const CalibrateArguments& arguments) {
   if (const auto board = parse_board(arguments.board); !board) throw IoError("--board", board.error());
   CalibrationRequest request{arguments.board, arguments.views, arguments.out, arguments.residuals};
   if (request.plot.empty()) request.plot = fs::path(arguments.out).replace_extension(".png");
+  if (request.plot.lexically_normal() == request.out.lexically_normal())
+    throw IoError("--out", arguments.out + " is where the picture of the residuals goes: name it .yaml");
   if (request.out.has_parent_path()) prepare_output_folder(request.out.parent_path());
   catch_interrupts();
   const auto source = open_raw(arguments.source);
+  for (const std::string& note : source->report().notes) fmt::print("note        {}\n", note);
   const auto say = [&](const std::string& line) {
     if (!arguments.quiet) fmt::print(stderr, "{}\n", line);
   };

@@ -15,6 +15,7 @@
 #include "io/plots/plot.hpp"
 #include "surface/comparison.hpp"
 #include "surface/mesh_picture.hpp"
+#include "surface/triangle_grid.hpp"
 
 namespace twofold {
 namespace {
@@ -24,9 +25,12 @@ namespace fs = std::filesystem;
 constexpr int kPictureWidth = 1400;
 constexpr std::int64_t kSameTimeNs = 10'000'000;
 
-TriangleMesh read_surface(const std::string& file) {
+/// @param spacing  of the points that the surfaces are compared at [m]
+TriangleMesh read_surface(const std::string& file, double spacing) {
   TriangleMesh mesh = read_ply_mesh(file);
   if (mesh.triangles.empty()) throw IoError(file, "holds no triangles");
+  if (const std::string reason = too_large_reason(mesh, spacing); !reason.empty())
+    throw IoError(file, reason);
   return mesh;
 }
 
@@ -65,15 +69,16 @@ cv::Mat heat_map(TriangleMesh estimate, const SE3& T_w_e, const SurfaceCompariso
 }  // namespace
 
 void eval_surface(const SurfaceEvalArguments& arguments) {
-  const TriangleMesh estimate = read_surface(arguments.estimate);
-  const TriangleMesh truth = read_surface(arguments.truth);
-  const TriangleMesh seen = arguments.seen.empty() ? truth : read_surface(arguments.seen);
+  const double spacing = 0.5 * arguments.threshold;
+  const TriangleMesh estimate = read_surface(arguments.estimate, spacing);
+  const TriangleMesh truth = read_surface(arguments.truth, spacing);
+  const TriangleMesh seen = arguments.seen.empty() ? truth : read_surface(arguments.seen, spacing);
   std::optional<SE3> T_w_e;
   if (arguments.align) T_w_e = alignment_of(arguments.estimate);
   if (arguments.fit) T_w_e = fit_surface(estimate, T_w_e.value_or(SE3()), truth);
   SurfaceComparisonOptions options;
   options.threshold = arguments.threshold;
-  options.spacing = 0.5 * arguments.threshold;
+  options.spacing = spacing;
   const SurfaceComparison found = compare_surfaces(estimate, T_w_e.value_or(SE3()), truth, seen, options);
   fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
              arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",

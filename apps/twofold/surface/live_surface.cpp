@@ -55,8 +55,8 @@ LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSourc
                          EngineOptions& options, bool one_thread, LiveMesh::Listener on_mesh)
     : source_(&source), arguments_(arguments), rig_(source.rig()) {
   if (arguments.voxel == 0) return;
-  if (rig_.kind == SensorKind::kMono)
-    throw IoError("--surface", "one camera gives no depth: a surface needs stereo or RGB-D");
+  if (const std::string why = no_surface_reason(rig_); !why.empty())
+    throw IoError("--surface", "the source " + why);
   SurfaceOptions surface;
   surface.voxel = arguments.voxel;
   surface.depth_noise = usual_depth_noise(rig_);

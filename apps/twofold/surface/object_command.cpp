@@ -45,8 +45,8 @@ std::unique_ptr<ObjectSource> object_source(ObjectArguments& arguments) {
   options.stop = &interrupted();
   if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
   std::unique_ptr<FrameSource> source = open_source(arguments.source, options);
-  if (source->rig().kind == SensorKind::kMono)
-    throw IoError(arguments.source, "is one camera, which gives no depth: an object needs stereo or RGB-D");
+  if (const std::string why = no_surface_reason(source->rig()); !why.empty())
+    throw IoError(arguments.source, why);
   if (arguments.surface.depth_noise == 0) arguments.surface.depth_noise = usual_depth_noise(source->rig());
   arguments.frames.mask.depth_noise = arguments.surface.depth_noise;
   for (const std::string& reason : {arguments.frames.invalid_reason(), arguments.surface.invalid_reason()})

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -42,6 +43,7 @@ struct SurfaceArguments {
 };
 
 constexpr std::int64_t kSameTimeNs = 1'000'000;
+constexpr std::int64_t kTruthGapNs = 50'000'000;  // that a camera's way between two true poses is guessed in
 constexpr int kPictureWidth = 1600;
 
 /// What a run was made of.
@@ -75,9 +77,22 @@ struct SurfaceJob {
   std::unique_ptr<FrameSource> source;
   double row_offset = 0;  ///< RunInput::row_offset
   Trajectory poses;
+  bool of_truth = false;  ///< poses are the recording's ground truth, of times of its own
   std::string poses_name;
   fs::path out;
 };
+
+/// Vertices are single-precision numbers: this far from the origin their steps are an eighth of a voxel.
+void expect_within_reach(const SurfaceJob& job, double voxel) {
+  const double farthest = voxel * (1 << 20);
+  for (const TimedPose& pose : job.poses) {
+    const double distance = pose.T_w_c.translation().norm();
+    if (distance > farthest)
+      throw IoError(job.poses_name, fmt::format("has a pose {:.0f} m from the origin; with voxels of {:g} m "
+                                                "{:.0f} m is the most: shift the trajectory",
+                                                distance, voxel, farthest));
+  }
+}
 
 SurfaceJob surface_job(const SurfaceArguments& arguments) {
   SurfaceJob job;
@@ -96,6 +111,7 @@ SurfaceJob surface_job(const SurfaceArguments& arguments) {
   if (arguments.poses == "truth") {
     job.poses = job.source->ground_truth();
     job.poses_name = "the ground truth";
+    job.of_truth = true;
     if (job.poses.empty()) throw IoError(arguments.input, "has no ground truth");
   } else {
     const char* const own = input.went_on ? "trajectory.txt" : "keyframes.txt";
@@ -105,15 +121,30 @@ SurfaceJob surface_job(const SurfaceArguments& arguments) {
     job.poses_name = file.string();
     if (job.poses.empty()) throw IoError(file, "holds no poses");
   }
-  if (job.source->rig().kind == SensorKind::kMono)
-    throw IoError(arguments.input, "is one camera, which gives no depth: a surface needs stereo or RGB-D");
+  if (const std::string why = no_surface_reason(job.source->rig()); !why.empty())
+    throw IoError(arguments.input, why);
+  expect_within_reach(job, arguments.options.voxel);
   return job;
 }
 
-const TimedPose* pose_at(const Trajectory& poses, std::int64_t t_ns) {
-  const auto after = std::lower_bound(poses.begin(), poses.end(), t_ns - kSameTimeNs,
+/// Of the nearest time, which is the frame's but for kSameTimeNs. Between two poses of a ground truth, which
+/// was measured at times of its own: on the way from one to the other.
+std::optional<SE3> pose_at(const SurfaceJob& job, std::int64_t t_ns) {
+  const Trajectory& poses = job.poses;
+  const auto after = std::lower_bound(poses.begin(), poses.end(), t_ns,
                                       [](const TimedPose& pose, std::int64_t t) { return pose.t_ns < t; });
-  return after != poses.end() && after->t_ns <= t_ns + kSameTimeNs ? &*after : nullptr;
+  const auto near = [&](const TimedPose& pose) { return std::abs(pose.t_ns - t_ns) <= kSameTimeNs; };
+  const TimedPose* later = after != poses.end() ? &*after : nullptr;
+  const TimedPose* earlier = after != poses.begin() ? &*(after - 1) : nullptr;
+  if (later != nullptr && earlier != nullptr && later->t_ns - t_ns > t_ns - earlier->t_ns && near(*earlier))
+    return earlier->T_w_c;
+  if (later != nullptr && near(*later)) return later->T_w_c;
+  if (earlier != nullptr && near(*earlier)) return earlier->T_w_c;
+  if (!job.of_truth || later == nullptr || earlier == nullptr || later->t_ns - earlier->t_ns > kTruthGapNs)
+    return std::nullopt;
+  const double share =
+      static_cast<double>(t_ns - earlier->t_ns) / static_cast<double>(later->t_ns - earlier->t_ns);
+  return earlier->T_w_c * SE3::exp(share * (earlier->T_w_c.inverse() * later->T_w_c).log());
 }
 
 class DepthFusion {
@@ -193,11 +224,11 @@ void run_surface(const SurfaceArguments& arguments) {
   FrameStatus status;
   std::size_t posed = 0, unposed = 0;
   while ((status = job.source->next(frame)) == FrameStatus::kFrame) {
-    const TimedPose* pose = pose_at(job.poses, frame.t_ns);
-    if (pose == nullptr)
+    const std::optional<SE3> T_w_c = pose_at(job, frame.t_ns);
+    if (!T_w_c)
       ++unposed;
     else if (posed++ % arguments.every == 0)
-      fusion.fuse(frame, pose->T_w_c);
+      fusion.fuse(frame, *T_w_c);
   }
   if (status == FrameStatus::kError) throw IoError(job.source->error());
   if (posed == 0)

@@ -128,6 +128,7 @@ class Page {
   private read(message: Text): void {
     if (message.hello) {
       this.model.forget();
+      this.stage.surface.clear();  // of the run before this one
       this.model.hello = message.hello;
       if (!speaksTheSame(message.hello.protocol)) return;
       document.title = `${message.hello.title} – Twofold`;
