@@ -58,6 +58,8 @@ TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
        {"first_structure.finest_sigma", [](auto& o) { o.first_structure.finest_sigma = 0; }},
        {"first_structure.max_point_error", [](auto& o) { o.first_structure.max_point_error = 0; }},
        {"first_structure.near_share", [](auto& o) { o.first_structure.near_share = 0; }},
+       {"first_structure.max_still_share", [](auto& o) { o.first_structure.max_still_share = 2; }},
+       {"first_structure.fixed_strip", [](auto& o) { o.first_structure.fixed_strip = -1; }},
        {"cell_px", [](auto& o) { o.cell_px = 0; }}});
 }
 

@@ -157,13 +157,14 @@ TEST(FirstStructure, WantsMostCornersToAgree) {
   EXPECT_EQ(start.error(), LostCause::kNoCommonMotion);
 }
 
-/// Every third corner is on the horizon: it agrees with the motion, and knows no depth.
+/// Every third corner is on the horizon: it agrees with the motion, and knows no depth. (That it moves at all
+/// tells it from the background of a camera that stands.)
 TEST(FirstStructure, PointsWithoutADepthDoNotJoin) {
   const auto before_a_horizon = [](int i, double s) {
     return Vector3((i % 3 == 0 ? 1000 : 1) * scattered(i, s));
   };
   const auto start =
-      first_structure(kRig, views_of({before_a_horizon, moving({-0.6, 0, 0}, {0, 0, 0})}, 1), {});
+      first_structure(kRig, views_of({before_a_horizon, moving({-0.6, 0, 0}, {0, 0.02, 0})}, 1), {});
   ASSERT_TRUE(start) << describe(start.error());
   EXPECT_GT(start->corners.size(), 60U);
   for (const int corner : start->corners) EXPECT_NE(corner % 3, 0) << corner;
@@ -178,6 +179,33 @@ TEST(FirstStructure, IsNotStartedBySomethingThatMoves) {
   // Not even while the camera turns.
   const auto turning = first_structure(kRig, views_of({passing, moving({0, 0, 0}, {0, 0.1, 0})}, 1), {});
   ASSERT_FALSE(turning);
+}
+
+/// It hides seven tenths or more of the view, and alone gives a structure that is as good as any.
+TEST(FirstStructure, IsNotStartedByWhatHidesMostOfTheView) {
+  const std::function<SE3(double)> itself[] = {moving({-0.6, 0, 0}, {0, 0, 0}),
+                                               moving({-0.6, 0.1, 0.1}, {0.02, 0.08, -0.03}),
+                                               moving({0.1, 0, -1.4}, {0, 0.01, 0})};
+  for (const double hidden : {0.7, 0.8}) {
+    for (const auto& motion : itself) {
+      const auto point = [&](int i, double s) {
+        const Vector3 p = scattered(i, s);
+        return Vector3(p.x() / p.z() < hidden - 0.5 ? motion(s) * p : p);
+      };
+      expect_wait({point, moving({0, 0, 0}, {0, 0, 0})}, LostCause::kNoCommonMotion, "hidden");
+    }
+  }
+}
+
+/// Along the lower border, where a camera sees the bonnet of its own car.
+TEST(FirstStructure, StartsDespiteWhatMovesWithTheCamera) {
+  const auto motion = moving({-0.6, 0.1, 0.1}, {0.02, 0.08, -0.03});
+  const auto point = [&](int i, double s) {
+    const Vector3 p = scattered(i, s);
+    return Vector3(p.y() / p.z() > 0.2 ? motion(s).inverse() * p : p);
+  };
+  for (std::uint32_t seed = 1; seed <= 5; ++seed)
+    EXPECT_TRUE(first_structure(kRig, views_of({point, motion}, seed), {})) << seed;
 }
 
 TEST(FirstStructure, NeedsCorners) {

@@ -34,7 +34,8 @@ TEST_P(WrongStart, IsNotAccepted) {
 }
 INSTANTIATE_TEST_SUITE_P(Rendered, WrongStart,
                          ::testing::Values("turning only, court", "standing, desk", "held still, court",
-                                           "passer-by, near", "passer-by, turning"));
+                                           "passer-by, near", "passer-by, turning", "60 % hidden",
+                                           "80 % hidden", "80 % hidden, turning"));
 
 }  // namespace
 }  // namespace twofold

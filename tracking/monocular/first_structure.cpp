@@ -36,6 +36,11 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+/// Between the values that a tenth each lie below and above.
+double extent(const std::vector<double>& values) {
+  return quantile(values, 0.9) - quantile(values, 0.1);
+}
+
 double median_flow(const CornerViews& views) {
   std::vector<double> flow;
   for (std::size_t i = 0; i < views.first.size(); ++i)
@@ -282,6 +287,30 @@ class FirstStructureEstimator {
     return filter.inverse_depth_sigma() / filter.psi.z();
   }
 
+  /// Too many corners stand still in all frames where this motion would have moved them at the median depth,
+  /// one: the camera stands, and something that hides much of its view moves. A translation alone explains
+  /// them, too, as far away; but who carries a camera turns it a little. In a strip across the image they are
+  /// taken for what moves with the camera.
+  [[nodiscard]] bool something_passes(const SE3& T_last_first) const {
+    std::vector<double> v, v_still;
+    for (std::size_t i = 0; i < first_.size(); ++i) {
+      const Vector2& uv = views_.first[i];
+      v.push_back(uv.y());
+      const Vector3 p = T_last_first * first_[i];
+      const bool stays = p.z() > 0 && (rig_.camera.project(p) - uv).norm() < 2 * options_.rotation_px;
+      if (stays || !stands(i)) continue;
+      v_still.push_back(uv.y());
+    }
+    const auto all = static_cast<double>(v.size());
+    if (static_cast<double>(v_still.size()) <= options_.max_still_share * all) return false;
+    return extent(v_still) > options_.fixed_strip * extent(v);
+  }
+  [[nodiscard]] bool stands(std::size_t i) const {
+    const auto near = [&](const Vector2& uv) { return (uv - views_.first[i]).norm() < options_.rotation_px; };
+    return near(views_.last[i]) && std::all_of(views_.between.begin(), views_.between.end(),
+                                               [&](auto& seen) { return near(seen[i]); });
+  }
+
   tl::expected<FirstStructure, LostCause> collect(const Trial& trial) const {
     const AnchoredViews& views = trial.views;
     FirstStructure structure;
@@ -303,6 +332,7 @@ class FirstStructureEstimator {
     const double unit = median(std::span(depths));
     const SE3& T_last_first = views.views[0].T_c_a;
     structure.T_last_first = {T_last_first.so3(), T_last_first.translation() / unit};
+    if (something_passes(structure.T_last_first)) return tl::unexpected(LostCause::kNoCommonMotion);
     for (Vector3& psi : structure.psi) psi.z() *= unit;
     return structure;
   }
@@ -333,6 +363,8 @@ std::string FirstStructureOptions::invalid_reason() const {
       .share("finest_sigma", finest_sigma)
       .above("max_point_error", max_point_error, 0)
       .share("near_share", near_share)
+      .within("max_still_share", max_still_share, 0, 1)
+      .within("fixed_strip", fixed_strip, 0, 1)
       .reason();
 }
 

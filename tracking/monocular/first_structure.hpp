@@ -29,6 +29,12 @@ struct FirstStructureOptions {
   double max_point_error = 0.25;  ///< of inverse depth, as a share of it, of a point that joins the map, > 0
   double near_share = 0.3;  ///< of the corners, the nearest, that max_depth_error is of: those far off veto
                             ///< nothing, in (0, 1]
+  /// Of the corners, that stand still where the motion would have moved them: more say that the camera
+  /// stands, and something moves before it, in [0, 1] ...
+  double max_still_share = 0.08;
+  /// ... unless they lie in a strip of so much of the image's height, as a bonnet or a caption does, in [0,
+  /// 1].
+  double fixed_strip = 0.3;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -52,12 +58,13 @@ struct FirstStructure {
 /// homography that explain the same corners.
 ///
 /// Most of what the essential matrix explains must be beyond any rotation: a camera that turns on the spot
-/// gives no depth, and of a standing one before which something moves, most corners stand. Where a
-/// homography explains about as much, the scene may be a plane, of which two motions give the same first and
-/// last view: its motions are tried beside that of the essential matrix. All frames decide, because the views
-/// of a third one from elsewhere fit only the true motion; where two fit them all, the start has to wait.
-/// Depths are those of a bundle adjustment of all frames (thesis 4.5.3). Points so far away that they may be
-/// behind infinity by noise neither vote nor veto.
+/// gives no depth, and of a standing one before which something moves, most corners stand. If it hides most
+/// of the view, they tell by standing still where this motion would have moved them. Where a homography
+/// explains about as much, the scene may be a plane, of which two motions give the same first and last view:
+/// its motions are tried beside that of the essential matrix. All frames decide, because the views of a third
+/// one from elsewhere fit only the true motion; where two fit them all, the start has to wait. Depths are
+/// those of a bundle adjustment of all frames (thesis 4.5.3). Points so far away that they may be behind
+/// infinity by noise neither vote nor veto.
 ///
 /// Deterministic. Allocates; its work is bounded by the number of corners and max_samples.
 /// @return  otherwise why not: kTooFewCorners, kTooLittleParallax, kRotatingOnly, kNoCommonMotion,
