@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstring>
 #include <exception>
+#include <map>
 #include <stdexcept>
 #include <vector>
 
@@ -78,8 +79,10 @@ class Seat {
   explicit Seat(std::size_t& taken) : taken_(&taken) { ++*taken_; }
   Seat(Seat&& other) noexcept : taken_(std::exchange(other.taken_, nullptr)) {}
   Seat& operator=(Seat&&) = delete;
-  ~Seat() {
+  ~Seat() { leave(); }
+  void leave() {
     if (taken_ != nullptr) --*taken_;
+    taken_ = nullptr;
   }
 
  private:
@@ -162,11 +165,27 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
 
 using Viewers = std::vector<std::shared_ptr<ViewerConnection>>;
 
+/// Whose connection it is: his address, or of IPv6 its network, in which anybody has as many as he likes.
+asio::ip::address caller_of(const tcp::socket& socket) {
+  Error error;
+  const tcp::endpoint remote = socket.remote_endpoint(error);
+  if (error || remote.address().is_v4()) return remote.address();
+  asio::ip::address_v6 address = remote.address().to_v6();
+  if (address.is_v4_mapped()) return asio::ip::make_address_v4(asio::ip::v4_mapped, address);
+  auto bytes = address.to_bytes();
+  std::fill(bytes.begin() + bytes.size() / 2, bytes.end(), std::uint8_t{0});
+  return asio::ip::address_v6(bytes);
+}
+
 /// Answers one request, or becomes a viewer's connection.
 class Visitor : public std::enable_shared_from_this<Visitor> {
  public:
   Visitor(Hall& hall, Viewers& viewers, tcp::socket socket)
-      : hall_(hall), viewers_(viewers), seat_(hall.connections), stream_(std::move(socket)) {
+      : hall_(hall),
+        viewers_(viewers),
+        caller_(caller_of(socket)),
+        seat_(hall.connections),
+        stream_(std::move(socket)) {
     parser_.header_limit(kHeaderBytes);
     parser_.body_limit(0);
   }
@@ -174,8 +193,19 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
   void read() {
     stream_.expires_after(hall_.request_time);
     http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](Error error, std::size_t) {
+      if (!self->is_silent_) return;
+      self->is_silent_ = false;
       if (!error) self->answer();
     });
+  }
+  /// It has not said yet what it wants.
+  [[nodiscard]] bool is_silent() const { return is_silent_; }
+  [[nodiscard]] const asio::ip::address& caller() const { return caller_; }
+  /// Somebody else gets its place.
+  void give_way() {
+    is_silent_ = false;
+    seat_.leave();
+    stream_.close();
   }
 
  private:
@@ -256,11 +286,49 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
 
   Hall& hall_;
   Viewers& viewers_;
+  const asio::ip::address caller_;
   Seat seat_;
+  bool is_silent_ = true;
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{2 * kHeaderBytes};
   http::request_parser<http::empty_body> parser_;
   http::response<http::string_body> response_;
+};
+
+/// Connections that have not said yet what they want, in the order in which they came.
+class WaitingRoom {
+ public:
+  void enter(const std::shared_ptr<Visitor>& visitor) {
+    forget_others();
+    waiting_.push_back(visitor);
+  }
+
+  /// Sends somebody away: of the caller who has most of the connections, the one that came first, so that
+  /// nobody who opens many keeps out, or drives out, somebody else.
+  /// @return  false when nobody waits
+  bool make_room() {
+    forget_others();
+    std::map<asio::ip::address, std::size_t> connections;
+    for (const auto& visitor : waiting_) ++connections[visitor.lock()->caller()];
+    std::shared_ptr<Visitor> leaves;
+    for (const auto& entry : waiting_) {
+      auto visitor = entry.lock();
+      if (leaves == nullptr || connections[visitor->caller()] > connections[leaves->caller()])
+        leaves = std::move(visitor);
+    }
+    if (leaves != nullptr) leaves->give_way();
+    return leaves != nullptr;
+  }
+
+ private:
+  void forget_others() {
+    std::erase_if(waiting_, [](const auto& visitor) {
+      const auto here = visitor.lock();
+      return here == nullptr || !here->is_silent();
+    });
+  }
+
+  std::vector<std::weak_ptr<Visitor>> waiting_;
 };
 
 std::string machine_name() {
@@ -421,9 +489,11 @@ class ViewServer::Impl {
     acceptor_.async_accept([this](Error error, tcp::socket socket) {
       accepting_ = false;
       if (error) return;  // no file descriptors, perhaps: again at the next tick
-      if (connections_ < kConnections) {
+      if (connections_ < kConnections || waiting_room_.make_room()) {
         socket.set_option(tcp::no_delay(true), error);
-        std::make_shared<Visitor>(hall_, viewers_, std::move(socket))->read();
+        const auto visitor = std::make_shared<Visitor>(hall_, viewers_, std::move(socket));
+        waiting_room_.enter(visitor);
+        visitor->read();
       }
       accept();
     });
@@ -435,6 +505,7 @@ class ViewServer::Impl {
   asio::steady_timer timer_;
   Hall hall_;
   Viewers viewers_;
+  WaitingRoom waiting_room_;
   const std::vector<std::string> addresses_;
   const int port_ = acceptor_.local_endpoint().port();
   const bool is_open_to_network_;

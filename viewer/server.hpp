@@ -30,7 +30,8 @@ struct ViewServerOptions {
 /// Bounds: 32 connections, 8 of them viewers; requests of 8 KiB and without a body; request_time for one to
 /// come in, 30 s for the answer to go out; messages of a viewer of 64 bytes, and 500 of them a second beside
 /// acknowledgements, of which there are no more than messages to it; 10 s for a message to a viewer to go
-/// out. What exceeds a bound is refused, or its connection closed.
+/// out. What exceeds a bound is refused, or its connection closed. Who comes when there are 32 connections
+/// gets the place of one whose request has not come yet: the first one of the address that has most of them.
 class ViewServer {
  public:
   /// Listens from here on. Options must be valid. Throws std::runtime_error when the address cannot be had,

@@ -181,6 +181,28 @@ TEST_F(ViewServerTest, SurvivesAThousandConnections) {
   EXPECT_TRUE(serves());
 }
 
+/// Well within the time that each of them has for its request.
+TEST_F(ViewServerTest, WhoSaysNothingKeepsNobodyOut) {
+  std::vector<LocalClient> silent;
+  for (int n = 0; n < 100; ++n) silent.emplace_back(port_);
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(serves());
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, milliseconds(600));
+}
+
+/// Who has one connection keeps it, however many somebody else opens, before and after.
+TEST_F(ViewServerTest, WhoOpensManyConnectionsDrivesOutHisOwn) {
+  std::vector<LocalClient> before, after;
+  for (int n = 0; n < 20; ++n) before.emplace_back(port_, "127.0.0.2");
+  LocalClient slow(port_);
+  const std::string request = http_request("/?token=" + token_);
+  slow.send(request.substr(0, 10));
+  for (int n = 0; n < 60; ++n) after.emplace_back(port_, "127.0.0.2");
+  std::this_thread::sleep_for(milliseconds(200));
+  slow.send(request.substr(10));
+  EXPECT_TRUE(slow.receive().starts_with("HTTP/1.1 200"));
+}
+
 TEST_F(ViewServerTest, EightViewersAtMost) {
   std::vector<LocalClient> viewers;
   for (int n = 0; n < 8; ++n) viewers.push_back(viewer());
