@@ -24,9 +24,13 @@ bool Tracker::start_part(FrameStep& step) {
       new_points_.sees_corners(current_.left, options_.min_corners_seen) || sees_structure(step);
   if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.new_part_after || !something_in_view ||
       loss_.lost_frames() < options_.new_part_frames) {
+    if (monocular_start_) monocular_start_->reset();  // what it followed was seen before
     return false;
   }
-  if (step.free_proposal == nullptr || !immature_points_.pending().empty()) return false;
+  if (step.free_proposal == nullptr || !immature_points_.pending().empty()) {
+    if (monocular_start_) monocular_start_->watch(current_, step.frame);
+    return false;
+  }
   return make_first_keyframe(step) == LostCause::kNone;
 }
 
@@ -35,6 +39,7 @@ bool Tracker::start_part(FrameStep& step) {
 ///         are forgotten
 LostCause Tracker::make_first_keyframe(FrameStep& step) {
   if (step.free_proposal == nullptr || !immature_points_.room_for_keyframe()) {
+    if (monocular_start_) monocular_start_->watch(current_, step.frame);
     return LostCause::kNoKeyframeBuffer;
   }
   if (monocular_start_) return start_from_motion(step);

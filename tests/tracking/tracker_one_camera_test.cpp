@@ -15,9 +15,9 @@ namespace {
 using namespace testing;
 
 /// Left images of a walk through the room.
-std::vector<Frame> walk(const std::function<SE3(int i)>& T_c_w, int count) {
+std::vector<Frame> walk(const std::function<SE3(int i)>& T_c_w, int count, std::uint32_t room = 21) {
   const Rig rig = test_rig(SensorKind::kMono, 320, 240);
-  RenderedScene scene(rig, {3, 2, 5}, 21);
+  RenderedScene scene(rig, {3, 2, 5}, room);
   std::vector<Frame> frames;
   for (int i = 0; i < count; ++i)
     frames.push_back({i, i * std::int64_t{33'000'000}, scene.render_one(T_c_w(i), 2), {}, {}});
@@ -99,6 +99,51 @@ TEST(TrackerOneCamera, TurningOnTheSpotItSaysSo) {
     said += result.cause == LostCause::kRotatingOnly;
   }
   EXPECT_GT(said, 12);
+}
+
+/// As while the mapper is behind. From the third frame on there is nothing to write a keyframe into, for so
+/// long that the corners have moved further than they are looked for from one frame to the next.
+TEST(TrackerOneCamera, CornersAreFollowedWhileNoKeyframeCanBeMade) {
+  const auto faster = [](int i) { return corner_walk(2 * i); };
+  const std::vector<Frame> frames = walk(faster, 20);
+  PlainMap map;
+  const GraphSnapshot empty = map.publish();
+  KeyframeProposal proposal;
+  Tracker tracker(test_rig(SensorKind::kMono, 320, 240), {});
+  tracker.prepare(proposal);
+  int started = -1;
+  for (const Frame& frame : frames) {
+    const bool withheld = frame.index >= 2 && frame.index < 14;
+    const TrackResult result = tracker.step(frame, empty, withheld ? nullptr : &proposal);
+    if (result.status == TrackStatus::kTracking) {
+      started = static_cast<int>(frame.index);
+      break;
+    }
+    EXPECT_EQ(result.cause == LostCause::kNoKeyframeBuffer, withheld) << frame.index;
+  }
+  EXPECT_EQ(started, 14);
+}
+
+/// Lost in another room, it stands, is covered, and has been moved on when it sees again.
+TEST(TrackerOneCamera, APartDoesNotBeginWithWhatWasSeenBeforeACover) {
+  Odometry odometry(SensorKind::kMono);
+  for (const Frame& frame : before_the_corner()) (void)odometry.step(frame);
+  const std::vector<Frame> room = walk(corner_walk, 30, 22);
+  std::int64_t index = kFrames;
+  const auto show = [&](Frame frame) {
+    frame.index = index++;
+    frame.t_ns = frame.index * 33'000'000;
+    return odometry.step(frame);
+  };
+  for (int n = 0; n < 60; ++n) ASSERT_NE(show(room[0]).status, TrackStatus::kTracking);
+  for (int n = 0; n < 40; ++n) (void)show(covered(room[0]));
+  const std::int64_t sees_again = index;
+  for (int n = 0; n < 30; ++n) ASSERT_NE(show(room[4]).status, TrackStatus::kTracking);
+  TrackResult result;
+  for (std::size_t i = 4; i < room.size() && result.status != TrackStatus::kTracking; ++i)
+    result = show(room[i]);
+  ASSERT_EQ(result.status, TrackStatus::kTracking) << describe(result.cause);
+  EXPECT_GE(odometry.proposal().frame_index, sees_again);
 }
 
 }  // namespace

@@ -42,11 +42,15 @@ void MonocularStart::reset() {
   has_last_ = false;
 }
 
+void MonocularStart::watch(const FrameImages& images, const Frame& frame) {
+  follow_all(images);
+  renew_candidates(images, frame);
+  remember_frame(images, frame);
+}
+
 tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameImages& images,
                                                                    const Frame& frame) {
-  if (has_last_) {
-    for (const std::size_t c : order_) follow(images, candidates_[c]);
-  }
+  follow_all(images);
   LostCause cause = LostCause::kTooLittleParallax;
   // The oldest one has seen most motion, and says what is missing.
   for (const std::size_t c : order_) {
@@ -55,10 +59,19 @@ tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameIm
     if (c == order_.front()) cause = structure.error();
   }
   renew_candidates(images, frame);
+  remember_frame(images, frame);
+  return tl::unexpected(candidates_[order_.front()].corners.empty() ? LostCause::kTooFewCorners : cause);
+}
+
+void MonocularStart::remember_frame(const FrameImages& images, const Frame& frame) {
   last_.left.copy_from(images.left);
   last_index_ = frame.index;
   has_last_ = true;
-  return tl::unexpected(candidates_[order_.front()].corners.empty() ? LostCause::kTooFewCorners : cause);
+}
+
+void MonocularStart::follow_all(const FrameImages& images) {
+  if (!has_last_) return;
+  for (const std::size_t c : order_) follow(images, candidates_[c]);
 }
 
 void MonocularStart::follow(const FrameImages& images, StartCandidate& candidate) const {

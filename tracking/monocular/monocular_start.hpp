@@ -57,6 +57,9 @@ class MonocularStart {
 
   /// Forgets all candidates.
   void reset();
+  /// A frame in which nothing can be started: corners are followed through it all the same, because from one
+  /// frame to the next is how far they are looked for.
+  void watch(const FrameImages& images, const Frame& frame);
   /// @return  the start, or what it waits for
   [[nodiscard]] tl::expected<MonocularStartResult, LostCause> step(const FrameImages& images,
                                                                    const Frame& frame);
@@ -65,11 +68,13 @@ class MonocularStart {
   [[nodiscard]] std::vector<EarlierFrame> earlier_frames(const MonocularStartResult& start) const;
 
  private:
+  void follow_all(const FrameImages& images);
   void follow(const FrameImages& images, StartCandidate& candidate) const;
   void remember_place(StartCandidate& candidate) const;
   void remember_path(std::int64_t frame_index, StartCandidate& candidate) const;
   [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
   void renew_candidates(const FrameImages& images, const Frame& frame);
+  void remember_frame(const FrameImages& images, const Frame& frame);
   void fill(StartCandidate& candidate, const FrameImages& images, const Frame& frame);
 
   Rig rig_;
