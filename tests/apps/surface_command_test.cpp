@@ -198,10 +198,8 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
   expect_bad_input(run(folder, "run 'synthetic:desk?sensor=mono&frames=5' --surface 0.01 --quiet" + to),
                    "is one camera, which gives no depth");
   folder.write("tiny.yaml",
-               "sensor: stereo\nalready_rectified: true\ncameras:\n  - {size: [320, 240], intrinsics: [200, "
-               "200, 160, 120]}\n"
-               "  - {size: [320, 240], intrinsics: [200, 200, 160, 120]}\n"
-               "T_right_left: [1, 0, 0, -0.0002,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]\n");
+               "sensor: stereo\ncameras:\n  - {size: [320, 240], intrinsics: [200, 200, 160, 120]}\n"
+               "baseline: 0.0002\n");
   ASSERT_EQ(run(folder, "record 'synthetic:desk?frames=3&width=320&height=240' '" + (folder / "pair") + "'")
                 .exit_code,
             0);
