@@ -1,6 +1,7 @@
 #include "calibration/view_collector.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -18,12 +19,18 @@ constexpr double kRest = 0.002;  // [image widths]
 ViewCollector::ViewCollector(const Board& board, const CollectorInput& input, const ViewGuideOptions& options)
     : board_(board), input_(input), guide_(board, input.size, options) {}
 
-bool ViewCollector::rests(const BoardView& view) const {
-  if (before_.ids != view.ids) return false;
+double movement(const BoardView& before, const BoardView& now) {
   double most = 0;
-  for (std::size_t i = 0; i < view.pixels.size(); ++i)
-    most = std::max(most, cv::norm(view.pixels[i] - before_.pixels[i]));
-  return most < kRest * input_.size.width;
+  std::size_t common = 0;
+  for (std::size_t i = 0; i < now.ids.size(); ++i) {
+    const auto at = std::lower_bound(before.ids.begin(), before.ids.end(), now.ids[i]);
+    if (at == before.ids.end() || *at != now.ids[i]) continue;
+    const auto there = static_cast<std::size_t>(at - before.ids.begin());
+    most = std::max(most, cv::norm(now.pixels[i] - before.pixels[there]));
+    ++common;
+  }
+  const std::size_t more = std::max(before.ids.size(), now.ids.size());
+  return common > 0 && 4 * common >= 3 * more ? most : std::numeric_limits<double>::infinity();
 }
 
 ViewCollector::Sight ViewCollector::see(const Frame& frame, ViewPair* pair) {
@@ -36,7 +43,8 @@ ViewCollector::Sight ViewCollector::see(const Frame& frame, ViewPair* pair) {
     pair->right = *std::move(right);
   }
   pair->left = *std::move(left);
-  return !input_.live || rests(pair->left) ? Sight::kUsable : Sight::kMoving;
+  const bool rests = movement(before_, pair->left) < kRest * input_.size.width;
+  return !input_.live || rests ? Sight::kUsable : Sight::kMoving;
 }
 
 void ViewCollector::look(const Frame& frame) {
@@ -49,8 +57,11 @@ void ViewCollector::look(const Frame& frame) {
   if (sight == Sight::kNone || sight == Sight::kLeftOnly) return;
   ++found_;
   if (sight == Sight::kMoving) return;
-  (void)guide_.offer(pair.left);
-  offered_.push_back(std::move(pair));
+  if (guide_.offer(pair.left)) chosen_.emplace(offered_, std::move(pair));
+  ++offered_;
+  std::erase_if(chosen_, [&](const auto& view) {  // a better one may have taken its place
+    return !std::binary_search(guide_.chosen().begin(), guide_.chosen().end(), view.first);
+  });
 }
 
 std::string ViewCollector::progress() const {
@@ -67,7 +78,7 @@ std::string ViewCollector::progress() const {
 
 std::vector<ViewPair> ViewCollector::chosen() const {
   std::vector<ViewPair> pairs;
-  for (const int number : guide_.chosen()) pairs.push_back(offered_[static_cast<std::size_t>(number)]);
+  for (const auto& [number, pair] : chosen_) pairs.push_back(pair);
   return pairs;
 }
 

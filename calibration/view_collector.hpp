@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 
 #include "calibration/calibrate.hpp"
 #include "calibration/view_guide.hpp"
@@ -14,6 +15,10 @@ struct CollectorInput {
   bool stereo = false;  ///< the board has to be seen in both
   bool live = false;    ///< somebody moves the board: views are taken while it rests
 };
+
+/// How far the board moved from one view to the next: its farthest corner [px]. Single corners of a ChArUco
+/// board come and go; infinite where fewer than three quarters of them are in both.
+[[nodiscard]] double movement(const BoardView& before, const BoardView& now);
 
 /// Looks for the board in one frame after the other, keeps the views a calibration needs, and tells the
 /// person with the board what to do next.
@@ -37,12 +42,12 @@ class ViewCollector {
  private:
   enum class Sight : std::uint8_t { kNone, kLeftOnly, kMoving, kUsable };
   [[nodiscard]] Sight see(const Frame& frame, ViewPair* pair);
-  [[nodiscard]] bool rests(const BoardView& view) const;
 
   Board board_;
   CollectorInput input_;
   ViewGuide guide_;
-  std::vector<ViewPair> offered_;
+  std::map<int, ViewPair> chosen_;  // by the guide's number
+  int offered_ = 0;
   BoardView before_;  // of the frame before; empty when the board was not seen
   Sight sight_ = Sight::kUsable;
   int same_sight_ = 0;  // frames in a row

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <memory>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -111,10 +112,12 @@ std::string edge_list(const GraphSnapshot& graph, KeyframeId part) {
 
 std::string g2o_text(const GraphSnapshot& graph) {
   std::string vertices, edges, fixed;
+  std::set<KeyframeId> parts;
   for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) {
     const Keyframe& keyframe = graph.keyframe(KeyframeId{k});
     if (keyframe.culled()) continue;
-    if (fixed.empty()) fixed = fmt::format("FIX {}\n", k);
+    // Nothing else ties the parts of a map to each other.
+    if (parts.insert(graph.part(keyframe.id)).second) fixed += fmt::format("FIX {}\n", k);
     vertices += fmt::format("VERTEX_SE3:QUAT {} {}\n", k, pose_text(keyframe.T_k_w.inverse()));
     for (const Edge& edge : *keyframe.edges) {
       if (edge.other < keyframe.id) continue;

@@ -80,6 +80,7 @@ TEST_F(MapCommand, ExportHasAFileForEachPart) {
   EXPECT_GT(first, second);
   EXPECT_GT(second, 5U);
   EXPECT_EQ(first + second, count(content(folder_ / "p.g2o"), "VERTEX_SE3:QUAT"));
+  EXPECT_EQ(count(content(folder_ / "p.g2o"), "FIX "), 2U);
   for (const char* name : {"p.ply", "p-2.ply"})
     EXPECT_EQ(count(content(folder_ / name), "element vertex 0"), 0U) << name;
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "p-3.txt"));

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "calibration/view_collector.hpp"
 #include "fixtures/rendered_board.hpp"
 
 namespace twofold {
@@ -36,6 +37,23 @@ TEST(ViewShape, TellsWhichSideIsFartherAway) {
   const auto pitch = shape_of(view_at(SO3::exp(Vector3(0.4, 0, 0)), {0, 0, 0.4}), kBoard, kImageSize);
   ASSERT_TRUE(pitch.has_value());
   EXPECT_NEAR(pitch->pitch(), 0.4, 0.08);  // about x: the lower side
+}
+
+/// A corner of a ChArUco board that is found in every other frame does not make it move.
+TEST(ViewCollector, ABoardRestsWhileSingleCornersComeAndGo) {
+  const BoardView whole = view_at(SO3(), {0, 0, 0.4});
+  BoardView part = whole;
+  part.ids.erase(part.ids.begin() + 7);
+  part.pixels.erase(part.pixels.begin() + 7);
+  EXPECT_EQ(movement(whole, part), 0);
+  EXPECT_EQ(movement(part, whole), 0);
+  part.pixels[20].x += 3;
+  EXPECT_NEAR(movement(whole, part), 3, 1e-4);
+  BoardView few;
+  few.ids.assign(whole.ids.begin(), whole.ids.begin() + 10);
+  few.pixels.assign(whole.pixels.begin(), whole.pixels.begin() + 10);
+  EXPECT_FALSE(std::isfinite(movement(whole, few)));
+  EXPECT_FALSE(std::isfinite(movement({}, whole)));
 }
 
 TEST(ViewGuide, TakesOnlyNewViews) {
