@@ -28,6 +28,8 @@ std::string SyntheticOptions::invalid_reason() const {
                                  outside("depth_noise", depth_noise, 0, 10),
                                  outside("depth_max", depth_max, 0.5, 100),
                                  outside("blur", blur, 0, 1),
+                                 outside("shutter", shutter, 0, 1 / fps),
+                                 outside("readout", readout.value_or(0), 0, 1),
                                  outside("exposure", exposure, 0, 0.9),
                                  outside("flight", flight, 0, 3),
                                  outside("walkers", walkers, 0, 16),

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,7 @@ struct SyntheticOptions {
   double depth_noise = 1;  ///< RGB-D: factor on the sensor's depth noise, 0 .. 10
   double depth_max = 8;    ///< RGB-D: the sensor's reach [m], 0.5 .. 100
   double blur = 0;         ///< exposure time as a share of the frame interval, 0 .. 1
+  double shutter = 0;      ///< readout of a rolling one [s], its rows from top to bottom, 0 .. 1 / fps
   double exposure = 0;     ///< amplitude of the changes of gain, 0 .. 0.9
   double flight = 0;       ///< the camera swings about its path (flown in camera_path.hpp) by so much, 0 .. 3
   bool object = false;     ///< something moves through the scene
@@ -37,6 +39,9 @@ struct SyntheticOptions {
   double exposure_steps = 0;  ///< every few seconds the gain changes at once, by up to so many stops, 0 .. 4
   double flicker = 0;         ///< amplitude of the lamps' flicker, 0 .. 0.5
   double drop = 0;            ///< share of frames lost, 0 .. 0.9; the first is always there
+
+  /// What the calibration says of `shutter` [s], 0 .. 1; nothing: it leaves that open.
+  std::optional<double> readout;
 
   /// A hand covers the lens at this time [s], and nothing but noise is seen for `cover` seconds; 0: never.
   double cover_at = 0;

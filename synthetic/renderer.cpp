@@ -65,6 +65,15 @@ class ImageCaster {
     return view;
   }
 
+  /// Row y of the view, into a row of the same width of another one; its neighbours say where rims are.
+  void cast_row(int y, int into, View& other) {
+    View view{cv::Mat(height_, width_, CV_32FC1), cv::Mat(height_, width_, CV_32FC1)};
+    for (int r = 0; r < rows_; ++r) trace_tile_row(r, view.inverse_depth);
+    shade_row(y, view);
+    view.intensity.row(y).copyTo(other.intensity.row(into));
+    view.inverse_depth.row(y).copyTo(other.inverse_depth.row(into));
+  }
+
  private:
   [[nodiscard]] float ray_x(float u) const { return (u - cx_) * inv_fx_; }
   [[nodiscard]] float ray_y(float v) const { return (v - cy_) * inv_fy_; }
@@ -149,6 +158,21 @@ class ImageCaster {
 View Renderer::render(const PinholeCamera& camera, const SE3& T_w_c, const std::vector<Quad>& extra) const {
   const ViewGeometry geometry(*scene_, extra, camera, T_w_c);
   return ImageCaster(camera, geometry).cast();
+}
+
+View Renderer::render_rows(const PinholeCamera& camera,
+                           const std::function<Instant(int row)>& instant_of) const {
+  View view{cv::Mat(camera.height, camera.width, CV_32FC1), cv::Mat(camera.height, camera.width, CV_32FC1)};
+  for_each_row(camera.height, [&](int row) {
+    const Instant instant = instant_of(row);
+    const int top = std::max(row - 1, 0), bottom = std::min(row + 1, camera.height - 1);
+    PinholeCamera strip = camera;
+    strip.cy -= top;
+    strip.height = bottom - top + 1;
+    const ViewGeometry geometry(*scene_, instant.extra, strip, instant.T_w_c);
+    ImageCaster(strip, geometry).cast_row(row - top, row, view);
+  });
+  return view;
 }
 
 }  // namespace twofold::synthetic

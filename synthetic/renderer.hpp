@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -13,6 +14,12 @@ namespace twofold::synthetic {
 struct View {
   cv::Mat intensity;      ///< CV_32FC1, grey levels
   cv::Mat inverse_depth;  ///< CV_32FC1, 1/z of the surface through the pixel's centre [1/m]; 0 for the sky
+};
+
+/// What a camera is before at one instant.
+struct Instant {
+  SE3 T_w_c;
+  std::vector<Quad> extra;  ///< moving objects; their textures belong to the scene
 };
 
 /// Ray caster with exact depth and filtered textures.
@@ -29,6 +36,11 @@ class Renderer {
   /// extra: primitives of this instant only (moving objects); their textures belong to the scene.
   [[nodiscard]] View render(const PinholeCamera& camera, const SE3& T_w_c,
                             const std::vector<Quad>& extra = {}) const;
+
+  /// As a rolling shutter sees it: each row at an instant of its own. Takes several times as long.
+  /// @param instant_of  is called from several threads
+  [[nodiscard]] View render_rows(const PinholeCamera& camera,
+                                 const std::function<Instant(int row)>& instant_of) const;
 
  private:
   const Scene* scene_;

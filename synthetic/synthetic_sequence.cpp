@@ -68,6 +68,7 @@ SyntheticSequence::SyntheticSequence(const SyntheticOptions& options)
   rig_.camera.fx = rig_.camera.fy = options.f * (1 + options.f_error);
   rig_.baseline = options.sensor == SensorKind::kMono ? 0 : options.baseline;
   rig_.depth_max = options.depth_max;
+  rig_.readout = options.readout;
   const std::int64_t frames =
       options.frames > 0 ? options.frames
                          : std::max(1L, std::lround(options.rounds * staging_.round_seconds * options.fps));
@@ -112,14 +113,25 @@ double SyntheticSequence::gain(int i) const {
   return changing * stepped_gain(t, options_.exposure_steps) * flickering(t, options_.flicker);
 }
 
-View SyntheticSequence::view_at(const Staging& staging, double t, double right_m) const {
-  const SE3 T_w_c = staging.path(t) * SE3(SO3(), Vector3(right_m, 0, 0));
-  std::vector<Quad> moving;
+Instant SyntheticSequence::instant_at(const Staging& staging, double t, double right_m) const {
+  Instant instant{staging.path(t) * SE3(SO3(), Vector3(right_m, 0, 0)), {}};
   if (options_.object && staging.T_w_object)
-    moving = box_quads(staging.T_w_object(t), staging.object_size, staging.object_texture);
-  staging.walkers.append(t, moving);
-  if (staging.surroundings) staging.surroundings(t, moving);
-  return Renderer(staging.scene).render(lens_, T_w_c, moving);
+    instant.extra = box_quads(staging.T_w_object(t), staging.object_size, staging.object_texture);
+  staging.walkers.append(t, instant.extra);
+  if (staging.surroundings) staging.surroundings(t, instant.extra);
+  return instant;
+}
+
+View SyntheticSequence::view_at(const Staging& staging, double t, double right_m) const {
+  const Renderer renderer(staging.scene);
+  if (options_.shutter == 0) {
+    const Instant instant = instant_at(staging, t, right_m);
+    return renderer.render(lens_, instant.T_w_c, instant.extra);
+  }
+  return renderer.render_rows(lens_, [&](int row) {
+    const double late = ((row + 0.5) / lens_.height - 0.5) * options_.shutter;
+    return instant_at(staging, std::max(0.0, t + late), right_m);
+  });
 }
 
 cv::Mat SyntheticSequence::blurred(int i, double right_m) const {

@@ -37,7 +37,7 @@ class SyntheticSequence {
 
   /// The images as the sensor delivers them.
   [[nodiscard]] Frame render(int i) const;
-  /// The left view without noise, gain or blur, with exact depth.
+  /// The left view without noise, gain or blur, with exact depth; each row as it is exposed.
   [[nodiscard]] View exact_view(int i) const;
 
  private:
@@ -48,7 +48,9 @@ class SyntheticSequence {
   [[nodiscard]] const Staging& staging(int i) const {
     return carried(i) && elsewhere_ ? *elsewhere_ : staging_;
   }
-  /// View at time t of the walk of a camera shifted by right_m along the rig's x axis.
+  /// What is before a camera shifted by right_m along the rig's x axis, at time t of the walk.
+  [[nodiscard]] Instant instant_at(const Staging& staging, double t, double right_m) const;
+  /// Its view, of which t is the middle of the exposure.
   [[nodiscard]] View view_at(const Staging& staging, double t, double right_m) const;
   [[nodiscard]] cv::Mat blurred(int i, double right_m) const;
   [[nodiscard]] double gain(int i) const;

@@ -87,6 +87,7 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
                                    {"depth_noise", &options.depth_noise},
                                    {"depth_max", &options.depth_max},
                                    {"blur", &options.blur},
+                                   {"shutter", &options.shutter},
                                    {"exposure", &options.exposure},
                                    {"exposure_steps", &options.exposure_steps},
                                    {"flicker", &options.flicker},
@@ -97,6 +98,7 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
                                    {"cover", &options.cover},
                                    {"carried_to", &options.carried_to}})
     take(parameters, key, value);
+  if (const auto readout = parameters.take_number("readout")) options.readout = *readout;
   take_int(parameters, "frames", &options.frames);
   if (const auto seed = take_integer(parameters, "seed")) options.seed = static_cast<std::uint64_t>(*seed);
   if (const auto seed = take_integer(parameters, "elsewhere"))

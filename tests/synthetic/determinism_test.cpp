@@ -2,6 +2,8 @@
 #include <tbb/global_control.h>
 
 #include <cstring>
+#include <opencv2/core.hpp>
+#include <utility>
 
 #include "synthetic/synthetic_sequence.hpp"
 
@@ -31,6 +33,40 @@ SyntheticOptions small(const std::string& scene, SensorKind sensor) {
   options.object = true;
   options.drop = 0.2;
   return options;
+}
+
+/// Rows v of a frame at t are exposed at t + ((v + 0.5) / 40 - 0.5) 32 ms; the other camera takes an image
+/// each millisecond.
+TEST(RollingShutter, RowsAreExposedOneAfterTheOtherAboutTheFramesTime) {
+  SyntheticOptions options = default_options("desk");
+  options.sensor = SensorKind::kMono;
+  options.f *= 320.0 / options.width;
+  options.width = 320;
+  options.height = 40;
+  options.flight = 1;
+  options.object = true;
+  options.fps = 20;
+  options.frames = 50;
+  options.shutter = 0.032;
+  options.readout = 0.031;
+  const SyntheticSequence rolling(options);
+  EXPECT_EQ(rolling.rig().readout, 0.031);
+  options.fps = 1000;
+  options.frames = 2100;
+  options.shutter = 0;
+  options.readout = std::nullopt;
+  const SyntheticSequence global(options);
+  EXPECT_EQ(global.rig().readout, std::nullopt);
+  const auto differ = [&](int row, int frame) {
+    return cv::norm(rolling.exact_view(40).intensity.row(row), global.exact_view(frame).intensity.row(row),
+                    cv::NORM_L1) /
+           options.width;
+  };
+  for (const auto& [row, ms] : {std::pair{12, -6}, {22, 2}, {27, 6}}) {
+    EXPECT_LT(differ(row, 2000 + ms), 0.05) << row;
+    EXPECT_GT(differ(row, 2000 - ms), 0.2) << row;
+  }
+  EXPECT_LT((rolling.T_w_c(40).inverse() * global.T_w_c(2000)).log().norm(), 1e-9);
 }
 
 class Determinism : public testing::TestWithParam<std::string> {};

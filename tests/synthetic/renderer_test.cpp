@@ -62,6 +62,38 @@ TEST(Renderer, QuadHasTheDepthOfItsPlaneAndItsOutline) {
   EXPECT_GT(hits, 5000);
 }
 
+/// Of one row, in grey levels or in inverse depth [1/m], whichever is more.
+double worst_difference(const View& rows, const View& whole, int row) {
+  const double grey = cv::norm(rows.intensity.row(row), whole.intensity.row(row), cv::NORM_INF);
+  return std::max(grey, cv::norm(rows.inverse_depth.row(row), whole.inverse_depth.row(row), cv::NORM_INF));
+}
+
+/// Quads, cylinders, spheres and rims; a height field; something that moves.
+TEST(Renderer, EachRowIsWhatAWholeViewOfItsInstantShows) {
+  const Staging desk = make_desk(3), descent = make_descent(3);
+  for (const Staging* staging : {&desk, &descent}) {
+    const auto instant_of = [&](int row) {
+      Instant instant{staging->path(4 + 0.002 * row), {}};
+      if (staging->T_w_object)
+        instant.extra =
+            box_quads(staging->T_w_object(4 + 0.002 * row), staging->object_size, staging->object_texture);
+      return instant;
+    };
+    const Renderer renderer(staging->scene);
+    const View rows = renderer.render_rows(kCamera, instant_of);
+    const Instant first = instant_of(0);
+    const View from_first = renderer.render(kCamera, first.T_w_c, first.extra);
+    for (const int row : {0, 1, 57, 120, 238, 239}) {
+      const Instant instant = instant_of(row);
+      const View whole = renderer.render(kCamera, instant.T_w_c, instant.extra);
+      EXPECT_LT(worst_difference(rows, whole, row), 1e-3) << row;
+      if (row > 50) {
+        EXPECT_GT(worst_difference(rows, from_first, row), 1) << row;
+      }
+    }
+  }
+}
+
 TEST(Renderer, BackOfAQuadIsNotSeen) {
   Scene scene;
   const int texture = scene.add(grey(8, 8, 100));

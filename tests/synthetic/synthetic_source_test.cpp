@@ -195,6 +195,9 @@ TEST(SyntheticSource, WrongParametersAreNamed) {
   EXPECT_IO_ERROR(open_synthetic("corridor", {{"walkers", "17"}}), "walkers must be between 0 and 16");
   EXPECT_IO_ERROR(open_synthetic("corridor", {{"flicker", "1"}}), "flicker must be between");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"drop", "0.95"}}), "drop must be between");
+  EXPECT_IO_ERROR(open_synthetic("desk", {{"shutter", "0.034"}}), "shutter must be between");
+  EXPECT_IO_ERROR(open_synthetic("desk", {{"shutter", "0.02"}, {"readout", "-0.02"}}),
+                  "readout must be between");
   EXPECT_IO_ERROR(open_source("synthetic:desk?blur"), "blur");
 }
 
