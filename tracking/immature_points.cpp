@@ -2,7 +2,18 @@
 
 #include <algorithm>
 
+#include "geometry/inverse_depth.hpp"
+
 namespace twofold {
+
+void move_to_mid_exposure(const Rig& rig, const RollingShutter& shutter, ImmaturePoint& point) {
+  if (shutter.at_rest()) return;
+  Observation& seen = point.anchor_observation;
+  const Vector3 x_c = shutter.T_row_c(seen.z.y()).inverse() * from_inverse_depth(point.psi);
+  if (!(x_c.z() > 0)) return;
+  point.psi = to_inverse_depth(x_c);
+  seen.z = shutter.at_mid_exposure(rig, seen.z.cast<double>(), x_c).cast<float>();
+}
 
 const PendingKeyframe* ImmaturePoints::find_pending(KeyframeId id) const {
   const auto it = std::find_if(pending_.begin(), pending_.end(), [&](const auto& p) { return p.id == id; });

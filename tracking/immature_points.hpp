@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "camera/rig.hpp"
+#include "camera/rolling_shutter.hpp"
 #include "graph/keyframe.hpp"
 #include "graph/snapshot.hpp"
 #include "imaging/point_appearance.hpp"
@@ -22,6 +24,11 @@ struct ImmaturePoint {
   std::uint8_t agreed = 0;               ///< frames in a row in which it was where it should be
   std::uint8_t moved = 0;                ///< times in a row that it was found where it should not be
 };
+
+/// A point that was measured where the camera was when its row was exposed, psi and observation, as its
+/// anchor has it at mid-exposure. Left as it is if it would be behind the camera there.
+/// @param shutter  of the anchor
+void move_to_mid_exposure(const Rig& rig, const RollingShutter& shutter, ImmaturePoint& point);
 
 /// A keyframe that was proposed but is not in the snapshot yet.
 struct PendingKeyframe {

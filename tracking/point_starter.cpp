@@ -109,7 +109,7 @@ int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameIm
       continue;
     }
     ++with_depth_;
-    if (!shutter.at_rest()) move_to_mid_exposure(shutter, point);
+    move_to_mid_exposure(rig_, shutter, point);
     if (!immature.add(point)) break;
     occupy(uv);
     ++started;
@@ -185,14 +185,6 @@ bool PointStarter::measure(const FrameImages& images, const Corner& corner, Imma
   point.anchor_observation.z = {point.appearance.uv.x(), point.appearance.uv.y(), static_cast<float>(u_r)};
   point.anchor_observation.level = corner.level;
   return true;
-}
-
-void PointStarter::move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const {
-  Observation& seen = point.anchor_observation;
-  const Vector3 x_c = shutter.T_row_c(seen.z.y()).inverse() * from_inverse_depth(point.psi);
-  if (!(x_c.z() > 0)) return;
-  point.psi = to_inverse_depth(x_c);
-  seen.z = shutter.at_mid_exposure(rig_, seen.z.cast<double>(), x_c).cast<float>();
 }
 
 }  // namespace twofold

@@ -66,7 +66,6 @@ class PointStarter {
                const RollingShutter& shutter, ImmaturePoints& immature);
   void spread_corners(const FrameImages& images, const CornerBounds& bounds);
   [[nodiscard]] bool measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const;
-  void move_to_mid_exposure(const RollingShutter& shutter, ImmaturePoint& point) const;
 
   Rig rig_;
   TrackerOptions options_;

@@ -67,7 +67,7 @@ void Tracker::observe_seeds(const FrameStep& step) {
   };
   // A frame placed by its depth image may have no point that says how far the scene is.
   const double depth = result.by_depth ? depth_alignment_->typical_depth() : median_depth(result.T_c_ref);
-  if (depth > 0) new_points_.observe_seeds(current_.left, depth, T_c_anchor, immature_points_);
+  if (depth > 0) new_points_.observe_seeds(current_.left, step.shutter, depth, T_c_anchor, immature_points_);
 }
 
 }  // namespace twofold

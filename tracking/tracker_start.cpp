@@ -58,7 +58,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   search_.clear();
   step.result.T_c_ref = SE3();
   proposer_.begin({kNoKeyframe, SE3()}, view_of(step), step, immature_points_);
-  new_points_.start_seeds(current_, id);
+  new_points_.start_seeds(current_, id, step.shutter);
   hand_over_images(*step.free_proposal);
   step.result.status = TrackStatus::kTracking;
   step.result.cause = LostCause::kNone;

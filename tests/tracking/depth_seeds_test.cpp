@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
+
+#include "base/median.hpp"
 #include "fixtures/rendered_scene.hpp"
 #include "imaging/fast_corners.hpp"
 #include "imaging/patch.hpp"
@@ -12,6 +15,21 @@ namespace {
 constexpr KeyframeId kAnchor{3};
 constexpr double kMedianDepth = 4;
 
+/// Corners of an image, one a cell.
+std::vector<PointAppearance> corners_of(const Rig& rig, const ImagePyramid& image) {
+  std::vector<Corner> corners;
+  corners.reserve(1000);
+  const int columns = rig.camera.width / 32, rows = rig.camera.height / 32;
+  const std::vector<std::uint8_t> free(static_cast<std::size_t>(columns * rows), 0);
+  detect_corners(image.level(0), 0, 10, 15, 12, {32, columns, rows, free}, corners);
+  std::vector<PointAppearance> appearances;
+  PointAppearance appearance;
+  for (const Corner& corner : corners) {
+    if (cut_appearance(image.level(0), corner.u, corner.v, 0, appearance)) appearances.push_back(appearance);
+  }
+  return appearances;
+}
+
 /// Corners of a rendered room, seen from its middle; others of a room that is not there.
 class DepthSeedsTest : public ::testing::Test {
  protected:
@@ -21,16 +39,8 @@ class DepthSeedsTest : public ::testing::Test {
     testing::RenderedScene scene(rig_, kRoom, room);
     FrameImages images;
     scene.render(SE3(), 1, images);
-    std::vector<Corner> corners;
-    corners.reserve(1000);
-    const int columns = rig_.camera.width / 32, rows = rig_.camera.height / 32;
-    const std::vector<std::uint8_t> free(static_cast<std::size_t>(columns * rows), 0);
-    detect_corners(images.left.level(0), 0, 10, 15, 12, {32, columns, rows, free}, corners);
-    for (const Corner& corner : corners) {
-      PointAppearance appearance;
-      if (cut_appearance(images.left.level(0), corner.u, corner.v, 0, appearance))
-        seeds_->add(kAnchor, appearance);
-    }
+    for (const PointAppearance& appearance : corners_of(rig_, images.left))
+      seeds_->add(kAnchor, appearance, {});
     ASSERT_GT(seeds_->size(), 30U);
   }
   /// The camera has moved by `shift` to the right.
@@ -39,7 +49,7 @@ class DepthSeedsTest : public ::testing::Test {
     FrameImages images;
     scene_.render(T_c_a, 1, images);
     seeds_->observe(
-        images.left, median_depth, [&](KeyframeId) { return T_c_a; }, ready_);
+        images.left, {}, median_depth, [&](KeyframeId) { return T_c_a; }, ready_);
   }
   [[nodiscard]] std::size_t ready() const { return ready_.points().size(); }
   /// By how far two views' depths are apart that differ by a pixel, as inverse depths.
@@ -153,6 +163,59 @@ TEST_F(DepthSeedsTest, TheOldAreGivenUp) {
   EXPECT_GT(seeds_->size(), 0U);
   seeds_->drop_stale(KeyframeId{newest + 1});
   EXPECT_EQ(seeds_->size(), 0U);
+}
+
+/// What came of corners that were seen through a rolling shutter.
+struct RolledPoints {
+  std::size_t count = 0;
+  double depth_error = 0;  ///< median, as a share
+  double anchor_px = 0;    ///< the worst of where the anchor is said to have seen them at mid-exposure
+};
+
+/// Seen from the middle of the room turning one way, then from 0.3 m to the right turning back, 30 ms from
+/// the first row to the last, by who takes it for so many seconds.
+RolledPoints rolled_points(double assumed_readout) {
+  Rig rig = testing::test_rig(SensorKind::kMono, 320, 240);
+  rig.readout = 0.03;
+  const Vector6 turning = (Vector6() << 0, 0, 0, 0.1, 0.8, 0).finished();
+  const SE3 T_c_a(SO3(), Vector3(-0.3, 0, 0));
+  const RollingShutter first(rig, turning), later(rig, -turning);
+  testing::RenderedScene scene(rig, {3, 2, kMedianDepth}, 21);
+  ImagePyramid first_image, later_image;
+  first_image.build(scene.render_rows([&](int row) { return first.T_row_c(row); }, 1));
+  later_image.build(scene.render_rows([&](int row) { return later.at_row(row, T_c_a); }, 1));
+
+  rig.readout = assumed_readout;
+  DepthSeeds seeds(rig, {}, {}, 300);
+  for (const PointAppearance& appearance : corners_of(rig, first_image))
+    seeds.add(kAnchor, appearance, RollingShutter(rig, turning));
+  ImmaturePoints ready(300, 1);
+  seeds.observe(
+      later_image, RollingShutter(rig, -turning), kMedianDepth, [&](KeyframeId) { return T_c_a; }, ready);
+
+  RolledPoints result{.count = ready.points().size()};
+  std::vector<double> errors;
+  for (const ImmaturePoint& point : ready.points()) {
+    const Vector2 uv = point.appearance.uv.cast<double>();
+    const SE3 T_row_a = first.T_row_c(uv.y());
+    const Vector3 x_a = T_row_a.inverse() * (rig.camera.unproject(uv) * scene.depth(T_row_a, uv));
+    errors.push_back(std::abs(point.psi.z() * x_a.z() - 1));
+    const Vector2 seen = point.anchor_observation.z.head<2>().cast<double>();
+    result.anchor_px = std::max(result.anchor_px, (seen - rig.camera.project(x_a)).norm());
+  }
+  if (!errors.empty()) result.depth_error = median(std::span(errors));
+  return result;
+}
+
+TEST(RollingDepthSeeds, PointsAreWhereAGlobalShutterWouldHaveSeenThem) {
+  const RolledPoints known = rolled_points(0.03);
+  EXPECT_GT(known.count, 25U);
+  EXPECT_LT(known.depth_error, 0.03);
+  EXPECT_LT(known.anchor_px, 0.1);
+  const RolledPoints ignored = rolled_points(0);
+  ASSERT_GT(ignored.count, 10U);
+  EXPECT_GT(ignored.depth_error, 2 * known.depth_error);
+  EXPECT_GT(ignored.anchor_px, 1);
 }
 
 }  // namespace

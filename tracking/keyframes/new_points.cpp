@@ -31,7 +31,7 @@ void NewPoints::start(const FrameImages& images, KeyframeId anchor, const LocalM
   if (enough_found && rig_.kind != SensorKind::kRgbd)
     occupy_unsearched(local_map, step.result.T_c_ref, found.candidates);
   if (rig_.kind != SensorKind::kMono) starter_.start(images, anchor, step.shutter, immature_points);
-  start_seeds(images, anchor);
+  start_seeds(images, anchor, step.shutter);
 }
 
 /// Where the map has points that nobody looked for, because enough others had been found: a place seen again
@@ -46,7 +46,7 @@ void NewPoints::occupy_unsearched(const LocalMap& local_map, const SE3& T_c_ref,
   }
 }
 
-void NewPoints::start_seeds(const FrameImages& images, KeyframeId anchor) {
+void NewPoints::start_seeds(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter) {
   seeds_.drop_stale(anchor);
   const bool one_camera = rig_.kind == SensorKind::kMono;
   if (!one_camera && !starter_.depth_is_scarce()) return;
@@ -55,7 +55,7 @@ void NewPoints::start_seeds(const FrameImages& images, KeyframeId anchor) {
       one_camera ? options_.max_new_points : options_.seeded_points - starter_.points_in_view();
   corners_.clear();
   starter_.choose_corners(images, wanted, corners_);
-  for (const PointAppearance& appearance : corners_) seeds_.add(anchor, appearance);
+  for (const PointAppearance& appearance : corners_) seeds_.add(anchor, appearance, shutter);
 }
 
 }  // namespace twofold

@@ -33,13 +33,13 @@ class NewPoints {
              SearchOutcome& found, ImmaturePoints& immature_points);
   /// Starts seeds at corners where no point is tracked or known, and none waits for its depth. One camera has
   /// nothing else; other rigs live on them where depth is out of reach, or the right camera is covered.
-  void start_seeds(const FrameImages& images, KeyframeId anchor);
+  void start_seeds(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter);
 
   /// DepthSeeds::observe.
   template <class PoseOfAnchor>
-  void observe_seeds(const ImagePyramid& image, double median_depth, PoseOfAnchor&& T_c_anchor,
-                     ImmaturePoints& ready) {
-    seeds_.observe(image, median_depth, T_c_anchor, ready);
+  void observe_seeds(const ImagePyramid& image, const RollingShutter& shutter, double median_depth,
+                     PoseOfAnchor&& T_c_anchor, ImmaturePoints& ready) {
+    seeds_.observe(image, shutter, median_depth, T_c_anchor, ready);
   }
   void forget_seeds() { seeds_.clear(); }
   [[nodiscard]] bool has_seeds() const { return seeds_.size() > 0; }

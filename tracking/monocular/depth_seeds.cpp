@@ -46,12 +46,13 @@ DepthSeeds::DepthSeeds(const Rig& rig, const GuidedSearchOptions& search, const 
   seeds_.reserve(capacity);
 }
 
-void DepthSeeds::add(KeyframeId anchor, const PointAppearance& appearance) {
+void DepthSeeds::add(KeyframeId anchor, const PointAppearance& appearance, const RollingShutter& shutter) {
   if (seeds_.size() == seeds_.capacity()) return;
   Seed seed;
   seed.anchor = anchor;
   seed.appearance = appearance;
   seed.uv = appearance.uv;
+  seed.shutter = shutter;
   seed.filter = InverseDepthFilter::from_mono(rig_.camera, appearance.uv.cast<double>(),
                                               sigma_px(rig_, appearance.level));
   seeds_.push_back(seed);
@@ -74,30 +75,41 @@ InverseDepthRange DepthSeeds::range_of(const Seed& seed, double median_depth) co
 
 /// A look along much less parallax than what is known came from adds nothing but its errors. Another one from
 /// the same place counts: it says better where the point is seen from there.
-bool DepthSeeds::worth_a_look(const Seed& seed, const EpipolarStretch& stretch, const SE3& T_c_a) const {
+bool DepthSeeds::worth_a_look(const Seed& seed, const EpipolarStretch& stretch, const SE3& T_c_row) const {
   if (!known(seed)) return stretch.length_px() > kShortestStretch;
-  const auto p = project_inverse_depth(rig_, T_c_a, seed.filter.psi);
+  const auto p = project_inverse_depth(rig_, T_c_row, seed.filter.psi);
   if (!p) return false;
   const double sigma = seed.filter.inverse_depth_sigma();
   const double per_px = p->J_psi.col(2).head<2>().norm() / sigma_px(rig_, stretch.level);
   return per_px * per_px * sigma * sigma > options_.min_gain;
 }
 
-void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const SE3& T_c_a, double median_depth) const {
-  const Vector3 ray_a(seed.filter.psi.x(), seed.filter.psi.y(), 1);
-  const auto stretch =
-      epipolar_stretch(rig_.camera, seed.appearance, ray_a, T_c_a, range_of(seed, median_depth));
+/// Where the camera was when the corner's row was exposed.
+SE3 DepthSeeds::T_anchor_row(const Seed& seed) const {
+  return seed.shutter.T_row_c(seed.appearance.uv.y()).inverse();
+}
+
+/// The row on which a corner is seen, and so when, is that of its likely depth until it is found.
+void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const RollingShutter& shutter, const SE3& T_c_a,
+                      double median_depth) const {
+  const SE3 T_c_row = seed.shutter.at_rest() ? T_c_a : T_c_a * T_anchor_row(seed);
+  const Vector3 ray(seed.filter.psi.x(), seed.filter.psi.y(), 1);
+  const InverseDepthRange range = range_of(seed, median_depth);
+  const Vector3 likely = ray / std::max(range.likely, kFarthest / median_depth);
+  const SE3 T_seen_row = shutter.seen_from(rig_, T_c_row, likely);
+  const auto stretch = epipolar_stretch(rig_.camera, seed.appearance, ray, T_seen_row, range);
   if (!stretch) return;
-  if (!worth_a_look(seed, *stretch, T_c_a)) return;
+  if (!worth_a_look(seed, *stretch, T_seen_row)) return;
   const auto found = find_along(images, seed.appearance, *stretch, search_);
   if (!found) {
     ++seed.misses;
     return;
   }
+  const SE3 T_found_row = shutter.at_row(found->z.y(), T_c_row);
   if (!known(seed)) {
-    seed.filter.psi.z() = std::max(0.0, triangulated(rig_.camera, ray_a, T_c_a, found->z.head<2>()));
+    seed.filter.psi.z() = std::max(0.0, triangulated(rig_.camera, ray, T_found_row, found->z.head<2>()));
   }
-  if (!seed.filter.update(rig_, T_c_a, found->z, sigma_px(rig_, found->level), kFilterSteps)) {
+  if (!seed.filter.update(rig_, T_found_row, found->z, sigma_px(rig_, found->level), kFilterSteps)) {
     ++seed.misses;
     return;
   }
@@ -122,6 +134,7 @@ ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const 
   point.anchor_observation.z = {seed.appearance.uv.x(), seed.appearance.uv.y(),
                                 std::numeric_limits<float>::quiet_NaN()};
   point.anchor_observation.level = seed.appearance.level;
+  move_to_mid_exposure(rig_, seed.shutter, point);
   return point;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera/rig.hpp"
+#include "camera/rolling_shutter.hpp"
 #include "filters/inverse_depth_filter.hpp"
 #include "imaging/epipolar_search.hpp"
 #include "imaging/point_appearance.hpp"
@@ -33,8 +34,10 @@ struct DepthSeedOptions {
 
 /// Corners of keyframes whose depth is not known yet: each has an information filter of its own, which begins
 /// with no depth at all, and is updated with every frame whose pose is known (thesis 3.4.4). Given that pose
-/// they are independent. What is known well enough becomes an ImmaturePoint: the tracker uses it at once, and
-/// the map adjusts it jointly when the next keyframe has found it.
+/// they are independent. Where rows are read one after the other, a seed's own frame is the camera as it was
+/// when the corner's row was exposed: as long as its depth is not known, it cannot be moved to mid-exposure.
+/// What is known well enough becomes an ImmaturePoint: the tracker uses it at once, and the map adjusts it
+/// jointly when the next keyframe has found it.
 ///
 /// Never grows beyond its capacity; work per frame is bounded by the options.
 class DepthSeeds {
@@ -44,17 +47,19 @@ class DepthSeeds {
 
   void clear() { seeds_.clear(); }
   /// A corner of keyframe `anchor`; dropped when there is no room.
-  void add(KeyframeId anchor, const PointAppearance& appearance);
+  /// @param shutter  of that keyframe
+  void add(KeyframeId anchor, const PointAppearance& appearance, const RollingShutter& shutter);
   /// Gives up seeds that are too old.
   void drop_stale(KeyframeId newest);
 
   /// What the frame says about depths.
+  /// @param shutter       of the frame
   /// @param T_c_anchor    callable: pose of the frame relative to keyframe `id`
   /// @param median_depth  of what is tracked
   /// @param ready         takes the points that can be used from now on
   template <class PoseOfAnchor>
-  void observe(const ImagePyramid& images, double median_depth, PoseOfAnchor&& T_c_anchor,
-               ImmaturePoints& ready);
+  void observe(const ImagePyramid& images, const RollingShutter& shutter, double median_depth,
+               PoseOfAnchor&& T_c_anchor, ImmaturePoints& ready);
 
   /// visit(level-0 pixel) for each seed, where it was seen last.
   template <class Visit>
@@ -67,16 +72,19 @@ class DepthSeeds {
   struct Seed {
     KeyframeId anchor = kNoKeyframe;
     PointAppearance appearance;
-    InverseDepthFilter filter;
-    Eigen::Vector2f uv{0, 0};  ///< where it was seen last
-    std::uint8_t looks = 0;    ///< frames that saw it
-    std::uint8_t misses = 0;   ///< looks in a row that did not find it
+    RollingShutter shutter;     ///< of the anchor
+    InverseDepthFilter filter;  ///< in the frame of the corner's row
+    Eigen::Vector2f uv{0, 0};   ///< where it was seen last
+    std::uint8_t looks = 0;     ///< frames that saw it
+    std::uint8_t misses = 0;    ///< looks in a row that did not find it
   };
 
   [[nodiscard]] bool known(const Seed& seed) const { return seed.looks > 0; }
   [[nodiscard]] InverseDepthRange range_of(const Seed& seed, double median_depth) const;
-  [[nodiscard]] bool worth_a_look(const Seed& seed, const EpipolarStretch& stretch, const SE3& T_c_a) const;
-  void look(Seed& seed, const ImagePyramid& images, const SE3& T_c_a, double median_depth) const;
+  [[nodiscard]] SE3 T_anchor_row(const Seed& seed) const;
+  [[nodiscard]] bool worth_a_look(const Seed& seed, const EpipolarStretch& stretch, const SE3& T_c_row) const;
+  void look(Seed& seed, const ImagePyramid& images, const RollingShutter& shutter, const SE3& T_c_a,
+            double median_depth) const;
   [[nodiscard]] bool mature(const Seed& seed, double median_depth) const;
   [[nodiscard]] ImmaturePoint point_of(const Seed& seed, double median_depth) const;
   void keep_immature(double median_depth, ImmaturePoints& ready);
@@ -89,8 +97,8 @@ class DepthSeeds {
 };
 
 template <class PoseOfAnchor>
-void DepthSeeds::observe(const ImagePyramid& images, double median_depth, PoseOfAnchor&& T_c_anchor,
-                         ImmaturePoints& ready) {
+void DepthSeeds::observe(const ImagePyramid& images, const RollingShutter& shutter, double median_depth,
+                         PoseOfAnchor&& T_c_anchor, ImmaturePoints& ready) {
   const std::size_t count = std::min(seeds_.size(), static_cast<std::size_t>(options_.max_observed));
   KeyframeId anchor = kNoKeyframe;
   SE3 T_c_a;
@@ -98,7 +106,7 @@ void DepthSeeds::observe(const ImagePyramid& images, double median_depth, PoseOf
     if (next_ >= seeds_.size()) next_ = 0;
     Seed& seed = seeds_[next_];
     if (seed.anchor != anchor) T_c_a = T_c_anchor(anchor = seed.anchor);
-    look(seed, images, T_c_a, median_depth);
+    look(seed, images, shutter, T_c_a, median_depth);
   }
   keep_immature(median_depth, ready);
 }
