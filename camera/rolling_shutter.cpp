@@ -1,5 +1,7 @@
 #include "camera/rolling_shutter.hpp"
 
+#include <algorithm>
+
 namespace twofold {
 
 RollingShutter::RollingShutter(const Rig& rig, const Vector6& velocity)
@@ -19,6 +21,14 @@ SE3 RollingShutter::seen_from(const Rig& rig, const SE3& T_c_w, const Vector3& x
   if (at_rest_) return T_c_w;
   const Vector3 x_c = T_c_w * x_w;
   return x_c.z() > 0 ? T_row_c(rig.camera.project(x_c).y()) * T_c_w : T_c_w;
+}
+
+Vector2 followed_to_mid_exposure(const PinholeCamera& camera, const Vector2& uv, const Vector2& motion,
+                                 double share) {
+  const double tau = (uv.y() + 0.5) / camera.height - 0.5;
+  // Between the two rows lies more than one interval when the corner goes down.
+  const double intervals = std::max(1 + share * motion.y() / camera.height, 0.5);
+  return uv - tau * share / intervals * motion;
 }
 
 }  // namespace twofold

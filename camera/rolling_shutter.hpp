@@ -40,4 +40,11 @@ class RollingShutter {
   double half_readout_ = 0;
 };
 
+/// Where a global shutter would have seen a corner at mid-exposure, by how the corner itself moves: neither
+/// its depth nor the camera's motion need be known.
+/// @param motion  of the corner from a frame to the next, one of them that of uv [px]
+/// @param share   of the time between the two, that the rows take to be read, in [0, 1]
+[[nodiscard]] Vector2 followed_to_mid_exposure(const PinholeCamera& camera, const Vector2& uv,
+                                               const Vector2& motion, double share);
+
 }  // namespace twofold

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "camera/frame.hpp"
@@ -49,6 +50,9 @@ class FrameStep {
   bool tracked = false;     ///< in the map that there was
   bool started = false;     ///< a map or map part, with this frame
   RollingShutter shutter;   ///< as the camera moves in this frame, as far as known
+  /// How it moves in this frame, left perturbation a second, where a start found that out: there is no frame
+  /// before.
+  std::optional<Vector6> velocity;
   TrackResult result;
   /// One camera: frames before this one whose poses its start found out, relative to the reference keyframe.
   std::vector<EarlierFrame> earlier_frames;

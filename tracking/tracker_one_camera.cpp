@@ -14,6 +14,8 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   const TrackResult before = step.result;
   if (const LostCause cause = confirm_start(*start, step); cause != LostCause::kNone) {
     step.restore(before);
+    step.velocity.reset();
+    step.shutter = {};
     immature_points_.clear_points();
     return cause;
   }
@@ -45,13 +47,15 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
     point.anchor = id;
     point.psi = start.structure.psi[n];
     point.appearance = start.first->corners[corner].appearance;
-    const Eigen::Vector2f& uv = point.appearance.uv;
+    const Eigen::Vector2f uv = monocular_start_->first_place(*start.first, corner).cast<float>();
     point.anchor_observation.z = {uv.x(), uv.y(), static_cast<float>(Rig::kNoRight)};
     point.anchor_observation.level = point.appearance.level;
     if (!immature_points_.add(point)) break;
   }
   const Placement placement{id, start.structure.T_last_first};
   local_map_.update(step.graph, id, immature_points_, options_.neighbour_keyframes);
+  step.velocity = monocular_start_->velocity(start);
+  step.shutter = step.velocity ? shutter_.at(placement.T_c_ref, step) : RollingShutter();
   local_map_search_.run(current_, placement.T_c_ref, options_.lost_radius_px, step, search_);
   const LostCause cause = pose_estimator_.estimate(placement, step, search_);
   if (cause != LostCause::kNone) return cause;

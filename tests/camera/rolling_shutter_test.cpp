@@ -58,6 +58,28 @@ TEST(RollingShutter, SaysFromWhereAPointIsSeen) {
   EXPECT_LT((predicted - measured(rig, x_c)).norm(), 0.5);
 }
 
+/// 30 ms of frames at 25 Hz: by the frame before, and by the next one.
+TEST(RollingShutter, AFollowedCornerSaysItselfWhereItWasAtMidExposure) {
+  const Rig rig = rolling_rig();
+  const double interval = 0.04;
+  std::mt19937 rng(5);
+  std::uniform_real_distribution<double> u(60, 580), v(60, 420), depth(2, 8);
+  double moved = 0, worst = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Vector3 x_c = rig.camera.unproject({u(rng), v(rng)}) * depth(rng);
+    const Vector2 seen = measured(rig, x_c).head<2>(), truth = rig.project(x_c).head<2>();
+    moved = std::max(moved, (seen - truth).norm());
+    for (const double step : {-interval, interval}) {
+      const Vector2 other = measured(rig, SE3::exp(step * kVelocity) * x_c).head<2>();
+      const Vector2 motion = step > 0 ? other - seen : seen - other;
+      const Vector2 found = followed_to_mid_exposure(rig.camera, seen, motion, *rig.readout / interval);
+      worst = std::max(worst, (found - truth).norm());
+    }
+  }
+  EXPECT_GT(moved, 8);
+  EXPECT_LT(worst, 0.15 * moved);
+}
+
 TEST(RollingShutter, IsAGlobalOneWithoutReadoutOrMotion) {
   Rig rig = rolling_rig();
   const Vector3 x_c(0.4, -0.7, 3);

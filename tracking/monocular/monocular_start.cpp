@@ -5,6 +5,7 @@
 #include <span>
 
 #include "base/median.hpp"
+#include "camera/rolling_shutter.hpp"
 #include "estimation/motion_only.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_buffers.hpp"
@@ -43,14 +44,14 @@ void MonocularStart::reset() {
 }
 
 void MonocularStart::watch(const FrameImages& images, const Frame& frame) {
-  follow_all(images);
+  follow_all(images, frame);
   renew_candidates(images, frame);
   remember_frame(images, frame);
 }
 
 tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameImages& images,
                                                                    const Frame& frame) {
-  follow_all(images);
+  follow_all(images, frame);
   LostCause cause = LostCause::kTooLittleParallax;
   // The oldest one has seen most motion, and says what is missing.
   for (const std::size_t c : order_) {
@@ -66,39 +67,44 @@ tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameIm
 void MonocularStart::remember_frame(const FrameImages& images, const Frame& frame) {
   last_.left.copy_from(images.left);
   last_index_ = frame.index;
+  last_t_ns_ = frame.t_ns;
   has_last_ = true;
 }
 
-void MonocularStart::follow_all(const FrameImages& images) {
+void MonocularStart::follow_all(const FrameImages& images, const Frame& frame) {
   if (!has_last_) return;
+  for (const std::size_t c : order_) {
+    remember_place(candidates_[c]);
+    remember_path(last_index_, candidates_[c]);
+  }
+  interval_ = 1e-9 * static_cast<double>(frame.t_ns - last_t_ns_);
   for (const std::size_t c : order_) follow(images, candidates_[c]);
 }
 
 void MonocularStart::follow(const FrameImages& images, StartCandidate& candidate) const {
-  remember_place(candidate);
-  remember_path(last_index_, candidate);
   ++candidate.age;
+  const bool from_first = candidate.age == 1;
+  if (from_first) {
+    candidate.first_interval = interval_;
+    candidate.first_motion.assign(candidate.corners.size(), Eigen::Vector2f::Zero());
+  }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidate.corners.size(); ++i) {
     if (!follow_corner(last_.left, images.left, candidate.corners[i])) continue;
     candidate.corners[kept] = candidate.corners[i];
+    candidate.first_motion[kept] =
+        from_first ? candidate.corners[i].uv - candidate.corners[i].appearance.uv : candidate.first_motion[i];
     for (auto& places : candidate.between) places[kept] = places[i];
     for (PathFrame& frame : candidate.path) frame.places[kept] = frame.places[i];
     ++kept;
   }
   candidate.corners.resize(kept);
+  candidate.first_motion.resize(kept);
   for (auto& places : candidate.between) places.resize(kept);
   for (PathFrame& frame : candidate.path) frame.places.resize(kept);
 }
 
 namespace {
-
-std::vector<Eigen::Vector2f> places_of(const std::vector<FollowedCorner>& corners) {
-  std::vector<Eigen::Vector2f> places;
-  places.reserve(corners.size());
-  for (const FollowedCorner& corner : corners) places.push_back(corner.uv);
-  return places;
-}
 
 /// Every second one goes.
 template <class Frames>
@@ -109,6 +115,31 @@ void thin_out(Frames& frames) {
 
 }  // namespace
 
+/// Of the time between two frames, the rows take so much to be read; 0 where the calibration does not say.
+double MonocularStart::readout_share(double interval) const {
+  return interval > 0 ? std::min(rig_.readout.value_or(0) / interval, 1.0) : 0;
+}
+
+/// Where the newest frame sees a corner, as a global shutter would have.
+Vector2 MonocularStart::last_place(const FollowedCorner& corner) const {
+  return followed_to_mid_exposure(rig_.camera, corner.uv.cast<double>(),
+                                  corner.motion.value_or(Eigen::Vector2f::Zero()).cast<double>(),
+                                  readout_share(interval_));
+}
+
+std::vector<Eigen::Vector2f> MonocularStart::last_places(const StartCandidate& candidate) const {
+  std::vector<Eigen::Vector2f> places;
+  places.reserve(candidate.corners.size());
+  for (const FollowedCorner& corner : candidate.corners) places.push_back(last_place(corner).cast<float>());
+  return places;
+}
+
+Vector2 MonocularStart::first_place(const StartCandidate& first, std::size_t corner) const {
+  return followed_to_mid_exposure(rig_.camera, first.corners[corner].appearance.uv.cast<double>(),
+                                  first.first_motion[corner].cast<double>(),
+                                  readout_share(first.first_interval));
+}
+
 /// Every stride-th frame is one between. When they are too many, every second one goes.
 void MonocularStart::remember_place(StartCandidate& candidate) const {
   if (candidate.age == 0 || candidate.age % candidate.stride != 0) return;
@@ -118,7 +149,7 @@ void MonocularStart::remember_place(StartCandidate& candidate) const {
     candidate.stride *= 2;
     if (candidate.age % candidate.stride != 0) return;
   }
-  between.push_back(places_of(candidate.corners));
+  between.push_back(last_places(candidate));
 }
 
 void MonocularStart::remember_path(std::int64_t frame_index, StartCandidate& candidate) const {
@@ -128,7 +159,7 @@ void MonocularStart::remember_path(std::int64_t frame_index, StartCandidate& can
     candidate.path_stride *= 2;
     if (candidate.age % candidate.path_stride != 0) return;
   }
-  candidate.path.push_back({frame_index, places_of(candidate.corners)});
+  candidate.path.push_back({frame_index, last_places(candidate)});
 }
 
 std::vector<EarlierFrame> MonocularStart::earlier_frames(const MonocularStartResult& start) const {
@@ -149,6 +180,24 @@ std::vector<EarlierFrame> MonocularStart::earlier_frames(const MonocularStartRes
   return frames;
 }
 
+/// By the pose of the frame before.
+std::optional<Vector6> MonocularStart::velocity(const MonocularStartResult& start) const {
+  const double share = readout_share(interval_);
+  if (share == 0) return std::nullopt;
+  std::vector<MotionObservation> observations;
+  for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
+    const FollowedCorner& corner = start.first->corners[static_cast<std::size_t>(start.structure.corners[n])];
+    const Vector2 motion = corner.motion.value_or(Eigen::Vector2f::Zero()).cast<double>();
+    const Vector2 uv =
+        followed_to_mid_exposure(rig_.camera, corner.uv.cast<double>() - motion, motion, share);
+    const Eigen::Vector3f z(Vector3(uv.x(), uv.y(), Rig::kNoRight).cast<float>());
+    observations.push_back(observe_point(rig_, from_inverse_depth(start.structure.psi[n]), z, 0));
+  }
+  const SE3& T_last_first = start.structure.T_last_first;
+  const SE3 T_before_first = optimise_motion(rig_, observations, T_last_first, {}).T_c_ref;
+  return (T_last_first * T_before_first.inverse()).log() / interval_;
+}
+
 tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandidate& candidate) const {
   if (candidate.between.empty()) return tl::unexpected(LostCause::kTooLittleParallax);
   const auto as_pixels = [](const std::vector<Eigen::Vector2f>& places) {
@@ -157,9 +206,10 @@ tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandi
     return pixels;
   };
   CornerViews views;
-  for (const FollowedCorner& corner : candidate.corners) {
-    views.first.push_back(corner.appearance.uv.cast<double>());
-    views.last.push_back(corner.uv.cast<double>());
+  for (std::size_t i = 0; i < candidate.corners.size(); ++i) {
+    const FollowedCorner& corner = candidate.corners[i];
+    views.first.push_back(first_place(candidate, i));
+    views.last.push_back(last_place(corner));
   }
   for (const auto& places : candidate.between) views.between.push_back(as_pixels(places));
   return first_structure(rig_, views, options_.first_structure);
@@ -193,6 +243,7 @@ void MonocularStart::fill(StartCandidate& candidate, const FrameImages& images, 
   appearances_.clear();
   starter_.choose_corners(images, static_cast<int>(appearances_.capacity()), appearances_);
   candidate.corners.clear();
+  candidate.first_motion.clear();
   candidate.between.clear();
   candidate.stride = 1;
   candidate.path.clear();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <tl/expected.hpp>
 #include <vector>
 
@@ -13,7 +14,8 @@
 
 namespace twofold {
 
-/// A frame since a candidate, and where it saw the candidate's corners, in step with those still seen.
+/// A frame since a candidate, and where it saw the candidate's corners, in step with those still seen: as a
+/// global shutter would have seen them, where the calibration says how long rows take to be read.
 struct PathFrame {
   std::int64_t frame_index = 0;
   std::vector<Eigen::Vector2f> places;  ///< level-0 pixels
@@ -27,6 +29,9 @@ struct StartCandidate {
   FrameImages images;
   std::vector<FollowedCorner> corners;  ///< those still seen
   std::size_t corners_at_first = 0;
+  /// In step with `corners`: how far they moved to the frame after this one [px], which took so long [s].
+  std::vector<Eigen::Vector2f> first_motion;
+  double first_interval = 0;
   /// In step with `corners`: where they were at the ages stride, 2 stride, ... before the present one.
   std::vector<std::vector<Eigen::Vector2f>> between;
   int stride = 1;
@@ -66,10 +71,18 @@ class MonocularStart {
   /// The first frame of a start and those since, as far as the points of the start say where they were seen
   /// from; to be called before the next step. Allocates.
   [[nodiscard]] std::vector<EarlierFrame> earlier_frames(const MonocularStartResult& start) const;
+  /// Where the first frame saw a corner, as a global shutter would have. Likewise.
+  [[nodiscard]] Vector2 first_place(const StartCandidate& first, std::size_t corner) const;
+  /// How the camera moves in the frame that started (v, omega), left perturbation a second. Likewise. Nothing
+  /// where the calibration gives no readout: nobody needs it then.
+  [[nodiscard]] std::optional<Vector6> velocity(const MonocularStartResult& start) const;
 
  private:
-  void follow_all(const FrameImages& images);
+  void follow_all(const FrameImages& images, const Frame& frame);
   void follow(const FrameImages& images, StartCandidate& candidate) const;
+  [[nodiscard]] double readout_share(double interval) const;
+  [[nodiscard]] Vector2 last_place(const FollowedCorner& corner) const;
+  [[nodiscard]] std::vector<Eigen::Vector2f> last_places(const StartCandidate& candidate) const;
   void remember_place(StartCandidate& candidate) const;
   void remember_path(std::int64_t frame_index, StartCandidate& candidate) const;
   [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
@@ -85,6 +98,8 @@ class MonocularStart {
   FrameImages last_;                ///< of the frame before
   bool has_last_ = false;
   std::int64_t last_index_ = 0;
+  std::int64_t last_t_ns_ = 0;
+  double interval_ = 0;                       ///< between the last two frames [s]
   std::vector<PointAppearance> appearances_;  ///< scratch
 };
 

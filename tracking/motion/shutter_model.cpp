@@ -20,8 +20,13 @@ ShutterModel::ShutterModel(const Rig& rig, const MotionModel& motion, std::size_
 
 RollingShutter ShutterModel::at(const SE3& T_c_ref, const FrameStep& step) const {
   if (rig_.readout.value_or(0) == 0) return {};
-  const auto velocity = motion_.velocity_at(T_c_ref, step.frame.t_ns, step.after_loss());
-  return velocity ? RollingShutter(rig_, *velocity) : RollingShutter();
+  const auto moving = velocity(T_c_ref, step);
+  return moving ? RollingShutter(rig_, *moving) : RollingShutter();
+}
+
+/// As since the frame before, if there is one with a pose.
+std::optional<Vector6> ShutterModel::velocity(const SE3& T_c_ref, const FrameStep& step) const {
+  return step.velocity ? step.velocity : motion_.velocity_at(T_c_ref, step.frame.t_ns, step.after_loss());
 }
 
 Matrix6 ShutterModel::covariance(const Matrix6& information, const Matrix6& by_rows,

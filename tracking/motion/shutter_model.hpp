@@ -45,6 +45,7 @@ class ShutterModel {
   }
 
  private:
+  [[nodiscard]] std::optional<Vector6> velocity(const SE3& T_c_ref, const FrameStep& step) const;
   [[nodiscard]] double readout_sigma() const;
 
   Rig rig_;  ///< with the readout, once that is found
