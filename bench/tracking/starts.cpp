@@ -4,8 +4,7 @@
 
 #include "fixtures/starts.hpp"
 
-// One camera's start on twenty rendered beginnings that show depth, and on twenty-nine that do not: a line
-// each.
+// One camera's start on rendered beginnings that show depth, and on others that do not: a line each.
 
 namespace twofold {
 namespace {

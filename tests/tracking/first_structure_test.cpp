@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <random>
+#include <utility>
 
 #include "fixtures/rendered_scene.hpp"
 #include "geometry/inverse_depth.hpp"
@@ -37,6 +39,21 @@ CornerViews views_of(const Setting& setting, std::uint32_t seed, int corners = 1
     for (std::size_t b = 0; b < views.between.size(); ++b)
       views.between[b].push_back(seen(i, kBetween[b]) + kBetween[b] * astray);
     views.last.push_back(seen(i, 1) + astray);
+  }
+  return views;
+}
+
+/// The same of ten frames, from a camera whose readout nobody knows.
+CornerViews views_through_some_shutter(const Setting& setting, std::uint32_t seed) {
+  CornerViews views = views_of(setting, seed);
+  const Rig rig = test_rig(SensorKind::kMono);
+  for (std::size_t n = 0; n < views.first.size(); ++n) {
+    const int i = static_cast<int>(n);
+    const auto seen = [&](double s) -> Vector2 {
+      return rig.camera.project(setting.T_c_first(s) * setting.point(i, s));
+    };
+    views.first_motion.push_back(seen(0.1) - seen(0));
+    views.last_motion.push_back(seen(1) - seen(0.9));
   }
   return views;
 }
@@ -133,6 +150,64 @@ TEST(FirstStructure, WaitsWhileTheCameraStandsOrTurnsOnTheSpot) {
   expect_wait({scattered, moving({0, 0, 0}, {0.03, 0.12, 0})}, LostCause::kRotatingOnly, "turning");
   expect_wait({scattered, moving({-0.02, 0, 0}, {0.03, 0.12, 0})}, LostCause::kRotatingOnly,
               "turning, nearly");
+}
+
+TEST(FirstStructure, StartsThoughTheReadoutIsNotKnown) {
+  const std::pair<const char*, Setting> settings[] = {
+      {"sideways", {scattered, moving({-0.6, 0, 0}, {0, 0, 0})}},
+      {"turning", {scattered, moving({-0.6, 0.1, 0.1}, {0.02, 0.08, -0.03})}},
+      {"forward", {scattered, moving({0, 0, -1.4}, {0, 0.01, 0})}},
+      {"plane", {on_a_plane, moving({-2.0, 0.4, -1.4}, {0, 0.08, 0})}}};
+  for (const auto& [what, setting] : settings) {
+    for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+      const auto start = first_structure(kRig, views_through_some_shutter(setting, seed), {});
+      EXPECT_TRUE(start) << what << seed << ": " << describe(start.error());
+    }
+  }
+}
+
+/// Corners as a camera follows them that pans on the spot, to and fro in 24 frames: from when it turns
+/// fastest one way until it turns back. Its rows take a share of the time between frames to be read.
+CornerViews panned_views(double share, std::uint32_t seed) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> noise(0, 0.4);
+  const PinholeCamera& camera = kRig.camera;
+  const auto seen = [&](int i, double frame) -> Vector2 {
+    Vector2 uv(0, 0.5 * camera.height);
+    for (int n = 0; n < 10; ++n) {
+      const double tau = (uv.y() + 0.5) / camera.height - 0.5;
+      const double angle = 0.1 * std::sin(2 * M_PI * (frame + share * tau) / 24);
+      uv = camera.project(SO3::exp(Vector3(0, angle, 0)) * scattered(i, 0));
+    }
+    return uv + Vector2(noise(rng), noise(rng));
+  };
+  CornerViews views;
+  views.between.resize(2);
+  for (int i = 0; i < 160; ++i) {
+    views.first.push_back(seen(i, 0));
+    views.first_motion.push_back(seen(i, 1) - views.first.back());
+    views.between[0].push_back(seen(i, 3));
+    views.between[1].push_back(seen(i, 6));
+    views.last.push_back(seen(i, 9));
+    views.last_motion.push_back(views.last.back() - seen(i, 8));
+  }
+  return views;
+}
+
+TEST(FirstStructure, IsNotDeceivedByARollingShutterThatPans) {
+  for (const double share : {0.5, 0.7, 0.9}) {
+    for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+      CornerViews views = panned_views(share, seed);
+      const auto start = first_structure(kRig, views, {});
+      ASSERT_FALSE(start) << share << ' ' << seed;
+      EXPECT_EQ(start.error(), LostCause::kRotatingOnly) << describe(start.error());
+      // Who takes them for a global shutter's sees no rotation.
+      views.first_motion.clear();
+      views.last_motion.clear();
+      const auto deceived = first_structure(kRig, views, {});
+      EXPECT_TRUE(deceived || deceived.error() != LostCause::kRotatingOnly) << share << ' ' << seed;
+    }
+  }
 }
 
 TEST(FirstStructure, WaitsForTheFlowThatIsAskedFor) {

@@ -33,9 +33,10 @@ TEST_P(WrongStart, IsNotAccepted) {
   EXPECT_FALSE(outcome.seconds) << outcome.path << " m";
 }
 INSTANTIATE_TEST_SUITE_P(Rendered, WrongStart,
-                         ::testing::Values("turning only, court", "standing, desk", "held still, court",
-                                           "passer-by, near", "passer-by, turning", "60 % hidden",
-                                           "80 % hidden", "80 % hidden, turning"));
+                         ::testing::Values("turning only, court", "panning, 25 ms, corridor",
+                                           "standing, desk", "held still, court", "passer-by, near",
+                                           "passer-by, turning", "60 % hidden", "80 % hidden",
+                                           "80 % hidden, turning"));
 
 }  // namespace
 }  // namespace twofold

@@ -6,6 +6,7 @@
 
 #include "base/median.hpp"
 #include "base/option_check.hpp"
+#include "camera/rolling_shutter.hpp"
 #include "estimation/motion_only.hpp"
 #include "filters/anchored_views.hpp"
 #include "filters/inverse_depth_filter.hpp"
@@ -21,11 +22,22 @@ constexpr double kSignificant = 2;     // standard deviations
 constexpr double kOutlierChi2 = 9.21;  // 99 % of chi-square with 2 degrees of freedom
 constexpr double kGrossChi2 = 50;      // beyond this before the adjustment, a corner follows something else
 constexpr int kAdjustmentSteps = 15;
+constexpr double kMostSheared = 0.9;  // quantile of the corners, by which readouts are told apart
+constexpr int kMostReadouts = 32;     // bounds the work
 
 std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vector2>& pixels) {
   std::vector<Vector3> result;
   result.reserve(pixels.size());
   for (const Vector2& uv : pixels) result.push_back(camera.unproject(uv));
+  return result;
+}
+
+std::vector<Vector2> at_mid_exposure(const PinholeCamera& camera, const std::vector<Vector2>& pixels,
+                                     const std::vector<Vector2>& motion, double share) {
+  std::vector<Vector2> result;
+  result.reserve(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    result.push_back(followed_to_mid_exposure(camera, pixels[i], motion[i], share));
   return result;
 }
 
@@ -75,13 +87,9 @@ class FirstStructureEstimator {
     if (median_flow(views_) < options_.min_flow_px) return tl::unexpected(LostCause::kTooLittleParallax);
     const auto epipolar = estimate_relative_pose(first_, last_, ransac_options(options_.threshold_px));
     if (!epipolar || !enough(epipolar->inliers.size())) return tl::unexpected(LostCause::kNoCommonMotion);
-    const auto rotation = estimate_view_rotation(first_, last_, ransac_options(options_.rotation_px));
-    const auto moving = static_cast<double>(epipolar->inliers.size());
-    if (!rotation || static_cast<double>(common(epipolar->inliers, rotation->inliers)) >
-                         options_.max_rotation_share * moving) {
-      return tl::unexpected(turned(rotation) ? LostCause::kRotatingOnly : LostCause::kTooLittleParallax);
-    }
     inliers_ = epipolar->inliers;
+    if (const LostCause cause = judge_rotation(); cause != LostCause::kNone) return tl::unexpected(cause);
+    const auto moving = static_cast<double>(inliers_.size());
     std::vector<SE3> motions{epipolar->T_b_a};
     const auto plane = estimate_homography(first_, last_, ransac_options(options_.rotation_px));
     if (plane && static_cast<double>(common(inliers_, plane->inliers)) > options_.min_plane_share * moving) {
@@ -106,6 +114,41 @@ class FirstStructureEstimator {
   }
   [[nodiscard]] bool turned(const std::optional<ViewRotation>& rotation) const {
     return rotation && rotation->R_b_a.log().norm() * rig_.camera.fx > options_.min_flow_px;
+  }
+
+  /// What the essential matrix explains, a rotation may explain as well.
+  /// @return kNone when none does, through whatever readout
+  [[nodiscard]] LostCause judge_rotation() const {
+    const int readouts = readouts_told_apart();
+    for (int n = 0; n <= readouts; ++n) {
+      const auto rotation = rotation_through(n == 0 ? 0 : static_cast<double>(n) / readouts);
+      if (!rotation || static_cast<double>(common(inliers_, rotation->inliers)) >
+                           options_.max_rotation_share * static_cast<double>(inliers_.size())) {
+        return turned(rotation) ? LostCause::kRotatingOnly : LostCause::kTooLittleParallax;
+      }
+    }
+    return LostCause::kNone;
+  }
+  /// The rotation that explains most, if the rows take that share of the frames' interval to be read.
+  [[nodiscard]] std::optional<ViewRotation> rotation_through(double share) const {
+    const RansacOptions ransac = ransac_options(options_.rotation_px);
+    if (share == 0) return estimate_view_rotation(first_, last_, ransac);
+    const PinholeCamera& camera = rig_.camera;
+    return estimate_view_rotation(
+        bearings(camera, at_mid_exposure(camera, views_.first, views_.first_motion, share)),
+        bearings(camera, at_mid_exposure(camera, views_.last, views_.last_motion, share)), ransac);
+  }
+  /// Shares tried beside none: so many that hardly a corner moves by more than rotation_px from one to the
+  /// next.
+  [[nodiscard]] int readouts_told_apart() const {
+    if (views_.first_motion.empty()) return 0;
+    const auto first = at_mid_exposure(rig_.camera, views_.first, views_.first_motion, 1);
+    const auto last = at_mid_exposure(rig_.camera, views_.last, views_.last_motion, 1);
+    std::vector<double> sheared;
+    for (std::size_t i = 0; i < first.size(); ++i)
+      sheared.push_back((last[i] - views_.last[i] - first[i] + views_.first[i]).norm());
+    const double most = quantile(std::move(sheared), kMostSheared);
+    return static_cast<int>(std::clamp(std::ceil(most / options_.rotation_px), 1.0, 1.0 * kMostReadouts));
   }
 
   /// One motion tried: the frames as it explains them. Corners that it does not are put aside.

@@ -45,6 +45,10 @@ struct FirstStructureOptions {
 struct CornerViews {
   std::vector<Vector2> first, last;
   std::vector<std::vector<Vector2>> between;
+  /// How far each corner moved from the first frame to the next one, and from the one before to the last
+  /// [px], where rows may be read one after the other, nobody knows how fast. Empty: the pixels are those of
+  /// a global shutter.
+  std::vector<Vector2> first_motion, last_motion;
 };
 
 /// What the frames show of camera and scene, in a unit of its own: the median depth of the points is one.
@@ -59,12 +63,14 @@ struct FirstStructure {
 ///
 /// Most of what the essential matrix explains must be beyond any rotation: a camera that turns on the spot
 /// gives no depth, and of a standing one before which something moves, most corners stand. If it hides most
-/// of the view, they tell by standing still where this motion would have moved them. Where a homography
-/// explains about as much, the scene may be a plane, of which two motions give the same first and last view:
-/// its motions are tried beside that of the essential matrix. All frames decide, because the views of a third
-/// one from elsewhere fit only the true motion; where two fit them all, the start has to wait. Depths are
-/// those of a bundle adjustment of all frames (thesis 4.5.3). Points so far away that they may be behind
-/// infinity by noise neither vote nor veto.
+/// of the view, they tell by standing still where this motion would have moved them. A rolling shutter shears
+/// views in which the camera turns at different rates, and a motion that is none explains that: where its
+/// readout is not known, most must be beyond any rotation through any readout. Where a homography explains
+/// about as much, the scene may be a plane, of which two motions give the same first and last view: its
+/// motions are tried beside that of the essential matrix. All frames decide, because the views of a third one
+/// from elsewhere fit only the true motion; where two fit them all, the start has to wait. Depths are those
+/// of a bundle adjustment of all frames (thesis 4.5.3). Points so far away that they may be behind infinity
+/// by noise neither vote nor veto.
 ///
 /// Deterministic. Allocates; its work is bounded by the number of corners and max_samples.
 /// @return  otherwise why not: kTooFewCorners, kTooLittleParallax, kRotatingOnly, kNoCommonMotion,

@@ -210,6 +210,9 @@ tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandi
     const FollowedCorner& corner = candidate.corners[i];
     views.first.push_back(first_place(candidate, i));
     views.last.push_back(last_place(corner));
+    if (rig_.readout) continue;
+    views.first_motion.push_back(candidate.first_motion[i].cast<double>());
+    views.last_motion.push_back(corner.motion.value_or(Eigen::Vector2f::Zero()).cast<double>());
   }
   for (const auto& places : candidate.between) views.between.push_back(as_pixels(places));
   return first_structure(rig_, views, options_.first_structure);
