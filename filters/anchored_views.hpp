@@ -34,9 +34,9 @@ struct AnchoredViews {
   std::vector<Point> points;
   std::vector<View> views;
 
-  /// Levenberg-Marquardt to the minimum; the damping holds the free scale. False when points stay behind a
-  /// camera. The cost never rises.
-  [[nodiscard]] bool minimise(int max_iterations);
+  /// Levenberg-Marquardt until a step gains less of the cost than least_gain; the damping holds the free
+  /// scale. False when points stay behind a camera. The cost never rises.
+  [[nodiscard]] bool minimise(int max_iterations, double least_gain = 1e-6);
   /// Squared whitened error; infinity when a point is behind a camera.
   [[nodiscard]] double cost() const;
   /// Lets the first view be one unit of length from the anchor. False when it stands there.
@@ -48,6 +48,9 @@ struct AnchoredViews {
  private:
   struct Equations;
   [[nodiscard]] bool linearise(Equations& equations) const;
+  template <int kRows>
+  [[nodiscard]] bool add_view(std::size_t v, Equations& equations) const;
+  [[nodiscard]] std::vector<SE3> poses() const;
   void move(const Eigen::VectorXd& poses_step, const std::vector<Vector3>& points_step);
 };
 

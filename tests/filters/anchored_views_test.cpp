@@ -59,6 +59,19 @@ Start make_start(SensorKind kind, int points, unsigned seed) {
   return start;
 }
 
+/// Whoever needs no minimum to the last digit says so, and is done in fewer steps.
+TEST(AnchoredViews, EndsWithAStepThatGainsLessThanIsAskedFor) {
+  Start exact = make_start(SensorKind::kMono, 40, 1);
+  Start rough = exact;
+  const double before = exact.views.cost();
+  ASSERT_TRUE(exact.views.minimise(60));
+  ASSERT_TRUE(rough.views.minimise(60, before));
+  EXPECT_LT(rough.views.cost(), before);
+  EXPECT_GT(rough.views.cost(), 1.001 * exact.views.cost());
+  ASSERT_TRUE(rough.views.minimise(60, 1e-2));
+  EXPECT_NEAR(rough.views.cost(), exact.views.cost(), 0.1);
+}
+
 class AnchoredViewsTest : public testing::TestWithParam<SensorKind> {};
 
 TEST_P(AnchoredViewsTest, ReachesTheMinimumOfTheWindowSolver) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "base/median.hpp"
 #include "base/option_check.hpp"
@@ -24,6 +25,8 @@ constexpr double kGrossChi2 = 50;      // beyond this before the adjustment, a c
 constexpr int kAdjustmentSteps = 15;
 constexpr double kMostSheared = 0.9;  // quantile of the corners, by which readouts are told apart
 constexpr int kMostReadouts = 32;     // bounds the work
+// Of the squared whitened errors, with which an adjustment ends: the first one only tells gross errors.
+constexpr double kFirstGain = 1, kLeastGain = 0.01;
 
 std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vector2>& pixels) {
   std::vector<Vector3> result;
@@ -183,9 +186,9 @@ class FirstStructureEstimator {
   /// Bundle adjustment without the corners that follow something else.
   /// @return false when too few are left
   bool adjust(Trial& trial) const {
-    for (const double bound : {kGrossChi2, kOutlierChi2}) {
+    for (const auto& [bound, gain] : {std::pair{kGrossChi2, kFirstGain}, {kOutlierChi2, kLeastGain}}) {
       put_outliers_aside(bound, trial);
-      if (!enough(trial.corners.size()) || !trial.views.minimise(kAdjustmentSteps)) return false;
+      if (!enough(trial.corners.size()) || !trial.views.minimise(kAdjustmentSteps, gain)) return false;
     }
     put_outliers_aside(kOutlierChi2, trial);
     trial.sigma_px = measured_sigma(trial.views);
