@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::size_t kPairPoints = 160;  // of those that both frames see: bounds the work
 constexpr int kPoseIterations = 3;
+// Of its depth in the frame before: what comes so near leaves the image.
+constexpr double kNearestShare = 0.05;
 constexpr int kFirstGuess = 8;      // pairs after which pairs are linearised at the estimate
 constexpr int kMeanIntervals = 32;  // the usual interval is the mean of about so many
 
@@ -145,7 +147,7 @@ ReadoutEstimator::PairEquations ReadoutEstimator::equations(const SE3& T_cur_pre
   for (const PairPoint& point : pair_) {
     const Vector3 x_prev = moved(before, -point.row_prev * readout_, point.x_prev);
     const Vector3 x = moved(now, point.row * readout_, R * x_prev + T_cur_prev.translation());
-    if (!(x.z() > 0.05)) continue;
+    if (!(x.z() > kNearestShare * point.x_prev.z())) continue;
     const double inv_z = 1 / x.z(), a = camera.fx * inv_z, c = camera.fy * inv_z;
     const double u = x.x() * inv_z, v = x.y() * inv_z;
     const Vector2 r = point.uv - Vector2(camera.fx * u + camera.cx, camera.fy * v + camera.cy);

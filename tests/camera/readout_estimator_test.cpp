@@ -41,11 +41,13 @@ class ShakenCamera {
   }
   double stamp_jitter = 0;  ///< share of the period by which time stamps are wrong
   bool shaken = true;
+  double unit = 1;  ///< [m]: of one camera's map any length
 
   void show(int frame, ReadoutEstimator& estimator) {
     const double t = frame * kPeriod;
     std::uniform_real_distribution<double> jitter(-stamp_jitter, stamp_jitter);
-    const SE3 T_cur_prev = T_c_w_at(t, shaken) * T_c_w_at(t - kPeriod, shaken).inverse();
+    SE3 T_cur_prev = T_c_w_at(t, shaken) * T_c_w_at(t - kPeriod, shaken).inverse();
+    T_cur_prev.translation() /= unit;
     const auto t_ns = static_cast<std::int64_t>((t + jitter(random_) * kPeriod + 1) * 1e9);
     std::vector<ReadoutPoint>* seen = estimator.begin_frame(t_ns, T_cur_prev);
     if (seen == nullptr) return;
@@ -69,7 +71,7 @@ class ShakenCamera {
     if (!(x.z() > 0.3) || !rig_.camera.find_in_view(x, 8)) return;
     std::normal_distribution<double> noise(0, 1);
     const Vector2 uv = rig_.camera.project(x) + kNoisePx * Vector2(noise(random_), noise(random_));
-    seen.push_back({p + 1, uv, x.z() * (1 + 0.01 * noise(random_)), 0.5});
+    seen.push_back({p + 1, uv, x.z() / unit * (1 + 0.01 * noise(random_)), 0.5});
   }
 
   const Rig rig_ = camera_rig();
@@ -99,6 +101,16 @@ TEST_P(ReadoutOfACamera, IsFoundThoughTimeStampsJitter) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Readouts, ReadoutOfACamera, ::testing::Values(0, 0.010, 0.026, 0.033));
+
+/// A drone that started at 200 m hovers near the ground: what it sees is a hundredth of a unit away.
+TEST(ReadoutEstimator, TheUnitOfLengthDoesNotMatter) {
+  ShakenCamera metric(0.026), drone(0.026);
+  drone.unit = 200;
+  const ReadoutEstimate expected = metric.after(60), found = drone.after(60);
+  EXPECT_EQ(found.pairs, expected.pairs);
+  EXPECT_NEAR(found.seconds, expected.seconds, 1e-6);
+  EXPECT_NEAR(found.sigma, expected.sigma, 1e-6);
+}
 
 /// What is mapped before stays bent.
 TEST(ReadoutEstimator, IsBelievedSoon) {
