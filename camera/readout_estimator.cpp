@@ -24,6 +24,15 @@ Vector3 moved(const Vector6& xi, double s, const Vector3& x) {
   return x + d + (0.5 * s) * omega.cross(d);
 }
 
+/// Square root of the information of a pixel that an error of depth moves by `slide` [px], over its weight
+/// without one: (I + weight slide slide^T)^(-1/2).
+Eigen::Matrix2d without_slide(const Vector2& slide, double weight) {
+  const double squared = slide.squaredNorm();
+  if (!(squared > 1e-12)) return Eigen::Matrix2d::Identity();
+  const double share = 1 - 1 / std::sqrt(1 + weight * squared);
+  return Eigen::Matrix2d::Identity() - (share / squared) * slide * slide.transpose();
+}
+
 }  // namespace
 
 /// Normal equations of pose and readout, r = measured minus expected.
@@ -130,8 +139,8 @@ void ReadoutEstimator::join_points(std::size_t age) {
     if (p == before.end()) break;
     if (p->key != now.key) continue;
     const double sigma = std::max(p->sigma_px, now.sigma_px);
-    pair_.push_back(
-        {rig_.camera.unproject(p->uv) * p->depth, now.uv, row(*p), row(now), 1 / (sigma * sigma)});
+    pair_.push_back({rig_.camera.unproject(p->uv) * p->depth, now.uv, row(*p), row(now), 1 / (sigma * sigma),
+                     p->depth_error});
   }
   // Keys go with the keyframes that points come from: every second, third, ... point is of all of them.
   const std::size_t stride = (pair_.size() + kPairPoints - 1) / kPairPoints;
@@ -150,13 +159,18 @@ ReadoutEstimator::PairEquations ReadoutEstimator::equations(const SE3& T_cur_pre
     if (!(x.z() > kNearestShare * point.x_prev.z())) continue;
     const double inv_z = 1 / x.z(), a = camera.fx * inv_z, c = camera.fy * inv_z;
     const double u = x.x() * inv_z, v = x.y() * inv_z;
-    const Vector2 r = point.uv - Vector2(camera.fx * u + camera.cx, camera.fy * v + camera.cy);
+    Vector2 r = point.uv - Vector2(camera.fx * u + camera.cx, camera.fy * v + camera.cy);
     Eigen::Matrix<double, 2, 6> J;  // of r: minus d project / d x [I, -[x]x]
     J << -a, 0, a * u, a * u * x.y(), -a * (x.z() + u * x.x()), a * x.y(),  //
         0, -c, c * v, c * (x.z() + v * x.y()), -c * v * x.x(), -c * x.x();
     const Vector3 late = point.row * (now.head<3>() + now.tail<3>().cross(x));
     const Vector3 early = point.row_prev * (before.head<3>() + before.tail<3>().cross(x_prev));
-    const Vector2 J_r = J.leftCols<3>() * (late - R * early);
+    Vector2 J_r = J.leftCols<3>() * (late - R * early);
+    if (point.depth_error > 0) {
+      const Vector2 slide = point.depth_error * (J.leftCols<3>() * T_cur_prev.translation());
+      const Eigen::Matrix2d whitening = without_slide(slide, point.weight);
+      J = whitening * J, J_r = whitening * J_r, r = whitening * r;
+    }
     const double sigmas = r.norm() * std::sqrt(point.weight);
     if (sigmas > options_.gross_sigmas) continue;
     sum.add(J, J_r, r, point.weight * std::min(1.0, options_.huber_sigmas / std::max(sigmas, 1e-9)));

@@ -15,10 +15,11 @@ namespace twofold {
 
 /// A point as one frame saw it.
 struct ReadoutPoint {
-  std::uint64_t key = 0;  ///< the same in every frame that sees the point
-  Vector2 uv{0, 0};       ///< where it was found, on level 0 [px]
-  double depth = 0;       ///< [m] measured, or as good as known
-  double sigma_px = 0.5;  ///< of uv
+  std::uint64_t key = 0;   ///< the same in every frame that sees the point
+  Vector2 uv{0, 0};        ///< where it was found, on level 0 [px]
+  double depth = 0;        ///< [m] measured, or as good as known
+  double sigma_px = 0.5;   ///< of uv
+  double depth_error = 0;  ///< standard deviation of the inverse depth, as a share of it
 };
 
 struct ReadoutEstimate {
@@ -66,7 +67,9 @@ struct ReadoutOptions {
 /// Per pair the pose T_k,k-1 is eliminated (Schur complement), which leaves one equation h readout = b; these
 /// are summed. While the velocity xi stays the same the readout hides in the pose; where a rotation speeds up
 /// or turns back, it shears one image against the other by readout f (omega_k - omega_k-1). So only pairs
-/// count in which it does. Where translation dominates, errors of depth look like a readout.
+/// count in which it does. Where translation dominates, errors of depth look like a readout: of a point whose
+/// depth is not measured, what is seen along its epipolar line counts the less the farther its depth may have
+/// moved it there. The depths of one camera's map are bent by the readout itself.
 ///
 /// Velocities are central differences of the pairs' poses. Time stamps jitter by more than a camera's clock
 /// does, and that would look like a change of velocity: frames are taken to follow each other regularly.
@@ -110,6 +113,7 @@ class ReadoutEstimator {
     Vector2 uv{0, 0};
     double row_prev = 0, row = 0;  ///< (v + 0.5) / height - 0.5
     double weight = 0;
+    double depth_error = 0;
   };
   struct PairEquations;
 

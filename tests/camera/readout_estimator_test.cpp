@@ -21,13 +21,19 @@ Rig camera_rig() {
   return rig;
 }
 
-/// About all axes, to and fro or, not `shaken`, ever on.
-SE3 T_c_w_at(double seconds, bool shaken) {
-  const Vector3 turn = shaken ? Vector3(0.10 * std::sin(7 * seconds), 0.25 * std::sin(5 * seconds),
-                                        0.08 * std::sin(9 * seconds))
-                              : Vector3(0.02, 0.5, 0.01) * seconds;
-  const SE3 T_w_c(SO3::exp(turn), Vector3(0.1 * std::sin(3 * seconds), 0, 0.05 * seconds));
-  return T_w_c.inverse();
+enum class Motion {
+  kShaken,   ///< turns about all axes, to and fro
+  kTurning,  ///< ever on
+  kOnAnArm   ///< shaken, and it moves aside the faster the more its turn changes
+};
+
+SE3 T_c_w_at(double seconds, Motion motion) {
+  const Vector3 turn =
+      motion == Motion::kTurning
+          ? Vector3(Vector3(0.02, 0.5, 0.01) * seconds)
+          : Vector3(0.10 * std::sin(7 * seconds), 0.25 * std::sin(5 * seconds), 0.08 * std::sin(9 * seconds));
+  const double aside = motion == Motion::kOnAnArm ? -std::cos(5 * seconds) : std::sin(3 * seconds);
+  return SE3(SO3::exp(turn), Vector3(0.1 * aside, 0, 0.05 * seconds)).inverse();
 }
 
 class ShakenCamera {
@@ -40,13 +46,15 @@ class ShakenCamera {
     }
   }
   double stamp_jitter = 0;  ///< share of the period by which time stamps are wrong
-  bool shaken = true;
-  double unit = 1;  ///< [m]: of one camera's map any length
+  Motion motion = Motion::kShaken;
+  double unit = 1;         ///< [m]: of one camera's map any length
+  double bend = 0;         ///< of inverse depths, a share by which the last row's exceed the first row's
+  double depth_error = 0;  ///< of which the estimator is told
 
   void show(int frame, ReadoutEstimator& estimator) {
     const double t = frame * kPeriod;
     std::uniform_real_distribution<double> jitter(-stamp_jitter, stamp_jitter);
-    SE3 T_cur_prev = T_c_w_at(t, shaken) * T_c_w_at(t - kPeriod, shaken).inverse();
+    SE3 T_cur_prev = T_c_w_at(t, motion) * T_c_w_at(t - kPeriod, motion).inverse();
     T_cur_prev.translation() /= unit;
     const auto t_ns = static_cast<std::int64_t>((t + jitter(random_) * kPeriod + 1) * 1e9);
     std::vector<ReadoutPoint>* seen = estimator.begin_frame(t_ns, T_cur_prev);
@@ -62,16 +70,17 @@ class ShakenCamera {
 
  private:
   void see(std::size_t p, double t, std::vector<ReadoutPoint>& seen) {
-    Vector3 x = T_c_w_at(t, shaken) * points_[p];
+    Vector3 x = T_c_w_at(t, motion) * points_[p];
     for (int round = 0; round < 4; ++round) {
       if (!(x.z() > 0.3)) return;
       const double v = rig_.camera.project(x).y();
-      x = T_c_w_at(t + ((v + 0.5) / rig_.camera.height - 0.5) * readout_, shaken) * points_[p];
+      x = T_c_w_at(t + ((v + 0.5) / rig_.camera.height - 0.5) * readout_, motion) * points_[p];
     }
     if (!(x.z() > 0.3) || !rig_.camera.find_in_view(x, 8)) return;
     std::normal_distribution<double> noise(0, 1);
     const Vector2 uv = rig_.camera.project(x) + kNoisePx * Vector2(noise(random_), noise(random_));
-    seen.push_back({p + 1, uv, x.z() / unit * (1 + 0.01 * noise(random_)), 0.5});
+    const double bent = 1 + bend * ((uv.y() + 0.5) / rig_.camera.height - 0.5);
+    seen.push_back({p + 1, uv, x.z() / unit * (1 + 0.01 * noise(random_)) / bent, 0.5, depth_error});
   }
 
   const Rig rig_ = camera_rig();
@@ -138,10 +147,28 @@ TEST(ReadoutEstimator, DoesNotBelieveAnythingOfAGlobalShutter) {
 
 TEST(ReadoutEstimator, LearnsNothingFromATurnThatStaysTheSame) {
   ShakenCamera camera(0.026);
-  camera.shaken = false;
+  camera.motion = Motion::kTurning;
   const ReadoutEstimate found = camera.after(60);
   EXPECT_EQ(found.pairs, 0);
   EXPECT_FALSE(found.significant);
+}
+
+/// A map that is bent one way and the other. Depths that are believed turn into a readout.
+TEST(ReadoutEstimator, IsNotDeceivedByDepthsThatNobodyMeasured) {
+  const auto found_with = [](double bend, double depth_error) {
+    ShakenCamera camera(0.026);
+    camera.motion = Motion::kOnAnArm;
+    camera.bend = bend;
+    camera.depth_error = depth_error;
+    return camera.after(90);
+  };
+  EXPECT_GT(std::abs(found_with(-0.5, 0).seconds - found_with(0.5, 0).seconds), 0.006);
+  const ReadoutEstimate one_way = found_with(-0.5, 5), other_way = found_with(0.5, 5);
+  EXPECT_LT(std::abs(one_way.seconds - other_way.seconds), 0.004);
+  for (const ReadoutEstimate& found : {one_way, other_way}) {
+    EXPECT_TRUE(found.significant);
+    EXPECT_NEAR(found.seconds, 0.026, 0.004);
+  }
 }
 
 TEST(ReadoutEstimator, NeedsFramesThatFollowEachOther) {
