@@ -24,6 +24,9 @@ constexpr double kShortest = 0.3, kLongest = 4;  // focal length over the width 
 constexpr double kClipKernel = 3;                // [standard deviations] of a clip's own focal length
 constexpr double kLeastSigma = 0.02;             // of a corner [px]: nobody is better
 constexpr int kSharpenings = 4;                  // of the weights
+constexpr double kReadoutSigma = 0.002;          // [s] of a readout that is shown ...
+constexpr double kReadoutSigmas = 3.5;           // ... and standard deviations that it is from none
+constexpr double kFinestReadout = 0.001;         // [s] no camera is known better, as the tracker has it
 constexpr int kTrialIterations = 12;
 constexpr int kJointIterations = 60;
 
@@ -225,6 +228,10 @@ LensVector lens_sigma(const std::vector<Clip>& clips, std::vector<ClipAdjustment
   return by_corners.cwiseMax((covariance * scatter * covariance).diagonal().cwiseSqrt());
 }
 
+bool shows_readout(const SelfCalibration& found) {
+  return found.readout_sigma < kReadoutSigma && found.lens.readout > kReadoutSigmas * found.readout_sigma;
+}
+
 std::string refusal_of(const SelfCalibration& found, int width, const SelfCalibrationOptions& options) {
   const double f = found.lens.f();
   if (!std::isfinite(f) || !std::isfinite(found.sigma[0]) || f < kShortest * width || f > kLongest * width ||
@@ -277,6 +284,7 @@ tl::expected<SelfCalibration, std::string> self_calibrate(const std::vector<Clip
   solve_all(adjustments, weights.of_clip, prior, found.lens);
   found.sigma = lens_sigma(clips, adjustments, weights, prior, found.lens);
   found.f_sigma = found.lens.f() * std::hypot(found.sigma[0], options.systematic_sigma);
+  found.readout_sigma = std::hypot(found.sigma[5], kFinestReadout);
   std::vector<double> corner_sigmas;
   for (const ClipAdjustment& clip : adjustments) corner_sigmas.push_back(clip.sigma());
   found.corner_sigma_px = median(std::span(corner_sigmas));
@@ -292,6 +300,7 @@ Calibration to_calibration(const SelfCalibration& found, int width, int height) 
   calibration.left.pinhole = {f, f, found.lens.centre.x(), found.lens.centre.y(), width, height};
   calibration.left.distortion.model = DistortionModel::kRadTan;
   calibration.left.distortion.coefficients = {found.lens.k1, found.lens.k2, 0, 0, 0};
+  if (shows_readout(found)) calibration.readout = found.lens.readout;
   return calibration;
 }
 

@@ -28,6 +28,7 @@ struct SelfCalibration {
   LensVector sigma =
       LensVector::Zero();      ///< standard deviations of the lens; [0] as a share of f, without systematics
   double f_sigma = 0;          ///< of the focal length, systematics included [px]
+  double readout_sigma = 0;    ///< of the readout, likewise [s]
   std::size_t clips = 0;       ///< that it rests on
   double corner_sigma_px = 0;  ///< of a corner, median over the clips
 };
@@ -50,8 +51,9 @@ struct SelfCalibration {
 [[nodiscard]] tl::expected<SelfCalibration, std::string> self_calibrate(
     const std::vector<Clip>& clips, int width, int height, const SelfCalibrationOptions& options = {});
 
-/// As a calibration of one camera (radial-tangential distortion). The readout stays open: the tracker's own
-/// estimate of it is better.
+/// As a calibration of one camera (radial-tangential distortion). With the readout where the video shows it:
+/// it is adjusted together with the depths, whereas the tracker learns it from a map that it has bent before.
+/// Else it stays open.
 [[nodiscard]] Calibration to_calibration(const SelfCalibration& found, int width, int height);
 
 }  // namespace twofold

@@ -39,6 +39,7 @@ void write_calibration(const std::filesystem::path& file, const Calibration& cal
   const bool stereo = calibration.kind == SensorKind::kStereo;
   std::string text = fmt::format("sensor: {}\n", stereo ? "stereo" : "mono");
   if (calibration.fps > 0) text += fmt::format("fps: {:g}\n", calibration.fps);
+  if (calibration.readout) text += fmt::format("readout: {:.6g}\n", *calibration.readout);
   text += "cameras:\n" + camera_text(calibration.left);
   if (stereo) {
     text += camera_text(calibration.right);

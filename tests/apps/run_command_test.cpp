@@ -403,6 +403,8 @@ TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   EXPECT_LT(sigma, 0.04 * kFocalLength);
   EXPECT_NEAR(found["focal_px"].get<double>(), kFocalLength, 3 * sigma);
   EXPECT_EQ(found["file"], folder_ / "auto/calibration.yaml");
+  EXPECT_EQ(content(folder_ / "auto/calibration.yaml").find("readout"), std::string::npos);
+  EXPECT_GT(found["readout_sigma_ms"].get<double>(), 0);
   const Outcome again =
       run(folder_, source + (folder_ / "again") + "' --calib '" + (folder_ / "auto/calibration.yaml") + "'");
   EXPECT_EQ(again.exit_code, 0) << again.err;

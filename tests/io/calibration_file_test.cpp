@@ -258,6 +258,18 @@ TEST(CalibrationFile, WrittenLensesAreReadBack) {
   }
 }
 
+TEST(CalibrationFile, AWrittenReadoutIsReadBack) {
+  const ScratchFolder folder;
+  for (const std::optional<double> readout : {std::optional<double>(), {0.0}, {0.0182}}) {
+    Calibration written;
+    written.kind = SensorKind::kMono;
+    written.left.pinhole = {610, 611, 640, 360, 1280, 720};
+    written.readout = readout;
+    write_calibration(folder.path() / "c.yaml", written, {});
+    EXPECT_EQ(read_calibration(folder.path() / "c.yaml").readout, readout);
+  }
+}
+
 TEST(CalibrationFile, KalibrChain) {
   const ScratchFolder folder;
   const auto c = read_calibration(folder.write("camchain.yaml", R"(cam0:

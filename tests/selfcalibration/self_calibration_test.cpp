@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
+
 #include "selfcalibration/affine_alignment.hpp"
 #include "selfcalibration/clip_collector.hpp"
 #include "tests/selfcalibration/simulated_clips.hpp"
@@ -91,6 +94,22 @@ TEST(SelfCalibration, ARollingShutterDoesNotMoveTheFocalLength) {
   EXPECT_LT(std::abs(found->lens.log_f - world.lens.log_f), 3 * found->sigma[0]);
   EXPECT_LT(std::abs(found->lens.readout - 0.03), 3 * found->sigma[5]);
   EXPECT_LT(found->sigma[5], 0.006);
+  EXPECT_GE(found->readout_sigma, std::max(0.001, found->sigma[5])) << "no camera is known better";
+}
+
+/// In the calibration when it is beyond doubt, else left open.
+TEST(SelfCalibration, TheReadoutIsGivenWhereItIsShown) {
+  SelfCalibration found;
+  found.lens.readout = 0.018;
+  found.readout_sigma = 0.0014;
+  EXPECT_EQ(to_calibration(found, kWidth, kHeight).readout, 0.018);
+  found.readout_sigma = 0.003;
+  EXPECT_EQ(to_calibration(found, kWidth, kHeight).readout, std::nullopt);
+  found.readout_sigma = 0.001;
+  for (const double none : {0.003, 0.0, -0.018}) {
+    found.lens.readout = none;
+    EXPECT_EQ(to_calibration(found, kWidth, kHeight).readout, std::nullopt) << none;
+  }
 }
 
 TEST(SelfCalibration, ClipsOfAnotherMindAreOutvoted) {

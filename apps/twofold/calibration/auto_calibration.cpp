@@ -90,6 +90,8 @@ nlohmann::ordered_json auto_calibration_json(const AutoCalibration& result) {
           {"focal_sigma_px", result.found.f_sigma},
           {"centre_px", {lens.centre.x(), lens.centre.y()}},
           {"radial", {lens.k1, lens.k2}},
+          {"readout_ms", 1e3 * lens.readout},
+          {"readout_sigma_ms", 1e3 * result.found.readout_sigma},
           {"clips", result.found.clips},
           {"seconds", result.seconds},
           {"file", result.file.string()}};
@@ -98,6 +100,9 @@ nlohmann::ordered_json auto_calibration_json(const AutoCalibration& result) {
 void print_auto_calibration(const AutoCalibration& result) {
   fmt::print("calibration f {:.1f} +- {:.1f} px, from {:.0f} s of the video itself; in {}\n",
              result.found.lens.f(), result.found.f_sigma, result.seconds, result.file.string());
+  if (result.calibration.readout)
+    fmt::print("            a rolling shutter, readout {:.1f} +- {:.1f} ms\n",
+               1e3 * *result.calibration.readout, 1e3 * result.found.readout_sigma);
 }
 
 }  // namespace twofold
