@@ -57,8 +57,8 @@ struct CameraRig {
   double depth_unit = 0.001;
   double depth_min = 0.3;  ///< nearer readings are holes [m] > 0; stereo: of surfaces only
   double depth_max = 8.0;  ///< farther ones likewise, finite and > depth_min
-  /// Rolling shutter: from the exposure of the first row to that of the last [s], finite and >= 0; 0: all
-  /// rows at once. Nothing: not known, and found out while a camera turns to and fro; until then
+  /// Rolling shutter: from the exposure of the first row to that of the last [s], 0 to 0.5; 0: all rows at
+  /// once. Nothing: not known, and found out while a camera turns to and fro; until then
   /// PoseEstimate::covariance allows for any usual readout, which makes standard deviations of single axes
   /// several times too wide, up to 15, if the shutter is a global one. Whoever knows that it is says 0.
   std::optional<double> readout = std::nullopt;

@@ -577,9 +577,11 @@ TEST_F(SlamTest, OptionsAndRigsThatMakeNoSenseAreNamed) {
   expect(what_is_wrong(rig_without_focus, {}), "rig.fx");
   CameraRig rig_before_time = rig();
   rig_before_time.readout = -0.01;
-  expect(what_is_wrong(rig_before_time, {}), "rig.readout must be finite and >= 0, is -0.01");
+  expect(what_is_wrong(rig_before_time, {}), "rig.readout must be 0 to 0.5, is -0.01");
+  rig_before_time.readout = 23.7;  // milliseconds
+  expect(what_is_wrong(rig_before_time, {}), "rig.readout must be 0 to 0.5, is 23.7");
   rig_before_time.readout = std::numeric_limits<double>::infinity();
-  expect(what_is_wrong(rig_before_time, {}), "rig.readout must be finite");
+  expect(what_is_wrong(rig_before_time, {}), "rig.readout must be 0 to 0.5, is inf");
   CameraRig rgbd = rig();
   rgbd.sensor = Sensor::kRgbd;
   rgbd.depth_max = 0.1;
