@@ -9,10 +9,10 @@ namespace {
 constexpr int kLargestSide =
     16384;  // maps for two such images take four gigabytes: a file's mistake costs more
 
-/// Whether the largest circle around the principal point that fits into the image can be seen.
-bool sees_its_middle(const CameraModel& camera) {
+/// Whether a circle around the principal point can be seen: so much of the largest that fits into the image.
+bool sees_its_middle(const CameraModel& camera, double share) {
   const PinholeCamera& p = camera.pinhole;
-  const double radius = std::min({p.cx, p.cy, p.width - 1 - p.cx, p.height - 1 - p.cy});
+  const double radius = share * std::min({p.cx, p.cy, p.width - 1 - p.cx, p.height - 1 - p.cy});
   if (radius <= 0) return true;
   const Vector2 centre(p.cx, p.cy);
   const Vector2 right(radius, 0), down(0, radius);
@@ -42,8 +42,10 @@ std::string CameraModel::invalid_reason() const {
            std::to_string(pinhole.cy);
   }
   if (auto reason = distortion.invalid_reason(); !reason.empty()) return reason;
+  // A strong lens' polynomial of three terms may well fold over near the rim.
   const bool rational = distortion.model == DistortionModel::kRational;
-  if ((rational || distortion.model == DistortionModel::kRadTan) && !sees_its_middle(*this)) {
+  const bool radtan = distortion.model == DistortionModel::kRadTan;
+  if ((rational || radtan) && !sees_its_middle(*this, rational ? 1 : 0.5)) {
     return std::string("the lens folds the middle of the image over: are its coefficients k1 k2 p1 p2") +
            (rational ? " k3 k4 k5 k6" : "") + ", in this order and with all their digits?";
   }
