@@ -45,7 +45,7 @@ std::string CameraModel::invalid_reason() const {
   // A strong lens' polynomial of three terms may well fold over near the rim.
   const bool rational = distortion.model == DistortionModel::kRational;
   const bool radtan = distortion.model == DistortionModel::kRadTan;
-  if ((rational || radtan) && !sees_its_middle(*this, rational ? 1 : 0.5)) {
+  if ((rational || radtan) && !sees_its_middle(*this, rational ? 1 : 0.4)) {
     return std::string("the lens folds the middle of the image over: are its coefficients k1 k2 p1 p2") +
            (rational ? " k3 k4 k5 k6" : "") + ", in this order and with all their digits?";
   }
