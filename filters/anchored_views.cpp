@@ -60,7 +60,7 @@ class ViewProjection {
 /// Normal equations, points apart from poses: [D_j  E_j; E_j^T  C]. The E_j^T stand side by side.
 struct AnchoredViews::Equations {
   std::vector<Matrix3> D;
-  Eigen::MatrixXd E_T, gain_T;  ///< one column block of three a point
+  Eigen::MatrixXd E_T, G_T;  ///< one column block of three a point
   std::vector<Vector3> g_points;
   Eigen::MatrixXd C, S;
   Eigen::VectorXd g_poses, rhs;
@@ -71,18 +71,18 @@ struct AnchoredViews::Equations {
   bool solve(double damping, Eigen::VectorXd& poses_step, std::vector<Vector3>& points_step) {
     rhs = g_poses;
     inverse.resize(D.size());
-    gain_T.resizeLike(E_T);
+    G_T.resizeLike(E_T);
     for (std::size_t j = 0; j < D.size(); ++j) {
       Matrix3 damped = D[j];
       damped.diagonal() += damping * (D[j].diagonal().array() + 1).matrix();
       inverse[j] = damped.inverse();
       const auto at = static_cast<Eigen::Index>(3 * j);
-      gain_T.middleCols<3>(at).noalias() = E_T.middleCols<3>(at).lazyProduct(inverse[j]);
-      rhs.noalias() -= gain_T.middleCols<3>(at).lazyProduct(g_points[j]);
+      G_T.middleCols<3>(at).noalias() = E_T.middleCols<3>(at).lazyProduct(inverse[j]);
+      rhs.noalias() -= G_T.middleCols<3>(at).lazyProduct(g_points[j]);
     }
     S = C;
     S.diagonal() += damping * (C.diagonal().array() + 1).matrix();
-    S.noalias() -= gain_T * E_T.transpose();
+    S.noalias() -= G_T * E_T.transpose();
     const Eigen::LLT<Eigen::MatrixXd> llt(S);
     if (llt.info() != Eigen::Success) return false;
     poses_step = llt.solve(rhs);
