@@ -64,16 +64,16 @@ void print(const Finding& finding) {
   if (!finding.remedy.empty()) fmt::print("      {:<15} -> {}\n", "", finding.remedy);
 }
 
-/// @param faults  of images that were left out
-/// @param error   that ended the recording; empty: none
-Finding check_images(const std::vector<std::string>& faults, const std::string& error) {
-  const std::string subject = "images";
-  if (!error.empty()) return {Health::kBad, subject, error, "copy the recording anew"};
+/// What became of the images that were asked for.
+Finding check_images(const FrameSource& source) {
+  const std::string subject = "images", remedy = source.is_live() ? "" : "copy the recording anew";
+  if (!source.error().empty()) return {Health::kBad, subject, source.error(), remedy};
+  const std::vector<std::string> faults = source.report().faults;
   if (faults.empty()) return {Health::kOk, subject, "can be read", ""};
   const std::string others =
       faults.size() > 1 ? fmt::format(", and {} other{}", faults.size() - 1, faults.size() > 2 ? "s" : "")
                         : "";
-  return {Health::kWarn, subject, faults.front() + others, "copy the recording anew; runs leave them out"};
+  return {Health::kWarn, subject, faults.front() + others, remedy};
 }
 
 /// Looks at some pairs of a recording, or of a camera whose calibration is known.
@@ -95,8 +95,8 @@ std::vector<Finding> look_at_pairs(const DoctorArguments& arguments) {
     if (i % kApart != 0) continue;
     if (const auto offset = meter.search(frame.left, frame.right)) offsets.push_back(*offset);
   }
-  if (status == FrameStatus::kError) return {check_images(source->report().faults, source->error())};
-  return {check_images(source->report().faults, ""), check_rows(offsets)};
+  if (status == FrameStatus::kError) return {check_images(*source)};
+  return {check_images(*source), check_rows(offsets)};
 }
 
 int examine(const DoctorArguments& arguments) {

@@ -133,13 +133,12 @@ std::optional<SE3> pose_at(const SurfaceJob& job, std::int64_t t_ns) {
   const Trajectory& poses = job.poses;
   const auto after = std::lower_bound(poses.begin(), poses.end(), t_ns,
                                       [](const TimedPose& pose, std::int64_t t) { return pose.t_ns < t; });
-  const auto near = [&](const TimedPose& pose) { return std::abs(pose.t_ns - t_ns) <= kSameTimeNs; };
   const TimedPose* later = after != poses.end() ? &*after : nullptr;
   const TimedPose* earlier = after != poses.begin() ? &*(after - 1) : nullptr;
-  if (later != nullptr && earlier != nullptr && later->t_ns - t_ns > t_ns - earlier->t_ns && near(*earlier))
-    return earlier->T_w_c;
-  if (later != nullptr && near(*later)) return later->T_w_c;
-  if (earlier != nullptr && near(*earlier)) return earlier->T_w_c;
+  const bool earlier_is_nearer =
+      later == nullptr || (earlier != nullptr && t_ns - earlier->t_ns < later->t_ns - t_ns);
+  const TimedPose* nearest = earlier_is_nearer ? earlier : later;
+  if (nearest != nullptr && std::abs(nearest->t_ns - t_ns) <= kSameTimeNs) return nearest->T_w_c;
   if (!job.of_truth || later == nullptr || earlier == nullptr || later->t_ns - earlier->t_ns > kTruthGapNs)
     return std::nullopt;
   const double share =
