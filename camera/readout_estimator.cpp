@@ -6,6 +6,7 @@
 
 #include "base/check.hpp"
 #include "base/option_check.hpp"
+#include "geometry/small_motion.hpp"
 
 namespace twofold {
 namespace {
@@ -16,13 +17,6 @@ constexpr int kPoseIterations = 3;
 constexpr double kNearestShare = 0.05;
 constexpr int kFirstGuess = 8;      // pairs after which pairs are linearised at the estimate
 constexpr int kMeanIntervals = 32;  // the usual interval is the mean of about so many
-
-/// exp(s xi) x to second order: a frame's time is short.
-Vector3 moved(const Vector6& xi, double s, const Vector3& x) {
-  const Vector3 omega = xi.tail<3>();
-  const Vector3 d = s * (xi.head<3>() + omega.cross(x));
-  return x + d + (0.5 * s) * omega.cross(d);
-}
 
 /// Square root of the information of a pixel that an error of depth moves by `slide` [px], over its weight
 /// without one: (I + weight slide slide^T)^(-1/2).
@@ -154,8 +148,8 @@ ReadoutEstimator::PairEquations ReadoutEstimator::equations(const SE3& T_cur_pre
   const Matrix3 R = T_cur_prev.rotation();
   PairEquations sum;
   for (const PairPoint& point : pair_) {
-    const Vector3 x_prev = moved(before, -point.row_prev * readout_, point.x_prev);
-    const Vector3 x = moved(now, point.row * readout_, R * x_prev + T_cur_prev.translation());
+    const Vector3 x_prev = moved_by(-point.row_prev * readout_ * before, point.x_prev);
+    const Vector3 x = moved_by(point.row * readout_ * now, R * x_prev + T_cur_prev.translation());
     if (!(x.z() > kNearestShare * point.x_prev.z())) continue;
     const double inv_z = 1 / x.z(), a = camera.fx * inv_z, c = camera.fy * inv_z;
     const double u = x.x() * inv_z, v = x.y() * inv_z;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
-namespace twofold {
+#include "geometry/small_motion.hpp"
 
+namespace twofold {
 RollingShutter::RollingShutter(const Rig& rig, const Vector6& velocity)
     : at_rest_(rig.readout.value_or(0) == 0 || velocity.isZero(0)),
       velocity_(velocity),
@@ -12,7 +13,7 @@ RollingShutter::RollingShutter(const Rig& rig, const Vector6& velocity)
 
 Vector3 RollingShutter::at_mid_exposure(const Rig& rig, const Vector3& z, const Vector3& x_c) const {
   if (at_rest_) return z;
-  const Vector3 x_row = T_row_c(z.y()) * x_c;
+  const Vector3 x_row = moved_by(tau(z.y()) * velocity_, x_c);
   if (!(x_c.z() > 0) || !(x_row.z() > 0)) return z;
   return z + rig.project(x_c) - rig.project(x_row);
 }

@@ -125,21 +125,40 @@ std::optional<float> brightness_since_anchor(const ImagePyramid& images, const P
   return now > kBlack && then > kBlack ? std::optional(now / then) : std::nullopt;
 }
 
+namespace {
+
+/// Nine depth readings in order, by exchanges that are the same whatever they are: nothing for the processor
+/// to guess, which it would get wrong every other time.
+void sort_nine(std::array<std::uint16_t, 9>& r) {
+  constexpr std::array<std::array<std::uint8_t, 2>, 25> kExchanges{
+      {{0, 1}, {3, 4}, {6, 7}, {1, 2}, {4, 5}, {7, 8}, {0, 1}, {3, 4}, {6, 7}, {0, 3}, {3, 6}, {0, 3}, {1, 4},
+       {4, 7}, {1, 4}, {2, 5}, {5, 8}, {2, 5}, {1, 3}, {5, 7}, {2, 6}, {4, 6}, {2, 4}, {2, 3}, {5, 6}}};
+  for (const auto [a, b] : kExchanges) {
+    const std::uint16_t lower = std::min(r[a], r[b]), higher = std::max(r[a], r[b]);
+    r[a] = lower, r[b] = higher;
+  }
+}
+
+}  // namespace
+
 double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v) {
   const int u0 = static_cast<int>(std::lround(u));
   const int v0 = static_cast<int>(std::lround(v));
   if (u0 < 1 || v0 < 1 || u0 >= depth.cols - 1 || v0 >= depth.rows - 1) return Rig::kNoRight;
+  constexpr std::uint16_t kNone = 0xffff;  // comes last
   std::array<std::uint16_t, 9> readings;
-  std::size_t count = 0;
+  std::size_t at = 0, count = 0;
   for (int dv = -1; dv <= 1; ++dv) {
     const auto* row = depth.ptr<std::uint16_t>(v0 + dv) + u0;
     for (int du = -1; du <= 1; ++du) {
       const double metres = row[du] * rig.depth_unit;
-      if (metres >= rig.depth_min && metres <= rig.depth_max) readings[count++] = row[du];
+      const bool valid = metres >= rig.depth_min && metres <= rig.depth_max;
+      readings[at++] = valid ? row[du] : kNone;
+      count += valid ? 1 : 0;
     }
   }
   if (count < 5) return Rig::kNoRight;
-  std::sort(readings.begin(), readings.begin() + static_cast<std::ptrdiff_t>(count));
+  sort_nine(readings);
   const auto disparity = [&](std::size_t i) {
     return rig.disparity_from_depth(readings[i] * rig.depth_unit);
   };

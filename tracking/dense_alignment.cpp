@@ -97,8 +97,30 @@ float brightness_ratio(const cv::Mat& earlier, const cv::Mat& later) {
 DenseAlignment::DenseAlignment(std::size_t capacity, const DenseAlignmentOptions& options)
     : options_(options), samples_(capacity), usable_(capacity) {}
 
-bool DenseAlignment::prepare_point(const PinholeCamera& level_camera, const cv::Mat& image, int level,
-                                   const AlignmentPoint& point, Sample& out) const {
+void DenseAlignment::prepare_directions(const PinholeCamera& level_camera,
+                                        std::span<const AlignmentPoint> points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3& x = points[i].x;
+    samples_[i].du.setZero();
+    samples_[i].dv.setZero();
+    if (!in_front_of_camera(x)) continue;
+    // d pixel / d (v, omega) for x -> exp(delta) x
+    const Eigen::Matrix<float, 2, 3> J_x = level_camera.project_jacobian(x).cast<float>();
+    const Eigen::Matrix<float, 2, 3> J_omega = -J_x * hat(x).cast<float>();
+    samples_[i].du.head<6>() << J_x.row(0).transpose(), J_omega.row(0).transpose();
+    samples_[i].dv.head<6>() << J_x.row(1).transpose(), J_omega.row(1).transpose();
+  }
+}
+
+void DenseAlignment::refine_directions(std::size_t points) {
+  for (std::size_t i = 0; i < points; ++i) {
+    samples_[i].du *= 2;
+    samples_[i].dv *= 2;
+  }
+}
+
+bool DenseAlignment::prepare_patch(const cv::Mat& image, int level, const AlignmentPoint& point,
+                                   Sample& sample) {
   const float s = std::ldexp(1.0F, -level);
   const float u = (point.uv.x() + 0.5F) * s - 0.5F;
   const float v = (point.uv.y() + 0.5F) * s - 0.5F;
@@ -110,24 +132,19 @@ bool DenseAlignment::prepare_point(const PinholeCamera& level_camera, const cv::
     return Eigen::Map<const Eigen::Array4f>(reinterpret_cast<const float*>(&rows[row]) + column);
   };
   for (int r = 0; r < kSize; ++r) {
-    out.value.segment<kSize>(r * kSize) = four(r + 1, 1);
-    out.gradient_u.segment<kSize>(r * kSize) = 0.5F * (four(r + 1, 2) - four(r + 1, 0));
-    out.gradient_v.segment<kSize>(r * kSize) = 0.5F * (four(r + 2, 1) - four(r, 1));
+    sample.value.segment<kSize>(r * kSize) = four(r + 1, 1);
+    sample.gradient_u.segment<kSize>(r * kSize) = 0.5F * (four(r + 1, 2) - four(r + 1, 0));
+    sample.gradient_v.segment<kSize>(r * kSize) = 0.5F * (four(r + 2, 1) - four(r, 1));
   }
-  // d pixel / d (v, omega) for x -> exp(delta) x
-  const Eigen::Matrix<float, 2, 3> J_x = level_camera.project_jacobian(point.x).cast<float>();
-  const Eigen::Matrix<float, 2, 3> J_omega = -J_x * hat(point.x).cast<float>();
-  out.du << J_x.row(0).transpose(), J_omega.row(0).transpose(), 0, 0;
-  out.dv << J_x.row(1).transpose(), J_omega.row(1).transpose(), 0, 0;
   return true;
 }
 
-void DenseAlignment::prepare(const PinholeCamera& level_camera, const cv::Mat& image, int level,
-                             std::span<const AlignmentPoint> points) {
+void DenseAlignment::prepare_patches(const cv::Mat& image, int level,
+                                     std::span<const AlignmentPoint> points) {
   double inverse_depths = 0;
   int usable = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    usable_[i] = prepare_point(level_camera, image, level, points[i], samples_[i]) ? 1 : 0;
+    usable_[i] = prepare_patch(image, level, points[i], samples_[i]) ? 1 : 0;
     if (usable_[i] == 0) continue;
     inverse_depths += 1 / points[i].x.z();
     ++usable;
@@ -233,9 +250,11 @@ DenseAlignmentResult DenseAlignment::align(const PinholeCamera& camera, const Im
   state.gain =
       brightness_ratio(previous.level(options_.coarsest_level), current.level(options_.coarsest_level));
   state.offset = kMidGrey * (state.gain - 1);
+  prepare_directions(camera.at_level(options_.coarsest_level), points);
   for (int level = options_.coarsest_level; level >= std::max(finest_level, options_.finest_level); --level) {
     const PinholeCamera level_camera = camera.at_level(level);
-    prepare(level_camera, previous.level(level), level, points);
+    if (level < options_.coarsest_level) refine_directions(points.size());
+    prepare_patches(previous.level(level), level, points);
     DenseAlignmentResult refined = state;
     if (align_level(level_camera, current.level(level), points, refined)) {
       state = refined;

@@ -73,10 +73,12 @@ class DenseAlignment {
     void add(const Sample& sample, const Pixels& residual, const Pixels& w);
   };
 
-  void prepare(const PinholeCamera& level_camera, const cv::Mat& image, int level,
-               std::span<const AlignmentPoint> points);
-  bool prepare_point(const PinholeCamera& level_camera, const cv::Mat& image, int level,
-                     const AlignmentPoint& point, Sample& sample) const;
+  /// Sets du and dv as of this camera, the coarsest level's.
+  void prepare_directions(const PinholeCamera& level_camera, std::span<const AlignmentPoint> points);
+  void prepare_patches(const cv::Mat& image, int level, std::span<const AlignmentPoint> points);
+  static bool prepare_patch(const cv::Mat& image, int level, const AlignmentPoint& point, Sample& sample);
+  /// Pixels of the next finer level are half as wide.
+  void refine_directions(std::size_t points);
   /// Normal equations of the pose of the earlier frame, the gain and the offset.
   void evaluate(const PinholeCamera& level_camera, const cv::Mat& image,
                 std::span<const AlignmentPoint> points, const DenseAlignmentResult& state, Cost& cost) const;

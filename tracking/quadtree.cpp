@@ -20,6 +20,7 @@ Quadtree::Quadtree(int width, int height, std::size_t capacity)
       width_(width),
       height_(height) {
   leaves_.reserve(capacity);
+  visited_.reserve(capacity);
   level_.reserve(capacity + 4);
   next_level_.reserve(capacity + 4);
   stack_.reserve(4 * kDepth + 4);
@@ -41,12 +42,13 @@ bool Quadtree::insert(const Eigen::Vector2f& uv, std::uint32_t number) {
   }
   const auto x = static_cast<std::uint32_t>(uv.x() * cells_per_px_);
   const auto y = static_cast<std::uint32_t>(uv.y() * cells_per_px_);
-  leaves_.push_back({spread(x) | (spread(y) << 1), number, false});
+  leaves_.push_back(Leaf{spread(x) | (spread(y) << 1)} << 32 | number);
   return true;
 }
 
 void Quadtree::build() {
-  std::sort(leaves_.begin(), leaves_.end(), [](const Leaf& a, const Leaf& b) { return a.key() < b.key(); });
+  std::sort(leaves_.begin(), leaves_.end());
+  visited_.assign(leaves_.size(), 0);
   if (!leaves_.empty()) level_.push_back({0, static_cast<std::uint32_t>(leaves_.size()), 0});
   built_ = true;
 }
@@ -55,8 +57,8 @@ void Quadtree::build() {
 /// many are halved.
 std::uint32_t Quadtree::end_of_quadrant(std::uint32_t begin, std::uint32_t end, int shift) const {
   constexpr std::uint32_t kFew = 12;
-  const std::uint32_t quadrant = leaves_[begin].morton >> shift;
-  const auto is_inside = [&](std::uint32_t i) { return leaves_[i].morton >> shift == quadrant; };
+  const Leaf quadrant = leaves_[begin] >> (32 + shift);
+  const auto is_inside = [&](std::uint32_t i) { return leaves_[i] >> (32 + shift) == quadrant; };
   if (is_inside(end - 1)) return end;
   std::uint32_t inside = begin;
   while (end - inside > kFew) {
@@ -85,9 +87,9 @@ int Quadtree::children(const Node& node, Node (&result)[4]) {
 std::int64_t Quadtree::take(const Node& leaf) {
   // Points closer together than the smallest region share a leaf; each is a leaf of its own in turn.
   for (std::uint32_t i = leaf.begin; i < leaf.end; ++i) {
-    if (!leaves_[i].visited) {
-      leaves_[i].visited = true;
-      return leaves_[i].number;
+    if (visited_[i] == 0) {
+      visited_[i] = 1;
+      return static_cast<std::uint32_t>(leaves_[i]);
     }
   }
   return -1;

@@ -31,14 +31,9 @@ class Quadtree {
  private:
   static constexpr int kDepth = 8;  ///< smallest region: 1/256 of the image's longer side
 
-  struct Leaf {
-    std::uint32_t morton;
-    std::uint32_t number;
-    bool visited;
-
-    /// Orders leaves along the curve, and by number where they share a place.
-    [[nodiscard]] std::uint64_t key() const { return std::uint64_t{morton} << 32 | number; }
-  };
+  /// Place along the curve in the upper half, number in the lower: in order along the curve, and by number
+  /// where points share a place.
+  using Leaf = std::uint64_t;
   /// Points [begin, end) share the first `depth` quadrants.
   struct Node {
     std::uint32_t begin, end;
@@ -59,7 +54,8 @@ class Quadtree {
   int width_;
   int height_;
   std::vector<Leaf> leaves_;
-  std::vector<Node> level_;  // of the breadth-first search, not yet expanded
+  std::vector<std::uint8_t> visited_;  // of each leaf
+  std::vector<Node> level_;            // of the breadth-first search, not yet expanded
   std::vector<Node> next_level_;
   std::vector<Node> stack_;
   std::minstd_rand random_;

@@ -7,6 +7,7 @@
 #include "geometry/inverse_depth.hpp"
 #include "geometry/se2.hpp"
 #include "geometry/sim3.hpp"
+#include "geometry/small_motion.hpp"
 #include "tests/numeric_derivative.hpp"
 
 namespace twofold {
@@ -155,6 +156,21 @@ TYPED_TEST(LieGroup, LongProductsStayInTheGroup) {
   TypeParam T;
   for (int i = 0; i < 1000000; ++i) T = T * step;
   EXPECT_NEAR(matrix(T).determinant(), 1.0, 1e-12);
+}
+
+TEST(SmallMotion, IsTheExponentialTimesAPoint) {
+  std::mt19937 rng(8);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (const double angle : {0.0, 1e-6, 0.02, 0.1, 0.5}) {
+    for (int i = 0; i < 50; ++i) {
+      const Vector3 axis = Vector3::NullaryExpr([&] { return uniform(rng); }).normalized();
+      Vector6 xi;
+      xi << 0.3 * Vector3::NullaryExpr([&] { return uniform(rng); }), angle * axis;
+      const Vector3 x = 5 * Vector3::NullaryExpr([&] { return uniform(rng); });
+      const double error = (moved_by(xi, x) - SE3::exp(xi) * x).norm();
+      EXPECT_LT(error, angle <= 0.1 ? 1e-9 : 2e-5) << angle;
+    }
+  }
 }
 
 TEST(Sim3, WithoutScaleKeepsCentreAndRays) {

@@ -8,6 +8,9 @@ namespace twofold {
 namespace {
 
 constexpr int kShutterRounds = 3;
+// A round moves the pose by about a twentieth of what the one before moved it by: by this many of its
+// standard deviations, and the next one is not worth its time.
+constexpr double kSettledSigmas = 1;
 
 }  // namespace
 
@@ -30,9 +33,13 @@ LostCause PoseEstimator::estimate(const Placement& start, FrameStep& step, Searc
   motion.T_c_ref = start.T_c_ref;
   const int rounds = step.shutter.at_rest() ? 1 : kShutterRounds;
   for (int round = 0; round < rounds; ++round) {
-    observe(motion.T_c_ref, step.shutter, found);
-    motion = optimise_motion(rig_, found.observations, motion.T_c_ref, solver(step));
-    if (rounds > 1) step.shutter = shutter_.at(motion.T_c_ref, step);
+    const SE3 T_before = motion.T_c_ref;
+    observe(T_before, step.shutter, found);
+    motion = optimise_motion(rig_, found.observations, T_before, solver(step));
+    if (rounds == 1) break;
+    step.shutter = shutter_.at(motion.T_c_ref, step);
+    const Vector6 moved = (motion.T_c_ref * T_before.inverse()).log();
+    if (moved.dot(motion.information * moved) < kSettledSigmas * kSettledSigmas) break;
   }
   ask_elders(solver(step), found);
   result.moving = judge_immature_points(found);
