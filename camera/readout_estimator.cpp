@@ -148,8 +148,8 @@ ReadoutEstimator::PairEquations ReadoutEstimator::equations(const SE3& T_cur_pre
   const Matrix3 R = T_cur_prev.rotation();
   PairEquations sum;
   for (const PairPoint& point : pair_) {
-    const Vector3 x_prev = moved_by(-point.row_prev * readout_ * before, point.x_prev);
-    const Vector3 x = moved_by(point.row * readout_ * now, R * x_prev + T_cur_prev.translation());
+    const Vector3 x_prev = moved_by<2>(-point.row_prev * readout_ * before, point.x_prev);
+    const Vector3 x = moved_by<2>(point.row * readout_ * now, R * x_prev + T_cur_prev.translation());
     if (!(x.z() > kNearestShare * point.x_prev.z())) continue;
     const double inv_z = 1 / x.z(), a = camera.fx * inv_z, c = camera.fy * inv_z;
     const double u = x.x() * inv_z, v = x.y() * inv_z;
