@@ -6,7 +6,7 @@
 
 namespace twofold {
 
-Eigen::Vector3f Rig::information(const Eigen::Vector3f& z, int level) const {
+Eigen::Vector3f Rig::information(const StereoPixelF& z, int level) const {
   const double sigma = std::ldexp(noise.sigma_px, level);
   const auto pixel = static_cast<float>(1 / (sigma * sigma));
   if (kind == SensorKind::kMono || !has_right(z)) return {pixel, pixel, 0};

@@ -4,6 +4,7 @@
 #include <limits>
 #include <optional>
 
+#include "camera/measurement.hpp"
 #include "camera/pinhole.hpp"
 
 namespace twofold {
@@ -23,9 +24,8 @@ struct MeasurementNoise {
 /// Rectified camera rig: the left (or only) camera and, for stereo and RGB-D, a right camera shifted by
 /// `baseline`.
 ///
-/// A measurement is z = (u_l, v_l, u_r)  (thesis eq. 3.8). RGB-D depth becomes a virtual u_r = u_l - f b /
-/// depth (6.5.3). Without right-image information u_r is NaN (kNoRight) and the measurement has two
-/// components.
+/// What it measures of a point is a StereoPixel. RGB-D depth becomes a virtual u_r = u_l - f b / depth
+/// (6.5.3).
 struct Rig {
   SensorKind kind = SensorKind::kStereo;
   PinholeCamera camera;       ///< both cameras of a rectified pair
@@ -42,7 +42,7 @@ struct Rig {
   static constexpr double kNoRight = std::numeric_limits<double>::quiet_NaN();
 
   /// Stereo measurement of a point in the left camera's frame [m]; x_c.z() must be positive  (eq. 3.8).
-  [[nodiscard]] Vector3 project(const Vector3& x_c) const {
+  [[nodiscard]] StereoPixel project(const Vector3& x_c) const {
     const double inv_z = 1.0 / x_c.z();
     return {camera.fx * x_c.x() * inv_z + camera.cx, camera.fy * x_c.y() * inv_z + camera.cy,
             camera.fx * (x_c.x() - baseline) * inv_z + camera.cx};
@@ -64,10 +64,10 @@ struct Rig {
   [[nodiscard]] double disparity_from_depth(double depth) const { return camera.fx * baseline / depth; }
   /// Diagonal of Lambda_z of a measurement taken on pyramid level `level` [1/px^2]; the third entry is 0
   /// without a right coordinate.
-  [[nodiscard]] Eigen::Vector3f information(const Eigen::Vector3f& z, int level) const;
+  [[nodiscard]] Eigen::Vector3f information(const StereoPixelF& z, int level) const;
 
   /// Point in the left camera's frame; z.x() - z.z() must be positive  (eq. 3.9).
-  [[nodiscard]] Vector3 unproject(const Vector3& z) const {
+  [[nodiscard]] Vector3 unproject(const StereoPixel& z) const {
     return camera.unproject(z.head<2>()) * depth_from_disparity(z.x() - z.z());
   }
 };

@@ -11,7 +11,7 @@ RollingShutter::RollingShutter(const Rig& rig, const Vector6& velocity)
       seconds_per_row_(rig.readout.value_or(0) / rig.camera.height),
       half_readout_(0.5 * rig.readout.value_or(0)) {}
 
-Vector3 RollingShutter::at_mid_exposure(const Rig& rig, const Vector3& z, const Vector3& x_c) const {
+StereoPixel RollingShutter::at_mid_exposure(const Rig& rig, const StereoPixel& z, const Vector3& x_c) const {
   if (at_rest_) return z;
   const Vector3 x_row = moved_by(tau(z.y()) * velocity_, x_c);
   if (!(x_c.z() > 0) || !(x_row.z() > 0)) return z;

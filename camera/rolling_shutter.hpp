@@ -25,9 +25,9 @@ class RollingShutter {
   [[nodiscard]] SE3 T_row_c(double v) const { return at_rest_ ? SE3() : SE3::exp(tau(v) * velocity_); }
   /// The pose of the camera at pixel row v when it is at T_c_w at mid-exposure.
   [[nodiscard]] SE3 at_row(double v, const SE3& T_c_w) const { return at_rest_ ? T_c_w : T_row_c(v) * T_c_w; }
-  /// The measurement z = (u_l, v_l, u_r) [px] of a point, moved to where it would have been at mid-exposure.
+  /// Where a point was seen, moved to where it would have been at mid-exposure.
   /// @param x_c  the point at mid-exposure [m], in front of the camera; need be known roughly only
-  [[nodiscard]] Vector3 at_mid_exposure(const Rig& rig, const Vector3& z, const Vector3& x_c) const;
+  [[nodiscard]] StereoPixel at_mid_exposure(const Rig& rig, const StereoPixel& z, const Vector3& x_c) const;
   /// The pose T_c_w at which a point is seen: at mid-exposure, moved to the row on which it is expected.
   [[nodiscard]] SE3 seen_from(const Rig& rig, const SE3& T_c_w, const Vector3& x_w) const;
 

@@ -57,9 +57,9 @@ struct ObservationBatch {
     x = to_lanes(gather(o, [](const auto& m) { return m.x_ref.x(); }));
     y = to_lanes(gather(o, [](const auto& m) { return m.x_ref.y(); }));
     z = to_lanes(gather(o, [](const auto& m) { return m.x_ref.z(); }));
-    u = to_lanes(gather(o, [](const auto& m) -> double { return m.z.x(); }));
-    v = to_lanes(gather(o, [](const auto& m) -> double { return m.z.y(); }));
-    const LaneRegister right = gather(o, [](const auto& m) -> double { return m.z.z(); });
+    u = to_lanes(gather(o, [](const auto& m) -> double { return m.pixel.x(); }));
+    v = to_lanes(gather(o, [](const auto& m) -> double { return m.pixel.y(); }));
+    const LaneRegister right = gather(o, [](const auto& m) -> double { return m.pixel.z(); });
     wu = to_lanes(gather(o, [](const auto& m) -> double { return m.information.x(); }));
     wv = to_lanes(gather(o, [](const auto& m) -> double { return m.information.y(); }));
     const LaneRegister of_right = gather(o, [](const auto& m) -> double { return m.information.z(); });

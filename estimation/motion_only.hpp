@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 
@@ -11,15 +12,15 @@ namespace twofold {
 /// A point known in a reference frame and its measurement in the frame whose pose is sought.
 struct MotionObservation {
   Vector3 x_ref{0, 0, 1};                ///< point in the reference frame [m]
-  Eigen::Vector3f z{0, 0, 0};            ///< (u_l, v_l, u_r) [px]; u_r is ignored where its information is 0
+  StereoPixelF pixel{0, 0, 0};           ///< u_r is ignored where its information is 0
   Eigen::Vector3f information{1, 1, 1};  ///< diagonal [1/px^2]; see observe_point
   bool inlier = true;                    ///< set by the solver: chi2 below the threshold at the result
 };
 
 /// Point and measurement as motion-only adjustment takes them, weighed by the rig's noise on the pyramid
-/// level that z was measured on.
+/// level that the pixel was measured on.
 [[nodiscard]] inline MotionObservation observe_point(const Rig& rig, const Vector3& x_ref,
-                                                     const Eigen::Vector3f& z, int level) {
+                                                     const StereoPixelF& z, int level) {
   return {x_ref, z, rig.information(z, level)};
 }
 

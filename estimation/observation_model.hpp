@@ -46,7 +46,7 @@ struct ObservationModel {
 
   /// Whitened squared error; infinity behind the camera (or for a NaN). z.z() may be NaN where its
   /// information is 0.
-  [[nodiscard]] double chi2(const Vector3& x, const Eigen::Vector3f& z, const Eigen::Vector3f& info) const {
+  [[nodiscard]] double chi2(const Vector3& x, const StereoPixelF& z, const Eigen::Vector3f& info) const {
     if (!(x.z() > kSolverMinDepth)) return std::numeric_limits<double>::infinity();
     const double inv_z = 1.0 / x.z();
     const double eu = fx * x.x() * inv_z + cx - z.x();
@@ -58,7 +58,7 @@ struct ObservationModel {
   }
 
   /// Needs a point in front of the camera.
-  [[nodiscard]] ObservationTerms linearise(const Vector3& x, const Eigen::Vector3f& z,
+  [[nodiscard]] ObservationTerms linearise(const Vector3& x, const StereoPixelF& z,
                                            const Eigen::Vector3f& info, const HuberKernel& kernel) const {
     const double inv_z = 1.0 / x.z();
     const double x_right = x.x() - baseline;

@@ -107,7 +107,7 @@ PointElimination::PointEquations PointElimination::linearise(
     const RigidMotion& T = relative[o->slot];
     const Vector3 Ry = T.R * y;
     const Vector3 x = Ry + T.t;
-    const ObservationTerms terms = model.linearise(x, o->z, o->information, kernel);
+    const ObservationTerms terms = model.linearise(x, o->pixel, o->information, kernel);
     Rows3 J;  // d x / d psi  (B.20)
     for (int r = 0; r < 3; ++r) {
       J.row[r] = Packet4{T.R(r, 0), T.R(r, 1), -Ry[r], 0} * inv_q;

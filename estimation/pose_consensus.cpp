@@ -142,8 +142,8 @@ void PoseConsensus::add(const MotionObservation& match, const Vector3& x_c) {
   batch.x[lane] = match.x_ref.x();
   batch.y[lane] = match.x_ref.y();
   batch.z[lane] = match.x_ref.z();
-  batch.u[lane] = match.z.x();
-  batch.v[lane] = match.z.y();
+  batch.u[lane] = match.pixel.x();
+  batch.v[lane] = match.pixel.y();
   batch.information[lane] = match.information.x();
   pairs_.push_back({match.x_ref, x_c});
 }
@@ -152,7 +152,7 @@ std::optional<SE3> PoseConsensus::find(std::span<const MotionObservation> matche
   pairs_.clear();
   batches_.clear();
   for (const MotionObservation& match : matches) {
-    const Vector3 z = match.z.cast<double>();
+    const StereoPixel z = match.pixel.cast<double>();
     if (pairs_.size() == pairs_.capacity()) break;
     if (match.information.z() > 0 && z.x() - z.z() > options_.min_disparity_px) add(match, rig_.unproject(z));
   }
@@ -167,7 +167,7 @@ std::optional<SE3> PoseConsensus::find(std::span<const MotionObservation> matche
 }
 
 bool PoseConsensus::explains(const SE3& T_c_ref, const MotionObservation& match) const {
-  return squared_error(rig_.camera, T_c_ref * match.x_ref, match.z.head<2>().cast<double>(),
+  return squared_error(rig_.camera, T_c_ref * match.x_ref, match.pixel.head<2>().cast<double>(),
                        match.information.x()) <= options_.inlier_sigmas * options_.inlier_sigmas;
 }
 

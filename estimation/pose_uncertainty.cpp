@@ -51,8 +51,8 @@ void PoseUncertainty::update(std::span<const MotionObservation> observations, co
     if (!o.inlier) continue;
     const Vector3 x = R * o.x_ref + motion.T_c_ref.translation();
     if (!(x.z() > kSolverMinDepth)) continue;
-    const ObservationTerms terms = model.linearise(x, o.z, o.information, kernel);
-    sums_.add(o.z.head<2>(), about_pose(terms, x), wrench(terms.force, x));
+    const ObservationTerms terms = model.linearise(x, o.pixel, o.information, kernel);
+    sums_.add(o.pixel.head<2>(), about_pose(terms, x), wrench(terms.force, x));
   }
   of_frame_.reset();
   if (!all_agree) return;

@@ -29,7 +29,7 @@ double point_cost(const ObservationModel& model, const HuberKernel& kernel,
   double cost = 0;
   for (const PointView& view : views) {
     const Vector3 x = view.R_i_a * y + view.t_i_a;
-    cost += kernel.rho(model.chi2(x, view.observation->z, view.observation->information));
+    cost += kernel.rho(model.chi2(x, view.observation->pixel, view.observation->information));
   }
   return cost;
 }
@@ -40,7 +40,7 @@ PointEquations point_equations(const ObservationModel& model, const HuberKernel&
   const Vector3 y = from_inverse_depth(psi);
   for (const PointView& view : views) {
     const Vector3 x = view.R_i_a * y + view.t_i_a;
-    const auto terms = model.linearise(x, view.observation->z, view.observation->information, kernel);
+    const auto terms = model.linearise(x, view.observation->pixel, view.observation->information, kernel);
     const Matrix3 J = inverse_depth_jacobian(view.R_i_a, psi);
     Matrix3 SJ;
     for (int c = 0; c < 3; ++c) SJ.col(c) = terms.apply(J.col(c));
@@ -60,7 +60,7 @@ void collect_views(const WindowProblem& problem, const WindowProblem::Point& poi
     const auto& observation = problem.observations[point.first_observation + n];
     const SE3 T_i_a =
         observation.pose == point.anchor ? SE3() : problem.poses[observation.pose].T_k_w * T_w_a;
-    if (std::isfinite(model.chi2(T_i_a * y, observation.z, observation.information))) {
+    if (std::isfinite(model.chi2(T_i_a * y, observation.pixel, observation.information))) {
       views.push_back({T_i_a.rotation(), T_i_a.translation(), &observation});
     }
   }

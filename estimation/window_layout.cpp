@@ -107,7 +107,7 @@ void WindowLayout::collect_group(const WindowProblem& problem, int anchor, std::
       // system.
       const bool both_fixed = problem.poses[o.pose].fixed && problem.poses[anchor].fixed;
       slots_[group.first_slot + slot].coupled = o.pose != anchor && !both_fixed;
-      observations_.push_back({o.z, o.information, slot, -1});
+      observations_.push_back({o.pixel, o.information, slot, -1});
       ++track.observation_count;
     }
     if (track.observation_count == 0) continue;

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "estimation/window_problem.hpp"
 #include "sparse/block_cholesky.hpp"
 
@@ -30,7 +31,7 @@ class WindowLayout {
     bool anchor_is_row = false;  ///< that block has the anchor as row
   };
   struct Observation {
-    Eigen::Vector3f z;
+    StereoPixelF pixel;
     Eigen::Vector3f information;
     int slot;   ///< in the group
     int entry;  ///< coupling of the point with that slot; -1 for slots that are not coupled

@@ -16,7 +16,7 @@ double observation_chi2(const WindowProblem& problem, const WindowProblem::Point
   const SE3& T_i_w = problem.poses[observation.pose].T_k_w;
   const SE3& T_a_w = problem.poses[point.anchor].T_k_w;
   const Vector3 x = T_i_w * (T_a_w.inverse() * from_inverse_depth(point.psi));
-  return ObservationModel(problem.rig).chi2(x, observation.z, observation.information);
+  return ObservationModel(problem.rig).chi2(x, observation.pixel, observation.information);
 }
 
 double window_cost(const WindowProblem& problem, const WindowSolverOptions& options) {
@@ -54,7 +54,7 @@ const char* fault(const WindowProblem& problem, const WindowProblem::Observation
   for (int c = 0; c < 3; ++c) {
     if (!(o.information[c] >= 0) || !std::isfinite(o.information[c]))
       return "information is negative or not finite";
-    if ((c < 2 || o.information[c] > 0) && !std::isfinite(o.z[c])) return "measurement is not finite";
+    if ((c < 2 || o.information[c] > 0) && !std::isfinite(o.pixel[c])) return "measurement is not finite";
   }
   return nullptr;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 
@@ -23,7 +24,7 @@ struct WindowProblem {
   /// That a pose sees a point, with the measurement; those of one point stand together.
   struct Observation {
     int pose = 0;
-    Eigen::Vector3f z{0, 0, 0};  ///< (u_l, v_l, u_r) [px]; u_r is ignored where its information is 0
+    StereoPixelF pixel{0, 0, 0};           ///< u_r is ignored where its information is 0
     Eigen::Vector3f information{1, 1, 1};  ///< diagonal of Lambda_z [1/px^2]; third entry 0: no right image
   };
   struct Point {

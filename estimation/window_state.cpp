@@ -25,7 +25,7 @@ double track_cost(const WindowLayout& layout, const WindowLayout::Track& track, 
   double sum = 0;
   for (const auto* o = first; o != first + track.observation_count; ++o) {
     const RigidMotion& T = relative[o->slot];
-    sum += kernel.rho(model.chi2(T.R * y + T.t, o->z, o->information));
+    sum += kernel.rho(model.chi2(T.R * y + T.t, o->pixel, o->information));
   }
   return sum;
 }

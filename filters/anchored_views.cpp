@@ -109,7 +109,7 @@ double AnchoredViews::cost() const {
       const Vector3& psi = points[static_cast<std::size_t>(seen.point)].psi;
       const Vector3 h = project.ray(psi);
       if (!project.in_front(h, psi)) return kImpossible;
-      const Vector3 d = seen.z - project.pixel(h, psi);
+      const Vector3 d = seen.pixel - project.pixel(h, psi);
       sum += rig.kind == SensorKind::kMono ? d.head<2>().squaredNorm() : d.squaredNorm();
     }
     chi2 += weight * sum;
@@ -129,7 +129,7 @@ bool AnchoredViews::add_view(std::size_t v, Equations& equations) const {
     const Vector3& psi = points[j].psi;
     const Vector3 h = project.ray(psi);
     if (!project.in_front(h, psi)) return false;
-    const Eigen::Matrix<double, kRows, 1> d = (seen.z - project.pixel(h, psi)).template head<kRows>();
+    const Eigen::Matrix<double, kRows, 1> d = (seen.pixel - project.pixel(h, psi)).template head<kRows>();
     const Eigen::Matrix<double, kRows, 3> J_h = project.by_ray(h, psi).template topRows<kRows>();
     Eigen::Matrix<double, kRows, 6> J_T;
     J_T << psi.z() * J_h, -J_h * hat(h);

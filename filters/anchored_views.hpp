@@ -2,16 +2,16 @@
 
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 
 namespace twofold {
 
-/// That a view sees the point with this index, with the measurement (u_l, v_l, u_r) [px]; monocular rigs
-/// ignore u_r.
+/// That a view sees the point with this index, with the measurement; monocular rigs ignore u_r.
 struct SeenPoint {
   int point = 0;
-  Vector3 z = Vector3::Zero();
+  StereoPixel pixel = StereoPixel::Zero();
 };
 
 /// Bundle adjustment of one anchor frame and a few others that see its points: the start of a monocular

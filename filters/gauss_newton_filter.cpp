@@ -30,7 +30,7 @@ void GaussNewtonFilter::set_options(const GaussNewtonFilterOptions& options) {
   options_ = options;
 }
 
-InverseDepthFilter GaussNewtonFilter::first_estimate(const Vector3& z) const {
+InverseDepthFilter GaussNewtonFilter::first_estimate(const StereoPixel& z) const {
   return rig_.kind == SensorKind::kMono
              ? InverseDepthFilter::from_mono(rig_.camera, z.head<2>(), options_.sigma_px)
              : InverseDepthFilter::from_stereo(rig_, z, options_.sigma_px);
@@ -84,7 +84,7 @@ std::vector<GaussNewtonFilter::Seen> GaussNewtonFilter::match(
   std::vector<Seen> seen;
   for (const PointObservation& o : observations) {
     const auto found = std::lower_bound(index.begin(), index.end(), std::pair<std::int64_t, int>(o.point, 0));
-    if (found != index.end() && found->first == o.point) seen.push_back({found->second, o.z});
+    if (found != index.end() && found->first == o.point) seen.push_back({found->second, o.pixel});
   }
   return seen;
 }

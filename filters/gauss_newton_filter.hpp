@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "estimation/linearisation.hpp"
 #include "filters/anchored_views.hpp"
 #include "filters/inverse_depth_filter.hpp"
@@ -36,7 +37,7 @@ struct GaussNewtonFilterOptions {
 /// That a frame sees a point, with the measurement; monocular rigs ignore u_r.
 struct PointObservation {
   std::int64_t point = 0;
-  Vector3 z = Vector3::Zero();  ///< (u_l, v_l, u_r) [px]
+  StereoPixel pixel = StereoPixel::Zero();
 };
 
 /// Gauss-Newton filter for visual SLAM: an iterated information filter without motion prior over a joint
@@ -105,7 +106,7 @@ class GaussNewtonFilter {
   [[nodiscard]] int anchor_at(int anchor) const { return 6 * (anchor - 1); }
   [[nodiscard]] int point_at(int point) const { return 6 * anchor_count() + 3 * point; }
   [[nodiscard]] int pose_at() const { return 6 * anchor_count() + 3 * point_count(); }
-  [[nodiscard]] InverseDepthFilter first_estimate(const Vector3& z) const;
+  [[nodiscard]] InverseDepthFilter first_estimate(const StereoPixel& z) const;
   [[nodiscard]] std::vector<Seen> match(std::span<const PointObservation> observations) const;
   [[nodiscard]] SE3 T_c_anchor(int anchor) const {
     return T_c_w_ * anchors_[static_cast<std::size_t>(anchor)].inverse();

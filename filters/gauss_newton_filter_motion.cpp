@@ -59,7 +59,7 @@ std::optional<GaussNewtonFilter::Innovation> GaussNewtonFilter::innovation(const
     const auto p = project_inverse_depth(rig_, T_c_anchor(point.anchor), point.psi);
     if (!p) return std::nullopt;
     const auto row = rows * static_cast<Eigen::Index>(i);
-    innovation.d.segment(row, rows) = (seen[i].z - p->z_hat).head(rows);
+    innovation.d.segment(row, rows) = (seen[i].pixel - p->z_hat).head(rows);
     innovation.J_T.middleRows(row, rows) = p->J_camera.topRows(rows);
     if (!with_map) continue;
     J_map.block(row, point_at(seen[i].point), rows, 3) = p->J_psi.topRows(rows);

@@ -32,7 +32,7 @@ void GaussNewtonFilter::add_points(std::span<const PointObservation> observation
   grown.bottomLeftCorner(6, at) = Lambda_.bottomLeftCorner(6, at);
   grown.bottomRightCorner<6, 6>() = Lambda_.bottomRightCorner<6, 6>();
   for (const PointObservation& observation : observations) {
-    const InverseDepthFilter start = first_estimate(observation.z);
+    const InverseDepthFilter start = first_estimate(observation.pixel);
     points_.push_back({observation.point, anchor, start.psi});
     const int own = point_at(point_count() - 1);
     grown.block<3, 3>(own, own) = start.information;

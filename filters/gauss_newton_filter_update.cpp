@@ -35,7 +35,7 @@ double GaussNewtonFilter::add_measurements(const std::vector<Seen>& seen, Matrix
     const auto a = static_cast<std::size_t>(point.anchor);
     auto p = project_inverse_depth(rig_, T_c_a[a], point.psi);
     if (!p) return kInfinity;
-    const VectorX d = (s.z - p->z_hat).head(rows);
+    const VectorX d = (s.pixel - p->z_hat).head(rows);
     chi2 += weight * d.squaredNorm();
     if (Lambda == nullptr) continue;
     if (first) p = project_inverse_depth(rig_, T_c_a_lin[a], point.psi_lin.value_or(point.psi));

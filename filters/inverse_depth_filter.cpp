@@ -45,7 +45,7 @@ InverseDepthFilter InverseDepthFilter::from_mono(const PinholeCamera& camera, co
   return filter;
 }
 
-InverseDepthFilter InverseDepthFilter::from_stereo(const Rig& rig, const Vector3& z, double sigma_px) {
+InverseDepthFilter InverseDepthFilter::from_stereo(const Rig& rig, const StereoPixel& z, double sigma_px) {
   InverseDepthFilter filter;
   filter.psi = rig.camera.unproject(z.head<2>());
   filter.psi.z() = (z.x() - z.z()) / (rig.camera.fx * rig.baseline);  // eq. 4.23
@@ -65,7 +65,8 @@ struct Innovation {
 };
 
 /// None when the point is behind the camera.
-std::optional<Innovation> innovation(const Rig& rig, const SE3& T_c_a, const Vector3& psi, const Vector3& z) {
+std::optional<Innovation> innovation(const Rig& rig, const SE3& T_c_a, const Vector3& psi,
+                                     const StereoPixel& z) {
   const auto p = project_inverse_depth(rig, T_c_a, psi);
   if (!p) return std::nullopt;
   Innovation result{z - p->z_hat, p->J_psi};
@@ -77,7 +78,7 @@ std::optional<Innovation> innovation(const Rig& rig, const SE3& T_c_a, const Vec
 
 }  // namespace
 
-bool InverseDepthFilter::update(const Rig& rig, const SE3& T_c_a, const Vector3& z, double sigma_px,
+bool InverseDepthFilter::update(const Rig& rig, const SE3& T_c_a, const StereoPixel& z, double sigma_px,
                                 int iterations) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double weight = 1 / (sigma_px * sigma_px);

@@ -22,12 +22,12 @@ struct InverseDepthFilter {
                                                     double sigma_px, double start_inverse_depth = 1.0);
   /// Stereo measurement: eq. 4.23 and Lambda = J^T J / s^2, J = d z_s / d psi (what eq. 4.24 means: the
   /// printed matrix is J's inverse).
-  [[nodiscard]] static InverseDepthFilter from_stereo(const Rig& rig, const Vector3& z, double sigma_px);
+  [[nodiscard]] static InverseDepthFilter from_stereo(const Rig& rig, const StereoPixel& z, double sigma_px);
 
   /// Folds in one measurement from a camera at T_c_a (anchor to camera), by Levenberg-Marquardt on eq. 3.36,
   /// then adds its information (3.37). z.z() NaN: left image only. False, and unchanged, when the point
   /// cannot be brought in front of the camera.
-  bool update(const Rig& rig, const SE3& T_c_a, const Vector3& z, double sigma_px, int iterations = 10);
+  bool update(const Rig& rig, const SE3& T_c_a, const StereoPixel& z, double sigma_px, int iterations = 10);
 
   /// Standard deviation of the inverse depth given everything seen; infinity while it is unknown.
   [[nodiscard]] double inverse_depth_sigma() const;
@@ -35,7 +35,7 @@ struct InverseDepthFilter {
 
 /// Projection of an anchored point and its derivatives, shared by the filters.
 struct InverseDepthProjection {
-  Vector3 z_hat;      ///< (u_l, v_l, u_r)
+  StereoPixel z_hat;
   Matrix36 J_camera;  ///< by a left perturbation of T_c_w
   Matrix36 J_anchor;  ///< by a left perturbation of T_a_w
   Matrix3 J_psi;

@@ -68,14 +68,14 @@ void SlidingWindowFilter::add_observations(const FilterFrame& frame) {
   for (const LandmarkObservation& observation : frame.observations) {
     auto found = index_.find(observation.landmark);
     if (found == index_.end()) {
-      const double disparity = observation.z.x() - observation.z.z();
+      const double disparity = observation.pixel.x() - observation.pixel.z();
       if (!(disparity >= options_.min_disparity_px)) continue;  // also when u_r is NaN
       found = index_.emplace(observation.landmark, landmark_count()).first;
       landmarks_.push_back({});
       ids_.push_back(observation.landmark);
-      points_.push_back(T_l_c * rig_.unproject(observation.z));
+      points_.push_back(T_l_c * rig_.unproject(observation.pixel));
     }
-    pose.observations.push_back({found->second, observation.z, observation.information});
+    pose.observations.push_back({found->second, observation.pixel, observation.information});
     ++landmarks_[static_cast<std::size_t>(found->second)].observations;
   }
 }
@@ -86,12 +86,12 @@ std::optional<Vector3> SlidingWindowFilter::find_landmark(std::int64_t id) const
   return landmark(found->second);
 }
 
-bool SlidingWindowFilter::set_measurement(int pose, std::int64_t id, const Vector3& z) {
+bool SlidingWindowFilter::set_measurement(int pose, std::int64_t id, const StereoPixel& z) {
   const auto found = index_.find(id);
   if (found == index_.end()) return false;
   for (Observation& o : poses_[static_cast<std::size_t>(pose)].observations) {
     if (o.landmark != found->second) continue;
-    o.z = z;
+    o.pixel = z;
     return true;
   }
   return false;

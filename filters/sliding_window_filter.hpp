@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "estimation/linearisation.hpp"
 #include "filters/process_model.hpp"
@@ -55,9 +56,9 @@ struct SlidingWindowOptions {
 /// That a frame sees a landmark, with the measurement; one of the left image alone cannot start a landmark.
 struct LandmarkObservation {
   std::int64_t landmark = 0;
-  Vector3 z = Vector3::Zero();  ///< (u_l, v_l, u_r) [px]
+  StereoPixel pixel = StereoPixel::Zero();
   Matrix3 information =
-      Matrix3::Identity();  ///< R^-1 [1/px^2]; for a left-only z the top-left 2 x 2 block counts
+      Matrix3::Identity();  ///< R^-1 [1/px^2]; without a right coordinate the top-left 2 x 2 block counts
 };
 
 struct FilterFrame {
@@ -138,12 +139,12 @@ class SlidingWindowFilter {
 
   /// Replaces a measurement of a frame in the window, number of poses as for T_c_w(); false when that frame
   /// does not see the landmark.
-  bool set_measurement(int pose, std::int64_t id, const Vector3& z);
+  bool set_measurement(int pose, std::int64_t id, const StereoPixel& z);
 
  private:
   struct Observation {
     int landmark;  ///< index in the state
-    Vector3 z;
+    StereoPixel pixel;
     Matrix3 information;
   };
   struct Pose {

@@ -12,7 +12,7 @@ namespace {
 
 struct KnownLandmark {
   Vector3 x_l;
-  Vector3 z;
+  StereoPixel pixel;
   Matrix3 information;
 };
 
@@ -36,7 +36,7 @@ class PoseCost {
     for (const KnownLandmark& known : landmarks_) {
       const Vector3 x_c = T_c_l * known.x_l;
       if (!in_front_of_camera(x_c)) continue;
-      const Vector3 r = known.z - rig_.project(x_c);
+      const Vector3 r = known.pixel - rig_.project(x_c);
       const double chi2 = r.dot(known.information * r);
       sum += 0.5 * kernel_.rho(chi2);
       if (!H) continue;
@@ -87,8 +87,8 @@ void SlidingWindowFilter::fit_newest_pose(const FilterFrame& frame) {
   std::vector<KnownLandmark> known;
   for (const LandmarkObservation& o : frame.observations) {
     const auto found = index_.find(o.landmark);
-    if (found == index_.end() || !has_right(o.z)) continue;
-    known.push_back({points_[static_cast<std::size_t>(found->second)], o.z, o.information});
+    if (found == index_.end() || !has_right(o.pixel)) continue;
+    known.push_back({points_[static_cast<std::size_t>(found->second)], o.pixel, o.information});
   }
   if (known.size() < 3 && !frame.motion) return;
   Pose& pose = poses_.back();

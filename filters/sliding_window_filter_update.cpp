@@ -39,7 +39,7 @@ SlidingWindowFilter::WhitenedError SlidingWindowFilter::whitened_error(int pose,
   const Vector3 x_c =
       poses_[static_cast<std::size_t>(pose)].T_c_l * points_[static_cast<std::size_t>(observation.landmark)];
   if (!in_front_of_camera(x_c)) return {};
-  const Vector3 r = observation.z - rig_.project(x_c);
+  const Vector3 r = observation.pixel - rig_.project(x_c);
   if (has_right(r)) return {r.dot(observation.information * r), 3};
   return {r.head<2>().dot(observation.information.topLeftCorner<2, 2>() * r.head<2>()), 2};
 }
@@ -54,7 +54,7 @@ SlidingWindowFilter::ObservationTerm SlidingWindowFilter::linearise(int pose,
   if (!in_front_of_camera(x_c) || !in_front_of_camera(x_lin)) return term;
 
   term.valid = true;
-  term.r = observation.z - rig_.project(x_c);
+  term.r = observation.pixel - rig_.project(x_c);
   Matrix3 J = rig_.project_jacobian(x_lin);
   term.information = observation.information;
   const int rows = has_right(term.r) ? 3 : 2;

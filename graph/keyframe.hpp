@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "geometry/se3.hpp"
 #include "graph/ids.hpp"
 
@@ -13,8 +14,8 @@ namespace twofold {
 /// That keyframe V_i sees point y_k, and its measurement z_ik  (thesis 6.2.2).
 struct Observation {
   PointId point = kNoPoint;
-  Eigen::Vector3f z{0, 0, 0};  ///< (u_l, v_l, u_r) level-0 pixels; u_r is NaN without right-image information
-  std::uint8_t level = 0;      ///< pyramid level it was measured on: standard deviation grows with 2^level
+  StereoPixelF pixel{0, 0, 0};
+  std::uint8_t level = 0;  ///< pyramid level it was measured on: standard deviation grows with 2^level
 };
 
 /// Relative edge E_ij of the SLAM graph, kept by both its keyframes  (6.2.2).

@@ -12,10 +12,10 @@ std::shared_ptr<const ObservationList> take_observations(EntryReader& in) {
   for (std::size_t n = 0; n < list->size(); ++n) {
     Observation& observation = (*list)[n];
     observation.point = PointId{in.u32()};
-    for (int i = 0; i < 3; ++i) observation.z[i] = in.number<float>();
+    for (int i = 0; i < 3; ++i) observation.pixel[i] = in.number<float>();
     observation.level = in.small(kLevels, "pyramid level");
-    if (!std::isfinite(observation.z.x()) || !std::isfinite(observation.z.y()) ||
-        std::isinf(observation.z.z())) {
+    if (!std::isfinite(observation.pixel.x()) || !std::isfinite(observation.pixel.y()) ||
+        std::isinf(observation.pixel.z())) {
       throw MalformedBytes("holds a measurement that is not finite");
     }
     if (n > 0 && !((*list)[n - 1].point < observation.point))
@@ -118,7 +118,7 @@ PlaceAppearance take_place(EntryReader& in, const Rig& rig) {
   constexpr std::size_t kBytes = 3 * 4 + 1 + 4 + sizeof(BinaryDescriptor);
   PlaceAppearance place;
   place.corners.resize(in.count(kBytes));
-  if (rig.kind != SensorKind::kMono) place.z.reserve(place.corners.size());
+  if (rig.kind != SensorKind::kMono) place.pixels.reserve(place.corners.size());
   for (DescribedCorner& corner : place.corners) {
     for (int i = 0; i < 2; ++i) corner.uv[i] = in.number<float>();
     const auto u_r = in.number<float>();
@@ -130,7 +130,7 @@ PlaceAppearance take_place(EntryReader& in, const Rig& rig) {
     if (!inside) throw MalformedBytes("holds a corner outside of the image");
     if (!std::isfinite(corner.angle) || std::isinf(u_r))
       throw MalformedBytes("holds a number that is not finite");
-    if (rig.kind != SensorKind::kMono) place.z.emplace_back(corner.uv.x(), corner.uv.y(), u_r);
+    if (rig.kind != SensorKind::kMono) place.pixels.emplace_back(corner.uv.x(), corner.uv.y(), u_r);
   }
   return place;
 }

@@ -29,7 +29,7 @@ struct KeyframeEntry {
 [[nodiscard]] KeyframeEntry take_keyframe_1(EntryReader& in, KeyframeId id);
 /// A culled point, of which nothing follows, if it has no anchor.
 [[nodiscard]] MapPoint take_point(EntryReader& in);
-/// Corners are in the image; z stays empty for a monocular rig.
+/// Corners are in the image; their pixels stay empty for a monocular rig.
 [[nodiscard]] PlaceAppearance take_place(EntryReader& in, const Rig& rig);
 
 }  // namespace twofold::map_format

@@ -188,7 +188,7 @@ void put_keyframe(EntryWriter& out, const Keyframe& keyframe) {
   out.put(static_cast<std::uint32_t>(keyframe.observations->size()));
   for (const Observation& observation : *keyframe.observations) {
     out.put(observation.point);
-    out.put_vector(observation.z);
+    out.put_vector(observation.pixel);
     out.put(observation.level);
   }
   put_edges(out, keyframe);
@@ -242,7 +242,7 @@ void put_place(EntryWriter& out, KeyframeId id, const PlaceAppearance& place) {
   for (std::size_t n = 0; n < place.corners.size(); ++n) {
     const DescribedCorner& corner = place.corners[n];
     out.put_vector(corner.uv);
-    out.put(n < place.z.size() ? place.z[n].z() : std::numeric_limits<float>::quiet_NaN());
+    out.put(n < place.pixels.size() ? place.pixels[n].z() : std::numeric_limits<float>::quiet_NaN());
     out.put(corner.level);
     out.put(corner.angle);
     out.put_bytes(

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "imaging/described_corner.hpp"
 
 namespace twofold {
@@ -10,9 +11,9 @@ namespace twofold {
 /// which follow from the descriptors.
 struct PlaceAppearance {
   std::vector<DescribedCorner> corners;
-  /// In step with corners: (u_l, v_l, u_r) level-0 pixels; u_r is Rig::kNoRight where no depth is known.
-  /// Empty as stored for a monocular rig (loopclosure/depth_regression.hpp fills it).
-  std::vector<Eigen::Vector3f> z;
+  /// In step with corners; without a right coordinate where no depth is known. Empty as stored for a
+  /// monocular rig (loopclosure/depth_regression.hpp fills it).
+  std::vector<StereoPixelF> pixels;
 };
 
 }  // namespace twofold

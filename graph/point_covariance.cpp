@@ -13,7 +13,7 @@ std::optional<Matrix3> point_covariance(const Rig& rig, const GraphSnapshot& gra
     const Vector3 x_k = keyframe.T_k_w * x_w;
     if (seen == nullptr || !in_front_of_camera(x_k)) continue;
     const Matrix3 J = rig.project_jacobian(x_k) * keyframe.T_k_w.rotation();
-    const Vector3 weight = rig.information(seen->z, seen->level).cast<double>();
+    const Vector3 weight = rig.information(seen->pixel, seen->level).cast<double>();
     information += J.transpose() * weight.asDiagonal() * J;
   }
   const Eigen::LDLT<Matrix3> factor(information);

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 #include "imaging/image_pyramid.hpp"
@@ -26,9 +27,9 @@ struct GuidedSearchOptions {
 };
 
 struct PointMatch {
-  Vector3 z{0, 0, 0};  ///< (u_l, v_l, u_r) level-0 pixels; u_r is Rig::kNoRight if it was not found
-  int level = 0;       ///< pyramid level of the match: its noise is Rig::noise of that level
-  float rms = 0;       ///< remaining difference [grey]
+  StereoPixel pixel{0, 0, 0};  ///< without a right coordinate if it was not found in the right image
+  int level = 0;               ///< pyramid level of the match: its noise is Rig::noise of that level
+  float rms = 0;               ///< remaining difference [grey]
 };
 
 /// Looks for a known point in a new view: warps its patch to the view, compares it at every pixel within a

@@ -9,7 +9,7 @@ SE3 fit_pose_to_corners(const Rig& rig, const PlaceAppearance& b, const std::vec
   std::vector<MotionObservation> observations;
   observations.reserve(matches.size());
   for (const CornerMatch& match : matches) {
-    const Eigen::Vector3f& z_b = b.z[static_cast<std::size_t>(match.b)];
+    const StereoPixelF& z_b = b.pixels[static_cast<std::size_t>(match.b)];
     const int level = b.corners[static_cast<std::size_t>(match.b)].level;
     observations.push_back(observe_point(rig, match.x_a, z_b, level));
   }

@@ -20,7 +20,7 @@ struct CornerMatch {
 };
 
 /// Whether a corner's depth is known and it is near enough to tell about translation.
-[[nodiscard]] inline bool has_depth(const Eigen::Vector3f& z, double min_disparity_px) {
+[[nodiscard]] inline bool has_depth(const StereoPixelF& z, double min_disparity_px) {
   return z.x() - z.z() > min_disparity_px;  // false for NaN
 }
 
@@ -31,7 +31,7 @@ struct CornerMatch {
 
 /// Error of a measurement in units of the pixels of its level, squared; infinite behind the camera.
 /// @param per_pixel  per_squared_pixel of its level
-[[nodiscard]] inline double squared_error(const Rig& rig, const Vector3& x, const Eigen::Vector3f& z,
+[[nodiscard]] inline double squared_error(const Rig& rig, const Vector3& x, const StereoPixelF& z,
                                           double per_pixel) {
   if (!in_front_of_camera(x)) return std::numeric_limits<double>::infinity();
   const Vector3 e = rig.project(x) - z.cast<double>();

@@ -51,11 +51,11 @@ std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
 }
 
 void DepthRegression::fill(PlaceAppearance& view, double baseline) const {
-  view.z.clear();
+  view.pixels.clear();
   for (const DescribedCorner& corner : view.corners) {
     const auto depth = depth_at(corner.uv.cast<double>());
     const double u_r = depth ? corner.uv.x() - camera_.fx * baseline / *depth : Rig::kNoRight;
-    view.z.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(u_r));
+    view.pixels.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(u_r));
   }
 }
 

@@ -36,8 +36,8 @@ class DepthRegression {
   /// @return    depth in the map's unit
   [[nodiscard]] std::optional<double> depth_at(const Vector2& uv) const;
 
-  /// view.z as a second camera at `baseline` to the right would have measured it; NaN where the depth is not
-  /// known.
+  /// Sets view.pixels as if a second camera stood at `baseline` to the right; without a right coordinate
+  /// where the depth is not known.
   void fill(PlaceAppearance& view, double baseline) const;
 
  private:

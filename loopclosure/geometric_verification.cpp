@@ -27,8 +27,8 @@ std::vector<PlacePoint> points_of(const Rig& rig, std::span<const PlacedView> pl
     const SE3 T_a_v = place[v].T_v_a.inverse();
     const double turn = turn_of(T_a_v.rotation());
     for (std::size_t i = 0; i < view.corners.size(); ++i) {
-      if (!has_depth(view.z[i], options.min_disparity_px)) continue;
-      const Vector3 x_a = T_a_v * rig.unproject(view.z[i].cast<double>());
+      if (!has_depth(view.pixels[i], options.min_disparity_px)) continue;
+      const Vector3 x_a = T_a_v * rig.unproject(view.pixels[i].cast<double>());
       points.push_back({{static_cast<int>(v), static_cast<int>(i), 0, x_a},
                         &view.corners[i].descriptor,
                         view.corners[i].angle + turn});
@@ -74,7 +74,7 @@ std::vector<CornerMatch> keep_inliers(const Rig& rig, const PlaceAppearance& b,
   for (const CornerMatch& match : matches) {
     const auto j = static_cast<std::size_t>(match.b);
     const Vector3 x_b = T_b_a * match.x_a;
-    Eigen::Vector3f z_b = b.z[j];
+    StereoPixelF z_b = b.pixels[j];
     // A corner without depth in b is judged by its place in the left image alone.
     if (!has_right(z_b) && in_front_of_camera(x_b)) z_b.z() = static_cast<float>(rig.project(x_b).z());
     const double bound = options.max_error_px * options.max_error_px;
@@ -110,7 +110,7 @@ bool well_spread(const Rig& rig, std::span<const PlacedView> place, const PlaceA
 }
 
 bool has_positions(const PlaceAppearance& view) {
-  return view.z.size() == view.corners.size();
+  return view.pixels.size() == view.corners.size();
 }
 
 }  // namespace

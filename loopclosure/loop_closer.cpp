@@ -69,7 +69,7 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
     if (probation_.confirms(seen, graph) && !(one_camera && redundant_.has(seen, refinement_.found(), graph)))
       loop = seen;
   }
-  if (one_camera) view.z.clear();  // the map may change
+  if (one_camera) view.pixels.clear();  // the map may change
   remember(keyframe.id, std::move(view));
   return loop;
 }
@@ -89,7 +89,7 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
   PlaceView view = describer_.describe(images, *vocabulary_);
   if (rig_.kind == SensorKind::kMono) {
     for (const DescribedCorner& corner : view.corners)
-      view.z.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(Rig::kNoRight));
+      view.pixels.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(Rig::kNoRight));
   }
   return only_place(recogniser_.query_anywhere(
                         view.bag, static_cast<std::size_t>(options_.relocalisation_candidates), graph),
@@ -152,7 +152,7 @@ std::optional<double> LoopCloser::scale_of(const Relocalisation& seen) const {
   if (rig_.kind != SensorKind::kMono) return 1.0;
   std::vector<double> ratios;
   for (const MotionObservation& found : refinement_.found()) {
-    const auto depth = found.inlier ? depths_.depth_at(found.z.head<2>().cast<double>()) : std::nullopt;
+    const auto depth = found.inlier ? depths_.depth_at(found.pixel.head<2>().cast<double>()) : std::nullopt;
     if (depth) ratios.push_back(*depth / (seen.T_c_k * found.x_ref).z());
   }
   if (ratios.size() < static_cast<std::size_t>(options_.min_scale_points)) return std::nullopt;

@@ -13,11 +13,11 @@ PlaceView PlaceDescriber::describe(const FrameImages& images, const Vocabulary& 
   describer_.describe(images.left, view.corners);
   view.bag = vocabulary.bag(view.corners);
   if (rig_.kind == SensorKind::kMono) return view;
-  view.z.reserve(view.corners.size());
+  view.pixels.reserve(view.corners.size());
   const GuidedSearchOptions search;
   for (const DescribedCorner& corner : view.corners) {
     const double u_r = right_of_corner(images, rig_, corner.uv.cast<double>(), corner.level, search);
-    view.z.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(u_r));
+    view.pixels.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(u_r));
   }
   return view;
 }

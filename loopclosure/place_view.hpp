@@ -18,7 +18,7 @@ class PlaceDescriber {
   PlaceDescriber(const Rig& rig, const CornerSelectionOptions& options);
 
   /// Selects and describes corners; depth comes from the right image or the depth image (thesis 5.3.1 needs
-  /// nearest neighbours for it, having one camera). A monocular rig leaves z empty.
+  /// nearest neighbours for it, having one camera). A monocular rig leaves the pixels empty.
   [[nodiscard]] PlaceView describe(const FrameImages& images, const Vocabulary& vocabulary);
 
  private:

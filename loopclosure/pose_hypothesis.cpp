@@ -23,10 +23,10 @@ std::vector<CornerMatch> match_descriptors(const Rig& rig, const PlaceAppearance
     if (nearest.best < 0 || nearest.distance > options.max_distance) continue;
     const auto j = static_cast<std::size_t>(nearest.best);
     if (of_b[j].best != static_cast<int>(i)) continue;
-    if (!has_depth(a.z[i], options.min_disparity_px) ||
-        (depth_in_b && !has_depth(b.z[j], options.min_disparity_px)))
+    if (!has_depth(a.pixels[i], options.min_disparity_px) ||
+        (depth_in_b && !has_depth(b.pixels[j], options.min_disparity_px)))
       continue;
-    matches.push_back({0, static_cast<int>(i), nearest.best, rig.unproject(a.z[i].cast<double>())});
+    matches.push_back({0, static_cast<int>(i), nearest.best, rig.unproject(a.pixels[i].cast<double>())});
   }
   return matches;
 }
@@ -40,7 +40,7 @@ std::optional<SE3> pose_by_directions(const Rig& rig, const PlaceAppearance& b,
   for (const CornerMatch& match : matches) {
     bearings_a.push_back(match.x_a / match.x_a.z());
     bearings_b.push_back(
-        rig.camera.unproject(b.z[static_cast<std::size_t>(match.b)].head<2>().cast<double>()));
+        rig.camera.unproject(b.pixels[static_cast<std::size_t>(match.b)].head<2>().cast<double>()));
   }
   RansacOptions ransac;
   ransac.threshold = options.max_error_px / rig.camera.fx;
@@ -76,7 +76,7 @@ std::optional<RansacResult<TwoWaySimilarity>> best_of_all(const SimilarityEstima
 std::optional<SE3> find_pose_hypothesis(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                                         const VerificationOptions& options, VerificationReport& report) {
   const bool depth_in_b = rig.kind != SensorKind::kMono ||
-                          std::any_of(b.z.begin(), b.z.end(),
+                          std::any_of(b.pixels.begin(), b.pixels.end(),
                                       [&](const auto& z) { return has_depth(z, options.min_disparity_px); });
   const std::vector<CornerMatch> matches = match_descriptors(rig, a, b, options, depth_in_b);
   report.matches = static_cast<int>(matches.size());

@@ -53,7 +53,7 @@ void PoseRefinement::search(const GraphSnapshot& graph, KeyframeId place, const 
     const auto match = find_point(images, rig_, *point.appearance, point.psi, T_c_a, options);
     if (!match) continue;
     MotionObservation& found = found_.emplace_back(
-        observe_point(rig_, T_k_w * graph.position(id), match->z.cast<float>(), match->level));
+        observe_point(rig_, T_k_w * graph.position(id), match->pixel.cast<float>(), match->level));
     const Eigen::Vector3f of_pixels = found.information;
     const Eigen::Vector3f left = found.information = information(graph, id, T_c_k * T_k_w, of_pixels);
     known_.push_back(std::min(1.0f, left.x() / of_pixels.x() + left.y() / of_pixels.y()));

@@ -20,7 +20,7 @@ SimilarityEstimator::SimilarityEstimator(const Rig& rig, const PlaceAppearance& 
   for (const CornerMatch& match : matches) {
     const auto i = static_cast<std::size_t>(match.corner);
     const auto j = static_cast<std::size_t>(match.b);
-    pairs_.push_back({match.x_a, rig.unproject(b.z[j].cast<double>()), a.z[i], b.z[j],
+    pairs_.push_back({match.x_a, rig.unproject(b.pixels[j].cast<double>()), a.pixels[i], b.pixels[j],
                       per_squared_pixel(a.corners[i].level), per_squared_pixel(b.corners[j].level),
                       double{b.corners[j].angle} - a.corners[i].angle});
   }

@@ -53,16 +53,16 @@ class SimilarityEstimator {
   [[nodiscard]] double squared_residual(const Model& model, int i) const {
     const Pair& pair = pairs_[static_cast<std::size_t>(i)];
     if (!nearly_same_direction(pair.turn, model.turn, max_turn_)) return 2 * outlier_;
-    const double in_b = squared_error(rig_, model.to_b(pair.x_a), pair.z_b, pair.per_pixel_b);
+    const double in_b = squared_error(rig_, model.to_b(pair.x_a), pair.pixel_b, pair.per_pixel_b);
     if (in_b > outlier_) return in_b;
-    return std::max(squared_error(rig_, model.to_a(pair.x_b), pair.z_a, pair.per_pixel_a), in_b);
+    return std::max(squared_error(rig_, model.to_a(pair.x_b), pair.pixel_a, pair.per_pixel_a), in_b);
   }
 
  private:
   /// Of a match, both points, each in the frame of its own view, and both measurements.
   struct Pair {
     Vector3 x_a, x_b;
-    Eigen::Vector3f z_a, z_b;
+    StereoPixelF pixel_a, pixel_b;
     double per_pixel_a = 1, per_pixel_b = 1;
     double turn = 0;  ///< of the corner, from a to b
   };

@@ -7,7 +7,7 @@ namespace twofold {
 namespace {
 
 bool measured(const Observation& observation) {
-  return std::isfinite(observation.z.x()) && std::isfinite(observation.z.y());
+  return std::isfinite(observation.pixel.x()) && std::isfinite(observation.pixel.y());
 }
 
 const Observation* observation_of(const KeyframeProposal& proposal, PointId point) {

@@ -120,10 +120,10 @@ void MetricLoopCloser::search_candidates(const GraphSnapshot& graph, const Frame
     if (!match) continue;
     Observation observation;
     observation.point = candidate.id;
-    observation.z = match->z.cast<float>();
+    observation.pixel = match->pixel.cast<float>();
     observation.level = static_cast<std::uint8_t>(match->level);
     found_.push_back(observation);
-    motion_.push_back(observe_point(rig_, candidate.x_w, observation.z, match->level));
+    motion_.push_back(observe_point(rig_, candidate.x_w, observation.pixel, match->level));
   }
 }
 
@@ -143,7 +143,7 @@ void MetricLoopCloser::prune(const SE3& T_loop_w) {
   for (std::size_t n = 0; n < found_.size(); ++n) {
     const Vector3 x = T_loop_w * motion_[n].x_ref;
     if (!in_front_of_camera(x)) continue;
-    Vector3 error = (rig_.project(x) - motion_[n].z.cast<double>()) / std::ldexp(1.0, found_[n].level);
+    Vector3 error = (rig_.project(x) - motion_[n].pixel.cast<double>()) / std::ldexp(1.0, found_[n].level);
     if (motion_[n].information.z() == 0) error.z() = 0;
     if (error.cwiseAbs().maxCoeff() > options_.max_error_px) continue;
     found_[kept] = found_[n];
@@ -159,8 +159,8 @@ void MetricLoopCloser::prune(const SE3& T_loop_w) {
 bool MetricLoopCloser::well_spread(const std::vector<std::size_t>& matches) const {
   int left = 0, upper = 0;
   for (const std::size_t n : matches) {
-    left += found_[n].z.x() < 0.5F * static_cast<float>(rig_.camera.width) ? 1 : 0;
-    upper += found_[n].z.y() < 0.5F * static_cast<float>(rig_.camera.height) ? 1 : 0;
+    left += found_[n].pixel.x() < 0.5F * static_cast<float>(rig_.camera.width) ? 1 : 0;
+    upper += found_[n].pixel.y() < 0.5F * static_cast<float>(rig_.camera.height) ? 1 : 0;
   }
   const int count = static_cast<int>(matches.size());
   return 2 * std::min({left, count - left, upper, count - upper}) >= min_matches_;

@@ -150,8 +150,8 @@ void WindowBuilder::add_observation(const Observation& observation, int pose) {
   auto& entry = problem_.observations[static_cast<std::size_t>(problem_.points[p].first_observation) +
                                       static_cast<std::size_t>(filled_[p]++)];
   entry.pose = pose;
-  entry.z = observation.z;
-  entry.information = problem_.rig.information(observation.z, observation.level);
+  entry.pixel = observation.pixel;
+  entry.information = problem_.rig.information(observation.pixel, observation.level);
 }
 
 void WindowBuilder::collect_constraints(const GraphSnapshot& graph, const DoubleWindow& window) {

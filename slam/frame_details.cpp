@@ -28,8 +28,8 @@ std::size_t FrameDetails::points(std::span<MeasuredPoint> found) const {
     const Vector2 expected = rig.camera.project(T_c_ref * seen.x_ref);
     const Vector2 predicted = rig.camera.project(report.searched.T_c_ref * seen.x_ref);
     const double level_size = std::sqrt(level_0 / seen.information[0]);  // a pixel of its pyramid level
-    found[i] = {seen.z[0],
-                seen.z[1],
+    found[i] = {seen.pixel[0],
+                seen.pixel[1],
                 static_cast<float>(expected.x()),
                 static_cast<float>(expected.y()),
                 seen.inlier ? 1U : 0U,

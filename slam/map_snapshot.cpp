@@ -168,7 +168,7 @@ std::size_t MapSnapshot::memory_bytes() const {
     bytes += shared_list_bytes(*keyframe.observations) + shared_list_bytes(*keyframe.edges);
     if (const PlaceAppearance* place = map.places.find(keyframe.id)) {
       bytes += block_bytes<PlaceAppearance>(1) + block_bytes<DescribedCorner>(place->corners.capacity()) +
-               block_bytes<Eigen::Vector3f>(place->z.capacity());
+               block_bytes<StereoPixelF>(place->pixels.capacity());
     }
   });
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {

@@ -61,7 +61,7 @@ std::vector<StereoFeature> find_stereo_features(const FrameImages& images, const
     StereoFeature feature;
     if (!cut_patch(image, corner.u, corner.v, feature.patch)) continue;
     const double u_r = right_from_row(images, rig, corner.u, corner.v, 0, options.search);
-    feature.z = Vector3(corner.u, corner.v, u_r);
+    feature.pixel = Vector3(corner.u, corner.v, u_r);
     feature.score = corner.score;
     if (!(corner.u - u_r >= options.min_disparity_px)) continue;  // also when there is none
     features.push_back(feature);
@@ -69,7 +69,7 @@ std::vector<StereoFeature> find_stereo_features(const FrameImages& images, const
   return features;
 }
 
-Matrix3 stereo_covariance(const Rig& rig, const Vector3& z, double sigma_px) {
+Matrix3 stereo_covariance(const Rig& rig, const StereoPixel& z, double sigma_px) {
   const Matrix3 J = rig.project_jacobian(rig.unproject(z)).inverse();
   return sigma_px * sigma_px * J * J.transpose();
 }
@@ -83,7 +83,7 @@ std::vector<FeatureMatch> match_features(const std::vector<StereoFeature>& previ
   std::vector<Best> forward(previous.size()), backward(current.size());
   for (std::size_t p = 0; p < previous.size(); ++p) {
     for (std::size_t c = 0; c < current.size(); ++c) {
-      const Vector2 move = current[c].z.head<2>() - previous[p].z.head<2>();
+      const Vector2 move = current[c].pixel.head<2>() - previous[p].pixel.head<2>();
       if (move.cwiseAbs().maxCoeff() > reach_px) continue;
       const int cost =
           sum_of_differences(previous[p].patch, current[c].patch, previous_mean[p] - current_mean[c]);
@@ -108,8 +108,8 @@ std::vector<FeatureMatch> consistent_feature_matches(const std::vector<StereoFea
                                                      const StructureOptions& options) {
   std::vector<PointMatch3d> points;
   for (const FeatureMatch& match : matches) {
-    const Vector3& z_0 = previous[static_cast<std::size_t>(match.previous)].z;
-    const Vector3& z_1 = current[static_cast<std::size_t>(match.current)].z;
+    const StereoPixel& z_0 = previous[static_cast<std::size_t>(match.previous)].pixel;
+    const StereoPixel& z_1 = current[static_cast<std::size_t>(match.current)].pixel;
     const double sigma = std::hypot(options.sigma_px, kWholePixelSigma);
     points.push_back({rig.unproject(z_0), rig.unproject(z_1), stereo_covariance(rig, z_0, sigma),
                       stereo_covariance(rig, z_1, sigma)});

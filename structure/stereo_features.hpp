@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "geometry/consistent_matches.hpp"
 #include "imaging/image_pyramid.hpp"
@@ -12,7 +13,7 @@ namespace twofold {
 
 /// A corner of the left image found again in the right one.
 struct StereoFeature {
-  Vector3 z;  ///< (u_l, v_l, u_r) [px]; u_l, v_l whole pixels
+  StereoPixel pixel;  ///< u_l, v_l whole
   Patch patch;
   float score = 0;  ///< of the corner
 };
@@ -23,7 +24,7 @@ struct StereoFeature {
 
 /// Covariance in the camera's frame of a point from its stereo measurement, sigma_px on every component
 /// [m^2].
-[[nodiscard]] Matrix3 stereo_covariance(const Rig& rig, const Vector3& z, double sigma_px);
+[[nodiscard]] Matrix3 stereo_covariance(const Rig& rig, const StereoPixel& z, double sigma_px);
 
 struct FeatureMatch {
   int previous = 0, current = 0;  ///< indices into the two frames' features

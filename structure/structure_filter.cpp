@@ -22,7 +22,7 @@ class Occupancy {
         taken_(static_cast<std::size_t>(columns_ * (camera.height / cell_px + 1))) {}
 
   /// False when the cell was taken already.
-  bool take(const Vector3& z) {
+  bool take(const StereoPixel& z) {
     const int i = static_cast<int>(z.y()) / cell_ * columns_ + static_cast<int>(z.x()) / cell_;
     const auto cell = static_cast<std::size_t>(i);
     if (taken_[cell]) return false;
@@ -90,8 +90,8 @@ std::optional<SE3> StructureFilter::estimate_motion(const std::vector<StereoFeat
   std::vector<MotionObservation> observations;
   std::vector<Vector3> x_previous, x_current;
   for (const FeatureMatch& match : consistent) {
-    const Vector3& z = current[static_cast<std::size_t>(match.current)].z;
-    x_previous.push_back(rig_.unproject(previous_[static_cast<std::size_t>(match.previous)].z));
+    const StereoPixel& z = current[static_cast<std::size_t>(match.current)].pixel;
+    x_previous.push_back(rig_.unproject(previous_[static_cast<std::size_t>(match.previous)].pixel));
     x_current.push_back(rig_.unproject(z));
     observations.push_back(observe_point(corner_rig, x_previous.back(), z.cast<float>(), 0));
   }
@@ -113,7 +113,7 @@ std::vector<SurfaceTrack> StructureFilter::measure_tracks(const SE3& T_c_w) cons
     const auto z = measure_track(track, images_, rig_, T_a_w * *x_w, T_c_w * T_a_w.inverse(), options_);
     if (!z) continue;
     found.push_back(track);
-    found.back().z = *z;
+    found.back().pixel = *z;
   }
   return found;
 }
@@ -128,7 +128,7 @@ void StructureFilter::start_filter(const SE3& T_c_w) {
 
 void StructureFilter::start_tracks(const std::vector<StereoFeature>& features, StructureFrame& report) {
   Occupancy occupancy(rig_.camera, options_.cell_px);
-  for (const SurfaceTrack& track : tracks_) occupancy.take(track.z);
+  for (const SurfaceTrack& track : tracks_) occupancy.take(track.pixel);
   std::vector<const StereoFeature*> best;
   best.reserve(features.size());
   for (const StereoFeature& feature : features) best.push_back(&feature);
@@ -137,8 +137,8 @@ void StructureFilter::start_tracks(const std::vector<StereoFeature>& features, S
   const auto frame = static_cast<std::int64_t>(frames_.size()) - 1;
   for (const StereoFeature* feature : best) {
     if (static_cast<int>(tracks_.size()) >= options_.features) break;
-    if (!occupancy.take(feature->z)) continue;
-    auto track = start_track(images_, feature->z, options_);
+    if (!occupancy.take(feature->pixel)) continue;
+    auto track = start_track(images_, feature->pixel, options_);
     if (!track) continue;
     track->id = next_id_++;
     track->anchor_frame = frame;
@@ -158,7 +158,8 @@ void StructureFilter::update(const StructureFrame& report, int found_again) {
   FilterFrame frame;
   frame.T_c_w_start = report.T_c_w;
   const Matrix3 information = Matrix3::Identity() / (options_.sigma_px * options_.sigma_px);
-  for (const SurfaceTrack& track : tracks_) frame.observations.push_back({track.id, track.z, information});
+  for (const SurfaceTrack& track : tracks_)
+    frame.observations.push_back({track.id, track.pixel, information});
   filter_->add(frame);
   for (int i = 0; i < options_.refinements && found_again > 0; ++i) {
     filter_->optimise(1);
@@ -170,8 +171,8 @@ void StructureFilter::update(const StructureFrame& report, int found_again) {
       const SE3& T_a_w = anchors_.at(track.anchor_frame);
       const SE3 T_c_a = filter_->newest_T_c_w() * T_a_w.inverse();
       const auto z = measure_track(track, images_, rig_, T_a_w * *x_w, T_c_a, options_);
-      if (!z || has_right(*z) != has_right(track.z)) continue;
-      track.z = *z;
+      if (!z || has_right(*z) != has_right(track.pixel)) continue;
+      track.pixel = *z;
       filter_->set_measurement(newest, track.id, *z);
     }
   }
@@ -185,7 +186,7 @@ void StructureFilter::give_up_outliers() {
     if (!x_w) return true;
     const Vector3 x_c = T_c_w * *x_w;
     if (!in_front_of_camera(x_c)) return true;
-    const Vector3 r = track.z - rig_.project(x_c);
+    const Vector3 r = track.pixel - rig_.project(x_c);
     return r.head<2>().norm() > options_.max_residual_px || std::abs(r.z()) > options_.max_residual_px;
   };
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), is_off), tracks_.end());

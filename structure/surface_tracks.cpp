@@ -40,7 +40,7 @@ float deviation_of(const SurfacePatch& patch) {
 
 }  // namespace
 
-std::optional<SurfaceTrack> start_track(const FrameImages& images, const Vector3& z_start,
+std::optional<SurfaceTrack> start_track(const FrameImages& images, const StereoPixel& z_start,
                                         const StructureOptions& options) {
   SurfaceTrack track;
   if (!cut_surface_patch(images.left.level(0), z_start.head<2>(), track.patch)) return std::nullopt;
@@ -50,7 +50,7 @@ std::optional<SurfaceTrack> start_track(const FrameImages& images, const Vector3
   const Matrix3 H = shifted(Matrix3::Identity(), Vector2(z_start.z() - z_start.x(), 0));
   const auto right = align_surface_patch(track.patch, H, images.right, along_row);
   if (!right || !alike(track, right->rms, options)) return std::nullopt;
-  track.z = Vector3(z_start.x(), z_start.y(), right->uv.x());
+  track.pixel = Vector3(z_start.x(), z_start.y(), right->uv.x());
   return track;
 }
 
@@ -61,7 +61,7 @@ std::optional<Vector3> measure_track(const SurfaceTrack& track, const FrameImage
   const auto left = align_surface_patch(track.patch, *H_left, images.left, {});
   if (!left || !alike(track, left->rms, options)) return std::nullopt;
 
-  Vector3 z(left->uv.x(), left->uv.y(), Rig::kNoRight);
+  StereoPixel z(left->uv.x(), left->uv.y(), Rig::kNoRight);
   const SE3 T_right_c(SO3(), Vector3(-rig.baseline, 0, 0));
   const auto H_right = warp(track, rig.camera, x_a, T_right_c * T_c_a, options.patch);
   if (!H_right) return z;

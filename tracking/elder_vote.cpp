@@ -67,7 +67,7 @@ MotionOnlyResult ElderVote::settle_elders(const MotionOnlyResult& by_elders,
   const ObservationModel model(rig_);
   chi2_.clear();
   for (const MotionObservation& o : elders_) {
-    if (o.inlier) chi2_.push_back(model.chi2(by_elders.T_c_ref * o.x_ref, o.z, o.information));
+    if (o.inlier) chi2_.push_back(model.chi2(by_elders.T_c_ref * o.x_ref, o.pixel, o.information));
   }
   if (chi2_.empty()) return by_elders;
   const auto middle = chi2_.begin() + static_cast<std::ptrdiff_t>(chi2_.size() / 2);
@@ -106,8 +106,8 @@ double ElderVote::elders_nearer_to(const SE3& T_c_ref, const SE3& T_other) const
   const ObservationModel model(rig_);
   int count = 0;
   for (const MotionObservation& o : elders_) {
-    count +=
-        model.chi2(T_c_ref * o.x_ref, o.z, o.information) < model.chi2(T_other * o.x_ref, o.z, o.information);
+    count += model.chi2(T_c_ref * o.x_ref, o.pixel, o.information) <
+             model.chi2(T_other * o.x_ref, o.pixel, o.information);
   }
   return static_cast<double>(count) / static_cast<double>(elders_.size());
 }

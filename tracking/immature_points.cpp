@@ -9,10 +9,10 @@ namespace twofold {
 void move_to_mid_exposure(const Rig& rig, const RollingShutter& shutter, ImmaturePoint& point) {
   if (shutter.at_rest()) return;
   Observation& seen = point.anchor_observation;
-  const Vector3 x_c = shutter.T_row_c(seen.z.y()).inverse() * from_inverse_depth(point.psi);
+  const Vector3 x_c = shutter.T_row_c(seen.pixel.y()).inverse() * from_inverse_depth(point.psi);
   if (!(x_c.z() > 0)) return;
   point.psi = to_inverse_depth(x_c);
-  seen.z = shutter.at_mid_exposure(rig, seen.z.cast<double>(), x_c).cast<float>();
+  seen.pixel = shutter.at_mid_exposure(rig, seen.pixel.cast<double>(), x_c).cast<float>();
 }
 
 const PendingKeyframe* ImmaturePoints::find_pending(KeyframeId id) const {

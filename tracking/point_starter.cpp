@@ -182,7 +182,8 @@ bool PointStarter::measure(const FrameImages& images, const Corner& corner, Imma
   const double disparity = std::max(uv.x() - u_r, kFarthestDisparity);
   const Vector3 ray = rig_.camera.unproject(uv);
   point.psi = {ray.x(), ray.y(), 1.0 / rig_.depth_from_disparity(disparity)};
-  point.anchor_observation.z = {point.appearance.uv.x(), point.appearance.uv.y(), static_cast<float>(u_r)};
+  point.anchor_observation.pixel = {point.appearance.uv.x(), point.appearance.uv.y(),
+                                    static_cast<float>(u_r)};
   point.anchor_observation.level = corner.level;
   return true;
 }

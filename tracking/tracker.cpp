@@ -177,7 +177,7 @@ void Tracker::remember_frame(const FrameStep& step) {
   last_.points.clear();
   for (std::size_t m = 0; m < search_.matches.size() && last_.points.size() < last_.points.capacity(); ++m) {
     if (!search_.observations[m].inlier) continue;
-    const Vector3& z = search_.matches[m].found.z;
+    const StereoPixel& z = search_.matches[m].found.pixel;
     const SE3 T_row_ref = step.shutter.seen_from(rig_, result.T_c_ref, search_.observations[m].x_ref);
     last_.points.push_back({z.head<2>().cast<float>(), T_row_ref * search_.observations[m].x_ref});
   }

@@ -48,7 +48,7 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
     point.psi = start.structure.psi[n];
     point.appearance = start.first->corners[corner].appearance;
     const Eigen::Vector2f uv = monocular_start_->first_place(*start.first, corner).cast<float>();
-    point.anchor_observation.z = {uv.x(), uv.y(), static_cast<float>(Rig::kNoRight)};
+    point.anchor_observation.pixel = {uv.x(), uv.y(), static_cast<float>(Rig::kNoRight)};
     point.anchor_observation.level = point.appearance.level;
     if (!immature_points_.add(point)) break;
   }

@@ -37,7 +37,7 @@ std::vector<MotionObservation> measurements(const Rig& rig, Draws& draws) {
     s.x_ref = Vector3(4 * n[0] - 2, 3 * n[1] - 1.5, 2 + 6 * n[2]);
     const double f = rig.camera.fx, u = rig.camera.cx + f * s.x_ref.x() / s.x_ref.z();
     const double v = rig.camera.cy + f * s.x_ref.y() / s.x_ref.z();
-    s.z = {rounded(u + f * rig.baseline / s.x_ref.z() + n[3]), rounded(v + n[4]), rounded(u + n[5])};
+    s.pixel = {rounded(u + f * rig.baseline / s.x_ref.z() + n[3]), rounded(v + n[4]), rounded(u + n[5])};
   }
   return seen;
 }

@@ -39,7 +39,7 @@ KeyframeDatabase described(std::uint32_t keyframes, const Rig& rig) {
                    static_cast<float>(rng() % static_cast<unsigned>(rig.camera.height))};
       for (std::uint64_t& bits : corner.descriptor.bits) bits = rng();
       place.corners.push_back(corner);
-      place.z.emplace_back(corner.uv.x(), corner.uv.y(), corner.uv.x() - 10);
+      place.pixels.emplace_back(corner.uv.x(), corner.uv.y(), corner.uv.x() - 10);
     }
     places.set(KeyframeId{k}, std::move(place));
   }

@@ -43,7 +43,7 @@ PoseElimination::Values PoseElimination::start(const WindowProblem& problem) {
     for (int n = 0; n < point.observation_count; ++n) {
       const auto& o = problem.observations[point.first_observation + n];
       if (!((problem.poses[o.pose].T_k_w * p_w).z() > 2 * kSolverMinDepth)) continue;
-      by_pose[o.pose].push_back({static_cast<int>(k), o.z, o.information});
+      by_pose[o.pose].push_back({static_cast<int>(k), o.pixel, o.information});
       seen_[k] = 1;
     }
   }
@@ -71,7 +71,7 @@ double PoseElimination::cost(const WindowSolverOptions& options, const Values& v
     for (int n = begin_[i]; n < begin_[i + 1]; ++n) {
       const Observation& o = observations_[n];
       const Vector3 x = R * x_w[o.point] + values.poses[i].translation();
-      const double chi2 = model_->chi2(x, o.z, o.information);
+      const double chi2 = model_->chi2(x, o.pixel, o.information);
       if (!std::isfinite(chi2)) return std::numeric_limits<double>::infinity();
       sum += kernel.rho(chi2);
     }
@@ -102,7 +102,7 @@ void PoseElimination::linearise_pose(int i, const HuberKernel& kernel, const Val
     const Observation& o = observations_[n];
     const WorldPoint& point = points_[o.point];
     const Vector3 x = R * point.x_w + t;
-    const ObservationTerms terms = model_->linearise(x, o.z, o.information, kernel);
+    const ObservationTerms terms = model_->linearise(x, o.pixel, o.information, kernel);
     const Matrix3 J = R * point.dx_dpsi;
     Matrix3 S;
     S << terms.s00, 0, terms.s02, 0, terms.s11, terms.s12, terms.s02, terms.s12, terms.s22;

@@ -51,7 +51,8 @@ class PoseElimination {
   };
   struct Observation {
     int point;
-    Eigen::Vector3f z, information;
+    StereoPixelF pixel;
+    Eigen::Vector3f information;
   };
   struct PoseBlock {
     Matrix6 H, L;

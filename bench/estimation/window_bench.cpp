@@ -137,10 +137,10 @@ void BM_MotionOnly(benchmark::State& state) {
   for (int n = 0; n < state.range(0); ++n) {
     MotionObservation o;
     o.x_ref = Vector3(2 * uniform(rng), 1.5 * uniform(rng), 5 + 2 * uniform(rng));
-    Vector3 z = rig.project(T_c_ref * o.x_ref) + 0.7 * Vector3(normal(rng), normal(rng), normal(rng));
+    StereoPixel z = rig.project(T_c_ref * o.x_ref) + 0.7 * Vector3(normal(rng), normal(rng), normal(rng));
     if (n % 10 == 0) z += Vector3(20, -15, 20);
     if (n % 4 == 0) o.information.z() = 0;
-    o.z = z.cast<float>();
+    o.pixel = z.cast<float>();
     observations.push_back(o);
   }
   MotionOnlyOptions options;

@@ -70,8 +70,8 @@ struct ResidualStatistics {
     for (const MotionObservation& o : observations) {
       const auto level = static_cast<std::size_t>(std::lround(0.5 * std::log2(finest / o.information.x())));
       if (level >= by_level.size()) continue;
-      const Vector3 error =
-          (rig.project(T_c_ref * o.x_ref) - o.z.cast<double>()) * std::ldexp(1.0, -static_cast<int>(level));
+      const Vector3 error = (rig.project(T_c_ref * o.x_ref) - o.pixel.cast<double>()) *
+                            std::ldexp(1.0, -static_cast<int>(level));
       ++inliers[level][o.inlier ? 1 : 0];
       for (std::size_t k = 0; k < 3; ++k) {
         if (k < 2) by_level[level][k].push_back(std::abs(error[static_cast<int>(k)]));

@@ -75,7 +75,7 @@ void motion_only(benchmark::State& state) {
     const Vector2 uv(std::uniform_real_distribution(20.0, 620.0)(random),
                      std::uniform_real_distribution(20.0, 460.0)(random));
     const Vector3 x = rig().camera.unproject(uv) * std::uniform_real_distribution(1.0, 6.0)(random);
-    Vector3 z = rig().project(T_true * x) + Vector3(noise(random), noise(random), noise(random));
+    StereoPixel z = rig().project(T_true * x) + Vector3(noise(random), noise(random), noise(random));
     if (n % 10 == 0) z += Vector3(15, -9, 0);  // a wrong match
     observations.push_back({x, z.cast<float>(), {1, 1, 1}, true});
   }

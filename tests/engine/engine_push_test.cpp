@@ -148,8 +148,8 @@ TEST_F(EnginePushTest, TheListenerHearsWherePointsWereSearched) {
     if (report.record.state != FrameState::kTracked) return;
     for (const MotionObservation& found : report.measured) {
       const Vector2 predicted = rig.camera.project(report.searched.T_c_ref * found.x_ref);
-      const double level_size = std::sqrt(rig.information(found.z, 0)[0] / found.information[0]);
-      const Vector2 away = found.z.head<2>().cast<double>() - predicted;
+      const double level_size = std::sqrt(rig.information(found.pixel, 0)[0] / found.information[0]);
+      const Vector2 away = found.pixel.head<2>().cast<double>() - predicted;
       constexpr double kRefined = 1.5;  // the place found may be refined by so much
       EXPECT_LE(away.cwiseAbs().maxCoeff(), level_size * (report.searched.radius_px + kRefined));
       ++points;

@@ -34,11 +34,11 @@ Scene make_scene(int count, double noise, double outliers, double missing_right,
     z += noise * Vector3(normal(rng), normal(rng), normal(rng));
     scene.is_outlier.push_back(share(rng) < outliers);
     if (scene.is_outlier.back()) z += Vector3(30 + 30 * uniform(rng), -25 + 20 * uniform(rng), 30);
-    o.z = z.cast<float>();
+    o.pixel = z.cast<float>();
     if (noise > 0) o.information.setConstant(static_cast<float>(1 / (noise * noise)));
     if (share(rng) < missing_right) {
       o.information.z() = 0;
-      o.z.z() = std::nanf("");
+      o.pixel.z() = std::nanf("");
     }
     scene.observations.push_back(o);
   }
@@ -52,7 +52,7 @@ TEST(MotionOnly, APointsMeasurementWeighsAsTheRigsNoiseSays) {
   const MotionObservation fine = observe_point(rig, {1, 2, 3}, z, 0),
                           coarse = observe_point(rig, {1, 2, 3}, z, 2);
   EXPECT_EQ(fine.x_ref, Vector3(1, 2, 3));
-  EXPECT_EQ(fine.z, z);
+  EXPECT_EQ(fine.pixel, z);
   EXPECT_TRUE(fine.inlier);
   EXPECT_TRUE(fine.information.isApprox(Eigen::Vector3f::Constant(1 / 0.49F)));
   EXPECT_TRUE(coarse.information.isApprox(fine.information / 16));
@@ -125,7 +125,7 @@ TEST(MotionOnly, GradientVanishesAndInformationIsTheCurvature) {
     Eigen::VectorXd r(3 * 100);
     for (int n = 0; n < 100; ++n) {
       const auto& o = scene.observations[n];
-      Vector3 e = scene.rig.project(T * o.x_ref) - o.z.cast<double>();
+      Vector3 e = scene.rig.project(T * o.x_ref) - o.pixel.cast<double>();
       if (o.information.z() == 0) e.z() = 0;
       r.segment<3>(3 * n) = o.information.cast<double>().cwiseSqrt().cwiseProduct(e);
     }
@@ -170,7 +170,7 @@ TEST(MotionOnly, PointsBehindTheCameraDoNotPull) {
   for (int n = 0; n < 10; ++n) {
     MotionObservation behind;
     behind.x_ref = Vector3(0.1 * n, 0, -2);
-    behind.z = Eigen::Vector3f(320, 240, 310);
+    behind.pixel = Eigen::Vector3f(320, 240, 310);
     scene.observations.insert(scene.observations.begin() + 5 * n, behind);
   }
   const auto result = optimise_motion(scene.rig, scene.observations, SE3(), {});

@@ -63,7 +63,7 @@ TEST_F(PoseConsensusTest, FindsThePoseAmongDepthsThatErr) {
       Vector3 z_ref = rig_.project(match.x_ref);
       for (int k = 0; k < 3; ++k) {
         z_ref[k] += noise(random_);
-        match.z[k] += static_cast<float>(noise(random_));
+        match.pixel[k] += static_cast<float>(noise(random_));
       }
       match.x_ref = rig_.unproject(z_ref);
     }
@@ -108,7 +108,7 @@ TEST_F(PoseConsensusTest, GoesByMatchesWithDepthInBothFramesAndByAsManyAsThereIs
   EXPECT_FALSE(consensus.find(all, 31));
   all.resize(30);
   for (std::size_t i = 0; i < 5; ++i) all[i].information.z() = 0;
-  for (std::size_t i = 5; i < 10; ++i) all[i].z.z() = all[i].z.x() - 0.4F;
+  for (std::size_t i = 5; i < 10; ++i) all[i].pixel.z() = all[i].pixel.x() - 0.4F;
   EXPECT_TRUE(consensus.find(all, 20));
   EXPECT_FALSE(consensus.find(all, 21));
 }

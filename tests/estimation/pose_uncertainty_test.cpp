@@ -152,8 +152,8 @@ TEST_F(PoseUncertaintyTest, AnUnknownReadoutPushesThePoseAsFarAsItSays) {
   constexpr double kReadout = 0.01;
   make_frame(0, 0);
   for (MotionObservation& o : observations_) {
-    const double row = (o.z.y() + 0.5) / rig_.camera.height - 0.5;
-    o.z = rig_.project(SE3::exp(row * kReadout * velocity) * o.x_ref).cast<float>();
+    const double row = (o.pixel.y() + 0.5) / rig_.camera.height - 0.5;
+    o.pixel = rig_.project(SE3::exp(row * kReadout * velocity) * o.x_ref).cast<float>();
   }
   const MotionOnlyResult motion = solve();
   PoseUncertainty uncertainty(rig_);

@@ -81,7 +81,7 @@ TEST_F(BundleFiles, ReadsLibmvWithDistortion) {
       write("distorted.txt",
             "2 2 4\nP 500 320 240 -0.1 0 0 0 0\n0 0 370 240\n1 0 270 240\n0 1 320 340\n1 1 "
             "220 340\n0 0 0 0 0 0\n0 0 0 -1 0 0\n0.5 0 5\n0 1 5\n");
-  EXPECT_GT(read_bundle(distorted).observations[0].z.x(), 370.04);
+  EXPECT_GT(read_bundle(distorted).observations[0].pixel.x(), 370.04);
 }
 
 TEST_F(BundleFiles, ReadsStereoFolders) {

@@ -128,7 +128,7 @@ Eigen::VectorXd residuals(WindowProblem problem, const Eigen::VectorXd& delta) {
       const auto& o = problem.observations[point.first_observation + n];
       const Vector3 x = problem.poses[o.pose].T_k_w *
                         (problem.poses[point.anchor].T_k_w.inverse() * from_inverse_depth(point.psi));
-      const Vector3 e = problem.rig.project(x) - o.z.cast<double>();
+      const Vector3 e = problem.rig.project(x) - o.pixel.cast<double>();
       for (int c = 0; c < 3; ++c) {
         if (o.information[c] > 0) values.push_back(std::sqrt(o.information[c]) * e[c]);
       }
@@ -181,7 +181,7 @@ TEST_P(OneStep, EqualsTheDenseStepWithNumericalJacobians) {
     ASSERT_EQ(point.first_observation + point.observation_count,
               static_cast<int>(problem.observations.size()));
     auto again = problem.observations.back();
-    again.z += Eigen::Vector3f(2, -1, 2);
+    again.pixel += Eigen::Vector3f(2, -1, 2);
     problem.observations.push_back(again);
     ++point.observation_count;
   }

@@ -184,7 +184,7 @@ TEST(WindowSolver, HoldsPointsAtInfinity) {
     auto& point = problem.points[n];
     for (int m = 0; m < point.observation_count; ++m) {
       auto& o = problem.observations[point.first_observation + m];
-      o.z = problem.rig.project(Vector3(0.1, 0.2, 1) * 1e6).cast<float>() + Eigen::Vector3f(0, 0, 3);
+      o.pixel = problem.rig.project(Vector3(0.1, 0.2, 1) * 1e6).cast<float>() + Eigen::Vector3f(0, 0, 3);
     }
   }
   WindowSolver solver;

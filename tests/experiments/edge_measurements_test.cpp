@@ -48,8 +48,8 @@ class EdgeMeasurementsTest : public testing::Test {
     for (const KeyframeId observer : observers) {
       Observation seen;
       seen.point = id;
-      seen.z = rig_.project(writer_.graph().T_k_w(observer) * x_w).cast<float>();
-      for (int c = 0; c < 3; ++c) seen.z[c] += static_cast<float>(noise(rng));
+      seen.pixel = rig_.project(writer_.graph().T_k_w(observer) * x_w).cast<float>();
+      for (int c = 0; c < 3; ++c) seen.pixel[c] += static_cast<float>(noise(rng));
       writer_.add_observations(observer, std::span(&seen, 1));
     }
   }
@@ -79,8 +79,8 @@ class EdgeMeasurementsTest : public testing::Test {
     for (std::uint32_t n = 0; n < kViews; ++n) {
       for (const Observation& seen : *writer_.graph().keyframe(k(n)).observations) {
         const Vector3 z = rig_.project(poses[n] * writer_.graph().position(seen.point));
-        const Vector3 r = seen.z.cast<double>() - z;
-        cost += 0.5 * r.dot(rig_.information(seen.z, seen.level).cast<double>().cwiseProduct(r));
+        const Vector3 r = seen.pixel.cast<double>() - z;
+        cost += 0.5 * r.dot(rig_.information(seen.pixel, seen.level).cast<double>().cwiseProduct(r));
       }
     }
     return cost;

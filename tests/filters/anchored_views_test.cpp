@@ -102,7 +102,7 @@ TEST_P(AnchoredViewsTest, InformationIsTheCurvatureOfTheCost) {
     view.T_c_a = SE3(SO3::exp(Vector3(0, 0.02, 0)), Vector3(-0.1 * (static_cast<double>(k) + 1), 0, 0.01));
     for (SeenPoint& seen : view.seen) {
       const auto j = static_cast<std::size_t>(seen.point);
-      seen.z = project_inverse_depth(start.views.rig, view.T_c_a, start.views.points[j].psi)->z_hat;
+      seen.pixel = project_inverse_depth(start.views.rig, view.T_c_a, start.views.points[j].psi)->z_hat;
     }
   }
   const Eigen::MatrixXd H = start.views.information();

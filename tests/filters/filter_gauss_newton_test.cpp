@@ -34,7 +34,7 @@ TEST(FilterGaussNewton, StereoFilterEqualsBatchInTheLinearLimit) {
     }
     FilterFrame frame;
     for (const auto& o : scene.observations[j]) {
-      frame.observations.push_back({o.point, o.z, Matrix3::Identity() / (noise * noise)});
+      frame.observations.push_back({o.point, o.pixel, Matrix3::Identity() / (noise * noise)});
     }
     batch.step(frame);
   }
@@ -68,7 +68,7 @@ TEST(FilterGaussNewton, FirstEstimatesKeepTheAccuracyOfBatch) {
     for (const auto& seen : scene.observations) {
       FilterFrame frame;
       for (const PointObservation& o : seen)
-        frame.observations.push_back({o.point, o.z, 4 * Matrix3::Identity()});
+        frame.observations.push_back({o.point, o.pixel, 4 * Matrix3::Identity()});
       batch.step(frame);
     }
     batch_error += (batch.newest_T_c_w().inverse().translation() - truth).squaredNorm();

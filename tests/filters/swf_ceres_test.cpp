@@ -25,16 +25,16 @@ PoseBlock to_block(const SE3& T) {
 
 struct Reprojection {
   const Rig& rig;
-  Vector3 z;
+  StereoPixel pixel;
   double sigma;
   template <class T>
   bool operator()(const T* pose, const T* point, T* r) const {
     T x[3];
     ceres::AngleAxisRotatePoint(pose, point, x);
     for (int i = 0; i < 3; ++i) x[i] += pose[3 + i];
-    r[0] = (z.x() - (rig.camera.fx * x[0] / x[2] + rig.camera.cx)) / sigma;
-    r[1] = (z.y() - (rig.camera.fy * x[1] / x[2] + rig.camera.cy)) / sigma;
-    r[2] = (z.z() - (rig.camera.fx * (x[0] - rig.baseline) / x[2] + rig.camera.cx)) / sigma;
+    r[0] = (pixel.x() - (rig.camera.fx * x[0] / x[2] + rig.camera.cx)) / sigma;
+    r[1] = (pixel.y() - (rig.camera.fy * x[1] / x[2] + rig.camera.cy)) / sigma;
+    r[2] = (pixel.z() - (rig.camera.fx * (x[0] - rig.baseline) / x[2] + rig.camera.cx)) / sigma;
     return true;
   }
 };
@@ -79,7 +79,7 @@ TEST(SwfCeres, UnlimitedWindowIsTheBatchSolution) {
     }
     for (const auto& o : scene.frames[j].observations) {
       problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<Reprojection, 3, 6, 3>(new Reprojection{scene.rig, o.z, 0.5}),
+          new ceres::AutoDiffCostFunction<Reprojection, 3, 6, 3>(new Reprojection{scene.rig, o.pixel, 0.5}),
           nullptr, poses[j].data(), points[static_cast<std::size_t>(o.landmark)].data());
     }
   }

@@ -130,7 +130,7 @@ TEST(SwfFilter, HuberThresholdResistsOutliers) {
   std::uniform_real_distribution<double> gross(-40, 40), unit(0, 1);
   for (std::size_t j = 1; j < scene.frames.size(); ++j) {
     for (auto& o : scene.frames[j].observations) {
-      if (unit(rng) < 0.1) o.z += Vector3(gross(rng), gross(rng), gross(rng));
+      if (unit(rng) < 0.1) o.pixel += Vector3(gross(rng), gross(rng), gross(rng));
     }
   }
   double error[2];
@@ -156,11 +156,11 @@ TEST(SwfFilter, HuberThresholdResistsOutliers) {
 TEST(SwfFilter, LeftOnlyMeasurementsContributeAndCannotStartALandmark) {
   SwfScene scene = make_swf_scene({.frames = 6, .points = 40, .seed = 13, .motion = false});
   for (std::size_t j = 1; j < scene.frames.size(); ++j) {
-    for (auto& o : scene.frames[j].observations) o.z.z() = Rig::kNoRight;
+    for (auto& o : scene.frames[j].observations) o.pixel.z() = Rig::kNoRight;
   }
   LandmarkObservation fresh;
   fresh.landmark = 1000;
-  fresh.z = Vector3(300, 200, Rig::kNoRight);
+  fresh.pixel = Vector3(300, 200, Rig::kNoRight);
   scene.frames[3].observations.push_back(fresh);
   SlidingWindowOptions options;
   options.window = 3;
@@ -180,7 +180,7 @@ TEST(SwfFilter, SpreadOfLeftOnlyMeasurementsIsThatOfTheOthers) {
     SwfScene scene =
         make_swf_scene({.frames = 8, .points = 60, .seed = 20U + static_cast<unsigned>(n), .motion = false});
     for (std::size_t j = 1; j < scene.frames.size(); ++j) {
-      for (auto& o : scene.frames[j].observations) o.z.z() = Rig::kNoRight;
+      for (auto& o : scene.frames[j].observations) o.pixel.z() = Rig::kNoRight;
     }
     SlidingWindowOptions options = exact_options(0);
     SlidingWindowFilter filter(scene.rig, options);

@@ -58,7 +58,7 @@ class IteratedEkf {
         J_T << J, -J * hat(x_c);
         H.block<3, 6>(row, 0) = J_T * J_l;
         H.block<3, 3>(row, 6 + 3 * l) = J * T.rotation();
-        innovation.segment<3>(row) = known[i].z - rig_.project(x_c);
+        innovation.segment<3>(row) = known[i].pixel - rig_.project(x_c);
         R.block<3, 3>(row, row) = known[i].information.inverse();
       }
       K = P_ * H.transpose() * (H * P_ * H.transpose() + R).inverse();
@@ -76,7 +76,7 @@ class IteratedEkf {
   }
 
   void augment(const LandmarkObservation& o) {
-    const Vector3 x_c = rig_.unproject(o.z);
+    const Vector3 x_c = rig_.unproject(o.pixel);
     const Matrix3 R_w_c = T.rotation().transpose();
     Matrix36 G_T;
     G_T << -R_w_c, R_w_c * hat(x_c);

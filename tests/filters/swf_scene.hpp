@@ -64,7 +64,7 @@ inline SwfScene make_swf_scene(const SwfSceneOptions& options) {
       if (x_c.z() < 1 || std::abs(x_c.x()) > options.visible) continue;
       LandmarkObservation o;
       o.landmark = i;
-      o.z = scene.rig.project(x_c) + options.noise_px * Vector3(normal(rng), normal(rng), normal(rng));
+      o.pixel = scene.rig.project(x_c) + options.noise_px * Vector3(normal(rng), normal(rng), normal(rng));
       o.information = Matrix3::Identity() / std::max(1e-12, options.noise_px * options.noise_px);
       frame.observations.push_back(o);
     }

@@ -29,7 +29,7 @@ inline Edge edge_to(KeyframeId other, int weight) {
 inline Observation seen(std::uint32_t point, float u = 0) {
   Observation observation;
   observation.point = PointId{point};
-  observation.z = {u, 0, 0};
+  observation.pixel = {u, 0, 0};
   return observation;
 }
 

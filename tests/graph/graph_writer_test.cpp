@@ -49,9 +49,9 @@ TEST(GraphWriter, NewMeasurementsReplaceOldOnesOfTheSamePoint) {
   writer.add_observations(a, std::vector{seen(1, 2), seen(2, 2)});
   const auto& list = *writer.graph().keyframe(a).observations;
   ASSERT_EQ(list.size(), 3U);
-  EXPECT_EQ(list[0].z.x(), 1);
-  EXPECT_EQ(list[1].z.x(), 2);
-  EXPECT_EQ(list[2].z.x(), 2);
+  EXPECT_EQ(list[0].pixel.x(), 1);
+  EXPECT_EQ(list[1].pixel.x(), 2);
+  EXPECT_EQ(list[2].pixel.x(), 2);
   EXPECT_EQ(*writer.graph().point(PointId{2}).observers, ObserverList{a});
 }
 

@@ -16,14 +16,15 @@ inline void expect_same(const KeyframeDatabase& a, const KeyframeDatabase& b) {
     ASSERT_EQ(p == nullptr, q == nullptr) << k;
     if (p == nullptr) continue;
     ASSERT_EQ(p->corners.size(), q->corners.size());
-    ASSERT_EQ(p->z.size(), q->z.size());
+    ASSERT_EQ(p->pixels.size(), q->pixels.size());
     for (std::size_t n = 0; n < p->corners.size(); ++n) {
       EXPECT_EQ(p->corners[n].uv, q->corners[n].uv);
       EXPECT_EQ(p->corners[n].level, q->corners[n].level);
       EXPECT_EQ(p->corners[n].angle, q->corners[n].angle);
       EXPECT_EQ(p->corners[n].descriptor, q->corners[n].descriptor);
-      EXPECT_EQ(p->z[n].head<2>(), q->z[n].head<2>());
-      EXPECT_TRUE(p->z[n].z() == q->z[n].z() || (std::isnan(p->z[n].z()) && std::isnan(q->z[n].z())));
+      EXPECT_EQ(p->pixels[n].head<2>(), q->pixels[n].head<2>());
+      EXPECT_TRUE(p->pixels[n].z() == q->pixels[n].z() ||
+                  (std::isnan(p->pixels[n].z()) && std::isnan(q->pixels[n].z())));
     }
   }
 }
@@ -58,8 +59,8 @@ inline void expect_same(const SavedMap& a, const SavedMap& b, double rounding = 
       const Observation& o = (*k.observations)[n];
       const Observation& q = (*l.observations)[n];
       EXPECT_EQ(o.point, q.point);
-      EXPECT_EQ(o.z.head<2>(), q.z.head<2>());
-      EXPECT_TRUE(o.z.z() == q.z.z() || (std::isnan(o.z.z()) && std::isnan(q.z.z())));
+      EXPECT_EQ(o.pixel.head<2>(), q.pixel.head<2>());
+      EXPECT_TRUE(o.pixel.z() == q.pixel.z() || (std::isnan(o.pixel.z()) && std::isnan(q.pixel.z())));
       EXPECT_EQ(o.level, q.level);
     }
     ASSERT_EQ(k.edges->size(), l.edges->size());

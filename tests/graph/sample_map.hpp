@@ -88,7 +88,7 @@ inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
       }
       place.corners.push_back(corner);
       const float u_r = n % 3 == 0 ? std::numeric_limits<float>::quiet_NaN() : corner.uv.x() - 20;
-      place.z.emplace_back(corner.uv.x(), corner.uv.y(), u_r);
+      place.pixels.emplace_back(corner.uv.x(), corner.uv.y(), u_r);
     }
     map.places.set(id, std::move(place));
   }

@@ -49,7 +49,7 @@ TEST(EpipolarSearch, FindsPointsOfUnknownDepthWhereTheyAre) {
       const auto match = find_along(view.left, appearance, *stretch, {});
       if (!match) continue;
       ++found;
-      wrong += (match->z.head<2>() - truth).norm() > 1.0 * std::ldexp(1.0, match->level);
+      wrong += (match->pixel.head<2>() - truth).norm() > 1.0 * std::ldexp(1.0, match->level);
     }
     EXPECT_GT(found, 0.6 * inside) << t.transpose();
     EXPECT_LE(wrong, 0.05 * found) << t.transpose();

@@ -85,7 +85,7 @@ class GuidedSearch : public ::testing::TestWithParam<Motion> {
       ++errors.tried;
       const auto match = find_point(second, rig_, start.appearance, start.psi, T_c_a_predicted, {});
       if (!match) continue;
-      add(errors, match->z, truth, match->level);
+      add(errors, match->pixel, truth, match->level);
     }
     return errors;
   }
@@ -164,7 +164,7 @@ TEST_F(GuidedSearch, SurvivesAChangeOfExposure) {
     if (!rig_.camera.contains(truth.head<2>(), 60) || truth.z() < 60) continue;
     ++errors.tried;
     if (const auto match = find_point(second, rig_, start.appearance, start.psi, T_c_a, {})) {
-      add(errors, match->z, truth, match->level);
+      add(errors, match->pixel, truth, match->level);
     }
   }
   EXPECT_GT(errors.found, 0.9 * errors.tried);
@@ -202,7 +202,7 @@ TEST_F(GuidedSearch, FindsInTheLightWhatWasSeenInTheDark) {
       ++errors.tried;
       const GuidedSearchOptions options{.gain = static_cast<float>(gain)};
       if (const auto match = find_point(bright, rig_, start.appearance, start.psi, T_c_a, options))
-        add(errors, match->z, truth, match->level);
+        add(errors, match->pixel, truth, match->level);
     }
   }
   ASSERT_GT(ratios.size(), 200U);

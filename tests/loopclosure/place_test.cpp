@@ -59,7 +59,7 @@ class PlaceTest : public ::testing::TestWithParam<SensorKind> {
 TEST_P(PlaceTest, DescribesManyCornersSpreadOverTheImageWithTheirDepth) {
   const SE3 T_c_w = pose(0.2, {0.3, 0, 0});
   const PlaceView place = view(1, T_c_w);
-  ASSERT_EQ(place.z.size(), place.corners.size());
+  ASSERT_EQ(place.pixels.size(), place.corners.size());
   EXPECT_GT(place.corners.size(), 300U);
   EXPECT_LE(place.corners.size(), 500U);
   std::map<int, int> quadrants;
@@ -68,10 +68,10 @@ TEST_P(PlaceTest, DescribesManyCornersSpreadOverTheImageWithTheirDepth) {
   for (std::size_t i = 0; i < place.corners.size(); ++i) {
     const Vector2 uv = place.corners[i].uv.cast<double>();
     ++quadrants[(uv.x() < 320 ? 0 : 1) + (uv.y() < 240 ? 0 : 2)];
-    if (!std::isfinite(place.z[i].z())) continue;
+    if (!std::isfinite(place.pixels[i].z())) continue;
     ++with_depth;
     const double disparity = rig_.disparity_from_depth(scene.depth(T_c_w, uv));
-    right += std::abs(uv.x() - place.z[i].z() - disparity) < 1.0 ? 1 : 0;
+    right += std::abs(uv.x() - place.pixels[i].z() - disparity) < 1.0 ? 1 : 0;
   }
   for (const auto& [quadrant, count] : quadrants) EXPECT_GT(count, 40) << quadrant;
   EXPECT_GT(with_depth, 150);
@@ -195,7 +195,7 @@ TEST_P(PlaceTest, NeighboursLendTheirCorners) {
   const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5}), T_n_w = pose(0.12, {0.25, 0.1, -0.5});
   PlaceView a = view(1, T_a_w);
   const PlaceView n = view(1, T_n_w), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
-  for (std::size_t i = 0; i < a.corners.size(); i += 2) a.z[i].z() = static_cast<float>(Rig::kNoRight);
+  for (std::size_t i = 0; i < a.corners.size(); i += 2) a.pixels[i].z() = static_cast<float>(Rig::kNoRight);
   VerificationReport alone, together;
   (void)verify(a, b, {}, &alone);
   const std::array<PlacedView, 2> place{{{&a, SE3()}, {&n, T_n_w * T_a_w.inverse()}}};
@@ -220,14 +220,16 @@ class MatchRuleTest : public PlaceTest {
 TEST_P(MatchRuleTest, MatchesHaveDepthInBothViews) {
   const VerificationReport all = report();
   for (PlaceView* side : {&a_, &b_}) {
-    const std::vector<Eigen::Vector3f> kept = side->z;
-    for (std::size_t i = 0; i < side->z.size(); i += 2) side->z[i].z() = static_cast<float>(Rig::kNoRight);
+    const std::vector<StereoPixelF> kept = side->pixels;
+    for (std::size_t i = 0; i < side->pixels.size(); i += 2)
+      side->pixels[i].z() = static_cast<float>(Rig::kNoRight);
     EXPECT_LT(report().matches, 0.7 * all.matches);
-    for (std::size_t i = 0; i < side->z.size(); i += 2) side->z[i].z() = side->z[i].x() - 0.5F;  // far away
+    for (std::size_t i = 0; i < side->pixels.size(); i += 2)
+      side->pixels[i].z() = side->pixels[i].x() - 0.5F;  // far away
     EXPECT_LT(report().matches, 0.7 * all.matches);
     const bool of_place = side == &a_;
     EXPECT_LT(report().guided, (of_place ? 0.7 : 1.1) * all.guided);
-    side->z = kept;
+    side->pixels = kept;
   }
 }
 
@@ -265,7 +267,7 @@ TEST_P(MatchRuleTest, ACornerIsMatchedOnce) {
 /// Points of b at twice their depth: no motion keeps lengths, although each of them is where it was in the
 /// left image.
 TEST_P(MatchRuleTest, ATriangleOfAnotherSizeIsNoHypothesis) {
-  for (Eigen::Vector3f& z : b_.z) z.z() = z.x() - 0.5F * (z.x() - z.z());
+  for (StereoPixelF& z : b_.pixels) z.z() = z.x() - 0.5F * (z.x() - z.z());
   VerificationOptions anything;
   anything.max_stretch = 0.9;
   anything.ransac_error_px = 60;
@@ -288,17 +290,17 @@ TEST_P(MatchRuleTest, GuidedMatchesLookAlikeAndAreTurnedAlike) {
 /// Depths of half of b's corners are unknown: where they are in the left image is what speaks for them.
 TEST_P(MatchRuleTest, CornersWithoutDepthCountByTheirPlaceInTheImage) {
   const int all = report().inliers;
-  for (std::size_t j = 0; j < b_.z.size(); j += 2) b_.z[j].z() = static_cast<float>(Rig::kNoRight);
+  for (std::size_t j = 0; j < b_.pixels.size(); j += 2) b_.pixels[j].z() = static_cast<float>(Rig::kNoRight);
   EXPECT_GT(report().inliers, 0.9 * all);
 }
 
 TEST_P(MatchRuleTest, AViewWhoseCornersHaveNoPositionsIsNoPlace) {
   ASSERT_TRUE(verify(a_, b_));
   for (PlaceView* side : {&a_, &b_}) {
-    const std::vector<Eigen::Vector3f> kept = side->z;
-    side->z.pop_back();
+    const std::vector<StereoPixelF> kept = side->pixels;
+    side->pixels.pop_back();
     EXPECT_FALSE(verify(a_, b_));
-    side->z = kept;
+    side->pixels = kept;
   }
   EXPECT_FALSE(verify_place(rig_, {}, b_, {}));
 }
@@ -307,7 +309,7 @@ TEST_P(MatchRuleTest, AViewWhoseCornersHaveNoPositionsIsNoPlace) {
 /// that a sixth must speak for it.
 TEST_P(MatchRuleTest, FiveDirectionsAloneAreNoHypothesis) {
   PlaceView b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
-  for (Eigen::Vector3f& z : b.z) z.z() = static_cast<float>(Rig::kNoRight);
+  for (StereoPixelF& z : b.pixels) z.z() = static_cast<float>(Rig::kNoRight);
   rig_.kind = SensorKind::kMono;
   VerificationOptions options;
   options.min_inliers = 4;
@@ -318,7 +320,7 @@ TEST_P(MatchRuleTest, FiveDirectionsAloneAreNoHypothesis) {
     for (std::size_t first = 0; first + count <= b.corners.size(); ++first) {
       const auto from = static_cast<std::ptrdiff_t>(first), to = from + static_cast<std::ptrdiff_t>(count);
       b_.corners.assign(b.corners.begin() + from, b.corners.begin() + to);
-      b_.z.assign(b.z.begin() + from, b.z.begin() + to);
+      b_.pixels.assign(b.pixels.begin() + from, b.pixels.begin() + to);
       (void)verify(a_, b_, options, &report);
       if (report.ransac_inliers == static_cast<int>(count)) break;
     }

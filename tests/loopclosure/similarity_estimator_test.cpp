@@ -30,8 +30,8 @@ class SimilarityEstimatorTest : public ::testing::Test {
     };
     for (int i = 0; i < kMatches; ++i) {
       const Vector3 x_a(within(-1, 1), within(-1, 1), within(2, 4));
-      a_.z.push_back(rig_.project(x_a).cast<float>());
-      b_.z.push_back(rig_.project(T_b_a_ * x_a).cast<float>());
+      a_.pixels.push_back(rig_.project(x_a).cast<float>());
+      b_.pixels.push_back(rig_.project(T_b_a_ * x_a).cast<float>());
       a_.corners.emplace_back().angle = 0.5F;
       b_.corners.emplace_back().angle = 0.5F + static_cast<float>(turn_of(T_b_a_.rotation()));
       matches_.push_back({0, i, i, x_a});
@@ -75,7 +75,7 @@ TEST_F(SimilarityEstimatorTest, MatchesOfARigidSceneAgree) {
 
 TEST_F(SimilarityEstimatorTest, APointThatIsElsewhereAgreesWithNone) {
   const Vector3 x_b = T_b_a_ * matches_[kSpoiled].x_a;
-  b_.z[kSpoiled] = rig_.project(2 * x_b).cast<float>();
+  b_.pixels[kSpoiled] = rig_.project(2 * x_b).cast<float>();
   expect_spoiled_alone();
 }
 
@@ -97,7 +97,7 @@ TEST_F(SimilarityEstimatorTest, ErrorsCountInEitherView) {
   rig_.kind = SensorKind::kMono;
   for (PlaceAppearance* side : {&a_, &b_}) {
     ASSERT_TRUE(is_inlier(kSpoiled));
-    Eigen::Vector3f& z = side->z[kSpoiled];
+    StereoPixelF& z = side->pixels[kSpoiled];
     const float right = std::exchange(z.z(), z.x() - 0.5F * (z.x() - z.z()));
     if (side == &a_) matches_[kSpoiled].x_a = rig_.unproject(z.cast<double>());
     EXPECT_FALSE(is_inlier(kSpoiled));

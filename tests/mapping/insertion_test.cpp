@@ -53,7 +53,7 @@ class InsertionTest : public testing::Test {
     const SE3 T_k_w = proposal_.T_k_ref * writer_.graph().T_k_w(proposal_.reference);
     Observation observation;
     observation.point = id;
-    observation.z = rig_.project(T_k_w * x_w).cast<float>();
+    observation.pixel = rig_.project(T_k_w * x_w).cast<float>();
     proposal_.observations.push_back(observation);
   }
   /// A point that was started in keyframe `anchor` and found again.
@@ -61,7 +61,7 @@ class InsertionTest : public testing::Test {
     const Vector3 x_w(0.1, 0.01 * id, 1);
     const Vector3 x_a = writer_.graph().T_k_w(KeyframeId{anchor}) * x_w;
     Observation at_anchor;
-    at_anchor.z = rig_.project(x_a).cast<float>();
+    at_anchor.pixel = rig_.project(x_a).cast<float>();
     proposal_.new_points.push_back({PointId{id}, KeyframeId{anchor}, to_inverse_depth(x_a), at_anchor, {}});
     see(PointId{id}, x_w);
   }
@@ -81,7 +81,7 @@ TEST_F(InsertionTest, NewPointsJoinWhenTheyWereMeasuredTwiceAndTheirAnchorIsTher
   start(1, 2);
   proposal_.new_points.back().psi.z() = -1;  // behind the camera
   start(2, 2);
-  proposal_.observations.back().z.x() = std::numeric_limits<float>::quiet_NaN();
+  proposal_.observations.back().pixel.x() = std::numeric_limits<float>::quiet_NaN();
   start(3, 2);
   proposal_.observations.pop_back();  // not found again
   start(4, 2);
@@ -97,7 +97,7 @@ TEST_F(InsertionTest, NewPointsJoinWhenTheyWereMeasuredTwiceAndTheirAnchorIsTher
 
 TEST_F(InsertionTest, WhatWasNotMeasuredIsDropped) {
   share(3, {KeyframeId{2}, KeyframeId{3}});
-  proposal_.observations[1].z.y() = std::numeric_limits<float>::quiet_NaN();
+  proposal_.observations[1].pixel.y() = std::numeric_limits<float>::quiet_NaN();
   writer_.cull_point(PointId{2});
   const InsertionReport report = insert();
   EXPECT_EQ(report.observations, 1);

@@ -53,10 +53,10 @@ class MetricLoopTest : public testing::Test {
     const PointSearch search = [&, radius_px](const FrameImages&, PointId id, const MapPoint& point,
                                               const SE3& T_k_a) -> std::optional<PointMatch> {
       PointMatch match;
-      match.z = rig_.project(T_ref_true_ * x_w_[index(id)]);
-      if (wrong > 0 && ++calls % wrong == 0) match.z += Vector3(4, -3, 4);
+      match.pixel = rig_.project(T_ref_true_ * x_w_[index(id)]);
+      if (wrong > 0 && ++calls % wrong == 0) match.pixel += Vector3(4, -3, 4);
       const Vector2 predicted = rig_.camera.project(T_k_a * from_inverse_depth(point.psi));
-      if ((match.z.head<2>() - predicted).norm() > radius_px) return std::nullopt;
+      if ((match.pixel.head<2>() - predicted).norm() > radius_px) return std::nullopt;
       return match;
     };
     return MetricLoopCloser(rig_, options_, search).close(writer_, window_, reference_, FrameImages());
@@ -94,7 +94,7 @@ TEST_F(MetricLoopTest, WrongMatchesArePruned) {
   EXPECT_EQ(report.agreed, report.found - report.found / 4);
   for (const Observation& o : *writer_.graph().keyframe(reference_).observations) {
     const Vector3 z = rig_.project(T_ref_true_ * x_w_[index(o.point)]);
-    EXPECT_LT((z - o.z.cast<double>()).norm(), 0.01);
+    EXPECT_LT((z - o.pixel.cast<double>()).norm(), 0.01);
   }
 }
 
@@ -165,7 +165,7 @@ TEST_F(MetricLoopTest, OnlyWhoSharesEnoughPointsIsConnected) {
   for (std::uint32_t p = 0; p < 19; ++p) {
     Observation observation;
     observation.point = PointId{p};
-    observation.z = rig_.project(writer_.graph().T_k_w(other) * x_w_[p]).cast<float>();
+    observation.pixel = rig_.project(writer_.graph().T_k_w(other) * x_w_[p]).cast<float>();
     writer_.add_observations(other, std::span(&observation, 1));
   }
   select_window();

@@ -29,7 +29,7 @@ inline PointId add_point(GraphWriter& writer, const Rig& rig, const Vector3& x_w
   for (const KeyframeId k : observers) {
     Observation observation;
     observation.point = id;
-    observation.z = rig.project(writer.graph().T_k_w(k) * x_w).cast<float>();
+    observation.pixel = rig.project(writer.graph().T_k_w(k) * x_w).cast<float>();
     writer.add_observations(k, std::span(&observation, 1));
   }
   return id;

@@ -153,7 +153,7 @@ TEST_F(WindowBuilderTest, WrongMeasurementsAreFoundAndBadPointsCulled) {
   const PointId anchor = point({k(7), k(8), k(9)});
   for (const auto& [keyframe, id] : {std::pair(k(9), good), std::pair(k(9), pair), std::pair(k(7), anchor)}) {
     Observation wrong = *find_observation(writer_.graph().keyframe(keyframe), id);
-    wrong.z += Eigen::Vector3f(20, 0, 20);
+    wrong.pixel += Eigen::Vector3f(20, 0, 20);
     writer_.add_observations(keyframe, std::span(&wrong, 1));
   }
   const WindowBuilder builder = build();

@@ -200,7 +200,7 @@ RolledPoints rolled_points(double assumed_readout) {
     const SE3 T_row_a = first.T_row_c(uv.y());
     const Vector3 x_a = T_row_a.inverse() * (rig.camera.unproject(uv) * scene.depth(T_row_a, uv));
     errors.push_back(std::abs(point.psi.z() * x_a.z() - 1));
-    const Vector2 seen = point.anchor_observation.z.head<2>().cast<double>();
+    const Vector2 seen = point.anchor_observation.pixel.head<2>().cast<double>();
     result.anchor_px = std::max(result.anchor_px, (seen - rig.camera.project(x_a)).norm());
   }
   if (!errors.empty()) result.depth_error = median(std::span(errors));

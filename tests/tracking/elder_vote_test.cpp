@@ -86,7 +86,7 @@ TEST_F(ElderVoteTest, WhileTheYoungAreMistrustedElderOnesMustBeWhereTheOthersAre
   ASSERT_TRUE(ask());
   for (std::size_t n = 0; n < 60; ++n) {
     const float shift = n % 4 == 0 ? 1.1F : 0.05F * (static_cast<float>(n % 3) - 1);
-    observations_[n].z += Eigen::Vector3f(shift, 0, shift);
+    observations_[n].pixel += Eigen::Vector3f(shift, 0, shift);
   }
   const auto pose = ask();
   ASSERT_TRUE(pose);

@@ -51,7 +51,7 @@ TEST_F(PointStarterTest, StartsOnePointACellWithTheDepthOfThePair) {
     const Vector3 z = rig_.project(from_inverse_depth(point.psi));
     EXPECT_NEAR(z.x(), point.appearance.uv.x(), 0.01);
     EXPECT_NEAR(z.y(), point.appearance.uv.y(), 0.01);
-    EXPECT_NEAR(z.z(), point.anchor_observation.z.z(), 0.01);
+    EXPECT_NEAR(z.z(), point.anchor_observation.pixel.z(), 0.01);
   }
 }
 

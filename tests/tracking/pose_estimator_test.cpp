@@ -36,14 +36,14 @@ class PoseEstimatorTest : public ::testing::Test {
       const Vector3 x_c = T_c_ref * local_map_.points()[i].x_ref;
       const Vector2 uv = rig_.camera.project(x_c);
       PointMatch match{};
-      match.z = {uv.x(), uv.y(), uv.x() - rig_.camera.fx * rig_.baseline / x_c.z()};
+      match.pixel = {uv.x(), uv.y(), uv.x() - rig_.camera.fx * rig_.baseline / x_c.z()};
       found_.matches.push_back({i, match});
     }
     step_.result.matches = step_.result.searched = count;
   }
   /// Of the first points, seen elsewhere than they should be.
   void displace(int count) {
-    for (int m = 0; m < count; ++m) found_.matches[static_cast<std::size_t>(m)].found.z.y() += 15;
+    for (int m = 0; m < count; ++m) found_.matches[static_cast<std::size_t>(m)].found.pixel.y() += 15;
   }
   LostCause estimate() { return estimator_.estimate({kFirst, SE3()}, step_, found_); }
 
@@ -79,7 +79,8 @@ TEST_F(PoseEstimatorTest, GivesNoPoseWhereTooLittleWasFoundOrTooFewAgree) {
   EXPECT_EQ(estimate(), LostCause::kTooFewCandidates);
   step_.result.candidates = 60;
   find(60, T_true_);
-  for (std::size_t m = 0; m < 60; ++m) found_.matches[m].found.z.y() += static_cast<double>(m * 37 % 60) - 30;
+  for (std::size_t m = 0; m < 60; ++m)
+    found_.matches[m].found.pixel.y() += static_cast<double>(m * 37 % 60) - 30;
   EXPECT_EQ(estimate(), LostCause::kInconsistentMatches);
   EXPECT_NE(step_.result.status, TrackStatus::kTracking);
 }

@@ -148,7 +148,7 @@ void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObser
   for (const MotionObservation& corner : corners) {
     const Vector3 x = T_c_ref * corner.x_ref;
     if (!in_front_of_camera(x)) continue;
-    Vector3 residual = rig_.project(x) - corner.z.cast<double>();
+    Vector3 residual = rig_.project(x) - corner.pixel.cast<double>();
     const Vector3 information = corner.information.cast<double>();
     if (information.z() == 0) residual.z() = 0;  // there is no third component
     const double chi2 = residual.dot(information.cwiseProduct(residual));
@@ -162,7 +162,7 @@ void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObser
     const Vector6 g = weighted * residual;
     equations.H += H;
     equations.g += g;
-    if (regions != nullptr) regions->add(corner.z.head<2>(), H, g);
+    if (regions != nullptr) regions->add(corner.pixel.head<2>(), H, g);
   }
 }
 

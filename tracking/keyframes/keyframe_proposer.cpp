@@ -15,7 +15,7 @@ int occupied_regions(const PinholeCamera& camera, const SearchOutcome& found) {
   std::uint64_t occupied = 0;
   for (std::size_t m = 0; m < found.matches.size(); ++m) {
     if (!found.observations[m].inlier) continue;
-    const Vector3& z = found.matches[m].found.z;
+    const StereoPixel& z = found.matches[m].found.pixel;
     const int column =
         std::clamp(static_cast<int>(z.x() * kRegionColumns / camera.width), 0, kRegionColumns - 1);
     const int row = std::clamp(static_cast<int>(z.y() * kRegionRows / camera.height), 0, kRegionRows - 1);
@@ -72,7 +72,7 @@ void KeyframeProposer::add_observations(const SearchOutcome& found, const LocalM
       id = immature->id;
     }
     const auto level = static_cast<std::uint8_t>(found.matches[m].found.level);
-    proposal.observations.push_back({id, found.observations[m].z, level});
+    proposal.observations.push_back({id, found.observations[m].pixel, level});
   }
   std::sort(proposal.observations.begin(), proposal.observations.end(),
             [](const Observation& a, const Observation& b) { return a.point < b.point; });

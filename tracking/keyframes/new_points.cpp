@@ -25,7 +25,7 @@ void NewPoints::start(const FrameImages& images, KeyframeId anchor, const LocalM
                       const FrameStep& step, SearchOutcome& found, ImmaturePoints& immature_points) {
   starter_.clear();
   for (std::size_t m = 0; m < found.matches.size(); ++m) {
-    if (found.observations[m].inlier) starter_.occupy(found.matches[m].found.z.head<2>().cast<float>());
+    if (found.observations[m].inlier) starter_.occupy(found.matches[m].found.pixel.head<2>().cast<float>());
   }
   const bool enough_found = static_cast<int>(found.matches.size()) >= step.bounds.wanted_matches;
   if (enough_found && rig_.kind != SensorKind::kRgbd)

@@ -79,9 +79,9 @@ void WideSearch::match(const FrameImages& earlier, FrameCorners& corners, const 
     if (nearest.distance > options_.max_distance) continue;
     const auto j = static_cast<std::size_t>(nearest.best);
     if (of_corners_[j].best != static_cast<int>(i)) continue;
-    const Vector3 z_earlier = measure(earlier, corners, i, search);
+    const StereoPixel z_earlier = measure(earlier, corners, i, search);
     if (!has_right(z_earlier)) continue;
-    const Eigen::Vector3f z = measure(*now_, corners_, j, search).cast<float>();
+    const StereoPixelF z = measure(*now_, corners_, j, search).cast<float>();
     if (!has_right(z)) continue;
     matches_.push_back(observe_point(rig_, rig_.unproject(z_earlier), z, corners_.corners[j].level));
   }

@@ -105,15 +105,15 @@ void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const RollingShutt
     ++seed.misses;
     return;
   }
-  const SE3 T_found_row = shutter.at_row(found->z.y(), T_c_row);
+  const SE3 T_found_row = shutter.at_row(found->pixel.y(), T_c_row);
   if (!known(seed)) {
-    seed.filter.psi.z() = std::max(0.0, triangulated(rig_.camera, ray, T_found_row, found->z.head<2>()));
+    seed.filter.psi.z() = std::max(0.0, triangulated(rig_.camera, ray, T_found_row, found->pixel.head<2>()));
   }
-  if (!seed.filter.update(rig_, T_found_row, found->z, sigma_px(rig_, found->level), kFilterSteps)) {
+  if (!seed.filter.update(rig_, T_found_row, found->pixel, sigma_px(rig_, found->level), kFilterSteps)) {
     ++seed.misses;
     return;
   }
-  seed.uv = found->z.head<2>().cast<float>();
+  seed.uv = found->pixel.head<2>().cast<float>();
   seed.misses = 0;
   ++seed.looks;
 }
@@ -131,8 +131,8 @@ ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const 
   point.appearance = seed.appearance;
   point.psi = seed.filter.psi;
   point.psi.z() = std::max(point.psi.z(), kFarthest / median_depth);
-  point.anchor_observation.z = {seed.appearance.uv.x(), seed.appearance.uv.y(),
-                                std::numeric_limits<float>::quiet_NaN()};
+  point.anchor_observation.pixel = {seed.appearance.uv.x(), seed.appearance.uv.y(),
+                                    std::numeric_limits<float>::quiet_NaN()};
   point.anchor_observation.level = seed.appearance.level;
   move_to_mid_exposure(rig_, seed.shutter, point);
   return point;

@@ -219,7 +219,7 @@ class FirstStructureEstimator {
                             std::size_t k) const {
     const auto p = project_inverse_depth(rig_, view.T_c_a, point.psi);
     if (!p) return std::numeric_limits<double>::infinity();
-    return ((p->z_hat - view.seen[k].z).head<2>() / options_.sigma_px).squaredNorm();
+    return ((p->z_hat - view.seen[k].pixel).head<2>() / options_.sigma_px).squaredNorm();
   }
 
   void put_outliers_aside(double bound, Trial& trial) const {
@@ -230,7 +230,7 @@ class FirstStructureEstimator {
       views.points[kept] = views.points[k];
       trial.corners[kept] = trial.corners[k];
       for (AnchoredViews::View& view : views.views)
-        view.seen[kept] = {static_cast<int>(kept), view.seen[k].z};
+        view.seen[kept] = {static_cast<int>(kept), view.seen[k].pixel};
       ++kept;
     }
     views.points.resize(kept);
@@ -310,7 +310,7 @@ class FirstStructureEstimator {
     for (std::size_t k = 0; k < inliers_.size(); ++k) {
       if (!usable[k]) continue;
       const Vector2& uv = pixels[static_cast<std::size_t>(inliers_[k])];
-      const Vector3 z(uv.x(), uv.y(), Rig::kNoRight);
+      const StereoPixel z(uv.x(), uv.y(), Rig::kNoRight);
       observations.push_back(observe_point(rig_, from_inverse_depth(points[k].psi), z.cast<float>(), 0));
     }
     return optimise_motion(rig_, observations, start, {.inlier_chi2_mono = kOutlierChi2}).T_c_ref;

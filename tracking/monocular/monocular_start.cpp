@@ -169,7 +169,7 @@ std::vector<EarlierFrame> MonocularStart::earlier_frames(const MonocularStartRes
     std::vector<MotionObservation> observations;
     for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
       const Eigen::Vector2f& uv = frame.places[static_cast<std::size_t>(start.structure.corners[n])];
-      const Eigen::Vector3f z(uv.x(), uv.y(), static_cast<float>(Rig::kNoRight));
+      const StereoPixelF z(uv.x(), uv.y(), static_cast<float>(Rig::kNoRight));
       observations.push_back(observe_point(rig_, from_inverse_depth(start.structure.psi[n]), z, 0));
     }
     const MotionOnlyResult motion = optimise_motion(rig_, observations, frames.back().T_c_first, {});
@@ -190,7 +190,7 @@ std::optional<Vector6> MonocularStart::velocity(const MonocularStartResult& star
     const Vector2 motion = corner.motion.value_or(Eigen::Vector2f::Zero()).cast<double>();
     const Vector2 uv =
         followed_to_mid_exposure(rig_.camera, corner.uv.cast<double>() - motion, motion, share);
-    const Eigen::Vector3f z(Vector3(uv.x(), uv.y(), Rig::kNoRight).cast<float>());
+    const StereoPixelF z(Vector3(uv.x(), uv.y(), Rig::kNoRight).cast<float>());
     observations.push_back(observe_point(rig_, from_inverse_depth(start.structure.psi[n]), z, 0));
   }
   const SE3& T_last_first = start.structure.T_last_first;

@@ -56,7 +56,7 @@ void ShutterModel::learn(const FrameStep& step, const SearchOutcome& found, cons
   const double depth_error = rig_.kind == SensorKind::kMono ? kBentDepth : 0;
   for (const SearchOutcome::Match& match : found.matches) {
     const TrackedPoint& point = local_map.points()[match.point];
-    const Vector3& z = match.found.z;
+    const StereoPixel& z = match.found.pixel;
     const bool measured = rig_.kind != SensorKind::kMono && z.x() > z.z();
     const double depth =
         measured ? rig_.depth_from_disparity(z.x() - z.z()) : (step.result.T_c_ref * point.x_ref).z();

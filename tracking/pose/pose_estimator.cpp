@@ -96,7 +96,7 @@ void PoseEstimator::observe(const SE3& T_c_ref, const RollingShutter& shutter, S
   found.observations.clear();
   for (const SearchOutcome::Match& match : found.matches) {
     const Vector3& x_ref = local_map_.points()[match.point].x_ref;
-    const Eigen::Vector3f z = shutter.at_mid_exposure(rig_, match.found.z, T_c_ref * x_ref).cast<float>();
+    const StereoPixelF z = shutter.at_mid_exposure(rig_, match.found.pixel, T_c_ref * x_ref).cast<float>();
     found.observations.push_back(observe_point(rig_, x_ref, z, match.found.level));
   }
 }

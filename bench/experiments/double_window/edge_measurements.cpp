@@ -22,9 +22,9 @@ std::optional<Pull> pull_of(const Rig& rig, const Keyframe& keyframe, const Obse
                             const Vector3& x_w) {
   const Vector3 x = keyframe.T_k_w * x_w;
   if (!in_front_of_camera(x)) return std::nullopt;
-  const Vector3 information = rig.information(observation.z, observation.level).cast<double>();
+  const Vector3 information = rig.information(observation.pixel, observation.level).cast<double>();
   const Matrix3 J = rig.project_jacobian(x) * keyframe.T_k_w.so3().matrix();
-  Vector3 r = observation.z.cast<double>() - rig.project(x);
+  Vector3 r = observation.pixel.cast<double>() - rig.project(x);
   if (information.z() == 0) r.z() = 0;
   return Pull{J.transpose() * information.asDiagonal() * J, J.transpose() * information.cwiseProduct(r)};
 }

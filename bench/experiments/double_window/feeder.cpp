@@ -18,11 +18,11 @@ constexpr double kMinParallax = 0.01;  // [rad]
 Feeder::Feeder(const Scene& scene, Association association)
     : scene_(scene), association_(association), known_(scene.points.size()) {}
 
-Observation Feeder::observe(PointId id, const Vector3& z) const {
+Observation Feeder::observe(PointId id, const StereoPixel& z) const {
   Observation observation;
   observation.point = id;
-  observation.z = z.cast<float>();
-  if (scene_.rig.kind == SensorKind::kMono) observation.z.z() = static_cast<float>(Rig::kNoRight);
+  observation.pixel = z.cast<float>();
+  if (scene_.rig.kind == SensorKind::kMono) observation.pixel.z() = static_cast<float>(Rig::kNoRight);
   return observation;
 }
 
@@ -67,7 +67,7 @@ void Feeder::associate(const GraphSnapshot& graph) {
     if (id == kNoPoint) {
       unknown_.push_back(sighting);
     } else {
-      proposal_.observations.push_back(observe(id, sighting.z));
+      proposal_.observations.push_back(observe(id, sighting.pixel));
     }
   }
 }
@@ -80,7 +80,7 @@ void Feeder::track(const GraphSnapshot& graph) {
   const auto add = [&](const Vector3& x_ref, const Observation& observation) {
     MotionObservation& motion = seen.emplace_back();
     motion.x_ref = x_ref;
-    motion.z = observation.z;
+    motion.pixel = observation.pixel;
     if (mono) motion.information.z() = 0;
   };
   for (const Observation& observation : proposal_.observations) {
@@ -94,8 +94,8 @@ void Feeder::track(const GraphSnapshot& graph) {
     }
     for (const Scene::Sighting& a : scene_.seen[0]) {
       for (const Scene::Sighting& b : unknown_) {
-        if (a.point == b.point && a.z.x() - a.z.z() > kMinDisparityPx) {
-          add(scene_.rig.unproject(a.z), observe(kNoPoint, b.z));
+        if (a.point == b.point && a.pixel.x() - a.pixel.z() > kMinDisparityPx) {
+          add(scene_.rig.unproject(a.pixel), observe(kNoPoint, b.pixel));
         }
       }
     }
@@ -103,7 +103,7 @@ void Feeder::track(const GraphSnapshot& graph) {
   proposal_.T_k_ref = optimise_motion(scene_.rig, seen, proposal_.T_k_ref, {}).T_c_ref;
 }
 
-bool Feeder::start_value(const Vector3& z_previous, const Vector3& z, const SE3& T_previous_k,
+bool Feeder::start_value(const StereoPixel& z_previous, const StereoPixel& z, const SE3& T_previous_k,
                          Vector3& psi) const {
   const Vector3 ray = scene_.rig.camera.unproject(z_previous.head<2>());
   if (scene_.rig.kind != SensorKind::kMono) {
@@ -128,12 +128,12 @@ void Feeder::start_points() {
                                      [](const Scene::Sighting& s, int point) { return s.point < point; });
     if (at == previous.end() || at->point != sighting.point) continue;
     NewPoint point;
-    if (!start_value(at->z, sighting.z, T_previous_k, point.psi)) continue;
+    if (!start_value(at->pixel, sighting.pixel, T_previous_k, point.psi)) continue;
     point.id = free_point_;
     point.anchor = proposal_.reference;
-    point.anchor_observation = observe(point.id, at->z);
+    point.anchor_observation = observe(point.id, at->pixel);
     proposal_.new_points.push_back(point);
-    proposal_.observations.push_back(observe(point.id, sighting.z));
+    proposal_.observations.push_back(observe(point.id, sighting.pixel));
     known_[static_cast<std::size_t>(sighting.point)].push_back(point.id);
     free_point_ = PointId{index(free_point_) + 1};
   }

@@ -32,13 +32,13 @@ class Feeder {
     }
     return kNoPoint;
   }
-  [[nodiscard]] Observation observe(PointId id, const Vector3& z) const;
+  [[nodiscard]] Observation observe(PointId id, const StereoPixel& z) const;
 
  private:
   void associate(const GraphSnapshot& graph);
   void track(const GraphSnapshot& graph);
   void start_points();
-  [[nodiscard]] bool start_value(const Vector3& z_previous, const Vector3& z, const SE3& T_previous_k,
+  [[nodiscard]] bool start_value(const StereoPixel& z_previous, const StereoPixel& z, const SE3& T_previous_k,
                                  Vector3& psi) const;
 
   const Scene& scene_;

@@ -34,7 +34,7 @@ void MapUnit::read(const WindowProblem& problem, const DoubleWindow& window) {
       const double depth = (problem.poses[k].T_k_w * x_w).z();
       if (depth <= 0) continue;
       const double variance = 1.0 / seen.information.x() + 1.0 / seen.information.z();
-      const double d = problem.rig.camera.fx / depth, z = seen.z.x() - seen.z.z();
+      const double d = problem.rig.camera.fx / depth, z = seen.pixel.x() - seen.pixel.z();
       read_[k] += {d * z / variance, d * d / variance};
     }
   }

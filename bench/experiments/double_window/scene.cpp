@@ -77,7 +77,7 @@ Scene make_scene(const SceneOptions& options, const Rig& rig, std::vector<Vector
   for (const SE3& T_k_w : scene.T_k_w) {
     auto& seen = scene.seen.emplace_back();
     for (const int p : visible_points(scene, cells, T_k_w, options.max_sightings)) {
-      Vector3 z = scene.rig.project(T_k_w * scene.points[static_cast<std::size_t>(p)]);
+      StereoPixel z = scene.rig.project(T_k_w * scene.points[static_cast<std::size_t>(p)]);
       for (int c = 0; c < 3; ++c) z[c] += noise(rng);
       seen.push_back({p, z});
     }

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 
@@ -22,8 +23,8 @@ struct SceneOptions {
 /// One trial: true poses and points, and all measurements, drawn once so that every method gets the same.
 struct Scene {
   struct Sighting {
-    int point = 0;       ///< in `points`
-    Vector3 z{0, 0, 0};  ///< (u_l, v_l, u_r), noise included [px]
+    int point = 0;               ///< in `points`
+    StereoPixel pixel{0, 0, 0};  ///< noise included
   };
   Rig rig;
   std::vector<SE3> T_k_w;                   ///< truth

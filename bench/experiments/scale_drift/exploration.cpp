@@ -78,7 +78,7 @@ class Explorer {
       if (!at(t).x_w) continue;
       MotionObservation o;
       o.x_ref = *at(t).x_w;
-      o.z.head<2>() = uv(at(t), k).cast<float>();
+      o.pixel.head<2>() = uv(at(t), k).cast<float>();
       o.information.z() = 0;
       observations.push_back(o);
     }
@@ -143,7 +143,7 @@ class Explorer {
       }
       WindowProblem::Observation o;
       o.pose = k - begin;
-      o.z.head<2>() = uv(track, k).cast<float>();
+      o.pixel.head<2>() = uv(track, k).cast<float>();
       o.information.z() = 0;
       problem_.observations.push_back(o);
     }

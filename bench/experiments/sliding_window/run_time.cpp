@@ -178,8 +178,8 @@ void expansion_experiment(const SlidingWindowExperimentOptions& options, Report&
       for (std::size_t l = 0; l < run.landmarks.size(); ++l) {
         LandmarkObservation o;
         o.landmark = static_cast<std::int64_t>(l);
-        o.z = rig.project(T * run.landmarks[l]);
-        if (trial > 0) o.z += 0.5 * Vector3(normal(rng), normal(rng), normal(rng));
+        o.pixel = rig.project(T * run.landmarks[l]);
+        if (trial > 0) o.pixel += 0.5 * Vector3(normal(rng), normal(rng), normal(rng));
         o.information = 4 * Matrix3::Identity();
         frame.observations.push_back(o);
       }

@@ -20,7 +20,7 @@ namespace {
 
 bool visible(const Rig& rig, const Vector3& x_c) {
   if (x_c.z() < 0.3) return false;
-  const Vector3 z = rig.project(x_c);
+  const StereoPixel z = rig.project(x_c);
   return rig.camera.contains(z.head<2>()) && rig.camera.contains(Vector2(z.z(), z.y()));
 }
 
@@ -55,7 +55,7 @@ Run simulate(const Rig& rig, const RunOptions& options, unsigned seed) {
       if (options.overlap_axis > 0 ? !visible(rig, x_c) : x_c.z() < 0.3) continue;
       LandmarkObservation o;
       o.landmark = static_cast<std::int64_t>(l);
-      o.z = rig.project(x_c) + options.noise_px * Vector3(normal(rng), normal(rng), normal(rng));
+      o.pixel = rig.project(x_c) + options.noise_px * Vector3(normal(rng), normal(rng), normal(rng));
       o.information = Matrix3::Identity() / (options.noise_px * options.noise_px);
       frame.observations.push_back(o);
     }

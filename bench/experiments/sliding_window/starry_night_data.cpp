@@ -101,7 +101,7 @@ StarryNight load_starry_night(const std::string& folder, int first, int steps) {
     const auto k = static_cast<std::size_t>(row[0]) - static_cast<std::size_t>(first);
     LandmarkObservation o;
     o.landmark = static_cast<std::int64_t>(row[1]);
-    o.z = Vector3(row[2], 0.5 * (row[3] + row[5]), row[4]);
+    o.pixel = Vector3(row[2], 0.5 * (row[3] + row[5]), row[4]);
     o.information = information.asDiagonal();
     data.frames[k].observations.push_back(o);
   }

@@ -40,7 +40,7 @@ class BaPipeline {
   void add_observation(int pose, const PointObservation& o) {
     const auto found = index_.find(o.point);
     if (found == index_.end()) return;
-    tracks_[static_cast<std::size_t>(found->second)].push_back(make_observation(pose, o.z));
+    tracks_[static_cast<std::size_t>(found->second)].push_back(make_observation(pose, o.pixel));
   }
 
   /// Pose of a new frame from the points known so far  (eq. 4.15).
@@ -53,8 +53,8 @@ class BaPipeline {
       MotionObservation m;
       m.x_ref = problem_.poses[static_cast<std::size_t>(point.anchor)].T_k_w.inverse() *
                 from_inverse_depth(point.psi);
-      const auto w = make_observation(0, o.z);
-      m.z = w.z;
+      const auto w = make_observation(0, o.pixel);
+      m.pixel = w.pixel;
       m.information = w.information;
       observations.push_back(m);
     }
@@ -88,11 +88,11 @@ class BaPipeline {
   WindowProblem& problem() { return problem_; }
 
  private:
-  [[nodiscard]] WindowProblem::Observation make_observation(int pose, const Vector3& z) const {
+  [[nodiscard]] WindowProblem::Observation make_observation(int pose, const StereoPixel& z) const {
     WindowProblem::Observation o;
     const auto w = static_cast<float>(1 / (kSigma * kSigma));
     o.pose = pose;
-    o.z = z.cast<float>();
+    o.pixel = z.cast<float>();
     o.information = Eigen::Vector3f(w, w, mono_ ? 0.0F : w);
     return o;
   }
@@ -142,7 +142,7 @@ PipelineResult run_bundle_adjustment(const Block& block, int iterations) {
   } else {
     ba.add_pose(SE3(), true);
     for (const auto& o : block.first) {
-      ba.add_point(o.point, 0, InverseDepthFilter::from_stereo(block.rig, o.z, kSigma).psi);
+      ba.add_point(o.point, 0, InverseDepthFilter::from_stereo(block.rig, o.pixel, kSigma).psi);
       ba.add_observation(0, o);
     }
   }
@@ -152,14 +152,14 @@ PipelineResult run_bundle_adjustment(const Block& block, int iterations) {
     const SE3 T = ba.motion_only(T_previous, step.current);
     const int current = ba.add_pose(T, false);
     for (const auto& o : step.fresh) {  // a filter of its own per point between two keyframes  (3.4.4)
-      InverseDepthFilter filter = mono
-                                      ? InverseDepthFilter::from_mono(block.rig.camera, o.z.head<2>(), kSigma)
-                                      : InverseDepthFilter::from_stereo(block.rig, o.z, kSigma);
+      InverseDepthFilter filter =
+          mono ? InverseDepthFilter::from_mono(block.rig.camera, o.pixel.head<2>(), kSigma)
+               : InverseDepthFilter::from_stereo(block.rig, o.pixel, kSigma);
       if (mono) {
         for (const auto& c : step.current) {
           if (c.point != o.point) continue;
-          if (!filter.update(block.rig, T * T_previous.inverse(), Vector3(c.z.x(), c.z.y(), Rig::kNoRight),
-                             kSigma))
+          if (!filter.update(block.rig, T * T_previous.inverse(),
+                             Vector3(c.pixel.x(), c.pixel.y(), Rig::kNoRight), kSigma))
             break;
         }
         if (!(filter.psi.z() > kMinInverseDepth)) continue;

@@ -102,7 +102,7 @@ double scene_depth(Setting setting, const Vector3& origin_w, const Vector3& ray_
 
 bool visible(const Rig& rig, const Vector3& x_c) {
   if (x_c.z() < 0.2) return false;
-  const Vector3 z = rig.project(x_c);
+  const StereoPixel z = rig.project(x_c);
   if (!rig.camera.contains(z.head<2>())) return false;
   return rig.kind == SensorKind::kMono || z.z() >= 0;
 }
@@ -139,7 +139,7 @@ Block simulate_block(Setting setting, SensorKind kind, int frames, int points, u
   const auto measure = [&](std::int64_t id, const SE3& T, std::uint64_t when) {
     Stream rng(seed, static_cast<std::uint64_t>(id), when);
     std::normal_distribution<double> noise(0, 0.5);
-    const Vector3 z = block.rig.project(T * world[static_cast<std::size_t>(id)]);
+    const StereoPixel z = block.rig.project(T * world[static_cast<std::size_t>(id)]);
     return PointObservation{id, z + Vector3(noise(rng), noise(rng), noise(rng))};
   };
   const auto when = [frames](int frame) {
