@@ -16,6 +16,7 @@ struct DenseAlignmentOptions {
   int max_iterations = 8;    ///< per level
   float huber_grey = 8;      ///< kernel on the grey difference
   double settled_px = 0.05;  ///< stop a level when the step moves the points by less, in its pixels
+  double max_rms = 25;       ///< a pose that leaves more is not trusted [grey]
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

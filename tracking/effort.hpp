@@ -50,20 +50,20 @@ struct EffortBounds {
   bool doubts_poses = true;     ///< and looks for better ones by appearance, which costs most of all
   int motion_iterations = 0;
   int refine_iterations = 0;
-  bool urgent_keyframes_only = false;  ///< see TrackerOptions::urgent_share
+  bool urgent_keyframes_only = false;  ///< see KeyframeDecisionOptions::urgent_share
 };
 
 [[nodiscard]] inline EffortBounds bounds_of(EffortLevel effort, const TrackerOptions& options) {
-  EffortBounds bounds{options.wanted_matches,
-                      options.max_searches,
+  EffortBounds bounds{options.local_map.wanted_matches,
+                      options.local_map.max_searches,
                       options.alignment.finest_level,
                       true,
                       true,
-                      options.motion.max_iterations,
+                      options.pose.motion.max_iterations,
                       options.search.refine_iterations};
   if (effort >= EffortLevel::kFewerPoints) {
-    bounds.wanted_matches = std::max(options.wanted_matches / 2, options.min_inliers);
-    bounds.max_searches = std::max(options.max_searches / 2, bounds.wanted_matches);
+    bounds.wanted_matches = std::max(options.local_map.wanted_matches / 2, options.pose.min_inliers);
+    bounds.max_searches = std::max(options.local_map.max_searches / 2, bounds.wanted_matches);
   }
   if (effort >= EffortLevel::kCoarseAlignment) {
     bounds.finest_alignment_level =
@@ -72,7 +72,7 @@ struct EffortBounds {
     bounds.doubts_poses = false;
   }
   if (effort >= EffortLevel::kFewerIterations) {
-    bounds.motion_iterations = std::max(options.motion.max_iterations / 3, 2);
+    bounds.motion_iterations = std::max(options.pose.motion.max_iterations / 3, 2);
     bounds.refine_iterations = std::max(options.search.refine_iterations / 3, 1);
     bounds.urgent_keyframes_only = true;
   }

@@ -22,18 +22,20 @@ Eigen::Vector2f at_level_zero(const Corner& corner) {
 
 }  // namespace
 
-TrackerOptions with_cells_of_one_camera(const Rig& rig, TrackerOptions options) {
+NewPointOptions with_cells_of_one_camera(const Rig& rig, NewPointOptions options) {
   constexpr double kCellsPerCorner = 2;
   constexpr int kUnit = 4;  // CellGrid
   const double area = static_cast<double>(rig.camera.width) * rig.camera.height;
-  const double side = std::sqrt(area / (kCellsPerCorner * options.max_new_points));
+  const double side = std::sqrt(area / (kCellsPerCorner * options.max_points));
   options.cell_px = std::min(options.cell_px, std::max(static_cast<int>(side) / kUnit * kUnit, 2 * kUnit));
   return options;
 }
 
-PointStarter::PointStarter(const Rig& rig, const TrackerOptions& options, const FixedPixels* fixed)
+PointStarter::PointStarter(const Rig& rig, const NewPointOptions& options, const GuidedSearchOptions& search,
+                           const FixedPixels* fixed)
     : rig_(rig),
       options_(options),
+      search_(search),
       fixed_(fixed),
       quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
   options_.cell_px = std::max(options_.cell_px, CellGrid::smallest_cell_px(rig.camera.width));
@@ -87,7 +89,7 @@ void PointStarter::spread_corners(const FrameImages& images, const CornerBounds&
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                         ImmaturePoints& immature) {
   with_depth_ = without_depth_ = 0;
-  int started = start_at(usual_corners(), options_.max_new_points, images, anchor, shutter, immature);
+  int started = start_at(usual_corners(), options_.max_points, images, anchor, shutter, immature);
   if (tracked_ < options_.scarce_points && is_dark(images.left))
     started +=
         start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, immature);
@@ -168,7 +170,7 @@ int PointStarter::count_depths(const cv::Mat& left, const cv::Mat& right) {
   detect_corners(left, 0, options_.corner_threshold, options_.min_corner_score, kBorder,
                  {options_.cell_px, columns_, rows_, occupied_}, corners_);
   return static_cast<int>(std::count_if(corners_.begin(), corners_.end(), [&](const Corner& corner) {
-    return !std::isnan(right_from_row(left, right, rig_, corner.u, corner.v, 0, options_.search));
+    return !std::isnan(right_from_row(left, right, rig_, corner.u, corner.v, 0, search_));
   }));
 }
 
@@ -177,7 +179,7 @@ bool PointStarter::measure(const FrameImages& images, const Corner& corner, Imma
     return false;
   }
   const Vector2 uv = point.appearance.uv.cast<double>();
-  const double u_r = right_of_corner(images, rig_, uv, corner.level, options_.search);
+  const double u_r = right_of_corner(images, rig_, uv, corner.level, search_);
   if (std::isnan(u_r)) return false;
   const double disparity = std::max(uv.x() - u_r, kFarthestDisparity);
   const Vector3 ray = rig_.camera.unproject(uv);

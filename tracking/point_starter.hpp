@@ -6,12 +6,13 @@
 #include "camera/rig.hpp"
 #include "camera/rolling_shutter.hpp"
 #include "imaging/fast_corners.hpp"
+#include "imaging/guided_search.hpp"
 #include "imaging/image_pyramid.hpp"
 #include "imaging/point_appearance.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
 #include "tracking/immature_points.hpp"
+#include "tracking/keyframes/options.hpp"
 #include "tracking/lost_cause.hpp"
-#include "tracking/options.hpp"
 #include "tracking/quadtree.hpp"
 
 namespace twofold {
@@ -19,14 +20,16 @@ namespace twofold {
 /// One camera's options: cells so small that an image of any size has enough of them. A corner of one camera
 /// says where it is only after some frames, and many never do; where all there is to see stands in a narrow
 /// band of a small image, a corner for each usual cell is too few to live on.
-[[nodiscard]] TrackerOptions with_cells_of_one_camera(const Rig& rig, TrackerOptions options);
+[[nodiscard]] NewPointOptions with_cells_of_one_camera(const Rig& rig, NewPointOptions options);
 
 /// Decides where a keyframe needs new points, and starts them with the depth of the stereo pair or depth
 /// image (thesis 3.4.3, 6.3). Buffers are reserved at construction.
 class PointStarter {
  public:
-  /// @param fixed  of the left camera; must outlive this. Null: nothing is known of it
-  PointStarter(const Rig& rig, const TrackerOptions& options, const FixedPixels* fixed = nullptr);
+  /// @param search  in the right image
+  /// @param fixed   of the left camera; must outlive this. Null: nothing is known of it
+  PointStarter(const Rig& rig, const NewPointOptions& options, const GuidedSearchOptions& search,
+               const FixedPixels* fixed = nullptr);
 
   /// Marks the whole image as empty.
   void clear();
@@ -68,7 +71,8 @@ class PointStarter {
   [[nodiscard]] bool measure(const FrameImages& images, const Corner& corner, ImmaturePoint& point) const;
 
   Rig rig_;
-  TrackerOptions options_;
+  NewPointOptions options_;
+  GuidedSearchOptions search_;
   const FixedPixels* fixed_;
   int columns_ = 0;
   int rows_ = 0;

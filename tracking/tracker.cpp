@@ -11,15 +11,15 @@ namespace {
 
 constexpr std::size_t kMaxLocalPoints = 3000;
 constexpr std::size_t kMaxImmaturePoints = 1200;
-constexpr std::size_t kMostPendingKeyframes = 12;  // beyond TrackerOptions::max_pending: urgent ones
+constexpr std::size_t kMostPendingKeyframes = 12;  // beyond KeyframeDecisionOptions::max_pending: urgent ones
 constexpr std::size_t kMaxAlignmentPoints = 240;
 
 /// A pose that few points agree on, of few that were found, or very few at all: a wider search may know a
 /// better one.
 bool hardly_supported(const TrackResult& result, const TrackerOptions& options) {
-  return result.inliers < options.doubted_searched_share * result.searched ||
-         (result.inliers < options.doubted_inlier_share * result.matches &&
-          result.inliers < options.rough_searched_share * result.searched);
+  return result.inliers < options.pose.doubted_searched_share * result.searched ||
+         (result.inliers < options.pose.doubted_inlier_share * result.matches &&
+          result.inliers < options.pose.rough.searched_share * result.searched);
 }
 
 }  // namespace
@@ -27,8 +27,8 @@ bool hardly_supported(const TrackResult& result, const TrackerOptions& options) 
 Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
-      motion_(options_),
-      shutter_(rig_, motion_, static_cast<std::size_t>(options.max_searches), options.readout),
+      motion_(options_.motion_model),
+      shutter_(rig_, motion_, static_cast<std::size_t>(options.local_map.max_searches), options.readout),
       correction_(rig, options.fixed),
       local_map_(kMaxLocalPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
@@ -40,11 +40,11 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       views_(rig, options),
       new_points_(rig_, options_, correction_.fixed()),
       proposer_(options_),
-      reference_choice_(static_cast<std::size_t>(options.max_searches)) {
-  const auto searches = static_cast<std::size_t>(options.max_searches);
+      reference_choice_(static_cast<std::size_t>(options.local_map.max_searches)) {
+  const auto searches = static_cast<std::size_t>(options.local_map.max_searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);
-  if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth);
+  if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth.alignment);
   if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
   allocate_images(rig, current_);
   allocate_images(rig, last_.images);
@@ -98,7 +98,8 @@ bool Tracker::track(FrameStep& step) {
     return false;
   }
   SearchStart start{.placement = motion_.placement()};
-  local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
+  local_map_.update(step.graph, start.placement.reference, immature_points_,
+                    options_.local_map.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
   if (search_ahead(step)) return true;
   const bool by_depth = last_.by_depth && depth_can_place(step);
@@ -112,7 +113,8 @@ bool Tracker::track(FrameStep& step) {
   const auto first = doubted ? std::optional(set_aside(step)) : std::nullopt;
   if (search_widely(step)) return true;
   if (first) {  // nothing better
-    local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
+    local_map_.update(step.graph, start.placement.reference, immature_points_,
+                      options_.local_map.neighbour_keyframes);
     take_back(*first, step);
   }
   if (cause != LostCause::kNone) cause = place_by_depth_alone(cause, step);
@@ -150,14 +152,14 @@ std::optional<SE3> Tracker::align_to_previous(const SE3& start, FrameStep& step)
   if (last_.points.empty()) return std::nullopt;
   DenseAlignmentResult best = dense_alignment_.align(rig_.camera, last_.images.left, current_.left,
                                                      last_.points, start, step.bounds.finest_alignment_level);
-  if (step.bounds.align_from_rest && (!best.converged || best.rms > 0.5 * options_.max_alignment_rms)) {
+  if (step.bounds.align_from_rest && (!best.converged || best.rms > 0.5 * options_.alignment.max_rms)) {
     const DenseAlignmentResult rest =
         dense_alignment_.align(rig_.camera, last_.images.left, current_.left, last_.points, SE3(),
                                step.bounds.finest_alignment_level);
     if (rest.converged && (!best.converged || rest.rms < best.rms)) best = rest;
   }
   step.result.alignment_rms = best.rms;
-  const bool trusted = best.converged && best.rms < options_.max_alignment_rms;
+  const bool trusted = best.converged && best.rms < options_.alignment.max_rms;
   return trusted ? std::optional(best.T_cur_prev) : std::nullopt;
 }
 
@@ -200,7 +202,7 @@ void Tracker::remember_frame(const FrameStep& step) {
 void Tracker::learn_fixed_pixels(const FrameStep& step) {
   if (step.result.by_depth) return;  // no points say how far the scene is
   samples_.clear();
-  const bool agreed = step.result.inliers >= options_.fixed_inlier_share * step.result.matches;
+  const bool agreed = step.result.inliers >= options_.fixed.min_inlier_share * step.result.matches;
   if (agreed && !pose_estimator_.mistrusts_the_young()) {
     for (const MotionObservation& observation : search_.observations) {
       if (observation.inlier) samples_.push_back(1 / (step.result.T_c_ref * observation.x_ref).z());

@@ -11,7 +11,7 @@ namespace twofold {
 /// something else, and one corner of a room looks like the next.
 bool Tracker::depth_can_place(const FrameStep& step) const {
   return depth_alignment_ && motion_.reference() != kNoKeyframe &&
-         step.lost_frames <= options_.depth_patience;
+         step.lost_frames <= options_.depth.patience;
 }
 
 /// The frame's depth image, once.
@@ -46,7 +46,7 @@ SE3 Tracker::align_to_depth(FrameStep& step) {
 /// @param found  what the search came to
 bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step) {
   const bool points_placed = found == LostCause::kNone;
-  const bool few = points_placed ? step.result.inliers < options_.scarce_inliers : last_.by_depth;
+  const bool few = points_placed ? step.result.inliers < options_.depth.scarce_inliers : last_.by_depth;
   if (!few || !depth_can_place(step)) return false;
   const TrackResult by_points = step.result;
   if (place_by_depth(points_placed ? by_points.T_c_ref : T_c_ref, step) != LostCause::kNone) return false;
@@ -54,7 +54,7 @@ bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step
   // After a loss depth may have found another place of the same shape: what points say counts.
   if (points_placed ? 2 * step.result.inliers >= by_points.inliers : points_allow(step)) return true;
   step.restore(by_points);
-  classify_observations(rig_, search_.observations, by_points.T_c_ref, options_.motion);
+  classify_observations(rig_, search_.observations, by_points.T_c_ref, options_.pose.motion);
   return false;
 }
 
@@ -77,10 +77,11 @@ bool Tracker::points_allow(FrameStep& step) {
   const RollingShutter shutter = step.shutter;
   result.by_depth = false;
   const Placement placement{by_depth.reference, by_depth.T_c_ref};
-  local_map_.update(step.graph, placement.reference, immature_points_, options_.neighbour_keyframes);
+  local_map_.update(step.graph, placement.reference, immature_points_,
+                    options_.local_map.neighbour_keyframes);
   const SearchStart start{.placement = placement, .kind = SearchStart::Kind::kRough};
   if (search_from(start, step) == LostCause::kNone) return true;
-  if (step.after_loss() && result.candidates >= options_.telling_candidates) return false;
+  if (step.after_loss() && result.candidates >= options_.depth.telling_candidates) return false;
   step.restore(by_depth);
   step.shutter = shutter;
   search_.clear();
@@ -104,7 +105,7 @@ LostCause Tracker::place_by_depth(const SE3& T_c_ref, FrameStep& step) {
   result.information =
       inverse_symmetric(placed->covariance + shutter_.covariance(placed->all, placed->by_rows, step));
   result.matches = static_cast<int>(search_.matches.size());
-  result.inliers = classify_observations(rig_, search_.observations, result.T_c_ref, options_.motion);
+  result.inliers = classify_observations(rig_, search_.observations, result.T_c_ref, options_.pose.motion);
   return LostCause::kNone;
 }
 

@@ -44,7 +44,7 @@ void Tracker::propose_keyframe(FrameStep& step) {
   new_points_.start(current_, proposal.id, local_map_, step, search_, immature_points_);
   correction_.look_at_keyframe(current_);
   hand_over_images(proposal);
-  immature_points_.drop_stale(proposal.id, options_.max_failures, options_.max_immature_age);
+  immature_points_.drop_stale(proposal.id, options_.immature.max_failures, options_.immature.max_age);
 }
 
 /// To be done with the frame: the next one is aligned to its left image, and needs nothing else of it.

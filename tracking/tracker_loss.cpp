@@ -16,7 +16,7 @@ std::optional<Placement> Tracker::recognised(const FrameStep& step) {
 /// The camera is about where the frame was taken that was recognised, or, at few frames a second, where it
 /// can see what that frame shows.
 bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
-  local_map_.update(step.graph, asked.reference, immature_points_, options_.neighbour_keyframes);
+  local_map_.update(step.graph, asked.reference, immature_points_, options_.local_map.neighbour_keyframes);
   step.lap(TrackerStage::kCandidates);
   const SearchStart start{.placement = asked, .kind = SearchStart::Kind::kRecognised};
   if (search_from(start, step) == LostCause::kNone) return true;
@@ -96,7 +96,8 @@ bool Tracker::search_from_view(const FrameImages& images, FrameCorners& corners,
   if (!T_c_view) return false;
   SearchStart start = view;
   start.placement.T_c_ref = *T_c_view * view.placement.T_c_ref;
-  local_map_.update(step.graph, start.placement.reference, immature_points_, options_.neighbour_keyframes);
+  local_map_.update(step.graph, start.placement.reference, immature_points_,
+                    options_.local_map.neighbour_keyframes);
   return search_from(start, step) == LostCause::kNone;
 }
 

@@ -53,10 +53,10 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
     if (!immature_points_.add(point)) break;
   }
   const Placement placement{id, start.structure.T_last_first};
-  local_map_.update(step.graph, id, immature_points_, options_.neighbour_keyframes);
+  local_map_.update(step.graph, id, immature_points_, options_.local_map.neighbour_keyframes);
   step.velocity = monocular_start_->velocity(start);
   step.shutter = step.velocity ? shutter_.at(placement.T_c_ref, step) : RollingShutter();
-  local_map_search_.run(current_, placement.T_c_ref, options_.lost_radius_px, step, search_);
+  local_map_search_.run(current_, placement.T_c_ref, options_.local_map.lost_radius_px, step, search_);
   const LostCause cause = pose_estimator_.estimate(placement, step, search_);
   if (cause != LostCause::kNone) return cause;
   step.result.cause = LostCause::kNone;

@@ -14,10 +14,10 @@ LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
   SE3& T_c_ref = start.placement.T_c_ref;
   step.shutter = start.rough() ? RollingShutter() : shutter_.at(T_c_ref, step);
   LostCause cause = LostCause::kNone;
-  const int rounds = start.rough() ? options_.rough_rounds : 1;
+  const int rounds = start.rough() ? options_.pose.rough.rounds : 1;
   for (int round = 0; cause == LostCause::kNone && round < rounds; ++round) {
     const bool wide = start.rough() ? round + 1 < rounds : step.after_loss();
-    const double radius_px = wide ? options_.lost_radius_px : options_.search.radius_px;
+    const double radius_px = wide ? options_.local_map.lost_radius_px : options_.search.radius_px;
     local_map_search_.run(current_, T_c_ref, radius_px, step, search_);
     cause = pose_estimator_.estimate(start.placement, step, search_);
     T_c_ref = step.result.T_c_ref;
@@ -37,7 +37,7 @@ LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& ste
   const LostCause cause = search_from(aligned, step);
   const bool placed = cause == LostCause::kNone;
   const int inliers = placed ? step.result.inliers : 0;
-  const bool settled = inliers >= options_.settled_searched_share * step.result.searched;
+  const bool settled = inliers >= options_.pose.settled_searched_share * step.result.searched;
   if (settled || !leaves_motion(aligned.placement.T_c_ref, step)) return cause;
   const Attempt first = set_aside(step);
   const LostCause other = search_from(

@@ -11,7 +11,7 @@ void Tracker::continue_from(const GraphSnapshot& graph) {
 bool Tracker::start_map(FrameStep& step) {
   step.result.cause = make_first_keyframe(step);
   if (step.result.cause == LostCause::kNoTexture && rig_.kind == SensorKind::kStereo) {
-    step.result.cause = new_points_.explain_missing_depth(current_, options_.min_start_points);
+    step.result.cause = new_points_.explain_missing_depth(current_, options_.new_points.min_start_points);
   }
   return step.result.cause == LostCause::kNone;
 }
@@ -21,9 +21,9 @@ bool Tracker::start_map(FrameStep& step) {
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
   const bool something_in_view =
-      new_points_.sees_corners(current_.left, options_.min_corners_seen) || sees_structure(step);
-  if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.new_part_after || !something_in_view ||
-      loss_.lost_frames() < options_.new_part_frames) {
+      new_points_.sees_corners(current_.left, options_.loss.min_corners_seen) || sees_structure(step);
+  if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.loss.new_part_after ||
+      !something_in_view || loss_.lost_frames() < options_.loss.new_part_frames) {
     if (monocular_start_) monocular_start_->reset();  // what it followed was seen before
     return false;
   }
@@ -47,7 +47,8 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
   step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();
   new_points_.forget_seeds();
-  if (new_points_.start_first(current_, id, step.shutter, immature_points_) < options_.min_start_points) {
+  if (new_points_.start_first(current_, id, step.shutter, immature_points_) <
+      options_.new_points.min_start_points) {
     const LostCause open = judge_structure(step);
     if (open != LostCause::kNone) {
       immature_points_.clear_points();

@@ -221,7 +221,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
               {"inner_window", options.mapper.inner_window},
               {"outer_window", options.mapper.outer_window},
               {"min_covisible", options.mapper.min_covisible},
-              {"wanted_matches", options.tracker.wanted_matches}}},
+              {"wanted_matches", options.tracker.local_map.wanted_matches}}},
             {"notes", result.notes}};
   json.update(late_and_lost(options.pacing, result));
   return json;

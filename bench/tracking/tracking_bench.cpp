@@ -65,7 +65,7 @@ void motion_only(benchmark::State& state) {
   const TrackerOptions options;
   const auto effort = static_cast<EffortLevel>(state.range(0));
   const EffortBounds bounds = bounds_of(effort, options);
-  MotionOnlyOptions solver = options.motion;
+  MotionOnlyOptions solver = options.pose.motion;
   solver.max_iterations = bounds.motion_iterations;
   const SE3 T_true = T_c_w(1) * T_c_w(0).inverse();
   std::mt19937 random(5);

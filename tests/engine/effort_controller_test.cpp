@@ -91,14 +91,14 @@ TEST(EffortOptions, NameWhatIsWrong) {
 TEST(EffortBounds, EachRungLeavesOutMore) {
   const TrackerOptions options;
   EffortBounds before = bounds_of(kTop, options);
-  EXPECT_EQ(before.wanted_matches, options.wanted_matches);
-  EXPECT_EQ(before.motion_iterations, options.motion.max_iterations);
+  EXPECT_EQ(before.wanted_matches, options.local_map.wanted_matches);
+  EXPECT_EQ(before.motion_iterations, options.pose.motion.max_iterations);
   for (int r = 1; r < kEffortLevels; ++r) {
     const EffortBounds now = bounds_of(static_cast<EffortLevel>(r), options);
     EXPECT_LE(now.max_searches, before.max_searches);
     EXPECT_GE(now.finest_alignment_level, before.finest_alignment_level);
     EXPECT_LE(now.motion_iterations, before.motion_iterations);
-    EXPECT_GE(now.wanted_matches, options.min_inliers);
+    EXPECT_GE(now.wanted_matches, options.pose.min_inliers);
     const bool less = now.max_searches < before.max_searches ||
                       now.finest_alignment_level > before.finest_alignment_level ||
                       now.motion_iterations < before.motion_iterations;

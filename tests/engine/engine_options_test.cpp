@@ -29,38 +29,47 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
 TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
   expect_rules<TrackerOptions>(
       {{"alignment.coarsest_level", [](auto& o) { o.alignment.coarsest_level = 5; }},
-       {"corner_levels", [](auto& o) { o.corner_levels = 6; }},
+       {"new_points.corner_levels", [](auto& o) { o.new_points.corner_levels = 6; }},
        {"search.radius_px", [](auto& o) { o.search.radius_px = -1; }},
-       {"wide_search.min_agreeing", [](auto& o) { o.wide_search.min_agreeing = 2; }},
-       {"motion.rounds", [](auto& o) { o.motion.rounds = 0; }},
-       {"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
-       {"min_inliers", [](auto& o) { o.min_inliers = 2; }},
-       {"new_part_frames", [](auto& o) { o.new_part_frames = -1; }},
-       {"rough_rounds", [](auto& o) { o.rough_rounds = 0; }},
-       {"fixed_inlier_share", [](auto& o) { o.fixed_inlier_share = 0; }},
-       {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
-       {"recent_keyframes", [](auto& o) { o.recent_keyframes = 5; }},
-       {"depth_patience", [](auto& o) { o.depth_patience = -1; }},
-       {"keyframe_turn", [](auto& o) { o.keyframe_turn = 0; }},
-       {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
-       {"depth.max_apart", [](auto& o) { o.depth.max_apart = 0; }},
-       {"depth.min_facing", [](auto& o) { o.depth.min_facing = 1.1; }},
-       {"depth.widest_kernel", [](auto& o) { o.depth.widest_kernel = o.depth.kernel / 2; }},
-       {"depth.jackknife_share", [](auto& o) { o.depth.jackknife_share = -0.1; }},
+       {"loss.wide_search.min_agreeing", [](auto& o) { o.loss.wide_search.min_agreeing = 2; }},
+       {"pose.motion.rounds", [](auto& o) { o.pose.motion.rounds = 0; }},
+       {"local_map.wanted_matches",
+        [](auto& o) { o.local_map.wanted_matches = o.local_map.max_searches + 1; }},
+       {"pose.min_inliers", [](auto& o) { o.pose.min_inliers = 2; }},
+       {"loss.new_part_frames", [](auto& o) { o.loss.new_part_frames = -1; }},
+       {"pose.rough.rounds", [](auto& o) { o.pose.rough.rounds = 0; }},
+       {"fixed.min_inlier_share", [](auto& o) { o.fixed.min_inlier_share = 0; }},
+       {"new_points.min_start_points", [](auto& o) { o.new_points.min_start_points = 0; }},
+       {"loss.recent_keyframes", [](auto& o) { o.loss.recent_keyframes = 5; }},
+       {"depth.patience", [](auto& o) { o.depth.patience = -1; }},
+       {"keyframes.turn", [](auto& o) { o.keyframes.turn = 0; }},
+       {"keyframes.young_map_share", [](auto& o) { o.keyframes.young_map_share = 1.1; }},
+       {"depth.alignment.max_apart", [](auto& o) { o.depth.alignment.max_apart = 0; }},
+       {"depth.alignment.min_facing", [](auto& o) { o.depth.alignment.min_facing = 1.1; }},
+       {"depth.alignment.widest_kernel",
+        [](auto& o) { o.depth.alignment.widest_kernel = o.depth.alignment.kernel / 2; }},
+       {"depth.alignment.jackknife_share", [](auto& o) { o.depth.alignment.jackknife_share = -0.1; }},
        {"readout.min_points", [](auto& o) { o.readout.min_points = 5; }},
        {"readout.significant_sigmas", [](auto& o) { o.readout.significant_sigmas = 0; }},
-       {"keyframe_share", [](auto& o) { o.keyframe_share = 1.1; }},
-       {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
+       {"keyframes.tracked_share", [](auto& o) { o.keyframes.tracked_share = 1.1; }},
+       {"keyframes.urgent_share", [](auto& o) { o.keyframes.urgent_share = 0.7; }},
        {"monocular_start.candidates", [](auto& o) { o.monocular_start.candidates = 0; }},
        {"monocular_start.frames_between", [](auto& o) { o.monocular_start.frames_between = 1; }},
-       {"first_structure.max_behind_share", [](auto& o) { o.first_structure.max_behind_share = 1.1; }},
-       {"first_structure.decisive_chi2", [](auto& o) { o.first_structure.decisive_chi2 = -1; }},
-       {"first_structure.finest_sigma", [](auto& o) { o.first_structure.finest_sigma = 0; }},
-       {"first_structure.max_point_error", [](auto& o) { o.first_structure.max_point_error = 0; }},
-       {"first_structure.near_share", [](auto& o) { o.first_structure.near_share = 0; }},
-       {"first_structure.max_still_share", [](auto& o) { o.first_structure.max_still_share = 2; }},
-       {"first_structure.fixed_strip", [](auto& o) { o.first_structure.fixed_strip = -1; }},
-       {"cell_px", [](auto& o) { o.cell_px = 0; }}});
+       {"monocular_start.first_structure.max_behind_share",
+        [](auto& o) { o.monocular_start.first_structure.max_behind_share = 1.1; }},
+       {"monocular_start.first_structure.decisive_chi2",
+        [](auto& o) { o.monocular_start.first_structure.decisive_chi2 = -1; }},
+       {"monocular_start.first_structure.finest_sigma",
+        [](auto& o) { o.monocular_start.first_structure.finest_sigma = 0; }},
+       {"monocular_start.first_structure.max_point_error",
+        [](auto& o) { o.monocular_start.first_structure.max_point_error = 0; }},
+       {"monocular_start.first_structure.near_share",
+        [](auto& o) { o.monocular_start.first_structure.near_share = 0; }},
+       {"monocular_start.first_structure.max_still_share",
+        [](auto& o) { o.monocular_start.first_structure.max_still_share = 2; }},
+       {"monocular_start.first_structure.fixed_strip",
+        [](auto& o) { o.monocular_start.first_structure.fixed_strip = -1; }},
+       {"new_points.cell_px", [](auto& o) { o.new_points.cell_px = 0; }}});
 }
 
 TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {
@@ -102,7 +111,7 @@ TEST(Options, OfRunLogsSayWhyTheyAreInvalid) {
 
 TEST(Options, OfTheEngineSayWhyTheyAreInvalid) {
   expect_rules<EngineOptions>(
-      {{"tracker.min_inliers", [](auto& o) { o.tracker.min_inliers = 0; }},
+      {{"tracker.pose.min_inliers", [](auto& o) { o.tracker.pose.min_inliers = 0; }},
        {"mapper.inner_window", [](auto& o) { o.mapper.inner_window = 0; }},
        {"loop_closer.corners.wanted", [](auto& o) { o.loop_closer.corners.wanted = 0; }},
        {"checkpoint.period", [](auto& o) { o.checkpoint.period = -1; }},
@@ -117,12 +126,12 @@ TEST(Options, OfTheEngineSayWhyTheyAreInvalid) {
 
 TEST(Options, TheEngineRefusesThoseThatAreInvalid) {
   EngineOptions options;
-  options.tracker.cell_px = 0;
+  options.tracker.new_points.cell_px = 0;
   try {
     Engine(testing::test_rig(SensorKind::kStereo), options);
     ADD_FAILURE() << "accepted";
   } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "tracker.cell_px must be >= 1, is 0");
+    EXPECT_STREQ(error.what(), "tracker.new_points.cell_px must be >= 1, is 0");
   }
 }
 

@@ -46,8 +46,8 @@ class MapPartsTest : public testing::KidnappedCamera {
   }
   static EngineOptions impatient() {
     EngineOptions engine = options();
-    engine.tracker.new_part_after = 0.1;
-    engine.tracker.wide_search.enabled = false;  // it would find the room again before a part is started
+    engine.tracker.loss.new_part_after = 0.1;
+    engine.tracker.loss.wide_search.enabled = false;  // it would find the room again before a part is started
     return engine;
   }
 };
@@ -105,7 +105,7 @@ TEST_F(MapPartsTest, ALoopThatTheMapperNeverGetsIsNotClosed) {
 
 TEST_F(MapPartsTest, TheWiderSearchPlacesItWhereItIsOrNotAtAll) {
   EngineOptions patient = options(false);
-  patient.tracker.new_part_after = 10;
+  patient.tracker.loss.new_part_after = 10;
   const RunResult result = run_engine(patient, frames());
   int found = 0;
   for (const FrameRecord& record : result.frames) {

@@ -38,7 +38,7 @@ TEST_F(EnginePlacesTest, ACameraCarriedElsewhereFindsItselfInTheMap) {
 
 TEST_F(EnginePlacesTest, WithoutRecognitionAndWiderSearchItStaysLost) {
   EngineOptions blind = options(false);
-  blind.tracker.wide_search.enabled = false;
+  blind.tracker.loss.wide_search.enabled = false;
   const RunResult result = run_engine(blind, kidnapped(false));
   for (const FrameRecord& record : result.frames) {
     if (after_kidnapping(record)) {

@@ -214,7 +214,7 @@ TEST_F(EnginePushTest, StepsInOneOrderGiveTheSameBytes) {
 TEST_F(EnginePushTest, ARunWhoseLoopCloserRestsForManyKeyframesReplays) {
   constexpr int kLong = 160;
   EngineOptions options = stepped();
-  options.tracker.keyframe_share = 1;                // nearly every frame is one
+  options.tracker.keyframes.tracked_share = 1;       // nearly every frame is one
   options.mapper.culling.keep_replacements = 1'000;  // the maps are compared whole
   const auto there_and_back = [](int i) {
     const int n = i % (2 * kFrames - 2);

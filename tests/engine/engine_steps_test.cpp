@@ -68,7 +68,7 @@ TEST(WideSteps, AfterALossTheFrameThatWasRecognisedLeadsOn) {
   EngineOptions options;
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  options.tracker.new_part_after = 10;
+  options.tracker.loss.new_part_after = 10;
   const RunResult result = testing::run_engine(options, feed);
   for (const FrameRecord& record : result.frames) {
     const int n = static_cast<int>(record.frame_index) - kMapped - kCovered;

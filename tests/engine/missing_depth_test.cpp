@@ -55,7 +55,7 @@ TEST(MissingDepth, ADepthCameraGoesOnBeyondItsReach) {
     const SyntheticSequence sequence(scene);
     const Trajectory truth = testing::true_path(sequence);
     EngineOptions by_depth_alone;
-    by_depth_alone.tracker.seeded_points = 0;
+    by_depth_alone.tracker.new_points.seeded_points = 0;
     const Found without =
         found(testing::run_whole(sequence.rig(), testing::frames_of(sequence), by_depth_alone), truth);
     EXPECT_LT(without.path.size(), 20U) << "or this test says nothing";

@@ -75,7 +75,7 @@ TEST_F(EarlierViewsTest, CornersAreThoseOfAFrameThatWasLookedAt) {
 TEST(EarlierViews, OneCameraCannotFindAnything) {
   EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kMono, 320, 240), {}).can_find());
   TrackerOptions without;
-  without.wide_search.enabled = false;
+  without.loss.wide_search.enabled = false;
   EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kStereo, 320, 240), without).can_find());
   EXPECT_TRUE(EarlierViews(test_rig(SensorKind::kStereo, 320, 240), {}).can_find());
 }

@@ -16,10 +16,10 @@ class KeyframeDecisionTest : public ::testing::Test {
 
   void move(double depths) { result_.T_c_ref = SE3(SO3(), {0, depths * last_.median_depth, 0}); }
   [[nodiscard]] bool due(EffortLevel effort = EffortLevel::kEverything) const {
-    return keyframe_due(result_, last_, occupied_, backlog_, options_, bounds_of(effort, options_));
+    return keyframe_due(result_, last_, occupied_, backlog_, options_.keyframes, bounds_of(effort, options_));
   }
   [[nodiscard]] bool due_by_motion() const {
-    return keyframe_due_by_motion(result_.T_c_ref, last_, backlog_, options_);
+    return keyframe_due_by_motion(result_.T_c_ref, last_, backlog_, options_.keyframes);
   }
 
   const TrackerOptions options_;
@@ -35,10 +35,10 @@ TEST_F(KeyframeDecisionTest, NoneWhereTheCameraStands) {
 }
 
 TEST_F(KeyframeDecisionTest, WhenTheCameraHasMovedOn) {
-  move(0.95 * options_.keyframe_parallax);
+  move(0.95 * options_.keyframes.parallax);
   EXPECT_FALSE(due());
   EXPECT_FALSE(due_by_motion());
-  move(1.05 * options_.keyframe_parallax);
+  move(1.05 * options_.keyframes.parallax);
   EXPECT_TRUE(due());
   EXPECT_TRUE(due_by_motion());
 }
@@ -61,17 +61,17 @@ TEST_F(KeyframeDecisionTest, WhenHalfOfTheImageHasEmptied) {
 }
 
 TEST_F(KeyframeDecisionTest, TheSecondOneComesEarly) {
-  move(0.25 * options_.keyframe_parallax);
+  move(0.25 * options_.keyframes.parallax);
   EXPECT_FALSE(due());
   backlog_.map_is_young = true;
   EXPECT_TRUE(due());
   EXPECT_TRUE(due(EffortLevel::kFewerIterations)) << "without it there is no map";
-  move(0.15 * options_.keyframe_parallax);
+  move(0.15 * options_.keyframes.parallax);
   EXPECT_FALSE(due());
 }
 
 TEST_F(KeyframeDecisionTest, AMapperThatIsBehindGetsUrgentOnesOnly) {
-  backlog_.pending = options_.max_pending;
+  backlog_.pending = options_.keyframes.max_pending;
   move(1);
   EXPECT_FALSE(due());
   EXPECT_FALSE(due_by_motion());
@@ -101,16 +101,16 @@ TEST_F(KeyframeDecisionTest, ByDepthWhenTheCameraHasTurned) {
 }
 
 TEST_F(KeyframeDecisionTest, AsTheOptionsSay) {
-  TrackerOptions patient;
-  patient.keyframe_turn = 0.3;
+  KeyframeDecisionOptions patient;
+  patient.turn = 0.3;
   patient.young_map_share = 0.5;
   result_.T_c_ref = SE3(SO3::exp({0, 0.25, 0}), Vector3::Zero());
   EXPECT_FALSE(keyframe_due_by_motion(result_.T_c_ref, last_, backlog_, patient));
   backlog_.map_is_young = true;
-  const EffortBounds bounds = bounds_of(EffortLevel::kEverything, patient);
-  move(0.45 * patient.keyframe_parallax);
+  const EffortBounds bounds = bounds_of(EffortLevel::kEverything, options_);
+  move(0.45 * patient.parallax);
   EXPECT_FALSE(keyframe_due(result_, last_, occupied_, backlog_, patient, bounds));
-  move(0.55 * patient.keyframe_parallax);
+  move(0.55 * patient.parallax);
   EXPECT_TRUE(keyframe_due(result_, last_, occupied_, backlog_, patient, bounds));
 }
 

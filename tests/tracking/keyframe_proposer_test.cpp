@@ -86,7 +86,7 @@ TEST_F(KeyframeProposerTest, PointsFoundAgainGetNumbersAndGoToTheMapOnce) {
 
 TEST_F(KeyframeProposerTest, WhatWasFoundOnceOnlyIsLeftOutWhereTheYoungAreMistrusted) {
   find_all();
-  immature_.points()[4].agreed = static_cast<std::uint8_t>(options_.trusted_after);
+  immature_.points()[4].agreed = static_cast<std::uint8_t>(options_.immature.trusted_after);
   propose_next(true);
   ASSERT_EQ(proposal_.observations.size(), 1U);
   EXPECT_EQ(immature_.points()[4].id, proposal_.observations[0].point);
@@ -97,7 +97,7 @@ TEST_F(KeyframeProposerTest, TheSecondKeyframeOfAPartComesSoon) {
   step_.result.reference = KeyframeId{0};
   step_.result.reference_in_view = 1;
   step_.result.searched = step_.result.matches = 100;
-  step_.result.T_c_ref = SE3(SO3(), {0.5 * options_.keyframe_parallax * 2, 0, 0});
+  step_.result.T_c_ref = SE3(SO3(), {0.5 * options_.keyframes.parallax * 2, 0, 0});
   EXPECT_TRUE(proposer_.due(step_, 20, immature_));
   find_all();
   propose_next(false);

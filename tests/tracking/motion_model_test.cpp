@@ -22,7 +22,7 @@ class MotionModelTest : public ::testing::Test {
   static SE3 T_c_ref(double i) { return SE3::exp(1e-9 * kInterval * i * kVelocity); }
   static double between(const SE3& T_a, const SE3& T_b) { return (T_a * T_b.inverse()).log().norm(); }
 
-  TrackerOptions options_;
+  MotionModelOptions options_;
   MotionModel model_{options_};
 };
 

@@ -21,7 +21,7 @@ class PointStarterTest : public ::testing::Test {
   PointStarterTest() : rig_(testing::test_rig(SensorKind::kStereo, 320, 240)) {
     testing::RenderedScene scene(rig_, {3, 2, 5}, 21);
     scene.render(SE3(), 2, images_);
-    options_.max_new_points = 60;
+    options_.max_points = 60;
   }
 
   ImmaturePoints started(PointStarter& starter) {
@@ -35,12 +35,13 @@ class PointStarterTest : public ::testing::Test {
   }
 
   Rig rig_;
-  TrackerOptions options_;
+  NewPointOptions options_;
+  GuidedSearchOptions search_;
   FrameImages images_;
 };
 
 TEST_F(PointStarterTest, StartsOnePointACellWithTheDepthOfThePair) {
-  PointStarter starter(rig_, options_);
+  PointStarter starter(rig_, options_, search_);
   const ImmaturePoints points = started(starter);
   EXPECT_GT(points.points().size(), 30U);
   EXPECT_LE(points.points().size(), 60U);
@@ -63,12 +64,12 @@ TEST_F(PointStarterTest, TakesTheWidestImage) {
   cv::Mat noise(64, 16384, CV_8UC1);
   cv::randu(noise, 0, 255);
   images.left.build(noise);
-  PointStarter starter(wide, options_);
+  PointStarter starter(wide, options_, search_);
   EXPECT_TRUE(starter.sees_corners(images.left, 100));
 }
 
 TEST_F(PointStarterTest, StartsNothingWhereAPointIsTracked) {
-  PointStarter starter(rig_, options_);
+  PointStarter starter(rig_, options_, search_);
   const ImmaturePoints before = started(starter);
   starter.clear();
   std::set<std::pair<int, int>> tracked;
@@ -82,20 +83,20 @@ TEST_F(PointStarterTest, StartsNothingWhereAPointIsTracked) {
 }
 
 TEST_F(PointStarterTest, ClearsWhatWasTracked) {
-  PointStarter starter(rig_, options_);
+  PointStarter starter(rig_, options_, search_);
   const std::size_t all = started(starter).points().size();
   starter.clear();
   EXPECT_EQ(started(starter).points().size(), all);
 }
 
 TEST_F(PointStarterTest, EndsWhenThereIsNoRoom) {
-  PointStarter starter(rig_, options_);
+  PointStarter starter(rig_, options_, search_);
   ImmaturePoints points(7, 1);
   EXPECT_EQ(starter.start(images_, kAnchor, RollingShutter(), points), 7);
 }
 
 TEST_F(PointStarterTest, ChoosesCornersUpToTheRoomThereIs) {
-  PointStarter starter(rig_, options_);
+  PointStarter starter(rig_, options_, search_);
   std::vector<PointAppearance> appearances;
   appearances.reserve(20);
   starter.choose_corners(images_, 100, appearances);
@@ -106,7 +107,7 @@ TEST_F(PointStarterTest, ChoosesCornersUpToTheRoomThereIs) {
 }
 
 TEST_F(PointStarterTest, SeesCornersOnlyWhereThereAreSome) {
-  PointStarter starter(rig_, options_);
+  PointStarter starter(rig_, options_, search_);
   EXPECT_TRUE(starter.sees_corners(images_.left, 20));
   FrameImages grey;
   grey.left.build(cv::Mat(240, 320, CV_8UC1, cv::Scalar(120)));
@@ -114,7 +115,7 @@ TEST_F(PointStarterTest, SeesCornersOnlyWhereThereAreSome) {
 }
 
 TEST_F(PointStarterTest, SaysThatThePairIsSwapped) {
-  PointStarter starter(rig_, options_);
+  PointStarter starter(rig_, options_, search_);
   FrameImages swapped;
   swapped.left.build(images_.right.level(0));
   swapped.right.build(images_.left.level(0));

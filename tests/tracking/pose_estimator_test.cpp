@@ -54,7 +54,7 @@ class PoseEstimatorTest : public ::testing::Test {
   GraphSnapshot snapshot_ = map_.publish();
   Frame frame_;
   FrameStep step_{frame_, snapshot_, nullptr, bounds_of(EffortLevel::kEverything, options_), 0};
-  MotionModel motion_{options_};
+  MotionModel motion_{options_.motion_model};
   ShutterModel shutter_{rig_, motion_, 100};
   ImmaturePoints immature_{100, 4};
   LocalMap local_map_{100};
@@ -73,9 +73,9 @@ TEST_F(PoseEstimatorTest, FindsWhereAllPointsAreSeenFrom) {
 }
 
 TEST_F(PoseEstimatorTest, GivesNoPoseWhereTooLittleWasFoundOrTooFewAgree) {
-  find(options_.min_inliers - 1, T_true_);
+  find(options_.pose.min_inliers - 1, T_true_);
   EXPECT_EQ(estimate(), LostCause::kTooFewMatches);
-  step_.result.candidates = options_.min_inliers - 1;
+  step_.result.candidates = options_.pose.min_inliers - 1;
   EXPECT_EQ(estimate(), LostCause::kTooFewCandidates);
   step_.result.candidates = 60;
   find(60, T_true_);
@@ -86,13 +86,13 @@ TEST_F(PoseEstimatorTest, GivesNoPoseWhereTooLittleWasFoundOrTooFewAgree) {
 }
 
 TEST_F(PoseEstimatorTest, KnowsWhichOfTheTrackersPointsMoveOrAreNotFound) {
-  for (int times = 1; times <= options_.moving_after; ++times) {
+  for (int times = 1; times <= options_.immature.moving_after; ++times) {
     find(50, T_true_);
     displace(3);
     for (std::uint32_t i = 50; i < 60; ++i) found_.missed.push_back(i);
     ASSERT_EQ(estimate(), LostCause::kNone);
     EXPECT_EQ(step_.result.inliers, 47);
-    EXPECT_EQ(step_.result.moving, times < options_.moving_after ? 0 : 3);
+    EXPECT_EQ(step_.result.moving, times < options_.immature.moving_after ? 0 : 3);
     EXPECT_EQ(immature_.points()[0].moved, times);
     EXPECT_EQ(immature_.points()[0].agreed, 0);
     EXPECT_EQ(immature_.points()[10].agreed, times);
@@ -106,12 +106,13 @@ TEST_F(PoseEstimatorTest, KnowsWhichOfTheTrackersPointsMoveOrAreNotFound) {
 
 /// None of these points is of the map: many must be found, and of those searched not too few.
 TEST_F(PoseEstimatorTest, BelievesARoughStartOnlyWithMuchBehindIt) {
-  find(options_.rough_min_inliers, T_true_);
+  find(options_.pose.rough.min_inliers, T_true_);
   ASSERT_EQ(estimate(), LostCause::kNone);
   EXPECT_TRUE(estimator_.well_supported(step_.result, found_));
-  step_.result.searched = static_cast<int>(options_.rough_min_inliers / options_.rough_searched_share) + 5;
+  step_.result.searched =
+      static_cast<int>(options_.pose.rough.min_inliers / options_.pose.rough.searched_share) + 5;
   EXPECT_FALSE(estimator_.well_supported(step_.result, found_));
-  find(options_.rough_min_inliers - 1, T_true_);
+  find(options_.pose.rough.min_inliers - 1, T_true_);
   ASSERT_EQ(estimate(), LostCause::kNone);
   EXPECT_FALSE(estimator_.well_supported(step_.result, found_));
 }

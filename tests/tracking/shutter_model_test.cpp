@@ -43,7 +43,7 @@ class ShutterModelTest : public ::testing::Test {
   }
 
   TrackerOptions options_;
-  MotionModel motion_{options_};
+  MotionModel motion_{options_.motion_model};
   PlainMap map_;
   GraphSnapshot snapshot_ = map_.publish();
   Frame frame_;

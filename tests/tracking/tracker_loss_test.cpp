@@ -115,7 +115,7 @@ TEST(Tracker, FindsOnAfterAStepTooWideForItsPrediction) {
 /// A turning camera, every third frame on whose way is followed by so many that are missing.
 int lost_where_frames_are_missing(int missing) {
   TrackerOptions options;
-  options.wide_search.enabled = false;  // the prediction alone
+  options.loss.wide_search.enabled = false;  // the prediction alone
   const Rig rig = test_rig(SensorKind::kStereo, 320, 240);
   Odometry odometry(rig, options);
   RenderedScene scene(rig, {3, 2, 5}, 21);
@@ -160,11 +160,11 @@ TEST(Tracker, StartsNoPartForAFewLostFramesHoweverLongTheyTake) {
   Odometry odometry(SensorKind::kStereo);
   for (std::size_t i = 0; i < 15; ++i) odometry.step(frames(SensorKind::kStereo)[i]);
   Frame elsewhere = another_view(SE3());
-  for (int i = 0; i < TrackerOptions{}.new_part_frames; ++i) {
+  for (int i = 0; i < TrackerOptions{}.loss.new_part_frames; ++i) {
     elsewhere.index = 15 + i;
     elsewhere.t_ns = (10 + 3 * i) * std::int64_t{1'000'000'000};  // three seconds apart
     EXPECT_EQ(odometry.step(elsewhere).status,
-              i + 1 < TrackerOptions{}.new_part_frames ? TrackStatus::kLost : TrackStatus::kTracking)
+              i + 1 < TrackerOptions{}.loss.new_part_frames ? TrackStatus::kLost : TrackStatus::kTracking)
         << i;
   }
 }
@@ -342,7 +342,7 @@ TEST(Tracker, GoesWhereItIsRelocalised) {
 
 /// A camera in a map that another one made, told about where it is.
 TrackStatus told_where_it_is(TrackerOptions options) {
-  options.wide_search.enabled = false;
+  options.loss.wide_search.enabled = false;
   const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
   static const GraphSnapshot map = [&] {
     Odometry odometry(SensorKind::kStereo);
@@ -362,20 +362,20 @@ TrackStatus told_where_it_is(TrackerOptions options) {
 TEST(Tracker, BelievesAnAnswerThatEnoughOfTheMapsPointsSupport) {
   EXPECT_EQ(told_where_it_is({}), TrackStatus::kTracking);
   TrackerOptions options;
-  options.rough_min_inliers = 10'000;
+  options.pose.rough.min_inliers = 10'000;
   EXPECT_EQ(told_where_it_is(options), TrackStatus::kTracking) << "points that the map has will do";
-  options.rough_min_mapped = 10'000;
+  options.pose.rough.min_mapped = 10'000;
   EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost);
   options = {};
-  options.rough_searched_share = 1;
+  options.pose.rough.searched_share = 1;
   EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost) << "some of those searched are not found";
   options = {};
-  options.motion.inlier_chi2_stereo = 0.1;
-  options.min_inliers = 6;
-  options.rough_min_mapped = 6;
-  options.min_inlier_share = options.rough_inlier_share = options.rough_searched_share = 0.01;
+  options.pose.motion.inlier_chi2_stereo = 0.1;
+  options.pose.min_inliers = 6;
+  options.pose.rough.min_mapped = 6;
+  options.pose.min_inlier_share = options.pose.rough.inlier_share = options.pose.rough.searched_share = 0.01;
   EXPECT_EQ(told_where_it_is(options), TrackStatus::kTracking);
-  options.rough_inlier_share = 1;
+  options.pose.rough.inlier_share = 1;
   EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost) << "some of those found do not agree";
 }
 

@@ -139,14 +139,14 @@ TrackResult sixth_frame(const TrackerOptions& options) {
 TEST(Tracker, LooksForPointsInsideOfTheBorder) {
   TrackerOptions options;
   const int everywhere = sixth_frame(options).candidates;
-  options.border_px = 60;  // 60 % and half of the image
-  options.min_inliers = 5;
+  options.local_map.border_px = 60;  // 60 % and half of the image
+  options.pose.min_inliers = 5;
   EXPECT_LT(sixth_frame(options).candidates, everywhere / 2);
 }
 
 TEST(Tracker, LooksForPointsFromTheSideTheyWereSeenFrom) {
   TrackerOptions options;
-  options.min_view_cosine = 1;
+  options.local_map.min_view_cosine = 1;
   const TrackResult result = sixth_frame(options);
   EXPECT_EQ(result.status, TrackStatus::kLost);
   EXPECT_EQ(result.candidates, 0);
@@ -155,20 +155,20 @@ TEST(Tracker, LooksForPointsFromTheSideTheyWereSeenFrom) {
 
 TEST(Tracker, StopsSearchingWhenItHasEnough) {
   TrackerOptions options;
-  options.wanted_matches = 60;
+  options.local_map.wanted_matches = 60;
   const TrackResult enough = sixth_frame(options);
   EXPECT_EQ(enough.matches, 60);
   EXPECT_LT(enough.searched, enough.candidates);
   options = {};
-  options.max_searches = 50;
+  options.local_map.max_searches = 50;
   EXPECT_EQ(sixth_frame(options).searched, 50);
 }
 
 /// Why the first of ten frames is lost when so many points must agree, and 60 are searched for.
 LostCause first_loss(int min_inliers, TrackerOptions options = {}) {
-  options.wanted_matches = 60;
-  options.min_inliers = min_inliers;
-  options.wide_search.enabled = false;
+  options.local_map.wanted_matches = 60;
+  options.pose.min_inliers = min_inliers;
+  options.loss.wide_search.enabled = false;
   Odometry odometry(test_rig(SensorKind::kStereo, 320, 240), options);
   for (std::size_t i = 0; i < 10; ++i) {
     const TrackResult result = odometry.step(frames(SensorKind::kStereo)[i]);
@@ -182,16 +182,16 @@ TEST(Tracker, IsLostWhenFewerPointsAgreeThanMust) {
   EXPECT_EQ(first_loss(61), LostCause::kTooFewMatches);
   EXPECT_EQ(first_loss(1000), LostCause::kTooFewCandidates);
   TrackerOptions strict;
-  strict.motion.inlier_chi2_stereo = 0.02;  // a tenth of a pixel, and no point is free of noise
+  strict.pose.motion.inlier_chi2_stereo = 0.02;  // a tenth of a pixel, and no point is free of noise
   EXPECT_EQ(first_loss(60, strict), LostCause::kInconsistentMatches);
 }
 
 TEST(Tracker, IsLostWhenMostOfWhatIsFoundDisagrees) {
   TrackerOptions options;
-  options.motion.inlier_chi2_stereo = 0.05;
-  options.min_inlier_share = 0.01;
+  options.pose.motion.inlier_chi2_stereo = 0.05;
+  options.pose.min_inlier_share = 0.01;
   EXPECT_EQ(first_loss(6, options), LostCause::kNone);
-  options.min_inlier_share = 0.95;
+  options.pose.min_inlier_share = 0.95;
   EXPECT_EQ(first_loss(6, options), LostCause::kInconsistentMatches);
 }
 

@@ -51,6 +51,7 @@ std::string FixedPixelOptions::invalid_reason() const {
       .within("believed", believed, 2, 100)
       .above("round", round, 0)
       .share("most_of_it", most_of_it)
+      .share("min_inlier_share", min_inlier_share)
       .reason();
 }
 

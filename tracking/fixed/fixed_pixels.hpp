@@ -22,6 +22,8 @@ struct FixedPixelOptions {
   int believed = 5;         ///< looks at which a telling pixel must have stayed the same, in [2, 100]
   double round = 0.2;       ///< time in which all of the image is looked at once [s], > 0
   double most_of_it = 0.5;  ///< of the image: when more seems fixed, no region is believed to be, in (0, 1]
+  /// Of the points found in a frame, in (0, 1]: with fewer inliers its pose says nothing of pixels.
+  double min_inlier_share = 0.5;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

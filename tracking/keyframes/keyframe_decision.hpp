@@ -1,7 +1,7 @@
 #pragma once
 
 #include "tracking/effort.hpp"
-#include "tracking/options.hpp"
+#include "tracking/keyframes/options.hpp"
 #include "tracking/track_result.hpp"
 
 namespace twofold {
@@ -24,12 +24,13 @@ struct KeyframeBacklog {
 /// @param last  of the newest keyframe
 /// @param occupied_regions  of this frame
 [[nodiscard]] bool keyframe_due(const TrackResult& result, const KeyframeView& last, int occupied_regions,
-                                const KeyframeBacklog& backlog, const TrackerOptions& options,
+                                const KeyframeBacklog& backlog, const KeyframeDecisionOptions& options,
                                 const EffortBounds& bounds);
 
 /// The same for a frame that was placed by its depth image (TrackResult::by_depth): the camera has moved on
 /// or turned, and there may be corners again.
 [[nodiscard]] bool keyframe_due_by_motion(const SE3& T_c_ref, const KeyframeView& last,
-                                          const KeyframeBacklog& backlog, const TrackerOptions& options);
+                                          const KeyframeBacklog& backlog,
+                                          const KeyframeDecisionOptions& options);
 
 }  // namespace twofold

@@ -36,8 +36,9 @@ bool KeyframeProposer::due(const FrameStep& step, int regions, const ImmaturePoi
       is_newest(first) && part_of(step.graph, immature_points, step.result.reference) == first;
   const KeyframeBacklog backlog{immature_points.room_for_keyframe(),
                                 static_cast<int>(immature_points.pending().size()), one_keyframe};
-  return step.result.by_depth ? keyframe_due_by_motion(step.result.T_c_ref, last_, backlog, options_)
-                              : keyframe_due(step.result, last_, regions, backlog, options_, step.bounds);
+  return step.result.by_depth
+             ? keyframe_due_by_motion(step.result.T_c_ref, last_, backlog, options_.keyframes)
+             : keyframe_due(step.result, last_, regions, backlog, options_.keyframes, step.bounds);
 }
 
 void KeyframeProposer::begin(const Placement& placement, const KeyframeView& view, FrameStep& step,
@@ -67,7 +68,7 @@ void KeyframeProposer::add_observations(const SearchOutcome& found, const LocalM
     PointId id = point.id;
     if (ImmaturePoint* immature = immature_points.at(point.immature)) {
       const bool unconfirmed = immature->id == kNoPoint;
-      if (unconfirmed && mistrusts_the_young && immature->agreed < options_.trusted_after) continue;
+      if (unconfirmed && mistrusts_the_young && immature->agreed < options_.immature.trusted_after) continue;
       if (unconfirmed) confirm(*immature, proposal);
       id = immature->id;
     }

@@ -9,10 +9,11 @@ constexpr std::size_t kMaxSeeds = 600;
 
 NewPoints::NewPoints(const Rig& rig, const TrackerOptions& options, const FixedPixels& fixed)
     : rig_(rig),
-      options_(options),
-      starter_(rig, rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options) : options, &fixed),
-      seeds_(rig, options.search, options.seeds, kMaxSeeds) {
-  corners_.reserve(static_cast<std::size_t>(options.max_new_points));
+      options_(rig.kind == SensorKind::kMono ? with_cells_of_one_camera(rig, options.new_points)
+                                             : options.new_points),
+      starter_(rig, options_, options.search, &fixed),
+      seeds_(rig, options.search, options_.seeds, kMaxSeeds) {
+  corners_.reserve(static_cast<std::size_t>(options_.max_points));
 }
 
 int NewPoints::start_first(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
@@ -51,8 +52,7 @@ void NewPoints::start_seeds(const FrameImages& images, KeyframeId anchor, const 
   const bool one_camera = rig_.kind == SensorKind::kMono;
   if (!one_camera && !starter_.depth_is_scarce()) return;
   seeds_.for_places([&](const Eigen::Vector2f& uv) { starter_.occupy(uv); });
-  const int wanted =
-      one_camera ? options_.max_new_points : options_.seeded_points - starter_.points_in_view();
+  const int wanted = one_camera ? options_.max_points : options_.seeded_points - starter_.points_in_view();
   corners_.clear();
   starter_.choose_corners(images, wanted, corners_);
   for (const PointAppearance& appearance : corners_) seeds_.add(anchor, appearance, shutter);

@@ -18,8 +18,7 @@ namespace twofold {
 /// No allocation after construction.
 class NewPoints {
  public:
-  /// All must outlive this.
-  /// @param fixed  of the left camera
+  /// @param rig, fixed  must outlive this; fixed pixels of the left camera
   NewPoints(const Rig& rig, const TrackerOptions& options, const FixedPixels& fixed);
 
   /// Starts points in the first keyframe of a map or map part. Seeds are left to `start_seeds`.
@@ -57,7 +56,7 @@ class NewPoints {
   void occupy_unsearched(const LocalMap& local_map, const SE3& T_c_ref, Quadtree& candidates);
 
   const Rig& rig_;
-  const TrackerOptions& options_;
+  const NewPointOptions options_;
   PointStarter starter_;
   DepthSeeds seeds_;
   std::vector<PointAppearance> corners_;  ///< scratch

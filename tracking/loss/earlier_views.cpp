@@ -17,10 +17,10 @@ RecentView room_for_view(const Rig& rig, const WideSearch& search) {
 }  // namespace
 
 EarlierViews::EarlierViews(const Rig& rig, const TrackerOptions& options)
-    : can_find_(options.wide_search.enabled && rig.kind != SensorKind::kMono),
+    : can_find_(options.loss.wide_search.enabled && rig.kind != SensorKind::kMono),
       guided_(options.search),
-      search_(rig, options.wide_search),
-      keyframes_(static_cast<std::size_t>(options.recent_keyframes), room_for_view(rig, search_)),
+      search_(rig, options.loss.wide_search),
+      keyframes_(static_cast<std::size_t>(options.loss.recent_keyframes), room_for_view(rig, search_)),
       asked_(room_for_view(rig, search_)) {}
 
 void EarlierViews::look_at(const FrameImages& now) {

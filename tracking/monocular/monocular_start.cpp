@@ -25,10 +25,10 @@ double median_flow(const StartCandidate& candidate) {
 MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
-      starter_(rig, with_cells_of_one_camera(rig, options)),
+      starter_(rig, with_cells_of_one_camera(rig, options.new_points), options.search),
       candidates_(static_cast<std::size_t>(options.monocular_start.candidates)) {
-  rig_.noise.sigma_px = options.first_structure.sigma_px;
-  const auto corners = static_cast<std::size_t>(options.max_new_points);
+  rig_.noise.sigma_px = options.monocular_start.first_structure.sigma_px;
+  const auto corners = static_cast<std::size_t>(options.new_points.max_points);
   for (StartCandidate& candidate : candidates_) {
     allocate_images(rig, candidate.images);
     candidate.corners.reserve(corners);
@@ -215,7 +215,7 @@ tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandi
     views.last_motion.push_back(corner.motion.value_or(Eigen::Vector2f::Zero()).cast<double>());
   }
   for (const auto& places : candidate.between) views.between.push_back(as_pixels(places));
-  return first_structure(rig_, views, options_.first_structure);
+  return first_structure(rig_, views, options_.monocular_start.first_structure);
 }
 
 /// Gives up candidates of which little is still in view, and takes the frame as one when the newest has been

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "tracking/options.hpp"
+#include "tracking/motion/options.hpp"
 #include "tracking/placement.hpp"
 
 namespace twofold {
@@ -15,7 +15,7 @@ namespace twofold {
 class MotionModel {
  public:
   /// @param options  must outlive this
-  explicit MotionModel(const TrackerOptions& options) : options_(options) {}
+  explicit MotionModel(const MotionModelOptions& options) : options_(options) {}
 
   // The last frame with a pose.
   [[nodiscard]] const Placement& placement() const { return placement_; }
@@ -40,7 +40,7 @@ class MotionModel {
   /// Pose relative to the reference, likewise.
   [[nodiscard]] SE3 predicted_pose(std::int64_t t_ns, bool lost) const;
   /// Motion from the last frame to one that may be far from it: nothing if nobody knows how fast the camera
-  /// was, or where it went since (TrackerOptions::coast_for).
+  /// was, or where it went since (MotionModelOptions::coast_for).
   [[nodiscard]] std::optional<SE3> coasted(std::int64_t t_ns) const;
   /// The camera's velocity [m/s, rad/s] in a frame that is at T_c_ref, as since the last one; nothing after a
   /// loss.
@@ -60,7 +60,7 @@ class MotionModel {
     return 1e-9 * static_cast<double>(t_ns - t_ns_);
   }
 
-  const TrackerOptions& options_;
+  const MotionModelOptions& options_;
   Placement placement_;
   std::int64_t t_ns_ = 0;
   std::optional<SE3> T_this_previous_;  ///< the prediction of the next; none after a loss

@@ -21,9 +21,9 @@ PoseEstimator::PoseEstimator(const Rig& rig, const TrackerOptions& options, cons
       local_map_(local_map),
       shutter_(shutter),
       immature_points_(immature_points),
-      elder_vote_(rig, static_cast<std::size_t>(options.max_searches), options.elders),
+      elder_vote_(rig, static_cast<std::size_t>(options.local_map.max_searches), options.pose.elders),
       uncertainty_(rig) {
-  anchors_.reserve(static_cast<std::size_t>(options.max_searches));
+  anchors_.reserve(static_cast<std::size_t>(options.local_map.max_searches));
 }
 
 /// Where rows are read one after the other, how they move is known by the result only: a few rounds.
@@ -45,10 +45,10 @@ LostCause PoseEstimator::estimate(const Placement& start, FrameStep& step, Searc
   result.moving = judge_immature_points(found);
   elder_vote_.remember(found.verdict);
   result.inliers = motion.inliers;
-  if (result.candidates < options_.min_inliers) return LostCause::kTooFewCandidates;
-  if (result.matches < options_.min_inliers) return LostCause::kTooFewMatches;
-  if (!motion.determined || motion.inliers < options_.min_inliers ||
-      motion.inliers < options_.min_inlier_share * result.matches) {
+  if (result.candidates < options_.pose.min_inliers) return LostCause::kTooFewCandidates;
+  if (result.matches < options_.pose.min_inliers) return LostCause::kTooFewMatches;
+  if (!motion.determined || motion.inliers < options_.pose.min_inliers ||
+      motion.inliers < options_.pose.min_inlier_share * result.matches) {
     return LostCause::kInconsistentMatches;
   }
   result.status = TrackStatus::kTracking;
@@ -86,7 +86,7 @@ int PoseEstimator::judge_immature_points(const SearchOutcome& found) {
     immature->moved = static_cast<std::uint8_t>(agrees ? 0 : std::min(immature->moved + 1, 255));
     const bool expelled = found.verdict.by_elders && !agrees;  // found, but it is something that moves
     immature->failures = expelled ? 255 : 0;
-    moving += expelled || immature->moved >= options_.moving_after ? 1 : 0;
+    moving += expelled || immature->moved >= options_.immature.moving_after ? 1 : 0;
   }
   return moving;
 }
@@ -116,7 +116,7 @@ Matrix6 PoseEstimator::honest_information(const FrameStep& step, const SearchOut
 }
 
 MotionOnlyOptions PoseEstimator::solver(const FrameStep& step) const {
-  MotionOnlyOptions solver = options_.motion;
+  MotionOnlyOptions solver = options_.pose.motion;
   solver.max_iterations = step.bounds.motion_iterations;
   return solver;
 }
@@ -132,10 +132,10 @@ int PoseEstimator::mapped_inliers(const SearchOutcome& found) const {
 }
 
 bool PoseEstimator::well_supported(const TrackResult& result, const SearchOutcome& found) const {
-  return (result.inliers >= options_.rough_min_inliers ||
-          mapped_inliers(found) >= options_.rough_min_mapped) &&
-         result.inliers >= options_.rough_inlier_share * result.matches &&
-         result.inliers >= options_.rough_searched_share * result.searched;
+  return (result.inliers >= options_.pose.rough.min_inliers ||
+          mapped_inliers(found) >= options_.pose.rough.min_mapped) &&
+         result.inliers >= options_.pose.rough.inlier_share * result.matches &&
+         result.inliers >= options_.pose.rough.searched_share * result.searched;
 }
 
 }  // namespace twofold

@@ -60,14 +60,14 @@ EngineOptions options_for_object(const Rig& rig) {
   constexpr double kShare = 0.1;  // of the image, that an object is thought to have
   constexpr int kCellUnit = 4;    // [px] cells are multiples of it
   EngineOptions options;
-  TrackerOptions& tracker = options.tracker;
+  NewPointOptions& points = options.tracker.new_points;
   // Patches of coarser levels reach around what is round or narrow and beyond its outline, which keeps its
   // place when the object turns.
-  tracker.corner_levels = 1;
+  points.corner_levels = 1;
   // So small that the object's part has a cell for each point.
   const double area = kShare * rig.camera.width * rig.camera.height;
-  const auto units = std::lround(std::sqrt(area / tracker.max_new_points) / kCellUnit);
-  tracker.cell_px = std::clamp(kCellUnit * static_cast<int>(units), 2 * kCellUnit, tracker.cell_px);
+  const auto units = std::lround(std::sqrt(area / points.max_points) / kCellUnit);
+  points.cell_px = std::clamp(kCellUnit * static_cast<int>(units), 2 * kCellUnit, points.cell_px);
   // They are spread over the whole image: so many that the object's share of them is as large as usual.
   MetricLoopOptions& loop = options.mapper.loop;
   loop.max_searches = static_cast<int>(std::lround(loop.max_searches / kShare));

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <string>
+
+#include "tracking/monocular/depth_seeds.hpp"
+
+namespace twofold {
+
+/// When a frame becomes a keyframe (tracking/keyframes/keyframe_decision.hpp).
+struct KeyframeDecisionOptions {
+  double parallax = 0.09;       ///< |t| since the reference keyframe over the newest one's median depth
+  double tracked_share = 0.65;  ///< of the reference's points: with fewer still tracked a keyframe is due
+  /// A keyframe is due when fewer than 1 - emptied_share times as many image regions hold a tracked point as
+  /// at the last keyframe.
+  double emptied_share = 0.5;
+  double turn = 0.2;  ///< since the reference keyframe, where depth alone says how the camera moved [rad]
+  /// Share of the parallax at which a map's second keyframe is due: it confirms the points of the first, and
+  /// until then there is no map.
+  double young_map_share = 0.2;
+  double urgent_share = 0.35;  ///< as tracked_share; below it a keyframe is due whatever max_pending says
+  int max_pending = 2;         ///< with so many proposals on their way to the map no further one is made
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// Where a keyframe starts new points (tracking/keyframes/new_points.hpp).
+struct NewPointOptions {
+  int corner_threshold = 10;    ///< FAST [grey]
+  int corner_levels = 3;        ///< levels on which points are started
+  float min_corner_score = 12;  ///< Shi-Tomasi [grey^2/px^2]
+  int cell_px = 28;             ///< at most one new point a cell and only where no point is tracked
+  int max_points = 220;         ///< started in one keyframe
+  int min_start_points = 40;    ///< with measured depth; a map or map part starts with no fewer, > 0
+  /// In the dark, with fewer points in view, tracked and started, faint corners will do: half the threshold,
+  /// a quarter of the score, where the pyramid has averaged the noise away.
+  int scarce_points = 90;
+  DepthSeedOptions seeds;  ///< corners whose depth is not measured
+  /// Where most new corners have no depth, a rig that measures it starts some without, as one camera does:
+  /// as many as are missing to so many points in view; 0: never.
+  int seeded_points = 120;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+/// What becomes of points that no snapshot holds yet (tracking/immature_points.hpp).
+struct ImmaturePointOptions {
+  int max_failures = 4;  ///< not found in so many searches in a row: given up
+  int max_age = 3;       ///< keyframes after which a point is given up
+  /// While young points are mistrusted: frames in a row in which a point must agree to be confirmed.
+  int trusted_after = 3;
+  int moving_after = 2;  ///< times in a row that a point is found elsewhere: it is said to move
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+}  // namespace twofold

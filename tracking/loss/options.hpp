@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "tracking/loss/wide_search.hpp"
+
+namespace twofold {
+
+/// What a lost camera is compared with, and when it starts anew.
+struct LossOptions {
+  WideSearchOptions wide_search;
+  int recent_keyframes = 4;   ///< whose images a lost camera is compared with, and depth aligned to, in [1,
+                              ///< DepthAlignment::kViews]
+  double new_part_after = 1;  ///< lost for so long while corners are seen: a new map part is started [s]
+  int new_part_frames = 5;    ///< ... and for so many frames
+  int min_corners_seen = 40;  ///< fewer: the lens is covered, or there is nothing to see
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
+}  // namespace twofold
