@@ -135,7 +135,7 @@ void ClipCollector::follow(std::int64_t t_ns, ActiveClip& clip) const {
   std::size_t kept = 0;
   std::vector<Eigen::Vector2f> now;
   for (std::size_t i = 0; i < clip.corners.size(); ++i) {
-    if (!follow_corner(*last_, *current_, clip.corners[i])) continue;
+    if (!follow_corner(*last_, *current_, {}, clip.corners[i])) continue;
     clip.corners[kept] = clip.corners[i];
     for (auto& places : clip.places) places[kept] = places[i];
     now.push_back(clip.corners[i].uv);

@@ -10,7 +10,6 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kMaxCandidates = 3000;
-constexpr std::size_t kFewestInLight = 15;  // points that say by how much the light changed
 
 }  // namespace
 
@@ -105,7 +104,7 @@ void LocalMapSearch::search_in_other_light(SearchedView& view, int searched, Sea
         brightness_since_anchor(view.images.left, rig_.camera, *point.appearance, point.psi, T_c_a);
     if (ratio) gains_.push_back(*ratio);
   }
-  if (gains_.size() < kFewestInLight) return;
+  if (static_cast<int>(gains_.size()) < options_.local_map.min_light_points) return;
   const double gain = median(std::span(gains_));
   if (std::max(gain, 1 / gain) < options_.local_map.light_change) return;
   view.options.gain = static_cast<float>(gain);

@@ -34,6 +34,7 @@ std::string LocalMapSearchOptions::invalid_reason() const {
       .within("min_view_cosine", min_view_cosine, -1, 1)
       .above("lost_radius_px", lost_radius_px, 0)
       .share("light_missed_share", light_missed_share)
+      .at_least("min_light_points", min_light_points, 1)
       .above("light_change", light_change, 1)
       .reason();
 }
@@ -42,7 +43,7 @@ std::string TrackerOptions::invalid_reason() const {
   return OptionCheck()
       .nested("fixed", fixed.invalid_reason())
       .nested("motion_model", motion_model.invalid_reason())
-      .nested("readout", readout.invalid_reason())
+      .nested("shutter", shutter.invalid_reason())
       .nested("alignment", alignment.invalid_reason())
       .nested("search", search.invalid_reason())
       .nested("local_map", local_map.invalid_reason())
@@ -52,6 +53,7 @@ std::string TrackerOptions::invalid_reason() const {
       .within("loss.recent_keyframes", loss.recent_keyframes, 1, static_cast<double>(DepthAlignment::kViews))
       .nested("monocular_start", monocular_start.invalid_reason())
       .nested("keyframes", keyframes.invalid_reason())
+      .nested("reference", reference.invalid_reason())
       .nested("new_points", new_points.invalid_reason())
       .nested("immature", immature.invalid_reason())
       .reason();

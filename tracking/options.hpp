@@ -2,7 +2,6 @@
 
 #include <string>
 
-#include "camera/readout_estimator.hpp"
 #include "imaging/guided_search.hpp"
 #include "tracking/dense_alignment.hpp"
 #include "tracking/depth/options.hpp"
@@ -25,6 +24,7 @@ struct LocalMapSearchOptions {
   double lost_radius_px = 8;     ///< search radius while lost
   /// The light has changed when so large a share of the points searched was missed ...
   double light_missed_share = 0.5;
+  int min_light_points = 15;  ///< ... of which so many say by how much the light changed, >= 1 ...
   double light_change = 1.5;  ///< ... and the view is by so much brighter or darker there, > 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
@@ -35,7 +35,7 @@ struct LocalMapSearchOptions {
 struct TrackerOptions {
   FixedPixelOptions fixed;
   MotionModelOptions motion_model;
-  ReadoutOptions readout;  ///< of a rolling shutter, where the calibration does not have it
+  ShutterOptions shutter;
   DenseAlignmentOptions alignment;
   GuidedSearchOptions search;  ///< of one point
   LocalMapSearchOptions local_map;
@@ -44,6 +44,7 @@ struct TrackerOptions {
   LossOptions loss;
   MonocularStartOptions monocular_start;  ///< one camera only
   KeyframeDecisionOptions keyframes;
+  ReferenceChoiceOptions reference;
   NewPointOptions new_points;
   ImmaturePointOptions immature;
 

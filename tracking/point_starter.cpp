@@ -10,10 +10,7 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kMaxCorners = 4096;
-constexpr int kBorder = 12;                 // of a level: room for the patch and its search
-constexpr int kMaxRowShift = 8;             // between left and right image, looked for [px]
-constexpr int kClearly = 3;                 // times as many corners with depth: that was the mistake
-constexpr double kFarthestDisparity = 0.3;  // [px] below it the depth is as good as infinite
+constexpr int kBorder = 12;  // of a level: room for the patch and its search
 
 Eigen::Vector2f at_level_zero(const Corner& corner) {
   const float s = std::ldexp(1.0F, corner.level);
@@ -23,10 +20,9 @@ Eigen::Vector2f at_level_zero(const Corner& corner) {
 }  // namespace
 
 NewPointOptions with_cells_of_one_camera(const Rig& rig, NewPointOptions options) {
-  constexpr double kCellsPerCorner = 2;
   constexpr int kUnit = 4;  // CellGrid
   const double area = static_cast<double>(rig.camera.width) * rig.camera.height;
-  const double side = std::sqrt(area / (kCellsPerCorner * options.max_points));
+  const double side = std::sqrt(area / (options.cells_per_corner * options.max_points));
   options.cell_px = std::min(options.cell_px, std::max(static_cast<int>(side) / kUnit * kUnit, 2 * kUnit));
   return options;
 }
@@ -149,11 +145,11 @@ bool PointStarter::sees_corners(const ImagePyramid& image, int wanted) {
 LostCause PointStarter::explain_missing_depth(const FrameImages& images, int wanted) {
   const cv::Mat& left = images.left.level(0);
   const cv::Mat& right = images.right.level(0);
-  if (sees_corners(images.left, wanted) && !sees_corners(images.right, wanted / kClearly))
+  if (sees_corners(images.left, wanted) && !sees_corners(images.right, wanted / options_.mistake_ratio))
     return LostCause::kRightCovered;
-  const int enough = std::max(wanted, kClearly * count_depths(left, right));
+  const int enough = std::max(wanted, options_.mistake_ratio * count_depths(left, right));
   if (count_depths(right, left) >= enough) return LostCause::kImagesSwapped;
-  for (int shift = RowOffsetMeter::kMost; shift <= kMaxRowShift; ++shift) {
+  for (int shift = RowOffsetMeter::kMost; shift <= options_.max_row_shift; ++shift) {
     const cv::Range upper(0, left.rows - shift), lower(shift, left.rows);
     if (count_depths(left.rowRange(upper), right.rowRange(lower)) >= enough ||
         count_depths(left.rowRange(lower), right.rowRange(upper)) >= enough) {
@@ -181,7 +177,7 @@ bool PointStarter::measure(const FrameImages& images, const Corner& corner, Imma
   const Vector2 uv = point.appearance.uv.cast<double>();
   const double u_r = right_of_corner(images, rig_, uv, corner.level, search_);
   if (std::isnan(u_r)) return false;
-  const double disparity = std::max(uv.x() - u_r, kFarthestDisparity);
+  const double disparity = std::max(uv.x() - u_r, options_.min_disparity_px);
   const Vector3 ray = rig_.camera.unproject(uv);
   point.psi = {ray.x(), ray.y(), 1.0 / rig_.depth_from_disparity(disparity)};
   point.anchor_observation.pixel = {point.appearance.uv.x(), point.appearance.uv.y(),

@@ -28,7 +28,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
       motion_(options_.motion_model),
-      shutter_(rig_, motion_, static_cast<std::size_t>(options.local_map.max_searches), options.readout),
+      shutter_(rig_, motion_, static_cast<std::size_t>(options.local_map.max_searches), options.shutter),
       correction_(rig, options.fixed),
       local_map_(kMaxLocalPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
@@ -37,10 +37,11 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       pose_estimator_(rig_, options_, local_map_, shutter_, immature_points_),
       search_(rig, options),
       tried_(rig, options),
+      loss_(options.loss.signs),
       views_(rig, options),
       new_points_(rig_, options_, correction_.fixed()),
       proposer_(options_),
-      reference_choice_(static_cast<std::size_t>(options.local_map.max_searches)) {
+      reference_choice_(options.reference, static_cast<std::size_t>(options.local_map.max_searches)) {
   const auto searches = static_cast<std::size_t>(options.local_map.max_searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);

@@ -104,7 +104,8 @@ bool Tracker::search_from_view(const FrameImages& images, FrameCorners& corners,
 void Tracker::give_up_frame(LostCause cause, TrackResult& result) {
   result.status = TrackStatus::kLost;
   result.reference = kNoKeyframe;
-  result.cause = explain_loss(cause, current_.left, last_.images.left, loss_.gap_before());
+  result.cause =
+      explain_loss(cause, current_.left, last_.images.left, loss_.gap_before(), options_.loss.signs);
   result.inliers = 0;
   loss_.lost();
   // last_ and motion_ stay at the last good frame, from where the next one tries again.

@@ -26,50 +26,136 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
                                      {"initial_damping", [](auto& o) { o.initial_damping = -1; }}});
 }
 
-TEST(Options, OfTheTrackerSayWhyTheyAreInvalid) {
+TEST(Options, OfTheTrackersSearchSayWhyTheyAreInvalid) {
   expect_rules<TrackerOptions>(
-      {{"alignment.coarsest_level", [](auto& o) { o.alignment.coarsest_level = 5; }},
-       {"new_points.corner_levels", [](auto& o) { o.new_points.corner_levels = 6; }},
+      {{"fixed.min_inlier_share", [](auto& o) { o.fixed.min_inlier_share = 0; }},
+       {"motion_model.jitter", [](auto& o) { o.motion_model.jitter = -1; }},
+       {"shutter.readout.min_points", [](auto& o) { o.shutter.readout.min_points = 5; }},
+       {"alignment.coarsest_level", [](auto& o) { o.alignment.coarsest_level = 5; }},
        {"search.radius_px", [](auto& o) { o.search.radius_px = -1; }},
-       {"loss.wide_search.min_agreeing", [](auto& o) { o.loss.wide_search.min_agreeing = 2; }},
-       {"pose.motion.rounds", [](auto& o) { o.pose.motion.rounds = 0; }},
-       {"local_map.wanted_matches",
-        [](auto& o) { o.local_map.wanted_matches = o.local_map.max_searches + 1; }},
+       {"local_map.max_searches", [](auto& o) { o.local_map.max_searches = 0; }},
        {"pose.min_inliers", [](auto& o) { o.pose.min_inliers = 2; }},
-       {"loss.new_part_frames", [](auto& o) { o.loss.new_part_frames = -1; }},
-       {"pose.rough.rounds", [](auto& o) { o.pose.rough.rounds = 0; }},
-       {"fixed.min_inlier_share", [](auto& o) { o.fixed.min_inlier_share = 0; }},
-       {"new_points.min_start_points", [](auto& o) { o.new_points.min_start_points = 0; }},
-       {"loss.recent_keyframes", [](auto& o) { o.loss.recent_keyframes = 5; }},
        {"depth.patience", [](auto& o) { o.depth.patience = -1; }},
-       {"keyframes.turn", [](auto& o) { o.keyframes.turn = 0; }},
-       {"keyframes.young_map_share", [](auto& o) { o.keyframes.young_map_share = 1.1; }},
-       {"depth.alignment.max_apart", [](auto& o) { o.depth.alignment.max_apart = 0; }},
-       {"depth.alignment.min_facing", [](auto& o) { o.depth.alignment.min_facing = 1.1; }},
-       {"depth.alignment.widest_kernel",
-        [](auto& o) { o.depth.alignment.widest_kernel = o.depth.alignment.kernel / 2; }},
-       {"depth.alignment.jackknife_share", [](auto& o) { o.depth.alignment.jackknife_share = -0.1; }},
-       {"readout.min_points", [](auto& o) { o.readout.min_points = 5; }},
-       {"readout.significant_sigmas", [](auto& o) { o.readout.significant_sigmas = 0; }},
-       {"keyframes.tracked_share", [](auto& o) { o.keyframes.tracked_share = 1.1; }},
-       {"keyframes.urgent_share", [](auto& o) { o.keyframes.urgent_share = 0.7; }},
+       {"loss.recent_keyframes", [](auto& o) { o.loss.recent_keyframes = 5; }},
        {"monocular_start.candidates", [](auto& o) { o.monocular_start.candidates = 0; }},
-       {"monocular_start.frames_between", [](auto& o) { o.monocular_start.frames_between = 1; }},
-       {"monocular_start.first_structure.max_behind_share",
-        [](auto& o) { o.monocular_start.first_structure.max_behind_share = 1.1; }},
-       {"monocular_start.first_structure.decisive_chi2",
-        [](auto& o) { o.monocular_start.first_structure.decisive_chi2 = -1; }},
-       {"monocular_start.first_structure.finest_sigma",
-        [](auto& o) { o.monocular_start.first_structure.finest_sigma = 0; }},
-       {"monocular_start.first_structure.max_point_error",
-        [](auto& o) { o.monocular_start.first_structure.max_point_error = 0; }},
-       {"monocular_start.first_structure.near_share",
-        [](auto& o) { o.monocular_start.first_structure.near_share = 0; }},
-       {"monocular_start.first_structure.max_still_share",
-        [](auto& o) { o.monocular_start.first_structure.max_still_share = 2; }},
-       {"monocular_start.first_structure.fixed_strip",
-        [](auto& o) { o.monocular_start.first_structure.fixed_strip = -1; }},
-       {"new_points.cell_px", [](auto& o) { o.new_points.cell_px = 0; }}});
+       {"keyframes.turn", [](auto& o) { o.keyframes.turn = 0; }},
+       {"reference.interval", [](auto& o) { o.reference.interval = 0; }},
+       {"new_points.cell_px", [](auto& o) { o.new_points.cell_px = 0; }},
+       {"immature.max_failures", [](auto& o) { o.immature.max_failures = 0; }}});
+  expect_rules<DenseAlignmentOptions>({{"max_rms", [](auto& o) { o.max_rms = 0; }}});
+  expect_rules<LocalMapSearchOptions>(
+      {{"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
+       {"neighbour_keyframes", [](auto& o) { o.neighbour_keyframes = 0; }},
+       {"min_view_cosine", [](auto& o) { o.min_view_cosine = 1.1; }},
+       {"lost_radius_px", [](auto& o) { o.lost_radius_px = 0; }},
+       {"min_light_points", [](auto& o) { o.min_light_points = 0; }},
+       {"light_change", [](auto& o) { o.light_change = 1; }}});
+}
+
+TEST(Options, OfFixedPixelsSayWhyTheyAreInvalid) {
+  expect_rules<FixedPixelOptions>({{"min_contrast", [](auto& o) { o.min_contrast = o.same_grey; }},
+                                   {"aside_px", [](auto& o) { o.aside_px = 0; }},
+                                   {"most_votes", [](auto& o) { o.most_votes = 255 / o.believed + 1; }},
+                                   {"against", [](auto& o) { o.against = 256; }},
+                                   {"min_in_quarter", [](auto& o) { o.min_in_quarter = 0; }},
+                                   {"max_telling", [](auto& o) { o.max_telling = 0; }},
+                                   {"more_alone", [](auto& o) { o.more_alone = o.believed + 1; }},
+                                   {"touching", [](auto& o) { o.touching = 10; }},
+                                   {"rest", [](auto& o) { o.rest = 256; }},
+                                   {"chance", [](auto& o) { o.chance = o.believed; }},
+                                   {"far_share", [](auto& o) { o.far_share = 1; }},
+                                   {"nearer", [](auto& o) { o.nearer = 0.9; }}});
+}
+
+TEST(Options, OfMotionAndPoseSayWhyTheyAreInvalid) {
+  expect_rules<MotionModelOptions>({{"coast_for", [](auto& o) { o.coast_for = -1; }},
+                                    {"max_acceleration", [](auto& o) { o.max_acceleration = 0; }},
+                                    {"reach_slack", [](auto& o) { o.reach_slack = 0; }}});
+  expect_rules<ShutterOptions>(
+      {{"readout.significant_sigmas", [](auto& o) { o.readout.significant_sigmas = 0; }},
+       {"unknown_readout", [](auto& o) { o.unknown_readout = 0; }},
+       {"bent_depth", [](auto& o) { o.bent_depth = -1; }}});
+  expect_rules<PoseOptions>({{"motion.rounds", [](auto& o) { o.motion.rounds = 0; }},
+                             {"min_inlier_share", [](auto& o) { o.min_inlier_share = 1.1; }},
+                             {"doubted_inlier_share", [](auto& o) { o.doubted_inlier_share = 0; }},
+                             {"settled_searched_share", [](auto& o) { o.settled_searched_share = -0.1; }},
+                             {"rough.inlier_share", [](auto& o) { o.rough.inlier_share = 0; }},
+                             {"rough.min_mapped", [](auto& o) { o.rough.min_mapped = -1; }},
+                             {"rough.rounds", [](auto& o) { o.rough.rounds = 0; }},
+                             {"shutter_rounds", [](auto& o) { o.shutter_rounds = 0; }},
+                             {"shutter_settled", [](auto& o) { o.shutter_settled = -1; }}});
+}
+
+TEST(Options, OfDepthSayWhyTheyAreInvalid) {
+  expect_rules<DepthPlacementOptions>({{"alignment.max_apart", [](auto& o) { o.alignment.max_apart = 0; }},
+                                       {"scarce_inliers", [](auto& o) { o.scarce_inliers = -1; }},
+                                       {"telling_candidates", [](auto& o) { o.telling_candidates = -1; }}});
+  expect_rules<DepthAlignmentOptions>(
+      {{"planes.columns", [](auto& o) { o.planes.columns = 2; }},
+       {"min_facing", [](auto& o) { o.min_facing = 1.1; }},
+       {"widest_kernel", [](auto& o) { o.widest_kernel = o.kernel / 2; }},
+       {"jackknife_share", [](auto& o) { o.jackknife_share = -0.1; }},
+       {"max_deviation", [](auto& o) { o.max_deviation = 0; }},
+       {"settled_step", [](auto& o) { o.settled_step = 0; }},
+       {"nearly_settled_step", [](auto& o) { o.nearly_settled_step = o.settled_step / 2; }},
+       {"first_stride", [](auto& o) { o.first_stride = 0; }}});
+  expect_rules<DepthPlaneOptions>({{"min_readings", [](auto& o) { o.min_readings = 0; }},
+                                   {"many_columns", [](auto& o) { o.many_columns = 0; }},
+                                   {"max_scatter", [](auto& o) { o.max_scatter = 0; }},
+                                   {"min_cosine", [](auto& o) { o.min_cosine = -0.1; }},
+                                   {"least_noise", [](auto& o) { o.least_noise = 0; }}});
+}
+
+TEST(Options, OfALostCameraSayWhyTheyAreInvalid) {
+  expect_rules<LossOptions>({{"wide_search.min_agreeing", [](auto& o) { o.wide_search.min_agreeing = 2; }},
+                             {"signs.fine_level", [](auto& o) { o.signs.fine_level = -1; }},
+                             {"recent_keyframes", [](auto& o) { o.recent_keyframes = 0; }},
+                             {"new_part_frames", [](auto& o) { o.new_part_frames = -1; }}});
+  expect_rules<LossSignOptions>({{"coarse_level", [](auto& o) { o.coarse_level = o.fine_level; }},
+                                 {"covered_contrast", [](auto& o) { o.covered_contrast = 0; }},
+                                 {"blurred_detail", [](auto& o) { o.blurred_detail = 1.1; }},
+                                 {"gap_intervals", [](auto& o) { o.gap_intervals = 1; }}});
+}
+
+TEST(Options, OfKeyframesAndPointsSayWhyTheyAreInvalid) {
+  expect_rules<KeyframeDecisionOptions>({{"tracked_share", [](auto& o) { o.tracked_share = 1.1; }},
+                                         {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
+                                         {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
+                                         {"max_pending", [](auto& o) { o.max_pending = 0; }}});
+  expect_rules<ReferenceChoiceOptions>({{"min_gain_percent", [](auto& o) { o.min_gain_percent = -1; }}});
+  expect_rules<NewPointOptions>({{"corner_levels", [](auto& o) { o.corner_levels = 6; }},
+                                 {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
+                                 {"cells_per_corner", [](auto& o) { o.cells_per_corner = 0; }},
+                                 {"min_disparity_px", [](auto& o) { o.min_disparity_px = 0; }},
+                                 {"max_row_shift", [](auto& o) { o.max_row_shift = -1; }},
+                                 {"mistake_ratio", [](auto& o) { o.mistake_ratio = 0; }},
+                                 {"seeds.min_stretch_px", [](auto& o) { o.seeds.min_stretch_px = -1; }}});
+  expect_rules<ImmaturePointOptions>({{"max_age", [](auto& o) { o.max_age = -1; }},
+                                      {"trusted_after", [](auto& o) { o.trusted_after = 256; }},
+                                      {"moving_after", [](auto& o) { o.moving_after = 0; }}});
+}
+
+TEST(Options, OfOneCamerasStartSayWhyTheyAreInvalid) {
+  expect_rules<MonocularStartOptions>(
+      {{"frames_between", [](auto& o) { o.frames_between = 1; }},
+       {"following.coarsest_level", [](auto& o) { o.following.coarsest_level = 5; }},
+       {"first_structure.min_points", [](auto& o) { o.first_structure.min_points = 4; }}});
+  expect_rules<CornerFollowingOptions>({{"first_radius_px", [](auto& o) { o.first_radius_px = 0; }},
+                                        {"coarse_radius_px", [](auto& o) { o.coarse_radius_px = 0; }},
+                                        {"radius_px", [](auto& o) { o.radius_px = 0; }},
+                                        {"max_radius_px", [](auto& o) { o.max_radius_px = 1; }},
+                                        {"max_iterations", [](auto& o) { o.max_iterations = 0; }}});
+  expect_rules<FirstStructureOptions>({{"max_behind_share", [](auto& o) { o.max_behind_share = 1.1; }},
+                                       {"decisive_chi2", [](auto& o) { o.decisive_chi2 = -1; }},
+                                       {"finest_sigma", [](auto& o) { o.finest_sigma = 0; }},
+                                       {"max_point_error", [](auto& o) { o.max_point_error = 0; }},
+                                       {"near_share", [](auto& o) { o.near_share = 0; }},
+                                       {"max_still_share", [](auto& o) { o.max_still_share = 2; }},
+                                       {"fixed_strip", [](auto& o) { o.fixed_strip = -1; }},
+                                       {"significant_sigmas", [](auto& o) { o.significant_sigmas = -1; }},
+                                       {"gross_chi2", [](auto& o) { o.gross_chi2 = 0; }},
+                                       {"same_direction", [](auto& o) { o.same_direction = 2; }},
+                                       {"same_angle", [](auto& o) { o.same_angle = -1; }}});
 }
 
 TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {

@@ -37,7 +37,7 @@ class CornerFollowingTest : public ::testing::Test {
         FollowedCorner corner{{}, Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v)), motion};
         ASSERT_TRUE(cut_appearance(previous.level(0), u, v, 0, corner.appearance));
         ++asked_;
-        if (!follow_corner(previous, current, corner)) continue;
+        if (!follow_corner(previous, current, {}, corner)) continue;
         const Eigen::Vector2f expected(static_cast<float>(to.x), static_cast<float>(to.y));
         if ((corner.uv - expected).norm() < 0.5F) ++found_;
       }
@@ -72,7 +72,7 @@ TEST(CornerFollowing, WhatRepeatsStandsStillWhereItMay) {
   images.build(board);
   FollowedCorner corner{{}, {77, 60}, std::nullopt};
   ASSERT_TRUE(cut_appearance(images.level(0), 77, 60, 0, corner.appearance));
-  ASSERT_TRUE(follow_corner(images, images, corner));
+  ASSERT_TRUE(follow_corner(images, images, {}, corner));
   EXPECT_LT((corner.uv - Eigen::Vector2f(77, 60)).norm(), 0.1F);
 }
 

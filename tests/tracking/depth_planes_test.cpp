@@ -18,7 +18,7 @@ TEST(DepthPlanesTest, TheCapOnPlanesLeavesNoPartOfTheImageOut) {
   cv::Mat depth(480, 640, CV_16UC1, cv::Scalar(2 / rig.depth_unit));
   for (int u = 0; u < depth.cols; u += 24) depth.colRange(u, std::min(u + 4, depth.cols)).setTo(0);
 
-  DepthPlanes planes(rig);
+  DepthPlanes planes(rig, {});
   planes.read(depth);
   const auto total = static_cast<double>(planes.planes().size());
   ASSERT_GT(total, 5000);

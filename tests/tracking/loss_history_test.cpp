@@ -26,7 +26,7 @@ class LostCauseTest : public ::testing::Test {
   }
   static LostCause explain(const cv::Mat& now, LostCause found = LostCause::kTooFewMatches,
                            LostCause gap = LostCause::kNone) {
-    return explain_loss(found, pyramid_of(now), pyramid_of(view(0)), gap);
+    return explain_loss(found, pyramid_of(now), pyramid_of(view(0)), gap, {});
   }
 };
 
@@ -59,13 +59,13 @@ TEST_F(LostCauseTest, WhatIsKnownBetterStays) {
   cv::blur(view(0), blurred, cv::Size(25, 1));
   EXPECT_EQ(explain(blurred, LostCause::kNoKeyframeBuffer), LostCause::kNoKeyframeBuffer);
   EXPECT_EQ(explain(blurred, LostCause::kUnplaced), LostCause::kUnplaced);
-  EXPECT_EQ(explain_loss(LostCause::kTooFewMatches, pyramid_of(blurred), {}, LostCause::kNone),
+  EXPECT_EQ(explain_loss(LostCause::kTooFewMatches, pyramid_of(blurred), {}, LostCause::kNone, {}),
             LostCause::kTooFewMatches);
 }
 
 TEST(FrameIntervals, TellMissingFramesFromGapsInTime) {
   constexpr std::int64_t kMs = 1'000'000;
-  FrameIntervals intervals;
+  FrameIntervals intervals(LossSignOptions{}.gap_intervals);
   EXPECT_EQ(intervals.next(0, 5 * kMs), LostCause::kNone);
   EXPECT_EQ(intervals.next(1, 38 * kMs), LostCause::kNone);
   EXPECT_EQ(intervals.next(2, 75 * kMs), LostCause::kNone);
@@ -76,7 +76,7 @@ TEST(FrameIntervals, TellMissingFramesFromGapsInTime) {
 }
 
 TEST(FrameIntervals, TwoFramesThatComeTogetherMakeNoGapsOfTheOthers) {
-  FrameIntervals intervals;
+  FrameIntervals intervals(LossSignOptions{}.gap_intervals);
   std::int64_t t_ns = 0;
   for (int i = 0; i < 40; ++i) {
     t_ns += i == 10 ? 2'000'000 : 33'000'000;

@@ -53,7 +53,7 @@ class ReferenceChoiceTest : public ::testing::Test {
   GraphSnapshot snapshot_;
   LocalMap local_map_{200};
   SearchOutcome found_{test_rig(SensorKind::kStereo, 320, 240), {}};
-  ReferenceChoice choice_{200};
+  ReferenceChoice choice_{{}, 200};
 };
 
 TEST_F(ReferenceChoiceTest, ThatWhichSeesMostOfWhatIsFound) {

@@ -10,18 +10,9 @@
 #include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
-namespace {
-
-// How it is solved: neither changes the pose by as much as a tenth of what that is uncertain by.
-constexpr double kNearlySettled = 1e-3;
-constexpr double kSettled = 2e-5;        // a step [m, rad]
-constexpr std::size_t kFirstStride = 4;  // planes of the frame that are looked at until nearly settled
-constexpr double kFarDeviation = 30;     // counts as no farther [standard deviations]
-
-}  // namespace
-
 std::string DepthAlignmentOptions::invalid_reason() const {
   return OptionCheck()
+      .nested("planes", planes.invalid_reason())
       .at_least("max_iterations", max_iterations, 1)
       .at_least("min_planes", min_planes, 6)
       .share("min_met", min_met)
@@ -38,13 +29,18 @@ std::string DepthAlignmentOptions::invalid_reason() const {
       .above("max_corner_chi2", max_corner_chi2, 0)
       .at_least("widest_kernel", widest_kernel, kernel)
       .within("jackknife_share", jackknife_share, 0, 1)
+      .above("max_deviation", max_deviation, 0)
+      .above("settled_step", settled_step, 0)
+      .at_least("nearly_settled_step", nearly_settled_step, settled_step)
+      .at_least("first_stride", first_stride, 1)
       .reason();
 }
 
 DepthAlignment::DepthAlignment(const Rig& rig, const DepthAlignmentOptions& options)
-    : rig_(rig), options_(options), current_(rig) {
+    : rig_(rig), options_(options), current_(rig, options.planes) {
   slots_.reserve(kViews);
-  for (std::size_t v = 0; v < kViews; ++v) slots_.emplace_back(rig);  // a copy would lack room
+  for (std::size_t v = 0; v < kViews; ++v)
+    slots_.emplace_back(rig, options.planes);  // a copy would lack room
 }
 
 void DepthAlignment::add_view(KeyframeId id, const cv::Mat& depth, const SE3& T_view_ref) {
@@ -99,7 +95,7 @@ void DepthAlignment::add_pairs(const DepthPlanes::Plane& seen, std::span<const P
     J << pair.m_c, seen.x.cross(pair.m_c);  // of minus the residual
     equations.H.noalias() += weight * J * J.transpose();
     equations.g.noalias() -= weight * pair.residual * J;
-    equations.deviations += std::min(deviation, kFarDeviation);
+    equations.deviations += std::min(deviation, options_.max_deviation);
     equations.squares += robust * deviation * deviation;
     equations.weights += robust;
     ++equations.pairs;
@@ -191,7 +187,7 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
   if (static_cast<int>(current_.planes().size()) < options_.min_planes || views_ == 0)
     return tl::unexpected(LostCause::kTooFewMatches);
   SE3 T_c_ref = T_c_ref_start;
-  Pass pass{options_.widest_kernel, kFirstStride, false};
+  Pass pass{options_.widest_kernel, static_cast<std::size_t>(options_.first_stride), false};
   if (static_cast<int>(corners.size()) < options_.min_corners) corners = {};
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     Equations equations = linearise(T_c_ref, pass);
@@ -201,8 +197,8 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
     const Vector6 step = -solve_symmetric(equations.H, equations.g);
     if (!step.allFinite() || !(step.norm() < 1)) return tl::unexpected(LostCause::kNoStructure);
     T_c_ref = SE3::exp(step) * T_c_ref;
-    if (pass.stride == 1 && step.norm() < kSettled) break;
-    if (step.norm() < kNearlySettled) pass.stride = 1;
+    if (pass.stride == 1 && step.norm() < options_.settled_step) break;
+    if (step.norm() < options_.nearly_settled_step) pass.stride = 1;
     pass.kernel =
         std::clamp(2 * equations.deviations / equations.pairs, options_.kernel, options_.widest_kernel);
   }

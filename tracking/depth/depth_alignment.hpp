@@ -16,6 +16,7 @@
 namespace twofold {
 
 struct DepthAlignmentOptions {
+  DepthPlaneOptions planes;
   int max_iterations = 12;
   int min_planes = 100;  ///< in the depth image
   double min_met = 0.4;  ///< share of them that must be met in some view, in (0, 1]
@@ -36,6 +37,12 @@ struct DepthAlignmentOptions {
   double max_corner_chi2 = 30;   ///< farther ones are mistakes, > 0
   double widest_kernel = 30;     ///< that it begins with, >= kernel [standard deviations]
   double jackknife_share = 0.5;  ///< of the covariance, that is from leaving regions out, in [0, 1]
+  double max_deviation = 30;     ///< of a plane, counts as no farther [standard deviations] > 0
+  // How it is solved: neither changes the pose by as much as a tenth of what that is uncertain by.
+  double settled_step = 2e-5;  ///< [m, rad] > 0
+  double nearly_settled_step =
+      1e-3;              ///< until then every first_stride-th plane is looked at, >= settled_step
+  int first_stride = 4;  ///< >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -95,7 +102,7 @@ class DepthAlignment {
 
  private:
   struct ViewPlanes {
-    explicit ViewPlanes(const Rig& rig) : planes(rig) {}
+    ViewPlanes(const Rig& rig, const DepthPlaneOptions& options) : planes(rig, options) {}
     KeyframeId id = kNoKeyframe;
     SE3 T_view_ref;
     DepthPlanes planes;

@@ -3,29 +3,36 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/option_check.hpp"
+
 namespace twofold {
 namespace {
 
-constexpr int kColumns = 160;             // of the finest cells, about
 constexpr std::size_t kMaxPlanes = 6000;  // beyond, the smallest are left out
 /// Of eight rows, so that those had at any time lie evenly.
 constexpr std::array<int, 8> kRowOrder{0, 4, 2, 6, 1, 5, 3, 7};
-constexpr double kEnoughReadings = 0.75;  // of a cell's pixels
-constexpr int kEnoughCells = 8;           // of 3 x 3
-constexpr int kManyColumns = 60;          // beyond, not every 3 x 3 is asked how means scatter
-constexpr double kFlat = 2;               // scatter about a plane, in the usual one
-constexpr double kSteepest = 0.1;         // cosine between ray and normal
-constexpr double kMedianChi2 = 0.891;     // of chi-square with 6 degrees of freedom, over 6
-/// A perfect sensor's means still err by what depth units round off.
-constexpr double kFloor = 0.01;  // of the rig's noise of one reading
+constexpr int kEnoughCells = 8;        // of 3 x 3: a regression may lack one
+constexpr double kMedianChi2 = 0.891;  // of chi-square with 6 degrees of freedom, over 6
 
 }  // namespace
 
-DepthPlanes::DepthPlanes(const Rig& rig)
+std::string DepthPlaneOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("columns", columns, 3)
+      .share("min_readings", min_readings)
+      .at_least("many_columns", many_columns, 1)
+      .above("max_scatter", max_scatter, 0)
+      .within("min_cosine", min_cosine, 0, 1)
+      .above("least_noise", least_noise, 0)
+      .reason();
+}
+
+DepthPlanes::DepthPlanes(const Rig& rig, const DepthPlaneOptions& options)
     : rig_(rig),
+      options_(options),
       // Inverse depth is disparity / (f b), whose noise the rig knows.
-      sigma_floor_(kFloor * rig.noise.depth_sigma_px / (rig.camera.fx * rig.baseline)) {
-  int cell_px = std::max(2, rig.camera.width / kColumns);
+      sigma_floor_(options.least_noise * rig.noise.depth_sigma_px / (rig.camera.fx * rig.baseline)) {
+  int cell_px = std::max(2, rig.camera.width / options.columns);
   for (Means& means : means_) {
     means.cell_px = cell_px;
     means.columns = rig.camera.width / cell_px;
@@ -83,7 +90,7 @@ void DepthPlanes::read_finest(const cv::Mat& depth) {
       }
     }
     const bool lopsided = 2 * std::max(std::abs(left), std::abs(upper)) > count;  // by a quarter of a pixel
-    means.values[i] = count >= kEnoughReadings * px * px && !lopsided ? sum / count : 0;
+    means.values[i] = count >= options_.min_readings * px * px && !lopsided ? sum / count : 0;
   }
 }
 
@@ -137,7 +144,7 @@ bool DepthPlanes::regress(const Means& means, int column, int row, Regression& r
 double DepthPlanes::scatter(const Means& means) {
   variances_.clear();
   Regression regression;
-  const int step = means.columns > kManyColumns ? 3 : 1;
+  const int step = means.columns > options_.many_columns ? 3 : 1;
   for (int row = 1; row + 1 < means.rows; row += step) {
     for (int column = 1; column + 1 < means.columns; column += step) {
       if (regress(means, column, row, regression)) variances_.push_back(regression.variance);
@@ -184,7 +191,7 @@ bool DepthPlanes::add_rows(int size, int first_row, int step) {
 bool DepthPlanes::add_plane(const Means& means, int column, int row) {
   Regression fit;
   if (planes_.size() == kMaxPlanes || !regress(means, column, row, fit)) return false;
-  if (fit.variance > kFlat * kFlat * means.sigma * means.sigma) return false;
+  if (fit.variance > options_.max_scatter * options_.max_scatter * means.sigma * means.sigma) return false;
   const PinholeCamera& camera = rig_.camera;
   const double half = 0.5 * (means.cell_px - 1);
   const Vector3 ray = camera.unproject(Vector2(column * means.cell_px + half, row * means.cell_px + half));
@@ -198,7 +205,7 @@ bool DepthPlanes::add_plane(const Means& means, int column, int row) {
   plane.covariance = means.sigma * means.sigma * m_theta * fit.inverse * m_theta.transpose();
   plane.x = ray / means.at(column, row);
   plane.sigma = means.sigma;
-  if (!(fit.theta[0] > kSteepest * plane.m.norm() * ray.norm())) return false;  // w = m . ray
+  if (!(fit.theta[0] > options_.min_cosine * plane.m.norm() * ray.norm())) return false;  // w = m . ray
   planes_.push_back(plane);
   return true;
 }

@@ -3,11 +3,27 @@
 #include <array>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <string>
 #include <vector>
 
 #include "camera/rig.hpp"
 
 namespace twofold {
+
+struct DepthPlaneOptions {
+  int columns = 160;           ///< of the finest cells in a row of the image, about, >= 3
+  double min_readings = 0.75;  ///< of a cell's pixels: with fewer it has no mean, in (0, 1]
+  int many_columns = 60;       ///< in rows of more cells every third is asked how means scatter, >= 1
+  /// About a plane, times what is usual in cells of that size: more is curved, or an edge, > 0.
+  double max_scatter = 2;
+  double min_cosine = 0.1;  ///< between ray and normal: steeper surfaces are known badly, in [0, 1]
+  /// A perfect sensor's means still err by what depth units round off: of the rig's noise of one reading, >
+  /// 0.
+  double least_noise = 0.01;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
 
 /// A depth image as planes: large ones where the surface is flat, small ones where it is not.
 ///
@@ -24,7 +40,7 @@ class DepthPlanes {
     double sigma = 0;                      ///< standard deviation of the point's inverse depth [1/m]
   };
 
-  explicit DepthPlanes(const Rig& rig);
+  DepthPlanes(const Rig& rig, const DepthPlaneOptions& options);
 
   /// Reads a depth image (Frame::depth) of the rig. No allocation.
   void read(const cv::Mat& depth);
@@ -66,6 +82,7 @@ class DepthPlanes {
   [[nodiscard]] bool add_plane(const Means& means, int column, int row);
 
   Rig rig_;
+  DepthPlaneOptions options_;
   double sigma_floor_;
   std::array<Means, kSizes> means_;          ///< from fine to coarse
   std::vector<std::int16_t> plane_of_cell_;  ///< of the finest size; kNone: none

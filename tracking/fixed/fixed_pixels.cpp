@@ -11,17 +11,7 @@
 namespace twofold {
 namespace {
 
-constexpr int kRim = 4;                 // [px] along the image's edge that is not looked at
-constexpr double kAside = kRim;         // [px] along the motion: what a pixel is compared with
-constexpr int kMostVotes = 2;           // times as many as are believed are kept
-constexpr int kAgainst = 4;             // votes that a change takes back
-constexpr int kFewestInQuarter = 16;    // fixed pixels that cover a quarter of a block ...
-constexpr int kMostTelling = 2;         // ... unless more than so many times as many are telling
-constexpr int kMoreAlone = 2;           // votes that a pixel needs of which no neighbour says the same
-constexpr int kTouching = 3;            // fixed pixels, of those of a 5x5 patch
 constexpr std::size_t kAllDead = 8192;  // of an image
-constexpr std::uint8_t kRest = 3;       // rounds in which what clearly shows the scene is not looked at
-constexpr std::uint8_t kChance = 1;     // votes that a pixel of the scene gets now and then
 
 ByteRun difference(ByteRun a, ByteRun b) {
   return larger(a, b) - smaller(a, b);
@@ -52,20 +42,32 @@ std::string FixedPixelOptions::invalid_reason() const {
       .above("round", round, 0)
       .share("most_of_it", most_of_it)
       .share("min_inlier_share", min_inlier_share)
+      .within("aside_px", aside_px, 1, 32)
+      .within("most_votes", most_votes, 1, 255 / std::max(believed, 1))
+      .within("against", against, 1, 255)
+      .within("min_in_quarter", min_in_quarter, 1, 256)
+      .at_least("max_telling", max_telling, 1)
+      .within("more_alone", more_alone, 0, (most_votes - 1) * believed)
+      .within("touching", touching, 1, 9)
+      .within("rest", rest, 0, 255)
+      .within("chance", chance, 0, believed - 1)
+      .within("far_share", far_share, 0, 0.99)
+      .at_least("nearer", nearer, 1)
       .reason();
 }
 
 FixedPixels::FixedPixels(int width, int height, const FixedPixelOptions& options) : options_(options) {
   static_assert(kSide == kByteRun, "a row of a block is a run");
-  if (!options.enabled || std::min(width, height) < kSide + 2 * kRim) return;
-  columns_ = (width - 2 * kRim + kSide - 1) / kSide;
-  rows_ = (height - 2 * kRim + kSide - 1) / kSide;
+  const int rim = options.aside_px;  // along the edge: what is compared with lies inside the image
+  if (!options.enabled || std::min(width, height) < kSide + 2 * rim) return;
+  columns_ = (width - 2 * rim + kSide - 1) / kSide;
+  rows_ = (height - 2 * rim + kSide - 1) / kSide;
   blocks_.resize(static_cast<std::size_t>(columns_ * rows_));
   for (int i = 0; i < columns_ * rows_; ++i) {
     Block& block = blocks_[static_cast<std::size_t>(i)];
     // The last of a row or column overlaps the one before it.
-    block.u = std::min(kRim + i % columns_ * kSide, width - kRim - kSide);
-    block.v = std::min(kRim + i / columns_ * kSide, height - kRim - kSide);
+    block.u = std::min(rim + i % columns_ * kSide, width - rim - kSide);
+    block.v = std::min(rim + i / columns_ * kSide, height - rim - kSide);
   }
   dead_.reserve(kAllDead);
 }
@@ -98,7 +100,7 @@ void FixedPixels::look_at_block(const cv::Mat& image, ImageMotion& motion, Block
 }
 
 void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& block) {
-  const Vector2 along = kAside * motion_px.normalized();
+  const Vector2 along = options_.aside_px * motion_px.normalized();
   const auto aside =
       static_cast<std::ptrdiff_t>(image.step) * std::lround(along.y()) + std::lround(along.x());
   const auto same = static_cast<std::uint8_t>(options_.same_grey);
@@ -117,9 +119,9 @@ void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& bl
     const ByteRun stays = above(run_of(static_cast<std::uint8_t>(same + 1)), change) & tells;
     const ByteRun goes = above(change, run_of(same));
     ByteRun count = load_run(votes);
-    count = count - smaller(count, goes & run_of(kAgainst));
+    count = count - smaller(count, goes & run_of(static_cast<std::uint8_t>(options_.against)));
     // A byte of `stays` is 255, which is -1; what is believed and more is enough.
-    count = smaller(count - stays, run_of(static_cast<std::uint8_t>(kMostVotes * believed)));
+    count = smaller(count - stays, run_of(static_cast<std::uint8_t>(options_.most_votes * believed)));
     store_run(count, votes);
     most = larger(most, count);
     staying += std::popcount(mask_of(stays));
@@ -128,8 +130,9 @@ void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& bl
     telling[static_cast<std::size_t>(y)] = mask_of(tells);
   }
   sum_up(fixed, telling, block);
-  const bool shows_scene = mask_of(above(most, run_of(kChance))) == 0 && staying < kFewestInQuarter;
-  block.rest = shows_scene ? kRest : 0;
+  const bool shows_scene = mask_of(above(most, run_of(static_cast<std::uint8_t>(options_.chance)))) == 0 &&
+                           staying < options_.min_in_quarter;
+  block.rest = shows_scene ? static_cast<std::uint8_t>(options_.rest) : std::uint8_t{0};
 }
 
 /// What a block's votes come to.
@@ -145,7 +148,7 @@ void FixedPixels::sum_up(const Rows& fixed, const Rows& telling, Block& block) {
       count += std::popcount(fixed[static_cast<std::size_t>(y)] & half);
       could_be += std::popcount(telling[static_cast<std::size_t>(y)] & half);
     }
-    if (count >= kFewestInQuarter && could_be <= kMostTelling * count)
+    if (count >= options_.min_in_quarter && could_be <= options_.max_telling * count)
       block.covered = static_cast<std::uint8_t>(block.covered | 1U << quarter);
     all_fixed += count;
   }
@@ -155,8 +158,9 @@ void FixedPixels::sum_up(const Rows& fixed, const Rows& telling, Block& block) {
   for (int y = 0; y < kSide; ++y) {
     for (std::uint32_t left = fixed[static_cast<std::size_t>(y)]; left != 0; left &= left - 1) {
       const int x = std::countr_zero(left);
-      if (count_around(fixed, x, y) >= kTouching) continue;
-      if (block.votes[static_cast<std::size_t>(y * kSide + x)] < options_.believed + kMoreAlone) continue;
+      if (count_around(fixed, x, y) >= options_.touching) continue;
+      if (block.votes[static_cast<std::size_t>(y * kSide + x)] < options_.believed + options_.more_alone)
+        continue;
       block.dead[block.dead_count++] = static_cast<std::uint16_t>(y * kSide + x);
     }
   }
@@ -171,8 +175,9 @@ void FixedPixels::list_dead() {
 }
 
 const FixedPixels::Block* FixedPixels::block_at(int u, int v) const {
-  const int column = (u - kRim) / kSide, row = (v - kRim) / kSide;
-  if (u < kRim || v < kRim || column >= columns_ || row >= rows_) return nullptr;
+  const int rim = options_.aside_px;
+  const int column = (u - rim) / kSide, row = (v - rim) / kSide;
+  if (u < rim || v < rim || column >= columns_ || row >= rows_) return nullptr;
   const Block& block = blocks_[static_cast<std::size_t>(row * columns_ + column)];
   return u < block.u + kSide && v < block.v + kSide ? &block : nullptr;
 }
@@ -205,7 +210,7 @@ bool FixedPixels::touches(const Eigen::Vector2f& uv, int level) const {
       fixed += block->votes[at] >= options_.believed ? 1 : 0;
     }
   }
-  return fixed >= kTouching;
+  return fixed >= options_.touching;
 }
 
 }  // namespace twofold

@@ -24,6 +24,19 @@ struct FixedPixelOptions {
   double most_of_it = 0.5;  ///< of the image: when more seems fixed, no region is believed to be, in (0, 1]
   /// Of the points found in a frame, in (0, 1]: with fewer inliers its pose says nothing of pixels.
   double min_inlier_share = 0.5;
+  /// What a pixel is compared with lies so far to either side, along the motion; as wide a rim of the image
+  /// is not looked at, in [1, 32].
+  int aside_px = 4;
+  int most_votes = 2;       ///< times `believed`: beyond, votes are not counted, >= 1
+  int against = 4;          ///< votes that a change takes back, in [1, 255]
+  int min_in_quarter = 16;  ///< fixed pixels that cover a quarter of a block, of 256, ...
+  int max_telling = 2;      ///< ... unless more than so many times as many are telling, >= 1
+  int more_alone = 2;       ///< votes beyond `believed` of a pixel of which no neighbour says the same, >= 0
+  int touching = 3;         ///< fixed pixels of a neighbourhood that are no single ones, in [1, 9]
+  int rest = 3;             ///< rounds in which a block that clearly shows the scene is not looked at, >= 0
+  int chance = 1;           ///< votes that a pixel of the scene gets now and then, in [0, believed - 1]
+  double far_share = 0.1;   ///< of the tracked points, that may be farther than what is looked at, in [0, 1)
+  double nearer = 2;        ///< times: what is not tracked may be so much nearer than what is, >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -36,7 +49,7 @@ struct FixedPixelOptions {
 /// a block was looked at last, whatever its depth, each of its pixels votes: one that differs from what lies
 /// along the motion, and is the same as before, for being fixed; one that has changed against it, several
 /// times as much. A camera at rest, the direction of travel and plain surfaces give no votes. A block in
-/// which nothing seems fixed is looked at in one round of four only.
+/// which nothing seems fixed rests for some rounds.
 ///
 /// One instance a camera. No allocation after construction; bounded work.
 class FixedPixels {

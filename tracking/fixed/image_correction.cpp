@@ -3,15 +3,9 @@
 #include <algorithm>
 
 namespace twofold {
-namespace {
-
-constexpr double kFar = 0.1;   // share of the points that may be farther than what moves in the image
-constexpr double kNearer = 2;  // times: what is not tracked may be so much nearer than what is
-
-}  // namespace
-
 ImageCorrection::ImageCorrection(const Rig& rig, const FixedPixelOptions& options)
-    : image_motion_(rig.camera),
+    : options_(options),
+      image_motion_(rig.camera),
       fixed_(rig.camera.width, rig.camera.height, options),
       has_depth_(rig.kind == SensorKind::kRgbd) {
   if (rig.kind != SensorKind::kStereo) return;
@@ -49,9 +43,10 @@ void ImageCorrection::learn(const Frame& frame, std::span<double> inverse_depths
     return;
   }
   const auto far =
-      inverse_depths.begin() + static_cast<std::ptrdiff_t>(kFar * static_cast<double>(inverse_depths.size()));
+      inverse_depths.begin() +
+      static_cast<std::ptrdiff_t>(options_.far_share * static_cast<double>(inverse_depths.size()));
   std::nth_element(inverse_depths.begin(), far, inverse_depths.end());
-  image_motion_.set_inverse_depths(*far, kNearer * *std::max_element(far, inverse_depths.end()));
+  image_motion_.set_inverse_depths(*far, options_.nearer * *std::max_element(far, inverse_depths.end()));
   fixed_.look_at(frame.left, frame.t_ns, image_motion_);
   if (fixed_right_) fixed_right_->look_at(frame.right, frame.t_ns, image_motion_);
 }

@@ -43,6 +43,7 @@ class ImageCorrection {
  private:
   void load_right(const Frame& frame, ImagePyramid& right);
 
+  FixedPixelOptions options_;
   ImageMotion image_motion_;
   FixedPixels fixed_;
   std::optional<FixedPixels> fixed_right_;  ///< stereo only, as the next

@@ -17,6 +17,13 @@ std::string KeyframeDecisionOptions::invalid_reason() const {
       .reason();
 }
 
+std::string ReferenceChoiceOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("interval", interval, 1)
+      .at_least("min_gain_percent", min_gain_percent, 0)
+      .reason();
+}
+
 std::string NewPointOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("corner_threshold", corner_threshold, 1)
@@ -26,6 +33,10 @@ std::string NewPointOptions::invalid_reason() const {
       .at_least("max_points", max_points, 1)
       .at_least("min_start_points", min_start_points, 1)
       .at_least("scarce_points", scarce_points, 0)
+      .above("cells_per_corner", cells_per_corner, 0)
+      .above("min_disparity_px", min_disparity_px, 0)
+      .at_least("max_row_shift", max_row_shift, 0)
+      .at_least("mistake_ratio", mistake_ratio, 1)
       .nested("seeds", seeds.invalid_reason())
       .at_least("seeded_points", seeded_points, 0)
       .reason();

@@ -24,6 +24,15 @@ struct KeyframeDecisionOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
+/// When an older keyframe becomes the reference again (tracking/keyframes/reference_choice.hpp).
+struct ReferenceChoiceOptions {
+  int interval = 3;           ///< frames between looks for a better reference, >= 1
+  int min_gain_percent = 20;  ///< by which it must see more of what is found than the present one, >= 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 /// Where a keyframe starts new points (tracking/keyframes/new_points.hpp).
 struct NewPointOptions {
   int corner_threshold = 10;    ///< FAST [grey]
@@ -35,6 +44,12 @@ struct NewPointOptions {
   /// In the dark, with fewer points in view, tracked and started, faint corners will do: half the threshold,
   /// a quarter of the score, where the pyramid has averaged the noise away.
   int scarce_points = 90;
+  double cells_per_corner = 2;    ///< of one camera, cells being smaller in small images, > 0
+  double min_disparity_px = 0.3;  ///< below it the depth is as good as infinite, > 0
+  // Why a stereo pair gives too few depths to start with.
+  int max_row_shift = 8;  ///< between left and right image, looked for [rows]
+  int mistake_ratio =
+      3;  ///< so many times as many corners with depth the other way: that was the mistake, >= 1
   DepthSeedOptions seeds;  ///< corners whose depth is not measured
   /// Where most new corners have no depth, a rig that measures it starts some without, as one camera does:
   /// as many as are missing to so many points in view; 0: never.

@@ -3,15 +3,10 @@
 #include <algorithm>
 
 namespace twofold {
-namespace {
-
-constexpr std::uint32_t kRevisitInterval = 3;  // frames between looks for a better reference
-
-}  // namespace
 
 std::optional<KeyframeId> ReferenceChoice::better(const GraphSnapshot& graph, KeyframeId reference,
                                                   const LocalMap& local_map, const SearchOutcome& found) {
-  if (frames_ % kRevisitInterval != 0) return std::nullopt;
+  if (frames_ % static_cast<std::uint32_t>(options_.interval) != 0) return std::nullopt;
   found_.clear();
   for (std::size_t m = 0; m < found.matches.size(); ++m) {
     const PointId id = local_map.points()[found.matches[m].point].id;
@@ -20,7 +15,7 @@ std::optional<KeyframeId> ReferenceChoice::better(const GraphSnapshot& graph, Ke
   std::sort(found_.begin(), found_.end());
   std::optional<KeyframeId> best;
   // Changing back and forth helps nobody: a new reference must be clearly better.
-  int best_count = shared(graph, reference) * 6 / 5;
+  int best_count = shared(graph, reference) * (100 + options_.min_gain_percent) / 100;
   for (const KeyframeId id : local_map.neighbours()) {
     const int count = shared(graph, id);
     if (count <= best_count) continue;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "tracking/keyframes/options.hpp"
 #include "tracking/local_map.hpp"
 #include "tracking/local_map_search.hpp"
 
@@ -15,7 +16,9 @@ namespace twofold {
 class ReferenceChoice {
  public:
   /// @param max_points  found in a frame at most
-  explicit ReferenceChoice(std::size_t max_points) { found_.reserve(max_points); }
+  ReferenceChoice(const ReferenceChoiceOptions& options, std::size_t max_points) : options_(options) {
+    found_.reserve(max_points);
+  }
 
   /// Counts frames: a better keyframe is looked for in some of them only.
   void begin_frame() { ++frames_; }
@@ -27,6 +30,7 @@ class ReferenceChoice {
  private:
   [[nodiscard]] int shared(const GraphSnapshot& graph, KeyframeId id) const;
 
+  ReferenceChoiceOptions options_;
   std::uint32_t frames_ = 0;
   std::vector<PointId> found_;  ///< sorted
 };

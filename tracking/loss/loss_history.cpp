@@ -4,16 +4,10 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "base/option_check.hpp"
+
 namespace twofold {
 namespace {
-
-constexpr int kFineLevel = 1;
-constexpr int kCoarseLevel = 4;
-// Shares of what the last good frame had. Two neighbouring frames of a steady camera differ by a few per
-// cent.
-constexpr double kCoveredContrast = 0.35;
-constexpr double kBlurredDetail = 0.7;
-constexpr double kGap = 2.5;  // usual intervals
 
 /// Mean absolute difference of horizontal neighbours [grey].
 double detail(const cv::Mat& image) {
@@ -43,21 +37,33 @@ double contrast(const cv::Mat& image) {
 
 /// Detail at a fine level over that at a coarse one: blur takes the first away and leaves the second; a view
 /// of something else changes both.
-double sharpness(const ImagePyramid& images) {
-  return detail(images.level(kFineLevel)) / (1 + detail(images.level(kCoarseLevel)));
+double sharpness(const ImagePyramid& images, const LossSignOptions& options) {
+  return detail(images.level(options.fine_level)) / (1 + detail(images.level(options.coarse_level)));
 }
 
 }  // namespace
 
-LostCause explain_loss(LostCause found, const ImagePyramid& now, const ImagePyramid& last_good,
-                       LostCause gap) {
+std::string LossSignOptions::invalid_reason() const {
+  return OptionCheck()
+      .within("fine_level", fine_level, 0, ImagePyramid::kLevels - 2)
+      .within("coarse_level", coarse_level, fine_level + 1, ImagePyramid::kLevels - 1)
+      .share("covered_contrast", covered_contrast)
+      .share("blurred_detail", blurred_detail)
+      .above("gap_intervals", gap_intervals, 1)
+      .reason();
+}
+
+LostCause explain_loss(LostCause found, const ImagePyramid& now, const ImagePyramid& last_good, LostCause gap,
+                       const LossSignOptions& options) {
   const bool unexplained = found == LostCause::kTooFewMatches || found == LostCause::kInconsistentMatches ||
                            found == LostCause::kTooFewCandidates;
   if (!unexplained) return found;
   if (!last_good.empty()) {
-    if (contrast(now.level(kCoarseLevel)) < kCoveredContrast * contrast(last_good.level(kCoarseLevel)))
+    if (contrast(now.level(options.coarse_level)) <
+        options.covered_contrast * contrast(last_good.level(options.coarse_level)))
       return LostCause::kCovered;
-    if (sharpness(now) < kBlurredDetail * sharpness(last_good)) return LostCause::kBlurred;
+    if (sharpness(now, options) < options.blurred_detail * sharpness(last_good, options))
+      return LostCause::kBlurred;
   }
   return gap != LostCause::kNone ? gap : found;
 }
@@ -68,7 +74,8 @@ LostCause FrameIntervals::next(std::int64_t index, std::int64_t t_ns) {
     const std::int64_t interval = t_ns - t_ns_;
     if (index > index_ + 1) {
       gap = LostCause::kFramesMissing;
-    } else if (usual_.ns() > 0 && static_cast<double>(interval) > kGap * static_cast<double>(usual_.ns())) {
+    } else if (usual_.ns() > 0 &&
+               static_cast<double>(interval) > gap_intervals_ * static_cast<double>(usual_.ns())) {
       gap = LostCause::kGapInTime;
     }
   }

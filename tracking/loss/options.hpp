@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "tracking/loss/loss_history.hpp"
 #include "tracking/loss/wide_search.hpp"
 
 namespace twofold {
@@ -9,6 +10,7 @@ namespace twofold {
 /// What a lost camera is compared with, and when it starts anew.
 struct LossOptions {
   WideSearchOptions wide_search;
+  LossSignOptions signs;
   int recent_keyframes = 4;   ///< whose images a lost camera is compared with, and depth aligned to, in [1,
                               ///< DepthAlignment::kViews]
   double new_part_after = 1;  ///< lost for so long while corners are seen: a new map part is started [s]

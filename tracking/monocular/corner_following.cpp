@@ -4,20 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "base/option_check.hpp"
 #include "imaging/guided_search.hpp"
 #include "imaging/level_pixels.hpp"
 #include "imaging/patch.hpp"
 
 namespace twofold {
 namespace {
-
-constexpr int kCoarsest = 3;      // coarser patches cover what moves differently
-constexpr int kFirstRadius = 8;   // [px of the coarsest level] of a corner whose motion is not known
-constexpr int kCoarseRadius = 4;  // [px of the coarsest level]
-constexpr int kRadius = 2;        // [px of a level] around what a coarser one said
-constexpr int kLargestRadius =
-    12;  // [px of a level] bounds the work where no coarser level could be searched
-constexpr int kMaxIterations = 12;
 
 struct LevelPatch {
   Patch patch;
@@ -57,17 +50,31 @@ std::optional<Eigen::Vector2f> search_square(const Patch& patch, const cv::Mat& 
 
 }  // namespace
 
-bool follow_corner(const ImagePyramid& previous, const ImagePyramid& current, FollowedCorner& corner) {
+std::string CornerFollowingOptions::invalid_reason() const {
+  return OptionCheck()
+      .within("coarsest_level", coarsest_level, 0, ImagePyramid::kLevels - 1)
+      .at_least("first_radius_px", first_radius_px, 1)
+      .at_least("coarse_radius_px", coarse_radius_px, 1)
+      .at_least("radius_px", radius_px, 1)
+      .at_least("max_radius_px", max_radius_px, radius_px)
+      .at_least("max_iterations", max_iterations, 1)
+      .reason();
+}
+
+bool follow_corner(const ImagePyramid& previous, const ImagePyramid& current,
+                   const CornerFollowingOptions& options, FollowedCorner& corner) {
   const int finest = corner.appearance.level;
   Eigen::Vector2f motion = corner.motion.value_or(Eigen::Vector2f::Zero());
-  const int whole_radius = corner.motion ? kCoarseRadius : kFirstRadius;
+  const int whole_radius = corner.motion ? options.coarse_radius_px : options.first_radius_px;
   bool searched = false;
   LevelPatch cut;
-  for (int level = kCoarsest; level >= finest; --level) {
+  for (int level = options.coarsest_level; level >= finest; --level) {
     if (!cut_at(previous, level, corner.uv, cut)) continue;
     const float s = std::ldexp(1.0F, -level);
     // Near the border the coarse levels have no patch: what is searched widely is the first that has one.
-    const int radius = searched ? kRadius : std::min(whole_radius << (kCoarsest - level), kLargestRadius);
+    const int radius =
+        searched ? options.radius_px
+                 : std::min(whole_radius << (options.coarsest_level - level), options.max_radius_px);
     const auto found = search_square(cut.patch, current.level(level), cut.whole + s * motion, radius);
     if (!found) continue;
     searched = true;
@@ -78,13 +85,13 @@ bool follow_corner(const ImagePyramid& previous, const ImagePyramid& current, Fo
   warp_patch(corner.appearance, Eigen::Matrix2d::Identity(), finest, own);
   const cv::Mat& image = current.level(finest);
   const Eigen::Vector2f start = to_level((corner.uv + motion).cast<double>(), finest);
-  auto found = align_patch(own, image, start, kMaxIterations);
+  auto found = align_patch(own, image, start, options.max_iterations);
   if (found && looks_alike(own, found->rms, {})) {
     motion = from_level(found->uv, finest).cast<float>() - corner.uv;
   } else {
     if (!cut_at(previous, finest, corner.uv, cut)) return false;
     const float s = std::ldexp(1.0F, -finest);
-    found = align_patch(cut.patch, image, cut.whole + s * motion, kMaxIterations);
+    found = align_patch(cut.patch, image, cut.whole + s * motion, options.max_iterations);
     if (!found || !looks_alike(cut.patch, found->rms, {})) return false;
     motion = (found->uv - cut.whole) / s;
   }

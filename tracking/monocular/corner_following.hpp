@@ -1,11 +1,26 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "imaging/image_pyramid.hpp"
 #include "imaging/point_appearance.hpp"
 
 namespace twofold {
+
+struct CornerFollowingOptions {
+  int coarsest_level = 3;  ///< patches of coarser ones cover what moves differently
+  int first_radius_px =
+      8;  ///< searched on the coarsest level for a corner whose motion is not known [its px]
+  int coarse_radius_px = 4;  ///< ... and for one whose motion is known
+  int radius_px = 2;         ///< around what a coarser level said [px of the level]
+  /// Bounds the work where no coarser level could be searched [px of the level].
+  int max_radius_px = 12;
+  int max_iterations = 12;  ///< of sub-pixel alignment
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
 
 /// A corner of an earlier frame, followed from frame to frame.
 struct FollowedCorner {
@@ -20,6 +35,6 @@ struct FollowedCorner {
 ///
 /// @return false when it is not found; the corner is then as it was
 [[nodiscard]] bool follow_corner(const ImagePyramid& previous, const ImagePyramid& current,
-                                 FollowedCorner& corner);
+                                 const CornerFollowingOptions& options, FollowedCorner& corner);
 
 }  // namespace twofold

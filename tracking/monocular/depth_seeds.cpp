@@ -8,7 +8,6 @@
 namespace twofold {
 namespace {
 
-constexpr float kShortestStretch = 2;  // [level px] below it nothing is learnt of an unknown depth
 constexpr int kFilterSteps = 5;
 constexpr double kFarthest = 1e-3;  // inverse depth of a point at infinity, in 1 / median depth
 
@@ -29,6 +28,7 @@ std::string DepthSeedOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("max_observed", max_observed, 1)
       .above("nearest", nearest, 0)
+      .at_least("min_stretch_px", min_stretch_px, 0)
       .above("range_sigmas", range_sigmas, 0)
       .above("min_gain", min_gain, 0)
       .at_least("min_looks", min_looks, 1)
@@ -76,7 +76,7 @@ InverseDepthRange DepthSeeds::range_of(const Seed& seed, double median_depth) co
 /// A look along much less parallax than what is known came from adds nothing but its errors. Another one from
 /// the same place counts: it says better where the point is seen from there.
 bool DepthSeeds::worth_a_look(const Seed& seed, const EpipolarStretch& stretch, const SE3& T_c_row) const {
-  if (!known(seed)) return stretch.length_px() > kShortestStretch;
+  if (!known(seed)) return stretch.length_px() > options_.min_stretch_px;
   const auto p = project_inverse_depth(rig_, T_c_row, seed.filter.psi);
   if (!p) return false;
   const double sigma = seed.filter.inverse_depth_sigma();

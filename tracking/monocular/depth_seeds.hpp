@@ -15,8 +15,10 @@
 namespace twofold {
 
 struct DepthSeedOptions {
-  int max_observed = 300;   ///< filters updated in one frame, >= 1
-  double nearest = 0.25;    ///< of the scene's median depth: nothing nearer is looked for, > 0
+  int max_observed = 300;  ///< filters updated in one frame, >= 1
+  double nearest = 0.25;   ///< of the scene's median depth: nothing nearer is looked for, > 0
+  /// Of the epipolar line, on the level searched: below it nothing is learnt of an unknown depth, >= 0 [px].
+  float min_stretch_px = 2;
   double range_sigmas = 3;  ///< half of the stretch searched once something is known, > 0
   double min_gain = 0.5;    ///< share of what is known of the depth that another look must add, > 0
   /// Later frames that must have seen a point before it is used, >= 1; the keyframe that brings it into the

@@ -19,9 +19,7 @@
 namespace twofold {
 namespace {
 
-constexpr double kSignificant = 2;     // standard deviations
 constexpr double kOutlierChi2 = 9.21;  // 99 % of chi-square with 2 degrees of freedom
-constexpr double kGrossChi2 = 50;      // beyond this before the adjustment, a corner follows something else
 constexpr int kAdjustmentSteps = 15;
 constexpr double kMostSheared = 0.9;  // quantile of the corners, by which readouts are told apart
 constexpr int kMostReadouts = 32;     // bounds the work
@@ -186,7 +184,8 @@ class FirstStructureEstimator {
   /// Bundle adjustment without the corners that follow something else.
   /// @return false when too few are left
   bool adjust(Trial& trial) const {
-    for (const auto& [bound, gain] : {std::pair{kGrossChi2, kFirstGain}, {kOutlierChi2, kLeastGain}}) {
+    for (const auto& [bound, gain] :
+         {std::pair{options_.gross_chi2, kFirstGain}, {kOutlierChi2, kLeastGain}}) {
       put_outliers_aside(bound, trial);
       if (!enough(trial.corners.size()) || !trial.views.minimise(kAdjustmentSteps, gain)) return false;
     }
@@ -196,12 +195,10 @@ class FirstStructureEstimator {
   }
 
   /// Two starts that came to different minima.
-  static bool differ(const AnchoredViews& a, const AnchoredViews& b) {
+  [[nodiscard]] bool differ(const AnchoredViews& a, const AnchoredViews& b) const {
     const SE3 &T_a = a.views[0].T_c_a, &T_b = b.views[0].T_c_a;
-    constexpr double kSameDirection = 0.95;  // cosine
-    constexpr double kSameAngle = 0.02;      // [rad]
-    return (T_a.so3().inverse() * T_b.so3()).log().norm() > kSameAngle ||
-           T_a.translation().normalized().dot(T_b.translation().normalized()) < kSameDirection;
+    return (T_a.so3().inverse() * T_b.so3()).log().norm() > options_.same_angle ||
+           T_a.translation().normalized().dot(T_b.translation().normalized()) < options_.same_direction;
   }
 
   /// Squared whitened error of a point in the frame that it fits least.
@@ -274,12 +271,12 @@ class FirstStructureEstimator {
       // turned + q t is along the bearing: least squares for q.
       const double q = -sight.dot(last_[n].cross(turned)) / sight.squaredNorm();
       const double sigma = options_.sigma_px / rig_.camera.fx / sight.norm();
-      if (q > kSignificant * sigma) ++in_front;
-      if (q < -kSignificant * sigma) ++behind;
+      if (q > options_.significant_sigmas * sigma) ++in_front;
+      if (q < -options_.significant_sigmas * sigma) ++behind;
       const InverseDepthFilter own =
           InverseDepthFilter::from_mono(rig_.camera, views_.first[n], options_.sigma_px, std::max(q, 1e-3));
       views.points.push_back({own.psi, own.psi, own.information});
-      usable.push_back(q > kSignificant * sigma);
+      usable.push_back(q > options_.significant_sigmas * sigma);
     }
     if (behind > options_.max_behind_share * (in_front + behind)) return std::nullopt;
     views.views.push_back({T_last_first, seen(views_.last)});
@@ -411,6 +408,10 @@ std::string FirstStructureOptions::invalid_reason() const {
       .share("near_share", near_share)
       .within("max_still_share", max_still_share, 0, 1)
       .within("fixed_strip", fixed_strip, 0, 1)
+      .at_least("significant_sigmas", significant_sigmas, 0)
+      .above("gross_chi2", gross_chi2, 0)
+      .within("same_direction", same_direction, -1, 1)
+      .at_least("same_angle", same_angle, 0)
       .reason();
 }
 

@@ -35,6 +35,11 @@ struct FirstStructureOptions {
   /// ... unless they lie in a strip of so much of the image's height, as a bonnet or a caption does, in [0,
   /// 1].
   double fixed_strip = 0.3;
+  double significant_sigmas = 2;  ///< of a depth, from which on its sign counts, >= 0
+  double gross_chi2 = 50;         ///< beyond this before the adjustment, a corner follows something else, > 0
+  // Motions that differ by less are one: cosine between directions, in [-1, 1], and angle [rad].
+  double same_direction = 0.95;
+  double same_angle = 0.02;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -90,7 +90,8 @@ void MonocularStart::follow(const FrameImages& images, StartCandidate& candidate
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidate.corners.size(); ++i) {
-    if (!follow_corner(last_.left, images.left, candidate.corners[i])) continue;
+    if (!follow_corner(last_.left, images.left, options_.monocular_start.following, candidate.corners[i]))
+      continue;
     candidate.corners[kept] = candidate.corners[i];
     candidate.first_motion[kept] =
         from_first ? candidate.corners[i].uv - candidate.corners[i].appearance.uv : candidate.first_motion[i];

@@ -12,6 +12,7 @@ std::string MonocularStartOptions::invalid_reason() const {
       .share("placed_share", placed_share)
       .at_least("next_flow", next_flow, 0)
       .share("min_left_share", min_left_share)
+      .nested("following", following.invalid_reason())
       .nested("first_structure", first_structure.invalid_reason())
       .reason();
 }

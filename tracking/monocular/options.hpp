@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "tracking/monocular/corner_following.hpp"
 #include "tracking/monocular/first_structure.hpp"
 
 namespace twofold {
@@ -16,6 +17,7 @@ struct MonocularStartOptions {
   double next_flow = 0.03;      ///< share of the image's width that corners have moved by: a new candidate is
                                 ///< worth its place, >= 0
   double min_left_share = 0.4;  ///< of its corners: a candidate with fewer is given up, in (0, 1]
+  CornerFollowingOptions following;
   FirstStructureOptions first_structure;
 
   /// Empty when valid; otherwise names the field, the rule and the value.

@@ -4,11 +4,6 @@
 #include <cmath>
 
 namespace twofold {
-namespace {
-
-constexpr double kJitter = 0.3;  // of the interval between two frames
-
-}  // namespace
 
 void MotionModel::advance(const Placement& placement, std::int64_t t_ns, bool lost) {
   const bool goes_on = !lost && placement.reference == placement_.reference;
@@ -31,7 +26,7 @@ SE3 MotionModel::predicted_motion(std::int64_t t_ns, bool lost) const {
   if (lost) return {};
   const double seconds = seconds_until(t_ns);
   const double intervals = interval_ > 0 ? seconds / interval_ : 1;
-  if (!velocity_ || std::abs(intervals - 1) < kJitter) return T_this_previous_.value_or(SE3());
+  if (!velocity_ || std::abs(intervals - 1) < options_.jitter) return T_this_previous_.value_or(SE3());
   return coasted(t_ns).value_or(SE3());
 }
 

@@ -5,20 +5,10 @@
 #include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
-namespace {
-
-/// Cameras either read all rows at once or take up to a frame's period: while nobody knows [s].
-constexpr double kUnknownReadout = 0.015;
-/// Of an inverse depth in one camera's map, which the readout itself bends, all of a place alike: by far more
-/// than any one is wrong. With half of it readouts are too small; with more they are known late.
-constexpr double kBentDepth = 2;
-
-}  // namespace
-
 ShutterModel::ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points,
-                           const ReadoutOptions& options)
-    : rig_(rig), motion_(motion) {
-  if (!rig.readout) readout_.emplace(rig, max_points, options);
+                           const ShutterOptions& options)
+    : rig_(rig), motion_(motion), options_(options) {
+  if (!rig.readout) readout_.emplace(rig, max_points, options.readout);
 }
 
 RollingShutter ShutterModel::at(const SE3& T_c_ref, const FrameStep& step) const {
@@ -53,7 +43,7 @@ void ShutterModel::learn(const FrameStep& step, const SearchOutcome& found, cons
   if (!T_this_previous) readout_->interrupt();
   std::vector<ReadoutPoint>* seen = readout_->begin_frame(step.frame.t_ns, T_this_previous.value_or(SE3()));
   if (seen == nullptr) return;
-  const double depth_error = rig_.kind == SensorKind::kMono ? kBentDepth : 0;
+  const double depth_error = rig_.kind == SensorKind::kMono ? options_.bent_depth : 0;
   for (const SearchOutcome::Match& match : found.matches) {
     const TrackedPoint& point = local_map.points()[match.point];
     const StereoPixel& z = match.found.pixel;
@@ -75,7 +65,7 @@ void ShutterModel::learn(const FrameStep& step, const SearchOutcome& found, cons
 double ShutterModel::readout_sigma() const {
   if (!readout_) return 0;
   const ReadoutEstimate& estimate = readout_->estimate();
-  const double prior = kUnknownReadout * kUnknownReadout;
+  const double prior = options_.unknown_readout * options_.unknown_readout;
   const double trust = prior / (prior + estimate.sigma * estimate.sigma);  // 0 before the first pair
   const double unused = rig_.readout ? 0 : trust * estimate.seconds;
   return std::hypot(std::sqrt(prior * (1 - trust)), unused);

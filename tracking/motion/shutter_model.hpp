@@ -21,7 +21,7 @@ class ShutterModel {
   /// @param motion      of the camera up to the frame that is asked for; must outlive this
   /// @param max_points  found in a frame at most
   ShutterModel(const Rig& rig, const MotionModel& motion, std::size_t max_points,
-               const ReadoutOptions& options = {});
+               const ShutterOptions& options = {});
 
   /// The shutter of a frame whose pose is T_c_ref.
   [[nodiscard]] RollingShutter at(const SE3& T_c_ref, const FrameStep& step) const;
@@ -50,6 +50,7 @@ class ShutterModel {
 
   Rig rig_;  ///< with the readout, once that is found
   const MotionModel& motion_;
+  ShutterOptions options_;
   std::optional<ReadoutEstimator> readout_;  ///< if the calibration leaves it open
 };
 

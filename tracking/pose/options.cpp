@@ -24,6 +24,8 @@ std::string PoseOptions::invalid_reason() const {
       .share("doubted_searched_share", doubted_searched_share)
       .within("settled_searched_share", settled_searched_share, 0, 1)
       .nested("rough", rough.invalid_reason())
+      .at_least("shutter_rounds", shutter_rounds, 1)
+      .at_least("shutter_settled", shutter_settled, 0)
       .reason();
 }
 

@@ -40,6 +40,11 @@ struct PoseOptions {
   /// points searched agrees on a pose already; 0: never. Poses that a passing object gave have up to 0.31.
   double settled_searched_share = 0.35;
   RoughStartOptions rough;
+  /// Where rows are read one after the other, how they move follows from the pose, and that from it, >= 1.
+  int shutter_rounds = 3;
+  /// A round that moves the pose by less is the last, >= 0 [standard deviations]: the next one would move it
+  /// by about a twentieth of that.
+  double shutter_settled = 1;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

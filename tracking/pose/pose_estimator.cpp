@@ -5,14 +5,6 @@
 #include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
-namespace {
-
-constexpr int kShutterRounds = 3;
-// A round moves the pose by about a twentieth of what the one before moved it by: by this many of its
-// standard deviations, and the next one is not worth its time.
-constexpr double kSettledSigmas = 1;
-
-}  // namespace
 
 PoseEstimator::PoseEstimator(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map,
                              const ShutterModel& shutter, ImmaturePoints& immature_points)
@@ -31,7 +23,7 @@ LostCause PoseEstimator::estimate(const Placement& start, FrameStep& step, Searc
   TrackResult& result = step.result;
   MotionOnlyResult& motion = found.motion;
   motion.T_c_ref = start.T_c_ref;
-  const int rounds = step.shutter.at_rest() ? 1 : kShutterRounds;
+  const int rounds = step.shutter.at_rest() ? 1 : options_.pose.shutter_rounds;
   for (int round = 0; round < rounds; ++round) {
     const SE3 T_before = motion.T_c_ref;
     observe(T_before, step.shutter, found);
@@ -39,7 +31,8 @@ LostCause PoseEstimator::estimate(const Placement& start, FrameStep& step, Searc
     if (rounds == 1) break;
     step.shutter = shutter_.at(motion.T_c_ref, step);
     const Vector6 moved = (motion.T_c_ref * T_before.inverse()).log();
-    if (moved.dot(motion.information * moved) < kSettledSigmas * kSettledSigmas) break;
+    const double settled = options_.pose.shutter_settled;
+    if (moved.dot(motion.information * moved) < settled * settled) break;
   }
   ask_elders(solver(step), found);
   result.moving = judge_immature_points(found);
