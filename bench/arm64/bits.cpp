@@ -30,14 +30,16 @@ float rounded(double px) {
 }
 
 std::vector<MotionObservation> measurements(const Rig& rig, Draws& draws) {
-  std::vector<MotionObservation> seen(200);
-  for (MotionObservation& s : seen) {
+  std::vector<MotionObservation> seen;
+  for (int i = 0; i < 200; ++i) {
     double n[6];
     for (double& value : n) value = draws.next();
-    s.x_ref = Vector3(4 * n[0] - 2, 3 * n[1] - 1.5, 2 + 6 * n[2]);
-    const double f = rig.camera.fx, u = rig.camera.cx + f * s.x_ref.x() / s.x_ref.z();
-    const double v = rig.camera.cy + f * s.x_ref.y() / s.x_ref.z();
-    s.pixel = {rounded(u + f * rig.baseline / s.x_ref.z() + n[3]), rounded(v + n[4]), rounded(u + n[5])};
+    const Vector3 x_ref(4 * n[0] - 2, 3 * n[1] - 1.5, 2 + 6 * n[2]);
+    const double f = rig.camera.fx, u = rig.camera.cx + f * x_ref.x() / x_ref.z();
+    const double v = rig.camera.cy + f * x_ref.y() / x_ref.z();
+    seen.push_back(observe_point(
+        rig, x_ref, {rounded(u + f * rig.baseline / x_ref.z() + n[3]), rounded(v + n[4]), rounded(u + n[5])},
+        0));
   }
   return seen;
 }
@@ -52,6 +54,7 @@ void run() {
   rig.kind = SensorKind::kStereo;
   rig.camera = {400, 400, 319.5, 239.5, 640, 480};
   rig.baseline = 0.1;
+  rig.noise.sigma_px = 1;
   Draws draws;
   std::uint64_t hash = 1469598103934665603ULL;
   double sum = 0;

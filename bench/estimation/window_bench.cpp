@@ -129,19 +129,18 @@ void BM_MotionOnly(benchmark::State& state) {
   std::mt19937 rng(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::normal_distribution<double> normal;
-  const Rig rig = synthetic_window_detail::make_rig(SensorKind::kStereo);
+  Rig rig = synthetic_window_detail::make_rig(SensorKind::kStereo);
+  rig.noise.sigma_px = 1;
   Vector6 motion;
   motion << 0.05, -0.05, 0.1, 0.02, -0.03, 0.01;
   const SE3 T_c_ref = SE3::exp(motion);
   std::vector<MotionObservation> observations;
   for (int n = 0; n < state.range(0); ++n) {
-    MotionObservation o;
-    o.x_ref = Vector3(2 * uniform(rng), 1.5 * uniform(rng), 5 + 2 * uniform(rng));
-    StereoPixel z = rig.project(T_c_ref * o.x_ref) + 0.7 * Vector3(normal(rng), normal(rng), normal(rng));
+    const Vector3 x_ref(2 * uniform(rng), 1.5 * uniform(rng), 5 + 2 * uniform(rng));
+    StereoPixel z = rig.project(T_c_ref * x_ref) + 0.7 * Vector3(normal(rng), normal(rng), normal(rng));
     if (n % 10 == 0) z += Vector3(20, -15, 20);
-    if (n % 4 == 0) o.information.z() = 0;
-    o.pixel = z.cast<float>();
-    observations.push_back(o);
+    if (n % 4 == 0) z.z() = Rig::kNoRight;
+    observations.push_back(observe_point(rig, x_ref, z.cast<float>(), 0));
   }
   MotionOnlyOptions options;
   options.stop_step = state.range(1) != 0 ? options.stop_step : 0;

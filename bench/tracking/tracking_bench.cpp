@@ -69,7 +69,7 @@ void motion_only(benchmark::State& state) {
   solver.max_iterations = bounds.motion_iterations;
   const SE3 T_true = T_c_w(1) * T_c_w(0).inverse();
   std::mt19937 random(5);
-  std::normal_distribution<double> noise(0, 0.7);
+  std::normal_distribution<double> noise(0, rig().noise.sigma_px);
   std::vector<MotionObservation> observations;
   for (int n = 0; n < bounds.wanted_matches; ++n) {
     const Vector2 uv(std::uniform_real_distribution(20.0, 620.0)(random),
@@ -77,7 +77,7 @@ void motion_only(benchmark::State& state) {
     const Vector3 x = rig().camera.unproject(uv) * std::uniform_real_distribution(1.0, 6.0)(random);
     StereoPixel z = rig().project(T_true * x) + Vector3(noise(random), noise(random), noise(random));
     if (n % 10 == 0) z += Vector3(15, -9, 0);  // a wrong match
-    observations.push_back({x, z.cast<float>(), {1, 1, 1}, true});
+    observations.push_back(observe_point(rig(), x, z.cast<float>(), 0));
   }
   std::vector<MotionObservation> copy;
   for (auto _ : state) {

@@ -75,32 +75,30 @@ void Feeder::associate(const GraphSnapshot& graph) {
 /// Pose of the new keyframe relative to its reference, from the points the map has.
 void Feeder::track(const GraphSnapshot& graph) {
   const SE3 T_ref_w = graph.T_k_w(proposal_.reference);
-  const bool mono = scene_.rig.kind == SensorKind::kMono;
+  Rig rig = scene_.rig;
+  rig.noise.sigma_px = 1;  // whatever the scene's: all points weigh alike, and some scenes have none
   std::vector<MotionObservation> seen;
   const auto add = [&](const Vector3& x_ref, const Observation& observation) {
-    MotionObservation& motion = seen.emplace_back();
-    motion.x_ref = x_ref;
-    motion.pixel = observation.pixel;
-    if (mono) motion.information.z() = 0;
+    seen.push_back(observe_point(rig, x_ref, observation.pixel, observation.level));
   };
   for (const Observation& observation : proposal_.observations) {
     add(T_ref_w * graph.position(observation.point), observation);
   }
   proposal_.T_k_ref = T_step_;
   if (next_ == 1) {  // there is no map yet
-    if (mono) {
+    if (rig.kind == SensorKind::kMono) {
       proposal_.T_k_ref = scene_.T_k_w[1] * scene_.T_k_w[0].inverse();
       return;
     }
     for (const Scene::Sighting& a : scene_.seen[0]) {
       for (const Scene::Sighting& b : unknown_) {
         if (a.point == b.point && a.pixel.x() - a.pixel.z() > kMinDisparityPx) {
-          add(scene_.rig.unproject(a.pixel), observe(kNoPoint, b.pixel));
+          add(rig.unproject(a.pixel), observe(kNoPoint, b.pixel));
         }
       }
     }
   }
-  proposal_.T_k_ref = optimise_motion(scene_.rig, seen, proposal_.T_k_ref, {}).T_c_ref;
+  proposal_.T_k_ref = optimise_motion(rig, seen, proposal_.T_k_ref, {}).T_c_ref;
 }
 
 bool Feeder::start_value(const StereoPixel& z_previous, const StereoPixel& z, const SE3& T_previous_k,

@@ -16,6 +16,7 @@ constexpr std::size_t kMinPlacing = 8;  ///< known points that place a frame
 class Explorer {
  public:
   Explorer(const Rig& rig, const ExplorationOptions& options) : rig_(rig), options_(options) {
+    rig_.noise.sigma_px = 1;  // whatever the images': all points weigh alike
     solver_options_.max_iterations = options.iterations;
     solver_options_.huber_sigmas = options.huber_sigmas;
     solver_options_.relative_decrease = 1e-5;
@@ -69,6 +70,10 @@ class Explorer {
   const Vector2& uv(const Track& track, int frame) const {
     return track.uv[static_cast<std::size_t>(frame - track.first_frame)];
   }
+  StereoPixelF pixel(const Track& track, int frame) const {
+    const Eigen::Vector2f at = uv(track, frame).cast<float>();
+    return {at.x(), at.y(), static_cast<float>(Rig::kNoRight)};
+  }
 
   /// Motion-only bundle adjustment of frame k  (eq. 3.34). Where too few points are known it stays where the
   /// motion goes on: the window's adjustment, which has the points seen twice too, starts from there.
@@ -76,11 +81,7 @@ class Explorer {
     std::vector<MotionObservation> observations;
     for (const int t : result_.seen[static_cast<std::size_t>(k)]) {
       if (!at(t).x_w) continue;
-      MotionObservation o;
-      o.x_ref = *at(t).x_w;
-      o.pixel.head<2>() = uv(at(t), k).cast<float>();
-      o.information.z() = 0;
-      observations.push_back(o);
+      observations.push_back(observe_point(rig_, *at(t).x_w, pixel(at(t), k), 0));
     }
     MotionOnlyOptions options;
     options.rounds = 1;
@@ -141,11 +142,8 @@ class Explorer {
         problem_.observations.resize(static_cast<std::size_t>(point.first_observation));
         return;
       }
-      WindowProblem::Observation o;
-      o.pose = k - begin;
-      o.pixel.head<2>() = uv(track, k).cast<float>();
-      o.information.z() = 0;
-      problem_.observations.push_back(o);
+      const StereoPixelF z = pixel(track, k);
+      problem_.observations.push_back({k - begin, z, rig_.information(z, 0)});
     }
     problem_.points.push_back(point);
     in_window_.push_back(t);

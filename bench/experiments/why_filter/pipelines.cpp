@@ -18,8 +18,9 @@ constexpr double kMinInverseDepth = 1e-3;  // farther points say nothing to bund
 /// Bundle adjustment pipeline over growing data; frames are pose indices of the problem.
 class BaPipeline {
  public:
-  BaPipeline(const Rig& rig, int iterations) : mono_(rig.kind == SensorKind::kMono) {
+  BaPipeline(const Rig& rig, int iterations) {
     problem_.rig = rig;
+    problem_.rig.noise.sigma_px = kSigma;
     options_.max_iterations = iterations;
     options_.huber_sigmas = 0;
     options_.relative_decrease = 1e-10;
@@ -40,7 +41,9 @@ class BaPipeline {
   void add_observation(int pose, const PointObservation& o) {
     const auto found = index_.find(o.point);
     if (found == index_.end()) return;
-    tracks_[static_cast<std::size_t>(found->second)].push_back(make_observation(pose, o.pixel));
+    const StereoPixelF pixel = o.pixel.cast<float>();
+    tracks_[static_cast<std::size_t>(found->second)].push_back(
+        {pose, pixel, problem_.rig.information(pixel, 0)});
   }
 
   /// Pose of a new frame from the points known so far  (eq. 4.15).
@@ -50,13 +53,9 @@ class BaPipeline {
       const auto found = index_.find(o.point);
       if (found == index_.end()) continue;
       const auto& point = problem_.points[static_cast<std::size_t>(found->second)];
-      MotionObservation m;
-      m.x_ref = problem_.poses[static_cast<std::size_t>(point.anchor)].T_k_w.inverse() *
-                from_inverse_depth(point.psi);
-      const auto w = make_observation(0, o.pixel);
-      m.pixel = w.pixel;
-      m.information = w.information;
-      observations.push_back(m);
+      const Vector3 x_w = problem_.poses[static_cast<std::size_t>(point.anchor)].T_k_w.inverse() *
+                          from_inverse_depth(point.psi);
+      observations.push_back(observe_point(problem_.rig, x_w, o.pixel.cast<float>(), 0));
     }
     MotionOnlyOptions options;
     options.huber_sigmas = 1e6;
@@ -88,16 +87,6 @@ class BaPipeline {
   WindowProblem& problem() { return problem_; }
 
  private:
-  [[nodiscard]] WindowProblem::Observation make_observation(int pose, const StereoPixel& z) const {
-    WindowProblem::Observation o;
-    const auto w = static_cast<float>(1 / (kSigma * kSigma));
-    o.pose = pose;
-    o.pixel = z.cast<float>();
-    o.information = Eigen::Vector3f(w, w, mono_ ? 0.0F : w);
-    return o;
-  }
-
-  bool mono_;
   WindowProblem problem_;
   WindowSolver solver_;
   WindowSolverOptions options_;
