@@ -30,8 +30,21 @@ struct SearchStart {
   [[nodiscard]] bool rough() const { return kind != Kind::kNear; }
 };
 
+/// What one way to a frame's pose came to: all of the step that another way overwrites, so that it can be set
+/// aside while that is tried.
+struct Attempt {
+  TrackResult result;
+  RollingShutter shutter;  ///< as the camera moves in this frame, as far as known
+  /// How it moves in this frame, left perturbation a second, where a start found that out: there is no frame
+  /// before.
+  std::optional<Vector6> velocity;
+  /// Information of a pose that depth alignment gave if each plane erred by itself, as the weights of edges
+  /// assume of points.
+  Matrix6 information_of_planes = Matrix6::Zero();
+};
+
 /// What belongs to one frame only: handed from stage to stage of the tracker, which writes the result.
-class FrameStep {
+class FrameStep : public Attempt {
  public:
   FrameStep(const Frame& new_frame, const GraphSnapshot& map, KeyframeProposal* buffer,
             const EffortBounds& limits, int frames_without_pose)
@@ -49,16 +62,8 @@ class FrameStep {
   bool depth_read = false;  ///< the frame's depth image, by the depth alignment
   bool tracked = false;     ///< in the map that there was
   bool started = false;     ///< a map or map part, with this frame
-  RollingShutter shutter;   ///< as the camera moves in this frame, as far as known
-  /// How it moves in this frame, left perturbation a second, where a start found that out: there is no frame
-  /// before.
-  std::optional<Vector6> velocity;
-  TrackResult result;
   /// One camera: frames before this one whose poses its start found out, relative to the reference keyframe.
   std::vector<EarlierFrame> earlier_frames;
-  /// Information of a pose that depth alignment gave if each plane erred by itself, as the weights of edges
-  /// assume of points.
-  Matrix6 information_of_planes = Matrix6::Zero();
 
   /// The frame before this one has no pose.
   [[nodiscard]] bool after_loss() const { return lost_frames > 0; }
@@ -68,10 +73,12 @@ class FrameStep {
     result.stage_ns[static_cast<std::size_t>(stage)] += (now - last_lap_).count();
     last_lap_ = now;
   }
-  /// The result is again what it was, but for the time that passed.
-  void restore(const TrackResult& earlier) {
+  /// What the frame's pose came to so far.
+  [[nodiscard]] Attempt attempt() const { return *this; }
+  /// All is again what it was, but for the time that passed.
+  void restore(const Attempt& earlier) {
     const auto stage_ns = result.stage_ns;
-    result = earlier;
+    static_cast<Attempt&>(*this) = earlier;
     result.stage_ns = stage_ns;
   }
   /// The time since the last lap was not the tracker's.

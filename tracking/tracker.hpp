@@ -103,12 +103,6 @@ class Tracker {
   [[nodiscard]] std::span<const MotionObservation> last_observations() const { return search_.observations; }
 
  private:
-  /// What one start came to; its SearchOutcome is tried_ while another start is tried.
-  struct Attempt {
-    TrackResult result;
-    RollingShutter shutter;
-  };
-
   // tracker.cpp: the stages of a frame
   void follow(const GraphSnapshot& graph);
   bool track(FrameStep& step);

@@ -48,13 +48,14 @@ bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step
   const bool points_placed = found == LostCause::kNone;
   const bool few = points_placed ? step.result.inliers < options_.depth.scarce_inliers : last_.by_depth;
   if (!few || !depth_can_place(step)) return false;
-  const TrackResult by_points = step.result;
-  if (place_by_depth(points_placed ? by_points.T_c_ref : T_c_ref, step) != LostCause::kNone) return false;
+  const Attempt by_points = step.attempt();
+  if (place_by_depth(points_placed ? by_points.result.T_c_ref : T_c_ref, step) != LostCause::kNone)
+    return false;
   if (!step.after_loss()) return true;
   // After a loss depth may have found another place of the same shape: what points say counts.
-  if (points_placed ? 2 * step.result.inliers >= by_points.inliers : points_allow(step)) return true;
+  if (points_placed ? 2 * step.result.inliers >= by_points.result.inliers : points_allow(step)) return true;
   step.restore(by_points);
-  classify_observations(rig_, search_.observations, by_points.T_c_ref, options_.pose.motion);
+  classify_observations(rig_, search_.observations, by_points.result.T_c_ref, options_.pose.motion);
   return false;
 }
 
@@ -72,18 +73,16 @@ LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
 /// better one. After a loss nobody knows how the camera moves, and where enough of them should be seen and
 /// are not found, the pose is wrong.
 bool Tracker::points_allow(FrameStep& step) {
+  const Attempt by_depth = step.attempt();
   TrackResult& result = step.result;
-  const TrackResult by_depth = result;
-  const RollingShutter shutter = step.shutter;
   result.by_depth = false;
-  const Placement placement{by_depth.reference, by_depth.T_c_ref};
+  const Placement placement{result.reference, result.T_c_ref};
   local_map_.update(step.graph, placement.reference, immature_points_,
                     options_.local_map.neighbour_keyframes);
   const SearchStart start{.placement = placement, .kind = SearchStart::Kind::kRough};
   if (search_from(start, step) == LostCause::kNone) return true;
   if (step.after_loss() && result.candidates >= options_.depth.telling_candidates) return false;
   step.restore(by_depth);
-  step.shutter = shutter;
   search_.clear();
   result.matches = result.inliers = 0;
   return true;

@@ -11,14 +11,7 @@ namespace twofold {
 LostCause Tracker::start_from_motion(FrameStep& step) {
   const auto start = monocular_start_->step(current_, step.frame);
   if (!start) return start.error();
-  const TrackResult before = step.result;
-  if (const LostCause cause = confirm_start(*start, step); cause != LostCause::kNone) {
-    step.restore(before);
-    step.velocity.reset();
-    step.shutter = {};
-    immature_points_.clear_points();
-    return cause;
-  }
+  if (const LostCause cause = confirm_start(*start, step); cause != LostCause::kNone) return cause;
   step.earlier_frames = monocular_start_->earlier_frames(*start);
   const StartCandidate& first = *start->first;
   const Placement here{step.result.reference, step.result.T_c_ref};
@@ -37,7 +30,9 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
 }
 
 /// A start counts when the tracker's own search finds its points from where it says the camera is.
+/// @return kNone, or why it does not: the step is then as it was, and its points are forgotten
 LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& step) {
+  const Attempt before = step.attempt();
   const KeyframeId id = proposer_.next();
   immature_points_.clear_points();
   new_points_.forget_seeds();
@@ -58,7 +53,11 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   step.shutter = step.velocity ? shutter_.at(placement.T_c_ref, step) : RollingShutter();
   local_map_search_.run(current_, placement.T_c_ref, options_.local_map.lost_radius_px, step, search_);
   const LostCause cause = pose_estimator_.estimate(placement, step, search_);
-  if (cause != LostCause::kNone) return cause;
+  if (cause != LostCause::kNone) {
+    step.restore(before);
+    immature_points_.clear_points();
+    return cause;
+  }
   step.result.cause = LostCause::kNone;
   return LostCause::kNone;
 }

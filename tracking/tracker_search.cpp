@@ -50,16 +50,16 @@ LostCause Tracker::search_from_either(const SearchStart& aligned, FrameStep& ste
                                   search_);  // again: what the other start did not find was counted
 }
 
-Tracker::Attempt Tracker::set_aside(const FrameStep& step) {
+/// What the search from one start came to, while another start is tried.
+Attempt Tracker::set_aside(const FrameStep& step) {
   std::swap(search_, tried_);
-  return {step.result, step.shutter};
+  return step.attempt();
 }
 
 /// Of the attempt set aside last. The local map must be the one that it searched.
 void Tracker::take_back(const Attempt& attempt, FrameStep& step) {
   std::swap(search_, tried_);
-  step.restore(attempt.result);
-  step.shutter = attempt.shutter;
+  step.restore(attempt);
 }
 
 /// The pose is further from where the camera would be had it gone on, as the last frame's points show, than
