@@ -10,12 +10,12 @@
 #include "apps/command_line.hpp"
 #include "apps/vocabulary/place_evaluation.hpp"
 #include "apps/vocabulary/training_images.hpp"
+#include "apps/vocabulary/vocabulary_trainer.hpp"
 #include "engine/clock.hpp"
 #include "imaging/corner_selection.hpp"
 #include "io/files/image_file.hpp"
 #include "io/files/io_error.hpp"
 #include "loopclosure/default_vocabulary.hpp"
-#include "loopclosure/vocabulary_trainer.hpp"
 
 namespace twofold {
 namespace {

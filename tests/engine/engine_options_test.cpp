@@ -5,7 +5,6 @@
 #include "fixtures/option_rules.hpp"
 #include "fixtures/rendered_scene.hpp"
 #include "imaging/plane_warp.hpp"
-#include "loopclosure/vocabulary_trainer.hpp"
 
 namespace twofold {
 namespace {
@@ -187,8 +186,6 @@ TEST(Options, OfTheLoopCloserSayWhyTheyAreInvalid) {
        {"depths.max_depth_ratio", [](auto& o) { o.depths.max_depth_ratio = 0.9; }},
        {"min_scale_points", [](auto& o) { o.min_scale_points = 0; }},
        {"relocalisation_candidates", [](auto& o) { o.relocalisation_candidates = 0; }}});
-  expect_rules<VocabularyTrainerOptions>(
-      {{"branching", [](auto& o) { o.branching = 1; }}, {"levels", [](auto& o) { o.levels = 7; }}});
 }
 
 TEST(Options, OfRunLogsSayWhyTheyAreInvalid) {

@@ -6,8 +6,9 @@
 #include <fstream>
 #include <random>
 
+#include "apps/vocabulary/vocabulary_trainer.hpp"
+#include "fixtures/option_rules.hpp"
 #include "loopclosure/place_index.hpp"
-#include "loopclosure/vocabulary_trainer.hpp"
 
 namespace twofold {
 namespace {
@@ -45,12 +46,12 @@ std::vector<DescribedCorner> corners_of(const std::vector<BinaryDescriptor>& des
   return corners;
 }
 
-class VocabularyTest : public testing::Test {
+class VocabularyTest : public ::testing::Test {
  protected:
   std::mt19937_64 rng_{7};
   std::vector<std::vector<BinaryDescriptor>> images_ = noisy_views(20, 3, 60, rng_);
   Vocabulary vocabulary_ = train_vocabulary(images_, {.branching = 6, .levels = 3});
-  std::filesystem::path file_ = std::filesystem::path(testing::TempDir()) / "vocabulary_test.tfvoc";
+  std::filesystem::path file_ = std::filesystem::path(::testing::TempDir()) / "vocabulary_test.tfvoc";
 
   std::vector<std::uint8_t> saved_bytes() {
     vocabulary_.save(file_);
@@ -69,6 +70,11 @@ TEST_F(VocabularyTest, ViewsOfOnePlaceScoreAboveAllOthers) {
       EXPECT_GT(same, bag_score(query, vocabulary_.bag(corners_of(images_[j])))) << i << " against " << j;
     }
   }
+}
+
+TEST(VocabularyTrainer, SaysWhyItsOptionsAreInvalid) {
+  testing::expect_rules<VocabularyTrainerOptions>(
+      {{"branching", [](auto& o) { o.branching = 1; }}, {"levels", [](auto& o) { o.levels = 7; }}});
 }
 
 TEST_F(VocabularyTest, TrainingIsReproducible) {

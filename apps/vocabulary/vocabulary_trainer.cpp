@@ -1,4 +1,4 @@
-#include "loopclosure/vocabulary_trainer.hpp"
+#include "apps/vocabulary/vocabulary_trainer.hpp"
 
 #include <algorithm>
 #include <cmath>
