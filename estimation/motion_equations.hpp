@@ -45,7 +45,7 @@ inline constexpr double kSigmasBehind = 100;
 /// kLanes observations side by side.
 struct ObservationBatch {
   Lanes x, y, z;     // point in the reference frame
-  Lanes u, v, r;     // measurement; r is 0 without a right image
+  Lanes u, v, r;     // measurement; r is 0 unless it counts (weighs_right)
   Lanes wu, wv, wr;  // information
   Lanes used;        // 1 or 0
 

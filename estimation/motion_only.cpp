@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/measurement.hpp"
 #include "estimation/levenberg_marquardt.hpp"
 #include "estimation/motion_equations.hpp"
 
@@ -42,7 +43,8 @@ class MotionCost {
       const BatchProjection p(model_, R, T.translation(), ObservationBatch(observations_, first, false));
       for (std::size_t n = first; n < std::min(first + kLanes, observations_.size()); ++n) {
         MotionObservation& o = observations_[n];
-        const double limit = o.information.z() == 0 ? options.inlier_chi2_mono : options.inlier_chi2_stereo;
+        const double limit =
+            weighs_right(o.information) ? options.inlier_chi2_stereo : options.inlier_chi2_mono;
         o.inlier = p.front[n - first] > 0 && p.chi2[n - first] <= limit;
         inliers += o.inlier;
       }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/option_check.hpp"
+#include "camera/measurement.hpp"
 #include "geometry/absolute_orientation.hpp"
 #include "geometry/ransac.hpp"
 
@@ -154,7 +155,8 @@ std::optional<SE3> PoseConsensus::find(std::span<const MotionObservation> matche
   for (const MotionObservation& match : matches) {
     const StereoPixel z = match.pixel.cast<double>();
     if (pairs_.size() == pairs_.capacity()) break;
-    if (match.information.z() > 0 && z.x() - z.z() > options_.min_disparity_px) add(match, rig_.unproject(z));
+    if (weighs_right(match.information) && z.x() - z.z() > options_.min_disparity_px)
+      add(match, rig_.unproject(z));
   }
   const ThreePoints estimator(rig_, pairs_, batches_);
   const auto best = best_model(estimator,

@@ -24,8 +24,8 @@ struct WindowProblem {
   /// That a pose sees a point, with the measurement; those of one point stand together.
   struct Observation {
     int pose = 0;
-    StereoPixelF pixel{0, 0, 0};           ///< u_r is ignored where its information is 0
-    Eigen::Vector3f information{1, 1, 1};  ///< diagonal of Lambda_z [1/px^2]; third entry 0: no right image
+    StereoPixelF pixel{0, 0, 0};   ///< u_r is ignored unless weighs_right(information)
+    Eigen::Vector3f information{1, 1, 1};  ///< diagonal of Lambda_z [1/px^2]
   };
   struct Point {
     int anchor = 0;  ///< pose index of a(k)

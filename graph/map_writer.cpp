@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <limits>
 #include <mutex>
 #include <utility>
 
@@ -242,7 +241,7 @@ void put_place(EntryWriter& out, KeyframeId id, const PlaceAppearance& place) {
   for (std::size_t n = 0; n < place.corners.size(); ++n) {
     const DescribedCorner& corner = place.corners[n];
     out.put_vector(corner.uv);
-    out.put(n < place.pixels.size() ? place.pixels[n].z() : std::numeric_limits<float>::quiet_NaN());
+    out.put(n < place.pixels.size() ? place.pixels[n].z() : static_cast<float>(Rig::kNoRight));
     out.put(corner.level);
     out.put(corner.angle);
     out.put_bytes(

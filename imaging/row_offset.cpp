@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/measurement.hpp"
 #include "imaging/patch.hpp"
 
 namespace twofold {
@@ -60,7 +61,7 @@ std::optional<RowOffset> RowOffsetMeter::measure_at(const cv::Mat& left, const c
   for (const Corner& corner : corners_) {
     const double u_r = right_from_row(from, to, rig_, corner.u, corner.v, 0, search_);
     Patch patch;
-    if (std::isnan(u_r) || !cut_patch(from, corner.u, corner.v, patch)) continue;
+    if (!has_right(u_r) || !cut_patch(from, corner.u, corner.v, patch)) continue;
     const Eigen::Vector2f start(static_cast<float>(u_r), corner.v);
     const auto aligned = align_patch(patch, to, start, search_.refine_iterations);
     if (aligned && looks_alike(patch, aligned->rms, search_))

@@ -29,7 +29,9 @@ struct CornerMatch {
   return std::ldexp(1.0, -2 * level);
 }
 
-/// Error of a measurement in units of the pixels of its level, squared; infinite behind the camera.
+/// Error of a measurement in units of the pixels of its level, squared; infinite behind the camera. Of one
+/// camera's only in the left image: its u_r stands for the depth that the map has there, not for a
+/// measurement.
 /// @param per_pixel  per_squared_pixel of its level
 [[nodiscard]] inline double squared_error(const Rig& rig, const Vector3& x, const StereoPixelF& z,
                                           double per_pixel) {

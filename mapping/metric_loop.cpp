@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/measurement.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/view_change.hpp"
 #include "mapping/edges.hpp"
@@ -144,7 +145,7 @@ void MetricLoopCloser::prune(const SE3& T_loop_w) {
     const Vector3 x = T_loop_w * motion_[n].x_ref;
     if (!in_front_of_camera(x)) continue;
     Vector3 error = (rig_.project(x) - motion_[n].pixel.cast<double>()) / std::ldexp(1.0, found_[n].level);
-    if (motion_[n].information.z() == 0) error.z() = 0;
+    if (!weighs_right(motion_[n].information)) error.z() = 0;
     if (error.cwiseAbs().maxCoeff() > options_.max_error_px) continue;
     found_[kept] = found_[n];
     motion_[kept] = motion_[n];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/measurement.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/guided_search.hpp"
 #include "mapping/edges.hpp"
@@ -201,8 +202,8 @@ void WindowBuilder::find_outliers(const DoubleWindow& window, std::vector<Outlie
     const auto& point = problem_.points[p];
     for (int n = 0; n < point.observation_count; ++n) {
       const auto& observation = problem_.observations[static_cast<std::size_t>(point.first_observation + n)];
-      const bool stereo = observation.information.z() > 0;
-      const double limit = stereo ? options_.outlier_chi2_stereo : options_.outlier_chi2_mono;
+      const double limit =
+          weighs_right(observation.information) ? options_.outlier_chi2_stereo : options_.outlier_chi2_mono;
       if (observation_chi2(problem_, point, observation) <= limit) continue;
       outliers.push_back({window.nodes[static_cast<std::size_t>(observation.pose)].id, point_ids_[p]});
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/measurement.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/row_offset.hpp"
 
@@ -166,7 +167,7 @@ int PointStarter::count_depths(const cv::Mat& left, const cv::Mat& right) {
   detect_corners(left, 0, options_.corner_threshold, options_.min_corner_score, kBorder,
                  {options_.cell_px, columns_, rows_, occupied_}, corners_);
   return static_cast<int>(std::count_if(corners_.begin(), corners_.end(), [&](const Corner& corner) {
-    return !std::isnan(right_from_row(left, right, rig_, corner.u, corner.v, 0, search_));
+    return has_right(right_from_row(left, right, rig_, corner.u, corner.v, 0, search_));
   }));
 }
 
@@ -176,7 +177,7 @@ bool PointStarter::measure(const FrameImages& images, const Corner& corner, Imma
   }
   const Vector2 uv = point.appearance.uv.cast<double>();
   const double u_r = right_of_corner(images, rig_, uv, corner.level, search_);
-  if (std::isnan(u_r)) return false;
+  if (!has_right(u_r)) return false;
   const double disparity = std::max(uv.x() - u_r, options_.min_disparity_px);
   const Vector3 ray = rig_.camera.unproject(uv);
   point.psi = {ray.x(), ray.y(), 1.0 / rig_.depth_from_disparity(disparity)};

@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "base/processor_time.hpp"
+#include "camera/measurement.hpp"
 #include "evaluation/evaluation.hpp"
 #include "fixtures/plain_map.hpp"
 #include "io/files/trajectory_file.hpp"
@@ -76,7 +77,7 @@ struct ResidualStatistics {
       for (std::size_t k = 0; k < 3; ++k) {
         if (k < 2) by_level[level][k].push_back(std::abs(error[static_cast<int>(k)]));
         // Of the disparity: the right coordinate alone repeats u.
-        else if (o.information.z() != 0)
+        else if (weighs_right(o.information))
           by_level[level][k].push_back(std::abs(error.x() - error.z()));
       }
     }

@@ -64,7 +64,18 @@ TEST(Measurement, OneOfTheLeftImageAloneHasNoRightCoordinate) {
   z.z() = Rig::kNoRight;
   EXPECT_FALSE(has_right(z));
   EXPECT_FALSE(has_right(z.cast<float>()));
-  EXPECT_EQ(rig.information(z.cast<float>(), 0).z(), 0);
+  EXPECT_FALSE(has_right(z.z()));
+}
+
+TEST(Measurement, ARightCoordinateCountsWhereItWasFoundAndTheRigHasABaseline) {
+  Rig rig = stereo_rig();
+  const Eigen::Vector3f z = rig.project({0.1, 0.2, 3}).cast<float>();
+  const Eigen::Vector3f left(z.x(), z.y(), static_cast<float>(Rig::kNoRight));
+  EXPECT_TRUE(weighs_right(rig.information(z, 0)));
+  EXPECT_FALSE(weighs_right(rig.information(left, 0)));
+  rig.kind = SensorKind::kMono;  // goes on with the map of a rig
+  EXPECT_TRUE(has_right(z));
+  EXPECT_FALSE(weighs_right(rig.information(z, 0)));
 }
 
 TEST(MeasurementNoise, FallsByFourALevelAndIsNoneWithoutARightCoordinate) {

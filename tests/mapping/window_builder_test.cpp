@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "estimation/window_solver.hpp"
@@ -166,6 +167,28 @@ TEST_F(WindowBuilderTest, WrongMeasurementsAreFoundAndBadPointsCulled) {
   EXPECT_FALSE(writer_.graph().point(pair).alive());
   EXPECT_FALSE(writer_.graph().point(anchor).alive());
   EXPECT_EQ(broken_invariant(writer_.graph(), 2), "");
+}
+
+TEST_F(WindowBuilderTest, OneCameraJudgesTheMeasurementsOfARigsMapByTheirTwoComponents) {
+  const PointId right_off = point({k(7), k(8), k(9)});
+  const PointId between = point({k(7), k(8), k(9)});
+  Observation wrong = *find_observation(writer_.graph().keyframe(k(9)), right_off);
+  wrong.z.z() += 20;
+  writer_.add_observations(k(9), std::span(&wrong, 1));
+  wrong = *find_observation(writer_.graph().keyframe(k(9)), between);
+  const float chi2 = 11.6F;  // too much for two components, not for three
+  wrong.z.y() += std::sqrt(chi2 / rig_.information(wrong.z, 0).y());
+  writer_.add_observations(k(9), std::span(&wrong, 1));
+  std::vector<WindowBuilder::Outlier> outliers;
+  const auto points = [&] {
+    build().find_outliers(window_, outliers);
+    std::vector<PointId> ids;
+    for (const WindowBuilder::Outlier& outlier : outliers) ids.push_back(outlier.point);
+    return ids;
+  };
+  EXPECT_EQ(points(), std::vector{right_off});
+  rig_.kind = SensorKind::kMono;
+  EXPECT_EQ(points(), std::vector{between});
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/option_check.hpp"
+#include "camera/measurement.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "geometry/so3.hpp"
 #include "geometry/symmetric_solve.hpp"
@@ -146,7 +147,7 @@ void DepthAlignment::add_corners(const SE3& T_c_ref, std::span<const MotionObser
     if (!in_front_of_camera(x)) continue;
     Vector3 residual = rig_.project(x) - corner.pixel.cast<double>();
     const Vector3 information = corner.information.cast<double>();
-    if (information.z() == 0) residual.z() = 0;  // there is no third component
+    if (!weighs_right(information)) residual.z() = 0;  // there is no third component
     const double chi2 = residual.dot(information.cwiseProduct(residual));
     if (settling && chi2 > options_.max_corner_chi2) continue;
     const double robust = HuberKernel{options_.corner_huber}.weight(chi2);

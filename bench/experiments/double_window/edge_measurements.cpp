@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "camera/measurement.hpp"
 #include "imaging/guided_search.hpp"
 #include "mapping/edges.hpp"
 
@@ -25,7 +26,7 @@ std::optional<Pull> pull_of(const Rig& rig, const Keyframe& keyframe, const Obse
   const Vector3 information = rig.information(observation.pixel, observation.level).cast<double>();
   const Matrix3 J = rig.project_jacobian(x) * keyframe.T_k_w.so3().matrix();
   Vector3 r = observation.pixel.cast<double>() - rig.project(x);
-  if (information.z() == 0) r.z() = 0;
+  if (!weighs_right(information)) r.z() = 0;
   return Pull{J.transpose() * information.asDiagonal() * J, J.transpose() * information.cwiseProduct(r)};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "camera/measurement.hpp"
 #include "geometry/inverse_depth.hpp"
 
 namespace twofold::bench {
@@ -29,7 +30,7 @@ void MapUnit::read(const WindowProblem& problem, const DoubleWindow& window) {
     const Vector3 x_w = T_a_w.inverse() * from_inverse_depth(point.psi);
     for (int n = 0; n < point.observation_count; ++n) {
       const auto& seen = problem.observations[static_cast<std::size_t>(point.first_observation + n)];
-      if (!window.is_inner(seen.pose) || seen.information.z() == 0) continue;
+      if (!window.is_inner(seen.pose) || !weighs_right(seen.information)) continue;
       const auto k = static_cast<std::size_t>(seen.pose);
       const double depth = (problem.poses[k].T_k_w * x_w).z();
       if (depth <= 0) continue;
