@@ -17,7 +17,7 @@ constexpr std::size_t kMostViews = 12;    // of a clip
 constexpr std::size_t kFewest = 50;       // corners of a clip
 constexpr std::size_t kMostActive = 4;    // clips under way
 constexpr std::size_t kMostFrames = 120;  // of a clip
-constexpr double kSurvivors = 0.3;        // share of the corners at which a clip ends
+constexpr double kFewestShare = 0.3;      // of the corners that a clip began with: it ends with fewer
 constexpr double kNextFlow = 0.08;        // of the image's width: then another clip begins
 constexpr double kLeastFlow = 0.03;       // of the image's width: less says nothing
 constexpr double kSeenShare = 0.75;       // of the views
@@ -78,7 +78,7 @@ void ClipCollector::add_frame(const cv::Mat& image, std::int64_t t_ns) {
     const bool over =
         clip.corners.size() <
             std::max(kFewest,
-                     static_cast<std::size_t>(kSurvivors * static_cast<double>(clip.corners_at_first))) ||
+                     static_cast<std::size_t>(kFewestShare * static_cast<double>(clip.corners_at_first))) ||
         clip.places.size() >= kMostFrames;
     if (over) end_clip(clip);
     return over;

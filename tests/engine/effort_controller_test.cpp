@@ -15,7 +15,7 @@ std::int64_t latency(double periods) {
   return static_cast<std::int64_t>(periods * kPeriod);
 }
 
-TEST(EffortController, GoesDownARungForEachLateFrameInTheStatedOrder) {
+TEST(EffortController, GoesDownALevelForEachLateFrameInTheStatedOrder) {
   EffortController controller({}, LatePolicy::kDrop);
   std::vector<EffortLevel> levels{controller.effort()};
   for (int i = 0; i < 6; ++i) {
@@ -26,7 +26,7 @@ TEST(EffortController, GoesDownARungForEachLateFrameInTheStatedOrder) {
                                               EffortLevel::kFewerIterations, kBottom, kBottom, kBottom}));
 }
 
-TEST(EffortController, ComesBackARungAtATimeAndOnlyAfterPatience) {
+TEST(EffortController, ComesBackALevelAtATimeAndOnlyAfterPatience) {
   const EffortOptions options{.patience = 10};
   EffortController controller(options, LatePolicy::kDrop);
   for (int i = 0; i < 4; ++i) controller.tracked(latency(2), kPeriod);
@@ -51,7 +51,7 @@ TEST(EffortController, StaysBetweenEarlyAndLate) {
   }
 }
 
-TEST(EffortController, DropsOnTheLastRungOrBeyondTheBoundAndOnlyIfThePolicyAllows) {
+TEST(EffortController, DropsOnTheLastLevelOrBeyondTheBoundAndOnlyIfThePolicyAllows) {
   EffortController controller({.drop_after = 1.5}, LatePolicy::kDrop);
   const Arrival overtaken{0, latency(1.2), kPeriod, true};
   const Arrival beyond{0, latency(1.6), kPeriod, true};
@@ -88,7 +88,7 @@ TEST(EffortOptions, NameWhatIsWrong) {
   EXPECT_NE(EffortOptions{.drop_after = 0.5}.invalid_reason().find("drop_after"), std::string::npos);
 }
 
-TEST(EffortBounds, EachRungLeavesOutMore) {
+TEST(EffortBounds, EachLevelLeavesOutMore) {
   const TrackerOptions options;
   EffortBounds before = bounds_of(kTop, options);
   EXPECT_EQ(before.wanted_matches, options.local_map.wanted_matches);

@@ -117,7 +117,7 @@ class CostlyClock : public PacingClock {
   int readings_ = 0;
 };
 
-TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
+TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLevelsComesBackAndIsReplayed) {
   for (const LatePolicy late : {LatePolicy::kQueue, LatePolicy::kDrop}) {
     EngineOptions options;
     options.trace = true;
@@ -158,7 +158,7 @@ TEST_F(EnginePaceTest, ALateTrackerGoesDownTheLadderComesBackAndIsReplayed) {
   }
 }
 
-TEST_F(EnginePaceTest, ReplayRefusesARungItDoesNotKnow) {
+TEST_F(EnginePaceTest, ReplayRefusesALevelItDoesNotKnow) {
   EngineOptions options;
   Schedule schedule = schedule_of(run(options));
   schedule.tracker[3].effort_level = kEffortLevels;

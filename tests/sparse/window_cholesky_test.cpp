@@ -45,7 +45,7 @@ TEST(CouplingPattern, ListsWhatComesAfterInOrderAcrossWords) {
   EXPECT_TRUE(after(pattern, 199).empty());
 }
 
-TEST(CouplingPattern, InheritsOnlyWhatComesAfterTheHeir) {
+TEST(CouplingPattern, InheritsOnlyWhatComesAfterTheNodeItself) {
   CouplingPattern pattern(200);
   for (const int j : {20, 63, 64, 65, 130}) pattern.couple(5, j);
   pattern.couple(64, 199);

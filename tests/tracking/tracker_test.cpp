@@ -208,7 +208,7 @@ TEST(Tracker, DoesNotStartOnAnEmptyWall) {
   EXPECT_EQ(odometry.proposal().id, KeyframeId{0});
 }
 
-TEST(Tracker, FollowsTheCameraOnEveryRungOfTheLadder) {
+TEST(Tracker, FollowsTheCameraOnEveryEffortLevel) {
   for (int effort = 0; effort < kEffortLevels; ++effort) {
     Odometry odometry(SensorKind::kStereo);
     odometry.set_effort(static_cast<EffortLevel>(effort));

@@ -15,7 +15,7 @@ constexpr int kMinViews = 3;  ///< of a point that serves to close a loop: its d
 constexpr int kReach = 4;     ///< frames on either side whose points belong to a frame's surroundings
 
 /// A point in a camera's frame, with the information its sightings give (one pixel, poses held).
-struct LocalPoint {
+struct EstimatedPoint {
   Vector3 x;
   Matrix3 information;
 };
@@ -38,8 +38,8 @@ Matrix3 point_information(const Rig& rig, const ExplorationResult& map, const Tr
 
 /// Points of the map around a frame by point of the scene: those of one frame alone, seen under a narrow
 /// angle, would leave the rotation to the noise of their depths.
-std::map<int, LocalPoint> points_around(const Rig& rig, const ExplorationResult& map, int frame) {
-  std::map<int, LocalPoint> points;
+std::map<int, EstimatedPoint> points_around(const Rig& rig, const ExplorationResult& map, int frame) {
+  std::map<int, EstimatedPoint> points;
   const SE3& T_c_w = map.T_c_w[static_cast<std::size_t>(frame)];
   const int first = std::max(0, frame - kReach);
   const int last = std::min(static_cast<int>(map.seen.size()) - 1, frame + kReach);
@@ -77,7 +77,7 @@ struct SimilarityEstimator {
 
 /// Gauss-Newton on sum (x_j - S x_i)^T C^-1 (x_j - S x_i), C the covariance of the difference: bundle
 /// adjustment of the two places' points over S, their cameras held, to first order  (thesis 5.3.1).
-Sim3 refine(const std::vector<std::pair<LocalPoint, LocalPoint>>& pairs, Sim3 S_j_i) {
+Sim3 refine(const std::vector<std::pair<EstimatedPoint, EstimatedPoint>>& pairs, Sim3 S_j_i) {
   for (int iteration = 0; iteration < 5; ++iteration) {
     const Matrix3 sR = S_j_i.scale() * S_j_i.rotation();
     Matrix7 H = Matrix7::Zero();
@@ -109,11 +109,11 @@ Group constraint(const Sim3& S_j_i) {
 
 std::optional<LoopConstraint> close_loop(const Rig& rig, const ExplorationResult& map, int i_begin, int i_end,
                                          int j) {
-  const std::map<int, LocalPoint> in_j = points_around(rig, map, j);
-  std::vector<std::pair<LocalPoint, LocalPoint>> pairs;
+  const std::map<int, EstimatedPoint> in_j = points_around(rig, map, j);
+  std::vector<std::pair<EstimatedPoint, EstimatedPoint>> pairs;
   LoopConstraint loop{.i = -1, .j = j, .S_j_i = {}};
   for (int i = i_begin; i < i_end; ++i) {
-    std::vector<std::pair<LocalPoint, LocalPoint>> shared;
+    std::vector<std::pair<EstimatedPoint, EstimatedPoint>> shared;
     for (const auto& [point, x] : points_around(rig, map, i)) {
       const auto other = in_j.find(point);
       if (other != in_j.end()) shared.emplace_back(x, other->second);
@@ -130,7 +130,7 @@ std::optional<LoopConstraint> close_loop(const Rig& rig, const ExplorationResult
   const SimilarityEstimator estimator{x_j, x_i};
   const auto found = ransac(estimator, {.threshold = 0.1});
   if (!found || found->inliers.size() < 10) return std::nullopt;
-  std::vector<std::pair<LocalPoint, LocalPoint>> inliers;
+  std::vector<std::pair<EstimatedPoint, EstimatedPoint>> inliers;
   for (const int k : found->inliers) inliers.push_back(pairs[static_cast<std::size_t>(k)]);
   loop.S_j_i = refine(inliers, found->model);
   loop.inliers = static_cast<int>(inliers.size());
