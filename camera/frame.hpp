@@ -17,4 +17,11 @@ struct Frame {
   cv::Mat depth;
 };
 
+/// What came of asking for the next frame.
+enum class FrameStatus : std::uint8_t {
+  kFrame,  ///< the frame was filled
+  kEnd,    ///< no more frames
+  kError   ///< the input is broken; who was asked says how (FrameSource::error)
+};
+
 }  // namespace twofold

@@ -51,21 +51,21 @@ RunResult feed_all(Pipeline& pipeline, const FrameFeed& feed, const std::atomic<
   const FrameSink show = [&](const FrameRecord&, const PoseCorrection&) {
     if (progress) progress(pipeline.progress());
   };
-  FeedStatus status = FeedStatus::kFrame;
+  FrameStatus status = FrameStatus::kFrame;
   Frame frame;
   std::int64_t pushed = 0;
-  while (wait_for_room(pipeline, interrupted, show) && (status = feed(frame)) == FeedStatus::kFrame) {
+  while (wait_for_room(pipeline, interrupted, show) && (status = feed(frame)) == FrameStatus::kFrame) {
     pipeline.push(std::move(frame));
     ++pushed;
   }
   play_out(pipeline, pushed, interrupted, show);
   if (interrupted.load(std::memory_order_relaxed)) pipeline.end_pace();
-  const bool input_is_short = status == FeedStatus::kEnd && pipeline.frames_due() > 0;
+  const bool input_is_short = status == FrameStatus::kEnd && pipeline.frames_due() > 0;
   pipeline.stop();
   pipeline.collect(show);
   RunResult result = pipeline.finish();
   result.interrupted = interrupted.load(std::memory_order_relaxed);
-  if (status == FeedStatus::kError) result.error = "the input ended with an error";
+  if (status == FrameStatus::kError) result.error = "the input ended with an error";
   if (input_is_short && !result.interrupted) result.error = "the schedule has more frames than the input";
   return result;
 }

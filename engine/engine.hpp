@@ -9,9 +9,8 @@
 
 namespace twofold {
 
-enum class FeedStatus : std::uint8_t { kFrame, kEnd, kError };
 /// Fills the next frame. The engine keeps the images as long as it needs them: nobody writes into them again.
-using FrameFeed = std::function<FeedStatus(Frame&)>;
+using FrameFeed = std::function<FrameStatus(Frame&)>;
 
 using ProgressSink = std::function<void(const Progress&)>;
 

@@ -159,17 +159,12 @@ RecordedImages images_to_look_at(const RunArguments& arguments) {
 
 FrameFeed feed_from(FrameSource& source, LiveView& view, LiveSurface& surface) {
   return [&](Frame& frame) {
-    switch (source.next(frame)) {
-      case FrameStatus::kFrame:
-        view.show(frame);
-        surface.show(frame);
-        return FeedStatus::kFrame;
-      case FrameStatus::kEnd:
-        return FeedStatus::kEnd;
-      case FrameStatus::kError:
-        break;
+    const FrameStatus status = source.next(frame);
+    if (status == FrameStatus::kFrame) {
+      view.show(frame);
+      surface.show(frame);
     }
-    return FeedStatus::kError;
+    return status;
   };
 }
 

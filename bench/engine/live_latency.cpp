@@ -78,9 +78,9 @@ Measured measure(const Scene& scene, int gap_ms) {
   V4l2Source source(parse_source_spec(testing::side_by_side_source(scene.rig)), {}, std::move(driver));
   const auto end = static_cast<std::int64_t>(scene.images.size());
   const FrameFeed feed = [&](Frame& frame) {
-    if (source.next(frame) != FrameStatus::kFrame) return FeedStatus::kError;
+    if (source.next(frame) != FrameStatus::kFrame) return FrameStatus::kError;
     read_ns.store(camera.now_ns(), std::memory_order_relaxed);  // a figure; it publishes nothing
-    return frame.index < end ? FeedStatus::kFrame : FeedStatus::kEnd;
+    return frame.index < end ? FrameStatus::kFrame : FrameStatus::kEnd;
   };
   std::atomic<bool> interrupted{false};
   RunResult result = Engine(scene.rig, options).run(feed, interrupted);

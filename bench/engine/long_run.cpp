@@ -70,11 +70,11 @@ void run(const Arguments& arguments) {
   const auto end = static_cast<std::int64_t>(arguments.hours * static_cast<double>(kFramesAnHour));
   std::int64_t index = 0;
   const FrameFeed feed = [&](Frame& frame) {
-    if (index == end) return FeedStatus::kEnd;
+    if (index == end) return FrameStatus::kEnd;
     frame = scene.frames[place_of(index, scene.frames.size(), arguments.closed)];
     frame.index = index;
     frame.t_ns = ++index * kPeriodNs;
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   fmt::print("{:>7} {:>9} {:>9} {:>7} {:>9} {:>11}\n", "hours", "frames", "keyframes", "lost", "RSS MiB",
              "files MiB");

@@ -36,14 +36,6 @@ struct ClosedRun {
   MapperOptions mapper;
 };
 
-FrameFeed feed_from(FrameSource& source) {
-  return [&](Frame& frame) {
-    const FrameStatus status = source.next(frame);
-    if (status == FrameStatus::kFrame) return FeedStatus::kFrame;
-    return status == FrameStatus::kEnd ? FeedStatus::kEnd : FeedStatus::kError;
-  };
-}
-
 ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
   SourceOptions source_options;
   source_options.left_only = true;
@@ -59,12 +51,13 @@ ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
     newest = graph;
   };
   const std::atomic<bool> interrupted{false};
-  ClosedRun run{Engine(source->rig(), options).run(feed_from(*source), interrupted),
-                {},
-                {},
-                before_loop,
-                source->rig(),
-                options.mapper};
+  ClosedRun run{
+      Engine(source->rig(), options).run([&](Frame& frame) { return source->next(frame); }, interrupted),
+      {},
+      {},
+      before_loop,
+      source->rig(),
+      options.mapper};
   if (!run.result.error.empty()) throw std::runtime_error(run.result.error);
   for (const FrameRecord& record : run.result.frames) {
     if (!has_final_pose(record) || !run.result.graph.contains(record.reference)) continue;

@@ -288,12 +288,12 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   auto next = static_cast<std::size_t>(variation.left_out);
   const FrameFeed feed = [&](Frame& frame) {
     for (bool is_there = false; !is_there; next += static_cast<std::size_t>(variation.every)) {
-      if (next >= frames.size()) return FeedStatus::kEnd;
+      if (next >= frames.size()) return FrameStatus::kEnd;
       frame = frames[next];
       frame.index = static_cast<std::int64_t>(next);
       is_there = vary(frame, variation, 1e-9 * static_cast<double>(frame.t_ns - frames.front().t_ns));
     }
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   const std::atomic<bool> interrupted{false};
   const RunResult result = Engine(varied(rig, variation), options).run(feed, interrupted);

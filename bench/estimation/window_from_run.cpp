@@ -63,11 +63,7 @@ RunProblem window_from_run(const RunOptions& options) {
   engine_options.mapper.inner_window = options.inner;
   engine_options.mapper.outer_window = options.outer;
   engine_options.mapper.hook = std::make_shared<ProblemTaker>(options.round, taken);
-  const FrameFeed feed = [&](Frame& frame) {
-    const FrameStatus status = source->next(frame);
-    if (status == FrameStatus::kFrame) return FeedStatus::kFrame;
-    return status == FrameStatus::kEnd ? FeedStatus::kEnd : FeedStatus::kError;
-  };
+  const FrameFeed feed = [&](Frame& frame) { return source->next(frame); };
   const std::atomic<bool> interrupted{false};
   const RunResult result = Engine(source->rig(), engine_options).run(feed, interrupted);
   if (!source->error().empty()) throw std::runtime_error(source->error());

@@ -39,11 +39,7 @@ MeasuredRun measure(const std::string& text) {
   EngineOptions options;
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  const FrameFeed feed = [&](Frame& frame) {
-    const FrameStatus status = source->next(frame);
-    if (status == FrameStatus::kFrame) return FeedStatus::kFrame;
-    return status == FrameStatus::kEnd ? FeedStatus::kEnd : FeedStatus::kError;
-  };
+  const FrameFeed feed = [&](Frame& frame) { return source->next(frame); };
   MeasuredRun run;
   run.samples.reserve(100000);
   const ProgressSink progress = [&](const Progress& p) {

@@ -79,10 +79,10 @@ KidnapOutcome KidnapTrials::run(const Kidnapping& kidnapping) {
 
   const auto seconds = [&](int i) { return i / options_.fps; };
   const FrameFeed feed = [&, next = 0](Frame& out) mutable {
-    if (next == sequence.frame_count()) return FeedStatus::kEnd;
+    if (next == sequence.frame_count()) return FrameStatus::kEnd;
     out = frame(sequence, next, seconds(next) < kidnapping.cover_at);
     ++next;
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   std::atomic<bool> interrupted{false};
   const RunResult result = Engine(sequence.rig(), engine_).run(feed, interrupted);

@@ -13,12 +13,6 @@
 
 namespace twofold {
 
-enum class FrameStatus : std::uint8_t {
-  kFrame,  ///< the frame was filled
-  kEnd,    ///< no more frames
-  kError   ///< the input is broken; FrameSource::error says how
-};
-
 /// What became of the frames that were not delivered, and what the source goes without. Recordings lose none
 /// but images that were asked to be left out for want of a partner.
 struct SourceReport {

@@ -104,11 +104,11 @@ class DistortedImages : public ::testing::Test {
     const CameraSampler pinhole({rectifier.rig().camera, {}}, rectifier.R_rectified_left().inverse(),
                                 sequence_.rig().camera);
     const FrameFeed frames = [&, next = std::size_t{0}](Frame& frame) mutable {
-      if (next == ideal_.size()) return FeedStatus::kEnd;
+      if (next == ideal_.size()) return FrameStatus::kEnd;
       frame = ideal_[next++];
       frame.left = pinhole.see(frame.left);
       frame.right = pinhole.see(frame.right);
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
     return walk(rectifier.rig(), frames, sequence_, "without lenses");
   }

@@ -61,15 +61,15 @@ class EngineCameraTest : public ::testing::Test {
   /// The source's first frames: a camera has no last one.
   static FrameFeed feed(FrameSource& source) {
     return [&source, n = 0](Frame& frame) mutable {
-      if (n++ == kFrames) return FeedStatus::kEnd;
-      return source.next(frame) == FrameStatus::kFrame ? FeedStatus::kFrame : FeedStatus::kError;
+      if (n++ == kFrames) return FrameStatus::kEnd;
+      return source.next(frame) == FrameStatus::kFrame ? FrameStatus::kFrame : FrameStatus::kError;
     };
   }
   static FrameFeed file_feed() {
     return [n = std::size_t{0}](Frame& frame) mutable {
-      if (n == frames_->size()) return FeedStatus::kEnd;
+      if (n == frames_->size()) return FrameStatus::kEnd;
       frame = (*frames_)[n++];
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
   }
 

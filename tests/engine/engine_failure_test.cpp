@@ -36,10 +36,10 @@ class EngineFailureTest : public testing::KidnappedCamera {
   }
   static FrameFeed endless_walk() {
     return [next = 0](Frame& frame) mutable {
-      if (next == kManyFrames) return FeedStatus::kEnd;
+      if (next == kManyFrames) return FrameStatus::kEnd;
       frame = walk(next);
       number_frame(frame, next++);
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
   }
 };
@@ -77,7 +77,7 @@ TEST_F(EngineFailureTest, ALostCameraIsAnsweredWhenTheLoopCloserFails) {
   ThreadedRun run(small_rig(), options);
   const FrameFeed frames = kidnapped(false, 1000);
   int after_failure = 0;
-  for (Frame frame; after_failure < 20 && frames(frame) == FeedStatus::kFrame;) {
+  for (Frame frame; after_failure < 20 && frames(frame) == FrameStatus::kFrame;) {
     while (!run.has_room()) {
       run.collect({});
       run.wait(std::chrono::steady_clock::now() + std::chrono::milliseconds(5));

@@ -38,11 +38,11 @@ class EngineMapTest : public ::testing::Test {
   /// Frames [begin, end) of the walk through the mapped room, numbered from 0.
   static FrameFeed frames(int begin, int end) {
     return [begin, end, next = begin](Frame& frame) mutable {
-      if (next == end) return FeedStatus::kEnd;
+      if (next == end) return FrameStatus::kEnd;
       frame = (*room_)[static_cast<std::size_t>(next)];
       testing::number_frame(frame, next - begin);
       ++next;
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
   }
 
@@ -164,7 +164,7 @@ TEST_F(EngineMapTest, WhileMappingIsPausedTheMapGetsNoKeyframes) {
   EXPECT_GT(keyframes_after(run_engine(threaded, frames(0, kFrames))), 0);
   threaded.mapping_paused = &paused;
   const FrameFeed feed = [&, next = frames(0, kFrames)](Frame& frame) {
-    const FeedStatus status = next(frame);
+    const FrameStatus status = next(frame);
     if (frame.index == kPausedFrom) paused = true;
     return status;
   };
@@ -178,10 +178,10 @@ TEST_F(EngineMapTest, InAnotherRoomNothingIsRecognised) {
   const std::vector<Frame> elsewhere = render_walk(T_c_w, 10, 22, 77);
   for (const bool localise_only : {false, true}) {
     const FrameFeed feed = [&, next = std::size_t{0}](Frame& frame) mutable {
-      if (next == elsewhere.size()) return FeedStatus::kEnd;
+      if (next == elsewhere.size()) return FrameStatus::kEnd;
       frame = elsewhere[next];
       testing::number_frame(frame, static_cast<int>(next++));
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
     const RunResult result = run_engine(options_with_map(localise_only), feed);
     ASSERT_EQ(result.error, "");

@@ -78,7 +78,7 @@ TEST_F(EnginePaceTest, AnInterruptDoesNotWaitForFramesThatAreStillToCome) {
     const FrameFeed all = feed();
     std::atomic<bool> interrupted{false};
     const FrameFeed jumping = [&](Frame& frame) {
-      const FeedStatus status = all(frame);
+      const FrameStatus status = all(frame);
       if (frame.index >= after) frame.t_ns += 86'400LL * 1'000'000'000;
       return status;
     };

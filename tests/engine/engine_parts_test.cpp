@@ -16,7 +16,7 @@ using testing::run_engine;
 /// Feeds frames one after the other; no image stands for a hand over the lens.
 FrameFeed shown_in_turn(std::vector<Frame> frames) {
   return [frames = std::move(frames), next = 0](Frame& frame) mutable {
-    if (next == static_cast<int>(frames.size())) return FeedStatus::kEnd;
+    if (next == static_cast<int>(frames.size())) return FrameStatus::kEnd;
     frame = frames[static_cast<std::size_t>(next)];
     if (frame.left.empty()) {
       frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(12));
@@ -24,7 +24,7 @@ FrameFeed shown_in_turn(std::vector<Frame> frames) {
     }
     testing::number_frame(frame, next);
     ++next;
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
 }
 

@@ -233,9 +233,9 @@ TEST_F(EnginePushTest, ARunWhoseLoopCloserRestsForManyKeyframesReplays) {
   const RunResult result = run.finish();
   ASSERT_GT(result.keyframes_not_described, 70U);
   const FrameFeed again = [&, next = 0](Frame& seen) mutable {
-    if (next == kLong) return FeedStatus::kEnd;
+    if (next == kLong) return FrameStatus::kEnd;
     seen = there_and_back(next++);
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   const RunResult replayed = expect_replay(options, again, result);
   EXPECT_EQ(replayed.keyframes_not_described, result.keyframes_not_described);

@@ -29,9 +29,9 @@ TEST(WideSteps, AreTakenWithoutASecondPartAndTheRoundIsClosed) {
   std::vector<Frame> frames = testing::render_walk(T_c_w, 0, kFrames, 5);
   for (Frame& frame : frames) frame.t_ns = 1'000'000'000 + frame.index * kInterval;
   const FrameFeed feed = [&, next = std::size_t{0}](Frame& frame) mutable {
-    if (next == frames.size()) return FeedStatus::kEnd;
+    if (next == frames.size()) return FrameStatus::kEnd;
     frame = frames[next++];
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   EngineOptions options;
   options.deterministic = true;
@@ -59,11 +59,11 @@ TEST(WideSteps, AfterALossTheFrameThatWasRecognisedLeadsOn) {
   }
   for (int n = 0; n < kSeen; ++n) frames.push_back(frames[static_cast<std::size_t>(kEvery * n)]);
   const FrameFeed feed = [&, next = 0](Frame& frame) mutable {
-    if (next == static_cast<int>(frames.size())) return FeedStatus::kEnd;
+    if (next == static_cast<int>(frames.size())) return FrameStatus::kEnd;
     frame = frames[static_cast<std::size_t>(next)];
     frame.index = next;
     frame.t_ns = 1'000'000'000 + next++ * kInterval;
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   EngineOptions options;
   options.deterministic = true;
@@ -116,9 +116,9 @@ class LookingAround {
 
 void expect_round_closed(const char* name, const LookingAround& walk, double max_ate) {
   const FrameFeed feed = [&, next = 0](Frame& frame) mutable {
-    if (next == walk.frames()) return FeedStatus::kEnd;
+    if (next == walk.frames()) return FrameStatus::kEnd;
     frame = walk.render(next++);
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   EngineOptions options;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());

@@ -51,7 +51,7 @@ TEST_F(EngineTest, AScheduleIsFollowedOverItsOwnInputOnly) {
   const FrameFeed same = feed();
   EXPECT_EQ(error_over(small_rig(), same), "");
   const FrameFeed other = [frames = feed()](Frame& frame) {
-    const FeedStatus status = frames(frame);
+    const FrameStatus status = frames(frame);
     frame.left = frame.left.clone();
     frame.left.at<std::uint8_t>(10, 10) ^= 1;
     return status;
@@ -92,7 +92,7 @@ TEST_F(EngineTest, KeepsWhatItHasWhenInterruptedOrTheInputBreaks) {
     EXPECT_LT(stopped.frames.size(), static_cast<std::size_t>(kFrames));
     EXPECT_GE(stopped.graph.keyframe_count(), 1U);
 
-    const RunResult broken = testing::run_engine(options, feed(20, FeedStatus::kError));
+    const RunResult broken = testing::run_engine(options, feed(20, FrameStatus::kError));
     EXPECT_EQ(broken.error, "the input ended with an error");
     EXPECT_EQ(broken.frames.size(), 20U);
   }
@@ -102,14 +102,14 @@ TEST_F(EngineTest, ReportsLostFramesAndRecovers) {
   EngineOptions options;
   options.deterministic = true;
   const FrameFeed covered = [next = 0](Frame& frame) mutable {
-    if (next == kFrames) return FeedStatus::kEnd;
+    if (next == kFrames) return FrameStatus::kEnd;
     frame = (*frames_)[static_cast<std::size_t>(next)];
     if (next >= 20 && next < 23) {  // a hand over the lens
       frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(12));
       frame.right = frame.left;
     }
     ++next;
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   const RunResult result = testing::run_engine(options, covered);
   for (const FrameRecord& record : result.frames) {
@@ -130,9 +130,9 @@ TEST(Engine, OneCameraIsFollowedUpToScale) {
     const std::atomic<bool> interrupted{false};
     const auto feed = [&]() -> FrameFeed {
       return [&, next = std::size_t{0}](Frame& frame) mutable {
-        if (next == frames.size()) return FeedStatus::kEnd;
+        if (next == frames.size()) return FrameStatus::kEnd;
         frame = frames[next++];
-        return FeedStatus::kFrame;
+        return FrameStatus::kFrame;
       };
     };
     const RunResult result = Engine(rig, options).run(feed(), interrupted);

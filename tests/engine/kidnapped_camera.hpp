@@ -39,7 +39,7 @@ class KidnappedCamera : public ::testing::Test {
   /// another room.
   static FrameFeed kidnapped(bool to_another_room, int after = kAfter) {
     return [to_another_room, after, next = 0](Frame& frame) mutable {
-      if (next == kFrames + kCovered + after) return FeedStatus::kEnd;
+      if (next == kFrames + kCovered + after) return FrameStatus::kEnd;
       const int i = shown(next);
       if (i < 0) {
         frame.left = cv::Mat(240, 320, CV_8UC1, cv::Scalar(12));
@@ -51,7 +51,7 @@ class KidnappedCamera : public ::testing::Test {
       }
       number_frame(frame, next);
       ++next;
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
   }
 

@@ -69,10 +69,10 @@ class LiveLatencyTest : public ::testing::Test {
     source_ = std::make_unique<V4l2Source>(parse_source_spec(testing::side_by_side_source(rig_)),
                                            SourceOptions{}, std::move(opened_with_));
     const FrameFeed feed = [this](Frame& frame) {
-      if (frame_ + 1 >= static_cast<std::int64_t>(kFrames)) return FeedStatus::kEnd;
-      if (source_->next(frame) != FrameStatus::kFrame) return FeedStatus::kError;
+      if (frame_ + 1 >= static_cast<std::int64_t>(kFrames)) return FrameStatus::kEnd;
+      if (source_->next(frame) != FrameStatus::kFrame) return FrameStatus::kError;
       frame_ = frame.index;
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
     std::atomic<bool> interrupted{false};
     RunResult result = Engine(rig_, options_).run(feed, interrupted);

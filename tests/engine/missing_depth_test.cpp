@@ -71,10 +71,10 @@ TEST(MissingDepth, APairGoesOnWithAHandOverTheRightCamera) {
   scene.frames = 120;
   const SyntheticSequence sequence(scene);
   const FrameFeed covered = [&sequence, next = 0](Frame& frame) mutable {
-    if (next == sequence.frame_count()) return FeedStatus::kEnd;
+    if (next == sequence.frame_count()) return FrameStatus::kEnd;
     frame = sequence.render(next);
     if (next++ >= kCovered) frame.right = cv::Mat(frame.left.size(), CV_8UC1, cv::Scalar(9));
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   const auto run = testing::run_whole(sequence.rig(), covered);
   const Found result = found(run, testing::true_path(sequence));

@@ -32,9 +32,9 @@ const synthetic::SyntheticSequence& courtyard() {
 double farthest(const PassingStrip::Look& look) {
   PassingStrip strip(courtyard().render(0), look);
   const FrameFeed feed = [&, next = 0](Frame& frame) mutable {
-    if (next++ == kFrames) return FeedStatus::kEnd;
+    if (next++ == kFrames) return FrameStatus::kEnd;
     frame = strip.next();
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   EngineOptions options;
   options.deterministic = true;

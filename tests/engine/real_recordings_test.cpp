@@ -96,8 +96,8 @@ class SeldomFrames : public ::testing::TestWithParam<Seldom> {
   static FrameFeed seldom(FrameSource& source, int every, int first) {
     return [&source, every, next = every - first](Frame& frame) mutable {
       while (source.next(frame) == FrameStatus::kFrame)
-        if (next++ % every == 0) return FeedStatus::kFrame;
-      return FeedStatus::kEnd;
+        if (next++ % every == 0) return FrameStatus::kFrame;
+      return FrameStatus::kEnd;
     };
   }
 };
@@ -137,10 +137,10 @@ TEST(BlackFrames, OfACarLeaveOneMap) {
   if (data == nullptr) GTEST_SKIP() << "TWOFOLD_DATA is not set";
   const auto source = open_source("kitti:" + std::string(data) + "/stereo_kitti06_51", {});
   const FrameFeed feed = [&source](Frame& frame) {
-    if (source->next(frame) != FrameStatus::kFrame) return FeedStatus::kEnd;
+    if (source->next(frame) != FrameStatus::kFrame) return FrameStatus::kEnd;
     if (frame.index >= 20 && frame.index < 27)
       frame.left = frame.right = cv::Mat::zeros(frame.left.size(), CV_8UC1);
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
   const auto [result, path] = testing::run_whole(source->rig(), feed);
   int parts = 0;

@@ -33,9 +33,9 @@ SyntheticOptions small_courtyard() {
 Walk walk(double rows, int from = 0) {
   static const SyntheticSequence sequence(small_courtyard());
   const FrameFeed slipped = [&, frames = testing::frames_of(sequence)](Frame& frame) {
-    const FeedStatus status = frames(frame);
+    const FrameStatus status = frames(frame);
     cv::Mat moved;
-    if (status == FeedStatus::kFrame && frame.index >= from) take_back_row_offset(frame.right, -rows, moved);
+    if (status == FrameStatus::kFrame && frame.index >= from) take_back_row_offset(frame.right, -rows, moved);
     if (!moved.empty()) frame.right = moved;
     return status;
   };

@@ -24,11 +24,11 @@ class SwayingCamera : public ::testing::Test {
     frames_ = nullptr;
   }
 
-  static FrameFeed feed(int count = kFrames, FeedStatus last = FeedStatus::kEnd) {
+  static FrameFeed feed(int count = kFrames, FrameStatus last = FrameStatus::kEnd) {
     return [count, last, next = 0](Frame& frame) mutable {
       if (next == count) return last;
       frame = (*frames_)[static_cast<std::size_t>(next++)];
-      return FeedStatus::kFrame;
+      return FrameStatus::kFrame;
     };
   }
 

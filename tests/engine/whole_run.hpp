@@ -32,17 +32,15 @@ inline WholeRun run_whole(const Rig& rig, const FrameFeed& frames, EngineOptions
 
 /// `source` must outlive the feed.
 inline FrameFeed frames_of(FrameSource& source) {
-  return [&source](Frame& frame) {
-    return source.next(frame) == FrameStatus::kFrame ? FeedStatus::kFrame : FeedStatus::kEnd;
-  };
+  return [&source](Frame& frame) { return source.next(frame); };
 }
 
 /// `sequence` must outlive the feed.
 inline FrameFeed frames_of(const synthetic::SyntheticSequence& sequence) {
   return [&sequence, next = 0](Frame& frame) mutable {
-    if (next == sequence.frame_count()) return FeedStatus::kEnd;
+    if (next == sequence.frame_count()) return FrameStatus::kEnd;
     frame = sequence.render(next++);
-    return FeedStatus::kFrame;
+    return FrameStatus::kFrame;
   };
 }
 

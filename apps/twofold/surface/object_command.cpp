@@ -141,12 +141,7 @@ void run_object(ObjectArguments& arguments) {
   options.pacing.live = source->is_live();
   catch_interrupts();
   Engine engine(source->rig(), options);
-  const FrameFeed feed = [&](Frame& frame) {
-    const FrameStatus status = source->next(frame);
-    return status == FrameStatus::kFrame ? FeedStatus::kFrame
-           : status == FrameStatus::kEnd ? FeedStatus::kEnd
-                                         : FeedStatus::kError;
-  };
+  const FrameFeed feed = [&](Frame& frame) { return source->next(frame); };
   const RunResult result = engine.run(feed, interrupted(), [](const Progress&) {});
   if (!source->error().empty()) throw IoError(arguments.source, source->error());
   if (!result.error.empty()) throw std::runtime_error(result.error);
