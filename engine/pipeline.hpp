@@ -55,7 +55,9 @@ class Pipeline {
 
   /// Whether there is a buffer for a frame. Buffers are given back by collect.
   [[nodiscard]] virtual bool has_buffer() = 0;
-  /// Likewise, and whether map and disk follow a run that has no clock to keep.
+  /// Whether another frame should be pushed now: there is a buffer, and a run that keeps no pace, whose
+  /// frames come as fast as they are tracked, is not ahead of the mapper or of the thread that writes its
+  /// logs.
   [[nodiscard]] virtual bool has_room() = 0;
   /// Hands a frame to the tracker; there must be a buffer. Frame::index and time stamps grow.
   virtual void push(Frame frame) = 0;

@@ -137,9 +137,9 @@ class MapperRunner {
 };
 
 /// Whether the map has taken a loop that the mapper was sent: its keyframes, or those that stand for them by
-/// now, share an edge or, when one was culled since, a neighbour: the edges of what is culled pass on as far
-/// as that. So it is with a loop that there is nothing more to be waited for of: its keyframes are forgotten
-/// or one, or it seems to have been lost on its way.
+/// now, share an edge or, when one was culled since, a neighbour, to which the culled one's edges pass on.
+/// Also true when waiting is pointless: its keyframes are forgotten or have become one, or the message seems
+/// lost.
 [[nodiscard]] bool has_arrived(const GraphSnapshot& graph, const LoopConstraint& loop);
 
 /// The loop closer's step as every kind of run takes it: recognise, verify, and, once the map has taken a
@@ -151,8 +151,9 @@ class LoopCloserRunner {
 
   /// @return what the mapper should know, in order; valid until the next step
   std::span<LoopMessage> step(const KeyframeProposal& keyframe, const GraphSnapshot& graph);
-  /// Before the first `count` of these are sent, which the others are not: a loop that the mapper gets is
-  /// closed, and the listener is told.
+  /// To be called before the first `count` messages of the last step are sent to the mapper, which has no
+  /// room for the others. Where all of them are sent, the step's loop is among loops() and the listener is
+  /// told.
   void sending(std::size_t count);
 
   [[nodiscard]] RelocalisationAnswer relocalise(const RelocalisationRequest& request,

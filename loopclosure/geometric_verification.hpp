@@ -25,7 +25,7 @@ struct VerificationOptions {
   double guided_radius_px = 8;    ///< of the first round of guided matching, pixels of the corner's level;
                                   ///< the later rounds take half of it
   int guided_distance = 64;       ///< descriptors in guided matching [bits]
-  int min_inliers = 30;           ///< corners, as min_covisible points make an edge
+  int min_inliers = 30;           ///< corners that agree with the pose, of those that guided matching found
   double min_inlier_share = 0.4;  ///< of the guided matches: what is near by chance seldom fits
   /// Inliers in the upper, lower, left and right half of either view, so that the pose does not hang on one
   /// corner of the image. Half of min_inliers, as for metric loops (6.4.1), would refuse views that share

@@ -25,7 +25,7 @@ class MapperHook {
                            [[maybe_unused]] KeyframeId to) {}
   /// May change a pose-pose constraint, which is that of eq. 6.2; with information 0 it is left out.
   /// @param edge      as seen from `from`
-  /// @param position  of points: > 0 for those in the problem
+  /// @param position  position + 1 of a point in the problem; 0 or none: it is left out
   virtual void constrain([[maybe_unused]] const GraphSnapshot& graph, [[maybe_unused]] const Keyframe& from,
                          [[maybe_unused]] const Edge& edge, [[maybe_unused]] const IdMap& position,
                          [[maybe_unused]] WindowProblem::PoseConstraint& constraint) {}

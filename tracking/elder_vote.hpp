@@ -20,7 +20,9 @@ struct ElderVoteOptions {
   /// Share of the elders that must lie nearer to where their pose says than to where that of all does, in (0,
   /// 1].
   double min_convinced = 2.0 / 3;
-  double min_loyal = 0.5;  ///< share of the young that go with all which must go with the elders, in (0, 1]
+  /// Of the young points that agree with the pose of all, the share that must agree with the elders' pose,
+  /// too; with fewer the young are overruled. In (0, 1].
+  double min_loyal = 0.5;
   int mistrusted_frames = 30;  ///< for so long nobody asks the young again, >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.

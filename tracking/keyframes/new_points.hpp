@@ -25,9 +25,10 @@ class NewPoints {
   /// @return how many points were started
   int start_first(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                   ImmaturePoints& immature_points);
-  /// Starts points and seeds in a later keyframe, where nothing is tracked or known. Where enough was found,
-  /// cameras without a depth image leave out what the frame's search had no time for, too, and the candidates
-  /// of `found` are used up.
+  /// Starts points and seeds in a later keyframe, at corners away from the points that were found in it and,
+  /// but for RGB-D, from those of the local map that are in view and were not searched, because enough others
+  /// had been found.
+  /// @param found  of the keyframe's frame; the candidates that its search left are taken out
   void start(const FrameImages& images, KeyframeId anchor, const LocalMap& local_map, const FrameStep& step,
              SearchOutcome& found, ImmaturePoints& immature_points);
   /// Starts seeds at corners where no point is tracked or known, and none waits for its depth. One camera has
