@@ -1,21 +1,21 @@
 #include "engine/logs/log_writer.hpp"
 
 #include <algorithm>
-#include <chrono>
 
 namespace twofold {
 namespace {
 
-constexpr auto kPeriod = std::chrono::milliseconds(100);
+constexpr auto kFailureCheck = std::chrono::milliseconds(100);
 
 }  // namespace
 
-LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round)
+LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round,
+                     std::chrono::milliseconds period)
     : files_(std::move(files)) {
   thread_.emplace(WorkerOptions{.name = "log writer", .time_slice = kPatientSlice},
-                  [this, before_round = std::move(before_round)](const std::stop_token& stop) {
+                  [this, before_round = std::move(before_round), period](const std::stop_token& stop) {
                     while (!stop.stop_requested()) {
-                      (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + kPeriod,
+                      (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + period,
                                                 [this] { return file_is_behind(); });
                       if (before_round) before_round();
                       for (const auto& file : files_) file->write_waiting();
@@ -39,7 +39,7 @@ void LogWriter::wait_for_room() {
   parking_.wake();
   std::unique_lock lock(round_);
   // A thread that fails wakes nobody.
-  while (!written_.wait_for(lock, kPeriod, [this] { return !behind(); })) {
+  while (!written_.wait_for(lock, kFailureCheck, [this] { return !behind(); })) {
   }
 }
 

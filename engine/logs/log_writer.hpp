@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <memory>
@@ -14,13 +15,15 @@
 
 namespace twofold {
 
-/// A thread that writes what was appended to log files, ten times a second: whoever appends never waits for
-/// the disk.
+/// A thread that writes what was appended to log files, time and again: whoever appends never waits for the
+/// disk.
 class LogWriter {
  public:
   /// Throws std::system_error when no thread can be made.
   /// @param before_round  called on the thread before it looks what waits; tests let it fail
-  explicit LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round = {});
+  /// @param period        from one round to the next, unless a file is behind
+  explicit LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round = {},
+                     std::chrono::milliseconds period = std::chrono::milliseconds(100));
 
   /// Whether a file is behind, and somebody there who will write it; any thread.
   [[nodiscard]] bool behind() const;

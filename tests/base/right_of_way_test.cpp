@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <future>
 #include <thread>
 
 namespace twofold {
@@ -47,17 +48,38 @@ TEST(RightOfWay, NobodyWaitsForEverAndAfterwardsForAWhileNotAtAll) {
   EXPECT_LT(std::chrono::steady_clock::now() - waited, 1s) << "it has waited again";
 }
 
-TEST(RightOfWay, OtherThreadsGoOn) {
+/// Whether work on another thread comes to its end though somebody has the right of way, or had it.
+template <class Work>
+bool goes_on(RightOfWay& right, const Work& work) {
+  auto done = std::async(std::launch::async, work);
+  const bool went_on = done.wait_for(10s) == std::future_status::ready;
+  right.give_up();  // so that a thread that waits ends, too
+  return went_on;
+}
+
+TEST(RightOfWay, AThreadThatNeverMadeWayGoesOn) {
   RightOfWay right;
   right.take();
-  make_way();  // never made way for anybody
-  {
-    const MakesWay makes_way(right, 1h);
-    right.give_up();
-    make_way();  // not taken
-  }
+  EXPECT_TRUE(goes_on(right, [] { make_way(); }));
+}
+
+TEST(RightOfWay, AThreadThatMakesWayGoesOnWhileNobodyHasIt) {
+  RightOfWay right;
   right.take();
-  make_way();  // does so no more
+  right.give_up();
+  EXPECT_TRUE(goes_on(right, [&] {
+    const MakesWay makes_way(right, 1h);
+    make_way();
+  }));
+}
+
+TEST(RightOfWay, AThreadThatMakesWayNoMoreGoesOn) {
+  RightOfWay right;
+  right.take();
+  EXPECT_TRUE(goes_on(right, [&] {
+    { const MakesWay makes_way(right, 1h); }
+    make_way();
+  }));
 }
 
 }  // namespace

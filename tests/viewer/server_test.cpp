@@ -25,7 +25,9 @@ using testing::upgrade_request;
 
 class ViewServerTest : public ::testing::Test {
  protected:
-  ViewServerTest() {
+  /// @param request_time  ViewServerOptions::request_time
+  explicit ViewServerTest(milliseconds request_time = milliseconds(1200))
+      : server_({.bind = "127.0.0.1", .port = 0, .request_time = request_time}, scene_, title_) {
     scene_.show(testing::small_map(50));
     const std::string& address = server_.address();
     token_ = address.substr(address.find('=') + 1);
@@ -72,7 +74,7 @@ class ViewServerTest : public ::testing::Test {
 
   ViewTitle title_{.title = "test", .control = true, .keyframe_images = true};
   KeyframeImages images_{image_of};
-  ViewServer server_{{.bind = "127.0.0.1", .port = 0, .request_time = milliseconds(1200)}, scene_, title_};
+  ViewServer server_;
   std::string token_;
   int port_ = 0;
   std::jthread thread_;
@@ -181,13 +183,16 @@ TEST_F(ViewServerTest, SurvivesAThousandConnections) {
   EXPECT_TRUE(serves());
 }
 
-/// Well within the time that each of them has for its request.
-TEST_F(ViewServerTest, WhoSaysNothingKeepsNobodyOut) {
+/// Nobody leaves for want of a request.
+class PatientViewServerTest : public ViewServerTest {
+ protected:
+  PatientViewServerTest() : ViewServerTest(std::chrono::hours(1)) {}
+};
+
+TEST_F(PatientViewServerTest, WhoSaysNothingKeepsNobodyOut) {
   std::vector<LocalClient> silent;
   for (int n = 0; n < 100; ++n) silent.emplace_back(port_);
-  const auto begin = std::chrono::steady_clock::now();
   EXPECT_TRUE(serves());
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, milliseconds(600));
 }
 
 /// Who has one connection keeps it, however many somebody else opens, before and after.
