@@ -249,7 +249,7 @@ void LockstepRun::count() {
   logs_.wait_for_room();
   progress_.count(record_);
   progress_.map_version = snapshot_.version();
-  progress_.queued = mapper_inbox_.proposals_approx();
+  progress_.waiting.keyframes = mapper_inbox_.proposals_approx();
   collected_ = false;
 }
 

@@ -14,6 +14,13 @@
 
 namespace twofold {
 
+/// How much waits for tracker, mapper and loop closer. For users: QueueLengths.
+struct WaitingCounts {
+  std::size_t frames = 0;     ///< for the tracker
+  std::size_t keyframes = 0;  ///< proposals, for the mapper
+  std::size_t places = 0;     ///< keyframes, for the loop closer
+};
+
 /// State of a run for a progress line.
 struct Progress {
   std::int64_t frames = 0;
@@ -21,10 +28,8 @@ struct Progress {
   std::int64_t dropped = 0;
   double tracked_share = 0;  ///< of the last frame
   std::uint64_t map_version = 0;
-  std::int64_t keyframes = 0;      ///< accepted so far
-  std::size_t queued = 0;          ///< proposals waiting for the mapper
-  std::size_t frames_waiting = 0;  ///< for the tracker
-  std::size_t places_waiting = 0;  ///< keyframes, for the loop closer
+  std::int64_t keyframes = 0;  ///< accepted so far
+  WaitingCounts waiting;       ///< a lockstep run's: keyframes only
 
   /// Another frame is done with.
   void count(const FrameRecord& record);
@@ -83,11 +88,8 @@ class Pipeline {
   [[nodiscard]] virtual std::string checkpoint_error() const = 0;
   /// Counts of what was collected.
   [[nodiscard]] virtual const Progress& progress() const = 0;
-  /// What waits for tracker, mapper and loop closer. Any thread, wait-free: no more than a look at the rings.
-  struct Waiting {
-    std::size_t frames = 0, keyframes = 0, places = 0;
-  };
-  [[nodiscard]] virtual Waiting waiting() const { return {}; }
+  /// Any thread, wait-free: no more than a look at the rings.
+  [[nodiscard]] virtual WaitingCounts waiting() const { return {}; }
 
   /// From now on nobody waits for the exposure of a frame that was pushed. Any thread.
   virtual void end_pace() {}

@@ -91,10 +91,7 @@ void SteppedRun::collect(const FrameSink& sink) {
     const FrameRecord& record = slot->record;
     progress_.count(record);
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
-    const Waiting now = waiting();
-    progress_.queued = now.keyframes;
-    progress_.frames_waiting = now.frames;
-    progress_.places_waiting = now.places;
+    progress_.waiting = waiting();
     logs_.add(record, slot->correction);
     logs_.schedule().tracker.append(slot->step);
     slot->frame = {};  // images are freed here, not on the tracker's thread

@@ -44,7 +44,7 @@ class SteppedRun : public Pipeline {
   [[nodiscard]] std::vector<std::string> log_errors() const override { return logs_.errors(); }
   [[nodiscard]] std::string checkpoint_error() const override { return checkpoints_.newest_error(); }
   [[nodiscard]] const Progress& progress() const override { return progress_; }
-  [[nodiscard]] Waiting waiting() const override {
+  [[nodiscard]] WaitingCounts waiting() const override {
     return {frames_.size_approx(), mapper_inbox_.proposals_approx(), keyframes_.size_approx()};
   }
   void end_pace() override { pacer_.end_waits(); }

@@ -45,7 +45,7 @@ PipelineStep to_engine(SlamStep step) {
   return PipelineStep::kCloseLoops;
 }
 
-QueueLengths to_queue_lengths(const Pipeline::Waiting& waiting) {
+QueueLengths to_queue_lengths(const WaitingCounts& waiting) {
   return {static_cast<std::int64_t>(waiting.frames), static_cast<std::int64_t>(waiting.keyframes),
           static_cast<std::int64_t>(waiting.places)};
 }

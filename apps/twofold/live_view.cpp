@@ -211,9 +211,9 @@ void LiveView::count_losses() {
 
 void LiveView::show(const Progress& progress) {
   const auto length = [](std::size_t number) { return static_cast<std::int64_t>(number); };
-  frames_waiting_.store(length(progress.frames_waiting), std::memory_order_relaxed);
-  keyframes_waiting_.store(length(progress.queued), std::memory_order_relaxed);
-  places_waiting_.store(length(progress.places_waiting), std::memory_order_relaxed);
+  frames_waiting_.store(length(progress.waiting.frames), std::memory_order_relaxed);
+  keyframes_waiting_.store(length(progress.waiting.keyframes), std::memory_order_relaxed);
+  places_waiting_.store(length(progress.waiting.places), std::memory_order_relaxed);
 }
 
 QueueLengths LiveView::waiting() const {

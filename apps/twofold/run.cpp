@@ -47,7 +47,7 @@ class ProgressLine {
     fmt::print(
         stderr,
         "\rframe {}{}  {:.0f} fps  tracked {:.0f} %  keyframes {}  map version {}  queue {}  lost {}  ",
-        p.frames, total, fps, 100 * p.tracked_share, p.keyframes, p.map_version, p.queued, p.lost);
+        p.frames, total, fps, 100 * p.tracked_share, p.keyframes, p.map_version, p.waiting.keyframes, p.lost);
     std::fflush(stderr);
   }
   void end() const {
