@@ -55,10 +55,8 @@ std::vector<KeyframeId> PlaceRecogniser::forget_culled(const GraphSnapshot& grap
                        [&](KeyframeId k) { return is_culled(graph, k); });
 }
 
-/// Keyframes newer than the snapshot are near too: they were made just now.
 void PlaceRecogniser::exclude_near(KeyframeId id, const GraphSnapshot& graph) {
   weighted_breadth_first(graph, id, static_cast<std::size_t>(options_.near_keyframes), excluded_, near_);
-  if (near_.empty()) excluded_.reset(graph.keyframe_count());
 }
 
 bool PlaceRecogniser::same_place(KeyframeId a, KeyframeId b, const GraphSnapshot& graph) const {

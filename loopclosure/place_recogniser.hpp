@@ -41,8 +41,8 @@ class PlaceRecogniser {
   std::vector<KeyframeId> forget_culled(const GraphSnapshot& graph);
   [[nodiscard]] std::size_t keyframe_count() const { return index_.keyframe_count(); }
 
-  /// Candidates for the keyframe `id` (not added yet, or added), best first. To be called for keyframes in
-  /// the order they were made: the calls before are what a candidate must be consistent with.
+  /// Candidates for the keyframe `id`, which `graph` has and the index need not, best first. To be called for
+  /// keyframes in the order they were made: the calls before are what a candidate must be consistent with.
   /// @param reference_score  bag_score with the keyframe before; scores are relative to it
   [[nodiscard]] std::vector<PlaceCandidate> recognise(KeyframeId id, const BagOfWords& bag,
                                                       double reference_score, const GraphSnapshot& graph);

@@ -1,0 +1,114 @@
+#include "loopclosure/depth_regression.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "geometry/inverse_depth.hpp"
+#include "graph/graph_writer.hpp"
+
+namespace twofold {
+namespace {
+
+/// Points of the map, seen from a keyframe that is elsewhere than their anchor.
+class DepthRegressionTest : public ::testing::Test {
+ protected:
+  static constexpr KeyframeId kAnchor{0}, kSeenFrom{1};
+
+  DepthRegressionTest() {
+    for (const KeyframeId id : {kAnchor, kSeenFrom}) {
+      Keyframe keyframe;
+      keyframe.id = id;
+      keyframe.part = kAnchor;
+      if (id == kSeenFrom) keyframe.T_k_w = SE3(SO3::exp({0, 0.05, 0}), {0.2, 0, 0.1});
+      writer_.add_keyframe(keyframe);
+    }
+  }
+  /// @param uv, depth  in the keyframe it is seen from
+  void add_point(const Vector2& uv, double depth) {
+    const PointId id{static_cast<std::uint32_t>(writer_.graph().point_count())};
+    const GraphSnapshot& graph = writer_.graph();
+    MapPoint point;
+    point.anchor = kAnchor;
+    point.psi = to_inverse_depth(graph.T_k_w(kAnchor) * graph.T_k_w(kSeenFrom).inverse() *
+                                 (camera_.unproject(uv) * depth));
+    writer_.add_point(id, point);
+    Observation observation;
+    observation.point = id;
+    observation.z = {0, 0, 0};  // where it was measured makes no difference
+    writer_.add_observations(kSeenFrom, std::span(&observation, 1));
+  }
+  std::optional<double> depth_at(const Vector2& uv) {
+    regression_.learn(writer_.graph(), kSeenFrom);
+    return regression_.depth_at(uv);
+  }
+
+  const PinholeCamera camera_{400, 400, 320, 240, 640, 480};
+  GraphWriter writer_;
+  DepthRegression regression_{camera_};
+};
+
+TEST_F(DepthRegressionTest, ACornerIsAsDeepAsThePointsAroundIt) {
+  add_point({300, 200}, 4);
+  EXPECT_NEAR(depth_at({301, 200}).value_or(0), 4, 1e-9);
+  add_point({310, 200}, 5);
+  EXPECT_NEAR(1 / depth_at({305, 200}).value_or(0), (1.0 / 4 + 1.0 / 5) / 2, 1e-9)
+      << "the mean of inverse depths";
+  EXPECT_GT(depth_at({307, 200}).value_or(0), depth_at({305, 200}).value_or(0))
+      << "the nearer one counts for more";
+}
+
+TEST_F(DepthRegressionTest, TheNearestThreePointsAreAsked) {
+  for (const double u : {300.0, 302.0, 304.0}) add_point({u, 200}, 4);
+  add_point({315, 200}, 4.9);
+  EXPECT_NEAR(depth_at({301, 200}).value_or(0), 4, 1e-9);
+}
+
+TEST_F(DepthRegressionTest, FarFromAllPointsNothingIsKnown) {
+  EXPECT_FALSE(depth_at({300, 200}));
+  add_point({300, 200}, 4);
+  const double reach = DepthRegressionOptions().max_distance_share * camera_.width;
+  EXPECT_TRUE(depth_at({300 + reach - 0.1, 200}));
+  EXPECT_FALSE(depth_at({300 + reach + 0.1, 200}));
+}
+
+TEST_F(DepthRegressionTest, AcrossAnEdgeOfDepthNothingIsKnown) {
+  const double ratio = DepthRegressionOptions().max_depth_ratio;
+  add_point({300, 200}, 4);
+  add_point({310, 200}, 0.99 * 4 * ratio);
+  EXPECT_TRUE(depth_at({305, 200}));
+  add_point({305, 210}, 1.01 * 4 * ratio);
+  EXPECT_FALSE(depth_at({305, 203}));
+}
+
+TEST_F(DepthRegressionTest, PointsBehindTheCameraSayNothing) {
+  add_point({300, 200}, -4);
+  EXPECT_FALSE(depth_at({300, 200}));
+}
+
+TEST_F(DepthRegressionTest, DepthsFollowTheMapsUnit) {
+  add_point({300, 200}, 4);
+  ASSERT_TRUE(depth_at({300, 200}));
+  const Vector3 psi = writer_.graph().point(PointId{0}).psi;
+  writer_.set_inverse_depth(PointId{0}, {psi.x(), psi.y(), psi.z() / 2});
+  const SE3 T = writer_.graph().keyframe(kSeenFrom).T_k_w;
+  writer_.set_pose(kSeenFrom, SE3(T.so3(), 2 * T.translation()));
+  EXPECT_NEAR(depth_at({300, 200}).value_or(0), 8, 1e-9);
+}
+
+TEST_F(DepthRegressionTest, DepthsAreWrittenAsASecondCameraWouldMeasureThem) {
+  add_point({300, 200}, 4);
+  PlaceAppearance view;
+  view.corners.resize(2);
+  view.corners[0].uv = {300, 200};
+  view.corners[1].uv = {100, 400};
+  regression_.learn(writer_.graph(), kSeenFrom);
+  regression_.fill(view, 0.5);
+  ASSERT_EQ(view.z.size(), 2U);
+  EXPECT_NEAR(view.z[0].z(), 300 - 400 * 0.5 / 4, 1e-4);
+  EXPECT_EQ(view.z[0].head<2>(), view.corners[0].uv);
+  EXPECT_TRUE(std::isnan(view.z[1].z()));
+}
+
+}  // namespace
+}  // namespace twofold
