@@ -8,7 +8,7 @@
 #include "estimation/window_solver.hpp"
 #include "filters/inverse_depth_filter.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
 
 constexpr double kSigma = 0.5;
@@ -72,7 +72,7 @@ TEST(AnchoredViews, EndsWithAStepThatGainsLessThanIsAskedFor) {
   EXPECT_NEAR(rough.views.cost(), exact.views.cost(), 0.1);
 }
 
-class AnchoredViewsTest : public testing::TestWithParam<SensorKind> {};
+class AnchoredViewsTest : public ::testing::TestWithParam<SensorKind> {};
 
 TEST_P(AnchoredViewsTest, ReachesTheMinimumOfTheWindowSolver) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
@@ -123,7 +123,7 @@ TEST_P(AnchoredViewsTest, InformationIsTheCurvatureOfTheCost) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, AnchoredViewsTest, testing::Values(SensorKind::kMono, SensorKind::kStereo));
+INSTANTIATE_TEST_SUITE_P(Kinds, AnchoredViewsTest, ::testing::Values(SensorKind::kMono, SensorKind::kStereo));
 
 TEST(AnchoredViewsTest, ScaleIsTheDistanceOfTheFirstView) {
   Start start = make_start(SensorKind::kMono, 20, 3);
@@ -145,4 +145,4 @@ TEST(AnchoredViewsTest, PointsBehindACameraAreSaid) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

@@ -7,8 +7,10 @@
 #include "filters/sliding_window_filter.hpp"
 #include "tests/filters/filter_scene.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
+
+using namespace testing;
 
 /// In the linear limit the filter is batch least squares: pose and its covariance against the batch sliding
 /// window.
@@ -190,4 +192,4 @@ TEST(FilterGaussNewton, InvalidOptionsAreNamed) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

@@ -7,8 +7,10 @@
 #include "filters/inverse_depth_filter.hpp"
 #include "tests/filters/filter_scene.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
+
+using namespace testing;
 
 TEST(FilterInverseDepth, ProjectionJacobiansAreCentralDifferences) {
   const Rig rig = make_rig(SensorKind::kStereo);
@@ -102,4 +104,4 @@ TEST(FilterInverseDepth, BehindTheCameraIsRefused) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

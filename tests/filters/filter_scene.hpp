@@ -6,7 +6,7 @@
 #include "camera/rig.hpp"
 #include "filters/gauss_newton_filter.hpp"
 
-namespace twofold::test {
+namespace twofold::testing {
 
 inline Rig make_rig(SensorKind kind) {
   Rig rig;
@@ -41,4 +41,4 @@ inline Scene make_scene(const Rig& rig, int frames, int count, double noise, uns
   return scene;
 }
 
-}  // namespace twofold::test
+}  // namespace twofold::testing

@@ -9,8 +9,10 @@
 
 #include "swf_scene.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
+
+using namespace testing;
 
 using PoseBlock = std::array<double, 6>;  // rotation vector, translation of T_c_w
 
@@ -106,4 +108,4 @@ TEST(SwfCeres, UnlimitedWindowIsTheBatchSolution) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

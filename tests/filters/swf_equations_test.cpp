@@ -5,8 +5,10 @@
 
 #include "swf_scene.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
+
+using namespace testing;
 
 TEST(SwfProcessModel, JacobiansAreCentralDifferences) {
   std::mt19937 rng(2);
@@ -120,4 +122,4 @@ TEST(SwfEquations, BothEliminationOrdersAgree) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

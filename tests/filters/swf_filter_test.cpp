@@ -5,8 +5,10 @@
 
 #include "swf_scene.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
+
+using namespace testing;
 
 TEST(SwfFilter, FullWindowEqualsBatch) {
   const SwfScene scene = make_swf_scene({.frames = 9, .points = 40, .seed = 6, .visible = 3.0});
@@ -221,4 +223,4 @@ TEST(SwfFilter, InvalidOptionsAreNamed) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

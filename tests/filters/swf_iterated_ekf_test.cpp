@@ -7,8 +7,10 @@
 #include "geometry/cbh.hpp"
 #include "swf_scene.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
+
+using namespace testing;
 
 /// EKF-SLAM with iterated update  (Bar-Shalom; Bell & Cathey 1993). State: pose, then landmarks in the order
 /// met.
@@ -131,4 +133,4 @@ TEST(SwfIteratedEkf, WindowOneIsTheIteratedEkf) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

@@ -8,8 +8,10 @@
 
 #include "swf_scene.hpp"
 
-namespace twofold::test {
+namespace twofold {
 namespace {
+
+using namespace testing;
 
 MatrixX random_matrix(int rows, int cols, std::mt19937& rng) {
   std::normal_distribution<double> n(0, 1);
@@ -201,4 +203,4 @@ TEST(SwfMarginalisation, RigidMotionsBelongToTheFrame) {
 }
 
 }  // namespace
-}  // namespace twofold::test
+}  // namespace twofold

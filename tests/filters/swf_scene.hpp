@@ -5,7 +5,7 @@
 
 #include "filters/sliding_window_filter.hpp"
 
-namespace twofold::test {
+namespace twofold::testing {
 
 /// A stereo rig that descends sideways towards points spread over a slab; measured motion and pixels are
 /// noisy.
@@ -91,4 +91,4 @@ inline SlidingWindowOptions exact_options(int window) {
   return options;
 }
 
-}  // namespace twofold::test
+}  // namespace twofold::testing
