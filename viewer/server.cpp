@@ -24,7 +24,7 @@
 
 #include "base/check.hpp"
 #include "twofold/viewer.hpp"
-#include "viewer/door.hpp"
+#include "viewer/access_control.hpp"
 #include "viewer/page_files.hpp"
 
 namespace twofold {
@@ -51,10 +51,10 @@ constexpr auto kWriteTime = std::chrono::seconds(10);
 constexpr auto kLastCall = std::chrono::seconds(3);
 
 /// What the connections share; outlives them.
-struct Hall {
+struct ServerState {
   const ViewScene& scene;
   const ViewTitle& title;
-  ViewDoor door;
+  AccessControl access;
   std::size_t& connections;
   std::chrono::milliseconds request_time;
   ViewSight sight = {};
@@ -65,7 +65,7 @@ std::string_view field(const Request& request, http::field name) {
   return {value.data(), value.size()};
 }
 
-DoorRequest door_request(const Request& request) {
+AccessRequest access_request(const Request& request) {
   const auto method = request.method_string();
   const auto target = request.target();
   return {{method.data(), method.size()},      {target.data(), target.size()},
@@ -74,26 +74,29 @@ DoorRequest door_request(const Request& request) {
 }
 
 /// Counts a connection for as long as it is there.
-class Seat {
+class ConnectionCount {
  public:
-  explicit Seat(std::size_t& taken) : taken_(&taken) { ++*taken_; }
-  Seat(Seat&& other) noexcept : taken_(std::exchange(other.taken_, nullptr)) {}
-  Seat& operator=(Seat&&) = delete;
-  ~Seat() { leave(); }
-  void leave() {
-    if (taken_ != nullptr) --*taken_;
-    taken_ = nullptr;
+  explicit ConnectionCount(std::size_t& count) : count_(&count) { ++*count_; }
+  ConnectionCount(ConnectionCount&& other) noexcept : count_(std::exchange(other.count_, nullptr)) {}
+  ConnectionCount& operator=(ConnectionCount&&) = delete;
+  ~ConnectionCount() { release(); }
+  void release() {
+    if (count_ != nullptr) --*count_;
+    count_ = nullptr;
   }
 
  private:
-  std::size_t* taken_;
+  std::size_t* count_;
 };
 
 /// A browser that watches. Reads and writes keep it alive; it ends when both have failed.
 class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
  public:
-  ViewerConnection(Hall& hall, Seat seat, beast::tcp_stream stream)
-      : hall_(hall), seat_(std::move(seat)), socket_(std::move(stream)), feed_(hall.scene, hall.title) {}
+  ViewerConnection(ServerState& state, ConnectionCount count, beast::tcp_stream stream)
+      : state_(state),
+        count_(std::move(count)),
+        socket_(std::move(stream)),
+        feed_(state.scene, state.title) {}
 
   void accept(const Request& request) {
     beast::get_lowest_layer(socket_).expires_never();
@@ -118,7 +121,7 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
       if (Clock::now() - write_began_ > kWriteTime) close();
       return;
     }
-    std::optional<ViewMessage> message = feed_.next(hall_.sight);
+    std::optional<ViewMessage> message = feed_.next(state_.sight);
     if (!message) return;
     writing_ = true;
     write_began_ = Clock::now();
@@ -154,8 +157,8 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
     return sensible;
   }
 
-  Hall& hall_;
-  Seat seat_;
+  ServerState& state_;
+  ConnectionCount count_;
   websocket::stream<beast::tcp_stream> socket_;
   ClientFeed feed_;
   beast::flat_buffer buffer_;
@@ -165,8 +168,9 @@ class ViewerConnection : public std::enable_shared_from_this<ViewerConnection> {
 
 using Viewers = std::vector<std::shared_ptr<ViewerConnection>>;
 
-/// Whose connection it is: his address, or of IPv6 its network, in which anybody has as many as he likes.
-asio::ip::address caller_of(const tcp::socket& socket) {
+/// Whose connection it is: the peer's address, or of IPv6 its network, in which anybody has as many as he
+/// likes.
+asio::ip::address peer_of(const tcp::socket& socket) {
   Error error;
   const tcp::endpoint remote = socket.remote_endpoint(error);
   if (error || remote.address().is_v4()) return remote.address();
@@ -178,58 +182,58 @@ asio::ip::address caller_of(const tcp::socket& socket) {
 }
 
 /// Answers one request, or becomes a viewer's connection.
-class Visitor : public std::enable_shared_from_this<Visitor> {
+class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
-  Visitor(Hall& hall, Viewers& viewers, tcp::socket socket)
-      : hall_(hall),
+  HttpSession(ServerState& state, Viewers& viewers, tcp::socket socket)
+      : state_(state),
         viewers_(viewers),
-        caller_(caller_of(socket)),
-        seat_(hall.connections),
+        peer_(peer_of(socket)),
+        count_(state.connections),
         stream_(std::move(socket)) {
     parser_.header_limit(kHeaderBytes);
     parser_.body_limit(0);
   }
 
   void read() {
-    stream_.expires_after(hall_.request_time);
+    stream_.expires_after(state_.request_time);
     http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](Error error, std::size_t) {
-      if (!self->is_silent_) return;
-      self->is_silent_ = false;
+      if (!self->awaits_request_) return;
+      self->awaits_request_ = false;
       if (!error) self->answer();
     });
   }
-  /// It has not said yet what it wants.
-  [[nodiscard]] bool is_silent() const { return is_silent_; }
-  [[nodiscard]] const asio::ip::address& caller() const { return caller_; }
-  /// Somebody else gets its place.
-  void give_way() {
-    is_silent_ = false;
-    seat_.leave();
+  /// Its request has not come yet.
+  [[nodiscard]] bool awaits_request() const { return awaits_request_; }
+  [[nodiscard]] const asio::ip::address& peer() const { return peer_; }
+  /// Another connection gets its place.
+  void drop() {
+    awaits_request_ = false;
+    count_.release();
     stream_.close();
   }
 
  private:
   void answer() {
     const Request& request = parser_.get();
-    const Admission admission = hall_.door.judge(door_request(request));
-    switch (admission) {
-      case Admission::kBadMethod:
+    const AccessDecision decision = state_.access.decide(access_request(request));
+    switch (decision) {
+      case AccessDecision::kBadMethod:
         return refuse(http::status::method_not_allowed, "only GET is answered here");
-      case Admission::kBadHost:
+      case AccessDecision::kBadHost:
         return refuse(http::status::forbidden, "this server does not go by that name");
-      case Admission::kBadOrigin:
+      case AccessDecision::kBadOrigin:
         return refuse(http::status::forbidden, "pages of other sites may not look");
-      case Admission::kNoToken:
+      case AccessDecision::kNoToken:
         return refuse(http::status::forbidden, "open the address that the program printed, with its token");
-      case Admission::kByCookie:
-      case Admission::kByToken:
+      case AccessDecision::kByCookie:
+      case AccessDecision::kByToken:
         break;
     }
     const std::string_view target(request.target().data(), request.target().size());
     if (path_of(target) == kLivePath)
       return websocket::is_upgrade(request) ? let_view() : say_whether_there_is_room();
     if (websocket::is_upgrade(request)) return refuse(http::status::not_found, "there is no such socket");
-    send_file(admission == Admission::kByToken);
+    send_file(decision == AccessDecision::kByToken);
   }
 
   /// For pages whose socket was refused: a browser does not tell them why.
@@ -239,7 +243,7 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
   }
   void let_view() {
     if (viewers_.size() >= kViewers) return refuse(http::status::service_unavailable, kNoRoom);
-    viewers_.push_back(std::make_shared<ViewerConnection>(hall_, std::move(seat_), std::move(stream_)));
+    viewers_.push_back(std::make_shared<ViewerConnection>(state_, std::move(count_), std::move(stream_)));
     viewers_.back()->accept(parser_.get());
   }
 
@@ -251,7 +255,7 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
     if (file == files.end()) return refuse(http::status::not_found, "there is no such file");
     set_head(http::status::ok, file->type);
     response_.set(http::field::content_encoding, "gzip");
-    if (set_cookie) response_.set(http::field::set_cookie, hall_.door.set_cookie());
+    if (set_cookie) response_.set(http::field::set_cookie, state_.access.set_cookie());
     response_.body() = std::string(file->gzip);
     send();
   }
@@ -284,51 +288,51 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
     });
   }
 
-  Hall& hall_;
+  ServerState& state_;
   Viewers& viewers_;
-  const asio::ip::address caller_;
-  Seat seat_;
-  bool is_silent_ = true;
+  const asio::ip::address peer_;
+  ConnectionCount count_;
+  bool awaits_request_ = true;
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{2 * kHeaderBytes};
   http::request_parser<http::empty_body> parser_;
   http::response<http::string_body> response_;
 };
 
-/// Connections that have not said yet what they want, in the order in which they came.
-class WaitingRoom {
+/// Sessions whose requests have not come yet, in the order in which they were accepted.
+class PendingSessions {
  public:
-  void enter(const std::shared_ptr<Visitor>& visitor) {
+  void add(const std::shared_ptr<HttpSession>& session) {
     forget_others();
-    waiting_.push_back(visitor);
+    pending_.push_back(session);
   }
 
-  /// Sends somebody away: of the caller who has most of the connections, the one that came first, so that
-  /// nobody who opens many keeps out, or drives out, somebody else.
-  /// @return  false when nobody waits
-  bool make_room() {
+  /// Drops one: of the peer that has most of them, the one that came first, so that nobody who opens many
+  /// keeps out, or drives out, somebody else.
+  /// @return  false when there is none
+  bool drop_one() {
     forget_others();
     std::map<asio::ip::address, std::size_t> connections;
-    for (const auto& visitor : waiting_) ++connections[visitor.lock()->caller()];
-    std::shared_ptr<Visitor> leaves;
-    for (const auto& entry : waiting_) {
-      auto visitor = entry.lock();
-      if (leaves == nullptr || connections[visitor->caller()] > connections[leaves->caller()])
-        leaves = std::move(visitor);
+    for (const auto& session : pending_) ++connections[session.lock()->peer()];
+    std::shared_ptr<HttpSession> dropped;
+    for (const auto& entry : pending_) {
+      auto session = entry.lock();
+      if (dropped == nullptr || connections[session->peer()] > connections[dropped->peer()])
+        dropped = std::move(session);
     }
-    if (leaves != nullptr) leaves->give_way();
-    return leaves != nullptr;
+    if (dropped != nullptr) dropped->drop();
+    return dropped != nullptr;
   }
 
  private:
   void forget_others() {
-    std::erase_if(waiting_, [](const auto& visitor) {
-      const auto here = visitor.lock();
-      return here == nullptr || !here->is_silent();
+    std::erase_if(pending_, [](const auto& entry) {
+      const auto session = entry.lock();
+      return session == nullptr || !session->awaits_request();
     });
   }
 
-  std::vector<std::weak_ptr<Visitor>> waiting_;
+  std::vector<std::weak_ptr<HttpSession>> pending_;
 };
 
 std::string machine_name() {
@@ -412,12 +416,12 @@ class ViewServer::Impl {
   Impl(const ViewServerOptions& options, const ViewScene& scene, const ViewTitle& title)
       : acceptor_(listen(context_, options)),
         timer_(context_),
-        hall_{scene,
-              title,
-              {secrets_kept_in(options.secrets), acceptor_.local_endpoint().port(), machine_name()},
-              connections_,
-              options.request_time},
-        addresses_(printed_addresses(acceptor_.local_endpoint(), hall_.door.token())),
+        state_{scene,
+               title,
+               {secrets_kept_in(options.secrets), acceptor_.local_endpoint().port(), machine_name()},
+               connections_,
+               options.request_time},
+        addresses_(printed_addresses(acceptor_.local_endpoint(), state_.access.token())),
         is_open_to_network_(!acceptor_.local_endpoint().address().is_loopback()) {}
 
   void run(const std::stop_token& stop, const Tick& tick, const std::function<std::string()>& last_words) {
@@ -478,7 +482,7 @@ class ViewServer::Impl {
       if (const auto keyframe = viewer->feed().wanted_keyframe()) audience.keyframes.push_back(*keyframe);
     }
     const auto begin = Clock::now();
-    const auto next = tick(audience, hall_.sight);
+    const auto next = tick(audience, state_.sight);
     for (const auto& viewer : viewers_) viewer->excuse(Clock::now() - begin);
     for (const auto& viewer : viewers_) viewer->write();
     return next;
@@ -489,11 +493,11 @@ class ViewServer::Impl {
     acceptor_.async_accept([this](Error error, tcp::socket socket) {
       accepting_ = false;
       if (error) return;  // no file descriptors, perhaps: again at the next tick
-      if (connections_ < kConnections || waiting_room_.make_room()) {
+      if (connections_ < kConnections || pending_sessions_.drop_one()) {
         socket.set_option(tcp::no_delay(true), error);
-        const auto visitor = std::make_shared<Visitor>(hall_, viewers_, std::move(socket));
-        waiting_room_.enter(visitor);
-        visitor->read();
+        const auto session = std::make_shared<HttpSession>(state_, viewers_, std::move(socket));
+        pending_sessions_.add(session);
+        session->read();
       }
       accept();
     });
@@ -503,9 +507,9 @@ class ViewServer::Impl {
   asio::io_context context_{1};
   tcp::acceptor acceptor_;
   asio::steady_timer timer_;
-  Hall hall_;
+  ServerState state_;
   Viewers viewers_;
-  WaitingRoom waiting_room_;
+  PendingSessions pending_sessions_;
   const std::vector<std::string> addresses_;
   const int port_ = acceptor_.local_endpoint().port();
   const bool is_open_to_network_;

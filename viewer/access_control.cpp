@@ -1,4 +1,4 @@
-#include "viewer/door.hpp"
+#include "viewer/access_control.hpp"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -82,7 +82,7 @@ bool is_secret(std::string_view line) {
          });
 }
 
-ViewDoor::Secrets secrets_of(const FileDescriptor& file, const std::string& name) {
+AccessControl::Secrets secrets_of(const FileDescriptor& file, const std::string& name) {
   struct stat status {};
   if (fstat(file.get(), &status) != 0) throw std::runtime_error(name + ": cannot be read");
   if (const std::string why = why_not_private(status); !why.empty())
@@ -100,33 +100,33 @@ ViewDoor::Secrets secrets_of(const FileDescriptor& file, const std::string& name
 
 }  // namespace
 
-ViewDoor::ViewDoor(Secrets secrets, int port, std::string_view machine_name)
+AccessControl::AccessControl(Secrets secrets, int port, std::string_view machine_name)
     : secrets_(std::move(secrets)),
       cookie_name_(fmt::format("twofold-{}", port)),
       machine_name_(in_lower_case(machine_name)) {}
 
-Admission ViewDoor::judge(const DoorRequest& request) const {
-  if (request.method != "GET") return Admission::kBadMethod;
-  if (!is_this_machine(host_name(request.host))) return Admission::kBadHost;
+AccessDecision AccessControl::decide(const AccessRequest& request) const {
+  if (request.method != "GET") return AccessDecision::kBadMethod;
+  if (!is_this_machine(host_name(request.host))) return AccessDecision::kBadHost;
   const bool must_say = request.is_upgrade;
   if ((must_say || !request.origin.empty()) &&
       in_lower_case(request.origin) != in_lower_case(fmt::format("http://{}", request.host)))
-    return Admission::kBadOrigin;
+    return AccessDecision::kBadOrigin;
   if (is_same_secret(value_of(request.cookie, cookie_name_, ';'), secrets_.cookie))
-    return Admission::kByCookie;
+    return AccessDecision::kByCookie;
   const std::size_t query = std::min(request.target.find('?'), request.target.size());
   const std::string_view parameters = request.target.substr(std::min(query + 1, request.target.size()));
   if (!request.is_upgrade && is_same_secret(value_of(parameters, "token", '&'), secrets_.token))
-    return Admission::kByToken;
-  return Admission::kNoToken;
+    return AccessDecision::kByToken;
+  return AccessDecision::kNoToken;
 }
 
-std::string ViewDoor::set_cookie() const {
+std::string AccessControl::set_cookie() const {
   return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict", cookie_name_, secrets_.cookie);
 }
 
 /// Addresses are safe: a page of another site can only come here by a name of its own.
-bool ViewDoor::is_this_machine(std::string_view name) const {
+bool AccessControl::is_this_machine(std::string_view name) const {
   const std::string asked = in_lower_case(name);  // as browsers write names
   const std::string_view first_label = std::string_view(machine_name_).substr(0, machine_name_.find('.'));
   const bool is_its_name = !first_label.empty() && (asked == machine_name_ || asked == first_label ||
@@ -147,8 +147,8 @@ std::string random_secret() {
   return digits;
 }
 
-ViewDoor::Secrets secrets_kept_in(const std::filesystem::path& file) {
-  ViewDoor::Secrets fresh{random_secret(), random_secret()};
+AccessControl::Secrets secrets_kept_in(const std::filesystem::path& file) {
+  AccessControl::Secrets fresh{random_secret(), random_secret()};
   if (file.empty()) return fresh;
   if (const FileDescriptor made(::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600)); made) {
     const std::string text = fresh.token + "\n" + fresh.cookie + "\n";

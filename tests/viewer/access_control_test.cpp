@@ -1,4 +1,4 @@
-#include "viewer/door.hpp"
+#include "viewer/access_control.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,35 +13,35 @@ namespace {
 const std::string kSecret = "00112233445566778899aabbccddeeff";
 const std::string kCookie = "ffeeddccbbaa99887766554433221100";
 
-class ViewDoorTest : public ::testing::Test {
+class AccessControlTest : public ::testing::Test {
  protected:
-  [[nodiscard]] Admission page(const std::string& target, const std::string& host = "127.0.0.1:8420",
-                               const std::string& origin = "", const std::string& cookie = "") const {
-    return door_.judge({"GET", target, host, origin, cookie, false});
+  [[nodiscard]] AccessDecision page(const std::string& target, const std::string& host = "127.0.0.1:8420",
+                                    const std::string& origin = "", const std::string& cookie = "") const {
+    return access_.decide({"GET", target, host, origin, cookie, false});
   }
-  [[nodiscard]] Admission socket(const std::string& origin, const std::string& cookie,
-                                 const std::string& host = "127.0.0.1:8420") const {
-    return door_.judge({"GET", "/live?token=" + kSecret, host, origin, cookie, true});
+  [[nodiscard]] AccessDecision socket(const std::string& origin, const std::string& cookie,
+                                      const std::string& host = "127.0.0.1:8420") const {
+    return access_.decide({"GET", "/live?token=" + kSecret, host, origin, cookie, true});
   }
 
-  ViewDoor door_{{kSecret, kCookie}, 8420, "Robot.lab.example"};
+  AccessControl access_{{kSecret, kCookie}, 8420, "Robot.lab.example"};
   const std::string cookie_ = "twofold-8420=" + kCookie;
 };
 
-TEST_F(ViewDoorTest, TokenOpensThePageAndCookieTheRest) {
-  EXPECT_EQ(page("/?token=" + kSecret), Admission::kByToken);
-  EXPECT_EQ(page("/?a=b&token=" + kSecret), Admission::kByToken);
-  EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "", "other=1; " + cookie_), Admission::kByCookie);
-  EXPECT_EQ(socket("http://127.0.0.1:8420", cookie_), Admission::kByCookie);
+TEST_F(AccessControlTest, TokenOpensThePageAndCookieTheRest) {
+  EXPECT_EQ(page("/?token=" + kSecret), AccessDecision::kByToken);
+  EXPECT_EQ(page("/?a=b&token=" + kSecret), AccessDecision::kByToken);
+  EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "", "other=1; " + cookie_), AccessDecision::kByCookie);
+  EXPECT_EQ(socket("http://127.0.0.1:8420", cookie_), AccessDecision::kByCookie);
 }
 
 TEST(ViewSecrets, AreKeptInAFileOfTheOwnersAlone) {
   const ScratchFolder folder;
   const auto file = folder.path() / "secrets";
-  const ViewDoor::Secrets first = secrets_kept_in(file);
+  const AccessControl::Secrets first = secrets_kept_in(file);
   EXPECT_EQ(first.token.size(), 32U);
   EXPECT_NE(first.token, first.cookie);
-  const ViewDoor::Secrets again = secrets_kept_in(file);
+  const AccessControl::Secrets again = secrets_kept_in(file);
   EXPECT_EQ(again.token, first.token);
   EXPECT_EQ(again.cookie, first.cookie);
   EXPECT_EQ(std::filesystem::status(file).permissions() & std::filesystem::perms::mask,
@@ -75,50 +75,50 @@ TEST(ViewSecrets, AFileThatWillNotDoIsRefused) {
   expect_refused(folder.path() / "nowhere" / "secrets", "neither");
 }
 
-TEST_F(ViewDoorTest, WithoutTokenOrWithAnotherNobodyEnters) {
-  EXPECT_EQ(page("/"), Admission::kNoToken);
-  EXPECT_EQ(page("/?token="), Admission::kNoToken);
-  EXPECT_EQ(page("/?token=" + kSecret.substr(1) + "0"), Admission::kNoToken);
-  EXPECT_EQ(page("/?token=" + kSecret + "0"), Admission::kNoToken);
-  EXPECT_EQ(page("/?nottoken=" + kSecret), Admission::kNoToken);
-  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8421=" + kCookie), Admission::kNoToken);
-  EXPECT_EQ(socket("http://127.0.0.1:8420", ""), Admission::kNoToken) << "a token in a socket's address";
-  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8420=" + kSecret), Admission::kNoToken);
-  EXPECT_EQ(page("/?token=" + kCookie), Admission::kNoToken)
+TEST_F(AccessControlTest, WithoutTokenOrWithAnotherNobodyMayLook) {
+  EXPECT_EQ(page("/"), AccessDecision::kNoToken);
+  EXPECT_EQ(page("/?token="), AccessDecision::kNoToken);
+  EXPECT_EQ(page("/?token=" + kSecret.substr(1) + "0"), AccessDecision::kNoToken);
+  EXPECT_EQ(page("/?token=" + kSecret + "0"), AccessDecision::kNoToken);
+  EXPECT_EQ(page("/?nottoken=" + kSecret), AccessDecision::kNoToken);
+  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8421=" + kCookie), AccessDecision::kNoToken);
+  EXPECT_EQ(socket("http://127.0.0.1:8420", ""), AccessDecision::kNoToken) << "a token in a socket's address";
+  EXPECT_EQ(page("/", "127.0.0.1:8420", "", "twofold-8420=" + kSecret), AccessDecision::kNoToken);
+  EXPECT_EQ(page("/?token=" + kCookie), AccessDecision::kNoToken)
       << "who saw the cookie does not know the address";
 }
 
-TEST_F(ViewDoorTest, NamesOfOthersAreRefused) {
+TEST_F(AccessControlTest, NamesOfOthersAreRefused) {
   for (const char* host : {"", "evil.example", "evil.example:8420", "127.0.0.1.evil.example",
                            "localhost.evil.example:8420", "127.0.0.1:", "127.0.0.1:84200000", "127.0.0.1:84a",
                            "[::1", "robot.example", "robot.lab", "robot.local.evil.example", "127.0.0.1 "})
-    EXPECT_EQ(page("/?token=" + kSecret, host), Admission::kBadHost) << host;
+    EXPECT_EQ(page("/?token=" + kSecret, host), AccessDecision::kBadHost) << host;
   for (const char* host :
        {"localhost", "localhost:9000", "127.0.0.1:8420", "[::1]:8420", "192.168.1.7:8420", "robot:8420",
         "ROBOT:8420", "robot.local:8420", "Robot.Local", "robot.lab.example:8420"})
-    EXPECT_EQ(page("/?token=" + kSecret, host), Admission::kByToken) << host;
+    EXPECT_EQ(page("/?token=" + kSecret, host), AccessDecision::kByToken) << host;
 }
 
-TEST_F(ViewDoorTest, PagesOfOthersAreRefused) {
+TEST_F(AccessControlTest, PagesOfOthersAreRefused) {
   for (const char* origin :
        {"", "null", "http://evil.example", "https://127.0.0.1:8420", "http://127.0.0.1:3000",
         "http://127.0.0.1:8420.evil.example", "http://localhost:8420"})
-    EXPECT_EQ(socket(origin, cookie_), Admission::kBadOrigin) << origin;
-  EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "http://evil.example", cookie_), Admission::kBadOrigin);
+    EXPECT_EQ(socket(origin, cookie_), AccessDecision::kBadOrigin) << origin;
+  EXPECT_EQ(page("/page.js", "127.0.0.1:8420", "http://evil.example", cookie_), AccessDecision::kBadOrigin);
 }
 
-TEST_F(ViewDoorTest, NamesAreTheSameInUpperAndLowerCase) {
-  EXPECT_EQ(socket("http://robot.local:8420", cookie_, "robot.local:8420"), Admission::kByCookie);
-  EXPECT_EQ(socket("http://robot.local:8420", cookie_, "Robot.local:8420"), Admission::kByCookie);
+TEST_F(AccessControlTest, NamesAreTheSameInUpperAndLowerCase) {
+  EXPECT_EQ(socket("http://robot.local:8420", cookie_, "robot.local:8420"), AccessDecision::kByCookie);
+  EXPECT_EQ(socket("http://robot.local:8420", cookie_, "Robot.local:8420"), AccessDecision::kByCookie);
 }
 
-TEST_F(ViewDoorTest, AnswersGetAlone) {
-  EXPECT_EQ(door_.judge({"POST", "/?token=" + kSecret, "127.0.0.1:8420", "", cookie_, false}),
-            Admission::kBadMethod);
+TEST_F(AccessControlTest, AnswersGetAlone) {
+  EXPECT_EQ(access_.decide({"POST", "/?token=" + kSecret, "127.0.0.1:8420", "", cookie_, false}),
+            AccessDecision::kBadMethod);
 }
 
-TEST_F(ViewDoorTest, CookieIsNoScriptsAndNoOtherSites) {
-  EXPECT_EQ(door_.set_cookie(), cookie_ + "; Path=/; HttpOnly; SameSite=Strict");
+TEST_F(AccessControlTest, CookieIsNoScriptsAndNoOtherSites) {
+  EXPECT_EQ(access_.set_cookie(), cookie_ + "; Path=/; HttpOnly; SameSite=Strict");
 }
 
 TEST(RandomSecret, Has128Bits) {

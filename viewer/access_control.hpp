@@ -8,12 +8,12 @@
 namespace twofold {
 
 /// What decides whether a request is answered; header fields are empty when they are missing.
-struct DoorRequest {
+struct AccessRequest {
   std::string_view method, target, host, origin, cookie;
   bool is_upgrade = false;  ///< to a WebSocket
 };
 
-enum class Admission : std::uint8_t {
+enum class AccessDecision : std::uint8_t {
   kByCookie,
   kByToken,    ///< in the address: the answer shall set the cookie
   kBadMethod,  ///< other than GET
@@ -23,9 +23,9 @@ enum class Admission : std::uint8_t {
 };
 
 /// Who may look: those who know the token, with a browser that speaks to this very server.
-class ViewDoor {
+class AccessControl {
  public:
-  /// What those bring who may enter; 32 hexadecimal digits each.
+  /// What those send who may look; 32 hexadecimal digits each.
   struct Secrets {
     std::string token;  ///< in the address that is printed
     /// Another one: browsers send cookies to all ports of a host, and whoever listens there need not learn
@@ -34,9 +34,9 @@ class ViewDoor {
   };
   /// @param port  names the cookie, as browsers share them among ports
   /// @param machine_name  with or without its domain
-  ViewDoor(Secrets secrets, int port, std::string_view machine_name);
+  AccessControl(Secrets secrets, int port, std::string_view machine_name);
 
-  [[nodiscard]] Admission judge(const DoorRequest& request) const;
+  [[nodiscard]] AccessDecision decide(const AccessRequest& request) const;
   [[nodiscard]] const std::string& token() const { return secrets_.token; }
   /// Value of Set-Cookie.
   [[nodiscard]] std::string set_cookie() const;
@@ -54,6 +54,6 @@ class ViewDoor {
 [[nodiscard]] std::string random_secret();
 /// New ones; with a file, those in it: it is made when it is not there, readable by its owner alone. Throws
 /// std::runtime_error naming the file: others may read it, it is somebody else's, or holds something else.
-[[nodiscard]] ViewDoor::Secrets secrets_kept_in(const std::filesystem::path& file);
+[[nodiscard]] AccessControl::Secrets secrets_kept_in(const std::filesystem::path& file);
 
 }  // namespace twofold
