@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "base/processor_time.hpp"
+#include "mapping/mapper_hook.hpp"
 
 namespace twofold {
 namespace {
@@ -273,14 +274,14 @@ std::span<LoopMessage> LoopCloserRunner::step(const KeyframeProposal& keyframe, 
   const auto loop = closer_->step(keyframe, graph);
   times_.record(place_cpu_stage_, begin_ns, thread_cpu_ns() - cpu_begin_ns);
   if (loop && !awaits_similarities(graph)) {
-    const bool one_camera = rig_.kind == SensorKind::kMono && mapper_options_.scale_drifts;
-    if (one_camera) messages_.emplace_back(close_over_sim3(graph, *loop, rig_, mapper_options_));
+    const bool drifts = scale_drifts(rig_, mapper_options_);
+    if (drifts) messages_.emplace_back(close_over_sim3(graph, *loop, rig_, mapper_options_));
     messages_.emplace_back(*loop);
     const bool joins = graph.part(loop->from) != graph.part(loop->to);
     found_ = ClosedLoop{
         *loop, graph.T_k_w(loop->to) * graph.T_k_w(loop->from).inverse(),   keyframe.t_ns,
         joins, joins ? 0 : distance_travelled(graph, loop->from, loop->to), time_of(graph, loop->from)};
-    (one_camera ? awaited_ : not_optimised_) = loop;
+    (drifts ? awaited_ : not_optimised_) = loop;
   }
   if (on_places_) on_places_(closer_->places());
   return messages_;

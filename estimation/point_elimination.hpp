@@ -24,7 +24,7 @@ namespace twofold {
 class PointElimination {
  public:
   using Matrix63 = Eigen::Matrix<double, 6, 3>;
-  /// What back substitution needs of a track; its Y_i stand in couplings().
+  /// What back substitution needs of a track; its Y_i stand in couplings_.
   struct EliminatedPoint {
     Matrix3 L;
     Vector3 c;
@@ -46,11 +46,6 @@ class PointElimination {
                        std::span<const Vector6> pose_steps, double lambda, std::vector<Vector3>& psi_steps,
                        double& predicted);
 
-  /// By track.
-  [[nodiscard]] const std::vector<EliminatedPoint>& points() const { return points_; }
-  /// Y_i, by entry of the layout.
-  [[nodiscard]] const std::vector<Matrix63>& couplings() const { return couplings_; }
-
  private:
   using Group = WindowLayout::Group;
   /// A point before its elimination, in the terms above.
@@ -70,8 +65,8 @@ class PointElimination {
   void add_group(const WindowLayout& layout, const Group& group, const RigidMotion* relative,
                  BlockCholesky& system, std::span<Vector6> gradient, std::span<Vector6> diagonal);
 
-  std::vector<EliminatedPoint> points_;
-  std::vector<Matrix63> couplings_;
+  std::vector<EliminatedPoint> points_;  // by track
+  std::vector<Matrix63> couplings_;      // Y_i, by entry of the layout
   // Of the group at hand, by coupled slot:
   std::vector<ObservationSums> sums_;
   std::vector<Vector6> eliminated_gradient_;  // sum Y_i c

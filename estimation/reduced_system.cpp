@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "estimation/pose_constraint.hpp"
 #include "sparse/block_kernels.hpp"
@@ -78,15 +77,6 @@ void ReducedSystem::add_constraint(const WindowProblem::PoseConstraint& c,
   } else {
     cholesky_.block(block) -= AK.transpose();
   }
-}
-
-double ReducedSystem::smallest_pivot_ratio() const {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (int p = 0; p < cholesky_.size(); ++p) {
-    const Vector6 root = cholesky_.block(cholesky_.diagonal_index(p)).diagonal();
-    smallest = std::min(smallest, (root.cwiseAbs2().array() / diagonal_[p].array()).minCoeff());
-  }
-  return smallest;
 }
 
 std::optional<double> ReducedSystem::advance(const WindowProblem& problem, const WindowState& state,

@@ -22,16 +22,12 @@ class ReducedSystem {
              double lambda);
   /// False when the system built last is not positive definite. Needed before advance and factor.
   [[nodiscard]] bool factorise() { return cholesky_.factorise(); }
-  /// Smallest pivot of the factorisation against the entry of D it belongs to: the share of what is known
-  /// about a pose that is left once everything else may move.
-  [[nodiscard]] double smallest_pivot_ratio() const;
   /// Step of all unknowns from `state`, where the system was built, to `next`; returns the decrease of the
   /// cost the quadratic model promises, nullopt when it is not a number.
   [[nodiscard]] std::optional<double> advance(const WindowProblem& problem, const WindowState& state,
                                               double lambda, WindowState& next);
 
   [[nodiscard]] const WindowLayout& layout() const { return layout_; }
-  [[nodiscard]] const PointElimination& elimination() const { return elimination_; }
   [[nodiscard]] const BlockCholesky& factor() const { return cholesky_; }
 
  private:

@@ -101,9 +101,7 @@ void number_nodes(DoubleWindow& window) {
 void select_double_window(const GraphSnapshot& graph, const MapperOptions& options, SelectionScratch& scratch,
                           DoubleWindow& window) {
   const auto inner = static_cast<std::size_t>(options.inner_window);
-  const std::size_t count = options.global_outer_window
-                                ? graph.keyframe_count()
-                                : inner + static_cast<std::size_t>(options.outer_window);
+  const std::size_t count = inner + static_cast<std::size_t>(options.outer_window);
   weighted_breadth_first(graph, graph.reference(), count, scratch.visited, window.nodes);
   window.inner = std::min(inner, window.nodes.size());
   number_nodes(window);

@@ -1,9 +1,11 @@
 #pragma once
 
+#include "camera/rig.hpp"
 #include "estimation/window_problem.hpp"
 #include "graph/id_map.hpp"
 #include "graph/snapshot.hpp"
 #include "mapping/double_window.hpp"
+#include "mapping/options.hpp"
 
 namespace twofold {
 
@@ -16,6 +18,9 @@ class MapperHook {
   MapperHook(const MapperHook&) = delete;
   MapperHook& operator=(const MapperHook&) = delete;
 
+  /// Whether the unit of one camera drifts, so that its loops are closed over Sim(3); if not, over SE(3).
+  /// Also called on the loop closer's thread.
+  [[nodiscard]] virtual bool scale_drifts() const { return true; }
   /// The mapper goes on with another graph.
   virtual void graph_replaced() {}
   /// An edge leaves W1.
@@ -38,5 +43,10 @@ class MapperHook {
   virtual void loop_closed([[maybe_unused]] KeyframeId from, [[maybe_unused]] KeyframeId to) {}
   virtual void keyframe_culled([[maybe_unused]] KeyframeId id) {}
 };
+
+/// Whether a map's unit of length drifts: that of one camera does, unless an experiment says otherwise.
+[[nodiscard]] inline bool scale_drifts(const Rig& rig, const MapperOptions& options) {
+  return rig.kind == SensorKind::kMono && (!options.hook || options.hook->scale_drifts());
+}
 
 }  // namespace twofold

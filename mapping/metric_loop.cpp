@@ -7,6 +7,7 @@
 #include "geometry/inverse_depth.hpp"
 #include "imaging/view_change.hpp"
 #include "mapping/edges.hpp"
+#include "mapping/mapper_hook.hpp"
 
 namespace twofold {
 
@@ -31,7 +32,7 @@ MetricLoopReport& MetricLoopReport::operator+=(const MetricLoopReport& other) {
 MetricLoopCloser::MetricLoopCloser(const Rig& rig, const MapperOptions& options, PointSearch search)
     : rig_(rig),
       min_matches_(options.min_covisible),
-      scale_drifts_(rig.kind == SensorKind::kMono && options.scale_drifts),
+      scale_drifts_(scale_drifts(rig, options)),
       options_(options.loop),
       search_(std::move(search)) {}
 

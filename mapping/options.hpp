@@ -66,16 +66,14 @@ struct CullingOptions {
 };
 
 struct MapperOptions {
-  int inner_window = 25;     ///< M1 >= 1: keyframes joined by point-pose constraints  (6.2.3)
-  int outer_window = 175;    ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO), anchors
-                             ///< included
-  bool scale_drifts = true;  ///< of one camera: its loops are closed over Sim(3); for experiments, SE(3)
-  bool global_outer_window = false;  ///< gDWO: the outer window is all the rest of the map
-  int max_anchors = 25;              ///< anchors that may take places of W2 for their points  (6.2.4)
-  int max_points = 5000;             ///< in one problem, >= 1; those with the fewest measurements stay out
-  double min_inverse_depth = 1e-5;   ///< [1/m] > 0; farther points say nothing about translation
-  double max_inverse_depth = 1e3;    ///< [1/m]; nearer ones are mistakes
-  int min_covisible = 15;            ///< Theta: covisible points that make an edge, 15 to 30
+  int inner_window = 25;            ///< M1 >= 1: keyframes joined by point-pose constraints  (6.2.3)
+  int outer_window = 175;           ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO), anchors
+                                    ///< included; so many that all fit (gDWO): all the rest of the map
+  int max_anchors = 25;             ///< anchors that may take places of W2 for their points  (6.2.4)
+  int max_points = 5000;            ///< in one problem, >= 1; those with the fewest measurements stay out
+  double min_inverse_depth = 1e-5;  ///< [1/m] > 0; farther points say nothing about translation
+  double max_inverse_depth = 1e3;   ///< [1/m]; nearer ones are mistakes
+  int min_covisible = 15;           ///< Theta: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;
   WindowSolverOptions solver;          ///< joint optimisation of eq. 6.4
   int structure_iterations = 2;        ///< structure-only, after poses were set along edges

@@ -39,9 +39,6 @@ class BlockCholesky {
   [[nodiscard]] bool factorise();
   /// Right-hand side in, solution out, six numbers an unknown, in elimination order.
   void solve(std::span<Vector6> rhs) const;
-  /// The two halves of solve, with L L^T = A: x becomes L^-1 x, or L^-T x.
-  void solve_lower(std::span<Vector6> rhs) const;
-  void solve_upper(std::span<Vector6> rhs) const;
 
  private:
   struct RowEntry {
@@ -50,6 +47,9 @@ class BlockCholesky {
 
   void choose_order();
   void find_fill();
+  /// The two halves of solve, with L L^T = A: x becomes L^-1 x, or L^-T x.
+  void solve_lower(std::span<Vector6> rhs) const;
+  void solve_upper(std::span<Vector6> rhs) const;
 
   CouplingPattern pattern_;
   std::vector<int> order_;     // unknown at a position

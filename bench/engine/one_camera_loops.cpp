@@ -17,6 +17,7 @@
 #include "loopclosure/default_vocabulary.hpp"
 #include "mapping/edges.hpp"
 #include "mapping/keyframe_pose_graph.hpp"
+#include "mapping/mapper_hook.hpp"
 #include "mapping/similarity_loop.hpp"
 
 // One camera round a loop, its scale drift corrected over Sim(3), and the same run with its loops closed over
@@ -36,6 +37,12 @@ struct ClosedRun {
   MapperOptions mapper;
 };
 
+/// Closes loops as if the unit of length were known.
+class RigidLoops : public MapperHook {
+ public:
+  [[nodiscard]] bool scale_drifts() const override { return false; }
+};
+
 ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
   SourceOptions source_options;
   source_options.left_only = true;
@@ -44,7 +51,7 @@ ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
   EngineOptions options;
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  options.mapper.scale_drifts = over_sim3;
+  if (!over_sim3) options.mapper.hook = std::make_shared<RigidLoops>();
   GraphSnapshot newest, before_loop;
   options.on_map = [&](const GraphSnapshot& graph, const DoubleWindow&) {
     if (graph.last_jump().version != 0 && before_loop.keyframe_count() == 0) before_loop = newest;

@@ -24,7 +24,7 @@
 #include "bench/engine/hardships.hpp"
 #include "engine/engine.hpp"
 #include "evaluation/evaluation.hpp"
-#include "evaluation/pose_consistency.hpp"
+#include "fixtures/pose_consistency.hpp"
 #include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "synthetic/image_effects.hpp"

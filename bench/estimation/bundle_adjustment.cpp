@@ -6,7 +6,7 @@
 #include <random>
 
 #include "bench/estimation/solver_race.hpp"
-#include "fixtures/bundle_files.hpp"
+#include "fixtures/files/bundle_files.hpp"
 
 namespace twofold {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "bench/estimation/solver_race.hpp"
 #include "bench/estimation/typical_window.hpp"
-#include "fixtures/window_problem_io.hpp"
+#include "fixtures/files/window_problem_io.hpp"
 
 namespace twofold {
 namespace {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "engine/engine.hpp"
-#include "fixtures/window_problem_io.hpp"
+#include "fixtures/files/window_problem_io.hpp"
 #include "io/sources/open_source.hpp"
 #include "loopclosure/default_vocabulary.hpp"
 #include "mapping/mapper_hook.hpp"

@@ -11,7 +11,7 @@
 
 #include "base/processor_time.hpp"
 #include "bench/posegraph/ceres_pose_graph.hpp"
-#include "fixtures/g2o_file.hpp"
+#include "fixtures/files/g2o_file.hpp"
 #include "posegraph/pose_graph_equations.hpp"
 #include "posegraph/pose_graph_initialisation.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "evaluation/pose_consistency.hpp"
+#include "fixtures/pose_consistency.hpp"
 #include "tests/engine/whole_run.hpp"
 
 namespace twofold {

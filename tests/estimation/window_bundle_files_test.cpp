@@ -1,4 +1,4 @@
-#include "fixtures/bundle_files.hpp"
+#include "fixtures/files/bundle_files.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "fixtures/window_problem_io.hpp"
+#include "fixtures/files/window_problem_io.hpp"
 
 #include <gtest/gtest.h>
 

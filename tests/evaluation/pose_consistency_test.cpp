@@ -1,4 +1,4 @@
-#include "evaluation/pose_consistency.hpp"
+#include "fixtures/pose_consistency.hpp"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "filters/inverse_depth_filter.hpp"
-#include "tests/filters/filter_scene.hpp"
+#include "tests/filters/filter_rig.hpp"
 
 namespace twofold {
 namespace {

@@ -1,4 +1,4 @@
-#include "fixtures/g2o_file.hpp"
+#include "fixtures/files/g2o_file.hpp"
 
 #include <gtest/gtest.h>
 

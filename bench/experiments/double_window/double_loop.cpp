@@ -18,8 +18,7 @@ MapperOptions mapper_options(LoopMethod method, const DoubleWindowExperimentOpti
   MapperOptions mapper = simulation_mapper_options(options);
   mapper.solver.huber_sigmas = kHuberSigmas;
   mapper.inner_window = method == kLoopBa ? kUnbounded : kInner;
-  mapper.outer_window = kOuter;
-  mapper.global_outer_window = method == kLoopGlobal || method == kLoopGlobalRigid;
+  mapper.outer_window = method == kLoopGlobal || method == kLoopGlobalRigid ? kUnbounded : kOuter;
   return mapper;
 }
 

@@ -21,7 +21,8 @@ struct DoubleWindowExperimentOptions {
   EdgeInformationOptions edge;
 };
 
-constexpr int kUnbounded = std::numeric_limits<int>::max() / 4;  // window size of BA over everything
+constexpr int kUnbounded =
+    std::numeric_limits<int>::max() / 4;  // window size of BA, or of the outer window, over everything
 
 /// What all methods share: three iterations, and nothing of what only matters with wrong measurements.
 [[nodiscard]] MapperOptions simulation_mapper_options(const DoubleWindowExperimentOptions& options);

@@ -22,8 +22,7 @@ constexpr const char* kNames[kMethods] = {"BA", "cDWO", "gDWO", "fixed rim"};
 MapperOptions mapper_options(Method method, const DoubleWindowExperimentOptions& options) {
   MapperOptions mapper = simulation_mapper_options(options);
   mapper.inner_window = method == kBa ? kUnbounded : kInner;
-  mapper.outer_window = kOuter;
-  mapper.global_outer_window = method == kGlobal;
+  mapper.outer_window = method == kGlobal ? kUnbounded : kOuter;
   return mapper;
 }
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "filters/gauss_newton_filter.hpp"
+#include "experiments/why_filter/gauss_newton_filter.hpp"
 
 namespace twofold::bench {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <numeric>
 
-#include "filters/gauss_newton_filter.hpp"
+#include "experiments/why_filter/gauss_newton_filter.hpp"
 #include "filters/sliding_window_filter_prior.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 namespace {
 
 /// Rows and columns of `m` in the given order.
@@ -117,4 +117,4 @@ void GaussNewtonFilter::marginalise_points(std::span<const std::int64_t> lost) {
   anchors_lin_ = std::move(anchors_lin);
 }
 
-}  // namespace twofold
+}  // namespace twofold::bench

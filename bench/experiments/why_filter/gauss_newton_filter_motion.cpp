@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
-#include "filters/gauss_newton_filter.hpp"
+#include "experiments/why_filter/gauss_newton_filter.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 
 /// What measurements say against their prediction by map and pose.
 struct GaussNewtonFilter::Innovation {
@@ -125,4 +125,4 @@ void GaussNewtonFilter::estimate_motion(const std::vector<Seen>& all) {
   }
 }
 
-}  // namespace twofold
+}  // namespace twofold::bench

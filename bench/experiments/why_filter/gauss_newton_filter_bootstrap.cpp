@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <iterator>
 
+#include "experiments/why_filter/gauss_newton_filter.hpp"
 #include "filters/anchored_views.hpp"
-#include "filters/gauss_newton_filter.hpp"
 #include "filters/sliding_window_filter_prior.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 namespace {
 
 using Matrix65 = Eigen::Matrix<double, 6, 5>;
@@ -96,4 +96,4 @@ bool GaussNewtonFilter::start_from(const AnchoredViews& views) {
   return true;
 }
 
-}  // namespace twofold
+}  // namespace twofold::bench

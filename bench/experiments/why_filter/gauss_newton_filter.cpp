@@ -1,4 +1,4 @@
-#include "filters/gauss_newton_filter.hpp"
+#include "experiments/why_filter/gauss_newton_filter.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include "base/check.hpp"
 #include "base/option_check.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 
 std::string GaussNewtonFilterOptions::invalid_reason() const {
   return OptionCheck()
@@ -95,4 +95,4 @@ Matrix6 GaussNewtonFilter::pose_covariance() const {
   return Lambda_.ldlt().solve(unit).bottomRows<6>();
 }
 
-}  // namespace twofold
+}  // namespace twofold::bench

@@ -5,9 +5,9 @@
 #include <limits>
 
 #include "base/processor_time.hpp"
-#include "filters/gauss_newton_filter.hpp"
+#include "experiments/why_filter/gauss_newton_filter.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -154,4 +154,4 @@ bool GaussNewtonFilter::joint_update(const std::vector<Seen>& seen, int iteratio
   return std::isfinite(current) && (moved || iterations == 0);
 }
 
-}  // namespace twofold
+}  // namespace twofold::bench

@@ -1,16 +1,44 @@
 // The Gauss-Newton filter of thesis 2.3.4, 4.5.2, 4.5.3.
+#include "bench/experiments/why_filter/gauss_newton_filter.hpp"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <random>
+#include <vector>
 
-#include "filters/gauss_newton_filter.hpp"
 #include "filters/sliding_window_filter.hpp"
-#include "tests/filters/filter_scene.hpp"
+#include "tests/filters/filter_rig.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 namespace {
 
-using namespace testing;
+using testing::make_rig;
+
+struct Scene {
+  std::vector<SE3> T_c_w;
+  std::vector<Vector3> points;
+  std::vector<std::vector<PointObservation>> observations;
+};
+
+Scene make_scene(const Rig& rig, int frames, int count, double noise, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> normal(0, 1);
+  std::uniform_real_distribution<double> x(-0.8, 1.2), y(-0.9, 0.9), z(1.8, 2.6);
+  Scene scene;
+  for (int i = 0; i < count; ++i) scene.points.emplace_back(x(rng), y(rng), z(rng));
+  for (int j = 0; j < frames; ++j) {
+    const SE3 T_w_c(SO3::exp(Vector3(0.01 * j, -0.02 * j, 0.01 * j)), Vector3(0.12 * j, 0.01 * j, 0.02 * j));
+    scene.T_c_w.push_back(T_w_c.inverse());
+    std::vector<PointObservation> seen;
+    for (int i = 0; i < count; ++i) {
+      const Vector3 z_true = rig.project(scene.T_c_w.back() * scene.points[static_cast<std::size_t>(i)]);
+      seen.push_back({i, z_true + noise * Vector3(normal(rng), normal(rng), normal(rng))});
+    }
+    scene.observations.push_back(seen);
+  }
+  return scene;
+}
 
 /// In the linear limit the filter is batch least squares: pose and its covariance against the batch sliding
 /// window.
@@ -192,4 +220,4 @@ TEST(FilterGaussNewton, InvalidOptionsAreNamed) {
 }
 
 }  // namespace
-}  // namespace twofold
+}  // namespace twofold::bench

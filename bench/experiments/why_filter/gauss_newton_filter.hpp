@@ -12,7 +12,7 @@
 #include "filters/inverse_depth_filter.hpp"
 #include "filters/sliding_window_filter_equations.hpp"
 
-namespace twofold {
+namespace twofold::bench {
 
 /// How the pose of a new frame is found before the joint update.
 enum class MotionEstimate : std::uint8_t {
@@ -144,4 +144,4 @@ class GaussNewtonFilter {
   double joint_seconds_ = 0;
 };
 
-}  // namespace twofold
+}  // namespace twofold::bench
