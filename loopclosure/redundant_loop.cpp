@@ -38,10 +38,7 @@ bool RedundantLoops::short_way(const LoopConstraint& loop, const GraphSnapshot& 
     const auto parent = static_cast<std::size_t>(tree_[n].parent);
     const Keyframe& near = graph.keyframe(tree_[parent].id);
     const Keyframe& far = graph.keyframe(tree_[n].id);
-    const SE3 T_far_near = relative_pose(graph, near.id, *find_edge(near, far.id));
-    const double depth = 0.5 * (near.median_depth + far.median_depth);
-    ways_[n] = ways_[parent] + T_far_near.so3().log().norm();
-    if (depth > 0) ways_[n] += T_far_near.translation().norm() / depth;
+    ways_[n] = ways_[parent] + way_length(near, far, relative_pose(graph, near.id, *find_edge(near, far.id)));
     if (tree_[n].id == loop.from) return ways_[n] <= options_.max_way;
   }
   return false;

@@ -9,14 +9,14 @@
 #include "graph/loop_constraint.hpp"
 #include "graph/neighbourhood.hpp"
 #include "graph/snapshot.hpp"
+#include "graph/way_length.hpp"
 
 namespace twofold {
 
 struct RedundantLoopOptions {
-  /// Way along the graph's edges from loop.to to loop.from: lengths in median depths of the scene, plus
-  /// radians turned. What lies that near is tied together by shared points, and by the metric closure
-  /// (MetricLoopOptions::max_way_of_one_camera).
-  double max_way = 4;
+  /// Along the graph's edges from loop.to to loop.from (way_length). What lies that near is tied together by
+  /// shared points, and by the metric closure (MetricLoopOptions::max_way_of_one_camera).
+  double max_way = kWayOfOneUnit;
   int max_keyframes = 200;  ///< met while that way is looked for: bounds its time
   /// By how much a loop may move the points in the image, root mean square. Those that differ by less agree,
   /// for the metric closure, too (MetricLoopOptions::max_error_px).

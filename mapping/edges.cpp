@@ -5,11 +5,9 @@
 #include <cmath>
 #include <numbers>
 
-namespace twofold {
+#include "graph/way_length.hpp"
 
-double mean_depth(const Keyframe& a, const Keyframe& b) {
-  return std::max(0.5 * (a.median_depth + b.median_depth), 1e-6);
-}
+namespace twofold {
 
 void covisible_keyframes(const GraphSnapshot& graph, KeyframeId id, IdMap& counts,
                          std::vector<Covisible>& result) {

@@ -43,9 +43,6 @@ void link(GraphWriter& writer, KeyframeId from, KeyframeId to, int weight);
 /// Adds or updates the edge with the relative pose as its constraint  (6.2.3, 6.8).
 void link_marginalised(GraphWriter& writer, KeyframeId from, KeyframeId to, int weight, const SE3& T_to_from);
 
-/// Of the scene between two keyframes [m], > 0.
-[[nodiscard]] double mean_depth(const Keyframe& a, const Keyframe& b);
-
 /// Lambda of an edge, eq. 6.2.
 ///
 /// Ideal precision: w points measured with sigma in both frames shift by f dw pixels when the frame turns by

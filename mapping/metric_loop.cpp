@@ -5,6 +5,7 @@
 
 #include "camera/measurement.hpp"
 #include "geometry/inverse_depth.hpp"
+#include "graph/way_length.hpp"
 #include "imaging/view_change.hpp"
 #include "mapping/edges.hpp"
 #include "mapping/mapper_hook.hpp"
@@ -70,7 +71,7 @@ void MetricLoopCloser::split_neighbourhoods(const GraphSnapshot& graph, const Do
   }
 }
 
-/// What has passed through the view on the way from the reference to each member of N2.
+/// From the reference to each member of N2.
 void MetricLoopCloser::measure_ways(const GraphSnapshot& graph, const DoubleWindow& window,
                                     std::size_t count) {
   ways_.assign(count, 0);
@@ -78,9 +79,7 @@ void MetricLoopCloser::measure_ways(const GraphSnapshot& graph, const DoubleWind
     const auto parent = static_cast<std::size_t>(window.nodes[n].parent);
     const Keyframe& from = graph.keyframe(window.nodes[parent].id);
     const Keyframe& to = graph.keyframe(window.nodes[n].id);
-    const SE3 T_to_from = to.T_k_w * from.T_k_w.inverse();
-    const double depth = mean_depth(from, to);
-    ways_[n] = ways_[parent] + T_to_from.translation().norm() / depth + T_to_from.so3().log().norm();
+    ways_[n] = ways_[parent] + way_length(from, to, to.T_k_w * from.T_k_w.inverse());
   }
 }
 

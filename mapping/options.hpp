@@ -5,6 +5,7 @@
 
 #include "estimation/pose_consensus.hpp"
 #include "estimation/window_problem.hpp"
+#include "graph/way_length.hpp"
 
 namespace twofold {
 
@@ -31,11 +32,8 @@ struct MetricLoopOptions {
   double border_px = 10;         ///< predictions closer to the image's edge are not searched, >= 0
   double min_view_cosine =
       0.6216;  ///< of the angle between the anchor's and the reference's ray to a point, in [-1, 1]
-  /// From the reference to a member of N2, of one camera whose scale drifts: lengths in median depths of the
-  /// scene, plus radians turned, > 0. The unit drifts by some 2 % times its root: over 4 that is twice as
-  /// much as a keyframe's own place leaves open (DriftOptions::placement_scale). Neighbours that share no
-  /// points are some 1 apart, the ends of a ring 10 or more.
-  double max_way_of_one_camera = 4;
+  /// From the reference to a member of N2 (way_length), of one camera whose scale drifts, > 0.
+  double max_way_of_one_camera = kWayOfOneUnit;
   PoseConsensusOptions consensus;
 
   /// Empty when valid; otherwise names the field, the rule and the value.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "graph/way_length.hpp"
 #include "mapping/edges.hpp"
 #include "mapping/keyframe_pose_graph.hpp"
 

@@ -20,7 +20,7 @@ class RedundantLoopTest : public ::testing::Test {
       keyframe.id = KeyframeId{k};
       keyframe.part = kFrom;
       keyframe.T_k_w = SE3(SO3::exp({0, 0, roll * k}), Vector3(-step * k, 0, 0));
-      keyframe.median_depth = kMedianDepth;
+      keyframe.median_depth = median_depth_;
       writer.add_keyframe(keyframe);
       writer.set_reference(keyframe.id);
     }
@@ -48,6 +48,7 @@ class RedundantLoopTest : public ::testing::Test {
     return points;
   }
 
+  double median_depth_ = kMedianDepth;
   std::vector<MotionObservation> wall_ = wall();
   RedundantLoops loops_{PinholeCamera{400, 400, 320, 240, 640, 480}, {}};
   const SE3 within_{SO3::exp({0, 0.001, 0}), Vector3(0.002, 0, 0)};  // 0.6 px
@@ -77,6 +78,13 @@ TEST_F(RedundantLoopTest, ItJoinsWhatOnlyALongWayJoins) {
   EXPECT_FALSE(redundant(loop(far), far));
   const GraphSnapshot torn = line(0.2, 4);
   EXPECT_FALSE(redundant(loop(torn), torn));
+}
+
+/// How far the keyframes are from each other nobody knows then: the loop may tell it.
+TEST_F(RedundantLoopTest, AWayPastKeyframesWithoutDepthIsLong) {
+  median_depth_ = 0;
+  const GraphSnapshot deep = line(0.2);
+  EXPECT_FALSE(redundant(loop(deep), deep));
 }
 
 /// What a camera saw before it turned has left its view.
