@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/angles.hpp"
+#include "camera/image_halves.hpp"
 #include "camera/measurement.hpp"
 #include "loopclosure/corner_grid.hpp"
 #include "loopclosure/corner_match.hpp"
@@ -83,24 +84,10 @@ std::vector<CornerMatch> keep_inliers(const Rig& rig, const PlaceAppearance& b,
   return kept;
 }
 
-/// Enough corners in the upper, lower, left and right half of the image.
-class Spread {
- public:
-  explicit Spread(const PinholeCamera& camera) : centre_(0.5F * camera.width, 0.5F * camera.height) {}
-  void add(const Eigen::Vector2f& uv) {
-    ++(uv.x() < centre_.x() ? left_ : right_);
-    ++(uv.y() < centre_.y() ? upper_ : lower_);
-  }
-  [[nodiscard]] int least() const { return std::min({left_, right_, upper_, lower_}); }
-
- private:
-  Eigen::Vector2f centre_;
-  int left_ = 0, right_ = 0, upper_ = 0, lower_ = 0;
-};
-
+/// Enough corners in each half of either image.
 bool well_spread(const Rig& rig, std::span<const PlacedView> place, const PlaceAppearance& b,
                  const std::vector<CornerMatch>& matches, int min_in_half) {
-  Spread in_place(rig.camera), in_b(rig.camera);
+  ImageHalves in_place(rig.camera), in_b(rig.camera);
   for (const CornerMatch& match : matches) {
     const PlaceAppearance& view = *place[static_cast<std::size_t>(match.view)].appearance;
     in_place.add(view.corners[static_cast<std::size_t>(match.corner)].uv);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "camera/image_halves.hpp"
 #include "camera/measurement.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "graph/way_length.hpp"
@@ -155,16 +156,10 @@ void MetricLoopCloser::prune(const SE3& T_loop_w) {
   motion_.resize(kept);
 }
 
-/// At least half of min_covisible matches in the upper, lower, left and right half of the reference image:
-/// constraints held by a corner of the image alone are weak.
 bool MetricLoopCloser::well_spread(const std::vector<std::size_t>& matches) const {
-  int left = 0, upper = 0;
-  for (const std::size_t n : matches) {
-    left += found_[n].pixel.x() < 0.5F * static_cast<float>(rig_.camera.width) ? 1 : 0;
-    upper += found_[n].pixel.y() < 0.5F * static_cast<float>(rig_.camera.height) ? 1 : 0;
-  }
-  const int count = static_cast<int>(matches.size());
-  return 2 * std::min({left, count - left, upper, count - upper}) >= min_matches_;
+  ImageHalves halves(rig_.camera);
+  for (const std::size_t n : matches) halves.add(found_[n].pixel.head<2>());
+  return halves.least() >= options_.min_half_share * min_matches_;
 }
 
 void MetricLoopCloser::connect(GraphWriter& writer, const SE3& T_loop_w, MetricLoopReport& report) {

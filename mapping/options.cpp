@@ -19,6 +19,7 @@ std::string MetricLoopOptions::invalid_reason() const {
       .at_least("border_px", border_px, 0)
       .within("min_view_cosine", min_view_cosine, -1, 1)
       .above("max_way_of_one_camera", max_way_of_one_camera, 0)
+      .within("min_half_share", min_half_share, 0, 1)
       .nested("consensus", consensus.invalid_reason())
       .reason();
 }

@@ -34,6 +34,9 @@ struct MetricLoopOptions {
       0.6216;  ///< of the angle between the anchor's and the reference's ray to a point, in [-1, 1]
   /// From the reference to a member of N2 (way_length), of one camera whose scale drifts, > 0.
   double max_way_of_one_camera = kWayOfOneUnit;
+  /// Of min_covisible: so many matches in the upper, lower, left and right half of the reference's image, in
+  /// [0, 1].
+  double min_half_share = 0.5;
   PoseConsensusOptions consensus;
 
   /// Empty when valid; otherwise names the field, the rule and the value.

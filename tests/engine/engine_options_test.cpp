@@ -165,6 +165,7 @@ TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {
        {"edge.rot_share", [](auto& o) { o.edge.rot_share = 0; }},
        {"solver.max_iterations", [](auto& o) { o.solver.max_iterations = 0; }},
        {"loop.columns", [](auto& o) { o.loop.columns = 0; }},
+       {"loop.min_half_share", [](auto& o) { o.loop.min_half_share = 1.1; }},
        {"loop.consensus.confidence", [](auto& o) { o.loop.consensus.confidence = 1; }},
        {"culling.redundant_observers", [](auto& o) { o.culling.redundant_observers = 1; }},
        {"culling.keep_replacements", [](auto& o) { o.culling.keep_replacements = 1; }},

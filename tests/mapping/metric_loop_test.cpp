@@ -107,6 +107,8 @@ TEST_F(MetricLoopTest, MatchesOnOneSideOfTheImageAreNotEnough) {
   EXPECT_EQ(report.edges, 0);
   EXPECT_EQ(find_edge(writer_.graph().keyframe(reference_), old_), nullptr);
   EXPECT_TRUE(writer_.graph().keyframe(reference_).observations->empty());
+  options_.loop.min_half_share = 0;
+  EXPECT_EQ(close().edges, 1);
 }
 
 TEST_F(MetricLoopTest, DriftBeyondTheSearchRadiusClosesNothing) {
