@@ -1,13 +1,11 @@
 #include "camera/rig.hpp"
 
-#include <cmath>
-
 #include "camera/measurement.hpp"
 
 namespace twofold {
 
 Eigen::Vector3f Rig::information(const StereoPixelF& z, int level) const {
-  const double sigma = std::ldexp(noise.sigma_px, level);
+  const double sigma = sigma_px(level);
   const auto pixel = static_cast<float>(1 / (sigma * sigma));
   if (kind == SensorKind::kMono || !has_right(z)) return {pixel, pixel, 0};
   if (kind == SensorKind::kStereo) return {pixel, pixel, pixel};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -62,6 +63,8 @@ struct Rig {
     return camera.fx * baseline / disparity;
   }
   [[nodiscard]] double disparity_from_depth(double depth) const { return camera.fx * baseline / depth; }
+  /// Standard deviation of a match on pyramid level `level` [level-0 px].
+  [[nodiscard]] double sigma_px(int level) const { return std::ldexp(noise.sigma_px, level); }
   /// Diagonal of Lambda_z of a measurement taken on pyramid level `level` [1/px^2]; the third entry is 0
   /// without a right coordinate.
   [[nodiscard]] Eigen::Vector3f information(const StereoPixelF& z, int level) const;

@@ -5,6 +5,7 @@
 
 #include "base/median.hpp"
 #include "camera/measurement.hpp"
+#include "estimation/median_chi2.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "filters/sliding_window_filter.hpp"
 #include "geometry/cbh.hpp"
@@ -13,10 +14,6 @@ namespace twofold {
 namespace {
 
 constexpr double kUnknownLandmark = 1e-6;  // [1/m^2]: keeps the system regular, and moves nothing
-
-double median_chi2(int dof) {
-  return dof == 2 ? 1.386 : 2.366;
-}
 
 }  // namespace
 

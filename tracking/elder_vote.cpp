@@ -4,15 +4,10 @@
 #include <cmath>
 
 #include "base/option_check.hpp"
+#include "estimation/median_chi2.hpp"
 #include "estimation/observation_model.hpp"
 
 namespace twofold {
-namespace {
-
-// Medians of chi-square with two and three degrees of freedom.
-constexpr double kMedianMono = 1.386, kMedianStereo = 2.366;
-
-}  // namespace
 
 std::string ElderVoteOptions::invalid_reason() const {
   return OptionCheck()
@@ -72,7 +67,7 @@ MotionOnlyResult ElderVote::settle_elders(const MotionOnlyResult& by_elders,
   if (chi2_.empty()) return by_elders;
   const auto middle = chi2_.begin() + static_cast<std::ptrdiff_t>(chi2_.size() / 2);
   std::nth_element(chi2_.begin(), middle, chi2_.end());
-  const double usual = rig_.kind == SensorKind::kMono ? kMedianMono : kMedianStereo;
+  const double usual = median_chi2(rig_.kind == SensorKind::kMono ? 2 : 3);
   const double narrower = std::min(1.0, *middle / usual);
   MotionOnlyOptions strict = solver;
   strict.huber_sigmas *= std::sqrt(narrower);

@@ -11,10 +11,6 @@ namespace {
 constexpr int kFilterSteps = 5;
 constexpr double kFarthest = 1e-3;  // inverse depth of a point at infinity, in 1 / median depth
 
-double sigma_px(const Rig& rig, int level) {
-  return std::ldexp(rig.noise.sigma_px, level);
-}
-
 /// Least squares inverse depth of a ray of the anchor that is seen at uv.
 double triangulated(const PinholeCamera& camera, const Vector3& ray_a, const SE3& T_c_a, const Vector2& uv) {
   const Vector3 bearing = camera.unproject(uv);
@@ -54,7 +50,7 @@ void DepthSeeds::add(KeyframeId anchor, const PointAppearance& appearance, const
   seed.uv = appearance.uv;
   seed.shutter = shutter;
   seed.filter = InverseDepthFilter::from_mono(rig_.camera, appearance.uv.cast<double>(),
-                                              sigma_px(rig_, appearance.level));
+                                              rig_.sigma_px(appearance.level));
   seeds_.push_back(seed);
 }
 
@@ -80,7 +76,7 @@ bool DepthSeeds::worth_a_look(const Seed& seed, const EpipolarStretch& stretch, 
   const auto p = project_inverse_depth(rig_, T_c_row, seed.filter.psi);
   if (!p) return false;
   const double sigma = seed.filter.inverse_depth_sigma();
-  const double per_px = p->J_psi.col(2).head<2>().norm() / sigma_px(rig_, stretch.level);
+  const double per_px = p->J_psi.col(2).head<2>().norm() / rig_.sigma_px(stretch.level);
   return per_px * per_px * sigma * sigma > options_.min_gain;
 }
 
@@ -109,7 +105,7 @@ void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const RollingShutt
   if (!known(seed)) {
     seed.filter.psi.z() = std::max(0.0, triangulated(rig_.camera, ray, T_found_row, found->pixel.head<2>()));
   }
-  if (!seed.filter.update(rig_, T_found_row, found->pixel, sigma_px(rig_, found->level), kFilterSteps)) {
+  if (!seed.filter.update(rig_, T_found_row, found->pixel, rig_.sigma_px(found->level), kFilterSteps)) {
     ++seed.misses;
     return;
   }

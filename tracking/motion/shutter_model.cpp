@@ -54,8 +54,7 @@ void ShutterModel::learn(const FrameStep& step, const SearchOutcome& found, cons
     const Eigen::Vector2f& uv = point.appearance->uv;
     const std::uint64_t key = std::uint64_t{index(local_map.anchor(point))} << 32U |
                               std::uint64_t(2 * uv.x() + 1) << 16U | std::uint64_t(2 * uv.y() + 1);
-    seen->push_back(
-        {key, z.head<2>(), depth, std::ldexp(rig_.noise.sigma_px, match.found.level), depth_error});
+    seen->push_back({key, z.head<2>(), depth, rig_.sigma_px(match.found.level), depth_error});
   }
   readout_->end_frame();
   if (readout_->estimate().significant) rig_.readout = readout_->estimate().seconds;
