@@ -11,6 +11,8 @@
 #include <numbers>
 #include <random>
 
+#include "imaging/level_pixels.hpp"
+
 namespace twofold {
 namespace {
 
@@ -91,11 +93,9 @@ float centroid_angle(const cv::Mat& image, int u, int v) {
 
 bool can_be_described(const ImagePyramid& pyramid, const DescribedCorner& corner) {
   const cv::Mat& image = pyramid.level(corner.level);
-  const float scale = std::ldexp(1.0F, -corner.level);
-  const float u = (corner.uv.x() + 0.5F) * scale - 0.5F;
-  const float v = (corner.uv.y() + 0.5F) * scale - 0.5F;
-  return u >= kDescriptorBorder && v >= kDescriptorBorder && u <= image.cols - 1 - kDescriptorBorder &&
-         v <= image.rows - 1 - kDescriptorBorder;
+  const Eigen::Vector2f uv = to_level(corner.uv.x(), corner.uv.y(), corner.level);
+  return uv.x() >= kDescriptorBorder && uv.y() >= kDescriptorBorder &&
+         uv.x() <= image.cols - 1 - kDescriptorBorder && uv.y() <= image.rows - 1 - kDescriptorBorder;
 }
 
 namespace {
@@ -240,9 +240,9 @@ void CornerDescriber::describe(const ImagePyramid& pyramid, std::vector<Describe
 
 void CornerDescriber::describe_one(const cv::Mat& image, const cv::Mat& smooth,
                                    DescribedCorner& corner) const {
-  const float scale = std::ldexp(1.0F, -corner.level);
-  const int u = static_cast<int>(std::lround((corner.uv.x() + 0.5F) * scale - 0.5F));
-  const int v = static_cast<int>(std::lround((corner.uv.y() + 0.5F) * scale - 0.5F));
+  const Eigen::Vector2f uv = to_level(corner.uv.x(), corner.uv.y(), corner.level);
+  const int u = static_cast<int>(std::lround(uv.x()));
+  const int v = static_cast<int>(std::lround(uv.y()));
   corner.angle = centroid_angle(image, u, v);
   const double turn = corner.angle / (2 * std::numbers::pi) * kDirections;
   const auto& pattern = patterns_[static_cast<std::size_t>(std::lround(turn)) % kDirections];

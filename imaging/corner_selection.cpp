@@ -4,6 +4,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "imaging/level_pixels.hpp"
+
 namespace twofold {
 namespace {
 
@@ -85,11 +87,10 @@ void CornerSelector::add(const ImagePyramid& pyramid, int level, int wanted, con
                  found_);
   std::sort(found_.begin(), found_.end(), stronger);
   if (static_cast<int>(found_.size()) > wanted) found_.resize(static_cast<std::size_t>(wanted));
-  const float scale = std::ldexp(1.0F, level);
   for (const Corner& corner : found_) {
     DescribedCorner described;
-    described.uv = {(static_cast<float>(corner.u) + 0.5F) * scale - 0.5F,
-                    (static_cast<float>(corner.v) + 0.5F) * scale - 0.5F};
+    described.uv = {static_cast<float>(from_level(corner.u, level)),
+                    static_cast<float>(from_level(corner.v, level))};
     described.level = corner.level;
     corners.push_back(described);
   }

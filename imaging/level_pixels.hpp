@@ -13,6 +13,16 @@ namespace twofold {
   return ((uv.array() + 0.5) * s - 0.5).matrix().cast<float>();
 }
 
+/// In single precision throughout, for places that were measured in it.
+[[nodiscard]] inline Eigen::Vector2f to_level(float u, float v, int level) {
+  const float s = std::ldexp(1.0F, -level);
+  return {(u + 0.5F) * s - 0.5F, (v + 0.5F) * s - 0.5F};
+}
+
+[[nodiscard]] inline double to_level(double p, int level) {
+  return (p + 0.5) * std::ldexp(1.0, -level) - 0.5;
+}
+
 [[nodiscard]] inline double from_level(double p, int level) {
   return (p + 0.5) * std::ldexp(1.0, level) - 0.5;
 }

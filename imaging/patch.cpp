@@ -13,6 +13,7 @@
 
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_pyramid.hpp"
+#include "imaging/level_pixels.hpp"
 #include "imaging/pixel_row.hpp"
 
 namespace twofold {
@@ -195,8 +196,7 @@ bool cut_appearance(const cv::Mat& level_image, int u, int v, int level, PointAp
     const std::uint8_t* row = level_image.ptr<std::uint8_t>(v0 + r) + u0;
     std::copy_n(row, PointAppearance::kSize, appearance.pixels.data() + r * PointAppearance::kSize);
   }
-  const double scale = std::ldexp(1.0, level);
-  appearance.uv = {static_cast<float>((u + 0.5) * scale - 0.5), static_cast<float>((v + 0.5) * scale - 0.5)};
+  appearance.uv = {static_cast<float>(from_level(u, level)), static_cast<float>(from_level(v, level))};
   appearance.level = static_cast<std::uint8_t>(level);
   return true;
 }

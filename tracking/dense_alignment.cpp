@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "geometry/symmetric_solve.hpp"
+#include "imaging/level_pixels.hpp"
 #include "imaging/pixel_row.hpp"
 
 namespace twofold {
@@ -121,11 +122,10 @@ void DenseAlignment::refine_directions(std::size_t points) {
 
 bool DenseAlignment::prepare_patch(const cv::Mat& image, int level, const AlignmentPoint& point,
                                    Sample& sample) {
-  const float s = std::ldexp(1.0F, -level);
-  const float u = (point.uv.x() + 0.5F) * s - 0.5F;
-  const float v = (point.uv.y() + 0.5F) * s - 0.5F;
+  const Eigen::Vector2f uv = to_level(point.uv.x(), point.uv.y(), level);
   Bilinear window{};
-  if (!in_front_of_camera(point.x) || !window_at(image, u, v, kSize / 2 + 1, kSize + 2, window)) return false;
+  if (!in_front_of_camera(point.x) || !window_at(image, uv.x(), uv.y(), kSize / 2 + 1, kSize + 2, window))
+    return false;
   Floats8 rows[kSize + 2];
   sample_6x6(window, rows);
   const auto four = [&](int row, int column) {

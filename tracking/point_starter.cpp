@@ -5,6 +5,7 @@
 
 #include "camera/measurement.hpp"
 #include "geometry/inverse_depth.hpp"
+#include "imaging/level_pixels.hpp"
 #include "imaging/row_offset.hpp"
 
 namespace twofold {
@@ -14,8 +15,8 @@ constexpr std::size_t kMaxCorners = 4096;
 constexpr int kBorder = 12;  // of a level: room for the patch and its search
 
 Eigen::Vector2f at_level_zero(const Corner& corner) {
-  const float s = std::ldexp(1.0F, corner.level);
-  return {(static_cast<float>(corner.u) + 0.5F) * s - 0.5F, (static_cast<float>(corner.v) + 0.5F) * s - 0.5F};
+  return {static_cast<float>(from_level(corner.u, corner.level)),
+          static_cast<float>(from_level(corner.v, corner.level))};
 }
 
 }  // namespace
