@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "geometry/types.hpp"
@@ -11,6 +12,11 @@ namespace twofold {
 inline constexpr double kNearestDepth = 1e-3;  ///< [m]
 [[nodiscard]] inline bool in_front_of_camera(const Vector3& x_c) {
   return x_c.z() > kNearestDepth;
+}
+/// The same of a point that may be infinitely far, h = q x_c with its inverse depth q in its anchor [1/m]:
+/// from a metre on its ray, as far forward.
+[[nodiscard]] inline bool in_front_of_camera(const Vector3& h, double q) {
+  return h.z() > kNearestDepth * std::max(q, 1.0);
 }
 
 /// Pinhole camera without distortion  (thesis eq. 3.3, with fx != fy allowed).

@@ -14,14 +14,14 @@ RollingShutter::RollingShutter(const Rig& rig, const Vector6& velocity)
 StereoPixel RollingShutter::at_mid_exposure(const Rig& rig, const StereoPixel& z, const Vector3& x_c) const {
   if (at_rest_) return z;
   const Vector3 x_row = moved_by(tau(z.y()) * velocity_, x_c);
-  if (!(x_c.z() > 0) || !(x_row.z() > 0)) return z;
+  if (!in_front_of_camera(x_c) || !in_front_of_camera(x_row)) return z;
   return z + rig.project(x_c) - rig.project(x_row);
 }
 
 SE3 RollingShutter::seen_from(const Rig& rig, const SE3& T_c_w, const Vector3& x_w) const {
   if (at_rest_) return T_c_w;
   const Vector3 x_c = T_c_w * x_w;
-  return x_c.z() > 0 ? T_row_c(rig.camera.project(x_c).y()) * T_c_w : T_c_w;
+  return in_front_of_camera(x_c) ? T_row_c(rig.camera.project(x_c).y()) * T_c_w : T_c_w;
 }
 
 Vector2 followed_to_mid_exposure(const PinholeCamera& camera, const Vector2& uv, const Vector2& motion,

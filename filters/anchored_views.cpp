@@ -24,9 +24,6 @@ class ViewProjection {
     constant_ = R.col(2);
   }
   [[nodiscard]] Vector3 ray(const Vector3& psi) const { return linear_ * psi + constant_; }
-  [[nodiscard]] static bool in_front(const Vector3& h, const Vector3& psi) {
-    return h.z() > kNearestDepth * std::max(psi.z(), 1.0);
-  }
   [[nodiscard]] Vector3 pixel(const Vector3& h, const Vector3& psi) const {
     const Vector2 uv = rig_.camera.project(h);
     return {uv.x(), uv.y(), uv.x() - rig_.camera.fx * rig_.baseline * psi.z() / h.z()};
@@ -108,7 +105,7 @@ double AnchoredViews::cost() const {
     for (const SeenPoint& seen : view.seen) {
       const Vector3& psi = points[static_cast<std::size_t>(seen.point)].psi;
       const Vector3 h = project.ray(psi);
-      if (!project.in_front(h, psi)) return kImpossible;
+      if (!in_front_of_camera(h, psi.z())) return kImpossible;
       const Vector3 d = seen.pixel - project.pixel(h, psi);
       sum += rig.kind == SensorKind::kMono ? d.head<2>().squaredNorm() : d.squaredNorm();
     }
@@ -128,7 +125,7 @@ bool AnchoredViews::add_view(std::size_t v, Equations& equations) const {
     const auto j = static_cast<std::size_t>(seen.point);
     const Vector3& psi = points[j].psi;
     const Vector3 h = project.ray(psi);
-    if (!project.in_front(h, psi)) return false;
+    if (!in_front_of_camera(h, psi.z())) return false;
     const Eigen::Matrix<double, kRows, 1> d = (seen.pixel - project.pixel(h, psi)).template head<kRows>();
     const Eigen::Matrix<double, kRows, 3> J_h = project.by_ray(h, psi).template topRows<kRows>();
     Eigen::Matrix<double, kRows, 6> J_T;

@@ -18,7 +18,7 @@ void DepthRegression::learn(const GraphSnapshot& graph, KeyframeId k) {
   for (const Observation& observation : *keyframe.observations) {
     // Where it should be, not where it was measured: a map may have been made with another camera.
     const Vector3 x_k = keyframe.T_k_w * graph.position(observation.point);
-    if (x_k.z() > 0) samples_.push_back({camera_.project(x_k), 1 / x_k.z()});
+    if (in_front_of_camera(x_k)) samples_.push_back({camera_.project(x_k), 1 / x_k.z()});
   }
 }
 

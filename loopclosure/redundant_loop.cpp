@@ -23,7 +23,7 @@ bool RedundantLoops::moves_nothing(const LoopConstraint& loop, std::span<const M
   for (const MotionObservation& observation : found) {
     if (!observation.inlier) continue;
     const Vector3 mapped = T_mapped * observation.x_ref, seen = T_seen * observation.x_ref;
-    if (mapped.z() <= 0 || seen.z() <= 0) return false;
+    if (!in_front_of_camera(mapped) || !in_front_of_camera(seen)) return false;
     squares += (camera_.project(mapped) - camera_.project(seen)).squaredNorm();
     ++count;
   }

@@ -10,7 +10,7 @@ void move_to_mid_exposure(const Rig& rig, const RollingShutter& shutter, Immatur
   if (shutter.at_rest()) return;
   Observation& seen = point.anchor_observation;
   const Vector3 x_c = shutter.T_row_c(seen.pixel.y()).inverse() * from_inverse_depth(point.psi);
-  if (!(x_c.z() > 0)) return;
+  if (!in_front_of_camera(x_c)) return;
   point.psi = to_inverse_depth(x_c);
   seen.pixel = shutter.at_mid_exposure(rig, seen.pixel.cast<double>(), x_c).cast<float>();
 }

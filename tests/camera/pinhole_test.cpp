@@ -90,5 +90,16 @@ TEST(MeasurementNoise, FallsByFourALevelAndIsNoneWithoutARightCoordinate) {
   EXPECT_EQ(rig.information({1, 1, 1}, 0), Eigen::Vector3f(0.25F, 0.25F, 0));
 }
 
+TEST(InFront, APointThatMayBeAtInfinity) {
+  for (const double q : {0.1, 1.0, 10.0}) {  // h = q x_c
+    EXPECT_TRUE(in_front_of_camera(Vector3(0, 0, q * 0.5), q)) << q;
+    EXPECT_FALSE(in_front_of_camera(Vector3(0, 0, -q * 0.5), q)) << q;
+  }
+  EXPECT_FALSE(in_front_of_camera(Vector3(0, 0, 10 * 0.5 * kNearestDepth), 10));  // at half the nearest depth
+  EXPECT_TRUE(in_front_of_camera(Vector3(0, 0, 1), 0));
+  EXPECT_TRUE(in_front_of_camera(Vector3(0, 0, 1), -0.1)) << "beyond infinity";
+  EXPECT_FALSE(in_front_of_camera(Vector3(0, 0, 0), 0)) << "to the side";
+}
+
 }  // namespace
 }  // namespace twofold

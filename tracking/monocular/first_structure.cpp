@@ -340,7 +340,8 @@ class FirstStructureEstimator {
       const Vector2& uv = views_.first[i];
       v.push_back(uv.y());
       const Vector3 p = T_last_first * first_[i];
-      const bool stays = p.z() > 0 && (rig_.camera.project(p) - uv).norm() < 2 * options_.rotation_px;
+      const bool stays =
+          in_front_of_camera(p) && (rig_.camera.project(p) - uv).norm() < 2 * options_.rotation_px;
       if (stays || !stands(i)) continue;
       v_still.push_back(uv.y());
     }
