@@ -4,7 +4,7 @@
 #include <string>
 
 #include "engine/pacing.hpp"
-#include "tracking/effort.hpp"
+#include "tracking/common/effort.hpp"
 
 namespace twofold {
 

@@ -16,8 +16,8 @@
 #include "graph/keyframe_database.hpp"
 #include "graph/loop_constraint.hpp"
 #include "graph/snapshot.hpp"
-#include "tracking/effort.hpp"
-#include "tracking/lost_cause.hpp"
+#include "tracking/common/effort.hpp"
+#include "tracking/common/lost_cause.hpp"
 
 namespace twofold {
 

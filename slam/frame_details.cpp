@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tracking/effort.hpp"
-#include "tracking/track_result.hpp"
+#include "tracking/common/effort.hpp"
+#include "tracking/common/track_result.hpp"
 
 namespace twofold {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "imaging/image_pyramid.hpp"
-#include "tracking/dense_alignment.hpp"
+#include "tracking/common/dense_alignment.hpp"
 #include "tracking/loss/wide_search.hpp"
 
 namespace twofold {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "imaging/guided_search.hpp"
-#include "tracking/dense_alignment.hpp"
+#include "tracking/common/dense_alignment.hpp"
 #include "tracking/depth/options.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
 #include "tracking/keyframes/options.hpp"
@@ -14,7 +14,7 @@
 
 namespace twofold {
 
-/// Which points of the map are searched in a frame (tracking/local_map_search.hpp).
+/// Which points of the map are searched in a frame (tracking/search/local_map_search.hpp).
 struct LocalMapSearchOptions {
   int wanted_matches = 180;      ///< stop searching once so many points were found
   int max_searches = 320;        ///< upper bound of points searched

@@ -5,6 +5,7 @@
 
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_buffers.hpp"
+#include "tracking/effort_bounds.hpp"
 
 namespace twofold {
 namespace {
@@ -38,7 +39,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       search_(rig, options),
       tried_(rig, options),
       loss_(options.loss.signs),
-      views_(rig, options),
+      views_(rig, options.loss.wide_search, options.search, options.loss.recent_keyframes),
       new_points_(rig_, options_, correction_.fixed()),
       proposer_(options_),
       reference_choice_(options.reference, static_cast<std::size_t>(options.local_map.max_searches)) {

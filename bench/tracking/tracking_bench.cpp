@@ -7,6 +7,7 @@
 
 #include "fixtures/plain_map.hpp"
 #include "fixtures/rendered_frames.hpp"
+#include "tracking/effort_bounds.hpp"
 #include "tracking/tracker.hpp"
 
 namespace twofold {

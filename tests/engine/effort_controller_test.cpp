@@ -1,5 +1,7 @@
 #include "engine/effort_controller.hpp"
 
+#include "tracking/effort_bounds.hpp"
+
 #include <gtest/gtest.h>
 
 #include <vector>

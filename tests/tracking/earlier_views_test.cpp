@@ -28,7 +28,7 @@ class EarlierViewsTest : public ::testing::Test {
 
   const Rig rig_ = test_rig(SensorKind::kStereo, 320, 240);
   RenderedScene scene_{rig_, {3, 2, 5}, 21};
-  EarlierViews views_{rig_, {}};
+  EarlierViews views_{rig_, {}, {}, 4};
   FrameImages now_;
   FrameCorners corners_;
 };
@@ -73,11 +73,11 @@ TEST_F(EarlierViewsTest, CornersAreThoseOfAFrameThatWasLookedAt) {
 }
 
 TEST(EarlierViews, OneCameraCannotFindAnything) {
-  EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kMono, 320, 240), {}).can_find());
-  TrackerOptions without;
-  without.loss.wide_search.enabled = false;
-  EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kStereo, 320, 240), without).can_find());
-  EXPECT_TRUE(EarlierViews(test_rig(SensorKind::kStereo, 320, 240), {}).can_find());
+  EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kMono, 320, 240), {}, {}, 4).can_find());
+  WideSearchOptions without;
+  without.enabled = false;
+  EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kStereo, 320, 240), without, {}, 4).can_find());
+  EXPECT_TRUE(EarlierViews(test_rig(SensorKind::kStereo, 320, 240), {}, {}, 4).can_find());
 }
 
 }  // namespace

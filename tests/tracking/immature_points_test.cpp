@@ -1,4 +1,4 @@
-#include "tracking/immature_points.hpp"
+#include "tracking/common/immature_points.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,7 @@
 #include "tracking/keyframes/keyframe_decision.hpp"
 
+#include "tracking/effort_bounds.hpp"
+
 #include <gtest/gtest.h>
 
 namespace twofold {

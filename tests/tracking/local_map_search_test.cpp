@@ -1,12 +1,12 @@
 // Where points of the local map are found in a frame.
-#include "tracking/local_map_search.hpp"
+#include "tracking/search/local_map_search.hpp"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
 #include "fixtures/rendered_scene.hpp"
-#include "tracking/point_starter.hpp"
+#include "tracking/search/point_starter.hpp"
 
 namespace twofold {
 namespace {

@@ -1,5 +1,5 @@
 // Which points the tracker looks for.
-#include "tracking/local_map.hpp"
+#include "tracking/common/local_map.hpp"
 
 #include <gtest/gtest.h>
 

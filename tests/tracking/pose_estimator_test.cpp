@@ -8,6 +8,7 @@
 #include "fixtures/plain_map.hpp"
 #include "fixtures/rendered_scene.hpp"
 #include "geometry/inverse_depth.hpp"
+#include "tracking/effort_bounds.hpp"
 
 namespace twofold {
 namespace {

@@ -1,4 +1,4 @@
-#include "tracking/quadtree.hpp"
+#include "tracking/common/quadtree.hpp"
 
 #include <gtest/gtest.h>
 

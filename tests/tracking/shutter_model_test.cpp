@@ -5,6 +5,7 @@
 
 #include "fixtures/plain_map.hpp"
 #include "fixtures/rendered_scene.hpp"
+#include "tracking/effort_bounds.hpp"
 
 namespace twofold {
 namespace {

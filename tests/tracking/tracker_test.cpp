@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/tracking/tracked_sequence.hpp"
+#include "tracking/effort_bounds.hpp"
 
 namespace twofold {
 namespace {

@@ -10,8 +10,8 @@
 #include "estimation/motion_only.hpp"
 #include "estimation/region_sums.hpp"
 #include "graph/ids.hpp"
+#include "tracking/common/lost_cause.hpp"
 #include "tracking/depth/depth_planes.hpp"
-#include "tracking/lost_cause.hpp"
 
 namespace twofold {
 

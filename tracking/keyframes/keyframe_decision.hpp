@@ -1,8 +1,8 @@
 #pragma once
 
-#include "tracking/effort.hpp"
+#include "tracking/common/effort.hpp"
+#include "tracking/common/track_result.hpp"
 #include "tracking/keyframes/options.hpp"
-#include "tracking/track_result.hpp"
 
 namespace twofold {
 

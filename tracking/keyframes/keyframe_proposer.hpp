@@ -4,11 +4,11 @@
 
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
-#include "tracking/frame_step.hpp"
-#include "tracking/immature_points.hpp"
+#include "tracking/common/frame_step.hpp"
+#include "tracking/common/immature_points.hpp"
+#include "tracking/common/local_map.hpp"
 #include "tracking/keyframes/keyframe_decision.hpp"
-#include "tracking/local_map.hpp"
-#include "tracking/local_map_search.hpp"
+#include "tracking/search/local_map_search.hpp"
 
 namespace twofold {
 

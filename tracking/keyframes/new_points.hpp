@@ -3,12 +3,12 @@
 #include <vector>
 
 #include "camera/rig.hpp"
-#include "tracking/frame_step.hpp"
-#include "tracking/immature_points.hpp"
-#include "tracking/local_map.hpp"
-#include "tracking/local_map_search.hpp"
+#include "tracking/common/frame_step.hpp"
+#include "tracking/common/immature_points.hpp"
+#include "tracking/common/local_map.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
-#include "tracking/point_starter.hpp"
+#include "tracking/search/local_map_search.hpp"
+#include "tracking/search/point_starter.hpp"
 
 namespace twofold {
 

@@ -59,7 +59,7 @@ struct NewPointOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// What becomes of points that no snapshot holds yet (tracking/immature_points.hpp).
+/// What becomes of points that no snapshot holds yet (tracking/common/immature_points.hpp).
 struct ImmaturePointOptions {
   int max_failures = 4;  ///< not found in so many searches in a row: given up
   int max_age = 3;       ///< keyframes after which a point is given up

@@ -4,9 +4,9 @@
 #include <optional>
 #include <vector>
 
+#include "tracking/common/local_map.hpp"
 #include "tracking/keyframes/options.hpp"
-#include "tracking/local_map.hpp"
-#include "tracking/local_map_search.hpp"
+#include "tracking/search/local_map_search.hpp"
 
 namespace twofold {
 

@@ -16,11 +16,12 @@ RecentView room_for_view(const Rig& rig, const WideSearch& search) {
 
 }  // namespace
 
-EarlierViews::EarlierViews(const Rig& rig, const TrackerOptions& options)
-    : can_find_(options.loss.wide_search.enabled && rig.kind != SensorKind::kMono),
-      guided_(options.search),
-      search_(rig, options.loss.wide_search),
-      keyframes_(static_cast<std::size_t>(options.loss.recent_keyframes), room_for_view(rig, search_)),
+EarlierViews::EarlierViews(const Rig& rig, const WideSearchOptions& wide, const GuidedSearchOptions& guided,
+                           int keyframes)
+    : can_find_(wide.enabled && rig.kind != SensorKind::kMono),
+      guided_(guided),
+      search_(rig, wide),
+      keyframes_(static_cast<std::size_t>(keyframes), room_for_view(rig, search_)),
       asked_(room_for_view(rig, search_)) {}
 
 void EarlierViews::look_at(const FrameImages& now) {

@@ -3,10 +3,10 @@
 #include <optional>
 
 #include "camera/rig.hpp"
+#include "imaging/guided_search.hpp"
+#include "tracking/common/placement.hpp"
 #include "tracking/loss/recent_views.hpp"
 #include "tracking/loss/wide_search.hpp"
-#include "tracking/options.hpp"
-#include "tracking/placement.hpp"
 
 namespace twofold {
 
@@ -17,7 +17,10 @@ namespace twofold {
 /// No allocation after construction.
 class EarlierViews {
  public:
-  EarlierViews(const Rig& rig, const TrackerOptions& options);
+  /// @param guided     the search around a view's points, once the camera was turned
+  /// @param keyframes  so many of the newest are compared with
+  EarlierViews(const Rig& rig, const WideSearchOptions& wide, const GuidedSearchOptions& guided,
+               int keyframes);
 
   /// A new frame: its corners are not known yet.
   void begin_frame() { looked_ = false; }

@@ -5,7 +5,7 @@
 
 #include "camera/usual_interval.hpp"
 #include "imaging/image_pyramid.hpp"
-#include "tracking/lost_cause.hpp"
+#include "tracking/common/lost_cause.hpp"
 
 namespace twofold {
 

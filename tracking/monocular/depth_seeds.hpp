@@ -10,7 +10,7 @@
 #include "filters/inverse_depth_filter.hpp"
 #include "imaging/epipolar_search.hpp"
 #include "imaging/point_appearance.hpp"
-#include "tracking/immature_points.hpp"
+#include "tracking/common/immature_points.hpp"
 
 namespace twofold {
 

@@ -5,7 +5,7 @@
 
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
-#include "tracking/lost_cause.hpp"
+#include "tracking/common/lost_cause.hpp"
 
 namespace twofold {
 

@@ -7,7 +7,7 @@
 
 namespace twofold {
 
-/// How one camera starts (tracking/monocular/monocular_start.hpp): which earlier frames its first motion is
+/// How one camera starts (tracking/monocular_start.hpp): which earlier frames its first motion is
 /// looked for from, and what must come of them.
 struct MonocularStartOptions {
   int candidates = 4;           ///< earlier frames tried, the oldest being left out, >= 1

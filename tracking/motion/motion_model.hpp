@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "tracking/common/placement.hpp"
 #include "tracking/motion/options.hpp"
-#include "tracking/placement.hpp"
 
 namespace twofold {
 

@@ -6,9 +6,9 @@
 #include "camera/readout_estimator.hpp"
 #include "camera/rig.hpp"
 #include "camera/rolling_shutter.hpp"
-#include "tracking/frame_step.hpp"
-#include "tracking/local_map_search.hpp"
+#include "tracking/common/frame_step.hpp"
 #include "tracking/motion/motion_model.hpp"
+#include "tracking/search/local_map_search.hpp"
 
 namespace twofold {
 

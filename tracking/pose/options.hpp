@@ -3,7 +3,7 @@
 #include <string>
 
 #include "estimation/motion_only.hpp"
-#include "tracking/elder_vote.hpp"
+#include "tracking/common/elder_vote.hpp"
 
 namespace twofold {
 

@@ -4,13 +4,13 @@
 
 #include "camera/rig.hpp"
 #include "estimation/pose_uncertainty.hpp"
-#include "tracking/elder_vote.hpp"
-#include "tracking/frame_step.hpp"
-#include "tracking/immature_points.hpp"
-#include "tracking/local_map.hpp"
-#include "tracking/local_map_search.hpp"
+#include "tracking/common/elder_vote.hpp"
+#include "tracking/common/frame_step.hpp"
+#include "tracking/common/immature_points.hpp"
+#include "tracking/common/local_map.hpp"
 #include "tracking/motion/shutter_model.hpp"
 #include "tracking/options.hpp"
+#include "tracking/search/local_map_search.hpp"
 
 namespace twofold {
 

@@ -1,4 +1,4 @@
-#include "tracking/lost_cause.hpp"
+#include "tracking/common/lost_cause.hpp"
 
 namespace twofold {
 

@@ -9,10 +9,9 @@
 #include "camera/rolling_shutter.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/snapshot.hpp"
-#include "tracking/effort.hpp"
-#include "tracking/monocular/monocular_start.hpp"
-#include "tracking/placement.hpp"
-#include "tracking/track_result.hpp"
+#include "tracking/common/effort.hpp"
+#include "tracking/common/placement.hpp"
+#include "tracking/common/track_result.hpp"
 
 namespace twofold {
 

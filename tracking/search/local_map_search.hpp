@@ -6,12 +6,12 @@
 #include "camera/rig.hpp"
 #include "estimation/motion_only.hpp"
 #include "imaging/guided_search.hpp"
-#include "tracking/elder_vote.hpp"
+#include "tracking/common/elder_vote.hpp"
+#include "tracking/common/frame_step.hpp"
+#include "tracking/common/local_map.hpp"
+#include "tracking/common/quadtree.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
-#include "tracking/frame_step.hpp"
-#include "tracking/local_map.hpp"
 #include "tracking/options.hpp"
-#include "tracking/quadtree.hpp"
 
 namespace twofold {
 

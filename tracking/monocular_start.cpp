@@ -1,4 +1,4 @@
-#include "tracking/monocular/monocular_start.hpp"
+#include "tracking/monocular_start.hpp"
 
 #include <algorithm>
 #include <cmath>

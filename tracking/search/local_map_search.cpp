@@ -1,4 +1,4 @@
-#include "tracking/local_map_search.hpp"
+#include "tracking/search/local_map_search.hpp"
 
 #include <algorithm>
 #include <span>

@@ -1,4 +1,4 @@
-#include "tracking/point_starter.hpp"
+#include "tracking/search/point_starter.hpp"
 
 #include <algorithm>
 #include <cmath>

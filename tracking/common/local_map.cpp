@@ -1,4 +1,4 @@
-#include "tracking/local_map.hpp"
+#include "tracking/common/local_map.hpp"
 
 #include "geometry/inverse_depth.hpp"
 

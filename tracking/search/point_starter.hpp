@@ -9,11 +9,11 @@
 #include "imaging/guided_search.hpp"
 #include "imaging/image_pyramid.hpp"
 #include "imaging/point_appearance.hpp"
+#include "tracking/common/immature_points.hpp"
+#include "tracking/common/lost_cause.hpp"
+#include "tracking/common/quadtree.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
-#include "tracking/immature_points.hpp"
 #include "tracking/keyframes/options.hpp"
-#include "tracking/lost_cause.hpp"
-#include "tracking/quadtree.hpp"
 
 namespace twofold {
 

@@ -7,7 +7,7 @@
 
 #include "graph/neighbourhood.hpp"
 #include "graph/snapshot.hpp"
-#include "tracking/immature_points.hpp"
+#include "tracking/common/immature_points.hpp"
 
 namespace twofold {
 

@@ -1,4 +1,4 @@
-#include "tracking/dense_alignment.hpp"
+#include "tracking/common/dense_alignment.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tracking/quadtree.hpp"
+#include "tracking/common/quadtree.hpp"
 
 #include <algorithm>
 #include <utility>

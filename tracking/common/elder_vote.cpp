@@ -1,4 +1,4 @@
-#include "tracking/elder_vote.hpp"
+#include "tracking/common/elder_vote.hpp"
 
 #include <algorithm>
 #include <cmath>

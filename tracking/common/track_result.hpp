@@ -5,7 +5,7 @@
 
 #include "geometry/se3.hpp"
 #include "graph/ids.hpp"
-#include "tracking/lost_cause.hpp"
+#include "tracking/common/lost_cause.hpp"
 
 namespace twofold {
 

@@ -7,10 +7,11 @@
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
 #include "imaging/image_pyramid.hpp"
+#include "tracking/common/placement.hpp"
 #include "tracking/monocular/corner_following.hpp"
 #include "tracking/monocular/first_structure.hpp"
 #include "tracking/options.hpp"
-#include "tracking/point_starter.hpp"
+#include "tracking/search/point_starter.hpp"
 
 namespace twofold {
 
@@ -38,12 +39,6 @@ struct StartCandidate {
   /// Likewise, of as many frames since as there is room for: they get their poses when the start is found.
   std::vector<PathFrame> path;
   int path_stride = 1;
-};
-
-/// Where the camera was in a frame between the first keyframe and the one in which the start was found.
-struct EarlierFrame {
-  std::int64_t frame_index = 0;
-  SE3 T_c_first;
 };
 
 /// The start as the tracker takes it over.

@@ -1,4 +1,4 @@
-#include "tracking/track_result.hpp"
+#include "tracking/common/track_result.hpp"
 
 namespace twofold {
 
