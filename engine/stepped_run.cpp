@@ -33,6 +33,23 @@ const char* name_of(PipelineStep step) {
 
 }  // namespace
 
+SteppedRun::Channels::Channels(const Rig& rig, const EngineOptions& options, const TrackerRunner& tracking,
+                               MapperRunner& mapping, const LoopCloserRunner& loop_closing)
+    : slots(options.frame_slots),
+      // In the rings, in the two threads' hands, and the tracker's spare one.
+      proposals(2 * ring_size(options.proposal_slots) + 4,
+                [&](KeyframeProposal& proposal) { tracking.prepare(proposal); }),
+      frames(ring_size(options.frame_slots)),
+      done(ring_size(options.frame_slots)),
+      mapper_inbox(ring_size(proposals.capacity()), ring_size(options.proposal_slots)),
+      keyframes(ring_size(options.proposal_slots)),
+      request_buffers(kRequests,
+                      [&](RelocalisationRequest& request) { allocate_images(rig, request.images); }),
+      requests(kRequests),
+      answers(kRequests),
+      snapshots(options.checkpoint.period > 0 ? 3 : 2, mapping.publish()),
+      places(1, loop_closing.places()) {}
+
 SteppedRun::SteppedRun(const Rig& rig, const EngineOptions& options, PacingClock* clock)
     : options_(options),
       rig_(rig),
@@ -41,19 +58,7 @@ SteppedRun::SteppedRun(const Rig& rig, const EngineOptions& options, PacingClock
       mapping_(rig, options, trace_.get()),
       loop_closing_(rig, options, trace_.get()),
       logs_(options.logs, mapping_.replacement_log()),
-      slots_(options.frame_slots),
-      // In the rings, in the two threads' hands, and the tracker's spare one.
-      proposals_pool_(2 * ring_size(options.proposal_slots) + 4,
-                      [this](KeyframeProposal& proposal) { tracking_.prepare(proposal); }),
-      frames_(ring_size(options.frame_slots)),
-      done_(ring_size(options.frame_slots)),
-      mapper_inbox_(ring_size(proposals_pool_.capacity()), ring_size(options.proposal_slots)),
-      keyframes_(ring_size(options.proposal_slots)),
-      request_pool_(kRequests, [&](RelocalisationRequest& request) { allocate_images(rig, request.images); }),
-      requests_(kRequests),
-      answers_(kRequests),
-      snapshots_(options.checkpoint.period > 0 ? 3 : 2, mapping_.publish()),
-      places_(1, loop_closing_.places()),
+      channels_(rig, options, tracking_, mapping_, loop_closing_),
       checkpoints_(rig, options.checkpoint),
       pacer_(options.pacing, clock),
       effort_controller_(options.effort, options.pacing.late) {}
@@ -63,7 +68,7 @@ void SteppedRun::begin_step(PipelineStep step) const {
 }
 
 bool SteppedRun::has_buffer() {
-  if (!free_slot_) free_slot_ = slots_.try_acquire();
+  if (!free_slot_) free_slot_ = channels_.slots.try_acquire();
   return static_cast<bool>(free_slot_);
 }
 
@@ -74,20 +79,20 @@ bool SteppedRun::has_room() {
 /// As fast as possible means as fast as the map and the disk can follow: without a clock to keep, frames wait
 /// for them.
 bool SteppedRun::must_hold_back() const {
-  return !options_.pacing.keeps_pace() && (mapper_inbox_.proposals_approx() > 1 || logs_.behind());
+  return !options_.pacing.keeps_pace() && (channels_.mapper_inbox.proposals_approx() > 1 || logs_.behind());
 }
 
 void SteppedRun::push(Frame frame) {
   TWOFOLD_CHECK(has_buffer(), "there is a buffer for the frame");
   logs_.note_input(rig_, frame);
   free_slot_->frame = std::move(frame);
-  TWOFOLD_CHECK(frames_.try_push(std::move(free_slot_)), "the ring holds every slot of the pool");
+  TWOFOLD_CHECK(channels_.frames.try_push(std::move(free_slot_)), "the ring holds every slot of the pool");
   tracker_parking_.wake();
 }
 
 void SteppedRun::collect(const FrameSink& sink) {
   SlotHandle slot;
-  while (done_.try_pop(slot)) {
+  while (channels_.done.try_pop(slot)) {
     const FrameRecord& record = slot->record;
     progress_.count(record);
     progress_.map_version = map_version_.load(std::memory_order_relaxed);
@@ -102,7 +107,7 @@ void SteppedRun::collect(const FrameSink& sink) {
 
 void SteppedRun::wait(std::chrono::steady_clock::time_point deadline) {
   const bool full = !has_room();
-  const auto ready = [&] { return done_.size_approx() > 0 || (full && has_room()); };
+  const auto ready = [&] { return channels_.done.size_approx() > 0 || (full && has_room()); };
   (void)reader_parking_.wait_until({}, deadline, ready);
 }
 
@@ -167,18 +172,19 @@ RunResult SteppedRun::finish() {
 
 /// The loop closer ends after the mapper: what it sent last is taken here, all steps being over.
 void SteppedRun::map_late_loops() {
-  (void)mapper_inbox_.take();
-  if (mapper_inbox_.loops().empty()) return;
-  const std::uint64_t version = mapping_.step({}, mapper_inbox_.loops());
+  MapperInbox& inbox = channels_.mapper_inbox;
+  (void)inbox.take();
+  if (inbox.loops().empty()) return;
+  const std::uint64_t version = mapping_.step({}, inbox.loops());
   (void)mapping_.publish();
-  logs_.schedule().mapper.append({version, 0, static_cast<std::uint32_t>(mapper_inbox_.loops().size())});
+  logs_.schedule().mapper.append({version, 0, static_cast<std::uint32_t>(inbox.loops().size())});
 }
 
 // The tracker's step: no lock, no allocation, no input or output.
 
 bool SteppedRun::step_tracker() {
   SlotHandle slot;
-  if (!frames_.try_pop(slot)) return false;
+  if (!channels_.frames.try_pop(slot)) return false;
   const Arrival arrival = pacer_.wait_for(slot->frame.t_ns, [this] { return successor_t_ns(); });
   const RightOfWayTaken way(options_.pacing.keeps_pace() ? options_.right_of_way : nullptr);
   begin_step(PipelineStep::kTrack);
@@ -187,16 +193,16 @@ bool SteppedRun::step_tracker() {
   if (effort_controller_.must_drop(arrival)) {
     drop(*slot);
   } else {
-    track(*slot, arrival, snapshots_.mailbox(kTrackerReader).latest());
+    track(*slot, arrival, channels_.snapshots.mailbox(kTrackerReader).latest());
   }
-  TWOFOLD_CHECK(done_.try_push(std::move(slot)), "the ring holds every slot of the pool");
+  TWOFOLD_CHECK(channels_.done.try_push(std::move(slot)), "the ring holds every slot of the pool");
   reader_parking_.wake();
   return true;
 }
 
 /// Of the frame that waits behind the one in hand.
 std::optional<std::int64_t> SteppedRun::successor_t_ns() {
-  const SlotHandle* const next = frames_.peek();
+  const SlotHandle* const next = channels_.frames.peek();
   if (next == nullptr) return std::nullopt;
   return (*next)->frame.t_ns;
 }
@@ -231,43 +237,43 @@ void SteppedRun::prepare_spare() {
   if (!tracking_.may_propose()) {
     spare_.reset();
   } else if (!spare_) {
-    spare_ = proposals_pool_.try_acquire();
+    spare_ = channels_.proposals.try_acquire();
   }
 }
 
 void SteppedRun::take_answers(TrackerStep& step) {
   RelocalisationAnswer answer;
-  while (answers_.try_pop(answer)) {
+  while (channels_.answers.try_pop(answer)) {
     tracking_.take_answer(answer);
     ++step.messages;
   }
 }
 
 void SteppedRun::send_proposal() {
-  mapper_inbox_.send(std::move(spare_));
+  channels_.mapper_inbox.send(std::move(spare_));
   mapper_parking_.wake();
 }
 
 void SteppedRun::ask_where_we_are() {
   if (!tracking_.wants_relocalisation()) return;
-  RequestHandle request = request_pool_.try_acquire();
+  RequestHandle request = channels_.request_buffers.try_acquire();
   TWOFOLD_CHECK(request, "the answer to the request before has come");
   (void)tracking_.request_relocalisation(*request);
-  TWOFOLD_CHECK(requests_.try_push(std::move(request)), "one request is under way at most");
+  TWOFOLD_CHECK(channels_.requests.try_push(std::move(request)), "one request is under way at most");
   loop_parking_.wake();
 }
 
 // The mapper's step.
 
 bool SteppedRun::step_mapper() {
-  if (!mapper_inbox_.take()) return false;
+  if (!channels_.mapper_inbox.take()) return false;
   begin_step(PipelineStep::kMap);
-  const std::span<ProposalHandle> proposals = mapper_inbox_.proposals();
-  const std::span<const LoopMessage> loops = mapper_inbox_.loops();
+  const std::span<ProposalHandle> proposals = channels_.mapper_inbox.proposals();
+  const std::span<const LoopMessage> loops = channels_.mapper_inbox.loops();
   const std::uint64_t version = mapping_.step(proposals, loops);
   {
     const ScopedStage timed = mapping_.timed_publication();
-    snapshots_.publish(mapping_.publish());
+    channels_.snapshots.publish(mapping_.publish());
   }
   map_version_.store(version, std::memory_order_relaxed);
   logs_.schedule().mapper.append(
@@ -276,7 +282,8 @@ bool SteppedRun::step_mapper() {
     // The loop closer may be behind by a whole ring: it then does not get to know this keyframe, which goes
     // back to its pool here.
     ProposalHandle described = std::move(proposal);
-    if (!keyframes_.try_push(std::move(described))) not_described_.fetch_add(1, std::memory_order_relaxed);
+    if (!channels_.keyframes.try_push(std::move(described)))
+      not_described_.fetch_add(1, std::memory_order_relaxed);
   }
   loop_parking_.wake();
   reader_parking_.wake();
@@ -288,9 +295,9 @@ bool SteppedRun::step_mapper() {
 bool SteppedRun::step_loop_closer() {
   if (answer_request()) return true;  // a lost camera comes first
   ProposalHandle keyframe;
-  if (!keyframes_.try_pop(keyframe)) return false;
+  if (!channels_.keyframes.try_pop(keyframe)) return false;
   begin_step(PipelineStep::kCloseLoops);
-  const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
+  const GraphSnapshot& graph = channels_.snapshots.mailbox(kLoopReader).latest();
   LoopStep step{graph.version(), static_cast<std::int64_t>(index(keyframe->id))};
   send_loops(loop_closing_.step(*keyframe, graph), step);
   publish_places();
@@ -300,10 +307,10 @@ bool SteppedRun::step_loop_closer() {
 
 bool SteppedRun::answer_request() {
   RequestHandle request;
-  if (!requests_.try_pop(request)) return false;
+  if (!channels_.requests.try_pop(request)) return false;
   answering_ = true;
   begin_step(PipelineStep::kCloseLoops);
-  const GraphSnapshot& graph = snapshots_.mailbox(kLoopReader).latest();
+  const GraphSnapshot& graph = channels_.snapshots.mailbox(kLoopReader).latest();
   RelocalisationAnswer answer = loop_closing_.relocalise(*request, graph);
   request.reset();  // before the answer: the next request finds its buffer free
   send_answer(std::move(answer), {graph.version(), -1, 1});
@@ -312,14 +319,14 @@ bool SteppedRun::answer_request() {
 
 bool SteppedRun::answer_nothing() {
   RequestHandle request;
-  if (!answering_ && !requests_.try_pop(request)) return false;
+  if (!answering_ && !channels_.requests.try_pop(request)) return false;
   request.reset();
-  send_answer(std::nullopt, {snapshots_.mailbox(kLoopReader).latest().version(), -1, 1, 1});
+  send_answer(std::nullopt, {channels_.snapshots.mailbox(kLoopReader).latest().version(), -1, 1, 1});
   return true;
 }
 
 void SteppedRun::send_answer(RelocalisationAnswer answer, const LoopStep& step) {
-  TWOFOLD_CHECK(answers_.try_push(std::move(answer)), "one request is under way at most");
+  TWOFOLD_CHECK(channels_.answers.try_push(std::move(answer)), "one request is under way at most");
   answering_ = false;
   logs_.schedule().loop_closer.append(step);
 }
@@ -328,21 +335,24 @@ void SteppedRun::send_answer(RelocalisationAnswer answer, const LoopStep& step) 
 /// have the loop in the map as soon as it is sent: whoever is told of it is told before.
 void SteppedRun::send_loops(std::span<LoopMessage> messages, LoopStep& step) {
   const std::span<LoopMessage> sent =
-      messages.first(std::min(messages.size(), mapper_inbox_.room_for_loops()));
+      messages.first(std::min(messages.size(), channels_.mapper_inbox.room_for_loops()));
   loop_closing_.sending(sent.size());
   for (LoopMessage& message : sent)
-    TWOFOLD_CHECK(mapper_inbox_.try_send(std::move(message)), "only the mapper changes what room there is");
+    TWOFOLD_CHECK(channels_.mapper_inbox.try_send(std::move(message)),
+                  "only the mapper changes what room there is");
   step.refused = static_cast<std::uint32_t>(messages.size() - sent.size());
   if (!sent.empty()) mapper_parking_.wake();
 }
 
 void SteppedRun::publish_places() {
   const KeyframeDatabase& places = loop_closing_.places();
-  if (checkpoints_.enabled() && places.version() > places_.newest()) places_.publish(places);
+  if (checkpoints_.enabled() && places.version() > channels_.places.newest())
+    channels_.places.publish(places);
 }
 
 void SteppedRun::save_checkpoint() {
-  checkpoints_.save(snapshots_.mailbox(kCheckpointReader).latest(), places_.mailbox(0).latest());
+  checkpoints_.save(channels_.snapshots.mailbox(kCheckpointReader).latest(),
+                    channels_.places.mailbox(0).latest());
 }
 
 }  // namespace twofold

@@ -45,7 +45,8 @@ class SteppedRun : public Pipeline {
   [[nodiscard]] std::string checkpoint_error() const override { return checkpoints_.newest_error(); }
   [[nodiscard]] const Progress& progress() const override { return progress_; }
   [[nodiscard]] WaitingCounts waiting() const override {
-    return {frames_.size_approx(), mapper_inbox_.proposals_approx(), keyframes_.size_approx()};
+    return {channels_.frames.size_approx(), channels_.mapper_inbox.proposals_approx(),
+            channels_.keyframes.size_approx()};
   }
   void end_pace() override { pacer_.end_waits(); }
   /// Takes all steps that are left, on this thread.
@@ -64,10 +65,12 @@ class SteppedRun : public Pipeline {
   [[nodiscard]] bool answer_nothing();
 
   // On the thread of that step: whether something waits for it.
-  [[nodiscard]] bool tracker_has_work() { return frames_.has_value(); }
-  [[nodiscard]] bool mapper_has_work() { return !mapper_inbox_.empty(); }
-  [[nodiscard]] bool loop_closer_has_work() { return requests_.has_value() || keyframes_.has_value(); }
-  [[nodiscard]] bool awaits_answer() { return answering_ || requests_.has_value(); }
+  [[nodiscard]] bool tracker_has_work() { return channels_.frames.has_value(); }
+  [[nodiscard]] bool mapper_has_work() { return !channels_.mapper_inbox.empty(); }
+  [[nodiscard]] bool loop_closer_has_work() {
+    return channels_.requests.has_value() || channels_.keyframes.has_value();
+  }
+  [[nodiscard]] bool awaits_answer() { return answering_ || channels_.requests.has_value(); }
 
   /// Reads the newest versions where they are, for as long as it takes: publishing goes on meanwhile, and the
   /// versions read are destroyed by their writers when newer ones are asked for. By one thread.
@@ -80,7 +83,7 @@ class SteppedRun : public Pipeline {
   Parking reader_parking_, tracker_parking_, mapper_parking_, loop_parking_;
 
  private:
-  static constexpr std::size_t kTrackerReader = 0;  // mailboxes of snapshots_
+  static constexpr std::size_t kTrackerReader = 0;  // mailboxes of Channels::snapshots
   static constexpr std::size_t kLoopReader = 1;
   static constexpr std::size_t kCheckpointReader = 2;
 
@@ -92,6 +95,26 @@ class SteppedRun : public Pipeline {
   };
   using SlotPool = FramePool<FrameSlot>;
   using SlotHandle = SlotPool::Handle;
+
+  /// What goes from step to step, and the pools its buffers come from and go back to.
+  struct Channels {
+    /// @param tracking               prepares the buffers of keyframes
+    /// @param mapping, loop_closing  have the first versions of map and places
+    Channels(const Rig& rig, const EngineOptions& options, const TrackerRunner& tracking,
+             MapperRunner& mapping, const LoopCloserRunner& loop_closing);
+
+    SlotPool slots;
+    ProposalPool proposals;
+    SpscRing<SlotHandle> frames;         // push -> tracker
+    SpscRing<SlotHandle> done;           // tracker -> collect; as long as the pool, so that it cannot be full
+    MapperInbox mapper_inbox;            // tracker, loop closer -> mapper
+    SpscRing<ProposalHandle> keyframes;  // mapper -> loop closer
+    RequestPool request_buffers;
+    SpscRing<RequestHandle> requests;        // tracker -> loop closer; one at most is under way
+    SpscRing<RelocalisationAnswer> answers;  // loop closer -> tracker
+    SnapshotPublisher<GraphSnapshot> snapshots;
+    SnapshotPublisher<KeyframeDatabase> places;  // loop closer -> checkpoints
+  };
 
   [[nodiscard]] bool take(PipelineStep step);
   void begin_step(PipelineStep step) const;
@@ -125,17 +148,7 @@ class SteppedRun : public Pipeline {
   LoopCloserRunner loop_closing_;
   RunLogs logs_;
 
-  SlotPool slots_;
-  ProposalPool proposals_pool_;
-  SpscRing<SlotHandle> frames_;         // push -> tracker
-  SpscRing<SlotHandle> done_;           // tracker -> collect; as long as the pool, so that it cannot be full
-  MapperInbox mapper_inbox_;            // tracker, loop closer -> mapper
-  SpscRing<ProposalHandle> keyframes_;  // mapper -> loop closer
-  RequestPool request_pool_;
-  SpscRing<RequestHandle> requests_;        // tracker -> loop closer; one at most is under way
-  SpscRing<RelocalisationAnswer> answers_;  // loop closer -> tracker
-  SnapshotPublisher<GraphSnapshot> snapshots_;
-  SnapshotPublisher<KeyframeDatabase> places_;  // loop closer -> checkpoints
+  Channels channels_;
   CheckpointWriter checkpoints_;
   Pacer pacer_;
   EffortController effort_controller_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.hpp"
 #include "camera/measurement.hpp"
 #include "imaging/patch.hpp"
 
@@ -15,13 +16,6 @@ constexpr float kMinScore = 12;        // Shi-Tomasi [grey^2/px^2]
 constexpr std::size_t kFewest = 16;    // corners found in both images
 constexpr double kWidestSpread = 0.6;  // [px] half the distance between quartiles: more is no common offset
 constexpr double kNearWholeOffset = 0.7;  // [px] where most corners are found, they are found about there
-
-double quantile(std::vector<double>& values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 }  // namespace
 
@@ -67,9 +61,12 @@ std::optional<RowOffset> RowOffsetMeter::measure_at(const cv::Mat& left, const c
     if (aligned && looks_alike(patch, aligned->rms, search_))
       offsets_.push_back(static_cast<double>(aligned->uv.y()) - corner.v);
   }
-  if (offsets_.size() < kFewest || quantile(offsets_, 0.75) - quantile(offsets_, 0.25) > 2 * kWidestSpread)
+  const auto quantile_of_offsets = [&](double share) {
+    return quantile(offsets_, share, QuantileRank::kLower);
+  };
+  if (offsets_.size() < kFewest || quantile_of_offsets(0.75) - quantile_of_offsets(0.25) > 2 * kWidestSpread)
     return std::nullopt;
-  return RowOffset{offset + quantile(offsets_, 0.5), static_cast<int>(offsets_.size())};
+  return RowOffset{offset + quantile_of_offsets(0.5), static_cast<int>(offsets_.size())};
 }
 
 void take_back_row_offset(const cv::Mat& right, double offset, cv::Mat& out) {

@@ -38,22 +38,8 @@ void register_rows() {
   PYBIND11_NUMPY_DTYPE(Map::Part, id, keyframes);
 }
 
-}  // namespace
-
-void bind_map(py::module_& module) {
-  register_rows();
-  py::class_<MapRows>(
-      module, "Map",
-      "One version of the map, which never changes and may be held as long as one likes.\n\n"
-      "Tables are structured arrays, ascending by id, made when first asked for: read-only views that hold "
-      "this object.\n"
-      "While it is held, what the map has replaced since stays in memory, at most memory_bytes().")
-      .def_property_readonly(
-          "version", [](const MapRows& self) { return self.snapshot.version(); }, "Grows with every version.")
-      .def_property_readonly(
-          "reference", [](const MapRows& self) { return self.snapshot.reference(); },
-          "Keyframe in the middle of the windows; NO_ID in an empty map.")
-      .def(
+void define_tables(py::class_<MapRows>& rows) {
+  rows.def(
           "keyframes",
           [](const py::object& self) {
             return lazily(self, &MapRows::keyframes, [](const MapSnapshot& map) { return map.keyframes(); });
@@ -101,8 +87,26 @@ void bind_map(py::module_& module) {
           [](const py::object& self) {
             return lazily(self, &MapRows::parts, [](const MapSnapshot& map) { return map.parts(); });
           },
-          "(N,) with fields id, keyframes (their number); one when everything is connected.")
-      .def(
+          "(N,) with fields id, keyframes (their number); one when everything is connected.");
+}
+
+}  // namespace
+
+void bind_map(py::module_& module) {
+  register_rows();
+  py::class_<MapRows> rows(
+      module, "Map",
+      "One version of the map, which never changes and may be held as long as one likes.\n\n"
+      "Tables are structured arrays, ascending by id, made when first asked for: read-only views that hold "
+      "this object.\n"
+      "While it is held, what the map has replaced since stays in memory, at most memory_bytes().");
+  rows.def_property_readonly(
+          "version", [](const MapRows& self) { return self.snapshot.version(); }, "Grows with every version.")
+      .def_property_readonly(
+          "reference", [](const MapRows& self) { return self.snapshot.reference(); },
+          "Keyframe in the middle of the windows; NO_ID in an empty map.");
+  define_tables(rows);
+  rows.def(
           "memory_bytes",
           [](const MapRows& self) {
             const py::gil_scoped_release unlocked;

@@ -167,7 +167,7 @@ std::map<std::uint32_t, PoseList> trajectories_of(const SlamSummary& summary) {
   return trajectories;
 }
 
-void bind_summary(py::module_& module) {
+void bind_stage_time(py::module_& module) {
   py::class_<StageTime>(module, "StageTime", "What a stage of a thread took, over the whole run.")
       .def_readonly("thread", &StageTime::thread, "tracker, mapper or loop closer.")
       .def_readonly("stage", &StageTime::stage, "Its name.")
@@ -180,6 +180,10 @@ void bind_summary(py::module_& module) {
         return fmt::format("<StageTime {}, {}: {} times, mean {:.3f} ms, p99 {:.3f} ms>", self.thread,
                            self.stage, self.count, self.mean_ms, self.p99_ms);
       });
+}
+
+void bind_summary(py::module_& module) {
+  bind_stage_time(module);
   using Readout = SlamSummary::Readout;
   py::class_<Readout>(module, "Readout", "How long a rolling shutter takes, as a run measured it.")
       .def_readonly("found", &Readout::found, "Whether it is one, and the run went on with it.")
@@ -287,10 +291,11 @@ SlamSummary finish(SlamWithUpdates& self) {
   return summary;
 }
 
-void bind_slam_class(py::module_& module) {
+using SlamClass = py::class_<SlamWithUpdates, std::unique_ptr<SlamWithUpdates, DeleteUnlocked>>;
+
+void define_constructor(SlamClass& slam) {
   const SlamOptions d;
-  py::class_<SlamWithUpdates, std::unique_ptr<SlamWithUpdates, DeleteUnlocked>>(module, "Slam")
-      .def(py::init(&make_slam), py::arg("rig"), py::kw_only(), py::arg("mode") = d.mode,
+  slam.def(py::init(&make_slam), py::arg("rig"), py::kw_only(), py::arg("mode") = d.mode,
            py::arg("live") = d.live, py::arg("speed") = d.speed, py::arg("late") = d.late,
            py::arg("map") = py::none(), py::arg("localise_only") = d.localise_only,
            py::arg("places") = d.places, py::arg("vocabulary") = py::none(),
@@ -300,8 +305,11 @@ void bind_slam_class(py::module_& module) {
            py::arg("tracker_cpu") = d.tracker_cpu, py::arg("mapper_cpu") = d.mapper_cpu,
            py::arg("loop_closer_cpu") = d.loop_closer_cpu, py::arg("fifo_priority") = d.fifo_priority,
            py::arg("run_folder") = py::none(), py::arg("kept_frames") = d.kept_frames,
-           py::arg("trace") = py::none())
-      .def(
+           py::arg("trace") = py::none());
+}
+
+void define_frames(SlamClass& slam) {
+  slam.def(
           "push", &push, py::arg("frame"),
           "Queued, dropped because there is no room, or refused (images that do not fit the rig, time that "
           "does not grow),\n"
@@ -337,8 +345,12 @@ void bind_slam_class(py::module_& module) {
           "taking this step.")
       .def(
           "latest", [](const SlamWithUpdates& self) { return self.slam.latest(); },
-          "Of the newest frame that was processed, tracked or lost; None before the first. Waits for nobody.")
-      .def(
+          "Of the newest frame that was processed, tracked or lost; None before the first. Waits for "
+          "nobody.");
+}
+
+void define_map(SlamClass& slam) {
+  slam.def(
           "map",
           [](const SlamWithUpdates& self) {
             const py::gil_scoped_release unlocked;
@@ -361,16 +373,22 @@ void bind_slam_class(py::module_& module) {
           "pause_mapping", [](SlamWithUpdates& self, bool paused) { self.slam.pause_mapping(paused); },
           py::arg("paused"),
           "While paused, the map gets no keyframe: the camera is localised in what there is. Waits for "
-          "nobody.")
-      .def(
+          "nobody.");
+}
+
+void define_end(SlamClass& slam) {
+  slam.def(
           "end_pace", [](SlamWithUpdates& self) { self.slam.end_pace(); }, Unlocked(),
           "With `speed`: from now on no frame waits for its time, so that finish() returns soon, also when "
           "it "
           "is called by\n"
           "another thread already.")
       .def("errors", [](const SlamWithUpdates& self) { return self.slam.errors(); })
-      .def("finish", &finish)
-      .def("view", &view, py::kw_only(), py::arg("title") = "Twofold", py::arg("port") = ViewerOptions{}.port,
+      .def("finish", &finish);
+}
+
+void define_view(SlamClass& slam) {
+  slam.def("view", &view, py::kw_only(), py::arg("title") = "Twofold", py::arg("port") = ViewerOptions{}.port,
            py::arg("bind") = ViewerOptions{}.bind, py::arg("secrets") = py::none(),
            py::arg("truth") = py::none(),
            "Shows the run in a browser while it runs, and returns the address to open, whose token lets one "
@@ -388,8 +406,17 @@ void bind_slam_class(py::module_& module) {
           "close_view", [](SlamWithUpdates& self) { self.view.close(); }, Unlocked(),
           "Whoever looks gets the last map and is told that the run is over. Happens by itself when the Slam "
           "goes.\n"
-          "view() can open another one then, which shows the map, and what comes from there on.")
-      .def_property_readonly("_updates", [](const SlamWithUpdates& self) { return self.updates; });
+          "view() can open another one then, which shows the map, and what comes from there on.");
+}
+
+void bind_slam_class(py::module_& module) {
+  SlamClass slam(module, "Slam");
+  define_constructor(slam);
+  define_frames(slam);
+  define_map(slam);
+  define_end(slam);
+  define_view(slam);
+  slam.def_property_readonly("_updates", [](const SlamWithUpdates& self) { return self.updates; });
 }
 
 }  // namespace

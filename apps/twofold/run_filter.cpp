@@ -36,6 +36,45 @@ std::vector<PlyPoint> surface_points(const StructureFilter& filter) {
   return points;
 }
 
+struct Timing {
+  double wall_seconds = 0;
+  double busy_ms = 0;     ///< in the filter
+  double slowest_ms = 0;  ///< of a frame
+};
+
+Timing process_all(FrameSource& source, const std::atomic<bool>& stop, StructureFilter& filter) {
+  using Clock = std::chrono::steady_clock;
+  using Milliseconds = std::chrono::duration<double, std::milli>;
+  Timing timing;
+  const auto start = Clock::now();
+  Frame frame;
+  // Relaxed: the flag carries no other data.
+  while (!stop.load(std::memory_order_relaxed) && source.next(frame) == FrameStatus::kFrame) {
+    const auto before = Clock::now();
+    filter.process(frame);
+    const double took_ms = Milliseconds(Clock::now() - before).count();
+    timing.busy_ms += took_ms;
+    timing.slowest_ms = std::max(timing.slowest_ms, took_ms);
+  }
+  timing.wall_seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  return timing;
+}
+
+/// Writes the trajectories and the truth; returns how many frames were tracked.
+std::size_t write_trajectories(const StructureFilter& filter, const FrameSource& source,
+                               const std::filesystem::path& folder) {
+  Trajectory smoothed, causal;
+  for (const StructureFrame& f : filter.frames()) {
+    if (!f.tracked) continue;
+    smoothed.push_back({f.t_ns, f.T_c_w_smoothed.inverse()});
+    causal.push_back({f.t_ns, f.T_c_w.inverse()});
+  }
+  write_tum_trajectory(folder / "trajectory.txt", smoothed);
+  write_tum_trajectory(folder / "trajectory_causal.txt", causal);
+  if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
+  return smoothed.size();
+}
+
 /// Empty: none.
 std::string failure_of(const FrameSource& source, const std::string& source_text, std::size_t tracked) {
   if (!source.error().empty()) return source.error();
@@ -52,33 +91,13 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
   StructureOptions options;
   options.filter.window = window;
   StructureFilter filter(source.rig(), options);
-  const auto start = std::chrono::steady_clock::now();
-  double slowest_ms = 0, busy_ms = 0;
-  Frame frame;
-  // Relaxed: the flag carries no other data.
-  while (!stop.load(std::memory_order_relaxed) && source.next(frame) == FrameStatus::kFrame) {
-    const auto before = std::chrono::steady_clock::now();
-    filter.process(frame);
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - before;
-    busy_ms += took.count();
-    slowest_ms = std::max(slowest_ms, took.count());
-  }
-  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
-
-  Trajectory smoothed, causal;
-  for (const StructureFrame& f : filter.frames()) {
-    if (!f.tracked) continue;
-    smoothed.push_back({f.t_ns, f.T_c_w_smoothed.inverse()});
-    causal.push_back({f.t_ns, f.T_c_w.inverse()});
-  }
+  const Timing timing = process_all(source, stop, filter);
+  const std::size_t tracked = write_trajectories(filter, source, folder);
   const std::vector<PlyPoint> points = surface_points(filter);
-  const std::size_t frames = filter.frames().size();
-  write_tum_trajectory(folder / "trajectory.txt", smoothed);
-  write_tum_trajectory(folder / "trajectory_causal.txt", causal);
-  if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_ply(folder / "structure.ply", points);
-  const double mean_ms = busy_ms / static_cast<double>(std::max<std::size_t>(1, frames));
-  const std::string error = failure_of(source, source_text, smoothed.size());
+  const std::size_t frames = filter.frames().size();
+  const double mean_ms = timing.busy_ms / static_cast<double>(std::max<std::size_t>(1, frames));
+  const std::string error = failure_of(source, source_text, tracked);
   using Json = nlohmann::ordered_json;
   const Json summary{{"source", absolute_source(source_text)},
                      {"estimator", "swf"},
@@ -87,17 +106,17 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
                      {"error", error},
                      {"errors", error.empty() ? Json::array() : Json::array({error})},
                      {"frames", frames},
-                     {"tracked", smoothed.size()},
-                     {"lost", frames - smoothed.size()},
+                     {"tracked", tracked},
+                     {"lost", frames - tracked},
                      {"restarts", filter.restarts()},
                      {"points", points.size()},
-                     {"wall_seconds", wall.count()},
+                     {"wall_seconds", timing.wall_seconds},
                      {"mean_ms", mean_ms},
-                     {"slowest_ms", slowest_ms},
+                     {"slowest_ms", timing.slowest_ms},
                      {"notes", source.report().notes}};
   write_file(folder / "summary.json", text_of_json(summary, 2) + "\n");
   fmt::print("{} frames, {} tracked, {} restarts, {} points; {:.1f} ms a frame, slowest {:.1f}; {}\n", frames,
-             smoothed.size(), filter.restarts(), points.size(), mean_ms, slowest_ms, folder.string());
+             tracked, filter.restarts(), points.size(), mean_ms, timing.slowest_ms, folder.string());
   for (const std::string& note : source.report().notes) fmt::print("note        {}\n", note);
   if (!source.error().empty()) throw IoError(error);
   if (!error.empty()) throw std::runtime_error(error);

@@ -21,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/median.hpp"
 #include "bench/engine/hardships.hpp"
 #include "engine/engine.hpp"
 #include "evaluation/evaluation.hpp"
@@ -80,12 +81,9 @@ struct Outcome {
   std::vector<PoseError> poses;    ///< relative to the frame's reference keyframe
 };
 
+/// -1 of none.
 double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return -1;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  return values.empty() ? -1 : twofold::quantile(values, share, QuantileRank::kLower);
 }
 
 /// The middle of an image of this size.

@@ -21,5 +21,16 @@ TEST(Median, IsZeroOfNone) {
   EXPECT_EQ(median(std::span<double>()), 0);
 }
 
+TEST(Quantile, IsOneOfTheValues) {
+  std::vector<double> values{5, 1, 4, 2, 3, 6};
+  EXPECT_EQ(quantile(values, 0, QuantileRank::kLower), 1);
+  EXPECT_EQ(quantile(values, 1, QuantileRank::kLower), 6);
+  EXPECT_EQ(quantile(values, 0.5, QuantileRank::kLower), 3);  // between 3 and 4
+  EXPECT_EQ(quantile(values, 0.5, QuantileRank::kNearest), 4);
+  EXPECT_EQ(quantile(values, 0.25, QuantileRank::kLower), 2);  // a quarter of the way from 2 to 3
+  EXPECT_EQ(quantile(values, 0.25, QuantileRank::kNearest), 2);
+  EXPECT_EQ(quantile(std::span<double>(), 0.5, QuantileRank::kNearest), 0);
+}
+
 }  // namespace
 }  // namespace twofold

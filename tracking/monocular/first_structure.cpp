@@ -42,16 +42,9 @@ std::vector<Vector2> at_mid_exposure(const PinholeCamera& camera, const std::vec
   return result;
 }
 
-double quantile(std::vector<double> values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 /// Between the values that a tenth each lie below and above.
-double extent(const std::vector<double>& values) {
-  return quantile(values, 0.9) - quantile(values, 0.1);
+double extent(std::vector<double> values) {
+  return quantile(values, 0.9, QuantileRank::kNearest) - quantile(values, 0.1, QuantileRank::kNearest);
 }
 
 double median_flow(const CornerViews& views) {
@@ -148,7 +141,7 @@ class FirstStructureEstimator {
     std::vector<double> sheared;
     for (std::size_t i = 0; i < first.size(); ++i)
       sheared.push_back((last[i] - views_.last[i] - first[i] + views_.first[i]).norm());
-    const double most = quantile(std::move(sheared), kMostSheared);
+    const double most = quantile(sheared, kMostSheared, QuantileRank::kNearest);
     return static_cast<int>(std::clamp(std::ceil(most / options_.rotation_px), 1.0, 1.0 * kMostReadouts));
   }
 
@@ -347,7 +340,7 @@ class FirstStructureEstimator {
     }
     const auto all = static_cast<double>(v.size());
     if (static_cast<double>(v_still.size()) <= options_.max_still_share * all) return false;
-    return extent(v_still) > options_.fixed_strip * extent(v);
+    return extent(std::move(v_still)) > options_.fixed_strip * extent(std::move(v));
   }
   [[nodiscard]] bool stands(std::size_t i) const {
     const auto near = [&](const Vector2& uv) { return (uv - views_.first[i]).norm() < options_.rotation_px; };
@@ -371,7 +364,7 @@ class FirstStructureEstimator {
     if (static_cast<int>(errors.size()) < options_.min_points)
       return tl::unexpected(LostCause::kNoCommonMotion);
     if (static_cast<int>(depths.size()) < options_.min_points ||
-        quantile(std::move(errors), options_.near_share) > options_.max_depth_error)
+        quantile(errors, options_.near_share, QuantileRank::kNearest) > options_.max_depth_error)
       return tl::unexpected(LostCause::kTooLittleParallax);
     const double unit = median(std::span(depths));
     const SE3& T_last_first = views.views[0].T_c_a;
