@@ -13,6 +13,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/check.hpp"
+#include "base/option_check.hpp"
 #include "engine/thrown.hpp"
 
 namespace twofold {
@@ -41,6 +43,14 @@ void take_time_slice(std::chrono::nanoseconds slice) {
 }
 
 }  // namespace
+
+std::string WorkerOptions::invalid_reason() const {
+  OptionCheck check;
+  if (cpu) check.at_least("cpu", *cpu, 0);
+  if (fifo_priority) check.within("fifo_priority", *fifo_priority, 1, 99);
+  if (time_slice) check.within("time_slice", static_cast<double>(time_slice->count()), 100, 100'000);
+  return check.reason();
+}
 
 std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
   std::vector<std::string> notes;
@@ -100,6 +110,7 @@ tl::expected<void, std::string> lock_memory() {
 
 Worker::Worker(WorkerOptions options, std::function<void(std::stop_token)> body)
     : options_(std::move(options)) {
+  TWOFOLD_CHECK(options_.invalid_reason().empty(), "worker options");
   thread_ = std::jthread([this, body = std::move(body)](const std::stop_token& stop) { run(stop, body); });
   started_.wait(false, std::memory_order_acquire);
 }

@@ -20,6 +20,10 @@ struct WorkerOptions {
   /// the place of one with a longer slice at once, and shares stay as they are (EEVDF, Linux 6.12). Older
   /// kernels give all threads the same slice, about 3 ms: that long a frame may wait behind the mapper.
   std::optional<std::chrono::microseconds> time_slice = std::nullopt;
+
+  /// Empty when valid; otherwise names the field, the rule and the value. Whether the system grants what is
+  /// valid shows when a thread asks for it.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 constexpr std::chrono::microseconds kPromptSlice{
@@ -27,7 +31,7 @@ constexpr std::chrono::microseconds kPromptSlice{
 constexpr std::chrono::microseconds kPatientSlice{20000};  ///< for threads that work in the background
 
 /// Applies the options to the calling thread. Returns one line for each wish that was not granted, saying why
-/// and what to do; the thread runs on without it.
+/// and what to do; the thread runs on without it. Options that are not valid are refused likewise.
 [[nodiscard]] std::vector<std::string> configure_this_thread(const WorkerOptions& options);
 /// Lets the calling thread run when the others leave time.
 void yield_to_other_threads();
@@ -38,8 +42,8 @@ void yield_to_other_threads();
 /// function and is reported by join.
 class Worker {
  public:
-  /// Starts the thread and returns when its options are applied. Throws std::system_error when no thread can
-  /// be made.
+  /// Starts the thread and returns when its options, which must be valid, are applied. Throws
+  /// std::system_error when no thread can be made.
   Worker(WorkerOptions options, std::function<void(std::stop_token)> body);
   /// Requests a stop and joins.
   ~Worker();

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "base/check.hpp"
+#include "base/option_check.hpp"
 #include "geometry/symmetric_solve.hpp"
 #include "surface/triangle_grid.hpp"
 
@@ -69,9 +70,13 @@ SE3 fit_surface(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMe
   return T;
 }
 
+std::string SurfaceComparisonOptions::invalid_reason() const {
+  return OptionCheck().above("threshold", threshold, 0).above("spacing", spacing, 0).reason();
+}
+
 SurfaceComparison compare_surfaces(const TriangleMesh& estimate, const SE3& T_w_e, const TriangleMesh& truth,
                                    const TriangleMesh& seen, const SurfaceComparisonOptions& options) {
-  TWOFOLD_CHECK(options.threshold > 0 && options.spacing > 0, "valid options of the comparison");
+  TWOFOLD_CHECK(options.invalid_reason().empty(), "options of the comparison");
   TriangleMesh moved;
   moved.triangles = estimate.triangles;
   moved.positions.reserve(estimate.positions.size());

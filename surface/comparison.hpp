@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "geometry/se3.hpp"
@@ -10,6 +11,9 @@ namespace twofold {
 struct SurfaceComparisonOptions {
   double threshold = 0.01;  ///< what counts as near, for completeness, precision and F-score [m] > 0
   double spacing = 0.005;   ///< of the points that are compared [m] > 0
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
 };
 
 struct DistanceStatistics {

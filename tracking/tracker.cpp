@@ -10,7 +10,6 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kMaxPoints = 3000;
 constexpr std::size_t kMaxImmaturePoints = 1200;
 constexpr std::size_t kMostPendingKeyframes = 12;  // beyond KeyframeDecisionOptions::max_pending: urgent ones
 constexpr std::size_t kMaxAlignmentPoints = 240;
@@ -31,7 +30,6 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       motion_(options_.motion_model),
       shutter_(rig_, motion_, static_cast<std::size_t>(options.local_map.max_searches), options.shutter),
       correction_(rig, options.fixed),
-      local_map_(kMaxPoints),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
       local_map_search_(rig_, options_, local_map_, correction_.fixed()),
       immature_points_(kMaxImmaturePoints, kMostPendingKeyframes),

@@ -10,6 +10,8 @@
 
 namespace twofold {
 
+/// Choices, none of which can be invalid by itself; what does not go together with a source, open_source
+/// says.
 struct SourceOptions {
   /// Overrides the one in the recording (docs/calibration.md).
   std::optional<std::filesystem::path> calibration;

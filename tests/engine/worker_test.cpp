@@ -9,14 +9,18 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
+#include <string>
+#include <thread>
 #include <vector>
 
 #include "engine/clock.hpp"
 #include "engine/health.hpp"
 #include "engine/parking.hpp"
+#include "fixtures/option_rules.hpp"
 
 namespace twofold {
 namespace {
@@ -66,13 +70,29 @@ TEST(Worker, NamesItsThread) {
 
 TEST(Worker, RefusedWishesAreToldAndTheThreadRunsOn) {
   std::atomic<bool> ran{false};
-  Worker worker({.name = "tracker", .cpu = CPU_SETSIZE - 1, .fifo_priority = 1000},
-                [&](const std::stop_token&) { ran = true; });
-  ASSERT_EQ(worker.notes().size(), 2u);
+  Worker worker({.name = "tracker", .cpu = CPU_SETSIZE - 1}, [&](const std::stop_token&) { ran = true; });
+  ASSERT_EQ(worker.notes().size(), 1u);
   EXPECT_NE(worker.notes()[0].find("tracker: running on CPU"), std::string::npos) << worker.notes()[0];
-  EXPECT_NE(worker.notes()[1].find("SCHED_FIFO priority 1000"), std::string::npos) << worker.notes()[1];
   EXPECT_TRUE(worker.join());
   EXPECT_TRUE(ran);
+}
+
+/// A priority that there is may be granted to whoever runs the tests.
+TEST(Worker, RefusedPrioritiesAreTold) {
+  std::vector<std::string> notes;
+  std::thread([&] { notes = configure_this_thread({.name = "tracker", .fifo_priority = 1000}); }).join();
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("tracker: SCHED_FIFO priority 1000"), std::string::npos) << notes[0];
+}
+
+TEST(WorkerOptions, SayWhyTheyAreInvalid) {
+  using std::chrono::microseconds;
+  testing::expect_rules<WorkerOptions>(
+      {{"cpu", [](auto& o) { o.cpu = -1; }},
+       {"fifo_priority", [](auto& o) { o.fifo_priority = 100; }},
+       {"time_slice", [](auto& o) { o.time_slice = microseconds(99); }},
+       {"time_slice", [](auto& o) { o.time_slice = microseconds(100'001); }}});
+  EXPECT_EQ((WorkerOptions{.cpu = 0, .fifo_priority = 99, .time_slice = kPatientSlice}).invalid_reason(), "");
 }
 
 TEST(Worker, PinsToACpuItMayUse) {

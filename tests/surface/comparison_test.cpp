@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "fixtures/option_rules.hpp"
 #include "surface/triangle_grid.hpp"
 
 namespace twofold {
@@ -44,6 +45,11 @@ TEST(CompareSurfaces, ShiftAndHalfAreFound) {
   EXPECT_NEAR(found.vertex_errors[0], 0.004, 1e-5);
   const SE3 T_w_e(SO3(), Vector3(0, 0, -0.004));
   EXPECT_NEAR(compare_surfaces(half, T_w_e, truth, half).accuracy.mean, 0, 1e-5);
+}
+
+TEST(CompareSurfaces, OptionsSayWhyTheyAreInvalid) {
+  testing::expect_rules<SurfaceComparisonOptions>(
+      {{"threshold", [](auto& o) { o.threshold = 0; }}, {"spacing", [](auto& o) { o.spacing = -0.1; }}});
 }
 
 TEST(FitSurface, FindsTheRigidMotion) {

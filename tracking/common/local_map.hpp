@@ -30,7 +30,11 @@ struct AnchorPose {
 /// (eq. 6.5), and the immature points. Pointers are valid until map, reference or immature points change.
 class LocalMap {
  public:
-  explicit LocalMap(std::size_t capacity);
+  /// Room for the points around a reference keyframe and its neighbours: some ten times as many as a frame
+  /// searches.
+  static constexpr std::size_t kMaxPoints = 3000;
+
+  explicit LocalMap(std::size_t capacity = kMaxPoints);
 
   /// Collects the points around `reference`, a keyframe of the graph or a pending one, unless nothing of that
   /// has changed since the last time.

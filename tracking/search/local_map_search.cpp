@@ -7,14 +7,8 @@
 #include "imaging/view_change.hpp"
 
 namespace twofold {
-namespace {
-
-constexpr std::size_t kMaxCandidates = 3000;
-
-}  // namespace
-
 SearchOutcome::SearchOutcome(const Rig& rig, const TrackerOptions& options)
-    : candidates(rig.camera.width, rig.camera.height, kMaxCandidates) {
+    : candidates(rig.camera.width, rig.camera.height, LocalMap::kMaxPoints) {
   const auto searches = static_cast<std::size_t>(options.local_map.max_searches);
   matches.reserve(searches);
   missed.reserve(searches);
