@@ -11,8 +11,8 @@ namespace twofold {
 
 /// A point known in a reference frame and its measurement in the frame whose pose is sought.
 struct MotionObservation {
-  Vector3 x_ref{0, 0, 1};      ///< point in the reference frame [m]
-  StereoPixelF pixel{0, 0, 0};   ///< u_r is ignored unless weighs_right(information)
+  Vector3 x_ref{0, 0, 1};                ///< point in the reference frame [m]
+  StereoPixelF pixel{0, 0, 0};           ///< u_r is ignored unless weighs_right(information)
   Eigen::Vector3f information{1, 1, 1};  ///< diagonal [1/px^2]; see observe_point
   bool inlier = true;                    ///< set by the solver: chi2 below the threshold at the result
 };

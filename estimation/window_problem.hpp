@@ -24,7 +24,7 @@ struct WindowProblem {
   /// That a pose sees a point, with the measurement; those of one point stand together.
   struct Observation {
     int pose = 0;
-    StereoPixelF pixel{0, 0, 0};   ///< u_r is ignored unless weighs_right(information)
+    StereoPixelF pixel{0, 0, 0};           ///< u_r is ignored unless weighs_right(information)
     Eigen::Vector3f information{1, 1, 1};  ///< diagonal of Lambda_z [1/px^2]
   };
   struct Point {

@@ -98,7 +98,8 @@ std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
   if (rig.kind == SensorKind::kStereo && !images.right.empty()) {
     const double u_r = match.pixel.x() - rig.disparity_from_depth(warp->depth);
     const double predicted = to_level(u_r, *level);
-    match.pixel.z() = search_right(patch, images.right.level(*level), aligned->uv, predicted, *level, options);
+    match.pixel.z() =
+        search_right(patch, images.right.level(*level), aligned->uv, predicted, *level, options);
   } else if (rig.kind == SensorKind::kRgbd && !images.depth.empty()) {
     match.pixel.z() = right_from_depth(images.depth, rig, match.pixel.x(), match.pixel.y());
   }

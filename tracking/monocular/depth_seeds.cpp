@@ -128,7 +128,7 @@ ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const 
   point.psi = seed.filter.psi;
   point.psi.z() = std::max(point.psi.z(), kFarthest / median_depth);
   point.anchor_observation.pixel = {seed.appearance.uv.x(), seed.appearance.uv.y(),
-                                static_cast<float>(Rig::kNoRight)};
+                                    static_cast<float>(Rig::kNoRight)};
   point.anchor_observation.level = seed.appearance.level;
   move_to_mid_exposure(rig_, seed.shutter, point);
   return point;
