@@ -35,7 +35,7 @@ class DepthRegressionTest : public ::testing::Test {
     writer_.add_point(id, point);
     Observation observation;
     observation.point = id;
-    observation.z = {0, 0, 0};  // where it was measured makes no difference
+    observation.pixel = {0, 0, 0};  // where it was measured makes no difference
     writer_.add_observations(kSeenFrom, std::span(&observation, 1));
   }
   std::optional<double> depth_at(const Vector2& uv) {
@@ -104,10 +104,10 @@ TEST_F(DepthRegressionTest, DepthsAreWrittenAsASecondCameraWouldMeasureThem) {
   view.corners[1].uv = {100, 400};
   regression_.learn(writer_.graph(), kSeenFrom);
   regression_.fill(view, 0.5);
-  ASSERT_EQ(view.z.size(), 2U);
-  EXPECT_NEAR(view.z[0].z(), 300 - 400 * 0.5 / 4, 1e-4);
-  EXPECT_EQ(view.z[0].head<2>(), view.corners[0].uv);
-  EXPECT_TRUE(std::isnan(view.z[1].z()));
+  ASSERT_EQ(view.pixels.size(), 2U);
+  EXPECT_NEAR(view.pixels[0].z(), 300 - 400 * 0.5 / 4, 1e-4);
+  EXPECT_EQ(view.pixels[0].head<2>(), view.corners[0].uv);
+  EXPECT_TRUE(std::isnan(view.pixels[1].z()));
 }
 
 }  // namespace

@@ -173,11 +173,11 @@ TEST_F(WindowBuilderTest, OneCameraJudgesTheMeasurementsOfARigsMapByTheirTwoComp
   const PointId right_off = point({k(7), k(8), k(9)});
   const PointId between = point({k(7), k(8), k(9)});
   Observation wrong = *find_observation(writer_.graph().keyframe(k(9)), right_off);
-  wrong.z.z() += 20;
+  wrong.pixel.z() += 20;
   writer_.add_observations(k(9), std::span(&wrong, 1));
   wrong = *find_observation(writer_.graph().keyframe(k(9)), between);
   const float chi2 = 11.6F;  // too much for two components, not for three
-  wrong.z.y() += std::sqrt(chi2 / rig_.information(wrong.z, 0).y());
+  wrong.pixel.y() += std::sqrt(chi2 / rig_.information(wrong.pixel, 0).y());
   writer_.add_observations(k(9), std::span(&wrong, 1));
   std::vector<WindowBuilder::Outlier> outliers;
   const auto points = [&] {

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "fixtures/rendered_scene.hpp"
+#include "tracking/effort_bounds.hpp"
 #include "tracking/search/point_starter.hpp"
 
 namespace twofold {
@@ -23,7 +24,7 @@ class LocalMapSearchTest : public ::testing::Test {
     scene_.render(SE3(), 2, at_keyframe);
     scene_.render(T_true_, 2, now_);
     immature_.add_pending({.id = kFirst, .reference = kNoKeyframe, .T_k_ref = SE3()});
-    PointStarter(rig_, options_).start(at_keyframe, kFirst, RollingShutter(), immature_);
+    PointStarter(rig_, options_.new_points, options_.search).start(at_keyframe, kFirst, RollingShutter(), immature_);
     local_map_.update(graph_, kFirst, immature_, 20);
   }
   FrameStep search(const SE3& T_c_ref, double radius_px, const EffortBounds& bounds) {
@@ -37,7 +38,7 @@ class LocalMapSearchTest : public ::testing::Test {
     return static_cast<std::size_t>(std::count_if(
         outcome_.matches.begin(), outcome_.matches.end(), [&](const SearchOutcome::Match& match) {
           const Vector2 truth = rig_.camera.project(T_true_ * local_map_.points()[match.point].x_ref);
-          return (match.found.z.head<2>() - truth).norm() < 1;
+          return (match.found.pixel.head<2>() - truth).norm() < 1;
         }));
   }
 
@@ -101,7 +102,7 @@ TEST_F(LocalMapSearchTest, FindsPointsInOtherLight) {
   now_.right.build(0.3 * now_.right.level(0));
   (void)search(T_true_, 4);
   EXPECT_GT(static_cast<double>(right_matches()), 0.85 * static_cast<double>(local_map_.points().size()));
-  options_.light_missed_share = 2;  // more than there are
+  options_.local_map.light_missed_share = 2;  // more than there are
   (void)search(T_true_, 4);
   EXPECT_EQ(right_matches(), 0U) << "their patches are of another light";
 }

@@ -5,6 +5,7 @@
 
 #include "fixtures/rendered_scene.hpp"
 #include "graph/graph_writer.hpp"
+#include "tracking/effort_bounds.hpp"
 
 namespace twofold {
 namespace {
@@ -18,7 +19,7 @@ class NewPointsTest : public ::testing::Test {
   static constexpr int kMany = 15;  // points started again, of those that were not found
 
   explicit NewPointsTest(SensorKind kind = SensorKind::kStereo) : rig_(test_rig(kind, 320, 240)) {
-    options_.max_new_points = 60;
+    options_.new_points.max_points = 60;
     RenderedScene(rig_, {3, 2, 5}, 21).render(SE3(), 2, images_);
   }
 
