@@ -11,13 +11,6 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kPairPoints = 160;  // of those that both frames see: bounds the work
-constexpr int kPoseIterations = 3;
-// Of its depth in the frame before: what comes so near leaves the image.
-constexpr double kNearestShare = 0.05;
-constexpr int kFirstGuess = 8;      // pairs after which pairs are linearised at the estimate
-constexpr int kMeanIntervals = 32;  // the usual interval is the mean of about so many
-
 /// Square root of the information of a pixel that an error of depth moves by `slide` [px], over its weight
 /// without one: (I + weight slide slide^T)^(-1/2).
 Eigen::Matrix2d without_slide(const Vector2& slide, double weight) {
@@ -53,6 +46,11 @@ std::string ReadoutOptions::invalid_reason() const {
       .above("huber_sigmas", huber_sigmas, 0)
       .at_least("min_turn_change", min_turn_change, 0)
       .share("max_jitter", max_jitter)
+      .at_least("pair_points", pair_points, 6)
+      .at_least("pose_iterations", pose_iterations, 1)
+      .above("nearest_share", nearest_share, 0)
+      .at_least("mean_intervals", mean_intervals, 4)
+      .at_least("first_guess", first_guess, 1)
       .at_least("pair_sigma", pair_sigma, 0)
       .above("pair_huber", pair_huber, 0)
       .at_least("min_pairs", min_pairs, 1)
@@ -77,9 +75,9 @@ bool ReadoutEstimator::regular(std::int64_t interval_ns) {
   if (!(interval > 0)) return false;
   const bool usual = intervals_ == 0 || std::abs(interval - period_) < options_.max_jitter * period_;
   // The first interval may have been the unusual one.
-  if (!usual && intervals_ < kMeanIntervals / 4) intervals_ = 0;
+  if (!usual && intervals_ < options_.mean_intervals / 4) intervals_ = 0;
   if (!usual && intervals_ > 0) return false;
-  intervals_ = std::min(intervals_ + 1, kMeanIntervals);
+  intervals_ = std::min(intervals_ + 1, options_.mean_intervals);
   period_ += (interval - period_) / intervals_;
   return usual;
 }
@@ -137,7 +135,8 @@ void ReadoutEstimator::join_points(std::size_t age) {
                      p->depth_error});
   }
   // Keys go with the keyframes that points come from: every second, third, ... point is of all of them.
-  const std::size_t stride = (pair_.size() + kPairPoints - 1) / kPairPoints;
+  const auto pair_points = static_cast<std::size_t>(options_.pair_points);
+  const std::size_t stride = (pair_.size() + pair_points - 1) / pair_points;
   for (std::size_t n = 0; n * stride < pair_.size(); ++n) pair_[n] = pair_[n * stride];
   if (stride > 1) pair_.resize((pair_.size() + stride - 1) / stride);
 }
@@ -150,7 +149,7 @@ ReadoutEstimator::PairEquations ReadoutEstimator::equations(const SE3& T_cur_pre
   for (const PairPoint& point : pair_) {
     const Vector3 x_prev = moved_by<2>(-point.row_prev * readout_ * before, point.x_prev);
     const Vector3 x = moved_by<2>(point.row * readout_ * now, R * x_prev + T_cur_prev.translation());
-    if (!(x.z() > kNearestShare * point.x_prev.z())) continue;
+    if (!(x.z() > options_.nearest_share * point.x_prev.z())) continue;
     const double inv_z = 1 / x.z(), a = camera.fx * inv_z, c = camera.fy * inv_z;
     const double u = x.x() * inv_z, v = x.y() * inv_z;
     Vector2 r = point.uv - Vector2(camera.fx * u + camera.cx, camera.fy * v + camera.cy);
@@ -180,7 +179,7 @@ void ReadoutEstimator::solve_pair(std::size_t age) {
   join_points(age);
   if (pair_.size() < static_cast<std::size_t>(options_.min_points)) return;
   const Velocity xi = frame(age + 1).T_cur_prev.log() / period_;
-  for (int i = 0; i < kPoseIterations; ++i) {
+  for (int i = 0; i < options_.pose_iterations; ++i) {
     const PairEquations sum = equations(seen.T_cur_prev, xi, xi);
     const Eigen::LLT<Matrix6> llt(sum.H);
     const Vector6 step = llt.solve(-sum.g);
@@ -205,7 +204,7 @@ void ReadoutEstimator::add_pair() {
   if (!(h > 0) || !std::isfinite(h) || !std::isfinite(gradient)) return;
   const double readout = readout_ - gradient / h;
   h /= 1 + h * options_.pair_sigma * options_.pair_sigma;
-  if (estimate_.pairs >= kFirstGuess) {
+  if (estimate_.pairs >= options_.first_guess) {
     h *= std::min(1.0, options_.pair_huber / (1e-9 + std::abs(readout - estimate_.seconds) * std::sqrt(h)));
   }
   const double b = h * readout;
@@ -217,7 +216,7 @@ void ReadoutEstimator::add_pair() {
   estimate_.significant =
       estimate_.pairs >= options_.min_pairs && estimate_.seconds < (1 + options_.max_jitter) * period_ &&
       estimate_.seconds > options_.significant_sigmas * std::hypot(estimate_.sigma, options_.finest_sigma);
-  if (estimate_.pairs >= kFirstGuess) readout_ = std::clamp(estimate_.seconds, 0.0, period_);
+  if (estimate_.pairs >= options_.first_guess) readout_ = std::clamp(estimate_.seconds, 0.0, period_);
 }
 
 }  // namespace twofold

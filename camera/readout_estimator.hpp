@@ -38,8 +38,14 @@ struct ReadoutOptions {
   double min_turn_change =
       0.05;  ///< of the angular velocity [rad/s]: with less there is nothing to learn, >= 0
   double max_jitter =
-      0.35;  ///< of the time between frames, as a share of it: beyond, one is missing, in (0, 1]
+      0.35;               ///< of the time between frames, as a share of it: beyond, one is missing, in (0, 1]
+  int pair_points = 160;  ///< of those that both see, that count, >= 6: bounds the work
+  int pose_iterations = 3;  ///< of a pair, >= 1
+  double nearest_share =
+      0.05;                 ///< of its depth in the frame before: what comes so near leaves the image, > 0
+  int mean_intervals = 32;  ///< the usual interval is the mean of about so many, >= 4
   // All pairs together.
+  int first_guess = 8;        ///< pairs after which pairs are linearised at the estimate, >= 1
   double pair_sigma = 0.003;  ///< of one pair's answer, beside its points' noise [s] >= 0
   double pair_huber = 2;      ///< standard deviations beyond which a pair counts less, > 0
   int min_pairs = 8;          ///< for a belief, >= 1: what is mapped before is bent and stays so
@@ -77,8 +83,8 @@ struct ReadoutOptions {
 /// The standard deviation is that of the scatter of pairs about the common estimate, not of the pixels: what
 /// is wrong in a pair (velocity, depth) is wrong for all of its points.
 ///
-/// No allocation after construction; per frame at most three poses from kPairPoints points each. Once the
-/// estimate is exact enough nothing more is done.
+/// No allocation after construction; per frame at most pose_iterations poses from pair_points points each.
+/// Once the estimate is exact enough nothing more is done.
 class ReadoutEstimator {
  public:
   /// @param max_points  that a frame sees at most

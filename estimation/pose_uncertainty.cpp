@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/option_check.hpp"
 #include "estimation/observation_model.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "geometry/so3.hpp"
@@ -13,9 +14,6 @@
 namespace twofold {
 namespace {
 
-constexpr double kNewestRegions = 0.25;  // share of the newest value in the smoothed one
-constexpr double kNewestSplit = 0.1;
-constexpr double kOfFrame = 0.5;  // share of the frame's own residuals in its covariance
 constexpr int kPoseDimensions = 6;
 
 void smooth(std::optional<double>& mean, double newest, double share) {
@@ -41,6 +39,14 @@ Matrix6 about_pose(const ObservationTerms& terms, const Vector3& x) {
 
 }  // namespace
 
+std::string PoseUncertaintyOptions::invalid_reason() const {
+  return OptionCheck()
+      .share("newest_regions", newest_regions)
+      .share("newest_split", newest_split)
+      .within("of_frame", of_frame, 0, 1)
+      .reason();
+}
+
 void PoseUncertainty::update(std::span<const MotionObservation> observations, const MotionOnlyResult& motion,
                              const MotionOnlyOptions& options, bool all_agree) {
   const ObservationModel model(rig_);
@@ -57,12 +63,12 @@ void PoseUncertainty::update(std::span<const MotionObservation> observations, co
   of_frame_.reset();
   if (!all_agree) return;
   if (const auto factor = sums_.variance_factor(motion.information))
-    smooth(regions_, *factor, kNewestRegions);
+    smooth(regions_, *factor, options_.newest_regions);
   of_frame_ = sums_.jackknife(motion.information);
 }
 
 void PoseUncertainty::add_split(double factor) {
-  smooth(split_, factor, kNewestSplit);
+  smooth(split_, factor, options_.newest_split);
 }
 
 Matrix6 PoseUncertainty::covariance(const Matrix6& information) const {
@@ -70,7 +76,7 @@ Matrix6 PoseUncertainty::covariance(const Matrix6& information) const {
   if (!of_frame_ || !regions_) return usual;
   // What splits show and regions do not is missing in the frame's own part by the same factor.
   const double hidden = variance_factor() / std::max(*regions_, std::numeric_limits<double>::min());
-  return (1 - kOfFrame) * usual + kOfFrame * hidden * *of_frame_;
+  return (1 - options_.of_frame) * usual + options_.of_frame * hidden * *of_frame_;
 }
 
 std::optional<double> split_factor(const Matrix6& information_of_all, const Matrix6& information_of_some,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "camera/rig.hpp"
 #include "estimation/motion_only.hpp"
@@ -10,19 +11,29 @@
 
 namespace twofold {
 
+struct PoseUncertaintyOptions {
+  double newest_regions = 0.25;  ///< share of the newest frame in what regions say, in (0, 1]
+  double newest_split = 0.1;     ///< the same of splits, of which there are fewer
+  double of_frame = 0.5;         ///< share of a frame's own residuals in its covariance, in [0, 1]
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 /// How well poses are known, as residuals say.
 ///
 /// (J^T W J)^-1 takes every measurement to err by itself and as the rig says. Both are wrong: noise depends
 /// on camera, light and texture, and what lies side by side errs together, because its points hang on the
 /// same keyframes and lens, shutter and depth sensor bend regions and not pixels. Residuals show both. The
 /// size of what they show is smoothed over frames; one frame's regions are too few for a matrix. But where a
-/// frame hangs on few measurements that err, it alone shows it, so that half of the covariance is the frame's
-/// own (RegionSums::jackknife).
+/// frame hangs on few measurements that err, it alone shows it, so that a part of the covariance is the
+/// frame's own (RegionSums::jackknife).
 ///
 /// What all residuals of a frame hide, an error that the pose itself takes up, is not in it.
 class PoseUncertainty {
  public:
-  explicit PoseUncertainty(const Rig& rig) : rig_(rig), sums_(rig.camera) {}
+  explicit PoseUncertainty(const Rig& rig, const PoseUncertaintyOptions& options = {})
+      : rig_(rig), options_(options), sums_(rig.camera) {}
 
   /// One frame's residuals. A frame with few regions says nothing. No allocation.
   /// @param observations  as the solver, with `options`, left them, of which `motion` is the result
@@ -44,6 +55,7 @@ class PoseUncertainty {
 
  private:
   Rig rig_;
+  PoseUncertaintyOptions options_;
   RegionSums sums_;
   std::optional<double> regions_, split_;
   std::optional<Matrix6> of_frame_;

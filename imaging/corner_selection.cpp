@@ -58,7 +58,7 @@ void CornerSelector::select(const ImagePyramid& pyramid, std::vector<DescribedCo
 /// Low contrast is for want of light there, not of texture: fainter corners instead of those that are
 /// missing, where the pyramid has averaged the noise away.
 void CornerSelector::add_faint(const ImagePyramid& pyramid, std::vector<DescribedCorner>& corners) {
-  const Bounds faint{std::max(options_.threshold / 2, 1), options_.min_score / 4};
+  const Bounds faint{options_.faint.threshold(options_.threshold), options_.faint.score(options_.min_score)};
   for (int level = 1; level < options_.levels; ++level) {
     const auto before = static_cast<std::ptrdiff_t>(corners.size());
     if (before >= options_.wanted) return;

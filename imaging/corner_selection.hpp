@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -8,11 +9,26 @@
 
 namespace twofold {
 
+/// What a corner must be in the dark (is_dark): contrast is low there for want of light, and noise is not.
+struct FaintCornerOptions {
+  double threshold_share = 0.5;  ///< of the usual FAST threshold, in (0, 1]
+  double score_share = 0.25;     ///< of the usual least score, in (0, 1]
+
+  [[nodiscard]] int threshold(int usual) const {
+    return std::max(static_cast<int>(threshold_share * usual), 1);
+  }
+  [[nodiscard]] float score(float usual) const { return static_cast<float>(score_share) * usual; }
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 struct CornerSelectionOptions {
   int wanted = 500;     ///< corners of a keyframe at most, over all levels (thesis 6.4.2: 500 to 2000)
   int levels = 3;       ///< pyramid levels searched, in [1, 3]
   int threshold = 8;    ///< FAST [grey]
   float min_score = 6;  ///< Shi-Tomasi, see Corner
+  FaintCornerOptions faint = {};  ///< in the dark
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -21,8 +37,7 @@ struct CornerSelectionOptions {
 /// Picks the corners of an image that describe its place: each level is parted into cells, each cell gives
 /// its best corner, so that a busy corner of the image does not speak for the rest; the strongest are kept.
 /// A level gets cells in proportion to its share of the corners wanted, half as many as the level below. In
-/// the dark, where corners are missing, higher levels give fainter ones in their place: at half the threshold
-/// and a quarter of the score.
+/// the dark, where corners are missing, higher levels give fainter ones in their place.
 ///
 /// Keeps buffers between calls; one instance a thread.
 class CornerSelector {

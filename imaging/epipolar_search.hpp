@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "camera/pinhole.hpp"
 #include "geometry/se3.hpp"
@@ -25,12 +26,24 @@ struct EpipolarStretch {
   [[nodiscard]] float length_px() const { return (near - far).norm(); }
 };
 
+struct EpipolarSearchOptions {
+  float step_px = 0.8F;    ///< between the places that are compared [level px] > 0
+  float beside_px = 4;     ///< nearer than this two are the same place [level px] >= 0
+  float beyond_px = 1.5F;  ///< past the ends, that sub-pixel search may go [level px] >= 0
+  /// Of the depth at infinity's ray, that a near point keeps: nearer ones leave the image, in (0, 1].
+  double nearest_share = 0.2;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 /// @param ray_a  of the point in its anchor frame, at depth 1
 /// @return nothing when all of it is behind the view or its scale is too different
 [[nodiscard]] std::optional<EpipolarStretch> epipolar_stretch(const PinholeCamera& camera,
                                                               const PointAppearance& appearance,
                                                               const Vector3& ray_a, const SE3& T_c_a,
-                                                              const InverseDepthRange& range);
+                                                              const InverseDepthRange& range,
+                                                              const EpipolarSearchOptions& line = {});
 
 /// Looks for a point of unknown depth in a new view (thesis 3.4.4): compares its patch along the stretch,
 /// refuses what is found at two places, and refines to sub-pixel; the result lies on the line. No allocation;
@@ -38,6 +51,7 @@ struct EpipolarStretch {
 [[nodiscard]] std::optional<PointMatch> find_along(const ImagePyramid& images,
                                                    const PointAppearance& appearance,
                                                    const EpipolarStretch& stretch,
-                                                   const GuidedSearchOptions& options);
+                                                   const GuidedSearchOptions& options,
+                                                   const EpipolarSearchOptions& line = {});
 
 }  // namespace twofold

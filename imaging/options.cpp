@@ -5,12 +5,17 @@
 
 namespace twofold {
 
+std::string FaintCornerOptions::invalid_reason() const {
+  return OptionCheck().share("threshold_share", threshold_share).share("score_share", score_share).reason();
+}
+
 std::string CornerSelectionOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("wanted", wanted, 1)
       .within("levels", levels, 1, 3)
       .at_least("threshold", threshold, 1)
       .at_least("min_score", min_score, 0)
+      .nested("faint", faint.invalid_reason())
       .reason();
 }
 

@@ -4,22 +4,29 @@
 #include <cmath>
 
 #include "base/median.hpp"
+#include "base/option_check.hpp"
 #include "camera/measurement.hpp"
 #include "imaging/patch.hpp"
 
 namespace twofold {
 namespace {
 
-constexpr int kBorder = 12;            // [px] room for the patch and its search
-constexpr int kThreshold = 10;         // FAST [grey]
-constexpr float kMinScore = 12;        // Shi-Tomasi [grey^2/px^2]
-constexpr std::size_t kFewest = 16;    // corners found in both images
-constexpr double kWidestSpread = 0.6;  // [px] half the distance between quartiles: more is no common offset
-constexpr double kNearWholeOffset = 0.7;  // [px] where most corners are found, they are found about there
+constexpr int kBorder = 12;  // [px] room for the patch and its search
 
 }  // namespace
 
-RowOffsetMeter::RowOffsetMeter(const Rig& rig, int corners) : rig_(rig) {
+std::string RowOffsetOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("corner_threshold", corner_threshold, 1)
+      .at_least("min_corner_score", min_corner_score, 0)
+      .at_least("min_matches", min_matches, 1)
+      .above("max_spread_px", max_spread_px, 0)
+      .above("max_apart_px", max_apart_px, 0)
+      .reason();
+}
+
+RowOffsetMeter::RowOffsetMeter(const Rig& rig, int corners, const RowOffsetOptions& options)
+    : rig_(rig), options_(options) {
   const double area = static_cast<double>(rig.camera.width) * rig.camera.height;
   cell_px_ = std::max({8, CellGrid::smallest_cell_px(rig.camera.width),
                        4 * static_cast<int>(std::lround(std::sqrt(area / corners) / 4))});
@@ -38,7 +45,7 @@ std::optional<RowOffset> RowOffsetMeter::search(const cv::Mat& left, const cv::M
   std::optional<RowOffset> best;
   for (int offset = -kMost; offset <= kMost; ++offset) {
     const auto measured = measure_at(left, right, offset);
-    if (!measured || std::abs(measured->rows - offset) > kNearWholeOffset) continue;
+    if (!measured || std::abs(measured->rows - offset) > options_.max_apart_px) continue;
     if (!best || measured->matches > best->matches) best = measured;
   }
   return best;
@@ -51,7 +58,8 @@ std::optional<RowOffset> RowOffsetMeter::measure_at(const cv::Mat& left, const c
   const cv::Mat to = right.rowRange(offset > 0 ? lower : upper);
   corners_.clear();
   offsets_.clear();
-  detect_corners(from, 0, kThreshold, kMinScore, kBorder, {cell_px_, columns_, rows_, occupied_}, corners_);
+  detect_corners(from, 0, options_.corner_threshold, options_.min_corner_score, kBorder,
+                 {cell_px_, columns_, rows_, occupied_}, corners_);
   for (const Corner& corner : corners_) {
     const double u_r = right_from_row(from, to, rig_, corner.u, corner.v, 0, search_);
     Patch patch;
@@ -64,7 +72,8 @@ std::optional<RowOffset> RowOffsetMeter::measure_at(const cv::Mat& left, const c
   const auto quantile_of_offsets = [&](double share) {
     return quantile(offsets_, share, QuantileRank::kLower);
   };
-  if (offsets_.size() < kFewest || quantile_of_offsets(0.75) - quantile_of_offsets(0.25) > 2 * kWidestSpread)
+  if (static_cast<int>(offsets_.size()) < options_.min_matches ||
+      quantile_of_offsets(0.75) - quantile_of_offsets(0.25) > 2 * options_.max_spread_px)
     return std::nullopt;
   return RowOffset{offset + quantile_of_offsets(0.5), static_cast<int>(offsets_.size())};
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "camera/rig.hpp"
@@ -18,6 +19,18 @@ struct RowOffset {
   int matches = 0;  ///< corners it was measured at
 };
 
+struct RowOffsetOptions {
+  int corner_threshold = 10;    ///< FAST [grey], >= 1
+  float min_corner_score = 12;  ///< Shi-Tomasi [grey^2/px^2], >= 0
+  int min_matches = 16;         ///< corners found in both images: fewer say nothing, >= 1
+  double max_spread_px = 0.6;   ///< half the distance between quartiles: more is no common offset, > 0
+  /// From the whole offset searched with: where most corners are found, they are found about there, > 0.
+  double max_apart_px = 0.7;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 /// Measures it, at corners spread over the image. Buffers are reserved at construction; bounded work.
 class RowOffsetMeter {
  public:
@@ -25,7 +38,7 @@ class RowOffsetMeter {
   static constexpr int kMost = 4;
 
   /// @param corners  about so many are looked at, 40 to 200
-  RowOffsetMeter(const Rig& rig, int corners);
+  RowOffsetMeter(const Rig& rig, int corners, const RowOffsetOptions& options = {});
 
   /// If the rows are at most about one apart: corners are found along their row, and then aligned across it.
   /// @return nothing when few corners are found, or where they are found differs too much
@@ -37,6 +50,7 @@ class RowOffsetMeter {
   std::optional<RowOffset> measure_at(const cv::Mat& left, const cv::Mat& right, int offset);
 
   Rig rig_;
+  RowOffsetOptions options_;
   GuidedSearchOptions search_;
   int cell_px_ = 0, columns_ = 0, rows_ = 0;
   std::vector<std::uint8_t> occupied_;  ///< nothing is

@@ -9,6 +9,8 @@ namespace twofold {
 
 /// What the tracker does on a frame at this level, as said beside EffortLevel.
 [[nodiscard]] inline EffortBounds bounds_of(EffortLevel effort, const TrackerOptions& options) {
+  const EffortBoundsOptions& by = options.effort;
+  const auto part = [](double share, int whole) { return static_cast<int>(share * whole); };
   EffortBounds bounds{options.local_map.wanted_matches,
                       options.local_map.max_searches,
                       options.alignment.finest_level,
@@ -17,18 +19,22 @@ namespace twofold {
                       options.pose.motion.max_iterations,
                       options.search.refine_iterations};
   if (effort >= EffortLevel::kFewerPoints) {
-    bounds.wanted_matches = std::max(options.local_map.wanted_matches / 2, options.pose.min_inliers);
-    bounds.max_searches = std::max(options.local_map.max_searches / 2, bounds.wanted_matches);
+    bounds.wanted_matches =
+        std::max(part(by.fewer_points, options.local_map.wanted_matches), options.pose.min_inliers);
+    bounds.max_searches =
+        std::max(part(by.fewer_points, options.local_map.max_searches), bounds.wanted_matches);
   }
   if (effort >= EffortLevel::kCoarseAlignment) {
     bounds.finest_alignment_level =
-        std::min(options.alignment.finest_level + 2, options.alignment.coarsest_level);
+        std::min(options.alignment.finest_level + by.coarse_levels, options.alignment.coarsest_level);
     bounds.align_from_rest = false;
     bounds.doubts_poses = false;
   }
   if (effort >= EffortLevel::kFewerIterations) {
-    bounds.motion_iterations = std::max(options.pose.motion.max_iterations / 3, 2);
-    bounds.refine_iterations = std::max(options.search.refine_iterations / 3, 1);
+    bounds.motion_iterations =
+        std::max(part(by.fewer_iterations, options.pose.motion.max_iterations), by.min_motion_iterations);
+    bounds.refine_iterations =
+        std::max(part(by.fewer_iterations, options.search.refine_iterations), by.min_refine_iterations);
     bounds.urgent_keyframes_only = true;
   }
   return bounds;

@@ -39,8 +39,20 @@ std::string LocalMapSearchOptions::invalid_reason() const {
       .reason();
 }
 
+std::string EffortBoundsOptions::invalid_reason() const {
+  return OptionCheck()
+      .share("fewer_points", fewer_points)
+      .at_least("coarse_levels", coarse_levels, 0)
+      .share("fewer_iterations", fewer_iterations)
+      .at_least("min_motion_iterations", min_motion_iterations, 1)
+      .at_least("min_refine_iterations", min_refine_iterations, 1)
+      .reason();
+}
+
 std::string TrackerOptions::invalid_reason() const {
   return OptionCheck()
+      .nested("effort", effort.invalid_reason())
+      .nested("right_rows", right_rows.invalid_reason())
       .nested("fixed", fixed.invalid_reason())
       .nested("motion_model", motion_model.invalid_reason())
       .nested("shutter", shutter.invalid_reason())

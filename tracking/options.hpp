@@ -3,6 +3,7 @@
 #include <string>
 
 #include "imaging/guided_search.hpp"
+#include "imaging/right_rows.hpp"
 #include "tracking/common/dense_alignment.hpp"
 #include "tracking/depth/options.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
@@ -31,8 +32,23 @@ struct LocalMapSearchOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
+/// By how much each level of effort bounds a frame's work (EffortLevel); each level's bounds hold for those
+/// below it, too.
+struct EffortBoundsOptions {
+  double fewer_points = 0.5;          ///< share of wanted_matches and max_searches, in (0, 1]
+  int coarse_levels = 2;              ///< so many above the finest, dense alignment stops, >= 0
+  double fewer_iterations = 1.0 / 3;  ///< share of the solver's and the patch search's, in (0, 1]
+  int min_motion_iterations = 2;      ///< of the solver, whatever that share is, >= 1
+  int min_refine_iterations = 1;      ///< of the patch search, likewise
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 /// Of the tracker, in the order in which a frame meets them.
 struct TrackerOptions {
+  EffortBoundsOptions effort;
+  RightRowsOptions right_rows;  ///< stereo only
   FixedPixelOptions fixed;
   MotionModelOptions motion_model;
   ShutterOptions shutter;

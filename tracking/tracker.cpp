@@ -29,7 +29,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       options_(options),
       motion_(options_.motion_model),
       shutter_(rig_, motion_, static_cast<std::size_t>(options.local_map.max_searches), options.shutter),
-      correction_(rig, options.fixed),
+      correction_(rig, options.fixed, options.right_rows),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
       local_map_search_(rig_, options_, local_map_, correction_.fixed()),
       immature_points_(kMaxImmaturePoints, kMostPendingKeyframes),

@@ -90,6 +90,17 @@ TEST(EffortOptions, NameWhatIsWrong) {
   EXPECT_NE(EffortOptions{.drop_after = 0.5}.invalid_reason().find("drop_after"), std::string::npos);
 }
 
+TEST(EffortBounds, ByHowMuchIsAnOption) {
+  TrackerOptions options;
+  options.effort = {
+      .fewer_points = 0.75, .coarse_levels = 1, .fewer_iterations = 0.2, .min_motion_iterations = 4};
+  const EffortBounds bounds = bounds_of(EffortLevel::kFewerIterations, options);
+  EXPECT_EQ(bounds.wanted_matches, 135);  // of 180
+  EXPECT_EQ(bounds.max_searches, 240);    // of 320
+  EXPECT_EQ(bounds.finest_alignment_level, options.alignment.finest_level + 1);
+  EXPECT_EQ(bounds.motion_iterations, 4);  // more than a fifth of 15
+}
+
 TEST(EffortBounds, EachLevelLeavesOutMore) {
   const TrackerOptions options;
   EffortBounds before = bounds_of(kTop, options);

@@ -18,6 +18,24 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
                                      {"right_search_px", [](auto& o) { o.right_search_px = 0; }}});
   expect_rules<SurfaceAlignmentOptions>({{"max_iterations", [](auto& o) { o.max_iterations = 0; }},
                                          {"max_move_px", [](auto& o) { o.max_move_px = 0; }}});
+  expect_rules<CornerSelectionOptions>({{"faint.score_share", [](auto& o) { o.faint.score_share = 0; }}});
+  expect_rules<RightRowsOptions>({{"offset.min_matches", [](auto& o) { o.offset.min_matches = 0; }},
+                                  {"corners", [](auto& o) { o.corners = 201; }},
+                                  {"quick_corners", [](auto& o) { o.quick_corners = 39; }},
+                                  {"significant_px", [](auto& o) { o.significant_px = 0; }},
+                                  {"parts_of_row", [](auto& o) { o.parts_of_row = 0; }},
+                                  {"looks_at_start", [](auto& o) { o.looks_at_start = 0; }},
+                                  {"search_again_after", [](auto& o) { o.search_again_after = -1; }}});
+  expect_rules<RowOffsetOptions>({{"corner_threshold", [](auto& o) { o.corner_threshold = 0; }},
+                                  {"min_corner_score", [](auto& o) { o.min_corner_score = -1; }},
+                                  {"max_spread_px", [](auto& o) { o.max_spread_px = 0; }},
+                                  {"max_apart_px", [](auto& o) { o.max_apart_px = 0; }}});
+  expect_rules<EpipolarSearchOptions>({{"step_px", [](auto& o) { o.step_px = 0; }},
+                                       {"beside_px", [](auto& o) { o.beside_px = -1; }},
+                                       {"beyond_px", [](auto& o) { o.beyond_px = -1; }},
+                                       {"nearest_share", [](auto& o) { o.nearest_share = 0; }}});
+  expect_rules<PoseUncertaintyOptions>({{"newest_regions", [](auto& o) { o.newest_regions = 0; }},
+                                        {"newest_split", [](auto& o) { o.newest_split = 1.1; }}});
   expect_rules<MotionOnlyOptions>({{"max_iterations", [](auto& o) { o.max_iterations = 0; }},
                                    {"rounds", [](auto& o) { o.rounds = 0; }},
                                    {"inlier_chi2_mono", [](auto& o) { o.inlier_chi2_mono = 0; }}});
@@ -27,7 +45,9 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
 
 TEST(Options, OfTheTrackersSearchSayWhyTheyAreInvalid) {
   expect_rules<TrackerOptions>(
-      {{"fixed.min_inlier_share", [](auto& o) { o.fixed.min_inlier_share = 0; }},
+      {{"effort.fewer_points", [](auto& o) { o.effort.fewer_points = 0; }},
+       {"right_rows.look_every", [](auto& o) { o.right_rows.look_every = 0; }},
+       {"fixed.min_inlier_share", [](auto& o) { o.fixed.min_inlier_share = 0; }},
        {"motion_model.jitter", [](auto& o) { o.motion_model.jitter = -1; }},
        {"shutter.readout.min_points", [](auto& o) { o.shutter.readout.min_points = 5; }},
        {"alignment.coarsest_level", [](auto& o) { o.alignment.coarsest_level = 5; }},
@@ -41,6 +61,11 @@ TEST(Options, OfTheTrackersSearchSayWhyTheyAreInvalid) {
        {"reference.interval", [](auto& o) { o.reference.interval = 0; }},
        {"new_points.cell_px", [](auto& o) { o.new_points.cell_px = 0; }},
        {"immature.max_failures", [](auto& o) { o.immature.max_failures = 0; }}});
+  expect_rules<EffortBoundsOptions>(
+      {{"coarse_levels", [](auto& o) { o.coarse_levels = -1; }},
+       {"fewer_iterations", [](auto& o) { o.fewer_iterations = 1.1; }},
+       {"min_motion_iterations", [](auto& o) { o.min_motion_iterations = 0; }},
+       {"min_refine_iterations", [](auto& o) { o.min_refine_iterations = 0; }}});
   expect_rules<DenseAlignmentOptions>({{"max_rms", [](auto& o) { o.max_rms = 0; }}});
   expect_rules<LocalMapSearchOptions>(
       {{"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
@@ -70,6 +95,11 @@ TEST(Options, OfMotionAndPoseSayWhyTheyAreInvalid) {
   expect_rules<MotionModelOptions>({{"coast_for", [](auto& o) { o.coast_for = -1; }},
                                     {"max_acceleration", [](auto& o) { o.max_acceleration = 0; }},
                                     {"reach_slack", [](auto& o) { o.reach_slack = 0; }}});
+  expect_rules<ReadoutOptions>({{"pair_points", [](auto& o) { o.pair_points = 5; }},
+                                {"pose_iterations", [](auto& o) { o.pose_iterations = 0; }},
+                                {"nearest_share", [](auto& o) { o.nearest_share = 0; }},
+                                {"mean_intervals", [](auto& o) { o.mean_intervals = 3; }},
+                                {"first_guess", [](auto& o) { o.first_guess = 0; }}});
   expect_rules<ShutterOptions>(
       {{"readout.significant_sigmas", [](auto& o) { o.readout.significant_sigmas = 0; }},
        {"unknown_readout", [](auto& o) { o.unknown_readout = 0; }},
@@ -82,7 +112,8 @@ TEST(Options, OfMotionAndPoseSayWhyTheyAreInvalid) {
                              {"rough.min_mapped", [](auto& o) { o.rough.min_mapped = -1; }},
                              {"rough.rounds", [](auto& o) { o.rough.rounds = 0; }},
                              {"shutter_rounds", [](auto& o) { o.shutter_rounds = 0; }},
-                             {"shutter_settled", [](auto& o) { o.shutter_settled = -1; }}});
+                             {"shutter_settled", [](auto& o) { o.shutter_settled = -1; }},
+                             {"uncertainty.of_frame", [](auto& o) { o.uncertainty.of_frame = 1.1; }}});
 }
 
 TEST(Options, OfDepthSayWhyTheyAreInvalid) {
@@ -122,13 +153,18 @@ TEST(Options, OfKeyframesAndPointsSayWhyTheyAreInvalid) {
                                          {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
                                          {"max_pending", [](auto& o) { o.max_pending = 0; }}});
   expect_rules<ReferenceChoiceOptions>({{"min_gain_percent", [](auto& o) { o.min_gain_percent = -1; }}});
-  expect_rules<NewPointOptions>({{"corner_levels", [](auto& o) { o.corner_levels = 6; }},
-                                 {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
-                                 {"cells_per_corner", [](auto& o) { o.cells_per_corner = 0; }},
-                                 {"min_disparity_px", [](auto& o) { o.min_disparity_px = 0; }},
-                                 {"max_row_shift", [](auto& o) { o.max_row_shift = -1; }},
-                                 {"mistake_ratio", [](auto& o) { o.mistake_ratio = 0; }},
-                                 {"seeds.min_stretch_px", [](auto& o) { o.seeds.min_stretch_px = -1; }}});
+  expect_rules<NewPointOptions>(
+      {{"corner_levels", [](auto& o) { o.corner_levels = 6; }},
+       {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
+       {"faint_corners.score_share", [](auto& o) { o.faint_corners.score_share = 0; }},
+       {"cells_per_corner", [](auto& o) { o.cells_per_corner = 0; }},
+       {"min_disparity_px", [](auto& o) { o.min_disparity_px = 0; }},
+       {"max_row_shift", [](auto& o) { o.max_row_shift = -1; }},
+       {"mistake_ratio", [](auto& o) { o.mistake_ratio = 0; }},
+       {"seeds.min_stretch_px", [](auto& o) { o.seeds.min_stretch_px = -1; }}});
+  expect_rules<DepthSeedOptions>({{"line.step_px", [](auto& o) { o.line.step_px = 0; }},
+                                  {"filter_iterations", [](auto& o) { o.filter_iterations = 0; }},
+                                  {"farthest", [](auto& o) { o.farthest = 0; }}});
   expect_rules<ImmaturePointOptions>({{"max_age", [](auto& o) { o.max_age = -1; }},
                                       {"trusted_after", [](auto& o) { o.trusted_after = 256; }},
                                       {"moving_after", [](auto& o) { o.moving_after = 0; }}});
@@ -154,7 +190,13 @@ TEST(Options, OfOneCamerasStartSayWhyTheyAreInvalid) {
                                        {"significant_sigmas", [](auto& o) { o.significant_sigmas = -1; }},
                                        {"gross_chi2", [](auto& o) { o.gross_chi2 = 0; }},
                                        {"same_direction", [](auto& o) { o.same_direction = 2; }},
-                                       {"same_angle", [](auto& o) { o.same_angle = -1; }}});
+                                       {"outlier_chi2", [](auto& o) { o.outlier_chi2 = 0; }},
+                                       {"adjustment_steps", [](auto& o) { o.adjustment_steps = 0; }},
+                                       {"first_gain", [](auto& o) { o.first_gain = 0; }},
+                                       {"least_gain", [](auto& o) { o.least_gain = 0; }},
+                                       {"same_angle", [](auto& o) { o.same_angle = -1; }},
+                                       {"most_sheared", [](auto& o) { o.most_sheared = 0; }},
+                                       {"max_readouts", [](auto& o) { o.max_readouts = 0; }}});
 }
 
 TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {
@@ -177,6 +219,7 @@ TEST(Options, OfTheLoopCloserSayWhyTheyAreInvalid) {
   expect_rules<LoopCloserOptions>(
       {{"corners.levels", [](auto& o) { o.corners.levels = 4; }},
        {"corners.wanted", [](auto& o) { o.corners.wanted = 0; }},
+       {"corners.faint.threshold_share", [](auto& o) { o.corners.faint.threshold_share = 0; }},
        {"recogniser.consistency", [](auto& o) { o.recogniser.consistency = 0; }},
        {"verification.min_inliers", [](auto& o) { o.verification.min_inliers = 3; }},
        {"refinement.min_inlier_share", [](auto& o) { o.refinement.min_inlier_share = 1.5; }},

@@ -34,7 +34,7 @@ class RightRowsTest : public ::testing::Test {
 
   const Rig rig_ = testing::test_rig(SensorKind::kStereo, 320, 240);
   FrameImages images_;
-  RightRows rows_{rig_};
+  RightRows rows_{rig_, {}};
 };
 
 TEST_F(RightRowsTest, ARigThatIsWellStaysAsItIs) {

@@ -51,7 +51,7 @@ class ImageCorrectionTest : public ::testing::Test {
   /// Images of the last of some frames.
   FrameImages after_frames(SensorKind kind, bool trusted) {
     constexpr int kSeen = 12;
-    ImageCorrection correction(rig_of(kind), {});
+    ImageCorrection correction(rig_of(kind), {}, {});
     FrameImages images;
     allocate_images(rig_of(kind), images);
     std::vector<double> inverse_depths(20, 0.5);

@@ -67,6 +67,14 @@ TEST_F(ReferenceChoiceTest, NotWhatIsHardlyBetter) {
   EXPECT_EQ(better(), std::nullopt);
 }
 
+TEST_F(ReferenceChoiceTest, ByHowMuchIsAnOption) {
+  make_map(90);
+  choice_ = ReferenceChoice({.min_gain_percent = 10}, 200);
+  EXPECT_EQ(better(), kFirst);
+  choice_ = ReferenceChoice({.interval = 4, .min_gain_percent = 10}, 200);
+  EXPECT_EQ(better(), std::nullopt) << "within three frames nobody looks";
+}
+
 TEST_F(ReferenceChoiceTest, OnlyWhatAgreesWithThePoseCounts) {
   make_map(50);
   for (std::size_t m = 0; m < found_.matches.size(); ++m) {

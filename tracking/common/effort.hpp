@@ -5,13 +5,13 @@
 namespace twofold {
 
 /// How much work the tracker does on a frame, from most to least. Each level does less, as said beside it,
-/// and as the levels above it do.
+/// and as the levels above it do; by how much, EffortBoundsOptions say.
 enum class EffortLevel : std::uint8_t {
   kEverything,
-  kFewerPoints,      ///< half of the points are searched
-  kCoarseAlignment,  ///< dense alignment stops two levels above the finest, and starts once only; a pose that
-                     ///< few points agree on is taken as it is
-  kFewerIterations,  ///< a third of the solver's and the patch search's iterations; no keyframes of frames
+  kFewerPoints,      ///< a part of the points is searched
+  kCoarseAlignment,  ///< dense alignment stops some levels above the finest, and starts once only; a pose
+                     ///< that few points agree on is taken as it is
+  kFewerIterations,  ///< a part of the solver's and the patch search's iterations; no keyframes of frames
                      ///< that points placed, unless tracking would soon be lost without one or the map has
                      ///< one keyframe only: they are the most expensive frames, and the mapper, which works
                      ///< on them, needs the same processors

@@ -3,13 +3,14 @@
 #include <algorithm>
 
 namespace twofold {
-ImageCorrection::ImageCorrection(const Rig& rig, const FixedPixelOptions& options)
+ImageCorrection::ImageCorrection(const Rig& rig, const FixedPixelOptions& options,
+                                 const RightRowsOptions& right_rows)
     : options_(options),
       image_motion_(rig.camera),
       fixed_(rig.camera.width, rig.camera.height, options),
       has_depth_(rig.kind == SensorKind::kRgbd) {
   if (rig.kind != SensorKind::kStereo) return;
-  right_rows_.emplace(rig);
+  right_rows_.emplace(rig, right_rows);
   fixed_right_.emplace(rig.camera.width, rig.camera.height, options);
 }
 

@@ -19,7 +19,7 @@ namespace twofold {
 /// No allocation after construction.
 class ImageCorrection {
  public:
-  ImageCorrection(const Rig& rig, const FixedPixelOptions& options);
+  ImageCorrection(const Rig& rig, const FixedPixelOptions& options, const RightRowsOptions& right_rows);
 
   /// @param images  of the frame as it is tracked; made by `allocate_images`
   void load(const Frame& frame, FrameImages& images);

@@ -33,6 +33,7 @@ std::string NewPointOptions::invalid_reason() const {
       .at_least("max_points", max_points, 1)
       .at_least("min_start_points", min_start_points, 1)
       .at_least("scarce_points", scarce_points, 0)
+      .nested("faint_corners", faint_corners.invalid_reason())
       .above("cells_per_corner", cells_per_corner, 0)
       .above("min_disparity_px", min_disparity_px, 0)
       .at_least("max_row_shift", max_row_shift, 0)

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "imaging/corner_selection.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
 
 namespace twofold {
@@ -41,9 +42,10 @@ struct NewPointOptions {
   int cell_px = 28;             ///< at most one new point a cell and only where no point is tracked
   int max_points = 220;         ///< started in one keyframe
   int min_start_points = 40;    ///< with measured depth; a map or map part starts with no fewer, > 0
-  /// In the dark, with fewer points in view, tracked and started, faint corners will do: half the threshold,
-  /// a quarter of the score, where the pyramid has averaged the noise away.
+  /// In the dark, with fewer points in view, tracked and started, faint corners will do, where the pyramid
+  /// has averaged the noise away.
   int scarce_points = 90;
+  FaintCornerOptions faint_corners;
   double cells_per_corner = 2;    ///< of one camera, cells being smaller in small images, > 0
   double min_disparity_px = 0.3;  ///< below it the depth is as good as infinite, > 0
   // Why a stereo pair gives too few depths to start with.

@@ -8,9 +8,6 @@
 namespace twofold {
 namespace {
 
-constexpr int kFilterSteps = 5;
-constexpr double kFarthest = 1e-3;  // inverse depth of a point at infinity, in 1 / median depth
-
 /// Least squares inverse depth of a ray of the anchor that is seen at uv.
 double triangulated(const PinholeCamera& camera, const Vector3& ray_a, const SE3& T_c_a, const Vector2& uv) {
   const Vector3 bearing = camera.unproject(uv);
@@ -33,6 +30,9 @@ std::string DepthSeedOptions::invalid_reason() const {
       .at_least("max_misses", max_misses, 1)
       .at_least("max_first_misses", max_first_misses, 1)
       .at_least("max_age", max_age, 1)
+      .nested("line", line.invalid_reason())
+      .at_least("filter_iterations", filter_iterations, 1)
+      .above("farthest", farthest, 0)
       .reason();
 }
 
@@ -91,12 +91,12 @@ void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const RollingShutt
   const SE3 T_c_row = seed.shutter.at_rest() ? T_c_a : T_c_a * T_anchor_row(seed);
   const Vector3 ray(seed.filter.psi.x(), seed.filter.psi.y(), 1);
   const InverseDepthRange range = range_of(seed, median_depth);
-  const Vector3 likely = ray / std::max(range.likely, kFarthest / median_depth);
+  const Vector3 likely = ray / std::max(range.likely, options_.farthest / median_depth);
   const SE3 T_seen_row = shutter.seen_from(rig_, T_c_row, likely);
-  const auto stretch = epipolar_stretch(rig_.camera, seed.appearance, ray, T_seen_row, range);
+  const auto stretch = epipolar_stretch(rig_.camera, seed.appearance, ray, T_seen_row, range, options_.line);
   if (!stretch) return;
   if (!worth_a_look(seed, *stretch, T_seen_row)) return;
-  const auto found = find_along(images, seed.appearance, *stretch, search_);
+  const auto found = find_along(images, seed.appearance, *stretch, search_, options_.line);
   if (!found) {
     ++seed.misses;
     return;
@@ -105,7 +105,8 @@ void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const RollingShutt
   if (!known(seed)) {
     seed.filter.psi.z() = std::max(0.0, triangulated(rig_.camera, ray, T_found_row, found->pixel.head<2>()));
   }
-  if (!seed.filter.update(rig_, T_found_row, found->pixel, rig_.sigma_px(found->level), kFilterSteps)) {
+  if (!seed.filter.update(rig_, T_found_row, found->pixel, rig_.sigma_px(found->level),
+                          options_.filter_iterations)) {
     ++seed.misses;
     return;
   }
@@ -126,7 +127,7 @@ ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const 
   point.anchor = seed.anchor;
   point.appearance = seed.appearance;
   point.psi = seed.filter.psi;
-  point.psi.z() = std::max(point.psi.z(), kFarthest / median_depth);
+  point.psi.z() = std::max(point.psi.z(), options_.farthest / median_depth);
   point.anchor_observation.pixel = {seed.appearance.uv.x(), seed.appearance.uv.y(),
                                     static_cast<float>(Rig::kNoRight)};
   point.anchor_observation.level = seed.appearance.level;

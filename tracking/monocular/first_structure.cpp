@@ -19,13 +19,6 @@
 namespace twofold {
 namespace {
 
-constexpr double kOutlierChi2 = 9.21;  // 99 % of chi-square with 2 degrees of freedom
-constexpr int kAdjustmentSteps = 15;
-constexpr double kMostSheared = 0.9;  // quantile of the corners, by which readouts are told apart
-constexpr int kMostReadouts = 32;     // bounds the work
-// Of the squared whitened errors, with which an adjustment ends: the first one only tells gross errors.
-constexpr double kFirstGain = 1, kLeastGain = 0.01;
-
 std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vector2>& pixels) {
   std::vector<Vector3> result;
   result.reserve(pixels.size());
@@ -141,8 +134,9 @@ class FirstStructureEstimator {
     std::vector<double> sheared;
     for (std::size_t i = 0; i < first.size(); ++i)
       sheared.push_back((last[i] - views_.last[i] - first[i] + views_.first[i]).norm());
-    const double most = quantile(sheared, kMostSheared, QuantileRank::kNearest);
-    return static_cast<int>(std::clamp(std::ceil(most / options_.rotation_px), 1.0, 1.0 * kMostReadouts));
+    const double most = quantile(sheared, options_.most_sheared, QuantileRank::kNearest);
+    return static_cast<int>(
+        std::clamp(std::ceil(most / options_.rotation_px), 1.0, 1.0 * options_.max_readouts));
   }
 
   /// One motion tried: the frames as it explains them. Corners that it does not are put aside.
@@ -177,12 +171,13 @@ class FirstStructureEstimator {
   /// Bundle adjustment without the corners that follow something else.
   /// @return false when too few are left
   bool adjust(Trial& trial) const {
-    for (const auto& [bound, gain] :
-         {std::pair{options_.gross_chi2, kFirstGain}, {kOutlierChi2, kLeastGain}}) {
+    for (const auto& [bound, gain] : {std::pair{options_.gross_chi2, options_.first_gain},
+                                      {options_.outlier_chi2, options_.least_gain}}) {
       put_outliers_aside(bound, trial);
-      if (!enough(trial.corners.size()) || !trial.views.minimise(kAdjustmentSteps, gain)) return false;
+      if (!enough(trial.corners.size()) || !trial.views.minimise(options_.adjustment_steps, gain))
+        return false;
     }
-    put_outliers_aside(kOutlierChi2, trial);
+    put_outliers_aside(options_.outlier_chi2, trial);
     trial.sigma_px = measured_sigma(trial.views);
     return enough(trial.corners.size());
   }
@@ -242,9 +237,9 @@ class FirstStructureEstimator {
   /// that fits no better than chance counts as an outlier, whether it was put aside or not.
   [[nodiscard]] double cost(const Trial& trial, double sigma_px) const {
     const double finer = (options_.sigma_px / sigma_px) * (options_.sigma_px / sigma_px);
-    double sum = static_cast<double>(inliers_.size() - trial.corners.size()) * kOutlierChi2;
+    double sum = static_cast<double>(inliers_.size() - trial.corners.size()) * options_.outlier_chi2;
     for (std::size_t k = 0; k < trial.views.points.size(); ++k)
-      sum += std::min(finer * worst_chi2(trial.views, k), kOutlierChi2);
+      sum += std::min(finer * worst_chi2(trial.views, k), options_.outlier_chi2);
     return sum;
   }
 
@@ -303,7 +298,7 @@ class FirstStructureEstimator {
       const StereoPixel z(uv.x(), uv.y(), Rig::kNoRight);
       observations.push_back(observe_point(rig_, from_inverse_depth(points[k].psi), z.cast<float>(), 0));
     }
-    return optimise_motion(rig_, observations, start, {.inlier_chi2_mono = kOutlierChi2}).T_c_ref;
+    return optimise_motion(rig_, observations, start, {.inlier_chi2_mono = options_.outlier_chi2}).T_c_ref;
   }
 
   /// Standard deviation of the point's inverse depth over that, given the poses; infinite behind infinity.
@@ -404,8 +399,14 @@ std::string FirstStructureOptions::invalid_reason() const {
       .within("fixed_strip", fixed_strip, 0, 1)
       .at_least("significant_sigmas", significant_sigmas, 0)
       .above("gross_chi2", gross_chi2, 0)
+      .above("outlier_chi2", outlier_chi2, 0)
+      .at_least("adjustment_steps", adjustment_steps, 1)
+      .above("first_gain", first_gain, 0)
+      .above("least_gain", least_gain, 0)
       .within("same_direction", same_direction, -1, 1)
       .at_least("same_angle", same_angle, 0)
+      .share("most_sheared", most_sheared)
+      .at_least("max_readouts", max_readouts, 1)
       .reason();
 }
 

@@ -36,10 +36,19 @@ struct FirstStructureOptions {
   /// 1].
   double fixed_strip = 0.3;
   double significant_sigmas = 2;  ///< of a depth, from which on its sign counts, >= 0
-  double gross_chi2 = 50;         ///< beyond this before the adjustment, a corner follows something else, > 0
+  double gross_chi2 = 50;  ///< beyond this before the adjustment, a corner follows something else, > 0 ...
+  double outlier_chi2 = 9.21;  ///< ... and after: 99 % of chi-square with 2 degrees of freedom, > 0
+  int adjustment_steps = 15;   ///< at most, >= 1
+  /// Of the squared whitened errors, with less of which an adjustment ends, > 0: the first one only tells
+  /// gross errors.
+  double first_gain = 1;
+  double least_gain = 0.01;
   // Motions that differ by less are one: cosine between directions, in [-1, 1], and angle [rad].
   double same_direction = 0.95;
   double same_angle = 0.02;
+  // Where nobody knows how fast rows are read.
+  double most_sheared = 0.9;  ///< quantile of the corners' shear, by which readouts are told apart, in (0, 1]
+  int max_readouts = 32;      ///< tried, >= 1: bounds the work
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -26,6 +26,7 @@ std::string PoseOptions::invalid_reason() const {
       .nested("rough", rough.invalid_reason())
       .at_least("shutter_rounds", shutter_rounds, 1)
       .at_least("shutter_settled", shutter_settled, 0)
+      .nested("uncertainty", uncertainty.invalid_reason())
       .reason();
 }
 

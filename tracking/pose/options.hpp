@@ -3,6 +3,7 @@
 #include <string>
 
 #include "estimation/motion_only.hpp"
+#include "estimation/pose_uncertainty.hpp"
 #include "tracking/common/elder_vote.hpp"
 
 namespace twofold {
@@ -45,6 +46,7 @@ struct PoseOptions {
   /// A round that moves the pose by less is the last, >= 0 [standard deviations]: the next one would move it
   /// by about a twentieth of that.
   double shutter_settled = 1;
+  PoseUncertaintyOptions uncertainty;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -14,7 +14,7 @@ PoseEstimator::PoseEstimator(const Rig& rig, const TrackerOptions& options, cons
       shutter_(shutter),
       immature_points_(immature_points),
       elder_vote_(rig, static_cast<std::size_t>(options.local_map.max_searches), options.pose.elders),
-      uncertainty_(rig) {
+      uncertainty_(rig, options.pose.uncertainty) {
   anchors_.reserve(static_cast<std::size_t>(options.local_map.max_searches));
 }
 

@@ -63,9 +63,9 @@ PointStarter::CornerBounds PointStarter::usual_corners() const {
   return {0, options_.corner_threshold, options_.min_corner_score};
 }
 
-/// For the dark: contrast is low there, and noise is not.
 PointStarter::CornerBounds PointStarter::faint_corners() const {
-  return {1, std::max(options_.corner_threshold / 2, 1), options_.min_corner_score / 4};
+  return {1, options_.faint_corners.threshold(options_.corner_threshold),
+          options_.faint_corners.score(options_.min_corner_score)};
 }
 
 /// Corners of the free cells, into the quadtree; none of what moves with the camera.
