@@ -8,7 +8,7 @@
 namespace twofold {
 namespace {
 
-struct Alignment {
+struct PointAlignment {
   Vector3 centroid_a, centroid_b;
   double spread_a, spread_b;  // summed squared distances from the centroids
   SO3 R_a_b;
@@ -48,9 +48,9 @@ std::optional<SO3> rotation_of_triangles(const Matrix3& H, const Vector3& centro
   return SO3(Matrix3(turned * axes_b.transpose()));
 }
 
-std::optional<Alignment> align(std::span<const Vector3> x_a, std::span<const Vector3> x_b) {
+std::optional<PointAlignment> align(std::span<const Vector3> x_a, std::span<const Vector3> x_b) {
   if (x_a.size() != x_b.size() || x_a.size() < 3) return std::nullopt;
-  Alignment result{centroid(x_a), centroid(x_b), 0, 0, SO3()};
+  PointAlignment result{centroid(x_a), centroid(x_b), 0, 0, SO3()};
   Matrix3 H = Matrix3::Zero();
   for (std::size_t i = 0; i < x_a.size(); ++i) {
     const Vector3 y_a = x_a[i] - result.centroid_a;  // eq. 5.12

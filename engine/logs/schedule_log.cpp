@@ -70,7 +70,7 @@ void put_input(ByteWriter& file, const InputFingerprint& input) {
   end_section(file, begin);
 }
 
-struct Section {
+struct ScheduleSection {
   std::uint8_t id = kEnd;
   std::uint64_t records = 0;
   std::span<const std::uint8_t> bytes;
@@ -89,7 +89,7 @@ class ScheduleSectionReader {
   }
 
   /// False at the end, where the file is torn, or when something is wrong.
-  bool next(Section& section) {
+  bool next(ScheduleSection& section) {
     if (!error_.empty() || ended_ || in_.at_end()) return false;
     const std::size_t begin = in_.at();
     section.id = in_.u8();
@@ -144,7 +144,7 @@ class ScheduleSectionReader {
 
 /// Empty, or what is wrong with the records.
 template <class Step>
-std::string parse_steps(const Section& section, Step& last, std::vector<Step>& steps) {
+std::string parse_steps(const ScheduleSection& section, Step& last, std::vector<Step>& steps) {
   ByteReader in(section.bytes);
   try {
     // Every record has at least one byte: a false count is found before any record is looked at.
@@ -164,7 +164,7 @@ std::string parse_steps(const Section& section, Step& last, std::vector<Step>& s
 }
 
 /// Empty, or what is wrong with it.
-std::string parse_input(const Section& section, std::optional<InputFingerprint>& input) {
+std::string parse_input(const ScheduleSection& section, std::optional<InputFingerprint>& input) {
   if (input) return ScheduleSectionReader::name_of(kInput) + " is there twice";
   if (section.records != 1 || section.bytes.size() != 2 * sizeof(std::uint64_t))
     return ScheduleSectionReader::name_of(kInput) + " is not one record of 16 bytes";
@@ -173,7 +173,7 @@ std::string parse_input(const Section& section, std::optional<InputFingerprint>&
   return "";
 }
 
-std::string parse_section(const Section& section, TrackerStep& tracker, MapperStep& mapper,
+std::string parse_section(const ScheduleSection& section, TrackerStep& tracker, MapperStep& mapper,
                           LoopStep& loop_closer, Schedule& schedule) {
   switch (section.id) {
     case 1:
@@ -251,7 +251,7 @@ tl::expected<Schedule, std::string> parse_schedule(std::span<const std::uint8_t>
   TrackerStep tracker;
   MapperStep mapper;
   LoopStep loop_closer;
-  for (Section section; reader.next(section);) {
+  for (ScheduleSection section; reader.next(section);) {
     const std::string wrong = parse_section(section, tracker, mapper, loop_closer, schedule);
     if (!wrong.empty()) reader.fail(wrong);
   }
@@ -264,7 +264,7 @@ tl::expected<std::vector<std::uint8_t>, std::string> merge_schedule(std::span<co
   ScheduleSectionReader reader(file);
   std::array<std::vector<std::uint8_t>, kSectionNames.size()> bytes;
   std::array<std::uint64_t, kSectionNames.size()> records{};
-  for (Section section; reader.next(section);) {
+  for (ScheduleSection section; reader.next(section);) {
     auto& of_thread = bytes.at(section.id - 1U);
     of_thread.insert(of_thread.end(), section.bytes.begin(), section.bytes.end());
     records.at(section.id - 1U) += section.records;
