@@ -59,8 +59,8 @@ class TrackerRunner {
   bool prepare_next(FrameRecord& record);
   /// Of the map, seen first by the frame of the last step; of reason kNone when there was none.
   [[nodiscard]] const PoseCorrection& correction() const { return correction_; }
-  /// True when the camera has been lost, or not placed yet and no answer is awaited: `request` is then
-  /// filled.
+  /// True when there is a vocabulary, no answer is awaited, and the camera is lost or not placed yet:
+  /// `request` is then filled.
   bool request_relocalisation(RelocalisationRequest& request);
   /// Before the next step.
   void take_answer(const RelocalisationAnswer& answer);

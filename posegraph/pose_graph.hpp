@@ -34,7 +34,7 @@ enum class PoseGraphError : std::uint8_t {
   /// e = (translation, twice the quaternion's vector part[, log scale]); planar: (translation, angle). Equal
   /// to the log to first order. With that of g2o, by which published costs are computed, but for a factor:
   /// its rotation in SE(3) is half of this, so a g2o information matrix Lambda becomes D Lambda D here, D =
-  /// diag(1, 1, 1, 1/2, 1/2, 1/2) (fixtures/g2o_file.cpp).
+  /// diag(1, 1, 1, 1/2, 1/2, 1/2) (fixtures/files/g2o_file.cpp).
   kComponents
 };
 

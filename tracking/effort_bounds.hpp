@@ -20,9 +20,9 @@ namespace twofold {
                       options.search.refine_iterations};
   if (effort >= EffortLevel::kFewerPoints) {
     bounds.wanted_matches =
-        std::max(part(by.fewer_points, options.local_map.wanted_matches), options.pose.min_inliers);
+        std::max(part(by.points_share, options.local_map.wanted_matches), options.pose.min_inliers);
     bounds.max_searches =
-        std::max(part(by.fewer_points, options.local_map.max_searches), bounds.wanted_matches);
+        std::max(part(by.points_share, options.local_map.max_searches), bounds.wanted_matches);
   }
   if (effort >= EffortLevel::kCoarseAlignment) {
     bounds.finest_alignment_level =
@@ -32,9 +32,9 @@ namespace twofold {
   }
   if (effort >= EffortLevel::kFewerIterations) {
     bounds.motion_iterations =
-        std::max(part(by.fewer_iterations, options.pose.motion.max_iterations), by.min_motion_iterations);
+        std::max(part(by.iterations_share, options.pose.motion.max_iterations), by.min_motion_iterations);
     bounds.refine_iterations =
-        std::max(part(by.fewer_iterations, options.search.refine_iterations), by.min_refine_iterations);
+        std::max(part(by.iterations_share, options.search.refine_iterations), by.min_refine_iterations);
     bounds.urgent_keyframes_only = true;
   }
   return bounds;

@@ -41,9 +41,9 @@ std::string LocalMapSearchOptions::invalid_reason() const {
 
 std::string EffortBoundsOptions::invalid_reason() const {
   return OptionCheck()
-      .share("fewer_points", fewer_points)
+      .share("points_share", points_share)
       .at_least("coarse_levels", coarse_levels, 0)
-      .share("fewer_iterations", fewer_iterations)
+      .share("iterations_share", iterations_share)
       .at_least("min_motion_iterations", min_motion_iterations, 1)
       .at_least("min_refine_iterations", min_refine_iterations, 1)
       .reason();

@@ -35,9 +35,9 @@ struct LocalMapSearchOptions {
 /// By how much each level of effort bounds a frame's work (EffortLevel); each level's bounds hold for those
 /// below it, too.
 struct EffortBoundsOptions {
-  double fewer_points = 0.5;          ///< share of wanted_matches and max_searches, in (0, 1]
+  double points_share = 0.5;          ///< of wanted_matches and max_searches, in (0, 1]
   int coarse_levels = 2;              ///< so many above the finest, dense alignment stops, >= 0
-  double fewer_iterations = 1.0 / 3;  ///< share of the solver's and the patch search's, in (0, 1]
+  double iterations_share = 1.0 / 3;  ///< of the solver's and the patch search's, in (0, 1]
   int min_motion_iterations = 2;      ///< of the solver, whatever that share is, >= 1
   int min_refine_iterations = 1;      ///< of the patch search, likewise
 

@@ -93,7 +93,7 @@ TEST(EffortOptions, NameWhatIsWrong) {
 TEST(EffortBounds, ByHowMuchIsAnOption) {
   TrackerOptions options;
   options.effort = {
-      .fewer_points = 0.75, .coarse_levels = 1, .fewer_iterations = 0.2, .min_motion_iterations = 4};
+      .points_share = 0.75, .coarse_levels = 1, .iterations_share = 0.2, .min_motion_iterations = 4};
   const EffortBounds bounds = bounds_of(EffortLevel::kFewerIterations, options);
   EXPECT_EQ(bounds.wanted_matches, 135);  // of 180
   EXPECT_EQ(bounds.max_searches, 240);    // of 320

@@ -45,7 +45,7 @@ TEST(Options, OfImagingAndEstimationSayWhyTheyAreInvalid) {
 
 TEST(Options, OfTheTrackersSearchSayWhyTheyAreInvalid) {
   expect_rules<TrackerOptions>(
-      {{"effort.fewer_points", [](auto& o) { o.effort.fewer_points = 0; }},
+      {{"effort.points_share", [](auto& o) { o.effort.points_share = 0; }},
        {"right_rows.look_every", [](auto& o) { o.right_rows.look_every = 0; }},
        {"fixed.min_inlier_share", [](auto& o) { o.fixed.min_inlier_share = 0; }},
        {"motion_model.jitter", [](auto& o) { o.motion_model.jitter = -1; }},
@@ -63,7 +63,7 @@ TEST(Options, OfTheTrackersSearchSayWhyTheyAreInvalid) {
        {"immature.max_failures", [](auto& o) { o.immature.max_failures = 0; }}});
   expect_rules<EffortBoundsOptions>(
       {{"coarse_levels", [](auto& o) { o.coarse_levels = -1; }},
-       {"fewer_iterations", [](auto& o) { o.fewer_iterations = 1.1; }},
+       {"iterations_share", [](auto& o) { o.iterations_share = 1.1; }},
        {"min_motion_iterations", [](auto& o) { o.min_motion_iterations = 0; }},
        {"min_refine_iterations", [](auto& o) { o.min_refine_iterations = 0; }}});
   expect_rules<DenseAlignmentOptions>({{"max_rms", [](auto& o) { o.max_rms = 0; }}});
@@ -87,7 +87,7 @@ TEST(Options, OfFixedPixelsSayWhyTheyAreInvalid) {
                                    {"touching", [](auto& o) { o.touching = 10; }},
                                    {"rest", [](auto& o) { o.rest = 256; }},
                                    {"chance", [](auto& o) { o.chance = o.believed; }},
-                                   {"far_share", [](auto& o) { o.far_share = 1; }},
+                                   {"far_share", [](auto& o) { o.far_share = 0.995; }},
                                    {"nearer", [](auto& o) { o.nearer = 0.9; }}});
 }
 
@@ -175,6 +175,8 @@ TEST(Options, OfOneCamerasStartSayWhyTheyAreInvalid) {
       {{"frames_between", [](auto& o) { o.frames_between = 1; }},
        {"following.coarsest_level", [](auto& o) { o.following.coarsest_level = 5; }},
        {"first_structure.min_points", [](auto& o) { o.first_structure.min_points = 4; }}});
+  expect_rules<FirstStructureOptions>({{"min_share", [](auto& o) { o.min_share = 0; }},
+                                       {"max_rotation_share", [](auto& o) { o.max_rotation_share = 0; }}});
   expect_rules<CornerFollowingOptions>({{"first_radius_px", [](auto& o) { o.first_radius_px = 0; }},
                                         {"coarse_radius_px", [](auto& o) { o.coarse_radius_px = 0; }},
                                         {"radius_px", [](auto& o) { o.radius_px = 0; }},

@@ -35,8 +35,9 @@ struct FixedPixelOptions {
   int touching = 3;         ///< fixed pixels of a neighbourhood that are no single ones, in [1, 9]
   int rest = 3;             ///< rounds in which a block that clearly shows the scene is not looked at, >= 0
   int chance = 1;           ///< votes that a pixel of the scene gets now and then, in [0, believed - 1]
-  double far_share = 0.1;   ///< of the tracked points, that may be farther than what is looked at, in [0, 1)
-  double nearer = 2;        ///< times: what is not tracked may be so much nearer than what is, >= 1
+  double far_share =
+      0.1;            ///< of the tracked points, that may be farther than what is looked at, in [0, 0.99]
+  double nearer = 2;  ///< times: what is not tracked may be so much nearer than what is, >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

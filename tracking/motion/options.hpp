@@ -26,8 +26,9 @@ struct ShutterOptions {
   ReadoutOptions readout;  ///< where the calibration does not have it
   /// Cameras either read all rows at once or take up to a frame's period: while nobody knows [s], > 0.
   double unknown_readout = 0.015;
-  /// Of an inverse depth in one camera's map, which the readout itself bends, all of a place alike: by far
-  /// more than any one is wrong. With half of it readouts are too small; with more they are known late. >= 0.
+  /// One camera: standard deviation that the estimator assumes of an inverse depth, as a share of it, because
+  /// an unknown readout bends all depths of a place together, >= 0. Half of it makes readouts too small; more
+  /// makes them known late.
   double bent_depth = 2;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
