@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "camera/measurement.hpp"
 #include "camera/rig.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "geometry/types.hpp"
@@ -44,15 +45,15 @@ struct ObservationModel {
   explicit ObservationModel(const Rig& rig)
       : fx(rig.camera.fx), fy(rig.camera.fy), cx(rig.camera.cx), cy(rig.camera.cy), baseline(rig.baseline) {}
 
-  /// Whitened squared error; infinity behind the camera (or for a NaN). z.z() may be NaN where its
-  /// information is 0.
+  /// Whitened squared error; infinity behind the camera (or for a NaN). z.z() may be NaN where it
+  /// does not count (weighs_right).
   [[nodiscard]] double chi2(const Vector3& x, const StereoPixelF& z, const Eigen::Vector3f& info) const {
     if (!(x.z() > kSolverMinDepth)) return std::numeric_limits<double>::infinity();
     const double inv_z = 1.0 / x.z();
     const double eu = fx * x.x() * inv_z + cx - z.x();
     const double ev = fy * x.y() * inv_z + cy - z.y();
     const double mono = info.x() * eu * eu + info.y() * ev * ev;
-    if (info.z() == 0) return mono;
+    if (!weighs_right(info)) return mono;
     const double er = fx * (x.x() - baseline) * inv_z + cx - z.z();
     return mono + info.z() * er * er;
   }
@@ -64,7 +65,7 @@ struct ObservationModel {
     const double x_right = x.x() - baseline;
     const double eu = fx * x.x() * inv_z + cx - z.x();
     const double ev = fy * x.y() * inv_z + cy - z.y();
-    const double er = info.z() == 0 ? 0.0 : fx * x_right * inv_z + cx - z.z();
+    const double er = weighs_right(info) ? fx * x_right * inv_z + cx - z.z() : 0.0;
     double wu = info.x(), wv = info.y(), wr = info.z();
 
     ObservationTerms terms;

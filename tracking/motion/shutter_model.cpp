@@ -47,7 +47,7 @@ void ShutterModel::learn(const FrameStep& step, const SearchOutcome& found, cons
   for (const SearchOutcome::Match& match : found.matches) {
     const TrackedPoint& point = local_map.points()[match.point];
     const StereoPixel& z = match.found.pixel;
-    const bool measured = rig_.kind != SensorKind::kMono && z.x() > z.z();
+    const bool measured = rig_.kind != SensorKind::kMono && has_right(z) && z.x() > z.z();
     const double depth =
         measured ? rig_.depth_from_disparity(z.x() - z.z()) : (step.result.T_c_ref * point.x_ref).z();
     // By where it was seen first, which it keeps when the map takes it over.
