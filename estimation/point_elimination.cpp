@@ -134,11 +134,11 @@ PointElimination::PointEquations PointElimination::linearise(
     equations.anchor.rotation.row[r] = -torque.row[r];
   }
   // A point at the bound that would like to go beyond infinity keeps its depth for this step.
-  if (psi.z() <= kMinInverseDepth && equations.g.z() > 0) hold_depth(equations);
+  if (psi.z() <= kMinInverseDepth && equations.g.z() > 0) fix_depth(equations);
   return equations;
 }
 
-void PointElimination::hold_depth(PointEquations& equations) {
+void PointElimination::fix_depth(PointEquations& equations) {
   auto& [V, g, anchor] = equations;
   V.row(2).setZero(), V.col(2).setZero();
   V(2, 2) = V(0, 0) + V(1, 1);

@@ -58,7 +58,7 @@ class PointElimination {
   [[nodiscard]] PointEquations linearise(const WindowLayout& layout, const WindowLayout::Track& track,
                                          const ObservationModel& model, const HuberKernel& kernel,
                                          const RigidMotion* relative, const Vector3& psi);
-  void hold_depth(PointEquations& equations);
+  void fix_depth(PointEquations& equations);
   void eliminate_track(const WindowLayout& layout, const Group& group, const WindowLayout::Track& track,
                        PointEquations& equations, double lambda, BlockCholesky& system,
                        EliminatedPoint& point);

@@ -33,7 +33,7 @@ void ReducedSystem::build(const WindowProblem& problem, const WindowSolverOption
                    relative_motion(state.matrices[c.j], state.matrices[c.i]), state.constraint_errors[n]);
   }
 
-  // A direction in which nothing pulls at a pose is held by a share of what pulls at the average pose.
+  // Where nothing pulls at a pose in some direction, a share of what pulls at the average pose damps it.
   Vector6 mean = Vector6::Zero();
   for (const Vector6& d : diagonal_) mean += d / static_cast<double>(diagonal_.size());
   for (int p = 0; p < cholesky_.size(); ++p) {

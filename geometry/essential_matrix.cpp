@@ -281,7 +281,7 @@ double sampson_cost(const SE3& T_b_a, const FivePointEstimator& data, std::span<
   return cost;
 }
 
-/// One Gauss-Newton step with the Sampson denominators held: rotation R <- exp(w) R, direction t <- t + B y.
+/// One Gauss-Newton step with the Sampson denominators fixed: rotation R <- exp(w) R, direction t <- t + B y.
 SE3 sampson_step(const SE3& T_b_a, const FivePointEstimator& data, std::span<const int> indices) {
   using Matrix5 = Eigen::Matrix<double, 5, 5>;
   using Vector5 = Eigen::Matrix<double, 5, 1>;

@@ -7,7 +7,7 @@ namespace twofold {
 
 /// Best positions for given rotations: minimises sum t_ji |c_j - c_i - R_i^T p_ji|^2 over the camera centres
 /// c in the world, p_ji the measured centre of j in the frame of i, T_j_i^-1's translation, t the mean
-/// diagonal entry of the translation information. Without an origin pose 0 is held. The matrix, a weighted
+/// diagonal entry of the translation information. Without an origin pose 0 is fixed. The matrix, a weighted
 /// graph Laplacian, does not depend on the poses and is factorised once.
 template <class Group>
 class PoseGraphPositions {

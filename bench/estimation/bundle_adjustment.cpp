@@ -1,5 +1,5 @@
 // bench/bundle_adjustment FILE: a bundle adjustment problem (BAL, libmv text, or a folder of stereo tracks)
-// by WindowSolver and by Ceres, poses and points free, intrinsics held.
+// by WindowSolver and by Ceres, poses and points free, intrinsics fixed.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>

@@ -19,7 +19,7 @@ struct CeresSummary {
 };
 
 /// Minimises pose_graph_cost(graph, kComponents) with Ceres: Levenberg-Marquardt, sparse Cholesky
-/// (SuiteSparse), one thread, automatic derivatives, the graph's origin held constant. Poses are kept as
+/// (SuiteSparse), one thread, automatic derivatives, the graph's origin fixed. Poses are kept as
 /// camera in world, the form Ceres' own pose graph examples use.
 CeresSummary solve_with_ceres(PoseGraph<SE2>& graph, const CeresOptions& options);
 CeresSummary solve_with_ceres(PoseGraph<SE3>& graph, const CeresOptions& options);

@@ -29,8 +29,8 @@ struct SearchStart {
   [[nodiscard]] bool rough() const { return kind != Kind::kNear; }
 };
 
-/// What one way to a frame's pose came to: all of the step that another way overwrites, so that it can be set
-/// aside while that is tried.
+/// What one attempt at a frame's pose came to; what another one overwrites, so that it can be set aside while
+/// that is made.
 struct Attempt {
   TrackResult result;
   RollingShutter shutter;  ///< as the camera moves in this frame, as far as known

@@ -102,7 +102,7 @@ class Explorer {
     if (x_a) track.x_w = pose(a).inverse() * *x_a;
   }
 
-  /// Bundle adjustment of the window; its first two frames are held, their baseline hands the scale on
+  /// Bundle adjustment of the window; its first two frames are fixed, their baseline hands the scale on
   /// (thesis 3.3.3).
   void adjust() {
     const int end = static_cast<int>(result_.T_c_w.size());

@@ -14,7 +14,7 @@ namespace {
 constexpr int kMinViews = 3;  ///< of a point that serves to close a loop: its depth is known well by then
 constexpr int kReach = 4;     ///< frames on either side whose points belong to a frame's surroundings
 
-/// A point in a camera's frame, with the information its sightings give (one pixel, poses held).
+/// A point in a camera's frame, with the information its sightings give (one pixel, poses fixed).
 struct EstimatedPoint {
   Vector3 x;
   Matrix3 information;
@@ -76,7 +76,7 @@ struct SimilarityEstimator {
 };
 
 /// Gauss-Newton on sum (x_j - S x_i)^T C^-1 (x_j - S x_i), C the covariance of the difference: bundle
-/// adjustment of the two places' points over S, their cameras held, to first order  (thesis 5.3.1).
+/// adjustment of the two places' points over S, their cameras fixed, to first order  (thesis 5.3.1).
 Sim3 refine(const std::vector<std::pair<EstimatedPoint, EstimatedPoint>>& pairs, Sim3 S_j_i) {
   for (int iteration = 0; iteration < 5; ++iteration) {
     const Matrix3 sR = S_j_i.scale() * S_j_i.rotation();
