@@ -33,4 +33,9 @@ class LevenbergMarquardtDamping {
   double growth_ = 2;
 };
 
+/// Plain damping after a step that failed: ten times as much, at least `first`, as it may have been 0 so far.
+[[nodiscard]] inline double raised_damping(double damping, double first) {
+  return std::max(10 * damping, first);
+}
+
 }  // namespace twofold

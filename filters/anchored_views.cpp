@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "camera/pinhole.hpp"
+#include "estimation/levenberg_marquardt.hpp"
 #include "geometry/so3.hpp"
 
 namespace twofold {
@@ -177,7 +178,7 @@ bool AnchoredViews::minimise(int max_iterations, double least_gain) {
       if (next <= current) break;
       points = points_before;
       for (std::size_t v = 0; v < views.size(); ++v) views[v].T_c_a = poses_before[v];
-      damping = std::max(10 * damping, 1e-4);
+      damping = raised_damping(damping, 1e-4);
     }
     if (!(next <= current)) break;
     const double gain = current - next;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "camera/measurement.hpp"
+#include "estimation/levenberg_marquardt.hpp"
 
 namespace twofold {
 
@@ -101,7 +102,7 @@ bool InverseDepthFilter::update(const Rig& rig, const SE3& T_c_a, const StereoPi
     const auto next_seen = delta.allFinite() ? innovation(rig, T_c_a, next, z) : std::nullopt;
     const double value = cost(next, next_seen);
     if (value > best) {
-      damping = std::max(10 * damping, 1e-3);
+      damping = raised_damping(damping, 1e-3);
       continue;
     }
     at = next;

@@ -6,6 +6,7 @@
 
 #include "base/check.hpp"
 #include "base/option_check.hpp"
+#include "estimation/levenberg_marquardt.hpp"
 
 namespace twofold {
 
@@ -116,7 +117,7 @@ FilterSummary SlidingWindowFilter::optimise(int max_iterations) {
   while (summary_.iterations < max_iterations) {
     ++summary_.iterations;
     if (!reuse_factor && !factorise(damping)) {
-      damping = std::max(10 * damping, 1e-6);
+      damping = raised_damping(damping, 1e-6);
       continue;
     }
     factor_.solve(equations_.g_poses, equations_.g_landmarks, step_);
@@ -127,7 +128,7 @@ FilterSummary SlidingWindowFilter::optimise(int max_iterations) {
     if (summary_.converged) break;
     if (!(cost() <= current + allowed_rise(current, reuse_factor ? 0.0 : decrement))) {
       set_estimate(before);
-      if (!reuse_factor) damping = std::max(10 * damping, 1e-3);
+      if (!reuse_factor) damping = raised_damping(damping, 1e-3);
       reuse_factor = false;
       continue;
     }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "camera/measurement.hpp"
+#include "estimation/levenberg_marquardt.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "filters/sliding_window_filter.hpp"
 #include "geometry/symmetric_solve.hpp"
@@ -70,7 +71,7 @@ SE3 minimise(const PoseCost& cost, SE3 T_c_l) {
     const SE3 T_new = SE3::exp(delta) * T_c_l;
     const double next = cost.at(T_new);
     if (!std::isfinite(next) || next > current) {
-      damping = std::max(10 * damping, 1e-3);
+      damping = raised_damping(damping, 1e-3);
       continue;
     }
     T_c_l = T_new;

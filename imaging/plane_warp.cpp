@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "imaging/level_pixels.hpp"
+
 namespace twofold {
 namespace {
 
@@ -124,13 +126,13 @@ std::optional<SurfaceAlignment> align_surface_patch(const SurfacePatch& patch, c
   const auto level = level_of_patch(A_0);
   if (!level) return std::nullopt;
   const double scale = std::ldexp(1.0, -*level);
-  const auto to_level = [scale](const Vector2& uv) -> Vector2 { return (uv.array() + 0.5) * scale - 0.5; };
   const cv::Mat& image = view.level(*level);
   Vector2 places[SurfacePatch::kArea];
   for (int i = 0; i < SurfacePatch::kArea; ++i) {
     const Vector2 offset(i % SurfacePatch::kSize - SurfacePatch::kHalf,
                          i / SurfacePatch::kSize - SurfacePatch::kHalf);
-    places[i] = to_level(map_pixel(H_v_r, patch.uv + offset));
+    const Vector2 uv = map_pixel(H_v_r, patch.uv + offset);
+    places[i] = {to_level(uv.x(), *level), to_level(uv.y(), *level)};
   }
   const SurfacePatchEquations equations(patch, scale * A_0, options.along_row);
   Vector2 move(0, 0);

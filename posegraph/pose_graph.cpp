@@ -8,6 +8,7 @@
 
 #include "base/check.hpp"
 #include "base/option_check.hpp"
+#include "estimation/levenberg_marquardt.hpp"
 #include "estimation/robust_kernel.hpp"
 #include "posegraph/pose_graph_equations.hpp"
 #include "posegraph/pose_graph_error.hpp"
@@ -160,7 +161,7 @@ class StepControl {
   }
   /// Once more with a factor of its own, or else shorter. False when there is nothing left to try.
   [[nodiscard]] bool rejected() {
-    if (std::exchange(own_factor_, true)) damping_ = std::max(10 * damping_, kFirst);
+    if (std::exchange(own_factor_, true)) damping_ = raised_damping(damping_, kFirst);
     return damping_ < kMost;
   }
 

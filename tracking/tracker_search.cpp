@@ -71,7 +71,7 @@ bool Tracker::leaves_motion(const SE3& T_c_ref, const FrameStep& step) {
   samples_.clear();
   for (const AlignmentPoint& point : last_.points) {
     const Vector3 here = T_cur_prev * point.x, there = T_cur_prev_predicted * point.x;
-    if (std::min(here.z(), there.z()) <= 0) continue;
+    if (!in_front_of_camera(here) || !in_front_of_camera(there)) continue;
     samples_.push_back((rig_.camera.project(here) - rig_.camera.project(there)).norm());
   }
   return !samples_.empty() && median(std::span(samples_)) > options_.search.radius_px;

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <optional>
+#include <span>
 
 #include "base/bytes.hpp"
+#include "base/median.hpp"
 #include "io/bags/ros_images.hpp"
 #include "io/files/damaged_images.hpp"
 #include "io/files/grey_levels.hpp"
@@ -89,9 +91,7 @@ class Surveyor {
     if (times.size() <= kFewest) return 0;
     std::vector<std::int64_t> intervals;
     for (std::size_t i = 1; i < times.size(); ++i) intervals.push_back(times[i] - times[i - 1]);
-    const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-    std::nth_element(intervals.begin(), middle, intervals.end());
-    return *middle;
+    return median(std::span(intervals));
   }
 
   BagReader& reader_;

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include <fmt/format.h>
 
+#include "base/median.hpp"
 #include "io/files/calibration_file.hpp"
 #include "io/files/grey_levels.hpp"
 #include "io/files/image_file.hpp"
@@ -77,9 +79,7 @@ void note_long_intervals(const fs::path& file, Recording& recording) {
   if (frames.size() < kFewest) return;
   std::vector<std::int64_t> intervals;
   for (std::size_t i = 1; i < frames.size(); ++i) intervals.push_back(frames[i].t_ns - frames[i - 1].t_ns);
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  const double interval = static_cast<double>(*middle) * 1e-9;
+  const double interval = static_cast<double>(median(std::span(intervals))) * 1e-9;
   if (interval <= kLong) return;
   recording.notes.push_back(
       fmt::format("{}: time stamps are taken as seconds, by which the frames are {:.6g} s apart",

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "base/option_check.hpp"
 #include "estimation/median_chi2.hpp"
 #include "estimation/observation_model.hpp"
@@ -65,10 +67,8 @@ MotionOnlyResult ElderVote::settle_elders(const MotionOnlyResult& by_elders,
     if (o.inlier) chi2_.push_back(model.chi2(by_elders.T_c_ref * o.x_ref, o.pixel, o.information));
   }
   if (chi2_.empty()) return by_elders;
-  const auto middle = chi2_.begin() + static_cast<std::ptrdiff_t>(chi2_.size() / 2);
-  std::nth_element(chi2_.begin(), middle, chi2_.end());
   const double usual = median_chi2(rig_.kind == SensorKind::kMono ? 2 : 3);
-  const double narrower = std::min(1.0, *middle / usual);
+  const double narrower = std::min(1.0, median(std::span(chi2_)) / usual);
   MotionOnlyOptions strict = solver;
   strict.huber_sigmas *= std::sqrt(narrower);
   strict.inlier_chi2_mono *= narrower;

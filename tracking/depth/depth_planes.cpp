@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "base/median.hpp"
 #include "base/option_check.hpp"
 
 namespace twofold {
@@ -151,9 +153,7 @@ double DepthPlanes::scatter(const Means& means) {
     }
   }
   if (variances_.empty()) return sigma_floor_;
-  const auto median = variances_.begin() + static_cast<std::ptrdiff_t>(variances_.size() / 2);
-  std::nth_element(variances_.begin(), median, variances_.end());
-  return std::max(sigma_floor_, std::sqrt(*median / kMedianChi2));
+  return std::max(sigma_floor_, std::sqrt(median(std::span(variances_)) / kMedianChi2));
 }
 
 void DepthPlanes::add_planes(int size) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "estimation/levenberg_marquardt.hpp"
 #include "experiments/why_filter/gauss_newton_filter.hpp"
 
 namespace twofold::bench {
@@ -113,7 +114,7 @@ void GaussNewtonFilter::estimate_motion(const std::vector<Seen>& all) {
     if (!(next_chi2 < chi2)) {
       T_c_w_ = T_before;
       if (delta.norm() < 1e-9) break;
-      damping = std::max(10 * damping, 1e-4);
+      damping = raised_damping(damping, 1e-4);
       continue;
     }
     const bool settled = chi2 - next_chi2 < 1e-6;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/processor_time.hpp"
+#include "estimation/levenberg_marquardt.hpp"
 #include "experiments/why_filter/gauss_newton_filter.hpp"
 
 namespace twofold::bench {
@@ -144,7 +145,7 @@ bool GaussNewtonFilter::joint_update(const std::vector<Seen>& seen, int iteratio
         damping = std::max(0.1 * damping, 1e-12);
       } else {
         set_mean(old);
-        damping = std::max(10 * damping, 1e-4);
+        damping = raised_damping(damping, 1e-4);
       }
     }
     if (!accepted) break;
