@@ -231,6 +231,8 @@ SolverSummary PoseGraphSolver<Group>::solve(PoseGraph<Group>& graph, const PoseG
   return summary;
 }
 
+// The program has no planar graphs. SE(2) is here for the published ones that tests and benchmarks solve:
+// without it, the solver and its equations would all have to be in headers.
 template class PoseGraphSolver<SE2>;
 template class PoseGraphSolver<SE3>;
 template class PoseGraphSolver<Sim3>;
