@@ -20,7 +20,7 @@ std::string CalibrationOptions::invalid_reason() const {
 std::string ViewGuideOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("wanted_views", wanted_views, 3)
-      .at_least("most_views", most_views, wanted_views)
+      .at_least("max_views", max_views, wanted_views)
       .within("wanted_coverage", wanted_coverage, 0, 1)
       .at_least("wanted_tilt", wanted_tilt, 0)
       .at_least("wanted_zoom", wanted_zoom, 1)

@@ -78,12 +78,12 @@ bool ViewGuide::offer(const BoardView& view) {
   if (!is_new(entry, entries_)) return false;
   entries_.push_back(std::move(entry));
   chosen_.push_back(number);
-  if (static_cast<int>(entries_.size()) > options_.most_views) thin_out();
+  if (static_cast<int>(entries_.size()) > options_.max_views) thin_out();
   return !chosen_.empty() && chosen_.back() == number;
 }
 
 void ViewGuide::thin_out() {
-  while (static_cast<int>(entries_.size()) > options_.most_views) {
+  while (static_cast<int>(entries_.size()) > options_.max_views) {
     novelty_px_ *= 1.25;
     novelty_angle_ *= 1.25;
     std::vector<Entry> kept;

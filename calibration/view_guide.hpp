@@ -8,7 +8,7 @@ namespace twofold {
 
 struct ViewGuideOptions {
   int wanted_views = 20;         ///< >= 3
-  int most_views = 60;           ///< more are thinned out, >= wanted_views
+  int max_views = 60;            ///< more are thinned out, >= wanted_views
   double wanted_coverage = 0.8;  ///< share of the image's cells with a corner, 0..1
   double wanted_tilt = 0.3;      ///< in each of four directions [rad]
   double wanted_zoom = 1.5;      ///< largest over smallest view

@@ -161,7 +161,7 @@ bool AnchoredViews::linearise(Equations& equations) const {
   return true;
 }
 
-bool AnchoredViews::minimise(int max_iterations, double least_gain) {
+bool AnchoredViews::minimise(int max_iterations, double min_gain) {
   double current = cost(), damping = 1e-6;
   Equations equations;
   Eigen::VectorXd poses_step;
@@ -184,7 +184,7 @@ bool AnchoredViews::minimise(int max_iterations, double least_gain) {
     const double gain = current - next;
     current = next;
     damping = std::max(0.1 * damping, 1e-12);
-    if (gain < least_gain) break;
+    if (gain < min_gain) break;
   }
   return std::isfinite(current);
 }

@@ -34,9 +34,9 @@ struct AnchoredViews {
   std::vector<Point> points;
   std::vector<View> views;
 
-  /// Levenberg-Marquardt until a step gains less of the cost than least_gain; the damping holds the free
+  /// Levenberg-Marquardt until a step gains less of the cost than min_gain; the damping holds the free
   /// scale. False when points stay behind a camera. The cost never rises.
-  [[nodiscard]] bool minimise(int max_iterations, double least_gain = 1e-6);
+  [[nodiscard]] bool minimise(int max_iterations, double min_gain = 1e-6);
   /// Squared whitened error; infinity when a point is behind a camera.
   [[nodiscard]] double cost() const;
   /// Lets the first view be one unit of length from the anchor. False when it stands there.

@@ -53,7 +53,7 @@ Board board_of(const BoardCalibrator::Options& options) {
 ViewGuideOptions guide_options(int views) {
   ViewGuideOptions options;
   options.wanted_views = views;
-  options.most_views = std::max(options.most_views, views);
+  options.max_views = std::max(options.max_views, views);
   return options;
 }
 

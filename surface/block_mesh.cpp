@@ -53,7 +53,7 @@ VertexPlace place_of(int s, int last, const CubeEdge& edge) {
 BlockMesher::BlockMesher(const SurfaceVolume& volume)
     : volume_(volume),
       voxel_(static_cast<float>(volume.options().voxel)),
-      least_weight_(steps_of(static_cast<float>(volume.options().least_weight), volume.units().weight)) {}
+      min_weight_(steps_of(static_cast<float>(volume.options().min_weight), volume.units().weight)) {}
 
 void BlockMesher::extract(const BlockPosition& at, BlockMesh& piece) {
   piece.edges = {};
@@ -119,11 +119,11 @@ bool BlockMesher::find_rows() {
       const std::size_t first = sample_at(0, y, z);
       Row found;
       if (blocks[0] != nullptr) {
-        found.known = bits_of(load<LaneUnsignedShort>(&blocks[0]->weight[first]) >= least_weight_);
+        found.known = bits_of(load<LaneUnsignedShort>(&blocks[0]->weight[first]) >= min_weight_);
         found.inside = bits_of(load<LaneShort>(&blocks[0]->distance[first]) < 0);
       }
       if (blocks[1] != nullptr) {
-        found.known |= static_cast<unsigned>(blocks[1]->weight[first] >= least_weight_) << kBlockEdge;
+        found.known |= static_cast<unsigned>(blocks[1]->weight[first] >= min_weight_) << kBlockEdge;
         found.inside |= static_cast<unsigned>(blocks[1]->distance[first] < 0) << kBlockEdge;
       }
       rows_[static_cast<std::size_t>(z * kRows + y)] = found;

@@ -106,8 +106,8 @@ class BlockMesher {
 
   const SurfaceVolume& volume_;
   const float voxel_;
-  std::uint16_t least_weight_ = 0;  // [steps]
-  Around around_{};                 // of the block: x + 3 y + 9 z, the block itself being 13
+  std::uint16_t min_weight_ = 0;  // [steps]
+  Around around_{};               // of the block: x + 3 y + 9 z, the block itself being 13
   std::array<float, kPaddedSamples> distance_{}, weight_{};
   std::array<Row, static_cast<std::size_t>(kRows) * kRows> rows_{};
 };

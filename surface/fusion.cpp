@@ -13,8 +13,8 @@ namespace twofold {
 namespace {
 
 constexpr float kColourBand = 2.0f * kDistanceSteps;
-constexpr float kReadingShare = 0.2f;  // of most_weight: what one reading, however near, weighs at most
-constexpr float kFreeShare = 0.1f;     // of most_weight: what the sight of free space weighs
+constexpr float kReadingShare = 0.2f;  // of max_weight: what one reading, however near, weighs at most
+constexpr float kFreeShare = 0.1f;     // of max_weight: what the sight of free space weighs
 
 /// Eight readings, each kind together.
 struct PixelLanes {
@@ -150,11 +150,11 @@ struct RowScale {
         truncation(pose.truncation),
         behind(1 / (pose.truncation - view.voxel)),
         distance(1 / units.distance),
-        most_weight(kReadingShare * kMostWeightSteps / 255),
+        max_weight(kReadingShare * kMostWeightSteps / 255),
         weight(view.voxel * view.voxel / (view.noise * view.noise) / units.weight / 255) {}
 
   std::array<Lanes, 3> step;  ///< from the row's first sample to the others
-  float truncation, behind, distance, most_weight, weight;
+  float truncation, behind, distance, max_weight, weight;
 };
 
 /// Row y of a layer. Weights are those at the samples' depths, which are the readings' but for the
@@ -182,7 +182,7 @@ inline void measure_row(const FusionView& view, const RowScale& scale, const Pix
   const Lanes behind = smaller(kOne, (in_depth + scale.truncation) * scale.behind);
   const Lanes squared = inverse * inverse;
   const Lanes facing = real((at.colour_and_facing >> 24) & 255);
-  const Lanes weight = facing * behind * smaller(scale.weight * squared * squared, kZero + scale.most_weight);
+  const Lanes weight = facing * behind * smaller(scale.weight * squared * squared, kZero + scale.max_weight);
   const Lanes banded = in_band ? weight : kZero;
   row.distance = scale.distance * (is_free ? kZero + scale.truncation : s);
   row.weight = is_free ? kZero + kFreeShare * kMostWeightSteps : banded;
@@ -228,7 +228,7 @@ inline void update_row(const RowUpdate& row, std::size_t first, VoxelBlock& bloc
 /// Nothing but free space, seen more than once: carving has nothing more to do here.
 bool is_all_free(const VoxelBlock& block, const FusionView& view, const SampleUnits& units) {
   const auto far = static_cast<std::int16_t>(0.9f * view.truncation / units.distance);
-  const auto known = static_cast<std::uint16_t>(kFreeShare * view.most_weight / units.weight);
+  const auto known = static_cast<std::uint16_t>(kFreeShare * view.max_weight / units.weight);
   constexpr std::size_t kLayer = kBlockEdge * kBlockEdge;  // most blocks show in the first that they are not
   for (std::size_t layer = 0; layer < kBlockSamples; layer += kLayer) {
     LaneShort other{};

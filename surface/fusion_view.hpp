@@ -18,7 +18,7 @@ struct FusionView {
   Eigen::Matrix3f R_c_v;
   float fx, fy, cx, cy, width, height;
   std::int32_t stride;
-  float voxel, truncation, noise, most_weight;
+  float voxel, truncation, noise, max_weight;
 
   FusionView(const DepthView& view, const SurfaceOptions& options, const SE3& T_c_v)
       : R_c_v(T_c_v.rotation().cast<float>()),
@@ -32,7 +32,7 @@ struct FusionView {
         voxel(static_cast<float>(options.voxel)),
         truncation(static_cast<float>(options.truncation * options.voxel)),
         noise(static_cast<float>(options.depth_noise)),
-        most_weight(static_cast<float>(options.most_weight)) {}
+        max_weight(static_cast<float>(options.max_weight)) {}
 
   /// Distances are kept up to so much [m] for readings at depth z [m], whose sigma is noise z^2.
   [[nodiscard]] float truncation_at(float z) const {

@@ -159,7 +159,7 @@ TriangleMesh MeshPieces::piece(const BlockPosition& at) const {
   return mesh;
 }
 
-TriangleMesh MeshPieces::joined(int least_triangles) const {
+TriangleMesh MeshPieces::joined(int min_triangles) const {
   TriangleMesh mesh;
   std::unordered_map<const BlockMesh*, std::uint32_t> first;
   first.reserve(pieces_.size());
@@ -188,7 +188,7 @@ TriangleMesh MeshPieces::joined(int least_triangles) const {
     };
     for (const auto& t : piece.mesh.triangles) mesh.triangles.push_back({name(t[0]), name(t[1]), name(t[2])});
   }
-  drop_small_pieces(mesh, least_triangles);
+  drop_small_pieces(mesh, min_triangles);
   return mesh;
 }
 
@@ -237,7 +237,7 @@ std::size_t drop_pieces_beside(TriangleMesh& mesh, const Vector3& up) {
 TriangleMesh extract_mesh(const SurfaceVolume& volume) {
   MeshPieces pieces;
   pieces.update(volume);
-  return pieces.joined(volume.options().least_triangles);
+  return pieces.joined(volume.options().min_triangles);
 }
 
 }  // namespace twofold

@@ -27,13 +27,13 @@ class MeshPieces {
   /// more, unless it is 0: there was nothing before.
   [[nodiscard]] std::vector<BlockPosition> changed_since(std::uint64_t revision) const;
   /// The triangles of a block's cells by themselves: vertices on the border to the blocks behind it are in
-  /// their pieces as well. Specks of noise, which joined and least_triangles leave out, are among them.
+  /// their pieces as well. Specks of noise, which joined and min_triangles leave out, are among them.
   [[nodiscard]] TriangleMesh piece(const BlockPosition& at) const;
 
   /// All pieces as one mesh, in the order of their positions; they share the vertices on their borders.
-  /// Pieces of the surface of fewer than least_triangles triangles are left out, as extract_mesh leaves them
+  /// Pieces of the surface of fewer than min_triangles triangles are left out, as extract_mesh leaves them
   /// out.
-  [[nodiscard]] TriangleMesh joined(int least_triangles) const;
+  [[nodiscard]] TriangleMesh joined(int min_triangles) const;
   [[nodiscard]] std::size_t bytes() const;
 
  private:

@@ -8,9 +8,9 @@
 namespace twofold {
 
 /// The surface of a volume by marching cubes, in the volume's frame: where the distance is 0, between samples
-/// of at least options().least_weight. Blocks share the vertices on their borders, so that the mesh is closed
+/// of at least options().min_weight. Blocks share the vertices on their borders, so that the mesh is closed
 /// wherever the field is known; normals are the field's gradient, sigmas voxel / sqrt(weight), an upper
-/// estimate. Pieces of fewer than options().least_triangles triangles are left out. Same volume, same bytes.
+/// estimate. Pieces of fewer than options().min_triangles triangles are left out. Same volume, same bytes.
 [[nodiscard]] TriangleMesh extract_mesh(const SurfaceVolume& volume);
 
 /// Leaves out connected pieces of fewer than `least` triangles, then vertices that no triangle uses.

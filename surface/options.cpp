@@ -17,9 +17,9 @@ std::string SurfaceOptions::invalid_reason() const {
       .within("truncation", truncation, 2, 20)
       .at_least("max_depth", max_depth, 0)
       .within("depth_noise", depth_noise, 0, kMostDepthNoise)
-      .above("least_weight", least_weight, 0)
-      .at_least("most_weight", most_weight, 1)
-      .at_least("least_triangles", least_triangles, 0)
+      .above("min_weight", min_weight, 0)
+      .at_least("max_weight", max_weight, 1)
+      .at_least("min_triangles", min_triangles, 0)
       .reason();
 }
 

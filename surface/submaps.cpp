@@ -25,8 +25,8 @@ SE3 begin_of_submap(const SE3& T_k_w, double voxel) {
 
 std::string SubmapOptions::invalid_reason() const {
   return OptionCheck()
-      .at_least("most_keyframes", most_keyframes, 1)
-      .at_least("most_waiting", static_cast<double>(most_waiting), 1)
+      .at_least("max_keyframes", max_keyframes, 1)
+      .at_least("max_waiting", static_cast<double>(max_waiting), 1)
       .above("memory_mb", memory_mb, 0)
       .reason();
 }
@@ -47,7 +47,7 @@ SubmapSurface::SubmapSurface(const Rig& rig, const SurfaceOptions& options, cons
 
 void SubmapSurface::offer(KeyframeDepth frame) {
   waiting_.push_back(std::move(frame));
-  if (waiting_.size() <= limits_.most_waiting) return;
+  if (waiting_.size() <= limits_.max_waiting) return;
   waiting_.pop_front();
   ++report_.overtaken;
 }
@@ -114,7 +114,7 @@ double SubmapSurface::bend_of(const Submap& submap) const {
 void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph, std::size_t most) {
   for (; next_keyframe_ < graph.keyframe_count(); ++next_keyframe_) {
     without_depth_.push_back(KeyframeId{next_keyframe_});
-    if (without_depth_.size() > limits_.most_waiting) without_depth_.pop_front();
+    if (without_depth_.size() > limits_.max_waiting) without_depth_.pop_front();
   }
   keyframes_left_ = false;
   while (!without_depth_.empty() && !waiting_.empty()) {
@@ -159,7 +159,7 @@ SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, con
   Submap* best = nullptr;
   int most = 0;
   for (const auto& submap : submaps_) {
-    if (static_cast<int>(submap->members.size()) >= limits_.most_keyframes || submap->part != keyframe.part)
+    if (static_cast<int>(submap->members.size()) >= limits_.max_keyframes || submap->part != keyframe.part)
       continue;
     int shared = 0;
     for (const Member& member : submap->members) {

@@ -15,8 +15,8 @@
 namespace twofold {
 
 struct SubmapOptions {
-  int most_keyframes = 10;        ///< of a submap >= 1
-  std::size_t most_waiting = 64;  ///< depth images that wait for their keyframes, or to be fused >= 1
+  int max_keyframes = 10;        ///< of a submap >= 1
+  std::size_t max_waiting = 64;  ///< depth images that wait for their keyframes, or to be fused >= 1
   /// Of samples and depth images [MiB] > 0: with more than this no keyframe is added, and its depth is let go
   /// of. What is fused anew may exceed it.
   double memory_mb = 2000;

@@ -12,7 +12,7 @@ namespace twofold {
 SurfaceVolume::SurfaceVolume(const SurfaceOptions& options) : options_(options) {
   TWOFOLD_CHECK(options.invalid_reason().empty() && options.depth_noise > 0, "valid surface options");
   units_.distance = static_cast<float>(options.voxel) / kDistanceSteps;
-  units_.weight = static_cast<float>(options.most_weight) / kMostWeightSteps;
+  units_.weight = static_cast<float>(options.max_weight) / kMostWeightSteps;
 }
 
 std::optional<SurfaceDistance> SurfaceVolume::distance(const Vector3& x_v) const {

@@ -89,7 +89,7 @@ TEST(ViewGuide, AsksForWhatIsMissingUntilNothingIs) {
 
 TEST(ViewGuide, ThinsOutALongRecording) {
   ViewGuideOptions options;
-  options.most_views = 12;
+  options.max_views = 12;
   options.wanted_views = 10;
   ViewGuide guide(kBoard, kImageSize, options);
   std::mt19937 random(4);

@@ -79,7 +79,7 @@ TEST(Options, OfTheTrackersSearchSayWhyTheyAreInvalid) {
 TEST(Options, OfFixedPixelsSayWhyTheyAreInvalid) {
   expect_rules<FixedPixelOptions>({{"min_contrast", [](auto& o) { o.min_contrast = o.same_grey; }},
                                    {"aside_px", [](auto& o) { o.aside_px = 0; }},
-                                   {"most_votes", [](auto& o) { o.most_votes = 255 / o.believed + 1; }},
+                                   {"max_votes", [](auto& o) { o.max_votes = 255 / o.believed + 1; }},
                                    {"against", [](auto& o) { o.against = 256; }},
                                    {"min_in_quarter", [](auto& o) { o.min_in_quarter = 0; }},
                                    {"max_telling", [](auto& o) { o.max_telling = 0; }},
@@ -123,7 +123,7 @@ TEST(Options, OfDepthSayWhyTheyAreInvalid) {
   expect_rules<DepthAlignmentOptions>(
       {{"planes.columns", [](auto& o) { o.planes.columns = 2; }},
        {"min_facing", [](auto& o) { o.min_facing = 1.1; }},
-       {"widest_kernel", [](auto& o) { o.widest_kernel = o.kernel / 2; }},
+       {"max_kernel", [](auto& o) { o.max_kernel = o.kernel / 2; }},
        {"jackknife_share", [](auto& o) { o.jackknife_share = -0.1; }},
        {"max_deviation", [](auto& o) { o.max_deviation = 0; }},
        {"settled_step", [](auto& o) { o.settled_step = 0; }},
@@ -133,7 +133,7 @@ TEST(Options, OfDepthSayWhyTheyAreInvalid) {
                                    {"many_columns", [](auto& o) { o.many_columns = 0; }},
                                    {"max_scatter", [](auto& o) { o.max_scatter = 0; }},
                                    {"min_cosine", [](auto& o) { o.min_cosine = -0.1; }},
-                                   {"least_noise", [](auto& o) { o.least_noise = 0; }}});
+                                   {"min_noise", [](auto& o) { o.min_noise = 0; }}});
 }
 
 TEST(Options, OfALostCameraSayWhyTheyAreInvalid) {
@@ -195,9 +195,9 @@ TEST(Options, OfOneCamerasStartSayWhyTheyAreInvalid) {
                                        {"outlier_chi2", [](auto& o) { o.outlier_chi2 = 0; }},
                                        {"adjustment_steps", [](auto& o) { o.adjustment_steps = 0; }},
                                        {"first_gain", [](auto& o) { o.first_gain = 0; }},
-                                       {"least_gain", [](auto& o) { o.least_gain = 0; }},
+                                       {"min_gain", [](auto& o) { o.min_gain = 0; }},
                                        {"same_angle", [](auto& o) { o.same_angle = -1; }},
-                                       {"most_sheared", [](auto& o) { o.most_sheared = 0; }},
+                                       {"shear_quantile", [](auto& o) { o.shear_quantile = 0; }},
                                        {"max_readouts", [](auto& o) { o.max_readouts = 0; }}});
 }
 

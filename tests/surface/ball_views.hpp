@@ -22,7 +22,7 @@ inline SurfaceOptions fine_options(double voxel = 0.01) {
   SurfaceOptions options;
   options.voxel = voxel;
   options.depth_noise = 1.425e-3;
-  options.least_triangles = 0;
+  options.min_triangles = 0;
   return options;
 }
 

@@ -43,7 +43,7 @@ class RandomViews {
 
 SurfaceOptions options() {
   SurfaceOptions coarse = testing::fine_options(0.02);
-  coarse.least_triangles = 8;
+  coarse.min_triangles = 8;
   return coarse;
 }
 
@@ -57,7 +57,7 @@ TEST(MeshPieces, AfterAnyFusionAreTheMeshOfTheWhole) {
     pieces.update(volume);
     const TriangleMesh whole = extract_mesh(volume);
     ASSERT_GT(whole.triangles.size(), 500u);
-    ASSERT_TRUE(pieces.joined(volume.options().least_triangles) == whole) << n;
+    ASSERT_TRUE(pieces.joined(volume.options().min_triangles) == whole) << n;
   }
 }
 
@@ -141,7 +141,7 @@ class CompositionTest : public ::testing::Test {
   void expect_same(const char* after) {
     composition_.settle(placed_);
     const TriangleMesh mesh = mesh_of_all();
-    EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh) << after;
+    EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh) << after;
     EXPECT_TRUE(extract_mesh(composition_.whole()) == mesh) << after;
   }
   void move(std::size_t n, double by) { placed_[n].T_w_v = SE3(SO3(), {0, by, 0}) * placed_[n].T_w_v; }
@@ -179,7 +179,7 @@ TEST_F(CompositionTest, FollowsOnlyWhatMovesByHalfAVoxel) {
   EXPECT_EQ(composition_.mesh().revision(), revision);
   move(1, 0.4 * options().voxel);
   EXPECT_GT(composition_.update(placed_), 0u);
-  EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
+  EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
 TEST_F(CompositionTest, KeepsNoBlocksWhereNothingIsAnyMore) {
@@ -200,7 +200,7 @@ TEST_F(CompositionTest, FollowsAVolumeThatHadNothingYet) {
   move(3, 0.3);
   views_.fuse_next(volumes_.back());
   composition_.update(placed_);
-  EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
+  EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
 TEST_F(CompositionTest, WhatItGivesUpIsDoneByTheNextCall) {
@@ -223,7 +223,7 @@ TEST_F(CompositionTest, WhatItGivesUpIsDoneByTheNextCall) {
   move(2, -0.1);
   EXPECT_GT(composition_.update(placed_), 0u);
   EXPECT_FALSE(composition_.unfinished());
-  EXPECT_TRUE(composition_.mesh().joined(options().least_triangles) == mesh_of_all());
+  EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
 /// 0 where nothing was ever seen.

@@ -59,7 +59,7 @@ class SubmapSurfaceTest : public ::testing::Test {
   Ball ball_{{0.02, -0.01, 0.03}, 0.15};
   GraphWriter writer_;
   int loaded_ = 0;  ///< keyframes that the map has from another run, whose frames were counted likewise
-  SubmapOptions limits_{.most_keyframes = 5, .most_waiting = 64, .memory_mb = 500};
+  SubmapOptions limits_{.max_keyframes = 5, .max_waiting = 64, .memory_mb = 500};
 };
 
 TEST_F(SubmapSurfaceTest, KeyframesShareSubmapsAndMakeOneSurface) {
@@ -103,9 +103,9 @@ TEST_F(SubmapSurfaceTest, OnlyABentGroupIsFusedAnew) {
   shift(1, 0.008);
   shift(6, 0.002);
   surface.step(writer_.publish());
-  EXPECT_EQ(surface.report().fused_anew, limits_.most_keyframes);
+  EXPECT_EQ(surface.report().fused_anew, limits_.max_keyframes);
   surface.step(writer_.publish());
-  EXPECT_EQ(surface.report().fused_anew, limits_.most_keyframes);
+  EXPECT_EQ(surface.report().fused_anew, limits_.max_keyframes);
 }
 
 TEST_F(SubmapSurfaceTest, BentGroupsMoveAtOnceAndAreFusedAnewOneByOneMostBentFirst) {
@@ -220,7 +220,7 @@ TEST_F(SubmapSurfaceTest, ImagesWithoutReadingsAreNotFused) {
 }
 
 TEST_F(SubmapSurfaceTest, FramesThatNeverBecomeKeyframesAreLetGoOf) {
-  limits_.most_waiting = 3;
+  limits_.max_waiting = 3;
   SubmapSurface surface(rig_, testing::fine_options(), limits_);
   const cv::Mat depth(240, 320, CV_16UC1, cv::Scalar(1000));
   for (int n = 0; n < 8; ++n) surface.offer(pack_keyframe_depth(-100 + n, depth, {}));

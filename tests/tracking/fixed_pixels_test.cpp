@@ -68,7 +68,7 @@ class FixedPixelsTest : public ::testing::Test {
     return count;
   }
 
-  FixedPixelOptions options_{.most_of_it = 1};
+  FixedPixelOptions options_{.max_fixed_share = 1};
   std::int64_t t_ns_ = 0;
   ImageMotion motion_{kCamera};
   FixedPixels fixed_{kWidth, kHeight, options_};

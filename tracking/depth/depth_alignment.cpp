@@ -28,7 +28,7 @@ std::string DepthAlignmentOptions::invalid_reason() const {
       .within("min_facing", min_facing, -1, 1)
       .above("corner_huber", corner_huber, 0)
       .above("max_corner_chi2", max_corner_chi2, 0)
-      .at_least("widest_kernel", widest_kernel, kernel)
+      .at_least("max_kernel", max_kernel, kernel)
       .within("jackknife_share", jackknife_share, 0, 1)
       .above("max_deviation", max_deviation, 0)
       .above("settled_step", settled_step, 0)
@@ -188,7 +188,7 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
   if (static_cast<int>(current_.planes().size()) < options_.min_planes || views_ == 0)
     return tl::unexpected(LostCause::kTooFewMatches);
   SE3 T_c_ref = T_c_ref_start;
-  Pass pass{options_.widest_kernel, static_cast<std::size_t>(options_.first_stride), false};
+  Pass pass{options_.max_kernel, static_cast<std::size_t>(options_.first_stride), false};
   if (static_cast<int>(corners.size()) < options_.min_corners) corners = {};
   for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
     Equations equations = linearise(T_c_ref, pass);
@@ -201,7 +201,7 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::align(
     if (pass.stride == 1 && step.norm() < options_.settled_step) break;
     if (step.norm() < options_.nearly_settled_step) pass.stride = 1;
     pass.kernel =
-        std::clamp(2 * equations.deviations / equations.pairs, options_.kernel, options_.widest_kernel);
+        std::clamp(2 * equations.deviations / equations.pairs, options_.kernel, options_.max_kernel);
   }
   return judge(T_c_ref, corners);
 }

@@ -35,7 +35,7 @@ struct DepthAlignmentOptions {
   // Corners err like planes, but some are found somewhere else.
   double corner_huber = 1.5;     ///< [standard deviations] > 0
   double max_corner_chi2 = 30;   ///< farther ones are mistakes, > 0
-  double widest_kernel = 30;     ///< that it begins with, >= kernel [standard deviations]
+  double max_kernel = 30;        ///< that it begins with, >= kernel [standard deviations]
   double jackknife_share = 0.5;  ///< of the covariance, that is from leaving regions out, in [0, 1]
   double max_deviation = 30;     ///< of a plane, counts as no farther [standard deviations] > 0
   // How it is solved: neither changes the pose by as much as a tenth of what that is uncertain by.

@@ -25,7 +25,7 @@ std::string DepthPlaneOptions::invalid_reason() const {
       .at_least("many_columns", many_columns, 1)
       .above("max_scatter", max_scatter, 0)
       .within("min_cosine", min_cosine, 0, 1)
-      .above("least_noise", least_noise, 0)
+      .above("min_noise", min_noise, 0)
       .reason();
 }
 
@@ -33,7 +33,7 @@ DepthPlanes::DepthPlanes(const Rig& rig, const DepthPlaneOptions& options)
     : rig_(rig),
       options_(options),
       // Inverse depth is disparity / (f b), whose noise the rig knows.
-      sigma_floor_(options.least_noise * rig.noise.depth_sigma_px / (rig.camera.fx * rig.baseline)) {
+      sigma_floor_(options.min_noise * rig.noise.depth_sigma_px / (rig.camera.fx * rig.baseline)) {
   int cell_px = std::max(2, rig.camera.width / options.columns);
   for (Means& means : means_) {
     means.cell_px = cell_px;

@@ -19,7 +19,7 @@ struct DepthPlaneOptions {
   double min_cosine = 0.1;  ///< between ray and normal: steeper surfaces are known badly, in [0, 1]
   /// A perfect sensor's means still err by what depth units round off: of the rig's noise of one reading, >
   /// 0.
-  double least_noise = 0.01;
+  double min_noise = 0.01;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -40,14 +40,14 @@ std::string FixedPixelOptions::invalid_reason() const {
       .within("min_contrast", min_contrast, same_grey + 1, 254)
       .within("believed", believed, 2, 100)
       .above("round", round, 0)
-      .share("most_of_it", most_of_it)
+      .share("max_fixed_share", max_fixed_share)
       .share("min_inlier_share", min_inlier_share)
       .within("aside_px", aside_px, 1, 32)
-      .within("most_votes", most_votes, 1, 255 / std::max(believed, 1))
+      .within("max_votes", max_votes, 1, 255 / std::max(believed, 1))
       .within("against", against, 1, 255)
       .within("min_in_quarter", min_in_quarter, 1, 256)
       .at_least("max_telling", max_telling, 1)
-      .within("more_alone", more_alone, 0, (most_votes - 1) * believed)
+      .within("more_alone", more_alone, 0, (max_votes - 1) * believed)
       .within("touching", touching, 1, 9)
       .within("rest", rest, 0, 255)
       .within("chance", chance, 0, believed - 1)
@@ -121,7 +121,7 @@ void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& bl
     ByteRun count = load_run(votes);
     count = count - smaller(count, goes & run_of(static_cast<std::uint8_t>(options_.against)));
     // A byte of `stays` is 255, which is -1; what is believed and more is enough.
-    count = smaller(count - stays, run_of(static_cast<std::uint8_t>(options_.most_votes * believed)));
+    count = smaller(count - stays, run_of(static_cast<std::uint8_t>(options_.max_votes * believed)));
     store_run(count, votes);
     most = larger(most, count);
     staying += std::popcount(mask_of(stays));

@@ -19,15 +19,16 @@ struct FixedPixelOptions {
   int same_grey = 3;  ///< a pixel that has changed by more shows the scene, >= 0
   /// A pixel is telling if it differs by so much from what lies along the motion, > same_grey.
   int min_contrast = 12;
-  int believed = 5;         ///< looks at which a telling pixel must have stayed the same, in [2, 100]
-  double round = 0.2;       ///< time in which all of the image is looked at once [s], > 0
-  double most_of_it = 0.5;  ///< of the image: when more seems fixed, no region is believed to be, in (0, 1]
+  int believed = 5;    ///< looks at which a telling pixel must have stayed the same, in [2, 100]
+  double round = 0.2;  ///< time in which all of the image is looked at once [s], > 0
+  /// Of the image: when more seems fixed, no region is believed to be, in (0, 1].
+  double max_fixed_share = 0.5;
   /// Of the points found in a frame, in (0, 1]: with fewer inliers its pose says nothing of pixels.
   double min_inlier_share = 0.5;
   /// What a pixel is compared with lies so far to either side, along the motion; as wide a rim of the image
   /// is not looked at, in [1, 32].
   int aside_px = 4;
-  int most_votes = 2;       ///< times `believed`: beyond, votes are not counted, >= 1
+  int max_votes = 2;        ///< times `believed`: beyond, votes are not counted, >= 1
   int against = 4;          ///< votes that a change takes back, in [1, 255]
   int min_in_quarter = 16;  ///< fixed pixels that cover a quarter of a block, of 256, ...
   int max_telling = 2;      ///< ... unless more than so many times as many are telling, >= 1
@@ -91,7 +92,7 @@ class FixedPixels {
   void list_dead();
   [[nodiscard]] const Block* block_at(int u, int v) const;
   [[nodiscard]] bool is_believable() const {
-    return covered_ <= options_.most_of_it * 4 * static_cast<double>(blocks_.size());
+    return covered_ <= options_.max_fixed_share * 4 * static_cast<double>(blocks_.size());
   }
 
   FixedPixelOptions options_;

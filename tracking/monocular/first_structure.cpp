@@ -134,7 +134,7 @@ class FirstStructureEstimator {
     std::vector<double> sheared;
     for (std::size_t i = 0; i < first.size(); ++i)
       sheared.push_back((last[i] - views_.last[i] - first[i] + views_.first[i]).norm());
-    const double most = quantile(sheared, options_.most_sheared, QuantileRank::kNearest);
+    const double most = quantile(sheared, options_.shear_quantile, QuantileRank::kNearest);
     return static_cast<int>(
         std::clamp(std::ceil(most / options_.rotation_px), 1.0, 1.0 * options_.max_readouts));
   }
@@ -171,8 +171,8 @@ class FirstStructureEstimator {
   /// Bundle adjustment without the corners that follow something else.
   /// @return false when too few are left
   bool adjust(Trial& trial) const {
-    for (const auto& [bound, gain] : {std::pair{options_.gross_chi2, options_.first_gain},
-                                      {options_.outlier_chi2, options_.least_gain}}) {
+    for (const auto& [bound, gain] :
+         {std::pair{options_.gross_chi2, options_.first_gain}, {options_.outlier_chi2, options_.min_gain}}) {
       put_outliers_aside(bound, trial);
       if (!enough(trial.corners.size()) || !trial.views.minimise(options_.adjustment_steps, gain))
         return false;
@@ -402,10 +402,10 @@ std::string FirstStructureOptions::invalid_reason() const {
       .above("outlier_chi2", outlier_chi2, 0)
       .at_least("adjustment_steps", adjustment_steps, 1)
       .above("first_gain", first_gain, 0)
-      .above("least_gain", least_gain, 0)
+      .above("min_gain", min_gain, 0)
       .within("same_direction", same_direction, -1, 1)
       .at_least("same_angle", same_angle, 0)
-      .share("most_sheared", most_sheared)
+      .share("shear_quantile", shear_quantile)
       .at_least("max_readouts", max_readouts, 1)
       .reason();
 }

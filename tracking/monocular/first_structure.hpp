@@ -42,13 +42,13 @@ struct FirstStructureOptions {
   /// Of the squared whitened errors, with less of which an adjustment ends, > 0: the first one only tells
   /// gross errors.
   double first_gain = 1;
-  double least_gain = 0.01;
+  double min_gain = 0.01;
   // Motions that differ by less are one: cosine between directions, in [-1, 1], and angle [rad].
   double same_direction = 0.95;
   double same_angle = 0.02;
   // Where nobody knows how fast rows are read.
-  double most_sheared = 0.9;  ///< quantile of the corners' shear, by which readouts are told apart, in (0, 1]
-  int max_readouts = 32;      ///< tried, >= 1: bounds the work
+  double shear_quantile = 0.9;  ///< of the corners' shear, by which readouts are told apart, in (0, 1]
+  int max_readouts = 32;        ///< tried, >= 1: bounds the work
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -68,7 +68,7 @@ bool ObjectSource::mask(Frame& frame) {
 }
 
 void ObjectSource::keep(const Frame& frame, const cv::Mat& depth, const cv::Mat& grey) {
-  if (kept_bytes_ > options_.most_bytes) {
+  if (kept_bytes_ > options_.max_bytes) {
     ++not_kept_;
     return;
   }
@@ -85,7 +85,7 @@ std::vector<std::string> ObjectSource::left_out() const {
   if (without_object_ > 0) all.push_back(fmt::format("{} frames: {}", without_object_, reason_));
   if (not_kept_ > 0)
     all.push_back(fmt::format("the depth of {} frames, beyond {} MiB: raise --every", not_kept_,
-                              options_.most_bytes >> 20));
+                              options_.max_bytes >> 20));
   return all;
 }
 

@@ -13,9 +13,9 @@ namespace twofold {
 
 struct ObjectSourceOptions {
   ObjectMaskOptions mask;
-  double nearest_stereo = 0.3;       ///< disparities are searched for up to that of this depth [m] > 0
-  int keep_every = 5;                ///< frames whose depth is kept for the surface >= 1
-  std::size_t most_bytes = 1 << 30;  ///< of kept depth and colour
+  double nearest_stereo = 0.3;      ///< disparities are searched for up to that of this depth [m] > 0
+  int keep_every = 5;               ///< frames whose depth is kept for the surface >= 1
+  std::size_t max_bytes = 1 << 30;  ///< of kept depth and colour
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -45,7 +45,7 @@ class ObjectSource final : public FrameSource {
   [[nodiscard]] const std::vector<Kept>& kept() const { return kept_; }
   /// Kept frames have the source's colours.
   [[nodiscard]] bool coloured() const { return coloured_; }
-  /// What was left out, in words: frames without an object, depth beyond most_bytes.
+  /// What was left out, in words: frames without an object, depth beyond max_bytes.
   [[nodiscard]] std::vector<std::string> left_out() const;
   /// Why no frame shows an object, once the source has ended; empty when one does.
   [[nodiscard]] std::string nothing_shown() const;
