@@ -24,7 +24,8 @@ class LocalMapSearchTest : public ::testing::Test {
     scene_.render(SE3(), 2, at_keyframe);
     scene_.render(T_true_, 2, now_);
     immature_.add_pending({.id = kFirst, .reference = kNoKeyframe, .T_k_ref = SE3()});
-    PointStarter(rig_, options_.new_points, options_.search).start(at_keyframe, kFirst, RollingShutter(), immature_);
+    PointStarter(rig_, options_.new_points, options_.search)
+        .start(at_keyframe, kFirst, RollingShutter(), immature_);
     local_map_.update(graph_, kFirst, immature_, 20);
   }
   FrameStep search(const SE3& T_c_ref, double radius_px, const EffortBounds& bounds) {
