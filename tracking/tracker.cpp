@@ -98,8 +98,7 @@ bool Tracker::track(FrameStep& step) {
     return false;
   }
   SearchStart start{.placement = motion_.placement()};
-  local_map_.update(step.graph, start.placement.reference, immature_points_,
-                    options_.local_map.neighbour_keyframes);
+  collect_local_map(start.placement.reference, step);
   step.lap(TrackerStage::kCandidates);
   if (search_ahead(step)) return true;
   const bool by_depth = last_.by_depth && depth_can_place(step);
@@ -113,8 +112,7 @@ bool Tracker::track(FrameStep& step) {
   const auto first = doubted ? std::optional(set_aside(step)) : std::nullopt;
   if (search_widely(step)) return true;
   if (first) {  // nothing better
-    local_map_.update(step.graph, start.placement.reference, immature_points_,
-                      options_.local_map.neighbour_keyframes);
+    collect_local_map(start.placement.reference, step);
     take_back(*first, step);
   }
   if (cause != LostCause::kNone) cause = place_by_depth_alone(cause, step);

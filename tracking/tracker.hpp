@@ -112,6 +112,7 @@ class Tracker {
   void learn_fixed_pixels(const FrameStep& step);
 
   // tracker_search.cpp: a pose from points
+  void collect_local_map(KeyframeId reference, const FrameStep& step);
   LostCause search_from(SearchStart start, FrameStep& step);
   LostCause search_from_either(const SearchStart& aligned, FrameStep& step);
   [[nodiscard]] bool leaves_motion(const SE3& T_c_ref, const FrameStep& step);
@@ -123,6 +124,7 @@ class Tracker {
   bool search_from_recognised(const Placement& asked, FrameStep& step);
   void leave_other_part(const FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
+  [[nodiscard]] std::optional<Placement> placement_in_this_part(KeyframeId id, const FrameStep& step) const;
   bool search_widely(FrameStep& step);
   bool search_from_view(const FrameImages& images, FrameCorners& corners, const SearchStart& view,
                         FrameStep& step);

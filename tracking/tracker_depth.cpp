@@ -24,11 +24,10 @@ tl::expected<DepthAlignment::Result, LostCause> Tracker::align_depth(
     const SE3& T_c_ref, std::span<const MotionObservation> corners, FrameStep& step) {
   read_depth(step);
   depth_alignment_->clear_views();
-  const KeyframeId part = part_of(step.graph, immature_points_, motion_.reference());
   for (std::size_t age = 0; age < views_.keyframes().size(); ++age) {
     const RecentView& view = views_.keyframes()[age];
-    const auto placement = placement_of(step.graph, view.id);
-    if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
+    const auto placement = placement_in_this_part(view.id, step);
+    if (!placement) continue;
     const SE3 T_placed_ref =
         pose_relative_to(step.graph, immature_points_, placement->reference, motion_.reference());
     depth_alignment_->add_view(view.id, view.images.depth, placement->T_c_ref * T_placed_ref);
@@ -77,8 +76,7 @@ bool Tracker::points_allow(FrameStep& step) {
   TrackResult& result = step.result;
   result.by_depth = false;
   const Placement placement{result.reference, result.T_c_ref};
-  local_map_.update(step.graph, placement.reference, immature_points_,
-                    options_.local_map.neighbour_keyframes);
+  collect_local_map(placement.reference, step);
   const SearchStart start{.placement = placement, .kind = SearchStart::Kind::kRough};
   if (search_from(start, step) == LostCause::kNone) return true;
   if (step.after_loss() && result.candidates >= options_.depth.telling_candidates) return false;

@@ -16,7 +16,7 @@ std::optional<Placement> Tracker::recognised(const FrameStep& step) {
 /// The camera is about where the frame was taken that was recognised, or, at few frames a second, where it
 /// can see what that frame shows.
 bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
-  local_map_.update(step.graph, asked.reference, immature_points_, options_.local_map.neighbour_keyframes);
+  collect_local_map(asked.reference, step);
   step.lap(TrackerStage::kCandidates);
   const SearchStart start{.placement = asked, .kind = SearchStart::Kind::kRecognised};
   if (search_from(start, step) == LostCause::kNone) return true;
@@ -42,17 +42,25 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
   return live ? std::optional(Placement{live->id, live->T_this_live}) : std::nullopt;
 }
 
+/// As placement_of, of a keyframe in the part of the map where the last good frame was: how parts lie to each
+/// other nobody knows.
+std::optional<Placement> Tracker::placement_in_this_part(KeyframeId id, const FrameStep& step) const {
+  const std::optional<Placement> placement = placement_of(step.graph, id);
+  if (!placement) return std::nullopt;
+  const auto part = [&](KeyframeId k) { return part_of(step.graph, immature_points_, k); };
+  return part(placement->reference) == part(motion_.reference()) ? placement : std::nullopt;
+}
+
 /// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
 bool Tracker::search_widely(FrameStep& step) {
   if (!views_.can_find() || motion_.reference() == kNoKeyframe) return false;
   views_.look_at(current_);
   SearchStart start{.placement = motion_.placement(), .kind = SearchStart::Kind::kRough};
   if (!last_.is_keyframe && search_from_view(last_.images, last_.corners, start, step)) return true;
-  const KeyframeId part = part_of(step.graph, immature_points_, motion_.reference());
   for (std::size_t age = 0; age < views_.keyframes().size(); ++age) {
     RecentView& view = views_.keyframes()[age];
-    const auto placement = placement_of(step.graph, view.id);
-    if (!placement || part_of(step.graph, immature_points_, placement->reference) != part) continue;
+    const auto placement = placement_in_this_part(view.id, step);
+    if (!placement) continue;
     start.placement = *placement;
     if (search_from_view(view.images, view.corners, start, step)) return true;
   }
@@ -96,8 +104,7 @@ bool Tracker::search_from_view(const FrameImages& images, FrameCorners& corners,
   if (!T_c_view) return false;
   SearchStart start = view;
   start.placement.T_c_ref = *T_c_view * view.placement.T_c_ref;
-  local_map_.update(step.graph, start.placement.reference, immature_points_,
-                    options_.local_map.neighbour_keyframes);
+  collect_local_map(start.placement.reference, step);
   return search_from(start, step) == LostCause::kNone;
 }
 

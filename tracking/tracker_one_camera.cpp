@@ -48,7 +48,7 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
     if (!immature_points_.add(point)) break;
   }
   const Placement placement{id, start.structure.T_last_first};
-  local_map_.update(step.graph, id, immature_points_, options_.local_map.neighbour_keyframes);
+  collect_local_map(id, step);
   step.velocity = monocular_start_->velocity(start);
   step.shutter = step.velocity ? shutter_.at(placement.T_c_ref, step) : RollingShutter();
   local_map_search_.run(current_, placement.T_c_ref, options_.local_map.lost_radius_px, step, search_);

@@ -8,6 +8,10 @@
 
 namespace twofold {
 
+void Tracker::collect_local_map(KeyframeId reference, const FrameStep& step) {
+  local_map_.update(step.graph, reference, immature_points_, options_.local_map.neighbour_keyframes);
+}
+
 /// Points where they should be, where they are, and the pose that fits: once from a good start, a few times
 /// from a rough one.
 LostCause Tracker::search_from(SearchStart start, FrameStep& step) {
