@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "base/median.hpp"
+#include "imaging/right_rows.hpp"
 
 namespace twofold {
 namespace {
 
-constexpr double kWell = 0.35;  // [px] as far as tracking lets it be
 constexpr const char* kRemedy = "calibrate the pair again (twofold calibrate)";
 
 double median_rows(std::span<const RowOffset> offsets) {
@@ -31,7 +31,8 @@ Finding check_rows(std::span<const RowOffset> offsets) {
   const double rows = median_rows(offsets);
   const std::string state = fmt::format("right images lie {:.2f} rows {} than left ones", std::abs(rows),
                                         rows > 0 ? "lower" : "higher");
-  if (std::abs(rows) <= kWell) return {Health::kOk, subject, state, ""};
+  const double left_alone = RightRowsOptions{}.significant_px;  // by runs
+  if (std::abs(rows) <= left_alone) return {Health::kOk, subject, state, ""};
   return {Health::kWarn, subject, state, std::string(kRemedy) + "; runs shift the rows until then"};
 }
 

@@ -13,6 +13,8 @@ std::string DenseAlignmentOptions::invalid_reason() const {
       .above("huber_grey", huber_grey, 0)
       .at_least("settled_px", settled_px, 0)
       .above("max_rms", max_rms, 0)
+      .share("doubted_rms_share", doubted_rms_share)
+      .above("light_change", light_change, 1)
       .reason();
 }
 

@@ -150,7 +150,8 @@ std::optional<SE3> Tracker::align_to_previous(const SE3& start, FrameStep& step)
   if (last_.points.empty()) return std::nullopt;
   DenseAlignmentResult best = dense_alignment_.align(rig_.camera, last_.images.left, current_.left,
                                                      last_.points, start, step.bounds.finest_alignment_level);
-  if (step.bounds.align_from_rest && (!best.converged || best.rms > 0.5 * options_.alignment.max_rms)) {
+  const double doubted_rms = options_.alignment.doubted_rms_share * options_.alignment.max_rms;
+  if (step.bounds.align_from_rest && (!best.converged || best.rms > doubted_rms)) {
     const DenseAlignmentResult rest =
         dense_alignment_.align(rig_.camera, last_.images.left, current_.left, last_.points, SE3(),
                                step.bounds.finest_alignment_level);

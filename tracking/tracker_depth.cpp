@@ -52,7 +52,8 @@ bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step
     return false;
   if (!step.after_loss()) return true;
   // After a loss depth may have found another place of the same shape: what points say counts.
-  if (points_placed ? 2 * step.result.inliers >= by_points.result.inliers : points_allow(step)) return true;
+  const double agreeing = options_.depth.agreeing_share * by_points.result.inliers;
+  if (points_placed ? step.result.inliers >= agreeing : points_allow(step)) return true;
   step.restore(by_points);
   classify_observations(rig_, search_.observations, by_points.result.T_c_ref, options_.pose.motion);
   return false;

@@ -84,7 +84,7 @@ bool Tracker::is_within_reach(SearchStart::Kind kind, const FrameStep& step) con
 /// a street may look the same from where the camera was last, too.
 bool Tracker::search_ahead(FrameStep& step) {
   const std::optional<SE3> motion = motion_.coasted(step.frame.t_ns);
-  if (step.lost_frames < 2 || !motion) return false;
+  if (step.lost_frames < options_.loss.coast_after || !motion) return false;
   SearchStart start{.placement = motion_.placement(), .kind = SearchStart::Kind::kRough};
   start.placement.T_c_ref = *motion * motion_.T_c_ref();
   if (search_from(start, step) == LostCause::kNone) return true;

@@ -66,7 +66,9 @@ TEST(Options, OfTheTrackersSearchSayWhyTheyAreInvalid) {
        {"iterations_share", [](auto& o) { o.iterations_share = 1.1; }},
        {"min_motion_iterations", [](auto& o) { o.min_motion_iterations = 0; }},
        {"min_refine_iterations", [](auto& o) { o.min_refine_iterations = 0; }}});
-  expect_rules<DenseAlignmentOptions>({{"max_rms", [](auto& o) { o.max_rms = 0; }}});
+  expect_rules<DenseAlignmentOptions>({{"max_rms", [](auto& o) { o.max_rms = 0; }},
+                                       {"doubted_rms_share", [](auto& o) { o.doubted_rms_share = 0; }},
+                                       {"light_change", [](auto& o) { o.light_change = 1; }}});
   expect_rules<LocalMapSearchOptions>(
       {{"wanted_matches", [](auto& o) { o.wanted_matches = o.max_searches + 1; }},
        {"neighbour_keyframes", [](auto& o) { o.neighbour_keyframes = 0; }},
@@ -119,7 +121,8 @@ TEST(Options, OfMotionAndPoseSayWhyTheyAreInvalid) {
 TEST(Options, OfDepthSayWhyTheyAreInvalid) {
   expect_rules<DepthPlacementOptions>({{"alignment.max_apart", [](auto& o) { o.alignment.max_apart = 0; }},
                                        {"scarce_inliers", [](auto& o) { o.scarce_inliers = -1; }},
-                                       {"telling_candidates", [](auto& o) { o.telling_candidates = -1; }}});
+                                       {"telling_candidates", [](auto& o) { o.telling_candidates = -1; }},
+                                       {"agreeing_share", [](auto& o) { o.agreeing_share = 0; }}});
   expect_rules<DepthAlignmentOptions>(
       {{"planes.columns", [](auto& o) { o.planes.columns = 2; }},
        {"min_facing", [](auto& o) { o.min_facing = 1.1; }},
@@ -140,6 +143,7 @@ TEST(Options, OfALostCameraSayWhyTheyAreInvalid) {
   expect_rules<LossOptions>({{"wide_search.min_agreeing", [](auto& o) { o.wide_search.min_agreeing = 2; }},
                              {"signs.fine_level", [](auto& o) { o.signs.fine_level = -1; }},
                              {"recent_keyframes", [](auto& o) { o.recent_keyframes = 0; }},
+                             {"coast_after", [](auto& o) { o.coast_after = 0; }},
                              {"new_part_frames", [](auto& o) { o.new_part_frames = -1; }}});
   expect_rules<LossSignOptions>({{"coarse_level", [](auto& o) { o.coarse_level = o.fine_level; }},
                                  {"covered_contrast", [](auto& o) { o.covered_contrast = 0; }},

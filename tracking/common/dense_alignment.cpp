@@ -87,10 +87,9 @@ void sample_6x6(const Bilinear& w, Floats8 (&rows)[6]) {
 }
 
 /// What the later image is brighter by, when that is too much to be left to the solver; else 1.
-float brightness_ratio(const cv::Mat& earlier, const cv::Mat& later) {
-  constexpr double kMuch = 1.5;
+float brightness_ratio(const cv::Mat& earlier, const cv::Mat& later, double much) {
   const double ratio = std::max(cv::mean(later)[0], 1.0) / std::max(cv::mean(earlier)[0], 1.0);
-  return ratio > kMuch || ratio < 1 / kMuch ? static_cast<float>(ratio) : 1.0F;
+  return ratio > much || ratio < 1 / much ? static_cast<float>(ratio) : 1.0F;
 }
 
 }  // namespace
@@ -247,8 +246,8 @@ DenseAlignmentResult DenseAlignment::align(const PinholeCamera& camera, const Im
   points = points.first(std::min(points.size(), samples_.size()));
   DenseAlignmentResult state;
   state.T_cur_prev = T_cur_prev_start;
-  state.gain =
-      brightness_ratio(previous.level(options_.coarsest_level), current.level(options_.coarsest_level));
+  state.gain = brightness_ratio(previous.level(options_.coarsest_level),
+                                current.level(options_.coarsest_level), options_.light_change);
   state.offset = kMidGrey * (state.gain - 1);
   prepare_directions(camera.at_level(options_.coarsest_level), points);
   for (int level = options_.coarsest_level; level >= std::max(finest_level, options_.finest_level); --level) {

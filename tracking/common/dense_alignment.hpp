@@ -17,6 +17,9 @@ struct DenseAlignmentOptions {
   float huber_grey = 8;      ///< kernel on the grey difference
   double settled_px = 0.05;  ///< stop a level when the step moves the points by less, in its pixels
   double max_rms = 25;       ///< a pose that leaves more is not trusted [grey]
+  /// Share of max_rms, beyond which a pose is doubted and alignment also tried from rest, in (0, 1].
+  double doubted_rms_share = 0.5;
+  double light_change = 1.5;  ///< a view brighter or darker by so much is more than the solver finds, > 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

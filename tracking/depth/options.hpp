@@ -13,6 +13,9 @@ struct DepthPlacementOptions {
   /// After a loss, a pose from the depth image alone is rejected when so many points should be seen from it
   /// and the search does not confirm it.
   int telling_candidates = 40;
+  /// After a loss, a pose by depth and points replaces one by points alone when so large a share of the
+  /// latter's inliers agrees with it, in (0, 1].
+  double agreeing_share = 0.5;
   int patience = 5;  ///< lost frames, beyond which the depth image alone places nothing, >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.

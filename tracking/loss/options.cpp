@@ -9,6 +9,7 @@ std::string LossOptions::invalid_reason() const {
       .nested("wide_search", wide_search.invalid_reason())
       .nested("signs", signs.invalid_reason())
       .at_least("recent_keyframes", recent_keyframes, 1)
+      .at_least("coast_after", coast_after, 1)
       .at_least("new_part_after", new_part_after, 0)
       .at_least("new_part_frames", new_part_frames, 0)
       .at_least("min_corners_seen", min_corners_seen, 0)
