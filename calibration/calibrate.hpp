@@ -12,13 +12,13 @@ namespace twofold {
 /// What a calibration must reach; below it is refused.
 struct CalibrationOptions {
   int min_views = 10;               ///< >= 3
-  double min_coverage = 0.6;        ///< share of the image's cells (Coverage) with a corner, 0..1
-  int min_tilted = 4;               ///< views tilted against the middle one by more than min_tilt
-  double min_tilt = 0.15;           ///< [rad]
-  double max_rms_px = 0.7;          ///< reprojection error per corner, root mean square
-  double max_focal_std = 0.003;     ///< standard deviation of fx, fy by themselves
-  double max_baseline_std = 0.005;  ///< of the baseline by itself
-  double outlier = 3.0;             ///< views with so many times the median error are left out; 0: none
+  double min_coverage = 0.6;        ///< share of the image's cells (Coverage) with a corner, in [0, 1]
+  int min_tilted = 4;               ///< views tilted against the middle one by more than min_tilt, >= 0
+  double min_tilt = 0.15;           ///< [rad] >= 0
+  double max_rms_px = 0.7;          ///< reprojection error per corner, root mean square, > 0
+  double max_focal_std = 0.003;     ///< standard deviation of fx, fy by themselves, > 0
+  double max_baseline_std = 0.005;  ///< of the baseline by itself, > 0
+  double outlier = 3.0;             ///< views with so many times the median error are left out, >= 0; 0: none
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

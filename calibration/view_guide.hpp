@@ -9,11 +9,12 @@ namespace twofold {
 struct ViewGuideOptions {
   int wanted_views = 20;         ///< >= 3
   int max_views = 60;            ///< more are thinned out, >= wanted_views
-  double wanted_coverage = 0.8;  ///< share of the image's cells with a corner, 0..1
-  double wanted_tilt = 0.3;      ///< in each of four directions [rad]
-  double wanted_zoom = 1.5;      ///< largest over smallest view
-  double novelty = 0.03;         ///< rms distance of corners from every chosen view [image diagonals], or ...
-  double novelty_angle = 0.25;   ///< ... another tilt than every chosen view that is nearer [rad]
+  double wanted_coverage = 0.8;  ///< share of the image's cells with a corner, in [0, 1]
+  double wanted_tilt = 0.3;      ///< in each of four directions [rad] >= 0
+  double wanted_zoom = 1.5;      ///< largest over smallest view, >= 1
+  double novelty = 0.03;         ///< rms distance of corners from every chosen view [image diagonals] >= 0,
+                                 ///< or ...
+  double novelty_angle = 0.25;   ///< ... another tilt than every chosen view that is nearer [rad] >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -56,8 +56,8 @@ struct ReadoutOptions {
   double finest_sigma = 0.001;  ///< [s] no camera is known better than that, >= 0
   // The end of learning.
   double exact_enough = 0.0015;  ///< [s] > 0: known so well ...
-  int pairs_to_know = 20;        ///< ... from so many pairs
-  int pairs_to_give_up = 600;    ///< with so many, whatever was found
+  int pairs_to_know = 20;        ///< ... from so many pairs, >= 1
+  int pairs_to_give_up = 600;    ///< with so many, whatever was found, >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -12,7 +12,7 @@
 namespace twofold {
 
 struct RectifierOptions {
-  int width = 0;   ///< of the rectified images [px]; 0 = as the raw left image
+  int width = 0;   ///< of the rectified images [px] >= 0; 0 = as the raw left image
   int height = 0;  ///< likewise
   /// 0: every rectified pixel has a source in every raw image, unless a lens does not reach the image's
   /// edges; 1: every raw pixel has a place in the

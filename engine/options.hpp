@@ -82,7 +82,7 @@ struct EngineOptions {
   PacingOptions pacing{.speed = 0};  ///< of threaded and stepped runs
   EffortOptions effort;              ///< likewise, if they keep a pace
 
-  std::size_t frame_slots = 8;  ///< frames decoded ahead, or waiting, at most
+  std::size_t frame_slots = 8;  ///< frames decoded ahead, or waiting, at most, >= 1
   /// Proposals waiting for the mapper, and keyframes for the loop closer, at most; rounded up to a power of
   /// two, in [1, 16]: while a proposal waits, so many others may cull keyframes, and the map still knows what
   /// replaced its reference (CullingOptions::keep_replacements).
@@ -91,7 +91,7 @@ struct EngineOptions {
   std::optional<int> tracker_cpu;  ///< pin the threads to these, >= 0
   std::optional<int> mapper_cpu;
   std::optional<int> loop_closer_cpu;
-  std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, 1..99
+  std::optional<int> fifo_priority;  ///< SCHED_FIFO for the tracker, in [1, 99]
 
   /// Taken by the tracker's step from when a frame is due until it is done, in threaded and stepped runs that
   /// keep a pace: threads of the caller's that can wait make way for it (MakesWay). Of one engine; may be

@@ -15,7 +15,7 @@ namespace twofold {
 struct WorkerOptions {
   std::string name = "worker";            ///< shown by top and debuggers, where cut to 15 characters
   std::optional<int> cpu = std::nullopt;  ///< run on this CPU only, >= 0
-  std::optional<int> fifo_priority = std::nullopt;  ///< run under SCHED_FIFO with this priority, 1..99
+  std::optional<int> fifo_priority = std::nullopt;  ///< run under SCHED_FIFO with this priority, in [1, 99]
   /// How long the thread runs before the scheduler looks for another; 100 us to 100 ms. One that wakes takes
   /// the place of one with a longer slice at once, and shares stay as they are (EEVDF, Linux 6.12). Older
   /// kernels give all threads the same slice, about 3 ms: that long a frame may wait behind the mapper.

@@ -30,7 +30,7 @@ struct MotionOnlyOptions {
   double inlier_chi2_mono = 5.991;    ///< 95 % of chi-square with 2 degrees of freedom, > 0
   double inlier_chi2_stereo = 7.815;  ///< 95 % of chi-square with 3 degrees of freedom, > 0
   int rounds = 2;           ///< outliers are put aside after each and judged again in the next, >= 1
-  double stop_step = 1e-7;  ///< stop when the step is smaller (norm of the tangent vector)
+  double stop_step = 1e-7;  ///< stop when the step is smaller (norm of the tangent vector), >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

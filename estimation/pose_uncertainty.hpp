@@ -13,7 +13,7 @@ namespace twofold {
 
 struct PoseUncertaintyOptions {
   double newest_regions = 0.25;  ///< share of the newest frame in what regions say, in (0, 1]
-  double newest_split = 0.1;     ///< the same of splits, of which there are fewer
+  double newest_split = 0.1;     ///< the same of splits, of which there are fewer, in (0, 1]
   double of_frame = 0.5;         ///< share of a frame's own residuals in its covariance, in [0, 1]
 
   /// Empty when valid; otherwise names the field, the rule and the value.

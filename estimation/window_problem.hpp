@@ -49,8 +49,8 @@ struct WindowProblem {
 
 struct WindowSolverOptions {
   int max_iterations = 3;           ///< Levenberg-Marquardt steps, accepted or not, >= 1
-  double initial_damping = 1e-4;    ///< relative to each parameter's diagonal entry of the normal equations;
-                                    ///< also fixes the gauge (thesis 6.2.3)
+  double initial_damping = 1e-4;    ///< relative to each parameter's diagonal entry of the normal equations,
+                                    ///< >= 0; also fixes the gauge (thesis 6.2.3)
   double huber_sigmas = 2.0;        ///< kernel on the whitened reprojection error norm; <= 0: none
   double constraint_huber = 0;      ///< kernel on sqrt(v^T Lambda v); <= 0: none
   double relative_decrease = 1e-6;  ///< stop when a step lowers the cost by less than this share, >= 0

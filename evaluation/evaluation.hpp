@@ -86,9 +86,9 @@ struct KittiErrors {
 
 struct EvaluationOptions {
   Alignment alignment = Alignment::kSe3;
-  double delta_s = 1.0;            ///< step of the error per time
-  double delta_m = 1.0;            ///< step of the error per distance
-  double time_tolerance_s = 0.05;  ///< pairs whose times differ from delta_s by more are left out
+  double delta_s = 1.0;            ///< step of the error per time [s] > 0
+  double delta_m = 1.0;            ///< step of the error per distance [m] > 0
+  double time_tolerance_s = 0.05;  ///< pairs whose times differ from delta_s by more are left out [s] >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

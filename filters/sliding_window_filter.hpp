@@ -27,7 +27,7 @@ enum class PoseRemoval : std::uint8_t {
 };
 
 struct SlidingWindowOptions {
-  int window = 10;  ///< k, poses kept; 0: all (batch / full SLAM). 1: iterated extended Kalman filter
+  int window = 10;  ///< k, poses kept, >= 0; 0: all (batch / full SLAM). 1: iterated extended Kalman filter
   PoseRemoval removal = PoseRemoval::kMarginalise;
   /// kFirstEstimate works as kCurrent for window 1 (the iterated EKF), where a pose enters the prior as a
   /// mere prediction, before it is measured.

@@ -24,10 +24,10 @@ struct FaintCornerOptions {
 };
 
 struct CornerSelectionOptions {
-  int wanted = 500;     ///< corners of a keyframe at most, over all levels (thesis 6.4.2: 500 to 2000)
+  int wanted = 500;     ///< corners of a keyframe at most, over all levels, >= 1 (thesis 6.4.2: 500 to 2000)
   int levels = 3;       ///< pyramid levels searched, in [1, 3]
-  int threshold = 8;    ///< FAST [grey]
-  float min_score = 6;  ///< Shi-Tomasi, see Corner
+  int threshold = 8;    ///< FAST [grey] >= 1
+  float min_score = 6;  ///< Shi-Tomasi, see Corner, >= 0
   FaintCornerOptions faint = {};  ///< in the dark
 
   /// Empty when valid; otherwise names the field, the rule and the value.

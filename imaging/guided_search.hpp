@@ -14,12 +14,12 @@
 namespace twofold {
 
 struct GuidedSearchOptions {
-  double radius_px = 3;        ///< search radius around the prediction, in pixels of the searched level
-  float max_rms = 14;          ///< of a match, gain and offset removed [grey]
-  float max_rms_share = 0.6F;  ///< ... and as a share of the patch's own standard deviation, beyond `noise`
-  float noise = 3;             ///< grey levels two views of the same surface differ by anyway
-  int refine_iterations = 12;  ///< upper bound of sub-pixel Lucas-Kanade steps
-  double right_search_px = 6;  ///< stereo: half range along the row around the predicted u_r, level pixels
+  double radius_px = 3;        ///< search radius around the prediction, in pixels of the searched level, > 0
+  float max_rms = 14;          ///< of a match, gain and offset removed [grey] > 0
+  float max_rms_share = 0.6F;  ///< ... share of the patch's own standard deviation, beyond `noise`, > 0
+  float noise = 3;             ///< grey levels two views of the same surface differ by anyway, >= 0
+  int refine_iterations = 12;  ///< upper bound of sub-pixel Lucas-Kanade steps, >= 1
+  double right_search_px = 6;  ///< stereo: half range in the row around the predicted u_r, level pixels, > 0
   float gain = 1;              ///< contrast of the view over that of the patch, as far as known before, > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.

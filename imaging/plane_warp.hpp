@@ -48,9 +48,9 @@ struct SurfaceAlignment {
 };
 
 struct SurfaceAlignmentOptions {
-  int max_iterations = 15;
-  double settled_px = 0.003;  ///< stop when a step is shorter [level px]
-  double max_move_px = 4;     ///< farther from the predicted place is another feature [level px]
+  int max_iterations = 15;    ///< >= 1
+  double settled_px = 0.003;  ///< stop when a step is shorter [level px] > 0
+  double max_move_px = 4;     ///< farther from the predicted place is another feature [level px] > 0
   bool along_row = false;     ///< move along the row only: right images of a rectified pair
 
   /// Empty when valid; otherwise names the field, the rule and the value.

@@ -14,23 +14,23 @@ namespace twofold {
 /// the radians turned: what has passed through the view.
 struct DriftOptions {
   // Of a keyframe alone, whatever the way: it may be placed badly.
-  double placement = 0.1;         ///< [depths]
-  double placement_deg = 5;       ///< [degrees]
-  double placement_scale = 0.02;  ///< of the logarithm of the scale
+  double placement = 0.1;         ///< [depths] > 0
+  double placement_deg = 5;       ///< [degrees] > 0
+  double placement_scale = 0.02;  ///< of the logarithm of the scale, > 0
   // Of chance: they grow with the root of the way.
-  double shift = 0.05;      ///< [depths]
-  double turn_deg = 0.2;    ///< [degrees]
-  double log_scale = 0.02;  ///< of one camera
+  double shift = 0.05;      ///< [depths] > 0
+  double turn_deg = 0.2;    ///< [degrees] > 0
+  double log_scale = 0.02;  ///< of one camera, > 0
   // Of the calibration: alike everywhere, so that they grow with the way, and cancel where turns do.
-  double length_gain = 0.03;             ///< share of all lengths
-  double turn_gain = 0.02;               ///< share of all turns
-  double turn_gain_of_one_camera = 0.1;  ///< whose focal length may be wrong by a fifth
-  double log_scale_gain = 0.007;         ///< of one camera: logarithm of the scale per way
+  double length_gain = 0.03;             ///< share of all lengths, >= 0
+  double turn_gain = 0.02;               ///< share of all turns, >= 0
+  double turn_gain_of_one_camera = 0.1;  ///< whose focal length may be wrong by a fifth, >= 0
+  double log_scale_gain = 0.007;         ///< of one camera: logarithm of the scale per way, >= 0
   // Keyframes so near to each other make one step of the way: what a head or a car nods is no turn.
   double step_distance = 1;  ///< [depths] > 0
   double step_turn = 0.3;    ///< [rad] > 0
-  double max_chi2 = 24.3;    ///< 99.9 % of chi-square with 7 degrees of freedom; where the
-                             ///< scale is known 6 count, and it is 99.95 %
+  double max_chi2 = 24.3;    ///< 99.9 % of chi-square with 7 degrees of freedom, > 0; where the scale is
+                             ///< known 6 count, and it is 99.95 %
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

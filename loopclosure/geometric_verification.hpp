@@ -11,27 +11,27 @@
 namespace twofold {
 
 struct VerificationOptions {
-  int max_distance = 50;       ///< of a match's descriptors [bits]
-  double max_error_px = 3;     ///< reprojection error of an inlier, pixels of the corner's level
-  double ransac_error_px = 9;  ///< ... while poses come from three points each, which are rough
-  double max_stretch = 0.15;   ///< by so much of its length a sample's side may differ between the views
+  int max_distance = 50;       ///< of a match's descriptors [bits] >= 1
+  double max_error_px = 3;     ///< reprojection error of an inlier, pixels of the corner's level, > 0
+  double ransac_error_px = 9;  ///< ... while poses come from three points each, which are rough, > 0
+  double max_stretch = 0.15;   ///< by so much of its length a sample's side may differ between the views, > 0
   /// A match counts only if its corner's direction turned between the views as the pose says, about the
-  /// camera's axis, give or take this.
+  /// camera's axis, give or take this, in [0, 180].
   double max_turn_deg = 30;
-  int max_samples = 300;          ///< triangles of matches, any two of which agree
-  int max_iterations = 5000;      ///< one camera: samples drawn; most fail at their sides already
-  int min_hypothesis = 5;         ///< matches that must agree before the pose is tried by guided matching;
-                                  ///< at least 6 for a lost single camera, whose pose needs 5
-  double guided_radius_px = 8;    ///< of the first round of guided matching, pixels of the corner's level;
-                                  ///< the later rounds take half of it
-  int guided_distance = 64;       ///< descriptors in guided matching [bits]
-  int min_inliers = 30;           ///< corners that agree with the pose, of those that guided matching found
-  double min_inlier_share = 0.4;  ///< of the guided matches: what is near by chance seldom fits
-  /// Inliers in the upper, lower, left and right half of either view, so that the pose does not hang on one
-  /// corner of the image. Half of min_inliers, as for metric loops (6.4.1), would refuse views that share
+  int max_samples = 300;          ///< triangles of matches, any two of which agree, >= 1
+  int max_iterations = 5000;      ///< one camera: samples drawn, >= 1; most fail at their sides already
+  int min_hypothesis = 5;         ///< matches that must agree before the pose is tried by guided matching,
+                                  ///< >= 3; at least 6 for a lost single camera, whose pose needs 5
+  double guided_radius_px = 8;    ///< of the first round of guided matching, pixels of the corner's level,
+                                  ///< > 0; the later rounds take half of it
+  int guided_distance = 64;       ///< descriptors in guided matching [bits] >= 1
+  int min_inliers = 30;           ///< corners that agree with the pose, of those of guided matching, >= 4
+  double min_inlier_share = 0.4;  ///< of the guided matches, in [0, 1]: what is near by chance seldom fits
+  /// Inliers in the upper, lower, left and right half of either view, >= 0, so that the pose does not hang on
+  /// one corner of the image. Half of min_inliers, as for metric loops (6.4.1), would refuse views that share
   /// half of what they see (docs/places.md).
   int min_in_half = 4;
-  double min_disparity_px = 1;  ///< corners with less tell nothing about translation
+  double min_disparity_px = 1;  ///< corners with less tell nothing about translation, >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

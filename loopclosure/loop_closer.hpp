@@ -24,8 +24,8 @@ struct LoopCloserOptions {
   RefinementOptions refinement;
   ProbationOptions probation;
   RedundantLoopOptions redundant;
-  int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included
-  int relocalisation_candidates = 10;  ///< places tried for a lost camera
+  int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included, >= 1
+  int relocalisation_candidates = 10;  ///< places tried for a lost camera, >= 1
   DepthRegressionOptions depths;       ///< of one camera's corners
   int min_scale_points = 12;  ///< that say how one camera's units differ; with fewer nobody knows, >= 1
 

@@ -12,10 +12,10 @@
 namespace twofold {
 
 struct ProbationOptions {
-  double max_shift = 0.15;   ///< two loops agree up to so much of the scene's median depth ...
-  double max_angle_deg = 6;  ///< ... and so much rotation
-  double max_scale = 0.05;   ///< ... and so much of the logarithm of the scale
-  int patience = 12;         ///< keyframe numbers after which a loop that nobody confirmed is dropped
+  double max_shift = 0.15;   ///< two loops agree up to so much of the scene's median depth, > 0 ...
+  double max_angle_deg = 6;  ///< ... and so much rotation, > 0
+  double max_scale = 0.05;   ///< ... and so much of the logarithm of the scale, > 0
+  int patience = 12;         ///< keyframe numbers after which a loop that nobody confirmed is dropped, >= 1
   DriftOptions drift;        ///< what a loop may correct
 
   /// Empty when valid; otherwise names the field, the rule and the value.

@@ -10,13 +10,13 @@
 namespace twofold {
 
 struct RecogniserOptions {
-  int near_keyframes = 60;      ///< this many around the query by breadth-first search are never candidates
-  int max_candidates = 10;      ///< of a query
-  double min_score = 0.4;       ///< of a candidate, relative to the score with the keyframe before
-  double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing
+  int near_keyframes = 60;      ///< this many around the query, breadth-first, are never candidates, >= 0
+  int max_candidates = 10;      ///< of a query, >= 1
+  double min_score = 0.4;       ///< of a candidate, relative to the score with the keyframe before, >= 0
+  double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing, >= 0
   int consistency = 2;          ///< successive keyframes that must agree about the place, >= 1
   int same_place =
-      6;  ///< keyframes whose numbers differ by no more, or that an edge joins, show the same place
+      6;  ///< keyframes whose numbers differ by no more, or that an edge joins, show the same place, >= 0
   /// Places looked at for each one added, in turn, whether their keyframe was culled: bounds a step's time;
   /// at most one place in so many is of a culled keyframe. >= 1
   int culled_visits = 64;

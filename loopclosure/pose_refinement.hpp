@@ -12,15 +12,16 @@
 namespace twofold {
 
 struct RefinementOptions {
-  int neighbours = 8;    ///< keyframes of N1 whose points are looked for, the place itself included
-  int max_points = 400;  ///< searched
-  int min_visible = 40;  ///< points that should be in view; fewer say nothing
-  double border_px = 8;  ///< a point nearer than this to the image's border is not looked for
-  double radius_px = 8;  ///< of the first search, pixels of the searched level
-  double second_radius_px = 8.0 / 3;  ///< of the second one, from the pose the first one found
-  int min_inliers = 20;               ///< points
-  double min_inlier_share = 0.6;      ///< of the points found
-  double min_visible_share = 0.1;     ///< ... and of those looked for: the others should be seen and are not
+  int neighbours = 8;    ///< keyframes of N1 whose points are looked for, the place itself included, >= 1
+  int max_points = 400;  ///< searched, >= min_visible
+  int min_visible = 40;  ///< points that should be in view, >= 1; fewer say nothing
+  double border_px = 8;  ///< a point nearer than this to the image's border is not looked for, >= 0
+  double radius_px = 8;  ///< of the first search, pixels of the searched level, > 0
+  double second_radius_px = 8.0 / 3;  ///< of the second one, from the pose the first one found, > 0
+  int min_inliers = 20;               ///< points, >= 3
+  double min_inlier_share = 0.6;      ///< of the points found, in [0, 1]
+  double min_visible_share = 0.1;     ///< ... and of those looked for, in [0, 1]: the others should be seen
+                                      ///< and are not
   /// Far below a hundredth of a pixel the iterations need not settle: with many outliers they take long to.
   MotionOnlyOptions solver{.max_iterations = 15, .stop_step = 1e-5};
 

@@ -14,14 +14,14 @@
 namespace twofold {
 
 struct RedundantLoopOptions {
-  /// Along the graph's edges from loop.to to loop.from (way_length). What lies that near is tied together by
-  /// shared points, and by the metric closure (MetricLoopOptions::max_way_of_one_camera).
+  /// Along the graph's edges from loop.to to loop.from (way_length), >= 0. What lies that near is tied
+  /// together by shared points, and by the metric closure (MetricLoopOptions::max_way_of_one_camera).
   double max_way = kWayOfOneUnit;
-  int max_keyframes = 200;  ///< met while that way is looked for: bounds its time
-  /// By how much a loop may move the points in the image, root mean square. Those that differ by less agree,
-  /// for the metric closure, too (MetricLoopOptions::max_error_px).
+  int max_keyframes = 200;  ///< met while that way is looked for, >= 1: bounds its time
+  /// By how much a loop may move the points in the image, root mean square, >= 0. Those that differ by less
+  /// agree, for the metric closure, too (MetricLoopOptions::max_error_px).
   double max_shift_px = 1;
-  /// Of the logarithm of the scale: half of what a keyframe's own place leaves open
+  /// Of the logarithm of the scale, >= 0: half of what a keyframe's own place leaves open
   /// (DriftOptions::placement_scale).
   double max_log_scale = 0.01;
 

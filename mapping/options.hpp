@@ -70,16 +70,16 @@ struct MapperOptions {
   int inner_window = 25;            ///< M1 >= 1: keyframes joined by point-pose constraints  (6.2.3)
   int outer_window = 175;           ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO), anchors
                                     ///< included; so many that all fit (gDWO): all the rest of the map
-  int max_anchors = 25;             ///< anchors that may take places of W2 for their points  (6.2.4)
+  int max_anchors = 25;             ///< anchors that may take places of W2 for their points, >= 0  (6.2.4)
   int max_points = 5000;            ///< in one problem, >= 1; those with the fewest measurements stay out
   double min_inverse_depth = 1e-5;  ///< [1/m] > 0; farther points say nothing about translation
-  double max_inverse_depth = 1e3;   ///< [1/m]; nearer ones are mistakes
-  int min_covisible = 15;           ///< Theta: covisible points that make an edge, 15 to 30
+  double max_inverse_depth = 1e3;   ///< [1/m] > min_inverse_depth; nearer ones are mistakes
+  int min_covisible = 15;           ///< Theta >= 1: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;
   WindowSolverOptions solver;          ///< joint optimisation of eq. 6.4
-  int structure_iterations = 2;        ///< structure-only, after poses were set along edges
-  double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom
-  double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom
+  int structure_iterations = 2;        ///< structure-only, after poses were set along edges, >= 0
+  double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom, > 0
+  double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom, > 0
   MetricLoopOptions loop;
   CullingOptions culling;
   std::shared_ptr<MapperHook> hook;  ///< an experiment's; null: none

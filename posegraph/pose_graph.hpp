@@ -52,7 +52,7 @@ struct PoseGraphOptions {
   double initial_damping = 0;       ///< relative to the diagonal, >= 0; 0: Gauss-Newton until a step fails.
                                     ///< Without an origin at least 1e-9 is used
   double huber = 0;                 ///< kernel on sqrt(e^T Lambda e); <= 0: none
-  double relative_decrease = 1e-6;  ///< stop when a step lowers the cost by less than this share
+  double relative_decrease = 1e-6;  ///< stop when a step lowers the cost by less than this share, >= 0
   /// Once a step has lowered the cost by less than this share, its factor also serves the following steps, as
   /// long as each of them gains at most a third of the one before. 0: every step has its own factor.
   double keep_factor_below = 0.1;

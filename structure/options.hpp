@@ -22,16 +22,17 @@ struct StructureOptions {
   int refinements =
       3;  ///< Gauss-Newton steps after which the newest frame's features are aligned again, >= 0
 
-  int corner_cell_px = 12;      ///< at most one corner a cell is matched between frames, a multiple of 4
-  int cell_px = 24;             ///< at most one landmark a cell is started, > 0
-  int corner_threshold = 8;     ///< FAST [grey]
-  float min_corner_score = 20;  ///< Shi-Tomasi [grey^2/px^2]
+  int corner_cell_px = 12;      ///< at most one corner a cell is matched between frames, a positive multiple
+                                ///< of 4
+  int cell_px = 24;             ///< at most one landmark a cell is started, >= 1
+  int corner_threshold = 8;     ///< FAST [grey] >= 1
+  float min_corner_score = 20;  ///< Shi-Tomasi [grey^2/px^2] >= 0
   double min_disparity_px = 1;  ///< of a corner: below it a point's distance is a guess, > 0
-  double search_share = 0.25;   ///< features of successive frames are matched within this share of the width
-  double max_sad_ratio = 0.8;   ///< best over second-best sum of differences, < 1
+  double search_share = 0.25;   ///< features of successive frames match within this share of the width, > 0
+  double max_sad_ratio = 0.8;   ///< best over second-best sum of differences, in (0, 1)
   ConsistencyOptions consistency;
-  int min_matches = 8;         ///< consistent matches, and measured landmarks, that make a frame tracked
-  double max_residual_px = 3;  ///< a track farther off its landmark after the update is given up
+  int min_matches = 8;         ///< consistent matches and measured landmarks that make a frame tracked, >= 3
+  double max_residual_px = 3;  ///< a track farther off its landmark after the update is given up, > 0
   GuidedSearchOptions search;  ///< stereo match of new features, and how alike patches must be
 
   /// Empty when valid; otherwise names the field, the rule and the value.

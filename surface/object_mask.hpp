@@ -15,7 +15,7 @@ struct ObjectMaskOptions {
   double farthest = 0.8;  ///< depth cut: nothing beyond belongs to the object [m] > 0
   double above = 0.003;   ///< the object begins this far above the support plane, or four standard deviations
                           ///< of the depth, whichever is more [m] >= 0
-  int erode = 2;          ///< pixels taken from the mask's rim, where depths mix, 0 .. 20
+  int erode = 2;          ///< pixels taken from the mask's rim, where depths mix, in [0, 20]
   double depth_noise = 0.0;  ///< to be set: standard deviation of a depth z is depth_noise z^2 [1/m] > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.

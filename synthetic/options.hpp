@@ -16,11 +16,11 @@ struct SyntheticOptions {
   SensorKind sensor = SensorKind::kStereo;
   int width = 640;         ///< [px] 32 .. 4096
   int height = 480;        ///< [px] 32 .. 4096
-  double f = 420;          ///< focal length [px] > 0
+  double f = 420;          ///< focal length [px] 10 .. 100000
   double f_error = 0;      ///< the calibration's focal length is too long by this share, -0.5 .. 0.5
-  double baseline = 0.11;  ///< [m] > 0; RGB-D: of the virtual right camera
-  double fps = 30;         ///< (0, 1000]
-  double rounds = 2;       ///< times around, or back and forth > 0
+  double baseline = 0.11;  ///< [m] 1e-4 .. 100; RGB-D: of the virtual right camera
+  double fps = 30;         ///< [Hz] 0.01 .. 1000
+  double rounds = 2;       ///< times around, or back and forth, 1e-3 .. 1e5
   int frames = 0;          ///< 0: as many as the rounds take; else the walk is cut or goes on
   std::uint64_t seed = 1;  ///< of textures and noise
   double noise = 2;        ///< standard deviation [grey levels] 0 .. 50
@@ -45,7 +45,7 @@ struct SyntheticOptions {
 
   /// A hand covers the lens at this time [s], and nothing but noise is seen for `cover` seconds; 0: never.
   double cover_at = 0;
-  double cover = 2;             ///< [s] >= 0
+  double cover = 2;             ///< [s] 0 .. 1e6
   double carried_to = 0;        ///< the walk goes on from where it is at this time [s] >= 0
   std::uint64_t elsewhere = 0;  ///< seed of the place it goes on in, which then looks different; 0: the same
 

@@ -16,9 +16,9 @@ namespace twofold {
 struct ViewServerOptions {
   std::string bind =
       "127.0.0.1";  ///< address to listen on; others than loopback show the scene to the network
-  int port = 0;     ///< 0: any that is free
+  int port = 0;     ///< in [0, 65535]; 0: any that is free
   std::filesystem::path secrets = {};                                ///< ViewerOptions::secrets
-  std::chrono::milliseconds request_time = std::chrono::seconds(5);  ///< for a request to come in
+  std::chrono::milliseconds request_time = std::chrono::seconds(5);  ///< for a request to come in, > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -11,7 +11,7 @@ namespace twofold {
 struct VocabularyTrainerOptions {
   int branching = 10;      ///< children of a node, >= 2
   int levels = 4;          ///< 10^4 words with the default branching (thesis 6.4.2), in [1, 6]
-  int iterations = 12;     ///< of k-medians at each node
+  int iterations = 12;     ///< of k-medians at each node, >= 1
   std::uint32_t seed = 1;  ///< same descriptors and seed, same tree
 
   /// Empty when valid; otherwise names the field, the rule and the value.

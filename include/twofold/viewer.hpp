@@ -44,7 +44,7 @@ struct ViewerOptions {
   std::filesystem::path secrets = {};
   std::vector<std::string> stages = {};   ///< names of what `tell` is given times of, at most 8
   std::vector<std::string> efforts = {};  ///< words of PoseEstimate::effort, from 0 on; may be none
-  double frame_period = 0;                ///< the budget of a frame [s]; 0: as the frames' times say
+  double frame_period = 0;                ///< a frame's budget [s], finite, >= 0; 0: as the frames' times say
   /// Whose pace the run keeps, "camera" or "recording": the page says how far poses are behind it. Empty: no
   /// pace; PoseEstimate::latency_ns is then what tracking took.
   std::string paced_by = {};

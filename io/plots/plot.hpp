@@ -29,7 +29,7 @@ struct PlotOptions {
   std::string subtitle;
   std::string value_label = "error [m]";
   int up_axis = 2;      ///< axis of the world to look along: 0, 1 or 2; see up_axis_of
-  int long_side = 760;  ///< of the area inside the axes, before margins [px]
+  int long_side = 760;  ///< of the area inside the axes, before margins [px] >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -18,7 +18,7 @@ namespace twofold {
 
 struct RecorderOptions {
   std::size_t queue_frames = 64;  ///< frames waiting to be written, >= 1; bounds the memory used
-  int png_compression = 1;        ///< 0..9: 1 keeps up with cameras, 9 is small
+  int png_compression = 1;        ///< in [0, 9]: 1 keeps up with cameras, 9 is small
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -21,7 +21,7 @@ struct V4l2FramesOptions {
   std::optional<CameraOptions> second;  ///< right or depth camera
   bool side_by_side = false;            ///< the stream's left half is the left image
   bool depth = false;                   ///< second delivers Z16
-  std::optional<double> pairing_tolerance_ms = std::nullopt;  ///< default: half a frame interval
+  std::optional<double> pairing_tolerance_ms = std::nullopt;  ///< >= 0; default: half a frame interval
 
   [[nodiscard]] SensorKind kind() const;
 

@@ -16,7 +16,7 @@ struct CameraOptions {
   std::string path;  ///< "/dev/video0", or a name under /dev/v4l/by-id that stays the same over a re-plug
   CaptureFormat format;
   CameraSettings settings;
-  int buffers = 4;              ///< in the driver, 2..32
+  int buffers = 4;              ///< in the driver, in [2, 32]
   int stall_timeout_ms = 2000;  ///< a stream that is silent for so long is started anew, > 0
   int reconnect_ms = 10000;  ///< how long to wait for a camera that is gone or silent before giving up, >= 0
 

@@ -11,12 +11,12 @@
 namespace twofold {
 
 struct DenseAlignmentOptions {
-  int coarsest_level = 4;
-  int finest_level = 1;
-  int max_iterations = 8;    ///< per level
-  float huber_grey = 8;      ///< kernel on the grey difference
-  double settled_px = 0.05;  ///< stop a level when the step moves the points by less, in its pixels
-  double max_rms = 25;       ///< a pose that leaves more is not trusted [grey]
+  int coarsest_level = 4;  ///< pyramid level that it starts on, in [finest_level, ImagePyramid::kLevels - 1]
+  int finest_level = 1;    ///< ... and that it ends on, >= 0
+  int max_iterations = 8;  ///< per level, >= 1
+  float huber_grey = 8;    ///< kernel on the grey difference, > 0
+  double settled_px = 0.05;  ///< stop a level when the step moves the points by less, in its pixels, >= 0
+  double max_rms = 25;       ///< a pose that leaves more is not trusted [grey] > 0
   /// Share of max_rms, beyond which a pose is doubted and alignment also tried from rest, in (0, 1].
   double doubted_rms_share = 0.5;
   double light_change = 1.5;  ///< a view brighter or darker by so much is more than the solver finds, > 1

@@ -11,7 +11,7 @@ struct DepthPlacementOptions {
   DepthAlignmentOptions alignment;
   int scarce_inliers = 40;  ///< with fewer it is placed by its depth image as well, >= 0
   /// After a loss, a pose from the depth image alone is rejected when so many points should be seen from it
-  /// and the search does not confirm it.
+  /// and the search does not confirm it, >= 0.
   int telling_candidates = 40;
   /// After a loss, a pose by depth and points replaces one by points alone when so large a share of the
   /// latter's inliers agrees with it, in (0, 1].

@@ -16,8 +16,8 @@ struct FixedPixelOptions {
   bool enabled = true;
   /// By which the scene must have moved at a pixel between two looks, whatever its depth, > 0.
   double min_motion_px = 8;
-  int same_grey = 3;  ///< a pixel that has changed by more shows the scene, >= 0
-  /// A pixel is telling if it differs by so much from what lies along the motion, > same_grey.
+  int same_grey = 3;  ///< a pixel that has changed by more shows the scene, in [0, 254]
+  /// A pixel is telling if it differs by so much from what lies along the motion, in [same_grey + 1, 254].
   int min_contrast = 12;
   int believed = 5;    ///< looks at which a telling pixel must have stayed the same, in [2, 100]
   double round = 0.2;  ///< time in which all of the image is looked at once [s], > 0
@@ -28,13 +28,15 @@ struct FixedPixelOptions {
   /// What a pixel is compared with lies so far to either side, along the motion; as wide a rim of the image
   /// is not looked at, in [1, 32].
   int aside_px = 4;
-  int max_votes = 2;        ///< times `believed`: beyond, votes are not counted, >= 1
+  int max_votes = 2;        ///< times `believed`: beyond, votes are not counted, in [1, 255 / believed]
   int against = 4;          ///< votes that a change takes back, in [1, 255]
-  int min_in_quarter = 16;  ///< fixed pixels that cover a quarter of a block, of 256, ...
+  int min_in_quarter = 16;  ///< fixed pixels that cover a quarter of a block, in [1, 256], ...
   int max_telling = 2;      ///< ... unless more than so many times as many are telling, >= 1
-  int more_alone = 2;       ///< votes beyond `believed` of a pixel of which no neighbour says the same, >= 0
+  int more_alone = 2;       ///< votes beyond `believed` of a pixel of which no neighbour says the same,
+                            ///< in [0, (max_votes - 1) * believed]
   int touching = 3;         ///< fixed pixels of a neighbourhood that are no single ones, in [1, 9]
-  int rest = 3;             ///< rounds in which a block that clearly shows the scene is not looked at, >= 0
+  int rest = 3;             ///< rounds in which a block that clearly shows the scene is not looked at,
+                            ///< in [0, 255]
   int chance = 1;           ///< votes that a pixel of the scene gets now and then, in [0, believed - 1]
   double far_share =
       0.1;            ///< of the tracked points, that may be farther than what is looked at, in [0, 0.99]

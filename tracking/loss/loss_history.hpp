@@ -15,8 +15,8 @@ struct LossSignOptions {
   double covered_contrast = 0.35;  ///< with less contrast the view is covered, or dark, in (0, 1]
   /// With less detail at a fine pyramid level over that at a coarse one the image is blurred, in (0, 1].
   double blurred_detail = 0.7;
-  int fine_level = 1, coarse_level = 4;
-  double gap_intervals = 2.5;  ///< usual intervals between two frames: longer is a gap, > 1
+  int fine_level = 1, coarse_level = 4;  ///< 0 <= fine_level < coarse_level < ImagePyramid::kLevels
+  double gap_intervals = 2.5;            ///< usual intervals between two frames: longer is a gap, > 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

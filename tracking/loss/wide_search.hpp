@@ -18,8 +18,8 @@ namespace twofold {
 struct WideSearchOptions {
   bool enabled = true;  ///< else a frame after a step too wide for the prediction is lost
   CornerSelectionOptions corners{.wanted = 700};
-  int max_distance = 64;  ///< of a match's descriptors [bits]
-  int min_agreeing = 8;   ///< matches that the motion must explain
+  int max_distance = 64;  ///< of a match's descriptors [bits] >= 1
+  int min_agreeing = 8;   ///< matches that the motion must explain, >= 3
   /// Corners are found to a whole pixel of their level only.
   PoseConsensusOptions consensus{.inlier_sigmas = 8, .max_samples = 2000};
 

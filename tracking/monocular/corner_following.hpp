@@ -9,14 +9,15 @@
 namespace twofold {
 
 struct CornerFollowingOptions {
-  int coarsest_level = 3;  ///< patches of coarser ones cover what moves differently
+  int coarsest_level = 3;  ///< patches of coarser ones cover what moves differently,
+                           ///< in [0, ImagePyramid::kLevels - 1]
   int first_radius_px =
-      8;  ///< searched on the coarsest level for a corner whose motion is not known [its px]
-  int coarse_radius_px = 4;  ///< ... and for one whose motion is known
-  int radius_px = 2;         ///< around what a coarser level said [px of the level]
-  /// Bounds the work where no coarser level could be searched [px of the level].
+      8;  ///< searched on the coarsest level for a corner whose motion is not known [its px] >= 1
+  int coarse_radius_px = 4;  ///< ... and for one whose motion is known, >= 1
+  int radius_px = 2;         ///< around what a coarser level said [px of the level] >= 1
+  /// Bounds the work where no coarser level could be searched [px of the level], >= radius_px.
   int max_radius_px = 12;
-  int max_iterations = 12;  ///< of sub-pixel alignment
+  int max_iterations = 12;  ///< of sub-pixel alignment, >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -43,7 +43,7 @@ struct FirstStructureOptions {
   /// gross errors.
   double first_gain = 1;
   double min_gain = 0.01;
-  // Motions that differ by less are one: cosine between directions, in [-1, 1], and angle [rad].
+  // Motions that differ by less are one: cosine between directions, in [-1, 1], and angle [rad] >= 0.
   double same_direction = 0.95;
   double same_angle = 0.02;
   // Where nobody knows how fast rows are read.

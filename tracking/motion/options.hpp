@@ -10,10 +10,10 @@ namespace twofold {
 struct MotionModelOptions {
   double jitter = 0.3;  ///< of the interval between two frames: by less stamps differ for nothing, >= 0
   /// While lost, so long after the last pose, the camera is looked for first where it is if it went on as it
-  /// moved [s]; later, if it is within reach of where it then was.
+  /// moved [s] >= 0; later, if it is within reach of where it then was.
   double coast_for = 1.5;
   /// A pose from a rough start, in metres, may be so far from where the camera would be had it gone on: by
-  /// what an acceleration adds [m/s^2], and by what the poses themselves err [m].
+  /// what an acceleration adds [m/s^2] > 0, and by what the poses themselves err [m] > 0.
   double max_acceleration = 10;
   double reach_slack = 0.5;
 
