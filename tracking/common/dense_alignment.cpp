@@ -45,16 +45,11 @@ Floats8 load_4x2(const std::uint8_t* p, std::ptrdiff_t stride) {
   return to_floats(packed);
 }
 
-/// The 4x4 samples of a window, row by row.
-template <class Pixels>
-void sample_4x4(const Bilinear& w, Pixels& samples) {
-  for (int r = 0; r < 4; r += 2) {
-    const std::uint8_t* p = w.p + r * w.stride;
-    const Floats8 rows = w.w00 * load_4x2(p, w.stride) + w.w01 * load_4x2(p + 1, w.stride) +
-                         w.w10 * load_4x2(p + w.stride, w.stride) +
-                         w.w11 * load_4x2(p + w.stride + 1, w.stride) - kMidGrey;
-    std::memcpy(samples.data() + 4 * r, &rows, sizeof rows);
-  }
+/// Two rows of four samples of a window, from row `r` on.
+Floats8 sample_4x2(const Bilinear& w, int r) {
+  const std::uint8_t* p = w.p + r * w.stride;
+  return w.w00 * load_4x2(p, w.stride) + w.w01 * load_4x2(p + 1, w.stride) +
+         w.w10 * load_4x2(p + w.stride, w.stride) + w.w11 * load_4x2(p + w.stride + 1, w.stride) - kMidGrey;
 }
 
 /// Seven pixels of a row, as bytes of a number; the first is the lowest. (Written for little-endian
@@ -73,7 +68,7 @@ Floats8 bytes_as_floats(std::uint64_t bytes) {
 }
 
 /// The 6x6 samples of a window, in rows of eight whose last two are worth nothing. The same operations in the
-/// same order as in sample_4x4.
+/// same order as in sample_4x2.
 void sample_6x6(const Bilinear& w, Floats8 (&rows)[6]) {
   std::uint64_t bytes = load_seven(w.p);
   Floats8 here = bytes_as_floats(bytes), next = bytes_as_floats(bytes >> 8);
@@ -84,6 +79,19 @@ void sample_6x6(const Bilinear& w, Floats8 (&rows)[6]) {
     here = below;
     next = below_next;
   }
+}
+
+/// Four numbers of a row, from a column on, and four of the next.
+template <int kColumn>
+Floats8 four_of_each(const Floats8& row, const Floats8& next) {
+  return __builtin_shufflevector(row, next, kColumn, kColumn + 1, kColumn + 2, kColumn + 3, kColumn + 8,
+                                 kColumn + 9, kColumn + 10, kColumn + 11);
+}
+
+/// Eight residuals' weights in an iteratively reweighted Huber cost.
+Floats8 huber_weights(const Floats8& residuals, float threshold) {
+  const Floats8 size = residuals < 0 ? -residuals : residuals;
+  return threshold / (size > threshold ? size : threshold + Floats8{});
 }
 
 /// What the later image is brighter by, when that is too much to be left to the solver; else 1.
@@ -127,14 +135,15 @@ bool DenseAlignment::prepare_patch(const cv::Mat& image, int level, const Alignm
     return false;
   Floats8 rows[kSize + 2];
   sample_6x6(window, rows);
-  const auto four = [&](int row, int column) {
-    return Eigen::Map<const Eigen::Array4f>(reinterpret_cast<const float*>(&rows[row]) + column);
+  const auto prepare = [&](const Floats8* first, Floats8 Pixels::*half) {
+    sample.value.*half = four_of_each<1>(first[1], first[2]);
+    sample.gradient_u.*half =
+        0.5F * (four_of_each<2>(first[1], first[2]) - four_of_each<0>(first[1], first[2]));
+    sample.gradient_v.*half =
+        0.5F * (four_of_each<1>(first[2], first[3]) - four_of_each<1>(first[0], first[1]));
   };
-  for (int r = 0; r < kSize; ++r) {
-    sample.value.segment<kSize>(r * kSize) = four(r + 1, 1);
-    sample.gradient_u.segment<kSize>(r * kSize) = 0.5F * (four(r + 1, 2) - four(r + 1, 0));
-    sample.gradient_v.segment<kSize>(r * kSize) = 0.5F * (four(r + 2, 1) - four(r, 1));
-  }
+  prepare(rows, &Pixels::upper);
+  prepare(rows + 2, &Pixels::lower);
   return true;
 }
 
@@ -152,24 +161,34 @@ void DenseAlignment::prepare_patches(const cv::Mat& image, int level,
 }
 
 /// The upper triangle of blocks of H: (pose, pose), (pose, light), (light, light).
-inline void DenseAlignment::Cost::add(const Sample& s, const Pixels& residual, const Pixels& w) {
-  const Pixels wr = w * residual, wu = w * s.gradient_u, wv = w * s.gradient_v, wt = w * s.value;
-  squares += (wr * residual).sum();
-  weights += w.sum();
+inline void DenseAlignment::Cost::add(const Sample& s, const Pixels& r, const Pixels& w) {
+  const auto times = [](const Pixels& a, const Pixels& b) {
+    return Pixels{a.upper * b.upper, a.lower * b.lower};
+  };
+  const auto dot = [](const Pixels& a, const Pixels& b) { return a.lower * b.lower + a.upper * b.upper; };
+  const auto total = [](const Pixels& a) { return a.upper + a.lower; };
+  const Pixels wr = times(w, r), wu = times(w, s.gradient_u), wv = times(w, s.gradient_v),
+               wt = times(w, s.value);
   // sum over the pixels of w J J^T with J = gu du + gv dv, then value, then 1: all but du, dv are sums.
-  const float uv_sum = (wu * s.gradient_v).sum();
-  const Row along_u = (wu * s.gradient_u).sum() * s.du + uv_sum * s.dv;
-  const Row along_v = uv_sum * s.du + (wv * s.gradient_v).sum() * s.dv;
+  const Floats8 of_pose =
+      sums_of_rows({dot(wu, s.gradient_u), dot(wu, s.gradient_v), dot(wv, s.gradient_v), dot(wu, s.value),
+                    dot(wv, s.value), total(wu), total(wv), dot(wr, r)});
+  const Floats8 of_light = sums_of_rows(
+      {dot(wt, s.value), total(wt), total(w), dot(wu, r), dot(wv, r), dot(wt, r), total(wr), Floats8{}});
+  squares += of_pose[7];
+  weights += of_light[2];
+  const Row along_u = of_pose[0] * s.du + of_pose[1] * s.dv;
+  const Row along_v = of_pose[1] * s.du + of_pose[2] * s.dv;
   H.noalias() += along_u * s.du.transpose();
   H.noalias() += along_v * s.dv.transpose();
-  H.col(6) += (wu * s.value).sum() * s.du + (wv * s.value).sum() * s.dv;
-  H.col(7) += wu.sum() * s.du + wv.sum() * s.dv;
-  H(6, 6) += (wt * s.value).sum();
-  H(6, 7) += wt.sum();
-  H(7, 7) += w.sum();
-  g += (wu * residual).sum() * s.du + (wv * residual).sum() * s.dv;
-  g(6) += (wt * residual).sum();
-  g(7) += wr.sum();
+  H.col(6) += of_pose[3] * s.du + of_pose[4] * s.dv;
+  H.col(7) += of_pose[5] * s.du + of_pose[6] * s.dv;
+  H(6, 6) += of_light[0];
+  H(6, 7) += of_light[1];
+  H(7, 7) += of_light[2];
+  g += of_light[3] * s.du + of_light[4] * s.dv;
+  g(6) += of_light[5];
+  g(7) += of_light[6];
 }
 
 void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& image,
@@ -180,9 +199,9 @@ void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& 
   cost.H.setZero();
   cost.g.setZero();
   cost.squares = cost.weights = 0;
+  const float huber = options_.huber_grey;
   int visible = 0;
   int usable = 0;
-  Pixels now;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (usable_[i] == 0) continue;
     ++usable;
@@ -195,10 +214,10 @@ void DenseAlignment::evaluate(const PinholeCamera& level_camera, const cv::Mat& 
       continue;
     }
     ++visible;
-    sample_4x4(window, now);
     const Sample& s = samples_[i];
-    const Pixels residual = now - state.gain * s.value - state.offset;
-    cost.add(s, residual, options_.huber_grey / residual.abs().max(options_.huber_grey));
+    const Pixels residual{sample_4x2(window, 0) - state.gain * s.value.upper - state.offset,
+                          sample_4x2(window, 2) - state.gain * s.value.lower - state.offset};
+    cost.add(s, residual, {huber_weights(residual.upper, huber), huber_weights(residual.lower, huber)});
   }
   cost.H.bottomLeftCorner<2, 6>() = cost.H.topRightCorner<6, 2>().transpose();
   cost.H(7, 6) = cost.H(6, 7);

@@ -7,6 +7,7 @@
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
 #include "imaging/image_pyramid.hpp"
+#include "imaging/pixel_row.hpp"
 
 namespace twofold {
 
@@ -57,8 +58,9 @@ class DenseAlignment {
 
  private:
   static constexpr int kSize = 4;
-  static constexpr int kArea = kSize * kSize;
-  using Pixels = Eigen::Array<float, kArea, 1>;
+  struct Pixels {          ///< of a patch
+    Floats8 upper, lower;  ///< two rows each
+  };
   using Row = Eigen::Matrix<float, 8, 1>;  ///< (v, omega, gain, offset)
   /// Patch of the earlier image at one level, mid-grey subtracted. The Jacobian of a pixel with respect to
   /// the pose is gradient_u * du + gradient_v * dv, with du and dv the same over the patch.
@@ -73,8 +75,8 @@ class DenseAlignment {
     Eigen::Matrix<float, 8, 8> H;
     Row g;
 
-    /// A patch's residuals and their weights.
-    void add(const Sample& sample, const Pixels& residual, const Pixels& w);
+    /// A patch's residuals r and their weights w.
+    void add(const Sample& s, const Pixels& r, const Pixels& w);
   };
 
   /// Sets du and dv as of this camera, the coarsest level's.

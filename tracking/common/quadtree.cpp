@@ -1,6 +1,7 @@
 #include "tracking/common/quadtree.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace twofold {
@@ -20,10 +21,10 @@ Quadtree::Quadtree(int width, int height, std::size_t capacity)
       width_(width),
       height_(height) {
   leaves_.reserve(capacity);
+  sorted_.reserve(capacity);
   visited_.reserve(capacity);
   level_.reserve(capacity + 4);
   next_level_.reserve(capacity + 4);
-  stack_.reserve(4 * kDepth + 4);
 }
 
 void Quadtree::clear() {
@@ -46,8 +47,22 @@ bool Quadtree::insert(const Eigen::Vector2f& uv, std::uint32_t number) {
   return true;
 }
 
+/// By the places' lower byte, then by the upper one, each time keeping the order of those that are equal:
+/// points that share a place stay as they were inserted.
+void Quadtree::sort_along_curve() {
+  sorted_.resize(leaves_.size());
+  for (const int shift : {32, 40}) {
+    const auto key = [shift](Leaf leaf) { return static_cast<std::uint8_t>(leaf >> shift); };
+    std::array<std::uint32_t, 257> begin{};
+    for (const Leaf leaf : leaves_) ++begin[key(leaf) + 1U];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    for (const Leaf leaf : leaves_) sorted_[begin[key(leaf)]++] = leaf;
+    std::swap(leaves_, sorted_);
+  }
+}
+
 void Quadtree::build() {
-  std::sort(leaves_.begin(), leaves_.end());
+  sort_along_curve();
   visited_.assign(leaves_.size(), 0);
   if (!leaves_.empty()) level_.push_back({0, static_cast<std::uint32_t>(leaves_.size()), 0});
   built_ = true;
@@ -69,7 +84,7 @@ std::uint32_t Quadtree::end_of_quadrant(std::uint32_t begin, std::uint32_t end, 
   return inside;
 }
 
-int Quadtree::children(const Node& node, Node (&result)[4]) {
+int Quadtree::children(const Node& node, Node* result) {
   const int shift = 2 * (kDepth - 1 - node.depth);
   int count = 0;
   std::uint32_t begin = node.begin;
@@ -78,9 +93,8 @@ int Quadtree::children(const Node& node, Node (&result)[4]) {
     result[count++] = {begin, end, node.depth + 1};
     begin = end;
   }
-  for (int i = count - 1; i > 0; --i) {
-    std::swap(result[i], result[static_cast<int>(random_() % static_cast<unsigned>(i + 1))]);
-  }
+  for (std::uint32_t left = static_cast<std::uint32_t>(count); left > 1; --left)
+    std::swap(result[left - 1], result[random_below(left)]);
   return count;
 }
 
@@ -96,19 +110,15 @@ std::int64_t Quadtree::take(const Node& leaf) {
 }
 
 std::int64_t Quadtree::take_leaf_below(const Node& node) {
-  stack_.clear();
-  stack_.push_back(node);
-  while (!stack_.empty()) {
-    const Node top = stack_.back();
-    stack_.pop_back();
-    if (is_leaf(top)) {
-      const std::int64_t number = take(top);
-      if (number >= 0) return number;
-      continue;
+  std::size_t size = 0;
+  stack_[size++] = node;
+  while (size > 0) {
+    const Node top = stack_[--size];
+    if (!is_leaf(top)) {
+      size += static_cast<std::size_t>(children(top, &stack_[size]));
+    } else if (const std::int64_t number = take(top); number >= 0) {
+      return number;
     }
-    Node below[4];
-    const int count = children(top, below);
-    stack_.insert(stack_.end(), below, below + count);
   }
   return -1;
 }
@@ -120,8 +130,7 @@ std::int64_t Quadtree::next() {
       if (next_level_.empty()) return -1;
       std::swap(level_, next_level_);
     }
-    const std::size_t chosen = random_() % level_.size();
-    std::swap(level_[chosen], level_.back());
+    std::swap(level_[random_below(static_cast<std::uint32_t>(level_.size()))], level_.back());
     const Node node = level_.back();
     if (is_leaf(node)) {
       const std::int64_t number = take(node);
@@ -132,7 +141,7 @@ std::int64_t Quadtree::next() {
     level_.pop_back();
     Node below[4];
     const int count = children(node, below);
-    next_level_.insert(next_level_.end(), below, below + count);
+    for (int i = 0; i < count; ++i) next_level_.push_back(below[i]);
     const std::int64_t number = take_leaf_below(node);
     if (number >= 0) return number;
   }

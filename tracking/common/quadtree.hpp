@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <random>
 #include <vector>
@@ -31,9 +32,7 @@ class Quadtree {
  private:
   static constexpr int kDepth = 8;  ///< smallest region: 1/256 of the image's longer side
 
-  /// Place along the curve in the upper half, number in the lower: in order along the curve, and by number
-  /// where points share a place.
-  using Leaf = std::uint64_t;
+  using Leaf = std::uint64_t;  ///< place along the curve in the upper half, number in the lower
   /// Points [begin, end) share the first `depth` quadrants.
   struct Node {
     std::uint32_t begin, end;
@@ -41,9 +40,12 @@ class Quadtree {
   };
 
   void build();
+  void sort_along_curve();
   [[nodiscard]] std::uint32_t end_of_quadrant(std::uint32_t begin, std::uint32_t end, int shift) const;
-  /// Non-empty children of a node, in random order; returns how many.
-  int children(const Node& node, Node (&result)[4]);
+  /// Writes up to four non-empty children of a node, in random order; returns how many.
+  int children(const Node& node, Node* result);
+  /// In [0, count).
+  std::uint32_t random_below(std::uint32_t count) { return static_cast<std::uint32_t>(random_()) % count; }
   std::int64_t take_leaf_below(const Node& node);
   std::int64_t take(const Node& leaf);
   [[nodiscard]] static bool is_leaf(const Node& node) {
@@ -53,11 +55,11 @@ class Quadtree {
   double cells_per_px_;
   int width_;
   int height_;
-  std::vector<Leaf> leaves_;
+  std::vector<Leaf> leaves_, sorted_;
   std::vector<std::uint8_t> visited_;  // of each leaf
   std::vector<Node> level_;            // of the breadth-first search, not yet expanded
   std::vector<Node> next_level_;
-  std::vector<Node> stack_;
+  std::array<Node, 4 * kDepth + 4> stack_;  // of the depth-first search
   std::minstd_rand random_;
   bool built_ = false;
 };
