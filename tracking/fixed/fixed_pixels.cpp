@@ -51,6 +51,7 @@ std::string FixedPixelOptions::invalid_reason() const {
       .within("touching", touching, 1, 9)
       .within("rest", rest, 0, 255)
       .within("chance", chance, 0, believed - 1)
+      .share("chance_share", chance_share)
       .within("far_share", far_share, 0, 0.99)
       .at_least("nearer", nearer, 1)
       .reason();
@@ -78,10 +79,22 @@ void FixedPixels::look_at(const cv::Mat& image, std::int64_t t_ns, ImageMotion& 
   const auto blocks = static_cast<double>(blocks_.size());
   const auto looks = static_cast<std::size_t>(std::ceil(std::clamp(rounds, 0.0, 1.0) * blocks));
   for (std::size_t i = 0; i < looks; ++i) {
-    look_at_block(image, motion, blocks_[next_]);
-    if (++next_ < blocks_.size()) continue;
-    next_ = 0;
-    list_dead();
+    Block& block = blocks_[next_];
+    if (++next_ == blocks_.size()) next_ = 0;
+    prefetch(image, blocks_[next_]);
+    look_at_block(image, motion, block);
+    if (next_ == 0) list_dead();
+  }
+}
+
+/// Most of a look would be waiting for memory: nobody has touched the block since the round before.
+void FixedPixels::prefetch(const cv::Mat& image, const Block& block) {
+  if (block.rest > 0) return;
+  constexpr int kLine = 64;  // bytes that come together
+  for (int y = 0; y < kSide; ++y) __builtin_prefetch(image.ptr<std::uint8_t>(block.v + y) + block.u);
+  for (std::size_t at = 0; at < block.before.size(); at += kLine) {
+    __builtin_prefetch(&block.before[at]);
+    __builtin_prefetch(&block.votes[at], 1);
   }
 }
 
@@ -107,7 +120,7 @@ void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& bl
   const auto believed = static_cast<std::uint8_t>(options_.believed);
   Rows fixed{}, telling{};
   ByteRun most{};
-  int staying = 0;
+  int staying = 0, could_stay = 0;
   for (int y = 0; y < kSide; ++y) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(block.v + y) + block.u;
     std::uint8_t* votes = &block.votes[static_cast<std::size_t>(y * kSide)];
@@ -128,10 +141,12 @@ void FixedPixels::vote(const cv::Mat& image, const Vector2& motion_px, Block& bl
     fixed[static_cast<std::size_t>(y)] =
         mask_of(above(count, run_of(static_cast<std::uint8_t>(believed - 1))));
     telling[static_cast<std::size_t>(y)] = mask_of(tells);
+    could_stay += std::popcount(telling[static_cast<std::size_t>(y)]);
   }
   sum_up(fixed, telling, block);
-  const bool shows_scene = mask_of(above(most, run_of(static_cast<std::uint8_t>(options_.chance)))) == 0 &&
-                           staying < options_.min_in_quarter;
+  const bool shows_scene =
+      mask_of(above(most, run_of(static_cast<std::uint8_t>(options_.chance)))) == 0 &&
+      staying < std::max(static_cast<double>(options_.min_in_quarter), options_.chance_share * could_stay);
   block.rest = shows_scene ? static_cast<std::uint8_t>(options_.rest) : std::uint8_t{0};
 }
 

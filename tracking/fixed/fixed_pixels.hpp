@@ -28,16 +28,17 @@ struct FixedPixelOptions {
   /// What a pixel is compared with lies so far to either side, along the motion; as wide a rim of the image
   /// is not looked at, in [1, 32].
   int aside_px = 4;
-  int max_votes = 2;        ///< times `believed`: beyond, votes are not counted, in [1, 255 / believed]
-  int against = 4;          ///< votes that a change takes back, in [1, 255]
-  int min_in_quarter = 16;  ///< fixed pixels that cover a quarter of a block, in [1, 256], ...
-  int max_telling = 2;      ///< ... unless more than so many times as many are telling, >= 1
-  int more_alone = 2;       ///< votes beyond `believed` of a pixel of which no neighbour says the same,
-                            ///< in [0, (max_votes - 1) * believed]
-  int touching = 3;         ///< fixed pixels of a neighbourhood that are no single ones, in [1, 9]
-  int rest = 3;             ///< rounds in which a block that clearly shows the scene is not looked at,
-                            ///< in [0, 255]
-  int chance = 1;           ///< votes that a pixel of the scene gets now and then, in [0, believed - 1]
+  int max_votes = 2;           ///< times `believed`: beyond, votes are not counted, in [1, 255 / believed]
+  int against = 4;             ///< votes that a change takes back, in [1, 255]
+  int min_in_quarter = 16;     ///< fixed pixels that cover a quarter of a block, in [1, 256], ...
+  int max_telling = 2;         ///< ... unless more than so many times as many are telling, >= 1
+  int more_alone = 2;          ///< votes beyond `believed` of a pixel of which no neighbour says the same,
+                               ///< in [0, (max_votes - 1) * believed]
+  int touching = 3;            ///< fixed pixels of a neighbourhood that are no single ones, in [1, 9]
+  int rest = 3;                ///< rounds in which a block that clearly shows the scene is not looked at,
+                               ///< in [0, 255]
+  int chance = 2;              ///< votes that a pixel of the scene gets now and then, in [0, believed - 1]
+  double chance_share = 0.25;  ///< of the telling pixels, that stay the same by chance, in (0, 1]
   double far_share =
       0.1;            ///< of the tracked points, that may be farther than what is looked at, in [0, 0.99]
   double nearer = 2;  ///< times: what is not tracked may be so much nearer than what is, >= 1
@@ -88,6 +89,7 @@ class FixedPixels {
     std::array<std::uint16_t, kMostDead> dead{};  ///< positions
   };
 
+  static void prefetch(const cv::Mat& image, const Block& block);
   void look_at_block(const cv::Mat& image, ImageMotion& motion, Block& block);
   void vote(const cv::Mat& image, const Vector2& motion_px, Block& block);
   void sum_up(const Rows& fixed, const Rows& telling, Block& block);
