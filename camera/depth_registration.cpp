@@ -10,7 +10,7 @@
 namespace twofold {
 namespace {
 
-constexpr float kJumpRatio = 0.05f;  // of the depth, from pixel to pixel
+constexpr float kMaxStepShare = 0.05f;  // of the depth, from pixel to pixel
 
 /// A reading in the image it is registered to.
 struct Sight {
@@ -62,7 +62,7 @@ void draw_cell(cv::Mat& registered, const std::array<Sight, 4>& corner) {
     low = std::min(low, s.z);
     high = std::max(high, s.z);
   }
-  if (low > 0 && high - low <= kJumpRatio * low) {
+  if (low > 0 && high - low <= kMaxStepShare * low) {
     draw_triangle(registered, corner[0], corner[1], corner[2]);
     draw_triangle(registered, corner[3], corner[2], corner[1]);
     return;

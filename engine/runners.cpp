@@ -50,10 +50,12 @@ CorrectionReason reason_of(MapChange::Kind kind) {
   return CorrectionReason::kPartsJoined;
 }
 
+constexpr std::uint64_t kPatience =
+    32;  // versions: a loop that the mapper dropped would be waited for for ever
+
 }  // namespace
 
 bool has_arrived(const GraphSnapshot& graph, const LoopConstraint& loop) {
-  constexpr std::uint64_t kPatience = 32;  // versions
   if (graph.version() > loop.snapshot_version + kPatience) return true;
   const auto from = graph.live_replacement(loop.from), to = graph.live_replacement(loop.to);
   if (!from || !to || from->id == to->id) return true;
@@ -160,9 +162,9 @@ void TrackerRunner::find_correction(const GraphSnapshot& graph, const FrameRecor
   const SE3 T_c_w_before = last_.T_c_w_causal.unpacked();
   const SE3 change = T_c_w * T_c_w_before.inverse();  // of the camera itself, wherever the world's origin is
   if (change.translation().norm() < kCorrection && change.so3().log().norm() < kCorrectionAngle) return;
-  const MapChange& jump = graph.last_jump();
-  const bool jumped = jump.version > last_.snapshot_version;
-  const CorrectionReason reason = jumped ? reason_of(jump.kind) : CorrectionReason::kOptimisation;
+  const MapChange& of_map = graph.last_change();
+  const bool changed = of_map.version > last_.snapshot_version;
+  const CorrectionReason reason = changed ? reason_of(of_map.kind) : CorrectionReason::kOptimisation;
   correction_ = {reason, record.frame_index, record.t_ns, last_.T_c_w_causal, PackedPose(T_c_w)};
   last_.snapshot_version = graph.version();  // said: a lost camera's next frames see the same map
   last_.T_c_w_causal = correction_.T_c_w_after;

@@ -20,6 +20,8 @@
 namespace twofold {
 namespace {
 
+constexpr int kNice = 10;  // a tenth of the share of a thread that does not yield
+
 /// The kernel's struct sched_attr in its first form, which every kernel takes.
 struct SchedulingAttributes {
   std::uint32_t size = sizeof(SchedulingAttributes);
@@ -80,7 +82,6 @@ std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
 }
 
 void yield_to_other_threads() {
-  constexpr int kNice = 10;  // a tenth of the share of a thread that does not yield
   (void)setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);  // never refused
 }
 

@@ -24,8 +24,8 @@ class MotionCost {
   [[nodiscard]] MotionEquations evaluate(const SE3& T, bool inliers_only) const {
     const Matrix3 R = T.rotation();
     MotionEquations sum;
-    Lanes used = Lanes::Zero();
-    for (std::size_t first = 0; first < observations_.size(); first += kLanes) {
+    ObservationLanes used = ObservationLanes::Zero();
+    for (std::size_t first = 0; first < observations_.size(); first += kObservationLanes) {
       const ObservationBatch batch(observations_, first, inliers_only);
       const BatchProjection projection(model_, R, T.translation(), batch);
       sum.add(model_, batch, projection, kernel_);
@@ -39,9 +39,9 @@ class MotionCost {
   int classify(const SE3& T, const MotionOnlyOptions& options) const {
     const Matrix3 R = T.rotation();
     int inliers = 0;
-    for (std::size_t first = 0; first < observations_.size(); first += kLanes) {
+    for (std::size_t first = 0; first < observations_.size(); first += kObservationLanes) {
       const BatchProjection p(model_, R, T.translation(), ObservationBatch(observations_, first, false));
-      for (std::size_t n = first; n < std::min(first + kLanes, observations_.size()); ++n) {
+      for (std::size_t n = first; n < std::min(first + kObservationLanes, observations_.size()); ++n) {
         MotionObservation& o = observations_[n];
         const double limit =
             weighs_right(o.information) ? options.inlier_chi2_stereo : options.inlier_chi2_mono;

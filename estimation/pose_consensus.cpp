@@ -22,8 +22,9 @@ std::string PoseConsensusOptions::invalid_reason() const {
 
 namespace {
 
-constexpr double kSideSigmas = 4;  // by which a side of a right sample may differ
-constexpr double kFarOff = 1e12;   // variances of a point that is not in front of the camera
+constexpr double kSideSigmas =
+    4;  // by which a side of a right sample may differ: one of 16,000 does by chance
+constexpr double kFarOff = 1e12;  // variances of a point that is not in front of the camera
 
 /// In the left image, in variances.
 double squared_error(const PinholeCamera& camera, const Vector3& x_c, const Vector2& uv, double information) {
@@ -62,15 +63,15 @@ class PoseConsensus::ThreePoints {
   [[nodiscard]] ModelScore score(const SE3& T_c_ref, double threshold2, double enough) const {
     constexpr std::size_t kBetweenLooks = 8;  // batches: a look at the sum costs as much as one of them
     const Matrix3 R = T_c_ref.rotation();
-    const std::size_t filled_up = kLanes * batches_.size() - pairs_.size();
-    Lanes inliers{}, score{};
+    const std::size_t filled_up = kObservationLanes * batches_.size() - pairs_.size();
+    ObservationLanes inliers{}, score{};
     score[0] = -threshold2 * static_cast<double>(filled_up);
     for (std::size_t b = 0; b < batches_.size(); ++b) {
-      Lanes error;
+      ObservationLanes error;
       measure(R, T_c_ref.translation(), batches_[b], error);
       const auto within = error <= threshold2;
-      score += within ? error : Lanes{} + threshold2;
-      inliers += within ? Lanes{} + 1 : Lanes{};
+      score += within ? error : ObservationLanes{} + threshold2;
+      inliers += within ? ObservationLanes{} + 1 : ObservationLanes{};
       if (b % kBetweenLooks == kBetweenLooks - 1 && sum(score) >= enough) break;
     }
     return {sum(score), static_cast<int>(sum(inliers))};
@@ -104,20 +105,20 @@ class PoseConsensus::ThreePoints {
   }
   /// Of where a point is seen [px].
   [[nodiscard]] double sigma(std::size_t i) const {
-    return 1 / std::sqrt(batches_[i / kLanes].information[i % kLanes]);
+    return 1 / std::sqrt(batches_[i / kObservationLanes].information[i % kObservationLanes]);
   }
-  static double sum(const Lanes& lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
+  static double sum(const ObservationLanes& lanes) { return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]); }
 
   /// As squared_error.
   [[gnu::always_inline]] void measure(const Matrix3& R, const Vector3& t, const Batch& b,
-                                      Lanes& squared_errors) const {
-    const Lanes x = R(0, 0) * b.x + R(0, 1) * b.y + R(0, 2) * b.z + t.x();
-    const Lanes y = R(1, 0) * b.x + R(1, 1) * b.y + R(1, 2) * b.z + t.y();
-    const Lanes z = R(2, 0) * b.x + R(2, 1) * b.y + R(2, 2) * b.z + t.z();
-    const Lanes inv_z = 1.0 / z;
-    const Lanes du = camera_.fx * x * inv_z + (camera_.cx - b.u);
-    const Lanes dv = camera_.fy * y * inv_z + (camera_.cy - b.v);
-    squared_errors = z > kNearestDepth ? b.information * (du * du + dv * dv) : Lanes{} + kFarOff;
+                                      ObservationLanes& squared_errors) const {
+    const ObservationLanes x = R(0, 0) * b.x + R(0, 1) * b.y + R(0, 2) * b.z + t.x();
+    const ObservationLanes y = R(1, 0) * b.x + R(1, 1) * b.y + R(1, 2) * b.z + t.y();
+    const ObservationLanes z = R(2, 0) * b.x + R(2, 1) * b.y + R(2, 2) * b.z + t.z();
+    const ObservationLanes inv_z = 1.0 / z;
+    const ObservationLanes du = camera_.fx * x * inv_z + (camera_.cx - b.u);
+    const ObservationLanes dv = camera_.fy * y * inv_z + (camera_.cy - b.v);
+    squared_errors = z > kNearestDepth ? b.information * (du * du + dv * dv) : ObservationLanes{} + kFarOff;
   }
 
   const PinholeCamera& camera_;
@@ -129,14 +130,14 @@ class PoseConsensus::ThreePoints {
 PoseConsensus::PoseConsensus(const Rig& rig, std::size_t capacity, const PoseConsensusOptions& options)
     : rig_(rig), options_(options) {
   pairs_.reserve(capacity);
-  batches_.reserve((capacity + kLanes - 1) / kLanes);
+  batches_.reserve((capacity + kObservationLanes - 1) / kObservationLanes);
   models_.reserve(1);
 }
 
 void PoseConsensus::add(const MotionObservation& match, const Vector3& x_c) {
-  const std::size_t lane = pairs_.size() % kLanes;
+  const std::size_t lane = pairs_.size() % kObservationLanes;
   if (lane == 0) {
-    const Lanes nowhere = Lanes{} + std::numeric_limits<double>::quiet_NaN();
+    const ObservationLanes nowhere = ObservationLanes{} + std::numeric_limits<double>::quiet_NaN();
     batches_.push_back({nowhere, nowhere, nowhere, nowhere, nowhere, nowhere});
   }
   Batch& batch = batches_.back();

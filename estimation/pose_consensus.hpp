@@ -41,12 +41,12 @@ class PoseConsensus {
   struct Pair {
     Vector3 x_ref, x_c;
   };
-  static constexpr std::size_t kLanes = 4;
-  using Lanes = double __attribute__((vector_size(sizeof(double) * kLanes)));
+  static constexpr std::size_t kObservationLanes = 4;
+  using ObservationLanes = double __attribute__((vector_size(sizeof(double) * kObservationLanes)));
   /// What four pairs' residuals are computed from, side by side.
   struct Batch {
-    Lanes x, y, z;            ///< in the reference frame
-    Lanes u, v, information;  ///< in the left image
+    ObservationLanes x, y, z;            ///< in the reference frame
+    ObservationLanes u, v, information;  ///< in the left image
   };
   class ThreePoints;
 

@@ -7,8 +7,8 @@
 namespace twofold {
 namespace {
 
-constexpr int kFewestRegions = 12;
-constexpr int kOfPose = 6;  // dimensions
+constexpr int kFewestRegions = 12;  // of 24: with fewer, what one region says weighs too much
+constexpr int kOfPose = 6;          // dimensions
 
 }  // namespace
 

@@ -62,7 +62,7 @@ std::uint32_t& GraphWriter::anchored(KeyframeId id) {
 void GraphWriter::add_point(PointId id, MapPoint point) {
   TWOFOLD_CHECK(index(id) >= graph_.point_count(), "a point is added once, in order of ids");
   graph_.points_.extend(std::size_t{index(id)} + 1);
-  if (!point.alive()) return;
+  if (point.culled()) return;
   ++anchored(point.anchor);
   if (!point.observers) point.observers = std::make_shared<const ObserverList>();
   graph_.points_.mutate(index(id)) = std::move(point);
@@ -80,7 +80,7 @@ void GraphWriter::add_observations(KeyframeId id, std::span<const Observation> o
   keyframe.observations = std::move(merged);
   for (const Observation& observation : added) {
     MapPoint& point = graph_.points_.mutate(index(observation.point));
-    TWOFOLD_CHECK(point.alive(), "a culled point cannot be observed");
+    TWOFOLD_CHECK(!point.culled(), "a culled point cannot be observed");
     const ObserverList& old = *point.observers;
     const auto at = std::lower_bound(old.begin(), old.end(), id);
     if (at != old.end() && *at == id) continue;
@@ -145,7 +145,7 @@ void GraphWriter::remove_edge(KeyframeId id, KeyframeId other) {
 }
 
 void GraphWriter::cull_point(PointId id) {
-  if (!graph_.point(id).alive()) return;
+  if (graph_.point(id).culled()) return;
   const ObserverList observers = *graph_.point(id).observers;
   for (const KeyframeId keyframe : observers) remove_observations(keyframe, std::span(&id, 1));
   --anchored(graph_.point(id).anchor);

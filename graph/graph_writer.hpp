@@ -51,8 +51,8 @@ class GraphWriter {
   void set_inverse_depth(PointId id, const Vector3& psi) { graph_.points_.mutate(index(id)).psi = psi; }
   void set_misses(PointId id, std::uint8_t misses) { graph_.points_.mutate(index(id)).misses = misses; }
   void set_reference(KeyframeId id) { graph_.reference_ = id; }
-  /// Says that poses jump with the version being made.
-  void announce_jump(MapChange::Kind kind) { graph_.last_jump_ = {graph_.version_, kind}; }
+  /// Says that all poses change with the version being made.
+  void announce_change(MapChange::Kind kind) { graph_.last_change_ = {graph_.version_, kind}; }
 
   /// Adds observations to a keyframe, or replaces those of the same points, and registers it as an observer
   /// of the points.
@@ -74,12 +74,12 @@ class GraphWriter {
   /// Its pose stays; asking for it no longer walks along the chain.
   void shorten_replacements(KeyframeId id);
 
-  /// Forgets the replacements of culled keyframes that no living point is anchored in, but for the `keep`
+  /// Forgets the replacements of culled keyframes that no point is anchored in, but for the `keep`
   /// culled last. Looks at no more than `visits` of them, the oldest first, and goes on from there in the
   /// next call. Called with more visits than keyframes were culled since the last call, it keeps the number
   /// of replacements near `keep` plus that of culled anchors.
   void forget_replacements(std::size_t keep, std::size_t visits = 8);
-  /// Forgets all replacements but those of keyframes that living points are anchored in. Cost grows with the
+  /// Forgets all replacements but those of keyframes that points are anchored in. Cost grows with the
   /// map.
   void keep_needed_replacements() {
     list_replacements();

@@ -11,14 +11,14 @@ namespace twofold {
 
 /// Scratch map from ids to small numbers: a hash table with linear probing. Its memory is proportional to the
 /// most ids it ever held at once, not to the ids' values, which grow for as long as the camera moves. Cleared
-/// in O(1) by counting rounds.
+/// in O(1) by counting generations.
 class IdMap {
  public:
   void clear() {
     count_ = 0;
-    if (++round_ == 0) {  // wrapped around: old marks could be taken for new ones
+    if (++generation_ == 0) {  // wrapped around: old marks could be taken for new ones
       entries_.assign(entries_.size(), Entry{});
-      round_ = 1;
+      generation_ = 1;
     }
   }
   /// Makes room for `count` ids without further allocation.
@@ -31,14 +31,14 @@ class IdMap {
   [[nodiscard]] int find(std::uint32_t id) const {
     if (entries_.empty()) return -1;
     const Entry& entry = entries_[slot_of(id)];
-    return entry.round == round_ ? entry.value : -1;
+    return entry.generation == generation_ ? entry.value : -1;
   }
   /// value >= 0.
   void set(std::uint32_t id, int value) {
     if (2 * (count_ + 1) > entries_.size()) reserve(2 * count_ + 1);
     Entry& entry = entries_[slot_of(id)];
-    count_ += entry.round == round_ ? 0 : 1;
-    entry = {round_, id, value};
+    count_ += entry.generation == generation_ ? 0 : 1;
+    entry = {generation_, id, value};
   }
   [[nodiscard]] bool contains(KeyframeId id) const { return find(index(id)) >= 0; }
   [[nodiscard]] int find(KeyframeId id) const { return find(index(id)); }
@@ -49,7 +49,7 @@ class IdMap {
  private:
   static constexpr std::size_t kLeast = 64;
   struct Entry {
-    std::uint32_t round = 0;
+    std::uint32_t generation = 0;
     std::uint32_t id = 0;
     int value = -1;
   };
@@ -58,20 +58,20 @@ class IdMap {
   [[nodiscard]] std::size_t slot_of(std::uint32_t id) const {
     const std::size_t mask = entries_.size() - 1;
     std::size_t slot = (id * std::size_t{2654435761U} >> 7) & mask;
-    while (entries_[slot].round == round_ && entries_[slot].id != id) slot = (slot + 1) & mask;
+    while (entries_[slot].generation == generation_ && entries_[slot].id != id) slot = (slot + 1) & mask;
     return slot;
   }
   void rehash(std::size_t size) {
     std::vector<Entry> old(size);
     std::swap(old, entries_);
     for (const Entry& entry : old) {
-      if (entry.round == round_) entries_[slot_of(entry.id)] = entry;
+      if (entry.generation == generation_) entries_[slot_of(entry.id)] = entry;
     }
   }
 
   std::vector<Entry> entries_;  ///< a power of two of them
   std::size_t count_ = 0;
-  std::uint32_t round_ = 1;
+  std::uint32_t generation_ = 1;
 };
 
 }  // namespace twofold

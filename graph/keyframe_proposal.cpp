@@ -10,7 +10,7 @@ void KeyframeProposal::clear() {
   pose_information.setZero();
   median_depth = 0;
   observations.clear();
-  new_points.clear();
+  points.clear();
 }
 
 }  // namespace twofold

@@ -10,7 +10,7 @@ namespace twofold {
 
 /// A point that was started in keyframe `anchor` and found again in the proposed keyframe: it may join the
 /// map (6.3). Its measurement in the proposed keyframe is among KeyframeProposal::observations.
-struct NewPoint {
+struct ProposedPoint {
   PointId id = kNoPoint;
   KeyframeId anchor = kNoKeyframe;
   Vector3 psi{0, 0, 1};  ///< in the anchor's frame
@@ -31,9 +31,9 @@ struct KeyframeProposal {
   /// Of T_k_ref, left perturbation (v, omega), when that was measured as a whole and does not rest on the
   /// observations alone (a depth camera before bare walls); else zero.
   Matrix6 pose_information = Matrix6::Zero();
-  double median_depth = 0;           ///< [m]
-  ObservationList observations;      ///< of map points and of `new_points`, ascending by point
-  std::vector<NewPoint> new_points;  ///< ascending by id
+  double median_depth = 0;            ///< [m]
+  ObservationList observations;       ///< of map points and of `points`, ascending by point
+  std::vector<ProposedPoint> points;  ///< ascending by id
   FrameImages images;
 
   void clear();

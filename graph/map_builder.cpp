@@ -61,10 +61,10 @@ void MapBuilder::take_keyframes(EntryReader in) {
 void MapBuilder::take_points(EntryReader in) {
   for (std::uint32_t n = 0; n < kPointsPerSection && !in.at_end(); ++n) {
     PointEntry entry{PointId{next_point_}, take_point(in), {}};
-    const std::uint32_t run = version_ >= 3 && !entry.point.alive() ? in.run() : 1;
+    const std::uint32_t run = version_ >= 3 && entry.point.culled() ? in.run() : 1;
     if (run > point_count_ - next_point_) throw MalformedBytes("holds more points than announced");
     next_point_ += run;
-    if (entry.point.alive()) points_.push_back(std::move(entry));
+    if (!entry.point.culled()) points_.push_back(std::move(entry));
   }
   in.expect_end();
 }

@@ -101,7 +101,7 @@ KeyframeEntry take_keyframe_1(EntryReader& in, KeyframeId id) {
 MapPoint take_point(EntryReader& in) {
   MapPoint point;
   point.anchor = KeyframeId{in.u32()};
-  if (!point.alive()) return point;
+  if (point.culled()) return point;
   point.psi = in.vector3();
   if (in.small(2, "flag") == 0) return point;
   auto appearance = std::make_shared<PointAppearance>();

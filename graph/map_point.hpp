@@ -25,7 +25,7 @@ struct MapPoint {
   std::shared_ptr<const PointAppearance> appearance;
   std::shared_ptr<const ObserverList> observers;
 
-  [[nodiscard]] bool alive() const { return anchor != kNoKeyframe; }
+  [[nodiscard]] bool culled() const { return anchor == kNoKeyframe; }
 };
 
 }  // namespace twofold

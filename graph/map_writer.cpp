@@ -161,7 +161,7 @@ bool is_forgotten(const GraphSnapshot& graph, std::uint32_t k) {
 }
 
 bool is_culled_point(const GraphSnapshot& graph, std::uint32_t p) {
-  return !graph.point(PointId{p}).alive();
+  return graph.point(PointId{p}).culled();
 }
 
 /// Number of entries from `begin` on, up to `end`, that are `like` it.

@@ -40,7 +40,7 @@ void VisitedSet::reset(std::size_t size) {
 }
 
 bool VisitedSet::insert(std::uint32_t id) {
-  TWOFOLD_CHECK(id < size_, "id beyond the size of the round");
+  TWOFOLD_CHECK(id < size_, "id beyond the size of the set");
   if (contains(id)) return false;
   met_.set(id, 0);
   return true;
@@ -88,7 +88,7 @@ void visible_points(const GraphSnapshot& graph, std::span<const KeyframeId> keyf
     const Keyframe& keyframe = graph.keyframe(id);
     if (!keyframe.observations) continue;
     for (const Observation& observation : *keyframe.observations) {
-      if (visited.insert(index(observation.point)) && graph.point(observation.point).alive()) {
+      if (visited.insert(index(observation.point)) && !graph.point(observation.point).culled()) {
         result.push_back(observation.point);
       }
     }

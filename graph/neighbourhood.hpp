@@ -13,12 +13,12 @@ namespace twofold {
 /// what is met, not the ids.
 class VisitedSet {
  public:
-  /// Starts a new round for ids below `size`.
+  /// Forgets what was inserted, and takes ids below `size`.
   void reset(std::size_t size);
-  /// True the first time an id is inserted in this round; ids beyond the size of the round are a bug.
+  /// True the first time an id is inserted since the last reset; ids beyond its size are a bug.
   bool insert(std::uint32_t id);
   [[nodiscard]] bool contains(std::uint32_t id) const { return met_.find(id) >= 0; }
-  /// Makes room for `count` ids in a round.
+  /// Makes room for `count` ids.
   void reserve(std::size_t count) { met_.reserve(count); }
 
  private:
@@ -43,7 +43,7 @@ void weighted_breadth_first(const GraphSnapshot& graph, KeyframeId root, std::si
 void direct_neighbours(const GraphSnapshot& graph, KeyframeId id, std::size_t max_count,
                        std::vector<KeyframeId>& result);
 
-/// Points seen from the given keyframes that are alive, each once, in order of first sight. Appends to
+/// Points seen from the given keyframes that were not culled, each once, in order of first sight. Appends to
 /// `result`.
 void visible_points(const GraphSnapshot& graph, std::span<const KeyframeId> keyframes, VisitedSet& visited,
                     std::vector<PointId>& result);

@@ -20,7 +20,7 @@ class Renumbering {
     }
     for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
       const MapPoint& point = graph.point(PointId{p});
-      if (point.alive() && (*this)(point.anchor) != kNoKeyframe) points_[p] = PointId{points++};
+      if (!point.culled() && (*this)(point.anchor) != kNoKeyframe) points_[p] = PointId{points++};
     }
   }
   [[nodiscard]] KeyframeId operator()(KeyframeId id) const { return keyframes_[index(id)]; }

@@ -31,7 +31,7 @@ class GraphSnapshot {
   /// V_ref, the current centre of interest  (6.2.2); kNoKeyframe in an empty graph.
   [[nodiscard]] KeyframeId reference() const { return reference_; }
 
-  [[nodiscard]] const MapChange& last_jump() const { return last_jump_; }
+  [[nodiscard]] const MapChange& last_change() const { return last_change_; }
 
   /// Replacement of a culled keyframe; it may be culled by now.
   [[nodiscard]] const Replacement& replacement(KeyframeId id) const { return replacements_[index(id)]; }
@@ -47,7 +47,7 @@ class GraphSnapshot {
   [[nodiscard]] SE3 T_k_w(KeyframeId id) const;
   /// Map part of a keyframe, also of a culled one: its replacements'. kNoKeyframe if those are forgotten.
   [[nodiscard]] KeyframeId part(KeyframeId id) const;
-  /// Position of a point that is alive, in the world frame [m].
+  /// Position of a point that was not culled, in the world frame [m].
   [[nodiscard]] Vector3 position(PointId id) const;
 
  private:
@@ -55,7 +55,7 @@ class GraphSnapshot {
 
   std::uint64_t version_ = 0;
   KeyframeId reference_ = kNoKeyframe;
-  MapChange last_jump_;
+  MapChange last_change_;
   // Small chunks: a write copies one.
   PersistentVector<Keyframe, 5, 3> keyframes_;
   PersistentVector<MapPoint, 5, 3> points_;

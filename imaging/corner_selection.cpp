@@ -9,9 +9,8 @@
 namespace twofold {
 namespace {
 
-// Cells without texture give nothing: more are laid out than corners are wanted.
-constexpr double kCellsPerCorner = 1.5;
-constexpr int kSmallestCell = 8;  // [level-0 px]
+constexpr double kCellsPerCorner = 1.5;  // cells without texture give nothing: more than corners are wanted
+constexpr int kSmallestCell = 8;         // [level-0 px] below it, corners of one cell are hardly two
 
 /// Corners wanted of a level: halved from level to level.
 int share_of_level(int wanted, int level, int levels) {
@@ -52,7 +51,7 @@ void CornerSelector::select(const ImagePyramid& pyramid, std::vector<DescribedCo
     const int wanted = share_of_level(options_.wanted, level, options_.levels);
     add(pyramid, level, wanted, {options_.threshold, options_.min_score}, corners);
   }
-  if (is_dark(pyramid)) add_faint(pyramid, corners);
+  if (mean_brightness(pyramid) < options_.faint.dark_below) add_faint(pyramid, corners);
 }
 
 /// Low contrast is for want of light there, not of texture: fainter corners instead of those that are

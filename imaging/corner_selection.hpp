@@ -9,8 +9,9 @@
 
 namespace twofold {
 
-/// What a corner must be in the dark (is_dark): contrast is low there for want of light, and noise is not.
+/// What a corner must be in the dark: contrast is low there for want of light, and noise is not.
 struct FaintCornerOptions {
+  double dark_below = 60;        ///< mean brightness of an image that is dark [grey] > 0
   double threshold_share = 0.5;  ///< of the usual FAST threshold, in (0, 1]
   double score_share = 0.25;     ///< of the usual least score, in (0, 1]
 

@@ -175,6 +175,7 @@ struct Strip {
 void detect_corners(const cv::Mat& image, int level, int threshold, float min_score, int border,
                     const CellGrid& grid, std::vector<Corner>& corners) {
   TWOFOLD_CHECK(grid.columns <= CellGrid::kMaxColumns, "image too wide for cells of this size");
+  TWOFOLD_CHECK(level >= 0 && level <= 2 && grid.cell_px % 4 == 0, "cells are whole pixels on levels 0 to 2");
   if (image.cols < kRun + 2 * border) return;
   const int cell = grid.cell_px >> level;
   const Circle circle = circle_offsets(static_cast<std::ptrdiff_t>(image.step));

@@ -11,8 +11,13 @@
 namespace twofold {
 namespace {
 
-constexpr double kNearestBaselines = 2.5;
-constexpr int kMargin = Patch::kSize;  // whole patches, and room for the sub-pixel search around them
+constexpr double kNearestBaselines = 2.5;  // a nearer point is seen by one camera of a pair only
+constexpr int kNoiseSsd = 4 * 64 * 4;      // four times what noise of two grey levels adds to a patch
+constexpr int kOctaves = 3;  // two pixels of so many levels higher are as wide as what was kept of the look
+constexpr float kBlack = 4;  // [grey] darker tells nothing
+constexpr double kDisparityJump = 2.0;  // [px] more than noise and any slanted surface show over three pixels
+constexpr int kBeside = 3;              // [px] costs so near to the best are low because that is
+constexpr int kMargin = Patch::kSize;   // whole patches, and room for the sub-pixel search around them
 
 /// Best whole pixel within the radius; nothing when the window leaves the image.
 std::optional<Eigen::Vector2f> search_disc(const Patch& patch, const cv::Mat& image,
@@ -67,7 +72,6 @@ double search_right(const Patch& patch, const cv::Mat& right, const Eigen::Vecto
 }  // namespace
 
 bool is_unambiguous(std::int64_t best, std::int64_t second) {
-  constexpr int kNoiseSsd = 4 * 64 * 4;  // four times what noise of two grey levels adds to a patch
   return second * 4 > best * 5 + kNoiseSsd;
 }
 
@@ -109,8 +113,6 @@ std::optional<PointMatch> find_point(const FrameImages& images, const Rig& rig,
 std::optional<float> brightness_since_anchor(const ImagePyramid& images, const PinholeCamera& camera,
                                              const PointAppearance& appearance, const Vector3& psi,
                                              const SE3& T_c_a) {
-  constexpr int kOctaves = 3;  // two pixels of so many levels higher are as wide as what was kept of the look
-  constexpr float kBlack = 4;  // [grey] darker tells nothing
   const auto warp = predict_warp(camera, psi, T_c_a);
   if (!warp || !camera.contains(warp->uv)) return std::nullopt;
   const int level = std::min(appearance.level + kOctaves, ImagePyramid::kLevels - 1);
@@ -165,8 +167,7 @@ double right_from_depth(const cv::Mat& depth, const Rig& rig, double u, double v
   };
   const double near = disparity(0);
   const double far = disparity(count - 1);
-  constexpr double kDepthEdge = 2.0;  // [px] more than noise and any slanted surface show over three pixels
-  if (near - far > kDepthEdge) return Rig::kNoRight;
+  if (near - far > kDisparityJump) return Rig::kNoRight;
   return u - disparity(count / 2);
 }
 
@@ -188,7 +189,6 @@ struct RowCosts {
   }
   /// Least cost elsewhere, not beside the best: near to `best` where texture repeats.
   [[nodiscard]] int second_best() const {
-    constexpr int kBeside = 3;
     const int at = best_u - first;
     return std::min(least(0, at - kBeside), least(at + kBeside + 1, count));
   }

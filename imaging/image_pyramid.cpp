@@ -88,9 +88,8 @@ void FrameImages::copy_from(const FrameImages& other) {
   }
 }
 
-bool is_dark(const ImagePyramid& pyramid) {
-  constexpr double kDark = 60;  // [grey]
-  return cv::mean(pyramid.level(ImagePyramid::kLevels - 1))[0] < kDark;
+double mean_brightness(const ImagePyramid& pyramid) {
+  return cv::mean(pyramid.level(ImagePyramid::kLevels - 1))[0];
 }
 
 }  // namespace twofold

@@ -37,7 +37,7 @@ struct FrameImages {
   void copy_from(const FrameImages& other);
 };
 
-/// Whether contrast is low for want of light, not of texture.
-[[nodiscard]] bool is_dark(const ImagePyramid& pyramid);
+/// Of the whole image [grey].
+[[nodiscard]] double mean_brightness(const ImagePyramid& pyramid);
 
 }  // namespace twofold

@@ -6,7 +6,11 @@
 namespace twofold {
 
 std::string FaintCornerOptions::invalid_reason() const {
-  return OptionCheck().share("threshold_share", threshold_share).share("score_share", score_share).reason();
+  return OptionCheck()
+      .above("dark_below", dark_below, 0)
+      .share("threshold_share", threshold_share)
+      .share("score_share", score_share)
+      .reason();
 }
 
 std::string CornerSelectionOptions::invalid_reason() const {

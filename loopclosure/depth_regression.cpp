@@ -7,8 +7,8 @@
 namespace twofold {
 namespace {
 
-constexpr std::size_t kNeighbours = 3;
-constexpr double kSamePlace = 1.0;  // [px] distances below this weigh alike
+constexpr std::size_t kNeighbours = 3;  // thesis 5.3.1: a surface has three points, more are of another one
+constexpr double kSamePlace = 1.0;  // [px] as exactly as corners are found: distances below this weigh alike
 
 }  // namespace
 

@@ -10,6 +10,9 @@
 namespace twofold {
 namespace {
 
+constexpr int kMaxIterations = 10;  // of Gauss-Newton; three or four are usual
+constexpr double kSettled = 0.1;    // of chi-square, whose bounds are tens
+
 /// Where the steps lead with their errors.
 template <class Steps>
 Sim3 end_of(const Steps& steps, const Vector7& placement) {
@@ -30,8 +33,6 @@ DriftModel::DriftModel(SensorKind sensor, const DriftOptions& options) : options
 
 double DriftModel::chi2(const GraphSnapshot& graph, KeyframeId from, KeyframeId to,
                         const Sim3& S_to_from) const {
-  constexpr int kMaxIterations = 10;
-  constexpr double kSettled = 0.1;  // of chi-square
   std::vector<Step> steps = steps_between(graph, from, to);
   const double depth = graph.keyframe(to).median_depth;
   const Vector7 placement_variance =

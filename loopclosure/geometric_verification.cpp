@@ -100,6 +100,10 @@ bool has_positions(const PlaceAppearance& view) {
   return view.pixels.size() == view.corners.size();
 }
 
+/// Searches, each from the pose that the one before gave, and in what share of guided_radius_px: half of it
+/// is wide enough for a pose from many corners.
+constexpr std::array kGuidedRadii{1.0, 0.5, 0.5};
+
 }  // namespace
 
 std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const PlacedView> place,
@@ -119,7 +123,7 @@ std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const Placed
   const std::vector<PlacePoint> points = points_of(rig, place, options);
   const CornerGrid corners_of_b(rig.camera, b.corners, options.guided_radius_px);
   std::vector<CornerMatch> inliers;
-  for (const double radius : {1.0, 0.5, 0.5}) {
+  for (const double radius : kGuidedRadii) {
     const std::vector<CornerMatch> guided =
         match_guided(rig, points, b, corners_of_b, T_b_a, radius * options.guided_radius_px, options);
     r.guided = static_cast<int>(guided.size());

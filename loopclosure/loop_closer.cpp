@@ -48,7 +48,7 @@ void LoopCloser::continue_from(const KeyframeDatabase& places) {
 std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe, const GraphSnapshot& graph) {
   for (const KeyframeId culled : recogniser_.forget_culled(graph)) places_.forget(culled);
   if (!graph.contains(keyframe.id) || graph.keyframe(keyframe.id).culled()) return std::nullopt;
-  PlaceView view = describer_.describe(keyframe.images, *vocabulary_);
+  DescribedPlace view = describer_.describe(keyframe.images, *vocabulary_);
 
   const bool one_camera = rig_.kind == SensorKind::kMono;
   if (one_camera) {
@@ -86,7 +86,7 @@ std::vector<PlaceCandidate> LoopCloser::in_older_parts(KeyframeId id, const BagO
 }
 
 std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, const GraphSnapshot& graph) {
-  PlaceView view = describer_.describe(images, *vocabulary_);
+  DescribedPlace view = describer_.describe(images, *vocabulary_);
   if (rig_.kind == SensorKind::kMono) {
     for (const DescribedCorner& corner : view.corners)
       view.pixels.emplace_back(corner.uv.x(), corner.uv.y(), static_cast<float>(Rig::kNoRight));
@@ -98,7 +98,7 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
 
 /// The likeliest of the candidates that is verified.
 std::optional<Relocalisation> LoopCloser::first_place(const std::vector<PlaceCandidate>& candidates,
-                                                      const PlaceView& view, const FrameImages& images,
+                                                      const DescribedPlace& view, const FrameImages& images,
                                                       const GraphSnapshot& graph) {
   for (const PlaceCandidate& candidate : candidates) {
     auto verified = verify(candidate.keyframe, view, images, graph);
@@ -110,7 +110,7 @@ std::optional<Relocalisation> LoopCloser::first_place(const std::vector<PlaceCan
 /// The same, where nothing is known of where the camera may be: none if the view shows places that cannot be
 /// one, as in a street whose houses look alike.
 std::optional<Relocalisation> LoopCloser::only_place(const std::vector<PlaceCandidate>& candidates,
-                                                     const PlaceView& view, const FrameImages& images,
+                                                     const DescribedPlace& view, const FrameImages& images,
                                                      const GraphSnapshot& graph) {
   std::optional<Relocalisation> likeliest;
   for (const PlaceCandidate& candidate : candidates) {
@@ -126,7 +126,7 @@ std::optional<Relocalisation> LoopCloser::only_place(const std::vector<PlaceCand
   return likeliest ? verify(likeliest->keyframe, view, images, graph) : std::nullopt;
 }
 
-std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const PlaceView& view,
+std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const DescribedPlace& view,
                                                  const FrameImages& images, const GraphSnapshot& graph) {
   if (!graph.contains(k)) return std::nullopt;
   collect_views(k, graph);
@@ -179,7 +179,7 @@ void LoopCloser::collect_views(KeyframeId k, const GraphSnapshot& graph) {
   }
 }
 
-void LoopCloser::remember(KeyframeId id, PlaceView view) {
+void LoopCloser::remember(KeyframeId id, DescribedPlace view) {
   recogniser_.add(id, view.bag);
   previous_ = std::move(view.bag);
   places_.set(id, std::move(view));

@@ -8,10 +8,10 @@
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
 #include "loopclosure/depth_regression.hpp"
+#include "loopclosure/described_place.hpp"
 #include "loopclosure/geometric_verification.hpp"
 #include "loopclosure/loop_probation.hpp"
 #include "loopclosure/place_recogniser.hpp"
-#include "loopclosure/place_view.hpp"
 #include "loopclosure/pose_refinement.hpp"
 #include "loopclosure/redundant_loop.hpp"
 
@@ -73,19 +73,21 @@ class LoopCloser {
 
  private:
   /// Does the view show the place of keyframe k? First by corners, then by the map's points.
-  [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const PlaceView& view,
+  [[nodiscard]] std::optional<Relocalisation> verify(KeyframeId k, const DescribedPlace& view,
                                                      const FrameImages& images, const GraphSnapshot& graph);
   [[nodiscard]] std::optional<Relocalisation> first_place(const std::vector<PlaceCandidate>& candidates,
-                                                          const PlaceView& view, const FrameImages& images,
+                                                          const DescribedPlace& view,
+                                                          const FrameImages& images,
                                                           const GraphSnapshot& graph);
   [[nodiscard]] std::optional<Relocalisation> only_place(const std::vector<PlaceCandidate>& candidates,
-                                                         const PlaceView& view, const FrameImages& images,
+                                                         const DescribedPlace& view,
+                                                         const FrameImages& images,
                                                          const GraphSnapshot& graph);
   [[nodiscard]] std::vector<PlaceCandidate> in_older_parts(KeyframeId id, const BagOfWords& bag,
                                                            const GraphSnapshot& graph);
   void collect_views(KeyframeId k, const GraphSnapshot& graph);
   [[nodiscard]] std::optional<double> scale_of(const Relocalisation& seen) const;
-  void remember(KeyframeId id, PlaceView view);
+  void remember(KeyframeId id, DescribedPlace view);
 
   Rig rig_;
   std::shared_ptr<const Vocabulary> vocabulary_;

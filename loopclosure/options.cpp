@@ -8,7 +8,7 @@ std::string RecogniserOptions::invalid_reason() const {
       .at_least("near_keyframes", near_keyframes, 0)
       .at_least("max_candidates", max_candidates, 1)
       .at_least("min_score", min_score, 0)
-      .at_least("min_reference", min_reference, 0)
+      .at_least("min_previous_score", min_previous_score, 0)
       .at_least("consistency", consistency, 1)
       .at_least("same_place", same_place, 0)
       .at_least("culled_visits", culled_visits, 1)

@@ -16,15 +16,15 @@ PlaceRecogniser::PlaceRecogniser(std::size_t word_count, const RecogniserOptions
     : options_(options), index_(word_count) {}
 
 std::vector<PlaceCandidate> PlaceRecogniser::recognise(KeyframeId id, const BagOfWords& bag,
-                                                       double reference_score, const GraphSnapshot& graph) {
+                                                       double previous_score, const GraphSnapshot& graph) {
   std::vector<PlaceCandidate> confirmed;
   std::vector<Hypothesis> hypotheses;
-  if (reference_score >= options_.min_reference) {
+  if (previous_score >= options_.min_previous_score) {
     exclude_near(id, graph);
     const auto admitted = [&](KeyframeId k) { return !excluded_.contains(index(k)) && !is_culled(graph, k); };
     for (const PlaceCandidate& candidate :
          index_.query(bag, static_cast<std::size_t>(options_.max_candidates), admitted)) {
-      if (candidate.score < options_.min_score * reference_score) break;  // best first
+      if (candidate.score < options_.min_score * previous_score) break;  // best first
       int length = 1;
       for (const Hypothesis& before : hypotheses_) {
         if (same_place(before.keyframe, candidate.keyframe, graph))

@@ -10,11 +10,12 @@
 namespace twofold {
 
 struct RecogniserOptions {
-  int near_keyframes = 60;      ///< this many around the query, breadth-first, are never candidates, >= 0
-  int max_candidates = 10;      ///< of a query, >= 1
-  double min_score = 0.4;       ///< of a candidate, relative to the score with the keyframe before, >= 0
-  double min_reference = 0.05;  ///< score with the keyframe before below which the query says nothing, >= 0
-  int consistency = 2;          ///< successive keyframes that must agree about the place, >= 1
+  int near_keyframes = 60;  ///< this many around the query, breadth-first, are never candidates, >= 0
+  int max_candidates = 10;  ///< of a query, >= 1
+  double min_score = 0.4;   ///< of a candidate, relative to the score with the keyframe before, >= 0
+  double min_previous_score =
+      0.05;             ///< score with the keyframe before below which the query says nothing, >= 0
+  int consistency = 2;  ///< successive keyframes that must agree about the place, >= 1
   int same_place =
       6;  ///< keyframes whose numbers differ by no more, or that an edge joins, show the same place, >= 0
   /// Places looked at for each one added, in turn, whether their keyframe was culled: bounds a step's time;
@@ -43,9 +44,9 @@ class PlaceRecogniser {
 
   /// Candidates for the keyframe `id`, which `graph` has and the index need not, best first. To be called for
   /// keyframes in the order they were made: the calls before are what a candidate must be consistent with.
-  /// @param reference_score  bag_score with the keyframe before; scores are relative to it
+  /// @param previous_score  bag_score with the keyframe before; scores are relative to it
   [[nodiscard]] std::vector<PlaceCandidate> recognise(KeyframeId id, const BagOfWords& bag,
-                                                      double reference_score, const GraphSnapshot& graph);
+                                                      double previous_score, const GraphSnapshot& graph);
 
   /// Candidates anywhere in the map, best first, without the tests that need a history: for a lost camera.
   /// Here as there, a culled keyframe is no candidate.

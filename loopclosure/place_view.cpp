@@ -1,4 +1,4 @@
-#include "loopclosure/place_view.hpp"
+#include "loopclosure/described_place.hpp"
 
 #include "imaging/guided_search.hpp"
 
@@ -7,8 +7,8 @@ namespace twofold {
 PlaceDescriber::PlaceDescriber(const Rig& rig, const CornerSelectionOptions& options)
     : rig_(rig), selector_(options) {}
 
-PlaceView PlaceDescriber::describe(const FrameImages& images, const Vocabulary& vocabulary) {
-  PlaceView view;
+DescribedPlace PlaceDescriber::describe(const FrameImages& images, const Vocabulary& vocabulary) {
+  DescribedPlace view;
   selector_.select(images.left, view.corners);
   describer_.describe(images.left, view.corners);
   view.bag = vocabulary.bag(view.corners);

@@ -13,6 +13,8 @@
 namespace twofold {
 namespace {
 
+constexpr int kMinAgreeing = 6;  // five points always agree with a pose of their own
+
 std::vector<CornerMatch> match_descriptors(const Rig& rig, const PlaceAppearance& a, const PlaceAppearance& b,
                                            const VerificationOptions& options, bool depth_in_b) {
   std::vector<NearestDescriptor> of_a, of_b;
@@ -47,8 +49,7 @@ std::optional<SE3> pose_by_directions(const Rig& rig, const PlaceAppearance& b,
   const auto epipolar = estimate_relative_pose(bearings_a, bearings_b, ransac);
   if (!epipolar) return std::nullopt;
   report.ransac_inliers = static_cast<int>(epipolar->inliers.size());
-  // Five points always agree with a pose of their own.
-  if (report.ransac_inliers < std::max(options.min_hypothesis, 6)) return std::nullopt;
+  if (report.ransac_inliers < std::max(options.min_hypothesis, kMinAgreeing)) return std::nullopt;
   const SE3& T_b_a = epipolar->T_b_a;
   std::vector<CornerMatch> inliers;
   std::vector<double> lengths;

@@ -66,7 +66,7 @@ int remove_outlier_observations(GraphWriter& writer, std::span<const WindowBuild
   int culled = 0;
   for (const PointId id : suspects) {
     const MapPoint& point = writer.graph().point(id);
-    if (!point.alive()) continue;
+    if (point.culled()) continue;
     if (point.observers->size() >= kMinObservers && !has_lost_its_anchor(writer.graph(), id)) continue;
     writer.cull_point(id);
     ++culled;
@@ -143,7 +143,7 @@ int PointCuller::cull(GraphWriter& writer, KeyframeId newest, std::span<const Po
   int culled = 0;
   for (const PointId id : points) {
     const MapPoint& point = writer.graph().point(id);
-    if (!point.alive() || point.observers->size() > kMinObservers) continue;
+    if (point.culled() || point.observers->size() > kMinObservers) continue;
     if (std::binary_search(point.observers->begin(), point.observers->end(), newest)) {
       if (point.misses > 0) writer.set_misses(id, 0);
       continue;

@@ -39,7 +39,7 @@ void add_keyframe(GraphWriter& writer, const KeyframeProposal& proposal, const S
 int add_new_points(GraphWriter& writer, const KeyframeProposal& proposal) {
   int added = 0;
   std::vector<std::pair<KeyframeId, Observation>> anchor_observations;
-  for (const NewPoint& point : proposal.new_points) {
+  for (const ProposedPoint& point : proposal.points) {
     const GraphSnapshot& graph = writer.graph();
     if (index(point.id) < graph.point_count() || !graph.contains(point.anchor)) continue;
     if (graph.keyframe(point.anchor).culled() || point.anchor == proposal.id) continue;
@@ -76,8 +76,9 @@ void add_proposed_observations(GraphWriter& writer, const KeyframeProposal& prop
   accepted.reserve(proposal.observations.size());
   for (const Observation& observation : proposal.observations) {
     const GraphSnapshot& graph = writer.graph();
-    const bool alive = graph.contains(observation.point) && graph.point(observation.point).alive();
-    const bool here = alive && graph.part(graph.point(observation.point).anchor) == graph.part(proposal.id);
+    const bool is_there = graph.contains(observation.point) && !graph.point(observation.point).culled();
+    const bool here =
+        is_there && graph.part(graph.point(observation.point).anchor) == graph.part(proposal.id);
     if (here && measured(observation)) {
       accepted.push_back(observation);
     } else {

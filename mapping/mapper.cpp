@@ -104,7 +104,7 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   report.joined += join_parts(writer_, from, to, T_to_from);
   link_marginalised(writer_, from, to, loop.weight, T_to_from);
   if (options_.hook) options_.hook->loop_closed(from, to);
-  writer_.announce_jump(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
+  writer_.announce_change(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
   ++report.loops;
 }
 
@@ -208,7 +208,7 @@ int Mapper::take_pose_graph(const PoseGraphUpdate& update) {
     writer_.set_pose(pose.id, pose.T_k_w * T_optimised_w);
     ++moved;
   }
-  if (moved > 0) writer_.announce_jump(MapChange::Kind::kPoseGraph);
+  if (moved > 0) writer_.announce_change(MapChange::Kind::kPoseGraph);
   return moved;
 }
 
@@ -220,7 +220,7 @@ std::vector<KeyframeScaling> Mapper::take_similarities(const SimilarityUpdate& u
   }));
   // Whether the loop follows, or comes too late.
   if (!moved.empty())
-    writer_.announce_jump(joined_ > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
+    writer_.announce_change(joined_ > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
   return moved;
 }
 

@@ -30,8 +30,9 @@ struct MetricLoopOptions {
   double search_radius_px = 10;  ///< > 0
   double max_error_px = 1;       ///< of points that agree with T_loop, on their pyramid level, > 0
   double border_px = 10;         ///< predictions closer to the image's edge are not searched, >= 0
-  double min_view_cosine =
-      0.6216;  ///< of the angle between the anchor's and the reference's ray to a point, in [-1, 1]
+  /// Of the angle between the anchor's and the reference's ray to a point, in [-1, 1]: a patch is found again
+  /// up to some 50 degrees.
+  double min_view_cosine = 0.6216;
   /// From the reference to a member of N2 (way_length), of one camera whose scale drifts, > 0.
   double max_way_of_one_camera = kWayOfOneUnit;
   /// Of min_covisible: so many matches in the upper, lower, left and right half of the reference's image, in

@@ -89,7 +89,7 @@ void scale_what_hangs_on(GraphWriter& writer, const Factors& factors) {
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
     const PointId id{p};
     const MapPoint& point = graph.point(id);
-    if (!point.alive()) continue;
+    if (point.culled()) continue;
     const double factor = factors.of(graph.live_replacement(point.anchor)->id);
     if (factor != 1) writer.set_inverse_depth(id, {point.psi.x(), point.psi.y(), point.psi.z() / factor});
   }

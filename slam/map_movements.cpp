@@ -27,7 +27,7 @@ void MapMovements::found(const ClosedLoop& loop) {
 void MapMovements::published(const GraphSnapshot& graph, const DoubleWindow& window) {
   MapMovement movement;
   movement.version = graph.version();
-  if (graph.last_jump().version > before_.version()) {
+  if (graph.last_change().version > before_.version()) {
     for (std::uint32_t k = 0; k < before_.keyframe_count(); ++k) compare(graph, KeyframeId{k}, movement);
   } else {
     for (const auto& node : window.nodes) compare(graph, node.id, movement);
@@ -70,7 +70,7 @@ void MapMovements::find_loops(const GraphSnapshot& graph, MapMovement& movement)
     newest_loop_ = loop;
     return true;
   });
-  if (graph.last_jump().version <= before_.version()) return;
+  if (graph.last_change().version <= before_.version()) return;
   // The whole pose graph is optimised for the loop before it: such a version has that loop, too.
   movement.loop_from = newest_loop_.from;
   movement.loop_to = newest_loop_.to;

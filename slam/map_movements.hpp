@@ -32,8 +32,9 @@ struct LoopEnds {
 /// Compares each version of the map with the one before, for the events that the tracker's thread tells.
 ///
 /// Roles: the loop closer's thread calls found, the mapper's published, the tracker's take. None waits, and
-/// take is bounded. A version is compared over its windows, or, after a jump (GraphSnapshot::last_jump),
-/// which has changed all keyframes, over all of them: time in proportion to what the mapper did.
+/// take is bounded. A version is compared over its windows, or, after a change of the whole map
+/// (GraphSnapshot::last_change), which has changed all keyframes, over all of them: time in proportion to
+/// what the mapper did.
 class MapMovements {
  public:
   void found(const ClosedLoop& loop);

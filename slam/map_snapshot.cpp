@@ -93,7 +93,7 @@ std::vector<MapSnapshot::Point> MapSnapshot::points(bool with_covariance) const 
   std::vector<Point> points;
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
     const MapPoint& from = graph.point(PointId{p});
-    if (!from.alive()) continue;
+    if (from.culled()) continue;
     Point& point = points.emplace_back();
     point.id = p;
     point.anchor = index(from.anchor);
@@ -173,7 +173,7 @@ std::size_t MapSnapshot::memory_bytes() const {
   });
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
     const MapPoint& point = graph.point(PointId{p});
-    if (point.alive()) bytes += block_bytes<PointAppearance>(1) + shared_list_bytes(*point.observers);
+    if (!point.culled()) bytes += block_bytes<PointAppearance>(1) + shared_list_bytes(*point.observers);
   }
   return bytes;
 }

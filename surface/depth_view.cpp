@@ -26,7 +26,8 @@ ConstRow row_of(const cv::Mat& image, int y) {
   return {image.ptr<float>(y), image.cols};
 }
 
-constexpr float kJumpRatio = 0.05f;  // of the depth, across two pixels; a slope of 75 degrees stays below it
+constexpr float kMaxSpreadShare =
+    0.05f;  // of the depth, across two pixels; a slope of 75 degrees stays below it
 constexpr float kNone = 1e9f;
 
 /// [m]; kNone where there is no reading.
@@ -87,7 +88,7 @@ void find_jumps(const cv::Mat& raw, cv::Mat& depth, cv::Mat& nearest) {
     auto* near = nearest.ptr<float>(y);
     for (int x = 0; x < raw.cols; ++x) {
       const float low = around.nearest(x);
-      kept[x] = ((z[x] < kNone) & (around.farthest(x) - low <= kJumpRatio * low)) ? z[x] : 0.0f;
+      kept[x] = ((z[x] < kNone) & (around.farthest(x) - low <= kMaxSpreadShare * low)) ? z[x] : 0.0f;
       near[x] = around.has_hole(x) ? 0.0f : low;
     }
   }

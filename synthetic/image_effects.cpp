@@ -10,7 +10,7 @@ namespace twofold::synthetic {
 namespace {
 
 constexpr double kDepthSigma = 1.425e-3;    ///< [m] at 1 m
-constexpr double kJumpRatio = 0.04;         ///< of the depth, between neighbouring pixels
+constexpr double kMaxSlopeShare = 0.04;     ///< of the depth, between neighbouring pixels
 constexpr double kSteepest = 3.73;          ///< tan(75 degrees)
 constexpr double kSpotProbability = 0.004;  ///< of a 4x4 block without reading
 constexpr int kTableBits = 12;
@@ -93,7 +93,7 @@ cv::Mat sense_depth(const cv::Mat& inverse_depth, const Rig& rig, double noise_s
       const double dx = 0.5 * (at(y, x + 1) - at(y, x - 1));
       const double dy = 0.5 * (at(y + 1, x) - at(y - 1, x));
       if (std::hypot(dx * rig.camera.fx, dy * rig.camera.fy) > kSteepest * w) continue;
-      if (std::max(std::abs(dx), std::abs(dy)) > kJumpRatio * w) continue;
+      if (std::max(std::abs(dx), std::abs(dy)) > kMaxSlopeShare * w) continue;
       const std::uint64_t block =
           (static_cast<std::uint64_t>(y / 4) << 32) | static_cast<std::uint64_t>(x / 4);
       if (unit_interval(mix64(spots ^ block)) < kSpotProbability) continue;

@@ -12,25 +12,9 @@
 #include "tracking/monocular/options.hpp"
 #include "tracking/motion/options.hpp"
 #include "tracking/pose/options.hpp"
+#include "tracking/search/options.hpp"
 
 namespace twofold {
-
-/// Which points of the map are searched in a frame (tracking/search/local_map_search.hpp).
-struct LocalMapSearchOptions {
-  int wanted_matches = 180;      ///< stop searching once so many points were found, in [1, max_searches]
-  int max_searches = 320;        ///< upper bound of points searched, >= 1
-  int neighbour_keyframes = 20;  ///< the reference keyframe's: so many, those that share most points, >= 1
-  double border_px = 8;          ///< points predicted closer to the image's edge are not searched, >= 0
-  double min_view_cosine = 0.7;  ///< of the angle between a point's first ray and today's, in [-1, 1]
-  double lost_radius_px = 8;     ///< search radius while lost, > 0
-  /// The light has changed when so large a share of the points searched was missed, in (0, 1] ...
-  double light_missed_share = 0.5;
-  int min_light_points = 15;  ///< ... of which so many say by how much the light changed, >= 1 ...
-  double light_change = 1.5;  ///< ... and the view is by so much brighter or darker there, > 1
-
-  /// Empty when valid; otherwise names the field, the rule and the value.
-  [[nodiscard]] std::string invalid_reason() const;
-};
 
 /// By how much each level of effort bounds a frame's work (EffortLevel); each level's bounds hold for those
 /// below it, too.

@@ -31,11 +31,11 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       shutter_(rig_, motion_, static_cast<std::size_t>(options.local_map.max_searches), options.shutter),
       correction_(rig, options.fixed, options.right_rows),
       dense_alignment_(kMaxAlignmentPoints, options.alignment),
-      local_map_search_(rig_, options_, local_map_, correction_.fixed()),
+      local_map_search_(rig_, options_.local_map, options_.search, local_map_, correction_.fixed()),
       immature_points_(kMaxImmaturePoints, kMostPendingKeyframes),
       pose_estimator_(rig_, options_, local_map_, shutter_, immature_points_),
-      search_(rig, options),
-      tried_(rig, options),
+      search_(rig, options.local_map.max_searches),
+      tried_(rig, options.local_map.max_searches),
       loss_(options.loss.signs),
       views_(rig, options.loss.wide_search, options.search, options.loss.recent_keyframes),
       new_points_(rig_, options_, correction_.fixed()),
@@ -127,7 +127,7 @@ void Tracker::follow(const GraphSnapshot& graph) {
   const PendingKeyframe* newest = nullptr;
   for (const PendingKeyframe& pending : immature_points_.pending()) {
     if (graph.contains(pending.id) && !graph.keyframe(pending.id).culled() &&
-        graph.part(pending.id) == part_of(graph, immature_points_, motion_.reference()))
+        in_same_part(pending.id, motion_.reference(), graph))
       newest = &pending;
   }
   if (newest != nullptr && newest->id != motion_.reference()) {
@@ -170,7 +170,7 @@ SE3 Tracker::aligned_pose(FrameStep& step) {
 /// What the next frame starts from.
 void Tracker::remember_frame(const FrameStep& step) {
   const TrackResult& result = step.result;
-  motion_.advance({result.reference, result.T_c_ref}, step.frame.t_ns, loss_.lost_frames() > 0);
+  motion_.advance({result.reference, result.T_c_ref}, step.frame.t_ns, step.after_loss());
   correction_.advance(motion_.since_previous());
   shutter_.learn(step, search_, local_map_);
   loss_.placed();

@@ -124,6 +124,8 @@ class Tracker {
   bool search_from_recognised(const Placement& asked, FrameStep& step);
   void leave_other_part(const FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
+  /// Of the map; also of keyframes that it has not got yet.
+  [[nodiscard]] bool in_same_part(KeyframeId a, KeyframeId b, const GraphSnapshot& graph) const;
   [[nodiscard]] std::optional<Placement> placement_in_this_part(KeyframeId id, const FrameStep& step) const;
   bool search_widely(FrameStep& step);
   bool search_from_view(const FrameImages& images, FrameCorners& corners, const SearchStart& view,

@@ -11,7 +11,7 @@ namespace twofold {
 void Tracker::prepare(KeyframeProposal& proposal) const {
   // Every match is an observation, and a new point at most.
   proposal.observations.reserve(search_.matches.capacity());
-  proposal.new_points.reserve(search_.matches.capacity());
+  proposal.points.reserve(search_.matches.capacity());
   allocate_images(rig_, proposal.images);
 }
 

@@ -28,11 +28,14 @@ bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
 /// Points and seeds of the part in which the camera was, if it was recognised in another one: how the two lie
 /// to each other nobody knows, and none of them can be seen from here.
 void Tracker::leave_other_part(const FrameStep& step) {
-  const auto part = [&](KeyframeId id) { return part_of(step.graph, immature_points_, id); };
   const KeyframeId before = motion_.reference();
-  if (before == kNoKeyframe || part(before) == part(step.result.reference)) return;
+  if (before == kNoKeyframe || in_same_part(before, step.result.reference, step.graph)) return;
   immature_points_.clear_points();
   new_points_.forget_seeds();
+}
+
+bool Tracker::in_same_part(KeyframeId a, KeyframeId b, const GraphSnapshot& graph) const {
+  return part_of(graph, immature_points_, a) == part_of(graph, immature_points_, b);
 }
 
 /// A keyframe as the map has it: itself, or the one that was left in its place.
@@ -46,9 +49,8 @@ std::optional<Placement> Tracker::placement_of(const GraphSnapshot& graph, Keyfr
 /// other nobody knows.
 std::optional<Placement> Tracker::placement_in_this_part(KeyframeId id, const FrameStep& step) const {
   const std::optional<Placement> placement = placement_of(step.graph, id);
-  if (!placement) return std::nullopt;
-  const auto part = [&](KeyframeId k) { return part_of(step.graph, immature_points_, k); };
-  return part(placement->reference) == part(motion_.reference()) ? placement : std::nullopt;
+  if (!placement || !in_same_part(placement->reference, motion_.reference(), step.graph)) return std::nullopt;
+  return placement;
 }
 
 /// Before the frame is given up: the last good frame or one of the newest keyframes may show what it shows.
@@ -72,9 +74,7 @@ bool Tracker::search_widely(FrameStep& step) {
 bool Tracker::is_within_reach(SearchStart::Kind kind, const FrameStep& step) const {
   const KeyframeId here = step.result.reference;
   const bool knows_way = rig_.kind != SensorKind::kMono && motion_.velocity();
-  if (!knows_way || part_of(step.graph, immature_points_, here) !=
-                        part_of(step.graph, immature_points_, motion_.reference()))
-    return true;
+  if (!knows_way || !in_same_part(here, motion_.reference(), step.graph)) return true;
   const SE3 T_here_last = pose_relative_to(step.graph, immature_points_, here, motion_.reference());
   const SE3 T_c_last = step.result.T_c_ref * T_here_last * motion_.T_c_ref().inverse();
   return motion_.reaches(T_c_last, step.frame.t_ns, kind == SearchStart::Kind::kRecognised);

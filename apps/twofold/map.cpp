@@ -36,7 +36,7 @@ void print_info(const std::string& file) {
       marginalised += edge.marginalised ? 1 : 0;
     }
   }
-  for (std::uint32_t p = 0; p < graph.point_count(); ++p) points += graph.point(PointId{p}).alive() ? 1 : 0;
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) points += graph.point(PointId{p}).culled() ? 0 : 1;
   std::size_t places = 0, corners = 0;
   for (std::uint32_t k = 0; k < map.places.size(); ++k) {
     const PlaceAppearance* place = map.places.find(KeyframeId{k});

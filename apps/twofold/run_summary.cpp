@@ -184,7 +184,7 @@ Json summary_json(const std::string& source_text, const EngineOptions& options, 
                   const std::vector<MapPart>& parts) {
   std::size_t points = 0;
   for (std::uint32_t p = 0; p < result.graph.point_count(); ++p)
-    points += result.graph.point(PointId{p}).alive();
+    points += !result.graph.point(PointId{p}).culled();
   const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
   Json json{{"source", absolute_source(source_text)},
             {"interrupted", result.interrupted},

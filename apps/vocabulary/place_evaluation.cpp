@@ -60,7 +60,7 @@ std::vector<PlacedView> views_of(const PlaceSet& set, const TruePairs& truth, in
 /// Tries to verify the candidates, best first, until one is.
 void verify_candidates(const PlaceSet& set, const TruePairs& truth, int end, double reference,
                        std::span<const PlaceCandidate> candidates, Answer& answer) {
-  const PlaceView& view = set.places[static_cast<std::size_t>(answer.query)].view;
+  const DescribedPlace& view = set.places[static_cast<std::size_t>(answer.query)].view;
   for (const PlaceCandidate& candidate : candidates) {
     Tried& tried = answer.tried.emplace_back();
     tried.place = static_cast<int>(index(candidate.keyframe));
@@ -81,7 +81,7 @@ std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSe
   std::vector<Answer> answers;
   const RecogniserOptions recogniser;
   for (int i = arguments.gap + 1; i < static_cast<int>(set.places.size()); ++i) {
-    const PlaceView& view = set.places[static_cast<std::size_t>(i)].view;
+    const DescribedPlace& view = set.places[static_cast<std::size_t>(i)].view;
     const int end = i - arguments.gap;  // of the images in the index
     index.add(KeyframeId{static_cast<std::uint32_t>(end - 1)},
               set.places[static_cast<std::size_t>(end - 1)].view.bag);
@@ -89,7 +89,7 @@ std::vector<Answer> ask(const PlaceEvaluationArguments& arguments, const PlaceSe
                                         [](KeyframeId) { return true; });
     if (candidates.empty()) continue;
     const double likeness = bag_score(view.bag, set.places[static_cast<std::size_t>(i - 1)].view.bag);
-    const double reference = std::max(likeness, recogniser.min_reference);
+    const double reference = std::max(likeness, recogniser.min_previous_score);
     Answer answer;
     answer.query = i;
     answer.place = static_cast<int>(twofold::index(candidates[0].keyframe));

@@ -9,13 +9,13 @@
 #include "apps/vocabulary/place_evaluation.hpp"
 #include "camera/rig.hpp"
 #include "geometry/se3.hpp"
-#include "loopclosure/place_view.hpp"
+#include "loopclosure/described_place.hpp"
 
 namespace twofold {
 
 /// An image of a set, described.
 struct DescribedImage {
-  PlaceView view;
+  DescribedPlace view;
   std::optional<SE3> T_w_c;  ///< true pose, if known
 };
 

@@ -54,7 +54,7 @@ ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
   if (!over_sim3) options.mapper.hook = std::make_shared<RigidLoops>();
   GraphSnapshot newest, before_loop;
   options.on_map = [&](const GraphSnapshot& graph, const DoubleWindow&) {
-    if (graph.last_jump().version != 0 && before_loop.keyframe_count() == 0) before_loop = newest;
+    if (graph.last_change().version != 0 && before_loop.keyframe_count() == 0) before_loop = newest;
     newest = graph;
   };
   const std::atomic<bool> interrupted{false};

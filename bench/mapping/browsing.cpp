@@ -27,7 +27,7 @@ MapSize size_of(const GraphSnapshot& graph) {
     size.edges += keyframe.edges->size();
   }
   size.edges /= 2;
-  for (std::uint32_t p = 0; p < graph.point_count(); ++p) size.points += graph.point(PointId{p}).alive();
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) size.points += !graph.point(PointId{p}).culled();
   return size;
 }
 

@@ -9,18 +9,18 @@ constexpr auto kFailureCheck = std::chrono::milliseconds(100);
 
 }  // namespace
 
-LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round,
+LogWriter::LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_look,
                      std::chrono::milliseconds period)
     : files_(std::move(files)) {
   thread_.emplace(WorkerOptions{.name = "log writer", .time_slice = kPatientSlice},
-                  [this, before_round = std::move(before_round), period](const std::stop_token& stop) {
+                  [this, before_look = std::move(before_look), period](const std::stop_token& stop) {
                     while (!stop.stop_requested()) {
                       (void)parking_.wait_until(stop, std::chrono::steady_clock::now() + period,
                                                 [this] { return file_is_behind(); });
-                      if (before_round) before_round();
+                      if (before_look) before_look();
                       for (const auto& file : files_) file->write_waiting();
-                      // Whoever looked at the files before this round sleeps by now, and hears it.
-                      { const std::scoped_lock lock(round_); }
+                      // Whoever looked at the files before this look sleeps by now, and hears it.
+                      { const std::scoped_lock lock(looking_); }
                       written_.notify_all();
                     }
                   });
@@ -37,7 +37,7 @@ bool LogWriter::file_is_behind() const {
 void LogWriter::wait_for_room() {
   if (!behind()) return;
   parking_.wake();
-  std::unique_lock lock(round_);
+  std::unique_lock lock(looking_);
   // A thread that fails wakes nobody.
   while (!written_.wait_for(lock, kFailureCheck, [this] { return !behind(); })) {
   }

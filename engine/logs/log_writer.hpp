@@ -20,9 +20,9 @@ namespace twofold {
 class LogWriter {
  public:
   /// Throws std::system_error when no thread can be made.
-  /// @param before_round  called on the thread before it looks what waits; tests let it fail
-  /// @param period        from one round to the next, unless a file is behind
-  explicit LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_round = {},
+  /// @param before_look  called on the thread before it looks what waits; tests let it fail
+  /// @param period       from one look to the next, unless a file is behind
+  explicit LogWriter(std::vector<std::shared_ptr<LogFile>> files, std::function<void()> before_look = {},
                      std::chrono::milliseconds period = std::chrono::milliseconds(100));
 
   /// Whether a file is behind, and somebody there who will write it; any thread.
@@ -40,7 +40,7 @@ class LogWriter {
 
   std::vector<std::shared_ptr<LogFile>> files_;
   Parking parking_;
-  std::mutex round_;  // guards nothing: whoever waits holds it between looking at the files and sleeping
+  std::mutex looking_;  // guards nothing: whoever waits holds it between looking at the files and sleeping
   std::condition_variable written_;
   std::optional<Worker> thread_;  // last: joins before what it uses is destroyed
 };

@@ -132,7 +132,7 @@ TEST(Options, OfDepthSayWhyTheyAreInvalid) {
        {"settled_step", [](auto& o) { o.settled_step = 0; }},
        {"nearly_settled_step", [](auto& o) { o.nearly_settled_step = o.settled_step / 2; }},
        {"first_stride", [](auto& o) { o.first_stride = 0; }}});
-  expect_rules<DepthPlaneOptions>({{"min_readings", [](auto& o) { o.min_readings = 0; }},
+  expect_rules<DepthPlaneOptions>({{"min_readings_share", [](auto& o) { o.min_readings_share = 0; }},
                                    {"many_columns", [](auto& o) { o.many_columns = 0; }},
                                    {"max_scatter", [](auto& o) { o.max_scatter = 0; }},
                                    {"min_cosine", [](auto& o) { o.min_cosine = -0.1; }},
@@ -156,7 +156,7 @@ TEST(Options, OfKeyframesAndPointsSayWhyTheyAreInvalid) {
                                          {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
                                          {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
                                          {"max_pending", [](auto& o) { o.max_pending = 0; }}});
-  expect_rules<ReferenceChoiceOptions>({{"min_gain_percent", [](auto& o) { o.min_gain_percent = -1; }}});
+  expect_rules<ReferenceChoiceOptions>({{"min_gain_share", [](auto& o) { o.min_gain_share = -1; }}});
   expect_rules<NewPointOptions>(
       {{"corner_levels", [](auto& o) { o.corner_levels = 6; }},
        {"min_start_points", [](auto& o) { o.min_start_points = 0; }},
@@ -168,7 +168,7 @@ TEST(Options, OfKeyframesAndPointsSayWhyTheyAreInvalid) {
        {"seeds.min_stretch_px", [](auto& o) { o.seeds.min_stretch_px = -1; }}});
   expect_rules<DepthSeedOptions>({{"line.step_px", [](auto& o) { o.line.step_px = 0; }},
                                   {"filter_iterations", [](auto& o) { o.filter_iterations = 0; }},
-                                  {"farthest", [](auto& o) { o.farthest = 0; }}});
+                                  {"min_inverse_depth", [](auto& o) { o.min_inverse_depth = 0; }}});
   expect_rules<ImmaturePointOptions>({{"max_age", [](auto& o) { o.max_age = -1; }},
                                       {"trusted_after", [](auto& o) { o.trusted_after = 256; }},
                                       {"moving_after", [](auto& o) { o.moving_after = 0; }}});
@@ -264,7 +264,7 @@ TEST(Options, TheEngineRefusesThoseThatAreInvalid) {
     Engine(testing::test_rig(SensorKind::kStereo), options);
     ADD_FAILURE() << "accepted";
   } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "tracker.new_points.cell_px must be >= 1, is 0");
+    EXPECT_STREQ(error.what(), "tracker.new_points.cell_px must be a multiple of 4, > 0, is 0");
   }
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 std::size_t points_alive(const GraphSnapshot& graph) {
   std::size_t count = 0;
-  for (std::uint32_t p = 0; p < graph.point_count(); ++p) count += graph.point(PointId{p}).alive() ? 1 : 0;
+  for (std::uint32_t p = 0; p < graph.point_count(); ++p) count += graph.point(PointId{p}).culled() ? 0 : 1;
   return count;
 }
 

@@ -28,7 +28,7 @@ void parse(const std::string& bytes) {
   try {
     const twofold::SavedMap map = twofold::read_map(in, bytes.size(), "fuzz");
     for (std::uint32_t p = 0; p < map.graph.point_count(); ++p) {
-      if (map.graph.point(twofold::PointId{p}).alive()) (void)map.graph.position(twofold::PointId{p});
+      if (!map.graph.point(twofold::PointId{p}).culled()) (void)map.graph.position(twofold::PointId{p});
     }
   } catch (const twofold::MapFileError&) {
   }

@@ -60,8 +60,8 @@ TEST(GraphWriter, SkippedPointIdsAreCulledPoints) {
   const KeyframeId a = add_keyframe(writer);
   writer.add_point(PointId{4}, anchored_in(a));
   EXPECT_EQ(writer.graph().point_count(), 5U);
-  for (std::uint32_t p = 0; p < 4; ++p) EXPECT_FALSE(writer.graph().point(PointId{p}).alive());
-  EXPECT_TRUE(writer.graph().point(PointId{4}).alive());
+  for (std::uint32_t p = 0; p < 4; ++p) EXPECT_TRUE(writer.graph().point(PointId{p}).culled());
+  EXPECT_FALSE(writer.graph().point(PointId{4}).culled());
   writer.cull_point(PointId{1});  // culling what is culled changes nothing
   EXPECT_DEATH(writer.add_observations(a, std::vector{seen(1)}), "culled point");
   EXPECT_DEATH(writer.add_point(PointId{3}, anchored_in(a)), "order of ids");
@@ -153,8 +153,8 @@ TEST(GraphWriter, InvariantsHoldUnderRandomOperations) {
     for (const auto& [snapshot, count] : published) ASSERT_EQ(broken_invariant(snapshot), "");
     for (std::uint32_t p = 0; p < points; ++p) {
       const MapPoint& point = writer.graph().point(PointId{p});
-      ASSERT_EQ(point.alive(), observers.contains(p));
-      if (!point.alive()) continue;
+      ASSERT_EQ(!point.culled(), observers.contains(p));
+      if (point.culled()) continue;
       std::set<std::uint32_t> ids;
       for (const KeyframeId k : *point.observers) ids.insert(index(k));
       ASSERT_EQ(ids, observers[p]);

@@ -239,7 +239,7 @@ TEST_F(MapFileTest, ForgottenKeyframesAreOnlyCounted) {
   EXPECT_EQ(broken_invariant(loaded.graph), "");
   EXPECT_EQ(known_replacements(loaded.graph), kept);
   for (std::uint32_t p = 1000; p < 2000; ++p) {
-    if (!before.point(PointId{p}).alive()) continue;
+    if (before.point(PointId{p}).culled()) continue;
     EXPECT_LT((loaded.graph.position(PointId{p}) - before.position(PointId{p})).norm(), 1e-9);
   }
 }

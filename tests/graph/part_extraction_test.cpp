@@ -30,7 +30,7 @@ void expect_same(const SavedMap& a, const SavedMap& b) {
     std::vector<double> values;
     for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
       const MapPoint& point = graph.point(PointId{p});
-      if (point.alive()) values.push_back(point.psi.z() + index(point.anchor));
+      if (!point.culled()) values.push_back(point.psi.z() + index(point.anchor));
     }
     return values;
   };

@@ -75,7 +75,7 @@ inline void expect_same(const SavedMap& a, const SavedMap& b, double rounding = 
     const MapPoint& p = a.graph.point(PointId{i});
     const MapPoint& q = b.graph.point(PointId{i});
     ASSERT_EQ(p.anchor, q.anchor);
-    if (!p.alive()) continue;
+    if (p.culled()) continue;
     EXPECT_LE((p.psi - q.psi).norm(), rounding);
     EXPECT_EQ(p.appearance->pixels, q.appearance->pixels);
     EXPECT_EQ(p.appearance->uv, q.appearance->uv);

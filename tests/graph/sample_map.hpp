@@ -122,7 +122,7 @@ inline SavedMap two_parts(const SavedMap& first, const SavedMap& second) {
   }
   for (std::uint32_t p = 0; p < second.graph.point_count(); ++p) {
     MapPoint point = second.graph.point(PointId{p});
-    if (!point.alive()) continue;
+    if (point.culled()) continue;
     point.anchor = shifted(point.anchor);
     ObserverList observers = *point.observers;
     for (KeyframeId& observer : observers) observer = shifted(observer);

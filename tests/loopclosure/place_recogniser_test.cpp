@@ -93,8 +93,8 @@ TEST_F(PlaceRecogniserTest, ACandidateMustLookAsMuchLikeItAsNeighboursDo) {
   PlaceRecogniser seen = recogniser();
   EXPECT_EQ(recognise(seen, between(7, 12), 0.6), (Ids{k(7), k(12)})) << "0.5, and 0.48 are needed";
   EXPECT_EQ(recognise(seen, between(7, 12), 0.65), Ids{});
-  EXPECT_EQ(recognise(seen, bag_of(7), options_.min_reference), Ids{k(7)});
-  EXPECT_EQ(recognise(seen, bag_of(7), 0.9 * options_.min_reference), Ids{})
+  EXPECT_EQ(recognise(seen, bag_of(7), options_.min_previous_score), Ids{k(7)});
+  EXPECT_EQ(recognise(seen, bag_of(7), 0.9 * options_.min_previous_score), Ids{})
       << "where neighbours hardly look alike, nothing is known";
 }
 

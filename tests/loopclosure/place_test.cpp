@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "geometry/ransac.hpp"
+#include "loopclosure/described_place.hpp"
 #include "loopclosure/geometric_verification.hpp"
-#include "loopclosure/place_view.hpp"
 #include "synthetic/image_effects.hpp"
 #include "tests/loopclosure/turning_camera.hpp"
 
@@ -28,14 +28,14 @@ class PlaceTest : public ::testing::TestWithParam<SensorKind> {
   Rig rig_ = test_rig(GetParam());
   PlaceDescriber describer_{rig_, {}};
 
-  PlaceView view(std::uint32_t room, const SE3& T_c_w) {
+  DescribedPlace view(std::uint32_t room, const SE3& T_c_w) {
     RenderedScene scene(rig_, Vector3(3, 2, 4), room);
     FrameImages images;
     scene.render(T_c_w, 2.0, images);
     return describer_.describe(images, *vocabulary());
   }
   /// With so much of the light, and the noise that a sensor has then.
-  PlaceView view_in_the_dark(std::uint32_t room, const SE3& T_c_w, double gain) {
+  DescribedPlace view_in_the_dark(std::uint32_t room, const SE3& T_c_w, double gain) {
     RenderedScene scene(rig_, Vector3(3, 2, 4), room);
     FrameImages images;
     scene.render(T_c_w, 0, images);
@@ -48,7 +48,7 @@ class PlaceTest : public ::testing::TestWithParam<SensorKind> {
     }
     return describer_.describe(images, *vocabulary());
   }
-  std::optional<VerifiedPlace> verify(const PlaceView& a, const PlaceView& b,
+  std::optional<VerifiedPlace> verify(const DescribedPlace& a, const DescribedPlace& b,
                                       VerificationOptions options = {},
                                       VerificationReport* report = nullptr) {
     const PlacedView place{&a, SE3()};
@@ -58,7 +58,7 @@ class PlaceTest : public ::testing::TestWithParam<SensorKind> {
 
 TEST_P(PlaceTest, DescribesManyCornersSpreadOverTheImageWithTheirDepth) {
   const SE3 T_c_w = pose(0.2, {0.3, 0, 0});
-  const PlaceView place = view(1, T_c_w);
+  const DescribedPlace place = view(1, T_c_w);
   ASSERT_EQ(place.pixels.size(), place.corners.size());
   EXPECT_GT(place.corners.size(), 300U);
   EXPECT_LE(place.corners.size(), 500U);
@@ -99,7 +99,7 @@ TEST_P(PlaceTest, VerifiesTheSamePlaceInTheDark) {
   constexpr double kGain = 0.07;
   const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5});
   const SE3 T_b_w = pose(-0.05, {-0.1, 0, -0.2});
-  const PlaceView place = view_in_the_dark(1, T_a_w, kGain);
+  const DescribedPlace place = view_in_the_dark(1, T_a_w, kGain);
   VerificationReport report;
   const auto verified = verify(place, view_in_the_dark(1, T_b_w, kGain), {}, &report);
   ASSERT_TRUE(verified) << place.corners.size() << " corners, " << report.matches << " matches, "
@@ -120,7 +120,7 @@ TEST_P(PlaceTest, RejectsAnotherRoomAndAnotherWall) {
 }
 
 TEST_P(PlaceTest, EachRuleOfVerificationRefusesAlone) {
-  const PlaceView a = view(1, pose(0.1, {0.2, 0.1, -0.5})), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  const DescribedPlace a = view(1, pose(0.1, {0.2, 0.1, -0.5})), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
   VerificationReport report;
   ASSERT_TRUE(verify(a, b, {}, &report));
   VerificationOptions options;
@@ -143,8 +143,8 @@ TEST_P(PlaceTest, EachRuleOfVerificationRefusesAlone) {
 
 /// A third of the corners are turned by more than the camera is: they are others that look and lie alike.
 TEST_P(PlaceTest, CornersThatAreTurnedAreOthers) {
-  const PlaceView a = view(1, pose(0.1, {0.2, 0.1, -0.5}));
-  PlaceView b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  const DescribedPlace a = view(1, pose(0.1, {0.2, 0.1, -0.5}));
+  DescribedPlace b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
   VerificationReport all, rest;
   ASSERT_TRUE(verify(a, b, {}, &all));
   for (std::size_t j = 0; j < b.corners.size(); j += 3) b.corners[j].angle += 2;
@@ -164,8 +164,8 @@ TEST_P(PlaceTest, ACameraThatRollsSeesThemTurnedAlike) {
 }
 
 TEST_P(PlaceTest, CornersOfOneSideOfTheImageAreNoLoop) {
-  const PlaceView a = view(1, pose(0, {0, 0, 0}));
-  PlaceView b = view(1, pose(0.02, {0.05, 0, 0}));
+  const DescribedPlace a = view(1, pose(0, {0, 0, 0}));
+  DescribedPlace b = view(1, pose(0.02, {0.05, 0, 0}));
   ASSERT_TRUE(verify(a, b));
   for (std::size_t j = 0; j < b.corners.size(); ++j) {
     if (b.corners[j].uv.x() > 300) b.corners[j].descriptor = {};
@@ -178,8 +178,8 @@ TEST_P(PlaceTest, CornersOfOneSideOfTheImageAreNoLoop) {
 
 /// What the place shows in the left half of its image the camera sees in the middle of its own.
 TEST_P(PlaceTest, CornersOfOneSideOfThePlaceAreNoLoop) {
-  PlaceView a = view(1, pose(0, {0, 0, 0}));
-  const PlaceView b = view(1, pose(0.3, {0, 0, 0}));
+  DescribedPlace a = view(1, pose(0, {0, 0, 0}));
+  const DescribedPlace b = view(1, pose(0.3, {0, 0, 0}));
   ASSERT_TRUE(verify(a, b));
   for (DescribedCorner& corner : a.corners) {
     if (corner.uv.x() > 310) corner.descriptor = {};
@@ -193,8 +193,8 @@ TEST_P(PlaceTest, CornersOfOneSideOfThePlaceAreNoLoop) {
 /// Half of the corners are missing in the place's own view; its neighbour has them.
 TEST_P(PlaceTest, NeighboursLendTheirCorners) {
   const SE3 T_a_w = pose(0.1, {0.2, 0.1, -0.5}), T_n_w = pose(0.12, {0.25, 0.1, -0.5});
-  PlaceView a = view(1, T_a_w);
-  const PlaceView n = view(1, T_n_w), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  DescribedPlace a = view(1, T_a_w);
+  const DescribedPlace n = view(1, T_n_w), b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
   for (std::size_t i = 0; i < a.corners.size(); i += 2) a.pixels[i].z() = static_cast<float>(Rig::kNoRight);
   VerificationReport alone, together;
   (void)verify(a, b, {}, &alone);
@@ -207,8 +207,8 @@ TEST_P(PlaceTest, NeighboursLendTheirCorners) {
 /// Of a view with the other's corners and depths: each match is right, until something is said of it.
 class MatchRuleTest : public PlaceTest {
  protected:
-  PlaceView a_ = view(1, pose(0.1, {0.2, 0.1, -0.5}));
-  PlaceView b_ = a_;
+  DescribedPlace a_ = view(1, pose(0.1, {0.2, 0.1, -0.5}));
+  DescribedPlace b_ = a_;
 
   VerificationReport report(const VerificationOptions& options = {}) {
     VerificationReport report;
@@ -219,7 +219,7 @@ class MatchRuleTest : public PlaceTest {
 
 TEST_P(MatchRuleTest, MatchesHaveDepthInBothViews) {
   const VerificationReport all = report();
-  for (PlaceView* side : {&a_, &b_}) {
+  for (DescribedPlace* side : {&a_, &b_}) {
     const std::vector<StereoPixelF> kept = side->pixels;
     for (std::size_t i = 0; i < side->pixels.size(); i += 2)
       side->pixels[i].z() = static_cast<float>(Rig::kNoRight);
@@ -296,7 +296,7 @@ TEST_P(MatchRuleTest, CornersWithoutDepthCountByTheirPlaceInTheImage) {
 
 TEST_P(MatchRuleTest, AViewWhoseCornersHaveNoPositionsIsNoPlace) {
   ASSERT_TRUE(verify(a_, b_));
-  for (PlaceView* side : {&a_, &b_}) {
+  for (DescribedPlace* side : {&a_, &b_}) {
     const std::vector<StereoPixelF> kept = side->pixels;
     side->pixels.pop_back();
     EXPECT_FALSE(verify(a_, b_));
@@ -308,7 +308,7 @@ TEST_P(MatchRuleTest, AViewWhoseCornersHaveNoPositionsIsNoPlace) {
 /// A lost camera that knows no depths: five directions agree with a pose of their own whatever they are, so
 /// that a sixth must speak for it.
 TEST_P(MatchRuleTest, FiveDirectionsAloneAreNoHypothesis) {
-  PlaceView b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
+  DescribedPlace b = view(1, pose(-0.05, {-0.1, 0, -0.2}));
   for (StereoPixelF& z : b.pixels) z.z() = static_cast<float>(Rig::kNoRight);
   rig_.kind = SensorKind::kMono;
   VerificationOptions options;
@@ -336,7 +336,7 @@ TEST_P(MatchRuleTest, FiveDirectionsAloneAreNoHypothesis) {
 INSTANTIATE_TEST_SUITE_P(Sensors, MatchRuleTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd));
 
 TEST_P(PlaceTest, LooksMoreLikeItselfThanLikeAnyOther) {
-  const PlaceView here = view(1, pose(0, {0, 0, 0}));
+  const DescribedPlace here = view(1, pose(0, {0, 0, 0}));
   const double same = bag_score(here.bag, view(1, pose(0.08, {0.1, 0, 0.2})).bag);
   for (std::uint32_t room = 2; room < 6; ++room) {
     EXPECT_GT(same, 1.5 * bag_score(here.bag, view(room, pose(0, {0, 0, 0})).bag)) << room;

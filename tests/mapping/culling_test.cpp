@@ -111,10 +111,10 @@ TEST(PointCuller, CullsWeakPointsThatAreInViewAndNeverSeenAgain) {
   int culled = 0;
   for (const std::uint32_t newest : {2U, 3U, 4U, 5U}) culled += culler.cull(writer, k(newest), points);
   EXPECT_EQ(culled, 1);
-  EXPECT_FALSE(writer.graph().point(forgotten).alive());
-  for (const PointId id : {strong, outside, again}) EXPECT_TRUE(writer.graph().point(id).alive());
+  EXPECT_TRUE(writer.graph().point(forgotten).culled());
+  for (const PointId id : {strong, outside, again}) EXPECT_FALSE(writer.graph().point(id).culled());
   culler.cull(writer, k(6), points);
-  EXPECT_FALSE(writer.graph().point(again).alive()) << "three misses since it was last seen";
+  EXPECT_TRUE(writer.graph().point(again).culled()) << "three misses since it was last seen";
 }
 
 TEST(CullRedundantKeyframes, KeepsUpWithAMapperThatInsertsSeveralAtATime) {
@@ -178,8 +178,8 @@ TEST(RemoveKeyframe, PointsThatOneKeyframeAloneWouldSeeGoWithIt) {
   const PointId one_left = add_point(writer, rig, {0.1, 0, 1}, {k(1), k(2)});
   const PointId two_left = add_point(writer, rig, {0.1, 0.1, 1}, {k(0), k(1), k(2)});
   EXPECT_EQ(remove_keyframe(writer, k(1)), 1);
-  EXPECT_FALSE(writer.graph().point(one_left).alive());
-  EXPECT_TRUE(writer.graph().point(two_left).alive());
+  EXPECT_TRUE(writer.graph().point(one_left).culled());
+  EXPECT_FALSE(writer.graph().point(two_left).culled());
 }
 
 TEST(RemoveOutlierObservations, APointIsHeldByItsAnchorAndAnotherKeyframe) {
@@ -190,9 +190,9 @@ TEST(RemoveOutlierObservations, APointIsHeldByItsAnchorAndAnotherKeyframe) {
   const PointId held = add_point(writer, rig, {0.1, 0.2, 1}, {k(0), k(1), k(2)});
   const std::vector<WindowBuilder::Outlier> outliers{{k(0), adrift}, {k(1), alone}, {k(1), held}};
   EXPECT_EQ(remove_outlier_observations(writer, outliers), 2);
-  EXPECT_FALSE(writer.graph().point(alone).alive()) << "seen from its anchor only";
-  EXPECT_FALSE(writer.graph().point(adrift).alive()) << "its anchor does not see it";
-  EXPECT_TRUE(writer.graph().point(held).alive());
+  EXPECT_TRUE(writer.graph().point(alone).culled()) << "seen from its anchor only";
+  EXPECT_TRUE(writer.graph().point(adrift).culled()) << "its anchor does not see it";
+  EXPECT_FALSE(writer.graph().point(held).culled());
 }
 
 /// A point is missed only by who should have seen it, and as its patch shows it.
@@ -255,7 +255,7 @@ Size living(const GraphSnapshot& graph) {
     size.edges += keyframe.edges->size();
   }
   for (std::uint32_t p = 0; p < graph.point_count(); ++p) {
-    size.points += graph.point(PointId{p}).alive() ? 1 : 0;
+    size.points += graph.point(PointId{p}).culled() ? 0 : 1;
   }
   return size;
 }

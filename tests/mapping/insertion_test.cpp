@@ -62,7 +62,7 @@ class InsertionTest : public testing::Test {
     const Vector3 x_a = writer_.graph().T_k_w(KeyframeId{anchor}) * x_w;
     Observation at_anchor;
     at_anchor.pixel = rig_.project(x_a).cast<float>();
-    proposal_.new_points.push_back({PointId{id}, KeyframeId{anchor}, to_inverse_depth(x_a), at_anchor, {}});
+    proposal_.points.push_back({PointId{id}, KeyframeId{anchor}, to_inverse_depth(x_a), at_anchor, {}});
     see(PointId{id}, x_w);
   }
   [[nodiscard]] const Edge* edge_to(std::uint32_t other) const {
@@ -79,7 +79,7 @@ TEST_F(InsertionTest, NewPointsJoinWhenTheyWereMeasuredTwiceAndTheirAnchorIsTher
   remove_keyframe(writer_, KeyframeId{1});
   start(0, 1);  // its anchor was culled meanwhile
   start(1, 2);
-  proposal_.new_points.back().psi.z() = -1;  // behind the camera
+  proposal_.points.back().psi.z() = -1;  // behind the camera
   start(2, 2);
   proposal_.observations.back().pixel.x() = std::numeric_limits<float>::quiet_NaN();
   start(3, 2);
@@ -88,7 +88,7 @@ TEST_F(InsertionTest, NewPointsJoinWhenTheyWereMeasuredTwiceAndTheirAnchorIsTher
   const InsertionReport report = insert();
   EXPECT_EQ(report.new_points, 1);
   for (std::uint32_t p = 0; p < 4; ++p) {
-    EXPECT_FALSE(writer_.graph().contains(PointId{p}) && writer_.graph().point(PointId{p}).alive()) << p;
+    EXPECT_FALSE(writer_.graph().contains(PointId{p}) && !writer_.graph().point(PointId{p}).culled()) << p;
   }
   EXPECT_EQ(*writer_.graph().point(PointId{4}).observers, (ObserverList{KeyframeId{2}, proposal_.id}));
   EXPECT_EQ(report.observations, 1);

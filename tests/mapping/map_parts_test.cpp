@@ -105,7 +105,7 @@ TEST(MapParts, AProposalWithoutReferenceStartsOneAndALoopJoinsIt) {
   loop.weight = 40;
   const MapperReport report = mapper.step({}, std::span(&loop, 1));
   EXPECT_EQ(report.joined, 2);
-  EXPECT_EQ(mapper.graph().last_jump().kind, MapChange::Kind::kPartsJoined);
+  EXPECT_EQ(mapper.graph().last_change().kind, MapChange::Kind::kPartsJoined);
   for (std::uint32_t k = 0; k < 7; ++k) EXPECT_EQ(mapper.graph().keyframe(KeyframeId{k}).part, KeyframeId{0});
   EXPECT_LT((relative(mapper.graph(), 6, 1) * kConstraint.inverse()).log().norm(), 1e-9);
   EXPECT_NE(find_edge(mapper.graph().keyframe(KeyframeId{6}), KeyframeId{1}), nullptr);
@@ -132,11 +132,11 @@ TEST(MapParts, ThoseOfOneCameraAreSaidToBeJoined) {
     return mapper.step({}, std::span(&loop, 1));
   };
   EXPECT_EQ(close(2, 6).joined, 5);
-  EXPECT_EQ(mapper.graph().last_jump().kind, MapChange::Kind::kPartsJoined);
+  EXPECT_EQ(mapper.graph().last_change().kind, MapChange::Kind::kPartsJoined);
   EXPECT_EQ(mapper.graph().part(KeyframeId{0}), cameras);
   EXPECT_EQ(mapper.step({}).joined, 0);
   EXPECT_EQ(close(0, 6).joined, 0);
-  EXPECT_EQ(mapper.graph().last_jump().kind, MapChange::Kind::kLoopClosure);
+  EXPECT_EQ(mapper.graph().last_change().kind, MapChange::Kind::kLoopClosure);
 }
 
 }  // namespace

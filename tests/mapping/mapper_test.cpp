@@ -151,7 +151,7 @@ TEST(Mapper, SeveralProposalsInOneRoundHangOnEachOther) {
   const SE3 T_second_first = second.T_k_ref * first.T_k_ref.inverse();
   second.reference = first.id;
   second.T_k_ref = T_second_first;
-  std::erase_if(second.new_points, [&](const NewPoint& p) { return p.anchor != second.reference; });
+  std::erase_if(second.points, [&](const ProposedPoint& p) { return p.anchor != second.reference; });
   KeyframeProposal* both[] = {&first, &second};
   const MapperReport report = mapper.step(both);
   EXPECT_EQ(report.inserted, 2);

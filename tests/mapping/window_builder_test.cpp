@@ -163,9 +163,9 @@ TEST_F(WindowBuilderTest, WrongMeasurementsAreFoundAndBadPointsCulled) {
   ASSERT_EQ(outliers.size(), 3U);
   EXPECT_TRUE(std::is_sorted(outliers.begin(), outliers.end()));
   EXPECT_EQ(remove_outlier_observations(writer_, outliers), 2);
-  EXPECT_TRUE(writer_.graph().point(good).alive());
-  EXPECT_FALSE(writer_.graph().point(pair).alive());
-  EXPECT_FALSE(writer_.graph().point(anchor).alive());
+  EXPECT_FALSE(writer_.graph().point(good).culled());
+  EXPECT_TRUE(writer_.graph().point(pair).culled());
+  EXPECT_TRUE(writer_.graph().point(anchor).culled());
   EXPECT_EQ(broken_invariant(writer_.graph(), 2), "");
 }
 

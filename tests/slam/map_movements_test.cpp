@@ -52,7 +52,7 @@ TEST_F(MapMovementsTest, AJumpIsComparedOverAllKeyframesAndNamesItsLoop) {
   move(1, 0.02);
   move(2, 0.5);
   move(3, 0.005);
-  writer_.announce_jump(MapChange::Kind::kLoopClosure);
+  writer_.announce_change(MapChange::Kind::kLoopClosure);
   publish();
   const MapMovement movement = movements_.take(graph_.version());
   EXPECT_EQ(movement.keyframes, 2U);
@@ -65,11 +65,11 @@ TEST_F(MapMovementsTest, AJumpIsComparedOverAllKeyframesAndNamesItsLoop) {
 TEST_F(MapMovementsTest, ThePoseGraphsOptimisationHasTheLoopItIsFor) {
   close_loop();
   take_loop();
-  writer_.announce_jump(MapChange::Kind::kLoopClosure);
+  writer_.announce_change(MapChange::Kind::kLoopClosure);
   publish();
   (void)movements_.take(graph_.version());
   move(0, 0.1);
-  writer_.announce_jump(MapChange::Kind::kPoseGraph);
+  writer_.announce_change(MapChange::Kind::kPoseGraph);
   publish();
   EXPECT_EQ(movements_.take(graph_.version()).loop_to, KeyframeId{3});
 }

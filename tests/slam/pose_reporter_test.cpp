@@ -123,7 +123,7 @@ TEST_F(PoseReporterTest, ACorrectionSaysWhatItDidToTheMap) {
   writer_.set_edge(KeyframeId{0}, edge);
   const SE3 jump(SO3(), Vector3(0, 5, 0));
   writer_.set_pose(KeyframeId{0}, jump);
-  writer_.announce_jump(MapChange::Kind::kLoopClosure);
+  writer_.announce_change(MapChange::Kind::kLoopClosure);
   publish();
   correction_ = {CorrectionReason::kLoopClosure, 1, kPeriod, PackedPose(), PackedPose(jump)};
   (void)report(tracked(1, jump));
@@ -151,7 +151,7 @@ TEST_F(PoseReporterTest, APartThatJoinsTheCamerasIsToldWithoutACorrection) {
   (void)report(tracked(0, T_c_w));
   EXPECT_FALSE(events_.correction);
   writer_.set_part(KeyframeId{1}, KeyframeId{0});
-  writer_.announce_jump(MapChange::Kind::kPartsJoined);
+  writer_.announce_change(MapChange::Kind::kPartsJoined);
   publish();
   (void)report(tracked(1, T_c_w));
   ASSERT_TRUE(events_.correction);

@@ -107,7 +107,7 @@ TEST_F(ElderVoteTest, TheYoungThatGoWithTheEldersAreNotMistrusted) {
   add(60, KeyframeId{0}, Vector3::Zero());
   add(100, KeyframeId{7}, Vector3(0.012, 0, 0));
   ElderVoteOptions any_dissent;
-  any_dissent.min_loyal = 1;
+  any_dissent.min_loyal_share = 1;
   vote_ = ElderVote(rig_, 300, any_dissent);
   ASSERT_TRUE(ask()) << "the elders' pose is another";
   vote_ = ElderVote(rig_, 300, {});

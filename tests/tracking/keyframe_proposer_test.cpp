@@ -51,7 +51,7 @@ class KeyframeProposerTest : public ::testing::Test {
   FrameStep step_{frame_, snapshot_, &proposal_, bounds_of(EffortLevel::kEverything, options_), 0};
   ImmaturePoints immature_{100, 4};
   LocalMap local_map_{100};
-  SearchOutcome found_{rig_, options_};
+  SearchOutcome found_{rig_, options_.local_map.max_searches};
   KeyframeProposer proposer_{options_};
 };
 
@@ -73,7 +73,7 @@ TEST_F(KeyframeProposerTest, PointsFoundAgainGetNumbersAndGoToTheMapOnce) {
   find_all();
   propose_next(false);
   ASSERT_EQ(proposal_.observations.size(), kPoints - 2U);
-  ASSERT_EQ(proposal_.new_points.size(), kPoints - 2U);
+  ASSERT_EQ(proposal_.points.size(), kPoints - 2U);
   for (std::uint32_t n = 0; n < kPoints - 2U; ++n) {
     EXPECT_EQ(proposal_.observations[n].point, PointId{n}) << "in the order of their numbers";
     EXPECT_EQ(proposal_.observations[n].level, 1);
@@ -82,7 +82,7 @@ TEST_F(KeyframeProposerTest, PointsFoundAgainGetNumbersAndGoToTheMapOnce) {
   EXPECT_EQ(immature_.points()[5].proposed_in, KeyframeId{1});
   propose_next(false);
   EXPECT_EQ(proposal_.observations.size(), kPoints - 2U);
-  EXPECT_TRUE(proposal_.new_points.empty());
+  EXPECT_TRUE(proposal_.points.empty());
 }
 
 TEST_F(KeyframeProposerTest, WhatWasFoundOnceOnlyIsLeftOutWhereTheYoungAreMistrusted) {

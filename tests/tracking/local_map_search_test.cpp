@@ -30,7 +30,8 @@ class LocalMapSearchTest : public ::testing::Test {
   }
   FrameStep search(const SE3& T_c_ref, double radius_px, const EffortBounds& bounds) {
     FrameStep step(frame_, graph_, nullptr, bounds, 0);
-    LocalMapSearch(rig_, options_, local_map_, fixed_).run(now_, T_c_ref, radius_px, step, outcome_);
+    LocalMapSearch(rig_, options_.local_map, options_.search, local_map_, fixed_)
+        .run(now_, T_c_ref, radius_px, step, outcome_);
     return step;
   }
   FrameStep search(const SE3& T_c_ref, double radius_px) { return search(T_c_ref, radius_px, bounds_); }
@@ -54,7 +55,7 @@ class LocalMapSearchTest : public ::testing::Test {
   ImmaturePoints immature_{400, 1};
   LocalMap local_map_{400};
   FixedPixels fixed_{320, 240, {}};
-  SearchOutcome outcome_{rig_, options_};
+  SearchOutcome outcome_{rig_, options_.local_map.max_searches};
 };
 
 TEST_F(LocalMapSearchTest, FindsThePointsFromWhereTheCameraIs) {

@@ -88,7 +88,7 @@ class NewPointsTest : public ::testing::Test {
   FixedPixels fixed_{320, 240, {}};
   ImmaturePoints immature_{200, 2};
   LocalMap local_map_{200};
-  SearchOutcome found_{rig_, options_};
+  SearchOutcome found_{rig_, options_.local_map.max_searches};
   std::optional<NewPoints> new_points_;
 };
 

@@ -60,7 +60,7 @@ class PoseEstimatorTest : public ::testing::Test {
   ImmaturePoints immature_{100, 4};
   LocalMap local_map_{100};
   PoseEstimator estimator_{rig_, options_, local_map_, shutter_, immature_};
-  SearchOutcome found_{rig_, options_};
+  SearchOutcome found_{rig_, options_.local_map.max_searches};
 };
 
 TEST_F(PoseEstimatorTest, FindsWhereAllPointsAreSeenFrom) {

@@ -35,7 +35,7 @@ class ReferenceChoiceTest : public ::testing::Test {
     for (int i = 0; i < points; ++i) {
       const PointId point{static_cast<std::uint32_t>(i)};
       const Observation seen{point, {1, 2, 3}, 0};
-      if (reference == kNoKeyframe) result.new_points.push_back({point, id, {0, 0, 0.5}, seen, {}});
+      if (reference == kNoKeyframe) result.points.push_back({point, id, {0, 0, 0.5}, seen, {}});
       if (reference != kNoKeyframe) result.observations.push_back(seen);
     }
     return result;
@@ -52,7 +52,7 @@ class ReferenceChoiceTest : public ::testing::Test {
   PlainMap map_;
   GraphSnapshot snapshot_;
   LocalMap local_map_{200};
-  SearchOutcome found_{test_rig(SensorKind::kStereo, 320, 240), {}};
+  SearchOutcome found_{test_rig(SensorKind::kStereo, 320, 240), LocalMapSearchOptions().max_searches};
   ReferenceChoice choice_{{}, 200};
 };
 
@@ -69,9 +69,9 @@ TEST_F(ReferenceChoiceTest, NotWhatIsHardlyBetter) {
 
 TEST_F(ReferenceChoiceTest, ByHowMuchIsAnOption) {
   make_map(90);
-  choice_ = ReferenceChoice({.min_gain_percent = 10}, 200);
+  choice_ = ReferenceChoice({.min_gain_share = 0.1}, 200);
   EXPECT_EQ(better(), kFirst);
-  choice_ = ReferenceChoice({.interval = 4, .min_gain_percent = 10}, 200);
+  choice_ = ReferenceChoice({.interval = 4, .min_gain_share = 0.1}, 200);
   EXPECT_EQ(better(), std::nullopt) << "within three frames nobody looks";
 }
 

@@ -107,7 +107,7 @@ TEST(Tracker, NumbersKeyframesAndPointsWithoutGaps) {
     if (!odometry.step(frame).proposed) continue;
     const KeyframeProposal& proposal = odometry.proposal();
     EXPECT_EQ(index(proposal.id), keyframes++);
-    for (const NewPoint& point : proposal.new_points) {
+    for (const ProposedPoint& point : proposal.points) {
       EXPECT_EQ(index(point.id), points++);
       EXPECT_LT(index(point.anchor), index(proposal.id));
       EXPECT_EQ(point.anchor_observation.point, point.id);

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <opencv2/core.hpp>
 
+#include "base/option_check.hpp"
 #include "geometry/symmetric_solve.hpp"
 #include "imaging/level_pixels.hpp"
 #include "imaging/pixel_row.hpp"
@@ -101,6 +102,19 @@ float brightness_ratio(const cv::Mat& earlier, const cv::Mat& later, double much
 }
 
 }  // namespace
+
+std::string DenseAlignmentOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("finest_level", finest_level, 0)
+      .within("coarsest_level", coarsest_level, finest_level, ImagePyramid::kLevels - 1)
+      .at_least("max_iterations", max_iterations, 1)
+      .above("huber_grey", huber_grey, 0)
+      .at_least("settled_px", settled_px, 0)
+      .above("max_rms", max_rms, 0)
+      .share("doubted_rms_share", doubted_rms_share)
+      .above("light_change", light_change, 1)
+      .reason();
+}
 
 DenseAlignment::DenseAlignment(std::size_t capacity, const DenseAlignmentOptions& options)
     : options_(options), samples_(capacity), usable_(capacity) {}

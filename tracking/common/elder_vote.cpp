@@ -15,10 +15,10 @@ std::string ElderVoteOptions::invalid_reason() const {
   return OptionCheck()
       .share("share", share)
       .at_least("min_elders", min_elders, 3)
-      .share("min_agreeing", min_agreeing)
+      .share("min_agreeing_share", min_agreeing_share)
       .above("dissent", dissent, 0)
-      .share("min_convinced", min_convinced)
-      .share("min_loyal", min_loyal)
+      .share("min_convinced_share", min_convinced_share)
+      .share("min_loyal_share", min_loyal_share)
       .at_least("mistrusted_frames", mistrusted_frames, 0)
       .reason();
 }
@@ -38,17 +38,17 @@ ElderVote::Verdict ElderVote::ask(std::span<MotionObservation> observations,
   if (mistrusted) verdict.mistrusted_for = mistrusted_for_ - 1;
   if (!choose_elders(observations, anchors)) return verdict;
   MotionOnlyResult by_elders = optimise_motion(rig_, elders_, by_all.T_c_ref, solver);
-  if (by_elders.inliers < options_.min_agreeing * static_cast<double>(elders_.size())) return verdict;
+  if (by_elders.inliers < options_.min_agreeing_share * static_cast<double>(elders_.size())) return verdict;
 
   if (mistrusted) by_elders = settle_elders(by_elders, solver);
   const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
   verdict.difference = split_factor(by_all.information, by_elders.information, apart);
   const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent &&
-                       elders_nearer_to(by_elders.T_c_ref, by_all.T_c_ref) >= options_.min_convinced;
+                       elders_nearer_to(by_elders.T_c_ref, by_all.T_c_ref) >= options_.min_convinced_share;
   if (!dissent && !mistrusted) return verdict;  // nearly always
   const int with_elders = young_inliers(observations, anchors, by_elders.T_c_ref, solver);
   const int with_all = young_inliers(observations, anchors, by_all.T_c_ref, solver);
-  const bool misled = dissent && with_elders < options_.min_loyal * with_all;
+  const bool misled = dissent && with_elders < options_.min_loyal_share * with_all;
   if (misled) verdict.mistrusted_for = options_.mistrusted_frames;
   if (!misled && !mistrusted) return verdict;
   by_elders.inliers = classify_observations(rig_, observations, by_elders.T_c_ref, solver);

@@ -13,16 +13,16 @@
 namespace twofold {
 
 struct ElderVoteOptions {
-  double share = 1.0 / 3;     ///< of the observations: so many are elders at least, in (0, 1]
-  int min_elders = 40;        ///< fewer overrule nobody, >= 3
-  double min_agreeing = 0.7;  ///< share of the elders that the pose they give must explain, in (0, 1]
-  double dissent = 4;         ///< between the two poses, in standard deviations of the elders' pose, > 0
-  /// Share of the elders that must lie nearer to where their pose says than to where that of all does, in (0,
-  /// 1].
-  double min_convinced = 2.0 / 3;
+  double share = 1.0 / 3;           ///< of the observations: so many are elders at least, in (0, 1]
+  int min_elders = 40;              ///< fewer overrule nobody, >= 3
+  double min_agreeing_share = 0.7;  ///< share of the elders that the pose they give must explain, in (0, 1]
+  double dissent = 4;  ///< between the two poses, in standard deviations of the elders' pose, > 0
+  /// Share of the elders that must lie nearer to where their pose says than to where that of all does:
+  /// in (0, 1].
+  double min_convinced_share = 2.0 / 3;
   /// Of the young points that agree with the pose of all, the share that must agree with the elders' pose,
   /// too; with fewer the young are overruled. In (0, 1].
-  double min_loyal = 0.5;
+  double min_loyal_share = 0.5;
   int mistrusted_frames = 30;  ///< for so long nobody asks the young again, >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.

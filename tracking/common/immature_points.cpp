@@ -2,9 +2,19 @@
 
 #include <algorithm>
 
+#include "base/option_check.hpp"
 #include "geometry/inverse_depth.hpp"
 
 namespace twofold {
+
+std::string ImmaturePointOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_failures", max_failures, 1)
+      .at_least("max_age", max_age, 0)
+      .within("trusted_after", trusted_after, 0, 255)
+      .at_least("moving_after", moving_after, 1)
+      .reason();
+}
 
 void move_to_mid_exposure(const Rig& rig, const RollingShutter& shutter, ImmaturePoint& point) {
   if (shutter.at_rest()) return;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "camera/rig.hpp"
@@ -29,6 +30,19 @@ struct ImmaturePoint {
 /// anchor has it at mid-exposure. Left as it is if it would be behind the camera there.
 /// @param shutter  of the anchor
 void move_to_mid_exposure(const Rig& rig, const RollingShutter& shutter, ImmaturePoint& point);
+
+/// What becomes of points that no snapshot holds yet.
+struct ImmaturePointOptions {
+  int max_failures = 4;  ///< not found in so many searches in a row, >= 1: given up
+  int max_age = 3;       ///< keyframes after which a point is given up, >= 0
+  /// While young points are mistrusted: frames in a row in which a point must agree to be confirmed,
+  /// in [0, 255].
+  int trusted_after = 3;
+  int moving_after = 2;  ///< times in a row that a point is found elsewhere, >= 1: it is said to move
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
 
 /// A keyframe that was proposed but is not in the snapshot yet.
 struct PendingKeyframe {

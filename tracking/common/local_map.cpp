@@ -44,9 +44,9 @@ LocalMap::LocalMap(std::size_t capacity) : met_(kTable, 0) {
 }
 
 bool LocalMap::first_sight(PointId id) {
-  const std::uint64_t entry = std::uint64_t{round_} << 32 | index(id);
+  const std::uint64_t entry = std::uint64_t{generation_} << 32 | index(id);
   std::size_t slot = (index(id) * std::size_t{2654435761U}) % kTable;
-  while (met_[slot] >> 32 == round_) {
+  while (met_[slot] >> 32 == generation_) {
     if (met_[slot] == entry) return false;
     slot = (slot + 1) % kTable;
   }
@@ -71,7 +71,7 @@ void LocalMap::add_neighbour(const GraphSnapshot& graph, KeyframeId id, const Im
   for (const Observation& observation : *graph.keyframe(id).observations) {
     if (points_.size() == points_.capacity() || met_count_ == kMaxMet) return;
     const MapPoint& point = graph.point(observation.point);
-    if (!point.alive() || !first_sight(observation.point)) continue;
+    if (point.culled() || !first_sight(observation.point)) continue;
     const int anchor = anchor_position(graph, point.anchor, immature);
     if (anchor < 0) continue;
     const SE3& T_ref_a = anchors_[static_cast<std::size_t>(anchor)].T_ref_a;
@@ -93,7 +93,7 @@ void LocalMap::rebuild(const GraphSnapshot& graph, const ImmaturePoints& immatur
   points_.clear();
   anchors_.clear();
   neighbours_.clear();
-  ++round_;
+  ++generation_;
   met_count_ = 0;
   for (std::size_t i = 0; i < immature.points().size() && points_.size() < points_.capacity(); ++i) {
     const ImmaturePoint& point = immature.points()[i];

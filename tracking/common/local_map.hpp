@@ -76,9 +76,9 @@ class LocalMap {
   std::vector<TrackedPoint> points_;
   std::vector<AnchorPose> anchors_;
   std::vector<KeyframeId> neighbours_;
-  std::vector<std::uint64_t> met_;  // open addressing: round in the high half, point in the low half
-  std::uint32_t round_ = 0;
-  std::size_t met_count_ = 0;  ///< in this round
+  std::vector<std::uint64_t> met_;  // open addressing: generation in the high half, point in the low half
+  std::uint32_t generation_ = 0;
+  std::size_t met_count_ = 0;  ///< in this generation
   Origin origin_;
   std::pair<std::size_t, std::size_t> reference_range_{0, 0};
 };

@@ -16,11 +16,11 @@ std::string DepthAlignmentOptions::invalid_reason() const {
       .nested("planes", planes.invalid_reason())
       .at_least("max_iterations", max_iterations, 1)
       .at_least("min_planes", min_planes, 6)
-      .share("min_met", min_met)
+      .share("min_met_share", min_met_share)
       .above("kernel", kernel, 0)
       .at_least("normal_sigma", normal_sigma, 0)
       .at_least("depth_sigma", depth_sigma, 0)
-      .share("max_chance", max_chance)
+      .share("max_chance_share", max_chance_share)
       .above("max_sigma_m", max_sigma_m, 0)
       .above("max_sigma_rad", max_sigma_rad, 0)
       .at_least("min_corners", min_corners, 3)
@@ -172,7 +172,8 @@ std::optional<Matrix6> DepthAlignment::determined(const Equations& equations,
   const Matrix6 all = equations.H / scale + of_corners;
   const Matrix6 chance = equations.chance / scale;
   // In no direction x is x' chance x more than this share of x' all x: the difference is positive definite.
-  if (Eigen::LLT<Matrix6>(options_.max_chance * all - chance).info() != Eigen::Success) return std::nullopt;
+  if (Eigen::LLT<Matrix6>(options_.max_chance_share * all - chance).info() != Eigen::Success)
+    return std::nullopt;
   const Matrix6 information = all - chance;
   const Eigen::LLT<Matrix6> llt(information);
   if (llt.info() != Eigen::Success) return std::nullopt;
@@ -214,7 +215,7 @@ tl::expected<DepthAlignment::Result, LostCause> DepthAlignment::judge(
   RegionSums regions(rig_.camera);
   const Equations depth = linearise(T_c_ref, {options_.kernel, 1, true}, &regions);
   result.met = static_cast<double>(depth.met) / static_cast<double>(current_.planes().size());
-  if (result.met < options_.min_met) return tl::unexpected(LostCause::kTooFewMatches);
+  if (result.met < options_.min_met_share) return tl::unexpected(LostCause::kTooFewMatches);
   Equations of_corners;
   add_corners(T_c_ref, corners, true, of_corners, &regions);
   const auto information = determined(depth, of_corners.H);

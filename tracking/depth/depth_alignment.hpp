@@ -17,15 +17,15 @@ namespace twofold {
 
 struct DepthAlignmentOptions {
   DepthPlaneOptions planes;
-  int max_iterations = 12;  ///< >= 1
-  int min_planes = 100;     ///< in the depth image, >= 6
-  double min_met = 0.4;     ///< share of them that must be met in some view, in (0, 1]
-  double kernel = 2;        ///< scale of the robust kernel (Cauchy) [standard deviations] > 0
+  int max_iterations = 12;     ///< >= 1
+  int min_planes = 100;        ///< in the depth image, >= 6
+  double min_met_share = 0.4;  ///< share of them that must be met in some view, in (0, 1]
+  double kernel = 2;           ///< scale of the robust kernel (Cauchy) [standard deviations] > 0
   // By what measured surfaces are bent, beyond noise: lenses, and what the sensor assumes.
   double normal_sigma = 0.01;   ///< [rad] >= 0
   double depth_sigma = 0.0005;  ///< [share of the depth] >= 0
   /// Share of the information about any direction that may be owed to noise, in (0, 1].
-  double max_chance = 0.5;
+  double max_chance_share = 0.5;
   double max_sigma_m = 0.02;    ///< the pose is refused when known worse than this in some direction, > 0
   double max_sigma_rad = 0.01;  ///< likewise
   int min_corners = 8;          ///< with fewer they are left out, >= 3

@@ -6,6 +6,7 @@
 
 #include "base/median.hpp"
 #include "base/option_check.hpp"
+#include "estimation/median_chi2.hpp"
 
 namespace twofold {
 namespace {
@@ -13,15 +14,14 @@ namespace {
 constexpr std::size_t kMaxPlanes = 6000;  // beyond, the smallest are left out
 /// Of eight rows, so that those had at any time lie evenly.
 constexpr std::array<int, 8> kRowOrder{0, 4, 2, 6, 1, 5, 3, 7};
-constexpr int kEnoughCells = 8;        // of 3 x 3: a regression may lack one
-constexpr double kMedianChi2 = 0.891;  // of chi-square with 6 degrees of freedom, over 6
+constexpr int kEnoughCells = 8;  // of 3 x 3: a regression may lack one
 
 }  // namespace
 
 std::string DepthPlaneOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("columns", columns, 3)
-      .share("min_readings", min_readings)
+      .share("min_readings_share", min_readings_share)
       .at_least("many_columns", many_columns, 1)
       .above("max_scatter", max_scatter, 0)
       .within("min_cosine", min_cosine, 0, 1)
@@ -92,7 +92,7 @@ void DepthPlanes::read_finest(const cv::Mat& depth) {
       }
     }
     const bool lopsided = 2 * std::max(std::abs(left), std::abs(upper)) > count;  // by a quarter of a pixel
-    means.values[i] = count >= options_.min_readings * px * px && !lopsided ? sum / count : 0;
+    means.values[i] = count >= options_.min_readings_share * px * px && !lopsided ? sum / count : 0;
   }
 }
 
@@ -153,7 +153,7 @@ double DepthPlanes::scatter(const Means& means) {
     }
   }
   if (variances_.empty()) return sigma_floor_;
-  return std::max(sigma_floor_, std::sqrt(median(std::span(variances_)) / kMedianChi2));
+  return std::max(sigma_floor_, std::sqrt(median(std::span(variances_)) / (median_chi2(6) / 6)));
 }
 
 void DepthPlanes::add_planes(int size) {

@@ -11,14 +11,14 @@
 namespace twofold {
 
 struct DepthPlaneOptions {
-  int columns = 160;           ///< of the finest cells in a row of the image, about, >= 3
-  double min_readings = 0.75;  ///< of a cell's pixels: with fewer it has no mean, in (0, 1]
-  int many_columns = 60;       ///< in rows of more cells every third is asked how means scatter, >= 1
+  int columns = 160;                 ///< of the finest cells in a row of the image, about, >= 3
+  double min_readings_share = 0.75;  ///< of a cell's pixels: with fewer it has no mean, in (0, 1]
+  int many_columns = 60;             ///< in rows of more cells every third is asked how means scatter, >= 1
   /// About a plane, times what is usual in cells of that size: more is curved, or an edge, > 0.
   double max_scatter = 2;
   double min_cosine = 0.1;  ///< between ray and normal: steeper surfaces are known badly, in [0, 1]
-  /// A perfect sensor's means still err by what depth units round off: of the rig's noise of one reading, >
-  /// 0.
+  /// A perfect sensor's means still err by what depth units round off: of the rig's noise of one reading,
+  /// > 0.
   double min_noise = 0.01;
 
   /// Empty when valid; otherwise names the field, the rule and the value.

@@ -39,7 +39,7 @@ std::string FixedPixelOptions::invalid_reason() const {
       .within("same_grey", same_grey, 0, 254)
       .within("min_contrast", min_contrast, same_grey + 1, 254)
       .within("believed", believed, 2, 100)
-      .above("round", round, 0)
+      .above("look_period", look_period, 0)
       .share("max_fixed_share", max_fixed_share)
       .share("min_inlier_share", min_inlier_share)
       .within("aside_px", aside_px, 1, 32)
@@ -74,10 +74,10 @@ FixedPixels::FixedPixels(int width, int height, const FixedPixelOptions& options
 }
 
 void FixedPixels::look_at(const cv::Mat& image, std::int64_t t_ns, ImageMotion& motion) {
-  const double rounds = 1e-9 * static_cast<double>(t_ns - last_ns_) / options_.round;
+  const double periods = 1e-9 * static_cast<double>(t_ns - last_ns_) / options_.look_period;
   last_ns_ = t_ns;
   const auto blocks = static_cast<double>(blocks_.size());
-  const auto looks = static_cast<std::size_t>(std::ceil(std::clamp(rounds, 0.0, 1.0) * blocks));
+  const auto looks = static_cast<std::size_t>(std::ceil(std::clamp(periods, 0.0, 1.0) * blocks));
   for (std::size_t i = 0; i < looks; ++i) {
     Block& block = blocks_[next_];
     if (++next_ == blocks_.size()) next_ = 0;
@@ -87,7 +87,7 @@ void FixedPixels::look_at(const cv::Mat& image, std::int64_t t_ns, ImageMotion& 
   }
 }
 
-/// Most of a look would be waiting for memory: nobody has touched the block since the round before.
+/// Most of a look would be waiting for memory: nobody has touched the block since the look before.
 void FixedPixels::prefetch(const cv::Mat& image, const Block& block) {
   if (block.rest > 0) return;
   constexpr int kLine = 64;  // bytes that come together

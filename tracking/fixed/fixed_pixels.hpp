@@ -19,8 +19,8 @@ struct FixedPixelOptions {
   int same_grey = 3;  ///< a pixel that has changed by more shows the scene, in [0, 254]
   /// A pixel is telling if it differs by so much from what lies along the motion, in [same_grey + 1, 254].
   int min_contrast = 12;
-  int believed = 5;    ///< looks at which a telling pixel must have stayed the same, in [2, 100]
-  double round = 0.2;  ///< time in which all of the image is looked at once [s], > 0
+  int believed = 5;          ///< looks at which a telling pixel must have stayed the same, in [2, 100]
+  double look_period = 0.2;  ///< time in which all of the image is looked at once [s], > 0
   /// Of the image: when more seems fixed, no region is believed to be, in (0, 1].
   double max_fixed_share = 0.5;
   /// Of the points found in a frame, in (0, 1]: with fewer inliers its pose says nothing of pixels.
@@ -35,7 +35,7 @@ struct FixedPixelOptions {
   int more_alone = 2;          ///< votes beyond `believed` of a pixel of which no neighbour says the same,
                                ///< in [0, (max_votes - 1) * believed]
   int touching = 3;            ///< fixed pixels of a neighbourhood that are no single ones, in [1, 9]
-  int rest = 3;                ///< rounds in which a block that clearly shows the scene is not looked at,
+  int rest = 2;                ///< periods in which a block that clearly shows the scene is not looked at,
                                ///< in [0, 255]
   int chance = 2;              ///< votes that a pixel of the scene gets now and then, in [0, believed - 1]
   double chance_share = 0.25;  ///< of the telling pixels, that stay the same by chance, in (0, 1]
@@ -54,7 +54,7 @@ struct FixedPixelOptions {
 /// a block was looked at last, whatever its depth, each of its pixels votes: one that differs from what lies
 /// along the motion, and is the same as before, for being fixed; one that has changed against it, several
 /// times as much. A camera at rest, the direction of travel and plain surfaces give no votes. A block in
-/// which nothing seems fixed rests for some rounds.
+/// which nothing seems fixed rests for some periods.
 ///
 /// One instance a camera. No allocation after construction; bounded work.
 class FixedPixels {
@@ -81,7 +81,7 @@ class FixedPixels {
   struct Block {
     int u = 0, v = 0;         ///< its first pixel
     std::int64_t taken = -1;  ///< frame that `before` is of
-    std::uint8_t rest = 0;    ///< rounds until it is looked at again
+    std::uint8_t rest = 0;    ///< periods until it is looked at again
     std::array<std::uint8_t, kArea> before{}, votes{};
     bool has_fixed = false;
     std::uint8_t covered = 0;  ///< quarters of it that are fixed, a bit each

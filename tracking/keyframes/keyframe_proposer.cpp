@@ -85,7 +85,7 @@ void KeyframeProposer::confirm(ImmaturePoint& point, KeyframeProposal& proposal)
   point.proposed_in = proposal.id;
   Observation anchor_observation = point.anchor_observation;
   anchor_observation.point = point.id;
-  proposal.new_points.push_back({point.id, point.anchor, point.psi, anchor_observation, point.appearance});
+  proposal.points.push_back({point.id, point.anchor, point.psi, anchor_observation, point.appearance});
 }
 
 }  // namespace twofold

@@ -8,12 +8,12 @@
 #include "tracking/common/immature_points.hpp"
 #include "tracking/common/local_map.hpp"
 #include "tracking/keyframes/keyframe_decision.hpp"
+#include "tracking/options.hpp"
 #include "tracking/search/local_map_search.hpp"
 
 namespace twofold {
-
-/// When a frame becomes a keyframe, and what of it the map gets. Numbers keyframes when it proposes them and
-/// points when a later keyframe finds them again.
+/// When a frame becomes a keyframe, and what of it the map gets. Numbers keyframes when it proposes them
+/// and points when a later keyframe finds them again.
 ///
 /// No allocation, if the proposals' buffers were prepared.
 class KeyframeProposer {
@@ -39,7 +39,8 @@ class KeyframeProposer {
              ImmaturePoints& immature_points);
   /// Adds the inliers as observations. Immature points that were found again get their numbers and join the
   /// proposal.
-  /// @param mistrusts_the_young  those found in a few frames only are left out: chance finds what moves near
+  /// @param mistrusts_the_young  those found in a few frames only are left out: chance finds what moves
+  /// near
   ///                             where it was
   void add_observations(const SearchOutcome& found, const LocalMap& local_map, bool mistrusts_the_young,
                         ImmaturePoints& immature_points, KeyframeProposal& proposal);

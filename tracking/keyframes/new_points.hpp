@@ -7,6 +7,7 @@
 #include "tracking/common/immature_points.hpp"
 #include "tracking/common/local_map.hpp"
 #include "tracking/monocular/depth_seeds.hpp"
+#include "tracking/options.hpp"
 #include "tracking/search/local_map_search.hpp"
 #include "tracking/search/point_starter.hpp"
 
@@ -25,14 +26,14 @@ class NewPoints {
   /// @return how many points were started
   int start_first(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                   ImmaturePoints& immature_points);
-  /// Starts points and seeds in a later keyframe, at corners away from the points that were found in it and,
-  /// but for RGB-D, from those of the local map that are in view and were not searched, because enough others
-  /// had been found.
+  /// Starts points and seeds in a later keyframe, at corners away from the points that were found in it
+  /// and, but for RGB-D, from those of the local map that are in view and were not searched, because enough
+  /// others had been found.
   /// @param found  of the keyframe's frame; the candidates that its search left are taken out
   void start(const FrameImages& images, KeyframeId anchor, const LocalMap& local_map, const FrameStep& step,
              SearchOutcome& found, ImmaturePoints& immature_points);
-  /// Starts seeds at corners where no point is tracked or known, and none waits for its depth. One camera has
-  /// nothing else; other rigs live on them where depth is out of reach, or the right camera is covered.
+  /// Starts seeds at corners where no point is tracked or known, and none waits for its depth. One camera
+  /// has nothing else; other rigs live on them where depth is out of reach, or the right camera is covered.
   void start_seeds(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter);
 
   /// DepthSeeds::observe.

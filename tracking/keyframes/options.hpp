@@ -2,9 +2,6 @@
 
 #include <string>
 
-#include "imaging/corner_selection.hpp"
-#include "tracking/monocular/depth_seeds.hpp"
-
 namespace twofold {
 
 /// When a frame becomes a keyframe (tracking/keyframes/keyframe_decision.hpp).
@@ -29,48 +26,8 @@ struct KeyframeDecisionOptions {
 
 /// When an older keyframe becomes the reference again (tracking/keyframes/reference_choice.hpp).
 struct ReferenceChoiceOptions {
-  int interval = 3;           ///< frames between looks for a better reference, >= 1
-  int min_gain_percent = 20;  ///< by which it must see more of what is found than the present one, >= 0
-
-  /// Empty when valid; otherwise names the field, the rule and the value.
-  [[nodiscard]] std::string invalid_reason() const;
-};
-
-/// Where a keyframe starts new points (tracking/keyframes/new_points.hpp).
-struct NewPointOptions {
-  int corner_threshold = 10;    ///< FAST [grey] >= 1
-  int corner_levels = 3;        ///< levels on which points are started, in [1, ImagePyramid::kLevels]
-  float min_corner_score = 12;  ///< Shi-Tomasi [grey^2/px^2] >= 0
-  int cell_px = 28;             ///< at most one new point a cell and only where no point is tracked, >= 1
-  int max_points = 220;         ///< started in one keyframe, >= 1
-  int min_start_points = 40;    ///< with measured depth; a map or map part starts with no fewer, >= 1
-  /// In the dark, with fewer points in view, tracked and started, faint corners will do, where the pyramid
-  /// has averaged the noise away; >= 0.
-  int scarce_points = 90;
-  FaintCornerOptions faint_corners;
-  double cells_per_corner = 2;    ///< of one camera, cells being smaller in small images, > 0
-  double min_disparity_px = 0.3;  ///< below it the depth is as good as infinite, > 0
-  // Why a stereo pair gives too few depths to start with.
-  int max_row_shift = 8;  ///< between left and right image, looked for [rows] >= 0
-  int mistake_ratio =
-      3;  ///< so many times as many corners with depth the other way: that was the mistake, >= 1
-  DepthSeedOptions seeds;  ///< corners whose depth is not measured
-  /// Where most new corners have no depth, a rig that measures it starts some without, as one camera does: as
-  /// many as are missing to so many points in view, >= 0; 0: never.
-  int seeded_points = 120;
-
-  /// Empty when valid; otherwise names the field, the rule and the value.
-  [[nodiscard]] std::string invalid_reason() const;
-};
-
-/// What becomes of points that no snapshot holds yet (tracking/common/immature_points.hpp).
-struct ImmaturePointOptions {
-  int max_failures = 4;  ///< not found in so many searches in a row, >= 1: given up
-  int max_age = 3;       ///< keyframes after which a point is given up, >= 0
-  /// While young points are mistrusted: frames in a row in which a point must agree to be confirmed,
-  /// in [0, 255].
-  int trusted_after = 3;
-  int moving_after = 2;  ///< times in a row that a point is found elsewhere, >= 1: it is said to move
+  int interval = 3;             ///< frames between looks for a better reference, >= 1
+  double min_gain_share = 0.2;  ///< by which it must see more of what is found than the present one, >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

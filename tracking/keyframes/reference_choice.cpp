@@ -15,7 +15,7 @@ std::optional<KeyframeId> ReferenceChoice::better(const GraphSnapshot& graph, Ke
   std::sort(found_.begin(), found_.end());
   std::optional<KeyframeId> best;
   // Changing back and forth helps nobody: a new reference must be clearly better.
-  int best_count = shared(graph, reference) * (100 + options_.min_gain_percent) / 100;
+  int best_count = static_cast<int>(shared(graph, reference) * (1 + options_.min_gain_share));
   for (const KeyframeId id : local_map.neighbours()) {
     const int count = shared(graph, id);
     if (count <= best_count) continue;

@@ -4,6 +4,15 @@
 
 namespace twofold {
 
+std::string WideSearchOptions::invalid_reason() const {
+  return OptionCheck()
+      .nested("corners", corners.invalid_reason())
+      .at_least("max_distance", max_distance, 1)
+      .at_least("min_agreeing", min_agreeing, 3)
+      .nested("consensus", consensus.invalid_reason())
+      .reason();
+}
+
 std::string LossOptions::invalid_reason() const {
   return OptionCheck()
       .nested("wide_search", wide_search.invalid_reason())

@@ -20,7 +20,7 @@ double triangulated(const PinholeCamera& camera, const Vector3& ray_a, const SE3
 std::string DepthSeedOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("max_observed", max_observed, 1)
-      .above("nearest", nearest, 0)
+      .above("min_depth_share", min_depth_share, 0)
       .at_least("min_stretch_px", min_stretch_px, 0)
       .above("range_sigmas", range_sigmas, 0)
       .above("min_gain", min_gain, 0)
@@ -32,7 +32,7 @@ std::string DepthSeedOptions::invalid_reason() const {
       .at_least("max_age", max_age, 1)
       .nested("line", line.invalid_reason())
       .at_least("filter_iterations", filter_iterations, 1)
-      .above("farthest", farthest, 0)
+      .above("min_inverse_depth", min_inverse_depth, 0)
       .reason();
 }
 
@@ -61,7 +61,7 @@ void DepthSeeds::drop_stale(KeyframeId newest) {
 }
 
 InverseDepthRange DepthSeeds::range_of(const Seed& seed, double median_depth) const {
-  const double nearest = 1 / (options_.nearest * median_depth);
+  const double nearest = 1 / (options_.min_depth_share * median_depth);
   if (!known(seed)) return {0, nearest, 1 / median_depth};
   const double half = options_.range_sigmas * seed.filter.inverse_depth_sigma();
   const double q = seed.filter.psi.z();
@@ -91,7 +91,7 @@ void DepthSeeds::look(Seed& seed, const ImagePyramid& images, const RollingShutt
   const SE3 T_c_row = seed.shutter.at_rest() ? T_c_a : T_c_a * T_anchor_row(seed);
   const Vector3 ray(seed.filter.psi.x(), seed.filter.psi.y(), 1);
   const InverseDepthRange range = range_of(seed, median_depth);
-  const Vector3 likely = ray / std::max(range.likely, options_.farthest / median_depth);
+  const Vector3 likely = ray / std::max(range.likely, options_.min_inverse_depth / median_depth);
   const SE3 T_seen_row = shutter.seen_from(rig_, T_c_row, likely);
   const auto stretch = epipolar_stretch(rig_.camera, seed.appearance, ray, T_seen_row, range, options_.line);
   if (!stretch) return;
@@ -127,7 +127,7 @@ ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const 
   point.anchor = seed.anchor;
   point.appearance = seed.appearance;
   point.psi = seed.filter.psi;
-  point.psi.z() = std::max(point.psi.z(), options_.farthest / median_depth);
+  point.psi.z() = std::max(point.psi.z(), options_.min_inverse_depth / median_depth);
   point.anchor_observation.pixel = {seed.appearance.uv.x(), seed.appearance.uv.y(),
                                     static_cast<float>(Rig::kNoRight)};
   point.anchor_observation.level = seed.appearance.level;

@@ -15,8 +15,8 @@
 namespace twofold {
 
 struct DepthSeedOptions {
-  int max_observed = 300;  ///< filters updated in one frame, >= 1
-  double nearest = 0.25;   ///< of the scene's median depth: nothing nearer is looked for, > 0
+  int max_observed = 300;         ///< filters updated in one frame, >= 1
+  double min_depth_share = 0.25;  ///< of the scene's median depth: nothing nearer is looked for, > 0
   EpipolarSearchOptions line;
   /// Of the epipolar line, on the level searched: below it nothing is learnt of an unknown depth, >= 0 [px].
   float min_stretch_px = 2;
@@ -25,13 +25,13 @@ struct DepthSeedOptions {
   /// Later frames that must have seen a point before it is used, >= 1; the keyframe that brings it into the
   /// map is one more.
   int min_looks = 1;
-  double near_error = 0.12;   ///< of inverse depth, as a share of it, with which a point is used, > 0
-  double far_error = 0.02;    ///< the same times the scene's median depth, for points at infinity, >= 0
-  int max_misses = 3;         ///< looks in a row without a match after which a seed is given up, >= 1
-  int max_first_misses = 2;   ///< the same of a seed that no later frame has seen yet, >= 1
-  int max_age = 6;            ///< keyframes after which it is given up, >= 1
-  int filter_iterations = 5;  ///< of the update with one frame, >= 1
-  double farthest = 1e-3;     ///< inverse depth of a point at infinity, in 1 / median depth, > 0
+  double near_error = 0.12;         ///< of inverse depth, as a share of it, with which a point is used, > 0
+  double far_error = 0.02;          ///< the same times the scene's median depth, for points at infinity, >= 0
+  int max_misses = 3;               ///< looks in a row without a match after which a seed is given up, >= 1
+  int max_first_misses = 2;         ///< the same of a seed that no later frame has seen yet, >= 1
+  int max_age = 6;                  ///< keyframes after which it is given up, >= 1
+  int filter_iterations = 5;        ///< of the update with one frame, >= 1
+  double min_inverse_depth = 1e-3;  ///< that of a point at infinity, in 1 / median depth, > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -32,8 +32,8 @@ struct FirstStructureOptions {
   /// Of the corners, that stand still where the motion would have moved them: more say that the camera
   /// stands, and something moves before it, in [0, 1] ...
   double max_still_share = 0.08;
-  /// ... unless they lie in a strip of so much of the image's height, as a bonnet or a caption does, in [0,
-  /// 1].
+  /// ... unless they lie in a strip of so much of the image's height, as a bonnet or a caption does:
+  /// in [0, 1].
   double fixed_strip = 0.3;
   double significant_sigmas = 2;  ///< of a depth, from which on its sign counts, >= 0
   double gross_chi2 = 50;  ///< beyond this before the adjustment, a corner follows something else, > 0 ...

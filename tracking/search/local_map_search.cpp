@@ -7,9 +7,9 @@
 #include "imaging/view_change.hpp"
 
 namespace twofold {
-SearchOutcome::SearchOutcome(const Rig& rig, const TrackerOptions& options)
+SearchOutcome::SearchOutcome(const Rig& rig, int max_searches)
     : candidates(rig.camera.width, rig.camera.height, LocalMap::kMaxPoints) {
-  const auto searches = static_cast<std::size_t>(options.local_map.max_searches);
+  const auto searches = static_cast<std::size_t>(max_searches);
   matches.reserve(searches);
   missed.reserve(searches);
   observations.reserve(searches);
@@ -24,10 +24,11 @@ void SearchOutcome::clear() {
   verdict = {};
 }
 
-LocalMapSearch::LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map,
+LocalMapSearch::LocalMapSearch(const Rig& rig, const LocalMapSearchOptions& options,
+                               const GuidedSearchOptions& guided, const LocalMap& local_map,
                                const FixedPixels& fixed)
-    : rig_(rig), options_(options), local_map_(local_map), fixed_(fixed) {
-  gains_.reserve(static_cast<std::size_t>(options.local_map.max_searches));
+    : rig_(rig), options_(options), guided_(guided), local_map_(local_map), fixed_(fixed) {
+  gains_.reserve(static_cast<std::size_t>(options.max_searches));
 }
 
 void LocalMapSearch::run(const FrameImages& images, const SE3& T_c_ref, double radius_px, FrameStep& step,
@@ -39,7 +40,7 @@ void LocalMapSearch::run(const FrameImages& images, const SE3& T_c_ref, double r
   result.searched = 0;
   result.T_c_ref_predicted = T_c_ref;
   result.search_radius_px = radius_px;
-  SearchedView view{images, T_c_ref, step.shutter, options_.search};
+  SearchedView view{images, T_c_ref, step.shutter, guided_};
   view.options.refine_iterations = step.bounds.refine_iterations;
   view.options.radius_px = radius_px;
   for (std::int64_t i = outcome.candidates.next(); i >= 0; i = outcome.candidates.next()) {
@@ -58,9 +59,8 @@ void LocalMapSearch::run(const FrameImages& images, const SE3& T_c_ref, double r
 
 void LocalMapSearch::select_candidates(const SE3& T_c_ref, TrackResult& result, Quadtree& candidates) const {
   std::size_t reference_points_in_view = 0;
-  const SimilarView view(
-      rig_.camera, T_c_ref,
-      {.border_px = options_.local_map.border_px, .min_cosine = options_.local_map.min_view_cosine});
+  const SimilarView view(rig_.camera, T_c_ref,
+                         {.border_px = options_.border_px, .min_cosine = options_.min_view_cosine});
   const auto points = local_map_.points();
   const auto [reference_begin, reference_end] = local_map_.reference_range();
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -89,7 +89,7 @@ bool LocalMapSearch::search_point(std::uint32_t point, const SearchedView& view,
 /// has changed, and they are looked for as they look in it. Patches are not made as bright as the view one by
 /// one: before another surface than theirs that would make them look alike.
 void LocalMapSearch::search_in_other_light(SearchedView& view, int searched, SearchOutcome& outcome) {
-  if (static_cast<double>(outcome.missed.size()) < options_.local_map.light_missed_share * searched) return;
+  if (static_cast<double>(outcome.missed.size()) < options_.light_missed_share * searched) return;
   gains_.clear();
   for (const std::uint32_t i : outcome.missed) {
     const TrackedPoint& point = local_map_.points()[i];
@@ -98,9 +98,9 @@ void LocalMapSearch::search_in_other_light(SearchedView& view, int searched, Sea
         brightness_since_anchor(view.images.left, rig_.camera, *point.appearance, point.psi, T_c_a);
     if (ratio) gains_.push_back(*ratio);
   }
-  if (static_cast<int>(gains_.size()) < options_.local_map.min_light_points) return;
+  if (static_cast<int>(gains_.size()) < options_.min_light_points) return;
   const double gain = median(std::span(gains_));
-  if (std::max(gain, 1 / gain) < options_.local_map.light_change) return;
+  if (std::max(gain, 1 / gain) < options_.light_change) return;
   view.options.gain = static_cast<float>(gain);
   std::erase_if(outcome.missed, [&](std::uint32_t i) { return search_point(i, view, outcome); });
 }

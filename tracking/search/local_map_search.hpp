@@ -11,7 +11,7 @@
 #include "tracking/common/local_map.hpp"
 #include "tracking/common/quadtree.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
-#include "tracking/options.hpp"
+#include "tracking/search/options.hpp"
 
 namespace twofold {
 
@@ -23,7 +23,8 @@ struct SearchOutcome {
     PointMatch found;
   };
 
-  SearchOutcome(const Rig& rig, const TrackerOptions& options);
+  /// @param max_searches  points searched at most
+  SearchOutcome(const Rig& rig, int max_searches);
   void clear();
 
   Quadtree candidates;                ///< points that should be visible; those not searched are left
@@ -39,8 +40,8 @@ struct SearchOutcome {
 class LocalMapSearch {
  public:
   /// All must outlive this.
-  LocalMapSearch(const Rig& rig, const TrackerOptions& options, const LocalMap& local_map,
-                 const FixedPixels& fixed);
+  LocalMapSearch(const Rig& rig, const LocalMapSearchOptions& options, const GuidedSearchOptions& guided,
+                 const LocalMap& local_map, const FixedPixels& fixed);
 
   /// Points that should be visible from T_c_ref (thesis 6.2.5), by guided search in equi-distributed order
   /// (thesis 3.4.3) until enough were found. Observations, motion and verdict are left to the caller.
@@ -63,7 +64,8 @@ class LocalMapSearch {
   void search_in_other_light(SearchedView& view, int searched, SearchOutcome& outcome);
 
   const Rig& rig_;
-  const TrackerOptions& options_;
+  const LocalMapSearchOptions& options_;
+  const GuidedSearchOptions& guided_;
   const LocalMap& local_map_;
   const FixedPixels& fixed_;  ///< of the left camera
   std::vector<double> gains_;

@@ -88,7 +88,7 @@ int PointStarter::start(const FrameImages& images, KeyframeId anchor, const Roll
                         ImmaturePoints& immature) {
   with_depth_ = without_depth_ = 0;
   int started = start_at(usual_corners(), options_.max_points, images, anchor, shutter, immature);
-  if (tracked_ < options_.scarce_points && is_dark(images.left))
+  if (tracked_ < options_.scarce_points && mean_brightness(images.left) < options_.faint_corners.dark_below)
     started +=
         start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, immature);
   return started;

@@ -13,7 +13,7 @@
 #include "tracking/common/lost_cause.hpp"
 #include "tracking/common/quadtree.hpp"
 #include "tracking/fixed/fixed_pixels.hpp"
-#include "tracking/keyframes/options.hpp"
+#include "tracking/search/options.hpp"
 
 namespace twofold {
 

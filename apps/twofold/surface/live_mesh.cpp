@@ -8,10 +8,10 @@
 namespace twofold {
 
 void LiveMesh::published(const GraphSnapshot& graph) {
-  const std::uint64_t jump = graph.last_jump().version;
+  const std::uint64_t change = graph.last_change().version;
   // A full ring leaves a figure out.
-  (void)times_.try_push({graph.version(), steady_now_ns(), jump > last_jump_});
-  last_jump_ = jump;
+  (void)times_.try_push({graph.version(), steady_now_ns(), change > last_change_});
+  last_change_ = change;
 }
 
 bool LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph,
@@ -47,7 +47,7 @@ void LiveMesh::take_times(std::uint64_t version) {
     }
     if (next_time_->version > version) return;
     behind_.record(now_ns - next_time_->published_ns);
-    if (next_time_->jumped) {
+    if (next_time_->changed) {
       loops_.record(now_ns - next_time_->published_ns);
       if (!unsettled_ns_) unsettled_ns_ = next_time_->published_ns;
     }

@@ -17,7 +17,7 @@ namespace twofold {
 struct MapTime {
   std::uint64_t version = 0;
   std::int64_t published_ns = 0;
-  bool jumped = false;  ///< all poses were corrected: a loop, or the pose graph
+  bool changed = false;  ///< all poses were corrected: a loop, or the pose graph
 };
 
 /// The mesh of the map part that the reference keyframe is in, kept up to date while the run lasts, and how
@@ -49,7 +49,7 @@ class LiveMesh {
   Listener listener_;
   std::uint64_t revision_ = 0;     // that the listener knows
   SpscRing<MapTime> times_{4096};  // mapper -> surface
-  std::uint64_t last_jump_ = 0;    // mapper's
+  std::uint64_t last_change_ = 0;  // mapper's
   std::optional<MapTime> next_time_;
   LatencyHistogram behind_, loops_;
   std::optional<std::int64_t> unsettled_ns_;  // since when submaps that a correction bent may wait

@@ -174,7 +174,7 @@ void LiveSurface::follow_map() {
 }
 
 bool LiveSurface::loop_came() {
-  return maps_.newest()->graph.last_jump().version > version_;
+  return maps_.newest()->graph.last_change().version > version_;
 }
 
 void LiveSurface::take(const Frame& frame, double row_offset) {

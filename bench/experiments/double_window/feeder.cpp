@@ -54,7 +54,7 @@ void Feeder::associate(const GraphSnapshot& graph) {
   direct_neighbours(graph, proposal_.reference, graph.keyframe_count(), near);
   std::sort(near.begin(), near.end());
   const auto recognised = [&](PointId id) {
-    if (!graph.contains(id) || !graph.point(id).alive()) return false;
+    if (!graph.contains(id) || graph.point(id).culled()) return false;
     if (association_ == Association::kGlobal) return true;
     const ObserverList& observers = *graph.point(id).observers;
     return std::any_of(observers.begin(), observers.end(), [&](KeyframeId observer) {
@@ -125,12 +125,12 @@ void Feeder::start_points() {
     const auto at = std::lower_bound(previous.begin(), previous.end(), sighting.point,
                                      [](const Scene::Sighting& s, int point) { return s.point < point; });
     if (at == previous.end() || at->point != sighting.point) continue;
-    NewPoint point;
+    ProposedPoint point;
     if (!start_value(at->pixel, sighting.pixel, T_previous_k, point.psi)) continue;
     point.id = free_point_;
     point.anchor = proposal_.reference;
     point.anchor_observation = observe(point.id, at->pixel);
-    proposal_.new_points.push_back(point);
+    proposal_.points.push_back(point);
     proposal_.observations.push_back(observe(point.id, sighting.pixel));
     known_[static_cast<std::size_t>(sighting.point)].push_back(point.id);
     free_point_ = PointId{index(free_point_) + 1};

@@ -53,7 +53,7 @@ std::vector<PointCopies> PlaceRecognition::copies(const GraphSnapshot& graph, Ke
   const std::vector<KeyframeId> near_from = neighbourhood(from), near_to = neighbourhood(to);
   const auto seen_from = [&graph](const std::vector<KeyframeId>& near) {
     return [&graph, &near](PointId id) {
-      if (!graph.contains(id) || !graph.point(id).alive()) return false;
+      if (!graph.contains(id) || graph.point(id).culled()) return false;
       const ObserverList& observers = *graph.point(id).observers;
       return std::any_of(observers.begin(), observers.end(), [&](KeyframeId observer) {
         return std::binary_search(near.begin(), near.end(), observer);

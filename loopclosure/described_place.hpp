@@ -8,7 +8,7 @@
 namespace twofold {
 
 /// A described image: how the place looks, and its words.
-struct PlaceView : PlaceAppearance {
+struct DescribedPlace : PlaceAppearance {
   BagOfWords bag;
 };
 
@@ -19,7 +19,7 @@ class PlaceDescriber {
 
   /// Selects and describes corners; depth comes from the right image or the depth image (thesis 5.3.1 needs
   /// nearest neighbours for it, having one camera). A monocular rig leaves the pixels empty.
-  [[nodiscard]] PlaceView describe(const FrameImages& images, const Vocabulary& vocabulary);
+  [[nodiscard]] DescribedPlace describe(const FrameImages& images, const Vocabulary& vocabulary);
 
  private:
   Rig rig_;
