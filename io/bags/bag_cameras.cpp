@@ -204,19 +204,25 @@ SO3 rotation_of(const CameraInfoMessage& info) {
   return SO3(R);
 }
 
-/// Rectified images are shifted: their P have -fx * x in the last column, x being where the camera stands on
-/// the line through both, which need not begin at the left one.
-double baseline_of(const CameraInfoMessage& left, const CameraInfoMessage& right) {
+/// t of P = K' [I | t]: where the origin that a pair's P share lies in this camera, turned as the rectified
+/// one.
+Vector3 shift_of(const CameraInfoMessage& info) {
+  const auto& P = info.P;
+  return {(P[3] - P[2] * P[11]) / P[0], (P[7] - P[6] * P[11]) / P[5], P[11]};
+}
+
+/// From the rectified left camera to the rectified right one; neither need be where their P have the origin.
+Vector3 translation_of(const CameraInfoMessage& left, const CameraInfoMessage& right) {
   constexpr double kTolerance = 1e-3;  // of the focal length
   if (!(std::abs(left.P[0] - right.P[0]) <= kTolerance * std::abs(right.P[0])))
     throw MalformedBytes(
         fmt::format("camera_info of a pair whose focal lengths differ (P[0]: {:.6g} and {:.6g}), which no "
                     "rectified pair's do: give --calib",
                     left.P[0], right.P[0]));
-  const double baseline = (left.P[3] - right.P[3]) / right.P[0];
-  if (!(baseline > 0) || baseline > 100)
+  const Vector3 t = shift_of(right) - shift_of(left);
+  if (!t.allFinite() || t.isZero() || t.norm() > 100)
     throw MalformedBytes("camera_info of the right camera states no baseline (P[3]): give --calib");
-  return baseline;
+  return t;
 }
 
 /// By how much of its width at most an image's corner is elsewhere in the other camera's image.
@@ -268,10 +274,11 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
     throw MalformedBytes("camera_info of '" + cameras.left.images.name + "' is not calibrated: give --calib");
   if (!right) return calibration;
   calibration.right = model_of(*cameras.right, *right);
-  const SE3 T_rectified(SO3(), Vector3(-baseline_of(left, *right), 0, 0));
-  calibration.already_rectified = cameras.left.rectified() && cameras.right->rectified();
-  if (calibration.already_rectified) {
-    calibration.T_right_left = T_rectified;
+  const Vector3 t = translation_of(left, *right);
+  constexpr double kPure = 1e-4;  // of the baseline; beyond that rows of rectified images are not the same
+  if (cameras.left.rectified() && cameras.right->rectified() && t.tail<2>().norm() <= kPure * t.norm()) {
+    calibration.already_rectified = true;
+    calibration.T_right_left = SE3(SO3(), Vector3(t.x(), 0, 0));
     return calibration;
   }
   // Of a pair of which one camera's images are rectified, that one's are turned already.
@@ -279,7 +286,7 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
     return SE3(camera.rectified() ? SO3() : rotation_of(info), Vector3::Zero());
   };
   const SE3 T_rect_left = rotation(cameras.left, left), T_rect_right = rotation(*cameras.right, *right);
-  calibration.T_right_left = T_rect_right.inverse() * T_rectified * T_rect_left;
+  calibration.T_right_left = T_rect_right.inverse() * SE3(SO3(), t) * T_rect_left;
   return calibration;
 }
 

@@ -51,8 +51,8 @@ struct WantedTopics {
 [[nodiscard]] BagCameras choose_cameras(const std::vector<BagTopic>& all, const WantedTopics& wanted);
 
 /// What the cameras' CameraInfo says; `right` for stereo. Throws MalformedBytes when it says nothing (K is
-/// zero), names a distortion that is not known, has more coefficients than are supported, or the focal
-/// lengths of a pair's P differ.
+/// zero), names a distortion that is not known, has more coefficients than are supported, the focal lengths
+/// of a pair's P differ, or its rectified cameras do not stand side by side.
 [[nodiscard]] Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& left,
                                          const std::optional<CameraInfoMessage>& right);
 

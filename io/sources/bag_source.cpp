@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "base/bytes.hpp"
+#include "evaluation/tum_line.hpp"
 #include "io/bags/ros_images.hpp"
 #include "io/files/calibration_file.hpp"
 #include "io/files/grey_levels.hpp"
@@ -17,8 +18,9 @@ namespace twofold {
 namespace {
 
 constexpr double kStereoGap = 0.002, kDepthGap = 0.016;  // [s]
-// Images of one camera that wait for the other's: beyond that its topic has ended or is another recording's.
-constexpr std::size_t kMostWaiting = 64;
+// Images of one camera that wait for the other's (which may have to wait for their order): beyond that its
+// topic has ended or is another recording's.
+constexpr std::size_t kMostWaiting = 64 + BagImageOrder::kConfirmed;
 
 BagImage decode(const BagCamera& camera, std::optional<double> depth_unit, const BagMessage& message) {
   const MessageEncoding encoding = camera.images.encodings.at(message.topic);
@@ -34,11 +36,6 @@ BagImage decode(const BagCamera& camera, std::optional<double> depth_unit, const
 double usual_gap(const BagCameras& cameras, const BagSurvey& survey) {
   const double usual = cameras.depth ? kDepthGap : kStereoGap;
   return survey.interval_ns == 0 ? usual : std::min(usual, 0.5e-9 * static_cast<double>(survey.interval_ns));
-}
-
-std::string seconds(std::int64_t t_ns) {
-  constexpr std::int64_t kSecond = 1'000'000'000;
-  return t_ns < 0 ? fmt::format("{} ns", t_ns) : fmt::format("{}.{:09} s", t_ns / kSecond, t_ns % kSecond);
 }
 
 }  // namespace
@@ -76,6 +73,7 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   rig_ = rectifier_->rig();
   R_rectified_raw_ = rectifier_->R_rectified_left();
   if (cameras_.depth) depth_unit_ = used.depth_unit;
+  left_order_ = other_order_ = BagImageOrder(survey.interval_ns);
   reader_->select(image_ids(cameras_));
 }
 
@@ -140,26 +138,22 @@ bool BagSource::take_message() {
     damaged_.leave_out(error);
     return true;
   }
-  if (!is_later(camera, image.t_ns, left ? last_left_ns_ : last_other_ns_)) return true;
   if (left || !cameras_.depth) look_at_grey_levels(image);
   Queue& queue = left ? left_ : other_;
-  queue.push_back(std::move(image));
-  if (queue.size() > kMostWaiting) {
-    queue.pop_front();
-    ++alone_;
-  }
+  leave_out(camera, (left ? left_order_ : other_order_).add(std::move(image), queue));
+  for (; queue.size() > kMostWaiting; queue.pop_front()) ++alone_;
   return true;
 }
 
-bool BagSource::is_later(const BagCamera& camera, std::int64_t t_ns, std::optional<std::int64_t>& last_ns) {
-  if (last_ns && t_ns <= *last_ns) {
-    unordered_.leave_out(
-        IoError(file_, fmt::format("an image of '{}' is of {}, not after the one before it, of {}",
-                                   camera.images.name, seconds(t_ns), seconds(*last_ns))));
-    return false;
-  }
-  last_ns = t_ns;
-  return true;
+void BagSource::finish_order() {
+  leave_out(cameras_.left, left_order_.finish(left_));
+  if (cameras_.right) leave_out(*cameras_.right, other_order_.finish(other_));
+  if (cameras_.depth) leave_out(*cameras_.depth, other_order_.finish(other_));
+}
+
+void BagSource::leave_out(const BagCamera& camera, const std::vector<std::string>& reasons) {
+  for (const std::string& reason : reasons)
+    unordered_.leave_out(IoError(file_, fmt::format("an image of '{}' {}", camera.images.name, reason)));
 }
 
 void BagSource::look_at_grey_levels(const BagImage& image) {
@@ -167,9 +161,9 @@ void BagSource::look_at_grey_levels(const BagImage& image) {
   const int bits = camera_bits(wide_bits(image.image).value_or(0));
   if (bits <= grey_bits_) return;
   brighter_.push_back(
-      fmt::format("{}: images of 16 bits use {} bits, not {}, from {} on: grey levels are taken "
+      fmt::format("{}: images of 16 bits use {} bits, not {}, from {} s on: grey levels are taken "
                   "from 0 to {}",
-                  file_.string(), bits, grey_bits_, seconds(image.t_ns), (1 << bits) - 1));
+                  file_.string(), bits, grey_bits_, seconds_text(image.t_ns), (1 << bits) - 1));
   grey_bits_ = bits;
 }
 
@@ -218,6 +212,7 @@ bool BagSource::read(Frame& frame) {
     }
     if (!ended_) {  // at the end, what waited for more is taken
       ended_ = !take_message();
+      if (ended_) finish_order();
       continue;
     }
     damaged_.expect_any_frame();
@@ -241,7 +236,7 @@ SourceReport BagSource::report() const {
     report.summary.push_back(
         fmt::format("{}: {} damaged images were left out", file_.string(), damaged_.count()));
   if (unordered_.count() > 0)
-    report.summary.push_back(fmt::format("{}: {} images whose times do not increase were left out",
+    report.summary.push_back(fmt::format("{}: {} images whose times are out of order were left out",
                                          file_.string(), unordered_.count()));
   if (alone_ > 0) report.summary.push_back(fmt::format("{}: {} images were alone", file_.string(), alone_));
   if (const std::string fault = reader_->fault(); !fault.empty()) report.faults.push_back(fault);

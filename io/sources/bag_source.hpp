@@ -9,25 +9,20 @@
 #include "io/bags/bag_cameras.hpp"
 #include "io/bags/bag_reader.hpp"
 #include "io/files/damaged_images.hpp"
+#include "io/sources/bag_image_order.hpp"
 #include "io/sources/frame_source.hpp"
 #include "io/sources/source_parameters.hpp"
 #include "io/v4l2/pairing.hpp"
 
 namespace twofold {
 
-/// One camera's image out of a bag.
-struct BagImage {
-  std::int64_t t_ns = 0;
-  cv::Mat image;  ///< grey of 8 or 16 bits, or depth
-};
-
 /// Images of a recording of ROS, in the order of the file and paired by the time in their headers.
 ///
 /// Parameters: left, right, depth: names of topics (BagCameras says what is taken without); max_gap [s]
 /// between the images of a pair, 0.002 for stereo, 0.016 for depth, half the interval between images if that
 /// is less; camera parameters (with_parameters). The calibration is the given file's, else CameraInfo's, else
-/// the parameters'. Images that cannot be decoded are left out, and those whose time is not after that of the
-/// one before them (DamagedImages).
+/// the parameters'. Images that cannot be decoded are left out (DamagedImages), and those whose time is out
+/// of order (BagImageOrder).
 class BagSource final : public FrameSource {
  public:
   /// Throws IoError.
@@ -47,10 +42,13 @@ class BagSource final : public FrameSource {
   [[nodiscard]] std::optional<CameraInfoMessage> first_info(const BagCamera& camera);
   /// Throws IoError when CameraInfo says that depth images are not the left camera's, pixel by pixel.
   void expect_registered_depth();
-  /// Decodes the next image that can be decoded into its camera's queue; false at the end.
+  /// Decodes the next image that can be decoded, into its camera's queue as soon as it is in order; false at
+  /// the end.
   bool take_message();
-  /// False, and told, when the time does not increase; else it is the last one now.
-  bool is_later(const BagCamera& camera, std::int64_t t_ns, std::optional<std::int64_t>& last_ns);
+  /// No more images come.
+  void finish_order();
+  /// Counts and tells the images of a camera that are out of order.
+  void leave_out(const BagCamera& camera, const std::vector<std::string>& reasons);
   /// Images may get brighter than the first ones were.
   void look_at_grey_levels(const BagImage& image);
   /// The oldest images would be a pair, but it is not known yet what follows the earlier one.
@@ -70,7 +68,7 @@ class BagSource final : public FrameSource {
   std::optional<double> depth_unit_;  // [m], of depth images
   int grey_bits_ = 16;
   Queue left_, other_;
-  std::optional<std::int64_t> last_left_ns_, last_other_ns_;
+  BagImageOrder left_order_{0}, other_order_{0};
   bool ended_ = false;  // nothing is left to be read
   std::int64_t index_ = 0;
   std::uint64_t alone_ = 0;  // images without a partner

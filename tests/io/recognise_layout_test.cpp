@@ -83,5 +83,32 @@ TEST(RecogniseLayout, WhatElseIsNoRecording) {
   EXPECT_IO_ERROR(recognise_layout(folder / "gone"), "no such file or folder");
 }
 
+TEST(RecogniseLayout, BagsOfRos2InSqliteSayHowToConvertThem) {
+  const ScratchFolder folder;
+  folder.write("walk/walk_0.db3", "SQLite format 3");
+  folder.write("walk/metadata.yaml", "rosbag2_bagfile_information:");
+  EXPECT_IO_ERROR(recognise_layout(folder / "walk/walk_0.db3"),
+                  "walk_0.db3: is a ROS 2 bag in SQLite's form, which is not read: 'mcap convert walk_0.db3 "
+                  "walk_0.mcap' or 'ros2 bag convert'");
+  EXPECT_IO_ERROR(recognise_layout(folder / "walk"), "walk_0.db3 in it is a ROS 2 bag in SQLite's form");
+  folder.write("split/metadata.yaml", "rosbag2_bagfile_information:");
+  folder.write("split/split_0.db3.zstd", "x");
+  EXPECT_IO_ERROR(recognise_layout(folder / "split"), "whose bag is packed, as split_0.db3.zstd: unpack it");
+  EXPECT_IO_ERROR(recognise_layout(folder / "split/split_0.db3.zstd"), "is an archive: unpack it");
+}
+
+TEST(RecogniseLayout, FoldersOfBagsSayWhichFileToGive) {
+  const ScratchFolder folder;
+  folder.write("walk/metadata.yaml", "rosbag2_bagfile_information:");
+  EXPECT_IO_ERROR(recognise_layout(folder / "walk"), "walk: is a ROS 2 bag's folder without the bag");
+  folder.write("walk/walk_0.mcap", "x");
+  EXPECT_IO_ERROR(recognise_layout(folder / "walk"),
+                  "walk: is no recording, but walk_0.mcap in it is: give that file");
+  folder.write("walk/walk_1.mcap", "x");
+  EXPECT_IO_ERROR(recognise_layout(folder / "walk"), "has 2 in it: give one of them, as walk_0.mcap");
+  folder.write("ros1/day.bag", "x");
+  EXPECT_IO_ERROR(recognise_layout(folder / "ros1"), "day.bag in it is: give that file");
+}
+
 }  // namespace
 }  // namespace twofold

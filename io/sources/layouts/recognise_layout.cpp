@@ -56,9 +56,41 @@ bool is_folder(const fs::path& path) {
 }
 
 bool is_archive(const fs::path& path) {
-  static constexpr std::array<std::string_view, 9> kEnds{".zip", ".tgz", ".tar", ".gz", ".bz2",
-                                                         ".xz",  ".zst", ".7z",  ".rar"};
+  static constexpr std::array<std::string_view, 10> kEnds{".zip", ".tgz", ".tar",  ".gz", ".bz2",
+                                                          ".xz",  ".zst", ".zstd", ".7z", ".rar"};
   return std::find(kEnds.begin(), kEnds.end(), path.extension().string()) != kEnds.end();
+}
+
+bool is_sqlite_bag(const fs::path& path) {
+  return path.extension() == ".db3";
+}
+
+bool is_bag(const fs::path& path) {
+  return path.extension() == ".mcap" || path.extension() == ".bag";
+}
+
+std::string sqlite_bag_advice(const fs::path& bag) {
+  return fmt::format(
+      "is a ROS 2 bag in SQLite's form, which is not read: 'mcap convert {} {}' or 'ros2 bag "
+      "convert' makes an MCAP file of it (docs/sources.md)",
+      bag.filename().string(), bag.filename().replace_extension(".mcap").string());
+}
+
+/// What to give instead of a folder of bags, as ROS 2 makes one for each; empty: it is none.
+std::string bag_folder_advice(const fs::path& folder) {
+  const auto one_of = [](const std::vector<std::string>& bags) {
+    return bags.size() == 1 ? fmt::format("is no recording, but {} in it is: give that file", bags[0])
+                            : fmt::format("is no recording, but has {} in it: give one of them, as {}",
+                                          bags.size(), bags[0]);
+  };
+  if (const auto bags = names_in(folder, is_bag); !bags.empty()) return one_of(bags);
+  if (const auto bags = names_in(folder, is_sqlite_bag); !bags.empty())
+    return fmt::format("{} in it {}", bags[0], sqlite_bag_advice(bags[0]));
+  std::error_code ignored;
+  if (!fs::exists(folder / "metadata.yaml", ignored)) return {};
+  if (const auto archives = names_in(folder, is_archive); !archives.empty())
+    return fmt::format("is a ROS 2 bag's folder, whose bag is packed, as {}: unpack it", archives[0]);
+  return "is a ROS 2 bag's folder without the bag: its .mcap file is missing";
 }
 
 /// Recordings in a folder, or, where it has none, in the folders in it (dataset/sequences/00).
@@ -92,6 +124,7 @@ bool is_image(const fs::path& path) {
 /// What to give instead of a folder that is no recording.
 std::string advice_for(const fs::path& folder) {
   constexpr int kLevels = 2;
+  if (const std::string advice = bag_folder_advice(folder); !advice.empty()) return advice;
   if (is_folder(folder / "image_00" / "data"))
     return "is of KITTI's raw data, which is not read whole: 'images:DIR/image_00/data?fps=10&fx=..' runs "
            "one camera of it, KITTI odometry has many of these drives as pairs";
@@ -123,6 +156,7 @@ std::string recognise_layout(const fs::path& path) {
   std::error_code error;
   if (fs::is_regular_file(path, error)) {
     if (is_archive(path)) throw IoError(path, "is an archive: unpack it, and give the recording's folder");
+    if (is_sqlite_bag(path)) throw IoError(path, sqlite_bag_advice(path));
     return path.extension() == ".mcap" ? "mcap" : path.extension() == ".bag" ? "bag" : "video";
   }
   if (fs::is_character_file(path, error)) return "v4l2";

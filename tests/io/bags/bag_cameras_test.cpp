@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "base/bytes.hpp"
 #include "tests/io/bags/small_bag.hpp"
 
@@ -135,6 +137,44 @@ TEST(BagCameras, RawPairsKeepTheirLensAndTheirTurn) {
   EXPECT_LT((half.T_right_left * rectified - of_right).norm(), 1e-9);
 }
 
+/// P = K' [I | t]: a shift along the axis is in the first two rows, too, by the principal point.
+void put_shift(const Vector3& t, WrittenCameraInfo* info) {
+  auto& P = info->P;
+  P[3] = P[0] * t.x() + P[2] * t.z();
+  P[7] = P[5] * t.y() + P[6] * t.z();
+  P[11] = t.z();
+}
+
+TEST(BagCameras, RawPairsStandWhereAllOfPSays) {
+  const WrittenCameraInfo left = rectified_info(false);
+  WrittenCameraInfo right = rectified_info(true);
+  const Vector3 t(-0.2, 0.02, -0.01);
+  put_shift(t, &right);
+  const Calibration calibration = calibration_of(stereo("image_raw"), message_of(left), message_of(right));
+  EXPECT_EQ(calibration.invalid_reason(), "");
+  EXPECT_LT((calibration.T_right_left.translation() - t).norm(), 1e-12);
+}
+
+/// KITTI's colour cameras stand 3 mm apart in height.
+TEST(BagCameras, RectifiedPairsThatDoNotStandSideBySideAreRectifiedOnceMore) {
+  const auto pair = [](const Vector3& t) {
+    const WrittenCameraInfo left = rectified_info(false);
+    WrittenCameraInfo right = rectified_info(true);
+    put_shift(t, &right);
+    return calibration_of(stereo("image_rect"), message_of(left), message_of(right));
+  };
+  EXPECT_TRUE(pair({-0.2, 1e-6, -1e-6}).already_rectified) << "rounded numbers";
+  EXPECT_EQ(pair({-0.2, 1e-6, -1e-6}).invalid_reason(), "");
+  for (const Vector3& t : {Vector3(-0.2, 0.003, 0), Vector3(-0.2, 0, 0.01)}) {
+    const Calibration calibration = pair(t);
+    EXPECT_FALSE(calibration.already_rectified);
+    EXPECT_EQ(calibration.invalid_reason(), "");
+    EXPECT_LT((calibration.T_right_left.translation() - t).norm(), 1e-12);
+  }
+  const std::string above = pair({0, -0.2, 0}).invalid_reason();
+  EXPECT_NE(above.find("must lie mainly along +x"), std::string::npos) << above;
+}
+
 /// As the drivers of depth sensors publish their lenses.
 TEST(BagCameras, KnowTheRationalModel) {
   const std::vector<double> eight{0.4371, -2.5066, 0.0006, -0.0002, 1.4637, 0.3137, -2.3387, 1.3903};
@@ -181,6 +221,9 @@ TEST(BagCameras, SayWhatTheInfoLacks) {
   uncalibrated.K = {};
   EXPECT_NE(why(uncalibrated, right).find("not calibrated"), std::string::npos);
   EXPECT_NE(why(left, left).find("no baseline"), std::string::npos);
+  WrittenCameraInfo no_number = right;
+  no_number.P[7] = std::nan("");
+  EXPECT_NE(why(left, no_number).find("no baseline"), std::string::npos);
   WrittenCameraInfo longer = right;
   longer.P[0] = 51;
   EXPECT_NE(why(left, longer).find("focal lengths differ (P[0]: 50 and 51)"), std::string::npos);
