@@ -48,10 +48,6 @@ bool rounded_to_same_time(const TimedPose& first, const TimedPose& second) {
          difference.head<3>().norm() < kMaxTranslation && difference.tail<3>().norm() < kMaxRotation;
 }
 
-}  // namespace
-
-namespace {
-
 /// The last line was not written to its end: fields are missing, or the last one is shorter than those of the
 /// lines before, all of which have the same decimals.
 bool is_cut(const std::vector<TextLine>& lines) {
@@ -66,11 +62,19 @@ bool is_cut(const std::vector<TextLine>& lines) {
   return decimals(last.back()) < decimals(before.back());
 }
 
+std::int64_t time_field(const fs::path& file, int line, std::string_view field,
+                        std::optional<TimeUnit> unit) {
+  if (!unit) return seconds_field(file, line, field);
+  const auto t_ns = time_to_ns(field, *unit);
+  if (!t_ns) throw IoError(file, line, fmt::format("'{}' is not a time stamp in {}", field, name_of(*unit)));
+  return *t_ns;
+}
+
 }  // namespace
 
-Trajectory read_tum_trajectory(const fs::path& file, CutLine cut, std::string* note, TimeOrder order) {
-  std::vector<TextLine> lines = read_text_lines(file);
-  if (cut == CutLine::kLeftOut && is_cut(lines)) {
+Trajectory read_tum_trajectory(const fs::path& file, const TumReading& how, std::string* note) {
+  std::vector<TextLine> lines = read_table_lines(file);
+  if (how.cut == CutLine::kLeftOut && is_cut(lines)) {
     if (note != nullptr)
       *note = fmt::format("{}:{}: the last line is cut, and left out", file.string(), lines.back().number);
     lines.pop_back();
@@ -79,12 +83,12 @@ Trajectory read_tum_trajectory(const fs::path& file, CutLine cut, std::string* n
   std::int64_t previous = -1;
   for (const TextLine& line : lines) {
     const Fields fields = fields_of(file, line, 8, " \t");
-    const std::int64_t t_ns = seconds_field(file, line.number, fields[0]);
+    const std::int64_t t_ns = time_field(file, line.number, fields[0], how.unit);
     const Vector3 q_xyz = vector_at(file, line.number, fields, 4);
     const Eigen::Quaterniond q(number_field(file, line.number, fields[7]), q_xyz.x(), q_xyz.y(), q_xyz.z());
     const TimedPose pose{
         t_ns, SE3(checked_rotation(file, line.number, q), vector_at(file, line.number, fields, 1))};
-    if (order == TimeOrder::kIncreasing) {
+    if (how.order == TimeOrder::kIncreasing) {
       if (!trajectory.empty() && rounded_to_same_time(trajectory.back(), pose)) continue;
       expect_increasing(file, line.number, t_ns, &previous);
     }
@@ -110,7 +114,7 @@ SE3 pose_of_rows(const fs::path& file, int line, const Fields& fields) {
 
 Trajectory read_matrices(const fs::path& file, std::size_t numbers) {
   Trajectory trajectory;
-  for (const TextLine& line : read_text_lines(file)) {
+  for (const TextLine& line : read_table_lines(file)) {
     const Fields fields = fields_of(file, line, numbers, " \t");
     trajectory.push_back(
         {static_cast<std::int64_t>(trajectory.size()), pose_of_rows(file, line.number, fields)});
@@ -144,7 +148,7 @@ std::optional<SE3> read_pose_matrix(const fs::path& file) {
 Trajectory read_euroc_trajectory(const fs::path& file) {
   Trajectory trajectory;
   std::int64_t previous = -1;
-  for (const TextLine& line : read_text_lines(file)) {
+  for (const TextLine& line : read_table_lines(file)) {
     const Fields fields = fields_of(file, line, 8, ", \t");
     const std::int64_t t_ns = nanoseconds_field(file, line.number, fields[0]);
     const Vector3 q_xyz = vector_at(file, line.number, fields, 5);
@@ -157,7 +161,7 @@ Trajectory read_euroc_trajectory(const fs::path& file) {
 }
 
 TrajectoryForm trajectory_form(const fs::path& file) {
-  const auto lines = read_text_lines(file);
+  const auto lines = read_table_lines(file);
   if (lines.empty()) throw IoError(file, "holds no poses");
   const std::string& first = lines[0].text;
   if (first.find(',') != std::string::npos) return TrajectoryForm::kEuroc;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "evaluation/trajectory.hpp"
+#include "io/files/text_file.hpp"
 
 namespace twofold {
 
@@ -15,14 +16,20 @@ enum class CutLine : std::uint8_t { kRefused, kLeftOut };
 /// kAny: of poses from several recordings.
 enum class TimeOrder : std::uint8_t { kIncreasing, kAny };
 
+struct TumReading {
+  CutLine cut =
+      CutLine::kRefused;  ///< kLeftOut: a last line without a line end that is not whole is no error
+  TimeOrder order = TimeOrder::kIncreasing;
+  std::optional<TimeUnit> unit =
+      std::nullopt;  ///< nothing: seconds, or nanoseconds where numbers are too large for others
+};
+
 /// TUM form: lines "time[s] tx ty tz qx qy qz qw" of T_w_c  [m].
 /// Throws IoError for anything that is not a finite number, a quaternion that is far from unit length, and
 /// time stamps out of order or repeated, unless any order will do.
-/// @param cut    kLeftOut: a last line without a line end that is not whole is no error
 /// @param note   what was left out, if anything was
-[[nodiscard]] Trajectory read_tum_trajectory(const std::filesystem::path& file,
-                                             CutLine cut = CutLine::kRefused, std::string* note = nullptr,
-                                             TimeOrder order = TimeOrder::kIncreasing);
+[[nodiscard]] Trajectory read_tum_trajectory(const std::filesystem::path& file, const TumReading& how = {},
+                                             std::string* note = nullptr);
 
 /// KITTI form: lines of the 12 numbers of the 3x4 matrix T_w_c, row by row. There are no time stamps: t_ns
 /// counts lines.

@@ -95,6 +95,60 @@ TEST(EvalCommand, HowManyPosesHaveAPartnerIsSaid) {
       << outcome.out;
 }
 
+/// The circle's times, multiplied: as text, for they get too large.
+std::string write_in_unit(const ScratchFolder& folder, const std::string& name, std::int64_t per_second,
+                          std::int64_t start_s) {
+  std::string text;
+  for (const TimedPose& pose : read_trajectory(write_circle(folder, "unit.txt", 1))) {
+    const Eigen::Quaterniond& q = pose.T_w_c.so3().quaternion();
+    const Vector3& t = pose.T_w_c.translation();
+    const std::int64_t count = (start_s + pose.t_ns / 1'000'000'000) * per_second +
+                               pose.t_ns % 1'000'000'000 / (1'000'000'000 / per_second);
+    text += fmt::format("{}.000000 {} {} {} {} {} {} {}\n", count, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(),
+                        q.w());
+  }
+  return folder.write(name, text).string();
+}
+
+TEST(EvalCommand, TheUnitOfTimesIsFoundByTheOtherFile) {
+  const ScratchFolder folder;
+  const auto poses = [&](const std::string& estimate, const std::string& truth, const std::string& said) {
+    const auto outcome = run(folder, "eval " + estimate + " " + truth + " --json " + (folder / "e.json"));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_TRUE(said.empty() ? outcome.err.empty() : outcome.err.find(said) != std::string::npos)
+        << outcome.err;
+    return nlohmann::json::parse(content(folder / "e.json"))["poses"].get<int>();
+  };
+  for (const std::int64_t start_s : {0, 1'403'636'579}) {
+    // write_circle begins at zero: the same path, at the given time in seconds.
+    Trajectory moved = read_trajectory(write_circle(folder, "truth.txt", 1));
+    for (TimedPose& pose : moved) pose.t_ns += start_s * 1'000'000'000;
+    write_tum_trajectory(folder.path() / "truth.txt", moved);
+    const std::string truth = folder / "truth.txt";
+    for (const auto& [name, per_second] : {std::pair("milliseconds", 1'000LL),
+                                           {"microseconds", 1'000'000LL},
+                                           {"nanoseconds", 1'000'000'000LL}}) {
+      SCOPED_TRACE(fmt::format("{} from {} s on", name, start_s));
+      const std::string other = write_in_unit(folder, "other.txt", per_second, start_s);
+      const bool certain = start_s > 0 && per_second == 1'000'000'000;
+      const std::string said =
+          certain ? "" : fmt::format("other.txt: time stamps are taken as {}, by which 60", name);
+      EXPECT_EQ(poses(other, truth, said), 60);
+      EXPECT_EQ(poses(truth, other, said), 60);
+    }
+  }
+}
+
+TEST(EvalCommand, WhereNothingIsCloseInTimeBothRangesAreSaid) {
+  const ScratchFolder folder;
+  const std::string early = write_in_unit(folder, "early.txt", 1'000'000'000, 1'403'636'579);
+  const std::string late = write_in_unit(folder, "late.txt", 1'000'000'000, 1'503'636'579);
+  expect_bad_input(run(folder, "eval " + early + " " + late),
+                   "early.txt has 60 from 1403636579.000000000 to 1403636584.900000000 s");
+  expect_bad_input(run(folder, "eval " + early + " " + late),
+                   "late.txt has 60 from 1503636579.000000000 to 1503636584.900000000 s");
+}
+
 /// As a run leaves its trajectory that was killed within a write.
 TEST(EvalCommand, ACutLastLineIsLeftOutAndSaid) {
   const ScratchFolder folder;

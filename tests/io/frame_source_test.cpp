@@ -394,6 +394,11 @@ TEST(FrameSource, ImageFolderTellsTimesFromNumbersAndNames) {
   EXPECT_EQ(times("00000 10.0 0.3\n00002 10.1 0.3\n00004 10.2 0.3\n"), expected) << "stems";
   EXPECT_EQ(times("00000.png 10.0\n00002.png 10.1\n00004.png 10.2\n"), expected) << "names";
   EXPECT_EQ(times("10.0 rgb/00000.png\n10.1 rgb/00002.png\n10.2 rgb/00004.png\n"), expected) << "a list";
+  EXPECT_EQ(times("\xef\xbb\xbfimage time\r\n00000 10.0 \r\n00002 10.1\t\r\n00004 10.2\r\n"), expected)
+      << "of Windows";
+  EXPECT_EQ(times("10000000000000000\n10000000100000000\n10000000200000000\n").front(),
+            10'000'000'000'000'000)
+      << "nanoseconds, as ORB-SLAM3's lists of EuRoC's images";
   EXPECT_IO_ERROR(times("10.0 1 2 3\n10.1 1 2 3\n10.2 1 2 3\n"), "times.txt:1: is none of");
   EXPECT_IO_ERROR(times("0 10.0\n1 10.1\n3 10.2\n"), "times.txt:3: is none of");
   EXPECT_IO_ERROR(times("0 10.0\n1 10.1\n"), "has 2 time stamps for 3 images");

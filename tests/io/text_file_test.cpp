@@ -37,5 +37,51 @@ TEST(TextFile, SkipsCommentsAndWindowsLineEnds) {
   EXPECT_IO_ERROR(read_text_lines(folder.path()), "cannot be opened");
 }
 
+TEST(TextFile, TimesAreExactInEveryUnit) {
+  EXPECT_EQ(time_to_ns("1403636579763555328.000000", TimeUnit::kNanoseconds), 1403636579763555328);
+  EXPECT_EQ(time_to_ns("1403636579763555.328", TimeUnit::kMicroseconds), 1403636579763555328);
+  EXPECT_EQ(time_to_ns("1403636579763.555328", TimeUnit::kMilliseconds), 1403636579763555328);
+  EXPECT_EQ(time_to_ns("1403636579.7635553289", TimeUnit::kSeconds), 1403636579763555328);
+  EXPECT_EQ(time_to_ns("2e3", TimeUnit::kMicroseconds), 2000000);
+  EXPECT_FALSE(time_to_ns("1403636579763555328", TimeUnit::kMicroseconds));
+}
+
+TEST(TextFile, SecondsThatCanOnlyBeNanosecondsAreThese) {
+  EXPECT_EQ(seconds_field("a.txt", 1, "1403636579763555328.000000"), 1403636579763555328);
+  EXPECT_EQ(seconds_field("a.txt", 1, "1403636579.5"), 1403636579500000000);
+  EXPECT_IO_ERROR(seconds_field("a.txt", 1, "1403636579763.5"), "large in milliseconds or microseconds");
+  EXPECT_EQ(nanoseconds_field("a.txt", 1, "1403636579763555328.000"), 1403636579763555328);
+  EXPECT_IO_ERROR(nanoseconds_field("a.txt", 1, "1403636579.763555328"), "not a time stamp in nanoseconds");
+}
+
+/// As editors and spreadsheets of Windows write them.
+TEST(TextFile, AByteOrderMarkIsNoPartOfTheFirstLine) {
+  const ScratchFolder folder;
+  const auto lines = read_text_lines(folder.write("a.txt",
+                                                  "\xef\xbb\xbf"
+                                                  "1 2 \t\r\n3 4\r\n"));
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_EQ(lines[0].text, "1 2");
+  EXPECT_EQ(read_text_lines(folder.write("b.txt", "\xef\xbb\xbf# c\n3 4\n")).size(), 1u);
+  EXPECT_IO_ERROR(read_text_lines(folder.write("c.txt", std::string("\xff\xfe"
+                                                                    "1\0",
+                                                                    4))),
+                  "c.txt: is UTF-16 text: save it as UTF-8");
+}
+
+TEST(TextFile, TablesMayHaveAHeading) {
+  const ScratchFolder folder;
+  const auto first = [&](const std::string& text) {
+    const auto lines = read_table_lines(folder.write("a.txt", text));
+    return lines.empty() ? "" : lines[0].text;
+  };
+  EXPECT_EQ(first("timestamp [ns],filename\n1,1.png\n"), "1,1.png");
+  EXPECT_EQ(first("# of a camera\n\"time\";\"x\"\n1 2\n"), "1 2");
+  EXPECT_EQ(first("img1 0.5\n"), "img1 0.5") << "an image and its time";
+  EXPECT_EQ(first("nan nan\n1 2\n"), "nan nan");
+  EXPECT_EQ(first("-inf x\n1 2\n"), "-inf x");
+  EXPECT_EQ(first("t x\na b\n"), "a b") << "the first line only";
+}
+
 }  // namespace
 }  // namespace twofold

@@ -66,6 +66,32 @@ TEST(TrajectoryFile, NamesFileLineAndProblem) {
   EXPECT_NE(error("1 0 0 0 0 2 0 0 0 0 1 0\n").find("not a rotation"), std::string::npos);
 }
 
+TEST(TrajectoryFile, IsReadAsWindowsAndSpreadsheetsWriteIt) {
+  const ScratchFolder folder;
+  const std::string mark = "\xef\xbb\xbf";
+  const auto tum = read_trajectory(folder.write(
+      "t.txt", mark + "timestamp tx ty tz qx qy qz qw\r\n1 0 0 0 0 0 0 1 \r\n2 1 0 0 0 0 0 1\t\r\n\r\n"));
+  ASSERT_EQ(tum.size(), 2u);
+  EXPECT_EQ(tum[1].T_w_c.translation().x(), 1);
+  const auto euroc = read_trajectory(
+      folder.write("e.csv", mark + "timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\r\n1000,0,0,0,1,0,0,0,\r\n"));
+  ASSERT_EQ(euroc.size(), 1u);
+  EXPECT_EQ(euroc[0].t_ns, 1000);
+}
+
+/// ORB-SLAM3's CameraTrajectory.txt of EuRoC.
+TEST(TrajectoryFile, NanosecondsOfOurTimesAreKnown) {
+  const ScratchFolder folder;
+  const auto trajectory = read_trajectory(folder.write("t.txt",
+                                                       "1403636579763555328.000000 0.1 0 0 0 0 0 1\n"
+                                                       "1403636579813555456.000000 0.2 0 0 0 0 0 1\n"));
+  ASSERT_EQ(trajectory.size(), 2u);
+  EXPECT_EQ(trajectory[0].t_ns, 1403636579763555328);
+  EXPECT_IO_ERROR(
+      read_trajectory(folder.write("t.txt", "1403636579763.5 0.1 0 0 0 0 0 1\n")),
+      "t.txt:1: '1403636579763.5' is not a time stamp in seconds: it is that large in milliseconds");
+}
+
 TEST(TrajectoryFile, KeepsTheFirstOfTwoPosesRoundedToOneStamp) {
   const ScratchFolder folder;
   const auto file =

@@ -49,7 +49,7 @@ void number_keyframes(std::vector<RunPart>& parts) {
 /// Of whatever recordings: a map that was gone on with twice has keyframes of two.
 Trajectory read_loaded_keyframes(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return {};
-  return read_tum_trajectory(file, CutLine::kRefused, nullptr, TimeOrder::kAny);
+  return read_tum_trajectory(file, {.order = TimeOrder::kAny});
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ std::vector<StampedFile> read_image_list(const fs::path& camera_folder) {
   const fs::path file = camera_folder / "data.csv";
   std::vector<StampedFile> images;
   std::int64_t previous = -1;
-  for (const TextLine& line : read_text_lines(file)) {
+  for (const TextLine& line : read_table_lines(file)) {
     const auto fields = split_fields(line.text, ", \t");
     if (fields.size() != 2) throw IoError(file, line.number, "is not 'time,file'");
     images.push_back({nanoseconds_field(file, line.number, fields[0]), camera_folder / "data" / fields[1]});

@@ -41,7 +41,7 @@ std::string_view time_in_line(const fs::path& file, const TextLine& line, const 
 std::vector<std::int64_t> read_image_times(const fs::path& file, const std::vector<fs::path>& images) {
   if (!fs::exists(file))
     throw IoError(file, "no such file: give the images' times there, or the parameter fps");
-  const auto lines = read_text_lines(file);
+  const auto lines = read_table_lines(file);
   if (lines.size() != images.size())
     throw IoError(file, fmt::format("has {} time stamps for {} images", lines.size(), images.size()));
   const auto first = to_integer(split_fields(lines[0].text)[0]);

@@ -18,7 +18,7 @@ std::vector<std::int64_t> read_times(const fs::path& file, std::size_t image_cou
     throw IoError(file, "no such file: data_odometry_calib.zip of KITTI has it beside calib.txt");
   std::vector<std::int64_t> times;
   std::int64_t previous = -1;
-  for (const TextLine& line : read_text_lines(file)) {
+  for (const TextLine& line : read_table_lines(file)) {
     times.push_back(seconds_field(file, line.number, line.text));
     expect_increasing(file, line.number, times.back(), &previous);
   }

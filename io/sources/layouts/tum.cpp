@@ -36,7 +36,7 @@ std::vector<StampedFile> read_list(const fs::path& folder, const char* name) {
   const fs::path file = folder / name;
   std::vector<StampedFile> entries;
   std::int64_t previous = -1;
-  for (const TextLine& line : read_text_lines(file)) {
+  for (const TextLine& line : read_table_lines(file)) {
     const auto fields = split_fields(line.text);
     if (fields.size() != 2) throw IoError(file, line.number, "is not 'time file'");
     entries.push_back({seconds_field(file, line.number, fields[0]), folder / fields[1]});
@@ -50,7 +50,7 @@ std::vector<RecordedFrame> read_associations(const fs::path& folder) {
   const fs::path file = folder / "associations.txt";
   std::vector<RecordedFrame> frames;
   std::int64_t previous = -1;
-  for (const TextLine& line : read_text_lines(file)) {
+  for (const TextLine& line : read_table_lines(file)) {
     const auto fields = split_fields(line.text);
     if (fields.size() != 4) throw IoError(file, line.number, "is not 'time rgb-file time depth-file'");
     // Some tools write depth first.

@@ -8,15 +8,13 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/evaluation/pose_pairing.hpp"
 #include "apps/twofold/surface/eval_surface.hpp"
 #include "base/text_of_json.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
-#include "io/files/trajectory_file.hpp"
 #include "io/plots/plot.hpp"
-#include "io/sources/open_source.hpp"
-#include "io/sources/recording.hpp"
 
 namespace twofold {
 namespace {
@@ -42,77 +40,6 @@ std::string name_of(Alignment alignment) {
     if (value == alignment) return name;
   }
   return "";
-}
-
-/// Files of EuRoC's form have the body's poses.
-Trajectory read_truth_of_body(const std::string& file) {
-  if (auto of_camera = read_euroc_truth_of_camera(file)) return *std::move(of_camera);
-  fmt::print(stderr,
-             "twofold: {}: these are poses of the body, not of the camera, and no cam0/sensor.yaml beside it "
-             "says how that sits in it: give groundtruth.txt of a run with --calib, or the recording's "
-             "folder, instead\n",
-             file);
-  return read_trajectory(file);
-}
-
-Trajectory read_truth(const std::string& text) {
-  if (fs::is_regular_file(text))
-    return trajectory_form(text) == TrajectoryForm::kEuroc ? read_truth_of_body(text) : read_trajectory(text);
-  const auto source = open_source(text);
-  if (!source->ground_truth().empty()) return source->ground_truth();
-  const std::vector<std::string> notes = source->report().notes;
-  std::string message = "the recording has no ground truth";
-  for (const std::string& note : notes) message += "; " + note;
-  throw IoError(text, message);
-}
-
-/// Of a run that was killed, too.
-Trajectory read_estimate(const std::string& file) {
-  if (trajectory_form(file) != TrajectoryForm::kTum) return read_trajectory(file);
-  std::string note;
-  Trajectory estimate = read_tum_trajectory(file, CutLine::kLeftOut, &note);
-  if (!note.empty()) fmt::print(stderr, "twofold: {}\n", note);
-  return estimate;
-}
-
-bool is_kitti(const std::string& file) {
-  return fs::is_regular_file(file) && trajectory_form(file) == TrajectoryForm::kKitti;
-}
-
-/// What to give for a truth of KITTI's form, whose times are in another file.
-std::string with_times_instead(const fs::path& poses) {
-  const fs::path sequence =
-      poses.parent_path().parent_path() / "sequences" / poses.stem();  // the benchmark's own layout
-  std::error_code ignored;
-  return fmt::format("give the folder of the sequence instead ({})",
-                     fs::is_directory(sequence, ignored) ? sequence.string() : "with its times.txt");
-}
-
-/// Poses of the estimate that have a partner in the truth, and how many there are in all.
-struct Pairing {
-  std::vector<PosePair> pairs;
-  std::size_t of = 0;
-};
-
-/// By time, or by line when neither file has times.
-Pairing pair_poses(const EvalArguments& arguments) {
-  if (!fs::is_regular_file(arguments.estimate)) throw IoError(arguments.estimate, "no such trajectory file");
-  const bool estimate_by_line = is_kitti(arguments.estimate);
-  if (estimate_by_line != is_kitti(arguments.truth)) {
-    throw IoError(
-        estimate_by_line ? arguments.estimate : arguments.truth,
-        "has no time stamps (KITTI form), the other trajectory has: " +
-            (estimate_by_line ? "they cannot be brought together" : with_times_instead(arguments.truth)));
-  }
-  const Trajectory estimate = read_estimate(arguments.estimate);
-  const Trajectory truth = read_truth(arguments.truth);
-  if (!estimate_by_line)
-    return {associate(estimate, truth, std::llround(arguments.max_difference_s * 1e9)), estimate.size()};
-  if (estimate.size() != truth.size()) {
-    throw IoError(arguments.estimate, fmt::format("has {} poses without time stamps, {} has {}",
-                                                  estimate.size(), arguments.truth, truth.size()));
-  }
-  return {associate(estimate, truth, 0), estimate.size()};
 }
 
 void print_row(const char* name, const char* unit, const ErrorStatistics& s) {
@@ -249,10 +176,11 @@ void run_eval(const EvalArguments& arguments) {
   }
   EvaluationOptions options;
   options.alignment = arguments.alignment;
-  const Pairing pairing = pair_poses(arguments);
+  const PosePairing pairing =
+      pair_poses(arguments.estimate, arguments.truth, std::llround(arguments.max_difference_s * 1e9));
   const auto evaluation = evaluate(pairing.pairs, options);
   if (!evaluation) throw IoError(arguments.estimate, evaluation.error());
-  const bool has_times = !is_kitti(arguments.estimate);
+  const bool has_times = pairing.has_times;
   print_table(arguments, *evaluation, pairing.of, has_times);
   if (arguments.alignment != Alignment::kNone) warn_of_constant_turn(*evaluation);
   if (!arguments.json.empty())
