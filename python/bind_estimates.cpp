@@ -2,13 +2,13 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include <fmt/format.h>
 
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
+#include "python/poses.hpp"
 #include "twofold/estimate.hpp"
 
 namespace twofold::python {
@@ -24,10 +24,7 @@ void expect_shape(const Array& array, py::ssize_t last, const char* what) {
 Pose make_pose(const Array& t, const Array& q) {
   if (t.ndim() != 1 || t.shape(0) != 3) throw py::value_error("t must have shape (3,)");
   if (q.ndim() != 1 || q.shape(0) != 4) throw py::value_error("q must have shape (4,)");
-  Pose pose{{q.at(0), q.at(1), q.at(2), q.at(3)}, {t.at(0), t.at(1), t.at(2)}};
-  const auto& [x, y, z, w] = pose.q;
-  if (std::abs(x * x + y * y + z * z + w * w - 1) > 1e-3) throw py::value_error("q must be of length 1");
-  return pose;
+  return checked_pose({t.at(0), t.at(1), t.at(2)}, {q.at(0), q.at(1), q.at(2), q.at(3)}, "");
 }
 
 /// (3,) or (N, 3) points of frame b in frame a.
@@ -71,7 +68,8 @@ void bind_pose(py::module_& module) {
                    "Rigid motion T_a_b: takes points of frame b to frame a, p_a = T_a_b @ p_b.")
       .def(py::init<>(), "The identity.")
       .def(py::init(&make_pose), py::arg("t"), py::arg("q"),
-           "From t (3,) [m] and the unit quaternion q (4,), x y z w.")
+           "From t (3,) [m] and the unit quaternion q (4,), x y z w, which is normalised when within 0.01 of "
+           "length 1. Raises ValueError.")
       .def_property_readonly(
           "t", [](const py::object& self) { return view_of(self.cast<const Pose&>().t.data(), {3}, self); },
           "Translation (3,) [m], read-only.")

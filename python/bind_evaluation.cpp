@@ -1,12 +1,14 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
+#include "python/poses.hpp"
 #include "python/trajectory.hpp"
 #include "twofold/evaluation.hpp"
 
@@ -34,8 +36,14 @@ PoseList make_trajectory(const py::object& given_times, const Doubles& positions
   for (py::ssize_t i = 0; i < count; ++i) {
     StampedPose& pose = trajectory.poses[static_cast<std::size_t>(i)];
     pose.t_ns = t_ns.at(i);
-    std::copy_n(positions.data(i, 0), 3, pose.T_world_camera.t.begin());
-    std::copy_n(orientations.data(i, 0), 4, pose.T_world_camera.q.begin());
+    if (i > 0 && t_ns.at(i) <= t_ns.at(i - 1))
+      throw py::value_error(
+          fmt::format("row {}: t_ns must grow, is {} after {}", i, t_ns.at(i), t_ns.at(i - 1)));
+    std::array<double, 3> t{};
+    std::array<double, 4> q{};
+    std::copy_n(positions.data(i, 0), 3, t.begin());
+    std::copy_n(orientations.data(i, 0), 4, q.begin());
+    pose.T_world_camera = checked_pose(t, q, fmt::format("row {}: ", i));
   }
   return trajectory;
 }
@@ -57,7 +65,9 @@ void bind_trajectory(py::module_& module) {
   py::class_<PoseList>(module, "Trajectory",
                        "Where the camera was, in the order of time. Columns are read-only views.")
       .def(py::init(&make_trajectory), py::arg("t_ns"), py::arg("positions"), py::arg("orientations"),
-           "From t_ns (N,) [ns], positions (N, 3) [m] and unit quaternions (N, 4), x y z w; copied.")
+           "From t_ns (N,) [ns], which must grow, positions (N, 3) [m] and unit quaternions (N, 4), x y z w; "
+           "copied. Quaternions within\n0.01 of length 1 are normalised. Raises ValueError naming row and "
+           "value.")
       .def_property_readonly(
           "t_ns",
           [](const py::object& self) {

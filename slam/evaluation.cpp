@@ -1,8 +1,11 @@
 #include "twofold/evaluation.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "base/angles.hpp"
 #include "base/option_check.hpp"
@@ -13,9 +16,24 @@
 namespace twofold {
 namespace {
 
+bool is_rigid_motion(const Pose& pose) {
+  constexpr double kTolerance = 0.01;  // of the quaternion's length, as of trajectory files
+  const bool finite = std::all_of(pose.t.begin(), pose.t.end(), [](double x) { return std::isfinite(x); });
+  const auto& [x, y, z, w] = pose.q;
+  const double length = std::hypot(std::hypot(x, y), std::hypot(z, w));
+  return finite && std::abs(length - 1) <= kTolerance;
+}
+
 Trajectory to_trajectory(const std::vector<StampedPose>& poses) {
   Trajectory trajectory;
-  for (const StampedPose& pose : poses) trajectory.push_back({pose.t_ns, to_se3(pose.T_world_camera)});
+  for (const StampedPose& pose : poses) {
+    const auto expect = [&](bool condition, const char* what) {
+      if (!condition) throw std::invalid_argument(fmt::format("pose {} {}", trajectory.size(), what));
+    };
+    expect(trajectory.empty() || pose.t_ns > trajectory.back().t_ns, "is not after the one before it");
+    expect(is_rigid_motion(pose.T_world_camera), "is not of finite numbers and a unit quaternion");
+    trajectory.push_back({pose.t_ns, to_se3(pose.T_world_camera)});
+  }
   return trajectory;
 }
 

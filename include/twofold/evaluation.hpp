@@ -13,7 +13,8 @@ namespace twofold {
 /// number; an EuRoC file has poses of the body, not of the camera. Throws std::runtime_error naming the file
 /// and line.
 [[nodiscard]] TWOFOLD_API std::vector<StampedPose> load_trajectory(const std::filesystem::path& file);
-/// TUM form: lines "time[s] tx ty tz qx qy qz qw". Throws std::runtime_error when it cannot be written.
+/// TUM form: lines "time[s] tx ty tz qx qy qz qw". Throws std::runtime_error when it cannot be written, and
+/// std::invalid_argument as compare does for poses.
 TWOFOLD_API void save_trajectory(const std::filesystem::path& file,
                                  const std::vector<StampedPose>& trajectory);
 
@@ -41,7 +42,9 @@ struct TrajectoryError {
   double scale = 1;  ///< the estimate's lengths times this are the truth's; 1 unless kSimilarity
 };
 
-/// Throws std::invalid_argument when there is nothing to compare or the alignment is undetermined.
+/// Throws std::invalid_argument when there is nothing to compare or the alignment is undetermined, and for
+/// poses whose times do not grow, numbers that are not finite, and quaternions that are not within 0.01 of
+/// length 1.
 [[nodiscard]] TWOFOLD_API TrajectoryError compare(const std::vector<StampedPose>& estimate,
                                                   const std::vector<StampedPose>& truth,
                                                   const ComparisonOptions& options = {});

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import SCENE
+from numpy.typing import NDArray
 
 import twofold
 
@@ -144,3 +145,36 @@ def test_poses_compose() -> None:
 def test_times_of_a_trajectory_are_whole_nanoseconds() -> None:
     with pytest.raises(TypeError, match="nanoseconds"):
         twofold.Trajectory([1.5, 2.5], np.zeros((2, 3)), np.tile([0, 0, 0, 1], (2, 1)))
+
+
+def test_poses_are_of_finite_numbers_and_unit_quaternions() -> None:
+    for value in [np.nan, np.inf]:
+        with pytest.raises(ValueError, match=f"t must be finite, is .0, {value}, 0"):
+            twofold.Pose([0, value, 0], [0, 0, 0, 1])
+        with pytest.raises(ValueError, match=f"q must be finite, is .{value}, 0, 0, 1"):
+            twofold.Pose([0, 0, 0], [value, 0, 0, 1])
+    with pytest.raises(ValueError, match="of length 1.5"):
+        twofold.Pose([0, 0, 0], [0, 0, 0, 1.5])
+    np.testing.assert_array_equal(twofold.Pose([0, 0, 0], [0, 0, 0, 1.004]).q, [0, 0, 0, 1])
+
+
+def test_rows_of_a_trajectory_are_checked() -> None:
+    t_ns, positions, orientations = [1, 2, 3], np.zeros((3, 3)), np.tile([0.0, 0, 0, 1], (3, 1))
+
+    def changed(array: NDArray[np.float64], value: float) -> NDArray[np.float64]:
+        array = array.copy()
+        array[1, 2] = value
+        return array
+
+    assert len(twofold.Trajectory(t_ns, positions, orientations)) == 3
+    for value in [np.nan, np.inf]:
+        with pytest.raises(ValueError, match=f"row 1: t must be finite, is .0, 0, {value}"):
+            twofold.Trajectory(t_ns, changed(positions, value), orientations)
+        with pytest.raises(ValueError, match=f"row 1: q must be finite, is .0, 0, {value}, 1"):
+            twofold.Trajectory(t_ns, positions, changed(orientations, value))
+    with pytest.raises(ValueError, match="row 1: q must be of length 1, is .0, 0, 2, 1. of length 2.236"):
+        twofold.Trajectory(t_ns, positions, changed(orientations, 2))
+    with pytest.raises(ValueError, match="row 2: t_ns must grow, is 2 after 2"):
+        twofold.Trajectory([1, 2, 2], positions, orientations)
+    rounded = orientations * 0.999
+    np.testing.assert_array_equal(twofold.Trajectory(t_ns, positions, rounded).orientations, orientations)

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <set>
 #include <stdexcept>
 #include <thread>
@@ -129,6 +131,31 @@ TEST(PublicEvaluation, MeasuresTheDistanceFromTheTruth) {
     EXPECT_NE(std::string(error.what()).find("options.max_time_difference_s"), std::string::npos)
         << error.what();
   }
+}
+
+TEST(PublicEvaluation, RefusesPosesThatAreNone) {
+  const auto truth = walk(0);
+  const auto why = [&](const std::function<void(StampedPose&)>& change) {
+    auto poses = truth;
+    change(poses[7]);
+    try {
+      (void)compare(poses, truth);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(why([](StampedPose& pose) { pose.T_world_camera.q[3] = 0.995; }), "");
+  EXPECT_NE(why([](StampedPose& pose) { pose.t_ns = 0; }).find("pose 7 is not after"), std::string::npos);
+  EXPECT_NE(why([&](StampedPose& pose) { pose.T_world_camera.t[1] = nan; }).find("pose 7 is not of finite"),
+            std::string::npos);
+  EXPECT_NE(why([&](StampedPose& pose) { pose.T_world_camera.q[0] = nan; }).find("pose 7"),
+            std::string::npos);
+  EXPECT_NE(why([](StampedPose& pose) {
+              pose.T_world_camera.q = {0, 0, 0, 2};
+            }).find("unit quaternion"),
+            std::string::npos);
 }
 
 TEST(PublicEvaluation, OptionsSayWhyTheyAreInvalid) {
