@@ -117,8 +117,24 @@ RectificationMap make_map(const PinholeCamera& rectified, const SO3& R_rectified
   return map;
 }
 
+/// Of the rectified pixels: those without a source in the raw image.
+double black_share_of(const RectificationMap& map, const PinholeCamera& raw) {
+  std::int64_t black = 0;
+  for (int v = 0; v < map.x.rows; ++v) {
+    const auto* row_x = map.x.ptr<float>(v);
+    const auto* row_y = map.y.ptr<float>(v);
+    for (int u = 0; u < map.x.cols; ++u)
+      if (!raw.contains(Vector2(row_x[u], row_y[u]), -1.0)) ++black;
+  }
+  return static_cast<double>(black) / static_cast<double>(map.x.total());
+}
+
 std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
+}
+
+std::string black_text(double share) {
+  return "of the rectified image " + std::to_string(std::lround(100 * share)) + " % are black";
 }
 
 std::string image_reason(const cv::Mat& image, const char* name, int type, const char* type_name, int width,
@@ -159,6 +175,11 @@ Rectifier::Rectifier(const Calibration& calibration, const RectifierOptions& opt
 
   raw_depth_size_ = raw_left_size_;
   find_maps(calibration, options);
+  constexpr double kMostBlack = 0.5;
+  if (options.field == 0 && black_share_ > kMostBlack)
+    throw std::runtime_error(black_text(black_share_) +
+                             ", for the lens does not reach that far from its axis: "
+                             "are its coefficients complete, and in the model's order?");
   if (!calibration.depth_apart || calibration.kind != SensorKind::kRgbd) return;
   const PinholeCamera& depth = calibration.depth_camera.model.pinhole;
   raw_depth_size_ = {depth.width, depth.height};
@@ -187,10 +208,17 @@ void Rectifier::find_maps(const Calibration& calibration, const RectifierOptions
   rig_.camera = fit_pinhole(windows, options.width > 0 ? options.width : raw_left_size_.width,
                             options.height > 0 ? options.height : raw_left_size_.height, options.field);
   left_ = make_map(rig_.camera, R_rectified_left_, calibration.left);
+  black_share_ = black_share_of(left_, calibration.left.pinhole);
   cv::convertMaps(left_.x, left_.y, left_fixed_.xy, left_fixed_.fraction, CV_16SC2);
   if (!stereo) return;
   right_ = make_map(rig_.camera, R_rectified_right_, calibration.right);
+  black_share_ = std::max(black_share_, black_share_of(right_, calibration.right.pinhole));
   cv::convertMaps(right_.x, right_.y, right_fixed_.xy, right_fixed_.fraction, CV_16SC2);
+}
+
+std::string Rectifier::black_note() const {
+  constexpr double kMuch = 0.2;
+  return black_share_ < kMuch ? "" : black_text(black_share_);
 }
 
 void Rectifier::rectify(const Frame& raw, Frame& rectified) const {

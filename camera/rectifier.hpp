@@ -39,13 +39,19 @@ struct RectificationMap {
 /// Immutable after construction; rectify may be called from several threads at once.
 class Rectifier {
  public:
-  /// Throws std::runtime_error, with the reason, for an invalid calibration or options, or cameras that share
-  /// no view.
+  /// Throws std::runtime_error, with the reason, for an invalid calibration or options, cameras that share no
+  /// view, and, at field 0, a lens that leaves more than half of the rectified image black.
   explicit Rectifier(const Calibration& calibration, const RectifierOptions& options = {});
 
   [[nodiscard]] const Rig& rig() const { return rig_; }
   /// The raw intensity images are rectified already and are passed through (headers only, pixels are shared).
   [[nodiscard]] bool passes_through() const { return left_.x.empty(); }
+
+  /// Share of the rectified image that no raw pixel is seen in, of the camera that has more of them, in [0,
+  /// 1].
+  [[nodiscard]] double black_share() const { return black_share_; }
+  /// Empty, or, from a fifth on, that share in words.
+  [[nodiscard]] std::string black_note() const;
 
   /// Rotation from the raw to the rectified camera: x_rectified = R x_raw. A trajectory of the rectified left
   /// camera becomes one of the raw left camera through it.
@@ -80,6 +86,7 @@ class Rectifier {
   ImageSize raw_left_size_, raw_right_size_, raw_depth_size_;
   SO3 R_rectified_left_;
   SO3 R_rectified_right_;
+  double black_share_ = 0;
   RectificationMap left_, right_;
   FixedMap left_fixed_, right_fixed_;
   std::optional<DepthRegistration> registration_;  ///< of depth that is not the left camera's

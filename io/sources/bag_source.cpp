@@ -70,6 +70,8 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   } catch (const std::runtime_error& error) {
     throw IoError(calibration_file, error.what());
   }
+  if (const std::string black = rectifier_->black_note(); !black.empty())
+    notes_.push_back(calibration_file.string() + ": " + black);
   rig_ = rectifier_->rig();
   R_rectified_raw_ = rectifier_->R_rectified_left();
   if (cameras_.depth) depth_unit_ = used.depth_unit;

@@ -140,6 +140,8 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
   } catch (const std::runtime_error& e) {
     throw IoError(recording_.calibration_file, e.what());
   }
+  if (const std::string black = rectifier_->black_note(); !black.empty())
+    recording_.notes.push_back(recording_.calibration_file.string() + ": " + black);
   rig_ = rectifier_->rig();
   if (recording_.left_only && rig_.kind != SensorKind::kMono) {  // its images as the rig would have them
     rig_.kind = SensorKind::kMono;

@@ -46,6 +46,14 @@ void V4l2Source::set_up_calibration(SourceParameters& parameters, const SourceOp
   R_rectified_raw_ = rectifier_->R_rectified_left();
 }
 
+SourceReport V4l2Source::report() const {
+  SourceReport report = frames_.report();
+  if (!rectifier_) return report;
+  if (const std::string black = rectifier_->black_note(); !black.empty())
+    report.notes.push_back(device_ + ": " + black);
+  return report;
+}
+
 namespace {
 
 /// The image, or a copy if it lies in the driver's memory, which goes back with the next call: such a Mat has

@@ -22,7 +22,7 @@ class V4l2Source final : public FrameSource {
 
   [[nodiscard]] bool is_live() const override { return true; }
   [[nodiscard]] bool is_raw() const override { return !rectifier_.has_value(); }
-  [[nodiscard]] SourceReport report() const override { return frames_.report(); }
+  [[nodiscard]] SourceReport report() const override;
 
  private:
   V4l2Source(SourceParameters parameters, const SourceSpec& spec, const SourceOptions& options,

@@ -99,6 +99,8 @@ bool VideoSource::read(Frame& frame) {
 
 SourceReport VideoSource::report() const {
   SourceReport report;
+  if (const std::string black = rectifier_->black_note(); !black.empty())
+    report.notes.push_back(file_.string() + ": " + black);
   if (without_time_ > 0) {
     report.summary.push_back(fmt::format(
         "{}: {} frames have no time of their own, or one that is not after the frame before: each was taken "

@@ -193,6 +193,45 @@ TEST_P(FoldingLens, ShowsNothingBeyondItsFold) {
   EXPECT_GT(beyond, 1000);
 }
 
+std::string error_of(const Calibration& c, const RectifierOptions& options = {}) {
+  try {
+    const Rectifier rectifier(c, options);
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+Calibration one_fisheye(const Distortion::Coefficients& k) {
+  Calibration c;
+  c.kind = SensorKind::kMono;
+  c.left = {{300, 300, 319.5, 239.5, 640, 480}, {DistortionModel::kEquidistant, k}};
+  return c;
+}
+
+/// Coefficients of another model, or in another order: the lens folds long before the image ends.
+TEST(Rectifier, RefusesALensThatLeavesMostOfTheImageBlack) {
+  EXPECT_NE(error_of(one_fisheye({-3, 0, 0, 0})).find("% are black"), std::string::npos)
+      << error_of(one_fisheye({-3, 0, 0, 0}));
+  EXPECT_EQ(error_of(one_fisheye({-0.01, 0.01, 0, 0})), "");
+  EXPECT_EQ(error_of(one_fisheye({-3, 0, 0, 0}), {.field = 1}), "") << "black is what was asked for";
+}
+
+TEST(Rectifier, SaysHowMuchOfTheImageIsBlack) {
+  EXPECT_EQ(Rectifier(euroc()).black_share(), 0);
+  EXPECT_EQ(Rectifier(euroc()).black_note(), "");
+  const Rectifier half(one_fisheye({-0.42, 0, 0, 0}));
+  int black = 0;
+  cv::Mat white(480, 640, CV_8UC1, cv::Scalar(255));
+  Frame out;
+  half.rectify({0, 0, white, {}, {}}, out);
+  black = 640 * 480 - cv::countNonZero(out.left);
+  EXPECT_GT(half.black_share(), 0.2) << "or this says nothing";
+  EXPECT_NEAR(half.black_share(), black / (640.0 * 480), 0.01);
+  EXPECT_EQ(half.black_note(), "of the rectified image " +
+                                   std::to_string(std::lround(100 * half.black_share())) + " % are black");
+}
+
 /// All four edges of a fisheye's image are behind it: the limit alone says how far the rectified one goes.
 TEST(Rectifier, TakesALensThatSeesToAllSides) {
   Calibration c;
@@ -213,15 +252,6 @@ TEST(Rectifier, MonoWithoutDistortionKeepsItsIntrinsics) {
   const Rectifier rectifier(c);
   EXPECT_TRUE(rectifier.passes_through());
   EXPECT_EQ(rectifier.rig().camera.fy, 510);
-}
-
-std::string error_of(const Calibration& c, const RectifierOptions& options = {}) {
-  try {
-    const Rectifier rectifier(c, options);
-  } catch (const std::runtime_error& e) {
-    return e.what();
-  }
-  return "";
 }
 
 TEST(Rectifier, RejectsWhatItCannotRectify) {
