@@ -1,10 +1,14 @@
 #include <CLI/CLI.hpp>
 #include <array>
 #include <memory>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "base/median.hpp"
 #include "doctor/camera.hpp"
 #include "doctor/disk.hpp"
 #include "doctor/machine.hpp"
@@ -57,11 +61,39 @@ Wanted wanted_of(const std::string& text) {
   return wanted;
 }
 
+SourceOptions source_options(const DoctorArguments& arguments) {
+  SourceOptions options;
+  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  return options;
+}
+
 void print(const Finding& finding) {
   static constexpr std::array kNames{"ok", "warn", "bad"};
   fmt::print("{:<4}  {:<15} {}\n", kNames[static_cast<std::size_t>(finding.health)], finding.subject,
              finding.state);
   if (!finding.remedy.empty()) fmt::print("      {:<15} -> {}\n", "", finding.remedy);
+}
+
+/// What recording such frames takes: their images, packed by nothing.
+double bytes_per_second(const Rig& rig, double fps) {
+  const int bytes_per_pixel = rig.kind == SensorKind::kStereo ? 2 : rig.kind == SensorKind::kRgbd ? 3 : 1;
+  return bytes_per_pixel * fps * rig.camera.width * rig.camera.height;
+}
+
+/// Of a recording at its own pace, by its first frames' times.
+double recorded_bytes_per_second(const DoctorArguments& arguments) {
+  constexpr std::size_t kFrames = 30;
+  constexpr double kUsualFps = 30;  // when a single frame says nothing
+  const auto source = open_source(arguments.source, source_options(arguments));
+  std::vector<std::int64_t> intervals;
+  Frame frame;
+  std::optional<std::int64_t> last_ns;
+  while (intervals.size() < kFrames && source->next(frame) == FrameStatus::kFrame) {
+    if (last_ns) intervals.push_back(frame.t_ns - *last_ns);
+    last_ns = frame.t_ns;
+  }
+  const std::int64_t usual = median(std::span(intervals));
+  return bytes_per_second(source->rig(), usual > 0 ? 1e9 / static_cast<double>(usual) : kUsualFps);
 }
 
 /// What became of the images that were asked for.
@@ -83,9 +115,7 @@ std::vector<Finding> look_at_pairs(const DoctorArguments& arguments) {
   constexpr int kCorners = 160;
   if (arguments.source.empty()) return {};
   if (arguments.calibration.empty() && is_camera(parse_source_spec(arguments.source))) return {};
-  SourceOptions options;
-  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
-  const auto source = open_source(arguments.source, options);
+  const auto source = open_source(arguments.source, source_options(arguments));
   if (source->rig().kind != SensorKind::kStereo) return {};
   RowOffsetMeter meter(source->rig(), kCorners);
   std::vector<RowOffset> offsets;
@@ -108,7 +138,10 @@ int examine(const DoctorArguments& arguments) {
       findings.push_back(std::move(finding));
   }
   for (Finding& finding : look_at_pairs(arguments)) findings.push_back(std::move(finding));
-  if (!arguments.folder.empty()) findings.push_back(check_disk(arguments.folder, wanted.bytes_per_second));
+  const bool recording = !arguments.source.empty() && wanted.cameras.empty();
+  if (!arguments.folder.empty())
+    findings.push_back(check_disk(
+        arguments.folder, recording ? recorded_bytes_per_second(arguments) : wanted.bytes_per_second));
   int exit_code = kOk;
   for (const Finding& finding : findings) {
     print(finding);
@@ -126,8 +159,10 @@ void add_doctor_command(CLI::App& app, int& exit_code) {
                       "Camera to run, e.g. v4l2:/dev/video0?size=640x480&fps=30, or a recording");
   command->add_option("--calib", arguments->calibration,
                       "Calibration of a stereo camera: says whether it still holds");
-  command->add_option("--record-to", arguments->folder,
-                      "Folder of recordings: measures how fast it can be written");
+  command->add_option(
+      "--record-to", arguments->folder,
+      "Folder of recordings: measures how fast it can be written, and says what SOURCE needs (without "
+      "one: a stereo camera of 640x480 at 30 fps)");
   command->add_option("--root", arguments->root, "Where proc and sys are (a tree to examine instead)")
       ->capture_default_str();
   command->callback([arguments, &exit_code] { exit_code = examine(*arguments); });

@@ -94,6 +94,20 @@ TEST(DoctorCommand, ReportsLineByLine) {
   expect_bad_input(run(folder, "doctor 'v4l2:/dev/video97?size=huge'"), "size='huge'");
 }
 
+/// Bytes of all images of a frame, times the frames of a second.
+TEST(DoctorCommand, ADiskIsComparedWithWhatTheSourceNeeds) {
+  const ScratchFolder folder;
+  const auto needs = [&](const std::string& source, const std::string& need) {
+    const Outcome outcome = run(folder, "doctor " + source + " --record-to " + folder.path().string());
+    EXPECT_NE(outcome.out.find("recording needs up to " + need + "\n"), std::string::npos) << outcome.out;
+  };
+  needs("", "18");
+  needs("'synthetic:desk?frames=6&width=1280&height=960&fps=30'", "74");
+  needs("'synthetic:desk?frames=6&width=1280&height=960&fps=15&sensor=mono'", "18");
+  needs("'synthetic:desk?frames=6&width=1280&height=960&fps=15&sensor=rgbd'", "55");
+  needs("'synthetic:desk?frames=1&width=1280&height=960&sensor=mono'", "37");
+}
+
 TEST(DoctorCommand, SaysThatImagesCannotBeRead) {
   const ScratchFolder folder;
   const std::string recording = folder / "recording";

@@ -405,9 +405,26 @@ TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   EXPECT_EQ(found["file"], folder_ / "auto/calibration.yaml");
   EXPECT_EQ(content(folder_ / "auto/calibration.yaml").find("readout"), std::string::npos);
   EXPECT_GT(found["readout_sigma_ms"].get<double>(), 0);
+  const Outcome anew = run(folder_, source + (folder_ / "auto") + "' --calib auto");
+  EXPECT_EQ(anew.exit_code, 0) << "a run may replace what it has found itself: " << anew.err;
   const Outcome again =
       run(folder_, source + (folder_ / "again") + "' --calib '" + (folder_ / "auto/calibration.yaml") + "'");
   EXPECT_EQ(again.exit_code, 0) << again.err;
+}
+
+TEST_F(RunCommand, SomebodysCalibrationInTheOutputFolderIsNotOverwritten) {
+  const std::string somebodys =
+      "sensor: mono\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n";
+  const auto refused = [&] {
+    fs::create_directories(folder_.path() / "result");
+    folder_.write("result/calibration.yaml", somebodys);
+    expect_bad_input(run_recording("--camera mono --calib auto"),
+                     "calibration.yaml: would be overwritten by what --calib auto finds");
+    EXPECT_EQ(content(folder_ / "result/calibration.yaml"), somebodys);
+  };
+  refused();
+  ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
+  refused();  // a run has left its mark there, but did not write this file
 }
 
 TEST_F(RunCommand, WhatDoesNotShowTheCalibrationIsRefused) {

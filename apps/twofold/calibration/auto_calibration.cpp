@@ -68,7 +68,7 @@ std::unique_ptr<FrameSource> open_with_auto_calibration(const std::string& text,
   const PinholeCamera& camera = source->rig().camera;
   result.found = *found;
   result.calibration = to_calibration(*found, camera.width, camera.height);
-  result.file = folder / "calibration.yaml";
+  result.file = folder / kCalibrationName;
   if (!source->is_live()) {
     options.preload = preload;
     source = open_source(text, options);
@@ -80,7 +80,7 @@ std::unique_ptr<FrameSource> open_with_auto_calibration(const std::string& text,
   }
   write_calibration(
       result.file, result.calibration,
-      {"none, the video itself", static_cast<int>(found->clips), found->corner_sigma_px, found->f_sigma, {}});
+      {kCalibratedByVideo, static_cast<int>(found->clips), found->corner_sigma_px, found->f_sigma, {}});
   return source;
 }
 

@@ -11,6 +11,10 @@
 
 namespace twofold {
 
+/// The file in the output folder, and what its `quality: board:` is.
+constexpr const char* kCalibrationName = "calibration.yaml";
+constexpr const char* kCalibratedByVideo = "none, the video itself";
+
 /// What `--calib auto` found.
 struct AutoCalibration {
   SelfCalibration found;

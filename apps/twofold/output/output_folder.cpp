@@ -2,8 +2,10 @@
 
 #include <array>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "apps/twofold/calibration/auto_calibration.hpp"
 #include "apps/twofold/map_parts.hpp"
 #include "engine/logs/schedule_log.hpp"
 #include "io/files/io_error.hpp"
@@ -34,6 +36,13 @@ bool is_of_a_run(const fs::path& folder) {
   return !earlier_summary(folder).is_null() || load_schedule(folder / "schedule.log").has_value();
 }
 
+/// That a run found by itself, and nobody has replaced since.
+bool is_own_calibration(const fs::path& folder) {
+  std::ifstream file(folder / kCalibrationName);
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  return is_of_a_run(folder) && text.find(kCalibratedByVideo) != std::string::npos;
+}
+
 void expect_not_of_source(const fs::path& folder, const std::string& source) {
   const auto path = path_of_source(source);
   std::error_code error;
@@ -57,13 +66,19 @@ void expect_output_folder(const fs::path& folder, const std::string& source) {
   for (const char* name : kResults) expect_free(name);
 }
 
+void expect_place_for_calibration(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(folder / kCalibrationName, error)) || is_own_calibration(folder)) return;
+  throw IoError(
+      folder / kCalibrationName,
+      "would be overwritten by what --calib auto finds, and no run into this folder has found it: name "
+      "another folder for --out, or move the file");
+}
+
 void remove_earlier_run(const fs::path& folder, const fs::path& calibration) {
   std::error_code error;
-  const nlohmann::json summary = earlier_summary(folder);
-  const fs::path own = folder / "calibration.yaml";  // a run's only if it calibrated itself
-  if (summary.is_object() && summary.value("self_calibration", nlohmann::json()).is_object() &&
-      !fs::equivalent(own, calibration, error))
-    fs::remove(own, error);
+  const fs::path own = folder / kCalibrationName;
+  if (is_own_calibration(folder) && !fs::equivalent(own, calibration, error)) fs::remove(own, error);
   for (const char* name : kResults) fs::remove(folder / name, error);
   for (const std::string name : kLogs) {
     fs::remove(folder / name, error);

@@ -12,6 +12,10 @@ namespace twofold {
 /// Nothing is changed.
 void expect_output_folder(const std::filesystem::path& folder, const std::string& source);
 
+/// Refuses (IoError) a folder whose calibration.yaml is not what an earlier run into it found by itself: one
+/// that calibrates itself writes another there.
+void expect_place_for_calibration(const std::filesystem::path& folder);
+
 /// What an earlier run into the folder wrote there by itself: should this one be killed, or end before it has
 /// anything to write, its folder holds nothing of another one's. Files that the user named, as maps, stay.
 /// For folders that expect_output_folder has let through.
