@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -33,6 +35,21 @@ int report(const CLI::App& app, const std::string& what, int exit_code) {
   const std::string line = fmt::format("{}: {}\n", app.get_name(), what.substr(0, what.find('\n')));
   (void)std::fputs(line.c_str(), stderr);  // which throws nothing when standard error is full
   return exit_code;
+}
+
+/// A message about subcommands says which word is none, and where they are listed.
+std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
+  std::string asked = app.get_name();
+  const CLI::App* command = &app;
+  for (auto inner = app.get_subcommands(); !inner.empty(); inner = command->get_subcommands()) {
+    command = inner.front();
+    asked += " " + command->get_name();
+  }
+  const std::string what = error.what();
+  if (what != "A subcommand is required") return what;
+  const std::vector<std::string> words = command->remaining();
+  return (words.empty() ? what : "'" + words.front() + "' is no subcommand") + "; " + asked +
+         " --help lists them";
 }
 
 /// `rule` in words after "must be".
@@ -63,8 +80,7 @@ int run_command_line(CLI::App& app, int argc, char** argv, const int& exit_code)
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help
-    const std::string hint = argc == 1 ? "; " + app.get_name() + " --help lists them" : "";
-    return report(app, e.what() + hint, kBadInput);
+    return report(app, usage_text(app, e), kBadInput);
   } catch (const WriteError& e) {
     return report(app, e.what(), kFailedRun);
   } catch (const IoError& e) {

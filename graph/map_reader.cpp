@@ -1,3 +1,5 @@
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 
 #include "graph/map_builder.hpp"
@@ -64,7 +66,8 @@ SavedMap load_map(const std::filesystem::path& file) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   std::ifstream in(file, std::ios::binary);
-  if (error || !in) throw MapFileError(file.string() + ": cannot be opened");
+  if (error) throw MapFileError(file.string() + ": cannot be opened: " + error.message());
+  if (!in) throw MapFileError(file.string() + ": cannot be opened: " + std::strerror(errno));
   return read_map(in, size, file.string());
 }
 

@@ -81,16 +81,17 @@ void bind_source(py::module_& module) {
       "bag:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. Iterating gives Frames; the "
       "interpreter runs on "
       "meanwhile.")
-      .def(py::init([](const std::string& name, const std::optional<std::filesystem::path>& calibration,
-                       bool preload, bool left_only) {
-             const py::gil_scoped_release unlocked;
-             return std::make_shared<Source>(name,
-                                             SourceSettings{calibration.value_or(""), preload, left_only});
-           }),
-           py::arg("name"), py::kw_only(), py::arg("calibration") = py::none(), py::arg("preload") = false,
-           py::arg("left_only") = false,
-           "calibration: file instead of the recording's own; preload: decode everything now; left_only: the "
-           "left camera alone, as Sensor.MONO. Raises RuntimeError.")
+      .def(
+          py::init([](const std::filesystem::path& name,
+                      const std::optional<std::filesystem::path>& calibration, bool preload, bool left_only) {
+            const py::gil_scoped_release unlocked;
+            return std::make_shared<Source>(name.string(),
+                                            SourceSettings{calibration.value_or(""), preload, left_only});
+          }),
+          py::arg("name"), py::kw_only(), py::arg("calibration") = py::none(), py::arg("preload") = false,
+          py::arg("left_only") = false,
+          "calibration: file instead of the recording's own; preload: decode everything now; left_only: the "
+          "left camera alone, as Sensor.MONO. Raises RuntimeError.")
       .def_property_readonly("rig", &Source::rig, py::return_value_policy::copy,
                              "CameraRig of all frames: size [px], focal lengths [px], baseline [m].")
       .def_property_readonly(

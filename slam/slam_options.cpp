@@ -35,7 +35,7 @@ void check_files(const SlamOptions& o, OptionCheck& check) {
   std::error_code ignored;
   check
       .rule(o.run_folder.empty() || std::filesystem::is_directory(o.run_folder),
-            "run_folder must be a folder")
+            "run_folder must be a folder that is there, is " + o.run_folder.string())
       .rule(o.schedule.empty() == (o.mode != RunMode::kReplay),
             "schedule and RunMode::kReplay belong together")
       .rule(o.run_folder.empty() ||

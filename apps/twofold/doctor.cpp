@@ -155,10 +155,13 @@ int examine(const DoctorArguments& arguments) {
 void add_doctor_command(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<DoctorArguments>();
   CLI::App* command = app.add_subcommand("doctor", "Say what on this machine will hurt real time");
-  command->add_option("SOURCE", arguments->source,
-                      "Camera to run, e.g. v4l2:/dev/video0?size=640x480&fps=30, or a recording");
-  command->add_option("--calib", arguments->calibration,
-                      "Calibration of a stereo camera: says whether it still holds");
+  CLI::Option* source =
+      command->add_option("SOURCE", arguments->source,
+                          "Camera to run, e.g. v4l2:/dev/video0?size=640x480&fps=30, or a recording");
+  command
+      ->add_option("--calib", arguments->calibration,
+                   "Calibration of a stereo camera: says whether it still holds")
+      ->needs(source);
   command->add_option(
       "--record-to", arguments->folder,
       "Folder of recordings: measures how fast it can be written, and says what SOURCE needs (without "

@@ -7,6 +7,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/interrupt.hpp"
+#include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/record_session.hpp"
 #include "engine/clock.hpp"
 #include "io/files/calibration_file.hpp"
@@ -46,6 +47,7 @@ int record(const RecordArguments& arguments) {
   options.raw = true;
   options.stop = &interrupted();
   if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  expect_not_of_source(arguments.out, arguments.source, "OUT");
   catch_interrupts();
   const std::unique_ptr<FrameSource> source = open_source(arguments.source, options);
   RecorderOptions recorder_options;

@@ -294,6 +294,7 @@ int run(const RunArguments& arguments) {
   std::optional<Schedule> schedule = schedule_of(arguments);
   expect_place_for_trace(arguments.trace);
   expect_output_folder(arguments.out, arguments.source);
+  expect_not_of_source(arguments.record, arguments.source, "--record");
   if (calibrates_itself(arguments)) expect_place_for_calibration(arguments.out);
   prepare_output_folder(arguments.out);
   std::optional<AutoCalibration> calibration;

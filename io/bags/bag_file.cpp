@@ -15,7 +15,9 @@ BagFile::BagFile(const std::filesystem::path& file) : name_(file.string()) {
   const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat status {};
   if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
+    const bool folder = descriptor >= 0 && S_ISDIR(status.st_mode);
     if (descriptor >= 0) (void)close(descriptor);
+    if (folder) throw IoError(file, "is a folder, not a file");
     throw IoError(file, "no such file, or it cannot be read");
   }
   const auto size = static_cast<std::size_t>(status.st_size);

@@ -288,6 +288,8 @@ Calibration read_calibration(const fs::path& file) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) {
     const fs::path cam0 = euroc_sensor_file(file, "cam0"), cam1 = euroc_sensor_file(file, "cam1");
+    if (!fs::exists(cam0, ignored))
+      throw IoError(file, "is a folder without cam0/sensor.yaml (EuRoC's): give a calibration file");
     return fs::exists(cam1, ignored) ? read_euroc_calibration(cam0, cam1) : read_calibration(cam0);
   }
   if (!fs::is_regular_file(file, ignored)) throw IoError(file, "no such calibration file");

@@ -161,10 +161,15 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   return files;
 }
 
-void expect_size(const fs::path& file, const cv::Mat& image, const PinholeCamera& camera) {
+void expect_size(const fs::path& file, const cv::Mat& image, const PinholeCamera& camera,
+                 const fs::path& calibration) {
   if (image.cols == camera.width && image.rows == camera.height) return;
-  throw IoError(file, fmt::format("the image is {}x{}, the calibration or the first image says {}x{}",
-                                  image.cols, image.rows, camera.width, camera.height));
+  std::error_code ignored;
+  const std::string by = !fs::is_regular_file(calibration, ignored)
+                             ? "the calibration or the first image says"
+                             : fmt::format("the calibration ({}) is for", calibration.string());
+  throw IoError(file, fmt::format("the image is {}x{}, {} {}x{}", image.cols, image.rows, by, camera.width,
+                                  camera.height));
 }
 
 }  // namespace twofold

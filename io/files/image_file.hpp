@@ -35,7 +35,9 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 
 /// Throws IoError naming the file when the image does not have the camera's size, which its calibration or
 /// the recording's first image said.
-void expect_size(const std::filesystem::path& file, const cv::Mat& image, const PinholeCamera& camera);
+/// @param calibration  the file, where it said so; else, if it is no file, that is not known
+void expect_size(const std::filesystem::path& file, const cv::Mat& image, const PinholeCamera& camera,
+                 const std::filesystem::path& calibration = {});
 
 /// Files in `folder` with an image's extension (png, jpg, jpeg, pgm, ppm, tif, tiff, bmp, webp), sorted by
 /// name: numbers in names by value, and names that are decimal numbers altogether by theirs. Throws IoError

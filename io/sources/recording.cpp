@@ -134,7 +134,7 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
   if (grey_bits_ < 16) recording_.notes.push_back(grey_levels_note(recording_.folder.string(), grey_bits_));
   set_missing_size(first.cols, first.rows, &recording_.calibration);
   expect_valid(recording_.calibration_file, recording_.calibration);
-  expect_size(first_file, first, recording_.calibration.left.pinhole);
+  expect_size(first_file, first, recording_.calibration.left.pinhole, recording_.calibration_file);
   try {
     rectifier_.emplace(recording_.calibration);
   } catch (const std::runtime_error& e) {

@@ -18,14 +18,14 @@ VideoSource::VideoSource(const std::filesystem::path& file,
   take_layout(parameters);
   const auto fps = parameters.take_number("fps");
   if (fps && !(*fps > 0)) throw IoError(parameters.subject(), fmt::format("fps={} must be positive", *fps));
+  if (!capture_.open(file.string(), cv::CAP_FFMPEG))
+    throw IoError(file, "is not a video that can be decoded");
   const SensorKind kind = side_by_side_ ? SensorKind::kStereo : SensorKind::kMono;
   Calibration base;
   if (calibration) base = read_calibration(*calibration);
   Calibration used = with_parameters(base, calibration.has_value(), kind, parameters);
   const std::filesystem::path calibration_file = calibration.value_or(parameters.subject());
 
-  if (!capture_.open(file.string(), cv::CAP_FFMPEG))
-    throw IoError(file, "is not a video that can be decoded");
   capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);  // a rolling shutter reads the sensor's rows
   const int width = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)) / (side_by_side_ ? 2 : 1);
   const int height = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT));

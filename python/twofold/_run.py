@@ -6,6 +6,7 @@ import atexit
 import threading
 import weakref
 from collections.abc import Iterator
+from os import PathLike
 from types import TracebackType
 from typing import Any
 
@@ -45,8 +46,8 @@ class Run:
     a context manager, it ends with the block.
     """
 
-    def __init__(self, source: str | Source, **options: Any) -> None:
-        self.source = Source(source) if isinstance(source, str) else source
+    def __init__(self, source: str | PathLike[str] | Source, **options: Any) -> None:
+        self.source = source if isinstance(source, Source) else Source(source)
         mode = options.get("mode", RunMode.THREADED)
         if mode == RunMode.STEPPED:
             raise ValueError("run() takes no steps: RunMode.STEPPED is for a Slam of your own")
@@ -93,7 +94,7 @@ class Run:
             self.finish()
 
 
-def run(source: str | Source, **options: Any) -> Run:
+def run(source: str | PathLike[str] | Source, **options: Any) -> Run:
     """Tracks a source, given as on the command line or opened before. Options are those of Slam; `live` follows the source."""
     return Run(source, **options)
 

@@ -178,3 +178,14 @@ def test_rows_of_a_trajectory_are_checked() -> None:
         twofold.Trajectory([1, 2, 2], positions, orientations)
     rounded = orientations * 0.999
     np.testing.assert_array_equal(twofold.Trajectory(t_ns, positions, rounded).orientations, orientations)
+
+
+def test_sources_may_be_paths(tmp_path: Path) -> None:
+    sources: list[Path | str] = [tmp_path / "none", str(tmp_path / "none")]
+    for source in sources:
+        with pytest.raises(RuntimeError, match="none: no such file or folder"):
+            twofold.run(source)
+        with pytest.raises(RuntimeError, match="none: no such file or folder"):
+            twofold.Source(source)
+    with pytest.raises(TypeError):
+        twofold.run(5)  # type: ignore[arg-type]

@@ -597,7 +597,8 @@ TEST_F(SlamTest, OptionsAndRigsThatMakeNoSenseAreNamed) {
   expect(what_is_wrong(rig(), {.mapper_cpu = -1}), "options.mapper_cpu");
   expect(what_is_wrong(rig(), {.loop_closer_cpu = -1}), "options.loop_closer_cpu");
   expect(what_is_wrong(rig(), {.fifo_priority = 100}), "options.fifo_priority");
-  expect(what_is_wrong(rig(), {.run_folder = "/nowhere/at.all"}), "options.run_folder must be a folder");
+  expect(what_is_wrong(rig(), {.run_folder = "/nowhere/at.all"}),
+         "options.run_folder must be a folder that is there, is /nowhere/at.all");
   expect(what_is_wrong(rig(), {.kept_frames = 0}), "options.kept_frames");
   EXPECT_EQ(SlamOptions().invalid_reason(), "");
   EXPECT_EQ(SlamOptions{.kept_frames = 0}.invalid_reason(), "kept_frames must be >= 1, is 0");

@@ -154,6 +154,7 @@ PosePairing pair_by_line(const std::string& estimate_file, const std::string& tr
 
 PosePairing pair_poses(const std::string& estimate, const std::string& truth,
                        std::int64_t max_difference_ns) {
+  if (fs::is_directory(estimate)) throw IoError(estimate, "is a folder: give its trajectory.txt");
   if (!fs::is_regular_file(estimate)) throw IoError(estimate, "no such trajectory file");
   const bool by_line = has_form(estimate, TrajectoryForm::kKitti);
   if (by_line == has_form(truth, TrajectoryForm::kKitti))

@@ -43,17 +43,17 @@ bool is_own_calibration(const fs::path& folder) {
   return is_of_a_run(folder) && text.find(kCalibratedByVideo) != std::string::npos;
 }
 
-void expect_not_of_source(const fs::path& folder, const std::string& source) {
+}  // namespace
+
+void expect_not_of_source(const fs::path& folder, const std::string& source, const std::string& option) {
   const auto path = path_of_source(source);
   std::error_code error;
   if (!path || !fs::equivalent(folder, *path, error)) return;
-  throw IoError(folder, "is the folder of the source: --out must name another one");
+  throw IoError(folder, "is the folder of the source: " + option + " must name another one");
 }
 
-}  // namespace
-
 void expect_output_folder(const fs::path& folder, const std::string& source) {
-  expect_not_of_source(folder, source);
+  expect_not_of_source(folder, source, "--out");
   if (is_of_a_run(folder)) return;
   const auto expect_free = [&](const char* name) {
     std::error_code error;

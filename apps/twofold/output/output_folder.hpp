@@ -12,6 +12,10 @@ namespace twofold {
 /// Nothing is changed.
 void expect_output_folder(const std::filesystem::path& folder, const std::string& source);
 
+/// Refuses (IoError) the folder of the source itself, links followed, for what `option` names.
+void expect_not_of_source(const std::filesystem::path& folder, const std::string& source,
+                          const std::string& option);
+
 /// Refuses (IoError) a folder whose calibration.yaml is not what an earlier run into it found by itself: one
 /// that calibrates itself writes another there.
 void expect_place_for_calibration(const std::filesystem::path& folder);

@@ -21,6 +21,7 @@
 #include "io/files/trajectory_file.hpp"
 #include "io/plots/plot.hpp"
 #include "io/sources/open_source.hpp"
+#include "io/sources/source_path.hpp"
 #include "surface/mesh_picture.hpp"
 #include "surface/meshing.hpp"
 #include "surface/stereo/stereo_depth.hpp"
@@ -97,6 +98,9 @@ void expect_within_reach(const SurfaceJob& job, double voxel) {
 SurfaceJob surface_job(const SurfaceArguments& arguments) {
   SurfaceJob job;
   const bool is_run = fs::is_regular_file(fs::path(arguments.input) / "summary.json");
+  const auto source_path = path_of_source(arguments.input);
+  if (!is_run && source_path && !fs::exists(*source_path))
+    throw IoError(*source_path, "no such file or folder");
   if (!is_run && arguments.poses.empty())
     throw IoError(arguments.input,
                   "is not the folder of a finished run: give --poses truth, or a trajectory");

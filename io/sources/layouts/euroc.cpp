@@ -111,6 +111,8 @@ void take_euroc_truth(const fs::path& mav, const std::optional<fs::path>& calibr
 Recording read_euroc_recording(const fs::path& folder, const std::optional<fs::path>& calibration,
                                SourceParameters& parameters) {
   const fs::path mav = fs::exists(folder / "mav0") ? folder / "mav0" : folder;
+  if (!fs::exists(mav / "cam0" / "data.csv") && mav == folder)
+    throw IoError(folder, "holds neither mav0 nor cam0/data.csv, as EuRoC's recordings do");
   const bool has_right = fs::exists(mav / "cam1");
   const bool stereo = has_right && !parameters.left_only();
   const bool right_known = stereo || (has_right && fs::exists(mav / "cam1" / "sensor.yaml"));

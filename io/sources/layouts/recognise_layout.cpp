@@ -125,6 +125,10 @@ bool is_image(const fs::path& path) {
 std::string advice_for(const fs::path& folder) {
   constexpr int kLevels = 2;
   if (const std::string advice = bag_folder_advice(folder); !advice.empty()) return advice;
+  if (std::error_code ignored;
+      fs::exists(folder / "summary.json", ignored) && fs::exists(folder / "trajectory.txt", ignored))
+    return "is the output folder of a run: give the run's source, or, for eval, a trajectory in it "
+           "(groundtruth.txt)";
   if (is_folder(folder / "image_00" / "data"))
     return "is of KITTI's raw data, which is not read whole: 'images:DIR/image_00/data?fps=10&fx=..' runs "
            "one camera of it, KITTI odometry has many of these drives as pairs";

@@ -153,7 +153,7 @@ TEST(BagReader, SaysWhatIsWrong) {
   EXPECT_IO_ERROR(rosbag(text), "some.bag: is no bag of format 2.0");
   EXPECT_IO_ERROR(mcap({}), "is no MCAP file");
   EXPECT_IO_ERROR(open_mcap("/nowhere/at.all"), "/nowhere/at.all: no such file");
-  EXPECT_IO_ERROR(open_rosbag("/dev"), "/dev: no such file");
+  EXPECT_IO_ERROR(open_rosbag("/dev"), "/dev: is a folder, not a file");
   const WrittenBag bag = stereo_bag(MessageEncoding::kCdr);
   Bytes file = mcap_file(bag, {.compression = "zstd", .checksums = false});
   const std::string packer = "zstd";
