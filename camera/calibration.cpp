@@ -14,6 +14,9 @@ std::string invalid_stereo(const Calibration& c) {
     return "T_right_left: the right camera must look the same way as the left one";
   const Vector3 right_in_left = c.T_right_left.inverse().translation();
   if (!(right_in_left.norm() > 1e-4)) return "T_right_left: the baseline must be longer than 0.1 mm";
+  if (right_in_left.norm() > kLongestBaseline)
+    return "T_right_left: the baseline is " + std::to_string(right_in_left.norm()) +
+           " m: was it given in millimetres?";
   if (right_in_left.x() < 0.5 * right_in_left.norm()) {
     return "T_right_left: the right camera must lie mainly along +x of the left one; its position there is "
            "(" +

@@ -18,6 +18,9 @@ struct DepthCamera {
   SE3 T_left_depth;  ///< its pose in the left (the only other) camera [m]
 };
 
+/// No pair that anything carries stands farther apart [m]: a longer baseline is in millimetres.
+constexpr double kLongestBaseline = 20;
+
 /// What a calibration file says about a sensor, before rectification. `Rectifier` turns it into a Rig.
 struct Calibration {
   SensorKind kind = SensorKind::kStereo;

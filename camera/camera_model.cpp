@@ -9,6 +9,19 @@ namespace {
 constexpr int kLargestSide =
     16384;  // maps for two such images take four gigabytes: a file's mistake costs more
 
+/// Focal lengths of millimetres, normalised ones, and slips of a digit.
+std::string strange_focal_length(const PinholeCamera& p) {
+  constexpr double kShortest = 0.05;  // of the width: a fisheye that sees all around has three times as much
+  constexpr double kMostApart = 3;    // fields of half the rows have 2
+  const std::string both = std::to_string(p.fx) + ", " + std::to_string(p.fy);
+  if (p.fx < kShortest * p.width)
+    return "fx, fy are focal lengths in pixels, of an image " + std::to_string(p.width) + " wide; they are " +
+           both;
+  if (p.fx > kMostApart * p.fy || p.fy > kMostApart * p.fx)
+    return "fx, fy must be nearly the same, are " + both;
+  return {};
+}
+
 /// Whether a circle around the principal point can be seen: so much of the largest that fits into the image.
 bool sees_its_middle(const CameraModel& camera, double share) {
   const PinholeCamera& p = camera.pinhole;
@@ -35,6 +48,7 @@ std::string CameraModel::invalid_reason() const {
     return "image size must be within " + std::to_string(kLargestSide) + " a side, is " +
            std::to_string(pinhole.width) + " x " + std::to_string(pinhole.height);
   }
+  if (auto reason = strange_focal_length(pinhole); !reason.empty()) return reason;
   // Outside of a part that was cut out of a larger image, but not far from it.
   const auto near = [](double c, int size) { return c >= -size && c <= 2.0 * size; };
   if (!near(pinhole.cx, pinhole.width) || !near(pinhole.cy, pinhole.height)) {

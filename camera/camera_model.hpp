@@ -13,10 +13,11 @@ struct CameraModel {
   PinholeCamera pinhole;  ///< intrinsics and size of the raw image
   Distortion distortion;
 
-  /// Empty when valid; otherwise names the field, the rule and the value. The principal point lies within an
-  /// image's size of the image. A rational lens must be one that sees the right, left, upper and lower end
-  /// of the largest circle around the principal point that fits into the image, a radtan lens those of two
-  /// fifths of it: coefficients of another lens, or in another order, fold the image over before that.
+  /// Empty when valid; otherwise names the field, the rule and the value. fx and fy are of one size,
+  /// and not of millimetres. The principal point lies within an image's size of the image. A rational lens
+  /// must be one that sees the right, left, upper and lower end of the largest circle around the principal
+  /// point that fits into the image, a radtan lens those of two fifths of it: coefficients of another lens,
+  /// or in another order, fold the image over before that.
   [[nodiscard]] std::string invalid_reason() const;
 
   /// Raw pixel of a point in the camera frame [m]; x_c.z() must be positive.

@@ -50,8 +50,8 @@ struct CameraRig {
   double fy = 0;        ///< [px] > 0
   double cx = 0;        ///< [px]
   double cy = 0;        ///< [px]
-  double baseline = 0;  ///< [m] > 0; RGB-D: of the virtual right camera that turns depth into disparity, say
-                        ///< 0.08; kMono: unused
+  double baseline = 0;  ///< [m] in (0, 20]; RGB-D: of the virtual right camera that turns depth into
+                        ///< disparity, say 0.08; kMono: unused
   /// Metres per unit of the depth image, > 0; stereo: of the depth that a surface is made of, which ends at
   /// 65535 of them.
   double depth_unit = 0.001;

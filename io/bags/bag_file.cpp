@@ -21,11 +21,14 @@ BagFile::BagFile(const std::filesystem::path& file) : name_(file.string()) {
     throw IoError(file, "no such file, or it cannot be read");
   }
   const auto size = static_cast<std::size_t>(status.st_size);
+  if (size == 0) {
+    (void)close(descriptor);
+    throw IoError(file, "the file is empty");
+  }
   // The pages are read as they are used, and are the kernel's to drop.
-  void* const data = size == 0 ? nullptr : mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor, 0);
+  void* const data = mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor, 0);
   (void)close(descriptor);
   if (data == MAP_FAILED) throw IoError(file, "cannot be read");
-  if (data == nullptr) return;
   (void)madvise(data, size, MADV_SEQUENTIAL);
   bytes_ = {static_cast<const std::uint8_t*>(data), size};
   mapped_ = true;

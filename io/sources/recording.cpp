@@ -58,6 +58,8 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
   if (const auto depth = parameters.take_positive("depth_max")) calibration.depth_max = *depth;
   if (const auto readout = parameters.take_number("readout")) calibration.readout = *readout;
   const auto baseline = parameters.take_positive("baseline");
+  if (kind == SensorKind::kMono && baseline && !parameters.left_only())
+    throw IoError(parameters.subject(), "parameter baseline: is for two cameras, but there is one");
   if (kind == SensorKind::kRgbd && baseline) calibration.virtual_baseline = *baseline;
   if (kind == SensorKind::kStereo && baseline) {
     calibration.right = calibration.left;

@@ -82,6 +82,21 @@ TEST(WrongInput, ACalibrationOfAnotherSizeIsNamed) {
                    "000000.png: the image is 64x48, the calibration (" + file + ") is for 640x480");
 }
 
+TEST(WrongInput, NumbersOfOnePairForOneCameraAndTheOtherWayRound) {
+  const ScratchFolder folder;
+  write_recording(folder, "kitti");
+  const std::string camera = "fx=50&fy=50&cx=32&cy=24";
+  expect_bad_input(
+      run(folder, "run 'images:" + (folder / "kitti/image_0") + "?fps=10&baseline=0.1&" + camera + "'"),
+      "parameter baseline: is for two cameras, but there is one");
+  const std::string file =
+      folder
+          .write("mono.yaml", "sensor: mono\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n")
+          .string();
+  expect_bad_input(run(folder, "run " + (folder / "kitti") + " --calib " + file),
+                   "mono.yaml: is not for a stereo camera, but there is a folder image_1");
+}
+
 /// A second layout in a recording's folder would be taken for the recording from then on.
 TEST(WrongInput, NothingIsRecordedIntoTheSource) {
   const ScratchFolder folder;

@@ -254,6 +254,19 @@ TEST(Rectifier, MonoWithoutDistortionKeepsItsIntrinsics) {
   EXPECT_EQ(rectifier.rig().camera.fy, 510);
 }
 
+TEST(Rectifier, RejectsLengthsInOtherUnits) {
+  Calibration c = euroc();
+  c.T_right_left = SE3(c.T_right_left.so3(), 1000 * c.T_right_left.translation());
+  EXPECT_NE(error_of(c).find("was it given in millimetres?"), std::string::npos) << error_of(c);
+  c = euroc();
+  c.left.pinhole.fx = c.left.pinhole.fy = 3.6;
+  EXPECT_NE(error_of(c).find("focal lengths in pixels, of an image 752 wide"), std::string::npos)
+      << error_of(c);
+  c = euroc();
+  c.left.pinhole.fx *= 10;
+  EXPECT_NE(error_of(c).find("fx, fy must be nearly the same"), std::string::npos) << error_of(c);
+}
+
 TEST(Rectifier, RejectsWhatItCannotRectify) {
   Calibration c = euroc();
   c.right.pinhole.fx = 0;

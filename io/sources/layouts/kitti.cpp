@@ -118,8 +118,10 @@ Recording read_kitti_recording(const fs::path& folder, const std::optional<fs::p
   recording.calibration = read_cameras(recording.calibration_file, cameras);
   if (stereo && recording.calibration.kind != SensorKind::kStereo) {
     throw IoError(recording.calibration_file,
-                  fmt::format("key '{}' is missing: there is a folder {}, but no right camera",
-                              cameras.right_key, cameras.right));
+                  calibration
+                      ? fmt::format("is not for a stereo camera, but there is a folder {}", cameras.right)
+                      : fmt::format("key '{}' is missing: there is a folder {}, but no right camera",
+                                    cameras.right_key, cameras.right));
   }
   if (!has_right) recording.calibration.kind = SensorKind::kMono;
 

@@ -153,6 +153,9 @@ TEST(BagReader, SaysWhatIsWrong) {
   EXPECT_IO_ERROR(rosbag(text), "some.bag: is no bag of format 2.0");
   EXPECT_IO_ERROR(mcap({}), "is no MCAP file");
   EXPECT_IO_ERROR(open_mcap("/nowhere/at.all"), "/nowhere/at.all: no such file");
+  const ScratchFolder scratch;
+  EXPECT_IO_ERROR(open_rosbag(scratch.write("empty.bag", "")), "empty.bag: the file is empty");
+  EXPECT_IO_ERROR(open_mcap(scratch.write("empty.mcap", "")), "empty.mcap: the file is empty");
   EXPECT_IO_ERROR(open_rosbag("/dev"), "/dev: is a folder, not a file");
   const WrittenBag bag = stereo_bag(MessageEncoding::kCdr);
   Bytes file = mcap_file(bag, {.compression = "zstd", .checksums = false});
