@@ -74,8 +74,8 @@ Rig to_rig(const CameraRig& rig) {
   inside.kind = kind_of(rig.sensor);
   inside.camera = {rig.fx, rig.fy, rig.cx, rig.cy, rig.width, rig.height};
   if (rig.sensor != Sensor::kMono) {
-    expect(positive(rig.baseline) && rig.baseline <= kLongestBaseline, "baseline",
-           "> 0 and at most 20 (metres)", rig.baseline);
+    expect(positive(rig.baseline) && rig.baseline <= kLongestBaseline, "baseline", "in (0, 20]",
+           rig.baseline);
     inside.baseline = rig.baseline;
   }
   if (rig.readout)

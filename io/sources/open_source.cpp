@@ -91,6 +91,7 @@ std::unique_ptr<FrameSource> only_range(std::unique_ptr<FrameSource> source, con
 std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOptions& options) {
   std::error_code error;
   if (!fs::is_regular_file(spec.argument, error)) throw IoError(spec.argument, "no such video file");
+  expect_no_sqlite_bag(spec.argument);
   SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
   const FrameRange range = parameters.take_range();
   auto source = std::make_unique<VideoSource>(spec.argument, options.calibration, parameters);
@@ -100,6 +101,7 @@ std::unique_ptr<FrameSource> open_video(const SourceSpec& spec, const SourceOpti
 
 Opener bag_opener(std::unique_ptr<BagReader> (*open)(const fs::path&)) {
   return [open](const SourceSpec& spec, const SourceOptions& options) -> std::unique_ptr<FrameSource> {
+    expect_no_sqlite_bag(spec.argument);
     SourceParameters parameters(spec.text, spec.parameters, options.suppose_camera, options.left_only);
     const FrameRange range = parameters.take_range();
     auto source =

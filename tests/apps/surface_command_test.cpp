@@ -222,7 +222,9 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
     expect_bad_input(run(folder, "run " + kScene + " --quiet " + option + to), "requires --surface");
   expect_bad_input(run(folder, "surface " + kScene + " --poses truth --depth-noise 2" + to),
                    "twofold surface: depth_noise must be");
-  expect_bad_input(run(folder, "surface '" + (folder / "nothing") + "'"), "not the folder of a finished run");
+  expect_bad_input(run(folder, "surface '" + (folder / "nothing") + "'"), "nothing: no such file or folder");
+  expect_bad_input(run(folder, "surface '" + folder.path().string() + "'"),
+                   "not the folder of a finished run");
   expect_bad_input(run(folder, "surface 'synthetic:desk?sensor=mono&frames=5' --poses truth" + to),
                    "no depth");
   expect_bad_input(

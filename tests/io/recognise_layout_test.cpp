@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "io/sources/open_source.hpp"
 #include "tests/io/scratch_folder.hpp"
 
 namespace twofold {
@@ -90,6 +91,8 @@ TEST(RecogniseLayout, BagsOfRos2InSqliteSayHowToConvertThem) {
   EXPECT_IO_ERROR(recognise_layout(folder / "walk/walk_0.db3"),
                   "walk_0.db3: is a ROS 2 bag in SQLite's form, which is not read: 'mcap convert walk_0.db3 "
                   "walk_0.mcap' or 'ros2 bag convert'");
+  for (const char* scheme : {"mcap:", "bag:", "video:"})
+    EXPECT_IO_ERROR(open_source(scheme + (folder / "walk/walk_0.db3")), "is a ROS 2 bag in SQLite's form");
   EXPECT_IO_ERROR(recognise_layout(folder / "walk"), "walk_0.db3 in it is a ROS 2 bag in SQLite's form");
   folder.write("split/metadata.yaml", "rosbag2_bagfile_information:");
   folder.write("split/split_0.db3.zstd", "x");

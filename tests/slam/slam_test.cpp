@@ -571,7 +571,9 @@ TEST_F(SlamTest, OptionsAndRigsThatMakeNoSenseAreNamed) {
   };
   CameraRig rig_without_baseline = rig();
   rig_without_baseline.baseline = 0;
-  expect(what_is_wrong(rig_without_baseline, {}), "rig.baseline must be > 0, is 0");
+  expect(what_is_wrong(rig_without_baseline, {}), "rig.baseline must be in (0, 20], is 0");
+  rig_without_baseline.baseline = 110;  // millimetres
+  expect(what_is_wrong(rig_without_baseline, {}), "rig.baseline must be in (0, 20], is 110");
   CameraRig rig_without_focus = rig();
   rig_without_focus.fx = std::numeric_limits<double>::quiet_NaN();
   expect(what_is_wrong(rig_without_focus, {}), "rig.fx");

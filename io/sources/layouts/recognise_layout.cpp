@@ -156,11 +156,15 @@ void expect_folder(const fs::path& folder) {
     throw IoError(folder, error ? "cannot be read" : "the folder is empty");
 }
 
+void expect_no_sqlite_bag(const fs::path& file) {
+  if (is_sqlite_bag(file)) throw IoError(file, sqlite_bag_advice(file));
+}
+
 std::string recognise_layout(const fs::path& path) {
   std::error_code error;
   if (fs::is_regular_file(path, error)) {
     if (is_archive(path)) throw IoError(path, "is an archive: unpack it, and give the recording's folder");
-    if (is_sqlite_bag(path)) throw IoError(path, sqlite_bag_advice(path));
+    expect_no_sqlite_bag(path);
     return path.extension() == ".mcap" ? "mcap" : path.extension() == ".bag" ? "bag" : "video";
   }
   if (fs::is_character_file(path, error)) return "v4l2";

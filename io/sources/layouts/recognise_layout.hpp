@@ -12,6 +12,9 @@ namespace twofold {
 /// a dataset's folder of sequences, at a part of a recording, it says what to give instead.
 [[nodiscard]] std::string recognise_layout(const std::filesystem::path& path);
 
+/// Throws IoError for ROS 2's bags in SQLite's form, which nothing here reads, and says how to convert them.
+void expect_no_sqlite_bag(const std::filesystem::path& file);
+
 /// Throws IoError unless there is such a folder, which can be read, and something in it.
 void expect_folder(const std::filesystem::path& folder);
 
