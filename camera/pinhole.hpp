@@ -1,22 +1,18 @@
 #pragma once
 
-#include <algorithm>
 #include <optional>
 
 #include "geometry/types.hpp"
 
 namespace twofold {
 
-/// Whether a point in the camera frame can be looked for in an image: no real point is nearer to a camera
-/// than a millimetre, and one behind it has no projection.
-inline constexpr double kNearestDepth = 1e-3;  ///< [m]
+/// Whether a point in the camera frame can be looked for in an image: one behind the camera has no
+/// projection, and none that a pinhole camera sees lies straight to its side. How far away it is does not
+/// count, because one camera's unit is arbitrary: who starts high above the ground lands at a thousandth of
+/// it. So x_c may have any length, as inverse depth coordinates give it, h = q x_c.
 [[nodiscard]] inline bool in_front_of_camera(const Vector3& x_c) {
-  return x_c.z() > kNearestDepth;
-}
-/// The same of a point that may be infinitely far, h = q x_c with its inverse depth q in its anchor [1/m]:
-/// from a metre on its ray, as far forward.
-[[nodiscard]] inline bool in_front_of_camera(const Vector3& h, double q) {
-  return h.z() > kNearestDepth * std::max(q, 1.0);
+  constexpr double kFlattest = 1e-3;  // depth over how far aside: no image is 2000 focal lengths wide
+  return x_c.z() > kFlattest * x_c.head<2>().lpNorm<Eigen::Infinity>();
 }
 
 /// Pinhole camera without distortion  (thesis eq. 3.3, with fx != fy allowed).

@@ -9,13 +9,13 @@
 
 namespace twofold {
 
-/// Solvers take a point nearer to the image plane than this for one behind the camera [m]. Far above
-/// rounding, but far below in_front_of_camera, so that a step may bring any point that was looked for
-/// somewhat nearer.
+/// Solvers take a point nearer to the image plane than this for one behind the camera [m; of one camera, the
+/// median depth that its map began with]. Far above rounding, but far below any depth that is seen, so that a
+/// step may bring a point somewhat nearer.
 inline constexpr double kSolverMinDepth = 1e-6;
 
-/// Smallest inverse depth the solvers let a point take [1/m]: points at infinity stay representable and
-/// never slip through it to behind the camera.
+/// Smallest inverse depth the solvers let a point take, in the inverse of that unit: points at infinity stay
+/// representable and never slip through it to behind the camera.
 inline constexpr double kMinInverseDepth = 1e-6;
 
 /// Diagonal by which a point's 3x3 system is damped: its own, with a floor that keeps the system regular when

@@ -118,7 +118,7 @@ class PoseConsensus::ThreePoints {
     const ObservationLanes inv_z = 1.0 / z;
     const ObservationLanes du = camera_.fx * x * inv_z + (camera_.cx - b.u);
     const ObservationLanes dv = camera_.fy * y * inv_z + (camera_.cy - b.v);
-    squared_errors = z > kNearestDepth ? b.information * (du * du + dv * dv) : ObservationLanes{} + kFarOff;
+    squared_errors = z > 0 ? b.information * (du * du + dv * dv) : ObservationLanes{} + kFarOff;
   }
 
   const PinholeCamera& camera_;

@@ -106,7 +106,7 @@ double AnchoredViews::cost() const {
     for (const SeenPoint& seen : view.seen) {
       const Vector3& psi = points[static_cast<std::size_t>(seen.point)].psi;
       const Vector3 h = project.ray(psi);
-      if (!in_front_of_camera(h, psi.z())) return kImpossible;
+      if (!in_front_of_camera(h)) return kImpossible;
       const Vector3 d = seen.pixel - project.pixel(h, psi);
       sum += rig.kind == SensorKind::kMono ? d.head<2>().squaredNorm() : d.squaredNorm();
     }
@@ -126,7 +126,7 @@ bool AnchoredViews::add_view(std::size_t v, Equations& equations) const {
     const auto j = static_cast<std::size_t>(seen.point);
     const Vector3& psi = points[j].psi;
     const Vector3 h = project.ray(psi);
-    if (!in_front_of_camera(h, psi.z())) return false;
+    if (!in_front_of_camera(h)) return false;
     const Eigen::Matrix<double, kRows, 1> d = (seen.pixel - project.pixel(h, psi)).template head<kRows>();
     const Eigen::Matrix<double, kRows, 3> J_h = project.by_ray(h, psi).template topRows<kRows>();
     Eigen::Matrix<double, kRows, 6> J_T;

@@ -20,7 +20,7 @@ std::optional<InverseDepthProjection> project_inverse_depth(const Rig& rig, cons
   const Matrix3 R = T_c_a.rotation();
   const Vector3& t = T_c_a.translation();
   const Vector3 h = R * ray_a + q * t;
-  if (!in_front_of_camera(h, q)) return std::nullopt;
+  if (!in_front_of_camera(h)) return std::nullopt;
   const double fx = rig.camera.fx, fy = rig.camera.fy, b = rig.baseline, z = h.z();
   const Vector2 uv = rig.camera.project(h);
   InverseDepthProjection result;

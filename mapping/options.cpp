@@ -45,7 +45,7 @@ std::string MapperOptions::invalid_reason() const {
       .at_least("max_anchors", max_anchors, 0)
       .at_least("max_points", max_points, 1)
       .above("min_inverse_depth", min_inverse_depth, 0)
-      .above("max_inverse_depth", max_inverse_depth, min_inverse_depth)
+      .at_least("nearest", nearest, 0)
       .at_least("min_covisible", min_covisible, 1)
       .nested("edge", edge.invalid_reason())
       .nested("solver", solver.invalid_reason())

@@ -74,7 +74,8 @@ struct MapperOptions {
   int max_anchors = 25;             ///< anchors that may take places of W2 for their points, >= 0  (6.2.4)
   int max_points = 5000;            ///< in one problem, >= 1; those with the fewest measurements stay out
   double min_inverse_depth = 1e-5;  ///< [1/m] > 0; farther points say nothing about translation
-  double max_inverse_depth = 1e3;   ///< [1/m] > min_inverse_depth; nearer ones are mistakes
+  double nearest = 1e-3;            ///< of the median depth of the keyframe that sees a point, >= 0: nearer
+                                    ///< ones are mistakes
   int min_covisible = 15;           ///< Theta >= 1: covisible points that make an edge, 15 to 30
   EdgeInformationOptions edge;
   WindowSolverOptions solver;          ///< joint optimisation of eq. 6.4

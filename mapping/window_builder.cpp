@@ -12,8 +12,10 @@
 namespace twofold {
 namespace {
 
-bool plausible(const Vector3& psi, const MapperOptions& options) {
-  return psi.allFinite() && psi.z() > options.min_inverse_depth && psi.z() < options.max_inverse_depth;
+/// @param median_depth  of the keyframe that psi is relative to
+bool plausible(const Vector3& psi, double median_depth, const MapperOptions& options) {
+  return psi.allFinite() && psi.z() > options.min_inverse_depth &&
+         options.nearest * median_depth * psi.z() < 1;
 }
 
 }  // namespace
@@ -54,9 +56,10 @@ bool WindowBuilder::anchor_point(const GraphSnapshot& graph, const DoubleWindow&
   if (!window.contains(graph.live_replacement(map_point.anchor)->id)) return false;
   point.anchor = seen_from;
   const KeyframeId seen_from_id = window.nodes[static_cast<std::size_t>(seen_from)].id;
-  const SE3 T_k_a = graph.keyframe(seen_from_id).T_k_w * graph.T_k_w(map_point.anchor).inverse();
+  const Keyframe& keyframe = graph.keyframe(seen_from_id);
+  const SE3 T_k_a = keyframe.T_k_w * graph.T_k_w(map_point.anchor).inverse();
   point.psi = to_inverse_depth(T_k_a * from_inverse_depth(map_point.psi));
-  return plausible(point.psi, options_);
+  return plausible(point.psi, keyframe.median_depth, options_);
 }
 
 void WindowBuilder::collect_points(const GraphSnapshot& graph, const DoubleWindow& window) {
@@ -192,7 +195,8 @@ void WindowBuilder::write_back(GraphWriter& writer, const DoubleWindow& window) 
       const SE3 T_a_used = graph.T_k_w(anchor) * problem_.poses[used].T_k_w.inverse();
       psi = to_inverse_depth(T_a_used * from_inverse_depth(psi));
     }
-    if (plausible(psi, options_)) writer.set_inverse_depth(point_ids_[p], psi);
+    if (plausible(psi, graph.keyframe(anchor).median_depth, options_))
+      writer.set_inverse_depth(point_ids_[p], psi);
   }
 }
 

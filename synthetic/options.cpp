@@ -54,8 +54,8 @@ std::string SyntheticOptions::invalid_reason() const {
 }
 
 const std::vector<std::string>& scene_names() {
-  static const std::vector<std::string> kNames{"campus",  "cloister", "corridor", "courtyard",
-                                               "descent", "desk",     "terrace",  "turntable"};
+  static const std::vector<std::string> kNames{"campus", "cloister", "corridor", "courtyard", "descent",
+                                               "desk",   "landing",  "terrace",  "turntable"};
   return kNames;
 }
 
@@ -86,6 +86,13 @@ SyntheticOptions default_options(const std::string& scene) {
     options.f = 0.5 * 640 / std::tan(40 * kDegree);
     options.baseline = 0.5;
     options.fps = 15;
+    options.rounds = 1;
+  }
+  if (scene == "landing") {  // 75 degrees across; nothing is near enough for a second camera
+    options.sensor = SensorKind::kMono;
+    options.width = 320;
+    options.height = 240;
+    options.f = 210;
     options.rounds = 1;
   }
   if (scene == "turntable") {

@@ -39,6 +39,8 @@ inline constexpr int kTurntableTextures = 3;  ///< prints, wood, stone
 [[nodiscard]] Staging make_terrace(std::uint64_t seed);   ///< 3 km along houses that are copies of four
 [[nodiscard]] Staging make_descent(
     std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
+/// Straight down onto ground that has detail of every size, 200 m to 20 cm.
+[[nodiscard]] Staging make_landing(std::uint64_t seed);
 /// A thing of 15 cm on a plate that turns before a camera, table and wall which stand still; the world is the
 /// thing's.
 [[nodiscard]] Staging make_turntable(std::uint64_t seed, int shape, int texture);

@@ -26,6 +26,7 @@ Staging make_place(const SyntheticOptions& options, std::uint64_t seed) {
   if (options.scene == "cloister") return make_cloister(seed);
   if (options.scene == "campus") return make_campus(seed);
   if (options.scene == "descent") return make_descent(seed);
+  if (options.scene == "landing") return make_landing(seed);
   if (options.scene == "terrace") return make_terrace(seed);
   if (options.scene == "turntable") return make_turntable(seed, options.shape, options.texture);
   throw std::invalid_argument("unknown scene '" + options.scene + "'");

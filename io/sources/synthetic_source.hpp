@@ -8,7 +8,8 @@
 
 namespace twofold {
 
-/// synthetic:SCENE?key=value&...  Scenes: campus, cloister, corridor, courtyard, descent, desk, turntable.
+/// synthetic:SCENE?key=value&...  Scenes: campus, cloister, corridor, courtyard, descent, desk, landing,
+/// terrace, turntable.
 /// Keys, with their ranges and defaults in synthetic/options.hpp: sensor (stereo, rgbd, mono), width, height,
 /// f, baseline, fps, rounds, frames, seed, noise, depth_noise, blur, shutter, readout, exposure,
 /// exposure_steps, flicker, flight, object, walkers, shape, texture, plain, bare, drop, cover_at, cover,

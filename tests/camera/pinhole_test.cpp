@@ -48,9 +48,9 @@ TEST(Pinhole, PyramidLevelKeepsTheAreaOfPixels) {
 TEST(Pinhole, FindsInViewWhatIsInFrontAndInside) {
   EXPECT_TRUE(kCamera.find_in_view({0, 0, 2}));
   EXPECT_EQ(kCamera.find_in_view({0, 0, 2}), kCamera.project({0, 0, 2}));
-  EXPECT_FALSE(kCamera.find_in_view({0, 0, -2}));      // behind
-  EXPECT_FALSE(kCamera.find_in_view({0, 0, 0.0005}));  // nearer than any point
-  EXPECT_FALSE(kCamera.find_in_view({2, 0, 2}));       // beside
+  EXPECT_FALSE(kCamera.find_in_view({0, 0, -2}));     // behind
+  EXPECT_TRUE(kCamera.find_in_view({0, 0, 0.0005}));  // in whatever unit
+  EXPECT_FALSE(kCamera.find_in_view({2, 0, 2}));      // beside
   const Vector3 near_rim = kCamera.unproject({5, 100});
   EXPECT_TRUE(kCamera.find_in_view(near_rim, 4));
   EXPECT_FALSE(kCamera.find_in_view(near_rim, 6));
@@ -90,15 +90,14 @@ TEST(MeasurementNoise, FallsByFourALevelAndIsNoneWithoutARightCoordinate) {
   EXPECT_EQ(rig.information({1, 1, 1}, 0), Eigen::Vector3f(0.25F, 0.25F, 0));
 }
 
-TEST(InFront, APointThatMayBeAtInfinity) {
-  for (const double q : {0.1, 1.0, 10.0}) {  // h = q x_c
-    EXPECT_TRUE(in_front_of_camera(Vector3(0, 0, q * 0.5), q)) << q;
-    EXPECT_FALSE(in_front_of_camera(Vector3(0, 0, -q * 0.5), q)) << q;
+TEST(InFront, InWhateverUnit) {
+  for (const double unit : {1e-5, 1.0, 1e5}) {
+    EXPECT_TRUE(in_front_of_camera(unit * Vector3(0, 0, 0.5))) << unit;
+    EXPECT_TRUE(in_front_of_camera(unit * Vector3(3, -2, 0.5))) << unit;
+    EXPECT_FALSE(in_front_of_camera(unit * Vector3(0, 0, -0.5))) << unit;
+    EXPECT_FALSE(in_front_of_camera(unit * Vector3(3, -2, 1e-4))) << "to the side, " << unit;
   }
-  EXPECT_FALSE(in_front_of_camera(Vector3(0, 0, 10 * 0.5 * kNearestDepth), 10));  // at half the nearest depth
-  EXPECT_TRUE(in_front_of_camera(Vector3(0, 0, 1), 0));
-  EXPECT_TRUE(in_front_of_camera(Vector3(0, 0, 1), -0.1)) << "beyond infinity";
-  EXPECT_FALSE(in_front_of_camera(Vector3(0, 0, 0), 0)) << "to the side";
+  EXPECT_FALSE(in_front_of_camera(Vector3(0, 0, 0)));
 }
 
 }  // namespace

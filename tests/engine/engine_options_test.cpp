@@ -209,7 +209,7 @@ TEST(Options, OfTheMapperSayWhyTheyAreInvalid) {
   expect_rules<MapperOptions>(
       {{"inner_window", [](auto& o) { o.inner_window = 0; }},
        {"outer_window", [](auto& o) { o.outer_window = -1; }},
-       {"max_inverse_depth", [](auto& o) { o.max_inverse_depth = o.min_inverse_depth; }},
+       {"nearest", [](auto& o) { o.nearest = -1e-9; }},
        {"edge.rot_share", [](auto& o) { o.edge.rot_share = 0; }},
        {"solver.max_iterations", [](auto& o) { o.solver.max_iterations = 0; }},
        {"loop.columns", [](auto& o) { o.loop.columns = 0; }},

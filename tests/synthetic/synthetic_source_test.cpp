@@ -172,9 +172,10 @@ TEST(SyntheticSource, EffectsShowInTheImages) {
 }
 
 TEST(SyntheticSource, WrongParametersAreNamed) {
-  EXPECT_IO_ERROR(open_synthetic("castle", {}),
-                  "unknown scene 'castle' (known: campus, cloister, corridor, courtyard, descent, desk, "
-                  "terrace, turntable)");
+  EXPECT_IO_ERROR(
+      open_synthetic("castle", {}),
+      "unknown scene 'castle' (known: campus, cloister, corridor, courtyard, descent, desk, landing, "
+      "terrace, turntable)");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"colour", "1"}}), "unknown parameter 'colour'");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"width", "many"}}), "width='many' is not a number");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"width", "10"}}), "width must be between 32 and 4096");
