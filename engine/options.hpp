@@ -28,9 +28,9 @@ struct ClosedLoop;
 /// "frame listener").
 using PoseListener = std::function<void(const PoseReport&)>;
 
-/// Told of each version of the map when it is published, and of the windows it was made in; valid during the
-/// call only, but for copies of the graph. Called on the mapper's thread, which waits for it, and where the
-/// run is made and finished.
+/// Told of each version of the map, and of the windows it was made in; valid during the call only, but for
+/// copies of the graph. Called on the mapper's thread, which waits for it, and where the run is made and
+/// finished.
 using MapListener = std::function<void(const GraphSnapshot& graph, const DoubleWindow& window)>;
 /// The same for how places look, on the loop closer's thread.
 using PlacesListener = std::function<void(const KeyframeDatabase& places)>;
@@ -98,9 +98,12 @@ struct EngineOptions {
   /// null; outlives the run.
   RightOfWay* right_of_way = nullptr;
 
-  PoseListener on_pose;      ///< as soon as the pose is known; may be empty
-  PoseListener on_frame;     ///< once the tracker is done with the frame, all stages timed; may be empty
-  MapListener on_map;        ///< a new version of the map; may be empty
+  PoseListener on_pose;   ///< as soon as the pose is known; may be empty
+  PoseListener on_frame;  ///< once the tracker is done with the frame, all stages timed; may be empty
+  /// A new version of the map is made, and nobody can see it yet: what must be known by then is worked out
+  /// here. Its time is a stage of its own ("map listener"). May be empty.
+  MapListener on_next_map;
+  MapListener on_map;        ///< it is published, and readers wait for it meanwhile; may be empty
   PlacesListener on_places;  ///< what the loop closer has described; may be empty
   LoopListener on_loop;      ///< a loop was closed by appearance; may be empty
 

@@ -204,16 +204,27 @@ void TrackerRunner::place_earlier_frames(RecordSequence<FrameRecord>& frames, Fr
 
 MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
     : mapper_(rig, options.mapper),
+      on_next_map_(options.on_next_map),
       on_map_(options.on_map),
       may_change_(!options.localise_only),
       times_("mapper", trace) {
   round_stage_ = times_.add_stage("round");
+  listener_stage_ = times_.add_stage("map listener");
   publish_stage_ = times_.add_stage("publish");
+  release_stage_ = times_.add_stage("release");
   if (options.map) mapper_.continue_from(options.map->graph);
+  tell_of_next_map();
 }
 
 std::uint64_t MapperRunner::step(std::span<const ProposalHandle> proposals,
                                  std::span<const LoopMessage> messages) {
+  do_round(proposals, messages);
+  tell_of_next_map();
+  return mapper_.graph().version();
+}
+
+void MapperRunner::do_round(std::span<const ProposalHandle> proposals,
+                            std::span<const LoopMessage> messages) {
   const ScopedStage timed(times_, round_stage_);
   proposals_.clear();
   for (const ProposalHandle& proposal : proposals) proposals_.push_back(&*proposal);
@@ -233,7 +244,12 @@ std::uint64_t MapperRunner::step(std::span<const ProposalHandle> proposals,
   totals_.metric_loops += report.metric_loops;
   totals_.loops += report.loops;
   totals_.late_loops += report.late_loops;
-  return mapper_.graph().version();
+}
+
+void MapperRunner::tell_of_next_map() {
+  if (!on_next_map_) return;
+  const ScopedStage timed(times_, listener_stage_);
+  on_next_map_(mapper_.graph(), mapper_.window());
 }
 
 GraphSnapshot MapperRunner::publish() {
@@ -244,6 +260,7 @@ GraphSnapshot MapperRunner::publish() {
 
 GraphSnapshot MapperRunner::finish() {
   if (may_change_) mapper_.optimise_all_poses();
+  tell_of_next_map();
   return publish();
 }
 

@@ -108,14 +108,15 @@ class MapperRunner {
  public:
   MapperRunner(const Rig& rig, const EngineOptions& options, Trace* trace);
 
-  /// One round over the given proposals, oldest first.
+  /// One round over the given proposals, oldest first. Listeners are told of the next version.
   /// @return the new version of the map, ready to be published
   std::uint64_t step(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages = {});
-  /// The listener is told.
+  /// Listeners are told that it is published.
   [[nodiscard]] GraphSnapshot publish();
-  /// Times, until it is destroyed, the stage in which a version is made, handed out, and older ones are let
-  /// go of.
+  /// Times, until it is destroyed, the stage in which a version is made and handed out.
   [[nodiscard]] ScopedStage timed_publication() { return {times_, publish_stage_}; }
+  /// Likewise, the stage in which versions that nobody reads any more are let go of.
+  [[nodiscard]] ScopedStage timed_release() { return {times_, release_stage_}; }
   /// The last version: all poses agree globally, unless the map was not to change.
   [[nodiscard]] GraphSnapshot finish();
   /// What became of the keyframes that were culled.
@@ -125,13 +126,16 @@ class MapperRunner {
   [[nodiscard]] StageRecorder& times() { return times_; }
 
  private:
+  void do_round(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages);
+  void tell_of_next_map();
+
   Mapper mapper_;
-  MapListener on_map_;
+  MapListener on_next_map_, on_map_;
   ReplacementLog replacement_log_;
   const bool may_change_;
   MappingTotals totals_;
   StageRecorder times_;
-  StageId round_stage_, publish_stage_;
+  StageId round_stage_, listener_stage_, publish_stage_, release_stage_;
   std::vector<KeyframeProposal*> proposals_;
   std::vector<LoopConstraint> loops_;
 };

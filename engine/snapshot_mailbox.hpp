@@ -68,19 +68,20 @@ class SnapshotMailbox {
 ///
 /// Roles: one writer thread constructs versions, calls publish and collect, and alone destroys versions;
 /// reader i calls latest on mailbox(i). Readers must have stopped before the publisher is destroyed.
-/// Progress: publish is wait-free: N exchanges, N loads, and O(N^2) work on its own books; the books and the
-/// room for the versions are allocated at construction.
+/// Progress: publish is wait-free: N exchanges, and O(N^2) work on its own books; the books and the room for
+/// the versions are allocated at construction. It destroys nothing, for that takes as long as what a version
+/// had to itself is large, and readers wait for the newest meanwhile: collect does, once it is handed out.
 ///
-/// A version is destroyed once each reader has either handed it back through put or announced a newer one.
-/// That needs no reference count: the writer keeps, for each version, the set of readers that may still come
-/// to it.
+/// A version may be destroyed once each reader has either handed it back through put or announced a newer
+/// one. That needs no reference count: the writer keeps, for each version, the set of readers that may still
+/// come to it.
 ///
-/// Bound: at most 2 N + 1 versions live between calls, 2 N + 2 inside publish. Let the writer read held = h
-/// from a reader after a put. Versions that reader took are announced one after the other before the next is
-/// taken, so of those it took only h itself and one taken but not yet announced are not older than h. Besides
-/// these two it can only come to the version put last, which is the same for all readers: 2 N + 1. A new one
-/// is made before the round of puts: 2 N + 2, for which room is fixed. A reader that stops calling latest
-/// pins no more than this.
+/// Bound: at most 2 N + 1 versions live after collect, 2 N + 2 before it. Let the writer read held = h from a
+/// reader after a put. Versions that reader took are announced one after the other before the next is taken,
+/// so of those it took only h itself and one taken but not yet announced are not older than h. Besides these
+/// two it can only come to the version put last, which is the same for all readers: 2 N + 1. A new one is
+/// made before the round of puts: 2 N + 2, for which room is fixed. A reader that stops calling latest pins
+/// no more than this.
 template <Versioned T, class Atomics = StdAtomics>
 class SnapshotPublisher {
  public:
@@ -95,31 +96,36 @@ class SnapshotPublisher {
   SnapshotPublisher(const SnapshotPublisher&) = delete;
   SnapshotPublisher& operator=(const SnapshotPublisher&) = delete;
 
-  /// Writer. Makes `next` the newest version. Its version must be greater than the last published one.
+  /// Writer. Makes `next` the newest version. Its version must be greater than the last published one. If
+  /// collect was not called since the last publish, it is first.
   void publish(T next) {
     TWOFOLD_CHECK(next.version() > newest_, "snapshot versions must grow");
+    if (!collected_) collect();
+    collected_ = false;
     newest_ = next.version();
     Entry& entry = free_entry();
     entry.value.emplace(std::move(next));
     entry.readers = (1u << readers_) - 1;
     for (std::size_t r = 0; r < readers_; ++r) {
-      if (const T* returned = boxes_[r].put(&*entry.value)) release(entry_of(returned), r);
+      if (const T* returned = boxes_[r].put(&*entry.value)) leave(entry_of(returned), r);
     }
-    collect();
   }
 
-  /// Writer. Destroys every version no reader can come to any more; publish does so too. Worth a call when
-  /// the writer idles, so that memory does not wait for the next publication. Returns how many versions live
-  /// on.
+  /// Writer. Destroys every version no reader can come to any more. Worth a call after publish, and when the
+  /// writer idles, so that memory does not wait for the next publication. Returns how many versions live on.
   std::size_t collect() {
+    collected_ = true;
     for (std::size_t r = 0; r < readers_; ++r) {
       const std::uint64_t held = boxes_[r].held();
       for (Entry& entry : versions_) {
-        if (entry.value && entry.value->version() < held) release(entry, r);
+        if (entry.value && entry.value->version() < held) leave(entry, r);
       }
     }
     std::size_t live = 0;
-    for (const Entry& entry : versions_) live += entry.value.has_value();
+    for (Entry& entry : versions_) {
+      if (entry.readers == 0) entry.value.reset();
+      live += entry.value.has_value();
+    }
     return live;
   }
 
@@ -137,10 +143,7 @@ class SnapshotPublisher {
     unsigned readers = 0;  // bit r: reader r may still come to it
   };
 
-  void release(Entry& entry, std::size_t reader) {
-    entry.readers &= ~(1u << reader);
-    if (entry.readers == 0) entry.value.reset();
-  }
+  void leave(Entry& entry, std::size_t reader) { entry.readers &= ~(1u << reader); }
   Entry& free_entry() {
     for (Entry& entry : versions_) {
       if (!entry.value) return entry;
@@ -158,6 +161,7 @@ class SnapshotPublisher {
   const std::unique_ptr<Mailbox[]> boxes_;
   std::vector<Entry> versions_;
   std::uint64_t newest_ = 0;
+  bool collected_ = true;  // since the last publish
 };
 
 }  // namespace twofold

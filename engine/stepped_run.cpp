@@ -287,6 +287,9 @@ bool SteppedRun::step_mapper() {
   }
   loop_parking_.wake();
   reader_parking_.wake();
+  // Last: nobody waits for it.
+  const ScopedStage timed = mapping_.timed_release();
+  channels_.snapshots.collect();
   return true;
 }
 
@@ -348,6 +351,7 @@ void SteppedRun::publish_places() {
   const KeyframeDatabase& places = loop_closing_.places();
   if (checkpoints_.enabled() && places.version() > channels_.places.newest())
     channels_.places.publish(places);
+  channels_.places.collect();
 }
 
 void SteppedRun::save_checkpoint() {

@@ -24,7 +24,7 @@ void MapMovements::found(const ClosedLoop& loop) {
   (void)loops_.try_push({loop.constraint.from, loop.constraint.to});  // full: an event does without its loop
 }
 
-void MapMovements::published(const GraphSnapshot& graph, const DoubleWindow& window) {
+void MapMovements::made(const GraphSnapshot& graph, const DoubleWindow& window) {
   MapMovement movement;
   movement.version = graph.version();
   if (graph.last_change().version > before_.version()) {

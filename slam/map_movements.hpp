@@ -31,14 +31,14 @@ struct LoopEnds {
 
 /// Compares each version of the map with the one before, for the events that the tracker's thread tells.
 ///
-/// Roles: the loop closer's thread calls found, the mapper's published, the tracker's take. None waits, and
-/// take is bounded. A version is compared over its windows, or, after a change of the whole map
-/// (GraphSnapshot::last_change), which has changed all keyframes, over all of them: time in proportion to
-/// what the mapper did.
+/// Roles: the loop closer's thread calls found, the mapper's made, the tracker's take. None waits, and
+/// take is bounded. A version is compared before it is published, so that what it did is known to whoever
+/// sees it; over its windows, or, after a change of the whole map (GraphSnapshot::last_change), which has changed all keyframes,
+/// over all of them: time in proportion to what the mapper did.
 class MapMovements {
  public:
   void found(const ClosedLoop& loop);
-  void published(const GraphSnapshot& graph, const DoubleWindow& window);
+  void made(const GraphSnapshot& graph, const DoubleWindow& window);
   /// What the versions up to this one did that were not taken before: of several, the largest of each number
   /// and the newest loop.
   [[nodiscard]] MapMovement take(std::uint64_t version);

@@ -80,9 +80,9 @@ void set_movement(const MapMovement& movement, MapEvent& event) {
 }  // namespace
 
 void PoseReporter::listen(EngineOptions& options) {
-  options.on_map =
-      both(options.on_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
-             movements_.published(graph, window);
+  options.on_next_map =
+      both(options.on_next_map, MapListener([this](const GraphSnapshot& graph, const DoubleWindow& window) {
+             movements_.made(graph, window);
            }));
   options.on_loop =
       both(options.on_loop, LoopListener([this](const ClosedLoop& loop) { movements_.found(loop); }));

@@ -64,6 +64,7 @@ class Rounds {
       begin_ns = steady_now_ns();
       snapshots_.publish(mapper_.publish());
       publish_ms.add(ms_since(begin_ns));
+      snapshots_.collect();
     }
     fmt::print("{:<14} {:6} {:9.2f} {:9.2f} {:9.2f} {:11.4f} {:11.4f} {:11.4f}\n", what,
                round_ms.values.size(), round_ms.quantile(0.5), round_ms.quantile(0.99), round_ms.quantile(1),

@@ -210,6 +210,30 @@ TEST_F(EnginePushTest, StepsInOneOrderGiveTheSameBytes) {
   expect_same(results[0], results[1]);
 }
 
+/// What an event says of a version must be known by the time that the tracker sees it.
+TEST_F(EnginePushTest, EachVersionOfTheMapIsToldBeforeItIsPublished) {
+  EngineOptions options = stepped();
+  std::vector<std::uint64_t> next, published;
+  options.on_next_map = [&](const GraphSnapshot& graph, const DoubleWindow&) {
+    next.push_back(graph.version());
+  };
+  options.on_map = [&](const GraphSnapshot& graph, const DoubleWindow&) {
+    published.push_back(graph.version());
+    EXPECT_EQ(next, published);
+  };
+  SteppedRun run(small_rig(), options);
+  for (std::size_t k = 0; k < kFrames; ++k) {
+    run.collect({});
+    run.push(frame(k));
+    while (run.step(PipelineStep::kTrack) || run.step(PipelineStep::kMap)) {
+    }
+  }
+  run.stop();
+  (void)run.finish();
+  EXPECT_GT(published.size(), 2U);
+  EXPECT_EQ(next, published);
+}
+
 // Keyframes that found the loop closer's ring full must not keep the buffers of a replay.
 TEST_F(EnginePushTest, ARunWhoseLoopCloserRestsForManyKeyframesReplays) {
   constexpr int kLong = 160;

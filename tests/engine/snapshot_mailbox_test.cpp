@@ -65,14 +65,27 @@ TEST(SnapshotPublisher, ReaderSeesTheNewestAndKeepsItUntilItAsksAgain) {
   EXPECT_EQ(box.latest().version(), 5u);
 }
 
-TEST(SnapshotPublisher, HandedBackVersionsDieAtOnceHeldOnesWhenANewerIsAnnounced) {
+/// Readers wait for the newest version while the writer publishes, and no longer than that.
+TEST(SnapshotPublisher, PublishDestroysNothingButWhatWasNotCollectedInTime) {
+  Probe::Counters counters;
+  SnapshotPublisher<Probe> publisher(1, Probe(1, counters));
+  publisher.publish(Probe(2, counters));  // 1 is handed back
+  EXPECT_EQ(counters.live, 2);
+  publisher.publish(Probe(3, counters));
+  EXPECT_EQ(counters.live, 2);
+  EXPECT_EQ(publisher.collect(), 1u);
+  EXPECT_EQ(counters.live, 1);
+}
+
+TEST(SnapshotPublisher, CollectDestroysHandedBackVersionsAtOnceHeldOnesWhenANewerIsAnnounced) {
   Probe::Counters counters;
   SnapshotPublisher<Probe> publisher(1, Probe(1, counters));
   auto& box = publisher.mailbox(0);
   (void)box.latest();
   publisher.publish(Probe(2, counters));
   publisher.publish(Probe(3, counters));  // 2 was never seen
-  EXPECT_EQ(counters.live, 2);            // 1 is held, 3 in the box
+  EXPECT_EQ(publisher.collect(), 2u);     // 1 is held, 3 in the box
+  EXPECT_EQ(counters.live, 2);
   EXPECT_EQ(box.latest().version(), 3u);
   EXPECT_EQ(counters.live, 2);  // the reader frees nothing
   EXPECT_EQ(publisher.collect(), 1u);
@@ -86,7 +99,9 @@ TEST(SnapshotPublisher, ASilentReaderPinsABoundedNumber) {
   for (std::uint64_t v = 2; v < 100; ++v) {
     publisher.publish(Probe(v, counters));
     if (v % 7 == 0) (void)publisher.mailbox(1).latest();
-    EXPECT_LE(counters.live, 7);
+    EXPECT_LE(counters.live, 8);
+    if (v % 2 == 1) continue;
+    EXPECT_LE(publisher.collect(), 7u);
   }
   EXPECT_TRUE(publisher.mailbox(0).latest().intact());
 }

@@ -30,7 +30,10 @@ struct MailboxModel : rl::test_suite<MailboxModel, kReaders + 1> {
 
   void thread(unsigned index) {
     if (index == 0) {
-      for (std::uint64_t v = 2; v <= kVersions; ++v) publisher.publish(Version(v));
+      for (std::uint64_t v = 2; v <= kVersions; ++v) {
+        publisher.publish(Version(v));
+        if (v % 2 == 0) publisher.collect();  // else the next publish does
+      }
       while (finished.load(rl::mo_relaxed, $) < kReaders) rl::yield(1, $);
     } else {
       read(publisher.mailbox(index - 1));

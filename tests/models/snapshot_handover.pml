@@ -3,8 +3,8 @@
  * atomic access, and all interleavings are searched.
  *
  * Shown: a reader never reads a version whose room was given back (no use after free); room for a new version is
- * always there, so that never more than 2 N + 2 live; between publications at most 2 N + 1 live; when the readers
- * have the newest version all others are reclaimed (no leak); nobody waits for ever (no invalid end state).
+ * always there, so that never more than 2 N + 2 live; after collect at most 2 N + 1 live; when the readers have the
+ * newest version all others are reclaimed (no leak); nobody waits for ever (no invalid end state).
  *
  * Seeded faults, each of which must be found:
  *   FAULT_ANNOUNCE_EARLY   the reader announces what it saw in the box while it still reads the older version
@@ -27,12 +27,8 @@ byte version[ROOMS];     /* version in a room, 0 = free */
 byte users[ROOMS];       /* writer's book: set of readers that may still come to it */
 byte done;               /* readers that have the last version */
 
-inline release(room, reader) {
-  users[room] = users[room] & (3 - (1 << reader));
-  if
-  :: users[room] == 0 -> version[room] = 0
-  :: else
-  fi
+inline leave(room, reader) {
+  users[room] = users[room] & (3 - (1 << reader))
 }
 
 inline collect() {
@@ -46,9 +42,9 @@ inline collect() {
        :: i < ROOMS ->
           if
 #ifdef FAULT_FREE_HELD
-          :: version[i] != 0 && version[i] <= held && version[i] < next && version[i] < VERSIONS -> release(i, r)
+          :: version[i] != 0 && version[i] <= held && version[i] < next && version[i] < VERSIONS -> leave(i, r)
 #else
-          :: version[i] != 0 && version[i] < held -> release(i, r)
+          :: version[i] != 0 && version[i] < held -> leave(i, r)
 #endif
           :: else
           fi;
@@ -63,7 +59,13 @@ inline collect() {
   d_step {
     live = 0; i = 0;
     do
-    :: i < ROOMS -> live = live + (version[i] != 0); i++
+    :: i < ROOMS ->
+       if
+       :: users[i] == 0 -> version[i] = 0
+       :: else
+       fi;
+       live = live + (version[i] != 0);
+       i++
     :: else -> break
     od
   }
@@ -91,7 +93,7 @@ proctype writer() {
 #ifdef FAULT_KEEP_RETURNED
         :: false
 #else
-        :: old != NONE -> d_step { release(old, r) }
+        :: old != NONE -> d_step { leave(old, r) }
 #endif
         :: else
         fi;

@@ -21,7 +21,7 @@ class MapMovementsTest : public ::testing::Test {
   }
   void publish() {
     graph_ = writer_.publish();
-    movements_.published(graph_, window_);
+    movements_.made(graph_, window_);
   }
   void move(std::uint32_t k, double distance) {
     writer_.set_pose(KeyframeId{k}, SE3(SO3(), Vector3(distance, 0, 0)));

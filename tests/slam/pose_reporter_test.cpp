@@ -107,7 +107,7 @@ TEST_F(PoseReporterTest, ACorrectionSaysWhatItDidToTheMap) {
   reporter_.listen(options);
   const auto publish = [&] {
     graph_ = writer_.publish();
-    options.on_map(graph_, {});
+    options.on_next_map(graph_, {});
   };
   Keyframe keyframe;
   keyframe.id = KeyframeId{1};
@@ -144,7 +144,7 @@ TEST_F(PoseReporterTest, APartThatJoinsTheCamerasIsToldWithoutACorrection) {
   writer_.add_keyframe(std::move(other));
   const auto publish = [&] {
     graph_ = writer_.publish();
-    options.on_map(graph_, {});
+    options.on_next_map(graph_, {});
   };
   publish();
   const SE3 T_c_w(SO3(), Vector3(0, 0, 2));
