@@ -12,8 +12,8 @@ namespace twofold {
 /// What recognition remembers of the keyframes of a map; of some it may remember nothing. A value: copying is
 /// O(1), and versions share what did not change.
 ///
-/// Threads: the rules of PersistentVector. One thread, the loop closer's, copies, changes and destroys
-/// versions; others read versions that were published to them.
+/// Threads: the rules of PersistentVector. One thread, the loop closer's, changes versions; others read, copy
+/// and destroy those that it gives them.
 class KeyframeDatabase {
  public:
   /// Grows with every change; 1 for an empty database.

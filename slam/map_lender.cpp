@@ -5,44 +5,56 @@
 namespace twofold {
 
 void MapLender::publish(const GraphSnapshot& graph, const DoubleWindow& window) {
-  MapVersion map;
-  map.graph = graph;
+  auto map = std::make_unique<MapVersion>();
+  map->graph = graph;
+  map->inner_window.reserve(window.inner);
+  map->outer_window.reserve(window.nodes.size() - window.inner);
   for (std::size_t n = 0; n < window.nodes.size(); ++n) {
-    (n < window.inner ? map.inner_window : map.outer_window).push_back(window.nodes[n].id);
+    (n < window.inner ? map->inner_window : map->outer_window).push_back(window.nodes[n].id);
   }
-  maps_.publish(std::move(map));
+  maps_.put(std::move(map));
+}
+
+void MapLender::publish(const KeyframeDatabase& places) {
+  if (places.version() == places_version_) return;
+  places_version_ = places.version();
+  places_.put(std::make_unique<KeyframeDatabase>(places));
 }
 
 void MapLender::publish(const ClosedLoop& loop) {
-  all_loops_.loops.push_back(loop);
-  loops_.publish(all_loops_);
+  all_loops_.push_back(loop);
+  loops_.put(std::make_unique<LoopList>(all_loops_));
+}
+
+/// The loan is let go of first: where only it and newest_ keep nodes, both do so.
+void MapLender::take_newest() {
+  const auto map = maps_.take();
+  const auto places = places_.take();
+  const auto loops = loops_.take();
+  if (!map && !places && !loops) return;
+  loan_.reset();
+  if (map) {
+    newest_.graph = std::move(map->graph);
+    newest_.inner_window = std::move(map->inner_window);
+    newest_.outer_window = std::move(map->outer_window);
+  }
+  if (places) newest_.places = std::move(*places);
+  if (loops) newest_.loops = std::move(*loops);
 }
 
 std::shared_ptr<const MapVersion> MapLender::newest() {
   const std::scoped_lock lock(borrowers_);
-  const MapVersion& map = maps_.mailbox(0).latest();
-  const KeyframeDatabase& places = places_.mailbox(0).latest();
-  const LoopList& loops = loops_.mailbox(0).latest();
+  take_newest();
+  if (loan_) return loan_;
+  loan_ = std::make_shared<const MapVersion>(newest_);
   std::erase_if(loans_, [](const auto& loan) { return loan.expired(); });
-  if (!loans_.empty()) {
-    auto last = loans_.back().lock();
-    if (last && last->version() == map.version() && last->places.version() == places.version() &&
-        last->loops.version() == loops.version())
-      return last;
-  }
-  auto loan = std::make_shared<MapVersion>(map);
-  loan->places = places;
-  loan->loops = loops;
-  loans_.push_back(loan);
-  return loan;
+  loans_.push_back(loan_);
+  return loan_;
 }
 
 void MapLender::catch_up() {
   const std::unique_lock lock(borrowers_, std::try_to_lock);
-  if (!lock) return;
-  (void)maps_.mailbox(0).latest();
-  (void)places_.mailbox(0).latest();
-  (void)loops_.mailbox(0).latest();
+  if (lock) take_newest();
 }
 
 MapLender::Loans MapLender::held() {
@@ -50,7 +62,8 @@ MapLender::Loans MapLender::held() {
   Loans loans;
   for (const auto& weak : loans_) {
     const auto loan = weak.lock();
-    if (!loan) continue;
+    const long ours = loan == loan_ ? 2 : 1;
+    if (!loan || loan.use_count() == ours) continue;
     ++loans.versions;
     const std::uint64_t version = loan->graph.version();
     if (loans.versions == 1 || version < loans.oldest) loans.oldest = version;

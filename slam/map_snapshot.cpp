@@ -123,7 +123,7 @@ std::vector<MapSnapshot::Edge> MapSnapshot::edges() const {
 
 std::vector<MapSnapshot::Loop> MapSnapshot::loops() const {
   std::vector<Loop> loops;
-  const auto& closed = impl_->map->loops.loops;
+  const auto& closed = impl_->map->loops;
   for (std::size_t n = 0; n < closed.size(); ++n) {
     const ClosedLoop& from = closed[n];
     Loop& loop = loops.emplace_back();
@@ -157,7 +157,7 @@ std::vector<MapSnapshot::Part> MapSnapshot::parts() const {
 std::size_t MapSnapshot::memory_bytes() const {
   const MapVersion& map = *impl_->map;
   const GraphSnapshot& graph = map.graph;
-  std::size_t bytes = sizeof map + map.loops.loops.size() * (kEntry + sizeof(ClosedLoop)) +
+  std::size_t bytes = sizeof map + map.loops.size() * (kEntry + sizeof(ClosedLoop)) +
                       block_bytes<KeyframeId>(map.inner_window.capacity()) +
                       block_bytes<KeyframeId>(map.outer_window.capacity());
   // Culled ones stand in their chunks beside others, and have a replacement for a while.

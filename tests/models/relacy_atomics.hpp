@@ -18,6 +18,7 @@
 #include "engine/snapshot_mailbox.hpp"
 #include "engine/spsc_ring.hpp"
 #include "graph/shared_array.hpp"
+#include "slam/hand_over_slot.hpp"
 #include "slam/latest_value.hpp"
 
 // Model checker; its warnings are its own.

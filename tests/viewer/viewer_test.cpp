@@ -165,7 +165,7 @@ TEST_F(ViewerTest, TellsTheLoopsOfTheMap) {
     ClosedLoop loop;
     loop.constraint.scale = 1.0625;
     loop.t_ns = 3'000'000'000;
-    version->loops.loops.push_back(loop);
+    version->loops.push_back(loop);
     return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{{}, version}));
   };
   Viewer viewer(kRig, map, {.port = 0});
