@@ -33,8 +33,8 @@ struct LoopEnds {
 ///
 /// Roles: the loop closer's thread calls found, the mapper's made, the tracker's take. None waits, and
 /// take is bounded. A version is compared before it is published, so that what it did is known to whoever
-/// sees it; over its windows, or, after a change of the whole map (GraphSnapshot::last_change), which has changed all keyframes,
-/// over all of them: time in proportion to what the mapper did.
+/// sees it; over its windows, or, after a change of the whole map (GraphSnapshot::last_change), which has
+/// changed all keyframes, over all of them: time in proportion to what the mapper did.
 class MapMovements {
  public:
   void found(const ClosedLoop& loop);
