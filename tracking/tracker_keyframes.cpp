@@ -44,7 +44,9 @@ void Tracker::propose_keyframe(FrameStep& step) {
   new_points_.start(current_, proposal.id, local_map_, step, search_, immature_points_);
   correction_.look_at_keyframe(current_);
   hand_over_images(proposal);
-  immature_points_.drop_stale(proposal.id, options_.immature.max_failures, options_.immature.max_age);
+  const int max_age =
+      rig_.kind == SensorKind::kMono ? options_.immature.max_age_of_one_camera : options_.immature.max_age;
+  immature_points_.drop_stale(proposal.id, options_.immature.max_failures, max_age);
 }
 
 /// To be done with the frame: the next one is aligned to its left image, and needs nothing else of it.

@@ -39,7 +39,7 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
     const auto corner = static_cast<std::size_t>(start.structure.corners[n]);
     ImmaturePoint point;
-    point.anchor = id;
+    point.anchor = point.usable_since = id;
     point.psi = start.structure.psi[n];
     point.appearance = start.first->corners[corner].appearance;
     const Eigen::Vector2f uv = monocular_start_->first_place(*start.first, corner).cast<float>();

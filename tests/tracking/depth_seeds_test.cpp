@@ -84,6 +84,25 @@ TEST_F(DepthSeedsTest, APointIsUsedWhenItsDepthIsKnown) {
 }
 
 /// What is far away is known to be far long before its distance is.
+// A far point may need many keyframes until its depth is known, and joins the map with the next ones: its age
+// counts from then.
+TEST_F(DepthSeedsTest, APointIsUsableSinceItsDepthIsKnown) {
+  begin({});
+  constexpr KeyframeId kNewest{7};
+  seeds_->begin_keyframe(kNewest);
+  look(0.5);
+  ASSERT_GT(ready(), 10U);
+  for (const ImmaturePoint& point : ready_.points()) {
+    EXPECT_EQ(point.anchor, kAnchor);
+    EXPECT_EQ(point.usable_since, kNewest);
+  }
+  const std::size_t all = ready();
+  ready_.drop_stale(KeyframeId{9}, 4, 3);
+  EXPECT_EQ(ready(), all) << "usable for two keyframes";
+  ready_.drop_stale(KeyframeId{11}, 4, 3);
+  EXPECT_EQ(ready(), 0U);
+}
+
 TEST_F(DepthSeedsTest, AFarPointIsUsedWhenItIsKnownToBeFar) {
   constexpr double kNear = kMedianDepth / 10;  // most of the scene is there
   for (const double far_error : {0.0, 0.02}) {
@@ -159,9 +178,9 @@ TEST_F(DepthSeedsTest, TheOldAreGivenUp) {
   begin({});
   const DepthSeedOptions options;
   const auto newest = index(kAnchor) + static_cast<std::uint32_t>(options.max_age);
-  seeds_->drop_stale(KeyframeId{newest});
+  seeds_->begin_keyframe(KeyframeId{newest});
   EXPECT_GT(seeds_->size(), 0U);
-  seeds_->drop_stale(KeyframeId{newest + 1});
+  seeds_->begin_keyframe(KeyframeId{newest + 1});
   EXPECT_EQ(seeds_->size(), 0U);
 }
 

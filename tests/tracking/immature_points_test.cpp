@@ -13,7 +13,7 @@ constexpr KeyframeId kFirst{0}, kSecond{1};
 
 ImmaturePoint point_of(KeyframeId anchor) {
   ImmaturePoint point;
-  point.anchor = anchor;
+  point.anchor = point.usable_since = anchor;
   return point;
 }
 

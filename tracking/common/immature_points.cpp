@@ -11,6 +11,7 @@ std::string ImmaturePointOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("max_failures", max_failures, 1)
       .at_least("max_age", max_age, 0)
+      .at_least("max_age_of_one_camera", max_age_of_one_camera, 0)
       .within("trusted_after", trusted_after, 0, 255)
       .at_least("moving_after", moving_after, 1)
       .reason();
@@ -59,7 +60,7 @@ void ImmaturePoints::drop_stale(KeyframeId newest, int max_failures, int max_age
   ++revision_;
   std::erase_if(points_, [&](const ImmaturePoint& point) {
     if (point.proposed_in != kNoKeyframe) return false;
-    const int age = static_cast<int>(index(newest)) - static_cast<int>(index(point.anchor));
+    const int age = static_cast<int>(index(newest)) - static_cast<int>(index(point.usable_since));
     return point.failures >= max_failures || age > max_age;
   });
 }

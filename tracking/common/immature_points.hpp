@@ -16,6 +16,8 @@ namespace twofold {
 /// tracking at once, and join the map only when a later keyframe finds them again).
 struct ImmaturePoint {
   KeyframeId anchor = kNoKeyframe;
+  KeyframeId usable_since = kNoKeyframe;  ///< the newest keyframe when its depth was known: the anchor, where
+                                          ///< that is measured, or a later one
   Vector3 psi{0, 0, 1};
   Observation anchor_observation;
   PointAppearance appearance;
@@ -34,7 +36,10 @@ void move_to_mid_exposure(const Rig& rig, const RollingShutter& shutter, Immatur
 /// What becomes of points that no snapshot holds yet.
 struct ImmaturePointOptions {
   int max_failures = 4;  ///< not found in so many searches in a row, >= 1: given up
-  int max_age = 3;       ///< keyframes after which a point is given up, >= 0
+  int max_age = 3;       ///< keyframes since it was usable, after which a point is given up, >= 0
+  /// The same of one camera, >= 0: driving, each frame is a keyframe, and with the points that its map does
+  /// not get in time goes what holds its scale.
+  int max_age_of_one_camera = 5;
   /// While young points are mistrusted: frames in a row in which a point must agree to be confirmed,
   /// in [0, 255].
   int trusted_after = 3;
@@ -80,8 +85,8 @@ class ImmaturePoints {
   void clear_points();
   /// Forgets what the map has.
   void forget_mapped(const GraphSnapshot& graph);
-  /// Forgets points that failed too often, or that no keyframe has confirmed for more than `max_age`
-  /// keyframes.
+  /// Forgets points that failed too often, or that have been usable for more than `max_age` keyframes, none
+  /// of which confirmed them.
   void drop_stale(KeyframeId newest, int max_failures, int max_age);
 
  private:

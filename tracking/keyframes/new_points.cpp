@@ -48,7 +48,7 @@ void NewPoints::occupy_unsearched(const LocalMap& local_map, const SE3& T_c_ref,
 }
 
 void NewPoints::start_seeds(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter) {
-  seeds_.drop_stale(anchor);
+  seeds_.begin_keyframe(anchor);
   const bool one_camera = rig_.kind == SensorKind::kMono;
   if (!one_camera && !starter_.depth_is_scarce()) return;
   seeds_.for_places([&](const Eigen::Vector2f& uv) { starter_.occupy(uv); });

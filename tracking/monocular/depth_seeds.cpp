@@ -54,7 +54,8 @@ void DepthSeeds::add(KeyframeId anchor, const PointAppearance& appearance, const
   seeds_.push_back(seed);
 }
 
-void DepthSeeds::drop_stale(KeyframeId newest) {
+void DepthSeeds::begin_keyframe(KeyframeId newest) {
+  newest_ = newest;
   std::erase_if(seeds_, [&](const Seed& seed) {
     return index(newest) - index(seed.anchor) > static_cast<std::uint32_t>(options_.max_age);
   });
@@ -125,6 +126,7 @@ bool DepthSeeds::mature(const Seed& seed, double median_depth) const {
 ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const {
   ImmaturePoint point;
   point.anchor = seed.anchor;
+  point.usable_since = newest_;
   point.appearance = seed.appearance;
   point.psi = seed.filter.psi;
   point.psi.z() = std::max(point.psi.z(), options_.min_inverse_depth / median_depth);

@@ -54,8 +54,8 @@ class DepthSeeds {
   /// A corner of keyframe `anchor`; dropped when there is no room.
   /// @param shutter  of that keyframe
   void add(KeyframeId anchor, const PointAppearance& appearance, const RollingShutter& shutter);
-  /// Gives up seeds that are too old.
-  void drop_stale(KeyframeId newest);
+  /// Gives up seeds that are too old by now; to be called before those of the newest keyframe are added.
+  void begin_keyframe(KeyframeId newest);
 
   /// What the frame says about depths.
   /// @param shutter       of the frame
@@ -97,6 +97,7 @@ class DepthSeeds {
   Rig rig_;
   GuidedSearchOptions search_;
   DepthSeedOptions options_;
+  KeyframeId newest_ = kNoKeyframe;
   std::vector<Seed> seeds_;  ///< by anchor
   std::size_t next_ = 0;     ///< where the next frame begins, when one does not get round
 };

@@ -102,7 +102,7 @@ int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameIm
     const Corner& corner = corners_[static_cast<std::size_t>(i)];
     const Eigen::Vector2f uv = at_level_zero(corner);
     ImmaturePoint point;
-    point.anchor = anchor;
+    point.anchor = point.usable_since = anchor;
     if (occupied_[cell_of(uv)] != 0) continue;
     if (!measure(images, corner, point)) {
       ++without_depth_;
