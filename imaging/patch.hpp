@@ -34,7 +34,7 @@ struct PatchWarp {
   double depth = 0;       ///< of the point in the view [m]
 };
 
-/// @return nothing if the point is not in front of the view (nearer than 1 mm).
+/// @return nothing if the point is not in front of the view.
 [[nodiscard]] std::optional<PatchWarp> predict_warp(const PinholeCamera& camera, const Vector3& psi,
                                                     const SE3& T_c_a);
 
