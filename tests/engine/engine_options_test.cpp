@@ -169,10 +169,11 @@ TEST(Options, OfKeyframesAndPointsSayWhyTheyAreInvalid) {
   expect_rules<DepthSeedOptions>({{"line.step_px", [](auto& o) { o.line.step_px = 0; }},
                                   {"filter_iterations", [](auto& o) { o.filter_iterations = 0; }},
                                   {"min_inverse_depth", [](auto& o) { o.min_inverse_depth = 0; }}});
-  expect_rules<ImmaturePointOptions>({{"max_age", [](auto& o) { o.max_age = -1; }},
-                                      {"max_age_of_one_camera", [](auto& o) { o.max_age_of_one_camera = -1; }},
-                                      {"trusted_after", [](auto& o) { o.trusted_after = 256; }},
-                                      {"moving_after", [](auto& o) { o.moving_after = 0; }}});
+  expect_rules<ImmaturePointOptions>(
+      {{"max_age", [](auto& o) { o.max_age = -1; }},
+       {"max_age_of_one_camera", [](auto& o) { o.max_age_of_one_camera = -1; }},
+       {"trusted_after", [](auto& o) { o.trusted_after = 256; }},
+       {"moving_after", [](auto& o) { o.moving_after = 0; }}});
 }
 
 TEST(Options, OfOneCamerasStartSayWhyTheyAreInvalid) {
