@@ -72,6 +72,7 @@ class Photometry : public testing::TestWithParam<std::string> {
 /// Slides the left patch, warped by the exact depth, along the right image: the best match is where geometry
 /// says.
 TEST_P(Photometry, DisparityMeasuredByCorrelationIsThatOfTheGeometry) {
+  if (options().sensor == SensorKind::kMono) GTEST_SKIP() << "no second camera";
   const SyntheticSequence sequence(options());
   const Rig& rig = sequence.rig();
   constexpr int kHalf = 7;
