@@ -45,7 +45,7 @@ std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
     command = inner.front();
     asked += " " + command->get_name();
   }
-  const std::string what = error.what();
+  std::string what = error.what();
   if (what != "A subcommand is required") return what;
   const std::vector<std::string> words = command->remaining();
   return (words.empty() ? what : "'" + words.front() + "' is no subcommand") + "; " + asked +

@@ -219,7 +219,7 @@ Vector3 translation_of(const CameraInfoMessage& left, const CameraInfoMessage& r
         fmt::format("camera_info of a pair whose focal lengths differ (P[0]: {:.6g} and {:.6g}), which no "
                     "rectified pair's do: give --calib",
                     left.P[0], right.P[0]));
-  const Vector3 t = shift_of(right) - shift_of(left);
+  Vector3 t = shift_of(right) - shift_of(left);
   if (!t.allFinite() || t.isZero() || t.norm() > 100)
     throw MalformedBytes("camera_info of the right camera states no baseline (P[3]): give --calib");
   return t;
