@@ -5,10 +5,13 @@
 # Copies the files (programs with the libraries they need) to /work, runs the command there, prints what it prints,
 # and ends with its status; 124 after SECONDS, 125 when the machine itself fails. The kernel (70 MB) is fetched with
 # apt once and kept in ${XDG_CACHE_HOME:-~/.cache}/twofold.
+# VM_VIVID: parameters of vivid; unless given, two cameras, each with a webcam and an HDMI input. VM_PROCESSOR: what QEMU
+# emulates (qemu64). VM_MEMORY [MiB] (1024).
 set -euo pipefail
 shopt -s nullglob
 fail() { echo "virtual_machine: $1" >&2; exit 125; }
 
+vivid=${VM_VIVID:-n_devs=2 node_types=0x1,0x1 num_inputs=2,2 input_types=0xc,0xc vid_cap_nr=0,1}
 seconds=$1; shift
 files=()
 while [ "$1" != -- ]; do files+=("$(realpath "$1")"); shift; done
@@ -70,8 +73,7 @@ build_root() {
 export PATH=/work:/bin
 mount -t proc none /proc; mount -t sysfs none /sys; mount -t devtmpfs none /dev
 for module in $(tr '\n' ' ' < "$scratch/modules"); do
-  # Two cameras, each with a webcam and an HDMI input.
-  [ \$module = vivid ] && set -- n_devs=2 node_types=0x1,0x1 num_inputs=2,2 input_types=0xc,0xc vid_cap_nr=0,1 || set --
+  [ \$module = vivid ] && set -- $vivid || set --
   insmod /modules/\$module.ko "\$@"
 done
 cd /work
@@ -88,7 +90,8 @@ for tool in qemu-system-x86_64 busybox v4l2-ctl cpio xz dpkg-deb; do
 done
 fetch_kernel
 build_root "$@"
-timeout --foreground "$seconds" qemu-system-x86_64 -accel tcg -smp 2 -m 1024 -nodefaults -no-reboot \
+timeout --foreground "$seconds" qemu-system-x86_64 -accel tcg -cpu "${VM_PROCESSOR:-qemu64}" -smp 2 \
+  -m "${VM_MEMORY:-1024}" -nodefaults -no-reboot \
   -display none -serial "file:$scratch/console" -kernel "$kernel/vmlinuz" -initrd "$scratch/initramfs" \
   -append "console=ttyS0 loglevel=0 panic=-1" < /dev/null 2> "$scratch/qemu" && ended=0 || ended=$?
 tr -d '\r' < "$scratch/console" | sed '/^@status /d'
