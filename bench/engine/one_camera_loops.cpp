@@ -43,7 +43,11 @@ class RigidLoops : public MapperHook {
   [[nodiscard]] bool scale_drifts() const override { return false; }
 };
 
-ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
+struct Windows {
+  int inner = MapperOptions{}.inner_window, outer = MapperOptions{}.outer_window;  ///< keyframes
+};
+
+ClosedRun run(const std::string& text, const Windows& windows, bool over_sim3, Trajectory& truth) {
   SourceOptions source_options;
   source_options.left_only = true;
   const auto source = open_source(text, source_options);
@@ -51,6 +55,8 @@ ClosedRun run(const std::string& text, bool over_sim3, Trajectory& truth) {
   EngineOptions options;
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
+  options.mapper.inner_window = windows.inner;
+  options.mapper.outer_window = windows.outer;
   if (!over_sim3) options.mapper.hook = std::make_shared<RigidLoops>();
   GraphSnapshot newest, before_loop;
   options.on_map = [&](const GraphSnapshot& graph, const DoubleWindow&) {
@@ -162,9 +168,10 @@ cv::Mat picture(const char* name, const Evaluation& evaluation, const Trajectory
                        plot);
 }
 
-void compare(const std::string& source, const std::string& file) {
+void compare(const std::string& source, const Windows& windows, const std::string& file) {
   Trajectory truth;
-  const ClosedRun over_sim3 = run(source, true, truth), over_se3 = run(source, false, truth);
+  const ClosedRun over_sim3 = run(source, windows, true, truth),
+                  over_se3 = run(source, windows, false, truth);
   print_loops(over_sim3.result);
   fmt::print("{:<22} {:>9} {:>9} {:>9} {:>9}\n", source.substr(0, 22), "ATE m", "% of path", "degrees",
              "halves %");
@@ -192,10 +199,14 @@ int main(int argc, char** argv) {
   std::string source = "synthetic:cloister", picture;
   CLI::App app("One camera's loops closed over Sim(3) and over SE(3)");
   app.add_option("source", source, "a source with ground truth");
+  twofold::Windows windows;
+  app.add_option("--inner-window", windows.inner, "Keyframes; fewer than usual let scale drift")
+      ->capture_default_str();
+  app.add_option("--outer-window", windows.outer, "Keyframes")->capture_default_str();
   app.add_option("--picture", picture, "PNG file: both paths side by side");
   CLI11_PARSE(app, argc, argv);
   try {
-    twofold::compare(source, picture);
+    twofold::compare(source, windows, picture);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 1;
