@@ -98,17 +98,22 @@ function(twofold_sanitizer_environment name)
   endif()
 endfunction()
 
-# twofold_command(target variable): the file that runs this program on this machine: the program, or a script that has the
-# emulator run it.
-function(twofold_command target variable)
-  set(command $<TARGET_FILE:${target}>)
+# twofold_emulated(name file variable): the program, or where programs are emulated a script that has the emulator run it. It
+# calls itself what the script is called: a program that starts itself again starts the script.
+function(twofold_emulated name file variable)
   if(CMAKE_CROSSCOMPILING_EMULATOR)
     list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
-    set(script ${CMAKE_BINARY_DIR}/emulated/${target})
-    file(GENERATE OUTPUT ${script} CONTENT "#!/bin/sh\nexec ${emulator} ${command} \"$@\"\n"
+    set(script ${CMAKE_BINARY_DIR}/emulated/${name})
+    file(GENERATE OUTPUT ${script} CONTENT "#!/bin/sh\nexec ${emulator} -0 ${script} ${file} \"$@\"\n"
       FILE_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
-    set(command ${script})
+    set(file ${script})
   endif()
+  set(${variable} ${file} PARENT_SCOPE)
+endfunction()
+
+# twofold_command(target variable): likewise of a program that is built here.
+function(twofold_command target variable)
+  twofold_emulated(${target} $<TARGET_FILE:${target}> command)
   set(${variable} ${command} PARENT_SCOPE)
 endfunction()
 
