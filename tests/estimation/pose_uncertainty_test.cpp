@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -57,6 +58,27 @@ class PoseUncertaintyTest : public ::testing::Test {
       if (frame >= kSettling) sum += error.dot(covariance.ldlt().solve(error)) / 6 / kFrames;
     }
     return sum;
+  }
+
+  void make_far_frame() {
+    std::uniform_real_distribution<double> u(5, 635), v(5, 475);
+    std::normal_distribution<double> noise(0, 0.1);
+    observations_.clear();
+    for (int n = 0; n < 200; ++n) {
+      // Braces: drawn from left to right by every compiler.
+      const Vector3 x = rig_.camera.unproject(Vector2{u(random_), v(random_)}) * 60;
+      const Vector3 z = rig_.project(x) + Vector3{noise(random_), noise(random_), noise(random_)};
+      const Eigen::Vector3f measured = z.cast<float>();
+      observations_.push_back(observe_point(rig_, x, measured, 0));
+    }
+  }
+
+  /// Of the pose in this frame, which should not have moved, over its covariance and 6. The frame counts in a
+  /// copy only.
+  double squared_error(PoseUncertainty uncertainty, const MotionOnlyResult& motion) {
+    uncertainty.update(observations_, motion, options_, true);
+    const Vector6 error = motion.T_c_ref.log();
+    return error.dot(uncertainty.covariance(motion.information).ldlt().solve(error)) / 6;
   }
 
   Rig rig_;
@@ -116,33 +138,28 @@ TEST_F(PoseUncertaintyTest, APoseFromSomeMeasurementsDiffersByWhatTheyLack) {
 }
 
 /// Far points all over, and one that is near where it is not: alone it says where the camera is, and leaves
-/// no residual that would tell.
+/// no residual that would tell. What a single frame says about itself varies a lot: from 0.4 to 220 in 500 of
+/// them.
 TEST_F(PoseUncertaintyTest, OnePointThatThePoseHangsOnDoesNotMakeItExact) {
-  PoseUncertainty uncertainty(rig_);
-  std::uniform_real_distribution<double> u(5, 635), v(5, 475);
-  std::normal_distribution<double> noise(0, 0.1);
-  const auto make_far_frame = [&] {
-    observations_.clear();
-    for (int n = 0; n < 200; ++n) {
-      const Vector3 x = rig_.camera.unproject(Vector2(u(random_), v(random_))) * 60;
-      const Vector3 z = rig_.project(x) + Vector3(noise(random_), noise(random_), noise(random_));
-      const Eigen::Vector3f measured = z.cast<float>();
-      observations_.push_back(observe_point(rig_, x, measured, 0));
-    }
-  };
+  PoseUncertainty usual(rig_), without_own_part(rig_, {.of_frame = 0});
   for (int frame = 0; frame < 30; ++frame) {
     make_far_frame();
-    uncertainty.update(observations_, solve(), options_, true);
+    usual.update(observations_, solve(), options_, true);
+    without_own_part.update(observations_, solve(), options_, true);
   }
-  make_far_frame();
-  const Vector3 near(0.4, 0.2, 1.5), seen = near + Vector3(0.1, -0.05, 0);
-  const Eigen::Vector3f z = rig_.project(seen).cast<float>();
-  observations_.push_back(observe_point(rig_, near, z, 0));
-  const MotionOnlyResult motion = solve();
-  const Vector6 error = motion.T_c_ref.log();
-  ASSERT_GT(error.head<3>().norm(), 0.05);
-  uncertainty.update(observations_, motion, options_, true);
-  EXPECT_LT(error.dot(uncertainty.covariance(motion.information).ldlt().solve(error)) / 6, 10);
+  std::vector<double> said;
+  for (int frame = 0; frame < 41; ++frame) {
+    make_far_frame();
+    const Vector3 near(0.4, 0.2, 1.5), seen = near + Vector3(0.1, -0.05, 0);
+    const Eigen::Vector3f z = rig_.project(seen).cast<float>();
+    observations_.push_back(observe_point(rig_, near, z, 0));
+    const MotionOnlyResult motion = solve();
+    ASSERT_GT(motion.T_c_ref.translation().norm(), 0.05);
+    said.push_back(squared_error(usual, motion));
+    EXPECT_GT(squared_error(without_own_part, motion), 1000);
+  }
+  std::nth_element(said.begin(), said.begin() + 20, said.end());
+  EXPECT_LT(said[20], 20);
 }
 
 /// A camera that turns and drives on while its rows are read, tracked as if it did not.
