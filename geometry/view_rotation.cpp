@@ -49,4 +49,11 @@ std::optional<ViewRotation> estimate_view_rotation(std::span<const Vector3> bear
   return result;
 }
 
+std::optional<RoughViewRotation> rough_view_rotation(std::span<const Vector3> bearings_a,
+                                                     std::span<const Vector3> bearings_b,
+                                                     const RansacOptions& options, std::vector<SO3>& models) {
+  const auto best = best_model(RotationEstimator{bearings_a, bearings_b}, options, models);
+  return best ? std::optional(RoughViewRotation{best->model, best->inliers}) : std::nullopt;
+}
+
 }  // namespace twofold

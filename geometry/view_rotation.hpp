@@ -27,5 +27,15 @@ struct ViewRotation {
 [[nodiscard]] std::optional<ViewRotation> estimate_view_rotation(std::span<const Vector3> bearings_a,
                                                                  std::span<const Vector3> bearings_b,
                                                                  const RansacOptions& options);
+/// The same without the fit to all of its pairs.
+struct RoughViewRotation {
+  SO3 R_b_a;
+  int inliers = 0;
+};
+/// @param models  scratch: nothing is allocated where it has room for one
+[[nodiscard]] std::optional<RoughViewRotation> rough_view_rotation(std::span<const Vector3> bearings_a,
+                                                                   std::span<const Vector3> bearings_b,
+                                                                   const RansacOptions& options,
+                                                                   std::vector<SO3>& models);
 
 }  // namespace twofold

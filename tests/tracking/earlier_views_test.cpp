@@ -72,8 +72,8 @@ TEST_F(EarlierViewsTest, CornersAreThoseOfAFrameThatWasLookedAt) {
   EXPECT_TRUE(corners_.corners.empty());
 }
 
-TEST(EarlierViews, OneCameraCannotFindAnything) {
-  EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kMono, 320, 240), {}, {}, 4).can_find());
+TEST(EarlierViews, FindNothingWhereTheWideSearchIsOff) {
+  EXPECT_TRUE(EarlierViews(test_rig(SensorKind::kMono, 320, 240), {}, {}, 4).can_find());
   WideSearchOptions without;
   without.enabled = false;
   EXPECT_FALSE(EarlierViews(test_rig(SensorKind::kStereo, 320, 240), without, {}, 4).can_find());

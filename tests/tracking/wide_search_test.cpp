@@ -66,6 +66,28 @@ TEST_P(WideSearchTest, KnownCornersGiveWhatFreshOnesDo) {
   EXPECT_EQ(search.find(second, kept, {})->matrix(), with_fresh->matrix());
 }
 
+// It has no depth, but far points are where the rotation takes them.
+TEST(WideSearchOfOneCamera, FindsWhichWayItTurned) {
+  const Rig rig = test_rig(SensorKind::kMono, 320, 240);
+  RenderedScene scene(rig, {3, 2, 5}, 21), other(rig, {3, 2, 5}, 1234);
+  FrameImages previous, current;
+  scene.render(SE3(), 2, previous);
+  WideSearch search(rig, {});
+  FrameCorners corners;
+  for (const double yaw : {-0.45, 0.3, 0.45}) {
+    const SE3 T_cur_prev(SO3::exp(Vector3(0.05, yaw, 0.04)), Vector3(0.02, -0.01, 0.03));
+    scene.render(T_cur_prev, 2, current);
+    search.look_at(current);
+    const auto found = search.find(previous, corners, {});
+    ASSERT_TRUE(found) << yaw;
+    EXPECT_EQ(found->translation(), Vector3(0, 0, 0));
+    EXPECT_LT((found->so3().inverse() * T_cur_prev.so3()).log().norm(), 0.03) << yaw;
+  }
+  other.render(SE3(), 2, current);
+  search.look_at(current);
+  EXPECT_FALSE(search.find(previous, corners, {})) << "another place";
+}
+
 INSTANTIATE_TEST_SUITE_P(Sensors, WideSearchTest, ::testing::Values(SensorKind::kStereo, SensorKind::kRgbd),
                          [](const auto& sensor) {
                            return sensor.param == SensorKind::kStereo ? "Stereo" : "Rgbd";

@@ -18,7 +18,7 @@ RecentView room_for_view(const Rig& rig, const WideSearch& search) {
 
 EarlierViews::EarlierViews(const Rig& rig, const WideSearchOptions& wide, const GuidedSearchOptions& guided,
                            int keyframes)
-    : can_find_(wide.enabled && rig.kind != SensorKind::kMono),
+    : can_find_(wide.enabled),
       guided_(guided),
       search_(rig, wide),
       keyframes_(static_cast<std::size_t>(keyframes), room_for_view(rig, search_)),

@@ -29,7 +29,7 @@ class EarlierViews {
   /// Pose of the frame looked at relative to an earlier one.
   /// @param corners  of the earlier frame; found if they are not known. Made by `prepare`.
   [[nodiscard]] std::optional<SE3> find(const FrameImages& earlier, FrameCorners& corners);
-  /// False for one camera, which measures no depth, and where the wide search is off.
+  /// False where the wide search is off.
   [[nodiscard]] bool can_find() const { return can_find_; }
 
   /// Makes room for a frame's corners.

@@ -10,6 +10,9 @@ std::string WideSearchOptions::invalid_reason() const {
       .at_least("max_distance", max_distance, 1)
       .at_least("min_agreeing", min_agreeing, 3)
       .nested("consensus", consensus.invalid_reason())
+      .at_least("min_turned", min_turned, 2)
+      .above("turned_within", turned_within, 0)
+      .at_least("max_turns", max_turns, 1)
       .reason();
 }
 

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "camera/measurement.hpp"
+#include "geometry/view_rotation.hpp"
 #include "imaging/image_buffers.hpp"
 
 namespace twofold {
@@ -29,6 +30,8 @@ WideSearch::WideSearch(const Rig& rig, const WideSearchOptions& options)
   of_earlier_.reserve(corners_.corners.capacity());
   of_corners_.reserve(corners_.corners.capacity());
   matches_.reserve(corners_.corners.capacity());
+  for (auto* bearings : {&bearings_earlier_, &bearings_now_}) bearings->reserve(matches_.capacity());
+  rotations_.reserve(1);
   // Noise has more corners than anything that is seen: all scratch has its full size after it.
   FrameImages noise;
   allocate_images(rig, noise);
@@ -61,6 +64,10 @@ void WideSearch::describe(const FrameImages& images, FrameCorners& corners) {
 std::optional<SE3> WideSearch::find(const FrameImages& earlier, FrameCorners& corners,
                                     const GuidedSearchOptions& search) {
   describe(earlier, corners);
+  if (rig_.kind == SensorKind::kMono) {
+    const auto R_now_earlier = find_rotation(corners);
+    return R_now_earlier ? std::optional(SE3(*R_now_earlier, Vector3::Zero())) : std::nullopt;
+  }
   match(earlier, corners, search);
   const auto agreed = consensus_.find(matches_, options_.min_agreeing);
   if (!agreed) return std::nullopt;
@@ -70,21 +77,42 @@ std::optional<SE3> WideSearch::find(const FrameImages& earlier, FrameCorners& co
   return optimise_motion(rig_, matches_, *agreed, {}).T_c_ref;
 }
 
-/// Corners that look alike, each more than any other, and have depth in both frames.
-void WideSearch::match(const FrameImages& earlier, FrameCorners& corners, const GuidedSearchOptions& search) {
+template <class Visit>
+void WideSearch::for_alike(const FrameCorners& corners, Visit&& visit) {
   find_nearest(corners.corners, corners_.corners, of_earlier_, of_corners_);
-  matches_.clear();
   for (std::size_t i = 0; i < corners.corners.size(); ++i) {
     const NearestDescriptor& nearest = of_earlier_[i];
     if (nearest.distance > options_.max_distance) continue;
     const auto j = static_cast<std::size_t>(nearest.best);
-    if (of_corners_[j].best != static_cast<int>(i)) continue;
-    const StereoPixel z_earlier = measure(earlier, corners, i, search);
-    if (!has_right(z_earlier)) continue;
-    const StereoPixelF z = measure(*now_, corners_, j, search).cast<float>();
-    if (!has_right(z)) continue;
-    matches_.push_back(observe_point(rig_, rig_.unproject(z_earlier), z, corners_.corners[j].level));
+    if (of_corners_[j].best == static_cast<int>(i)) visit(i, j);
   }
+}
+
+/// Corners that look alike and have depth in both frames.
+void WideSearch::match(const FrameImages& earlier, FrameCorners& corners, const GuidedSearchOptions& search) {
+  matches_.clear();
+  for_alike(corners, [&](std::size_t i, std::size_t j) {
+    const StereoPixel z_earlier = measure(earlier, corners, i, search);
+    if (!has_right(z_earlier)) return;
+    const StereoPixelF z = measure(*now_, corners_, j, search).cast<float>();
+    if (!has_right(z)) return;
+    matches_.push_back(observe_point(rig_, rig_.unproject(z_earlier), z, corners_.corners[j].level));
+  });
+}
+
+std::optional<SO3> WideSearch::find_rotation(const FrameCorners& corners) {
+  bearings_earlier_.clear();
+  bearings_now_.clear();
+  for_alike(corners, [&](std::size_t i, std::size_t j) {
+    bearings_earlier_.push_back(rig_.camera.unproject(corners.corners[i].uv.cast<double>()));
+    bearings_now_.push_back(rig_.camera.unproject(corners_.corners[j].uv.cast<double>()));
+  });
+  const double within = options_.turned_within * rig_.camera.width / rig_.camera.fx;
+  const auto turned =
+      rough_view_rotation(bearings_earlier_, bearings_now_,
+                          {.threshold = within, .max_iterations = options_.max_turns}, rotations_);
+  if (!turned || turned->inliers < options_.min_turned) return std::nullopt;
+  return turned->R_b_a;
 }
 
 /// A corner is matched with several frames', but looked for in the right image once.

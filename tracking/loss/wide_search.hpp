@@ -22,6 +22,11 @@ struct WideSearchOptions {
   int min_agreeing = 8;   ///< matches that the motion must explain, >= 3
   /// Corners are found to a whole pixel of their level only.
   PoseConsensusOptions consensus{.inlier_sigmas = 8, .max_samples = 2000};
+  // One camera.
+  int min_turned = 20;  ///< matches that the rotation must explain, >= 2 ...
+  /// ... by how far from where it takes them, of the image's width: the camera moves as well, > 0.
+  double turned_within = 0.02;
+  int max_turns = 500;  ///< samples, >= 1
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -43,7 +48,8 @@ struct FrameCorners {
 /// Finds the camera again after a step that was too wide for the guided search: corners of an earlier frame
 /// are matched with those of this one by what they look like, wherever they are; matches with depth in both
 /// frames give the motion that most of them agree on (three-point RANSAC). That is a proposal: only a guided
-/// search of the map's points from there tells whether it is right.
+/// search of the map's points from there tells whether it is right. One camera has no depth in either frame:
+/// it gets the rotation that most matches agree on, which takes points far away to where they are seen.
 ///
 /// To describe a frame takes longer than to compare it: what was described is kept.
 ///
@@ -65,11 +71,15 @@ class WideSearch {
 
   /// @param corners  of the earlier frame; found if they are not known. Made by `prepare`.
   /// @param search   the same for all searches
-  /// @return T_now_earlier; nothing when too few matches agree on one
+  /// @return T_now_earlier, without a translation with one camera; nothing when too few matches agree on one
   [[nodiscard]] std::optional<SE3> find(const FrameImages& earlier, FrameCorners& corners,
                                         const GuidedSearchOptions& search);
 
  private:
+  /// visit(position in `corners`, position in corners_) for those that look alike, each more than any other.
+  template <class Visit>
+  void for_alike(const FrameCorners& corners, Visit&& visit);
+  [[nodiscard]] std::optional<SO3> find_rotation(const FrameCorners& corners);
   void match(const FrameImages& earlier, FrameCorners& corners, const GuidedSearchOptions& search);
   [[nodiscard]] Vector3 measure(const FrameImages& images, FrameCorners& corners, std::size_t i,
                                 const GuidedSearchOptions& search) const;
@@ -82,6 +92,8 @@ class WideSearch {
   FrameCorners corners_;                                    ///< of the frame whose pose is sought
   std::vector<NearestDescriptor> of_earlier_, of_corners_;  ///< in the other frame each
   std::vector<MotionObservation> matches_;
+  std::vector<Vector3> bearings_earlier_, bearings_now_;  ///< one camera's matches
+  std::vector<SO3> rotations_;                            ///< scratch
   PoseConsensus consensus_;
 };
 
