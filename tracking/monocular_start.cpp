@@ -20,15 +20,24 @@ double median_flow(const StartCandidate& candidate) {
   return median(std::span(flow));
 }
 
+NewPointOptions of_wide_steps(const Rig& rig, const TrackerOptions& options) {
+  NewPointOptions more = options.new_points;
+  more.max_points = options.monocular_start.wide_following.wanted;
+  return with_cells_of_one_camera(rig, more);
+}
+
 }  // namespace
 
 MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
     : rig_(rig),
       options_(options),
       starter_(rig, with_cells_of_one_camera(rig, options.new_points), options.search),
+      wide_starter_(rig, of_wide_steps(rig, options), options.search),
+      wide_following_(rig, options.monocular_start.wide_following),
       candidates_(static_cast<std::size_t>(options.monocular_start.candidates)) {
   rig_.noise.sigma_px = options.monocular_start.first_structure.sigma_px;
-  const auto corners = static_cast<std::size_t>(options.new_points.max_points);
+  const auto corners = static_cast<std::size_t>(
+      std::max(options.new_points.max_points, options.monocular_start.wide_following.wanted));
   for (StartCandidate& candidate : candidates_) {
     allocate_images(rig, candidate.images);
     candidate.corners.reserve(corners);
@@ -36,6 +45,7 @@ MonocularStart::MonocularStart(const Rig& rig, const TrackerOptions& options)
   allocate_images(rig, last_);
   order_.reserve(candidates_.size());
   appearances_.reserve(corners);
+  seen_.reserve(corners);
 }
 
 void MonocularStart::reset() {
@@ -78,20 +88,39 @@ void MonocularStart::follow_all(const FrameImages& images, const Frame& frame) {
     remember_path(last_index_, candidates_[c]);
   }
   interval_ = 1e-9 * static_cast<double>(frame.t_ns - last_t_ns_);
+  wide_following_.begin_step();
   for (const std::size_t c : order_) follow(images, candidates_[c]);
 }
 
-void MonocularStart::follow(const FrameImages& images, StartCandidate& candidate) const {
+/// Which of a candidate's corners can be followed from the frame before, and whether those are few.
+bool MonocularStart::follow_corners(const FrameImages& images, std::vector<FollowedCorner>& corners) {
+  const MonocularStartOptions& options = options_.monocular_start;
+  seen_.clear();
+  for (FollowedCorner& corner : corners)
+    seen_.push_back(follow_corner(last_.left, images.left, options.following, corner) ? 1 : 0);
+  const auto followed = static_cast<double>(std::count(seen_.begin(), seen_.end(), 1));
+  return followed < options.wide_following.followed_share * static_cast<double>(corners.size());
+}
+
+/// Of a wide step many corners are lost: it begins with more of them.
+void MonocularStart::follow(const FrameImages& images, StartCandidate& candidate) {
   ++candidate.age;
   const bool from_first = candidate.age == 1;
+  if (follow_corners(images, candidate.corners)) {
+    if (from_first) {
+      choose_corners(wide_starter_, candidate);
+      follow_corners(images, candidate.corners);
+    }
+    candidate.wide = true;
+  }
+  if (candidate.wide) wide_following_.follow(last_.left, images.left, candidate.corners, seen_);
   if (from_first) {
     candidate.first_interval = interval_;
     candidate.first_motion.assign(candidate.corners.size(), Eigen::Vector2f::Zero());
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidate.corners.size(); ++i) {
-    if (!follow_corner(last_.left, images.left, options_.monocular_start.following, candidate.corners[i]))
-      continue;
+    if (seen_[i] == 0) continue;
     candidate.corners[kept] = candidate.corners[i];
     candidate.first_motion[kept] =
         from_first ? candidate.corners[i].uv - candidate.corners[i].appearance.uv : candidate.first_motion[i];
@@ -243,15 +272,20 @@ void MonocularStart::fill(StartCandidate& candidate, const FrameImages& images, 
   candidate.t_ns = frame.t_ns;
   candidate.age = 0;
   candidate.images.left.copy_from(images.left);
-  starter_.clear();
-  appearances_.clear();
-  starter_.choose_corners(images, static_cast<int>(appearances_.capacity()), appearances_);
-  candidate.corners.clear();
+  candidate.wide = false;
+  choose_corners(starter_, candidate);
   candidate.first_motion.clear();
   candidate.between.clear();
   candidate.stride = 1;
   candidate.path.clear();
   candidate.path_stride = 1;
+}
+
+void MonocularStart::choose_corners(PointStarter& starter, StartCandidate& candidate) {
+  starter.clear();
+  appearances_.clear();
+  starter.choose_corners(candidate.images, starter.most_points(), appearances_);
+  candidate.corners.clear();
   for (const PointAppearance& appearance : appearances_) {
     candidate.corners.push_back({appearance, appearance.uv, std::nullopt});
   }

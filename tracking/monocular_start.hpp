@@ -10,6 +10,7 @@
 #include "tracking/common/placement.hpp"
 #include "tracking/monocular/corner_following.hpp"
 #include "tracking/monocular/first_structure.hpp"
+#include "tracking/monocular/wide_following.hpp"
 #include "tracking/options.hpp"
 #include "tracking/search/point_starter.hpp"
 
@@ -28,6 +29,7 @@ struct StartCandidate {
   std::int64_t t_ns = 0;
   int age = 0;  ///< frames since
   FrameImages images;
+  bool wide = false;                    ///< a step since was too wide to follow most corners across it
   std::vector<FollowedCorner> corners;  ///< those still seen
   std::size_t corners_at_first = 0;
   /// In step with `corners`: how far they moved to the frame after this one [px], which took so long [s].
@@ -49,8 +51,9 @@ struct MonocularStartResult {
 
 /// Watches the frames of one camera until some earlier one and the newest show how it moves and how deep the
 /// scene is (first_structure). Several earlier frames are candidates, so that neither a pause nor a turn
-/// before the start matters. Buffers are made at construction; a decision allocates: until there is a map,
-/// nobody depends on the tracker's time.
+/// before the start matters. Across a step too wide to follow most corners a candidate takes more of them,
+/// which are found along epipolar lines (WideFollowing). Buffers are made at construction; a decision
+/// allocates: until there is a map, nobody depends on the tracker's time.
 class MonocularStart {
  public:
   MonocularStart(const Rig& rig, const TrackerOptions& options);
@@ -74,7 +77,8 @@ class MonocularStart {
 
  private:
   void follow_all(const FrameImages& images, const Frame& frame);
-  void follow(const FrameImages& images, StartCandidate& candidate) const;
+  bool follow_corners(const FrameImages& images, std::vector<FollowedCorner>& corners);
+  void follow(const FrameImages& images, StartCandidate& candidate);
   [[nodiscard]] double readout_share(double interval) const;
   [[nodiscard]] Vector2 last_place(const FollowedCorner& corner) const;
   [[nodiscard]] std::vector<Eigen::Vector2f> last_places(const StartCandidate& candidate) const;
@@ -85,17 +89,22 @@ class MonocularStart {
   void remember_frame(const FrameImages& images, const Frame& frame);
   void fill(StartCandidate& candidate, const FrameImages& images, const Frame& frame);
 
+  void choose_corners(PointStarter& starter, StartCandidate& candidate);
+
   Rig rig_;
   TrackerOptions options_;
-  PointStarter starter_;
+  PointStarter starter_, wide_starter_;
+  WideFollowing wide_following_;
   std::vector<StartCandidate> candidates_;
   std::vector<std::size_t> order_;  ///< of candidates_ in use, oldest first
   FrameImages last_;                ///< of the frame before
   bool has_last_ = false;
   std::int64_t last_index_ = 0;
   std::int64_t last_t_ns_ = 0;
-  double interval_ = 0;                       ///< between the last two frames [s]
-  std::vector<PointAppearance> appearances_;  ///< scratch
+  double interval_ = 0;  ///< between the last two frames [s]
+  // Scratch.
+  std::vector<PointAppearance> appearances_;
+  std::vector<char> seen_;
 };
 
 }  // namespace twofold

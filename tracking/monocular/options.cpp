@@ -13,6 +13,7 @@ std::string MonocularStartOptions::invalid_reason() const {
       .at_least("next_flow", next_flow, 0)
       .share("min_left_share", min_left_share)
       .nested("following", following.invalid_reason())
+      .nested("wide_following", wide_following.invalid_reason())
       .nested("first_structure", first_structure.invalid_reason())
       .reason();
 }

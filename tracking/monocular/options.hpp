@@ -4,6 +4,7 @@
 
 #include "tracking/monocular/corner_following.hpp"
 #include "tracking/monocular/first_structure.hpp"
+#include "tracking/monocular/wide_following.hpp"
 
 namespace twofold {
 
@@ -18,6 +19,7 @@ struct MonocularStartOptions {
                                 ///< worth its place, >= 0
   double min_left_share = 0.4;  ///< of its corners: a candidate with fewer is given up, in (0, 1]
   CornerFollowingOptions following;
+  WideFollowingOptions wide_following;
   FirstStructureOptions first_structure;
 
   /// Empty when valid; otherwise names the field, the rule and the value.

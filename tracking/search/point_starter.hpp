@@ -40,6 +40,8 @@ class PointStarter {
   /// many. The anchor's pose is that at mid-exposure.
   int start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
             ImmaturePoints& immature);
+  /// NewPointOptions::max_points.
+  [[nodiscard]] int most_points() const { return options_.max_points; }
   /// In the last start more corners had no depth than had one.
   [[nodiscard]] bool depth_is_scarce() const { return without_depth_ > with_depth_; }
   /// Points that were told of as tracked, or started, since all was empty.
