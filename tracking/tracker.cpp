@@ -69,6 +69,7 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   const bool map_exists = motion_.reference() != kNoKeyframe || unplaced_;
   if (map_exists) follow(graph);
   step.tracked = map_exists && track(step);
+  step.result.by_rays = step.tracked && needs_rays(step.result);
   if (step.tracked && new_points_.has_seeds()) observe_seeds(step);
   if (step.tracked)
     step.result.proposed = proposer_.due(step, occupied_regions(rig_.camera, search_), immature_points_);
@@ -80,6 +81,7 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
 void Tracker::prepare_next(FrameStep& step) {
   step.resume();
   if (step.tracked && step.result.proposed) propose_keyframe(step);
+  if (step.result.by_rays) new_points_.lend_rays(median_depth(step.result.T_c_ref), immature_points_);
   if (step.tracked || step.started) remember_frame(step);
   if (step.tracked) learn_fixed_pixels(step);
   if (step.tracked && !step.result.proposed && !step.result.by_depth) revisit_reference(step.graph);
@@ -106,8 +108,9 @@ bool Tracker::track(FrameStep& step) {
   step.lap(TrackerStage::kAlignment);
   LostCause cause = by_depth ? search_from(start, step) : search_from_either(start, step);
   if (place_by_both(start.placement.T_c_ref, cause, step)) return true;
-  const bool doubted =
-      cause == LostCause::kNone && step.bounds.doubts_poses && hardly_supported(step.result, options_);
+  // Which way one camera turned is no better than what it found already.
+  const bool may_doubt = step.bounds.doubts_poses && rig_.kind != SensorKind::kMono;
+  const bool doubted = cause == LostCause::kNone && may_doubt && hardly_supported(step.result, options_);
   if (cause == LostCause::kNone && !doubted) return true;
   const auto first = doubted ? std::optional(set_aside(step)) : std::nullopt;
   if (search_widely(step)) return true;

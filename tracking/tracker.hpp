@@ -157,6 +157,7 @@ class Tracker {
   LostCause start_from_motion(FrameStep& step);
   LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
   void observe_seeds(const FrameStep& step);
+  [[nodiscard]] bool needs_rays(const TrackResult& result);
 
   // tracker_keyframes.cpp
   [[nodiscard]] KeyframeView view_of(const FrameStep& step);

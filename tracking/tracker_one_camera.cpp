@@ -26,6 +26,10 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   const auto since_first = static_cast<double>(step.frame.t_ns - first.t_ns);
   motion_.place({here.reference, SE3::exp(share * here.T_c_ref.log())},
                 first.t_ns + static_cast<std::int64_t>(share * since_first));
+  if (first.wide) {  // most of its points leave the view before a keyframe has brought others
+    new_points_.start_seeds_between(first.images, here.reference, immature_points_);
+    observe_seeds(step);
+  }
   return LostCause::kNone;
 }
 
@@ -60,6 +64,14 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   }
   step.result.cause = LostCause::kNone;
   return LostCause::kNone;
+}
+
+/// Few points of known depth are found, and the camera hardly moves: corners without depth say how it turns.
+bool Tracker::needs_rays(const TrackResult& result) {
+  if (rig_.kind != SensorKind::kMono || result.reference != motion_.reference()) return false;
+  if (pose_estimator_.inliers_with_depth(search_) >= options_.new_points.rays_below) return false;
+  const double way = (result.T_c_ref * motion_.T_c_ref().inverse()).translation().norm();
+  return way < options_.new_points.rays_within * median_depth(result.T_c_ref);
 }
 
 /// The depths of corners that wait for one, by what this frame saw of them.

@@ -174,6 +174,40 @@ TEST_F(DepthSeedsTest, ACameraThatStandsLooksForNothing) {
   EXPECT_EQ(seeds_->size(), all);
 }
 
+/// Where points are missing: rays until the depth is known, and then points in their place.
+TEST_F(DepthSeedsTest, LentRaysBecomePointsWhereTheyStand) {
+  begin({});
+  const std::size_t all = seeds_->size();
+  seeds_->lend_rays(kMedianDepth, ready_);
+  seeds_->lend_rays(kMedianDepth, ready_);
+  ASSERT_EQ(ready(), all) << "each once";
+  std::vector<Eigen::Vector2f> places;
+  for (const ImmaturePoint& ray : ready_.points()) {
+    EXPECT_TRUE(ray.is_ray());
+    places.push_back(ray.appearance.uv);
+  }
+  look(0.5);
+  ASSERT_EQ(ready(), all);
+  std::size_t points = 0;
+  for (std::size_t i = 0; i < all; ++i) {
+    EXPECT_EQ(ready_.points()[i].appearance.uv, places[i]);
+    points += ready_.points()[i].is_ray() ? 0 : 1;
+  }
+  EXPECT_EQ(points, all - seeds_->size());
+  EXPECT_GT(points, all / 2);
+}
+
+TEST_F(DepthSeedsTest, ARayEndsWithItsSeed) {
+  begin({}, 99);
+  seeds_->lend_rays(kMedianDepth, ready_);
+  const std::size_t all = ready();
+  look(0.3);
+  look(0.32);
+  ASSERT_LT(seeds_->size(), all / 4);
+  ready_.drop_stale(kAnchor, 4, 3);
+  EXPECT_EQ(ready(), seeds_->size());
+}
+
 TEST_F(DepthSeedsTest, TheOldAreGivenUp) {
   begin({});
   const DepthSeedOptions options;

@@ -85,6 +85,17 @@ TEST_F(KeyframeProposerTest, PointsFoundAgainGetNumbersAndGoToTheMapOnce) {
   EXPECT_TRUE(proposal_.points.empty());
 }
 
+TEST_F(KeyframeProposerTest, RaysAreNoPointsOfTheMapButTheirPoseIsKept) {
+  find_all();
+  for (std::size_t i = 4; i < kPoints; ++i) immature_.points()[i].ray_sigma = 0.3;
+  step_.result.by_rays = true;
+  step_.result.information = 5 * Matrix6::Identity();
+  propose_next(false);
+  EXPECT_EQ(proposal_.observations.size(), 2U);
+  EXPECT_EQ(proposal_.points.size(), 2U);
+  EXPECT_EQ(proposal_.pose_information, step_.result.information);
+}
+
 TEST_F(KeyframeProposerTest, WhatWasFoundOnceOnlyIsLeftOutWhereTheYoungAreMistrusted) {
   find_all();
   immature_.points()[4].agreed = static_cast<std::uint8_t>(options_.immature.trusted_after);

@@ -79,6 +79,17 @@ TEST_F(LocalMapSearchTest, LooksNoFartherThanTheRadius) {
   EXPECT_GT(right_matches(), 10U);
 }
 
+TEST_F(LocalMapSearchTest, RaysAreSearchedFromBesideWhereTheyStarted) {
+  for (ImmaturePoint& point : immature_.points()) point.ray_sigma = 0.7 * point.psi.z();
+  immature_.changed();
+  local_map_.update(graph_, kFirst, immature_, 20);
+  const SO3& turned = T_true_.so3();
+  const FrameStep beside = search(SE3(turned, Vector3(0.002, 0, 0)), 16);
+  EXPECT_GT(beside.result.candidates, 60);
+  const FrameStep away = search(T_true_, 4);  // 0.1 m: nobody knows where they are seen
+  EXPECT_LT(away.result.candidates, beside.result.candidates / 4);
+}
+
 TEST_F(LocalMapSearchTest, PointsOutOfViewAreNoCandidates) {
   const FrameStep away = search(SE3(SO3::exp(Vector3(0, 3, 0)), Vector3::Zero()), 4);
   EXPECT_EQ(away.result.candidates, 0);

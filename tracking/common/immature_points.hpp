@@ -19,6 +19,10 @@ struct ImmaturePoint {
   KeyframeId usable_since = kNoKeyframe;  ///< the newest keyframe when its depth was known: the anchor, where
                                           ///< that is measured, or a later one
   Vector3 psi{0, 0, 1};
+  /// Standard deviation of its inverse depth where nobody knows that yet: such a point is a ray, which only
+  /// carries the camera's rotation, and is no point of the map. 0: the depth is known [1/m].
+  double ray_sigma = 0;
+  std::uint32_t seed = 0;  ///< of a ray, the number of the depth seed that lent it (DepthSeeds)
   Observation anchor_observation;
   PointAppearance appearance;
   PointId id = kNoPoint;                 ///< given when it is proposed to the map
@@ -26,6 +30,8 @@ struct ImmaturePoint {
   std::uint8_t failures = 0;             ///< searches in a row without a match
   std::uint8_t agreed = 0;               ///< frames in a row in which it was where it should be
   std::uint8_t moved = 0;                ///< times in a row that it was found where it should not be
+
+  [[nodiscard]] bool is_ray() const { return ray_sigma > 0; }
 };
 
 /// A point that was measured where the camera was when its row was exposed, psi and observation, as its
@@ -81,6 +87,8 @@ class ImmaturePoints {
   void add_pending(const PendingKeyframe& keyframe);
   /// False when full.
   bool add(const ImmaturePoint& point);
+  /// A point has changed in its place.
+  void changed() { ++revision_; }
   /// Forgets all points.
   void clear_points();
   /// Forgets what the map has.

@@ -101,7 +101,7 @@ void LocalMap::rebuild(const GraphSnapshot& graph, const ImmaturePoints& immatur
     if (anchor < 0) continue;
     const SE3& T_ref_a = anchors_[static_cast<std::size_t>(anchor)].T_ref_a;
     points_.push_back({point.id, static_cast<int>(i), anchor, &point.appearance, point.psi,
-                       T_ref_a * from_inverse_depth(point.psi)});
+                       T_ref_a * from_inverse_depth(point.psi), point.ray_sigma});
   }
   reference_range_ = {0, points_.size()};
   if (!graph.contains(reference)) return;

@@ -19,6 +19,7 @@ struct TrackedPoint {
   const PointAppearance* appearance = nullptr;  ///< lives as long as the snapshot, or the immature point
   Vector3 psi{0, 0, 1};
   Vector3 x_ref{0, 0, 1};  ///< in the reference keyframe's frame [m]
+  double ray_sigma = 0;    ///< ImmaturePoint::ray_sigma
 };
 
 struct AnchorPose {

@@ -42,6 +42,7 @@ struct TrackResult {
   /// The pose is that of DepthAlignment: from the depth image, together with what points were found. The map
   /// takes none of them as observations.
   bool by_depth = false;
+  bool by_rays = false;   ///< one camera: rays carried the rotation, points of known depth being few
   bool proposed = false;  ///< a keyframe is due: the free proposal is filled by the end of prepare_next
   std::array<std::int64_t, kTrackerStages> stage_ns{};
 

@@ -53,6 +53,7 @@ void KeyframeProposer::begin(const Placement& placement, const KeyframeView& vie
   proposal.reference = placement.reference;
   proposal.T_k_ref = placement.T_c_ref;
   if (step.result.by_depth) proposal.pose_information = step.information_of_planes;
+  if (step.result.by_rays) proposal.pose_information = step.result.information;
   last_ = view;
   proposal.median_depth = view.median_depth;
   immature_points.add_pending({proposal.id, placement.reference, placement.T_c_ref});
@@ -67,6 +68,7 @@ void KeyframeProposer::add_observations(const SearchOutcome& found, const LocalM
     const TrackedPoint& point = local_map.points()[found.matches[m].point];
     PointId id = point.id;
     if (ImmaturePoint* immature = immature_points.at(point.immature)) {
+      if (immature->is_ray()) continue;
       const bool unconfirmed = immature->id == kNoPoint;
       if (unconfirmed && mistrusts_the_young && immature->agreed < options_.immature.trusted_after) continue;
       if (unconfirmed) confirm(*immature, proposal);

@@ -35,6 +35,13 @@ void NewPoints::start(const FrameImages& images, KeyframeId anchor, const LocalM
   start_seeds(images, anchor, step.shutter);
 }
 
+void NewPoints::start_seeds_between(const FrameImages& images, KeyframeId anchor,
+                                    const ImmaturePoints& points) {
+  starter_.clear();
+  for (const ImmaturePoint& point : points.points()) starter_.occupy(point.appearance.uv);
+  start_seeds(images, anchor, {});
+}
+
 /// Where the map has points that nobody looked for, because enough others had been found: a place seen again
 /// would get new ones for ever. Depth cameras are left out: they gained nothing by it, and had fewer fresh
 /// points when frames blurred (docs/results/variations.md, seldom frames).

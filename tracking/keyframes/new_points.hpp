@@ -36,12 +36,18 @@ class NewPoints {
   /// has nothing else; other rigs live on them where depth is out of reach, or the right camera is covered.
   void start_seeds(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter);
 
+  /// The same in the first keyframe of one camera's map or map part, away from the points that it starts
+  /// with.
+  void start_seeds_between(const FrameImages& images, KeyframeId anchor, const ImmaturePoints& points);
+
   /// DepthSeeds::observe.
   template <class PoseOfAnchor>
   void observe_seeds(const ImagePyramid& image, const RollingShutter& shutter, double median_depth,
                      PoseOfAnchor&& T_c_anchor, ImmaturePoints& ready) {
     seeds_.observe(image, shutter, median_depth, T_c_anchor, ready);
   }
+  /// DepthSeeds::lend_rays.
+  void lend_rays(double median_depth, ImmaturePoints& points) { seeds_.lend_rays(median_depth, points); }
   void forget_seeds() { seeds_.clear(); }
   [[nodiscard]] bool has_seeds() const { return seeds_.size() > 0; }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/option_check.hpp"
 
@@ -33,6 +34,7 @@ std::string DepthSeedOptions::invalid_reason() const {
       .nested("line", line.invalid_reason())
       .at_least("filter_iterations", filter_iterations, 1)
       .above("min_inverse_depth", min_inverse_depth, 0)
+      .above("unknown_sigma", unknown_sigma, 0)
       .reason();
 }
 
@@ -48,6 +50,7 @@ void DepthSeeds::add(KeyframeId anchor, const PointAppearance& appearance, const
   seed.anchor = anchor;
   seed.appearance = appearance;
   seed.uv = appearance.uv;
+  seed.number = ++last_number_;
   seed.shutter = shutter;
   seed.filter = InverseDepthFilter::from_mono(rig_.camera, appearance.uv.cast<double>(),
                                               rig_.sigma_px(appearance.level));
@@ -137,12 +140,59 @@ ImmaturePoint DepthSeeds::point_of(const Seed& seed, double median_depth) const 
   return point;
 }
 
+ImmaturePoint DepthSeeds::ray_of(const Seed& seed, double median_depth) const {
+  ImmaturePoint ray = point_of(seed, median_depth);
+  const double most = options_.unknown_sigma / median_depth, sigma = seed.filter.inverse_depth_sigma();
+  if (!known(seed) || !(sigma < most)) ray.psi.z() = 1 / median_depth;
+  ray.ray_sigma = known(seed) ? std::min(sigma, most) : most;
+  ray.seed = seed.number;
+  return ray;
+}
+
+void DepthSeeds::lend_rays(double median_depth, ImmaturePoints& points) {
+  for (Seed& seed : seeds_) seed.lent = seed.lent || points.add(ray_of(seed, median_depth));
+}
+
+/// What was learnt of a seed moves its ray; without its seed a ray is given up.
+void DepthSeeds::update_rays(double median_depth, ImmaturePoints& points) {
+  bool any = false;
+  for (ImmaturePoint& point : points.points()) {
+    if (!point.is_ray()) continue;
+    any = true;
+    const auto seed = std::lower_bound(seeds_.begin(), seeds_.end(), point.seed,
+                                       [](const Seed& s, std::uint32_t number) { return s.number < number; });
+    if (seed == seeds_.end() || seed->number != point.seed) {
+      point.failures = std::numeric_limits<std::uint8_t>::max();
+      continue;
+    }
+    const ImmaturePoint ray = ray_of(*seed, median_depth);
+    point.psi = ray.psi;
+    point.ray_sigma = ray.ray_sigma;
+  }
+  if (any) points.changed();
+}
+
+/// A ray becomes a point where it stands: others refer to its position.
+/// @return false when there is no room
+bool DepthSeeds::hand_over(const Seed& seed, double median_depth, ImmaturePoints& ready) const {
+  const ImmaturePoint point = point_of(seed, median_depth);
+  if (!seed.lent) return ready.add(point);
+  auto& points = ready.points();
+  const auto ray = std::find_if(points.begin(), points.end(),
+                                [&](const ImmaturePoint& p) { return p.is_ray() && p.seed == seed.number; });
+  if (ray == points.end()) return ready.add(point);
+  *ray = point;
+  ready.changed();
+  return true;
+}
+
 /// Hands over what is known well enough, and gives up what was not found again.
 void DepthSeeds::keep_immature(double median_depth, ImmaturePoints& ready) {
   std::erase_if(seeds_, [&](const Seed& seed) {
     if (seed.misses >= (known(seed) ? options_.max_misses : options_.max_first_misses)) return true;
-    return mature(seed, median_depth) && ready.add(point_of(seed, median_depth));
+    return mature(seed, median_depth) && hand_over(seed, median_depth, ready);
   });
+  update_rays(median_depth, ready);
 }
 
 }  // namespace twofold

@@ -32,6 +32,7 @@ struct DepthSeedOptions {
   int max_age = 6;                  ///< keyframes after which it is given up, >= 1
   int filter_iterations = 5;        ///< of the update with one frame, >= 1
   double min_inverse_depth = 1e-3;  ///< that of a point at infinity, in 1 / median depth, > 0
+  double unknown_sigma = 0.7;       ///< of an inverse depth that nobody knows, in 1 / median depth, > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -66,6 +67,11 @@ class DepthSeeds {
   void observe(const ImagePyramid& images, const RollingShutter& shutter, double median_depth,
                PoseOfAnchor&& T_c_anchor, ImmaturePoints& ready);
 
+  /// Lends all seeds as rays (ImmaturePoint::is_ray): where the map has too few points in view, corners whose
+  /// depth nobody knows yet say how the camera turns. They follow their seeds, and become points in their
+  /// place when these know their depth.
+  void lend_rays(double median_depth, ImmaturePoints& points);
+
   /// visit(level-0 pixel) for each seed, where it was seen last.
   template <class Visit>
   void for_places(Visit&& visit) const {
@@ -80,6 +86,8 @@ class DepthSeeds {
     RollingShutter shutter;     ///< of the anchor
     InverseDepthFilter filter;  ///< in the frame of the corner's row
     Eigen::Vector2f uv{0, 0};   ///< where it was seen last
+    std::uint32_t number = 0;   ///< ascending
+    bool lent = false;          ///< as a ray
     std::uint8_t looks = 0;     ///< frames that saw it
     std::uint8_t misses = 0;    ///< looks in a row that did not find it
   };
@@ -92,14 +100,18 @@ class DepthSeeds {
             double median_depth) const;
   [[nodiscard]] bool mature(const Seed& seed, double median_depth) const;
   [[nodiscard]] ImmaturePoint point_of(const Seed& seed, double median_depth) const;
+  [[nodiscard]] ImmaturePoint ray_of(const Seed& seed, double median_depth) const;
+  [[nodiscard]] bool hand_over(const Seed& seed, double median_depth, ImmaturePoints& ready) const;
+  void update_rays(double median_depth, ImmaturePoints& points);
   void keep_immature(double median_depth, ImmaturePoints& ready);
 
   Rig rig_;
   GuidedSearchOptions search_;
   DepthSeedOptions options_;
   KeyframeId newest_ = kNoKeyframe;
-  std::vector<Seed> seeds_;  ///< by anchor
-  std::size_t next_ = 0;     ///< where the next frame begins, when one does not get round
+  std::vector<Seed> seeds_;  ///< by anchor and number
+  std::uint32_t last_number_ = 0;
+  std::size_t next_ = 0;  ///< where the next frame begins, when one does not get round
 };
 
 template <class PoseOfAnchor>

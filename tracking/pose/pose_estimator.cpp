@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "geometry/inverse_depth.hpp"
 #include "geometry/symmetric_solve.hpp"
 
 namespace twofold {
@@ -84,13 +85,26 @@ int PoseEstimator::judge_immature_points(const SearchOutcome& found) {
   return moving;
 }
 
+/// Share of the information on where a ray is seen that is left when its depth is taken for unknown.
+float PoseEstimator::certainty(const TrackedPoint& point, const SE3& T_c_ref) const {
+  const Vector3 x_c = T_c_ref * point.x_ref;
+  if (!in_front_of_camera(x_c)) return 0;
+  // With its inverse depth q the point moves along its ray: d x_c / d q = (anchor - x_c) / q.
+  const Vector3 along = (T_c_ref * local_map_.T_ref_a(point).translation() - x_c) / point.psi.z();
+  const double by_depth = point.ray_sigma * (rig_.camera.project_jacobian(x_c) * along).norm();
+  const double sigma = rig_.sigma_px(point.appearance->level);
+  return static_cast<float>(sigma * sigma / (sigma * sigma + by_depth * by_depth));
+}
+
 /// What was found, as a global shutter would have seen it.
 void PoseEstimator::observe(const SE3& T_c_ref, const RollingShutter& shutter, SearchOutcome& found) const {
   found.observations.clear();
   for (const SearchOutcome::Match& match : found.matches) {
-    const Vector3& x_ref = local_map_.points()[match.point].x_ref;
+    const TrackedPoint& point = local_map_.points()[match.point];
+    const Vector3& x_ref = point.x_ref;
     const StereoPixelF z = shutter.at_mid_exposure(rig_, match.found.pixel, T_c_ref * x_ref).cast<float>();
     found.observations.push_back(observe_point(rig_, x_ref, z, match.found.level));
+    if (point.ray_sigma > 0) found.observations.back().information *= certainty(point, T_c_ref);
   }
 }
 
@@ -121,6 +135,13 @@ int PoseEstimator::mapped_inliers(const SearchOutcome& found) const {
     const bool mapped = local_map_.points()[found.matches[m].point].immature < 0;
     count += mapped && found.observations[m].inlier ? 1 : 0;
   }
+  return count;
+}
+
+int PoseEstimator::inliers_with_depth(const SearchOutcome& found) const {
+  int count = 0;
+  for (std::size_t m = 0; m < found.matches.size(); ++m)
+    count += found.observations[m].inlier && local_map_.points()[found.matches[m].point].ray_sigma == 0;
   return count;
 }
 

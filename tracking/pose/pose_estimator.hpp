@@ -39,10 +39,14 @@ class PoseEstimator {
   /// place only all agree, and are all wrong by their depths' errors.
   [[nodiscard]] bool well_supported(const TrackResult& result, const SearchOutcome& found) const;
 
+  /// Inliers whose depth is known.
+  [[nodiscard]] int inliers_with_depth(const SearchOutcome& found) const;
+
   /// ElderVote::mistrusts_the_young.
   [[nodiscard]] bool mistrusts_the_young() const { return elder_vote_.mistrusts_the_young(); }
 
  private:
+  [[nodiscard]] float certainty(const TrackedPoint& point, const SE3& T_c_ref) const;
   void observe(const SE3& T_c_ref, const RollingShutter& shutter, SearchOutcome& found) const;
   void ask_elders(const MotionOnlyOptions& solver, SearchOutcome& found);
   int judge_immature_points(const SearchOutcome& found);

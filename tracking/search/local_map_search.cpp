@@ -57,15 +57,24 @@ void LocalMapSearch::run(const FrameImages& images, const SE3& T_c_ref, double r
   step.lap(TrackerStage::kSearch);
 }
 
+/// A ray does as long as the camera is so near to where it started that its depth hardly matters.
+bool LocalMapSearch::says_where_it_is(const TrackedPoint& point, const Vector3& view_ref) const {
+  if (point.ray_sigma == 0) return true;
+  const double way = (local_map_.T_ref_a(point).translation() - view_ref).norm();
+  return way * point.ray_sigma * rig_.camera.fx < options_.max_ray_px &&
+         way * point.psi.z() < options_.max_ray_parallax;
+}
+
 void LocalMapSearch::select_candidates(const SE3& T_c_ref, TrackResult& result, Quadtree& candidates) const {
   std::size_t reference_points_in_view = 0;
   const SimilarView view(rig_.camera, T_c_ref,
                          {.border_px = options_.border_px, .min_cosine = options_.min_view_cosine});
+  const Vector3 view_ref = T_c_ref.inverse().translation();
   const auto points = local_map_.points();
   const auto [reference_begin, reference_end] = local_map_.reference_range();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto uv = view.find(points[i].x_ref, local_map_.T_ref_a(points[i]).translation());
-    if (!uv || fixed_.covers(*uv)) continue;
+    if (!uv || fixed_.covers(*uv) || !says_where_it_is(points[i], view_ref)) continue;
     if (i >= reference_begin && i < reference_end) ++reference_points_in_view;
     candidates.insert(uv->cast<float>(), static_cast<std::uint32_t>(i));
   }

@@ -58,6 +58,7 @@ class LocalMapSearch {
     GuidedSearchOptions options;
   };
 
+  [[nodiscard]] bool says_where_it_is(const TrackedPoint& point, const Vector3& view_ref) const;
   void select_candidates(const SE3& T_c_ref, TrackResult& result, Quadtree& candidates) const;
   [[nodiscard]] bool search_point(std::uint32_t point, const SearchedView& view,
                                   SearchOutcome& outcome) const;

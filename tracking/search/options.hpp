@@ -15,6 +15,9 @@ struct LocalMapSearchOptions {
   double border_px = 8;          ///< points predicted closer to the image's edge are not searched, >= 0
   double min_view_cosine = 0.7;  ///< of the angle between a point's first ray and today's, in [-1, 1]
   double lost_radius_px = 8;     ///< search radius while lost, > 0
+  // A ray is searched as long as its depth hardly matters:
+  double max_ray_px = 3;           ///< moved in the image by a standard deviation of it, > 0,
+  double max_ray_parallax = 0.05;  ///< and seen from less far away than this share of its likely depth, > 0
   /// The light has changed when so large a share of the points searched was missed, in (0, 1] ...
   double light_missed_share = 0.5;
   int min_light_points = 15;  ///< ... of which so many say by how much the light changed, >= 1 ...
@@ -36,6 +39,11 @@ struct NewPointOptions {
   /// has averaged the noise away; >= 0.
   int scarce_points = 90;
   FaintCornerOptions faint_corners;
+  /// One camera: with fewer points of known depth found, corners whose depth is not known yet carry the
+  /// camera's rotation, >= 0 ...
+  int rays_below = 40;
+  double rays_within =
+      0.04;  ///< ... while it moves by less than this share of the depth from frame to frame, > 0
   double cells_per_corner = 2;    ///< of one camera, cells being smaller in small images, > 0
   double min_disparity_px = 0.3;  ///< below it the depth is as good as infinite, > 0
   // Why a stereo pair gives too few depths to start with.
