@@ -1,55 +1,96 @@
 #include "surface/packed_depth.hpp"
 
-#include <zlib.h>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
 
 #include "base/check.hpp"
 #include "base/right_of_way.hpp"
 
 namespace twofold {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "bits are read from the lowest byte on");
+
+// A group is a byte, the width of its codes in bits, then the codes, the first of them in the lowest bits.
+constexpr int kGroup = 16;           // pixels of a row
+constexpr std::size_t kPadding = 8;  // bytes behind the last code, since each is read from eight bytes
+
+std::size_t bytes_of_codes(int width) {
+  return static_cast<std::size_t>(kGroup / 8 * width);
+}
+
+/// Pixels and their codes: 0 without a reading, else one more than the difference to the row's reading
+/// before, small ones of either sign being small numbers. So holes cost their neighbours nothing.
+class Differences {
+ public:
+  std::uint32_t encode(std::uint16_t reading) {
+    if (reading == 0) return 0;
+    const auto difference = static_cast<std::int16_t>(reading - before_);
+    before_ = reading;
+    return 1U + static_cast<std::uint16_t>((difference << 1) ^ (difference >> 15));
+  }
+  std::uint16_t decode(std::uint32_t code) {
+    if (code == 0) return 0;
+    const std::uint32_t folded = code - 1;
+    before_ = static_cast<std::uint16_t>(before_ + ((folded >> 1) ^ (0U - (folded & 1U))));
+    return before_;
+  }
+
+ private:
+  std::uint16_t before_ = 0;
+};
+
+/// Up to 17 bits each.
+void append_codes(const std::array<std::uint32_t, kGroup>& codes, std::vector<std::uint8_t>& bytes) {
+  const int width = std::bit_width(*std::max_element(codes.begin(), codes.end()));
+  bytes.push_back(static_cast<std::uint8_t>(width));
+  std::uint64_t bits = 0;
+  int count = 0;
+  for (const std::uint32_t code : codes) {
+    bits |= std::uint64_t{code} << count;
+    for (count += width; count >= 8; count -= 8, bits >>= 8)
+      bytes.push_back(static_cast<std::uint8_t>(bits & 0xff));
+  }
+}
+
+}  // namespace
 
 PackedDepth::PackedDepth(const cv::Mat& depth) : rows_(depth.rows), cols_(depth.cols) {
   TWOFOLD_CHECK(depth.type() == CV_16UC1 && !depth.empty(), "a depth image of 16 bits");
-  const std::size_t pixels = depth.total();
-  std::vector<std::uint8_t> plain(2 * pixels);
-  std::size_t i = 0;
+  bytes_.reserve(2 * depth.total());
   for (int y = 0; y < rows_; ++y) {
     make_way();
     const auto* row = depth.ptr<std::uint16_t>(y);
-    std::uint16_t before = 0;
-    for (int x = 0; x < cols_; ++x, ++i) {
-      const auto difference = static_cast<std::uint16_t>(row[x] - before);
-      // Small differences of either sign get a high byte of 0.
-      const auto folded =
-          static_cast<std::uint16_t>((difference << 1) ^ ((difference & 0x8000) != 0 ? 0xffff : 0));
-      before = row[x];
-      plain[i] = static_cast<std::uint8_t>(folded);
-      plain[pixels + i] = static_cast<std::uint8_t>(folded >> 8);
+    Differences differences;
+    for (int x = 0; x < cols_; x += kGroup) {
+      std::array<std::uint32_t, kGroup> codes{};
+      for (int i = 0; i < std::min(kGroup, cols_ - x); ++i)
+        codes[static_cast<std::size_t>(i)] = differences.encode(row[x + i]);
+      append_codes(codes, bytes_);
     }
   }
-  uLongf size = compressBound(plain.size());
-  bytes_.resize(size);
-  TWOFOLD_CHECK(compress2(bytes_.data(), &size, plain.data(), plain.size(), Z_BEST_SPEED) == Z_OK,
-                "there is room for the packed depth");
-  bytes_.resize(size);
+  bytes_.resize(bytes_.size() + kPadding);
   bytes_.shrink_to_fit();
 }
 
 cv::Mat PackedDepth::unpacked() const {
   cv::Mat depth(rows_, cols_, CV_16UC1);
-  const std::size_t pixels = depth.total();
-  std::vector<std::uint8_t> plain(2 * pixels);
-  uLongf size = plain.size();
-  TWOFOLD_CHECK(uncompress(plain.data(), &size, bytes_.data(), bytes_.size()) == Z_OK && size == plain.size(),
-                "packed depth is whole");
-  std::size_t i = 0;
+  const std::uint8_t* from = bytes_.data();
   for (int y = 0; y < rows_; ++y) {
     make_way();
     auto* row = depth.ptr<std::uint16_t>(y);
-    std::uint16_t before = 0;
-    for (int x = 0; x < cols_; ++x, ++i) {
-      const unsigned folded = plain[i] | static_cast<unsigned>(plain[pixels + i]) << 8;
-      const unsigned difference = (folded >> 1) ^ ((folded & 1U) != 0 ? 0xffffU : 0U);
-      before = row[x] = static_cast<std::uint16_t>(before + difference);
+    Differences differences;
+    for (int x = 0; x < cols_; x += kGroup) {
+      const int width = *from++;
+      const std::uint64_t mask = (std::uint64_t{1} << width) - 1;
+      for (int i = 0; i < std::min(kGroup, cols_ - x); ++i) {
+        std::uint64_t bits = 0;
+        std::memcpy(&bits, from + i * width / 8, sizeof(bits));
+        row[x + i] = differences.decode(static_cast<std::uint32_t>(bits >> (i * width % 8) & mask));
+      }
+      from += bytes_of_codes(width);
     }
   }
   return depth;
