@@ -31,36 +31,34 @@ constexpr float kMaxSpreadShare =
 constexpr float kNone = 1e9f;
 
 /// [m]; kNone where there is no reading.
-cv::Mat readings(const Rig& rig, const cv::Mat& depth) {
-  cv::Mat metres;
-  depth.convertTo(metres, CV_32F, depth.type() == CV_16UC1 ? rig.depth_unit : 1.0);
+void read_depths(const Rig& rig, const cv::Mat& depth, int y, Row& metres) {
   const auto low = static_cast<float>(rig.depth_min);
   const auto high = static_cast<float>(rig.depth_max);
-  for (int y = 0; y < metres.rows; ++y) {
-    auto* row = metres.ptr<float>(y);
-    // NaN keeps no comparison.
-    for (int x = 0; x < metres.cols; ++x) row[x] = ((row[x] >= low) & (row[x] <= high)) ? row[x] : kNone;
+  // NaN keeps no comparison.
+  const auto bounded = [&](float z) { return ((z >= low) & (z <= high)) ? z : kNone; };
+  if (depth.type() == CV_16UC1) {
+    const auto unit = static_cast<float>(rig.depth_unit);
+    const auto* row = depth.ptr<std::uint16_t>(y);
+    for (int x = 0; x < depth.cols; ++x) metres[x] = bounded(unit * static_cast<float>(row[x]));
+  } else {
+    const auto* row = depth.ptr<float>(y);
+    for (int x = 0; x < depth.cols; ++x) metres[x] = bounded(row[x]);
   }
-  return metres;
 }
 
 /// Depths of three rows, and then of three columns, at their extremes.
 class Neighbourhood {
  public:
-  explicit Neighbourhood(const cv::Mat& raw)
-      : raw_(raw), low_(raw.cols + 2), high_(raw.cols + 2), farthest_(raw.cols + 2) {
+  explicit Neighbourhood(int width) : width_(width), low_(width + 2), high_(width + 2), farthest_(width + 2) {
     low_.fill(kNone);
     high_.fill(0);
     farthest_.fill(0);
   }
-  void at_row(int y) {
-    const ConstRow above = row_of(raw_, std::max(y - 1, 0));
-    const ConstRow here = row_of(raw_, y);
-    const ConstRow below = row_of(raw_, std::min(y + 1, raw_.rows - 1));
-    const auto seen = [](const ConstRow& z) { return z.min(kNone - z); };  // 0 instead of kNone
-    low_.segment(1, raw_.cols) = above.min(here).min(below);
-    high_.segment(1, raw_.cols) = above.max(here).max(below);
-    farthest_.segment(1, raw_.cols) = seen(above).max(seen(here)).max(seen(below));
+  void take(const Row& above, const Row& here, const Row& below) {
+    const auto seen = [](const Row& z) { return z.min(kNone - z); };  // 0 instead of kNone
+    low_.segment(1, width_) = above.min(here).min(below);
+    high_.segment(1, width_) = above.max(here).max(below);
+    farthest_.segment(1, width_) = seen(above).max(seen(here)).max(seen(below));
   }
   /// Without a reading: kNone.
   [[nodiscard]] float nearest(int x) const { return std::min(low_[x], std::min(low_[x + 1], low_[x + 2])); }
@@ -73,26 +71,52 @@ class Neighbourhood {
   }
 
  private:
-  const cv::Mat& raw_;
+  int width_;
   Row low_, high_, farthest_;  // of a column, which stands one to the right
 };
 
-/// Leaves readings beside a jump out of `depth`. nearest: as PixelReading has it.
-void find_jumps(const cv::Mat& raw, cv::Mat& depth, cv::Mat& nearest) {
-  Neighbourhood around(raw);
-  for (int y = 0; y < raw.rows; ++y) {
-    make_way();
-    around.at_row(y);
-    const auto* z = raw.ptr<float>(y);
-    auto* kept = depth.ptr<float>(y);
-    auto* near = nearest.ptr<float>(y);
-    for (int x = 0; x < raw.cols; ++x) {
-      const float low = around.nearest(x);
-      kept[x] = ((z[x] < kNone) & (around.farthest(x) - low <= kMaxSpreadShare * low)) ? z[x] : 0.0f;
-      near[x] = around.has_hole(x) ? 0.0f : low;
+/// Leaves readings beside a jump out, row by row.
+class JumpFilter {
+ public:
+  /// All must outlive it.
+  JumpFilter(const Rig& rig, const cv::Mat& sensor_depth, cv::Mat& depth)
+      : rig_(rig), raw_(sensor_depth), depth_(depth), around_(depth.cols) {
+    for (Row& row : metres_) row.resize(depth.cols);
+    for (Row& row : nearest_) row.resize(depth.cols);
+  }
+  /// Makes the rows of `depth` up to row y.
+  void advance_to(int y) {
+    for (const int last = std::min(y, depth_.rows - 1); done_ < last;) add_row(++done_);
+  }
+  /// As PixelReading has it, of one of the newest kKept rows.
+  [[nodiscard]] const Row& nearest(int y) const { return nearest_[static_cast<std::size_t>(y % kKept)]; }
+
+ private:
+  static constexpr int kKept = 8;
+
+  [[nodiscard]] Row& metres(int y) { return metres_[static_cast<std::size_t>(y % 3)]; }
+  void add_row(int y) {
+    if (y == 0) read_depths(rig_, raw_, 0, metres(0));
+    if (y + 1 < depth_.rows) read_depths(rig_, raw_, y + 1, metres(y + 1));
+    const Row& z = metres(y);
+    around_.take(metres(std::max(y - 1, 0)), z, metres(std::min(y + 1, depth_.rows - 1)));
+    auto* kept = depth_.ptr<float>(y);
+    Row& near = nearest_[static_cast<std::size_t>(y % kKept)];
+    for (int x = 0; x < depth_.cols; ++x) {
+      const float low = around_.nearest(x);
+      kept[x] = ((z[x] < kNone) & (around_.farthest(x) - low <= kMaxSpreadShare * low)) ? z[x] : 0.0f;
+      near[x] = around_.has_hole(x) ? 0.0f : low;
     }
   }
-}
+
+  const Rig& rig_;
+  const cv::Mat& raw_;
+  cv::Mat& depth_;
+  int done_ = -1;  // the last row that was made
+  std::array<Row, 3> metres_;
+  std::array<Row, kKept> nearest_;
+  Neighbourhood around_;
+};
 
 /// Inverse depths, averaged over squares of five pixels a side as far as these have readings.
 class SmoothedInverse {
@@ -150,6 +174,10 @@ class SmoothedInverse {
 /// taken across seven pixels of a smoothed image, because that of two neighbours is mostly noise.
 class Slopes {
  public:
+  /// Rows of depth below a row that at_row reads.
+  static constexpr int kRowsBelow = 4;
+
+  /// The first kRowsBelow rows of the view's depth must be there.
   explicit Slopes(const DepthView& view)
       : fx_(static_cast<float>(view.camera.fx)),
         fy_(static_cast<float>(view.camera.fy)),
@@ -167,7 +195,7 @@ class Slopes {
         ray_(width_) {
     for (int y = 0; y < std::min(kHalf, height_); ++y) smooth_.add_row(y);
   }
-  /// Rows are gone through from the first one on.
+  /// Rows are gone through from the first one on; the view's depth must be there as far as kRowsBelow.
   void at_row(int y) {
     if (y + kHalf < height_) smooth_.add_row(y + kHalf);
     const float ry = (static_cast<float>(y) - cy_) / fy_;
@@ -250,7 +278,7 @@ class TileRow {
   explicit TileRow(int width) : farthest_(width), nearest_(width), least_distance_per_depth_(width) {
     clear();
   }
-  void add(const ConstRow& depth, const ConstRow& nearest, const Row& distance_per_depth) {
+  void add(const ConstRow& depth, const Row& nearest, const Row& distance_per_depth) {
     farthest_ = farthest_.max(depth).max(nearest);
     nearest_ = nearest_.min(nearest);
     least_distance_per_depth_ = least_distance_per_depth_.min(distance_per_depth);
@@ -274,16 +302,19 @@ class TileRow {
   Row farthest_, nearest_, least_distance_per_depth_;  // of the pixels of a column
 };
 
-/// Pixels and tiles, from depths and what find_jumps told.
-void find_pixels(const cv::Mat& nearest, DepthView& view) {
+/// All but the camera and the colour image.
+void find_pixels(const Rig& rig, const cv::Mat& sensor_depth, DepthView& view) {
   const int width = view.depth.cols;
+  JumpFilter filter(rig, sensor_depth, view.depth);
+  filter.advance_to(Slopes::kRowsBelow - 1);
   Slopes slopes(view);
   TileRow tile_row(width);
   std::vector<std::uint32_t> colours(static_cast<std::size_t>(width));
   for (int y = 0; y < view.depth.rows; ++y) {
     make_way();
+    filter.advance_to(y + Slopes::kRowsBelow);
     const ConstRow depth = row_of(view.depth, y);
-    const ConstRow near = row_of(nearest, y);
+    const Row& near = filter.nearest(y);
     slopes.at_row(y);
     read_colours(view.colour, y, colours);
     auto* pixel = view.pixels.ptr<PixelReading>(y);
@@ -327,18 +358,20 @@ std::string depth_defect(const Rig& rig, const cv::Mat& depth, const cv::Mat& co
   return {};
 }
 
-DepthView make_depth_view(const Rig& rig, const cv::Mat& depth, const cv::Mat& colour) {
+void prepare_depth_view(const Rig& rig, const cv::Mat& depth, const cv::Mat& colour, DepthView& view) {
   TWOFOLD_CHECK(depth_defect(rig, depth, colour).empty(), "the depth image fits the rig");
-  DepthView view;
   view.camera = rig.camera;
   view.colour = colour;
   view.depth.create(depth.size(), CV_32FC1);
   view.pixels.create(depth.size(), CV_32FC4);
   view.tiles.create((depth.rows + kDepthTile - 1) / kDepthTile, (depth.cols + kDepthTile - 1) / kDepthTile,
                     CV_32FC3);
-  cv::Mat nearest(depth.size(), CV_32FC1);
-  find_jumps(readings(rig, depth), view.depth, nearest);
-  find_pixels(nearest, view);
+  find_pixels(rig, depth, view);
+}
+
+DepthView make_depth_view(const Rig& rig, const cv::Mat& depth, const cv::Mat& colour) {
+  DepthView view;
+  prepare_depth_view(rig, depth, colour, view);
   return view;
 }
 

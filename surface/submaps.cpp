@@ -11,7 +11,8 @@ namespace twofold {
 namespace {
 
 constexpr int kJpegQuality = 92;
-constexpr double kBend = 0.5;  // voxels that poses inside a group may move
+constexpr std::size_t kKeptImages = 4;  // of the frames that wait: 6 MB at 640 x 480
+constexpr double kBend = 0.5;           // voxels that poses inside a group may move
 
 /// T_w_s beside the keyframe, in whole blocks of the world's grid and not turned: until a loop moves the
 /// submap, a composition takes its samples as they are.
@@ -19,6 +20,19 @@ SE3 begin_of_submap(const SE3& T_k_w, double voxel) {
   const double edge = kBlockEdge * voxel;
   const Vector3 blocks = (T_k_w.inverse().translation() / edge).array().round();
   return SE3(SO3(), edge * blocks);
+}
+
+DepthImages unpacked(const KeyframeDepth& packed) {
+  DepthImages images{packed.depth.unpacked(), {}};
+  if (!packed.colour.empty()) images.colour = cv::imdecode(packed.colour, cv::IMREAD_UNCHANGED);
+  return images;
+}
+
+std::size_t bytes_of(const cv::Mat& image) {
+  return image.total() * image.elemSize();
+}
+std::size_t bytes_of(const KeyframeDepth& packed) {
+  return packed.depth.bytes() + packed.colour.size();
 }
 
 }  // namespace
@@ -45,8 +59,9 @@ SubmapSurface::SubmapSurface(const Rig& rig, const SurfaceOptions& options, cons
   TWOFOLD_CHECK(options.invalid_reason().empty() && submaps.invalid_reason().empty(), "valid options");
 }
 
-void SubmapSurface::offer(KeyframeDepth frame) {
-  waiting_.push_back(std::move(frame));
+void SubmapSurface::offer(KeyframeDepth frame, DepthImages images) {
+  waiting_.push_back({std::move(frame), std::move(images)});
+  if (waiting_.size() > kKeptImages) waiting_[waiting_.size() - 1 - kKeptImages].images = {};
   if (waiting_.size() <= limits_.max_waiting) return;
   waiting_.pop_front();
   ++report_.overtaken;
@@ -95,7 +110,7 @@ void SubmapSurface::fuse_bent(std::size_t most) {
   for (std::size_t n = 0; n < now; ++n) {
     Submap& submap = *bent[n].second;
     submap.volume.clear();
-    for (Member& member : submap.members) report_.fused_anew += fuse(submap, member);
+    for (Member& member : submap.members) report_.fused_anew += fuse(submap, member, {});
   }
   bent_ = bent.size() - now;
 }
@@ -119,7 +134,7 @@ void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph, std::size_t m
   keyframes_left_ = false;
   while (!without_depth_.empty() && !waiting_.empty()) {
     const Keyframe& keyframe = graph.keyframe(without_depth_.front());
-    const std::int64_t frame = waiting_.front().frame_index;
+    const std::int64_t frame = waiting_.front().packed.frame_index;
     if (keyframe.culled() || keyframe.frame_index < frame) {
       without_depth_.pop_front();
       continue;
@@ -132,14 +147,14 @@ void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph, std::size_t m
     keyframes_left_ = most == 0;
     if (keyframes_left_) return;
     --most;
-    KeyframeDepth images = std::move(waiting_.front());
+    Waiting frame_of_keyframe = std::move(waiting_.front());
     waiting_.pop_front();
     without_depth_.pop_front();
-    add_keyframe(graph, keyframe, std::move(images));
+    add_keyframe(graph, keyframe, std::move(frame_of_keyframe));
   }
 }
 
-void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, KeyframeDepth images) {
+void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, Waiting frame) {
   if (static_cast<double>(bytes()) > limits_.memory_mb * (1 << 20)) {
     ++report_.beyond_memory;
     return;
@@ -147,10 +162,10 @@ void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& key
   Submap& submap = submap_for(graph, keyframe);
   Member member;
   member.id = keyframe.id;
-  member.images = std::move(images);
+  member.packed = std::move(frame.packed);
   member.reach = std::max(keyframe.median_depth, rig_.depth_min);
   member.T_k_w = keyframe.T_k_w;
-  report_.without_readings += !fuse(submap, member);
+  report_.without_readings += !fuse(submap, member, std::move(frame.images));
   submap.members.push_back(std::move(member));
 }
 
@@ -179,14 +194,13 @@ SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, con
   return *submaps_.back();
 }
 
-bool SubmapSurface::fuse(Submap& submap, Member& member) {
+bool SubmapSurface::fuse(Submap& submap, Member& member, DepthImages images) {
   const std::int64_t begin_ns = thread_cpu_ns();
-  cv::Mat colour;
-  if (!member.images.colour.empty()) colour = cv::imdecode(member.images.colour, cv::IMREAD_UNCHANGED);
-  const DepthView view = make_depth_view(rig_, member.images.depth.unpacked(), colour);
+  if (images.depth.empty()) images = unpacked(member.packed);
+  prepare_depth_view(rig_, images.depth, images.colour, view_);
   member.T_k_s = member.T_k_w * submap.T_w_s;
-  const bool any = share_of_readings(view) > 0;
-  if (any) submap.volume.fuse(view, member.T_k_s);
+  const bool any = share_of_readings(view_) > 0;
+  if (any) submap.volume.fuse(view_, member.T_k_s);
   report_.fused += any;
   report_.fusion_ns += thread_cpu_ns() - begin_ns;
   return any;
@@ -208,11 +222,11 @@ std::vector<PlacedVolume> SubmapSurface::placed(KeyframeId part) const {
 
 std::size_t SubmapSurface::bytes() const {
   std::size_t sum = 0;
-  for (const KeyframeDepth& frame : waiting_) sum += frame.depth.bytes() + frame.colour.size();
+  for (const Waiting& frame : waiting_)
+    sum += bytes_of(frame.packed) + bytes_of(frame.images.depth) + bytes_of(frame.images.colour);
   for (const auto& submap : submaps_) {
     sum += submap->volume.bytes();
-    for (const Member& member : submap->members)
-      sum += member.images.depth.bytes() + member.images.colour.size();
+    for (const Member& member : submap->members) sum += bytes_of(member.packed);
   }
   return sum;
 }

@@ -9,6 +9,7 @@
 
 #include "graph/snapshot.hpp"
 #include "surface/composition.hpp"
+#include "surface/depth_view.hpp"
 #include "surface/packed_depth.hpp"
 #include "surface/volume.hpp"
 
@@ -37,6 +38,11 @@ struct KeyframeDepth {
   std::int64_t frame_index = 0;
   PackedDepth depth;
   std::vector<std::uint8_t> colour;  ///< JPEG; may be empty
+};
+
+/// The images that were packed.
+struct DepthImages {
+  cv::Mat depth, colour;
 };
 
 /// Packs the images of a frame, which must have no depth_defect. depth: CV_16UC1.
@@ -73,7 +79,9 @@ class SubmapSurface {
 
   /// A frame that is proposed as a keyframe, before or after a map has it; frame_index grows, and is not
   /// compared with that of keyframes before SubmapOptions::first_keyframe.
-  void offer(KeyframeDepth frame);
+  /// @param images  may be empty. Those of the newest frames are kept until they are fused, and need not be
+  ///                unpacked
+  void offer(KeyframeDepth frame, DepthImages images = {});
   /// Takes the map as it is now. Versions do not shrink. Submaps move with their keyframes in any case, which
   /// takes no time; what `work` leaves waits for later steps, of bent submaps those that are bent least.
   void step(const GraphSnapshot& graph, const SubmapWork& work = {});
@@ -95,7 +103,7 @@ class SubmapSurface {
  private:
   struct Member {
     KeyframeId id = kNoKeyframe;
-    KeyframeDepth images;
+    KeyframeDepth packed;
     double reach = 1;  ///< depth that is seen [m]
     SE3 T_k_w;         ///< in the last step
     SE3 T_k_s;         ///< along which it was fused
@@ -113,23 +121,29 @@ class SubmapSurface {
   void let_go_of_culled(const GraphSnapshot& graph);
   void move_submaps(const GraphSnapshot& graph);
   void take_new_keyframes(const GraphSnapshot& graph, std::size_t most);
-  void add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, KeyframeDepth images);
+  struct Waiting {
+    KeyframeDepth packed;
+    DepthImages images;  ///< of the newest only
+  };
+  void add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, Waiting frame);
   [[nodiscard]] Submap& submap_for(const GraphSnapshot& graph, const Keyframe& keyframe);
   void fuse_bent(std::size_t most);
   [[nodiscard]] double bend_of(const Submap& submap) const;
   /// False for an image without readings, of which nothing becomes.
-  bool fuse(Submap& submap, Member& member);
+  /// @param images  empty: those that the member has packed
+  bool fuse(Submap& submap, Member& member, DepthImages images);
 
   Rig rig_;
   SurfaceOptions options_;
   SubmapOptions limits_;
-  std::deque<KeyframeDepth> waiting_;     ///< ascending by frame
+  std::deque<Waiting> waiting_;           ///< ascending by frame
   std::uint32_t next_keyframe_;           ///< the first that no step has seen
   std::deque<KeyframeId> without_depth_;  ///< the newest of those seen, whose depth may still come; ascending
   std::vector<std::unique_ptr<Submap>> submaps_;  ///< ascending by id
   std::uint32_t next_submap_ = 0;
   std::size_t bent_ = 0;         ///< after the last step
   bool keyframes_left_ = false;  ///< likewise
+  DepthView view_;               ///< its memory is taken again
   SubmapReport report_;
 };
 

@@ -243,5 +243,26 @@ TEST(PackedDepth, GivesBackWhatItWasGiven) {
   EXPECT_LT(packed.bytes(), 2 * depth.total());
 }
 
+TEST(PackedDepth, KeepsAnyNumbersInRowsOfAnyLength) {
+  std::mt19937 random(4);
+  for (const int width : {1, 15, 16, 17, 37}) {
+    cv::Mat depth(3, width, CV_16UC1);
+    for (int i = 0; i < static_cast<int>(depth.total()); ++i)
+      depth.at<std::uint16_t>(i) = static_cast<std::uint16_t>(random() >> (random() % 17));
+    EXPECT_EQ(cv::norm(PackedDepth(depth).unpacked(), depth, cv::NORM_INF), 0) << width;
+  }
+}
+
+TEST(DepthView, TakesTheMemoryOfTheImageBefore) {
+  const Rig rig = depth_rig();
+  const cv::Mat near(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.0));
+  const cv::Mat far(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(2.0));
+  DepthView view = make_depth_view(rig, near, {});
+  const uchar* const before = view.pixels.data;
+  prepare_depth_view(rig, far, {}, view);
+  EXPECT_EQ(view.pixels.data, before);
+  EXPECT_EQ(cv::norm(view.pixels, make_depth_view(rig, far, {}).pixels, cv::NORM_INF), 0);
+}
+
 }  // namespace
 }  // namespace twofold

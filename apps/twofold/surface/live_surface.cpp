@@ -195,7 +195,7 @@ void LiveSurface::take(const Frame& frame, double row_offset) {
     ++unfit_;
     return;
   }
-  surface_->offer(pack_keyframe_depth(frame.index, depth, colour));
+  surface_->offer(pack_keyframe_depth(frame.index, depth, colour), {depth, colour});
 }
 
 TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, SurfaceFigures& figures) {
