@@ -77,8 +77,10 @@ struct Outcome {
   std::size_t frames = 0, tracked = 0;
   std::vector<std::size_t> parts;  ///< frames in each part of the final map, the largest first
   double ate = 0, ate_causal = 0;  ///< of the largest; causal: of the part that most frames named then [m]
-  double clock = 0;                ///< scatter of time stamps [s]
-  std::vector<PoseError> poses;    ///< relative to the frame's reference keyframe
+  /// True lengths over those of the largest part, and what is left of `ate` once they are alike [m].
+  double scale = 1, ate_to_scale = -1;
+  double clock = 0;              ///< scatter of time stamps [s]
+  std::vector<PoseError> poses;  ///< relative to the frame's reference keyframe
 };
 
 /// -1 of none.
@@ -246,6 +248,15 @@ double ate(const Trajectory& estimate, const Trajectory& truth, Alignment alignm
   return evaluation ? evaluation->absolute.rmse : -1;
 }
 
+/// How much of an error is the path's length: a wrong baseline and disparities that are all off by as much
+/// show in nothing else.
+void judge_scale(const Trajectory& estimate, const Trajectory& truth, Outcome& outcome) {
+  const auto evaluation = evaluate(associate(estimate, truth, 20'000'000), {.alignment = Alignment::kSim3});
+  if (!evaluation) return;
+  outcome.scale = evaluation->S_w_e.scale();
+  outcome.ate_to_scale = evaluation->absolute.rmse;
+}
+
 Trajectory longest(const std::map<KeyframeId, Trajectory>& of_parts) {
   Trajectory found;
   for (const auto& [part, trajectory] : of_parts) {
@@ -322,6 +333,7 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   const Alignment alignment = to_scale ? Alignment::kSe3 : Alignment::kSim3;
   judge_frames(estimates, result, truth, alignment, outcome.each);
   outcome.ate = ate(longest(estimates), truth, alignment);
+  judge_scale(longest(estimates), truth, outcome);
   outcome.ate_causal = ate(longest(causal), truth, alignment);
   return outcome;
 }
@@ -363,9 +375,9 @@ std::string nees_summary(const std::vector<PoseError>& poses) {
 
 void print_row(const Variation& variation, const Outcome& outcome) {
   const auto metres = [](double ate) { return ate < 0 ? std::string("-") : fmt::format("{:.5f}", ate); };
-  fmt::print("| {} | {}/{} | {} | {} | {} | {} |\n", variation.name, outcome.tracked, outcome.frames,
-             fmt::join(outcome.parts, " + "), metres(outcome.ate), metres(outcome.ate_causal),
-             nees_summary(outcome.poses));
+  fmt::print("| {} | {}/{} | {} | {} | {} | {} | {:.5f} | {} |\n", variation.name, outcome.tracked,
+             outcome.frames, fmt::join(outcome.parts, " + "), metres(outcome.ate), metres(outcome.ate_causal),
+             nees_summary(outcome.poses), outcome.scale, metres(outcome.ate_to_scale));
   std::fflush(stdout);
 }
 
@@ -447,7 +459,7 @@ int main(int argc, char** argv) {
     for (const std::string& source : sources) {
       fmt::print(
           "\n| {} | tracked | in parts | ATE m | causal m | NEES / 6: median / mean / p95 "
-          "|\n|---|---|---|---|---|---|\n",
+          "| scale | ATE m to scale |\n|---|---|---|---|---|---|---|---|\n",
           source);
       for (twofold::Variation& variation : variations) {
         variation.order = order;
