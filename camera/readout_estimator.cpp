@@ -185,7 +185,9 @@ void ReadoutEstimator::solve_pair(std::size_t age) {
     const Vector6 step = llt.solve(-sum.g);
     if (llt.info() != Eigen::Success || !step.allFinite()) return;
     seen.T_cur_prev = SE3::exp(step) * seen.T_cur_prev;
-    if (step.norm() < 1e-4) break;  // the next one is some hundred times shorter
+    // A tenth of a standard deviation, whatever the unit of length; the next step is some hundred times
+    // shorter.
+    if (step.dot(sum.H * step) < 0.01) break;
   }
   seen.usable = true;
 }
