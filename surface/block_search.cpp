@@ -126,6 +126,7 @@ void SurfaceVolume::add_blocks_to_carve(const DepthView& view, const SE3& T_c_v)
     const auto uv = view.camera.find_in_view(centre_c);
     if (!uv) continue;
     const float seen = view.pixel(static_cast<int>(uv->y() + 0.5), static_cast<int>(uv->x() + 0.5)).nearest;
+    make_way();
     if (seen < centre_c.z() - edge) continue;
     touched_.push_back(static_cast<std::uint32_t>(b));
   }

@@ -75,6 +75,7 @@ std::vector<std::uint32_t> MeshPieces::outdated(const SurfaceVolume& volume) con
       const auto near = blocks.number_of({at.x + n % 3 - 1, at.y + n / 3 % 3 - 1, at.z + n / 9 - 1});
       if (near) is_outdated[*near] = 1;
     }
+    make_way();
   }
   std::vector<std::uint32_t> all;
   for (std::uint32_t b = 0; b < is_outdated.size(); ++b)
