@@ -175,16 +175,17 @@ SurfaceVertex BlockMesher::vertex(const BlockPosition& at, int s, int axis) cons
 
 /// Of the nearer of the two samples that has one.
 std::array<std::uint8_t, 3> BlockMesher::colour(int s, int axis, float t) const {
-  std::array<std::uint16_t, 3> near = colour_of(*around_[kOwn], static_cast<std::size_t>(s));
+  SampleColour near = colour_of(*around_[kOwn], static_cast<std::size_t>(s));
   std::array<int, 3> at{s % 8, s / 8 % 8, s / 64};
   const auto along = static_cast<std::size_t>(axis);
   const bool is_behind = ++at[along] == kBlockEdge;
   const VoxelBlock* next = around_[kOwn + (is_behind ? std::array<std::size_t, 3>{1, 3, 9}[along] : 0)];
-  const auto far = colour_of(*next, sample_at(at[0], at[1], at[2]));
-  const std::array<std::uint16_t, 3> none{};
-  if ((t > 0.5f && far != none) || near == none) near = far;
-  return {static_cast<std::uint8_t>(near[0] / 256), static_cast<std::uint8_t>(near[1] / 256),
-          static_cast<std::uint8_t>(near[2] / 256)};
+  const SampleColour far = colour_of(*next, sample_at(at[0], at[1], at[2]));
+  if ((t > 0.5f && far != 0) || near == 0) near = far;
+  const auto level = [near](int c) {
+    return static_cast<std::uint8_t>((near >> (kColourBits * c) & kColourMask) / kColourSteps);
+  };
+  return {level(0), level(1), level(2)};
 }
 
 /// Central difference, or one-sided where a neighbour was never seen.

@@ -191,28 +191,29 @@ inline void measure_row(const FusionView& view, const RowScale& scale, const Pix
   row.colour = at.colour_and_facing;
 }
 
-/// Colours of samples within two voxels of the surface. share: of the new value in each average.
-inline void update_colours(const RowUpdate& row, const Lanes& share, std::size_t first, VoxelBlock& block) {
-  const Lanes near_share = row.near ? share : kZero;
-  for (std::size_t c = 0; c < 3; ++c) {
-    std::uint16_t* channel = &block.colour[c][first];
-    const LaneIndex bits = (row.colour >> static_cast<int>(8 * c)) & 255;
-    const Lanes before = real(load<LaneUnsignedShort>(channel));
-    const Lanes after = before + (256 * real(bits) - before) * near_share;
-    const LaneUnsignedShort rounded = narrow_unsigned(whole(after));
-    std::memcpy(channel, &rounded, sizeof(rounded));
+/// Colours of samples within two voxels of the surface. share: of the new value in each average; a sample's
+/// first colour is taken whole, whatever its distance was known by before.
+inline void update_colours(const RowUpdate& row, const Lanes& share, SampleColour* colours) {
+  const auto before = load<LaneIndex>(colours);
+  const Lanes own_share = row.near ? (before == 0 ? kOne : share) : kZero;
+  LaneIndex after{};
+  for (int c = 0; c < 3; ++c) {
+    const Lanes old = real((before >> (kColourBits * c)) & static_cast<int>(kColourMask));
+    const Lanes seen = kColourSteps * real((row.colour >> (8 * c)) & 255);
+    after |= whole(old + (seen - old) * own_share + 0.5f) << (kColourBits * c);
   }
+  std::memcpy(colours, &after, sizeof(after));
 }
 
 /// Running averages of eight samples; what was seen once does not go back to weight 0.
 template <bool kColours>
-inline void update_row(const RowUpdate& row, std::size_t first, VoxelBlock& block) {
+inline void update_row(const RowUpdate& row, std::size_t first, BlockTable& blocks, VoxelBlock& block) {
   std::int16_t* distances = &block.distance[first];
   std::uint16_t* weights = &block.weight[first];
   const Lanes sum = real(load<LaneUnsignedShort>(weights)) + row.weight;
   const Lanes share = row.weight / larger(sum, kZero + 1e-6f);
   if constexpr (kColours) {
-    if (any(row.near)) update_colours(row, share, first, block);
+    if (any(row.near)) update_colours(row, share, &blocks.colour_for(block).samples[first]);
   }
   Lanes average = real(load<LaneShort>(distances));
   average += (row.distance - average) * share;
@@ -252,7 +253,10 @@ inline void fetch_line(const VoxelBlock& block, int row) {
   const auto first = static_cast<std::size_t>(row) * kLanes;
   __builtin_prefetch(&block.distance[first], 1);
   __builtin_prefetch(&block.weight[first], 1);
-  for (const auto& channel : block.colour) __builtin_prefetch(&channel[first], 1);
+  if (block.colour == nullptr) return;
+  const SampleColour* colours = &block.colour->samples[first];
+  __builtin_prefetch(colours, 1);
+  __builtin_prefetch(colours + kRowsOfLine * kLanes / 2, 1);
 }
 
 /// One depth image, and what it says of every block.
@@ -260,6 +264,7 @@ struct BlockUpdate {
   const FusionView& view;
   const DepthView& images;
   const SampleUnits& units;
+  BlockTable& blocks;
 
   /// Whether any sample took part.
   bool operator()(const SE3& T_c_v, BlockHead& head, VoxelBlock& block, const VoxelBlock& next) const {
@@ -291,13 +296,13 @@ struct BlockUpdate {
         const auto first = static_cast<std::size_t>(r) * kLanes;
         if (layer.free[y] != 0) {
           if (is_settled(&block.distance[first], &block.weight[first], free)) continue;
-          update_row<false>(free_row, first, block);
+          update_row<false>(free_row, first, blocks, block);
           any_row = true;
           continue;
         }
         measure_row<kWholeInImage>(view, scale, pixels, layer, y, row);
         if (!any(row.weight > 0)) continue;
-        update_row<true>(row, first, block);
+        update_row<true>(row, first, blocks, block);
         any_row = true;
       }
     }
@@ -311,10 +316,12 @@ void SurfaceVolume::fuse(const DepthView& view, const SE3& T_c_v) {
   const FusionView f(view, options_, T_c_v);
   collect_blocks(view, T_c_v);
   add_blocks_to_carve(view, T_c_v);
-  const BlockUpdate update{f, view, units_};
+  const BlockUpdate update{f, view, units_, blocks_};
   ++revision_;
   for (std::size_t n = 0; n < touched_.size(); ++n) {
-    const VoxelBlock& next = blocks_[touched_[std::min(n + 1, touched_.size() - 1)]];
+    const std::size_t last = touched_.size() - 1;
+    const VoxelBlock& next = blocks_[touched_[std::min(n + 1, last)]];
+    __builtin_prefetch(&blocks_[touched_[std::min(n + 2, last)]]);  // position and colour
     const std::uint32_t b = touched_[n];
     if (update(T_c_v, blocks_.head(b), blocks_[b], next)) blocks_.set_changed(b, revision_);
     make_way();

@@ -126,17 +126,19 @@ inline LaneIndex near_surface(const Lanes& distance, const LaneIndex& weight) {
   return (weight > 0) & (distance < kColourBand) & (distance > -kColourBand);
 }
 
-void add_colour(const std::array<std::uint16_t, 3>& colour, float share, std::size_t sample,
-                VoxelBlock& block) {
-  const std::array<std::uint16_t, 3> none{};
-  if (colour == none) return;
-  const bool first = colour_of(block, sample) == none;
-  for (std::size_t c = 0; c < 3; ++c) {
-    std::uint16_t& own = block.colour[c][sample];
-    const float before = own;
-    own = first ? colour[c]
-                : static_cast<std::uint16_t>(before + (static_cast<float>(colour[c]) - before) * share);
+void add_colour(SampleColour colour, float share, SampleColour& own) {
+  if (colour == 0) return;
+  if (own == 0) {
+    own = colour;
+    return;
   }
+  SampleColour average = 0;
+  for (int shift = 0; shift < 3 * kColourBits; shift += kColourBits) {
+    const auto before = static_cast<float>(own >> shift & kColourMask);
+    const auto added = static_cast<float>(colour >> shift & kColourMask);
+    average |= static_cast<SampleColour>(before + (added - before) * share + 0.5f) << shift;
+  }
+  own = average;
 }
 
 }  // namespace
@@ -148,8 +150,8 @@ Resampler::Resampler(const SurfaceVolume& from, const SE3& T_f_t)
       steps_(T_f_t.rotation().cast<float>()),
       shift_(shift_in_blocks(T_f_t, kBlockEdge * voxel_)) {}
 
-bool Resampler::add_to(VoxelBlock& block) {
-  if (shift_) return add_same_samples(block);
+bool Resampler::add_to(BlockTable& to, VoxelBlock& block) {
+  if (shift_) return add_same_samples(to, block);
   const Vector3 origin(block.at.x, block.at.y, block.at.z);
   const Vector3 first = T_f_t_ * Vector3(origin * (kBlockEdge * voxel_)) / voxel_;
   if (!fill(first)) return false;
@@ -160,12 +162,12 @@ bool Resampler::add_to(VoxelBlock& block) {
     const int y = r % kBlockEdge, z = r / kBlockEdge;
     const Eigen::Vector3f at =
         in_cube + static_cast<float>(y) * steps_.col(1) + static_cast<float>(z) * steps_.col(2);
-    any |= add_row(at, static_cast<std::size_t>(r) * kBlockEdge, block);
+    any |= add_row(at, static_cast<std::size_t>(r) * kBlockEdge, to, block);
   }
   return any;
 }
 
-bool Resampler::add_same_samples(VoxelBlock& block) {
+bool Resampler::add_same_samples(BlockTable& to, VoxelBlock& block) {
   const VoxelBlock* from =
       from_.find({block.at.x + shift_->x, block.at.y + shift_->y, block.at.z + shift_->z});
   if (from == nullptr) return false;
@@ -177,9 +179,10 @@ bool Resampler::add_same_samples(VoxelBlock& block) {
     const Lanes distance = real(load<LaneShort>(&from->distance[first]));
     const Lanes share = average_row(distance, weight, first, block);
     const LaneIndex near = near_surface(distance, weight);
-    if (!any(near)) continue;
+    if (from->colour == nullptr || !any(near)) continue;
+    SampleColour* own = &to.colour_for(block).samples[first];
     for (std::size_t i = 0; i < kLanes; ++i)
-      if (near[i] != 0) add_colour(colour_of(*from, first + i), share[i], first + i, block);
+      if (near[i] != 0) add_colour(from->colour->samples[first + i], share[i], own[i]);
   }
   return any_seen;
 }
@@ -228,20 +231,22 @@ void Resampler::fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, 
 }
 
 /// Samples `first` to first + 7 of a block, whose first one lies `at` in the cube.
-bool Resampler::add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock& block) const {
+bool Resampler::add_row(const Eigen::Vector3f& at, std::size_t first, BlockTable& to,
+                        VoxelBlock& block) const {
   const auto along = [&](int a) { return at[a] + steps_(a, 0) * kCount; };
   const Resampled found = resample(cube_.data(), kRow, kRow * kCube, {along(0), along(1), along(2)});
   if (!any(found.weight)) return false;
   const Lanes share = average_row(found.distance, found.weight, first, block);
   const LaneIndex near = near_surface(found.distance, found.weight);
   if (!any(near)) return true;
+  SampleColour* own = &to.colour_for(block).samples[first];
   for (std::size_t i = 0; i < kLanes; ++i)
     if (near[i] != 0)
-      add_colour(colour_in_cube(static_cast<std::uint32_t>(found.nearest[i])), share[i], first + i, block);
+      add_colour(colour_in_cube(static_cast<std::uint32_t>(found.nearest[i])), share[i], own[i]);
   return true;
 }
 
-std::array<std::uint16_t, 3> Resampler::colour_in_cube(std::uint32_t index) const {
+SampleColour Resampler::colour_in_cube(std::uint32_t index) const {
   const int x = static_cast<int>(index % kRow);
   const int y = low_.y() + static_cast<int>(index / kRow % kCube);
   const int z = low_.z() + static_cast<int>(index / (kRow * kCube));

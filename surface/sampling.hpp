@@ -79,22 +79,22 @@ class Resampler {
   /// @param T_f_t  of the other volume's frame in that of `from`
   Resampler(const SurfaceVolume& from, const SE3& T_f_t);
 
-  /// Adds what is there to the running averages of a block of the other volume. Colours take part within
-  /// two and a half voxels of the surface, where there is one.
+  /// Adds what is there to the running averages of a block of the other volume's table. Colours take part
+  /// within two and a half voxels of the surface, where there is one.
   /// @return  whether anything is there
-  bool add_to(VoxelBlock& block);
+  bool add_to(BlockTable& to, VoxelBlock& block);
 
  private:
   static constexpr int kCube = 16;  // samples that a turned block reaches over along an axis, at most
   static constexpr int kRow = 3 * kBlockEdge;  // along x whole rows of blocks are copied
 
-  bool add_same_samples(VoxelBlock& block);
+  bool add_same_samples(BlockTable& to, VoxelBlock& block);
   /// Copies the samples around a block, whose first one lies at `first`, of those samples from low_ on.
   bool fill(const Vector3& first);
   void fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, int z);
-  bool add_row(const Eigen::Vector3f& at, std::size_t first, VoxelBlock& block) const;
+  bool add_row(const Eigen::Vector3f& at, std::size_t first, BlockTable& to, VoxelBlock& block) const;
   /// Of the sample of the cube with that index.
-  [[nodiscard]] std::array<std::uint16_t, 3> colour_in_cube(std::uint32_t index) const;
+  [[nodiscard]] SampleColour colour_in_cube(std::uint32_t index) const;
 
   const BlockTable& from_;
   double voxel_;

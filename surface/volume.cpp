@@ -64,8 +64,8 @@ void SurfaceVolume::compose_block(std::uint32_t block, std::span<Resampler* cons
   VoxelBlock& own = blocks_[block];
   own.distance.fill(0);
   own.weight.fill(0);
-  for (auto& channel : own.colour) channel.fill(0);
-  for (Resampler* other : others) (void)other->add_to(own);
+  if (own.colour != nullptr) own.colour->samples.fill(0);
+  for (Resampler* other : others) (void)other->add_to(blocks_, own);
   blocks_.head(block).all_free = false;
   blocks_.set_changed(block, ++revision_);
 }
@@ -94,7 +94,7 @@ void SurfaceVolume::add(const SurfaceVolume& other, const SE3& T_v_o) {
   ++revision_;
   Resampler resampler(other, T_v_o.inverse());
   for (const std::uint32_t b : reached) {
-    if (!resampler.add_to(blocks_[b])) continue;
+    if (!resampler.add_to(blocks_, blocks_[b])) continue;
     blocks_.head(b).all_free = false;
     blocks_.set_changed(b, revision_);
   }

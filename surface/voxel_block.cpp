@@ -1,12 +1,7 @@
 #include "surface/voxel_block.hpp"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cstddef>
-#include <memory>
-#include <new>
-#include <type_traits>
 
 #include "surface/lanes.hpp"
 
@@ -16,29 +11,6 @@ namespace {
 constexpr std::size_t kFirstSlots = 1024;
 
 }  // namespace
-
-BlockTable::ChunkPointer BlockTable::new_chunk(bool large_page) {
-  // Aligned to its size: what was mapped around it is given back.
-  constexpr std::size_t kMapped = 2 * kChunkBytes;
-  void* mapped = mmap(nullptr, kMapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (mapped == MAP_FAILED) throw std::bad_alloc();
-  auto* begin = static_cast<std::byte*>(mapped);
-  std::size_t space = kMapped;
-  void* aligned = mapped;
-  (void)std::align(kChunkBytes, kChunkBytes, aligned, space);
-  auto* chunk = static_cast<std::byte*>(aligned);
-  if (chunk != begin) (void)munmap(begin, static_cast<std::size_t>(chunk - begin));
-  if (space != kChunkBytes) (void)munmap(chunk + kChunkBytes, space - kChunkBytes);
-  // Advice: a kernel without large pages clears small ones, which cost half when they are asked for together.
-  (void)madvise(chunk, kChunkBytes, large_page ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
-  if (large_page) (void)madvise(chunk, kChunkBytes, MADV_POPULATE_WRITE);
-  return ChunkPointer(reinterpret_cast<VoxelBlock*>(chunk));
-}
-
-void BlockTable::ReturnPages::operator()(VoxelBlock* chunk) const {
-  static_assert(std::is_trivially_destructible_v<VoxelBlock>);
-  (void)munmap(chunk, kChunkBytes);
-}
 
 std::size_t BlockTable::slot_of(const BlockPosition& at) const {
   const std::size_t mask = slots_.size() - 1;
@@ -62,17 +34,11 @@ std::uint32_t BlockTable::find_or_add(const BlockPosition& at) {
   if (2 * size() >= slots_.size()) grow();
   Slot& slot = slots_[slot_of(at)];
   if (slot.block == kFree) {
-    add_block().at = at;  // the last that may throw
+    blocks_.add().at = at;  // the last that may throw
     slot = {at, static_cast<std::uint32_t>(size())};
     heads_.push_back({.at = at});
   }
   return slot.block;
-}
-
-VoxelBlock& BlockTable::add_block() {
-  const std::size_t in_chunk = size() % kChunk;
-  if (in_chunk == 0) chunks_.push_back(new_chunk(!chunks_.empty()));
-  return chunks_.back().get()[in_chunk];  // pages come cleared, and so is an empty block
 }
 
 void BlockTable::grow() {
@@ -106,14 +72,13 @@ std::vector<const VoxelBlock*> BlockTable::sorted() const {
 }
 
 std::size_t BlockTable::bytes() const {
-  const std::size_t in_first = std::min(size(), kChunk) * sizeof(VoxelBlock);
-  const std::size_t in_others = chunks_.size() > 1 ? (chunks_.size() - 1) * kChunkBytes : 0;
-  return in_first + in_others + chunks_.size() * sizeof(chunks_[0]) + heads_.capacity() * sizeof(heads_[0]) +
+  return blocks_.bytes() + colours_.bytes() + heads_.capacity() * sizeof(heads_[0]) +
          slots_.size() * sizeof(slots_[0]);
 }
 
 void BlockTable::clear() {
-  chunks_.clear();
+  blocks_.clear();
+  colours_.clear();
   heads_.clear();
   slots_.clear();
 }

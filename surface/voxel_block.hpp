@@ -4,12 +4,12 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "geometry/types.hpp"
+#include "surface/page_pool.hpp"
 
 namespace twofold {
 
@@ -45,19 +45,29 @@ inline constexpr int kMostDistanceVoxels = 60;  ///< that any truncation may hav
 /// Weights end at this number of steps.
 inline constexpr int kMostWeightSteps = 65535;
 
-/// 8^3 samples of a truncated signed distance; sample (x, y, z) of it is entry (z * 8 + y) * 8 + x. Whole
-/// numbers of SampleUnits: what a volume costs is mostly the way of its samples to and from memory.
-struct VoxelBlock {
-  BlockPosition at;
-  alignas(64) std::array<std::int16_t, kBlockSamples> distance{};  ///< positive outside the surface
-  alignas(64) std::array<std::uint16_t, kBlockSamples> weight{};   ///< 0: never seen
-  alignas(
-      64) std::array<std::array<std::uint16_t, kBlockSamples>, 3> colour{};  ///< red, green, blue in 1/256
+/// Red, green and blue of a sample, from the lowest of ten bits each on, in steps of 1 / kColourSteps; 0:
+/// none yet.
+using SampleColour = std::uint32_t;
+inline constexpr int kColourSteps = 4;
+inline constexpr int kColourBits = 10;
+inline constexpr std::uint32_t kColourMask = (1U << kColourBits) - 1;
+
+struct BlockColour {
+  alignas(64) std::array<SampleColour, kBlockSamples> samples{};
 };
 
-/// Red, green and blue of sample i in 1/256.
-[[nodiscard]] inline std::array<std::uint16_t, 3> colour_of(const VoxelBlock& block, std::size_t i) {
-  return {block.colour[0][i], block.colour[1][i], block.colour[2][i]};
+/// 8^3 samples of a truncated signed distance; sample (x, y, z) of it is entry (z * 8 + y) * 8 + x. Whole
+/// numbers of SampleUnits: what a volume costs is mostly the way of its samples to and from memory. Colours,
+/// which are half of it, only blocks near a surface have.
+struct VoxelBlock {
+  BlockPosition at;
+  BlockColour* colour = nullptr;                                   ///< BlockTable::colour_for; null: none yet
+  alignas(64) std::array<std::int16_t, kBlockSamples> distance{};  ///< positive outside the surface
+  alignas(64) std::array<std::uint16_t, kBlockSamples> weight{};   ///< 0: never seen
+};
+
+[[nodiscard]] inline SampleColour colour_of(const VoxelBlock& block, std::size_t i) {
+  return block.colour != nullptr ? block.colour->samples[i] : 0;
 }
 
 /// What is asked of all blocks one after the other. Blocks themselves lie pages apart: a glance at each of
@@ -84,9 +94,12 @@ class BlockTable {
   std::uint32_t find_or_add(const BlockPosition& at);
 
   [[nodiscard]] std::size_t size() const { return heads_.size(); }
-  [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return chunks_[i / kChunk].get()[i % kChunk]; }
-  [[nodiscard]] const VoxelBlock& operator[](std::size_t i) const {
-    return chunks_[i / kChunk].get()[i % kChunk];
+  [[nodiscard]] VoxelBlock& operator[](std::size_t i) { return blocks_[i]; }
+  [[nodiscard]] const VoxelBlock& operator[](std::size_t i) const { return blocks_[i]; }
+  /// Of a block of this table, which has a colour then.
+  [[nodiscard]] BlockColour& colour_for(VoxelBlock& block) {
+    if (block.colour == nullptr) block.colour = &colours_.add();
+    return *block.colour;
   }
   [[nodiscard]] BlockHead& head(std::size_t i) { return heads_[i]; }
   [[nodiscard]] const BlockHead& head(std::size_t i) const { return heads_[i]; }
@@ -108,21 +121,8 @@ class BlockTable {
   [[nodiscard]] std::size_t slot_of(const BlockPosition& at) const;
   void grow();
 
-  VoxelBlock& add_block();
-
-  /// Blocks live in pages of their own: what a volume gives back goes back to the system, where on the heap
-  /// it would be holes among what others keep. A chunk is a large page of the processor's, so that the kernel
-  /// clears it at once, and blocks are reached without a walk through its tables; the first chunk, which a
-  /// small volume hardly fills, is of small pages, each taken when it is written to.
-  static constexpr std::size_t kChunkBytes = std::size_t{1} << 21;
-  static constexpr std::size_t kChunk = kChunkBytes / sizeof(VoxelBlock);
-  struct ReturnPages {
-    void operator()(VoxelBlock* chunk) const;
-  };
-  using ChunkPointer = std::unique_ptr<VoxelBlock, ReturnPages>;
-  /// Throws std::bad_alloc.
-  [[nodiscard]] static ChunkPointer new_chunk(bool large_page);
-  std::vector<ChunkPointer> chunks_;
+  PagePool<VoxelBlock> blocks_;
+  PagePool<BlockColour> colours_;
   std::vector<BlockHead> heads_;
   std::vector<Slot> slots_;  ///< a power of two, at most half of them taken
 };

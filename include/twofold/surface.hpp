@@ -108,8 +108,9 @@ class TWOFOLD_API SurfaceModel {
   /// What changed in the mesh after that revision; of 0 on, all of it. Only cells that frames changed are
   /// made anew, so that asking after each frame is cheap. Small specks, which `mesh` leaves out, are there.
   [[nodiscard]] SurfaceChanges mesh_changes(std::uint64_t since);
-  /// Of all that is kept. Mostly blocks of 8^3 samples, 5.2 KB each, wherever a surface ever was: half the
-  /// voxel is about four times as many. There is no limit; clear gives them back.
+  /// Of all that is kept. Mostly blocks of 8^3 samples, 2.1 KB each, or 4.2 KB with the colours beside a
+  /// surface, wherever a surface ever was: half the voxel is about four times as many. There is no limit;
+  /// clear gives them back.
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

@@ -205,9 +205,31 @@ double resident_mb() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
+/// What was free before has the colour of the surface that comes, not a mixture with none.
+TEST(SurfaceVolume, TakesTheFirstColourWhole) {
+  const Rig rig = depth_rig();
+  SurfaceVolume volume(options());
+  const cv::Mat far(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.1));
+  const cv::Mat near(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.0));
+  const cv::Mat grey(rig.camera.height, rig.camera.width, CV_8UC1, cv::Scalar(200));
+  for (const cv::Mat& depth : {far, near}) volume.fuse(make_depth_view(rig, depth, grey), SE3());
+  int coloured = 0, without = 0;
+  for (const VoxelBlock* block : volume.blocks().sorted()) {
+    without += block->colour == nullptr;
+    for (std::size_t s = 0; s < kBlockSamples; ++s) {
+      const SampleColour colour = colour_of(*block, s);
+      if (colour == 0) continue;
+      ++coloured;
+      ASSERT_EQ(colour & kColourMask, 200u * kColourSteps);
+    }
+  }
+  EXPECT_GT(coloured, 10000);
+  EXPECT_GT(without, 0);
+}
+
 /// Small things that others allocate meanwhile, and keep, must not hold what a volume gives back.
 TEST(BlockTable, GivesMemoryBackToTheSystem) {
-  constexpr int kBlocks = 20000;  // 100 MB
+  constexpr int kBlocks = 24000;  // 100 MB with their colours
   BlockTable table;
   std::vector<std::unique_ptr<std::array<char, 2000>>> others;
   const double before = resident_mb();
@@ -218,7 +240,7 @@ TEST(BlockTable, GivesMemoryBackToTheSystem) {
       VoxelBlock& block = table[table.find_or_add({i, 0, 0})];
       // Large pages are taken at once, but not by every kernel, nor by an emulator.
       block.weight.fill(1);
-      block.colour.back().fill(1);
+      table.colour_for(block).samples.fill(1);
       if (i % 16 == 0) others.push_back(std::make_unique<std::array<char, 2000>>());
     }
     const double full = resident_mb() - before;
