@@ -104,7 +104,8 @@ class JumpFilter {
     Row& near = nearest_[static_cast<std::size_t>(y % kKept)];
     for (int x = 0; x < depth_.cols; ++x) {
       const float low = around_.nearest(x);
-      kept[x] = ((z[x] < kNone) & (around_.farthest(x) - low <= kMaxSpreadShare * low)) ? z[x] : 0.0f;
+      const float spread = around_.farthest(x) - low;
+      kept[x] = ((z[x] < kNone) & (spread <= kMaxSpreadShare * low)) ? z[x] : 0.0f;
       near[x] = around_.has_hole(x) ? 0.0f : low;
     }
   }
