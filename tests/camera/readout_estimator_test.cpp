@@ -176,7 +176,7 @@ TEST(ReadoutEstimator, IsNotDeceivedByDepthsThatNobodyMeasured) {
     }
   }
   EXPECT_GT(std::abs(believed), 0.006);
-  EXPECT_LT(std::abs(weighed), 0.5 * std::abs(believed));
+  EXPECT_LT(std::abs(weighed), 0.004);
 }
 
 TEST(ReadoutEstimator, NeedsFramesThatFollowEachOther) {
