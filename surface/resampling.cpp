@@ -56,6 +56,14 @@ struct Cells {
     const Lanes y1 = along_x[2] + at[1] * (along_x[3] - along_x[2]);
     return y0 + at[2] * (y1 - y0);
   }
+  /// The corner that each sample is nearest to.
+  [[nodiscard]] LaneIndex nearest() const {
+    const LaneIndex far_x = at[0] > 0.5f, far_y = at[1] > 0.5f, far_z = at[2] > 0.5f;
+    const auto along_x = [&](std::size_t c) { return far_x != 0 ? corners[c].second : corners[c].first; };
+    const LaneIndex z0 = far_y != 0 ? along_x(1) : along_x(0);
+    const LaneIndex z1 = far_y != 0 ? along_x(3) : along_x(2);
+    return far_z != 0 ? z1 : z0;
+  }
   /// All eight.
   [[nodiscard]] LaneIndex are_seen() const {
     LaneIndex seen = LaneIndex{} - 1;
@@ -79,6 +87,22 @@ struct Cells {
   }
 };
 
+/// Cells whose lowest corners stand beside each other in a row, as most do where a loop has turned a volume
+/// by a degree or two: whole rows of corners are loaded.
+inline void read_row(const std::uint32_t* first, int row, int layer, Cells& cells) {
+  for (int c = 0; c < 4; ++c) {
+    const std::uint32_t* from = first + (c >> 1) * layer + (c & 1) * row;
+    cells.corners[static_cast<std::size_t>(c)] = {load<LaneIndex>(from), load<LaneIndex>(from + 1)};
+  }
+}
+inline void read_scattered(const std::uint32_t* cube, const LaneIndex& base, int row, int layer,
+                           Cells& cells) {
+  std::array<std::int32_t, kLanes> index;
+  std::memcpy(index.data(), &base, sizeof(base));
+  for (int c = 0; c < 4; ++c)
+    cells.corners[static_cast<std::size_t>(c)] = read_pairs(cube + (c >> 1) * layer + (c & 1) * row, index);
+}
+
 /// Of a cube with so many samples along x, and along x and y. Weights are those of the nearest samples, 0
 /// where these were never seen: or each time that samples are taken to another grid, what is known would lose
 /// a sample all around, and be known less.
@@ -86,17 +110,16 @@ inline Resampled resample(const std::uint32_t* cube, int row, int layer, const s
   const LaneIndex x = whole(at[0]), y = whole(at[1]), z = whole(at[2]);
   Cells cells{{}, {at[0] - real(x), at[1] - real(y), at[2] - real(z)}};
   const LaneIndex base = z * layer + y * row + x;
-  const auto step = [](const Lanes& f, int by) { return (f > 0.5f) & by; };
+  constexpr LaneIndex kBeside{0, 1, 2, 3, 4, 5, 6, 7};
+  if (any((base - kBeside) ^ base[0]))
+    read_scattered(cube, base, row, layer, cells);
+  else
+    read_row(cube + base[0], row, layer, cells);
   Resampled result{};
+  const auto step = [](const Lanes& f, int by) { return (f > 0.5f) & by; };
   result.nearest = base + step(cells.at[0], 1) + step(cells.at[1], row) + step(cells.at[2], layer);
-  LaneIndex nearest;
-  for (std::size_t i = 0; i < kLanes; ++i) nearest[i] = static_cast<std::int32_t>(cube[result.nearest[i]]);
-  result.weight = weight_of(nearest);
+  result.weight = weight_of(cells.nearest());
   if (!any(result.weight)) return result;
-  std::array<std::int32_t, kLanes> index;
-  std::memcpy(index.data(), &base, sizeof(base));
-  for (int c = 0; c < 4; ++c)
-    cells.corners[static_cast<std::size_t>(c)] = read_pairs(cube + (c >> 1) * layer + (c & 1) * row, index);
   result.distance = cells.linear();
   const LaneIndex all_seen = cells.are_seen();
   if (any((all_seen == 0) & (result.weight > 0)))
@@ -126,19 +149,32 @@ inline LaneIndex near_surface(const Lanes& distance, const LaneIndex& weight) {
   return (weight > 0) & (distance < kColourBand) & (distance > -kColourBand);
 }
 
-void add_colour(SampleColour colour, float share, SampleColour& own) {
-  if (colour == 0) return;
-  if (own == 0) {
-    own = colour;
-    return;
-  }
-  SampleColour average = 0;
+/// Adds to the running averages of eight samples' colours; a sample's first one is taken whole.
+/// @param colours  0: none
+/// @param share    of the new one in each average
+void add_colours(const LaneIndex& colours, const Lanes& share, SampleColour* own) {
+  const auto before = load<LaneIndex>(own);
+  LaneIndex average{};
   for (int shift = 0; shift < 3 * kColourBits; shift += kColourBits) {
-    const auto before = static_cast<float>(own >> shift & kColourMask);
-    const auto added = static_cast<float>(colour >> shift & kColourMask);
-    average |= static_cast<SampleColour>(before + (added - before) * share + 0.5f) << shift;
+    const Lanes old = real(before >> shift & static_cast<int>(kColourMask));
+    const Lanes added = real(colours >> shift & static_cast<int>(kColourMask));
+    average |= whole(old + (added - old) * share + 0.5f) << shift;
   }
-  own = average;
+  const LaneIndex first = before == 0 ? colours : average;
+  const LaneIndex after = colours == 0 ? before : first;
+  std::memcpy(own, &after, sizeof(after));
+}
+
+/// @param rows  of the cube's samples, eight by eight; null: without colours
+LaneIndex read_colours(const SampleColour* const* rows, const LaneIndex& index, const LaneIndex& wanted) {
+  LaneIndex colours{};
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    if (wanted[i] == 0) continue;
+    const auto sample = static_cast<std::uint32_t>(index[i]);
+    const SampleColour* row = rows[sample / kBlockEdge];
+    if (row != nullptr) colours[i] = static_cast<std::int32_t>(row[sample % kBlockEdge]);
+  }
+  return colours;
 }
 
 }  // namespace
@@ -180,9 +216,8 @@ bool Resampler::add_same_samples(BlockTable& to, VoxelBlock& block) {
     const Lanes share = average_row(distance, weight, first, block);
     const LaneIndex near = near_surface(distance, weight);
     if (from->colour == nullptr || !any(near)) continue;
-    SampleColour* own = &to.colour_for(block).samples[first];
-    for (std::size_t i = 0; i < kLanes; ++i)
-      if (near[i] != 0) add_colour(from->colour->samples[first + i], share[i], own[i]);
+    add_colours(load<LaneIndex>(&from->colour->samples[first]) & near, share,
+                &to.colour_for(block).samples[first]);
   }
   return any_seen;
 }
@@ -216,17 +251,20 @@ bool Resampler::fill(const Vector3& first) {
 }
 
 void Resampler::fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, int z) {
-  std::uint32_t* to = &cube_[static_cast<std::size_t>(((z - low_.z()) * kCube + y - low_.y()) * kRow)];
+  auto to = static_cast<std::size_t>(((z - low_.z()) * kCube + y - low_.y()) * kRow);
   const auto row = static_cast<std::size_t>(((z & 7) * kBlockEdge + (y & 7)) * kBlockEdge);
   const auto reached = static_cast<std::size_t>((high_.x() >> 3) - (low_.x() >> 3) + 1);
   for (std::size_t n = 0; n < reached; ++n, to += kBlockEdge) {
     LaneIndex samples{};
+    const SampleColour* colours = nullptr;
     if (blocks[n] != nullptr) {
       const LaneIndex weight = wide(load<LaneUnsignedShort>(&blocks[n]->weight[row]));
       const LaneIndex distance = wide(load<LaneShort>(&blocks[n]->distance[row]));
       samples = weight << 16 | (distance & 0xffff);
+      if (blocks[n]->colour != nullptr) colours = &blocks[n]->colour->samples[row];
     }
-    std::memcpy(to, &samples, sizeof(samples));
+    std::memcpy(&cube_[to], &samples, sizeof(samples));
+    colours_[to / kBlockEdge] = colours;
   }
 }
 
@@ -239,21 +277,9 @@ bool Resampler::add_row(const Eigen::Vector3f& at, std::size_t first, BlockTable
   const Lanes share = average_row(found.distance, found.weight, first, block);
   const LaneIndex near = near_surface(found.distance, found.weight);
   if (!any(near)) return true;
-  SampleColour* own = &to.colour_for(block).samples[first];
-  for (std::size_t i = 0; i < kLanes; ++i)
-    if (near[i] != 0)
-      add_colour(colour_in_cube(static_cast<std::uint32_t>(found.nearest[i])), share[i], own[i]);
+  add_colours(read_colours(colours_.data(), found.nearest, near), share,
+              &to.colour_for(block).samples[first]);
   return true;
-}
-
-SampleColour Resampler::colour_in_cube(std::uint32_t index) const {
-  const int x = static_cast<int>(index % kRow);
-  const int y = low_.y() + static_cast<int>(index / kRow % kCube);
-  const int z = low_.z() + static_cast<int>(index / (kRow * kCube));
-  const auto block_along = [&](int coordinate, int a) { return (coordinate >> 3) - (low_[a] >> 3); };
-  const VoxelBlock* from =
-      blocks_[static_cast<std::size_t>((block_along(z, 2) * 3 + block_along(y, 1)) * 3 + (x >> 3))];
-  return colour_of(*from, static_cast<std::size_t>(((z & 7) * kBlockEdge + (y & 7)) * kBlockEdge + (x & 7)));
 }
 
 }  // namespace twofold

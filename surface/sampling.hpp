@@ -93,8 +93,6 @@ class Resampler {
   bool fill(const Vector3& first);
   void fill_row(const std::array<const VoxelBlock*, 3>& blocks, int y, int z);
   bool add_row(const Eigen::Vector3f& at, std::size_t first, BlockTable& to, VoxelBlock& block) const;
-  /// Of the sample of the cube with that index.
-  [[nodiscard]] SampleColour colour_in_cube(std::uint32_t index) const;
 
   const BlockTable& from_;
   double voxel_;
@@ -105,6 +103,7 @@ class Resampler {
   std::array<const VoxelBlock*, 27> blocks_{};  ///< from that of low_ on
   /// Weight in the upper half, distance in the lower one; x fastest, from the block of low_ on.
   alignas(32) std::array<std::uint32_t, kRow * kCube * kCube> cube_{};
+  std::array<const SampleColour*, kRow / kBlockEdge * kCube * kCube> colours_{};  ///< of its rows of eight
 };
 
 }  // namespace twofold

@@ -3,6 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include <array>
+#include <cmath>
 
 #include "bench/surface/depth_views.hpp"
 #include "surface/composition.hpp"
@@ -128,6 +129,29 @@ void compose_moved(benchmark::State& state) {
   }
 }
 BENCHMARK(compose_moved)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
+
+/// A loop moves all of eight submaps that overlap, by a degree and a few centimetres, each by its own.
+void compose_loop(benchmark::State& state) {
+  const DepthViews& all = depth_views();
+  std::vector<SurfaceVolume> volumes;
+  for (std::size_t v = 0; v < kViews; ++v) {
+    volumes.emplace_back(options_of(state));
+    for (std::size_t n = v; n < v + 4; ++n) volumes[v].fuse(all.views[n % kViews], all.T_c_w[n % kViews]);
+  }
+  Composition composition(options_of(state));
+  std::size_t loops = 0, blocks = 0;
+  for (auto _ : state) {
+    ++loops;
+    std::vector<PlacedVolume> placed;
+    for (std::uint32_t v = 0; v < kViews; ++v) {
+      const double by = 0.01 * std::sin(static_cast<double>(loops + 3 * v));
+      placed.push_back({v, &volumes[v], SE3(SO3::exp(Vector3(by, -by, by)), Vector3(by, 2 * by, -by))});
+    }
+    blocks += composition.update(placed);
+  }
+  state.counters["blocks"] = static_cast<double>(blocks) / static_cast<double>(loops);
+}
+BENCHMARK(compose_loop)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond);
 
 void pack_and_unpack_depth(benchmark::State& state) {
   const cv::Mat& depth = depth_views().depth.front();
