@@ -17,8 +17,60 @@ std::size_t Composition::update(std::span<const PlacedVolume> volumes, double re
   remove_all_but(volumes, rest);
   for (const PlacedVolume& volume : volumes) take_changes(volume);
   const std::size_t blocks = compose(volumes, gives_up);
-  if (!unfinished()) mesh_.update(whole_);
+  if (unfinished()) return blocks;
+  mesh_.update(whole_);
+  mesh_at_.clear();
+  for (const auto& [id, member] : members_) mesh_at_.emplace(id, member.T_w_v);
   return blocks;
+}
+
+bool Composition::move_mesh(std::span<const PlacedVolume> volumes) {
+  std::vector<Moved> all;
+  bool any = false;
+  for (const PlacedVolume& volume : volumes) {
+    const auto member = members_.find(volume.id);
+    const auto at = mesh_at_.find(volume.id);
+    if (member == members_.end() || at == mesh_at_.end()) continue;
+    Moved moved{volume.volume, at->second.inverse(), Motion::Identity()};
+    if (farthest_way(member->second, at->second, volume.T_w_v) > kRest * whole_.options().voxel) {
+      moved.motion = (volume.T_w_v * at->second.inverse()).matrix().topRows<3>();
+      at->second = volume.T_w_v;
+      any = true;
+    }
+    all.push_back(std::move(moved));
+  }
+  if (any) mesh_.move([&](const Vector3& x_w) { return mean_motion(all, x_w); });
+  return any;
+}
+
+/// Whether a vertex at x_v may rest on the volume.
+bool Composition::has_surface(const SurfaceVolume& volume, const Vector3& x_v) {
+  constexpr double kReach = 2.0 / kBlockEdge;  // to the samples around the two that the vertex lies between
+  const Vector3 at = x_v / (kBlockEdge * volume.options().voxel);
+  const Eigen::Vector3i first = (at.array() - kReach).floor().cast<int>();
+  const Eigen::Vector3i last = (at.array() + kReach).floor().cast<int>();
+  bool any_inside = false, any_outside = false;
+  for (int z = first.z(); z <= last.z(); ++z)
+    for (int y = first.y(); y <= last.y(); ++y)
+      for (int x = first.x(); x <= last.x(); ++x) {
+        const auto number = volume.blocks().number_of({x, y, z});
+        if (!number) continue;
+        any_inside |= volume.blocks().head(*number).any_inside;
+        any_outside |= volume.blocks().head(*number).any_outside;
+      }
+  return any_inside && any_outside;
+}
+
+/// Of the volumes that a vertex there may rest on; to stand still, if there is none.
+Motion Composition::mean_motion(std::span<const Moved> all, const Vector3& x_w) {
+  Motion sum = Motion::Zero();
+  int count = 0;
+  for (const Moved& one : all) {
+    if (!has_surface(*one.volume, one.T_v_w * x_w)) continue;
+    sum += one.motion;
+    ++count;
+  }
+  return count > 0 ? Motion(sum / count) : Motion(Motion::Identity());
 }
 
 /// Blocks are never taken out of a volume one by one: where moved volumes have left more than they are in,
@@ -46,19 +98,23 @@ void Composition::extend_bounds(Member& member, const SurfaceVolume& volume) con
   }
 }
 
-/// By the corners of what it holds: no sample moves farther.
 bool Composition::still_stands(Member& member, const PlacedVolume& now, double rest) const {
   if (now.volume->cleared() > member.revision) return false;
   extend_bounds(member, *now.volume);
   if ((member.low.array() > member.high.array()).any()) return false;  // it holds nothing
   if (rest == 0) return member.T_w_v.matrix() == now.T_w_v.matrix();
+  return farthest_way(member, member.T_w_v, now.T_w_v) <= rest * whole_.options().voxel;
+}
+
+/// That a sample moves [m], by the corners of what it holds: none moves farther.
+double Composition::farthest_way(const Member& member, const SE3& T_old, const SE3& T_new) {
   double most = 0;
   for (int c = 0; c < 8; ++c) {
     const Vector3 corner((c & 1 ? member.high : member.low).x(), (c & 2 ? member.high : member.low).y(),
                          (c & 4 ? member.high : member.low).z());
-    most = std::max(most, (now.T_w_v * corner - member.T_w_v * corner).norm());
+    most = std::max(most, (T_new * corner - T_old * corner).norm());
   }
-  return most <= rest * whole_.options().voxel;
+  return most;
 }
 
 void Composition::remove_all_but(std::span<const PlacedVolume> volumes, double rest) {

@@ -41,7 +41,12 @@ class Composition {
   }
   /// As update, but volumes stand exactly where they are said to.
   std::size_t settle(std::span<const PlacedVolume> volumes) { return update(volumes, 0, {}); }
-  /// Whether the last call gave up.
+  /// Moves the mesh as volumes have moved by more than half a voxel since it was made: each piece by the mean
+  /// of those that have surface there. They are joined anew by the next update, which takes far longer: a
+  /// wall that is twice in the mesh remains so until then.
+  /// @return  whether any moved
+  bool move_mesh(std::span<const PlacedVolume> volumes);
+  /// Whether the last call of update gave up.
   [[nodiscard]] bool unfinished() const { return !marked_.empty(); }
 
   [[nodiscard]] const SurfaceVolume& whole() const { return whole_; }
@@ -58,9 +63,17 @@ class Composition {
   };
 
   std::size_t update(std::span<const PlacedVolume> volumes, double rest, const GivesUp& gives_up);
+  struct Moved {
+    const SurfaceVolume* volume = nullptr;
+    SE3 T_v_w;      ///< where the mesh has it so far
+    Motion motion;  ///< from there to where it is now
+  };
+  [[nodiscard]] static bool has_surface(const SurfaceVolume& volume, const Vector3& x_v);
+  [[nodiscard]] static Motion mean_motion(std::span<const Moved> all, const Vector3& x_w);
   void let_go_of_empty_blocks();
   void extend_bounds(Member& member, const SurfaceVolume& volume) const;
   [[nodiscard]] bool still_stands(Member& member, const PlacedVolume& now, double rest) const;
+  [[nodiscard]] static double farthest_way(const Member& member, const SE3& T_old, const SE3& T_new);
   void remove_all_but(std::span<const PlacedVolume> volumes, double rest);
   void remove(std::uint32_t id, const Member& member);
   void take_changes(const PlacedVolume& volume);
@@ -70,6 +83,7 @@ class Composition {
   SurfaceVolume whole_;
   MeshPieces mesh_;
   std::map<std::uint32_t, Member> members_;
+  std::map<std::uint32_t, SE3> mesh_at_;              ///< T_w_v of the volumes in the mesh
   std::vector<std::vector<std::uint32_t>> in_block_;  ///< of each block of the whole: ids, ascending
   std::vector<std::uint32_t> marked_;                 ///< blocks to be made anew
   std::vector<std::uint8_t> is_marked_;

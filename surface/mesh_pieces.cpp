@@ -77,6 +77,8 @@ std::vector<std::uint32_t> MeshPieces::outdated(const SurfaceVolume& volume) con
     }
     make_way();
   }
+  for (const BlockPosition& at : moved_)
+    if (const auto block = blocks.number_of(at)) is_outdated[*block] = 1;
   std::vector<std::uint32_t> all;
   for (std::uint32_t b = 0; b < is_outdated.size(); ++b)
     if (is_outdated[b] != 0) all.push_back(b);
@@ -84,7 +86,7 @@ std::vector<std::uint32_t> MeshPieces::outdated(const SurfaceVolume& volume) con
 }
 
 std::size_t MeshPieces::update(const SurfaceVolume& volume) {
-  if (volume.revision() == seen_) return 0;
+  if (volume.revision() == seen_ && moved_.empty()) return 0;
   const std::uint64_t before = revision_++;
   bool any = false;
   BlockMesh piece;
@@ -102,7 +104,31 @@ std::size_t MeshPieces::update(const SurfaceVolume& volume) {
   }
   if (!any) revision_ = before;
   seen_ = volume.revision();
+  moved_.clear();
   return blocks.size();
+}
+
+void MeshPieces::move(const std::function<Motion(const Vector3&)>& motion_of) {
+  ++revision_;
+  for (auto& [at, piece] : pieces_) {
+    if (piece.mesh.vertices.empty()) continue;
+    make_way();
+    const Motion motion = motion_of(piece.mesh.vertices.front().position.cast<double>());
+    if (motion == Motion::Identity()) continue;
+    const Eigen::Matrix3f turn = motion.leftCols<3>().cast<float>();
+    const Eigen::Vector3f shift = motion.col(3).cast<float>();
+    for (SurfaceVertex& vertex : piece.mesh.vertices) {
+      vertex.position = turn * vertex.position + shift;
+      vertex.normal = (turn * vertex.normal).normalized();
+    }
+    moved_.push_back(at);
+  }
+  for (const BlockPosition& at : moved_) {
+    for (int n = 0; n < 8; ++n) {  // triangles of the blocks before it end in its vertices
+      const auto piece = pieces_.find({at.x - (n & 1), at.y - (n >> 1 & 1), at.z - (n >> 2)});
+      if (piece != pieces_.end()) piece->second.revision = revision_;
+    }
+  }
 }
 
 bool MeshPieces::replace(const BlockPosition& at, const BlockMesh& piece) {

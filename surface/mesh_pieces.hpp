@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <vector>
@@ -10,6 +11,9 @@
 #include "surface/volume.hpp"
 
 namespace twofold {
+
+/// [A b] takes a position x to A x + b [m]; rigid, or the mean of rigid ones that are alike.
+using Motion = Eigen::Matrix<double, 3, 4>;
 
 /// The mesh of a volume in a piece for each block, of which only those are made anew whose samples, or whose
 /// neighbours' samples, changed. Whoever shows it asks for what changed since a revision. One thread at a
@@ -21,7 +25,11 @@ class MeshPieces {
   /// @return  pieces extracted
   std::size_t update(const SurfaceVolume& volume);
 
-  /// Counts the updates that changed a piece; 0: there is none yet.
+  /// Moves pieces, until the next update makes them anew; neighbours still share their vertices.
+  /// @param motion_of  a piece's, asked for one of its vertices
+  void move(const std::function<Motion(const Vector3&)>& motion_of);
+
+  /// Counts the calls that changed a piece; 0: there is none yet.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// Blocks whose piece changed after that revision, ascending; also those that have none any
   /// more, unless it is 0: there was nothing before.
@@ -51,7 +59,8 @@ class MeshPieces {
 
   std::map<BlockPosition, Piece> pieces_;
   std::uint64_t revision_ = 0;
-  std::uint64_t seen_ = 0;  ///< of the volume's revisions
+  std::uint64_t seen_ = 0;            ///< of the volume's revisions
+  std::vector<BlockPosition> moved_;  ///< pieces that are not where the volume has them
 };
 
 }  // namespace twofold

@@ -220,6 +220,16 @@ std::vector<PlacedVolume> SubmapSurface::placed(KeyframeId part) const {
   return volumes;
 }
 
+std::vector<PlacedVolume> SubmapSurface::placed_in(const GraphSnapshot& graph, KeyframeId part) const {
+  std::vector<PlacedVolume> volumes;
+  for (const auto& submap : submaps_) {
+    const Keyframe& hung_on = graph.keyframe(submap->hung_on);
+    if (hung_on.part == part && !hung_on.culled())
+      volumes.push_back({submap->id, &submap->volume, hung_on.T_k_w.inverse() * submap->T_k_s});
+  }
+  return volumes;
+}
+
 std::size_t SubmapSurface::bytes() const {
   std::size_t sum = 0;
   for (const Waiting& frame : waiting_)

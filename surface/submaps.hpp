@@ -94,6 +94,8 @@ class SubmapSurface {
   [[nodiscard]] SurfaceVolume whole(KeyframeId part) const;
   /// These submaps, as Composition takes them; valid until the next step.
   [[nodiscard]] std::vector<PlacedVolume> placed(KeyframeId part) const;
+  /// The same, but where a newer map than that of the last step has them.
+  [[nodiscard]] std::vector<PlacedVolume> placed_in(const GraphSnapshot& graph, KeyframeId part) const;
 
   [[nodiscard]] const SubmapReport& report() const { return report_; }
   [[nodiscard]] std::size_t submap_count() const { return submaps_.size(); }

@@ -226,6 +226,83 @@ TEST_F(CompositionTest, WhatItGivesUpIsDoneByTheNextCall) {
   EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
+TEST_F(CompositionTest, TheMeshMovesAsOneWithItsVolumesAndIsMadeAnewAfterwards) {
+  composition_.update(placed_);
+  const TriangleMesh before = composition_.mesh().joined(0);
+  const std::uint64_t revision = composition_.mesh().revision();
+  EXPECT_FALSE(composition_.move_mesh(placed_));
+  const SE3 T_new_old(SO3::exp(Vector3(0.02, 0.3, -0.1)), Vector3(0.3, -0.2, 0.5));
+  for (PlacedVolume& volume : placed_) volume.T_w_v = T_new_old * volume.T_w_v;
+  ASSERT_TRUE(composition_.move_mesh(placed_));
+  const TriangleMesh moved = composition_.mesh().joined(0);
+  ASSERT_TRUE(moved.triangles == before.triangles);
+  EXPECT_EQ(composition_.mesh().changed_since(revision), composition_.mesh().changed_since(0));
+  for (std::size_t v = 0; v < moved.positions.size(); ++v) {
+    const Vector3 wanted = T_new_old * before.positions[v].cast<double>();
+    ASSERT_LT((moved.positions[v].cast<double>() - wanted).norm(), 1e-5);
+    ASSERT_LT(
+        (moved.normals[v].cast<double>() - T_new_old.rotation() * before.normals[v].cast<double>()).norm(),
+        1e-5);
+  }
+  EXPECT_FALSE(composition_.move_mesh(placed_)) << "moved twice";
+  composition_.update(placed_);
+  EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
+}
+
+TEST_F(CompositionTest, TheMeshMovesToWhereItsVolumesAreWhenAnUpdateGaveUpMeanwhile) {
+  composition_.update(placed_);
+  const TriangleMesh before = composition_.mesh().joined(0);
+  for (std::size_t n = 0; n < 3; ++n) move(n, 0.3);
+  composition_.move_mesh(placed_);
+  const std::vector<PlacedVolume> first = placed_;
+  for (std::size_t n = 0; n < 3; ++n) move(n, -0.1);
+  composition_.update(first, [&](double) {
+    composition_.move_mesh(placed_);
+    return true;
+  });
+  ASSERT_TRUE(composition_.unfinished());
+  const TriangleMesh moved = composition_.mesh().joined(0);
+  ASSERT_EQ(moved.positions.size(), before.positions.size());
+  for (std::size_t v = 0; v < moved.positions.size(); ++v)
+    ASSERT_LT((moved.positions[v] - before.positions[v] - Eigen::Vector3f(0, 0.2f, 0)).norm(), 1e-5);
+  composition_.update(placed_);
+  EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
+}
+
+TEST_F(CompositionTest, OnlyTheMeshOfAVolumeThatMovedMoves) {
+  placed_[2].T_w_v = SE3(SO3(), {5, 0, 0});  // alone
+  composition_.update(placed_);
+  const TriangleMesh before = composition_.mesh().joined(0);
+  move(2, 0.3);
+  ASSERT_TRUE(composition_.move_mesh(placed_));
+  const TriangleMesh moved = composition_.mesh().joined(0);
+  std::size_t far = 0;
+  for (std::size_t v = 0; v < moved.positions.size(); ++v) {
+    const bool is_of_moved = before.positions[v].x() > 3;
+    far += is_of_moved;
+    ASSERT_NEAR((moved.positions[v] - before.positions[v]).norm(), is_of_moved ? 0.3 : 0, 1e-5);
+  }
+  EXPECT_GT(far, 100u);
+  EXPECT_LT(far, moved.positions.size());
+}
+
+TEST_F(CompositionTest, VolumesThatOverlapMoveTheirMeshBetweenThem) {
+  for (PlacedVolume& volume : placed_) volume.T_w_v = SE3();
+  composition_.update(placed_);
+  const TriangleMesh before = composition_.mesh().joined(0);
+  move(0, 0.3);
+  ASSERT_TRUE(composition_.move_mesh(placed_));
+  const TriangleMesh moved = composition_.mesh().joined(0);
+  std::size_t between = 0;
+  for (std::size_t v = 0; v < moved.positions.size(); ++v) {
+    const float by = (moved.positions[v] - before.positions[v]).y();
+    ASSERT_GE(by, -1e-5f);
+    ASSERT_LE(by, 0.3f + 1e-5f);
+    between += by > 0.05f && by < 0.25f;
+  }
+  EXPECT_GT(between, 100u);
+}
+
 /// 0 where nothing was ever seen.
 std::uint16_t weight_of_nearest_sample(const SurfaceVolume& volume, const Vector3& x_v) {
   const Eigen::Vector3i g = (x_v / volume.options().voxel).array().round().cast<int>();

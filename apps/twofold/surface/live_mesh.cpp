@@ -14,10 +14,21 @@ void LiveMesh::published(const GraphSnapshot& graph) {
   last_change_ = change;
 }
 
+void LiveMesh::follow(const SubmapSurface& surface, const GraphSnapshot& graph) {
+  if (graph.reference() == kNoKeyframe || graph.last_change().version <= followed_) return;
+  followed_ = graph.last_change().version;
+  const KeyframeId part = graph.part(graph.reference());
+  followed_to_ = surface.placed_in(graph, part);
+  (void)composition_.move_mesh(followed_to_);
+  tell(part);
+  take_followed(graph.version());
+}
+
 bool LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph,
                       const Composition::GivesUp& gives_up) {
   if (graph.reference() == kNoKeyframe) return true;
   const KeyframeId part = graph.part(graph.reference());
+  followed_to_.clear();
   const std::int64_t begin_ns = thread_cpu_ns();
   const std::size_t blocks = composition_.update(surface.placed(part), gives_up);
   if (blocks > 0) {
@@ -27,31 +38,45 @@ bool LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph,
     most_bytes_ = std::max(most_bytes_, composition_.bytes());
   }
   if (composition_.unfinished()) return false;
+  if (!followed_to_.empty()) (void)composition_.move_mesh(followed_to_);
+  tell(part);
   take_times(graph.version());
   take_settled(surface);
-  if (composition_.mesh().revision() != revision_) {
-    revision_ = composition_.mesh().revision();
-    if (listener_) listener_(composition_.mesh(), part);
-  }
   return true;
+}
+
+void LiveMesh::tell(KeyframeId part) {
+  if (composition_.mesh().revision() == revision_) return;
+  revision_ = composition_.mesh().revision();
+  if (listener_) listener_(composition_.mesh(), part);
+}
+
+void LiveMesh::read_times() {
+  for (MapTime time; times_.try_pop(time);) map_times_.push_back(time);
+}
+
+/// The mesh has moved as the corrections up to this version of the map say.
+void LiveMesh::take_followed(std::uint64_t version) {
+  read_times();
+  const std::int64_t now_ns = steady_now_ns();
+  for (MapTime& time : map_times_) {
+    if (time.version > version) return;
+    if (!time.changed || time.followed) continue;
+    loops_.record(now_ns - time.published_ns);
+    time.followed = true;
+  }
 }
 
 /// The mesh is now that of this version of the map.
 void LiveMesh::take_times(std::uint64_t version) {
+  take_followed(version);
   const std::int64_t now_ns = steady_now_ns();
-  for (;;) {
-    if (!next_time_) {
-      MapTime time;
-      if (!times_.try_pop(time)) return;
-      next_time_ = time;
-    }
-    if (next_time_->version > version) return;
-    behind_.record(now_ns - next_time_->published_ns);
-    if (next_time_->changed) {
-      loops_.record(now_ns - next_time_->published_ns);
-      if (!unsettled_ns_) unsettled_ns_ = next_time_->published_ns;
-    }
-    next_time_.reset();
+  for (; !map_times_.empty() && map_times_.front().version <= version; map_times_.pop_front()) {
+    const MapTime& time = map_times_.front();
+    behind_.record(now_ns - time.published_ns);
+    if (!time.changed) continue;
+    joined_.record(now_ns - time.published_ns);
+    if (!unsettled_ns_) unsettled_ns_ = time.published_ns;
   }
 }
 
@@ -76,6 +101,7 @@ LiveMeshFigures LiveMesh::figures() const {
   figures.behind_max_ms = ms(behind_.max_ns());
   figures.loops = loops_.count();
   figures.loop_max_ms = ms(loops_.max_ns());
+  figures.joined_max_ms = ms(joined_.max_ns());
   figures.settled_max_ms = ms(settled_.max_ns());
   figures.memory_mb = static_cast<double>(most_bytes_) / (1 << 20);
   return figures;

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "apps/twofold/surface/surface_output.hpp"
 #include "engine/latency_histogram.hpp"
@@ -17,7 +19,8 @@ namespace twofold {
 struct MapTime {
   std::uint64_t version = 0;
   std::int64_t published_ns = 0;
-  bool changed = false;  ///< all poses were corrected: a loop, or the pose graph
+  bool changed = false;   ///< all poses were corrected: a loop, or the pose graph
+  bool followed = false;  ///< the mesh has moved as the correction says
 };
 
 /// The mesh of the map part that the reference keyframe is in, kept up to date while the run lasts, and how
@@ -33,7 +36,11 @@ class LiveMesh {
   /// The mapper's thread, when a map is published: a clock is read, and a ring written.
   void published(const GraphSnapshot& graph);
 
-  /// The surface's thread, or whoever ended it: makes the mesh what the submaps are now, in this map.
+  /// The surface's thread, during an update, too: if all poses were corrected since the last call, moves the
+  /// mesh with the submaps (Composition::move_mesh), which takes a few hundredths of a second.
+  void follow(const SubmapSurface& surface, const GraphSnapshot& graph);
+  /// The surface's thread, or whoever ended it: makes the mesh what the submaps are now, in this map, or
+  /// where they are in the map that was followed meanwhile.
   /// @param gives_up  as of Composition::update
   /// @return  false: it gave up
   bool update(const SubmapSurface& surface, const GraphSnapshot& graph,
@@ -42,16 +49,21 @@ class LiveMesh {
   [[nodiscard]] LiveMeshFigures figures() const;
 
  private:
+  void read_times();
+  void take_followed(std::uint64_t version);
   void take_times(std::uint64_t version);
+  void tell(KeyframeId part);
   void take_settled(const SubmapSurface& surface);
 
   Composition composition_;
   Listener listener_;
-  std::uint64_t revision_ = 0;     // that the listener knows
-  SpscRing<MapTime> times_{4096};  // mapper -> surface
-  std::uint64_t last_change_ = 0;  // mapper's
-  std::optional<MapTime> next_time_;
-  LatencyHistogram behind_, loops_;
+  std::uint64_t revision_ = 0;             // that the listener knows
+  SpscRing<MapTime> times_{4096};          // mapper -> surface
+  std::uint64_t last_change_ = 0;          // mapper's
+  std::deque<MapTime> map_times_;          // of maps that the mesh is not of yet
+  std::uint64_t followed_ = 0;             // correction of all poses that the mesh has moved with
+  std::vector<PlacedVolume> followed_to_;  // where submaps were then; until the end of an update
+  LatencyHistogram behind_, loops_, joined_;
   std::optional<std::int64_t> unsettled_ns_;  // since when submaps that a correction bent may wait
   LatencyHistogram settled_;
   std::int64_t updates_ = 0, cpu_ns_ = 0;

@@ -158,9 +158,9 @@ void LiveSurface::step(std::size_t most_frames) {
   if (mesh_) follow_map();
 }
 
-/// A loop is in the mesh before more is fused. Where another one comes meanwhile, what is begun for the first
-/// is given up, once, unless half of it is done: neither of two waits for more than one and a half times what
-/// all takes.
+/// A loop is in the mesh before more is fused: moved at once, then with the submaps joined anew. Where
+/// another one comes meanwhile, the mesh moves with that, too, and what is begun for the first is given up,
+/// once, unless half of it is done: neither of two waits for more than one and a half times what all takes.
 void LiveSurface::follow_map() {
   constexpr double kNearlyDone = 0.5;
   bool may_give_up = true;
@@ -168,8 +168,12 @@ void LiveSurface::follow_map() {
     const auto map = maps_.newest();
     version_ = map->graph.version();
     surface_->step(map->graph, {.keyframes = 0, .anew = 0});
-    may_give_up = mesh_->update(
-        *surface_, map->graph, [&](double done) { return may_give_up && done < kNearlyDone && loop_came(); });
+    mesh_->follow(*surface_, map->graph);
+    may_give_up = mesh_->update(*surface_, map->graph, [&](double done) {
+      if (!loop_came()) return false;
+      mesh_->follow(*surface_, maps_.newest()->graph);
+      return may_give_up && done < kNearlyDone;
+    });
   } while (loop_came());
 }
 

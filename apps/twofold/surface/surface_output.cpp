@@ -22,6 +22,7 @@ nlohmann::ordered_json live_mesh_json(const std::optional<LiveMeshFigures>& f) {
           {"behind_max_ms", f->behind_max_ms},
           {"loops", f->loops},
           {"loop_max_ms", f->loop_max_ms},
+          {"joined_max_ms", f->joined_max_ms},
           {"settled_max_ms", f->settled_max_ms},
           {"memory_mb", f->memory_mb}};
 }
@@ -72,8 +73,8 @@ void print_surface(const SurfaceFigures& f) {
     if (m.loops > 0)
       fmt::print(
           "            {} corrections of all poses (loops, pose graph) in the mesh after {:.0f} ms at most;\n"
-          "            what they bent fused anew after {:.0f} ms\n",
-          m.loops, m.loop_max_ms, m.settled_max_ms);
+          "            joined anew after {:.0f} ms, what they bent fused anew after {:.0f} ms\n",
+          m.loops, m.loop_max_ms, m.joined_max_ms, m.settled_max_ms);
   }
   for (const std::string& what : f.left_out) fmt::print("left out    {}\n", what);
 }
