@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 namespace twofold {
@@ -20,6 +21,8 @@ void DepthRegression::learn(const GraphSnapshot& graph, KeyframeId k) {
     const Vector3 x_k = keyframe.T_k_w * graph.position(observation.point);
     if (in_front_of_camera(x_k)) samples_.push_back({camera_.project(x_k), 1 / x_k.z()});
   }
+  std::stable_sort(samples_.begin(), samples_.end(),
+                   [](const Sample& a, const Sample& b) { return a.uv.y() < b.uv.y(); });
 }
 
 std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
@@ -28,17 +31,21 @@ std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
     double inverse_depth = 0;
   };
   std::array<Neighbour, kNeighbours> nearest;
-  for (const Sample& sample : samples_) {
-    const double distance = (sample.uv - uv).norm();
+  const double reach = options_.max_distance_share * camera_.width;
+  const auto above = [](const Sample& sample, double v) { return sample.uv.y() < v; };
+  for (auto sample = std::lower_bound(samples_.begin(), samples_.end(), uv.y() - reach, above);
+       sample != samples_.end() && sample->uv.y() <= uv.y() + reach; ++sample) {
+    if (std::abs(sample->uv.x() - uv.x()) > reach) continue;
+    const double distance = (sample->uv - uv).norm();
     if (distance >= nearest.back().distance) continue;
-    nearest.back() = {distance, sample.inverse_depth};
+    nearest.back() = {distance, sample->inverse_depth};
     for (std::size_t n = kNeighbours - 1; n > 0 && nearest[n].distance < nearest[n - 1].distance; --n)
       std::swap(nearest[n], nearest[n - 1]);
   }
   double sum = 0, weights = 0;
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const Neighbour& neighbour : nearest) {
-    if (neighbour.distance > options_.max_distance_share * camera_.width) break;
+    if (neighbour.distance > reach) break;
     const double distance = std::max(neighbour.distance, kSamePlace);
     const double weight = 1 / (distance * distance);
     sum += weight * neighbour.inverse_depth;

@@ -48,7 +48,7 @@ class DepthRegression {
 
   PinholeCamera camera_;
   DepthRegressionOptions options_;
-  std::vector<Sample> samples_;
+  std::vector<Sample> samples_;  ///< from top to bottom
 };
 
 }  // namespace twofold

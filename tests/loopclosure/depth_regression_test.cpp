@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "geometry/inverse_depth.hpp"
 #include "graph/graph_writer.hpp"
@@ -62,6 +63,20 @@ TEST_F(DepthRegressionTest, TheNearestThreePointsAreAsked) {
   for (const double u : {300.0, 302.0, 304.0}) add_point({u, 200}, 4);
   add_point({315, 200}, 4.9);
   EXPECT_NEAR(depth_at({301, 200}).value_or(0), 4, 1e-9);
+}
+
+TEST_F(DepthRegressionTest, TheOrderOfPointsMakesNoDifference) {
+  const std::vector<Vector2> places = {{300, 230}, {330, 170}, {306, 204},
+                                       {290, 190}, {312, 199}, {305, 215}};
+  for (const Vector2& uv : places) add_point(uv, 3.6 + 0.01 * (uv.x() - 290));
+  // Nearest to (305, 203): (306, 204), (312, 199), (305, 215).
+  double sum = 0, weights = 0;
+  for (const std::size_t n : {2, 4, 5}) {
+    const double weight = 1 / (places[n] - Vector2(305, 203)).squaredNorm();
+    sum += weight / (3.6 + 0.01 * (places[n].x() - 290));
+    weights += weight;
+  }
+  EXPECT_NEAR(depth_at({305, 203}).value_or(0), weights / sum, 1e-9);
 }
 
 TEST_F(DepthRegressionTest, FarFromAllPointsNothingIsKnown) {
