@@ -145,6 +145,25 @@ TEST(FirstStructure, IsNotDeceivedByAPlane) {
   }
 }
 
+/// Giving motions up early changes no decision.
+TEST(FirstStructure, GivesUpEarlyOnlyWhatCannotWin) {
+  FirstStructureOptions patient;
+  patient.hopeless_ratio = 1e9;
+  for (const double length : {0.3, 0.6, 1.0, 1.5, 2.5}) {
+    const Setting setting{on_a_plane, moving({-length, 0.2 * length, -0.5 * length}, {0, 0.03, 0})};
+    for (std::uint32_t seed = 1; seed <= 8; ++seed) {
+      const CornerViews views = views_of(setting, seed);
+      const auto early = first_structure(kRig, views, {}), late = first_structure(kRig, views, patient);
+      ASSERT_EQ(early.has_value(), late.has_value()) << length << ", " << seed;
+      if (early) {
+        EXPECT_EQ(early->corners, late->corners) << length << ", " << seed;
+      } else {
+        EXPECT_EQ(early.error(), late.error()) << length << ", " << seed;
+      }
+    }
+  }
+}
+
 TEST(FirstStructure, WaitsWhileTheCameraStandsOrTurnsOnTheSpot) {
   expect_wait({scattered, moving({0, 0, 0}, {0, 0, 0})}, LostCause::kTooLittleParallax, "standing");
   expect_wait({scattered, moving({0, 0, 0}, {0.03, 0.12, 0})}, LostCause::kRotatingOnly, "turning");

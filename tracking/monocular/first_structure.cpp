@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <span>
 #include <utility>
 
@@ -151,16 +152,13 @@ class FirstStructureEstimator {
   tl::expected<FirstStructure, LostCause> best_of(const std::vector<SE3>& motions) const {
     std::vector<Trial> trials;
     for (const SE3& T_last_first : motions) {
-      if (auto trial = triangulate(T_last_first); trial && adjust(*trial))
+      if (auto trial = triangulate(T_last_first); trial && adjust(Stage::kRough, *trial))
         trials.push_back(*std::move(trial));
     }
+    give_up_hopeless(trials);
+    std::erase_if(trials, [&](Trial& trial) { return !adjust(Stage::kFine, trial); });
     if (trials.empty()) return tl::unexpected(LostCause::kNoCommonMotion);
-    const double sigma_px = std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) {
-                              return a.sigma_px < b.sigma_px;
-                            })->sigma_px;
-    for (Trial& trial : trials) trial.cost = cost(trial, sigma_px);
-    const Trial& best =
-        *std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) { return a.cost < b.cost; });
+    const Trial& best = find_best(trials);
     for (const Trial& other : trials) {
       if (other.cost < best.cost + options_.decisive_chi2 && differ(other.views, best.views))
         return tl::unexpected(LostCause::kPlaneUndecided);
@@ -168,16 +166,39 @@ class FirstStructureEstimator {
     return collect(best);
   }
 
+  /// Sets all costs, by the sigma of the motion that fits best.
+  const Trial& find_best(std::vector<Trial>& trials) const {
+    const double sigma_px = std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) {
+                              return a.sigma_px < b.sigma_px;
+                            })->sigma_px;
+    for (Trial& trial : trials) trial.cost = cost(trial, sigma_px);
+    return *std::min_element(trials.begin(), trials.end(), [](auto& a, auto& b) { return a.cost < b.cost; });
+  }
+
+  /// After the rough adjustment most are decided: two that came to about the same motion end at the same
+  /// minimum, and one that explains far less than the best never catches up.
+  void give_up_hopeless(std::vector<Trial>& trials) const {
+    if (trials.size() < 2) return;
+    const Trial* best = &find_best(trials);
+    const double hopeless = options_.hopeless_ratio * best->cost + options_.decisive_chi2;
+    std::vector<Trial> kept{*best};
+    for (const Trial& trial : trials) {
+      if (&trial != best && trial.cost < hopeless && differ(trial.views, best->views)) kept.push_back(trial);
+    }
+    trials = std::move(kept);
+  }
+
+  enum class Stage : std::uint8_t { kRough, kFine };
+
   /// Bundle adjustment without the corners that follow something else.
   /// @return false when too few are left
-  bool adjust(Trial& trial) const {
-    for (const auto& [bound, gain] :
-         {std::pair{options_.gross_chi2, options_.first_gain}, {options_.outlier_chi2, options_.min_gain}}) {
-      put_outliers_aside(bound, trial);
-      if (!enough(trial.corners.size()) || !trial.views.minimise(options_.adjustment_steps, gain))
-        return false;
-    }
-    put_outliers_aside(options_.outlier_chi2, trial);
+  bool adjust(Stage stage, Trial& trial) const {
+    const bool rough = stage == Stage::kRough;
+    put_outliers_aside(rough ? options_.gross_chi2 : options_.outlier_chi2, trial);
+    if (!enough(trial.corners.size()) ||
+        !trial.views.minimise(options_.adjustment_steps, rough ? options_.first_gain : options_.min_gain))
+      return false;
+    if (!rough) put_outliers_aside(options_.outlier_chi2, trial);
     trial.sigma_px = measured_sigma(trial.views);
     return enough(trial.corners.size());
   }
@@ -392,6 +413,7 @@ std::string FirstStructureOptions::invalid_reason() const {
       .within("max_behind_share", max_behind_share, 0, 1)
       .within("min_plane_share", min_plane_share, 0, 1)
       .at_least("decisive_chi2", decisive_chi2, 0)
+      .at_least("hopeless_ratio", hopeless_ratio, 1)
       .share("finest_sigma", finest_sigma)
       .above("max_point_error", max_point_error, 0)
       .share("near_share", near_share)

@@ -24,6 +24,8 @@ struct FirstStructureOptions {
   double min_plane_share = 0.6;   ///< of those that moved: a homography explains so many, so that two motions
                                   ///< are asked, in [0, 1]
   double decisive_chi2 = 32;      ///< by which one motion must explain all better than another, >= 0
+  double hopeless_ratio = 1.5;    ///< after the rough adjustment, of a motion's cost over the best one's,
+                                  ///< beyond decisive_chi2: such a one is not adjusted any further, >= 1
   double finest_sigma = 0.35;  ///< times sigma_px: no corner is followed more exactly, on the sharpest image,
                                ///< in (0, 1]
   double max_point_error = 0.25;  ///< of inverse depth, as a share of it, of a point that joins the map, > 0
@@ -82,9 +84,9 @@ struct FirstStructure {
 /// readout is not known, most must be beyond any rotation through any readout. Where a homography explains
 /// about as much, the scene may be a plane, of which two motions give the same first and last view: its
 /// motions are tried beside that of the essential matrix. All frames decide, because the views of a third one
-/// from elsewhere fit only the true motion; where two fit them all, the start has to wait. Depths are those
-/// of a bundle adjustment of all frames (thesis 4.5.3). Points so far away that they may be behind infinity
-/// by noise neither vote nor veto.
+/// from elsewhere fit only the true motion; where two fit them all, the start has to wait. A motion that
+/// cannot win any more after a rough adjustment is given up. Depths are those of a bundle adjustment of all
+/// frames (thesis 4.5.3). Points so far away that they may be behind infinity by noise neither vote nor veto.
 ///
 /// Deterministic. Allocates; its work is bounded by the number of corners and max_samples.
 /// @return  otherwise why not: kTooFewCorners, kTooLittleParallax, kRotatingOnly, kNoCommonMotion,
