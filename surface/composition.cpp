@@ -45,10 +45,10 @@ bool Composition::move_mesh(std::span<const PlacedVolume> volumes) {
 
 /// Whether a vertex at x_v may rest on the volume.
 bool Composition::has_surface(const SurfaceVolume& volume, const Vector3& x_v) {
-  constexpr double kReach = 2.0 / kBlockEdge;  // to the samples around the two that the vertex lies between
+  constexpr double kNear = 2.0 / kBlockEdge;  // to the samples around the two that the vertex lies between
   const Vector3 at = x_v / (kBlockEdge * volume.options().voxel);
-  const Eigen::Vector3i first = (at.array() - kReach).floor().cast<int>();
-  const Eigen::Vector3i last = (at.array() + kReach).floor().cast<int>();
+  const Eigen::Vector3i first = (at.array() - kNear).floor().cast<int>();
+  const Eigen::Vector3i last = (at.array() + kNear).floor().cast<int>();
   bool any_inside = false, any_outside = false;
   for (int z = first.z(); z <= last.z(); ++z)
     for (int y = first.y(); y <= last.y(); ++y)
@@ -88,6 +88,8 @@ void Composition::let_go_of_empty_blocks() {
 
 /// By the blocks that changed since it was added.
 void Composition::extend_bounds(Member& member, const SurfaceVolume& volume) const {
+  if (volume.revision() == member.revision) return;
+  make_way();
   const double edge = kBlockEdge * whole_.options().voxel;
   for (std::size_t b = 0; b < volume.blocks().size(); ++b) {
     const BlockHead& block = volume.blocks().head(b);
@@ -152,6 +154,7 @@ void Composition::take_changes(const PlacedVolume& placed) {
     member.T_w_v = placed.T_w_v;
     extend_bounds(member, *placed.volume);
   }
+  if (placed.volume->revision() == member.revision) return;
   const BlockTable& blocks = placed.volume->blocks();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockHead& block = blocks.head(b);

@@ -221,9 +221,11 @@ TriangleMesh MeshPieces::joined(int min_triangles) const {
 
 std::size_t MeshPieces::bytes() const {
   std::size_t sum = 0;
-  for (const auto& [at, piece] : pieces_)
+  for (const auto& [at, piece] : pieces_) {
+    make_way();
     sum += sizeof(at) + sizeof(piece) + piece.mesh.vertices.capacity() * sizeof(SurfaceVertex) +
            piece.mesh.triangles.capacity() * sizeof(piece.mesh.triangles[0]);
+  }
   return sum;
 }
 
