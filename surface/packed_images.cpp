@@ -1,9 +1,10 @@
-#include "surface/packed_depth.hpp"
+#include "surface/packed_images.hpp"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
+#include <opencv2/imgcodecs.hpp>
 
 #include "base/check.hpp"
 #include "base/right_of_way.hpp"
@@ -55,6 +56,13 @@ void append_codes(const std::array<std::uint32_t, kGroup>& codes, std::vector<st
   }
 }
 
+constexpr int kJpegQuality = 92;
+constexpr int kStrip = 64;  // rows: whole blocks of JPEG's; each strip's tables take 600 bytes
+
+cv::Mat strip(const cv::Mat& image, int first) {
+  return image.rowRange(first, std::min(first + kStrip, image.rows));
+}
+
 }  // namespace
 
 PackedDepth::PackedDepth(const cv::Mat& depth) : rows_(depth.rows), cols_(depth.cols) {
@@ -94,6 +102,31 @@ cv::Mat PackedDepth::unpacked() const {
     }
   }
   return depth;
+}
+
+PackedColour::PackedColour(const cv::Mat& image) : rows_(image.rows), cols_(image.cols), type_(image.type()) {
+  TWOFOLD_CHECK((type_ == CV_8UC1 || type_ == CV_8UC3) && !image.empty(), "an image of 8 bits");
+  for (int y = 0; y < rows_; y += kStrip) {
+    make_way();
+    strips_.emplace_back();
+    (void)cv::imencode(".jpg", strip(image, y), strips_.back(), {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  }
+}
+
+cv::Mat PackedColour::unpacked() const {
+  if (empty()) return {};
+  cv::Mat image(rows_, cols_, type_);
+  for (std::size_t n = 0; n < strips_.size(); ++n) {
+    make_way();
+    cv::imdecode(strips_[n], cv::IMREAD_UNCHANGED).copyTo(strip(image, static_cast<int>(n) * kStrip));
+  }
+  return image;
+}
+
+std::size_t PackedColour::bytes() const {
+  std::size_t sum = 0;
+  for (const auto& bytes : strips_) sum += bytes.size();
+  return sum;
 }
 
 }  // namespace twofold

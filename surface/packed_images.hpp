@@ -24,4 +24,24 @@ class PackedDepth {
   std::vector<std::uint8_t> bytes_;
 };
 
+/// A colour or grey image as JPEG, in strips one below the other: a thread that makes way for others cannot
+/// do so while a library encodes or decodes an image, which takes milliseconds for a whole one.
+class PackedColour {
+ public:
+  PackedColour() = default;
+  /// image: CV_8UC1 or CV_8UC3.
+  explicit PackedColour(const cv::Mat& image);
+
+  [[nodiscard]] bool empty() const { return strips_.empty(); }
+  /// Of the image's size and type.
+  [[nodiscard]] cv::Mat unpacked() const;
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  int rows_ = 0;
+  int cols_ = 0;
+  int type_ = 0;
+  std::vector<std::vector<std::uint8_t>> strips_;
+};
+
 }  // namespace twofold

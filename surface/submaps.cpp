@@ -1,7 +1,6 @@
 #include "surface/submaps.hpp"
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 
 #include "base/check.hpp"
 #include "base/option_check.hpp"
@@ -10,7 +9,6 @@
 namespace twofold {
 namespace {
 
-constexpr int kJpegQuality = 92;
 constexpr std::size_t kKeptImages = 4;  // of the frames that wait: 6 MB at 640 x 480
 constexpr double kBend = 0.5;           // voxels that poses inside a group may move
 
@@ -23,16 +21,14 @@ SE3 begin_of_submap(const SE3& T_k_w, double voxel) {
 }
 
 DepthImages unpacked(const KeyframeDepth& packed) {
-  DepthImages images{packed.depth.unpacked(), {}};
-  if (!packed.colour.empty()) images.colour = cv::imdecode(packed.colour, cv::IMREAD_UNCHANGED);
-  return images;
+  return {packed.depth.unpacked(), packed.colour.unpacked()};
 }
 
 std::size_t bytes_of(const cv::Mat& image) {
   return image.total() * image.elemSize();
 }
 std::size_t bytes_of(const KeyframeDepth& packed) {
-  return packed.depth.bytes() + packed.colour.size();
+  return packed.depth.bytes() + packed.colour.bytes();
 }
 
 }  // namespace
@@ -49,8 +45,7 @@ KeyframeDepth pack_keyframe_depth(std::int64_t frame_index, const cv::Mat& depth
   KeyframeDepth packed;
   packed.frame_index = frame_index;
   packed.depth = PackedDepth(depth);
-  if (!colour.empty())
-    (void)cv::imencode(".jpg", colour, packed.colour, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  if (!colour.empty()) packed.colour = PackedColour(colour);
   return packed;
 }
 

@@ -10,7 +10,7 @@
 #include "graph/snapshot.hpp"
 #include "surface/composition.hpp"
 #include "surface/depth_view.hpp"
-#include "surface/packed_depth.hpp"
+#include "surface/packed_images.hpp"
 #include "surface/volume.hpp"
 
 namespace twofold {
@@ -37,7 +37,7 @@ struct SubmapWork {
 struct KeyframeDepth {
   std::int64_t frame_index = 0;
   PackedDepth depth;
-  std::vector<std::uint8_t> colour;  ///< JPEG; may be empty
+  PackedColour colour;  ///< may be empty
 };
 
 /// The images that were packed.

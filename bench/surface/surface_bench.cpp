@@ -8,7 +8,7 @@
 #include "bench/surface/depth_views.hpp"
 #include "surface/composition.hpp"
 #include "surface/meshing.hpp"
-#include "surface/packed_depth.hpp"
+#include "surface/packed_images.hpp"
 #include "surface/volume.hpp"
 
 namespace twofold {

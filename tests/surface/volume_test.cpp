@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "surface/meshing.hpp"
-#include "surface/packed_depth.hpp"
+#include "surface/packed_images.hpp"
 #include "tests/surface/ball_views.hpp"
 
 namespace twofold {
@@ -250,6 +250,25 @@ TEST(BlockTable, GivesMemoryBackToTheSystem) {
     EXPECT_GT(full, 90);
     EXPECT_LT(empty, 20);
   }
+}
+
+TEST(PackedColour, GivesBackAnImageOfAnyHeightWithoutSeams) {
+  for (const int height : {1, 63, 64, 65, 480}) {
+    cv::Mat image(height, 100, CV_8UC3);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < 100; ++x)
+        image.at<cv::Vec3b>(y, x) =
+            cv::Vec3b(static_cast<std::uint8_t>(2 * x), static_cast<std::uint8_t>(y / 2), 90);
+    const PackedColour packed(image);
+    EXPECT_FALSE(packed.empty());
+    const cv::Mat unpacked = packed.unpacked();
+    ASSERT_EQ(unpacked.size(), image.size());
+    ASSERT_EQ(unpacked.type(), image.type());
+    EXPECT_LE(cv::norm(unpacked, image, cv::NORM_INF), 4) << height;
+    const PackedColour grey(image.reshape(1));
+    EXPECT_EQ(grey.unpacked().type(), CV_8UC1);
+  }
+  EXPECT_TRUE(PackedColour().unpacked().empty());
 }
 
 TEST(PackedDepth, GivesBackWhatItWasGiven) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "base/processor_time.hpp"
@@ -91,8 +90,8 @@ ObjectModel build_object(const ObjectSource& source, const Trajectory& poses, co
     if (pose == poses.end()) break;
     if (pose->t_ns != kept.t_ns) continue;
     const std::int64_t begin_ns = thread_cpu_ns();
-    const cv::Mat colour = cv::imdecode(kept.images.colour, cv::IMREAD_UNCHANGED);
-    volume.fuse(make_depth_view(source.rig(), kept.images.depth.unpacked(), colour), pose->T_w_c.inverse());
+    volume.fuse(make_depth_view(source.rig(), kept.images.depth.unpacked(), kept.images.colour.unpacked()),
+                pose->T_w_c.inverse());
     fusion_ns += thread_cpu_ns() - begin_ns;
     up += pose->T_w_c.so3() * kept.up_c;
     ++model.figures.fused;

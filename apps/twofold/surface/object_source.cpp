@@ -76,7 +76,7 @@ void ObjectSource::keep(const Frame& frame, const cv::Mat& depth, const cv::Mat&
   coloured_ = !colour.empty();
   Kept kept{frame.t_ns, masker_.plane().normal,
             pack_keyframe_depth(frame.index, depth, colour.empty() ? grey : colour)};
-  kept_bytes_ += kept.images.depth.bytes() + kept.images.colour.size();
+  kept_bytes_ += kept.images.depth.bytes() + kept.images.colour.bytes();
   kept_.push_back(std::move(kept));
 }
 
