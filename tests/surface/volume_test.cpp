@@ -208,7 +208,7 @@ double resident_mb() {
 /// What was free before has the colour of the surface that comes, not a mixture with none.
 TEST(SurfaceVolume, TakesTheFirstColourWhole) {
   const Rig rig = depth_rig();
-  SurfaceVolume volume(options());
+  SurfaceVolume volume(fine_options(0.02));
   const cv::Mat far(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.1));
   const cv::Mat near(rig.camera.height, rig.camera.width, CV_32FC1, cv::Scalar(1.0));
   const cv::Mat grey(rig.camera.height, rig.camera.width, CV_8UC1, cv::Scalar(200));
