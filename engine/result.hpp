@@ -176,6 +176,8 @@ struct RunResult {
   std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted
   std::uint64_t keyframes_not_described = 0;  ///< the loop closer's queue was full
   bool interrupted = false;
+  /// How often the loop closer told a lost camera where it was when it asked; it may have moved on since.
+  std::uint64_t recognised = 0;
   /// Empty, or why the run ended early: a thread failed, the input broke.
   std::string error;
   std::vector<std::string> losses;  ///< what its logs lost, a sentence a file

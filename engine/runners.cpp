@@ -66,8 +66,18 @@ bool has_arrived(const GraphSnapshot& graph, const LoopConstraint& loop) {
   return culled && share_a_neighbour(a, b);
 }
 
+namespace {
+
+TrackerOptions tracker_options(const EngineOptions& options) {
+  TrackerOptions result = options.tracker;
+  result.starts_maps = result.starts_maps && !options.localise_only;
+  return result;
+}
+
+}  // namespace
+
 TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace* trace)
-    : tracker_(rig, options.tracker),
+    : tracker_(rig, tracker_options(options)),
       times_("tracker", trace),
       on_pose_(options.on_pose),
       on_frame_(options.on_frame),
@@ -184,7 +194,9 @@ bool TrackerRunner::request_relocalisation(RelocalisationRequest& request) {
 
 void TrackerRunner::take_answer(const RelocalisationAnswer& answer) {
   answer_awaited_ = false;
-  if (answer) tracker_.relocalise(answer->keyframe, answer->T_c_k);
+  if (!answer) return;
+  ++recognised_;
+  tracker_.relocalise(answer->keyframe, answer->T_c_k);
 }
 
 void TrackerRunner::place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const {
@@ -339,6 +351,7 @@ void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserR
   tracking.place_earlier_frames(result.frames, result.counts);
   mapping.replacement_log().hang_on_live_keyframes(result.frames);
   result.row_offset = tracking.row_offset();
+  result.recognised = tracking.recognised();
   result.mapping = mapping.totals();
   result.places = loop_closing.places();
   result.readout = tracking.readout();

@@ -65,6 +65,10 @@ class TrackerRunner {
   /// Before the next step.
   void take_answer(const RelocalisationAnswer& answer);
   [[nodiscard]] bool wants_relocalisation() const;
+  /// A request was made whose answer has not been taken.
+  [[nodiscard]] bool awaits_answer() const { return answer_awaited_; }
+  /// Answers so far that named a place.
+  [[nodiscard]] std::uint64_t recognised() const { return recognised_; }
   /// Tracker::row_offset.
   [[nodiscard]] double row_offset() const { return tracker_.row_offset(); }
   /// At the end of a run: frames before a start of one camera get the poses that it found out.
@@ -98,6 +102,7 @@ class TrackerRunner {
   std::int64_t begin_ns_ = 0;
   std::int64_t exposed_ns_ = 0;
   bool answer_awaited_ = false;
+  std::uint64_t recognised_ = 0;
   const bool can_relocalise_;
   const bool localise_only_;
   const std::atomic<bool>* const paused_;

@@ -331,6 +331,7 @@ bool SteppedRun::answer_nothing() {
 void SteppedRun::send_answer(RelocalisationAnswer answer, const LoopStep& step) {
   TWOFOLD_CHECK(channels_.answers.try_push(std::move(answer)), "one request is under way at most");
   answering_ = false;
+  tracker_parking_.wake();
   logs_.schedule().loop_closer.append(step);
 }
 

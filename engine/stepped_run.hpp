@@ -66,6 +66,10 @@ class SteppedRun : public Pipeline {
 
   // On the thread of that step: whether something waits for it.
   [[nodiscard]] bool tracker_has_work() { return channels_.frames.has_value(); }
+  /// Of the loop closer, who has not sent it yet.
+  [[nodiscard]] bool tracker_awaits_answer() {
+    return tracking_.awaits_answer() && !channels_.answers.has_value();
+  }
   [[nodiscard]] bool mapper_has_work() { return !channels_.mapper_inbox.empty(); }
   [[nodiscard]] bool loop_closer_has_work() {
     return channels_.requests.has_value() || channels_.keyframes.has_value();

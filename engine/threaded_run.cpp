@@ -55,7 +55,12 @@ void ThreadedRun::join_threads() {
 
 void ThreadedRun::tracker_thread(const std::stop_token& stop) {
   const std::stop_callback on_stop(stop, [this] { end_pace(); });
-  const auto ready = [this] { return tracker_has_work() || frames_ended_.load(std::memory_order_acquire); };
+  // As fast as possible means as fast as a lost camera is told where it is: without a clock to keep, the next
+  // frame waits for the answer, which would else say where the camera was many frames ago.
+  const auto ready = [this] {
+    if (tracker_has_work()) return options_.pacing.keeps_pace() || !tracker_awaits_answer();
+    return frames_ended_.load(std::memory_order_acquire) && !tracker_has_work();
+  };
   while (tracker_parking_.wait(stop, ready) && step_tracker()) {
   }
 }

@@ -31,6 +31,7 @@ struct EffortBoundsOptions {
 
 /// Of the tracker, in the order in which a frame meets them.
 struct TrackerOptions {
+  bool starts_maps = true;  ///< false: only localises in a map that was loaded
   EffortBoundsOptions effort;
   RightRowsOptions right_rows;  ///< stereo only
   FixedPixelOptions fixed;

@@ -20,6 +20,7 @@ bool Tracker::start_map(FrameStep& step) {
 /// it goes on in a map part of its own, from identity, until a place of both parts is recognised. Not before
 /// the map has all that was proposed of the old part, so that nothing here refers to that any more.
 bool Tracker::start_part(FrameStep& step) {
+  if (!options_.starts_maps) return false;
   const bool something_in_view =
       new_points_.sees_corners(current_.left, options_.loss.min_corners_seen) || sees_structure(step);
   if (loss_.seeing_for(something_in_view, step.frame.t_ns) < options_.loss.new_part_after ||

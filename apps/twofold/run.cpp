@@ -213,6 +213,14 @@ std::string main_cause(const RunResult& result) {
   return most == causes.end() ? "" : ": " + most->first;
 }
 
+/// Why no frame has a pose in a loaded map.
+std::string nothing_localised(const RunResult& result) {
+  if (result.recognised == 0) return "no place of the loaded map was recognised";
+  return fmt::format(
+      "a place of the loaded map was recognised {}, but from none of them the camera could be followed{}",
+      result.recognised == 1 ? "once" : fmt::format("{} times", result.recognised), main_cause(result));
+}
+
 /// What the run failed of: the source, a thread, that nothing was tracked; and what its files lost.
 RunFailures failures_of(const std::string& name, const PreparedSource& frames, const EngineOptions& options,
                         const RunResult& result, const PoseStreaming& poses) {
@@ -223,8 +231,9 @@ RunFailures failures_of(const std::string& name, const PreparedSource& frames, c
   } else if (!result.error.empty()) {
     failures.add(result.error);
   } else if (result.counts.tracked == 0 && !result.interrupted) {
-    failures.add(name + (options.map ? ": no place of the loaded map was recognised"
-                                     : ": no frame could be tracked" + main_cause(result)));
+    failures.add(
+        name + ": " +
+        (options.map ? nothing_localised(result) : "no frame could be tracked" + main_cause(result)));
   }
   for (const std::string& loss : result.losses) failures.add(loss);
   for (const std::string& problem : poses.problems()) failures.add("--poses " + problem);

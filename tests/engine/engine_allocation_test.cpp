@@ -91,6 +91,35 @@ TEST(TrackerThread, NeverAllocates) {
   EXPECT_GE(asked, 1);
 }
 
+/// One camera that looks for itself in a map of elsewhere: it has no use for a start of its own.
+TEST(TrackerThread, NeverAllocatesWhereOneCameraOnlyLocalises) {
+  if (!testing::allocations_are_counted()) GTEST_SKIP() << "the sanitizer has its own allocator";
+  Walk walk;
+  EngineOptions options;
+  options.deterministic = true;
+  const auto mapping = make_pipeline(walk.rig(), options);
+  for (int i = 0; i < 4; ++i) mapping->push(walk.frame(i));
+  mapping->stop();
+  const RunResult mapped = mapping->finish();
+  options.map = std::make_shared<const SavedMap>(SavedMap{walk.rig(), mapped.graph, mapped.places});
+  options.localise_only = true;
+  Rig one_camera = walk.rig();
+  one_camera.kind = SensorKind::kMono;
+  TrackerRunner tracking(one_camera, options, nullptr);
+  ProposalHandle none;
+  for (int i = 0; i < 40; ++i) {
+    Frame frame = walk.frame(i);
+    frame.right.release();
+    const std::uint64_t before = allocations();
+    FrameRecord record;
+    tracking.locate(frame, mapped.graph, EffortLevel{}, none, record);
+    tracking.tell(0, 0, record);
+    (void)tracking.prepare_next(record);
+    EXPECT_EQ(allocations(), before) << "frame " << i;
+    EXPECT_EQ(record.state, FrameState::kLost);
+  }
+}
+
 /// Its first keyframes neither: what their images go to is there when it begins, as in a threaded run. The
 /// listeners are called before and after what is done about a keyframe.
 TEST(DeterministicRun, HasRoomForKeyframesWhenItBegins) {
