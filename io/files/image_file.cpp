@@ -157,19 +157,27 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   if (files.empty())
     throw IoError(
         folder, fmt::format("the folder holds no images (files ending in {})", fmt::join(kExtensions, ", ")));
-  if (!sort_by_decimals(files)) std::sort(files.begin(), files.end(), file_precedes);
+  sort_images(files);
   return files;
 }
 
+void sort_images(std::vector<fs::path>& files) {
+  if (!sort_by_decimals(files)) std::sort(files.begin(), files.end(), file_precedes);
+}
+
 void expect_size(const fs::path& file, const cv::Mat& image, const PinholeCamera& camera,
-                 const fs::path& calibration) {
+                 const std::string& said_by) {
   if (image.cols == camera.width && image.rows == camera.height) return;
-  std::error_code ignored;
-  const std::string by = !fs::is_regular_file(calibration, ignored)
-                             ? "the calibration or the first image says"
-                             : fmt::format("the calibration ({}) is for", calibration.string());
-  throw IoError(file, fmt::format("the image is {}x{}, {} {}x{}", image.cols, image.rows, by, camera.width,
-                                  camera.height));
+  throw IoError(file, fmt::format("the image is {}x{}, {} {}x{}", image.cols, image.rows, said_by,
+                                  camera.width, camera.height));
+}
+
+std::string size_of_calibration(const fs::path& file) {
+  return fmt::format("the calibration ({}) is for", file.string());
+}
+
+std::string size_of_image(const fs::path& first) {
+  return fmt::format("the first image ({}) is", first.string());
 }
 
 }  // namespace twofold

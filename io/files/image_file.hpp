@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "camera/pinhole.hpp"
@@ -33,15 +34,19 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;
 /// A depth image as CV_16UC1; throws likewise and when the file holds anything but one channel of 16 bits.
 [[nodiscard]] cv::Mat read_depth_image(const std::filesystem::path& file);
 
-/// Throws IoError naming the file when the image does not have the camera's size, which its calibration or
-/// the recording's first image said.
-/// @param calibration  the file, where it said so; else, if it is no file, that is not known
+/// Throws IoError naming the file when the image does not have the camera's size.
+/// @param said_by  what said that size, as the clause that it ends: size_of_calibration or size_of_image
 void expect_size(const std::filesystem::path& file, const cv::Mat& image, const PinholeCamera& camera,
-                 const std::filesystem::path& calibration = {});
+                 const std::string& said_by);
+[[nodiscard]] std::string size_of_calibration(const std::filesystem::path& file);
+[[nodiscard]] std::string size_of_image(const std::filesystem::path& first);
 
 /// Files in `folder` with an image's extension (png, jpg, jpeg, pgm, ppm, tif, tiff, bmp, webp), sorted by
 /// name: numbers in names by value, and names that are decimal numbers altogether by theirs. Throws IoError
 /// when the folder is missing or holds none.
 [[nodiscard]] std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
+
+/// Puts images, whatever their folders, into that order.
+void sort_images(std::vector<std::filesystem::path>& files);
 
 }  // namespace twofold

@@ -64,7 +64,7 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   set_missing_size(survey.first.cols, survey.first.rows, &used);
   const std::filesystem::path calibration_file = calibration.value_or(file_);
   expect_valid(calibration_file, used);
-  expect_size(file_, survey.first, used.left.pinhole, calibration_file);
+  expect_size(file_, survey.first, used.left.pinhole, size_of_calibration(calibration_file));
   try {
     rectifier_.emplace(used);
   } catch (const std::runtime_error& error) {

@@ -88,10 +88,10 @@ bool RawFolderSource::read(Frame& frame) {
   frame.index = static_cast<std::int64_t>(next_);
   frame.t_ns = static_cast<std::int64_t>(next_);
   frame.left = read_grey_image(files.left);
-  expect_size(files.left, frame.left, rig_.camera);
+  expect_size(files.left, frame.left, rig_.camera, size_of_image(pairs_[0].left));
   if (rig_.kind == SensorKind::kStereo) {
     frame.right = read_grey_image(files.right);
-    expect_size(files.right, frame.right, rig_.camera);
+    expect_size(files.right, frame.right, rig_.camera, size_of_image(pairs_[0].left));
   }
   ++next_;
   return true;

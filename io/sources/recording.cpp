@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "base/counted.hpp"
 #include "base/median.hpp"
 #include "io/files/calibration_file.hpp"
 #include "io/files/grey_levels.hpp"
@@ -134,9 +135,9 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
   const fs::path& first_file = recording_.frames[next_].left;
   grey_bits_ = grey_bits_of(recording_.frames, first_file);
   if (grey_bits_ < 16) recording_.notes.push_back(grey_levels_note(recording_.folder.string(), grey_bits_));
-  set_missing_size(first.cols, first.rows, &recording_.calibration);
+  take_size(first);
   expect_valid(recording_.calibration_file, recording_.calibration);
-  expect_size(first_file, first, recording_.calibration.left.pinhole, recording_.calibration_file);
+  expect_size(first_file, first, recording_.calibration.left.pinhole, left_said_by_);
   try {
     rectifier_.emplace(recording_.calibration);
   } catch (const std::runtime_error& e) {
@@ -153,24 +154,55 @@ PlaybackSource::PlaybackSource(Recording recording) : recording_(std::move(recor
   ground_truth_ = rectified_trajectory(recording_.ground_truth, rectifier_->R_rectified_left());
 }
 
+SensorKind PlaybackSource::kind() const {
+  return recording_.left_only ? SensorKind::kMono : recording_.calibration.kind;
+}
+
+void PlaybackSource::take_size(const cv::Mat& first) {
+  Calibration& calibration = recording_.calibration;
+  const std::string by_image = size_of_image(recording_.frames[next_].left);
+  const std::string by_calibration = size_of_calibration(recording_.calibration_file);
+  left_said_by_ = calibration.left.pinhole.width == 0 ? by_image : by_calibration;
+  right_said_by_ = calibration.right.pinhole.width == 0 ? by_image : by_calibration;
+  set_missing_size(first.cols, first.rows, &calibration);
+}
+
 Frame PlaybackSource::decode(const RecordedFrame& files) const {
-  const SensorKind kind = recording_.left_only ? SensorKind::kMono : recording_.calibration.kind;
   Frame frame;
   frame.t_ns = files.t_ns;
   frame.left = read_grey_image(files.left, grey_bits_);
-  if (kind == SensorKind::kStereo) frame.right = read_grey_image(files.right, grey_bits_);
-  if (kind == SensorKind::kRgbd) frame.depth = read_depth_image(files.depth);
+  if (kind() == SensorKind::kStereo) frame.right = read_grey_image(files.right, grey_bits_);
+  if (kind() == SensorKind::kRgbd) frame.depth = read_depth_image(files.depth);
   return frame;
 }
 
 void PlaybackSource::expect_sizes(const RecordedFrame& files, const Frame& frame) const {
   const Calibration& calibration = recording_.calibration;
-  expect_size(files.left, frame.left, calibration.left.pinhole);
-  if (!frame.right.empty()) expect_size(files.right, frame.right, calibration.right.pinhole);
-  if (!frame.depth.empty()) {
-    const CameraModel& camera = calibration.depth_apart ? calibration.depth_camera.model : calibration.left;
-    expect_size(files.depth, frame.depth, camera.pinhole);
-  }
+  expect_size(files.left, frame.left, calibration.left.pinhole, left_said_by_);
+  if (!frame.right.empty()) expect_size(files.right, frame.right, calibration.right.pinhole, right_said_by_);
+  if (frame.depth.empty()) return;
+  if (calibration.depth_apart)
+    expect_size(files.depth, frame.depth, calibration.depth_camera.model.pinhole,
+                size_of_calibration(recording_.calibration_file));
+  else
+    expect_size(files.depth, frame.depth, calibration.left.pinhole, left_said_by_);
+}
+
+void PlaybackSource::leave_out(const RecordedFrame& files, const IoError& error) {
+  bool missing = false;
+  const auto look_for = [&](const fs::path& image, const char* otherwise) {
+    std::error_code ignored;
+    if (fs::exists(image, ignored)) return;
+    missing = true;
+    if (const fs::path folder = image.parent_path(); !fs::is_directory(folder, ignored))
+      throw IoError(folder, fmt::format("the folder is not there{}", otherwise));
+  };
+  constexpr const char* kAlone = " (--camera mono runs the left camera alone)";
+  look_for(files.left, "");
+  if (kind() == SensorKind::kStereo) look_for(files.right, kAlone);
+  if (kind() == SensorKind::kRgbd) look_for(files.depth, kAlone);
+  damaged_.leave_out(error);
+  if (missing) ++missing_;
 }
 
 SourceReport PlaybackSource::report() const {
@@ -181,10 +213,13 @@ SourceReport PlaybackSource::report() const {
   const std::string folder = recording_.folder.string();
   if (recording_.alone > 0)
     report.summary.push_back(
-        fmt::format("{}: {} images without a partner were left out", folder, recording_.alone));
-  if (damaged_.count() > 0)
+        fmt::format("{}: left out: {} without a partner", folder, counted(recording_.alone, "image")));
+  if (missing_ > 0)
     report.summary.push_back(
-        fmt::format("{}: {} frames with a damaged image were left out", folder, damaged_.count()));
+        fmt::format("{}: left out: {} with a missing image", folder, counted(missing_, "frame")));
+  if (const std::uint64_t damaged = damaged_.count() - missing_; damaged > 0)
+    report.summary.push_back(
+        fmt::format("{}: left out: {} with a damaged image", folder, counted(damaged, "frame")));
   return report;
 }
 
@@ -205,7 +240,7 @@ cv::Mat PlaybackSource::left_image(std::int64_t t_ns) const {
 }
 
 cv::Mat PlaybackSource::rectified_left(const fs::path& file, const cv::Mat& raw) const {
-  expect_size(file, raw, recording_.calibration.left.pinhole);
+  expect_size(file, raw, recording_.calibration.left.pinhole, left_said_by_);
   if (rectifier_->passes_through()) return raw;
   cv::Mat rectified;
   cv::remap(raw, rectified, rectifier_->left_map().x, rectifier_->left_map().y, cv::INTER_LINEAR);
@@ -217,7 +252,7 @@ cv::Mat PlaybackSource::first_image() {
     try {
       return read_grey_image(recording_.frames[next_].left);
     } catch (const IoError& error) {
-      damaged_.leave_out(error);
+      leave_out(recording_.frames[next_], error);
     }
   }
   damaged_.expect_any_frame();
@@ -231,7 +266,7 @@ bool PlaybackSource::read_raw(Frame& raw) {
     try {
       raw = decode(files);
     } catch (const IoError& error) {
-      damaged_.leave_out(error);
+      leave_out(files, error);
       continue;
     }
     damaged_.frame_was_read();

@@ -98,9 +98,15 @@ class PlaybackSource final : public FrameSource {
 
  private:
   bool read(Frame& frame) override;
+  [[nodiscard]] SensorKind kind() const;  ///< of the images that are looked at
   /// The first left image that can be read; those before it are left out.
   [[nodiscard]] cv::Mat first_image();
+  /// Gives the calibration the sizes that it lacks.
+  void take_size(const cv::Mat& first);
   [[nodiscard]] Frame decode(const RecordedFrame& files) const;
+  /// Of a frame that cannot be read because of `error`. Throws IoError where a whole folder is missing: that
+  /// is no gap.
+  void leave_out(const RecordedFrame& files, const IoError& error);
   void expect_sizes(const RecordedFrame& files, const Frame& frame) const;
   /// The next frame that can be read, not rectified; false at the end. Throws IoError.
   [[nodiscard]] bool read_raw(Frame& raw);
@@ -108,9 +114,11 @@ class PlaybackSource final : public FrameSource {
 
   Recording recording_;
   std::optional<Rectifier> rectifier_;
-  int grey_bits_ = 16;  ///< of images of 16 bits
+  int grey_bits_ = 16;                        ///< of images of 16 bits
+  std::string left_said_by_, right_said_by_;  ///< the sizes of these cameras (expect_size)
   std::size_t next_ = 0, end_ = 0;
   DamagedImages damaged_;
+  std::uint64_t missing_ = 0;  ///< of the frames that damaged_ counts: an image is not there
 };
 
 }  // namespace twofold

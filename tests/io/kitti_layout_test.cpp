@@ -104,6 +104,40 @@ TEST(KittiLayout, ColourCamerasOffTheRowAreRectified) {
   EXPECT_IO_ERROR(open_source(folder / "sequences/06"), "calib.txt: key 'P2' is missing");
 }
 
+std::vector<std::int64_t> numbers_of_frames(FrameSource& source) {
+  std::vector<std::int64_t> numbers;
+  for (Frame frame; source.next(frame) == FrameStatus::kFrame;) numbers.push_back(frame.index);
+  return numbers;
+}
+
+/// As after a download that missed some files; times.txt and the poses are those of the whole.
+TEST(KittiLayout, AnImageThatIsMissingIsAGap) {
+  const ScratchFolder folder;
+  write_dataset(folder, false);
+  fs::remove(folder.path() / "sequences/06/image_1/000001.png");
+  fs::remove(folder.path() / "sequences/06/image_0/000002.png");
+  const auto source = open_source(folder / "sequences/06");
+  EXPECT_EQ(numbers_of_frames(*source), (std::vector<std::int64_t>{0, 3})) << source->error();
+  EXPECT_EQ(source->ground_truth().size(), std::size_t{kSequenceLength});
+  const SourceReport report = source->report();
+  ASSERT_EQ(report.faults.size(), 2U);
+  EXPECT_EQ(report.faults[0],
+            (folder / "sequences/06/image_1/000001.png") + ": no such image file; its frame is left out");
+  EXPECT_EQ(report.faults[1],
+            (folder / "sequences/06/image_0/000002.png") + ": no such image file; its frame is left out");
+}
+
+TEST(KittiLayout, ImagesOfOtherNamesAreNoPairs) {
+  const ScratchFolder folder;
+  write_dataset(folder, false);
+  for (int i = 1; i < kSequenceLength; ++i) {
+    const fs::path right = folder.path() / "sequences/06/image_1";
+    fs::rename(right / fmt::format("{:06d}.png", i), right / fmt::format("r{}.png", i));
+  }
+  EXPECT_IO_ERROR(open_source(folder / "sequences/06"),
+                  "06: of 4 images in image_0 and 4 in image_1 only 1 have the same name");
+}
+
 TEST(KittiLayout, PosesOfOtherImagesAreLeftOut) {
   const ScratchFolder folder;
   write_dataset(folder, false);

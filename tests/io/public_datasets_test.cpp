@@ -388,7 +388,7 @@ TEST(PublicDatasets, ReplicaAsHandedOn) {
   const ScratchFolder folder;
   const std::string path = folder / "office0";
   write_replica(folder, 120, 68);
-  EXPECT_IO_ERROR(open_source(path), "the image is 120x68, the calibration or the first image says 1200x680");
+  EXPECT_IO_ERROR(open_source(path), "the image is 120x68, the calibration (" + path + ") is for 1200x680");
   folder.write("cam_params.json", kReplicaCamera);
   for (const std::string& text : {path, path + "/", "replica:" + path}) {
     const auto source = open_source(text);

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <map>
+
 #include <fmt/format.h>
 
 #include "io/files/calibration_file.hpp"
@@ -43,16 +46,37 @@ Cameras cameras_in(const fs::path& folder) {
   return {"image_0", "image_1", "P1", KittiPair::kGrey};
 }
 
-void expect_pairs(const fs::path& folder, const Cameras& cameras, const std::vector<fs::path>& left,
-                  const std::vector<fs::path>& right) {
-  if (left.size() != right.size()) {
-    throw IoError(folder, fmt::format("{} has {} images, {} has {}", cameras.left, left.size(), cameras.right,
-                                      right.size()));
+/// Image files of each name that one of the cameras has, in the order of the names. The other's file may be
+/// missing, which whoever reads it is told. Where hardly any name is of both it is no pair of cameras.
+std::vector<RecordedFrame> pair_images(const fs::path& folder, const Cameras& cameras,
+                                       const std::vector<fs::path>& left,
+                                       const std::vector<fs::path>& right) {
+  std::map<fs::path, RecordedFrame> by_stem;
+  for (const fs::path& file : left) by_stem[file.stem()].left = file;
+  for (const fs::path& file : right) by_stem[file.stem()].right = file;
+  const std::size_t of_both = left.size() + right.size() - by_stem.size();
+  if (2 * of_both < std::min(left.size(), right.size()))
+    throw IoError(folder, fmt::format("of {} images in {} and {} in {} only {} have the same name",
+                                      left.size(), cameras.left, right.size(), cameras.right, of_both));
+  std::vector<fs::path> names;
+  for (auto& [stem, frame] : by_stem) {
+    if (frame.left.empty()) frame.left = folder / cameras.left / frame.right.filename();
+    if (frame.right.empty()) frame.right = folder / cameras.right / frame.left.filename();
+    names.push_back(frame.left);
   }
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    if (left[i].stem() != right[i].stem())
-      throw IoError(left[i], fmt::format("has no image of the same name in {}", cameras.right));
-  }
+  sort_images(names);
+  std::vector<RecordedFrame> frames;
+  for (const fs::path& name : names) frames.push_back(by_stem[name.stem()]);
+  return frames;
+}
+
+/// Without their times yet.
+std::vector<RecordedFrame> list_frames(const fs::path& folder, const Cameras& cameras, bool stereo) {
+  const auto left = list_images(folder / cameras.left);
+  if (stereo) return pair_images(folder, cameras, left, list_images(folder / cameras.right));
+  std::vector<RecordedFrame> frames;
+  for (const fs::path& file : left) frames.push_back({0, file, {}, {}});
+  return frames;
 }
 
 Calibration read_cameras(const fs::path& file, const Cameras& cameras) {
@@ -105,11 +129,9 @@ Recording read_kitti_recording(const fs::path& folder, const std::optional<fs::p
   recording.folder = folder;
   recording.calibration_file = calibration.value_or(folder / "calib.txt");
   const Cameras cameras = cameras_in(folder);
-  const auto left = list_images(folder / cameras.left);
   const bool has_right = fs::exists(folder / cameras.right);
   const bool stereo = has_right && !parameters.left_only();
-  const auto right = stereo ? list_images(folder / cameras.right) : std::vector<fs::path>{};
-  if (stereo) expect_pairs(folder, cameras, left, right);
+  recording.frames = list_frames(folder, cameras, stereo);
 
   if (!calibration && !fs::exists(recording.calibration_file))
     throw IoError(
@@ -125,10 +147,8 @@ Recording read_kitti_recording(const fs::path& folder, const std::optional<fs::p
   }
   if (!has_right) recording.calibration.kind = SensorKind::kMono;
 
-  const auto times = read_times(folder / "times.txt", left.size());
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    recording.frames.push_back({times[i], left[i], stereo ? right[i] : fs::path(), {}});
-  }
+  const auto times = read_times(folder / "times.txt", recording.frames.size());
+  for (std::size_t i = 0; i < times.size(); ++i) recording.frames[i].t_ns = times[i];
   note_long_intervals(folder / "times.txt", recording);
   take_poses(cameras, times, &recording);
   return recording;
