@@ -78,12 +78,7 @@ void LockstepRun::run_deterministically(const Frame& frame) {
 
 void LockstepRun::expect_input_of_schedule() {
   if (!schedule_ || !schedule_->input) return;
-  const InputFingerprint& expected = *schedule_->input;
-  const InputFingerprint& given = *logs_.schedule().input;
-  if (given.rig != expected.rig)
-    fail("the schedule belongs to another rig than that of these frames");
-  else if (given.first_frame != expected.first_frame)
-    fail("the schedule belongs to another recording: its first frame was another one");
+  if (const std::string why = mismatch(*schedule_->input, *logs_.schedule().input); !why.empty()) fail(why);
 }
 
 void LockstepRun::replay(const Frame& frame) {

@@ -23,6 +23,7 @@
 #include "apps/twofold/run_output.hpp"
 #include "apps/twofold/surface/live_surface.hpp"
 #include "engine/engine.hpp"
+#include "engine/logs/input_fingerprint.hpp"
 #include "engine/worker.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -101,11 +102,19 @@ SourceOptions source_options_of(const RunArguments& arguments) {
   return options;
 }
 
+/// Reads the first frame of a recording: what it cannot deliver is known while an earlier run's files are
+/// still there. A camera's frame is not read before it is wanted. Throws IoError.
+const Frame* first_frame_of(FrameSource& source) {
+  return source.is_live() ? nullptr : source.peek();
+}
+
 int run_with_filter(const RunArguments& arguments) {
   expect_options_of_filter(arguments);
   expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
   const auto source = open_source(arguments.source, source_options_of(arguments));
+  expect_stereo(source->rig(), arguments.source);
+  (void)first_frame_of(*source);
   remove_earlier_run(arguments.out, calibration_file_of(arguments));
   catch_interrupts();
   run_filter(*source, arguments.source, arguments.window, arguments.out, interrupted());
@@ -148,6 +157,14 @@ PreparedSource prepared(std::unique_ptr<FrameSource> source, const RunArguments&
   auto recording = std::make_unique<RecordingTee>(std::move(source), arguments.record);
   RecordingTee* const recorder = recording.get();
   return {std::move(recording), recorder};
+}
+
+/// Refuses (IoError) a schedule of another rig or recording.
+void expect_input_of_schedule(const Schedule& schedule, const std::string& file, const Rig& rig,
+                              const Frame* first) {
+  if (first == nullptr || !schedule.input) return;
+  const std::string why = mismatch(*schedule.input, fingerprint_of(rig, *first));
+  if (!why.empty()) throw IoError(file, why);
 }
 
 /// Of keyframes that a viewer clicks.
@@ -312,6 +329,8 @@ int run(const RunArguments& arguments) {
       calibration ? calibration->file : std::filesystem::path(calibration_file_of(arguments));
   const PreparedSource frames = prepared(std::move(opened), arguments, options);
   const auto& source = frames.source;
+  const Frame* const first = first_frame_of(*source);
+  if (schedule) expect_input_of_schedule(*schedule, arguments.replay_schedule, source->rig(), first);
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   poses.listen(options);

@@ -83,11 +83,13 @@ std::string failure_of(const FrameSource& source, const std::string& source_text
 
 }  // namespace
 
+void expect_stereo(const Rig& rig, const std::string& source_text) {
+  if (rig.kind != SensorKind::kStereo)
+    throw IoError(source_text, "is not stereo, which --estimator swf needs");
+}
+
 void run_filter(FrameSource& source, const std::string& source_text, int window,
                 const std::filesystem::path& folder, const std::atomic<bool>& stop) {
-  if (source.rig().kind != SensorKind::kStereo) {
-    throw IoError(source_text, "is not stereo, which --estimator swf needs");
-  }
   StructureOptions options;
   options.filter.window = window;
   StructureFilter filter(source.rig(), options);

@@ -53,4 +53,11 @@ InputFingerprint fingerprint_of(const Rig& rig, const Frame& first) {
   return {hash_of(rig), frame.value()};
 }
 
+std::string mismatch(const InputFingerprint& expected, const InputFingerprint& given) {
+  if (given.rig != expected.rig) return "the schedule belongs to another rig than that of these frames";
+  if (given.first_frame != expected.first_frame)
+    return "the schedule belongs to another recording: its first frame was another one";
+  return "";
+}
+
 }  // namespace twofold

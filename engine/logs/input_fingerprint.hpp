@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "camera/frame.hpp"
 #include "camera/rig.hpp"
@@ -17,5 +18,9 @@ struct InputFingerprint {
 
 /// O(pixels): some 0.5 ms for a pair of 640 x 480.
 [[nodiscard]] InputFingerprint fingerprint_of(const Rig& rig, const Frame& first);
+
+/// Why a schedule of the input `expected` cannot be repeated over `given`: a clause about "the schedule".
+/// Empty: it can.
+[[nodiscard]] std::string mismatch(const InputFingerprint& expected, const InputFingerprint& given);
 
 }  // namespace twofold

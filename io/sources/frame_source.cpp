@@ -1,5 +1,7 @@
 #include "io/sources/frame_source.hpp"
 
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "io/files/io_error.hpp"
@@ -27,6 +29,10 @@ void check_images(const Frame& frame, const Rig& rig) {
 }  // namespace
 
 FrameStatus FrameSource::next(Frame& frame) {
+  if (peeked_) {
+    frame = *std::exchange(peeked_, std::nullopt);
+    return FrameStatus::kFrame;
+  }
   if (status_ != FrameStatus::kFrame) return status_;
   try {
     if (!read(frame)) return status_ = FrameStatus::kEnd;
@@ -43,6 +49,13 @@ FrameStatus FrameSource::next(Frame& frame) {
     status_ = FrameStatus::kError;
   }
   return status_;
+}
+
+const Frame* FrameSource::peek() {
+  if (peeked_) return &*peeked_;
+  Frame frame;
+  if (!next_or_throw(*this, frame)) return nullptr;
+  return &peeked_.emplace(std::move(frame));
 }
 
 bool next_or_throw(FrameSource& source, Frame& frame) {

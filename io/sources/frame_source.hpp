@@ -66,6 +66,10 @@ class FrameSource {
   /// strictly increase. After kEnd or kError the frame is unspecified and further calls repeat the answer.
   [[nodiscard]] FrameStatus next(Frame& frame);
 
+  /// The frame that next fetches next, read now and kept for it; null at the end. For whoever has something
+  /// to lose by a source that cannot deliver. Throws IoError with error().
+  [[nodiscard]] const Frame* peek();
+
   /// One line naming the file and what is wrong with it; after kError.
   [[nodiscard]] const std::string& error() const { return error_; }
 
@@ -82,6 +86,7 @@ class FrameSource {
   std::int64_t last_t_ns_ = 0;
   bool any_ = false;
   std::string error_;
+  std::optional<Frame> peeked_;
 };
 
 /// The next frame of a source that another one wraps; false at its end. Throws IoError with its error.

@@ -341,21 +341,21 @@ TEST_F(RunCommand, AReplayDoesNotOverwriteItsSchedule) {
   EXPECT_EQ(result("trajectory.txt"), poses);
 }
 
-TEST_F(RunCommand, AScheduleOfAnotherRunsInputIsAFailure) {
+TEST_F(RunCommand, AScheduleOfAnotherInputIsRefusedBeforeTheEarlierRunGoes) {
   ASSERT_EQ(run_recording().exit_code, 0);
   const std::string schedule = folder_ / "first.log";
-  fs::rename(folder_ / "result/schedule.log", schedule);
+  fs::copy(folder_ / "result/schedule.log", schedule);
+  const std::string poses = result("trajectory.txt");
   fs::remove_all(recording_ / "image_1");
   fs::copy(recording_ / "image_0", recording_ / "image_1");
   fs::remove(recording_ / "image_1/000000.png");
   fs::copy(master_->path() / "image_1/000001.png", recording_ / "image_1/000000.png");
-  const Outcome other = run_recording("--replay-schedule '" + schedule + "'");
-  EXPECT_EQ(other.exit_code, 1);
-  EXPECT_NE(other.err.find("the schedule belongs to another recording"), std::string::npos) << other.err;
+  expect_bad_input(run_recording("--replay-schedule '" + schedule + "'"),
+                   "first.log: the schedule belongs to another recording");
   replace_in("calib.txt", "P1: 220 0 159.5 -26.4", "P1: 220 0 159.5 -26.5");
-  const Outcome rig = run_recording("--replay-schedule '" + schedule + "'");
-  EXPECT_EQ(rig.exit_code, 1);
-  EXPECT_NE(rig.err.find("the schedule belongs to another rig"), std::string::npos) << rig.err;
+  expect_bad_input(run_recording("--replay-schedule '" + schedule + "'"),
+                   "first.log: the schedule belongs to another rig");
+  EXPECT_EQ(result("trajectory.txt"), poses);
 }
 
 /// What an earlier run left goes when this one begins, not when it is refused.
@@ -372,6 +372,23 @@ TEST_F(RunCommand, AFolderHoldsOneRun) {
   EXPECT_FALSE(fs::exists(folder_ / "result/schedule.log.new"));
   EXPECT_FALSE(fs::exists(folder_ / "result/keyframes_loaded.txt"));
   EXPECT_EQ(result("map.tfm"), "saved by whoever looked");
+}
+
+/// What a recording cannot deliver is known with its first frame.
+TEST_F(RunCommand, AFirstFrameThatCannotBeReadLeavesTheEarlierRun) {
+  ASSERT_EQ(run_recording().exit_code, 0);
+  const std::string poses = result("trajectory.txt"), summary = result("summary.json");
+  const fs::path first = recording_ / "image_1/000000.png";
+  cv::imwrite(first.string(), cv::Mat(100, 100, CV_8UC1, cv::Scalar(9)));
+  for (const char* estimator : {"engine", "swf"}) {
+    const Outcome refused = run_recording(std::string("--estimator ") + estimator);
+    expect_bad_input(refused, "image_1/000000.png: the image is 100x100, the first image");
+    EXPECT_EQ(refused.out, "");
+  }
+  fs::remove(first);
+  expect_bad_input(run_recording("--camera mono --estimator swf"), "is not stereo");
+  EXPECT_EQ(result("trajectory.txt"), poses);
+  EXPECT_EQ(result("summary.json"), summary);
 }
 
 /// Each estimator leaves a folder that holds its own files alone.

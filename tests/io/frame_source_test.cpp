@@ -240,6 +240,22 @@ TEST(FrameSource, AMissingDepthImageIsAGapAndAMissingFolderIsNone) {
   EXPECT_TRUE(without_depth->report().summary.empty());
 }
 
+TEST(FrameSource, AFrameThatWasPeekedAtComesNext) {
+  const ScratchFolder folder;
+  write_kitti(folder);
+  const auto source = open_source(folder.path().string());
+  const Frame* const first = source->peek();
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->index, 0);
+  EXPECT_EQ(source->peek(), first);
+  expect_frames(*source, 0, kCount - 1);
+  EXPECT_EQ(source->peek(), nullptr);
+  Frame frame;
+  EXPECT_EQ(source->next(frame), FrameStatus::kEnd);
+  folder.write_image("image_1/000000.png", numbered_image(60, 48, 1));
+  EXPECT_IO_ERROR(open_source(folder.path().string())->peek(), "image_1/000000.png: the image is 60x48");
+}
+
 TEST(FrameSource, WhatSaidAnotherSizeIsNamed) {
   const ScratchFolder folder;
   write_kitti(folder);
