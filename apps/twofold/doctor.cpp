@@ -10,6 +10,7 @@
 #include "apps/twofold/commands.hpp"
 #include "base/median.hpp"
 #include "doctor/camera.hpp"
+#include "doctor/depth_images.hpp"
 #include "doctor/disk.hpp"
 #include "doctor/machine.hpp"
 #include "doctor/stereo_rows.hpp"
@@ -108,25 +109,57 @@ Finding check_images(const FrameSource& source) {
   return {Health::kWarn, subject, faults.front() + others, remedy};
 }
 
-/// Looks at some pairs of a recording, or of a camera whose calibration is known.
-std::vector<Finding> look_at_pairs(const DoctorArguments& arguments) {
-  constexpr int kPairs = 5;
+/// What is told of images beside that they can be read.
+class ImageChecks {
+ public:
+  explicit ImageChecks(const Rig& rig) : rig_(rig) {
+    if (rig.kind == SensorKind::kStereo) meter_.emplace(rig, kCorners);
+  }
+
+  void look_at(const Frame& frame) {
+    if (meter_) {
+      if (const auto offset = meter_->search(frame.left, frame.right)) offsets_.push_back(*offset);
+    }
+    if (rig_.kind == SensorKind::kRgbd) depths_.push_back(frame.depth.clone());
+  }
+  /// After at least one look.
+  [[nodiscard]] std::vector<Finding> findings() const {
+    switch (rig_.kind) {
+      case SensorKind::kStereo:
+        return {check_rows(offsets_)};
+      case SensorKind::kRgbd:
+        return {check_depth(depths_, rig_)};
+      case SensorKind::kMono:
+        break;
+    }
+    return {};
+  }
+
+ private:
+  static constexpr int kCorners = 160;
+  const Rig rig_;
+  std::optional<RowOffsetMeter> meter_;
+  std::vector<RowOffset> offsets_;
+  std::vector<cv::Mat> depths_;
+};
+
+/// Looks at some frames of a recording, or of a camera whose calibration is known.
+std::vector<Finding> look_at_images(const DoctorArguments& arguments) {
+  constexpr int kLooks = 5;
   constexpr int kApart = 5;  // frames
-  constexpr int kCorners = 160;
   if (arguments.source.empty()) return {};
   if (arguments.calibration.empty() && is_camera(parse_source_spec(arguments.source))) return {};
   const auto source = open_source(arguments.source, source_options(arguments));
-  if (source->rig().kind != SensorKind::kStereo) return {};
-  RowOffsetMeter meter(source->rig(), kCorners);
-  std::vector<RowOffset> offsets;
+  ImageChecks checks(source->rig());
   Frame frame;
   FrameStatus status = FrameStatus::kFrame;
-  for (int i = 0; i < kPairs * kApart && (status = source->next(frame)) == FrameStatus::kFrame; ++i) {
-    if (i % kApart != 0) continue;
-    if (const auto offset = meter.search(frame.left, frame.right)) offsets.push_back(*offset);
-  }
-  if (status == FrameStatus::kError) return {check_images(*source)};
-  return {check_images(*source), check_rows(offsets)};
+  int frames = 0;
+  for (; frames < kLooks * kApart && (status = source->next(frame)) == FrameStatus::kFrame; ++frames)
+    if (frames % kApart == 0) checks.look_at(frame);
+  std::vector<Finding> findings{check_images(*source)};
+  if (status == FrameStatus::kError || frames == 0) return findings;
+  for (Finding& finding : checks.findings()) findings.push_back(std::move(finding));
+  return findings;
 }
 
 int examine(const DoctorArguments& arguments) {
@@ -137,7 +170,7 @@ int examine(const DoctorArguments& arguments) {
     for (Finding& finding : check_camera(calls, arguments.root, camera.path, camera.format))
       findings.push_back(std::move(finding));
   }
-  for (Finding& finding : look_at_pairs(arguments)) findings.push_back(std::move(finding));
+  for (Finding& finding : look_at_images(arguments)) findings.push_back(std::move(finding));
   const bool recording = !arguments.source.empty() && wanted.cameras.empty();
   if (!arguments.folder.empty())
     findings.push_back(check_disk(

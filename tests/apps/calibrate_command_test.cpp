@@ -128,5 +128,29 @@ TEST(DoctorCommand, SaysThatImagesCannotBeRead) {
   EXPECT_NE(all.out.find("bad   images"), std::string::npos) << all.out;
 }
 
+TEST(DoctorCommand, LooksAtDepthImages) {
+  const ScratchFolder folder;
+  const std::string recording = folder / "recording";
+  ASSERT_EQ(run(folder, "render 'synthetic:desk?sensor=rgbd&frames=14&width=64&height=48' --out " + recording)
+                .exit_code,
+            0);
+  const Outcome fine = run(folder, "doctor tum:" + recording);
+  EXPECT_NE(fine.out.find("ok    images"), std::string::npos) << fine.out;
+  EXPECT_NE(fine.out.find("ok    depth "), std::string::npos) << fine.out;
+  const Outcome wrong = run(folder, "doctor 'tum:" + recording + "?depth_scale=50'");
+  EXPECT_NE(wrong.out.find("warn  depth "), std::string::npos) << wrong.out;
+  EXPECT_NE(wrong.out.find("depth_scale"), std::string::npos) << wrong.out;
+  std::filesystem::remove_all(recording + "/mav0/depth0/data");
+  const Outcome none = run(folder, "doctor tum:" + recording);
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_NE(none.out.find("depth0/data: the folder is not there"), std::string::npos) << none.out;
+}
+
+TEST(DoctorCommand, LooksAtOneCamerasImages) {
+  const ScratchFolder folder;
+  const Outcome fine = run(folder, "doctor 'synthetic:desk?sensor=mono&frames=6&width=64&height=48'");
+  EXPECT_NE(fine.out.find("ok    images"), std::string::npos) << fine.out;
+}
+
 }  // namespace
 }  // namespace twofold

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "doctor/camera.hpp"
+#include "doctor/depth_images.hpp"
 #include "doctor/disk.hpp"
 #include "doctor/machine.hpp"
 #include "doctor/stereo_rows.hpp"
@@ -180,6 +181,29 @@ TEST(Doctor, SlippedRowsAreNamed) {
   EXPECT_NE(finding.remedy.find("calibrate"), std::string::npos);
   EXPECT_EQ(check_rows(std::vector<RowOffset>{{-0.1, 90}}).health, Health::kOk);
   EXPECT_EQ(check_rows({}).health, Health::kWarn);
+}
+
+TEST(Doctor, DepthInTheWrongUnitIsNamed) {
+  Rig rig;
+  rig.kind = SensorKind::kRgbd;
+  cv::Mat depth(48, 64, CV_16UC1, cv::Scalar(2000));  // 2 m in millimetres
+  depth.rowRange(0, 12).setTo(0);
+  const Finding fine = check_depth(std::vector{depth}, rig);
+  EXPECT_EQ(fine.health, Health::kOk);
+  EXPECT_EQ(fine.state, "in 75 % of the pixels, half of it nearer than 2.00 m, 100 % of it from 0.3 to 8 m");
+  rig.depth_unit = 1.0 / 10'000;
+  const Finding wrong = check_depth(std::vector{depth}, rig);
+  EXPECT_EQ(wrong.health, Health::kWarn);
+  EXPECT_NE(wrong.remedy.find("depth_scale"), std::string::npos);
+}
+
+TEST(Doctor, HardlyAnyDepthIsNamed) {
+  Rig rig;
+  rig.kind = SensorKind::kRgbd;
+  cv::Mat depth(48, 64, CV_16UC1, cv::Scalar(0));
+  EXPECT_EQ(check_depth(std::vector{depth}, rig).health, Health::kBad);
+  depth.rowRange(0, 2).setTo(2000);
+  EXPECT_EQ(check_depth(std::vector{depth}, rig).health, Health::kWarn);
 }
 
 }  // namespace
