@@ -126,9 +126,7 @@ std::unique_ptr<FrameSource> open_frames(const RunArguments& arguments,
   const SourceOptions options = source_options_of(arguments);
   if (!calibrates_itself(arguments)) return open_source(arguments.source, options);
   catch_interrupts();  // a camera may be watched for long
-  auto source = open_with_auto_calibration(arguments.source, options, arguments.out, calibration.emplace());
-  if (!arguments.quiet) print_auto_calibration(*calibration);
-  return source;
+  return open_with_auto_calibration(arguments.source, options, arguments.out, calibration.emplace());
 }
 
 /// Known with the source alone: a camera keeps a pace of its own.
@@ -334,6 +332,7 @@ int run(const RunArguments& arguments) {
 
   PoseStreaming poses(arguments.poses, arguments.poses_form);
   poses.listen(options);
+  if (calibration) print_auto_calibration(*calibration);  // now that standard output is for people, or moved
   LiveView view(arguments.view, arguments.source, arguments.out, *source, images_to_look_at(arguments),
                 options);
   const bool one_thread = options.deterministic || schedule.has_value();

@@ -411,7 +411,7 @@ TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   ASSERT_EQ(rendered.exit_code, 0) << rendered.err;
   const std::string source =
       "run 'euroc:" + (folder_ / "recording") + "' --camera mono --deterministic --out '";
-  const Outcome outcome = run(folder_, source + (folder_ / "auto") + "' --calib auto");
+  const Outcome outcome = run(folder_, source + (folder_ / "auto") + "' --calib auto --quiet");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("calibration f "), std::string::npos) << outcome.out;
   const auto summary = nlohmann::json::parse(content(folder_ / "auto/summary.json"));
@@ -422,8 +422,9 @@ TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   EXPECT_EQ(found["file"], folder_ / "auto/calibration.yaml");
   EXPECT_EQ(content(folder_ / "auto/calibration.yaml").find("readout"), std::string::npos);
   EXPECT_GT(found["readout_sigma_ms"].get<double>(), 0);
-  const Outcome anew = run(folder_, source + (folder_ / "auto") + "' --calib auto");
+  const Outcome anew = run(folder_, source + (folder_ / "auto") + "' --calib auto --poses -");
   EXPECT_EQ(anew.exit_code, 0) << "a run may replace what it has found itself: " << anew.err;
+  EXPECT_TRUE(anew.out.starts_with("{")) << "standard output has the poses alone: " << anew.out.substr(0, 80);
   const Outcome again =
       run(folder_, source + (folder_ / "again") + "' --calib '" + (folder_ / "auto/calibration.yaml") + "'");
   EXPECT_EQ(again.exit_code, 0) << again.err;
