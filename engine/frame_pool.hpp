@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <utility>
 
@@ -18,15 +17,13 @@ namespace internal {
 template <class T, class Atomics>
 struct PoolSlot {
   T value;
-  alignas(kCacheLine) typename Atomics::template Atomic<std::uint32_t> users{0};
+  alignas(kCacheLine) typename Atomics::template Atomic<bool> in_use{false};
 };
 
 }  // namespace internal
 
 /// Use of one object of a FramePool; gives it back when destroyed. Moves, through rings too; empty by default
-/// and after being moved from. A handle is used by one thread at a time, two handles of one object by two
-/// threads. The holder of the only handle may write the object; once share() was called all holders only
-/// read.
+/// and after being moved from. An object has one handle, used by one thread at a time.
 template <class T, class Atomics = StdAtomics>
 class PoolHandle {
  public:
@@ -41,16 +38,9 @@ class PoolHandle {
   }
   ~PoolHandle() { reset(); }
 
-  /// Another handle of the same object, for another thread; on an empty handle an empty one.
-  [[nodiscard]] PoolHandle share() const {
-    // Relaxed: the object reaches the other thread through a ring, whose release publishes it; the count
-    // cannot fall to zero meanwhile because this handle holds one.
-    if (slot_ != nullptr) slot_->users.fetch_add(1, std::memory_order_relaxed);
-    return PoolHandle(slot_);
-  }
   void reset() noexcept {
     if (slot_ == nullptr) return;
-    slot_->users.fetch_sub(1, std::memory_order_release);  // (A)
+    slot_->in_use.store(false, std::memory_order_release);  // (A)
     slot_ = nullptr;
   }
   [[nodiscard]] explicit operator bool() const { return slot_ != nullptr; }
@@ -67,16 +57,15 @@ class PoolHandle {
 /// Fixed number of objects made at start and used over and over, so that the steady state allocates nothing:
 /// frames, pyramids, message bodies. An object keeps its contents, buffers included, between two uses.
 ///
-/// Roles: one thread calls try_acquire; handles are dropped on any thread. All handles must be gone, or never
-/// be used again, when the pool is destroyed. Progress: both wait-free. Dropping a handle is one decrement;
-/// acquiring looks at each object's use count at most once, starting behind the last one given out, which in
+/// Roles: one thread calls try_acquire; a handle is dropped on the thread that has it. All handles must be
+/// gone, or never be used again, when the pool is destroyed. Progress: both wait-free. Dropping a handle is
+/// one store; acquiring looks at each object at most once, starting behind the last one given out, which in
 /// steady state is the first look. A ring of free objects for each dropping thread would do as well and need
-/// one ring more for every thread: the counts are there anyway. Full policy: an empty handle, and the caller
-/// drops or waits a frame.
+/// one ring more for every thread. Full policy: an empty handle, and the caller drops or waits a frame.
 ///
-/// Ordering. (A) users release (every drop) -> acquire (try_acquire): the drops of one object form a release
-/// sequence of read-modify-writes, so that reading 0 synchronises with each of them: all uses are over before
-/// the next begins. Only the acquiring thread takes a count from 0, hence no compare-and-swap.
+/// Ordering. (A) in_use release (drop) -> acquire (try_acquire): the use is over before the next begins; uses
+/// by the threads that had the handle before came to the last one with it, through a ring. Only the acquiring
+/// thread sets in_use, hence no compare-and-swap.
 template <class T, class Atomics = StdAtomics>
 class FramePool {
  public:
@@ -98,8 +87,8 @@ class FramePool {
     for (std::size_t looked = 0; looked < capacity_; ++looked) {
       Slot& slot = slots_[next_];
       next_ = next_ + 1 == capacity_ ? 0 : next_ + 1;
-      if (slot.users.load(std::memory_order_acquire) != 0) continue;  // (A)
-      slot.users.store(1, std::memory_order_relaxed);                 // nobody else looks at a count of 0
+      if (slot.in_use.load(std::memory_order_acquire)) continue;  // (A)
+      slot.in_use.store(true, std::memory_order_relaxed);         // nobody else sets it
       return Handle(&slot);
     }
     return {};
