@@ -66,7 +66,7 @@ std::vector<std::string> configure_this_thread(const WorkerOptions& options) {
     CPU_ZERO(&set);
     if (*options.cpu >= 0 && *options.cpu < CPU_SETSIZE) CPU_SET(*options.cpu, &set);
     if (const int error = pthread_setaffinity_np(pthread_self(), sizeof set, &set)) {
-      refuse(what, error, "name a CPU that `taskset -p 1` lists");
+      refuse(what, error, "name a CPU that `taskset -cp $$` lists");
     }
   }
   if (options.time_slice) take_time_slice(*options.time_slice);

@@ -140,7 +140,7 @@ TEST_F(RunCommand, RealTimeWishesAreGrantedOrSaidNotToBe) {
   EXPECT_EQ(refused.exit_code, 0) << refused.err;
   for (const char* part :
        {"tracker: running on CPU 1023 only was refused", "SCHED_FIFO priority 50 was refused", "`ulimit -r`",
-        "memory is not locked", "`ulimit -l"})
+        "memory is not locked", "`ulimit -l", "`taskset -cp $$`"})
     EXPECT_NE(refused.out.find(part), std::string::npos) << part << "\n" << refused.out;
   EXPECT_EQ(nlohmann::json::parse(result("summary.json"))["notes"].size(), 3U);
   const Outcome pinned = run_recording("--preload --pin 0,0,0");
