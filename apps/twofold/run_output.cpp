@@ -188,9 +188,11 @@ void print_times(const EngineOptions& options, const RunResult& result) {
     fmt::print("{:<11} {}\n", recorder.thread_name(), durations(recorder.histogram(0)));
   }
   if (options.pacing.keeps_pace()) fmt::print("exposure to pose: {}\n", durations(exposure_to_pose(result)));
-  const double frames = std::max<double>(1, static_cast<double>(result.frames.size()));
-  fmt::print("cost        {:.1f} s wall, {:.1f} s CPU ({:.1f} CPU-ms a frame), {:.0f} MB at most\n",
-             result.wall_seconds, result.cpu_seconds, 1e3 * result.cpu_seconds / frames, result.peak_rss_mb);
+  const auto frames = static_cast<double>(result.frames.size());
+  const std::string a_frame =
+      frames > 0 ? fmt::format(" ({:.1f} CPU-ms a frame)", 1e3 * result.cpu_seconds / frames) : "";
+  fmt::print("cost        {:.1f} s wall, {:.1f} s CPU{}, {:.0f} MB at most\n", result.wall_seconds,
+             result.cpu_seconds, a_frame, result.peak_rss_mb);
 }
 
 }  // namespace

@@ -391,6 +391,16 @@ TEST_F(RunCommand, AFirstFrameThatCannotBeReadLeavesTheEarlierRun) {
   EXPECT_EQ(result("summary.json"), summary);
 }
 
+TEST_F(RunCommand, ARunWithoutFramesHasNoCostAFrame) {
+  std::ofstream log(folder_ / "empty.log", std::ios::binary);
+  ASSERT_TRUE(write_schedule(log, ScheduleStreams()));
+  log.close();
+  const Outcome outcome = run_recording("--replay-schedule '" + (folder_ / "empty.log") + "'");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_NE(outcome.out.find("frames      0 ("), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(" s CPU, "), std::string::npos) << outcome.out;
+}
+
 /// Each estimator leaves a folder that holds its own files alone.
 TEST_F(RunCommand, NothingOfAnotherEstimatorStays) {
   ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
