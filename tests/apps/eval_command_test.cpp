@@ -38,6 +38,25 @@ TEST(EvalCommand, WritesTableJsonAndPlot) {
   EXPECT_EQ(cv::imread(folder / "e.png").empty(), false);
 }
 
+TEST(EvalCommand, SaysThatOneCamerasScaleIsArbitrary) {
+  const ScratchFolder folder;
+  const auto truth = write_circle(folder, "truth.txt", 1);
+  const auto estimate = write_circle(folder, "trajectory.txt", 0.5);
+  const auto is_said = [&](const std::string& options) {
+    const auto outcome = run(folder, "eval " + estimate + " " + truth + options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.err.find("whose scale is arbitrary: --align sim3") != std::string::npos;
+  };
+  EXPECT_FALSE(is_said(""));
+  folder.write("summary.json", R"({"scale": "arbitrary"})");
+  EXPECT_TRUE(is_said(""));
+  EXPECT_FALSE(is_said(" --align sim3"));
+  for (const char* other : {R"({"scale": "metric"})", R"({"scale": 3})", "[]", "no JSON"}) {
+    folder.write("summary.json", other);
+    EXPECT_FALSE(is_said("")) << other;
+  }
+}
+
 /// As of folders that come out of old archives.
 TEST(EvalCommand, NamesMayHoldBytesThatAreNoText) {
   const ScratchFolder folder;

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -156,6 +157,16 @@ cv::Mat draw(const EvalArguments& arguments, const Evaluation& e) {
       options);
 }
 
+/// A run leaves its summary beside its trajectories.
+void warn_of_arbitrary_scale(const fs::path& estimate) {
+  std::ifstream file(estimate.parent_path() / "summary.json");
+  const nlohmann::json summary = nlohmann::json::parse(file, nullptr, false);
+  if (!summary.is_object() || !summary.contains("scale") || summary["scale"] != "arbitrary") return;
+  fmt::print(stderr,
+             "twofold: {}: of one camera, whose scale is arbitrary: --align sim3 leaves it out of account\n",
+             estimate.string());
+}
+
 void warn_of_constant_turn(const Evaluation& evaluation) {
   const auto turn = constant_turn_deg(evaluation.pairs);
   if (!turn) return;
@@ -182,6 +193,7 @@ void run_eval(const EvalArguments& arguments) {
   if (!evaluation) throw IoError(arguments.estimate, evaluation.error());
   const bool has_times = pairing.has_times;
   print_table(arguments, *evaluation, pairing.of, has_times);
+  if (arguments.alignment != Alignment::kSim3) warn_of_arbitrary_scale(arguments.estimate);
   if (arguments.alignment != Alignment::kNone) warn_of_constant_turn(*evaluation);
   if (!arguments.json.empty())
     write_file(arguments.json, json_text(arguments, *evaluation, pairing.of, has_times));
