@@ -52,6 +52,8 @@ class ZmqOutput final : public PoseOutput {
 }  // namespace
 
 std::unique_ptr<PoseOutput> open_zmq(const std::string& endpoint, PoseForm form) {
+  if (endpoint.find("://") == std::string::npos)
+    throw std::runtime_error("zmq:" + endpoint + ": the form is zmq:tcp://HOST:PORT or zmq:ipc://PATH");
   if (is_beyond_ports(endpoint.substr(endpoint.rfind(':') + 1)))  // all of it, where there is no colon
     throw std::runtime_error("zmq:" + endpoint + ": a port is 65535 at most");
   return std::make_unique<ZmqOutput>(endpoint, form);

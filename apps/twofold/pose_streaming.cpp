@@ -3,14 +3,32 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <set>
+#include <system_error>
 
 #include "engine/listeners.hpp"
 #include "io/files/io_error.hpp"
 
 namespace twofold {
+namespace {
+
+/// Two writers of one file would write over each other.
+void expect_no_target_twice(const std::vector<std::string>& targets) {
+  std::set<std::filesystem::path> seen;
+  for (const std::string& target : targets) {
+    std::error_code ignored;
+    if (!seen.insert(std::filesystem::weakly_canonical(std::filesystem::absolute(target, ignored), ignored))
+             .second)
+      throw IoError("--poses", target + ": is given twice");
+  }
+}
+
+}  // namespace
 
 PoseStreaming::PoseStreaming(const std::vector<std::string>& targets, const std::string& form_name) {
   if (targets.empty()) return;
+  expect_no_target_twice(targets);
   const PoseForm form = form_name == "tum" ? PoseForm::kTum : PoseForm::kJson;
   std::vector<std::unique_ptr<PoseOutput>> outputs;
   try {

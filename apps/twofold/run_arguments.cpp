@@ -1,8 +1,11 @@
 #include "apps/twofold/run_arguments.hpp"
 
+#include <algorithm>
+#include <charconv>
 #include <cstdlib>
 #include <map>
 #include <memory>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -18,21 +21,22 @@ namespace {
 const std::map<std::string, LatePolicy> kLatePolicies{
     {"queue", LatePolicy::kQueue}, {"drop", LatePolicy::kDrop}, {"newest", LatePolicy::kNewest}};
 
+int parse_number(const std::string& text, const char* option) {
+  int number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  if (error == std::errc::result_out_of_range)
+    throw IoError(option, fmt::format("'{}' is out of range", text));
+  if (error != std::errc() || rest != end) throw IoError(option, fmt::format("'{}' is not a number", text));
+  return number;
+}
+
 std::vector<int> parse_numbers(const std::string& text, std::size_t count, const char* option) {
   std::vector<int> numbers;
   std::size_t begin = 0;
   while (begin <= text.size()) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string part = text.substr(begin, end - begin);
-    std::size_t used = 0;
-    int number = -1;
-    try {
-      number = std::stoi(part, &used);
-    } catch (const std::exception&) {
-      used = part.size() + 1;
-    }
-    if (used != part.size() || part.empty()) throw IoError(option, fmt::format("'{}' is not a number", part));
-    numbers.push_back(number);
+    numbers.push_back(parse_number(text.substr(begin, end - begin), option));
     begin = end + 1;
   }
   if (numbers.size() != count) throw IoError(option, fmt::format("needs {} numbers, got '{}'", count, text));
@@ -113,6 +117,8 @@ EngineOptions engine_options(const RunArguments& arguments) {
     throw IoError("--windows", reason);
   if (!arguments.pin.empty()) {
     const std::vector<int> cpus = parse_numbers(arguments.pin, 3, "--pin");
+    if (*std::min_element(cpus.begin(), cpus.end()) < 0)
+      throw IoError("--pin", fmt::format("CPUs count from 0, got '{}'", arguments.pin));
     options.tracker_cpu = cpus[0];
     options.mapper_cpu = cpus[1];
     options.loop_closer_cpu = cpus[2];

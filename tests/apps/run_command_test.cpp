@@ -294,6 +294,11 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
   expect_bad_input(run_recording("--speed -1"), "--speed");
   expect_bad_input(run_recording("--windows 25"), "--windows");
   expect_bad_input(run_recording("--windows 0,10"), "--windows");
+  expect_bad_input(run_recording("--windows 25,x"), "--windows: 'x' is not a number");
+  expect_bad_input(run_recording("--windows 99999999999,175"), "--windows: '99999999999' is out of range");
+  expect_bad_input(run_recording("--pin 0,-1,0"), "--pin: CPUs count from 0");
+  expect_bad_input(run_recording("--poses p.jsonl --poses ./p.jsonl"), "--poses: ./p.jsonl: is given twice");
+  expect_bad_input(run_recording("--poses zmq:foo"), "zmq:");
   expect_bad_input(run_recording("--late never"), "late");
   expect_bad_input(run_recording("--deterministic --speed 1"),
                    "--speed: has no meaning with --deterministic");

@@ -92,5 +92,14 @@ TEST_F(ZmqOutputTest, SubscribersAreToldWhatWasLostOnTheWay) {
   EXPECT_EQ(heard.missed, 17);
 }
 
+TEST(ZmqOutput, TheFormOfAnEndpointIsSaid) {
+  try {
+    (void)open_pose_output("zmq:localhost:5556", PoseForm::kJson);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "zmq:localhost:5556: the form is zmq:tcp://HOST:PORT or zmq:ipc://PATH");
+  }
+}
+
 }  // namespace
 }  // namespace twofold
