@@ -28,6 +28,18 @@ TEST(WrongInput, UnknownSubcommandsAreNamed) {
   expect_bad_input(run(folder, ""), "A subcommand is required; twofold --help lists them");
 }
 
+TEST(WrongInput, UnknownOptionsAreNamedWithTheOneThatIsMeant) {
+  const ScratchFolder folder;
+  expect_bad_input(run(folder, "run synthetic:desk --ouT o1"),
+                   "'--ouT' is no option of twofold run (--out?); --help lists them");
+  expect_bad_input(run(folder, "run synthetic:desk --sped=2"),
+                   "'--sped' is no option of twofold run (--speed?); --help lists them");
+  expect_bad_input(run(folder, "run synthetic:desk --nonsense"),
+                   "'--nonsense' is no option of twofold run; --help lists them\n");
+  expect_bad_input(run(folder, "map info a.tfm b.tfm"),
+                   "'b.tfm' was not expected; twofold map info --help says what is");
+}
+
 TEST(WrongInput, FilesThatAreNoVideoAreNotAskedForACalibration) {
   const ScratchFolder folder;
   const std::string text = folder.write("notes.txt", "no video\n").string();
