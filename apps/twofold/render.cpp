@@ -12,6 +12,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/surface/true_surface.hpp"
+#include "base/counted.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
 #include "io/files/trajectory_file.hpp"
@@ -203,7 +204,7 @@ void run_render(const RenderArguments& arguments) {
   }
   if (status == FrameStatus::kError) throw IoError(source->error());
   recording.finish(source->ground_truth());
-  fmt::print("{} frames written to {} (read them with {}:{})\n", progress.done(), arguments.out,
+  fmt::print("{} written to {} (read with {}:{})\n", counted(progress.done(), "frame"), arguments.out,
              source->rig().kind == SensorKind::kRgbd ? "tum" : "euroc", arguments.out);
 }
 

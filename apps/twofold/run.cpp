@@ -268,7 +268,7 @@ RunFrames frames_of(const RunArguments& arguments, const std::optional<AutoCalib
 void print_results(const RunArguments& arguments, const EngineOptions& options, const FrameSource& source,
                    const RunResult& result, const std::vector<MapPart>& parts,
                    const std::vector<std::string>& maps, const std::optional<SurfaceFigures>& surface) {
-  print_summary(arguments.out, options, result, parts);
+  print_summary(arguments.out, source.rig(), options, result, parts);
   if (surface) print_surface(*surface);
   if (scale_is_arbitrary(source.rig(), options))
     fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");

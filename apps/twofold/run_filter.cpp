@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "base/counted.hpp"
 #include "base/text_of_json.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -117,8 +118,9 @@ void run_filter(FrameSource& source, const std::string& source_text, int window,
                      {"slowest_ms", timing.slowest_ms},
                      {"notes", source.report().notes}};
   write_file(folder / "summary.json", text_of_json(summary, 2) + "\n");
-  fmt::print("{} frames, {} tracked, {} restarts, {} points; {:.1f} ms a frame, slowest {:.1f}; {}\n", frames,
-             tracked, filter.restarts(), points.size(), mean_ms, timing.slowest_ms, folder.string());
+  fmt::print("{}, {} tracked, {}, {}; {:.1f} ms a frame, slowest {:.1f}; {}\n", counted(frames, "frame"),
+             tracked, counted(filter.restarts(), "restart"), counted(points.size(), "point"), mean_ms,
+             timing.slowest_ms, folder.string());
   for (const std::string& note : source.report().notes) fmt::print("note        {}\n", note);
   if (!source.error().empty()) throw IoError(error);
   if (!error.empty()) throw std::runtime_error(error);

@@ -15,6 +15,7 @@
 #include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/run_summary.hpp"
 #include "apps/twofold/view/run_frames.hpp"
+#include "base/counted.hpp"
 #include "base/text_of_json.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
@@ -141,9 +142,10 @@ std::string durations(const LatencyHistogram& h) {
                      ms(h.quantile_ns(0.5)), ms(h.quantile_ns(0.99)), ms(h.max_ns()));
 }
 
-/// What each loop found before it was closed, a line a loop.
-void print_loops(const RunResult& result) {
+/// What each loop found before it was closed, a line a loop. Only one camera's has a scale to tell.
+void print_loops(const Rig& rig, const EngineOptions& options, const RunResult& result) {
   constexpr std::size_t kMost = 12;
+  const char* const unit = scale_is_arbitrary(rig, options) ? "" : " m";
   for (std::size_t n = 0; n < std::min(kMost, result.loops.size()); ++n) {
     const ClosedLoop& loop = result.loops[n];
     const auto [from, to] = std::pair(index(loop.constraint.from), index(loop.constraint.to));
@@ -153,11 +155,13 @@ void print_loops(const RunResult& result) {
     }
     const SE3 drift = loop.drift();
     const double moved = drift.translation().norm();
+    const std::string scale =
+        rig.kind == SensorKind::kMono ? fmt::format(", scale {:.4f}", loop.constraint.scale) : "";
     fmt::print(
-        "loop        keyframes {} and {}: drift {:.4f} ({:.3f} % of {:.1f} travelled), {:.2f} degrees, "
-        "scale {:.4f}\n",
-        from, to, moved, 100 * moved / std::max(loop.travelled, 1e-9), loop.travelled,
-        drift.so3().log().norm() * 180 / std::numbers::pi, loop.constraint.scale);
+        "loop        keyframes {} and {}: drift {:.4f}{} ({:.3f} % of {:.1f}{} travelled), {:.2f} "
+        "degrees{}\n",
+        from, to, moved, unit, 100 * moved / std::max(loop.travelled, 1e-9), loop.travelled, unit,
+        drift.so3().log().norm() * 180 / std::numbers::pi, scale);
   }
   if (result.loops.size() > kMost) fmt::print("loop        {} more\n", result.loops.size() - kMost);
 }
@@ -167,7 +171,7 @@ void print_other_maps(const EngineOptions& options, const RunResult& result,
                       const std::vector<MapPart>& parts) {
   if (options.map) {
     const auto frame = recognised_at(options, result);
-    fmt::print("loaded map  {} keyframes, {}\n", live_keyframes(options.map->graph),
+    fmt::print("loaded map  {}, {}\n", counted(live_keyframes(options.map->graph), "keyframe"),
                frame ? fmt::format("recognised at frame {}", *frame)
                      : std::string("no place of it was recognised: poses are not in its frame"));
   }
@@ -177,8 +181,8 @@ void print_other_maps(const EngineOptions& options, const RunResult& result,
   }
   for (const MapPart& part : parts) {
     if (parts.size() == 1) break;
-    fmt::print("map part    {} keyframes, {} frames, first keyframe {}\n", part.keyframes,
-               part.trajectory.size(), index(part.id));
+    fmt::print("map part    {}, {}, first keyframe {}\n", counted(part.keyframes, "keyframe"),
+               counted(part.trajectory.size(), "frame"), index(part.id));
   }
 }
 
@@ -197,17 +201,17 @@ void print_times(const EngineOptions& options, const RunResult& result) {
 
 }  // namespace
 
-void print_summary(const std::filesystem::path& folder, const EngineOptions& options, const RunResult& result,
-                   const std::vector<MapPart>& parts) {
+void print_summary(const std::filesystem::path& folder, const Rig& rig, const EngineOptions& options,
+                   const RunResult& result, const std::vector<MapPart>& parts) {
   const FrameCounts& counts = result.counts;
   const std::string later =
       counts.placed_later > 0 ? fmt::format("{} placed later, ", counts.placed_later) : "";
   fmt::print("frames      {} ({} tracked, {}{} lost, {} dropped){}\n", counts.frames, counts.tracked, later,
              counts.lost, counts.dropped, result.interrupted ? ", interrupted" : "");
-  fmt::print("map         {} keyframes, {} rounds, {} metric loop edges, {} loops by appearance\n",
-             live_keyframes(result.graph), result.mapping.rounds, result.mapping.metric_loops,
-             result.loops.size());
-  print_loops(result);
+  fmt::print("map         {}, {}, {}, {} by appearance\n", counted(live_keyframes(result.graph), "keyframe"),
+             counted(result.mapping.rounds, "round"),
+             counted(result.mapping.metric_loops, "metric loop edge"), counted(result.loops.size(), "loop"));
+  print_loops(rig, options, result);
   if (result.readout && result.readout->significant) {
     fmt::print("readout     {:.1f} +- {:.1f} ms: a rolling shutter, found from {} pairs of frames\n",
                1e3 * result.readout->seconds, 1e3 * result.readout->sigma, result.readout->pairs);

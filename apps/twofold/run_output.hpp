@@ -36,8 +36,8 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
 void write_trace(const std::filesystem::path& file, const RunResult& result);
 
 /// What a person wants to know, on standard output.
-void print_summary(const std::filesystem::path& folder, const EngineOptions& options, const RunResult& result,
-                   const std::vector<MapPart>& parts);
+void print_summary(const std::filesystem::path& folder, const Rig& rig, const EngineOptions& options,
+                   const RunResult& result, const std::vector<MapPart>& parts);
 
 /// One camera does not show how long a metre is, unless it is localised in a map that a stereo or RGB-D rig
 /// made.

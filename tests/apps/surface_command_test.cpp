@@ -192,6 +192,15 @@ TEST(SurfaceCommand, StereoGivesASurface) {
   EXPECT_GT(read_ply_mesh(folder / "result/surface.ply").triangles.size(), 500u);
 }
 
+TEST(SurfaceCommand, OfNoBlocksNothingIsSaidPerCubicMetre) {
+  const ScratchFolder folder;
+  const Outcome outcome =
+      run(folder, "run 'synthetic:desk?bare=1&frames=3&width=160&height=120' --surface 0.05 --out '" +
+                      (folder / "run") + "'");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_NE(outcome.out.find(" 0 blocks, 0 MiB at most, colour"), std::string::npos) << outcome.out;
+}
+
 TEST(SurfaceCommand, SaysWhatCannotBe) {
   const ScratchFolder folder;
   const std::string to = " --out '" + (folder / "result") + "'";

@@ -155,7 +155,7 @@ void run_object(ObjectArguments& arguments) {
   const ObjectModel model = build_object(*source, parts.front().trajectory, arguments.surface);
   write_run_output(arguments.out, {arguments.source, "", arguments.calibration, nullptr, result.losses},
                    *source, options, result, parts, surface_json(model.figures));
-  print_summary(arguments.out, options, result, parts);
+  print_summary(arguments.out, source->rig(), options, result, parts);
   print_surface(model.figures);
   if (model.mesh.triangles.empty())
     throw std::runtime_error(arguments.source + ": the object's frames gave no surface");

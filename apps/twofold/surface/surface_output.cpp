@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "base/counted.hpp"
 #include "io/files/mesh_file.hpp"
 
 namespace twofold {
@@ -58,10 +59,11 @@ void print_surface(const SurfaceFigures& f) {
       "surface     {} depth images fused, {:.1f} CPU-ms each, {} anew, {} triangles in {:.0f} CPU-ms, voxels "
       "of {:g} m\n",
       f.fused, f.fusion_ms, f.fused_anew, f.triangles, f.mesh_ms, f.voxel);
-  fmt::print(
-      "            {}{} blocks, {:.0f} MiB at most ({:.0f} MiB for a cubic metre of blocks), colour: {}\n",
-      f.submaps > 0 ? fmt::format("{} submaps, ", f.submaps) : "", f.blocks, f.memory_mb, f.mb_a_cubic_metre,
-      f.colour);
+  fmt::print("            {}{}, {:.0f} MiB at most{}, colour: {}\n",
+             f.submaps > 0 ? counted(f.submaps, "submap") + ", " : "", counted(f.blocks, "block"),
+             f.memory_mb,
+             f.blocks > 0 ? fmt::format(" ({:.0f} MiB for a cubic metre of blocks)", f.mb_a_cubic_metre) : "",
+             f.colour);
   if (f.live_mesh) {
     const LiveMeshFigures& m = *f.live_mesh;
     fmt::print(
