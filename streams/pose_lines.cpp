@@ -15,10 +15,17 @@ auto list(const Numbers& numbers) {
   return fmt::join(numbers, ",");
 }
 
+/// Zero has one sign: "-0" makes people look for a meaning.
+Pose without_minus_zeros(Pose T) {
+  for (double& number : T.q) number += 0.0;
+  for (double& number : T.t) number += 0.0;
+  return T;
+}
+
 void append_pose(std::string& line, const PoseEstimate& pose) {
   const auto out = std::back_inserter(line);
-  const Pose& T = pose.T_world_camera;
-  const Pose& T_ref = pose.T_reference_camera;
+  const Pose T = without_minus_zeros(pose.T_world_camera);
+  const Pose T_ref = without_minus_zeros(pose.T_reference_camera);
   fmt::format_to(out, R"(,"position":[{}],"orientation":[{}],"map_part":{},"reference_keyframe":{})",
                  list(T.t), list(T.q), pose.map_part, pose.reference_keyframe);
   fmt::format_to(out, R"(,"position_in_reference":[{}],"orientation_in_reference":[{}])", list(T_ref.t),
@@ -48,8 +55,8 @@ std::string id_or_null(std::uint32_t id) {
 }
 
 std::string json_event(const MapEvent& event) {
-  const Pose& before = event.T_world_camera_before;
-  const Pose& after = event.T_world_camera_after;
+  const Pose before = without_minus_zeros(event.T_world_camera_before);
+  const Pose after = without_minus_zeros(event.T_world_camera_after);
   return fmt::format(
       R"({{"event":"{}","frame":{},"t_ns":{},"map_version":{},"keyframe":{},"map_part_before":{},)"
       R"("map_part":{},"moved":{:.6g},"turned":{:.6g},"position_before":[{}],"orientation_before":[{}],)"
@@ -67,7 +74,7 @@ std::string json_event(const MapEvent& event) {
 std::string pose_line(const PoseEstimate& pose, PoseForm form) {
   if (form == PoseForm::kJson) return json_pose(pose);
   if (pose.state != TrackingState::kTracked) return "";
-  const Pose& T = pose.T_world_camera;
+  const Pose T = without_minus_zeros(pose.T_world_camera);
   return fmt::format("{} {} {}\n", seconds_text(pose.t_ns), fmt::join(T.t, " "), fmt::join(T.q, " "));
 }
 

@@ -62,6 +62,16 @@ TEST(PoseLines, TumFormIsTimeAndPose) {
   EXPECT_EQ(missed_line(4, PoseForm::kTum), "# missed 4 lines\n");
 }
 
+TEST(PoseLines, ZeroHasOneSign) {
+  PoseEstimate pose = numbered_pose(5);
+  pose.T_world_camera.t = {-0.0, 0.0, -1};
+  for (const PoseForm form : {PoseForm::kJson, PoseForm::kTum}) {
+    const std::string line = pose_line(pose, form);
+    EXPECT_EQ(line.find("-0,"), std::string::npos) << line;
+    EXPECT_EQ(line.find("-0 "), std::string::npos) << line;
+  }
+}
+
 TEST(PoseLines, EventsSayWhatMovedAndByHowMuch) {
   MapEvent event;
   event.kind = MapEventKind::kLoopClosure;
