@@ -66,6 +66,25 @@ cv::Mat heat_map(TriangleMesh estimate, const SE3& T_w_e, const SurfaceCompariso
   return draw_mesh(estimate, colours, overview_of(estimate, Vector3::UnitZ(), kPictureWidth));
 }
 
+void print_comparison(const SurfaceEvalArguments& arguments, bool moved, const SurfaceComparison& found) {
+  fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
+             arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
+             arguments.fit ? "moved so that the surfaces fit best"
+             : moved       ? "moved as the run's trajectory onto the ground truth"
+                           : "not moved");
+  if (arguments.align && !moved)
+    fmt::print(stderr,
+               "twofold: {}: is compared where it lies: its run's trajectory.txt and groundtruth.txt, which "
+               "would move it onto the truth, are not beside it (copy both there; --align none if it lies "
+               "right)\n",
+               arguments.estimate);
+  fmt::print("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}\n", "[mm]", "points", "mean", "median", "p95",
+             "rmse", fmt::format("<= {:g} mm", 1e3 * arguments.threshold));
+  print_row("accuracy", found.accuracy);
+  print_row("completeness", found.completeness);
+  fmt::print("F-score        {:.4f}\n", found.f_score);
+}
+
 }  // namespace
 
 void eval_surface(const SurfaceEvalArguments& arguments) {
@@ -80,16 +99,7 @@ void eval_surface(const SurfaceEvalArguments& arguments) {
   options.threshold = arguments.threshold;
   options.spacing = spacing;
   const SurfaceComparison found = compare_surfaces(estimate, T_w_e.value_or(SE3()), truth, seen, options);
-  fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
-             arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
-             arguments.fit ? "moved so that the surfaces fit best"
-             : T_w_e       ? "moved as the run's trajectory onto the ground truth"
-                           : "not moved");
-  fmt::print("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}\n", "[mm]", "points", "mean", "median", "p95",
-             "rmse", fmt::format("<= {:g} mm", 1e3 * arguments.threshold));
-  print_row("accuracy", found.accuracy);
-  print_row("completeness", found.completeness);
-  fmt::print("F-score        {:.4f}\n", found.f_score);
+  print_comparison(arguments, T_w_e.has_value(), found);
   if (!arguments.json.empty()) {
     const nlohmann::ordered_json json{{"estimate", arguments.estimate},
                                       {"truth", arguments.truth},
