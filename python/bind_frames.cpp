@@ -76,11 +76,11 @@ void bind_source(py::module_& module) {
   py::class_<Source, std::shared_ptr<Source>>(
       module, "Source",
       "Frames of a recording, a video, a rendered scene or a camera, rectified.\n\n"
-      "Named as on the command line: a path, or euroc:DIR, kitti:DIR, tum:DIR, images:DIR, video:FILE, "
-      "mcap:FILE,\n"
-      "bag:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value. Iterating gives Frames; the "
-      "interpreter runs on "
-      "meanwhile.")
+      "Named as on the command line: a path, or kitti:DIR, euroc:DIR, tum:DIR, 7scenes:DIR, replica:DIR, "
+      "scannet:DIR,\n"
+      "images:DIR, video:FILE, mcap:FILE, bag:FILE, v4l2:DEVICE, synthetic:SCENE, with "
+      "?key=value&key=value.\n"
+      "Iterating gives Frames; the interpreter runs on meanwhile.")
       .def(
           py::init([](const std::filesystem::path& name,
                       const std::optional<std::filesystem::path>& calibration, bool preload, bool left_only) {

@@ -25,8 +25,9 @@ struct SourceSettings {
 
 /// Frames of a recording, a video, a rendered scene or a camera, rectified.
 ///
-/// Named as on the command line (docs/sources.md): a path, or euroc:DIR, kitti:DIR, tum:DIR, images:DIR,
-/// video:FILE, mcap:FILE, bag:FILE, v4l2:DEVICE, synthetic:SCENE, with ?key=value&key=value.
+/// Named as on the command line (docs/sources.md): a path, or kitti:DIR, euroc:DIR, tum:DIR, 7scenes:DIR,
+/// replica:DIR, scannet:DIR, images:DIR, video:FILE, mcap:FILE, bag:FILE, v4l2:DEVICE, synthetic:SCENE, with
+/// ?key=value&key=value.
 ///
 /// Threads: every function may be called by any thread; those that ask for frames take turns. A move is
 /// nobody else's moment.
