@@ -9,90 +9,113 @@
 
 namespace twofold::testing {
 
-/// A map with everything a file must hold: culled keyframes and points, both kinds of edges, missing right
-/// coordinates.
-inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
-  std::mt19937 rng(seed);
-  std::uniform_real_distribution<double> number(-1, 1);
-  // One draw a statement: compilers evaluate arguments in orders of their own, and files of older formats
-  // hold this map.
-  const auto vector = [&] {
-    const double z = number(rng);
-    const double y = number(rng);
-    const double x = number(rng);
-    return Vector3(x, y, z);
-  };
-  const auto random_pose = [&] {
-    const Vector3 translation = 10 * vector();
-    return SE3(SO3::exp(vector()), translation);
-  };
-  GraphWriter writer;
-  for (int k = 0; k < keyframes; ++k) {
+/// Draws a map part by part. Files of older formats hold what it drew: the order of draws is theirs, one a
+/// statement, since compilers evaluate arguments in orders of their own.
+class SampleMapMaker {
+ public:
+  SampleMapMaker(int keyframes, int points, std::uint32_t seed)
+      : keyframes_(keyframes), points_(points), rng_(seed) {}
+
+  SavedMap make() {
+    for (int k = 0; k < keyframes_; ++k) add_keyframe(k);
+    writer_.set_reference(id_of(keyframes_ - 1));
+    for (int p = 0; p < points_; ++p) add_point(p);
+    cull_some();
+    SavedMap map;
+    map.rig.camera = {500, 501, 320, 240, 640, 480};
+    map.rig.baseline = 0.11;
+    map.graph = writer_.publish();
+    for (int k = 0; k < keyframes_; k += 2)  // some were never described
+      if (!map.graph.keyframe(id_of(k)).culled()) map.places.set(id_of(k), draw_place(1 + k % 7));
+    return map;
+  }
+
+ private:
+  static KeyframeId id_of(int k) { return KeyframeId{static_cast<std::uint32_t>(k)}; }
+
+  Vector3 draw_vector() {
+    const double z = number_(rng_);
+    const double y = number_(rng_);
+    const double x = number_(rng_);
+    return {x, y, z};
+  }
+
+  SE3 draw_pose() {
+    const Vector3 translation = 10 * draw_vector();
+    return SE3(SO3::exp(draw_vector()), translation);
+  }
+
+  void add_keyframe(int k) {
     Keyframe keyframe;
-    keyframe.id = KeyframeId{static_cast<std::uint32_t>(k)};
+    keyframe.id = id_of(k);
     keyframe.frame_index = 7 * k;
     keyframe.t_ns = 1'700'000'000'000'000'000 + 33'333'333LL * k;
-    keyframe.T_k_w = random_pose();
-    keyframe.median_depth = 2 + number(rng);
-    writer.add_keyframe(keyframe);
+    keyframe.T_k_w = draw_pose();
+    keyframe.median_depth = 2 + number_(rng_);
+    writer_.add_keyframe(keyframe);
     for (int back = 1; back <= std::min(k, 3); ++back) {
       Edge edge;
-      edge.other = KeyframeId{static_cast<std::uint32_t>(k - back)};
+      edge.other = id_of(k - back);
       edge.weight = 40 / back;
       edge.marginalised = back == 2;
-      if (edge.marginalised) edge.T_other_this = random_pose();
-      writer.set_edge(keyframe.id, edge);
+      if (edge.marginalised) edge.T_other_this = draw_pose();
+      writer_.set_edge(keyframe.id, edge);
     }
   }
-  writer.set_reference(KeyframeId{static_cast<std::uint32_t>(keyframes - 1)});
-  for (int p = 0; p < points; ++p) {
+
+  void add_point(int p) {
     const PointId id{static_cast<std::uint32_t>(p)};
-    const auto anchor = static_cast<std::uint32_t>(p * keyframes / points);
+    const int anchor = p * keyframes_ / points_;
     MapPoint point;
-    point.anchor = KeyframeId{anchor};
-    point.psi = vector();
+    point.anchor = id_of(anchor);
+    point.psi = draw_vector();
     point.psi.z() = 0.6 + 0.4 * point.psi.z();
     auto appearance = std::make_shared<PointAppearance>();
-    appearance->uv = {static_cast<float>(rng() % 640), static_cast<float>(rng() % 480)};
-    appearance->level = static_cast<std::uint8_t>(rng() % 3);
-    for (std::uint8_t& pixel : appearance->pixels) pixel = static_cast<std::uint8_t>(rng());
+    appearance->uv = {static_cast<float>(rng_() % 640), static_cast<float>(rng_() % 480)};
+    appearance->level = static_cast<std::uint8_t>(rng_() % 3);
+    for (std::uint8_t& pixel : appearance->pixels) pixel = static_cast<std::uint8_t>(rng_());
     point.appearance = appearance;
-    writer.add_point(id, point);
-    for (std::uint32_t k = anchor; k < std::min<std::uint32_t>(anchor + 3, keyframes); ++k) {
-      const float u = static_cast<float>(rng() % 6400) / 10;
+    writer_.add_point(id, point);
+    for (int k = anchor; k < std::min(anchor + 3, keyframes_); ++k) {
+      const float u = static_cast<float>(rng_() % 6400) / 10;
       const float right = p % 5 == 0 ? std::numeric_limits<float>::quiet_NaN() : u - 12;
-      writer.add_observations(KeyframeId{k}, std::vector<Observation>{{id, {u, 100, right}, 1}});
+      writer_.add_observations(id_of(k), std::vector<Observation>{{id, {u, 100, right}, 1}});
     }
   }
-  for (int p = 3; p < points; p += 11) writer.cull_point(PointId{static_cast<std::uint32_t>(p)});
-  for (int k = 4; k + 2 < keyframes; k += 9) {
-    writer.cull_keyframe(KeyframeId{static_cast<std::uint32_t>(k)},
-                         KeyframeId{static_cast<std::uint32_t>(k + 1)});
+
+  void cull_some() {
+    for (int p = 3; p < points_; p += 11) writer_.cull_point(PointId{static_cast<std::uint32_t>(p)});
+    for (int k = 4; k + 2 < keyframes_; k += 9) writer_.cull_keyframe(id_of(k), id_of(k + 1));
   }
-  SavedMap map;
-  map.rig.camera = {500, 501, 320, 240, 640, 480};
-  map.rig.baseline = 0.11;
-  map.graph = writer.publish();
-  for (int k = 0; k < keyframes; k += 2) {  // some were never described
-    const KeyframeId id{static_cast<std::uint32_t>(k)};
-    if (map.graph.keyframe(id).culled()) continue;
+
+  PlaceAppearance draw_place(int corners) {
     PlaceAppearance place;
-    for (int n = 0; n < 1 + k % 7; ++n) {
+    for (int n = 0; n < corners; ++n) {
       DescribedCorner corner;
-      corner.uv = {static_cast<float>(rng() % 640), static_cast<float>(rng() % 480)};
-      corner.level = static_cast<std::uint8_t>(rng() % 3);
-      corner.angle = 0.1F * static_cast<float>(rng() % 60);
+      corner.uv = {static_cast<float>(rng_() % 640), static_cast<float>(rng_() % 480)};
+      corner.level = static_cast<std::uint8_t>(rng_() % 3);
+      corner.angle = 0.1F * static_cast<float>(rng_() % 60);
       for (std::uint64_t& bits : corner.descriptor.bits) {
-        bits = std::uint64_t{rng()} << 32;
-        bits |= rng();
+        bits = std::uint64_t{rng_()} << 32;
+        bits |= rng_();
       }
       place.corners.push_back(corner);
       const float u_r = n % 3 == 0 ? std::numeric_limits<float>::quiet_NaN() : corner.uv.x() - 20;
       place.pixels.emplace_back(corner.uv.x(), corner.uv.y(), u_r);
     }
-    map.places.set(id, std::move(place));
+    return place;
   }
-  return map;
+
+  const int keyframes_, points_;
+  std::mt19937 rng_;
+  std::uniform_real_distribution<double> number_{-1, 1};
+  GraphWriter writer_;
+};
+
+/// A map with everything a file must hold: culled keyframes and points, both kinds of edges, missing right
+/// coordinates.
+inline SavedMap sample_map(int keyframes, int points, std::uint32_t seed) {
+  return SampleMapMaker(keyframes, points, seed).make();
 }
 
 /// Two maps in one graph, the second one's numbers behind the first one's.
