@@ -265,6 +265,78 @@ Trajectory longest(const std::map<KeyframeId, Trajectory>& of_parts) {
   return found;
 }
 
+/// What a run says of its poses while it goes on.
+class PoseWatch {
+ public:
+  /// `relative`: lengths are comparable with the truth's.
+  explicit PoseWatch(bool relative) : relative_(relative) {}
+
+  void look_at(const PoseReport& report) {
+    const FrameRecord& record = report.record;
+    jitter_.add(record.t_ns);
+    if (!relative_) return;
+    if (record.state != FrameState::kTracked || !report.graph.contains(record.reference)) return;
+    const std::int64_t t_ref_ns = report.graph.keyframe(record.reference).t_ns;
+    if (t_ref_ns == record.t_ns) return;
+    poses_.push_back(
+        {record.frame_index, record.T_c_ref.unpacked(), record.t_ns, t_ref_ns, report.information.inverse()});
+  }
+  /// How far the recording's time stamps scatter.
+  [[nodiscard]] double clock() const { return jitter_.sigma(); }
+  [[nodiscard]] const std::vector<RelativePose>& poses() const { return poses_; }
+
+ private:
+  bool relative_;
+  ClockJitter jitter_;
+  std::vector<RelativePose> poses_;
+};
+
+/// The frames that the variation has, as it has them. `frames` outlives the feed.
+FrameFeed feed_of(const std::vector<Frame>& frames, const Variation& variation) {
+  return [&frames, &variation, next = static_cast<std::size_t>(variation.left_out)](Frame& frame) mutable {
+    for (bool is_there = false; !is_there; next += static_cast<std::size_t>(variation.every)) {
+      if (next >= frames.size()) return FrameStatus::kEnd;
+      frame = frames[next];
+      frame.index = static_cast<std::int64_t>(next);
+      is_there = vary(frame, variation, 1e-9 * static_cast<double>(frame.t_ns - frames.front().t_ns));
+    }
+    return FrameStatus::kFrame;
+  };
+}
+
+/// Of each map part, which have worlds of their own.
+struct PartTrajectories {
+  std::map<KeyframeId, Trajectory> final_ones, causal;
+};
+
+/// Counts the frames by the way.
+PartTrajectories trajectories_of(const RunResult& result, Outcome& outcome) {
+  PartTrajectories parts;
+  for (const FrameRecord& record : result.frames) {
+    ++outcome.frames;
+    outcome.each.push_back({record});
+    if (!has_final_pose(record) || !result.graph.contains(record.reference)) continue;
+    parts.final_ones[result.graph.part(record.reference)].push_back(
+        {record.t_ns, final_T_c_w(record, result.graph).inverse()});
+    if (record.state == FrameState::kPlacedLater) continue;
+    ++outcome.tracked;
+    parts.causal[record.part_causal].push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
+  }
+  for (const auto& [part, estimate] : parts.final_ones) outcome.parts.push_back(estimate.size());
+  std::sort(outcome.parts.rbegin(), outcome.parts.rend());
+  return parts;
+}
+
+void judge_poses(const std::vector<RelativePose>& poses, const RelativeTruth& relative, Outcome& outcome) {
+  for (const RelativePose& pose : poses) {
+    const auto comparison = relative.compare(pose.T_c_ref, pose.t_c_ns, pose.t_ref_ns);
+    if (!comparison) continue;
+    const Vector6 variances = (pose.covariance + comparison->of_truth).diagonal();
+    outcome.poses.push_back({pose.frame_index, pose.t_c_ns, pose.t_ref_ns, comparison->error,
+                             variances.cwiseSqrt(), comparison->normalised(pose.covariance)});
+  }
+}
+
 /// @param noise    of the truth; its clock is how far the recording's time stamps scatter
 /// @param readout  of the cameras, where the source leaves it open [s]
 Outcome run(const std::string& text, const SourceOptions& source_options, const Variation& variation,
@@ -277,64 +349,25 @@ Outcome run(const std::string& text, const SourceOptions& source_options, const 
   const std::int64_t end_ns = frames.back().t_ns;
   frames = reordered(frames, variation.order, end_ns);
   const Trajectory truth = reordered(varied(source->ground_truth(), rig, variation), variation.order, end_ns);
-  std::vector<RelativePose> relative_poses;
-  ClockJitter jitter;
-  Outcome outcome;
+  const bool to_scale = rig.kind != SensorKind::kMono;
+  PoseWatch watch(to_scale);
   EngineOptions options;
   options.deterministic = true;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
-  const bool to_scale = rig.kind != SensorKind::kMono;  // lengths are comparable with the truth's
-  options.on_pose = [&](const PoseReport& report) {
-    const FrameRecord& record = report.record;
-    jitter.add(record.t_ns);
-    if (!to_scale) return;
-    if (record.state != FrameState::kTracked || !report.graph.contains(record.reference)) return;
-    const std::int64_t t_ref_ns = report.graph.keyframe(record.reference).t_ns;
-    if (t_ref_ns == record.t_ns) return;
-    relative_poses.push_back(
-        {record.frame_index, record.T_c_ref.unpacked(), record.t_ns, t_ref_ns, report.information.inverse()});
-  };
-  auto next = static_cast<std::size_t>(variation.left_out);
-  const FrameFeed feed = [&](Frame& frame) {
-    for (bool is_there = false; !is_there; next += static_cast<std::size_t>(variation.every)) {
-      if (next >= frames.size()) return FrameStatus::kEnd;
-      frame = frames[next];
-      frame.index = static_cast<std::int64_t>(next);
-      is_there = vary(frame, variation, 1e-9 * static_cast<double>(frame.t_ns - frames.front().t_ns));
-    }
-    return FrameStatus::kFrame;
-  };
+  options.on_pose = [&](const PoseReport& report) { watch.look_at(report); };
   const std::atomic<bool> interrupted{false};
-  const RunResult result = Engine(varied(rig, variation), options).run(feed, interrupted);
+  const RunResult result =
+      Engine(varied(rig, variation), options).run(feed_of(frames, variation), interrupted);
   if (!result.error.empty()) throw std::runtime_error(text + ": " + result.error);
-  std::map<KeyframeId, Trajectory> estimates, causal;  // parts have worlds of their own
-  for (const FrameRecord& record : result.frames) {
-    ++outcome.frames;
-    outcome.each.push_back({record});
-    if (!has_final_pose(record) || !result.graph.contains(record.reference)) continue;
-    estimates[result.graph.part(record.reference)].push_back(
-        {record.t_ns, final_T_c_w(record, result.graph).inverse()});
-    if (record.state == FrameState::kPlacedLater) continue;
-    ++outcome.tracked;
-    causal[record.part_causal].push_back({record.t_ns, record.T_c_w_causal.unpacked().inverse()});
-  }
-  for (const auto& [part, estimate] : estimates) outcome.parts.push_back(estimate.size());
-  std::sort(outcome.parts.rbegin(), outcome.parts.rend());
-  noise.clock = jitter.sigma();
-  outcome.clock = noise.clock;
-  const RelativeTruth relative(truth, noise);
-  for (const RelativePose& pose : relative_poses) {
-    const auto comparison = relative.compare(pose.T_c_ref, pose.t_c_ns, pose.t_ref_ns);
-    if (!comparison) continue;
-    const Vector6 variances = (pose.covariance + comparison->of_truth).diagonal();
-    outcome.poses.push_back({pose.frame_index, pose.t_c_ns, pose.t_ref_ns, comparison->error,
-                             variances.cwiseSqrt(), comparison->normalised(pose.covariance)});
-  }
+  Outcome outcome;
+  const PartTrajectories parts = trajectories_of(result, outcome);
+  outcome.clock = noise.clock = watch.clock();
+  judge_poses(watch.poses(), RelativeTruth(truth, noise), outcome);
   const Alignment alignment = to_scale ? Alignment::kSe3 : Alignment::kSim3;
-  judge_frames(estimates, result, truth, alignment, outcome.each);
-  outcome.ate = ate(longest(estimates), truth, alignment);
-  judge_scale(longest(estimates), truth, outcome);
-  outcome.ate_causal = ate(longest(causal), truth, alignment);
+  judge_frames(parts.final_ones, result, truth, alignment, outcome.each);
+  outcome.ate = ate(longest(parts.final_ones), truth, alignment);
+  judge_scale(longest(parts.final_ones), truth, outcome);
+  outcome.ate_causal = ate(longest(parts.causal), truth, alignment);
   return outcome;
 }
 
@@ -407,71 +440,93 @@ std::vector<Variation> hard_ones() {
   return variations;
 }
 
-}  // namespace
-}  // namespace twofold
-
-int main(int argc, char** argv) {
+/// What the command line says.
+struct Arguments {
   std::vector<std::string> sources;
-  twofold::SourceOptions options;
   std::string calibration;
+  std::string camera = "all";
   bool as_it_is_only = false, hard = false;
   bool frames = false, poses = false;
-  std::string camera = "all";
-  auto order = twofold::Order::kForwards;
+  Order order = Order::kForwards;
   int only = -1;
   std::vector<int> every;
   std::vector<double> truth{0, 0};
   std::optional<double> readout;
-  CLI::App app("Runs of one recording that should differ by little");
-  app.add_option("source", sources, "as of 'twofold run'")->required();
-  app.add_option("--calib", calibration, "calibration file for all of them");
-  app.add_option("--camera", camera, "mono: the left camera alone, errors after alignment with scale")
+};
+
+void add_options(CLI::App& app, Arguments& arguments) {
+  app.add_option("source", arguments.sources, "as of 'twofold run'")->required();
+  app.add_option("--calib", arguments.calibration, "calibration file for all of them");
+  app.add_option("--camera", arguments.camera,
+                 "mono: the left camera alone, errors after alignment with scale")
       ->check(CLI::IsMember({"all", "mono"}));
-  app.add_flag("--only-as-it-is", as_it_is_only, "no variations");
-  app.add_flag("--frames", frames, "what became of each frame");
-  app.add_flag("--poses", poses, "each pose relative to its reference keyframe against the truth");
-  CLI::Option* const one =
-      app.add_option("--only", only, "this variation alone, counted from 0")->check(CLI::NonNegativeNumber);
-  app.add_option("--order", order, "that frames are played in")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, twofold::Order>{{"forwards", twofold::Order::kForwards},
-                                                {"backwards", twofold::Order::kBackwards},
-                                                {"there-and-back", twofold::Order::kThereAndBack}}));
+  app.add_flag("--only-as-it-is", arguments.as_it_is_only, "no variations");
+  app.add_flag("--frames", arguments.frames, "what became of each frame");
+  app.add_flag("--poses", arguments.poses, "each pose relative to its reference keyframe against the truth");
+  CLI::Option* const one = app.add_option("--only", arguments.only, "this variation alone, counted from 0")
+                               ->check(CLI::NonNegativeNumber);
+  app.add_option("--order", arguments.order, "that frames are played in")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, Order>{{"forwards", Order::kForwards},
+                                                               {"backwards", Order::kBackwards},
+                                                               {"there-and-back", Order::kThereAndBack}}));
   CLI::Option* const seldom =
-      app.add_option("--every", every,
+      app.add_option("--every", arguments.every,
                      "instead of the variations: every first, second, .. frame, as many as given")
           ->check(CLI::PositiveNumber)
           ->excludes(one);
-  app.add_flag("--hard", hard, "instead of the variations: what real cameras do to a recording")
+  app.add_flag("--hard", arguments.hard, "instead of the variations: what real cameras do to a recording")
       ->excludes(seldom);
-  app.add_option("--readout", readout, "of the cameras, where the source leaves it open [s]; rendered: 0");
-  app.add_option("--truth", truth, "standard deviations of the truth's own poses: METRES RADIANS")
+  app.add_option("--readout", arguments.readout,
+                 "of the cameras, where the source leaves it open [s]; rendered: 0");
+  app.add_option("--truth", arguments.truth, "standard deviations of the truth's own poses: METRES RADIANS")
       ->expected(2);
-  CLI11_PARSE(app, argc, argv);
-  if (!calibration.empty()) options.calibration = calibration;
-  options.left_only = camera == "mono";
-  try {
-    std::vector<twofold::Variation> variations = hard            ? twofold::hard_ones()
-                                                 : every.empty() ? twofold::usual_ones()
-                                                                 : twofold::seldom_ones(every);
-    if (only >= static_cast<int>(variations.size()))
-      throw std::invalid_argument(fmt::format("--only {}: the last one is {}", only, variations.size() - 1));
-    for (const std::string& source : sources) {
-      fmt::print(
-          "\n| {} | tracked | in parts | ATE m | causal m | NEES / 6: median / mean / p95 "
-          "| scale | ATE m to scale |\n|---|---|---|---|---|---|---|---|\n",
-          source);
-      for (twofold::Variation& variation : variations) {
-        variation.order = order;
-        if (only >= 0 && &variation != &variations[static_cast<std::size_t>(only)]) continue;
-        const twofold::Outcome outcome =
-            twofold::run(source, options, variation, {truth[0], truth[1]}, readout);
-        print_row(variation, outcome);
-        if (frames) twofold::print_frames(outcome);
-        if (poses) twofold::print_poses(outcome);
-        if (as_it_is_only) break;
-      }
+}
+
+/// Those that are asked for.
+std::vector<Variation> variations_of(const Arguments& arguments) {
+  std::vector<Variation> variations = arguments.hard            ? hard_ones()
+                                      : arguments.every.empty() ? usual_ones()
+                                                                : seldom_ones(arguments.every);
+  const auto count = static_cast<int>(variations.size());
+  if (arguments.only >= count)
+    throw std::invalid_argument(fmt::format("--only {}: the last one is {}", arguments.only, count - 1));
+  if (arguments.only >= 0) variations = {variations[static_cast<std::size_t>(arguments.only)]};
+  if (arguments.as_it_is_only) variations.resize(1);
+  for (Variation& variation : variations) variation.order = arguments.order;
+  return variations;
+}
+
+void run_all(const Arguments& arguments) {
+  SourceOptions options;
+  if (!arguments.calibration.empty()) options.calibration = arguments.calibration;
+  options.left_only = arguments.camera == "mono";
+  const TruthNoise noise{arguments.truth[0], arguments.truth[1]};
+  const std::vector<Variation> variations = variations_of(arguments);
+  for (const std::string& source : arguments.sources) {
+    fmt::print(
+        "\n| {} | tracked | in parts | ATE m | causal m | NEES / 6: median / mean / p95 "
+        "| scale | ATE m to scale |\n|---|---|---|---|---|---|---|---|\n",
+        source);
+    for (const Variation& variation : variations) {
+      const Outcome outcome = run(source, options, variation, noise, arguments.readout);
+      print_row(variation, outcome);
+      if (arguments.frames) print_frames(outcome);
+      if (arguments.poses) print_poses(outcome);
     }
+  }
+}
+
+}  // namespace
+}  // namespace twofold
+
+int main(int argc, char** argv) {
+  twofold::Arguments arguments;
+  CLI::App app("Runs of one recording that should differ by little");
+  twofold::add_options(app, arguments);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    twofold::run_all(arguments);
   } catch (const std::exception& error) {
     fmt::print(stderr, "variations: {}\n", error.what());
     return 1;
