@@ -68,6 +68,27 @@ TEST_F(PointStarterTest, TakesTheWidestImage) {
   EXPECT_TRUE(starter.sees_corners(images.left, 100));
 }
 
+/// Of a cell's corners the best one has no depth, and others have.
+TEST_F(PointStarterTest, LooksCloserWhereMostCornersHaveNoDepth) {
+  const Rig rig = testing::test_rig(SensorKind::kRgbd, 320, 240);
+  testing::RenderedScene(rig, {3, 2, 5}, 21).render(SE3(), 2, images_);
+  for (int u = 0; u < images_.depth.cols; ++u) {
+    if (u / 10 % 3 != 0) images_.depth.col(u).setTo(0);
+  }
+  options_.max_points = 220;
+  options_.crowded_below = 0;
+  PointStarter usual(rig, options_, search_);
+  const std::size_t as_usual = started(usual).points().size();
+  options_.crowded_below = 90;
+  PointStarter closer(rig, options_, search_);
+  const ImmaturePoints points = started(closer);
+  EXPECT_LT(as_usual, 60U);
+  EXPECT_GT(points.points().size(), 3 * as_usual / 2);
+  EXPECT_LE(points.points().size(), 90U);
+  for (const ImmaturePoint& point : points.points())
+    EXPECT_NEAR(rig.project(from_inverse_depth(point.psi)).z(), point.anchor_observation.pixel.z(), 0.01);
+}
+
 TEST_F(PointStarterTest, StartsNothingWhereAPointIsTracked) {
   PointStarter starter(rig_, options_, search_);
   const ImmaturePoints before = started(starter);

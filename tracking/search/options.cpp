@@ -28,6 +28,9 @@ std::string NewPointOptions::invalid_reason() const {
       .that(cell_px > 0 && cell_px % 4 == 0, "cell_px", "a multiple of 4, > 0", cell_px)
       .at_least("max_points", max_points, 1)
       .at_least("min_start_points", min_start_points, 1)
+      .at_least("crowded_below", crowded_below, 0)
+      .that(small_cell_px > 0 && small_cell_px % 4 == 0, "small_cell_px", "a multiple of 4, > 0",
+            small_cell_px)
       .at_least("scarce_points", scarce_points, 0)
       .nested("faint_corners", faint_corners.invalid_reason())
       .at_least("rays_below", rays_below, 0)

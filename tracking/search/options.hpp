@@ -35,6 +35,10 @@ struct NewPointOptions {
   int cell_px = 28;      ///< at most one new point a cell and only where no point is tracked, a multiple of 4
   int max_points = 220;  ///< started in one keyframe, >= 1
   int min_start_points = 40;  ///< with measured depth; a map or map part starts with no fewer, >= 1
+  /// Of a depth camera, with fewer points in view, tracked and started, where most corners have no depth:
+  /// a cell whose best corner has none may have another one that has, and is parted, >= 0; 0: never.
+  int crowded_below = 90;
+  int small_cell_px = 12;  ///< a multiple of 4; never above cell_px
   /// In the dark, with fewer points in view, tracked and started, faint corners will do, where the pyramid
   /// has averaged the noise away; >= 0.
   int scarce_points = 90;

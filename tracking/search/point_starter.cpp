@@ -36,26 +36,39 @@ PointStarter::PointStarter(const Rig& rig, const NewPointOptions& options, const
       search_(search),
       fixed_(fixed),
       quadtree_(rig.camera.width, rig.camera.height, kMaxCorners) {
-  options_.cell_px = std::max(options_.cell_px, CellGrid::smallest_cell_px(rig.camera.width));
-  columns_ = rig.camera.width / options_.cell_px + 1;
-  rows_ = rig.camera.height / options_.cell_px + 1;
-  occupied_.resize(static_cast<std::size_t>(columns_ * rows_));
+  const int smallest = CellGrid::smallest_cell_px(rig.camera.width);
+  options_.cell_px = std::max(options_.cell_px, smallest);
+  options_.small_cell_px = std::clamp(options_.small_cell_px, smallest, options_.cell_px);
+  lay_out(options_.small_cell_px);  // the most cells there ever are
   corners_.reserve(kMaxCorners);
+  places_.reserve(kMaxCorners);
+  lay_out(options_.cell_px);
+}
+
+/// Parts the image into cells anew; what is tracked stays where it is.
+void PointStarter::lay_out(int cell_px) {
+  cell_px_ = cell_px;
+  columns_ = rig_.camera.width / cell_px + 1;
+  rows_ = rig_.camera.height / cell_px + 1;
+  occupied_.assign(static_cast<std::size_t>(columns_ * rows_), 0);
+  for (const Eigen::Vector2f& uv : places_) occupied_[cell_of(uv)] = 1;
 }
 
 void PointStarter::clear() {
-  std::fill(occupied_.begin(), occupied_.end(), 0);
-  tracked_ = 0;
+  places_.clear();
+  lay_out(options_.cell_px);
+  tracked_ = crowded_ = 0;
 }
 
 std::size_t PointStarter::cell_of(const Eigen::Vector2f& uv) const {
-  const int u = std::clamp(static_cast<int>(uv.x()), 0, rig_.camera.width - 1) / options_.cell_px;
-  const int v = std::clamp(static_cast<int>(uv.y()), 0, rig_.camera.height - 1) / options_.cell_px;
+  const int u = std::clamp(static_cast<int>(uv.x()), 0, rig_.camera.width - 1) / cell_px_;
+  const int v = std::clamp(static_cast<int>(uv.y()), 0, rig_.camera.height - 1) / cell_px_;
   return static_cast<std::size_t>(v * columns_ + u);
 }
 
 void PointStarter::occupy(const Eigen::Vector2f& uv) {
   occupied_[cell_of(uv)] = 1;
+  if (places_.size() < places_.capacity()) places_.push_back(uv);
   ++tracked_;
 }
 
@@ -71,7 +84,7 @@ PointStarter::CornerBounds PointStarter::faint_corners() const {
 /// Corners of the free cells, into the quadtree; none of what moves with the camera.
 void PointStarter::spread_corners(const FrameImages& images, const CornerBounds& bounds) {
   corners_.clear();
-  const CellGrid grid{options_.cell_px, columns_, rows_, occupied_};
+  const CellGrid grid{cell_px_, columns_, rows_, occupied_};
   for (int level = bounds.first_level; level < options_.corner_levels; ++level) {
     detect_corners(images.left.level(level), level, bounds.threshold, bounds.min_score, kBorder, grid,
                    corners_);
@@ -86,12 +99,18 @@ void PointStarter::spread_corners(const FrameImages& images, const CornerBounds&
 
 int PointStarter::start(const FrameImages& images, KeyframeId anchor, const RollingShutter& shutter,
                         ImmaturePoints& immature) {
-  with_depth_ = without_depth_ = 0;
+  with_depth_ = without_depth_ = crowded_ = 0;
   int started = start_at(usual_corners(), options_.max_points, images, anchor, shutter, immature);
   if (tracked_ < options_.scarce_points && mean_brightness(images.left) < options_.faint_corners.dark_below)
     started +=
         start_at(faint_corners(), options_.scarce_points - tracked_, images, anchor, shutter, immature);
-  return started;
+  if (rig_.kind == SensorKind::kRgbd && tracked_ < options_.crowded_below && depth_is_scarce()) {
+    lay_out(options_.small_cell_px);
+    crowded_ =
+        start_at(usual_corners(), options_.crowded_below - tracked_, images, anchor, shutter, immature);
+    lay_out(options_.cell_px);
+  }
+  return started + crowded_;
 }
 
 int PointStarter::start_at(const CornerBounds& bounds, int wanted, const FrameImages& images,
@@ -140,7 +159,7 @@ bool PointStarter::sees_corners(const ImagePyramid& image, int wanted) {
   corners_.clear();
   constexpr int level = 1;
   detect_corners(image.level(level), level, options_.corner_threshold, options_.min_corner_score, kBorder,
-                 {options_.cell_px, columns_, rows_, occupied_}, corners_);
+                 {cell_px_, columns_, rows_, occupied_}, corners_);
   return static_cast<int>(corners_.size()) >= wanted;
 }
 
@@ -166,7 +185,7 @@ int PointStarter::count_depths(const cv::Mat& left, const cv::Mat& right) {
   clear();
   corners_.clear();
   detect_corners(left, 0, options_.corner_threshold, options_.min_corner_score, kBorder,
-                 {options_.cell_px, columns_, rows_, occupied_}, corners_);
+                 {cell_px_, columns_, rows_, occupied_}, corners_);
   return static_cast<int>(std::count_if(corners_.begin(), corners_.end(), [&](const Corner& corner) {
     return has_right(right_from_row(left, right, rig_, corner.u, corner.v, 0, search_));
   }));

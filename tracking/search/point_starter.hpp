@@ -44,8 +44,9 @@ class PointStarter {
   [[nodiscard]] int most_points() const { return options_.max_points; }
   /// In the last start more corners had no depth than had one.
   [[nodiscard]] bool depth_is_scarce() const { return without_depth_ > with_depth_; }
-  /// Points that were told of as tracked, or started, since all was empty.
-  [[nodiscard]] int points_in_view() const { return tracked_; }
+  /// Points that were told of as tracked, or started, since all was empty; without those that the last start
+  /// crowded into small cells, which fill none of the image that was empty before.
+  [[nodiscard]] int points_in_view() const { return tracked_ - crowded_; }
   /// Patches where nothing is tracked, evenly over the image: at most `wanted` are appended to `appearances`,
   /// as its capacity allows. Marks their places as occupied.
   void choose_corners(const FrameImages& images, int wanted, std::vector<PointAppearance>& appearances);
@@ -59,6 +60,7 @@ class PointStarter {
  private:
   [[nodiscard]] int count_depths(const cv::Mat& left, const cv::Mat& right);
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector2f& uv) const;
+  void lay_out(int cell_px);
   /// Which corners are good enough.
   struct CornerBounds {
     int first_level = 0;
@@ -78,9 +80,12 @@ class PointStarter {
   const FixedPixels* fixed_;
   int columns_ = 0;
   int rows_ = 0;
-  std::vector<std::uint8_t> occupied_;
+  int cell_px_ = 0;                         ///< now
+  std::vector<std::uint8_t> occupied_;      ///< cells
+  std::vector<Eigen::Vector2f> places_;     ///< of all points that occupy a cell [px]
   int tracked_ = 0;                         ///< points that `occupy` was told of
   int with_depth_ = 0, without_depth_ = 0;  ///< corners of the last start
+  int crowded_ = 0;                         ///< points of the last start that small cells gave
   std::vector<Corner> corners_;
   Quadtree quadtree_;
 };
