@@ -1,5 +1,6 @@
 // A depth camera where there are hardly any corners: depth alignment says where it is, together with what
 // points were found, or alone.
+#include <cmath>
 #include <utility>
 
 #include "geometry/symmetric_solve.hpp"
@@ -48,21 +49,40 @@ bool Tracker::place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step
   const bool few = points_placed ? step.result.inliers < options_.depth.scarce_inliers : last_.by_depth;
   if (!few || !depth_can_place(step)) return false;
   const Attempt by_points = step.attempt();
+  const bool telling =
+      points_placed && (step.after_loss() || pose_estimator_.well_supported(by_points.result, search_));
   if (place_by_depth(points_placed ? by_points.result.T_c_ref : T_c_ref, step) != LostCause::kNone)
     return false;
-  if (!step.after_loss()) return true;
-  // After a loss depth may have found another place of the same shape: what points say counts.
-  const double agreeing = options_.depth.agreeing_share * by_points.result.inliers;
-  if (points_placed ? step.result.inliers >= agreeing : points_allow(step)) return true;
+  const bool agree = step.result.inliers >= options_.depth.agreeing_share * by_points.result.inliers;
+  const bool allowed = points_placed ? agree || !telling : may_be_placed(agree, step);
+  if (allowed) return true;
+  step.depth_refused = true;
   step.restore(by_points);
   classify_observations(rig_, search_.observations, by_points.result.T_c_ref, options_.pose.motion);
   return false;
 }
 
+/// Points gave no pose, and depth did: whether they leave it at that. What stands in the camera's way along
+/// bare walls may be somebody who walks: depth has the camera go along, points on the floor do not.
+/// @param agree  those of which one motion is true agree with it
+bool Tracker::may_be_placed(bool agree, FrameStep& step) {
+  const TrackResult& result = step.result;
+  const bool contradicted = !agree && result.matches >= options_.pose.min_inliers &&
+                            result.inliers < options_.pose.min_inlier_share * result.matches;
+  if (contradicted || sees_nothing_known(result)) return false;
+  return !step.after_loss() || points_allow(step);
+}
+
+/// Hardly any of the points that should be in view from a pose was found.
+bool Tracker::sees_nothing_known(const TrackResult& result) const {
+  return result.searched >= options_.depth.telling_candidates &&
+         result.matches < options_.depth.found_share * result.searched;
+}
+
 /// Before the frame is given up: what it measures, and no points.
 /// @return kNone, or why that is not enough
 LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
-  if (!depth_can_place(step)) return found;
+  if (!depth_can_place(step) || step.depth_refused) return found;
   search_.clear();
   const LostCause open = place_by_depth(motion_.predicted_pose(step.frame.t_ns, step.after_loss()), step);
   if (open != LostCause::kNone) return open == LostCause::kTooFewMatches ? found : open;
@@ -70,8 +90,8 @@ LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
 }
 
 /// A pose that depth alone gave, from a start that may be far off, before the map's points: they may give a
-/// better one. After a loss nobody knows how the camera moves, and where enough of them should be seen and
-/// are not found, the pose is wrong.
+/// better one. Where enough of them should be seen and hardly any is found, the pose is wrong; after a loss,
+/// when nobody knows how the camera moves, also where those found do not confirm it.
 bool Tracker::points_allow(FrameStep& step) {
   const Attempt by_depth = step.attempt();
   TrackResult& result = step.result;
@@ -81,10 +101,19 @@ bool Tracker::points_allow(FrameStep& step) {
   const SearchStart start{.placement = placement, .kind = SearchStart::Kind::kRough};
   if (search_from(start, step) == LostCause::kNone) return true;
   if (step.after_loss() && result.candidates >= options_.depth.telling_candidates) return false;
+  if (sees_nothing_known(result)) return false;
   step.restore(by_depth);
   search_.clear();
   result.matches = result.inliers = 0;
   return true;
+}
+
+/// So far from where it would be had it gone on that the two views have nothing in common: a corridor looks
+/// the same across, too.
+bool Tracker::turns_away(const SE3& T_c_ref, const FrameStep& step) const {
+  const SE3 T_c_ref_predicted = motion_.predicted_pose(step.frame.t_ns, step.after_loss());
+  const double half_view = std::atan(0.5 * rig_.camera.width / rig_.camera.fx);
+  return (T_c_ref.so3() * T_c_ref_predicted.so3().inverse()).log().norm() > half_view;
 }
 
 /// By depth and the points found, of which there may be none.
@@ -93,6 +122,7 @@ LostCause Tracker::place_by_depth(const SE3& T_c_ref, FrameStep& step) {
   const auto placed = align_depth(T_c_ref, search_.observations, step);
   step.lap(TrackerStage::kAlignment);
   if (!placed) return placed.error();
+  if (turns_away(placed->T_c_ref, step)) return LostCause::kTooFewMatches;
   TrackResult& result = step.result;
   result.status = TrackStatus::kTracking;
   result.by_depth = true;

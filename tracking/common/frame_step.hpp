@@ -57,10 +57,11 @@ class FrameStep : public Attempt {
   const GraphSnapshot& graph;
   KeyframeProposal* const free_proposal;  ///< null: no keyframe can be made
   const EffortBounds bounds;
-  const int lost_frames;    ///< between the last one with a pose and this one
-  bool depth_read = false;  ///< the frame's depth image, by the depth alignment
-  bool tracked = false;     ///< in the map that there was
-  bool started = false;     ///< a map or map part, with this frame
+  const int lost_frames;       ///< between the last one with a pose and this one
+  bool depth_read = false;     ///< the frame's depth image, by the depth alignment
+  bool depth_refused = false;  ///< the pose that it gave, for what the points found say of it
+  bool tracked = false;        ///< in the map that there was
+  bool started = false;        ///< a map or map part, with this frame
   /// One camera: frames before this one whose poses its start found out, relative to the reference keyframe.
   std::vector<EarlierFrame> earlier_frames;
 
