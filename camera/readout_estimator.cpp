@@ -45,6 +45,8 @@ std::string ReadoutOptions::invalid_reason() const {
       .above("gross_sigmas", gross_sigmas, 0)
       .above("huber_sigmas", huber_sigmas, 0)
       .at_least("min_turn_change", min_turn_change, 0)
+      .above("seldom_interval", seldom_interval, 0)
+      .share("max_missed_share", max_missed_share)
       .share("max_jitter", max_jitter)
       .at_least("pair_points", pair_points, 6)
       .at_least("pose_iterations", pose_iterations, 1)
@@ -98,21 +100,35 @@ std::vector<ReadoutPoint>* ReadoutEstimator::begin_frame(std::int64_t t_ns, cons
 }
 
 void ReadoutEstimator::end_frame() {
-  if (linked_ < kFrames || !turn_changes()) return;
-  for (std::size_t age = kFrames - 1; age-- > 0;) {
+  const std::size_t needed = 2 * newer_age() + 2;  // as many before the pair as after it
+  if (linked_ < needed || !turn_changes()) return;
+  for (std::size_t age = needed - 1; age-- > 0;) {
     if (!frame(age).solved) solve_pair(age);
     if (!frame(age).usable) return;
   }
   if (turn_changes()) add_pair();
 }
 
-/// At the frame of that age, 1 or 2: from the one before to the one after.
-ReadoutEstimator::Velocity ReadoutEstimator::velocity(std::size_t age) {
+/// At the frame of that age, >= 1: from the one before to the one after.
+ReadoutEstimator::Velocity ReadoutEstimator::mean_velocity(std::size_t age) {
   return (frame(age).T_cur_prev.log() + frame(age - 1).T_cur_prev.log()) / (2 * period_);
 }
 
+/// Where frames are seldom, at the frame of that age, >= 2: of the cubic whose means over the four intervals
+/// around it are the motions.
+ReadoutEstimator::Velocity ReadoutEstimator::velocity(std::size_t age) {
+  if (!seldom()) return mean_velocity(age);
+  const Velocity outer = frame(age + 1).T_cur_prev.log() + frame(age - 2).T_cur_prev.log();
+  return (14 * mean_velocity(age) - outer / period_) / 12;
+}
+
+/// Enough, and slowly enough for frames so far apart.
 bool ReadoutEstimator::turn_changes() {
-  return (velocity(1) - velocity(2)).tail<3>().norm() > options_.min_turn_change;
+  const std::size_t now = newer_age(), before = now + 1;
+  const Vector3 change = (velocity(now) - velocity(before)).tail<3>();
+  if (!(change.norm() > options_.min_turn_change)) return false;
+  const Vector3 of_means = (mean_velocity(now) - mean_velocity(before)).tail<3>();
+  return !seldom() || (change - of_means).norm() < options_.max_missed_share * change.norm();
 }
 
 /// What a frame and the one before both see.
@@ -192,11 +208,12 @@ void ReadoutEstimator::solve_pair(std::size_t age) {
   seen.usable = true;
 }
 
-/// Frames 2 and 1 with their velocities.
+/// Two frames in the middle with their velocities.
 void ReadoutEstimator::add_pair() {
-  join_points(1);
-  const Velocity before = velocity(2), now = velocity(1);
-  SE3 T_cur_prev = frame(1).T_cur_prev;
+  const std::size_t age = newer_age();
+  join_points(age);
+  const Velocity before = velocity(age + 1), now = velocity(age);
+  const SE3 T_cur_prev = frame(age).T_cur_prev;
   PairEquations sum = equations(T_cur_prev, before, now);
   const Eigen::LLT<Matrix6> llt(sum.H);
   if (llt.info() != Eigen::Success) return;

@@ -37,6 +37,12 @@ struct ReadoutOptions {
   double huber_sigmas = 1.5;  ///< of a point, > 0
   double min_turn_change =
       0.05;  ///< of the angular velocity [rad/s]: with less there is nothing to learn, >= 0
+  /// Frames farther apart are seldom: velocities are then of third order in time [s] > 0.
+  double seldom_interval = 0.11;
+  /// There, the share of that change which a straight line through the neighbours' motions misses, in (0, 1]:
+  /// beyond, the camera turns to and fro faster than frames follow it, velocities are too small and the
+  /// readout too large.
+  double max_missed_share = 0.2;
   double max_jitter =
       0.35;               ///< of the time between frames, as a share of it: beyond, one is missing, in (0, 1]
   int pair_points = 160;  ///< of those that both see, that count, >= 6: bounds the work
@@ -77,8 +83,11 @@ struct ReadoutOptions {
 /// depth is not measured, what is seen along its epipolar line counts the less the farther its depth may have
 /// moved it there. The depths of one camera's map are bent by the readout itself.
 ///
-/// Velocities are central differences of the pairs' poses. Time stamps jitter by more than a camera's clock
-/// does, and that would look like a change of velocity: frames are taken to follow each other regularly.
+/// Velocities are central differences of the pairs' poses. Where frames are seldom these are too small, by a
+/// third when a camera nods once a second at 5 frames a second: there, velocities are of third order in time,
+/// from the motions of the four intervals around a frame. Elsewhere these would add noise only. Time stamps
+/// jitter by more than a camera's clock does, and that would look like a change of velocity: frames are taken
+/// to follow each other regularly.
 ///
 /// The standard deviation is that of the scatter of pairs about the common estimate, not of the pixels: what
 /// is wrong in a pair (velocity, depth) is wrong for all of its points.
@@ -102,7 +111,7 @@ class ReadoutEstimator {
   [[nodiscard]] const ReadoutEstimate& estimate() const { return estimate_; }
 
  private:
-  static constexpr std::size_t kFrames = 4;
+  static constexpr std::size_t kFrames = 6;
   using Velocity = Vector6;  ///< left perturbation a second
 
   struct SeenFrame {
@@ -126,6 +135,10 @@ class ReadoutEstimator {
   /// `age` 0 is the newest frame.
   [[nodiscard]] SeenFrame& frame(std::size_t age) { return frames_[(newest_ + kFrames - age) % kFrames]; }
   [[nodiscard]] bool regular(std::int64_t interval_ns);
+  [[nodiscard]] bool seldom() const { return period_ > options_.seldom_interval; }
+  /// Of the pair that is asked, its newer frame's: velocities need frames before and after it.
+  [[nodiscard]] std::size_t newer_age() const { return seldom() ? 2 : 1; }
+  [[nodiscard]] Velocity mean_velocity(std::size_t age);
   [[nodiscard]] Velocity velocity(std::size_t age);
   [[nodiscard]] bool turn_changes();
   void join_points(std::size_t age);
