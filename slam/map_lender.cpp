@@ -1,6 +1,7 @@
 #include "slam/map_lender.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace twofold {
 
@@ -26,25 +27,27 @@ void MapLender::publish(const ClosedLoop& loop) {
   loops_.put(std::make_unique<LoopList>(all_loops_));
 }
 
-/// The loan is let go of first: where only it and newest_ keep nodes, both do so.
-void MapLender::take_newest() {
+MapLender::Replaced MapLender::take_newest() {
+  Replaced replaced;
   const auto map = maps_.take();
   const auto places = places_.take();
   const auto loops = loops_.take();
-  if (!map && !places && !loops) return;
-  loan_.reset();
+  if (!map && !places && !loops) return replaced;
+  replaced.loan = std::move(loan_);
   if (map) {
-    newest_.graph = std::move(map->graph);
+    replaced.version.graph = std::exchange(newest_.graph, std::move(map->graph));
     newest_.inner_window = std::move(map->inner_window);
     newest_.outer_window = std::move(map->outer_window);
   }
-  if (places) newest_.places = std::move(*places);
-  if (loops) newest_.loops = std::move(*loops);
+  if (places) replaced.version.places = std::exchange(newest_.places, std::move(*places));
+  if (loops) replaced.version.loops = std::exchange(newest_.loops, std::move(*loops));
+  return replaced;
 }
 
 std::shared_ptr<const MapVersion> MapLender::newest() {
+  Replaced replaced;  // outlives the lock
   const std::scoped_lock lock(borrowers_);
-  take_newest();
+  replaced = take_newest();
   if (loan_) return loan_;
   loan_ = std::make_shared<const MapVersion>(newest_);
   std::erase_if(loans_, [](const auto& loan) { return loan.expired(); });
@@ -53,8 +56,9 @@ std::shared_ptr<const MapVersion> MapLender::newest() {
 }
 
 void MapLender::catch_up() {
+  Replaced replaced;  // outlives the lock
   const std::unique_lock lock(borrowers_, std::try_to_lock);
-  if (lock) take_newest();
+  if (lock) replaced = take_newest();
 }
 
 MapLender::Loans MapLender::held() {

@@ -63,7 +63,12 @@ class MapLender {
   [[nodiscard]] Loans held();
 
  private:
-  void take_newest();
+  /// What newer versions took the place of: destroyed, which may take long, once nobody waits for the mutex.
+  struct Replaced {
+    std::shared_ptr<const MapVersion> loan;
+    MapVersion version;
+  };
+  [[nodiscard]] Replaced take_newest();
 
   HandOverSlot<MapVersion> maps_;  // whose places and loops are empty
   HandOverSlot<KeyframeDatabase> places_;
