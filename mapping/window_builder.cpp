@@ -189,14 +189,15 @@ void WindowBuilder::write_back(GraphWriter& writer, const DoubleWindow& window) 
     const auto& solved = problem_.points[p];
     const auto used = static_cast<std::size_t>(solved.anchor);
     const KeyframeId anchor = graph.point(point_ids_[p]).anchor;
+    // Near or not is asked where the problem has it: a culled anchor has no depths any more.
+    if (!plausible(solved.psi, graph.keyframe(window.nodes[used].id).median_depth, options_)) continue;
     Vector3 psi = solved.psi;
     if (anchor != window.nodes[used].id) {
       writer.shorten_replacements(anchor);
       const SE3 T_a_used = graph.T_k_w(anchor) * problem_.poses[used].T_k_w.inverse();
       psi = to_inverse_depth(T_a_used * from_inverse_depth(psi));
     }
-    if (plausible(psi, graph.keyframe(anchor).median_depth, options_))
-      writer.set_inverse_depth(point_ids_[p], psi);
+    if (psi.allFinite() && psi.z() > options_.min_inverse_depth) writer.set_inverse_depth(point_ids_[p], psi);
   }
 }
 

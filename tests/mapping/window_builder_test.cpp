@@ -137,6 +137,20 @@ TEST_F(WindowBuilderTest, PointsWhoseAnchorWasCulledAreOptimisedAndGoBackIntoThe
   EXPECT_LT((writer_.graph().position(id) - (x_w - Vector3(3, 2, 1))).norm(), 1e-9);
 }
 
+TEST_F(WindowBuilderTest, PointsWhoseAnchorWasCulledDoNotComeTooNearEither) {
+  const PointId id = point({k(7), k(8), k(9)});
+  const Vector3 x_w = writer_.graph().position(id);
+  link(writer_, k(6), k(8), 20);
+  remove_keyframe(writer_, k(7));
+  WindowBuilder builder = build();
+  ASSERT_EQ(builder.point_ids(), std::vector{id});
+  const double median_depth = writer_.graph().keyframe(k(9)).median_depth;
+  ASSERT_GT(median_depth, 0);
+  builder.problem().points[0].psi.z() = 1.01 / (options_.nearest * median_depth);
+  builder.write_back(writer_, window_);
+  EXPECT_LT((writer_.graph().position(id) - x_w).norm(), 1e-12);
+}
+
 TEST_F(WindowBuilderTest, MeasurementsBehindTheirCameraStayOutOfTheRound) {
   const PointId id = point({k(7), k(8), k(9)});
   writer_.set_pose(k(9), SE3(SO3::exp({0, 3.1, 0}), {0, 0, 0}));  // looks the other way
