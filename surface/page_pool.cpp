@@ -6,22 +6,12 @@
 
 namespace twofold {
 
-std::byte* new_chunk(bool large_page) {
-  // Aligned to its size: what was mapped around it is given back.
-  constexpr std::size_t kMapped = 2 * kChunkBytes;
-  void* mapped = mmap(nullptr, kMapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (mapped == MAP_FAILED) throw std::bad_alloc();
-  auto* begin = static_cast<std::byte*>(mapped);
-  std::size_t space = kMapped;
-  void* aligned = mapped;
-  (void)std::align(kChunkBytes, kChunkBytes, aligned, space);
-  auto* chunk = static_cast<std::byte*>(aligned);
-  if (chunk != begin) (void)munmap(begin, static_cast<std::size_t>(chunk - begin));
-  if (space != kChunkBytes) (void)munmap(chunk + kChunkBytes, space - kChunkBytes);
-  // Advice: a kernel without large pages clears small ones, which cost half when they are asked for together.
-  (void)madvise(chunk, kChunkBytes, large_page ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
-  if (large_page) (void)madvise(chunk, kChunkBytes, MADV_POPULATE_WRITE);
-  return chunk;
+std::byte* new_chunk() {
+  void* chunk = mmap(nullptr, kChunkBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (chunk == MAP_FAILED) throw std::bad_alloc();
+  // Advice: a kernel that does not know it clears each page when it is written to.
+  (void)madvise(chunk, kChunkBytes, MADV_POPULATE_WRITE);
+  return static_cast<std::byte*>(chunk);
 }
 
 void return_chunk(std::byte* chunk) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <type_traits>
@@ -8,17 +7,18 @@
 
 namespace twofold {
 
-/// Memory of the system's, aligned to its size, all zero.
-inline constexpr std::size_t kChunkBytes = std::size_t{1} << 21;
-/// A chunk is a large page of the processor's, so that the kernel clears it at once, and what it holds is
-/// reached without a walk through its tables; or it is of small pages, each taken when it is written to.
-/// Throws std::bad_alloc.
-[[nodiscard]] std::byte* new_chunk(bool large_page);
+/// Whole pages of the system's, all zero.
+inline constexpr std::size_t kChunkBytes = std::size_t{1} << 17;
+/// The kernel gives the pages of a chunk together, without a fault for each. They are small ones: a large
+/// page is cleared in one piece, while the tracker may want the processor, and where a hypervisor takes back
+/// what is free, a large page mostly has to come from it anew, which takes several times as long as clearing
+/// as many small ones. Throws std::bad_alloc.
+[[nodiscard]] std::byte* new_chunk();
 void return_chunk(std::byte* chunk);
 
 /// Objects that lie in pages of their own: what is given back goes back to the system, where on the heap it
 /// would be holes among what others keep. References stay valid until clear. An object whose bytes are all
-/// zero must be a new one. The first chunk, which a small volume hardly fills, is of small pages.
+/// zero must be a new one.
 template <class T>
 class PagePool {
  public:
@@ -27,7 +27,7 @@ class PagePool {
   [[nodiscard]] std::size_t size() const { return size_; }
   /// Throws std::bad_alloc.
   T& add() {
-    if (size_ % kInChunk == 0) chunks_.push_back(Chunk(new_chunk(!chunks_.empty())));
+    if (size_ % kInChunk == 0) chunks_.push_back(Chunk(new_chunk()));
     return at(size_++);
   }
   void clear() {
@@ -35,9 +35,7 @@ class PagePool {
     size_ = 0;
   }
   [[nodiscard]] std::size_t bytes() const {
-    const std::size_t in_first = std::min(size_, kInChunk) * sizeof(T);
-    const std::size_t in_others = chunks_.size() > 1 ? (chunks_.size() - 1) * kChunkBytes : 0;
-    return in_first + in_others + chunks_.capacity() * sizeof(chunks_[0]);
+    return chunks_.size() * kChunkBytes + chunks_.capacity() * sizeof(chunks_[0]);
   }
 
  private:

@@ -238,7 +238,7 @@ TEST(BlockTable, GivesMemoryBackToTheSystem) {
   for (int round = 0; round < 2; ++round) {
     for (int i = 0; i < kBlocks; ++i) {
       VoxelBlock& block = table[table.find_or_add({i, 0, 0})];
-      // Large pages are taken at once, but not by every kernel, nor by an emulator.
+      // Pages are taken at once, but not by every kernel, nor by an emulator.
       block.weight.fill(1);
       table.colour_for(block).samples.fill(1);
       if (i % 16 == 0) others.push_back(std::make_unique<std::array<char, 2000>>());
@@ -250,6 +250,16 @@ TEST(BlockTable, GivesMemoryBackToTheSystem) {
     EXPECT_GT(full, 90);
     EXPECT_LT(empty, 20);
   }
+}
+
+/// A submap has tables of its own: what each takes beyond its blocks counts as often.
+TEST(BlockTable, TakesLittleMoreThanItsBlocks) {
+  constexpr int kBlocks = 2000;
+  BlockTable table;
+  for (int i = 0; i < kBlocks; ++i) (void)table.colour_for(table[table.find_or_add({i, 0, 0})]);
+  constexpr double kNeeded = kBlocks * (sizeof(VoxelBlock) + sizeof(BlockColour));
+  EXPECT_GT(static_cast<double>(table.bytes()), kNeeded);
+  EXPECT_LT(static_cast<double>(table.bytes()), 1.1 * kNeeded);
 }
 
 TEST(PackedColour, GivesBackAnImageOfAnyHeightWithoutSeams) {
