@@ -15,21 +15,22 @@ double footprint(const Rig& rig, double range) {
   return 2 * range * 512 / rig.camera.fx;
 }
 
-struct Variant {
+struct FilterVariant {
   std::string name;
   int window;
   Linearisation linearisation;
 };
 
-const std::vector<Variant>& sideways_variants() {
-  static const std::vector<Variant> kVariants = {{"batch", 0, Linearisation::kCurrent},
-                                                 {"window 10", 10, Linearisation::kFirstEstimate},
-                                                 {"window 5", 5, Linearisation::kFirstEstimate},
-                                                 {"window 2", 2, Linearisation::kFirstEstimate},
-                                                 {"window 10, current", 10, Linearisation::kCurrent},
-                                                 {"window 2, current", 2, Linearisation::kCurrent},
-                                                 {"window 1 (EKF)", 1, Linearisation::kCurrent}};
-  return kVariants;
+const std::vector<FilterVariant>& sideways_variants() {
+  static const std::vector<FilterVariant> kFilterVariants = {
+      {"batch", 0, Linearisation::kCurrent},
+      {"window 10", 10, Linearisation::kFirstEstimate},
+      {"window 5", 5, Linearisation::kFirstEstimate},
+      {"window 2", 2, Linearisation::kFirstEstimate},
+      {"window 10, current", 10, Linearisation::kCurrent},
+      {"window 2, current", 2, Linearisation::kCurrent},
+      {"window 1 (EKF)", 1, Linearisation::kCurrent}};
+  return kFilterVariants;
 }
 
 RunOptions sideways_options(const Rig& rig) {
@@ -42,7 +43,7 @@ RunOptions sideways_options(const Rig& rig) {
 }
 
 /// Squared error of the newest position at each frame [m^2].
-std::vector<double> squared_errors(const Rig& rig, const Variant& variant, const Run& run) {
+std::vector<double> squared_errors(const Rig& rig, const FilterVariant& variant, const Run& run) {
   SlidingWindowOptions swf;
   swf.window = variant.window;
   swf.linearisation = variant.linearisation;
@@ -62,11 +63,11 @@ std::vector<double> squared_errors(const Rig& rig, const Variant& variant, const
 std::vector<std::vector<double>> mean_squared_errors(int trials) {
   const Rig rig = landing_rig();
   const RunOptions run_options = sideways_options(rig);
-  const std::vector<Variant>& variants = sideways_variants();
+  const std::vector<FilterVariant>& variants = sideways_variants();
   std::vector<std::vector<std::vector<double>>> of_trial(static_cast<std::size_t>(trials));
   tbb::parallel_for(0, trials, [&](int trial) {
     const Run run = simulate(rig, run_options, 2000u + static_cast<unsigned>(trial));
-    for (const Variant& variant : variants)
+    for (const FilterVariant& variant : variants)
       of_trial[static_cast<std::size_t>(trial)].push_back(squared_errors(rig, variant, run));
   });
   const auto frames = static_cast<std::size_t>(run_options.frames);
