@@ -148,7 +148,6 @@ class Tracker {
   SE3 align_to_depth(FrameStep& step);
   bool place_by_both(const SE3& T_c_ref, LostCause found, FrameStep& step);
   bool may_be_placed(bool agree, FrameStep& step);
-  [[nodiscard]] bool sees_nothing_known(const TrackResult& result) const;
   [[nodiscard]] bool turns_away(const SE3& T_c_ref, const FrameStep& step) const;
   LostCause place_by_depth_alone(LostCause found, FrameStep& step);
   bool points_allow(FrameStep& step);

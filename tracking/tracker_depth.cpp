@@ -69,14 +69,7 @@ bool Tracker::may_be_placed(bool agree, FrameStep& step) {
   const TrackResult& result = step.result;
   const bool contradicted = !agree && result.matches >= options_.pose.min_inliers &&
                             result.inliers < options_.pose.min_inlier_share * result.matches;
-  if (contradicted || sees_nothing_known(result)) return false;
-  return !step.after_loss() || points_allow(step);
-}
-
-/// Hardly any of the points that should be in view from a pose was found.
-bool Tracker::sees_nothing_known(const TrackResult& result) const {
-  return result.searched >= options_.depth.telling_candidates &&
-         result.matches < options_.depth.found_share * result.searched;
+  return !contradicted && (!step.after_loss() || points_allow(step));
 }
 
 /// Before the frame is given up: what it measures, and no points.
@@ -90,8 +83,8 @@ LostCause Tracker::place_by_depth_alone(LostCause found, FrameStep& step) {
 }
 
 /// A pose that depth alone gave, from a start that may be far off, before the map's points: they may give a
-/// better one. Where enough of them should be seen and hardly any is found, the pose is wrong; after a loss,
-/// when nobody knows how the camera moves, also where those found do not confirm it.
+/// better one. After a loss nobody knows how the camera moves, and where enough of them should be seen and
+/// are not found, the pose is wrong.
 bool Tracker::points_allow(FrameStep& step) {
   const Attempt by_depth = step.attempt();
   TrackResult& result = step.result;
@@ -101,7 +94,6 @@ bool Tracker::points_allow(FrameStep& step) {
   const SearchStart start{.placement = placement, .kind = SearchStart::Kind::kRough};
   if (search_from(start, step) == LostCause::kNone) return true;
   if (step.after_loss() && result.candidates >= options_.depth.telling_candidates) return false;
-  if (sees_nothing_known(result)) return false;
   step.restore(by_depth);
   search_.clear();
   result.matches = result.inliers = 0;

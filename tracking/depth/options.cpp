@@ -9,7 +9,6 @@ std::string DepthPlacementOptions::invalid_reason() const {
       .nested("alignment", alignment.invalid_reason())
       .at_least("scarce_inliers", scarce_inliers, 0)
       .at_least("telling_candidates", telling_candidates, 0)
-      .share("found_share", found_share)
       .share("agreeing_share", agreeing_share)
       .at_least("patience", patience, 0)
       .reason();

@@ -13,8 +13,6 @@ struct DepthPlacementOptions {
   /// After a loss, a pose from the depth image alone is rejected when so many points should be seen from it
   /// and the search does not confirm it, >= 0.
   int telling_candidates = 40;
-  /// In any frame, it is rejected when the search found less than such a share of as many points, in (0, 1].
-  double found_share = 0.1;
   /// A pose by depth and points replaces one by points alone, after a loss or where that is as well supported
   /// as one from a rough start must be (RoughStartOptions), when so large a share of the latter's inliers
   /// agrees with it, in (0, 1].
