@@ -6,6 +6,7 @@
 
 #include "base/option_check.hpp"
 #include "slam/conversions.hpp"
+#include "slam/distance_field.hpp"
 #include "slam/frame_pixels.hpp"
 #include "slam/surface_pieces.hpp"
 #include "surface/free_space/free_space.hpp"
@@ -116,18 +117,12 @@ void SurfaceModel::clear() {
 }
 
 SpacePoint SurfaceModel::at(const std::array<double, 3>& p_world) const {
-  SpacePoint point;
-  const Vector3 x_w(p_world[0], p_world[1], p_world[2]);
-  const auto found = impl_->volume.distance(x_w);
-  if (!found) {
-    const auto clearance = impl_->free.clearance(impl_->volume, x_w);
-    if (clearance) point = {SpaceState::kFree, *clearance, {0, 0, 0}};
-    return point;
-  }
-  point.state = found->distance > 0 ? SpaceState::kFree : SpaceState::kOccupied;
-  point.distance = found->distance;
-  point.gradient = {found->gradient.x(), found->gradient.y(), found->gradient.z()};
-  return point;
+  return space_point(impl_->volume, impl_->free, p_world);
+}
+
+DistanceField SurfaceModel::distances(const DistanceBox& box) const {
+  if (const std::string why = box.invalid_reason(); !why.empty()) throw std::invalid_argument("box." + why);
+  return distance_field(impl_->volume, impl_->free, box);
 }
 
 SurfaceMesh SurfaceModel::mesh() const {

@@ -36,11 +36,41 @@ struct SpacePoint {
   /// From the surface [m], positive outside; truncated at four voxels or at three standard deviations of the
   /// depth, whichever is more, but never at more than 60 voxels. Free space away from surfaces: four voxels,
   /// or less within a voxel of where distances are known. kUnknown: 0. Measured along the
-  /// cameras' rays and shortened by the slant: beside rims and in clutter a surface may be nearer.
+  /// cameras' rays and shortened by the slant: beside rims and in clutter a surface may be nearer
+  /// (SurfaceModel::distances has the nearest).
   double distance = 0;
   /// d distance / d position: away from the surface, up to what was said; its length is about 1. 0 in free
   /// space away from surfaces, and where unknown.
   std::array<double, 3> gradient{0, 0, 0};
+};
+
+/// A box of space, and how finely it is asked about.
+struct DistanceBox {
+  std::array<double, 3> lowest{0, 0, 0};   ///< its lowest corner [m]
+  std::array<double, 3> highest{0, 0, 0};  ///< the corner opposite [m], above the lowest in each axis
+  double cell = 0.1;                       ///< edge of a cell [m] > 0
+  double reach = 1;                        ///< no distance is longer [m] > 0
+  bool unknown_is_obstacle = false;        ///< middles of unknown cells are taken for points of a surface
+
+  /// Empty when valid; otherwise names the field, the rule and the value. The box and what is within reach
+  /// of it have 2^26 cells at most, which take 0.5 GB while distances are found.
+  [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
+};
+
+/// How far the nearest surface is, whichever way it lies, in the middle of each cell of a box: a Euclidean
+/// signed distance field, as planners and trajectory optimisers take it.
+struct DistanceField {
+  std::array<double, 3> lowest{0, 0, 0};  ///< corner of cell (0, 0, 0) [m]
+  double cell = 0;                        ///< [m]
+  std::array<std::int32_t, 3> size{};     ///< cells along x, y, z
+  /// [m], negative inside a surface, the reach at most; of unknown cells, to the nearest surface that is
+  /// known. Cell (i, j, k) is at i + size[0] * (j + size[1] * k), as in `states`.
+  std::vector<float> distances;
+  std::vector<SpaceState> states;
+
+  /// Between the middles of cells, the gradient as well, linear in x, y and z; the state of the cell. Outside
+  /// of the box, and what is not finite, is unknown, with a distance of 0.
+  [[nodiscard]] TWOFOLD_API SpacePoint at(const std::array<double, 3>& p_world) const;
 };
 
 /// Triangles go round anticlockwise seen from outside.
@@ -78,9 +108,9 @@ struct SurfaceChanges {
 /// What moves away is carved away by later frames. What comes to stand in free space makes unknown what it
 /// hides, since that may be its inside. A model stays where its poses put it: after a loop
 /// closure, clear it and add the frames of keyframes anew, which the caller keeps (PoseEstimate::keyframe).
-/// One model holds one map part: poses of another have another world. Same calls, same answers. Threads: at
-/// and mesh by several at once, add, clear and mesh_changes by one while nobody else does anything. A model
-/// that was moved from may only be assigned to or destroyed.
+/// One model holds one map part: poses of another have another world. Same calls, same answers. Threads: at,
+/// distances and mesh by several at once, add, clear and mesh_changes by one while nobody else does anything.
+/// A model that was moved from may only be assigned to or destroyed.
 class TWOFOLD_API SurfaceModel {
  public:
   /// Throws std::invalid_argument naming the field of rig or options, the rule and the value; one camera has
@@ -104,6 +134,11 @@ class TWOFOLD_API SurfaceModel {
 
   /// p_world [m]. What is not finite is unknown.
   [[nodiscard]] SpacePoint at(const std::array<double, 3>& p_world) const;
+  /// To the nearest surface of `mesh` whichever way it lies, in a box of space, right to a fraction of a
+  /// cell: at most half of its edge at the surface itself, where `at` is finer, less farther away. Takes
+  /// about a second for a million cells, and as long as `mesh`. Throws std::invalid_argument with
+  /// DistanceBox::invalid_reason, std::bad_alloc when memory ends.
+  [[nodiscard]] DistanceField distances(const DistanceBox& box) const;
   [[nodiscard]] SurfaceMesh mesh() const;
   /// What changed in the mesh after that revision; of 0 on, all of it. Only cells that frames changed are
   /// made anew, so that asking after each frame is cheap. Small specks, which `mesh` leaves out, are there.

@@ -231,6 +231,69 @@ TEST(SurfaceModel, KnowsNothingOfPositionsThatAreNoNumbers) {
   }
 }
 
+/// Before a wall 3 m away a box 1.5 m away; the camera looks past its side, along which `at` measures.
+TEST(SurfaceModel, KnowsTheNearestSurfaceWhicheverWayItLies) {
+  WallFrame frame = far_wall();
+  draw_box(frame, 0, 80, 0, kHeight, 1500);
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  ASSERT_GT(model.add(frame.view(), {}), 0);
+  const DistanceField field =
+      model.distances({.lowest = {-0.5, -0.4, 1.1}, .highest = {0.5, 0.4, 3.05}, .cell = 0.04, .reach = 0.8});
+  EXPECT_EQ(field.size, (std::array<std::int32_t, 3>{25, 20, 49}));
+  ASSERT_EQ(field.distances.size(), 25U * 20U * 49U);
+  ASSERT_EQ(field.states.size(), field.distances.size());
+  const SpacePoint before_box = field.at({-0.3, 0, 1.2});
+  EXPECT_EQ(before_box.state, SpaceState::kFree);
+  EXPECT_NEAR(before_box.distance, 0.3, 0.02);
+  EXPECT_NEAR(before_box.gradient[2], -1, 0.1);
+  // Beside the rim of the box, to the right and farther away: up and to the right it is nearest.
+  const SpacePoint beside = field.at({0.2, 0, 1.7});
+  EXPECT_EQ(beside.state, SpaceState::kFree);
+  EXPECT_NEAR(beside.distance, std::hypot(0.2, 0.2), 0.03);
+  EXPECT_NEAR(beside.gradient[0], std::sqrt(0.5), 0.15);
+  EXPECT_NEAR(beside.gradient[2], std::sqrt(0.5), 0.15);
+  EXPECT_NEAR(field.at({0.3, 0, 2.9}).distance, 0.1, 0.02);       // of the wall
+  EXPECT_NEAR(field.at({0.45, 0, 2.2}).distance, 0.8, 1e-6);      // as far as asked for
+  EXPECT_EQ(field.at({-0.3, 0, 2}).state, SpaceState::kUnknown);  // behind the box
+  EXPECT_NEAR(field.at({-0.3, 0, 1.53}).distance, -0.03, 0.02);
+  EXPECT_EQ(field.at({0.6, 0, 2}).state, SpaceState::kUnknown);  // outside
+  EXPECT_EQ(field.at({0.6, 0, 2}).distance, 0);
+  EXPECT_EQ(field.at({NAN, 0, 2}).state, SpaceState::kUnknown);
+}
+
+/// What was never seen may hold anything: behind the rim of a box, for one.
+TEST(SurfaceModel, TakesTheUnknownForAnObstacleWhereItIsAsked) {
+  WallFrame frame = far_wall();
+  draw_box(frame, 0, 80, 0, kHeight, 1500);
+  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  ASSERT_GT(model.add(frame.view(), {}), 0);
+  DistanceBox box{.lowest = {-0.2, -0.2, 1.8}, .highest = {0.6, 0.2, 2.6}, .cell = 0.04, .reach = 0.5};
+  const std::array<double, 3> beside{0.3, 0, 2.2};
+  EXPECT_NEAR(model.distances(box).at(beside).distance, 0.5, 0.01);
+  box.unknown_is_obstacle = true;
+  const SpacePoint point = model.distances(box).at(beside);
+  EXPECT_EQ(point.state, SpaceState::kFree);
+  EXPECT_LT(point.distance, 0.3);  // behind the box, on its left
+  EXPECT_GT(point.gradient[0], 0.5);
+}
+
+TEST(SurfaceModel, SaysWhichBoxesHaveNoDistances) {
+  const SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  const DistanceBox valid{.lowest = {0, 0, 0}, .highest = {1, 1, 1}};
+  EXPECT_EQ(valid.invalid_reason(), "");
+  for (const float distance : model.distances(valid).distances) EXPECT_EQ(distance, 1);  // of nothing at all
+  const auto refused = [&](DistanceBox box, const char* why) {
+    EXPECT_NE(box.invalid_reason().find(why), std::string::npos) << box.invalid_reason();
+    EXPECT_THROW(static_cast<void>(model.distances(box)), std::invalid_argument) << why;
+  };
+  refused({.highest = {1, 1, 0}}, "highest");
+  refused({.lowest = {0, NAN, 0}, .highest = {1, 1, 1}}, "lowest");
+  refused({.highest = {1, 1, 1e9}}, "highest");
+  refused({.highest = {1, 1, 1}, .cell = 0}, "cell");
+  refused({.highest = {1, 1, 1}, .reach = 0}, "reach");
+  refused({.highest = {100, 100, 100}, .cell = 0.01}, "cells");
+}
+
 TEST(SurfaceModel, OptionsSayWhyTheyAreInvalid) {
   testing::expect_rules<SurfaceModelOptions>({{"voxel", [](auto& o) { o.voxel = 11; }},
                                               {"max_depth", [](auto& o) { o.max_depth = -1; }},

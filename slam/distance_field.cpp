@@ -1,0 +1,160 @@
+#include "slam/distance_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/option_check.hpp"
+#include "surface/free_space/nearest_points.hpp"
+#include "surface/meshing.hpp"
+#include "surface/triangle_grid.hpp"
+
+namespace twofold {
+namespace {
+
+constexpr double kMostCells = 1 << 26;
+constexpr double kFarthestCorner = 1e5;  // [m]
+
+Eigen::Vector3d vector_of(const std::array<double, 3>& x) {
+  return {x[0], x[1], x[2]};
+}
+
+/// Cells of a box, and of what is within reach of it.
+struct Grid {
+  explicit Grid(const DistanceBox& box)
+      : size(((vector_of(box.highest) - vector_of(box.lowest)) / box.cell).array().ceil().cast<int>()),
+        border(static_cast<int>(std::ceil(box.reach / box.cell)) + 1),
+        origin(vector_of(box.lowest).array() - border * box.cell) {}
+
+  [[nodiscard]] Eigen::Vector3i whole() const { return size.array() + 2 * border; }
+  /// Of a cell of the whole grid [m].
+  [[nodiscard]] std::array<double, 3> middle(const Eigen::Vector3i& at, double cell) const {
+    const Eigen::Vector3d x = origin + cell * (at.cast<double>().array() + 0.5).matrix();
+    return {x.x(), x.y(), x.z()};
+  }
+
+  Eigen::Vector3i size;    ///< of the box
+  int border;              ///< cells around it
+  Eigen::Vector3d origin;  ///< lowest corner of the whole grid [m]
+};
+
+template <class Visit>
+void for_each_cell(const Eigen::Vector3i& size, Visit&& visit) {
+  Eigen::Vector3i at;
+  for (at.z() = 0; at.z() < size.z(); ++at.z())
+    for (at.y() = 0; at.y() < size.y(); ++at.y())
+      for (at.x() = 0; at.x() < size.x(); ++at.x()) visit(at);
+}
+
+/// Of the surface, so close that no cell that it passes through is without [cells of the whole grid].
+std::vector<Eigen::Vector3f> surface_points(const SurfaceVolume& volume, const Grid& grid, double cell) {
+  TriangleMesh mesh = extract_mesh(volume);
+  const Eigen::Vector3f origin = grid.origin.cast<float>();
+  for (Eigen::Vector3f& x : mesh.positions) x = (x - origin) / static_cast<float>(cell);
+  const Eigen::Array3f most = grid.whole().cast<float>();
+  const auto is_outside = [&](const std::array<std::uint32_t, 3>& corners) {
+    const Eigen::Array3f a = mesh.positions[corners[0]], b = mesh.positions[corners[1]],
+                         c = mesh.positions[corners[2]];
+    return (a.max(b).max(c) < 0).any() || (a.min(b).min(c) > most).any();
+  };
+  std::erase_if(mesh.triangles, is_outside);
+  constexpr float kLongest = 0.5F;  // [cells]
+  mesh = subdivided(mesh, kLongest);
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(mesh.triangles.size() * 4);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Eigen::Vector3f &x = mesh.positions[a], &y = mesh.positions[b], &z = mesh.positions[c];
+    points.insert(points.end(), {x, y, z, (x + y + z) / 3});
+  }
+  return points;
+}
+
+}  // namespace
+
+std::string DistanceBox::invalid_reason() const {
+  OptionCheck check;
+  check.above("cell", cell, 0).within("reach", reach, 0, kFarthestCorner).above("reach", reach, 0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    check.within("lowest", lowest[axis], -kFarthestCorner, kFarthestCorner)
+        .within("highest", highest[axis], -kFarthestCorner, kFarthestCorner);
+    check.above("highest - lowest", highest[axis] - lowest[axis], 0);
+  }
+  if (std::string reason = check.reason(); !reason.empty()) return reason;
+  const Eigen::Array3d edges = (vector_of(highest) - vector_of(lowest)).array() + 2 * reach;
+  return OptionCheck()
+      .within("cells of the box and what is within reach", (edges / cell + 4).prod(), 1, kMostCells)
+      .reason();
+}
+
+SpacePoint space_point(const SurfaceVolume& volume, const FreeSpace& free,
+                       const std::array<double, 3>& p_world) {
+  SpacePoint point;
+  const Vector3 x_w = vector_of(p_world);
+  const auto found = volume.distance(x_w);
+  if (!found) {
+    const auto clearance = free.clearance(volume, x_w);
+    if (clearance) point = {SpaceState::kFree, *clearance, {0, 0, 0}};
+    return point;
+  }
+  point.state = found->distance > 0 ? SpaceState::kFree : SpaceState::kOccupied;
+  point.distance = found->distance;
+  point.gradient = {found->gradient.x(), found->gradient.y(), found->gradient.z()};
+  return point;
+}
+
+DistanceField distance_field(const SurfaceVolume& volume, const FreeSpace& free, const DistanceBox& box) {
+  const Grid grid(box);
+  std::vector<Eigen::Vector3f> points = surface_points(volume, grid, box.cell);
+  DistanceField field{box.lowest, box.cell, {grid.size.x(), grid.size.y(), grid.size.z()}, {}, {}};
+  const auto state_of = [&](const Eigen::Vector3i& at) {
+    return space_point(volume, free, grid.middle(at, box.cell)).state;
+  };
+  const Eigen::Vector3i border = Eigen::Vector3i::Constant(grid.border);
+  for_each_cell(grid.size, [&](const Eigen::Vector3i& at) { field.states.push_back(state_of(at + border)); });
+  if (box.unknown_is_obstacle) {
+    for_each_cell(grid.whole(), [&](const Eigen::Vector3i& at) {
+      if (state_of(at) == SpaceState::kUnknown) points.emplace_back(at.cast<float>().array() + 0.5F);
+    });
+  }
+  const NearestPoints nearest(grid.whole(), points);
+  field.distances.reserve(field.states.size());
+  for_each_cell(grid.size, [&](const Eigen::Vector3i& at) {
+    const auto metres = static_cast<float>(
+        std::min(static_cast<double>(nearest.distance(at + border)) * box.cell, box.reach));
+    const bool inside = field.states[field.distances.size()] == SpaceState::kOccupied;
+    field.distances.push_back(inside ? -metres : metres);
+  });
+  return field;
+}
+
+SpacePoint DistanceField::at(const std::array<double, 3>& p_world) const {
+  const Eigen::Array3d in_cells = (vector_of(p_world) - vector_of(lowest)).array() / cell;
+  const Eigen::Array3d most(size[0], size[1], size[2]);
+  if (!(in_cells >= 0).all() || !(in_cells < most).all()) return {};
+  const auto number = [&](const Eigen::Array3i& at) {
+    return static_cast<std::size_t>(at.x()) +
+           static_cast<std::size_t>(size[0]) *
+               (static_cast<std::size_t>(at.y()) +
+                static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(at.z()));
+  };
+  SpacePoint point;
+  point.state = states[number(in_cells.cast<int>())];
+  // Between the middles of eight cells; in the outer half of the outermost cells as at their middles.
+  const Eigen::Array3d from_first = (in_cells - 0.5).max(0).min(most - 1);
+  const Eigen::Array3i first = from_first.cast<int>().min(most.cast<int>() - 2).max(0);
+  const Eigen::Array3d share = from_first - first.cast<double>();
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Array3i step(corner & 1, corner >> 1 & 1, corner >> 2);
+    const Eigen::Array3i at = (first + step).min(most.cast<int>() - 1);
+    const double value = distances[number(at)];
+    const Eigen::Array3d weight = (step == 1).select(share, 1 - share);
+    const Eigen::Array3d slope = (step == 1).select(Eigen::Array3d::Ones(), -Eigen::Array3d::Ones());
+    point.distance += value * weight.prod();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double others = weight[(axis + 1) % 3] * weight[(axis + 2) % 3];
+      point.gradient[static_cast<std::size_t>(axis)] += value * slope[axis] * others / cell;
+    }
+  }
+  return point;
+}
+
+}  // namespace twofold
