@@ -39,7 +39,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
       loss_(options.loss.signs),
       views_(rig, options.loss.wide_search, options.search, options.loss.recent_keyframes),
       new_points_(rig_, options_, correction_.fixed()),
-      proposer_(options_),
+      proposer_(rig.kind, options_),
       reference_choice_(options.reference, static_cast<std::size_t>(options.local_map.max_searches)) {
   const auto searches = static_cast<std::size_t>(options.local_map.max_searches);
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
@@ -71,8 +71,7 @@ FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, Keyfra
   step.tracked = map_exists && track(step);
   step.result.by_rays = step.tracked && needs_rays(step.result);
   if (step.tracked && new_points_.has_seeds()) observe_seeds(step);
-  if (step.tracked)
-    step.result.proposed = proposer_.due(step, occupied_regions(rig_.camera, search_), immature_points_);
+  if (step.tracked) step.result.proposed = proposer_.due(step, tracked_view(), immature_points_);
   step.started = !step.tracked && (map_exists ? start_part(step) : start_map(step));
   step.lap(TrackerStage::kKeyframe);
   return step;

@@ -162,6 +162,7 @@ class Tracker {
   [[nodiscard]] bool needs_rays(const TrackResult& result);
 
   // tracker_keyframes.cpp
+  [[nodiscard]] TrackedView tracked_view() const;
   [[nodiscard]] KeyframeView view_of(const FrameStep& step);
   void propose_keyframe(FrameStep& step);
   void hand_over_images(KeyframeProposal& proposal);

@@ -27,6 +27,11 @@ double Tracker::median_depth(const SE3& T_c_ref) {
   return median(std::span(samples_));
 }
 
+/// What says, beside its pose, whether this frame should become a keyframe.
+TrackedView Tracker::tracked_view() const {
+  return {occupied_regions(rig_.camera, search_), proposer_.revisits(search_, local_map_)};
+}
+
 /// What later frames are judged by if this one becomes a keyframe.
 KeyframeView Tracker::view_of(const FrameStep& step) {
   const double depth =

@@ -153,6 +153,12 @@ TEST(Options, OfALostCameraSayWhyTheyAreInvalid) {
 
 TEST(Options, OfKeyframesAndPointsSayWhyTheyAreInvalid) {
   expect_rules<KeyframeDecisionOptions>({{"tracked_share", [](auto& o) { o.tracked_share = 1.1; }},
+                                         {"waiting_inliers", [](auto& o) { o.waiting_inliers = -1; }},
+                                         {"lost_share", [](auto& o) { o.lost_share = 1.1; }},
+                                         {"waiting_way", [](auto& o) { o.waiting_way = -0.1; }},
+                                         {"revisiting_way", [](auto& o) { o.revisiting_way = 1.1; }},
+                                         {"revisited_after", [](auto& o) { o.revisited_after = 0; }},
+                                         {"revisited_share", [](auto& o) { o.revisited_share = 0; }},
                                          {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
                                          {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
                                          {"max_pending", [](auto& o) { o.max_pending = 0; }}});

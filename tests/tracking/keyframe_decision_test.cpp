@@ -18,7 +18,7 @@ class KeyframeDecisionTest : public ::testing::Test {
 
   void move(double depths) { result_.T_c_ref = SE3(SO3(), {0, depths * last_.median_depth, 0}); }
   [[nodiscard]] bool due(EffortLevel effort = EffortLevel::kEverything) const {
-    return keyframe_due(result_, last_, occupied_, backlog_, options_.keyframes, bounds_of(effort, options_));
+    return keyframe_due(result_, last_, seen_, backlog_, options_.keyframes, bounds_of(effort, options_));
   }
   [[nodiscard]] bool due_by_motion() const {
     return keyframe_due_by_motion(result_.T_c_ref, last_, backlog_, options_.keyframes);
@@ -28,7 +28,7 @@ class KeyframeDecisionTest : public ::testing::Test {
   TrackResult result_;
   KeyframeView last_{.median_depth = 2, .occupied_regions = 20};
   KeyframeBacklog backlog_{.room = true, .pending = 0, .map_is_young = false};
-  int occupied_ = 20;
+  TrackedView seen_{.occupied_regions = 20};
 };
 
 TEST_F(KeyframeDecisionTest, NoneWhereTheCameraStands) {
@@ -55,10 +55,34 @@ TEST_F(KeyframeDecisionTest, WhenLittleIsLeftOfWhatTheReferenceSaw) {
   EXPECT_TRUE(due()) << "the others are out of view";
 }
 
+TEST_F(KeyframeDecisionTest, WherePointsAreHardToFindOneCameraMakesNoMore) {
+  last_.most_tracked = 0.6;
+  result_.matches = 58;
+  result_.inliers = 79;
+  EXPECT_TRUE(due()) << "too few to do without new ones";
+  result_.inliers = 80;
+  EXPECT_FALSE(due()) << "a keyframe would not make them easier to find";
+  move(0.25 * options_.keyframes.parallax);
+  EXPECT_TRUE(due()) << "its unit of length is held by keyframes";
+  seen_.revisits = true;
+  EXPECT_FALSE(due()) << "by older ones here";
+  move(0.55 * options_.keyframes.parallax);
+  EXPECT_TRUE(due()) << "depths are seen anew";
+  move(0);
+  result_.matches = 56;
+  EXPECT_TRUE(due()) << "what could be found is going";
+  last_.most_tracked = 0.9;
+  result_.matches = 66;
+  EXPECT_FALSE(due()) << "much is gone, but enough is left";
+  last_.most_tracked = 0.34;
+  result_.matches = 34;
+  EXPECT_TRUE(due()) << "too little to wait";
+}
+
 TEST_F(KeyframeDecisionTest, WhenHalfOfTheImageHasEmptied) {
-  occupied_ = 10;
+  seen_.occupied_regions = 10;
   EXPECT_FALSE(due());
-  occupied_ = 9;
+  seen_.occupied_regions = 9;
   EXPECT_TRUE(due());
 }
 
@@ -111,9 +135,9 @@ TEST_F(KeyframeDecisionTest, AsTheOptionsSay) {
   backlog_.map_is_young = true;
   const EffortBounds bounds = bounds_of(EffortLevel::kEverything, options_);
   move(0.45 * patient.parallax);
-  EXPECT_FALSE(keyframe_due(result_, last_, occupied_, backlog_, patient, bounds));
+  EXPECT_FALSE(keyframe_due(result_, last_, seen_, backlog_, patient, bounds));
   move(0.55 * patient.parallax);
-  EXPECT_TRUE(keyframe_due(result_, last_, occupied_, backlog_, patient, bounds));
+  EXPECT_TRUE(keyframe_due(result_, last_, seen_, backlog_, patient, bounds));
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ class KeyframeProposerTest : public ::testing::Test {
   ImmaturePoints immature_{100, 4};
   LocalMap local_map_{100};
   SearchOutcome found_{rig_, options_.local_map.max_searches};
-  KeyframeProposer proposer_{options_};
+  KeyframeProposer proposer_{SensorKind::kStereo, options_};
 };
 
 TEST_F(KeyframeProposerTest, NumbersKeyframesAsItProposesThem) {
@@ -67,6 +67,52 @@ TEST_F(KeyframeProposerTest, NumbersKeyframesAsItProposesThem) {
   EXPECT_EQ(proposal_.reference, KeyframeId{0});
   EXPECT_EQ(proposer_.next(), KeyframeId{2});
   EXPECT_EQ(immature_.pending().size(), 2U);
+}
+
+TEST_F(KeyframeProposerTest, OneCameraComparesWithTheBestFrameFromTheLastKeyframeOn) {
+  for (const SensorKind kind : {SensorKind::kMono, SensorKind::kStereo}) {
+    KeyframeProposer proposer{kind, options_};
+    ImmaturePoints immature{100, 4};
+    proposer.begin({kNoKeyframe, SE3()}, {2, 20}, step_, immature);
+    step_.result.reference = KeyframeId{0};
+    const auto due = [&](int matches) {
+      step_.result.reference_in_view = 1;
+      step_.result.searched = 100;
+      step_.result.matches = matches;
+      step_.result.inliers = 100;
+      return proposer.due(step_, {20}, immature);
+    };
+    const bool measures_depth = kind != SensorKind::kMono;
+    EXPECT_EQ(due(58), measures_depth);
+    EXPECT_EQ(due(62), measures_depth);
+    EXPECT_EQ(due(60), measures_depth);
+    EXPECT_TRUE(due(58)) << "best was 62";
+    immature = ImmaturePoints(100, 4);
+    proposer.begin({KeyframeId{0}, SE3()}, {2, 20}, step_, immature);
+    EXPECT_EQ(due(56), measures_depth) << "the keyframe itself found 58";
+    EXPECT_TRUE(due(55));
+  }
+}
+
+TEST_F(KeyframeProposerTest, APlaceSeenAgainShowsPointsOfKeyframesLongAgo) {
+  TrackerOptions options;
+  options.keyframes.revisited_after = 2;
+  KeyframeProposer proposer{SensorKind::kMono, options};
+  ImmaturePoints others{100, 4};
+  proposer.begin({kNoKeyframe, SE3()}, {2, 20}, step_, others);
+  EXPECT_FALSE(proposer.revisits(found_, local_map_)) << "nothing is found";
+  find_all();
+  EXPECT_FALSE(proposer.revisits(found_, local_map_)) << "of the keyframe before";
+  proposer.begin({KeyframeId{0}, SE3()}, {2, 20}, step_, others);
+  EXPECT_TRUE(proposer.revisits(found_, local_map_));
+
+  propose_next(false);
+  for (std::size_t i = 4; i < kPoints; ++i) immature_.points()[i].anchor = KeyframeId{1};
+  immature_.changed();
+  local_map_.update(snapshot_, KeyframeId{0}, immature_, 20);
+  EXPECT_FALSE(proposer.revisits(found_, local_map_)) << "two of ten are old";
+  options.keyframes.revisited_share = 0.2;
+  EXPECT_TRUE(proposer.revisits(found_, local_map_));
 }
 
 TEST_F(KeyframeProposerTest, PointsFoundAgainGetNumbersAndGoToTheMapOnce) {
@@ -110,19 +156,19 @@ TEST_F(KeyframeProposerTest, TheSecondKeyframeOfAPartComesSoon) {
   step_.result.reference_in_view = 1;
   step_.result.searched = step_.result.matches = 100;
   step_.result.T_c_ref = SE3(SO3(), {0.5 * options_.keyframes.parallax * 2, 0, 0});
-  EXPECT_TRUE(proposer_.due(step_, 20, immature_));
+  EXPECT_TRUE(proposer_.due(step_, {20}, immature_));
   find_all();
   propose_next(false);
   step_.result.reference = KeyframeId{1};
-  EXPECT_FALSE(proposer_.due(step_, 25, immature_));
+  EXPECT_FALSE(proposer_.due(step_, {25}, immature_));
 }
 
 TEST_F(KeyframeProposerTest, NoKeyframeWithoutABuffer) {
   FrameStep without(frame_, snapshot_, nullptr, step_.bounds, 0);
   without.result.reference = KeyframeId{0};
-  EXPECT_FALSE(proposer_.due(without, 0, immature_));
+  EXPECT_FALSE(proposer_.due(without, {}, immature_));
   step_.result.reference = KeyframeId{0};
-  EXPECT_TRUE(proposer_.due(step_, 0, immature_)) << "nothing is left of what the first one saw";
+  EXPECT_TRUE(proposer_.due(step_, {}, immature_)) << "nothing is left of what the first one saw";
 }
 
 TEST_F(KeyframeProposerTest, CountsRegionsInWhichSomethingIsTracked) {

@@ -29,7 +29,23 @@ void KeyframeProposer::continue_from(const GraphSnapshot& graph) {
   next_point_ = static_cast<std::uint32_t>(graph.point_count());
 }
 
-bool KeyframeProposer::due(const FrameStep& step, int regions, const ImmaturePoints& immature_points) const {
+bool KeyframeProposer::revisits(const SearchOutcome& found, const LocalMap& local_map) const {
+  int inliers = 0, old = 0;
+  for (std::size_t m = 0; m < found.matches.size(); ++m) {
+    if (!found.observations[m].inlier) continue;
+    const KeyframeId anchor = local_map.anchor(local_map.points()[found.matches[m].point]);
+    ++inliers;
+    old += next_keyframe_ - index(anchor) >= static_cast<std::uint32_t>(options_.keyframes.revisited_after)
+               ? 1
+               : 0;
+  }
+  return inliers > 0 && old >= options_.keyframes.revisited_share * inliers;
+}
+
+bool KeyframeProposer::due(const FrameStep& step, const TrackedView& seen,
+                           const ImmaturePoints& immature_points) {
+  if (one_camera_)
+    last_.most_tracked = std::max(last_.most_tracked.value_or(0), reference_share(step.result));
   if (step.free_proposal == nullptr) return false;
   const KeyframeId first{first_of_part_};
   const bool one_keyframe =
@@ -38,7 +54,7 @@ bool KeyframeProposer::due(const FrameStep& step, int regions, const ImmaturePoi
                                 static_cast<int>(immature_points.pending().size()), one_keyframe};
   return step.result.by_depth
              ? keyframe_due_by_motion(step.result.T_c_ref, last_, backlog, options_.keyframes)
-             : keyframe_due(step.result, last_, regions, backlog, options_.keyframes, step.bounds);
+             : keyframe_due(step.result, last_, seen, backlog, options_.keyframes, step.bounds);
 }
 
 void KeyframeProposer::begin(const Placement& placement, const KeyframeView& view, FrameStep& step,
@@ -55,6 +71,7 @@ void KeyframeProposer::begin(const Placement& placement, const KeyframeView& vie
   if (step.result.by_depth) proposal.pose_information = step.information_of_planes;
   if (step.result.by_rays) proposal.pose_information = step.result.information;
   last_ = view;
+  if (one_camera_) last_.most_tracked = found_share(step.result);
   proposal.median_depth = view.median_depth;
   immature_points.add_pending({proposal.id, placement.reference, placement.T_c_ref});
   step.result.proposed = true;

@@ -19,14 +19,20 @@ namespace twofold {
 class KeyframeProposer {
  public:
   /// @param options  must outlive this
-  explicit KeyframeProposer(const TrackerOptions& options) : options_(options) {}
+  KeyframeProposer(SensorKind kind, const TrackerOptions& options)
+      : one_camera_(kind == SensorKind::kMono), options_(options) {}
 
   /// The numbers of keyframes and points continue those of a map made before.
   void continue_from(const GraphSnapshot& graph);
 
-  /// Whether a frame with a pose should become a keyframe.
-  /// @param regions  of the frame that are occupied
-  [[nodiscard]] bool due(const FrameStep& step, int regions, const ImmaturePoints& immature_points) const;
+  /// Whether a frame tracks a place that was seen long ago: enough of its inliers are of keyframes long
+  /// before the next one.
+  [[nodiscard]] bool revisits(const SearchOutcome& found, const LocalMap& local_map) const;
+  /// Whether a frame with a pose should become a keyframe. To be asked once of each: later ones are compared
+  /// with what it tracks.
+  /// @param seen  by the frame
+  [[nodiscard]] bool due(const FrameStep& step, const TrackedView& seen,
+                         const ImmaturePoints& immature_points);
   /// The number of the keyframe to be proposed next.
   [[nodiscard]] KeyframeId next() const { return KeyframeId{next_keyframe_}; }
   /// Whether this is the keyframe proposed last.
@@ -48,6 +54,7 @@ class KeyframeProposer {
  private:
   void confirm(ImmaturePoint& point, KeyframeProposal& proposal);
 
+  bool one_camera_;
   const TrackerOptions& options_;
   KeyframeView last_;
   std::uint32_t next_keyframe_ = 0;

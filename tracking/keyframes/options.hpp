@@ -9,6 +9,16 @@ struct KeyframeDecisionOptions {
   double parallax = 0.09;       ///< |t| since the reference keyframe over the newest one's median depth, > 0
   double tracked_share = 0.65;  ///< of the reference's points, in [0, 1]: with fewer still tracked a keyframe
                                 ///< is due
+  // Where points are hard to find again, another keyframe does not make them easier: with fewer than
+  // tracked_share one camera waits with it ...
+  int waiting_inliers = 80;     ///< while it still tracks so many points, >= 0,
+  double lost_share = 0.05;     ///< until so much is gone of what the last keyframe found, or the best frame
+                                ///< since, as a share of it, in [0, 1],
+  double waiting_way = 0.2;     ///< or it has moved by this share of the parallax, in [0, 1] ...
+  double revisiting_way = 0.5;  ///< ... where it sees a place again by this one, in [0, 1]. Along a street,
+                                ///< where points last for a few keyframes, these hold its unit of length.
+  int revisited_after = 30;     ///< keyframes after a point was begun it is one of a place seen again, >= 1
+  double revisited_share = 0.25;  ///< of the points tracked, in (0, 1]: with so many of those it is one
   /// A keyframe is due when fewer than 1 - emptied_share times as many image regions hold a tracked point as
   /// at the last keyframe. In [0, 1].
   double emptied_share = 0.5;
