@@ -53,6 +53,34 @@ TEST(SurfaceCommand, AlongTruePosesTheSurfaceIsTheTrueOne) {
   EXPECT_FALSE(content(folder / "heat.png").empty());
 }
 
+/// Points lie where the mesh is, in its colours, and cover it.
+TEST(SurfaceCommand, DepthImagesLieOverEachOtherInACloud) {
+  const ScratchFolder folder;
+  const Outcome outcome =
+      run(folder, "surface " + kScene + " --poses truth --every 5 --voxel 0.02 --cloud '" +
+                      (folder / "cloud.ply") + "' --out '" + (folder / "result") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const TriangleMesh cloud = read_ply_mesh(folder / "cloud.ply");
+  const TriangleMesh mesh = read_ply_mesh(folder / "result/surface.ply");
+  EXPECT_TRUE(cloud.triangles.empty());
+  ASSERT_EQ(cloud.colours.size(), cloud.positions.size());
+  ASSERT_GT(mesh.positions.size(), 1000U);
+  int covered = 0, alike = 0;
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const auto nearest =
+        std::min_element(cloud.positions.begin(), cloud.positions.end(), [&](const auto& a, const auto& b) {
+          return (a - mesh.positions[v]).squaredNorm() < (b - mesh.positions[v]).squaredNorm();
+        });
+    if ((*nearest - mesh.positions[v]).norm() > 0.03F) continue;
+    ++covered;
+    const auto point = static_cast<std::size_t>(nearest - cloud.positions.begin());
+    alike += std::abs(cloud.colours[point][0] - mesh.colours[v][0]) < 40 ? 1 : 0;
+  }
+  EXPECT_GT(covered, 0.95 * static_cast<double>(mesh.positions.size()));
+  EXPECT_GT(alike, 0.9 * covered);
+  EXPECT_LT(cloud.positions.size(), 4 * mesh.positions.size()) << "of a cube of a voxel one point";
+}
+
 TEST(SurfaceCommand, ThreadedRunsAndFinishedRunsGiveSurfacesToo) {
   const ScratchFolder folder;
   const Outcome live =

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/surface/registered_cloud.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "base/processor_time.hpp"
 #include "imaging/row_offset.hpp"
@@ -38,6 +39,7 @@ struct SurfaceArguments {
   std::string out;
   std::string picture;
   std::string obj;
+  std::string cloud;
   std::size_t every = 1;
   bool grey = false;
   SurfaceOptions options;
@@ -153,7 +155,9 @@ std::optional<SE3> pose_at(const SurfaceJob& job, std::int64_t t_ns) {
 class DepthFusion {
  public:
   DepthFusion(const SurfaceArguments& arguments, const SurfaceJob& job, const SurfaceOptions& options)
-      : source_(*job.source), row_offset_(job.row_offset), volume_(options), grey_(arguments.grey) {}
+      : source_(*job.source), row_offset_(job.row_offset), volume_(options), grey_(arguments.grey) {
+    if (!arguments.cloud.empty()) cloud_.emplace(options.voxel);
+  }
 
   void fuse(const Frame& frame, const SE3& T_w_c) {
     const Rig& rig = source_.rig();
@@ -172,11 +176,13 @@ class DepthFusion {
       return;
     }
     volume_.fuse(view, T_w_c.inverse());
+    if (cloud_) cloud_->add(view, T_w_c);
     fusion_ns_ += thread_cpu_ns() - begin_ns;
     ++fused_;
   }
 
-  [[nodiscard]] int fused() const { return fused_; }
+  /// If one was asked for.
+  [[nodiscard]] const std::optional<RegisteredCloud>& cloud() const { return cloud_; }
 
   TriangleMesh finish(SurfaceFigures& figures) const {
     const std::int64_t begin_ns = thread_cpu_ns();
@@ -199,6 +205,7 @@ class DepthFusion {
   const FrameSource& source_;
   const double row_offset_;
   SurfaceVolume volume_;
+  std::optional<RegisteredCloud> cloud_;
   const bool grey_;
   int fused_ = 0, empty_ = 0, coloured_ = 0;
   std::int64_t fusion_ns_ = 0;
@@ -245,6 +252,7 @@ void run_surface(const SurfaceArguments& arguments) {
   const Vector3 up = up_axis_of(job.poses) == 2 ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
   write_surface(job.out, mesh, up);
   if (!arguments.obj.empty()) write_obj_mesh(arguments.obj, mesh);
+  if (fusion.cloud()) write_ply_mesh(arguments.cloud, fusion.cloud()->points());
   if (!arguments.picture.empty())
     write_png(arguments.picture, draw_mesh(mesh, mesh.colours, overview_of(mesh, up, kPictureWidth)));
   fmt::print("written to  {}\n", job.out.string());
@@ -297,6 +305,10 @@ void add_surface_command(CLI::App& app, int& exit_code) {
       "--obj", arguments->obj,
       "Write the mesh to this OBJ file, too; its axes are surface.ply's: y points down, where many "
       "programs take it for up");
+  command->add_option(
+      "--cloud", arguments->cloud,
+      "Write the depth images themselves to this PLY file, too, as points with colours, laid over "
+      "each other along the poses; of the readings in a cube of a voxel their mean");
   command->add_option("--picture", arguments->picture, "Draw the mesh to this PNG file");
   command->callback([arguments, &exit_code] {
     run_surface(*arguments);
