@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -9,6 +10,7 @@
 
 #include "imaging/row_offset.hpp"
 #include "io/files/mesh_file.hpp"
+#include "io/files/trajectory_file.hpp"
 #include "tests/apps/command.hpp"
 
 namespace twofold {
@@ -79,6 +81,62 @@ TEST(SurfaceCommand, DepthImagesLieOverEachOtherInACloud) {
   EXPECT_GT(covered, 0.95 * static_cast<double>(mesh.positions.size()));
   EXPECT_GT(alike, 0.9 * covered);
   EXPECT_LT(cloud.positions.size(), 4 * mesh.positions.size()) << "of a cube of a voxel one point";
+}
+
+/// A run that saw a wall of 2 x 2 m two metres before it, in a world of its own; truth.ply and
+/// groundtruth.txt are as it was.
+void write_run_before_wall(const ScratchFolder& folder, const Trajectory& truth, const Trajectory& estimate) {
+  const SE3 T_e_w(SO3::exp(Vector3(0.3, -0.5, 0.2)), Vector3(1, 2, 3));
+  TriangleMesh wall;
+  for (const float x : {-1.0f, 1.0f}) {
+    for (const float y : {-1.0f, 1.0f}) wall.positions.emplace_back(x, y, 2.0f);
+  }
+  wall.triangles = {{0, 1, 2}, {2, 1, 3}};
+  write_ply_mesh(folder / "truth.ply", wall);
+  for (Eigen::Vector3f& x : wall.positions) x = (T_e_w * Vector3(x.cast<double>())).cast<float>();
+  write_ply_mesh(folder / "surface.ply", wall);
+  Trajectory moved = estimate;
+  for (TimedPose& pose : moved) pose.T_w_c = T_e_w * pose.T_w_c;
+  write_tum_trajectory(folder / "trajectory.txt", moved);
+  write_tum_trajectory(folder / "groundtruth.txt", truth);
+}
+
+double mean_accuracy(const ScratchFolder& folder, Outcome& outcome) {
+  outcome = run(folder, "eval --surface '" + (folder / "surface.ply") + "' '" + (folder / "truth.ply") +
+                            "' --json '" + (folder / "eval.json") + "'");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  if (outcome.exit_code != 0) return 1;
+  return nlohmann::json::parse(content(folder / "eval.json"))["accuracy"]["mean_m"];
+}
+
+/// Four centimetres of way, at whose ends the depth is off by a millimetre: by positions, three degrees.
+TEST(SurfaceCommand, AShortPathIsAlignedByOrientationsToo) {
+  const ScratchFolder folder;
+  Trajectory truth, estimate;
+  for (int i = 0; i <= 40; ++i) {
+    const SO3 R = SO3::exp(Vector3(0, 0.002 * i, 0));
+    truth.push_back({1'000'000'000 + 33'000'000LL * i, SE3(R, Vector3(0.001 * i, 0, 0))});
+    estimate.push_back({truth.back().t_ns, SE3(R, Vector3(0.001 * i, 0, 0.001 * (i - 20) / 20))});
+  }
+  write_run_before_wall(folder, truth, estimate);
+  Outcome outcome;
+  EXPECT_LT(mean_accuracy(folder, outcome), 0.0005) << outcome.out;
+  EXPECT_NE(outcome.err.find("rests on the run's orientations"), std::string::npos) << outcome.err;
+}
+
+/// A truth of positions alone says of each pose that it looks ahead.
+TEST(SurfaceCommand, OrientationsThatContradictTheTruthAreLeftOut) {
+  const ScratchFolder folder;
+  Trajectory truth, estimate;
+  for (int i = 0; i <= 40; ++i) {
+    const Vector3 t(std::cos(0.1 * i), std::sin(0.1 * i), 0);
+    truth.push_back({1'000'000'000 + 33'000'000LL * i, SE3(SO3(), t)});
+    estimate.push_back({truth.back().t_ns, SE3(SO3::exp(Vector3(0, 0, 0.1 * i)), t)});
+  }
+  write_run_before_wall(folder, truth, estimate);
+  Outcome outcome;
+  EXPECT_LT(mean_accuracy(folder, outcome), 0.0005) << outcome.out;
+  EXPECT_NE(outcome.err.find("by its run's positions alone"), std::string::npos) << outcome.err;
 }
 
 TEST(SurfaceCommand, ThreadedRunsAndFinishedRunsGiveSurfacesToo) {

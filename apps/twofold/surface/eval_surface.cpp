@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/twofold/surface/run_alignment.hpp"
 #include "base/text_of_json.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
@@ -34,17 +35,21 @@ TriangleMesh read_surface(const std::string& file, double spacing) {
   return mesh;
 }
 
-/// Rigid motion from the run's world to the truth's, by the trajectories that a run leaves beside its
-/// surface.
-std::optional<SE3> alignment_of(const fs::path& estimate) {
-  const fs::path own = estimate.parent_path() / "trajectory.txt";
-  const fs::path truth = estimate.parent_path() / "groundtruth.txt";
+/// From the run's world to the truth's, by the trajectories that a run leaves beside its surface.
+std::optional<RunAlignment> alignment_of(const fs::path& file, const TriangleMesh& estimate) {
+  const fs::path own = file.parent_path() / "trajectory.txt";
+  const fs::path truth = file.parent_path() / "groundtruth.txt";
   if (!fs::is_regular_file(own) || !fs::is_regular_file(truth)) return std::nullopt;
   const auto pairs = associate(read_trajectory(own), read_trajectory(truth), kSameTimeNs);
-  const auto S_w_e = align(pairs, Alignment::kSe3);
-  if (!S_w_e)
-    throw IoError(own, "cannot be aligned with the ground truth: too few poses, or all on one line");
-  return SE3(S_w_e->so3(), S_w_e->translation());
+  if (pairs.empty())
+    throw IoError(own, "cannot be aligned with the ground truth: no pose is close to one of it in time");
+  auto alignment = align_run(pairs, viewing_distance(estimate, pairs));
+  if (!alignment)
+    throw IoError(
+        own,
+        "cannot be aligned with the ground truth: orientations contradict each other, and positions "
+        "are too few, or all on one line");
+  return alignment;
 }
 
 nlohmann::ordered_json to_json(const DistanceStatistics& s) {
@@ -66,18 +71,31 @@ cv::Mat heat_map(TriangleMesh estimate, const SE3& T_w_e, const SurfaceCompariso
   return draw_mesh(estimate, colours, overview_of(estimate, Vector3::UnitZ(), kPictureWidth));
 }
 
-void print_comparison(const SurfaceEvalArguments& arguments, bool moved, const SurfaceComparison& found) {
-  fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
-             arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
-             arguments.fit ? "moved so that the surfaces fit best"
-             : moved       ? "moved as the run's trajectory onto the ground truth"
-                           : "not moved");
-  if (arguments.align && !moved)
+void print_notes(const SurfaceEvalArguments& arguments, const std::optional<RunAlignment>& alignment) {
+  if (arguments.align && !alignment && !arguments.fit)
     fmt::print(stderr,
                "twofold: {}: is compared where it lies: its run's trajectory.txt and groundtruth.txt, which "
                "would move it onto the truth, are not beside it (copy both there; --align none if it lies "
                "right)\n",
                arguments.estimate);
+  if (alignment && alignment->contradictory)
+    fmt::print(stderr,
+               "twofold: {}: is moved by its run's positions alone: orientations contradict the ground "
+               "truth's\n",
+               arguments.estimate);
+  if (alignment && !alignment->by_positions)
+    fmt::print(stderr,
+               "twofold: {}: the path is so short or straight that the rotation that it is moved by rests on "
+               "the run's orientations\n",
+               arguments.estimate);
+}
+
+void print_comparison(const SurfaceEvalArguments& arguments, bool moved, const SurfaceComparison& found) {
+  fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
+             arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
+             arguments.fit ? "moved so that the surfaces fit best"
+             : moved       ? "moved as the run's poses onto the ground truth"
+                           : "not moved");
   fmt::print("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}\n", "[mm]", "points", "mean", "median", "p95",
              "rmse", fmt::format("<= {:g} mm", 1e3 * arguments.threshold));
   print_row("accuracy", found.accuracy);
@@ -92,14 +110,17 @@ void eval_surface(const SurfaceEvalArguments& arguments) {
   const TriangleMesh estimate = read_surface(arguments.estimate, spacing);
   const TriangleMesh truth = read_surface(arguments.truth, spacing);
   const TriangleMesh seen = arguments.seen.empty() ? truth : read_surface(arguments.seen, spacing);
+  std::optional<RunAlignment> alignment;
+  if (arguments.align) alignment = alignment_of(arguments.estimate, estimate);
   std::optional<SE3> T_w_e;
-  if (arguments.align) T_w_e = alignment_of(arguments.estimate);
+  if (alignment) T_w_e = alignment->T_w_e;
   if (arguments.fit) T_w_e = fit_surface(estimate, T_w_e.value_or(SE3()), truth);
   SurfaceComparisonOptions options;
   options.threshold = arguments.threshold;
   options.spacing = spacing;
   const SurfaceComparison found = compare_surfaces(estimate, T_w_e.value_or(SE3()), truth, seen, options);
   print_comparison(arguments, T_w_e.has_value(), found);
+  print_notes(arguments, alignment);
   if (!arguments.json.empty()) {
     const nlohmann::ordered_json json{{"estimate", arguments.estimate},
                                       {"truth", arguments.truth},
