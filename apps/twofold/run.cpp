@@ -278,14 +278,6 @@ void print_results(const RunArguments& arguments, const EngineOptions& options, 
   for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
 }
 
-/// Known now, not after an hour of tracking.
-void expect_place_for_trace(const std::string& trace) {
-  const std::filesystem::path file(trace);
-  if (std::filesystem::is_directory(file)) throw IoError(file, "is a folder, no file for a trace");
-  if (file.has_parent_path() && !std::filesystem::is_directory(file.parent_path()))
-    throw IoError(file, "the folder is not there");
-}
-
 /// What is left of a run that is over: files and figures. What cannot be written stops nothing else, and is
 /// told at the end.
 void write_results(const RunArguments& arguments, const EngineOptions& options, const PreparedSource& frames,
@@ -316,7 +308,7 @@ int run(const RunArguments& arguments) {
   apply_map_options(arguments.map, options);
   options.logs.folder = arguments.out;
   std::optional<Schedule> schedule = schedule_of(arguments);
-  expect_place_for_trace(arguments.trace);
+  expect_place_for_file(arguments.trace, "--trace");
   expect_output_folder(arguments.out, arguments.source);
   expect_not_of_source(arguments.record, arguments.source, "--record");
   if (calibrates_itself(arguments)) expect_place_for_calibration(arguments.out);

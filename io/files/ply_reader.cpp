@@ -48,6 +48,7 @@ constexpr std::size_t kSizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
 class PlyReader {
  public:
   explicit PlyReader(fs::path file) : file_(std::move(file)) {
+    if (fs::is_directory(file_)) fail("is a folder, no PLY file");
     std::ifstream in(file_, std::ios::binary);
     if (!in) throw IoError(file_.string(), "cannot be opened");
     bytes_.assign(std::istreambuf_iterator<char>(in), {});

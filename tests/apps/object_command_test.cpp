@@ -52,6 +52,8 @@ TEST(ObjectCommand, SaysWhatIsMissing) {
   expect_bad_input(run(folder, "object " + kFew + " --depth-cut 0.31" + out), "hardly any depth");
   expect_bad_input(run(folder, "object " + kFew + " --above 0.3" + out), "nothing is left above");
   expect_bad_input(run(folder, "object " + kFew + " --voxel 0" + out), "voxel");
+  expect_bad_input(run(folder, "object " + kFew + " --picture '" + (folder / "none/p.png") + "'" + out),
+                   "none/p.png: the folder is not there");
   const Outcome none =
       run(folder,
           "object 'synthetic:turntable?sensor=rgbd&width=160&height=120&frames=160' --depth-cut 0.31" + out);

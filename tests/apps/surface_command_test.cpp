@@ -334,6 +334,17 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
     expect_bad_input(run(folder, std::string("eval a.txt b.txt ") + option), "requires --surface");
   expect_bad_input(run(folder, "eval --surface a.ply b.ply --align sim3"), "sim3 is for trajectories");
   expect_bad_input(run(folder, "eval --surface a.ply b.ply --max-difference 0.1"), "excludes");
+  for (const char* option : {"--obj", "--picture"})
+    expect_bad_input(run(folder, "surface " + kScene + " --poses truth " + option + " '" +
+                                     (folder / "none/file") + "'" + to),
+                     "none/file: the folder is not there");
+  for (const char* option : {"--json", "--plot"})
+    expect_bad_input(run(folder, std::string("eval --surface a.ply b.ply ") + option + " '" +
+                                     folder.path().string() + "'"),
+                     std::string("is a folder, no file for ") + option);
+  expect_bad_input(
+      run(folder, "eval --surface '" + folder.path().string() + "' '" + (folder / "stray.ply") + "'"),
+      folder.path().string() + ": is a folder, no PLY file");
   // Nothing within range: the near end of the desk is half a metre away.
   const Outcome empty = run(folder,
                             "surface 'synthetic:desk?sensor=rgbd&frames=3&width=160&height=120' --poses "

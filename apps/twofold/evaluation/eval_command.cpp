@@ -10,6 +10,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/evaluation/pose_pairing.hpp"
+#include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/surface/eval_surface.hpp"
 #include "base/text_of_json.hpp"
 #include "evaluation/evaluation.hpp"
@@ -177,6 +178,8 @@ void warn_of_constant_turn(const Evaluation& evaluation) {
 }
 
 void run_eval(const EvalArguments& arguments) {
+  expect_place_for_file(arguments.json, "--json");
+  expect_place_for_file(arguments.plot, "--plot");
   if (arguments.surface) {
     if (arguments.alignment == Alignment::kSim3)
       throw IoError("--align", "sim3 is for trajectories: a surface is moved rigidly (se3) or not (none)");

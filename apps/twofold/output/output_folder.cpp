@@ -66,6 +66,12 @@ void expect_output_folder(const fs::path& folder, const std::string& source) {
   for (const char* name : kResults) expect_free(name);
 }
 
+void expect_place_for_file(const fs::path& file, const std::string& option) {
+  if (fs::is_directory(file)) throw IoError(file, "is a folder, no file for " + option);
+  if (file.has_parent_path() && !fs::is_directory(file.parent_path()))
+    throw IoError(file, "the folder is not there");
+}
+
 void expect_place_for_calibration(const fs::path& folder) {
   std::error_code error;
   if (!fs::exists(fs::symlink_status(folder / kCalibrationName, error)) || is_own_calibration(folder)) return;

@@ -16,6 +16,10 @@ void expect_output_folder(const std::filesystem::path& folder, const std::string
 void expect_not_of_source(const std::filesystem::path& folder, const std::string& source,
                           const std::string& option);
 
+/// Refuses (IoError) a file that `option` names where none can be written: known now, not after an hour of
+/// work. Nothing is changed; empty: there is nothing to write.
+void expect_place_for_file(const std::filesystem::path& file, const std::string& option);
+
 /// Refuses (IoError) a folder whose calibration.yaml is not what an earlier run into it found by itself: one
 /// that calibrates itself writes another there.
 void expect_place_for_calibration(const std::filesystem::path& folder);

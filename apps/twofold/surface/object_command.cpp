@@ -132,6 +132,7 @@ void write_object(const ObjectArguments& arguments, const ObjectModel& model, co
 void run_object(ObjectArguments& arguments) {
   expect_output_folder(arguments.out, arguments.source);
   prepare_output_folder(arguments.out);
+  expect_place_for_file(arguments.picture, "--picture");
   const std::unique_ptr<ObjectSource> source = object_source(arguments);
   remove_earlier_run(arguments.out, arguments.calibration);
   EngineOptions options = options_for_object(source->rig());

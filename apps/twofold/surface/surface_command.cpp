@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "apps/twofold/commands.hpp"
+#include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/surface/registered_cloud.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "base/processor_time.hpp"
@@ -228,6 +229,8 @@ void run_surface(const SurfaceArguments& arguments) {
     throw IoError("twofold surface", reason);
   SurfaceJob job = surface_job(arguments);
   prepare_output_folder(job.out);
+  expect_place_for_file(arguments.obj, "--obj");
+  expect_place_for_file(arguments.picture, "--picture");
   if (options.depth_noise == 0) options.depth_noise = usual_depth_noise(job.source->rig());
   DepthFusion fusion(arguments, job, options);
   Frame frame;
