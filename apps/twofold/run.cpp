@@ -293,6 +293,9 @@ void write_results(const RunArguments& arguments, const EngineOptions& options, 
   if (surface.wanted())
     failures.attempt(
         [&] { figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id); });
+  // Of a run that tracked nothing, or was interrupted, a surface is not expected.
+  if (figures && figures->triangles == 0 && result.counts.tracked > 0 && !result.interrupted)
+    failures.add(arguments.source + ": --surface: " + no_mesh_reason(*figures, SurfaceOptions().max_depth));
   failures.attempt([&] {
     write_run_output(arguments.out, frames_of(arguments, calibration, failures), source, options, result,
                      parts, figures ? surface_json(*figures) : nullptr);

@@ -287,6 +287,18 @@ TEST(SurfaceCommand, OfNoBlocksNothingIsSaidPerCubicMetre) {
   EXPECT_NE(outcome.out.find(" 0 blocks, 0 MiB at most, colour"), std::string::npos) << outcome.out;
 }
 
+TEST(SurfaceCommand, ARunWithoutAMeshFailsAndSaysWhy) {
+  const ScratchFolder folder;
+  const Outcome outcome =
+      run(folder, "run 'synthetic:desk?sensor=rgbd&width=320&height=240&frames=20' " +
+                      std::string("--deterministic --quiet --surface 5 --out '") + (folder / "run") + "'");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.out;
+  EXPECT_NE(outcome.err.find("gave no surface: voxels of 5 m are too coarse"), std::string::npos)
+      << outcome.err;
+  const auto summary = nlohmann::json::parse(content(folder / "run/summary.json"));
+  ASSERT_EQ(summary["errors"].size(), 1u);
+}
+
 TEST(SurfaceCommand, SaysWhatCannotBe) {
   const ScratchFolder folder;
   const std::string to = " --out '" + (folder / "result") + "'";
@@ -351,7 +363,8 @@ TEST(SurfaceCommand, SaysWhatCannotBe) {
                             "truth --max-depth 0.31" +
                                 to);
   EXPECT_EQ(empty.exit_code, 1);
-  EXPECT_NE(empty.err.find("gave no surface"), std::string::npos) << empty.err;
+  EXPECT_NE(empty.err.find("gave no surface: no reading is within 0.31 m (--max-depth)"), std::string::npos)
+      << empty.err;
 }
 
 }  // namespace

@@ -159,7 +159,8 @@ void run_object(ObjectArguments& arguments) {
   print_summary(arguments.out, source->rig(), options, result, parts);
   print_surface(model.figures);
   if (model.mesh.triangles.empty())
-    throw std::runtime_error(arguments.source + ": the object's frames gave no surface");
+    throw std::runtime_error(arguments.source + ": " +
+                             no_mesh_reason(model.figures, arguments.surface.max_depth));
   write_object(arguments, model, result);
   print_object(model, result);
   if (!result.losses.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(result.losses, "; ")));

@@ -251,7 +251,7 @@ void run_surface(const SurfaceArguments& arguments) {
   say_without_partner(arguments.poses.empty(), job.poses.size(), posed, unposed, figures);
   print_surface(figures);
   if (mesh.triangles.empty())
-    throw std::runtime_error(arguments.input + ": the depth images gave no surface");
+    throw std::runtime_error(arguments.input + ": " + no_mesh_reason(figures, options.max_depth));
   const Vector3 up = up_axis_of(job.poses) == 2 ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
   write_surface(job.out, mesh, up);
   if (!arguments.obj.empty()) write_obj_mesh(arguments.obj, mesh);

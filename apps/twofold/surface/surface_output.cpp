@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "base/counted.hpp"
 #include "io/files/mesh_file.hpp"
@@ -79,6 +80,20 @@ void print_surface(const SurfaceFigures& f) {
           m.loops, m.loop_max_ms, m.joined_max_ms, m.settled_max_ms);
   }
   for (const std::string& what : f.left_out) fmt::print("left out    {}\n", what);
+}
+
+std::string no_mesh_reason(const SurfaceFigures& f, double max_depth) {
+  const std::string what = "the depth images gave no surface: ";
+  if (f.fused == 0)
+    return what + (f.left_out.empty()
+                       ? "there was none to fuse"
+                       : fmt::format("none was fused, but left out: {}", fmt::join(f.left_out, "; ")));
+  if (f.blocks == 0 && max_depth > 0)
+    return what + fmt::format("no reading is within {:g} m (--max-depth)", max_depth);
+  if (f.blocks == 0) return what + "their keyframes are not in the map any more";
+  return what +
+         fmt::format("voxels of {:g} m are too coarse for what was seen, or too fine for the depth's noise",
+                     f.voxel);
 }
 
 void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh, const Vector3& up) {

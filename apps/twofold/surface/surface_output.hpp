@@ -51,6 +51,11 @@ void describe_volume(const SurfaceVolume& volume, SurfaceFigures& figures);
 [[nodiscard]] nlohmann::ordered_json surface_json(const SurfaceFigures& figures);
 void print_surface(const SurfaceFigures& figures);
 
+/// "the depth images gave no surface: " and why, where the mesh has no triangle: how none was fused, that
+/// readings were too far away, or that voxels do not fit what was seen.
+/// @param max_depth  SurfaceOptions::max_depth [m]
+[[nodiscard]] std::string no_mesh_reason(const SurfaceFigures& figures, double max_depth);
+
 /// surface.ply and surface.glb in this folder; those of an earlier run are removed when there is no triangle.
 /// Throws IoError.
 /// @param up  unit: what is shown upright
