@@ -273,9 +273,7 @@ void print_results(const RunArguments& arguments, const EngineOptions& options, 
   if (scale_is_arbitrary(source.rig(), options))
     fmt::print("scale       arbitrary: one camera does not show it (eval --align sim3)\n");
   for (const std::string& map : maps) fmt::print("map in      {}\n", map);
-  const SourceReport captured = source.report();
-  for (const std::string& text : captured.summary) fmt::print("{}\n", text);
-  for (const std::string& text : captured.faults) fmt::print("  {}\n", text);
+  print_source_report(source.report());
 }
 
 /// What is left of a run that is over: files and figures. What cannot be written stops nothing else, and is

@@ -227,6 +227,11 @@ void print_summary(const std::filesystem::path& folder, const Rig& rig, const En
   fmt::print("written to  {}\n", folder.string());
 }
 
+void print_source_report(const SourceReport& report) {
+  for (const std::string& text : report.summary) fmt::print("{}\n", text);
+  for (const std::string& text : report.faults) fmt::print("  {}\n", text);
+}
+
 bool scale_is_arbitrary(const Rig& rig, const EngineOptions& options) {
   return rig.kind == SensorKind::kMono && !(options.map && options.map->rig.kind != SensorKind::kMono);
 }

@@ -39,6 +39,9 @@ void write_trace(const std::filesystem::path& file, const RunResult& result);
 void print_summary(const std::filesystem::path& folder, const Rig& rig, const EngineOptions& options,
                    const RunResult& result, const std::vector<MapPart>& parts);
 
+/// What the source left out, and why, on standard output.
+void print_source_report(const SourceReport& report);
+
 /// One camera does not show how long a metre is, unless it is localised in a map that a stereo or RGB-D rig
 /// made.
 [[nodiscard]] bool scale_is_arbitrary(const Rig& rig, const EngineOptions& options);

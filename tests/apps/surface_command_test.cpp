@@ -269,6 +269,26 @@ TEST(SurfaceCommand, SaysWhatHadNoPoseAndThatGreyWasAskedFor) {
   EXPECT_NE(outcome.out.find("as asked for (--grey)"), std::string::npos) << outcome.out;
 }
 
+TEST(SurfaceCommand, SaysWhichImagesAreDamaged) {
+  const ScratchFolder folder;
+  const std::string recording = folder / "recording";
+  ASSERT_EQ(run(folder,
+                "render 'synthetic:desk?sensor=rgbd&width=160&height=120&frames=6' --out '" + recording + "'")
+                .exit_code,
+            0);
+  std::vector<std::filesystem::path> depths;
+  for (const auto& file : std::filesystem::directory_iterator(recording + "/mav0/depth0/data"))
+    depths.push_back(file.path());
+  std::sort(depths.begin(), depths.end());
+  ASSERT_EQ(depths.size(), 6u);
+  std::filesystem::resize_file(depths[2], 100);
+  const Outcome outcome = run(folder, "surface 'tum:" + recording + "' --poses truth --voxel 0.02 --out '" +
+                                          (folder / "result") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("left out: 1 frame with a damaged image"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(depths[2].filename().string()), std::string::npos) << outcome.out;
+}
+
 TEST(SurfaceCommand, StereoGivesASurface) {
   const ScratchFolder folder;
   const std::string scene = "'synthetic:desk?width=320&height=240&frames=20'";

@@ -158,6 +158,7 @@ void run_object(ObjectArguments& arguments) {
                    *source, options, result, parts, surface_json(model.figures));
   print_summary(arguments.out, source->rig(), options, result, parts);
   print_surface(model.figures);
+  print_source_report(source->report());
   if (model.mesh.triangles.empty())
     throw std::runtime_error(arguments.source + ": " +
                              no_mesh_reason(model.figures, arguments.surface.max_depth));

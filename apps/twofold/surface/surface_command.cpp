@@ -13,6 +13,7 @@
 
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/output/output_folder.hpp"
+#include "apps/twofold/run_output.hpp"
 #include "apps/twofold/surface/registered_cloud.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "base/processor_time.hpp"
@@ -250,6 +251,7 @@ void run_surface(const SurfaceArguments& arguments) {
   const TriangleMesh mesh = fusion.finish(figures);
   say_without_partner(arguments.poses.empty(), job.poses.size(), posed, unposed, figures);
   print_surface(figures);
+  print_source_report(job.source->report());
   if (mesh.triangles.empty())
     throw std::runtime_error(arguments.input + ": " + no_mesh_reason(figures, options.max_depth));
   const Vector3 up = up_axis_of(job.poses) == 2 ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
