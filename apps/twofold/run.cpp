@@ -279,7 +279,7 @@ void print_results(const RunArguments& arguments, const EngineOptions& options, 
 /// What is left of a run that is over: files and figures. What cannot be written stops nothing else, and is
 /// told at the end.
 void write_results(const RunArguments& arguments, const EngineOptions& options, const PreparedSource& frames,
-                   const std::optional<AutoCalibration>& calibration, const RunResult& result,
+                   const std::optional<AutoCalibration>& calibration, RunResult& result,
                    const PoseStreaming& poses, LiveSurface& surface) {
   const FrameSource& source = *frames.source;
   const std::vector<MapPart> parts = map_parts(result, options);
@@ -294,6 +294,7 @@ void write_results(const RunArguments& arguments, const EngineOptions& options, 
   // Of a run that tracked nothing, or was interrupted, a surface is not expected.
   if (figures && figures->triangles == 0 && result.counts.tracked > 0 && !result.interrupted)
     failures.add(arguments.source + ": --surface: " + no_mesh_reason(*figures, SurfaceOptions().max_depth));
+  update_peak_memory(result);
   failures.attempt([&] {
     write_run_output(arguments.out, frames_of(arguments, calibration, failures), source, options, result,
                      parts, figures ? surface_json(*figures) : nullptr);
@@ -332,7 +333,7 @@ int run(const RunArguments& arguments) {
   LiveSurface surface(arguments.surface, *source, options, one_thread,
                       mesh_listener(view, arguments.surface.voxel));
   remove_earlier_run(arguments.out, calibrated_by);  // nothing refuses this one any more
-  const RunResult result = run_engine(arguments, options, std::move(schedule), *source, view, surface);
+  RunResult result = run_engine(arguments, options, std::move(schedule), *source, view, surface);
   poses.finish();
   view.finish();
 

@@ -17,6 +17,7 @@
 #include "apps/twofold/view/run_frames.hpp"
 #include "base/counted.hpp"
 #include "base/text_of_json.hpp"
+#include "engine/health.hpp"
 #include "evaluation/evaluation.hpp"
 #include "io/files/io_error.hpp"
 #include "io/files/output_file.hpp"
@@ -83,6 +84,10 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
 }
 
 }  // namespace
+
+void update_peak_memory(RunResult& result) {
+  result.peak_rss_mb = static_cast<double>(process_usage().peak_rss_bytes) / (1 << 20);
+}
 
 void write_run_output(const std::filesystem::path& folder, const RunFrames& frames, const FrameSource& source,
                       const EngineOptions& options, const RunResult& result,
@@ -195,7 +200,7 @@ void print_times(const EngineOptions& options, const RunResult& result) {
   const auto frames = static_cast<double>(result.frames.size());
   const std::string a_frame =
       frames > 0 ? fmt::format(" ({:.1f} CPU-ms a frame)", 1e3 * result.cpu_seconds / frames) : "";
-  fmt::print("cost        {:.1f} s wall, {:.1f} s CPU{}, {:.0f} MB at most\n", result.wall_seconds,
+  fmt::print("cost        {:.1f} s wall, {:.1f} s CPU{}, {:.0f} MiB at most\n", result.wall_seconds,
              result.cpu_seconds, a_frame, result.peak_rss_mb);
 }
 

@@ -22,6 +22,10 @@ struct RunFrames {
   std::vector<std::string> errors = {};  ///< of the run: what it failed of, and what was lost
 };
 
+/// RunResult::peak_rss_mb as it is by now: what comes after the run, a surface's mesh above all, may take
+/// more memory than the run itself.
+void update_peak_memory(RunResult& result);
+
 /// Writes a run's folder: trajectory.txt (final), trajectory_causal.txt, keyframes.txt, with a loaded map
 /// keyframes_loaded.txt, groundtruth.txt if
 /// known (all TUM form), map.ply, timing.json, loop_latency.txt, summary.json, trajectory.png

@@ -319,6 +319,24 @@ TEST(SurfaceCommand, ARunWithoutAMeshFailsAndSaysWhy) {
   ASSERT_EQ(summary["errors"].size(), 1u);
 }
 
+/// A surface of fine voxels takes more memory in the end than before.
+TEST(SurfaceCommand, ThePeakOfMemoryIsThatWithTheMesh) {
+  const ScratchFolder folder;
+  const std::string python =
+      "python3 -c 'import resource, subprocess, sys; code = subprocess.call(sys.argv[1:]); "
+      "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr); sys.exit(code)'";
+  const Outcome outcome = run(folder,
+                              "run 'synthetic:desk?sensor=rgbd&width=320&height=240&frames=30' "
+                              "--deterministic --quiet --surface 0.004 --out '" +
+                                  (folder / "run") + "'",
+                              python);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const double peak = std::stod(outcome.err) / 1024;  // the kernel counts in KiB
+  const double told = nlohmann::json::parse(content(folder / "run/summary.json"))["peak_rss_mb"];
+  std::printf("peak %.1f MiB, told %.1f MiB\n", peak, told);
+  EXPECT_NEAR(told, peak, 0.02 * peak);
+}
+
 TEST(SurfaceCommand, SaysWhatCannotBe) {
   const ScratchFolder folder;
   const std::string to = " --out '" + (folder / "result") + "'";

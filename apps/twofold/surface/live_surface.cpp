@@ -32,8 +32,9 @@ void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments
                              ->check(above_zero());
   command
       .add_option("--surface-memory", arguments.memory_mb,
-                  "No more keyframes are fused once samples and depth images take this much [MiB]; the mesh "
-                  "takes as much again")
+                  "No more keyframes are fused once samples and depth images take this much [MiB]; joining "
+                  "the submaps and the mesh at the end take beside it up to five times the samples, the more "
+                  "the finer the voxels")
       ->check(above_zero())
       ->capture_default_str()
       ->needs(surface);

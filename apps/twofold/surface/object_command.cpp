@@ -143,7 +143,7 @@ void run_object(ObjectArguments& arguments) {
   catch_interrupts();
   Engine engine(source->rig(), options);
   const FrameFeed feed = [&](Frame& frame) { return source->next(frame); };
-  const RunResult result = engine.run(feed, interrupted(), [](const Progress&) {});
+  RunResult result = engine.run(feed, interrupted(), [](const Progress&) {});
   if (!source->error().empty()) throw IoError(arguments.source, source->error());
   if (!result.error.empty()) throw std::runtime_error(result.error);
   if (const std::string reason = source->nothing_shown(); !reason.empty())
@@ -154,6 +154,7 @@ void run_object(ObjectArguments& arguments) {
         ": the object could not be tracked: it is too small in the images, or without texture");
   const std::vector<MapPart> parts = map_parts(result, options);
   const ObjectModel model = build_object(*source, parts.front().trajectory, arguments.surface);
+  update_peak_memory(result);
   write_run_output(arguments.out, {arguments.source, "", arguments.calibration, nullptr, result.losses},
                    *source, options, result, parts, surface_json(model.figures));
   print_summary(arguments.out, source->rig(), options, result, parts);
