@@ -12,8 +12,6 @@
 namespace twofold {
 namespace {
 
-constexpr double kReach = 10;  // thresholds
-
 DistanceStatistics statistics(const std::vector<MeshPoint>& samples, const TriangleGrid& surface,
                               double threshold) {
   std::vector<float> distances;
@@ -82,7 +80,7 @@ SurfaceComparison compare_surfaces(const TriangleMesh& estimate, const SE3& T_w_
   moved.positions.reserve(estimate.positions.size());
   for (const Eigen::Vector3f& x : estimate.positions)
     moved.positions.emplace_back((T_w_e * Vector3(x.cast<double>())).cast<float>());
-  const auto reach = static_cast<float>(kReach * options.threshold);
+  const auto reach = static_cast<float>(kMostThresholds * options.threshold);
   const auto spacing = static_cast<float>(options.spacing);
   const TriangleGrid true_surface(truth, reach);
   SurfaceComparison result;

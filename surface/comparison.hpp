@@ -8,6 +8,8 @@
 
 namespace twofold {
 
+inline constexpr double kMostThresholds = 10;  ///< distances are cut at so many
+
 struct SurfaceComparisonOptions {
   double threshold = 0.01;  ///< what counts as near, for completeness, precision and F-score [m] > 0
   double spacing = 0.005;   ///< of the points that are compared [m] > 0
@@ -18,7 +20,7 @@ struct SurfaceComparisonOptions {
 
 struct DistanceStatistics {
   std::size_t points = 0;
-  double mean = 0, median = 0, p95 = 0, rmse = 0;  ///< [m]; distances are cut at ten times the threshold
+  double mean = 0, median = 0, p95 = 0, rmse = 0;  ///< [m]; distances are cut at kMostThresholds
   double near = 0;                                 ///< share of points within the threshold
 };
 

@@ -53,6 +53,9 @@ TEST(SurfaceCommand, AlongTruePosesTheSurfaceIsTheTrueOne) {
   EXPECT_LT(figures["accuracy"]["mean_m"], 0.002);
   EXPECT_GT(figures["completeness"]["within_threshold"], 0.85);
   EXPECT_FALSE(content(folder / "heat.png").empty());
+  EXPECT_NE(compared.out.find("points 5 mm apart, distances cut at 100 mm"), std::string::npos)
+      << compared.out;
+  EXPECT_NE(compared.out.find("heat.png, red from 10 mm on"), std::string::npos) << compared.out;
 }
 
 /// Points lie where the mesh is, in its colours, and cover it.
@@ -335,6 +338,26 @@ TEST(SurfaceCommand, ThePeakOfMemoryIsThatWithTheMesh) {
   const double told = nlohmann::json::parse(content(folder / "run/summary.json"))["peak_rss_mb"];
   std::printf("peak %.1f MiB, told %.1f MiB\n", peak, told);
   EXPECT_NEAR(told, peak, 0.02 * peak);
+}
+
+/// A millimetre or less, read as a metre.
+TEST(SurfaceCommand, AWrongUnitOfDepthShows) {
+  const ScratchFolder folder;
+  const std::string recording = folder / "recording";
+  ASSERT_EQ(run(folder,
+                "render 'synthetic:desk?sensor=rgbd&width=160&height=120&frames=3' --out '" + recording + "'")
+                .exit_code,
+            0);
+  folder.write("unit.yaml",
+               "sensor: rgbd\nfps: 30\ncameras: [{size: [160, 120], intrinsics: [120, 120, 79.5, 59.5]}]\n"
+               "depth: {unit: 1, min: 0.3, max: 8, virtual_baseline: 0.1}\n");
+  const Outcome outcome = run(folder, "surface 'tum:" + recording + "' --poses truth --voxel 0.02 --calib '" +
+                                          (folder / "unit.yaml") + "' --out '" + (folder / "result") + "'");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("3 depth images without any reading from 0.3 to 8 m; theirs are from "),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("by a unit of 1 m (depth: unit)"), std::string::npos) << outcome.err;
 }
 
 TEST(SurfaceCommand, SaysWhatCannotBe) {

@@ -223,7 +223,8 @@ void add_surface_options(CLI::App* command, CLI::Option* max_difference,
       ->needs(surface);
   command
       ->add_option("--threshold", arguments->threshold,
-                   "--surface: distance of surfaces that counts as near [m]")
+                   "--surface: distance of surfaces that counts as near [m]; distances are cut at ten times "
+                   "it, points are half of it apart")
       ->check(CLI::Range(1e-4, 10.0))
       ->capture_default_str()
       ->needs(surface);
@@ -255,8 +256,10 @@ void add_eval_command(CLI::App& app, int& exit_code) {
           ->check(at_least_zero())
           ->capture_default_str();
   command->add_option("--json", arguments->json, "write all figures to this file");
-  command->add_option("--plot", arguments->plot,
-                      "draw both paths from above, or the surface, coloured by error, to this PNG file");
+  command->add_option(
+      "--plot", arguments->plot,
+      "draw both paths from above, or the surface, coloured by error (red from --threshold on), "
+      "to this PNG file");
   add_surface_options(command, difference, arguments);
   command->callback([arguments, &exit_code] {
     run_eval(*arguments);

@@ -90,12 +90,14 @@ void print_notes(const SurfaceEvalArguments& arguments, const std::optional<RunA
                arguments.estimate);
 }
 
-void print_comparison(const SurfaceEvalArguments& arguments, bool moved, const SurfaceComparison& found) {
-  fmt::print("{} against {}{}\n{}\n\n", arguments.estimate, arguments.truth,
-             arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
+void print_comparison(const SurfaceEvalArguments& arguments, bool moved,
+                      const SurfaceComparisonOptions& options, const SurfaceComparison& found) {
+  fmt::print("{} against {}{}\n{}; points {:g} mm apart, distances cut at {:g} mm\n\n", arguments.estimate,
+             arguments.truth, arguments.seen.empty() ? "" : ", as far as " + arguments.seen + " was seen",
              arguments.fit ? "moved so that the surfaces fit best"
              : moved       ? "moved as the run's poses onto the ground truth"
-                           : "not moved");
+                           : "not moved",
+             1e3 * options.spacing, 1e3 * kMostThresholds * options.threshold);
   fmt::print("{:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>11}\n", "[mm]", "points", "mean", "median", "p95",
              "rmse", fmt::format("<= {:g} mm", 1e3 * arguments.threshold));
   print_row("accuracy", found.accuracy);
@@ -119,7 +121,7 @@ void eval_surface(const SurfaceEvalArguments& arguments) {
   options.threshold = arguments.threshold;
   options.spacing = spacing;
   const SurfaceComparison found = compare_surfaces(estimate, T_w_e.value_or(SE3()), truth, seen, options);
-  print_comparison(arguments, T_w_e.has_value(), found);
+  print_comparison(arguments, T_w_e.has_value(), options, found);
   print_notes(arguments, alignment);
   if (!arguments.json.empty()) {
     const nlohmann::ordered_json json{{"estimate", arguments.estimate},
@@ -133,8 +135,10 @@ void eval_surface(const SurfaceEvalArguments& arguments) {
                                       {"f_score", found.f_score}};
     write_file(arguments.json, text_of_json(json, 2) + "\n");
   }
-  if (!arguments.plot.empty())
+  if (!arguments.plot.empty()) {
     write_png(arguments.plot, heat_map(estimate, T_w_e.value_or(SE3()), found, arguments.threshold));
+    fmt::print("picture in     {}, red from {:g} mm on\n", arguments.plot, 1e3 * arguments.threshold);
+  }
 }
 
 }  // namespace twofold

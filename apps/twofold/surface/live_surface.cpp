@@ -200,6 +200,7 @@ void LiveSurface::take(const Frame& frame, double row_offset) {
     ++unfit_;
     return;
   }
+  out_of_range_.look_at(rig_, depth);
   surface_->offer(pack_keyframe_depth(frame.index, depth, colour), {depth, colour});
 }
 
@@ -231,9 +232,11 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   const auto left_out = [&](int count, const std::string& what) {
     if (count > 0) figures.left_out.push_back(fmt::format("{} {}", count, what));
   };
-  left_out(report.without_readings, "depth images without any reading within range");
-  left_out(report.culled, "keyframes that the map culled: their depth is not fused anew");
-  left_out(report.submaps_dropped, "submaps all of whose keyframes the map culled");
+  left_out(report.without_readings, out_of_range_.text(rig_));
+  left_out(report.culled,
+           "keyframes at most, culled because others see the same: what they added stays until their submap "
+           "is fused anew");
+  left_out(report.submaps_dropped, "submaps all of whose keyframes were culled: others see the same");
   left_out(report.beyond_memory, "keyframes beyond the memory that the surface may take (--surface-memory)");
   left_out(report.overtaken + overtaken_, "keyframes, because the surface was behind (--surface-load)");
   left_out(unfit_, "images that did not fit: " + defect_);

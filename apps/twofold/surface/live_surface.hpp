@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "apps/twofold/surface/depth_out_of_range.hpp"
 #include "apps/twofold/surface/live_mesh.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "base/right_of_way.hpp"
@@ -86,6 +87,7 @@ class LiveSurface {
   std::optional<SubmapSurface> surface_;  // the surface's thread's
   std::uint64_t version_ = 0;             // likewise: of the map it saw last
   int coloured_ = 0;                      // likewise
+  DepthOutOfRange out_of_range_;          // likewise
   std::string defect_;                    // likewise: of the newest image that did not fit
   int unfit_ = 0;                         // likewise
   std::string colour_defect_;             // likewise: of the newest that could not be read

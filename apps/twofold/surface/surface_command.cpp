@@ -14,6 +14,7 @@
 #include "apps/twofold/commands.hpp"
 #include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/run_output.hpp"
+#include "apps/twofold/surface/depth_out_of_range.hpp"
 #include "apps/twofold/surface/registered_cloud.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "base/processor_time.hpp"
@@ -175,6 +176,7 @@ class DepthFusion {
     const DepthView view = make_depth_view(rig, depth, colour.empty() ? frame.left : colour);
     if (share_of_readings(view) == 0) {
       ++empty_;
+      out_of_range_.look_at(rig, depth);
       return;
     }
     volume_.fuse(view, T_w_c.inverse());
@@ -199,7 +201,7 @@ class DepthFusion {
                      : grey_       ? "grey: as asked for (--grey)"
                                    : "grey: the source gives no other";
     if (empty_ > 0)
-      figures.left_out.push_back(fmt::format("{} depth images without any reading within range", empty_));
+      figures.left_out.push_back(fmt::format("{} {}", empty_, out_of_range_.text(source_.rig())));
     return mesh;
   }
 
@@ -210,6 +212,7 @@ class DepthFusion {
   std::optional<RegisteredCloud> cloud_;
   const bool grey_;
   int fused_ = 0, empty_ = 0, coloured_ = 0;
+  DepthOutOfRange out_of_range_;
   std::int64_t fusion_ns_ = 0;
 };
 
