@@ -287,7 +287,7 @@ TEST(EvalCommand, BadInputIsOneLineAndExitCodeTwo) {
   expect_bad_input(run(folder, "eval " + truth + " " + (folder / "none")), "none: no such file or folder");
   expect_bad_input(run(folder, "eval " + truth + " " + truth + " --align fancy"), "align");
   expect_bad_input(run(folder, "eval " + truth + " " + truth + " --plot /nonexistent/p.png"),
-                   "cannot be written");
+                   "/nonexistent/p.png: the folder is not there");
   expect_bad_input(run(folder, "eval " + truth), "GROUNDTRUTH");
   expect_bad_input(run(folder, "eval --what"), "");
   expect_bad_input(run(folder, ""), "subcommand");
