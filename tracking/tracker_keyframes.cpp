@@ -29,7 +29,8 @@ double Tracker::median_depth(const SE3& T_c_ref) {
 
 /// What says, beside its pose, whether this frame should become a keyframe.
 TrackedView Tracker::tracked_view() const {
-  return {occupied_regions(rig_.camera, search_), proposer_.revisits(search_, local_map_)};
+  return {occupied_regions(rig_.camera, search_), proposer_.revisits(search_, local_map_),
+          pose_estimator_.mistrusts_the_young()};
 }
 
 /// What later frames are judged by if this one becomes a keyframe.

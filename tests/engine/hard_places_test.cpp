@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
+#include <string>
 
 #include "tests/engine/whole_run.hpp"
 
@@ -54,10 +56,21 @@ SyntheticOptions small(const char* place, int frames) {
   return scene;
 }
 
-void expect_not_taken_along(const char* place) {
+struct PeopledPlace {
+  const char* scene;
+  std::uint64_t seed;
+};
+
+class AmongPeople : public ::testing::TestWithParam<PeopledPlace> {};
+
+/// In the corridor a step darker before the end wall, of which half is plain, a turn left nobody any point
+/// with seeds 2, 4 and 5: no other ones had been started in time.
+TEST_P(AmongPeople, TheCameraIsNotTakenAlong) {
+  const auto& [place, seed] = GetParam();
   SyntheticOptions scene = small(place, 330);
+  scene.seed = seed;
   const Walk alone = walk(scene);
-  EXPECT_EQ(alone.with_moving, 0) << place;
+  EXPECT_EQ(alone.with_moving, 0);
   scene.walkers = 4;
   scene.plain = 0.5;
   scene.exposure_steps = 1;
@@ -65,17 +78,16 @@ void expect_not_taken_along(const char* place) {
   const Walk among_people = walk(scene);
   std::printf("%s: ATE %.4f m alone, %.4f m among people; moving points in %d and %d of %d frames\n", place,
               alone.ate, among_people.ate, alone.with_moving, among_people.with_moving, alone.frames);
-  EXPECT_LT(among_people.ate, 3 * alone.ate) << place;
-  EXPECT_GT(among_people.with_moving, 10) << place;
+  EXPECT_LT(among_people.ate, 3 * alone.ate);
+  EXPECT_GT(among_people.with_moving, 10);
 }
 
-TEST(HardPlaces, PeopleInTheCourtyardDoNotTakeTheCameraAlong) {
-  expect_not_taken_along("courtyard");
-}
-
-TEST(HardPlaces, PeopleInTheCorridorDoNotTakeTheCameraAlong) {
-  expect_not_taken_along("corridor");
-}
+INSTANTIATE_TEST_SUITE_P(HardPlaces, AmongPeople,
+                         ::testing::Values(PeopledPlace{"courtyard", 1}, PeopledPlace{"corridor", 1},
+                                           PeopledPlace{"corridor", 2}, PeopledPlace{"corridor", 4}),
+                         [](const auto& test) {
+                           return test.param.scene + std::string("Seed") + std::to_string(test.param.seed);
+                         });
 
 /// A quadrotor in a hurry: at up to 2.6 m and 250 degrees a second beside its way, with motion blur.
 TEST(HardPlaces, FlightThroughTheCourtyard) {

@@ -13,7 +13,7 @@ class KeyframeDecisionTest : public ::testing::Test {
   KeyframeDecisionTest() {
     result_.reference_in_view = 1;
     result_.searched = 100;
-    result_.matches = 90;
+    result_.matches = result_.inliers = 90;
   }
 
   void move(double depths) { result_.T_c_ref = SE3(SO3(), {0, depths * last_.median_depth, 0}); }
@@ -77,6 +77,22 @@ TEST_F(KeyframeDecisionTest, WherePointsAreHardToFindOneCameraMakesNoMore) {
   last_.most_tracked = 0.34;
   result_.matches = 34;
   EXPECT_TRUE(due()) << "too little to wait";
+}
+
+TEST_F(KeyframeDecisionTest, EarlierWhereFewPointsAreLeft) {
+  result_.reference_in_view = 0.85;  // share: 0.765
+  result_.inliers = options_.keyframes.few_points;
+  EXPECT_FALSE(due());
+  --result_.inliers;
+  EXPECT_TRUE(due()) << "a turn goes on, and takes the rest of them out of view";
+  seen_.young_mistrusted = true;
+  EXPECT_FALSE(due()) << "what passes by would get new points, too";
+  seen_.young_mistrusted = false;
+  last_.most_tracked = 0.8;
+  EXPECT_FALSE(due()) << "one camera's new points have no depth yet";
+  last_.most_tracked.reset();
+  result_.reference_in_view = 0.9;  // 0.81
+  EXPECT_FALSE(due()) << "the camera hardly moved";
 }
 
 TEST_F(KeyframeDecisionTest, WhenHalfOfTheImageHasEmptied) {

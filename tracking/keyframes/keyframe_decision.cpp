@@ -5,6 +5,14 @@
 namespace twofold {
 namespace {
 
+/// Of the reference's points, below which a keyframe is due.
+double least_share(const TrackResult& result, const KeyframeView& last, const TrackedView& seen,
+                   const KeyframeDecisionOptions& options) {
+  const bool one_camera = last.most_tracked.has_value();  // a keyframe gives it no points at once
+  const bool few = result.inliers < options.few_points && !seen.young_mistrusted && !one_camera;
+  return few ? options.few_tracked_share : options.tracked_share;
+}
+
 /// Whether the camera has hardly moved, tracks enough, and still finds about as much as it did.
 bool may_wait(const TrackResult& result, const KeyframeView& last, const TrackedView& seen,
               const KeyframeDecisionOptions& options) {
@@ -36,7 +44,8 @@ bool keyframe_due(const TrackResult& result, const KeyframeView& last, const Tra
   const bool first_needs_second = backlog.map_is_young && way > options.young_map_share * parallax;
   if (bounds.urgent_keyframes_only) return first_needs_second;
   const bool emptied = seen.occupied_regions < (1 - options.emptied_share) * last.occupied_regions;
-  const bool lost = share < options.tracked_share && !may_wait(result, last, seen, options);
+  const bool lost =
+      share < least_share(result, last, seen, options) && !may_wait(result, last, seen, options);
   return way > parallax || lost || emptied || first_needs_second;
 }
 

@@ -20,8 +20,9 @@ struct KeyframeView {
 
 /// What of the map a frame tracks.
 struct TrackedView {
-  int occupied_regions = 0;  ///< of the image, in which a point is tracked
-  bool revisits = false;     ///< a place seen long ago (KeyframeDecisionOptions::revisited_share)
+  int occupied_regions = 0;       ///< of the image, in which a point is tracked
+  bool revisits = false;          ///< a place seen long ago (KeyframeDecisionOptions::revisited_share)
+  bool young_mistrusted = false;  ///< something moves, and new points may be on it (ElderVote)
 };
 
 /// What stands in the way of a keyframe, or makes one welcome.

@@ -19,6 +19,11 @@ struct KeyframeDecisionOptions {
                                 ///< where points last for a few keyframes, these hold its unit of length.
   int revisited_after = 30;     ///< keyframes after a point was begun it is one of a place seen again, >= 1
   double revisited_share = 0.25;  ///< of the points tracked, in (0, 1]: with so many of those it is one
+  /// With fewer points tracked, >= 0; 0: never: a keyframe is due earlier where depth is measured, because
+  /// the next turn may leave none of them, and before a keyframe nobody looks for others. Not while something
+  /// passes by: it would get points sooner, too ...
+  int few_points = 65;
+  double few_tracked_share = 0.8;  ///< ... below this share instead of tracked_share, in [tracked_share, 1]
   /// A keyframe is due when fewer than 1 - emptied_share times as many image regions hold a tracked point as
   /// at the last keyframe. In [0, 1].
   double emptied_share = 0.5;
