@@ -235,6 +235,7 @@ void run_surface(const SurfaceArguments& arguments) {
   prepare_output_folder(job.out);
   expect_place_for_file(arguments.obj, "--obj");
   expect_place_for_file(arguments.picture, "--picture");
+  expect_place_for_file(arguments.cloud, "--cloud");
   if (options.depth_noise == 0) options.depth_noise = usual_depth_noise(job.source->rig());
   DepthFusion fusion(arguments, job, options);
   Frame frame;
