@@ -180,8 +180,8 @@ class DepthFusion {
       return;
     }
     volume_.fuse(view, T_w_c.inverse());
-    if (cloud_) cloud_->add(view, T_w_c);
     fusion_ns_ += thread_cpu_ns() - begin_ns;
+    if (cloud_) cloud_->add(view, T_w_c);
     ++fused_;
   }
 
