@@ -160,7 +160,7 @@ TEST(Options, OfKeyframesAndPointsSayWhyTheyAreInvalid) {
                                          {"revisited_after", [](auto& o) { o.revisited_after = 0; }},
                                          {"revisited_share", [](auto& o) { o.revisited_share = 0; }},
                                          {"few_points", [](auto& o) { o.few_points = -1; }},
-                                         {"few_tracked_share", [](auto& o) { o.few_tracked_share = 0.6; }},
+                                         {"few_tracked_share", [](auto& o) { o.few_tracked_share = 1.1; }},
                                          {"young_map_share", [](auto& o) { o.young_map_share = 1.1; }},
                                          {"urgent_share", [](auto& o) { o.urgent_share = 0.7; }},
                                          {"max_pending", [](auto& o) { o.max_pending = 0; }}});

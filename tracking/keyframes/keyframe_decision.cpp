@@ -10,7 +10,7 @@ double least_share(const TrackResult& result, const KeyframeView& last, const Tr
                    const KeyframeDecisionOptions& options) {
   const bool one_camera = last.most_tracked.has_value();  // a keyframe gives it no points at once
   const bool few = result.inliers < options.few_points && !seen.young_mistrusted && !one_camera;
-  return few ? options.few_tracked_share : options.tracked_share;
+  return few ? std::max(options.few_tracked_share, options.tracked_share) : options.tracked_share;
 }
 
 /// Whether the camera has hardly moved, tracks enough, and still finds about as much as it did.

@@ -15,7 +15,7 @@ std::string KeyframeDecisionOptions::invalid_reason() const {
       .at_least("revisited_after", revisited_after, 1)
       .share("revisited_share", revisited_share)
       .at_least("few_points", few_points, 0)
-      .within("few_tracked_share", few_tracked_share, tracked_share, 1)
+      .within("few_tracked_share", few_tracked_share, 0, 1)
       .within("emptied_share", emptied_share, 0, 1)
       .above("turn", turn, 0)
       .within("young_map_share", young_map_share, 0, 1)

@@ -23,7 +23,7 @@ struct KeyframeDecisionOptions {
   /// the next turn may leave none of them, and before a keyframe nobody looks for others. Not while something
   /// passes by: it would get points sooner, too ...
   int few_points = 65;
-  double few_tracked_share = 0.8;  ///< ... below this share instead of tracked_share, in [tracked_share, 1]
+  double few_tracked_share = 0.8;  ///< ... below this share, in [0, 1], if it is more than tracked_share
   /// A keyframe is due when fewer than 1 - emptied_share times as many image regions hold a tracked point as
   /// at the last keyframe. In [0, 1].
   double emptied_share = 0.5;
