@@ -191,8 +191,7 @@ std::optional<double> constant_turn_deg(const std::vector<PosePair>& aligned) {
   return turn;
 }
 
-bool is_straight(const std::vector<PosePair>& pairs, double error) {
-  if (pairs.empty()) return true;
+Vector3 spread_of_positions(const std::vector<PosePair>& pairs) {
   const auto count = static_cast<double>(pairs.size());
   Vector3 mean = Vector3::Zero();
   for (const PosePair& pair : pairs) mean += pair.T_w_c.translation() / count;
@@ -202,7 +201,12 @@ bool is_straight(const std::vector<PosePair>& pairs, double error) {
     spread += d * d.transpose() / count;
   }
   const Eigen::SelfAdjointEigenSolver<Matrix3> solver(spread, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, solver.eigenvalues()[1])) < 3 * error;  // ascending: [2] is along the path
+  return solver.eigenvalues();
+}
+
+bool is_straight(const std::vector<PosePair>& pairs, double error) {
+  const double across = spread_of_positions(pairs)[1];  // [2] is along the path
+  return std::sqrt(std::max(0.0, across)) < 3 * error;
 }
 
 ErrorStatistics error_statistics(std::vector<double> errors) {

@@ -46,6 +46,10 @@ enum class Alignment : std::uint8_t { kNone, kSe3, kSim3 };
 /// than a tenth of that (root mean square)
 [[nodiscard]] std::optional<double> constant_turn_deg(const std::vector<PosePair>& aligned);
 
+/// Variances of the true positions along the principal axes of their spread, ascending [m^2]; all zero for no
+/// poses.
+[[nodiscard]] Vector3 spread_of_positions(const std::vector<PosePair>& pairs);
+
 /// Whether the true path is so straight that positions leave the turn about it open: across it, it spreads by
 /// less than three times `error` (root mean square) [m].
 [[nodiscard]] bool is_straight(const std::vector<PosePair>& pairs, double error);

@@ -83,6 +83,24 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
                        plot);
 }
 
+nlohmann::ordered_json summary_of(const RunFrames& frames, const FrameSource& source,
+                                  const EngineOptions& options, const RunResult& result,
+                                  const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface) {
+  nlohmann::ordered_json summary = summary_json(frames.source, options, result, parts);
+  summary["errors"] = frames.errors;
+  summary["error"] = fmt::format("{}", fmt::join(frames.errors, "; "));
+  summary["scale"] = scale_is_arbitrary(source.rig(), options) ? "arbitrary" : "metric";
+  summary["self_calibration"] = frames.calibration;
+  summary["surface"] = surface;
+  const auto path_or_null = [](const std::string& file) {
+    return file.empty() ? nlohmann::ordered_json(nullptr)
+                        : nlohmann::ordered_json(std::filesystem::absolute(file).string());
+  };
+  summary["calibration_file"] = path_or_null(frames.calibration_file);
+  summary["recording"] = path_or_null(frames.recording);
+  return summary;
+}
+
 }  // namespace
 
 void update_peak_memory(RunResult& result) {
@@ -92,6 +110,9 @@ void update_peak_memory(RunResult& result) {
 void write_run_output(const std::filesystem::path& folder, const RunFrames& frames, const FrameSource& source,
                       const EngineOptions& options, const RunResult& result,
                       const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface) {
+  // First: it says what the run failed of, also where the disk has no room for what follows.
+  const auto summary = summary_of(frames, source, options, result, parts, surface);
+  write_file(folder / "summary.json", text_of_json(summary, 2) + "\n");
   const Trajectory& final_poses = parts.front().trajectory;
   const Trajectory causal_poses = causal_trajectory(result);
   write_tum_trajectory(folder / "trajectory.txt", final_poses);
@@ -111,25 +132,11 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   write_run_frames(folder / "frames.txt", result, options.pacing.keeps_pace());
   if (!source.ground_truth().empty()) write_tum_trajectory(folder / "groundtruth.txt", source.ground_truth());
   write_file(folder / "timing.json", text_of_json(timing_json(result), 1) + "\n");
-  const bool no_scale = scale_is_arbitrary(source.rig(), options);
-  nlohmann::ordered_json summary = summary_json(frames.source, options, result, parts);
-  summary["errors"] = frames.errors;
-  summary["error"] = fmt::format("{}", fmt::join(frames.errors, "; "));
-  summary["scale"] = no_scale ? "arbitrary" : "metric";
-  summary["self_calibration"] = frames.calibration;
-  summary["surface"] = surface;
-  const auto path_or_null = [](const std::string& file) {
-    return file.empty() ? nlohmann::ordered_json(nullptr)
-                        : nlohmann::ordered_json(std::filesystem::absolute(file).string());
-  };
-  summary["calibration_file"] = path_or_null(frames.calibration_file);
-  summary["recording"] = path_or_null(frames.recording);
-  write_file(folder / "summary.json", text_of_json(summary, 2) + "\n");
   write_file(folder / "loop_latency.txt", loop_latency_table(loop_latency(result)));
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",
               draw_run(frames.source, final_poses, causal_poses, source.ground_truth(),
-                       no_scale ? Alignment::kSim3 : Alignment::kSe3));
+                       scale_is_arbitrary(source.rig(), options) ? Alignment::kSim3 : Alignment::kSe3));
   }
 }
 

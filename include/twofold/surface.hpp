@@ -53,7 +53,8 @@ struct DistanceBox {
   bool unknown_is_obstacle = false;        ///< middles of unknown cells are taken for points of a surface
 
   /// Empty when valid; otherwise names the field, the rule and the value. The box and what is within reach
-  /// of it have 2^26 cells at most, which take 0.5 GB while distances are found.
+  /// of it have 2^26 cells at most, which take 0.5 GB while distances are found,
+  /// and up to 0.8 GB more where many are unknown and taken for obstacles.
   [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
 };
 

@@ -30,6 +30,7 @@ void KeyframeProposer::continue_from(const GraphSnapshot& graph) {
 }
 
 bool KeyframeProposer::revisits(const SearchOutcome& found, const LocalMap& local_map) const {
+  if (!one_camera_) return false;
   int inliers = 0, old = 0;
   for (std::size_t m = 0; m < found.matches.size(); ++m) {
     if (!found.observations[m].inlier) continue;

@@ -25,8 +25,8 @@ class KeyframeProposer {
   /// The numbers of keyframes and points continue those of a map made before.
   void continue_from(const GraphSnapshot& graph);
 
-  /// Whether a frame tracks a place that was seen long ago: enough of its inliers are of keyframes long
-  /// before the next one.
+  /// Whether a frame of one camera tracks a place that was seen long ago: enough of its inliers are of
+  /// keyframes long before the next one. Rigs do not wait with keyframes, and are not asked.
   [[nodiscard]] bool revisits(const SearchOutcome& found, const LocalMap& local_map) const;
   /// Whether a frame with a pose should become a keyframe. To be asked once of each: later ones are compared
   /// with what it tracks.

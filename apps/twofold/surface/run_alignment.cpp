@@ -1,6 +1,5 @@
 #include "apps/twofold/surface/run_alignment.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -33,17 +32,8 @@ double rotation_rmse(const std::vector<PosePair>& pairs, const SE3& T_w_e) {
 /// What the centres add to the least squares for the rotation about the axis that they say least about, over
 /// what the sides add: their mean square from that axis over two thirds of the squared distance.
 double weight_of_positions(const std::vector<PosePair>& pairs, double distance) {
-  const auto count = static_cast<double>(pairs.size());
-  Vector3 mean = Vector3::Zero();
-  for (const PosePair& pair : pairs) mean += pair.T_w_c.translation() / count;
-  Matrix3 spread = Matrix3::Zero();
-  for (const PosePair& pair : pairs) {
-    const Vector3 d = pair.T_w_c.translation() - mean;
-    spread += d * d.transpose() / count;
-  }
-  const Eigen::SelfAdjointEigenSolver<Matrix3> solver(spread, Eigen::EigenvaluesOnly);
-  const Vector3 moments = solver.eigenvalues();  // ascending
-  return (moments[0] + moments[1]) / (2.0 / 3.0 * distance * distance);
+  const Vector3 spread = spread_of_positions(pairs);
+  return (spread[0] + spread[1]) / (2.0 / 3.0 * distance * distance);
 }
 
 }  // namespace
