@@ -122,6 +122,8 @@ struct MappingTotals {
   std::int64_t metric_loops = 0;  ///< edges added by metric loop closure
   std::int64_t loops = 0;         ///< edges added by large-scale loop closure
   std::int64_t late_loops = 0;    ///< whose keyframes the map had forgotten, or never had
+  /// Adjusted all at once when the run ended (Mapper::adjust_all); 0: nothing called for it.
+  std::int64_t globally_adjusted_keyframes = 0;
 };
 
 /// A loop that was closed by appearance.

@@ -271,7 +271,10 @@ GraphSnapshot MapperRunner::publish() {
 }
 
 GraphSnapshot MapperRunner::finish() {
-  if (may_change_) mapper_.optimise_all_poses();
+  if (may_change_) {
+    mapper_.optimise_all_poses();
+    totals_.globally_adjusted_keyframes = mapper_.adjust_all().keyframes;
+  }
   tell_of_next_map();
   return publish();
 }

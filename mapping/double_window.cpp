@@ -153,6 +153,15 @@ int marginalise_all_edges(GraphWriter& writer) {
   return count;
 }
 
+void marginalise_edges_of(GraphWriter& writer, const DoubleWindow& window) {
+  for (const TreeNode& node : window.nodes) {
+    const std::shared_ptr<const EdgeList> edges = writer.graph().keyframe(node.id).edges;
+    for (const Edge& edge : *edges) {
+      if (edge.other > node.id && window.contains(edge.other)) marginalise(writer, node.id, edge.other);
+    }
+  }
+}
+
 int enter_window(GraphWriter& writer, const IdMap& consistent, const DoubleWindow& window) {
   const GraphSnapshot& graph = writer.graph();
   const auto& nodes = window.nodes;

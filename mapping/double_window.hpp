@@ -50,6 +50,10 @@ int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, cons
 /// @return  number of edges
 int marginalise_all_edges(GraphWriter& writer);
 
+/// Every edge within the window gets the present relative pose as its constraint, those that have one as
+/// well.
+void marginalise_edges_of(GraphWriter& writer, const DoubleWindow& window);
+
 /// Window entry, eq. 6.3: the poses of keyframes outside of `consistent`, and of all their children in the
 /// spanning tree, are set along the relative poses of the tree's edges. If the edges of a loop contradict
 /// each other, the contradiction thus appears at the rim of the window and not near the reference. Returns

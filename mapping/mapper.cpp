@@ -105,6 +105,7 @@ void Mapper::add_loop(const LoopConstraint& loop, MapperReport& report) {
   link_marginalised(writer_, from, to, loop.weight, T_to_from);
   if (options_.hook) options_.hook->loop_closed(from, to);
   writer_.announce_change(report.joined > 0 ? MapChange::Kind::kPartsJoined : MapChange::Kind::kLoopClosure);
+  loop_closed_ = true;
   ++report.loops;
 }
 
@@ -226,6 +227,11 @@ std::vector<KeyframeScaling> Mapper::take_similarities(const SimilarityUpdate& u
 
 PoseGraphReport Mapper::optimise_all_poses() {
   return optimise_all_components(writer_, rig_, options_);
+}
+
+GlobalAdjustmentReport Mapper::adjust_all() {
+  if (!options_.global.enabled || (rig_.kind != SensorKind::kMono && !loop_closed_)) return {};
+  return adjust_all_components(writer_, rig_, options_);
 }
 
 }  // namespace twofold

@@ -9,6 +9,7 @@
 #include "graph/loop_constraint.hpp"
 #include "mapping/culling.hpp"
 #include "mapping/double_window.hpp"
+#include "mapping/global_adjustment.hpp"
 #include "mapping/insertion.hpp"
 #include "mapping/metric_loop.hpp"
 #include "mapping/options.hpp"
@@ -87,6 +88,12 @@ class Mapper {
   /// Makes all poses agree globally, e.g. at the end of a run. Cost grows with the map.
   PoseGraphReport optimise_all_poses();
 
+  /// Bundle adjustment of everything, for the end of a run (adjust_all_components), where it helps: with one
+  /// camera, whose unit nothing else holds, and after a loop by appearance, which a pose graph alone has
+  /// spread. Elsewhere the windows have adjusted what there is. All poses must agree (optimise_all_poses).
+  /// Cost grows with the map.
+  GlobalAdjustmentReport adjust_all();
+
   [[nodiscard]] const DoubleWindow& window() const { return window_; }
   [[nodiscard]] const MapperOptions& options() const { return options_; }
 
@@ -111,6 +118,7 @@ class Mapper {
 
   DoubleWindow window_;       ///< of the last round
   DoubleWindow next_window_;  ///< being formed
+  bool loop_closed_ = false;  ///< by appearance
   int joined_ = 0;            ///< keyframes, by similarities that no round has reported yet
   IdMap consistent_;          ///< keyframes whose absolute poses agree: the last window and what joined since
   std::vector<KeyframeId> inserted_;  ///< in this round

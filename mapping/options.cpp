@@ -38,6 +38,14 @@ std::string CullingOptions::invalid_reason() const {
       .reason();
 }
 
+std::string GlobalAdjustmentOptions::invalid_reason() const {
+  return OptionCheck()
+      .at_least("max_keyframes", max_keyframes, 0)
+      .at_least("max_iterations", max_iterations, 1)
+      .at_least("rounds", rounds, 1)
+      .reason();
+}
+
 std::string MapperOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("inner_window", inner_window, 1)
@@ -54,6 +62,7 @@ std::string MapperOptions::invalid_reason() const {
       .above("outlier_chi2_stereo", outlier_chi2_stereo, 0)
       .nested("loop", loop.invalid_reason())
       .nested("culling", culling.invalid_reason())
+      .nested("global", global.invalid_reason())
       .reason();
 }
 

@@ -67,6 +67,17 @@ struct CullingOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
+/// Bundle adjustment of the whole map at the end of a run.
+struct GlobalAdjustmentOptions {
+  bool enabled = true;
+  int max_keyframes = 3000;  ///< maps of more keep what windows and pose graph gave them, >= 0
+  int max_iterations = 10;   ///< Levenberg-Marquardt steps a round, accepted or not, >= 1
+  int rounds = 2;            ///< after each, what disagrees is removed, >= 1
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] std::string invalid_reason() const;
+};
+
 struct MapperOptions {
   int inner_window = 25;            ///< M1 >= 1: keyframes joined by point-pose constraints  (6.2.3)
   int outer_window = 175;           ///< M2 >= 0: keyframes joined by pose-pose constraints (cDWO), anchors
@@ -84,6 +95,7 @@ struct MapperOptions {
   double outlier_chi2_stereo = 12.84;  ///< 99.5 % of chi-square with 3 degrees of freedom, > 0
   MetricLoopOptions loop;
   CullingOptions culling;
+  GlobalAdjustmentOptions global;
   std::shared_ptr<MapperHook> hook;  ///< an experiment's; null: none
 
   /// Empty when valid; otherwise names the field, the rule and the value.

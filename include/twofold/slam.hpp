@@ -265,10 +265,11 @@ class TWOFOLD_API Slam {
   /// lost something or cannot be written are in it within a second, whether frames come or not.
   [[nodiscard]] std::vector<std::string> errors() const;
 
-  /// Tracks what is queued, with `speed` when its time has come (end_pace), makes all poses agree globally
-  /// and ends the threads. A second call gives the same
-  /// answer. map() and save_map() then have the final map. The answer is a copy with all poses of the run (or
-  /// those kept), and the Slam keeps one: the one place where memory grows with the time.
+  /// Tracks what is queued, with `speed` when its time has come (end_pace), makes all poses agree globally,
+  /// and ends the threads. With one camera, and with a rig that has recognised a place, that is a bundle
+  /// adjustment of the whole map of up to 3,000 keyframes: about a millisecond a keyframe. A second call
+  /// gives the same answer. map() and save_map() then have the final map. The answer is a copy with all poses
+  /// of the run (or those kept), and the Slam keeps one: the one place where memory grows with the time.
   SlamSummary finish();
 
  private:

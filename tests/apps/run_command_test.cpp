@@ -110,6 +110,7 @@ TEST_F(RunCommand, WritesEveryOutputAndFollowsTheTruth) {
   const auto summary = nlohmann::json::parse(result("summary.json"));
   EXPECT_EQ(summary["tracked"], kFrames);
   EXPECT_EQ(summary["why_lost"].size(), 0U);
+  EXPECT_EQ(summary["globally_adjusted_keyframes"], 0) << "of a rig that recognised no place";
   const auto timing = nlohmann::json::parse(result("timing.json"));
   EXPECT_EQ(timing["tracker"]["frame"]["count"], kFrames);
   EXPECT_EQ(timing["run"]["frames"], kFrames);
@@ -449,6 +450,7 @@ TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   EXPECT_EQ(found["file"], folder_ / "auto/calibration.yaml");
   EXPECT_EQ(content(folder_ / "auto/calibration.yaml").find("readout"), std::string::npos);
   EXPECT_GT(found["readout_sigma_ms"].get<double>(), 0);
+  EXPECT_GT(summary["globally_adjusted_keyframes"], 0);
   const Outcome anew = run(folder_, source + (folder_ / "auto") + "' --calib auto --poses -");
   EXPECT_EQ(anew.exit_code, 0) << "a run may replace what it has found itself: " << anew.err;
   EXPECT_TRUE(anew.out.starts_with("{")) << "standard output has the poses alone: " << anew.out.substr(0, 80);

@@ -1,0 +1,88 @@
+#include "mapping/global_adjustment.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "estimation/window_solver.hpp"
+#include "graph/neighbourhood.hpp"
+#include "mapping/culling.hpp"
+#include "mapping/double_window.hpp"
+#include "mapping/window_builder.hpp"
+
+namespace twofold {
+namespace {
+
+/// All keyframes connected with `root` as an inner window.
+DoubleWindow whole_component(const GraphSnapshot& graph, KeyframeId root) {
+  DoubleWindow window;
+  VisitedSet visited;
+  weighted_breadth_first(graph, root, graph.keyframe_count(), visited, window.nodes);
+  window.inner = window.nodes.size();
+  for (std::size_t n = 0; n < window.nodes.size(); ++n)
+    window.position.set(window.nodes[n].id, static_cast<int>(n));
+  return window;
+}
+
+MapperOptions without_budget(const MapperOptions& options) {
+  MapperOptions all = options;
+  all.max_points = std::numeric_limits<int>::max();
+  all.solver.max_iterations = options.global.max_iterations;
+  return all;
+}
+
+/// What each round removes the next one does without.
+void adjust(GraphWriter& writer, const DoubleWindow& window, const Rig& rig, const MapperOptions& options,
+            GlobalAdjustmentReport& report) {
+  WindowBuilder builder(rig, options);
+  WindowSolver solver;
+  std::vector<WindowBuilder::Outlier> outliers;
+  for (int round = 0; round < options.global.rounds; ++round) {
+    builder.build(writer.graph(), window);
+    WindowProblem& problem = builder.problem();
+    problem.poses.front().fixed = true;
+    // Poses have come from the pose graph, which knows no points.
+    if (round == 0) optimise_structure(problem, options.solver);
+    const SolverSummary summary = solver.solve(problem, options.solver);
+    builder.write_back(writer, window);
+    builder.find_outliers(window, outliers);
+    remove_outlier_observations(writer, outliers);
+    report.outliers += static_cast<int>(outliers.size());
+    if (round == 0) {
+      report.points += static_cast<int>(problem.points.size());
+      report.observations += static_cast<int>(problem.observations.size());
+      report.initial_cost += summary.initial_cost;
+    }
+    if (round == options.global.rounds - 1 || outliers.empty()) {
+      report.final_cost += summary.final_cost;
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+GlobalAdjustmentReport adjust_all_components(GraphWriter& writer, const Rig& rig,
+                                             const MapperOptions& options) {
+  GlobalAdjustmentReport report;
+  const MapperOptions all = without_budget(options);
+  const GraphSnapshot& graph = writer.graph();
+  std::vector<KeyframeId> roots{graph.reference()};
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) roots.push_back(KeyframeId{k});
+  IdMap met;
+  for (const KeyframeId root : roots) {
+    if (!graph.contains(root) || met.contains(root) || graph.keyframe(root).culled()) continue;
+    const DoubleWindow window = whole_component(graph, root);
+    for (const TreeNode& node : window.nodes) met.set(node.id, 0);
+    if (window.nodes.size() > static_cast<std::size_t>(options.global.max_keyframes)) {
+      ++report.too_large;
+      continue;
+    }
+    adjust(writer, window, rig, all, report);
+    marginalise_edges_of(writer, window);
+    ++report.components;
+    report.keyframes += static_cast<int>(window.nodes.size());
+  }
+  return report;
+}
+
+}  // namespace twofold
