@@ -244,6 +244,13 @@ void Rectifier::rectify(const Frame& raw, Frame& rectified) const {
   }
 }
 
+cv::Mat Rectifier::rectified_left(const cv::Mat& raw) const {
+  if (passes_through()) return raw;
+  cv::Mat rectified;
+  cv::remap(raw, rectified, left_.x, left_.y, cv::INTER_LINEAR);
+  return rectified;
+}
+
 std::string Rectifier::mismatch_reason(const Frame& raw) const {
   const auto [width, height] = raw_left_size_;
   if (auto reason = image_reason(raw.left, "left", CV_8UC1, "8-bit grey", width, height); !reason.empty()) {

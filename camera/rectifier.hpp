@@ -66,6 +66,8 @@ class Rectifier {
   /// allocation here. The raw images must have the calibrated size and the types given in Frame: check with
   /// mismatch_reason.
   void rectify(const Frame& raw, Frame& rectified) const;
+  /// The left image alone, of any type and of the calibrated size (bilinear).
+  [[nodiscard]] cv::Mat rectified_left(const cv::Mat& raw) const;
   /// Empty when `raw` has the images, sizes and types the calibration promises; otherwise says what is wrong.
   [[nodiscard]] std::string mismatch_reason(const Frame& raw) const;
 

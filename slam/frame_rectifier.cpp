@@ -1,4 +1,3 @@
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "camera/rectifier.hpp"
@@ -83,14 +82,7 @@ FrameView FrameRectifier::rectify(const FrameView& view) const {
 FrameView FrameRectifier::rectify_in_colour(const FrameView& raw) const {
   const FrameView frame = rectify(raw);
   if (raw.left.format == ImageFormat::kGrey8) return frame;
-  cv::Mat colour = bgr_pixels_of(raw.left);
-  const Rectifier& rectifier = impl_->rectifier;
-  if (!rectifier.passes_through()) {
-    cv::Mat rectified;
-    cv::remap(colour, rectified, rectifier.left_map().x, rectifier.left_map().y, cv::INTER_LINEAR);
-    colour = rectified;
-  }
-  return with_colour(frame, colour);
+  return with_colour(frame, impl_->rectifier.rectified_left(bgr_pixels_of(raw.left)));
 }
 
 }  // namespace twofold

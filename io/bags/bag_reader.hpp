@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -24,10 +25,25 @@ struct BagTopic {
   MessageEncoding encoding = MessageEncoding::kOther;
 };
 
+/// Where a message stands in its file, for BagReader::read_again.
+struct MessagePlace {
+  std::uint64_t record = 0;  ///< byte at which its record begins, or its chunk's
+  std::optional<std::uint64_t>
+      in_chunk;  ///< byte of the unpacked chunk at which its own begins, if it is in one
+};
+
 struct BagMessage {
   std::uint32_t topic = 0;
   std::int64_t t_ns = 0;  ///< when it was recorded
   std::span<const std::uint8_t> data;
+  MessagePlace place;
+};
+
+/// The chunk that a message was read again from: the next one is mostly of the same.
+struct ChunkMemory {
+  std::optional<std::uint64_t> record;    ///< MessagePlace::record of what is in `records`
+  std::span<const std::uint8_t> records;  ///< in `unpacked` or in the file
+  std::vector<std::uint8_t> unpacked;
 };
 
 /// The messages of a recording of ROS, in the order of the file. All functions throw IoError naming the file,
@@ -42,6 +58,10 @@ class BagReader {
   virtual void select(std::set<std::uint32_t> topics) = 0;
   /// False at the end. The data are valid until the next call of anything.
   virtual bool next(BagMessage& message) = 0;
+  /// A message that next gave. Any thread, beside next, each with a chunk memory of its own; the data are
+  /// valid until that is used again. Throws IoError, too, when the file has changed and the message is not
+  /// there.
+  [[nodiscard]] virtual BagMessage read_again(const MessagePlace& place, ChunkMemory& chunk) const = 0;
   /// Empty, or where the file is cut short: its recorder was killed, and what came before was given; and that
   /// its summary is damaged, without which all of it was read.
   [[nodiscard]] virtual std::string fault() const = 0;

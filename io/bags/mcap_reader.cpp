@@ -86,6 +86,7 @@ class McapReader final : public BagReader {
     guarded(at_, [&] { found = find_next(message); });
     return found;
   }
+  [[nodiscard]] BagMessage read_again(const MessagePlace& place, ChunkMemory& chunk) const override;
   [[nodiscard]] std::string fault() const override {
     return note_.empty() || fault_.empty() ? note_ + fault_ : note_ + "; " + fault_;
   }
@@ -99,7 +100,7 @@ class McapReader final : public BagReader {
   }
   /// What is malformed is named with the record that begins at `at`.
   template <class Function>
-  void guarded(const std::uint64_t& at, Function function) {
+  void guarded(const std::uint64_t& at, Function function) const {
     try {
       function();
     } catch (const MalformedBytes& error) {
@@ -118,7 +119,10 @@ class McapReader final : public BagReader {
   void read_all_channels();
   /// The record at at_, which then is behind it; nothing at the end of the data, or where the file is cut.
   std::optional<McapRecord> next_of_file();
-  void open_chunk(const McapRecord& record);
+  void open_chunk(std::uint64_t begin, const McapRecord& record);
+  /// The records of a chunk, in `unpacked` where they are compressed.
+  [[nodiscard]] static std::span<const std::uint8_t> records_of(const McapRecord& chunk,
+                                                                std::vector<std::uint8_t>& unpacked);
   [[nodiscard]] bool is_wanted_chunk(std::uint64_t begin) const;
   bool find_next(BagMessage& message);
   bool take_message(const McapRecord& record, BagMessage& message) const;
@@ -130,6 +134,7 @@ class McapReader final : public BagReader {
   std::uint64_t at_ = 0;
   std::vector<std::uint8_t> unpacked_;
   ByteReader chunk_{{}};
+  std::uint64_t chunk_begin_ = 0;
   std::string note_;   // of the summary
   std::string fault_;  // of the data
 };
@@ -183,7 +188,8 @@ void McapReader::read_all_channels() {
   while (const auto record = next_of_file()) {
     channels_.take(*record);
     if (record->opcode != kChunk) continue;
-    for (open_chunk(*record); !chunk_.at_end();) channels_.take(next_record(chunk_));
+    for (chunk_ = ByteReader(records_of(*record, unpacked_)); !chunk_.at_end();)
+      channels_.take(next_record(chunk_));
   }
 }
 
@@ -203,20 +209,26 @@ std::optional<McapRecord> McapReader::next_of_file() {
   return record;
 }
 
-void McapReader::open_chunk(const McapRecord& record) {
-  ByteReader in(record.content);
+void McapReader::open_chunk(std::uint64_t begin, const McapRecord& record) {
+  chunk_ = ByteReader(records_of(record, unpacked_));
+  chunk_begin_ = begin;
+}
+
+std::span<const std::uint8_t> McapReader::records_of(const McapRecord& chunk,
+                                                     std::vector<std::uint8_t>& unpacked) {
+  ByteReader in(chunk.content);
   (void)in.take(16);
   const std::uint64_t size = in.u64();
   const std::uint32_t crc = in.u32();
   const std::string compression = in.text();
   auto records = in.take(in.u64());
   if (!compression.empty()) {
-    unpack_chunk(compression, records, size, unpacked_);
-    records = unpacked_;
+    unpack_chunk(compression, records, size, unpacked);
+    records = unpacked;
   }
   if (crc != 0 && crc != crc32_of(records))
     throw MalformedBytes("a chunk is damaged: its checksum does not fit");
-  chunk_ = ByteReader(records);
+  return records;
 }
 
 bool McapReader::is_wanted_chunk(std::uint64_t begin) const {
@@ -229,14 +241,38 @@ bool McapReader::is_wanted_chunk(std::uint64_t begin) const {
 bool McapReader::find_next(BagMessage& message) {
   for (;;) {
     while (!chunk_.at_end()) {
+      message.place = {chunk_begin_, chunk_.at()};
       if (take_message(next_record(chunk_), message)) return true;
     }
     const std::uint64_t begin = at_;
     const auto record = next_of_file();
     if (!record) return false;
-    if (record->opcode == kChunk && is_wanted_chunk(begin)) open_chunk(*record);
+    if (record->opcode == kChunk && is_wanted_chunk(begin)) open_chunk(begin, *record);
+    message.place = {begin, std::nullopt};
     if (take_message(*record, message)) return true;
   }
+}
+
+BagMessage McapReader::read_again(const MessagePlace& place, ChunkMemory& chunk) const {
+  BagMessage message;
+  message.place = place;
+  guarded(place.record, [&] {
+    ByteReader head(file_.part(place.record, kRecordHeader));
+    const std::uint8_t opcode = head.u8();
+    McapRecord record{opcode, file_.part(place.record + kRecordHeader, head.u64())};
+    if (place.in_chunk) {
+      if (chunk.record != place.record) {
+        chunk.record.reset();
+        chunk.records = records_of(record, chunk.unpacked);
+        chunk.record = place.record;
+      }
+      ByteReader records(chunk.records);
+      (void)records.take(*place.in_chunk);
+      record = next_record(records);
+    }
+    if (!take_message(record, message)) throw MalformedBytes("a message is not there any more");
+  });
+  return message;
 }
 
 bool McapReader::take_message(const McapRecord& record, BagMessage& message) const {

@@ -18,8 +18,9 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "native_copy turns big-endian numbers round");
 
 struct Encoding {
-  int type = 0;         ///< OpenCV's
-  int conversion = -1;  ///< to grey, OpenCV's; -1: none
+  int type = 0;      ///< OpenCV's
+  int to_grey = -1;  ///< OpenCV's conversion; -1: none is needed, it has no colour
+  int to_bgr = -1;   ///< likewise; -1: none is needed, or it has no colour
 };
 
 /// OpenCV names Bayer patterns by the second row's second and third pixel: its BG is rggb.
@@ -30,15 +31,15 @@ const std::map<std::string, Encoding, std::less<>>& encodings() {
       {"mono16", {CV_16UC1}},
       {"16UC1", {CV_16UC1}},
       {"32FC1", {CV_32FC1}},
-      {"rgb8", {CV_8UC3, cv::COLOR_RGB2GRAY}},
+      {"rgb8", {CV_8UC3, cv::COLOR_RGB2GRAY, cv::COLOR_RGB2BGR}},
       {"bgr8", {CV_8UC3, cv::COLOR_BGR2GRAY}},
       {"8UC3", {CV_8UC3, cv::COLOR_BGR2GRAY}},
-      {"rgba8", {CV_8UC4, cv::COLOR_RGBA2GRAY}},
-      {"bgra8", {CV_8UC4, cv::COLOR_BGRA2GRAY}},
-      {"bayer_rggb8", {CV_8UC1, cv::COLOR_BayerBG2GRAY}},
-      {"bayer_bggr8", {CV_8UC1, cv::COLOR_BayerRG2GRAY}},
-      {"bayer_gbrg8", {CV_8UC1, cv::COLOR_BayerGR2GRAY}},
-      {"bayer_grbg8", {CV_8UC1, cv::COLOR_BayerGB2GRAY}},
+      {"rgba8", {CV_8UC4, cv::COLOR_RGBA2GRAY, cv::COLOR_RGBA2BGR}},
+      {"bgra8", {CV_8UC4, cv::COLOR_BGRA2GRAY, cv::COLOR_BGRA2BGR}},
+      {"bayer_rggb8", {CV_8UC1, cv::COLOR_BayerBG2GRAY, cv::COLOR_BayerBG2BGR}},
+      {"bayer_bggr8", {CV_8UC1, cv::COLOR_BayerRG2GRAY, cv::COLOR_BayerRG2BGR}},
+      {"bayer_gbrg8", {CV_8UC1, cv::COLOR_BayerGR2GRAY, cv::COLOR_BayerGR2BGR}},
+      {"bayer_grbg8", {CV_8UC1, cv::COLOR_BayerGB2GRAY, cv::COLOR_BayerGB2BGR}},
   };
   return kEncodings;
 }
@@ -107,8 +108,8 @@ cv::Mat grey_image(const ImageMessage& image) {
   const cv::Mat view = view_of(image, encoding);
   if (encoding.type == CV_32FC1) throw MalformedBytes("an image of encoding 32FC1 where grey is wanted");
   cv::Mat grey;
-  if (encoding.conversion >= 0) {
-    cv::cvtColor(view, grey, encoding.conversion);
+  if (encoding.to_grey >= 0) {
+    cv::cvtColor(view, grey, encoding.to_grey);
   } else {
     grey = native_copy(view, image.big_endian);
   }
@@ -120,6 +121,21 @@ cv::Mat grey_image(const CompressedImageMessage& image) {
   if (grey.type() != CV_8UC1 && grey.type() != CV_16UC1)
     throw MalformedBytes("a compressed image that has neither 8 nor 16 bits");
   return grey;
+}
+
+cv::Mat colour_image(const ImageMessage& image) {
+  Encoding encoding;
+  const cv::Mat view = view_of(image, encoding);
+  if (encoding.to_grey < 0) return {};
+  if (encoding.to_bgr < 0) return view.clone();
+  cv::Mat bgr;
+  cv::cvtColor(view, bgr, encoding.to_bgr);
+  return bgr;
+}
+
+cv::Mat colour_image(const CompressedImageMessage& image) {
+  const cv::Mat bgr = decode(image.file, cv::IMREAD_ANYCOLOR);
+  return bgr.type() == CV_8UC3 ? bgr : cv::Mat();
 }
 
 cv::Mat depth_image(const ImageMessage& image, double unit) {

@@ -67,7 +67,7 @@ class RosbagReader final : public BagReader {
     const auto begin = file_.part(0, std::min<std::uint64_t>(file_.size(), kMagic.size()));
     if (!std::equal(kMagic.begin(), kMagic.end(), begin.begin(), begin.end()))
       file_.fail(0, "is no bag of format 2.0");
-    guarded([this] { read_topics(); });
+    guarded(at_, [this] { read_topics(); });
     rewind();
   }
 
@@ -78,18 +78,20 @@ class RosbagReader final : public BagReader {
   }
   bool next(BagMessage& message) override {
     bool found = false;
-    guarded([&] { found = find_next(message); });
+    guarded(at_, [&] { found = find_next(message); });
     return found;
   }
+  [[nodiscard]] BagMessage read_again(const MessagePlace& place, ChunkMemory& chunk) const override;
   [[nodiscard]] std::string fault() const override { return fault_; }
 
  private:
+  /// What is malformed is named with the record that begins at `at`.
   template <class Function>
-  void guarded(Function function) {
+  void guarded(const std::uint64_t& at, Function function) const {
     try {
       function();
     } catch (const MalformedBytes& error) {
-      file_.fail(at_, error.what());
+      file_.fail(at, error.what());
     }
   }
   void rewind() {
@@ -101,7 +103,10 @@ class RosbagReader final : public BagReader {
   void read_topics();
   void take_connection(const RosbagRecord& record);
   std::optional<RosbagRecord> next_of_file();
-  void open_chunk(const RosbagRecord& record);
+  void open_chunk(std::uint64_t begin, const RosbagRecord& record);
+  /// The records of a chunk, in `unpacked` where they are compressed.
+  [[nodiscard]] static std::span<const std::uint8_t> records_of(const RosbagRecord& chunk,
+                                                                std::vector<std::uint8_t>& unpacked);
   bool find_next(BagMessage& message);
   bool take_message(const RosbagRecord& record, BagMessage& message) const;
 
@@ -111,6 +116,7 @@ class RosbagReader final : public BagReader {
   std::uint64_t at_ = kMagic.size();
   std::vector<std::uint8_t> unpacked_;
   ByteReader chunk_{{}};
+  std::uint64_t chunk_begin_ = 0;
   std::string fault_;
 };
 
@@ -126,7 +132,8 @@ void RosbagReader::read_topics() {
   while (const auto record = next_of_file()) {
     take_connection(*record);
     if (indexed || record->operation != kChunk) continue;
-    for (open_chunk(*record); !chunk_.at_end();) take_connection(next_record(chunk_));
+    for (chunk_ = ByteReader(records_of(*record, unpacked_)); !chunk_.at_end();)
+      take_connection(next_record(chunk_));
   }
 }
 
@@ -159,26 +166,48 @@ std::optional<RosbagRecord> RosbagReader::next_of_file() {
   return record;
 }
 
-void RosbagReader::open_chunk(const RosbagRecord& record) {
-  const std::string compression = text(record.fields, "compression");
-  const auto size = number<std::uint32_t>(record.fields, "size");
-  if (compression == "none") {
-    chunk_ = ByteReader(record.data);
-    return;
-  }
-  unpack_chunk(compression, record.data, size, unpacked_);
-  chunk_ = ByteReader(unpacked_);
+void RosbagReader::open_chunk(std::uint64_t begin, const RosbagRecord& record) {
+  chunk_ = ByteReader(records_of(record, unpacked_));
+  chunk_begin_ = begin;
+}
+
+std::span<const std::uint8_t> RosbagReader::records_of(const RosbagRecord& chunk,
+                                                       std::vector<std::uint8_t>& unpacked) {
+  const std::string compression = text(chunk.fields, "compression");
+  const auto size = number<std::uint32_t>(chunk.fields, "size");
+  if (compression == "none") return chunk.data;
+  unpack_chunk(compression, chunk.data, size, unpacked);
+  return unpacked;
 }
 
 bool RosbagReader::find_next(BagMessage& message) {
   for (;;) {
     while (!chunk_.at_end()) {
+      message.place = {chunk_begin_, chunk_.at()};
       if (take_message(next_record(chunk_), message)) return true;
     }
+    const std::uint64_t begin = at_;
     const auto record = next_of_file();
     if (!record) return false;
-    if (record->operation == kChunk) open_chunk(*record);
+    if (record->operation == kChunk) open_chunk(begin, *record);
   }
+}
+
+BagMessage RosbagReader::read_again(const MessagePlace& place, ChunkMemory& chunk) const {
+  BagMessage message;
+  message.place = place;
+  guarded(place.record, [&] {
+    if (chunk.record != place.record) {
+      chunk.record.reset();
+      ByteReader file(file_.part(place.record, file_.size() - place.record));
+      chunk.records = records_of(next_record(file), chunk.unpacked);
+      chunk.record = place.record;
+    }
+    ByteReader records(chunk.records);
+    (void)records.take(place.in_chunk.value_or(0));
+    if (!take_message(next_record(records), message)) throw MalformedBytes("a message is not there any more");
+  });
+  return message;
 }
 
 bool RosbagReader::take_message(const RosbagRecord& record, BagMessage& message) const {

@@ -7,12 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "io/bags/bag_reader.hpp"
+
 namespace twofold {
 
 /// One camera's image out of a bag.
 struct BagImage {
   std::int64_t t_ns = 0;
   cv::Mat image;  ///< grey of 8 or 16 bits, or depth
+  MessagePlace place;
 };
 
 /// Images of one camera by increasing times.

@@ -26,10 +26,19 @@ BagImage decode(const BagCamera& camera, std::optional<double> depth_unit, const
   const MessageEncoding encoding = camera.images.encodings.at(message.topic);
   if (camera.compressed()) {
     const CompressedImageMessage image = parse_compressed_image(message.data, encoding);
-    return {image.t_ns, depth_unit ? depth_image(image) : grey_image(image)};
+    return {image.t_ns, depth_unit ? depth_image(image) : grey_image(image), message.place};
   }
   const ImageMessage image = parse_image(message.data, encoding);
-  return {image.t_ns, depth_unit ? depth_image(image, *depth_unit) : grey_image(image)};
+  return {image.t_ns, depth_unit ? depth_image(image, *depth_unit) : grey_image(image), message.place};
+}
+
+/// Of a message that was read again: the file may have changed meanwhile.
+cv::Mat decode_colour(const BagCamera& camera, const BagMessage& message) {
+  const auto encoding = camera.images.encodings.find(message.topic);
+  if (encoding == camera.images.encodings.end())
+    throw MalformedBytes("a message of another topic stands where an image was");
+  return camera.compressed() ? colour_image(parse_compressed_image(message.data, encoding->second))
+                             : colour_image(parse_image(message.data, encoding->second));
 }
 
 /// At high rates the image before or after lies within the usual gap, too.
@@ -72,6 +81,7 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   }
   if (const std::string black = rectifier_->black_note(); !black.empty())
     notes_.push_back(calibration_file.string() + ": " + black);
+  raw_left_ = used.left.pinhole;
   rig_ = rectifier_->rig();
   R_rectified_raw_ = rectifier_->R_rectified_left();
   if (cameras_.depth) depth_unit_ = used.depth_unit;
@@ -199,6 +209,10 @@ void BagSource::take_left(Frame& raw) {
   raw.index = index_++;
   raw.t_ns = left_.front().t_ns;
   raw.left = eight_bits(left_.front().image, grey_bits_);
+  {
+    const std::scoped_lock lock(places_mutex_);
+    left_places_.push_back(left_.front().place);
+  }
   left_.pop_front();
   damaged_.frame_was_read();
   unordered_.frame_was_read();
@@ -226,6 +240,23 @@ bool BagSource::read(Frame& frame) {
   frame = Frame();  // its old images may still be held elsewhere: never write into them
   rectifier_->rectify(raw, frame);
   return true;
+}
+
+std::optional<MessagePlace> BagSource::left_place(std::int64_t index) const {
+  const std::scoped_lock lock(places_mutex_);
+  if (index < 0 || index >= static_cast<std::int64_t>(left_places_.size())) return std::nullopt;
+  return left_places_[static_cast<std::size_t>(index)];
+}
+
+cv::Mat BagSource::colour_image(std::int64_t index) const {
+  const auto place = left_place(index);
+  if (!place) return {};
+  const std::scoped_lock lock(again_mutex_);
+  const cv::Mat raw =
+      named([&] { return decode_colour(cameras_.left, reader_->read_again(*place, chunk_)); });
+  if (raw.empty()) return raw;
+  expect_size(file_, raw, raw_left_, size_of_calibration(file_));
+  return rectifier_->rectified_left(raw);
 }
 
 SourceReport BagSource::report() const {

@@ -3,7 +3,9 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <vector>
 
 #include "camera/rectifier.hpp"
 #include "io/bags/bag_cameras.hpp"
@@ -30,6 +32,8 @@ class BagSource final : public FrameSource {
             const std::optional<std::filesystem::path>& calibration, SourceParameters& parameters);
 
   [[nodiscard]] SourceReport report() const override;
+  /// The frame's message is read again: frames that nobody wants in colour cost the place of theirs.
+  [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
 
  private:
   using Queue = std::deque<BagImage>;
@@ -56,6 +60,8 @@ class BagSource final : public FrameSource {
   /// The oldest pair, if both are there.
   bool take_pair(Frame& raw);
   void take_left(Frame& raw);
+  /// Of a frame that was delivered; nothing for others.
+  [[nodiscard]] std::optional<MessagePlace> left_place(std::int64_t index) const;
   /// What is malformed is named with the file.
   template <class Function>
   auto named(Function function) const;
@@ -63,6 +69,7 @@ class BagSource final : public FrameSource {
   const std::filesystem::path file_;
   const std::unique_ptr<BagReader> reader_;
   BagCameras cameras_;
+  PinholeCamera raw_left_;             // for its size
   std::optional<FramePairer> pairer_;  // none: one camera
   std::optional<Rectifier> rectifier_;
   std::optional<double> depth_unit_;  // [m], of depth images
@@ -74,6 +81,10 @@ class BagSource final : public FrameSource {
   std::uint64_t alone_ = 0;  // images without a partner
   DamagedImages damaged_, unordered_;
   std::vector<std::string> notes_, brighter_;
+  mutable std::mutex places_mutex_;        // guards left_places_: next adds to them, colour_image reads them
+  std::vector<MessagePlace> left_places_;  // by the frame's index
+  mutable std::mutex again_mutex_;         // guards chunk_: one message is read again at a time
+  mutable ChunkMemory chunk_;
 };
 
 }  // namespace twofold

@@ -1,7 +1,5 @@
 #include "io/sources/calibrated_source.hpp"
 
-#include <opencv2/imgproc.hpp>
-
 #include "io/files/io_error.hpp"
 
 namespace twofold {
@@ -15,10 +13,7 @@ CalibratedSource::CalibratedSource(std::unique_ptr<FrameSource> source, const Ca
 
 cv::Mat CalibratedSource::colour_image(std::int64_t index) const {
   const cv::Mat raw = source_->colour_image(index);
-  if (raw.empty() || rectifier_.passes_through()) return raw;
-  cv::Mat rectified;
-  cv::remap(raw, rectified, rectifier_.left_map().x, rectifier_.left_map().y, cv::INTER_LINEAR);
-  return rectified;
+  return raw.empty() ? raw : rectifier_.rectified_left(raw);
 }
 
 bool CalibratedSource::read(Frame& frame) {

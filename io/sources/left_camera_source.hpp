@@ -14,6 +14,9 @@ class LeftCameraSource final : public FrameSource {
   [[nodiscard]] std::optional<std::int64_t> frame_count() const override { return source_->frame_count(); }
   [[nodiscard]] bool is_live() const override { return source_->is_live(); }
   [[nodiscard]] SourceReport report() const override { return source_->report(); }
+  [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override {
+    return source_->colour_image(index);
+  }
 
  private:
   bool read(Frame& frame) override;

@@ -63,6 +63,9 @@ class RangedSource final : public FrameSource {
     R_rectified_raw_ = source_->R_rectified_raw();
   }
   [[nodiscard]] SourceReport report() const override { return source_->report(); }
+  [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override {
+    return source_->colour_image(index);
+  }
 
  private:
   bool read(Frame& frame) override {
@@ -76,7 +79,7 @@ class RangedSource final : public FrameSource {
     return true;
   }
 
-  std::unique_ptr<FrameSource> source_;  // without truth and colour: no video or bag has them
+  std::unique_ptr<FrameSource> source_;  // without truth: no video or bag has one
   const FrameRange range_;
   const std::string file_;
   std::int64_t taken_ = 0;  // of source_, the dropped ones, too

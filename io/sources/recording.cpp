@@ -1,7 +1,6 @@
 #include "io/sources/recording.hpp"
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -241,10 +240,7 @@ cv::Mat PlaybackSource::left_image(std::int64_t t_ns) const {
 
 cv::Mat PlaybackSource::rectified_left(const fs::path& file, const cv::Mat& raw) const {
   expect_size(file, raw, recording_.calibration.left.pinhole, left_said_by_);
-  if (rectifier_->passes_through()) return raw;
-  cv::Mat rectified;
-  cv::remap(raw, rectified, rectifier_->left_map().x, rectifier_->left_map().y, cv::INTER_LINEAR);
-  return rectified;
+  return rectifier_->rectified_left(raw);
 }
 
 cv::Mat PlaybackSource::first_image() {

@@ -10,23 +10,45 @@
 #include "io/sources/recording.hpp"
 
 namespace twofold {
+namespace {
+
+/// A rolling shutter reads the sensor's rows: they stay as they are, however the video is to be shown.
+void open_video(const std::filesystem::path& file, cv::VideoCapture& capture) {
+  if (!capture.open(file.string(), cv::CAP_FFMPEG)) throw IoError(file, "is not a video that can be decoded");
+  capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+}
+
+}  // namespace
+
+cv::Mat VideoColours::image(std::int64_t index) {
+  if (index < 0) return {};
+  if (!capture_.isOpened() || index + 1 < next_) {
+    open_video(file_, capture_);
+    next_ = 0;
+  }
+  for (; next_ <= index; ++next_) {
+    if (!capture_.grab()) throw IoError(file_, fmt::format("frame {} cannot be decoded again", next_));
+  }
+  cv::Mat image;
+  if (!capture_.retrieve(image) || image.empty())
+    throw IoError(file_, fmt::format("frame {} cannot be decoded again", index));
+  return image.type() == CV_8UC3 ? image : cv::Mat();
+}
 
 VideoSource::VideoSource(const std::filesystem::path& file,
                          const std::optional<std::filesystem::path>& calibration,
                          SourceParameters& parameters)
-    : file_(file) {
+    : file_(file), colours_(file) {
   take_layout(parameters);
   const auto fps = parameters.take_number("fps");
   if (fps && !(*fps > 0)) throw IoError(parameters.subject(), fmt::format("fps={} must be positive", *fps));
-  if (!capture_.open(file.string(), cv::CAP_FFMPEG))
-    throw IoError(file, "is not a video that can be decoded");
+  open_video(file, capture_);
   const SensorKind kind = side_by_side_ ? SensorKind::kStereo : SensorKind::kMono;
   Calibration base;
   if (calibration) base = read_calibration(*calibration);
   Calibration used = with_parameters(base, calibration.has_value(), kind, parameters);
   const std::filesystem::path calibration_file = calibration.value_or(parameters.subject());
 
-  capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);  // a rolling shutter reads the sensor's rows
   const int width = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)) / (side_by_side_ ? 2 : 1);
   const int height = static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT));
   announced_ = capture_.get(cv::CAP_PROP_FRAME_COUNT);
@@ -95,6 +117,16 @@ bool VideoSource::read(Frame& frame) {
   frame = Frame();  // its old images may still be held elsewhere: never write into them
   rectifier_->rectify(raw, frame);
   return true;
+}
+
+cv::Mat VideoSource::colour_image(std::int64_t index) const {
+  cv::Mat image;
+  {
+    const std::scoped_lock lock(colours_mutex_);
+    image = colours_.image(index);
+  }
+  if (image.empty()) return image;
+  return rectifier_->rectified_left(side_by_side_ ? image.colRange(0, image.cols / 2).clone() : image);
 }
 
 SourceReport VideoSource::report() const {

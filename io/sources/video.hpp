@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <mutex>
 #include <opencv2/videoio.hpp>
 #include <optional>
 
@@ -9,6 +10,23 @@
 #include "io/sources/source_parameters.hpp"
 
 namespace twofold {
+
+/// The images of a video in colour, by their numbers. A decoder of its own goes through the file once more as
+/// far as it is asked for: colours kept while the frames are read would take their memory also from those who
+/// want none, and the slower one of two readers would find the older ones gone. Opened when it is asked
+/// first.
+class VideoColours {
+ public:
+  explicit VideoColours(std::filesystem::path file) : file_(std::move(file)) {}
+  /// CV_8UC3 (blue, green, red), as the file has it; empty where that has no colour. One before the last that
+  /// was asked for: from the beginning again. Throws IoError.
+  [[nodiscard]] cv::Mat image(std::int64_t index);
+
+ private:
+  std::filesystem::path file_;
+  cv::VideoCapture capture_;
+  std::int64_t next_ = 0;  // frames that capture_ has gone past
+};
 
 /// A video file: one image a frame, or with layout=side-by-side a stereo pair (left image in the left half).
 ///
@@ -22,6 +40,7 @@ class VideoSource final : public FrameSource {
 
   /// A fault once the end was reached if the container had announced more frames.
   [[nodiscard]] SourceReport report() const override;
+  [[nodiscard]] cv::Mat colour_image(std::int64_t index) const override;
 
  private:
   bool read(Frame& frame) override;
@@ -41,6 +60,8 @@ class VideoSource final : public FrameSource {
   std::int64_t last_t_ns_ = 0;     ///< as it was given out
   std::int64_t without_time_ = 0;  ///< frames
   bool at_end_ = false;
+  mutable std::mutex colours_mutex_;  ///< guards colours_: one image is decoded at a time
+  mutable VideoColours colours_;
 };
 
 }  // namespace twofold

@@ -1,11 +1,14 @@
 // libFuzzer target for recordings of ROS: whatever the bytes, they are read or refused with an IoError. All
-// messages are taken for each type that can be parsed, and cameras for what they say of their lens.
+// messages are taken for each type that can be parsed, images in colour, too, and cameras for what they say
+// of their lens; and each message stands at its place.
+#include <algorithm>
 #include <span>
 
 #include "base/bytes.hpp"
 #include "base/check.hpp"
 #include "io/bags/bag_cameras.hpp"
 #include "io/bags/bag_reader.hpp"
+#include "io/bags/ros_images.hpp"
 #include "io/bags/ros_messages.hpp"
 #include "io/files/io_error.hpp"
 
@@ -35,6 +38,13 @@ void look_through_lens(const CameraInfoMessage& info) {
   }
 }
 
+void expect_again(const BagReader& reader, const BagMessage& message, ChunkMemory& chunk) {
+  const BagMessage again = reader.read_again(message.place, chunk);
+  TWOFOLD_CHECK(again.topic == message.topic && again.t_ns == message.t_ns, "a message's head again");
+  TWOFOLD_CHECK(std::equal(again.data.begin(), again.data.end(), message.data.begin(), message.data.end()),
+                "a message's data again");
+}
+
 template <class Open>
 void read_all(const Open& open, std::span<const std::uint8_t> bytes) {
   try {
@@ -43,9 +53,12 @@ void read_all(const Open& open, std::span<const std::uint8_t> bytes) {
     for (const BagTopic& topic : reader->topics()) topics.insert(topic.id);
     reader->select(topics);
     BagMessage message;
+    ChunkMemory chunk;
     while (reader->next(message)) {
-      parse(parse_image, message);
-      parse(parse_compressed_image, message);
+      expect_again(*reader, message, chunk);
+      parse([](auto bytes, auto encoding) { (void)colour_image(parse_image(bytes, encoding)); }, message);
+      parse([](auto bytes, auto encoding) { (void)colour_image(parse_compressed_image(bytes, encoding)); },
+            message);
       parse([](auto bytes, auto encoding) { look_through_lens(parse_camera_info(bytes, encoding)); },
             message);
     }

@@ -23,7 +23,8 @@ WrittenBag small_bag(MessageEncoding encoding) {
   bag.messages = {{0, 5, image_message(encoding, 5, cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)), "mono8")},
                   {1, 5, camera_info_message(encoding, info)},
                   {1, 6, camera_info_message(encoding, rational)},
-                  {0, 6, compressed_image_message(encoding, 6, "png", Bytes(9, 3))}};
+                  {0, 6, compressed_image_message(encoding, 6, "png", Bytes(9, 3))},
+                  {0, 7, image_message(encoding, 7, cv::Mat(3, 4, CV_8UC3, cv::Scalar(7, 8, 9)), "rgb8")}};
   return bag;
 }
 

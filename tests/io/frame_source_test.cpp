@@ -800,6 +800,46 @@ TEST(LeftCameraAlone, OfAFolderNeedsNothingOfTheOtherOne) {
   }
 }
 
+/// Each frame's own, in whatever order they are asked for, while others are read.
+TEST(FrameSource, AVideoGivesTheColoursOfItsFrames) {
+  constexpr int kFrames = 9;
+  const auto colours_of = [](int number) {
+    cv::Mat image(kHeight, kWidth, CV_8UC3, cv::Scalar(30 + 20 * number, 60, 200 - 20 * number));
+    image.colRange(kWidth / 2, kWidth).setTo(cv::Scalar(0, 0, 0));
+    return image;
+  };
+  for (const char* codec : {"MJPG", "mp4v"}) {
+    const ScratchFolder folder;
+    const std::string file = folder / (codec == std::string("mp4v") ? "a.mp4" : "a.avi");
+    const int fourcc = cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]);
+    cv::VideoWriter writer(file, cv::CAP_FFMPEG, fourcc, 25, {kWidth, kHeight});
+    if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here cannot write " << codec;
+    for (int i = 0; i < kFrames; ++i) writer.write(colours_of(i));
+    writer.release();
+    const auto expect_colours = [&](const FrameSource& source, int i, int columns) {
+      const cv::Mat colour = source.colour_image(i);
+      ASSERT_EQ(colour.type(), CV_8UC3);
+      ASSERT_EQ(colour.size(), cv::Size(columns, kHeight));
+      const cv::Rect inside(2, 2, kWidth / 2 - 4, kHeight - 4);
+      const cv::Scalar seen = cv::mean(colour(inside)), written = cv::mean(colours_of(i)(inside));
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen[c], written[c], 6) << codec << " " << i;
+    };
+    const auto whole = open_source("video:" + file + "?fx=50&fy=50&cx=32&cy=24&first=1");
+    Frame frame;
+    for (int i = 1; i < kFrames; ++i) {
+      ASSERT_EQ(whole->next(frame), FrameStatus::kFrame) << whole->error();
+      if (i % 3 == 0) expect_colours(*whole, i, kWidth);
+    }
+    for (const int i : {2, 2, 7, 1, 8}) expect_colours(*whole, i, kWidth);
+    EXPECT_IO_ERROR((void)whole->colour_image(kFrames), "frame 9 cannot be decoded again");
+    EXPECT_TRUE(whole->colour_image(-1).empty());
+    const auto pair =
+        open_source("video:" + file + "?layout=side-by-side&fx=50&fy=50&cx=16&cy=24&baseline=0.1");
+    ASSERT_EQ(pair->next(frame), FrameStatus::kFrame) << pair->error();
+    expect_colours(*pair, 0, kWidth / 2);
+  }
+}
+
 /// A rolling shutter reads the sensor's rows, and a calibration is of the sensor.
 TEST(FrameSource, AVideoComesAsTheSensorHasIt) {
   const ScratchFolder folder;

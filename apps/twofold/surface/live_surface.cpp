@@ -54,7 +54,7 @@ void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments
 
 LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source,
                          EngineOptions& options, bool one_thread, LiveMesh::Listener on_mesh)
-    : source_(&source), arguments_(arguments), rig_(source.rig()) {
+    : arguments_(arguments), rig_(source.rig()), colours_(source) {
   if (arguments.voxel == 0) return;
   if (const std::string why = no_surface_reason(rig_); !why.empty())
     throw IoError("--surface", "the source " + why);
@@ -186,15 +186,7 @@ void LiveSurface::take(const Frame& frame, double row_offset) {
   cv::Mat depth = frame.depth;
   if (rig_.kind == SensorKind::kStereo)
     depth = stereo_depth(rig_, frame.left, without_row_offset(frame.right, row_offset), kNearestStereo);
-  cv::Mat colour;
-  try {
-    colour = source_->colour_image(frame.index);
-  } catch (const IoError& error) {
-    colour_defect_ = error.what();
-    ++without_colour_;
-  }
-  coloured_ += !colour.empty();
-  if (colour.empty()) colour = frame.left;
+  const cv::Mat colour = colours_.left_image(frame);
   if (std::string defect = depth_defect(rig_, depth, colour); !defect.empty()) {
     defect_ = std::move(defect);
     ++unfit_;
@@ -228,7 +220,7 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   figures.fusion_ms = static_cast<double>(report.fusion_ns) * 1e-6 / std::max(1, report.fused);
   figures.memory_mb = static_cast<double>(report.most_bytes) / (1 << 20);
   figures.triangles = mesh.triangles.size();
-  figures.colour = coloured_ > 0 ? "of the recording" : "grey: the source gives no other";
+  figures.colour = colours_.text();
   const auto left_out = [&](int count, const std::string& what) {
     if (count > 0) figures.left_out.push_back(fmt::format("{} {}", count, what));
   };
@@ -240,7 +232,7 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   left_out(report.beyond_memory, "keyframes beyond the memory that the surface may take (--surface-memory)");
   left_out(report.overtaken + overtaken_, "keyframes, because the surface was behind (--surface-load)");
   left_out(unfit_, "images that did not fit: " + defect_);
-  left_out(without_colour_, "colour images: " + colour_defect_);
+  colours_.add_left_out(figures.left_out);
   left_out(report.not_in_map, "depth images whose frames are no keyframes of the map");
   return mesh;
 }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "apps/twofold/surface/depth_out_of_range.hpp"
+#include "apps/twofold/surface/frame_colours.hpp"
 #include "apps/twofold/surface/live_mesh.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "base/right_of_way.hpp"
@@ -81,17 +82,14 @@ class LiveSurface {
   using Keyframes = std::deque<std::pair<Frame, double>>;
   void take(const Frame& frame, double row_offset);
 
-  const FrameSource* source_;
   const LiveSurfaceArguments arguments_;
   Rig rig_;
   std::optional<SubmapSurface> surface_;  // the surface's thread's
   std::uint64_t version_ = 0;             // likewise: of the map it saw last
-  int coloured_ = 0;                      // likewise
+  FrameColours colours_;                  // likewise
   DepthOutOfRange out_of_range_;          // likewise
   std::string defect_;                    // likewise: of the newest image that did not fit
   int unfit_ = 0;                         // likewise
-  std::string colour_defect_;             // likewise: of the newest that could not be read
-  int without_colour_ = 0;                // likewise
 
   static constexpr std::size_t kMostDecisions = 256;      // more than frames are ever under way
   SpscRing<KeyframeDecision> decisions_{kMostDecisions};  // tracker -> reader

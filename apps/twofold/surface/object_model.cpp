@@ -109,7 +109,7 @@ ObjectModel build_object(const ObjectSource& source, const Trajectory& poses, co
   f.memory_mb = static_cast<double>(volume.bytes()) / (1 << 20);
   f.triangles = model.mesh.triangles.size();
   f.left_out = source.left_out();
-  f.colour = source.coloured() ? "of the recording" : "grey: the source gives no other";
+  f.colour = source.colour();
   model.axis = axis_of(poses, model.up);
   if (!model.mesh.triangles.empty()) model.box = box_around(model.mesh, model.up);
   return model;

@@ -23,7 +23,10 @@ std::string ObjectSourceOptions::invalid_reason() const {
 }
 
 ObjectSource::ObjectSource(std::unique_ptr<FrameSource> source, const ObjectSourceOptions& options)
-    : source_(std::move(source)), options_(options), masker_(source_->rig(), options.mask) {
+    : source_(std::move(source)),
+      options_(options),
+      masker_(source_->rig(), options.mask),
+      colours_(*source_) {
   TWOFOLD_CHECK(options.invalid_reason().empty(), "object source options");
   rig_ = source_->rig();
   R_rectified_raw_ = source_->R_rectified_raw();
@@ -57,7 +60,7 @@ bool ObjectSource::mask(Frame& frame) {
   }
   cv::Mat object(depth.size(), CV_16UC1, cv::Scalar(0));
   depth.copyTo(object, *found);
-  if (shown_++ % options_.keep_every == 0) keep(frame, object, frame.left);
+  if (shown_++ % options_.keep_every == 0) keep(frame, object);
   frame.left = fill_outside(frame.left, *found);
   if (rig_.kind == SensorKind::kStereo) {
     frame.right = fill_outside(frame.right, mask_in_right(rig_, *found, depth));
@@ -67,15 +70,13 @@ bool ObjectSource::mask(Frame& frame) {
   return true;
 }
 
-void ObjectSource::keep(const Frame& frame, const cv::Mat& depth, const cv::Mat& grey) {
+void ObjectSource::keep(const Frame& frame, const cv::Mat& depth) {
   if (kept_bytes_ > options_.max_bytes) {
     ++not_kept_;
     return;
   }
-  const cv::Mat colour = source_->colour_image(frame.index);
-  coloured_ = !colour.empty();
   Kept kept{frame.t_ns, masker_.plane().normal,
-            pack_keyframe_depth(frame.index, depth, colour.empty() ? grey : colour)};
+            pack_keyframe_depth(frame.index, depth, colours_.left_image(frame))};
   kept_bytes_ += kept.images.depth.bytes() + kept.images.colour.bytes();
   kept_.push_back(std::move(kept));
 }
@@ -86,6 +87,7 @@ std::vector<std::string> ObjectSource::left_out() const {
   if (not_kept_ > 0)
     all.push_back(fmt::format("the depth of {} frames, beyond {} MiB: raise --every", not_kept_,
                               options_.max_bytes >> 20));
+  colours_.add_left_out(all);
   return all;
 }
 

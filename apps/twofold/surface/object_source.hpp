@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/twofold/surface/frame_colours.hpp"
 #include "io/sources/frame_source.hpp"
 #include "surface/object_mask.hpp"
 #include "surface/submaps.hpp"
@@ -43,9 +44,10 @@ class ObjectSource final : public FrameSource {
   }
 
   [[nodiscard]] const std::vector<Kept>& kept() const { return kept_; }
-  /// Kept frames have the source's colours.
-  [[nodiscard]] bool coloured() const { return coloured_; }
-  /// What was left out, in words: frames without an object, depth beyond max_bytes.
+  /// Where the colours of kept frames come from: SurfaceFigures::colour.
+  [[nodiscard]] std::string colour() const { return colours_.text(); }
+  /// What was left out, in words: frames without an object, depth beyond max_bytes, colours that cannot be
+  /// read.
   [[nodiscard]] std::vector<std::string> left_out() const;
   /// Why no frame shows an object, once the source has ended; empty when one does.
   [[nodiscard]] std::string nothing_shown() const;
@@ -54,7 +56,8 @@ class ObjectSource final : public FrameSource {
   bool read(Frame& frame) override;
   /// Masks the frame; false when it shows no object.
   bool mask(Frame& frame);
-  void keep(const Frame& frame, const cv::Mat& depth, const cv::Mat& grey);
+  /// @param depth  of the object alone; frame is not masked yet
+  void keep(const Frame& frame, const cv::Mat& depth);
 
   std::unique_ptr<FrameSource> source_;
   ObjectSourceOptions options_;
@@ -62,7 +65,7 @@ class ObjectSource final : public FrameSource {
   std::vector<Kept> kept_;
   std::size_t kept_bytes_ = 0;
   int shown_ = 0, without_object_ = 0, not_kept_ = 0;
-  bool coloured_ = false;
+  FrameColours colours_;
   std::string reason_;  ///< of the last frame without an object
 };
 

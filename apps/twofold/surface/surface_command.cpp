@@ -15,6 +15,7 @@
 #include "apps/twofold/output/output_folder.hpp"
 #include "apps/twofold/run_output.hpp"
 #include "apps/twofold/surface/depth_out_of_range.hpp"
+#include "apps/twofold/surface/frame_colours.hpp"
 #include "apps/twofold/surface/registered_cloud.hpp"
 #include "apps/twofold/surface/surface_output.hpp"
 #include "base/processor_time.hpp"
@@ -158,7 +159,11 @@ std::optional<SE3> pose_at(const SurfaceJob& job, std::int64_t t_ns) {
 class DepthFusion {
  public:
   DepthFusion(const SurfaceArguments& arguments, const SurfaceJob& job, const SurfaceOptions& options)
-      : source_(*job.source), row_offset_(job.row_offset), volume_(options), grey_(arguments.grey) {
+      : source_(*job.source),
+        row_offset_(job.row_offset),
+        volume_(options),
+        grey_(arguments.grey),
+        colours_(source_) {
     if (!arguments.cloud.empty()) cloud_.emplace(options.voxel);
   }
 
@@ -167,13 +172,11 @@ class DepthFusion {
     cv::Mat depth = frame.depth;
     if (rig.kind == SensorKind::kStereo)
       depth = stereo_depth(rig, frame.left, without_row_offset(frame.right, row_offset_), kNearestStereo);
-    cv::Mat colour;
-    if (!grey_) colour = source_.colour_image(frame.index);
-    coloured_ += !colour.empty();
+    const cv::Mat colour = grey_ ? frame.left : colours_.left_image(frame);
     if (const std::string defect = depth_defect(rig, depth, colour); !defect.empty())
       throw IoError(fmt::format("frame {}", frame.index), defect);
     const std::int64_t begin_ns = thread_cpu_ns();
-    const DepthView view = make_depth_view(rig, depth, colour.empty() ? frame.left : colour);
+    const DepthView view = make_depth_view(rig, depth, colour);
     if (share_of_readings(view) == 0) {
       ++empty_;
       out_of_range_.look_at(rig, depth);
@@ -197,9 +200,8 @@ class DepthFusion {
     figures.fusion_ms = static_cast<double>(fusion_ns_) * 1e-6 / std::max(1, fused_);
     figures.memory_mb = static_cast<double>(volume_.bytes()) / (1 << 20);
     figures.triangles = mesh.triangles.size();
-    figures.colour = coloured_ > 0 ? "of the recording"
-                     : grey_       ? "grey: as asked for (--grey)"
-                                   : "grey: the source gives no other";
+    figures.colour = grey_ ? "grey: as asked for (--grey)" : colours_.text();
+    colours_.add_left_out(figures.left_out);
     if (empty_ > 0)
       figures.left_out.push_back(fmt::format("{} {}", empty_, out_of_range_.text(source_.rig())));
     return mesh;
@@ -211,7 +213,8 @@ class DepthFusion {
   SurfaceVolume volume_;
   std::optional<RegisteredCloud> cloud_;
   const bool grey_;
-  int fused_ = 0, empty_ = 0, coloured_ = 0;
+  FrameColours colours_;
+  int fused_ = 0, empty_ = 0;
   DepthOutOfRange out_of_range_;
   std::int64_t fusion_ns_ = 0;
 };

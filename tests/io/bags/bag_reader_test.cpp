@@ -96,6 +96,86 @@ TEST(BagReader, OtherTopicsAreLeftOutAndTheirChunksNotOpened) {
   EXPECT_IO_ERROR(reader->next(next), "some.mcap: a chunk is damaged: its checksum does not fit");
 }
 
+struct SomeFile {
+  std::string name;
+  Reader open;
+  Bytes bytes;
+};
+
+std::vector<SomeFile> files_of_all_kinds() {
+  std::vector<SomeFile> files;
+  for (const std::size_t chunk : {0, 1, 4, 1000}) {
+    for (const char* compression : {"", "zstd", "lz4"})
+      files.push_back({fmt::format("mcap {} {}", compression, chunk), mcap,
+                       mcap_file(stereo_bag(MessageEncoding::kCdr),
+                                 {MessageEncoding::kCdr, compression, chunk, chunk != 4, true})});
+    if (chunk == 0) continue;
+    for (const char* compression : {"none", "bz2", "lz4"})
+      files.push_back({fmt::format("rosbag {} {}", compression, chunk), rosbag,
+                       rosbag_file(stereo_bag(MessageEncoding::kRos1), {compression, chunk, chunk != 4})});
+  }
+  return files;
+}
+
+/// In any order, and while others are read on.
+TEST(BagReader, GivesAMessageAgainFromItsPlace) {
+  for (const SomeFile& file : files_of_all_kinds()) {
+    SCOPED_TRACE(file.name);
+    const auto reader = file.open(file.bytes);
+    reader->select(all_topics(*reader));
+    std::vector<BagMessage> messages;
+    std::vector<Bytes> data;
+    ChunkMemory chunk;
+    for (BagMessage next; reader->next(next);) {
+      data.emplace_back(next.data.begin(), next.data.end());
+      messages.push_back(next);
+      const BagMessage first = reader->read_again(messages.front().place, chunk);
+      EXPECT_EQ(Bytes(first.data.begin(), first.data.end()), data.front());
+    }
+    ASSERT_EQ(messages.size(), 5U * kCount);
+    for (std::size_t n = messages.size(); n-- > 0;) {
+      const BagMessage again = reader->read_again(messages[n].place, chunk);
+      EXPECT_EQ(again.topic, messages[n].topic);
+      EXPECT_EQ(again.t_ns, messages[n].t_ns);
+      EXPECT_EQ(Bytes(again.data.begin(), again.data.end()), data[n]);
+    }
+  }
+}
+
+/// As when a file is written to while it is read: refused, or a message; what was asked before does not
+/// matter.
+TEST(BagReader, WhatHasChangedMeanwhileIsRefused) {
+  std::mt19937 random(3);
+  for (const SomeFile& file : files_of_all_kinds()) {
+    SCOPED_TRACE(file.name);
+    Bytes bytes = file.bytes;
+    const auto reader = file.open(bytes);
+    reader->select(all_topics(*reader));
+    std::vector<MessagePlace> places;
+    for (BagMessage next; reader->next(next);) places.push_back(next.place);
+    int refused = 0;
+    ChunkMemory chunk;
+    for (int turn = 0; turn < 300; ++turn) {
+      bytes = file.bytes;
+      const MessagePlace& place = places[random() % places.size()];
+      for (int n = 0; n < 8; ++n) {
+        const std::size_t at = std::min<std::size_t>(place.record + random() % 60, bytes.size() - 1);
+        bytes[at] = static_cast<std::uint8_t>(random());
+      }
+      chunk.record.reset();
+      try {
+        (void)reader->read_again(place, chunk);
+      } catch (const IoError& error) {
+        ++refused;
+        EXPECT_NE(std::string(error.what()).find("(byte "), std::string::npos) << error.what();
+        bytes = file.bytes;
+        EXPECT_NO_THROW((void)reader->read_again(place, chunk));
+      }
+    }
+    EXPECT_GT(refused, 30);
+  }
+}
+
 /// Messages stand by themselves: a damaged summary costs a pass over the file, and is said.
 TEST(BagReader, ADamagedSummaryIsSaidAndDoneWithout) {
   const WrittenBag bag = stereo_bag(MessageEncoding::kCdr);

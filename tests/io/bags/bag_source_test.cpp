@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
 #include "io/sources/open_source.hpp"
 #include "tests/io/bags/small_bag.hpp"
 
@@ -252,6 +257,106 @@ TEST(BagSource, TumVisBagsAreReadWithKalibrsChain) {
                    "  cam_overlaps: [0]\n" +
                    camera + "  rostopic: /cam1/image_raw\n");
   expect_pairs(folder / "dataset-room1_512_16.bag", folder / "camchain.yaml");
+}
+
+/// Blue is the image's number, red where the lens shows another pixel when it is rectified.
+cv::Mat colours_of(int number) {
+  cv::Mat image(kHeight, kWidth, CV_8UC3);
+  for (int u = 0; u < kWidth; ++u) image.col(u).setTo(cv::Scalar(20 * number, 60, 4 * u));
+  return image;
+}
+
+/// One camera in colour. pixels: an encoding, or the suffix of the files that images are compressed as.
+WrittenBag colour_bag(MessageEncoding encoding, const std::string& pixels, const WrittenCameraInfo& info) {
+  const bool compressed = pixels.starts_with('.');
+  WrittenBag bag;
+  const std::string topic = compressed ? "/rgb/image_raw/compressed" : "/rgb/image_raw";
+  bag.topics = {{topic, compressed ? "sensor_msgs/CompressedImage" : "sensor_msgs/Image"},
+                {"/rgb/camera_info", "sensor_msgs/CameraInfo"}};
+  bag.messages.push_back({1, time_of(0), camera_info_message(encoding, info)});
+  for (int i = 0; i < kCount; ++i) {
+    const std::int64_t t = time_of(i);
+    cv::Mat image = colours_of(i);
+    if (pixels == "rgb8") cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+    Bytes file;
+    if (compressed) cv::imencode(pixels, image, file);
+    bag.messages.push_back({0, t,
+                            compressed ? compressed_image_message(encoding, t, "bgr8; compressed", file)
+                                       : image_message(encoding, t, image, pixels)});
+  }
+  return bag;
+}
+
+std::vector<std::string> write_colour_bags(const ScratchFolder& folder, const std::string& pixels,
+                                           const WrittenCameraInfo& info) {
+  folder.write("a.mcap", text_of(mcap_file(colour_bag(MessageEncoding::kCdr, pixels, info),
+                                           {.compression = "zstd", .chunk_messages = 2})));
+  folder.write("a.bag", text_of(rosbag_file(colour_bag(MessageEncoding::kRos1, pixels, info), {})));
+  return {"mcap:" + (folder / "a.mcap"), "bag:" + (folder / "a.bag")};
+}
+
+TEST(BagSource, GivesTheColoursOfAFrameAfterIt) {
+  for (const std::string pixels : {"bgr8", "rgb8", ".png", ".jpg"}) {
+    const ScratchFolder folder;
+    for (const std::string& text : write_colour_bags(folder, pixels, rectified_info(false))) {
+      SCOPED_TRACE(text + " " + pixels);
+      for (const bool alone : {false, true}) {
+        SourceOptions options;
+        options.left_only = options.preload = alone;
+        const auto source = open_source(text + "?first=1", options);
+        EXPECT_TRUE(alone || source->colour_image(1).empty()) << "it was not delivered";
+        EXPECT_EQ(drain(*source), std::to_string(kCount - 1));
+        for (const int i : {4, 1, 3}) {
+          const cv::Mat colour = source->colour_image(i);
+          ASSERT_EQ(colour.type(), CV_8UC3);
+          ASSERT_EQ(colour.size(), cv::Size(kWidth, kHeight));
+          EXPECT_LE(cv::norm(colour, colours_of(i), cv::NORM_INF), pixels == ".jpg" ? 12 : 0);
+        }
+        EXPECT_TRUE(source->colour_image(kCount).empty());
+        EXPECT_TRUE(source->colour_image(-1).empty());
+      }
+    }
+  }
+}
+
+TEST(BagSource, ColoursAreRectifiedAsTheFrameIs) {
+  const ScratchFolder folder;
+  WrittenCameraInfo info = rectified_info(false);
+  info.D = {0.3, 0.1, 0, 0, 0};
+  for (const std::string& text : write_colour_bags(folder, "bgr8", info)) {
+    const auto source = open_source(text);
+    Frame frame;
+    ASSERT_EQ(source->next(frame), FrameStatus::kFrame) << source->error();
+    const cv::Mat colour = source->colour_image(frame.index);
+    ASSERT_EQ(colour.size(), frame.left.size());
+    cv::Mat grey;
+    cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
+    EXPECT_LE(cv::norm(grey, frame.left, cv::NORM_INF), 2);
+    EXPECT_GT(cv::norm(colour, colours_of(0), cv::NORM_INF), 8) << "or this says nothing";
+  }
+}
+
+TEST(BagSource, GreyImagesHaveNoColours) {
+  const ScratchFolder folder;
+  folder.write("a.mcap", text_of(mcap_file(stereo_bag(MessageEncoding::kCdr), {})));
+  const auto source = open_source(folder / "a.mcap");
+  EXPECT_EQ(drain(*source), std::to_string(kCount));
+  EXPECT_TRUE(source->colour_image(2).empty());
+}
+
+/// A file that is written to while it is read.
+TEST(BagSource, AMessageThatWasDamagedMeanwhileIsNamed) {
+  const ScratchFolder folder;
+  for (const std::string& text : write_colour_bags(folder, "bgr8", rectified_info(false))) {
+    const auto source = open_source(text);
+    EXPECT_EQ(drain(*source), std::to_string(kCount));
+    const std::string file = text.substr(text.find(':') + 1);
+    std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
+    out.seekp(40);
+    for (auto left = std::filesystem::file_size(file) - 40; left > 0; --left) out.put('\x55');
+    out.close();
+    EXPECT_IO_ERROR((void)source->colour_image(3), "(byte ");
+  }
 }
 
 TEST(BagSource, AFileThatIsCutShortIsSaidToBe) {

@@ -68,6 +68,40 @@ TEST(RosImages, EveryEncodingIsMadeGrey) {
   }
 }
 
+TEST(RosImages, EveryEncodingKeepsItsColours) {
+  const cv::Mat bgr = colourful();
+  cv::Mat grey, rgb, rgba, bgra, wide;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  cv::cvtColor(bgr, bgra, cv::COLOR_BGR2BGRA);
+  cv::cvtColor(bgr, rgba, cv::COLOR_BGR2RGBA);
+  grey.convertTo(wide, CV_16U, 256);
+  for (const MessageEncoding encoding : kEncodings) {
+    const auto colours = [&](const cv::Mat& image, const std::string& pixels) {
+      return colour_image(parse_image(image_message(encoding, 5, image, pixels), encoding));
+    };
+    EXPECT_EQ(largest_difference(colours(bgr, "bgr8"), bgr), 0);
+    EXPECT_EQ(largest_difference(colours(bgr, "8UC3"), bgr), 0);
+    EXPECT_EQ(largest_difference(colours(rgb, "rgb8"), bgr), 0);
+    EXPECT_EQ(largest_difference(colours(bgra, "bgra8"), bgr), 0);
+    EXPECT_EQ(largest_difference(colours(rgba, "rgba8"), bgr), 0);
+    EXPECT_TRUE(colours(grey, "mono8").empty());
+    EXPECT_TRUE(colours(wide, "mono16").empty());
+    EXPECT_NE(malformed([&] { (void)colours(bgr, "yuv422"); }).find("unknown encoding 'yuv422'"),
+              std::string::npos);
+    const auto unpacked = [&](const cv::Mat& image, const char* suffix) {
+      Bytes file;
+      cv::imencode(suffix, image, file);
+      return colour_image(
+          parse_compressed_image(compressed_image_message(encoding, 5, "some", file), encoding));
+    };
+    EXPECT_EQ(largest_difference(unpacked(bgr, ".png"), bgr), 0);
+    EXPECT_LT(cv::norm(unpacked(bgr, ".jpg"), bgr, cv::NORM_L1) / (3.0 * kWidth * kHeight), 4);
+    EXPECT_TRUE(unpacked(grey, ".png").empty());
+    EXPECT_TRUE(unpacked(grey, ".jpg").empty());
+  }
+}
+
 /// A camera with a colour filter sees one of three values a pixel, where and which the name says.
 TEST(RosImages, BayerPatternsAreNamedByTheirFirstPixels) {
   const cv::Scalar blue_green_red(40, 120, 200);
@@ -86,6 +120,9 @@ TEST(RosImages, BayerPatternsAreNamedByTheirFirstPixels) {
                                  grey(inside)),
               1)
         << pattern;
+    const Bytes message = image_message(MessageEncoding::kRos1, 5, raw, "bayer_" + pattern + "8");
+    const cv::Mat colour = colour_image(parse_image(message, MessageEncoding::kRos1));
+    EXPECT_LE(largest_difference(colour(inside), flat(inside)), 1) << pattern;
   }
 }
 
