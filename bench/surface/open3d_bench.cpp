@@ -1,40 +1,24 @@
 // Open3D's fusion on one core, of the views that surface_bench fuses; only where its library is installed.
 #include <benchmark/benchmark.h>
-#include <open3d/geometry/RGBDImage.h>
+#include <omp.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
 
-#include <cstdlib>
-#include <cstring>
-#include <opencv2/imgproc.hpp>
-
 #include "bench/surface/depth_views.hpp"
+#include "bench/surface/open3d_images.hpp"
 
 namespace twofold {
 namespace {
-
-constexpr double kFarthest = 8;  // [m]
-
-open3d::geometry::Image image_of(const cv::Mat& pixels) {
-  open3d::geometry::Image image;
-  image.Prepare(pixels.cols, pixels.rows, pixels.channels(), static_cast<int>(pixels.elemSize1()));
-  std::memcpy(image.data_.data(), pixels.data, pixels.total() * pixels.elemSize());
-  return image;
-}
 
 /// Truncation as here: four voxels.
 void fuse_depth_open3d(benchmark::State& state) {
   using namespace open3d::pipelines::integration;
   const DepthViews& all = depth_views();
-  const PinholeCamera& c = all.rig.camera;
-  const open3d::camera::PinholeCameraIntrinsic intrinsic(c.width, c.height, c.fx, c.fy, c.cx, c.cy);
+  const auto intrinsic = open3d_camera(all.rig.camera);
   const double voxel = 1e-3 * static_cast<double>(state.range(0));
   ScalableTSDFVolume volume(voxel, 4 * voxel, TSDFVolumeColorType::RGB8);
   std::vector<std::shared_ptr<open3d::geometry::RGBDImage>> images;
   for (std::size_t n = 0; n < kViews; ++n) {
-    cv::Mat rgb;
-    cv::cvtColor(all.colour[n], rgb, cv::COLOR_BGR2RGB);
-    images.push_back(open3d::geometry::RGBDImage::CreateFromColorAndDepth(
-        image_of(rgb), image_of(all.depth[n]), 1 / all.rig.depth_unit, kFarthest, false));
+    images.push_back(open3d_rgbd(all.rig, all.depth[n], all.colour[n]));
     volume.Integrate(*images[n], intrinsic, all.T_c_w[n].matrix());
   }
   std::size_t n = 0;
@@ -49,7 +33,7 @@ BENCHMARK(fuse_depth_open3d)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond)->Me
 }  // namespace twofold
 
 int main(int argc, char** argv) {
-  setenv("OMP_NUM_THREADS", "1", 1);
+  omp_set_num_threads(1);  // the library has read OMP_NUM_THREADS when main begins
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
 }
