@@ -15,6 +15,10 @@ namespace {
 constexpr float kColourBand = 2.0f * kDistanceSteps;
 constexpr float kReadingShare = 0.2f;  // of max_weight: what one reading, however near, weighs at most
 constexpr float kFreeShare = 0.1f;     // of max_weight: what the sight of free space weighs
+// Of max_weight: what is left of a sample's weight when it was taken for the inside of something that is seen
+// through. One wrong reading moves the surface by less than a voxel then, and four sights carve away whatever
+// was seen before.
+constexpr float kContradictedShare = 0.5f;
 
 /// Eight readings, each kind together.
 struct PixelLanes {
@@ -114,6 +118,7 @@ BlockBounds bounds_of(const FusionView& view, const DepthView& images, const Blo
 struct RowUpdate {
   Lanes distance;  ///< new value for the average [steps]
   Lanes weight;    ///< [steps]; 0: the view says nothing
+  LaneIndex free;  ///< not 0: samples that the view sees through
   LaneIndex near;  ///< samples that take part in the surface's colour
   LaneIndex colour;
 };
@@ -186,7 +191,11 @@ inline void measure_row(const FusionView& view, const RowScale& scale, const Pix
   const Lanes banded = in_band ? weight : kZero;
   row.distance = scale.distance * (is_free ? kZero + scale.truncation : s);
   row.weight = is_free ? kZero + kFreeShare * kMostWeightSteps : banded;
-  if constexpr (!kWholeInImage) row.weight = seen ? row.weight : kZero;
+  row.free = is_free;
+  if constexpr (!kWholeInImage) {
+    row.weight = seen ? row.weight : kZero;
+    row.free &= seen;
+  }
   row.near = (row.weight > 0) & (row.distance < kColourBand) & (row.distance > -kColourBand);
   row.colour = at.colour_and_facing;
 }
@@ -210,12 +219,15 @@ template <bool kColours>
 inline void update_row(const RowUpdate& row, std::size_t first, BlockTable& blocks, VoxelBlock& block) {
   std::int16_t* distances = &block.distance[first];
   std::uint16_t* weights = &block.weight[first];
-  const Lanes sum = real(load<LaneUnsignedShort>(weights)) + row.weight;
+  Lanes average = real(load<LaneShort>(distances));
+  Lanes known = real(load<LaneUnsignedShort>(weights));
+  const LaneIndex contradicted = row.free & (average < 0);
+  known = contradicted ? smaller(known, kZero + kContradictedShare * kMostWeightSteps) : known;
+  const Lanes sum = known + row.weight;
   const Lanes share = row.weight / larger(sum, kZero + 1e-6f);
   if constexpr (kColours) {
     if (any(row.near)) update_colours(row, share, &blocks.colour_for(block).samples[first]);
   }
-  Lanes average = real(load<LaneShort>(distances));
   average += (row.distance - average) * share;
   constexpr float kToPositive = 32768;  // conversion cuts off toward 0
   const LaneShort average_steps =
@@ -284,8 +296,11 @@ struct BlockUpdate {
     const auto* pixels = images.pixels.ptr<PixelReading>(0);
     const auto free = static_cast<std::int16_t>(std::lrint(scale.truncation * scale.distance));
     RowUpdate row;
-    RowUpdate free_row{
-        kZero + scale.truncation * scale.distance, kZero + kFreeShare * kMostWeightSteps, {}, {}};
+    const RowUpdate free_row{kZero + scale.truncation * scale.distance,
+                             kZero + kFreeShare * kMostWeightSteps,
+                             ~LaneIndex{},
+                             {},
+                             {}};
     bool any_row = false;
     for (int z = 0; z < kBlockEdge; ++z) {
       const Layer layer(pose, bounds, z);

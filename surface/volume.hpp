@@ -31,8 +31,9 @@ class Resampler;
 /// A sample's weight stands for the information of its distance in units of 1 / voxel^2: voxel / sqrt(weight)
 /// is an upper estimate of its standard deviation. Each reading adds voxel^2 / sigma(z)^2, but less the more
 /// aslant the surface is seen and the farther the sample is behind it, and at most a fifth of max_weight;
-/// each sight of free space adds a tenth of max_weight. The sum ends at max_weight, so that the estimate is
-/// never below voxel / sqrt(max_weight). Same calls, same bytes. One thread at a time.
+/// each sight of free space adds a tenth of max_weight, and first takes what is above half of max_weight from
+/// a sample that was the inside of something. The sum ends at max_weight, so that the estimate is never below
+/// voxel / sqrt(max_weight). Same calls, same bytes. One thread at a time.
 class SurfaceVolume {
  public:
   /// options must be valid; depth_noise above 0.

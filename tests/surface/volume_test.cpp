@@ -75,6 +75,27 @@ TEST(SurfaceVolume, WhatWentAwayIsCarvedAway) {
     EXPECT_GT((T_c_w * Vector3(x.cast<double>())).z(), 1.4);
 }
 
+/// However often it was seen before; and one image that is wrong takes nothing away.
+TEST(SurfaceVolume, FourSightsCarveAwayWhatStoodForLong) {
+  const Rig rig = depth_rig();
+  const Ball ball{{0, 0, 0}, 0.1}, away{{50, 0, 0}, 0.1};
+  SurfaceVolume volume(fine_options());
+  const SE3 T_c_w = camera_around(0, 1);
+  for (int n = 0; n < 60; ++n) volume.fuse(make_depth_view(rig, depth_of(rig, T_c_w, ball, 1.5), {}), T_c_w);
+  const auto vertices_of_ball = [&] {
+    std::size_t count = 0;
+    for (const Eigen::Vector3f& x : extract_mesh(volume).positions)
+      count += (T_c_w * Vector3(x.cast<double>())).z() < 1.4 ? 1 : 0;
+    return count;
+  };
+  const std::size_t before = vertices_of_ball();
+  ASSERT_GT(before, 500U);
+  volume.fuse(make_depth_view(rig, depth_of(rig, T_c_w, away, 1.5), {}), T_c_w);
+  EXPECT_GT(vertices_of_ball(), before * 9 / 10);
+  for (int n = 0; n < 3; ++n) volume.fuse(make_depth_view(rig, depth_of(rig, T_c_w, away, 1.5), {}), T_c_w);
+  EXPECT_EQ(vertices_of_ball(), 0U);
+}
+
 TEST(SurfaceVolume, NoiseIsAveragedOut) {
   const Rig rig = depth_rig();
   const SE3 T_c_w;
