@@ -52,7 +52,7 @@ constexpr int kArrayBuffer = 34962;  // glTF's numbers
 constexpr int kElementBuffer = 34963;
 constexpr int kGlFloat = 5126;
 constexpr int kGlUnsignedInt = 5125;
-constexpr int kGlUnsignedByte = 5121;
+constexpr int kGlUnsignedShort = 5123;
 
 GlbPart glb_positions(const TriangleMesh& mesh) {
   GlbPart part;
@@ -79,19 +79,20 @@ GlbPart glb_normals(const TriangleMesh& mesh) {
 }
 
 /// Vertices start at multiples of four bytes: a fourth component, opaque, fills them up. glTF's colours are
-/// linear in light; those of images are not  (sRGB, IEC 61966-2-1).
+/// linear in light; those of images are not  (sRGB, IEC 61966-2-1): 8 bits of light would be one for up to
+/// thirteen dark levels of theirs.
 GlbPart glb_colours(const TriangleMesh& mesh) {
   GlbPart part;
   const auto linear = [](std::uint8_t c) {
     const double s = c / 255.0;
-    return static_cast<std::uint8_t>(
-        std::lround(255 * (s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4))));
+    return static_cast<std::uint16_t>(
+        std::lround(65535 * (s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4))));
   };
   for (const auto& colour : mesh.colours) {
     for (const std::uint8_t c : colour) append(linear(c), part.bytes);
-    append(std::uint8_t{255}, part.bytes);
+    append(std::uint16_t{65535}, part.bytes);
   }
-  part.accessor = {{"componentType", kGlUnsignedByte},
+  part.accessor = {{"componentType", kGlUnsignedShort},
                    {"normalized", true},
                    {"count", mesh.colours.size()},
                    {"type", "VEC4"}};

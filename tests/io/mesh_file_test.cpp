@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -130,6 +132,29 @@ TEST(MeshFile, GlbIsUprightWhateverIsUp) {
         nlohmann::json::parse(bytes.substr(20, size))["nodes"][0]["rotation"].get<std::vector<double>>();
     EXPECT_NEAR((Eigen::Quaterniond(q[3], q[0], q[1], q[2]) * up).y(), 1, 1e-12);
   }
+}
+
+TEST(MeshFile, GlbKeepsAllLevelsOfDarkColours) {
+  const ScratchFolder folder;
+  TriangleMesh mesh = sample_mesh();
+  mesh.colours = {{0, 1, 2}, {3, 4, 5}, {6, 7, 8}, {9, 128, 255}};
+  write_glb_mesh(folder / "a.glb", mesh);
+  const std::string bytes = bytes_of(folder / "a.glb");
+  std::uint32_t json_size = 0;
+  std::memcpy(&json_size, bytes.data() + 12, 4);
+  const auto json = nlohmann::json::parse(bytes.substr(20, json_size));
+  const std::size_t colours = json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"];
+  EXPECT_EQ(json["accessors"][colours]["componentType"], 5123);
+  const std::size_t view = json["accessors"][colours]["bufferView"];
+  const std::size_t offset = json["bufferViews"][view]["byteOffset"];
+  std::array<std::uint16_t, 16> light{};
+  std::memcpy(light.data(), bytes.data() + 20 + json_size + 8 + offset, sizeof light);
+  // c / 12.92 / 255 for the dark ones, in steps of 1 / 65535  (IEC 61966-2-1).
+  for (std::size_t c = 0; c < 10; ++c)
+    EXPECT_EQ(light[4 * (c / 3) + c % 3], std::lround(65535 * static_cast<double>(c) / 12.92 / 255)) << c;
+  EXPECT_NEAR(light[13], 0.2158605 * 65535, 1);
+  EXPECT_EQ(light[14], 65535);
+  EXPECT_EQ(light[15], 65535) << "opaque";
 }
 
 TEST(MeshFile, GlbHoldsTheMesh) {
