@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "io/files/mesh_file.hpp"
@@ -63,6 +64,17 @@ TEST(ObjectCommand, SaysWhatIsMissing) {
       run(folder, "object 'synthetic:turntable?sensor=stereo&width=160&height=120&frames=8'" + out);
   EXPECT_EQ(small.exit_code, 1);
   EXPECT_NE(small.err.find("too small in the images"), std::string::npos) << small.err;
+}
+
+TEST(ObjectCommand, SaysThatNothingTurned) {
+  const ScratchFolder folder;
+  const Outcome still =
+      run(folder, "object 'synthetic:turntable?sensor=rgbd&frames=15' --deterministic --out '" +
+                      (folder / "model") + "'");
+  EXPECT_EQ(still.exit_code, 1);
+  EXPECT_NE(still.err.find("seen from one side only, from directions that differ by 1"), std::string::npos)
+      << still.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "model/object.json"));
 }
 
 }  // namespace

@@ -78,6 +78,20 @@ bool is_turntable(const ObjectModel& model) {
   return model.axis && model.axis->deviation < kTurntable;
 }
 
+/// What is missing when nothing turned: then what was fused is what stood in front, on whatever plane there
+/// was. Empty when the camera saw the object from sides enough, or there is none.
+std::string no_object_reason(const ObjectModel& model, const Trajectory& poses) {
+  constexpr double kFewSides = 30 * kDegree;
+  if (model.mesh.triangles.empty()) return {};
+  const double angle = widest_view_angle(model.box.centre, poses);
+  if (angle >= kFewSides) return {};
+  return fmt::format(
+      "what is nearer than --depth-cut was seen from one side only, from directions that differ by {:.0f} "
+      "degrees: the object must turn, or the camera be carried around it, by {:.0f} at least; a surface of "
+      "what is in view is made by twofold surface, and by twofold run --surface",
+      angle / kDegree, kFewSides / kDegree);
+}
+
 nlohmann::ordered_json vector_json(const Vector3& x) {
   return {x.x(), x.y(), x.z()};
 }
@@ -154,6 +168,8 @@ void run_object(ObjectArguments& arguments) {
         ": the object could not be tracked: it is too small in the images, or without texture");
   const std::vector<MapPart> parts = map_parts(result, options);
   const ObjectModel model = build_object(*source, parts.front().trajectory, arguments.surface);
+  if (const std::string reason = no_object_reason(model, parts.front().trajectory); !reason.empty())
+    throw std::runtime_error(arguments.source + ": " + reason);
   update_peak_memory(result);
   write_run_output(arguments.out, {arguments.source, "", arguments.calibration, nullptr, result.losses},
                    *source, options, result, parts, surface_json(model.figures));

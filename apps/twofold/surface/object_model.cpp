@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "base/processor_time.hpp"
 #include "surface/mesh_picture.hpp"
@@ -59,6 +60,20 @@ ObjectBox box_around(const TriangleMesh& mesh, const Vector3& up) {
     best.axes = {best.axes[1], -best.axes[0], best.axes[2]};
   }
   return best;
+}
+
+double widest_view_angle(const Vector3& x_w, const Trajectory& poses) {
+  std::vector<Vector3> directions;
+  for (const TimedPose& pose : poses) {
+    const Vector3 direction = (pose.T_w_c.translation() - x_w).normalized();
+    constexpr double kSame = 0.01;  // [rad]: how finely it is told
+    const auto is_near = [&](const Vector3& other) { return (other - direction).norm() < kSame; };
+    if (std::none_of(directions.begin(), directions.end(), is_near)) directions.push_back(direction);
+  }
+  double least = 1;
+  for (std::size_t a = 0; a < directions.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) least = std::min(least, directions[a].dot(directions[b]));
+  return std::acos(std::max(least, -1.0));
 }
 
 cv::Mat draw_object(const ObjectModel& model) {

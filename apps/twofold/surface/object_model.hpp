@@ -38,6 +38,9 @@ struct ObjectModel {
 [[nodiscard]] ObjectModel build_object(const ObjectSource& source, const Trajectory& poses,
                                        const SurfaceOptions& options);
 
+/// Between the directions in which the cameras see a position, the largest angle there is [rad].
+[[nodiscard]] double widest_view_angle(const Vector3& x_w, const Trajectory& poses);
+
 /// Four views of the object, from a little above, a quarter turn from each to the next. CV_8UC3.
 [[nodiscard]] cv::Mat draw_object(const ObjectModel& model);
 
