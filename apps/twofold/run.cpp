@@ -210,11 +210,11 @@ RunResult run_engine(const RunArguments& arguments, const EngineOptions& options
   return result;
 }
 
-SurfaceFigures write_live_surface(const std::string& folder, LiveSurface& surface, const GraphSnapshot& graph,
-                                  KeyframeId part) {
+SurfaceFigures write_live_surface(const RunArguments& arguments, LiveSurface& surface,
+                                  const GraphSnapshot& graph, KeyframeId part) {
   SurfaceFigures figures;
   const TriangleMesh mesh = surface.finish(graph, part, figures);
-  write_surface(folder, mesh);
+  write_surface(arguments.out, mesh, -Vector3::UnitY(), arguments.surface.files);
   return figures;
 }
 
@@ -290,7 +290,7 @@ void write_results(const RunArguments& arguments, const EngineOptions& options, 
   std::optional<SurfaceFigures> figures;
   if (surface.wanted())
     failures.attempt(
-        [&] { figures = write_live_surface(arguments.out, surface, result.graph, parts.front().id); });
+        [&] { figures = write_live_surface(arguments, surface, result.graph, parts.front().id); });
   // Of a run that tracked nothing, or was interrupted, a surface is not expected.
   if (figures && figures->triangles == 0 && result.counts.tracked > 0 && !result.interrupted)
     failures.add(arguments.source + ": --surface: " + no_mesh_reason(*figures, SurfaceOptions().max_depth));

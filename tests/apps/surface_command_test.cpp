@@ -198,9 +198,12 @@ TEST(SurfaceCommand, ARunInALoadedMapIsFusedAlongItsTrajectory) {
 
 TEST(SurfaceCommand, KeepsTheMeshUpToDateAndSaysHowFarItIsBehind) {
   const ScratchFolder folder;
-  const Outcome live = run(
-      folder, "run " + kScene + " --surface 0.02 --surface-live --quiet --out '" + (folder / "live") + "'");
+  const Outcome live =
+      run(folder, "run " + kScene + " --surface 0.02 --surface-live --quiet --out '" + (folder / "live") +
+                      "' --obj '" + (folder / "mesh.obj") + "' --picture '" + (folder / "mesh.png") + "'");
   ASSERT_EQ(live.exit_code, 0) << live.err;
+  EXPECT_EQ(content(folder / "mesh.obj").rfind("# metres\nv ", 0), 0u);
+  EXPECT_FALSE(cv::imread(folder / "mesh.png").empty());
   EXPECT_NE(live.out.find("live mesh   behind the map by"), std::string::npos) << live.out;
   const auto surface = nlohmann::json::parse(content(folder / "live/summary.json"))["surface"];
   EXPECT_GT(surface["live_mesh"]["updates"], 0);

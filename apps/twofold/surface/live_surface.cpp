@@ -50,12 +50,15 @@ void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments
                 "Keep the mesh up to date while the run lasts, and say how far it is behind the map; not on "
                 "one thread")
       ->needs(surface);
+  add_mesh_file_options(command, arguments.files);
+  for (const char* option : {"--obj", "--picture"}) command.get_option(option)->needs(surface);
 }
 
 LiveSurface::LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source,
                          EngineOptions& options, bool one_thread, LiveMesh::Listener on_mesh)
     : arguments_(arguments), rig_(source.rig()), colours_(source) {
   if (arguments.voxel == 0) return;
+  expect_places_for(arguments.files);
   if (const std::string why = no_surface_reason(rig_); !why.empty())
     throw IoError("--surface", "the source " + why);
   SurfaceOptions surface;

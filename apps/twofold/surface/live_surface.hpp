@@ -28,9 +28,10 @@ struct LiveSurfaceArguments {
   double memory_mb = 2000;  ///< of samples and depth images
   bool live_mesh = false;   ///< kept up to date while the run lasts, unless that has one thread
   double load = 0.5;        ///< share of one processor's time that the thread may take, in (0, 1]
+  MeshFiles files;          ///< of the mesh at the end
 };
 
-/// --surface, --surface-memory, --surface-load and --surface-live.
+/// --surface, --surface-memory, --surface-load and --surface-live, and --obj and --picture, which need it.
 void add_live_surface_options(CLI::App& command, LiveSurfaceArguments& arguments);
 
 /// What the tracker made of a frame.

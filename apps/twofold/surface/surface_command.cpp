@@ -27,7 +27,6 @@
 #include "io/plots/plot.hpp"
 #include "io/sources/open_source.hpp"
 #include "io/sources/source_path.hpp"
-#include "surface/mesh_picture.hpp"
 #include "surface/meshing.hpp"
 #include "surface/stereo/stereo_depth.hpp"
 
@@ -41,8 +40,7 @@ struct SurfaceArguments {
   std::string poses;
   std::string calibration;
   std::string out;
-  std::string picture;
-  std::string obj;
+  MeshFiles files;
   std::string cloud;
   std::size_t every = 1;
   bool grey = false;
@@ -51,7 +49,6 @@ struct SurfaceArguments {
 
 constexpr std::int64_t kSameTimeNs = 1'000'000;
 constexpr std::int64_t kTruthGapNs = 50'000'000;  // that a camera's way between two true poses is guessed in
-constexpr int kPictureWidth = 1600;
 
 /// What a run was made of.
 struct RunInput {
@@ -236,8 +233,7 @@ void run_surface(const SurfaceArguments& arguments) {
     throw IoError("twofold surface", reason);
   SurfaceJob job = surface_job(arguments);
   prepare_output_folder(job.out);
-  expect_place_for_file(arguments.obj, "--obj");
-  expect_place_for_file(arguments.picture, "--picture");
+  expect_places_for(arguments.files);
   expect_place_for_file(arguments.cloud, "--cloud");
   if (options.depth_noise == 0) options.depth_noise = usual_depth_noise(job.source->rig());
   DepthFusion fusion(arguments, job, options);
@@ -262,11 +258,8 @@ void run_surface(const SurfaceArguments& arguments) {
   if (mesh.triangles.empty())
     throw std::runtime_error(arguments.input + ": " + no_mesh_reason(figures, options.max_depth));
   const Vector3 up = up_axis_of(job.poses) == 2 ? Vector3::UnitZ() : Vector3(-Vector3::UnitY());
-  write_surface(job.out, mesh, up);
-  if (!arguments.obj.empty()) write_obj_mesh(arguments.obj, mesh);
+  write_surface(job.out, mesh, up, arguments.files);
   if (fusion.cloud()) write_ply_mesh(arguments.cloud, fusion.cloud()->points());
-  if (!arguments.picture.empty())
-    write_png(arguments.picture, draw_mesh(mesh, mesh.colours, overview_of(mesh, up, kPictureWidth)));
   fmt::print("written to  {}\n", job.out.string());
 }
 
@@ -313,15 +306,11 @@ void add_surface_command(CLI::App& app, int& exit_code) {
                       "Folder for surface.ply and surface.glb; the run's otherwise, whose own are replaced");
   add_fusion_options(command, arguments);
   command->add_flag("--grey", arguments->grey, "Brightness instead of the recording's colours");
-  command->add_option(
-      "--obj", arguments->obj,
-      "Write the mesh to this OBJ file, too; its axes are surface.ply's: y points down, where many "
-      "programs take it for up");
+  add_mesh_file_options(*command, arguments->files);
   command->add_option(
       "--cloud", arguments->cloud,
       "Write the depth images themselves to this PLY file, too, as points with colours, laid over "
       "each other along the poses; of the readings in a cube of a voxel their mean");
-  command->add_option("--picture", arguments->picture, "Draw the mesh to this PNG file");
   command->callback([arguments, &exit_code] {
     run_surface(*arguments);
     exit_code = kOk;

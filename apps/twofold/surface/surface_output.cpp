@@ -1,13 +1,17 @@
 #include "apps/twofold/surface/surface_output.hpp"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "apps/twofold/output/output_folder.hpp"
 #include "base/counted.hpp"
 #include "io/files/mesh_file.hpp"
+#include "io/plots/plot.hpp"
+#include "surface/mesh_picture.hpp"
 
 namespace twofold {
 
@@ -96,12 +100,29 @@ std::string no_mesh_reason(const SurfaceFigures& f, double max_depth) {
                      f.voxel);
 }
 
-void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh, const Vector3& up) {
+void add_mesh_file_options(CLI::App& command, MeshFiles& files) {
+  command.add_option("--obj", files.obj,
+                     "Write the mesh to this OBJ file, too; its axes are surface.ply's: y points down, where "
+                     "many programs take it for up");
+  command.add_option("--picture", files.picture, "Draw the mesh to this PNG file");
+}
+
+void expect_places_for(const MeshFiles& files) {
+  expect_place_for_file(files.obj, "--obj");
+  expect_place_for_file(files.picture, "--picture");
+}
+
+void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh, const Vector3& up,
+                   const MeshFiles& files) {
+  constexpr int kPictureWidth = 1600;
   std::error_code ignored;
   for (const char* name : {"surface.ply", "surface.glb"}) std::filesystem::remove(folder / name, ignored);
   if (mesh.triangles.empty()) return;
   write_ply_mesh(folder / "surface.ply", mesh);
   write_glb_mesh(folder / "surface.glb", mesh, up);
+  if (!files.obj.empty()) write_obj_mesh(files.obj, mesh);
+  if (!files.picture.empty())
+    write_png(files.picture, draw_mesh(mesh, mesh.colours, overview_of(mesh, up, kPictureWidth)));
 }
 
 }  // namespace twofold

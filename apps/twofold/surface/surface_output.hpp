@@ -1,5 +1,6 @@
 #pragma once
 
+#include <CLI/App.hpp>
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -56,10 +57,21 @@ void print_surface(const SurfaceFigures& figures);
 /// @param max_depth  SurfaceOptions::max_depth [m]
 [[nodiscard]] std::string no_mesh_reason(const SurfaceFigures& figures, double max_depth);
 
-/// surface.ply and surface.glb in this folder; those of an earlier run are removed when there is no triangle.
-/// Throws IoError.
+/// Files of a mesh that are written only if asked for; empty: not.
+struct MeshFiles {
+  std::string obj;
+  std::string picture;
+};
+
+/// --obj and --picture.
+void add_mesh_file_options(CLI::App& command, MeshFiles& files);
+/// Throws IoError naming the option whose file has no folder to be in.
+void expect_places_for(const MeshFiles& files);
+
+/// surface.ply and surface.glb in this folder, and the files asked for; those of an earlier run are removed
+/// from the folder when there is no triangle. Throws IoError.
 /// @param up  unit: what is shown upright
 void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh,
-                   const Vector3& up = -Vector3::UnitY());
+                   const Vector3& up = -Vector3::UnitY(), const MeshFiles& files = {});
 
 }  // namespace twofold
