@@ -35,7 +35,7 @@ if(TWOFOLD_SHARED)
   twofold_debian_package(development libtwofold-dev)
 endif()
 if(TARGET twofold_python)
-  install(FILES examples/offline.py examples/webcam.py DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-twofold/examples
+  install(FILES examples/offline.py examples/surface.py examples/webcam.py DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/python3-twofold/examples
     COMPONENT python)
   twofold_debian_package(python python3-twofold)
 endif()

@@ -1,17 +1,12 @@
 // Is the way ahead free? A surface of the keyframes' depth, asked as a planner asks, and written as a mesh.
-//   07_surface_for_a_planner [SOURCE [MESH.obj]]
-// The mesh has the axes of the map, that of its first camera: y points down. Programs that take y for up show
-// it upside down; (x, -y, -z) stands upright there.
+//   07_surface_for_a_planner [SOURCE [MESH.glb]]
+// A mesh's name ends in .glb, .ply or .obj. The latter two have the axes of the map, that of its first
+// camera: y points down.
 // The source has depth: RGB-D, or stereo.
 #include <algorithm>
-#include <cstdint>
 #include <cstdio>
 #include <exception>
-#include <fstream>
-#include <map>
-#include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <twofold/slam.hpp>
@@ -23,42 +18,6 @@ namespace {
 using twofold::SpacePoint;
 using twofold::SpaceState;
 
-/// What keyframes saw, in the world of the map part that the first of them is in, whatever name that has.
-class Surroundings {
- public:
-  explicit Surroundings(const twofold::CameraRig& rig) : model_(rig, {.voxel = 0.02}) {}
-
-  void add(const twofold::FrameView& frame, const twofold::PoseEstimate& pose) {
-    if (frames_.empty()) part_ = pose.map_part;
-    if (pose.map_part != part_) return;
-    frames_[pose.frame] = frame;  // its owner keeps the images
-    model_.add(frame, pose.T_world_camera);
-  }
-
-  /// A surface stays where its poses put it; the map has corrected them since, and where it joined parts,
-  /// either may have the other's name now.
-  void correct(const twofold::MapSnapshot& map) {
-    model_.clear();
-    std::map<std::int64_t, twofold::FrameView> kept;
-    for (const auto& keyframe : map.keyframes()) {
-      const auto frame = frames_.find(keyframe.frame);
-      if (frame == frames_.end()) continue;
-      part_ = keyframe.part;
-      model_.add(frame->second, keyframe.T_world_camera);
-      kept.insert(*frame);
-    }
-    frames_ = std::move(kept);  // others are keyframes no more
-  }
-
-  [[nodiscard]] const twofold::SurfaceModel& model() const { return model_; }
-  [[nodiscard]] std::uint32_t part() const { return part_; }
-
- private:
-  twofold::SurfaceModel model_;
-  std::map<std::int64_t, twofold::FrameView> frames_;
-  std::uint32_t part_ = twofold::kNoId;
-};
-
 const char* in_words(SpaceState state) {
   if (state == SpaceState::kFree) return "free";
   return state == SpaceState::kOccupied ? "occupied" : "unknown";
@@ -67,12 +26,12 @@ const char* in_words(SpaceState state) {
 /// Straight ahead of the camera: what is there, and how far a body of 5 cm around it could go. Near the
 /// camera, where depth begins, nothing is known.
 /// @return  something of it is known to be free
-bool ask_ahead(const twofold::SurfaceModel& model, const twofold::Pose& T_world_camera) {
+bool ask_ahead(const twofold::SurfaceSnapshot& surface, const twofold::Pose& T_world_camera) {
   constexpr int kSteps = 300;
   constexpr double kStep = 0.01, kRadius = 0.05;  // [m]
   std::vector<SpacePoint> way;
   const auto metres = [&](auto point) { return kStep * static_cast<double>(point - way.begin()); };
-  for (int n = 0; n < kSteps; ++n) way.push_back(model.at(transform(T_world_camera, {0, 0, kStep * n})));
+  for (int n = 0; n < kSteps; ++n) way.push_back(surface.at(transform(T_world_camera, {0, 0, kStep * n})));
   for (auto begin = way.begin(); begin != way.end();) {
     const auto end =
         std::find_if(begin, way.end(), [&](const SpacePoint& p) { return p.state != begin->state; });
@@ -94,37 +53,30 @@ bool ask_ahead(const twofold::SurfaceModel& model, const twofold::Pose& T_world_
   return true;
 }
 
-void write_obj(const std::string& file, const twofold::SurfaceMesh& mesh) {
-  std::ofstream out(file);
-  for (const auto& x : mesh.positions) out << "v " << x[0] << ' ' << x[1] << ' ' << x[2] << '\n';
-  for (const auto& t : mesh.triangles) out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
-  if (!out.flush()) throw std::runtime_error(file + ": cannot be written");
+void write_mesh(const std::string& file, const twofold::SurfaceMesh& mesh) {
+  save_mesh(mesh, file);
   std::printf("%zu triangles written to %s\n", mesh.triangles.size(), file.c_str());
 }
 
 int run(const std::string& name, const std::string& mesh) {
   twofold::Source source(name);
-  // All on one thread here. A robot's surface has a thread of its own: `add` takes 10 to 100 ms for a depth
-  // image, more for a pair.
+  // All on one thread here. A robot's surface has a thread of its own: `update` takes 10 to 100 ms for a
+  // keyframe; planners ask snapshots, on theirs.
   twofold::Slam slam(source.rig(), {.mode = twofold::RunMode::kDeterministic});
-  bool corrected = false;
-  slam.on_event([&](const twofold::MapEvent& event) {
-    corrected |=
-        event.kind != twofold::MapEventKind::kNewPart && event.kind != twofold::MapEventKind::kRelocalisation;
-  });
-  Surroundings surroundings(source.rig());
-  twofold::Pose T_world_camera;  // in the surroundings' world
+  twofold::MapSurface surface(slam.map(), {.model = {.voxel = 0.02}});
+  twofold::Pose T_world_camera;
   for (twofold::FrameView frame; source.next(frame);) {
     slam.push(frame);
     const auto pose = slam.latest();
     if (!pose || pose->state != twofold::TrackingState::kTracked) continue;
-    if (corrected) surroundings.correct(slam.map());
-    corrected = false;
-    if (pose->keyframe) surroundings.add(frame, *pose);
-    if (pose->map_part == surroundings.part()) T_world_camera = pose->T_world_camera;
+    T_world_camera = pose->T_world_camera;
+    if (!pose->keyframe) continue;
+    surface.add(frame, pose->frame);
+    surface.update(slam.map());  // loops move what is there
   }
-  const bool known = ask_ahead(surroundings.model(), T_world_camera);
-  if (!mesh.empty()) write_obj(mesh, surroundings.model().mesh());
+  const twofold::SurfaceSnapshot now = surface.snapshot();
+  const bool known = ask_ahead(now, T_world_camera);
+  if (!mesh.empty()) write_mesh(mesh, now.mesh());
   return known ? 0 : 1;
 }
 

@@ -11,6 +11,7 @@ void bind_evaluation(pybind11::module_& module);
 void bind_frames(pybind11::module_& module);
 void bind_calibration(pybind11::module_& module);
 void bind_map(pybind11::module_& module);
+void bind_surface(pybind11::module_& module);
 void bind_slam(pybind11::module_& module);
 
 }  // namespace twofold::python

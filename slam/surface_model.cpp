@@ -6,46 +6,17 @@
 
 #include "base/option_check.hpp"
 #include "slam/conversions.hpp"
+#include "slam/depth_frame.hpp"
 #include "slam/distance_field.hpp"
-#include "slam/frame_pixels.hpp"
 #include "slam/surface_pieces.hpp"
 #include "surface/free_space/free_space.hpp"
 #include "surface/meshing.hpp"
-#include "surface/stereo/stereo_depth.hpp"
 
 namespace twofold {
 namespace {
 
 constexpr double kFarthest = 1e5;     // [m]
 constexpr double kUnitLength = 1e-3;  // that a quaternion's squared length may differ from one, as of a file
-
-Rig depth_rig(const CameraRig& rig) {
-  Rig inside = to_rig(rig);
-  if (const std::string why = no_surface_reason(inside); !why.empty())
-    throw std::invalid_argument("the rig " + why);
-  return inside;
-}
-
-SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& options) {
-  if (const std::string why = options.invalid_reason(); !why.empty())
-    throw std::invalid_argument("options." + why);
-  SurfaceOptions surface;
-  surface.voxel = options.voxel;
-  surface.max_depth = options.max_depth;
-  surface.depth_noise = usual_depth_noise(rig);
-  return surface;
-}
-
-void expect_pixels(const char* name, const ImageView& view, bool depth) {
-  if (const std::string refusal = pixels_refusal(name, view, depth); !refusal.empty())
-    throw std::invalid_argument(refusal);
-}
-
-/// As fusion takes it.
-cv::Mat colour_of(const ImageView& view) {
-  const bool is_grey = view.data == nullptr || view.format == ImageFormat::kGrey8;
-  return is_grey ? pixels_of(view, nullptr) : bgr_pixels_of(view);
-}
 
 }  // namespace
 
@@ -73,7 +44,7 @@ struct SurfaceModel::Impl {
 };
 
 SurfaceModel::SurfaceModel(const CameraRig& rig, const SurfaceModelOptions& options)
-    : impl_(new Impl(depth_rig(rig), options)) {}
+    : impl_(new Impl(expect_depth(to_rig(rig)), options)) {}
 SurfaceModel::~SurfaceModel() = default;
 SurfaceModel::SurfaceModel(SurfaceModel&&) noexcept = default;
 SurfaceModel& SurfaceModel::operator=(SurfaceModel&&) noexcept = default;
@@ -86,24 +57,8 @@ int SurfaceModel::add(const FrameView& frame, const Pose& T_world_camera) {
   const SE3 T_w_c = to_se3(T_world_camera);
   if (!(T_w_c.translation().norm() < kFarthest) || !T_w_c.matrix().allFinite())
     throw std::invalid_argument("T_world_camera is not finite, or farther than 100 km from the origin");
-  expect_pixels("left", frame.left, false);
-  cv::Mat depth;
-  if (rig.kind == SensorKind::kStereo) {
-    expect_pixels("right", frame.right, false);
-    const cv::Mat left = pixels_of(frame.left, nullptr);
-    const cv::Mat right = pixels_of(frame.right, nullptr);
-    const cv::Size size(rig.camera.width, rig.camera.height);
-    if (left.size() != size || right.size() != size)
-      throw std::invalid_argument("left and right image must both be of the rig's size");
-    depth = stereo_depth(rig, left, right, impl_->options.nearest_stereo);
-  } else {
-    expect_pixels("depth", frame.depth, true);
-    depth = pixels_of(frame.depth, frame.owner);
-  }
-  const cv::Mat colour = colour_of(frame.left);
-  if (const std::string defect = depth_defect(rig, depth, colour); !defect.empty())
-    throw std::invalid_argument(defect);
-  const DepthView view = make_depth_view(rig, depth, colour);
+  const DepthFrame images = depth_frame(rig, frame, impl_->options.nearest_stereo);
+  const DepthView view = make_depth_view(rig, images.depth, images.colour);
   const int readings = cv::countNonZero(view.depth);
   if (readings == 0) return 0;
   impl_->volume.fuse(view, T_w_c.inverse());

@@ -1,6 +1,23 @@
 #include "slam/surface_pieces.hpp"
 
+#include <cmath>
+#include <stdexcept>
+
+#include "io/files/mesh_file.hpp"
+
 namespace twofold {
+namespace {
+
+TriangleMesh to_triangle_mesh(const SurfaceMesh& plain) {
+  TriangleMesh mesh;
+  for (const auto& x : plain.positions) mesh.positions.emplace_back(x[0], x[1], x[2]);
+  for (const auto& n : plain.normals) mesh.normals.emplace_back(n[0], n[1], n[2]);
+  mesh.colours = plain.colours;
+  mesh.triangles = plain.triangles;
+  return mesh;
+}
+
+}  // namespace
 
 SurfaceMesh to_surface_mesh(const TriangleMesh& mesh) {
   SurfaceMesh plain;
@@ -18,6 +35,18 @@ std::vector<SurfacePiece> surface_pieces(const MeshPieces& mesh, std::uint64_t s
   for (const BlockPosition& at : mesh.changed_since(since))
     pieces.push_back({{at.x, at.y, at.z}, to_surface_mesh(mesh.piece(at))});
   return pieces;
+}
+
+void save_mesh(const SurfaceMesh& mesh, const std::filesystem::path& file, const std::array<double, 3>& up) {
+  const std::string kind = file.extension().string();
+  if (kind == ".ply") return write_ply_mesh(file, to_triangle_mesh(mesh));
+  if (kind == ".obj") return write_obj_mesh(file, to_triangle_mesh(mesh));
+  if (kind != ".glb")
+    throw std::invalid_argument(file.string() + ": the name must end in .ply, .obj or .glb");
+  if (mesh.triangles.empty()) throw std::invalid_argument(file.string() + ": the mesh has no triangle");
+  const Vector3 upright(up[0], up[1], up[2]);
+  if (!(std::abs(upright.norm() - 1) < 1e-3)) throw std::invalid_argument("up is no unit vector");
+  write_glb_mesh(file, to_triangle_mesh(mesh), upright.normalized());
 }
 
 }  // namespace twofold

@@ -1,6 +1,7 @@
 #include "surface/submaps.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/check.hpp"
 #include "base/option_check.hpp"
@@ -38,6 +39,7 @@ std::string SubmapOptions::invalid_reason() const {
       .at_least("max_keyframes", max_keyframes, 1)
       .at_least("max_waiting", static_cast<double>(max_waiting), 1)
       .above("memory_mb", memory_mb, 0)
+      .at_least("max_free_depth", max_free_depth, 0)
       .reason();
 }
 
@@ -104,7 +106,9 @@ void SubmapSurface::fuse_bent(std::size_t most) {
   const std::size_t now = std::min(most, bent.size());
   for (std::size_t n = 0; n < now; ++n) {
     Submap& submap = *bent[n].second;
-    submap.volume.clear();
+    submap.content.volume_to_change().clear();
+    submap.content.free = std::make_shared<FreeSpace>(options_, limits_.max_free_depth);
+    submap.content.free_shared = false;
     for (Member& member : submap.members) report_.fused_anew += fuse(submap, member, {});
   }
   bent_ = bent.size() - now;
@@ -160,7 +164,9 @@ void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& key
   member.packed = std::move(frame.packed);
   member.reach = std::max(keyframe.median_depth, rig_.depth_min);
   member.T_k_w = keyframe.T_k_w;
-  report_.without_readings += !fuse(submap, member, std::move(frame.images));
+  const bool any = fuse(submap, member, std::move(frame.images));
+  if (any && limits_.free_space) forget_hidden(submap, member.T_k_w);
+  report_.without_readings += !any;
   submap.members.push_back(std::move(member));
 }
 
@@ -184,8 +190,13 @@ SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, con
   if (best != nullptr) return *best;
   const SE3 T_k_w = graph.T_k_w(keyframe.id);
   const SE3 T_w_s = begin_of_submap(T_k_w, options_.voxel);
-  submaps_.push_back(std::make_unique<Submap>(
-      Submap{next_submap_++, keyframe.id, T_k_w * T_w_s, T_w_s, keyframe.part, {}, SurfaceVolume(options_)}));
+  submaps_.push_back(std::make_unique<Submap>(Submap{next_submap_++,
+                                                     keyframe.id,
+                                                     T_k_w * T_w_s,
+                                                     T_w_s,
+                                                     keyframe.part,
+                                                     {},
+                                                     Submap::Content(options_, limits_)}));
   return *submaps_.back();
 }
 
@@ -195,23 +206,40 @@ bool SubmapSurface::fuse(Submap& submap, Member& member, DepthImages images) {
   prepare_depth_view(rig_, images.depth, images.colour, view_);
   member.T_k_s = member.T_k_w * submap.T_w_s;
   const bool any = share_of_readings(view_) > 0;
-  if (any) submap.volume.fuse(view_, member.T_k_s);
+  if (any) submap.content.volume_to_change().fuse(view_, member.T_k_s);
+  if (any && limits_.free_space) submap.content.free_to_change().add(view_, member.T_k_s);
   report_.fused += any;
   report_.fusion_ns += thread_cpu_ns() - begin_ns;
   return any;
 }
 
+void SubmapSurface::forget_hidden(const Submap& fused_into, const SE3& T_k_w) {
+  for (const auto& submap : submaps_)
+    if (submap.get() != &fused_into && submap->part == fused_into.part)
+      submap->content.free_to_change().forget_hidden(view_, T_k_w * submap->T_w_s);
+}
+
+SurfaceVolume& SubmapSurface::Submap::Content::volume_to_change() {
+  if (std::exchange(volume_shared, false)) volume = std::make_shared<SurfaceVolume>(*volume);
+  return *volume;
+}
+
+FreeSpace& SubmapSurface::Submap::Content::free_to_change() {
+  if (std::exchange(free_shared, false)) free = std::make_shared<FreeSpace>(*free);
+  return *free;
+}
+
 SurfaceVolume SubmapSurface::whole(KeyframeId part) const {
   SurfaceVolume all(options_);
   for (const auto& submap : submaps_)
-    if (submap->part == part) all.add(submap->volume, submap->T_w_s);
+    if (submap->part == part) all.add(*submap->content.volume, submap->T_w_s);
   return all;
 }
 
 std::vector<PlacedVolume> SubmapSurface::placed(KeyframeId part) const {
   std::vector<PlacedVolume> volumes;
   for (const auto& submap : submaps_)
-    if (submap->part == part) volumes.push_back({submap->id, &submap->volume, submap->T_w_s});
+    if (submap->part == part) volumes.push_back({submap->id, submap->content.volume.get(), submap->T_w_s});
   return volumes;
 }
 
@@ -220,9 +248,20 @@ std::vector<PlacedVolume> SubmapSurface::placed_in(const GraphSnapshot& graph, K
   for (const auto& submap : submaps_) {
     const Keyframe& hung_on = graph.keyframe(submap->hung_on);
     if (hung_on.part == part && !hung_on.culled())
-      volumes.push_back({submap->id, &submap->volume, hung_on.T_k_w.inverse() * submap->T_k_s});
+      volumes.push_back({submap->id, submap->content.volume.get(), hung_on.T_k_w.inverse() * submap->T_k_s});
   }
   return volumes;
+}
+
+std::vector<SharedSubmap> SubmapSurface::share(KeyframeId part) {
+  std::vector<SharedSubmap> shared;
+  for (const auto& submap : submaps_) {
+    if (submap->part != part) continue;
+    Submap::Content& content = submap->content;
+    content.volume_shared = content.free_shared = true;
+    shared.push_back({content.volume, content.free, submap->T_w_s});
+  }
+  return shared;
 }
 
 std::size_t SubmapSurface::bytes() const {
@@ -230,7 +269,7 @@ std::size_t SubmapSurface::bytes() const {
   for (const Waiting& frame : waiting_)
     sum += bytes_of(frame.packed) + bytes_of(frame.images.depth) + bytes_of(frame.images.colour);
   for (const auto& submap : submaps_) {
-    sum += submap->volume.bytes();
+    sum += submap->content.bytes();
     for (const Member& member : submap->members) sum += bytes_of(member.packed);
   }
   return sum;

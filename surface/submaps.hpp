@@ -10,6 +10,7 @@
 #include "graph/snapshot.hpp"
 #include "surface/composition.hpp"
 #include "surface/depth_view.hpp"
+#include "surface/free_space/free_space.hpp"
 #include "surface/packed_images.hpp"
 #include "surface/volume.hpp"
 
@@ -22,6 +23,8 @@ struct SubmapOptions {
   /// of. What is fused anew may exceed it.
   double memory_mb = 2000;
   std::uint32_t first_keyframe = 0;  ///< those before are of another run's frames: a loaded map's
+  bool free_space = false;           ///< also keep what images saw through, away from surfaces
+  double max_free_depth = 0;         ///< FreeSpace's reach [m] >= 0; 0: as far as there are readings
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;
@@ -38,6 +41,13 @@ struct KeyframeDepth {
   std::int64_t frame_index = 0;
   PackedDepth depth;
   PackedColour colour;  ///< may be empty
+};
+
+/// A submap at its place, which nobody changes any more.
+struct SharedSubmap {
+  std::shared_ptr<const SurfaceVolume> volume;
+  std::shared_ptr<const FreeSpace> free;  ///< without anything unless SubmapOptions::free_space
+  SE3 T_w_s;
 };
 
 /// The images that were packed.
@@ -97,6 +107,10 @@ class SubmapSurface {
   /// The same, but where a newer map than that of the last step has them.
   [[nodiscard]] std::vector<PlacedVolume> placed_in(const GraphSnapshot& graph, KeyframeId part) const;
 
+  /// The submaps of a map part for whoever asks about them later, on any thread: takes no time, and each is
+  /// copied before it changes.
+  [[nodiscard]] std::vector<SharedSubmap> share(KeyframeId part);
+
   [[nodiscard]] const SubmapReport& report() const { return report_; }
   [[nodiscard]] std::size_t submap_count() const { return submaps_.size(); }
   [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
@@ -117,7 +131,20 @@ class SubmapSurface {
     SE3 T_w_s;                         ///< in the last step
     KeyframeId part{0};
     std::vector<Member> members;
-    SurfaceVolume volume;
+    /// Samples and free space; copied before they change if somebody else may have them.
+    struct Content {
+      Content(const SurfaceOptions& options, const SubmapOptions& submaps)
+          : volume(std::make_shared<SurfaceVolume>(options)),
+            free(std::make_shared<FreeSpace>(options, submaps.max_free_depth)) {}
+      [[nodiscard]] SurfaceVolume& volume_to_change();
+      [[nodiscard]] FreeSpace& free_to_change();
+      [[nodiscard]] std::size_t bytes() const { return volume->bytes() + free->bytes(); }
+
+      std::shared_ptr<SurfaceVolume> volume;
+      std::shared_ptr<FreeSpace> free;
+      bool volume_shared = false, free_shared = false;
+    };
+    Content content;
   };
 
   void let_go_of_culled(const GraphSnapshot& graph);
@@ -134,6 +161,8 @@ class SubmapSurface {
   /// False for an image without readings, of which nothing becomes.
   /// @param images  empty: those that the member has packed
   bool fuse(Submap& submap, Member& member, DepthImages images);
+  /// What the image that was fused last hides is not known to be free any more in any other submap.
+  void forget_hidden(const Submap& fused_into, const SE3& T_k_w);
 
   Rig rig_;
   SurfaceOptions options_;

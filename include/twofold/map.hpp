@@ -112,6 +112,7 @@ class TWOFOLD_API MapSnapshot {
   explicit MapSnapshot(std::shared_ptr<const Impl> impl);
 
  private:
+  friend class MapSurface;
   std::shared_ptr<const Impl> impl_;
 };
 

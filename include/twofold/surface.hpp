@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "twofold/map.hpp"
 #include "twofold/types.hpp"
 
 namespace twofold {
@@ -82,6 +84,14 @@ struct SurfaceMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
+/// Writes a mesh to a file of the kind that its name ends in: .ply, .obj or .glb.
+///
+/// @param up  of .glb alone, unit: becomes y, which is up there; of a run, y points down
+/// Throws std::invalid_argument for other names and for a .glb without triangles, std::runtime_error when the
+/// file cannot be written.
+TWOFOLD_API void save_mesh(const SurfaceMesh& mesh, const std::filesystem::path& file,
+                           const std::array<double, 3>& up = {0, -1, 0});
+
 /// The part of a mesh that lies in one cell of a grid.
 struct SurfacePiece {
   std::array<std::int32_t, 3> cell{};  ///< its lowest corner, in edges of a cell
@@ -147,6 +157,86 @@ class TWOFOLD_API SurfaceModel {
   /// Of all that is kept. Mostly blocks of 8^3 samples, 2.1 KB each, or 4.2 KB with the colours beside a
   /// surface, wherever a surface ever was: half the voxel is about four times as many. There is no limit;
   /// clear gives them back.
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+struct MapSurfaceOptions {
+  SurfaceModelOptions model = {};  ///< of samples and depth images, as those of SurfaceModel
+  /// Of samples and depth images [MiB] > 0: with more than this no keyframe is added.
+  double memory_mb = 2000;
+
+  /// Empty when valid; otherwise names the field, the rule and the value.
+  [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
+};
+
+/// The surface of a run as it was in one version of its map: it does not change any more. Copies are of the
+/// same one. Any thread, several at once. The first question joins what the surface has in submaps, on the
+/// thread that asks, which takes about 20 us for a block of 8^3 samples; the others are SurfaceModel's.
+class TWOFOLD_API SurfaceSnapshot {
+ public:
+  SurfaceSnapshot();  ///< of nothing
+  ~SurfaceSnapshot();
+  SurfaceSnapshot(const SurfaceSnapshot&);
+  SurfaceSnapshot& operator=(const SurfaceSnapshot&);
+
+  /// MapSnapshot::version of the map that it fits; 0: of nothing.
+  [[nodiscard]] std::uint64_t map_version() const;
+  /// Whose world positions are in; kNoId: none.
+  [[nodiscard]] std::uint32_t map_part() const;
+  /// As SurfaceModel::at.
+  [[nodiscard]] SpacePoint at(const std::array<double, 3>& p_world) const;
+  /// As SurfaceModel::distances.
+  [[nodiscard]] DistanceField distances(const DistanceBox& box) const;
+  /// As SurfaceModel::mesh.
+  [[nodiscard]] SurfaceMesh mesh() const;
+  /// What it keeps: its submaps, which the surface and other snapshots may have, too, and once it was asked
+  /// what they are joined into.
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  friend class MapSurface;
+  struct Impl;
+  explicit SurfaceSnapshot(std::shared_ptr<const Impl> impl);
+  std::shared_ptr<const Impl> impl_;
+};
+
+/// The surface of a run's keyframes, which moves with the map: as `twofold run --surface` makes it.
+///
+///   MapSurface surface(slam.map(), {.model = {.voxel = 0.02}});
+///   ... for keyframes, in a thread of yours:
+///   surface.add(frame, estimate.frame);
+///   surface.update(slam.map());
+///   const SurfaceSnapshot now = surface.snapshot();  // for planners, on their threads
+///
+/// Keyframes are fused into submaps that hang on the map: a loop moves them, and those inside which poses
+/// have moved by more than half a voxel are fused anew. Depth images are kept for that, compressed, as long
+/// as their keyframes are in the map. add, update and snapshot by one thread at a time; nobody waits for who
+/// holds a snapshot, of which a submap is copied before it changes.
+class TWOFOLD_API MapSurface {
+ public:
+  /// @param map  of the run, before its first keyframe: it tells the rig, and what comes of a loaded map
+  /// Throws std::invalid_argument as SurfaceModel does.
+  explicit MapSurface(const MapSnapshot& map, const MapSurfaceOptions& options = {});
+  ~MapSurface();
+  MapSurface(MapSurface&&) noexcept;
+  MapSurface& operator=(MapSurface&&) noexcept;
+
+  /// The depth of a rectified frame that the tracker took for a keyframe (PoseEstimate::keyframe), before or
+  /// after the map has it; others are let go of once the map has a later one, and the oldest of more than 64
+  /// that wait. Packs it, and takes as long as SurfaceModel::add for a pair.
+  /// @param number  PoseEstimate::frame; it grows
+  /// Throws std::invalid_argument saying what is wrong with the images.
+  void add(const FrameView& frame, std::int64_t number);
+  /// Takes the newest map: submaps move, and all that waits is fused. Throws std::invalid_argument for an
+  /// older one than that of the last call, std::bad_alloc when memory ends.
+  void update(const MapSnapshot& map);
+  /// As of the last update, of the map part in which the camera was then. Takes microseconds.
+  [[nodiscard]] SurfaceSnapshot snapshot();
+  /// Of samples and depth images.
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/right_of_way.hpp"
 #include "surface/free_space/depth_bounds.hpp"
 #include "surface/fusion_view.hpp"
 #include "surface/lanes.hpp"
@@ -21,8 +22,10 @@ BlockPosition to_cell(const Vector3& in_cells) {
 
 class FreeSpace::Look {
  public:
-  Look(const DepthView& view, const SurfaceOptions& options, const SE3& T_c_v, double reach)
-      : view_(view),
+  /// @param frees  what is looked through becomes free
+  Look(const DepthView& view, const SurfaceOptions& options, const SE3& T_c_v, double reach, bool frees)
+      : frees_(frees),
+        view_(view),
         fusion_(view, options, T_c_v),
         bounds_(view),
         T_c_v_(T_c_v),
@@ -34,6 +37,7 @@ class FreeSpace::Look {
     steps_ = K_ * fusion_.R_c_v * static_cast<float>(cell_);
   }
 
+  [[nodiscard]] bool frees() const { return frees_; }
   /// What is seen of a cube. first, edge: [cells]
   [[nodiscard]] Sight at(const Vector3& first, float edge) const {
     constexpr Lanes kX{0, 1, 0, 1, 0, 1, 0, 1}, kY{0, 0, 1, 1, 0, 0, 1, 1}, kZ{0, 0, 0, 0, 1, 1, 1, 1};
@@ -85,6 +89,7 @@ class FreeSpace::Look {
   }
 
  private:
+  bool frees_;
   const DepthView& view_;
   FusionView fusion_;
   DepthBounds bounds_;
@@ -99,7 +104,14 @@ class FreeSpace::Look {
 FreeSpace::FreeSpace(const SurfaceOptions& options, double reach) : options_(options), reach_(reach) {}
 
 void FreeSpace::add(const DepthView& view, const SE3& T_c_v) {
-  const Look look(view, options_, T_c_v, reach_);
+  visit_all(Look(view, options_, T_c_v, reach_, true));
+}
+
+void FreeSpace::forget_hidden(const DepthView& view, const SE3& T_c_v) {
+  if (!groups_.empty()) visit_all(Look(view, options_, T_c_v, 0, false));
+}
+
+void FreeSpace::visit_all(const Look& look) {
   Vector3 low, high;
   look.box(low, high);
   if (!(low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff() < kFarthestCell)) return;
@@ -116,7 +128,7 @@ void FreeSpace::visit(const Look& look, const BlockPosition& first, std::int32_t
   const Sight sight =
       hidden ? Sight::kHidden : look.at(Vector3(first.x, first.y, first.z), static_cast<float>(edge));
   if (sight == Sight::kNone) return;
-  if (sight == Sight::kThrough) return free_all(first, edge);
+  if (sight == Sight::kThrough) return look.frees() ? free_all(first, edge) : void();
   if (edge == 1) return forget_if_hidden(look, first);
   if (sight == Sight::kHidden && edge <= kGroupEdge && !groups_.contains(group_of(first))) return;
   const std::int32_t half = edge / 2;
@@ -143,6 +155,36 @@ void FreeSpace::free_all(const BlockPosition& first, std::int32_t edge) {
           for (std::int32_t y = 0; y < step; ++y)
             for (std::int32_t x = 0; x < step; ++x) group.set(bit_of({at.x + x, at.y + y, at.z + z}));
       }
+}
+
+void FreeSpace::add(const FreeSpace& other, const SE3& T_v_o) {
+  const double cell = kCellEdge * options_.voxel;
+  const SE3 T_o_v = T_v_o.inverse();
+  const Matrix3 axes = T_o_v.rotation();
+  const double half = 0.5 * kGroupEdge * Vector3(T_v_o.rotation().cwiseAbs().rowwise().sum()).maxCoeff();
+  for (const auto& [at, bits] : other.groups_) {
+    make_way();
+    const Vector3 middle =
+        T_v_o * Vector3((Vector3(at.x, at.y, at.z) + Vector3::Constant(0.5)) * kGroupEdge * cell) / cell;
+    const BlockPosition first = to_cell(middle.array() - half), last = to_cell(middle.array() + half);
+    for (std::int32_t z = first.z; z <= last.z; ++z)
+      for (std::int32_t y = first.y; y <= last.y; ++y)
+        for (std::int32_t x = first.x; x <= last.x; ++x) {
+          const Vector3 middle_v = Vector3(x, y, z) + Vector3::Constant(0.5);
+          const Vector3 middle_o = T_o_v * Vector3(middle_v * cell) / cell;
+          if (!contains({x, y, z}) && other.holds(middle_o, axes)) free_all({x, y, z}, 1);
+        }
+  }
+}
+
+bool FreeSpace::holds(const Vector3& middle, const Matrix3& axes) const {
+  constexpr double kHalf = 0.5 - 1e-6;
+  if (!contains(to_cell(middle))) return false;
+  for (int c = 0; c < 8; ++c) {
+    const Vector3 corner(c & 1 ? kHalf : -kHalf, c & 2 ? kHalf : -kHalf, c & 4 ? kHalf : -kHalf);
+    if (!contains(to_cell(middle + axes * corner))) return false;
+  }
+  return true;
 }
 
 bool FreeSpace::contains(const BlockPosition& cell) const {

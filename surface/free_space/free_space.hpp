@@ -31,6 +31,12 @@ class FreeSpace {
 
   /// Adds what a depth image taken from T_c_v looks through.
   void add(const DepthView& view, const SE3& T_c_v);
+  /// Forgets what a depth image does not see into any more, and makes nothing free: for what other images
+  /// saw through, into whose space things have come.
+  void forget_hidden(const DepthView& view, const SE3& T_c_v);
+  /// Cells of this one that lie wholly in free cells of another one, whose frame lies at T_v_o: those of a
+  /// turned one lose a rim of a cell.
+  void add(const FreeSpace& other, const SE3& T_v_o);
   void clear() { groups_.clear(); }
 
   /// Whether the cell was looked through, whatever the volume has there by now.
@@ -51,6 +57,9 @@ class FreeSpace {
   class Look;  // of one depth image
   enum class Sight : std::uint8_t { kNone, kThrough, kHidden, kMixed };
 
+  void visit_all(const Look& look);
+  /// Whether all corners of a cell lie in free cells, from its middle and its axes on [cells].
+  [[nodiscard]] bool holds(const Vector3& middle, const Matrix3& axes) const;
   /// A cube of edge^3 cells from `first` on. edge: a power of two, of whose multiples `first` is.
   void visit(const Look& look, const BlockPosition& first, std::int32_t edge, bool hidden);
   void forget_if_hidden(const Look& look, const BlockPosition& cell);

@@ -158,6 +158,28 @@ TEST_F(SubmapSurfaceTest, AStepDoesAsMuchAsItIsAllowedAndSaysWhetherAnythingIsLe
   EXPECT_FALSE(surface.unfinished());
 }
 
+TEST_F(SubmapSurfaceTest, WhatIsSharedStaysAsItIs) {
+  limits_.free_space = true;
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  for (int n = 0; n < 7; ++n) {
+    add_keyframe(surface);
+    surface.step(writer_.publish());
+  }
+  const std::vector<SharedSubmap> shared = surface.share(KeyframeId{0});
+  ASSERT_EQ(shared.size(), 2u);
+  EXPECT_EQ(shared[0].volume.get(), surface.placed(KeyframeId{0})[0].volume)
+      << "copied, though nobody changes it";
+  const std::uint64_t revision = shared[1].volume->revision();
+  const TriangleMesh mesh = extract_mesh(*shared[1].volume);
+  add_keyframe(surface);
+  surface.step(writer_.publish());
+  EXPECT_EQ(shared[1].volume->revision(), revision);
+  EXPECT_TRUE(extract_mesh(*shared[1].volume) == mesh);
+  EXPECT_GT(surface.placed(KeyframeId{0})[1].volume->revision(), revision);
+  EXPECT_EQ(shared[0].volume.get(), surface.placed(KeyframeId{0})[0].volume);
+  EXPECT_GT(shared[0].free->bytes(), 0u);
+}
+
 TEST_F(SubmapSurfaceTest, CulledKeyframesLeaveWhatTheyAdded) {
   SubmapSurface surface(rig_, testing::fine_options(), limits_);
   add_all(surface);

@@ -1,0 +1,298 @@
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <mutex>
+#include <shared_mutex>
+
+#include <fmt/format.h>
+
+#include "python/arrays.hpp"
+#include "python/bindings.hpp"
+#include "python/frames.hpp"
+#include "python/map_rows.hpp"
+#include "twofold/surface.hpp"
+
+namespace twofold::python {
+namespace {
+
+using Positions = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// Python's threads need not know who may ask while who adds.
+template <class Surface>
+struct Shared {
+  template <class... Arguments>
+  explicit Shared(const Arguments&... arguments) : surface(arguments...) {}
+  Surface surface;
+  std::shared_mutex mutex;  // never held by a thread that wants the interpreter's lock
+};
+using Model = Shared<SurfaceModel>;
+using OfMap = Shared<MapSurface>;
+
+/// An array over values that it owns from now on.
+template <class T>
+py::array array_over(std::vector<T> values) {
+  auto* owned = new std::vector<T>(std::move(values));
+  const py::capsule owner(owned, [](void* v) { delete static_cast<std::vector<T>*>(v); });
+  return py::array(py::dtype::of<T>(), {static_cast<py::ssize_t>(owned->size())}, {}, owned->data(), owner);
+}
+
+/// What `at` says of each row, without the interpreter's lock.
+template <class At>
+py::array ask(const Positions& positions, const At& at) {
+  if (positions.ndim() != 2 || positions.shape(1) != 3)
+    throw py::value_error("positions must be of shape (N, 3)");
+  const auto count = static_cast<std::size_t>(positions.shape(0));
+  const double* x = positions.data();
+  std::vector<SpacePoint> points;
+  {
+    const py::gil_scoped_release unlocked;
+    points.reserve(count);
+    for (std::size_t n = 0; n < count; ++n, x += 3) points.push_back(at({x[0], x[1], x[2]}));
+  }
+  return array_over(std::move(points));
+}
+
+template <class T>
+py::array rows_of_three(const std::vector<std::array<T, 3>>& rows, const py::object& owner) {
+  return view_of(reinterpret_cast<const T*>(rows.data()), {static_cast<py::ssize_t>(rows.size()), 3}, owner);
+}
+
+DistanceBox box_of(const std::array<double, 3>& lowest, const std::array<double, 3>& highest, double cell,
+                   double reach, bool unknown_is_obstacle) {
+  return {lowest, highest, cell, reach, unknown_is_obstacle};
+}
+
+void bind_mesh(py::module_& module) {
+  py::class_<SurfaceMesh>(module, "SurfaceMesh",
+                          "Triangles, which go round anticlockwise seen from outside. Arrays are read-only "
+                          "views that hold this object.")
+      .def_property_readonly(
+          "positions",
+          [](const py::object& self) {
+            return rows_of_three(self.cast<const SurfaceMesh&>().positions, self);
+          },
+          "(N, 3) float32, in the world [m]: of a run, y points down.")
+      .def_property_readonly(
+          "normals",
+          [](const py::object& self) { return rows_of_three(self.cast<const SurfaceMesh&>().normals, self); },
+          "(N, 3) float32, unit, pointing outside.")
+      .def_property_readonly(
+          "colours",
+          [](const py::object& self) { return rows_of_three(self.cast<const SurfaceMesh&>().colours, self); },
+          "(N, 3) uint8: red, green, blue.")
+      .def_property_readonly(
+          "triangles",
+          [](const py::object& self) {
+            return rows_of_three(self.cast<const SurfaceMesh&>().triangles, self);
+          },
+          "(M, 3) uint32: numbers of their corners.")
+      .def(
+          "save", &save_mesh, py::arg("file"), py::arg("up") = std::array<double, 3>{0, -1, 0},
+          py::call_guard<py::gil_scoped_release>(),
+          "Writes a file of the kind that its name ends in: .ply, .obj or .glb, where `up` (unit) becomes y, "
+          "which is up there.\nRaises RuntimeError when it cannot.")
+      .def("__repr__", [](const SurfaceMesh& self) {
+        return fmt::format("<SurfaceMesh: {} triangles>", self.triangles.size());
+      });
+}
+
+void bind_distances(py::module_& module) {
+  const auto shape = [](const DistanceField& field) {
+    return std::vector<py::ssize_t>{field.size[2], field.size[1], field.size[0]};
+  };
+  py::class_<DistanceField>(module, "DistanceField",
+                            "How far the nearest surface is, whichever way it lies, in the middle of each "
+                            "cell of a box.")
+      .def_readonly("lowest", &DistanceField::lowest, "Corner of cell [0, 0, 0] [m].")
+      .def_readonly("cell", &DistanceField::cell, "Edge of a cell [m].")
+      .def_property_readonly(
+          "distances",
+          [shape](const py::object& self) {
+            const auto& field = self.cast<const DistanceField&>();
+            return view_of(field.distances.data(), shape(field), self);
+          },
+          "(Z, Y, X) float32 [m], negative inside a surface: a read-only view.")
+      .def_property_readonly(
+          "states",
+          [shape](const py::object& self) {
+            const auto& field = self.cast<const DistanceField&>();
+            return view_of(reinterpret_cast<const std::uint8_t*>(field.states.data()), shape(field), self);
+          },
+          "(Z, Y, X) uint8, numbers of SpaceState: a read-only view.")
+      .def(
+          "at",
+          [](const DistanceField& self, const Positions& positions) {
+            return ask(positions, [&](const std::array<double, 3>& x) { return self.at(x); });
+          },
+          py::arg("positions"),
+          "Of positions (N, 3) [m], linear between the middles of cells: (N,) with fields as SurfaceModel.at "
+          "has them.");
+}
+
+constexpr const char* kAtDoc =
+    "What is known of positions: (N, 3) [m] -> (N,) with fields state (number of a SpaceState), distance (to "
+    "the surface\n[m], positive outside; ends at four voxels) and gradient (3,).";
+constexpr const char* kDistancesDoc =
+    "Of each cell of a box, as far as reach, how far the nearest surface is, whichever way it lies: a "
+    "DistanceField.\nCorners are (3,) [m], cell and reach in metres. Raises ValueError for more than 2^26 "
+    "cells.";
+
+/// Questions that both kinds of surfaces answer.
+template <class Class, class Questions>
+void bind_questions(Class& surface, const Questions& questions) {
+  surface
+      .def(
+          "at",
+          [questions](const typename Class::type& self, const Positions& positions) {
+            return ask(positions, [&](const std::array<double, 3>& x) {
+              return questions(self, [&](const auto& asked) { return asked.at(x); });
+            });
+          },
+          py::arg("positions"), kAtDoc)
+      .def(
+          "distances",
+          [questions](const typename Class::type& self, const std::array<double, 3>& lowest,
+                      const std::array<double, 3>& highest, double cell, double reach, bool unknown) {
+            const py::gil_scoped_release unlocked;
+            return questions(self, [&](const auto& asked) {
+              return asked.distances(box_of(lowest, highest, cell, reach, unknown));
+            });
+          },
+          py::arg("lowest"), py::arg("highest"), py::kw_only(), py::arg("cell") = 0.1, py::arg("reach") = 1.0,
+          py::arg("unknown_is_obstacle") = false, kDistancesDoc)
+      .def(
+          "mesh",
+          [questions](const typename Class::type& self) {
+            const py::gil_scoped_release unlocked;
+            return questions(self, [&](const auto& asked) { return asked.mesh(); });
+          },
+          "The surface as a SurfaceMesh.")
+      .def(
+          "memory_bytes",
+          [questions](const typename Class::type& self) {
+            const py::gil_scoped_release unlocked;
+            return questions(self, [&](const auto& asked) { return asked.memory_bytes(); });
+          },
+          "Of all that is kept.");
+}
+
+SurfaceModelOptions model_options(double voxel, double max_depth, double max_free_depth,
+                                  double nearest_stereo) {
+  return {voxel, max_depth, max_free_depth, nearest_stereo};
+}
+
+void bind_model(py::module_& module) {
+  py::class_<Model> model(module, "SurfaceModel",
+                          "A dense surface from frames with poses, for planners and models.\n\n"
+                          "Where poses are corrected afterwards, MapSurface moves with the map.");
+  model
+      .def(py::init([](const CameraRig& rig, double voxel, double max_depth, double max_free_depth,
+                       double nearest_stereo) {
+             return std::make_unique<Model>(rig,
+                                            model_options(voxel, max_depth, max_free_depth, nearest_stereo));
+           }),
+           py::arg("rig"), py::kw_only(), py::arg("voxel") = 0.05, py::arg("max_depth") = 0.0,
+           py::arg("max_free_depth") = 0.0, py::arg("nearest_stereo") = 0.4,
+           "voxel: distance of two samples [m]. Readings farther than max_depth begin no surface, and free "
+           "space is kept as far\nas max_free_depth from the camera [m]; 0: as far as there are readings. "
+           "Raises ValueError for a rig without depth.")
+      .def(
+          "add",
+          [](Model& self, const PythonFrame& frame, const Pose& T_world_camera) {
+            const py::gil_scoped_release unlocked;
+            const std::unique_lock lock(self.mutex);
+            return self.surface.add(frame.view, T_world_camera);
+          },
+          py::arg("frame"), py::arg("T_world_camera"),
+          "Adds the depth of a rectified frame, taken there; says how many pixels had a reading. Raises "
+          "ValueError for images\nthat do not fit the rig.")
+      .def(
+          "clear",
+          [](Model& self) {
+            const py::gil_scoped_release unlocked;
+            const std::unique_lock lock(self.mutex);
+            self.surface.clear();
+          },
+          "Forgets all.");
+  bind_questions(model, [](const Model& self, const auto& question) {
+    const std::shared_lock lock(const_cast<Model&>(self).mutex);
+    return question(self.surface);
+  });
+}
+
+void bind_map_surface(py::module_& module) {
+  py::class_<SurfaceSnapshot> snapshot(
+      module, "SurfaceSnapshot",
+      "The surface of a run as it was in one version of its map: it does not change any more. The first "
+      "question joins what\nthe surface has in submaps, which takes a while.");
+  snapshot
+      .def_property_readonly("map_version", &SurfaceSnapshot::map_version,
+                             "Of the map that it fits; 0: of nothing.")
+      .def_property_readonly("map_part", &SurfaceSnapshot::map_part,
+                             "Whose world positions are in; NO_ID: none.");
+  bind_questions(snapshot, [](const SurfaceSnapshot& self, const auto& question) { return question(self); });
+  py::class_<OfMap>(module, "MapSurface",
+                    "The surface of a run's keyframes, which moves with its map: as `twofold run --surface` "
+                    "makes it.")
+      .def(py::init([](const MapRows& map, double voxel, double max_depth, double max_free_depth,
+                       double nearest_stereo, double memory_mb) {
+             return std::make_unique<OfMap>(
+                 map.snapshot,
+                 MapSurfaceOptions{model_options(voxel, max_depth, max_free_depth, nearest_stereo),
+                                   memory_mb});
+           }),
+           py::arg("map"), py::kw_only(), py::arg("voxel") = 0.05, py::arg("max_depth") = 0.0,
+           py::arg("max_free_depth") = 0.0, py::arg("nearest_stereo") = 0.4, py::arg("memory_mb") = 2000.0,
+           "map: of the run, before its first keyframe; it tells the rig. Beyond memory_mb [MiB] no keyframe "
+           "is added. The\nothers: as SurfaceModel.")
+      .def(
+          "add",
+          [](OfMap& self, const PythonFrame& frame, std::int64_t number) {
+            const py::gil_scoped_release unlocked;
+            const std::unique_lock lock(self.mutex);
+            self.surface.add(frame.view, number);
+          },
+          py::arg("frame"), py::arg("number"),
+          "The frame of a keyframe (PoseEstimate.keyframe), before or after the map has it; number: "
+          "PoseEstimate.frame.\nRaises ValueError for images that do not fit the rig.")
+      .def(
+          "update",
+          [](OfMap& self, const MapRows& map) {
+            const py::gil_scoped_release unlocked;
+            const std::unique_lock lock(self.mutex);
+            self.surface.update(map.snapshot);
+          },
+          py::arg("map"), "Takes the newest map: submaps move, and all that waits is fused.")
+      .def(
+          "snapshot",
+          [](OfMap& self) {
+            const py::gil_scoped_release unlocked;
+            const std::unique_lock lock(self.mutex);
+            return self.surface.snapshot();
+          },
+          "As of the last update: a SurfaceSnapshot, for any thread.")
+      .def(
+          "memory_bytes",
+          [](OfMap& self) {
+            const py::gil_scoped_release unlocked;
+            const std::shared_lock lock(self.mutex);
+            return self.surface.memory_bytes();
+          },
+          "Of samples and depth images.");
+}
+
+}  // namespace
+
+void bind_surface(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(SpacePoint, state, distance, gradient);
+  py::enum_<SpaceState>(module, "SpaceState", "What is known of a position.")
+      .value("UNKNOWN", SpaceState::kUnknown, "never seen, or hidden")
+      .value("FREE", SpaceState::kFree, "outside every surface")
+      .value("OCCUPIED", SpaceState::kOccupied, "inside a surface, as far as the truncation");
+  bind_mesh(module);
+  bind_distances(module);
+  bind_model(module);
+  bind_map_surface(module);
+}
+
+}  // namespace twofold::python

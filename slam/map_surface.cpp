@@ -1,0 +1,168 @@
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "base/option_check.hpp"
+#include "slam/depth_frame.hpp"
+#include "slam/distance_field.hpp"
+#include "slam/map_snapshot.hpp"
+#include "slam/surface_pieces.hpp"
+#include "surface/meshing.hpp"
+#include "surface/submaps.hpp"
+#include "twofold/surface.hpp"
+
+namespace twofold {
+
+std::string MapSurfaceOptions::invalid_reason() const {
+  if (std::string reason = model.invalid_reason(); !reason.empty()) return "model." + reason;
+  return OptionCheck().above("memory_mb", memory_mb, 0).reason();
+}
+
+struct SurfaceSnapshot::Impl {
+  /// Of all submaps, in the world.
+  struct Joined {
+    Joined(const SurfaceOptions& options, const std::vector<SharedSubmap>& submaps)
+        : volume(options), free(options, 0) {
+      for (const SharedSubmap& submap : submaps) {
+        volume.add(*submap.volume, submap.T_w_s);
+        free.add(*submap.free, submap.T_w_s);
+      }
+    }
+    SurfaceVolume volume;
+    FreeSpace free;
+  };
+
+  Impl(const SurfaceOptions& its_options, std::vector<SharedSubmap> its_submaps, std::uint64_t its_version,
+       std::uint32_t its_part)
+      : options(its_options), submaps(std::move(its_submaps)), version(its_version), part(its_part) {}
+
+  [[nodiscard]] const Joined& joined() const {
+    const std::scoped_lock lock(mutex);
+    if (!joined_) joined_.emplace(options, submaps);
+    return *joined_;
+  }
+  [[nodiscard]] std::size_t bytes() const {
+    std::size_t sum = sizeof(Impl);
+    for (const SharedSubmap& submap : submaps) sum += submap.volume->bytes() + submap.free->bytes();
+    const std::scoped_lock lock(mutex);
+    return joined_ ? sum + joined_->volume.bytes() + joined_->free.bytes() : sum;
+  }
+
+  const SurfaceOptions options;
+  const std::vector<SharedSubmap> submaps;
+  const std::uint64_t version;
+  const std::uint32_t part;
+
+ private:
+  mutable std::mutex mutex;  // guards joined_ until it is there; then it does not change
+  mutable std::optional<Joined> joined_;
+};
+
+SurfaceSnapshot::SurfaceSnapshot() = default;
+SurfaceSnapshot::SurfaceSnapshot(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+SurfaceSnapshot::~SurfaceSnapshot() = default;
+SurfaceSnapshot::SurfaceSnapshot(const SurfaceSnapshot&) = default;
+SurfaceSnapshot& SurfaceSnapshot::operator=(const SurfaceSnapshot&) = default;
+
+std::uint64_t SurfaceSnapshot::map_version() const {
+  return impl_ ? impl_->version : 0;
+}
+
+std::uint32_t SurfaceSnapshot::map_part() const {
+  return impl_ ? impl_->part : kNoId;
+}
+
+SpacePoint SurfaceSnapshot::at(const std::array<double, 3>& p_world) const {
+  if (!impl_) return {};
+  const Impl::Joined& joined = impl_->joined();
+  return space_point(joined.volume, joined.free, p_world);
+}
+
+DistanceField SurfaceSnapshot::distances(const DistanceBox& box) const {
+  if (const std::string why = box.invalid_reason(); !why.empty()) throw std::invalid_argument("box." + why);
+  if (!impl_) {
+    SurfaceOptions options;
+    options.depth_noise = 1;  // of no depth image
+    return distance_field(SurfaceVolume(options), FreeSpace(options, 0), box);
+  }
+  const Impl::Joined& joined = impl_->joined();
+  return distance_field(joined.volume, joined.free, box);
+}
+
+SurfaceMesh SurfaceSnapshot::mesh() const {
+  return impl_ ? to_surface_mesh(extract_mesh(impl_->joined().volume)) : SurfaceMesh();
+}
+
+std::size_t SurfaceSnapshot::memory_bytes() const {
+  return impl_ ? impl_->bytes() : 0;
+}
+
+struct MapSurface::Impl {
+  Impl(const Rig& its_rig, const SurfaceModelOptions& its_options, const SubmapOptions& limits)
+      : rig(its_rig),
+        nearest_stereo(its_options.nearest_stereo),
+        options(surface_options(rig, its_options)),
+        submaps(rig, options, limits) {}
+
+  Rig rig;
+  double nearest_stereo;
+  SurfaceOptions options;
+  SubmapSurface submaps;
+  std::int64_t newest_frame = -1;
+  std::uint64_t version = 0;
+  KeyframeId part = kNoKeyframe;
+};
+
+namespace {
+
+SubmapOptions submap_options(const MapSurfaceOptions& options, std::uint32_t loaded_keyframes) {
+  if (const std::string why = options.invalid_reason(); !why.empty())
+    throw std::invalid_argument("options." + why);
+  SubmapOptions limits;
+  limits.memory_mb = options.memory_mb;
+  limits.first_keyframe = loaded_keyframes;
+  limits.free_space = true;
+  limits.max_free_depth = options.model.max_free_depth;
+  return limits;
+}
+
+}  // namespace
+
+MapSurface::MapSurface(const MapSnapshot& map, const MapSurfaceOptions& options)
+    : impl_(new Impl(expect_depth(map.impl_->rig), options.model,
+                     submap_options(options, map.impl_->loaded_keyframes))) {}
+MapSurface::~MapSurface() = default;
+MapSurface::MapSurface(MapSurface&&) noexcept = default;
+MapSurface& MapSurface::operator=(MapSurface&&) noexcept = default;
+
+void MapSurface::add(const FrameView& frame, std::int64_t number) {
+  if (number <= impl_->newest_frame)
+    throw std::invalid_argument("number " + std::to_string(number) + " comes after " +
+                                std::to_string(impl_->newest_frame));
+  const DepthFrame images = depth_frame(impl_->rig, frame, impl_->nearest_stereo);
+  impl_->submaps.offer(pack_keyframe_depth(number, images.depth, images.colour));
+  impl_->newest_frame = number;
+}
+
+void MapSurface::update(const MapSnapshot& map) {
+  const GraphSnapshot& graph = map.impl_->map->graph;
+  if (graph.version() < impl_->version)
+    throw std::invalid_argument("the map is of version " + std::to_string(graph.version()) + ", after " +
+                                std::to_string(impl_->version));
+  impl_->submaps.step(graph);
+  impl_->version = graph.version();
+  impl_->part = graph.reference() == kNoKeyframe ? kNoKeyframe : graph.part(graph.reference());
+}
+
+SurfaceSnapshot MapSurface::snapshot() {
+  if (impl_->part == kNoKeyframe) return {};
+  return SurfaceSnapshot(std::make_shared<const SurfaceSnapshot::Impl>(
+      impl_->options, impl_->submaps.share(impl_->part), impl_->version, index(impl_->part)));
+}
+
+std::size_t MapSurface::memory_bytes() const {
+  return impl_->submaps.bytes();
+}
+
+}  // namespace twofold

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import twofold
+
+SCENE = "synthetic:desk?rounds=1&frames=160&width=160&height=120&sensor=rgbd"
+
+
+def wall(rig: twofold.CameraRig, metres: float) -> twofold.Frame:
+    left = np.full((rig.height, rig.width, 3), (30, 60, 200), np.uint8)
+    depth = np.full((rig.height, rig.width), round(metres / rig.depth_unit), np.uint16)
+    return twofold.Frame(0, left, depth=depth)
+
+
+@pytest.fixture(scope="module")
+def rig() -> twofold.CameraRig:
+    return twofold.Source(SCENE).rig
+
+
+def test_a_model_tells_what_is_free_and_how_far_the_wall_is(rig: twofold.CameraRig, tmp_path: Path) -> None:
+    model = twofold.SurfaceModel(rig, voxel=0.02)
+    assert model.add(wall(rig, 2.0), twofold.Pose()) == rig.width * rig.height
+    known = model.at(np.array([[0, 0, 1.0], [0, 0, 1.96], [0, 0, 2.03], [0, 0, 5]]))
+    assert [twofold.SpaceState(int(state)) for state in known["state"]] == [
+        twofold.SpaceState.FREE,
+        twofold.SpaceState.FREE,
+        twofold.SpaceState.OCCUPIED,
+        twofold.SpaceState.UNKNOWN,
+    ]
+    assert known["distance"][1] == pytest.approx(0.04, abs=0.01)
+    assert known["gradient"].shape == (4, 3)
+    assert known["gradient"][1][2] == pytest.approx(-1, abs=0.1)
+
+    field = model.distances([-0.1, -0.2, 1.0], [0.1, 0.2, 1.9], cell=0.1, reach=1)
+    assert field.distances.shape == field.states.shape == (9, 4, 2)
+    assert field.distances[0, 0, 0] == pytest.approx(0.95, abs=0.03)
+    assert field.at(np.array([[0.0, 0, 1.55]]))["distance"][0] == pytest.approx(0.45, abs=0.03)
+    assert not field.distances.flags.owndata and not field.distances.flags.writeable
+
+    mesh = model.mesh()
+    assert mesh.positions.shape == mesh.normals.shape == mesh.colours.shape
+    assert np.abs(mesh.positions[:, 2] - 2).max() < 0.01
+    assert mesh.triangles.max() < len(mesh.positions)
+    assert (np.abs(mesh.colours.astype(int) - (200, 60, 30)) <= 2).all()
+    positions = mesh.positions
+    del mesh, model, field
+    assert np.isfinite(positions).all()
+
+
+def test_meshes_are_saved_by_the_kind_of_their_name(rig: twofold.CameraRig, tmp_path: Path) -> None:
+    model = twofold.SurfaceModel(rig, voxel=0.05)
+    model.add(wall(rig, 1.5), twofold.Pose())
+    mesh = model.mesh()
+    for name in ("wall.ply", "wall.glb", "wall.obj"):
+        mesh.save(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 12 * len(mesh.positions)
+    assert (tmp_path / "wall.glb").read_bytes()[:4] == b"glTF"
+    with pytest.raises(ValueError, match="must end in"):
+        mesh.save(tmp_path / "wall.stl")
+    with pytest.raises(RuntimeError):
+        mesh.save(tmp_path / "none" / "wall.ply")
+
+
+def test_what_makes_no_sense_is_refused(rig: twofold.CameraRig) -> None:
+    with pytest.raises(ValueError, match="voxel"):
+        twofold.SurfaceModel(rig, voxel=0)
+    model = twofold.SurfaceModel(rig)
+    with pytest.raises(ValueError, match="depth"):
+        model.add(twofold.Frame(0, np.zeros((rig.height, rig.width), np.uint8)), twofold.Pose())
+    with pytest.raises(ValueError, match=r"\(N, 3\)"):
+        model.at([0.0, 0, 1])
+    with pytest.raises(ValueError, match="highest"):
+        model.distances([0, 0, 0], [0, 0, 0])
+    assert model.memory_bytes() == 0
+    model.add(wall(rig, 1.5), twofold.Pose())
+    assert model.memory_bytes() > 0
+    model.clear()
+    assert len(model.mesh().triangles) == 0
+
+
+def test_a_runs_surface_follows_its_map() -> None:
+    source = twofold.Source(SCENE)
+    with twofold.Slam(source.rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+        surface = twofold.MapSurface(slam.map(), voxel=0.04)
+        early = surface.snapshot()
+        assert early.map_part == twofold.NO_ID
+        for frame in source:
+            slam.push(frame)
+            pose = slam.latest()
+            if pose is not None and pose.keyframe:
+                surface.add(frame, pose.frame)
+                surface.update(slam.map())
+                early = early if early.map_version else surface.snapshot()
+        triangles = len(early.mesh().triangles)
+        now = surface.snapshot()
+        assert now.map_version > early.map_version > 0
+        assert len(now.mesh().triangles) > triangles == len(early.mesh().triangles)
+        assert pose is not None
+        ahead = [pose.T_world_camera @ np.array([0, 0, z]) for z in np.arange(0.5, 4, 0.05)]
+        assert (now.at(ahead)["state"] == twofold.SpaceState.FREE.value).sum() > 5
+        assert now.memory_bytes() > 0 and surface.memory_bytes() > 0
+        with pytest.raises(ValueError, match="number"):
+            surface.add(frame, 0)
+
+
+def test_the_example_runs(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples" / "surface.py"
+    scene = "synthetic:desk?sensor=rgbd&frames=30&width=160&height=120"
+    command = [sys.executable, str(example), scene, str(tmp_path / "desk.glb")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert "free ahead from" in done.stdout and "triangles written to" in done.stdout

@@ -1,0 +1,152 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include "tests/io/scratch_folder.hpp"
+#include "twofold/slam.hpp"
+#include "twofold/source.hpp"
+#include "twofold/surface.hpp"
+
+namespace twofold {
+namespace {
+
+/// A run over a rendered desk, whose keyframes a surface gets.
+class MapSurfaceTest : public ::testing::Test {
+ protected:
+  static constexpr const char* kScene = "synthetic:desk?sensor=rgbd&width=160&height=120&rounds=1&frames=160";
+  static constexpr double kVoxel = 0.03;
+
+  /// Until so many keyframes more have been added, or the source ends.
+  void add_keyframes(int count) {
+    for (FrameView frame; count > 0 && source_.next(frame);) {
+      slam_.push(frame);
+      pose_ = slam_.latest();
+      if (!pose_ || !pose_->keyframe) continue;
+      surface_.add(frame, pose_->frame);
+      --count;
+    }
+    surface_.update(slam_.map());
+  }
+  [[nodiscard]] std::array<double, 3> ahead(double metres) const {
+    return transform(pose_->T_world_camera, {0, 0, metres});
+  }
+
+  Source source_{kScene};
+  Slam slam_{source_.rig(), {.mode = RunMode::kDeterministic}};
+  MapSurface surface_{slam_.map(), {.model = {.voxel = kVoxel}}};
+  std::optional<PoseEstimate> pose_;
+};
+
+TEST_F(MapSurfaceTest, AnswersWhatIsFreeAndWhereTheNextSurfaceIs) {
+  add_keyframes(1000);
+  const SurfaceSnapshot now = surface_.snapshot();
+  EXPECT_EQ(now.map_version(), slam_.map().version());
+  EXPECT_EQ(now.map_part(), pose_->map_part);
+  const SurfaceMesh mesh = now.mesh();
+  int count = 0, free = 0, occupied = 0, wrong = 0, near = 0;
+  for (std::size_t v = 0; v < mesh.positions.size(); v += 20, ++count) {
+    const auto beside = [&](double voxels) {
+      std::array<double, 3> x{};
+      for (std::size_t a = 0; a < 3; ++a) x[a] = mesh.positions[v][a] + voxels * kVoxel * mesh.normals[v][a];
+      return now.at(x);
+    };
+    free += beside(1.5).state == SpaceState::kFree;
+    occupied += beside(-0.7).state == SpaceState::kOccupied;
+    wrong += beside(1.5).state == SpaceState::kOccupied || beside(-0.7).state == SpaceState::kFree;
+    near += std::abs(beside(1).distance - kVoxel) < 0.5 * kVoxel;
+  }
+  ASSERT_GT(count, 100);
+  // Beside rims, and where a thing is thinner than the truncation, nothing is known on one side.
+  EXPECT_GT(free, 0.75 * count);
+  EXPECT_GT(occupied, 0.75 * count);
+  EXPECT_LT(wrong, 0.05 * count);
+  EXPECT_GT(near, 0.7 * count);
+  const auto x = mesh.positions[mesh.positions.size() / 2];
+  const DistanceBox box{{x[0] - 0.3, x[1] - 0.3, x[2] - 0.3}, {x[0] + 0.3, x[1] + 0.3, x[2] + 0.3}, 0.05};
+  EXPECT_LT(std::abs(now.distances(box).at({x[0], x[1], x[2]}).distance), 0.05);
+  EXPECT_EQ(now.at(ahead(0.4)).state, SpaceState::kFree) << "seen through, away from surfaces";
+  EXPECT_GT(now.mesh().triangles.size(), 500U);
+  EXPECT_GT(now.memory_bytes(), 100'000U);
+}
+
+TEST_F(MapSurfaceTest, ASnapshotStaysAsItWas) {
+  add_keyframes(2);
+  const SurfaceSnapshot early = surface_.snapshot();
+  const SurfaceSnapshot same = surface_.snapshot();
+  const SurfaceMesh mesh = early.mesh();
+  ASSERT_GT(mesh.triangles.size(), 100U);
+  add_keyframes(1000);
+  EXPECT_TRUE(same.mesh().positions == mesh.positions) << "joined only now";
+  EXPECT_GT(surface_.snapshot().mesh().triangles.size(), mesh.triangles.size());
+  EXPECT_LT(early.map_version(), surface_.snapshot().map_version());
+}
+
+TEST_F(MapSurfaceTest, IsAskedByOneThreadWhileAnotherMakesIt) {
+  add_keyframes(2);
+  const SurfaceSnapshot early = surface_.snapshot();
+  const std::size_t triangles = early.mesh().triangles.size();
+  const SurfaceSnapshot unasked = surface_.snapshot();
+  std::atomic<bool> done{false};
+  int asked = 0;
+  std::thread reader([&] {
+    do {
+      EXPECT_EQ(unasked.mesh().triangles.size(), triangles);
+      ++asked;
+    } while (!done);
+  });
+  add_keyframes(1000);
+  done = true;
+  reader.join();
+  EXPECT_GT(asked, 0);
+}
+
+TEST_F(MapSurfaceTest, SaysWhatIsWrong) {
+  add_keyframes(1);
+  const MapSnapshot early = slam_.map();
+  add_keyframes(2);
+  EXPECT_THROW(surface_.update(early), std::invalid_argument);
+  EXPECT_THROW(surface_.add({}, 1000), std::invalid_argument);
+  FrameView frame;
+  ASSERT_TRUE(source_.next(frame));
+  EXPECT_THROW(surface_.add(frame, 0), std::invalid_argument) << "a number that does not grow";
+  EXPECT_THROW(MapSurface(slam_.map(), {.memory_mb = 0}), std::invalid_argument);
+  EXPECT_THROW(MapSurface(slam_.map(), {.model = {.voxel = 0}}), std::invalid_argument);
+  EXPECT_NE(MapSurfaceOptions{.model = {.voxel = 0}}.invalid_reason().find("model.voxel"), std::string::npos);
+  DistanceBox box;
+  EXPECT_THROW((void)surface_.snapshot().distances(box), std::invalid_argument);
+}
+
+TEST_F(MapSurfaceTest, BeforeTheFirstKeyframeNothingIsKnown) {
+  surface_.update(slam_.map());
+  for (const SurfaceSnapshot& nothing : {surface_.snapshot(), SurfaceSnapshot()}) {
+    EXPECT_EQ(nothing.map_part(), kNoId);
+    EXPECT_EQ(nothing.at({0, 0, 1}).state, SpaceState::kUnknown);
+    EXPECT_TRUE(nothing.mesh().triangles.empty());
+    const DistanceField field = nothing.distances({{0, 0, 0}, {1, 1, 1}, 0.5});
+    EXPECT_EQ(field.states.size(), 8U);
+    EXPECT_EQ(field.states[0], SpaceState::kUnknown);
+  }
+}
+
+TEST_F(MapSurfaceTest, MeshesAreSavedByTheKindOfTheirName) {
+  add_keyframes(2);
+  const SurfaceMesh mesh = surface_.snapshot().mesh();
+  const ScratchFolder folder;
+  for (const char* name : {"a.ply", "a.obj", "a.glb"}) {
+    save_mesh(mesh, folder / name);
+    EXPECT_GT(std::filesystem::file_size(folder / name), 12 * mesh.positions.size()) << name;
+  }
+  EXPECT_THROW(save_mesh(mesh, folder / "a.stl"), std::invalid_argument);
+  EXPECT_THROW(save_mesh({}, folder / "b.glb"), std::invalid_argument);
+  EXPECT_THROW(save_mesh(mesh, folder / "a.glb", {0, 0, 2}), std::invalid_argument);
+  EXPECT_THROW(save_mesh(mesh, folder / "none/a.ply"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace twofold
