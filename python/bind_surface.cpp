@@ -23,7 +23,7 @@ struct Shared {
   template <class... Arguments>
   explicit Shared(const Arguments&... arguments) : surface(arguments...) {}
   Surface surface;
-  std::shared_mutex mutex;  // never held by a thread that wants the interpreter's lock
+  mutable std::shared_mutex mutex;  // never held by a thread that wants the interpreter's lock
 };
 using Model = Shared<SurfaceModel>;
 using OfMap = Shared<MapSurface>;
@@ -215,7 +215,7 @@ void bind_model(py::module_& module) {
           },
           "Forgets all.");
   bind_questions(model, [](const Model& self, const auto& question) {
-    const std::shared_lock lock(const_cast<Model&>(self).mutex);
+    const std::shared_lock lock(self.mutex);
     return question(self.surface);
   });
 }

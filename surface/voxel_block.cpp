@@ -12,6 +12,17 @@ constexpr std::size_t kFirstSlots = 1024;
 
 }  // namespace
 
+BlockTable::BlockTable(const BlockTable& other) : heads_(other.heads_), slots_(other.slots_) {
+  for (std::size_t b = 0; b < other.size(); ++b) {
+    VoxelBlock& block = blocks_.add();
+    block = other[b];
+    if (block.colour == nullptr) continue;
+    BlockColour& colour = colours_.add();
+    colour = *block.colour;
+    block.colour = &colour;
+  }
+}
+
 std::size_t BlockTable::slot_of(const BlockPosition& at) const {
   const std::size_t mask = slots_.size() - 1;
   std::size_t slot = hash_of(at) & mask;

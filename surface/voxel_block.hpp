@@ -85,6 +85,13 @@ struct BlockHead {
 /// those to heads until the next find_or_add.
 class BlockTable {
  public:
+  BlockTable() = default;
+  BlockTable(const BlockTable& other);
+  BlockTable& operator=(const BlockTable& other) { return *this = BlockTable(other); }
+  BlockTable(BlockTable&&) = default;
+  BlockTable& operator=(BlockTable&&) = default;
+  ~BlockTable() = default;
+
   [[nodiscard]] const VoxelBlock* find(const BlockPosition& at) const;
   [[nodiscard]] VoxelBlock* find(const BlockPosition& at) {
     return const_cast<VoxelBlock*>(std::as_const(*this).find(at));
