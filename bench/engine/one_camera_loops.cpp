@@ -57,6 +57,7 @@ ClosedRun run(const std::string& text, const Windows& windows, bool over_sim3, T
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   options.mapper.inner_window = windows.inner;
   options.mapper.outer_window = windows.outer;
+  options.mapper.global.enabled = false;  // it would take back most of what the loop did, over either group
   if (!over_sim3) options.mapper.hook = std::make_shared<RigidLoops>();
   GraphSnapshot newest, before_loop;
   options.on_map = [&](const GraphSnapshot& graph, const DoubleWindow&) {

@@ -114,7 +114,7 @@ void expect_places_for(const MeshFiles& files) {
 
 void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh, const Vector3& up,
                    const MeshFiles& files) {
-  constexpr int kPictureWidth = 1600;
+  constexpr int kWidth = 1600;
   std::error_code ignored;
   for (const char* name : {"surface.ply", "surface.glb"}) std::filesystem::remove(folder / name, ignored);
   if (mesh.triangles.empty()) return;
@@ -122,7 +122,7 @@ void write_surface(const std::filesystem::path& folder, const TriangleMesh& mesh
   write_glb_mesh(folder / "surface.glb", mesh, up);
   if (!files.obj.empty()) write_obj_mesh(files.obj, mesh);
   if (!files.picture.empty())
-    write_png(files.picture, draw_mesh(mesh, mesh.colours, overview_of(mesh, up, kPictureWidth)));
+    write_png(files.picture, draw_mesh(mesh, mesh.colours, overview_of(mesh, up, kWidth)));
 }
 
 }  // namespace twofold
